@@ -1,0 +1,231 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The plain-data description of a run: everything the solver needs and nothing of Blender."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass, field, fields
+
+import numpy as np
+
+from .errors import ParameterError, SceneError
+from .mesh import TriangleMesh
+from .texels import Texels
+
+
+@dataclass(frozen=True)
+class SensorParameters:
+    """What one texel is made of; names as in the paper's Tables 1 and 2, every value per texel.
+
+    Attributes
+    ----------
+    k : float, N/m
+        Normal stiffness (Eq. 8, 18).
+    cn : float, N·s/m
+        Normal damping (Eq. 8); about 1 % of `k` in number.
+    ct : float, N·s/m
+        Tangential viscous damping (Eq. 13).
+    sigma0 : float, N/m
+        Bristle stiffness (Eq. 9, 13).
+    sigma1 : float, N·s/m
+        Bristle damping (Eq. 13).
+    x0 : float, m/s
+        Stribeck velocity (Eq. 10).
+    mus, mud : float
+        Static and dynamic friction coefficients (Eq. 11, 12).
+    max_penetration : float, m
+        Depth past which a texel no longer acts (section 3.3.3: about twice the foam's thickness).
+    gain, zero : float
+        Linear conversion to what the sensor reports: ``reading = zero + gain · force``, in `unit`.
+    unit : str
+    """
+
+    k: float = 58.5
+    cn: float = 0.0583
+    ct: float = 0.01
+    sigma0: float = 1.0
+    sigma1: float = 0.1
+    x0: float = 0.3
+    mus: float = 0.435
+    mud: float = 0.23
+    max_penetration: float = 0.012
+    gain: float = 1.0
+    zero: float = 0.0
+    unit: str = "N"
+
+    def check(self, name: str) -> None:
+        """Raise :class:`ParameterError` for the first value that means nothing."""
+        for key in ("k", "sigma0", "x0", "max_penetration"):
+            value = getattr(self, key)
+            if not (np.isfinite(value) and value > 0):
+                raise ParameterError(f"{key} of sensor '{name}' is {value:g}: give it a value above zero.")
+        for key in ("cn", "ct", "sigma1", "mus", "mud"):
+            value = getattr(self, key)
+            if not (np.isfinite(value) and value >= 0):
+                raise ParameterError(f"{key} of sensor '{name}' is {value:g}: give it a value of zero or more.")
+        if self.mud > self.mus:
+            raise ParameterError(
+                f"mud of sensor '{name}' ({self.mud:g}) is larger than mus ({self.mus:g}): "
+                "dynamic friction cannot exceed static friction, lower mud or raise mus."
+            )
+        if not (np.isfinite(self.gain) and np.isfinite(self.zero) and self.gain != 0):
+            raise ParameterError(f"gain and zero of sensor '{name}' must be finite and gain not zero.")
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Poses of a body's frame over time; between samples linear in position, constant in angular velocity.
+
+    Attributes
+    ----------
+    times : (m,) float, seconds, increasing
+    positions : (m, 3) float, metres, world frame
+    quaternions : (m, 4) float, unit, (w, x, y, z), body to world
+    """
+
+    times: np.ndarray
+    positions: np.ndarray
+    quaternions: np.ndarray
+
+    @classmethod
+    def at_rest(cls, position=(0.0, 0.0, 0.0), quaternion=(1.0, 0.0, 0.0, 0.0)) -> Motion:
+        """Return the motion of a body that stays where it is."""
+        return cls(np.zeros(1), np.array([position], float), np.array([quaternion], float))
+
+    def extended(self, time: float, position: np.ndarray, quaternion: np.ndarray) -> Motion:
+        """Return this motion with one more sample at its end (the timeline learns poses frame by frame)."""
+        return Motion(
+            np.append(self.times, time), np.vstack([self.positions, position]), np.vstack([self.quaternions, quaternion])
+        )
+
+
+@dataclass(frozen=True)
+class Body:
+    """A rigid body.
+
+    Attributes
+    ----------
+    name : str
+    motion : Motion
+        Of a keyframed body: its path. Of a free body: the first sample is where it starts.
+    free : bool
+        True when forces move it, False when `motion` does.
+    mass : float, kg
+    center_of_mass : (3,) float, metres, body frame
+    inertia : (3, 3) float, kg·m², about the centre of mass, body axes
+    velocity, angular_velocity : (3,) float, m/s and rad/s, world frame
+        A free body's start.
+    """
+
+    name: str
+    motion: Motion
+    free: bool = False
+    mass: float = 1.0
+    center_of_mass: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    inertia: np.ndarray = field(default_factory=lambda: np.eye(3))
+    velocity: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    angular_velocity: np.ndarray = field(default_factory=lambda: np.zeros(3))
+
+
+@dataclass(frozen=True)
+class Sensor:
+    """Texels on a body. With `readout` False it is a pad: it acts, and reports nothing."""
+
+    name: str
+    body: int
+    texels: Texels
+    parameters: SensorParameters = field(default_factory=SensorParameters)
+    readout: bool = True
+
+
+@dataclass(frozen=True)
+class Target:
+    """A surface that presses on sensors; its mesh is in the frame of its body, metres."""
+
+    name: str
+    body: int
+    mesh: TriangleMesh
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """A whole run.
+
+    Attributes
+    ----------
+    bodies, sensors, targets : tuple
+        `Sensor.body` and `Target.body` index `bodies`. A sensor never touches the targets of its own body.
+    frame_start, frame_end : int
+        Frames that are recorded, both included; time zero is `frame_start`.
+    fps : float
+        Frames per second.
+    gravity : (3,) float, m/s²
+    dt : float or None, seconds
+        Longest substep. None: the adviser chooses (:mod:`.timestep`).
+    """
+
+    bodies: tuple[Body, ...]
+    sensors: tuple[Sensor, ...]
+    targets: tuple[Target, ...]
+    frame_start: int = 1
+    frame_end: int = 250
+    fps: float = 24.0
+    gravity: np.ndarray = field(default_factory=lambda: np.array([0.0, 0.0, -9.81]))
+    dt: float | None = None
+    name: str = "scene"
+
+    @property
+    def frames(self) -> range:
+        """The recorded frames."""
+        return range(self.frame_start, self.frame_end + 1)
+
+    def check(self) -> None:
+        """Raise a :class:`PalpateError` when the parts do not make a run."""
+        if self.frame_end < self.frame_start:
+            raise SceneError(
+                f"The frame range of '{self.name}' runs backwards ({self.frame_start} to {self.frame_end}): "
+                "set the end frame after the start frame."
+            )
+        if not (np.isfinite(self.fps) and self.fps > 0):
+            raise SceneError(f"The frame rate of '{self.name}' is {self.fps:g}: set it above zero.")
+        if self.dt is not None and not (np.isfinite(self.dt) and self.dt > 0):
+            raise ParameterError(f"The time step of '{self.name}' is {self.dt:g} s: give a value above zero, or leave it automatic.")
+        if not self.sensors:
+            raise SceneError(f"'{self.name}' has no sensor: make one with Physics › Palpate › Make Sensor.")
+        if not any(sensor.readout for sensor in self.sensors):
+            raise SceneError(f"'{self.name}' has pads but no sensor to read: change one pad's role to Sensor.")
+        touched = any(target.body != sensor.body for sensor in self.sensors for target in self.targets)
+        if not touched:
+            raise SceneError(f"Nothing in '{self.name}' can touch a sensor: give at least one other object the role Target.")
+        for sensor in self.sensors:
+            sensor.parameters.check(sensor.name)
+        for body in self.bodies:
+            if body.free and not (np.isfinite(body.mass) and body.mass > 0):
+                raise ParameterError(f"The mass of free body '{body.name}' is {body.mass:g} kg: give it a value above zero.")
+            path = (body.motion.positions, body.motion.quaternions)
+            if not all(np.isfinite(values).all() for values in path):
+                raise SceneError(f"The motion of '{body.name}' has a NaN or infinite pose: check its keyframes and drivers.")
+
+    def digest(self) -> str:
+        """Return a hash of everything that the forces depend on; equal digests give equal recordings, bit for bit."""
+        digest = hashlib.sha256(b"palpate-scenario/1")
+        _feed(digest, self)
+        return digest.hexdigest()
+
+
+def _feed(digest, value) -> None:
+    """Hash dataclasses field by field, arrays with type and shape, and everything else by its representation."""
+    if hasattr(value, "__dataclass_fields__"):
+        for item in fields(value):
+            digest.update(item.name.encode())
+            _feed(digest, getattr(value, item.name))
+    elif isinstance(value, tuple | list):
+        digest.update(f"[{len(value)}".encode())
+        for item in value:
+            _feed(digest, item)
+    elif isinstance(value, np.ndarray):
+        array = np.ascontiguousarray(value)
+        digest.update(f"{array.dtype.str}{array.shape}".encode())
+        digest.update(array.tobytes())
+    else:
+        digest.update(repr(value).encode())

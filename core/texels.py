@@ -1,0 +1,111 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Vertices of a mesh region become texels (paper, section 3.1 and Fig. 3)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .errors import SensorError
+from .layout import GridLayout, UVLayout, grid_layout, uv_layout
+from .mesh import TriangleMesh, vertex_areas, vertex_normals
+
+
+@dataclass(frozen=True)
+class Texels:
+    """The tactile elements of one sensor, in the frame of the sensor's body.
+
+    Attributes
+    ----------
+    vertex : (n,) int
+        Vertex of the sensor's mesh that each texel stands on.
+    position : (n, 3) float, metres
+    normal : (n, 3) float
+        Unit vectors, out of the sensor: normalised sum of the unit normals of the adjoining triangles.
+    tangent : (n, 3) float
+        Unit vectors of the texel's x axis; its y axis is ``normal × tangent``. Along the columns where the texels form a grid.
+    area : (n,) float, square metres
+        A third of the area of the adjoining triangles of the region.
+    layout : GridLayout or UVLayout
+        How the texels become a tactile image.
+    """
+
+    vertex: np.ndarray
+    position: np.ndarray
+    normal: np.ndarray
+    tangent: np.ndarray
+    area: np.ndarray
+    layout: GridLayout | UVLayout
+
+    def __len__(self) -> int:
+        return len(self.position)
+
+    @property
+    def bitangent(self) -> np.ndarray:
+        """(n, 3) unit vectors of the texels' y axes."""
+        return np.cross(self.normal, self.tangent)
+
+
+def texels_from_region(mesh: TriangleMesh, region: np.ndarray, name: str = "sensor") -> Texels:
+    """Build the texels of the vertices that `region` selects.
+
+    Parameters
+    ----------
+    mesh : TriangleMesh
+        The sensor's mesh, in its body's frame, metres.
+    region : (nv,) bool
+        True for each vertex that becomes a texel. A triangle belongs to the region when its three vertices do; normals are taken
+        from *all* adjoining triangles, as the paper does, areas from those of the region only.
+    name : str
+        Used in error messages.
+
+    Raises
+    ------
+    SensorError
+        The region is empty, has no triangle, or a texel has no normal.
+    """
+    region = np.asarray(region, dtype=bool)
+    vertex = np.flatnonzero(region)
+    if len(vertex) == 0:
+        raise SensorError(f"The region of sensor '{name}' is empty: select or paint at least three vertices of one face.")
+    inside = region[mesh.triangles].all(axis=1)
+    if not inside.any():
+        raise SensorError(
+            f"The {len(vertex)} vertices of sensor '{name}' span no face: select or paint all corners of at least one face."
+        )
+    triangles = mesh.triangles[inside]
+    on_face = np.zeros(len(mesh.vertices), dtype=bool)
+    on_face[triangles] = True
+    vertex = np.flatnonzero(on_face)
+
+    normals = vertex_normals(mesh)[vertex]
+    flat = np.linalg.norm(normals, axis=1) < 0.5
+    if flat.any():
+        raise SensorError(
+            f"Vertex {vertex[flat][0]} of sensor '{name}' has no normal, its faces cancel out: "
+            "recalculate the normals or leave the vertex out."
+        )
+    index = np.full(len(mesh.vertices), -1)
+    index[vertex] = np.arange(len(vertex))
+    position = mesh.vertices[vertex]
+    local_triangles = index[triangles]
+    local_polygons = index[mesh.quads] if mesh.quads is not None else None
+    layout, along = grid_layout(position, normals, local_triangles, local_polygons)
+    if layout is None:
+        layout, along = uv_layout(position, normals, local_triangles)
+    tangent = along - np.einsum("ij,ij->i", along, normals)[:, None] * normals
+    length = np.linalg.norm(tangent, axis=1)
+    bad = length < 1e-9
+    if bad.any():  # the axis stands on the normal there: any direction across will do, as long as it is always the same
+        tangent[bad] = np.cross(normals[bad], np.eye(3)[np.abs(normals[bad]).argmin(axis=1)])
+        length = np.linalg.norm(tangent, axis=1)
+    tangent /= length[:, None]
+    return Texels(
+        vertex=vertex,
+        position=position,
+        normal=normals,
+        tangent=tangent,
+        area=vertex_areas(mesh, inside)[vertex],
+        layout=layout,
+    )
