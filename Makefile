@@ -1,0 +1,72 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+# Each command sets up what it needs, the first time only. PYTHON must be a Python 3.11: bpy 4.5 and 5.0 exist for no other.
+PYTHON ?= python3.11
+BPY45 := 4.5.15
+BPY50 := 5.0.1
+VENV := .venv
+VENV50 := .venv-bpy5.0
+BIN := $(VENV)/bin
+DEMO_OUT ?= demo-output
+# Arguments for pytest, as in `make test PYTEST_ARGS='-k friction'`
+PYTEST_ARGS ?=
+# One group of benchmarks, as in `make bench ONLY=solver`
+ONLY ?=
+
+.DEFAULT_GOAL := help
+.PHONY: help demo test test-ui bench zip lint clean distclean env env50
+
+help:
+	@echo 'make demo     set up and run the demo: a picture, tactile images and the forces, in $(DEMO_OUT)/'
+	@echo 'make test     lint, type check, and all tests in bpy $(BPY45) and $(BPY50)'
+	@echo 'make test-ui  the extension in a real Blender window (Debian, as root: it sets up a Blender of its own)'
+	@echo 'make bench    benchmarks, one JSON line per figure; ONLY=solver for one group'
+	@echo 'make zip      the extension zips for every platform and Python, in dist/'
+	@echo 'make lint     ruff and mypy alone'
+	@echo 'make clean    remove build products; distclean: the environments too'
+
+# --- environments: a stamp each, renewed when what they are made from changes
+$(VENV)/.ready: pyproject.toml Makefile tools/system_packages.sh
+	tools/system_packages.sh $(PYTHON)
+	test -x $(VENV)/bin/python || $(PYTHON) -m venv $(VENV)
+	$(VENV)/bin/python -m pip install --quiet --editable '.[test]' bpy==$(BPY45)
+	touch $@
+
+$(VENV50)/.ready: pyproject.toml Makefile tools/system_packages.sh
+	tools/system_packages.sh $(PYTHON)
+	test -x $(VENV50)/bin/python || $(PYTHON) -m venv $(VENV50)
+	$(VENV50)/bin/python -m pip install --quiet --editable '.[test]' bpy==$(BPY50)
+	touch $@
+
+env: $(VENV)/.ready
+env50: $(VENV50)/.ready
+
+# --- what a user runs
+demo: env
+	$(BIN)/palpate demo --out $(DEMO_OUT)
+
+# --- what a developer runs
+lint: env
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+
+test: lint env50
+	$(BIN)/python -m pytest tests/core tests/blender $(PYTEST_ARGS)
+	$(VENV50)/bin/python -m pytest tests/blender $(PYTEST_ARGS)
+
+test-ui: env
+	$(BIN)/python tools/provision_blender.py
+	$(BIN)/python -m pytest tests/ui $(PYTEST_ARGS)
+
+bench: env
+	@$(BIN)/python -m benchmarks $(ONLY)
+
+zip: env
+	$(BIN)/python tools/build_zip.py
+
+clean:
+	rm -rf build dist $(DEMO_OUT) *.egg-info .pytest_cache .ruff_cache .mypy_cache
+	find . -name __pycache__ -not -path './.venv*' -prune -exec rm -rf {} +
+
+distclean: clean
+	rm -rf $(VENV) $(VENV50)

@@ -1,0 +1,237 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Build the extension zips: the package, its manifest and its wheels, one zip per platform and Python.
+
+Blender's installer picks wheels by platform only, so wheels for two Pythons must not share a zip. The same sources
+and wheels give the same bytes. Each zip is validated by Blender's own tool, which comes with bpy.
+
+    python tools/build_zip.py                                            all platforms and Pythons, into dist/
+    python tools/build_zip.py --platform linux-x64 --python-version 3.11
+    python tools/build_zip.py --local --python-version 3.13 --blender-min 4.2.0
+                                                    for a distribution's Blender, which runs on its own Python
+"""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+import importlib.util
+import platform
+import shutil
+import subprocess
+import sys
+import tomllib
+import zipfile
+from pathlib import Path
+
+import tomli_w
+
+ROOT = Path(__file__).resolve().parents[1]
+WHEEL_LIST = ROOT / "tools" / "wheels.txt"
+WHEEL_CACHE = ROOT / "build" / "wheels"
+
+# Blender's name of a platform → tags its wheels may carry; Blender too asks for glibc 2.28 and macOS 12.
+PLATFORMS = {
+    "linux-x64": [f"manylinux_2_{minor}_x86_64" for minor in (28, 27, 17)] + ["manylinux2014_x86_64"],
+    "windows-x64": ["win_amd64"],
+    "macos-arm64": [
+        "macosx_12_0_arm64",
+        "macosx_11_0_arm64",
+        "macosx_10_13_universal2",
+        "macosx_10_9_universal2",
+    ],
+}
+# Python → the first Blender that ships it, and the first that no longer does.
+BLENDER_RANGE = {"3.11": ("4.2.0", "5.1.0"), "3.13": ("5.1.0", None)}
+# The licence travels with the zip; everything else is in the package folders that pyproject.toml lists.
+ROOT_FILES = ["__init__.py", "LICENSE"]
+FIXED_TIME = (1980, 1, 1, 0, 0, 0)  # the earliest a zip can hold
+
+
+class BuildError(Exception):
+    """The zip cannot be built; the message says why and what to do."""
+
+
+def package_files() -> list[Path]:
+    """Files of the package, relative to the repository root, without the manifest."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    folders = {
+        package.split(".")[1] for package in project["tool"]["setuptools"]["packages"] if "." in package
+    }
+    files = [Path(name) for name in ROOT_FILES]
+    for folder in sorted(folders):
+        for path in sorted((ROOT / folder).rglob("*")):
+            relative = path.relative_to(ROOT)
+            hidden = any(part.startswith((".", "__pycache__")) for part in relative.parts)
+            # `scene.blend1` is the copy Blender keeps of the file it saved over
+            if path.is_file() and not hidden and path.suffix not in {".pyc", ".blend1", ".blend2"}:
+                files.append(relative)
+    return files
+
+
+def wheels_for(platform_name: str, python: str) -> list[Path]:
+    """Wheels of one platform and Python, fetched once and kept under build/."""
+    folder = WHEEL_CACHE / f"{platform_name}-cp{python.replace('.', '')}"
+    stamp = folder / ".complete"
+    wanted = hashlib.sha256(WHEEL_LIST.read_bytes()).hexdigest()
+    if not (stamp.is_file() and stamp.read_text() == wanted):
+        shutil.rmtree(folder, ignore_errors=True)
+        folder.mkdir(parents=True)
+        command = [sys.executable, "-m", "pip", "download", "--quiet", "--only-binary=:all:", "--no-deps"]
+        command += ["--implementation", "cp", "--python-version", python, "--dest", str(folder)]
+        for tag in PLATFORMS[platform_name]:
+            command += ["--platform", tag]
+        run = subprocess.run([*command, "--requirement", str(WHEEL_LIST)], capture_output=True, text=True)
+        if run.returncode != 0:
+            raise BuildError(
+                f"The wheels for {platform_name} and Python {python} could not be fetched; check the network "
+                f"and the versions in {WHEEL_LIST.relative_to(ROOT)}. pip said:\n{run.stderr.strip()}"
+            )
+        stamp.write_text(wanted)
+    return sorted(folder.glob("*.whl"))
+
+
+def manifest_for(platform_name: str, wheels: list[Path], blender_min: str, blender_max: str | None) -> bytes:
+    """Manifest of one zip: the repository's, with what holds for this zip only."""
+    manifest = tomllib.loads((ROOT / "blender_manifest.toml").read_text(encoding="utf-8"))
+    tables = {key: manifest.pop(key) for key in list(manifest) if isinstance(manifest[key], dict)}
+    manifest["blender_version_min"] = blender_min
+    if blender_max is not None:
+        manifest["blender_version_max"] = blender_max
+    manifest["platforms"] = [platform_name]
+    manifest["wheels"] = [f"./wheels/{wheel.name}" for wheel in wheels]
+    return tomli_w.dumps(manifest | tables).encode()
+
+
+def blender_extension_tool() -> Path:
+    """Blender's own command line for extensions, as bpy carries it."""
+    spec = importlib.util.find_spec("bpy")
+    if spec is None or spec.origin is None:
+        raise BuildError(
+            "Validating a zip needs Blender's own tool; run this where bpy is installed, as `make zip` does."
+        )
+    found = sorted(Path(spec.origin).parent.glob("*/scripts/addons_core/bl_pkg/cli/blender_ext.py"))
+    if not found:
+        raise BuildError(
+            f"The bpy in {Path(spec.origin).parent} carries no extension tool; use bpy 4.2 or later."
+        )
+    return found[-1]
+
+
+def validate(path: Path) -> None:
+    """Let Blender's own tool read the zip, or the repository's folder."""
+    command = [sys.executable, str(blender_extension_tool()), "validate", str(path)]
+    run = subprocess.run(command, capture_output=True, text=True)
+    if run.returncode != 0:
+        raise BuildError(f"Blender's tool refuses {path.name}:\n{run.stdout.strip()}\n{run.stderr.strip()}")
+
+
+def build(
+    platform_name: str,
+    python: str,
+    out: Path,
+    *,
+    blender_range: tuple[str, str | None] | None = None,
+    suffix: str = "",
+) -> Path:
+    """Build and validate one zip.
+
+    Parameters
+    ----------
+    platform_name : str
+        One of PLATFORMS.
+    python : str
+        Version of the Python that the target's Blender runs on, as in "3.11".
+    out : Path
+        Folder for the zip; made if it does not exist.
+    blender_range : (str, str or None), optional
+        First Blender it fits and first it no longer fits; by default the official ones with that Python.
+    suffix : str
+        Added to the file's name.
+
+    Returns
+    -------
+    Path
+        The zip.
+
+    Raises
+    ------
+    BuildError
+        If a wheel cannot be had or Blender's tool refuses the zip.
+    """
+    if blender_range is None:
+        if python not in BLENDER_RANGE:
+            raise BuildError(
+                f"No Blender ships Python {python}; for a distribution's, use --local with --blender-min."
+            )
+        blender_range = BLENDER_RANGE[python]
+    wheels = wheels_for(platform_name, python)
+    entries = {f"wheels/{wheel.name}": wheel.read_bytes() for wheel in wheels}
+    entries |= {file.as_posix(): (ROOT / file).read_bytes() for file in package_files()}
+    entries["blender_manifest.toml"] = manifest_for(platform_name, wheels, *blender_range)
+
+    version = tomllib.loads(entries["blender_manifest.toml"].decode())["version"]
+    out.mkdir(parents=True, exist_ok=True)
+    target = out / f"palpate-{version}-{platform_name}-cp{python.replace('.', '')}{suffix}.zip"
+    partial = target.with_suffix(".partial.zip")
+    with zipfile.ZipFile(partial, "w") as archive:
+        for name in sorted(entries):
+            info = zipfile.ZipInfo(name, FIXED_TIME)
+            info.external_attr = 0o644 << 16
+            info.create_system = 3  # Unix, wherever it is built
+            # wheels are compressed already
+            info.compress_type = zipfile.ZIP_STORED if name.endswith(".whl") else zipfile.ZIP_DEFLATED
+            archive.writestr(info, entries[name])
+    try:
+        validate(partial)
+    except BuildError:
+        partial.unlink()
+        raise
+    return partial.replace(target)
+
+
+def local_platform() -> str:
+    """Blender's name of the platform this runs on."""
+    names = {
+        ("Linux", "x86_64"): "linux-x64",
+        ("Windows", "AMD64"): "windows-x64",
+        ("Darwin", "arm64"): "macos-arm64",
+    }
+    here = (platform.system(), platform.machine())
+    if here not in names:
+        raise BuildError(f"There are no wheels for {' '.join(here)}; name a target with --platform.")
+    return names[here]
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Build the zips named on the command line."""
+    parser = argparse.ArgumentParser(description="Build the Palpate extension zips.")
+    add = parser.add_argument
+    add(
+        "--platform",
+        choices=sorted(PLATFORMS),
+        help="one platform only (default: all; with --local this one)",
+    )
+    add("--python-version", metavar="X.Y", help=f"one Python only (default: {' and '.join(BLENDER_RANGE)})")
+    add("--local", action="store_true", help="for a distribution's Blender, whatever its Python")
+    add("--blender-min", default="4.2.0", metavar="X.Y.Z", help="with --local: first Blender it fits")
+    add("--out", type=Path, default=ROOT / "dist", metavar="DIR", help="folder for the zips (default: dist/)")
+    args = parser.parse_args(argv)
+    if args.local and not args.python_version:
+        parser.error("--local needs --python-version: the Python that the distribution's Blender runs on")
+    pythons = [args.python_version] if args.python_version else list(BLENDER_RANGE)
+    blender_range = (args.blender_min, None) if args.local else None
+    suffix = "-local" if args.local else ""
+    try:
+        platforms = [local_platform()] if args.local else list(PLATFORMS)
+        for name in [args.platform] if args.platform else platforms:
+            for python in pythons:
+                path = build(name, python, args.out, blender_range=blender_range, suffix=suffix)
+                print(f"{path}  {path.stat().st_size / 1e6:.0f} MB", flush=True)
+    except BuildError as error:
+        print(error, file=sys.stderr)
+        return 1
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
