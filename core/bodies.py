@@ -1,9 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Rigid bodies: poses over time, rotations, and the linear system that moves the free ones.
-
-Velocities at the end of a substep are unknowns of a linear system (implicit in stiffness and damping of every contact), so that a stiff
-or heavily damped contact needs no small step; positions follow with those velocities.
-"""
+"""Rigid bodies: poses over time, rotations, and the blocks of the linear system that moves the free ones."""
 
 from __future__ import annotations
 

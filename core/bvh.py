@@ -1,15 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Bounding-volume tree over triangles, and the one question it answers: where does a texel's segment enter an object?
 
-The tree is a list in depth-first order: child follows parent, and `skip` says where to go on when a box is missed, so that a query
-needs no stack and allocates nothing. Boxes are tested against the box of what is left of the segment, which is conservative whatever
-the rounding; triangles are tested with edge functions that two neighbours evaluate to the same number with opposite sign, so that a
-segment through a shared edge or vertex always meets one of them (watertight, as in Woop, Benthin and Wald, JCGT 2013).
+The tree is a list in depth-first order: child follows parent, and `skip` says where to go on when a box is missed, so that a
+query needs no stack and allocates nothing. Boxes are tested against the box of what is left of the segment, which is
+conservative whatever the rounding; triangles are tested with edge functions that two neighbours evaluate to the same number
+with opposite sign, so that a segment through a shared edge or vertex always meets one of them (watertight, as in Woop, Benthin
+and Wald, JCGT 2013).
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -20,8 +21,7 @@ LEAF_SIZE = 4
 """Triangles per leaf; two to eight measured alike."""
 
 
-@dataclass(frozen=True)
-class Tree:
+class Tree(NamedTuple):
     """One or several meshes' trees behind one another, ready for the kernels.
 
     Attributes
@@ -170,15 +170,15 @@ def _node_count(n, leaf_size):
 
 
 @kernel
-def segment_entry(ox, oy, oz, dx, dy, dz, start, stop, hint, bounds, skip, first, count, corners, normals):
+def segment_entry(ox, oy, oz, dx, dy, dz, mesh, hint, tree):
     """Find where the segment from O to O + D first enters a surface from outside.
 
     Parameters
     ----------
     ox … dz : float
         Base of the segment and the vector to its tip, in the mesh's frame.
-    start, stop : int
-        Nodes of the mesh's tree.
+    mesh : int
+        Which of the tree's meshes.
     hint : int
         Triangle to try first, -1 for none; it changes the speed and never the answer.
 
@@ -193,6 +193,7 @@ def segment_entry(ox, oy, oz, dx, dy, dz, start, stop, hint, bounds, skip, first
         than `t` means that the base is inside the object.
     """
     t, triangle, leaving = 2.0, -1, 2.0
+    corners, normals = tree.corners, tree.normals
     if hint >= 0:
         u = _cross_triangle(ox, oy, oz, dx, dy, dz, corners[hint], normals[hint])
         if 0.0 <= u <= 1.0:
@@ -201,13 +202,13 @@ def segment_entry(ox, oy, oz, dx, dy, dz, start, stop, hint, bounds, skip, first
     x0, x1 = min(ox, ox + reach * dx), max(ox, ox + reach * dx)
     y0, y1 = min(oy, oy + reach * dy), max(oy, oy + reach * dy)
     z0, z1 = min(oz, oz + reach * dz), max(oz, oz + reach * dz)
-    node = start
+    node, stop = tree.roots[mesh], tree.roots[mesh + 1]
     while node < stop:
-        box = bounds[node]
+        box = tree.bounds[node]
         if box[0] > x1 or box[3] < x0 or box[1] > y1 or box[4] < y0 or box[2] > z1 or box[5] < z0:
-            node = skip[node]
+            node = tree.skip[node]
             continue
-        for i in range(first[node], first[node] + count[node]):
+        for i in range(tree.first[node], tree.first[node] + tree.count[node]):
             u = _cross_triangle(ox, oy, oz, dx, dy, dz, corners[i], normals[i])
             if 0.0 <= u <= 1.0:
                 # Of two triangles met at the very same point (a shared edge) the first in the list answers, hint or not.

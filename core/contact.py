@@ -6,9 +6,9 @@ Where the print is wrong or silent, this is what is computed (docs/model.md has 
 * Eq. 8: with `d` the penetration and ḋ its rate, ``fn = max(k d + cn ḋ, 0)``, along the object's surface normal. No adhesion.
 * Eq. 10: ``g = fn (mud + (mus - mud) exp(-|v|² / x0²))``; the exponential was lost in print.
 * Eq. 9, 13 as printed: ``ż = v - sigma0 |v| / g · z`` and ``ft = sigma0 z + sigma1 ż + ct v``.
-* The bristle deflection is carried along as the texel and the surface under it turn, and never exceeds what static friction can hold
-  (``sigma0 |z| ≤ mus fn``): where the normal force falls faster than the bristles can slide, Eq. 9 alone would leave friction
-  without a normal force.
+* The bristle deflection is carried along as the texel and the surface under it turn, and never exceeds what static friction
+  can hold (``sigma0 |z| ≤ mus fn``): where the normal force falls faster than the bristles can slide, Eq. 9 alone would leave
+  friction without a normal force.
 
 Over a substep the relative velocity is taken as constant, for which Eq. 9 has a closed solution: no step size makes it blow up.
 """
@@ -16,6 +16,9 @@ Over a substep the relative velocity is taken as constant, for which Eq. 9 has a
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
+
+import numpy as np
 
 from .bvh import segment_entry
 from .jit import kernel
@@ -28,6 +31,67 @@ ROW = 20
 
 # Columns of a parameter row, one per sensor or pad.
 K, CN, CT, SIGMA0, SIGMA1, X0, MUS, MUD = range(8)
+
+
+class World(NamedTuple):
+    """What does not change during a run: b bodies, m sensors with N texels together, q pairs of sensor and target.
+
+    Attributes
+    ----------
+    texels : (N, 12) float
+        Position, normal, x axis and y axis of each texel, in its body's frame and relative to the body's reference point.
+    texel_start : (m + 1,) int
+    parameters : (m, 8) float
+    reach : (m,) float, metres
+        Maximum penetration.
+    pairs : (q, 2) int
+        Sensor and target.
+    sensor_body : (m,) int
+    target_body : (targets,) int
+    slot_start : (q,) int
+        Where each pair's memory begins.
+    free_at : (b,) int
+        Place of each free body among the free ones, -1 for keyframed bodies.
+    mass : (b,) float, kg
+    inertia : (b, 3, 3) float, kg·m², body axes
+    gravity : (3,) float, m/s²
+    """
+
+    texels: np.ndarray
+    texel_start: np.ndarray
+    parameters: np.ndarray
+    reach: np.ndarray
+    pairs: np.ndarray
+    sensor_body: np.ndarray
+    target_body: np.ndarray
+    slot_start: np.ndarray
+    free_at: np.ndarray
+    mass: np.ndarray
+    inertia: np.ndarray
+    gravity: np.ndarray
+
+
+class State(NamedTuple):
+    """What a run carries from step to step; copied, it is a checkpoint.
+
+    Attributes
+    ----------
+    position : (b, 3) float, metres
+        Reference point of each body: centre of mass of a free one, origin of a keyframed one.
+    quaternion : (b, 4) float
+    velocity : (b, 6) float
+        Linear (m/s) and angular (rad/s), world axes.
+    hint : (s,) int
+        Triangle each texel met last, -1 for none, -2 once it was pressed past its reach.
+    bristles : (s, 4) float
+        Bristle deflection (m) in the frame of the sensor's body, and the share of the reach that is pressed in.
+    """
+
+    position: np.ndarray
+    quaternion: np.ndarray
+    velocity: np.ndarray
+    hint: np.ndarray
+    bristles: np.ndarray
 
 
 @kernel
@@ -86,31 +150,23 @@ def normal_force(depth, rate, parameters):
 
 
 @kernel
-def gather(
-    texels, texel_start, texel_stop, reach, slot_start,
-    position_a, rotation_a, position_b, rotation_b, start, stop,
-    bounds, skip, first, count, corners, normals,
-    hint, bristles, rows, slots, used,
-):  # fmt: skip
+def gather(pair, world, tree, state, rotation, rows, slots, used):
     """Collect the contacts of one sensor with one target as rows behind the `used` rows that are there already.
+
+    The segment of a texel runs from its vertex `reach` deep into the sensor; where it enters the target counts. Memory of the
+    pair in `state` is brought up to date: the triangle met, and the bristles, which are zero where nothing touches.
 
     Parameters
     ----------
-    texels : (N, 12) float
-        Position, normal, x axis and y axis of each texel in the frame of its body, relative to the centre of mass.
-    texel_start, texel_stop : int
-        The sensor's texels.
-    reach : float, metres
-        Maximum penetration: length of the segment behind the texel.
-    slot_start : int
-        Where this pair's memory begins in `hint` and `bristles`.
-    position_a, rotation_a, position_b, rotation_b : (3,), (3, 3)
-        Centres of mass and orientations of the sensor's body and the target's body.
-    hint : (S,) int
-        Triangle met last, -1 for none; -2 once a texel was pressed past its reach. Written.
-    bristles : (S, 4) float
-        Bristle deflection (m) in the frame of the sensor's body, and the share of the reach that is pressed in. Written: zero where
-        nothing touches.
+    pair : int
+    world : World
+    tree : Tree
+    state : State
+    rotation : (b, 3, 3) float
+        Orientation of each body.
+    rows : (s, ROW) float
+    slots : (s,) int
+        Written: which place in the memory each row belongs to.
 
     Returns
     -------
@@ -119,6 +175,11 @@ def gather(
     sunk : int
         Texels that were pressed past their maximum penetration and do not act.
     """
+    sensor, target = world.pairs[pair, 0], world.pairs[pair, 1]
+    a, b = world.sensor_body[sensor], world.target_body[target]
+    position_a, rotation_a, position_b, rotation_b = state.position[a], rotation[a], state.position[b], rotation[b]
+    hint, bristles, reach = state.hint, state.bristles, world.reach[sensor]
+    slot = world.slot_start[pair] - 1
     ra00, ra01, ra02 = rotation_a[0, 0], rotation_a[0, 1], rotation_a[0, 2]
     ra10, ra11, ra12 = rotation_a[1, 0], rotation_a[1, 1], rotation_a[1, 2]
     ra20, ra21, ra22 = rotation_a[2, 0], rotation_a[2, 1], rotation_a[2, 2]
@@ -126,11 +187,11 @@ def gather(
     rb10, rb11, rb12 = rotation_b[1, 0], rotation_b[1, 1], rotation_b[1, 2]
     rb20, rb21, rb22 = rotation_b[2, 0], rotation_b[2, 1], rotation_b[2, 2]
     gx, gy, gz = position_a[0] - position_b[0], position_a[1] - position_b[1], position_a[2] - position_b[2]
-    root = bounds[start]
+    root = tree.bounds[tree.roots[target]]
     sunk = 0
-    for texel in range(texel_start, texel_stop):
-        slot = slot_start + texel - texel_start
-        row = texels[texel]
+    for texel in range(world.texel_start[sensor], world.texel_start[sensor + 1]):
+        slot += 1
+        row = world.texels[texel]
         # Lever arm of the texel and its normal in world axes, then both in the target's frame.
         ax = ra00 * row[0] + ra01 * row[1] + ra02 * row[2]
         ay = ra10 * row[0] + ra11 * row[1] + ra12 * row[2]
@@ -154,16 +215,12 @@ def gather(
         )  # fmt: skip
         before = hint[slot]
         if not outside:
-            met, triangle, leaving = segment_entry(
-                ox, oy, oz, dx, dy, dz, start, stop, before, bounds, skip, first, count, corners, normals
-            )
+            met, triangle, leaving = segment_entry(ox, oy, oz, dx, dy, dz, target, before, tree)
         if triangle < 0:
             # Sunk: the base is inside the object. Either the segment leaves it somewhere, or the object's surface has just run
-            # past the base (it was within the last tenth of the reach a step ago).
-            if leaving <= 1.0 or before == -2 and not outside:
-                sunk += 1
-                hint[slot] = -2
-            elif before >= 0 and not outside and bristles[slot, 3] > 0.9:
+            # past the base (it was within the last tenth of the reach a step ago) and has not come back since.
+            ran_past = not outside and (before == -2 or (before >= 0 and bristles[slot, 3] > 0.9))
+            if leaving <= 1.0 or ran_past:
                 sunk += 1
                 hint[slot] = -2
             else:
@@ -174,7 +231,7 @@ def gather(
             bristles[slot, 3] = 0.0
             continue
         hint[slot] = triangle
-        normal = normals[triangle]
+        normal = tree.normals[triangle]
         cx = rb00 * normal[0] + rb01 * normal[1] + rb02 * normal[2]
         cy = rb10 * normal[0] + rb11 * normal[1] + rb12 * normal[2]
         cz = rb20 * normal[0] + rb21 * normal[1] + rb22 * normal[2]

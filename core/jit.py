@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """``@kernel``: compiled by numba where numba is, plain Python where it is not.
 
-``PALPATE_NUMBA=0`` switches compilation off; the numbers are the same to rounding (a test holds them to 1e-12). Nothing here lets
-the compiler reorder arithmetic: no fastmath, because "same seed, same bits" is worth more than a few per cent.
+``PALPATE_NUMBA=0`` switches compilation off; the numbers are the same to rounding (a test holds them to 1e-12). Nothing here
+lets the compiler reorder arithmetic: no fastmath, because "same seed, same bits" is worth more than a few per cent.
 """
 
 from __future__ import annotations

@@ -189,7 +189,9 @@ class Scenario:
         if not (np.isfinite(self.fps) and self.fps > 0):
             raise SceneError(f"The frame rate of '{self.name}' is {self.fps:g}: set it above zero.")
         if self.dt is not None and not (np.isfinite(self.dt) and self.dt > 0):
-            raise ParameterError(f"The time step of '{self.name}' is {self.dt:g} s: give a value above zero, or leave it automatic.")
+            raise ParameterError(
+                f"The time step of '{self.name}' is {self.dt:g} s: give a value above zero, or leave it automatic."
+            )
         if not self.sensors:
             raise SceneError(f"'{self.name}' has no sensor: make one with Physics › Palpate › Make Sensor.")
         if not any(sensor.readout for sensor in self.sensors):

@@ -55,8 +55,8 @@ def texels_from_region(mesh: TriangleMesh, region: np.ndarray, name: str = "sens
     mesh : TriangleMesh
         The sensor's mesh, in its body's frame, metres.
     region : (nv,) bool
-        True for each vertex that becomes a texel. A triangle belongs to the region when its three vertices do; normals are taken
-        from *all* adjoining triangles, as the paper does, areas from those of the region only.
+        True for each vertex that becomes a texel. A triangle belongs to the region when its three vertices do; normals are
+        taken from *all* adjoining triangles, as the paper does, areas from those of the region only.
     name : str
         Used in error messages.
 

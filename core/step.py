@@ -1,0 +1,358 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""One frame's substeps, and what the sensors feel at its end (kernels).
+
+Velocities at the end of a substep are the unknowns of a linear system, implicit in the stiffness and damping of every contact,
+so that a stiff or heavily damped contact needs no small step; positions follow with those velocities.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from .bodies import (
+    add_cross_block,
+    add_force,
+    add_own_block,
+    solve_positive,
+    turn_quaternion,
+    write_rotation,
+    write_world_inertia,
+)
+from .contact import (
+    ARM_A,
+    ARM_B,
+    DEPTH,
+    GAIN,
+    KEEP,
+    LIMIT,
+    NORMAL_FORCE,
+    ROW,
+    STIFF_N,
+    STIFF_T,
+    K,
+    State,
+    World,
+    bristle_limit,
+    bristle_rate,
+    friction_bias,
+    friction_force,
+    gather,
+    linearise,
+    normal_force,
+)
+from .jit import kernel
+
+PASSES = 12
+"""Most rounds in which contacts are linearised anew within a substep; two or three are usual, one at rest."""
+
+
+class Scratch(NamedTuple):
+    """Working memory of the kernels, so that nothing is allocated inside the loop.
+
+    Attributes
+    ----------
+    rotation, inertia : (b, 3, 3) float
+        Orientation and world-axes inertia of each body.
+    rows : (s, ROW) float
+        One row per contact, those of a pair behind one another.
+    slots : (s,) int
+        Place of each row in the memory of :class:`.State`.
+    pair_stop : (q,) int
+        Where each pair's rows end.
+    matrix, vector, momentum : (6 f, 6 f), (6 f,), (6 f,) float
+        The linear system of the f free bodies.
+    """
+
+    rotation: np.ndarray
+    inertia: np.ndarray
+    rows: np.ndarray
+    slots: np.ndarray
+    pair_stop: np.ndarray
+    matrix: np.ndarray
+    vector: np.ndarray
+    momentum: np.ndarray
+
+
+def scratch_for(world: World, state: State) -> Scratch:
+    """Allocate the working memory of a run."""
+    b, s = len(state.position), len(state.hint)
+    n = 6 * max(1, int(world.free_at.max()) + 1)
+    return Scratch(
+        rotation=np.zeros((b, 3, 3)),
+        inertia=np.zeros((b, 3, 3)),
+        rows=np.zeros((s, ROW)),
+        slots=np.zeros(s, np.int64),
+        pair_stop=np.zeros(len(world.pairs), np.int64),
+        matrix=np.zeros((n, n)),
+        vector=np.zeros(n),
+        momentum=np.zeros(n),
+    )
+
+
+@kernel
+def _relative_velocity(row, velocity, a, b):
+    """Velocity of the target's point relative to the sensor's, world axes (Eq. 3)."""
+    va, vb = velocity[a], velocity[b]
+    return (
+        vb[0] + vb[4] * row[8] - vb[5] * row[7] - va[0] - va[4] * row[5] + va[5] * row[4],
+        vb[1] + vb[5] * row[6] - vb[3] * row[8] - va[1] - va[5] * row[3] + va[3] * row[5],
+        vb[2] + vb[3] * row[7] - vb[4] * row[6] - va[2] - va[3] * row[4] + va[4] * row[3],
+    )
+
+
+@kernel
+def gather_all(world, tree, state, scratch):
+    """Contacts of all pairs of sensor and target where the bodies are now. Returns how many texels are sunk too deep to act."""
+    for body in range(len(state.position)):
+        write_rotation(state.quaternion[body], scratch.rotation[body])
+    used, sunk = 0, 0
+    for pair in range(len(world.pairs)):
+        used, deep = gather(pair, world, tree, state, scratch.rotation, scratch.rows, scratch.slots, used)
+        sunk += deep
+        scratch.pair_stop[pair] = used
+    return sunk
+
+
+@kernel
+def _solve_velocities(dt, world, state, scratch):
+    """Velocities of the free bodies at the step's end, written into the state.
+
+    Contacts are linearised at the current guess and the linear system solved, until the guess no longer moves; a contact that
+    would pull is left out of the next round. With no free body one round only linearises.
+    """
+    free_at, mass, velocity, inertia = world.free_at, world.mass, state.velocity, scratch.inertia
+    matrix, vector, momentum = scratch.matrix, scratch.vector, scratch.momentum
+    n = 6 * int(free_at.max() + 1)
+    for body in range(len(free_at)):
+        at = 6 * free_at[body]
+        if at >= 0:
+            for i in range(3):
+                momentum[at + i] = mass[body] * (velocity[body, i] + dt * world.gravity[i])
+                total = 0.0
+                for j in range(3):
+                    total += inertia[body, i, j] * velocity[body, 3 + j]
+                momentum[at + 3 + i] = total
+    for _ in range(PASSES):
+        for i in range(n):
+            vector[i] = momentum[i]
+            for j in range(n):
+                matrix[i, j] = 0.0
+        start = 0
+        for pair in range(len(world.pairs)):
+            sensor = world.pairs[pair, 0]
+            a, b = world.sensor_body[sensor], world.target_body[world.pairs[pair, 1]]
+            at_a, at_b = 6 * free_at[a], 6 * free_at[b]
+            p = world.parameters[sensor]
+            for r in range(start, scratch.pair_stop[pair]):
+                row = scratch.rows[r]
+                vx, vy, vz = _relative_velocity(row, velocity, a, b)
+                linearise(row, vx, vy, vz, dt, p)
+                if row[NORMAL_FORCE] <= 0.0 or (at_a < 0 and at_b < 0):
+                    continue
+                # What the known part of the motion and the stored springs do to the target; the sensor gets the opposite.
+                ux, uy, uz = _known_velocity(row, velocity, a, b, at_a, at_b)
+                out = ux * row[0] + uy * row[1] + uz * row[2]
+                push = p[K] * row[DEPTH] + (row[STIFF_N] - row[STIFF_T]) * out
+                stick = friction_bias(row, dt, p)
+                fx = -push * row[0] - stick * row[10] - row[STIFF_T] * ux
+                fy = -push * row[1] - stick * row[11] - row[STIFF_T] * uy
+                fz = -push * row[2] - stick * row[12] - row[STIFF_T] * uz
+                if at_b >= 0:
+                    add_force(vector, at_b, fx, fy, fz, row, ARM_B, dt)
+                    add_own_block(matrix, at_b, row, ARM_B, dt)
+                if at_a >= 0:
+                    add_force(vector, at_a, -fx, -fy, -fz, row, ARM_A, dt)
+                    add_own_block(matrix, at_a, row, ARM_A, dt)
+                if at_a >= 0 and at_b >= 0:
+                    if at_a < at_b:
+                        add_cross_block(matrix, at_a, at_b, row, ARM_A, ARM_B, dt)
+                    else:
+                        add_cross_block(matrix, at_b, at_a, row, ARM_B, ARM_A, dt)
+            start = scratch.pair_stop[pair]
+        if n == 0:
+            return
+        for body in range(len(free_at)):
+            at = 6 * free_at[body]
+            if at >= 0:
+                for i in range(3):
+                    matrix[at + i, at + i] += mass[body]
+                    for j in range(i + 1):
+                        matrix[at + 3 + i, at + 3 + j] += inertia[body, i, j]
+        solve_positive(matrix, vector, n)
+        change, speed = 0.0, 0.0
+        for body in range(len(free_at)):
+            at = 6 * free_at[body]
+            if at >= 0:
+                for i in range(6):
+                    change = max(change, abs(vector[at + i] - velocity[body, i]))
+                    speed = max(speed, abs(vector[at + i]))
+                    velocity[body, i] = vector[at + i]
+        if change <= 1e-3 * speed or change < 1e-9:
+            return
+
+
+@kernel
+def _known_velocity(row, velocity, a, b, at_a, at_b):
+    """Relative velocity of the contact point from the keyframed bodies alone."""
+    ux, uy, uz = 0.0, 0.0, 0.0
+    if at_b < 0:
+        v = velocity[b]
+        ux += v[0] + v[4] * row[8] - v[5] * row[7]
+        uy += v[1] + v[5] * row[6] - v[3] * row[8]
+        uz += v[2] + v[3] * row[7] - v[4] * row[6]
+    if at_a < 0:
+        v = velocity[a]
+        ux -= v[0] + v[4] * row[5] - v[5] * row[4]
+        uy -= v[1] + v[5] * row[3] - v[3] * row[5]
+        uz -= v[2] + v[3] * row[4] - v[4] * row[3]
+    return ux, uy, uz
+
+
+@kernel
+def _store_bristles(world, state, scratch):
+    """Bristle deflections at the step's end, back in the frame of the sensor's body."""
+    start = 0
+    for pair in range(len(world.pairs)):
+        a, b = world.sensor_body[world.pairs[pair, 0]], world.target_body[world.pairs[pair, 1]]
+        turn = scratch.rotation[a]
+        for r in range(start, scratch.pair_stop[pair]):
+            row = scratch.rows[r]
+            vx, vy, vz = _relative_velocity(row, state.velocity, a, b)
+            out = vx * row[0] + vy * row[1] + vz * row[2]
+            zx = row[KEEP] * row[10] + row[GAIN] * (vx - out * row[0])
+            zy = row[KEEP] * row[11] + row[GAIN] * (vy - out * row[1])
+            zz = row[KEEP] * row[12] + row[GAIN] * (vz - out * row[2])
+            length = math.sqrt(zx * zx + zy * zy + zz * zz)
+            scale = row[LIMIT] / length if length > row[LIMIT] else 1.0
+            zx, zy, zz = scale * zx, scale * zy, scale * zz
+            slot = scratch.slots[r]
+            for i in range(3):
+                state.bristles[slot, i] = turn[0, i] * zx + turn[1, i] * zy + turn[2, i] * zz
+        start = scratch.pair_stop[pair]
+
+
+@kernel
+def advance_frame(dt, path_position, path_quaternion, path_velocity, world, tree, state, scratch):
+    """Run the substeps of one frame; the state is brought forward in place.
+
+    Parameters
+    ----------
+    dt : float, seconds
+    path_position, path_quaternion : (steps + 1, b, 3) and (steps + 1, b, 4) float
+        Where the keyframed bodies are at the beginning of each step, and at the end of the last.
+    path_velocity : (steps, b, 6) float
+        Their velocities during each step.
+
+    Returns
+    -------
+    sunk : int
+        Most texels that were sunk too deep to act in any one step.
+    """
+    worst = 0
+    for step in range(len(path_velocity)):
+        _place_keyframed(step, path_position, path_quaternion, world, state)
+        for body in range(len(world.free_at)):
+            if world.free_at[body] < 0:
+                for i in range(6):
+                    state.velocity[body, i] = path_velocity[step, body, i]
+        worst = max(worst, gather_all(world, tree, state, scratch))
+        for body in range(len(world.free_at)):
+            if world.free_at[body] >= 0:
+                write_world_inertia(scratch.rotation[body], world.inertia[body], scratch.inertia[body])
+        _solve_velocities(dt, world, state, scratch)
+        _store_bristles(world, state, scratch)
+        for body in range(len(world.free_at)):
+            if world.free_at[body] >= 0:
+                _move_free(body, dt, world, state, scratch)
+    _place_keyframed(len(path_velocity), path_position, path_quaternion, world, state)
+    return worst
+
+
+@kernel
+def _place_keyframed(step, path_position, path_quaternion, world, state):
+    for body in range(len(world.free_at)):
+        if world.free_at[body] < 0:
+            for i in range(3):
+                state.position[body, i] = path_position[step, body, i]
+            for i in range(4):
+                state.quaternion[body, i] = path_quaternion[step, body, i]
+
+
+@kernel
+def _move_free(body, dt, world, state, scratch):
+    """Move a free body with its new velocity. What nothing touches keeps its angular momentum exactly."""
+    velocity, inertia, vector = state.velocity[body], scratch.inertia[body], scratch.vector
+    for i in range(3):
+        state.position[body, i] += dt * velocity[i]
+        vector[i] = inertia[i, 0] * velocity[3] + inertia[i, 1] * velocity[4] + inertia[i, 2] * velocity[5]
+    turn_quaternion(state.quaternion[body], dt * velocity[3], dt * velocity[4], dt * velocity[5])
+    write_rotation(state.quaternion[body], scratch.rotation[body])
+    write_world_inertia(scratch.rotation[body], world.inertia[body], inertia)
+    for i in range(3):
+        for j in range(i + 1):
+            scratch.matrix[i, j] = inertia[i, j]
+    solve_positive(scratch.matrix, vector, 3)
+    for i in range(3):
+        velocity[3 + i] = vector[i]
+
+
+@kernel
+def feel(world, state, scratch, force, shear, depth, slip, contact, net, moment):
+    """What every texel feels right now, from rows freshly gathered (Eq. 8, 9, 13); forces on the sensor, in its body's frame.
+
+    `net` gets force and torque about the body's reference point, `moment` the sum of fn · point and of fn.
+    """
+    start = 0
+    for pair in range(len(world.pairs)):
+        sensor = world.pairs[pair, 0]
+        a, b = world.sensor_body[sensor], world.target_body[world.pairs[pair, 1]]
+        p, turn = world.parameters[sensor], scratch.rotation[a]
+        for r in range(start, scratch.pair_stop[pair]):
+            row = scratch.rows[r]
+            texel = world.texel_start[sensor] + scratch.slots[r] - world.slot_start[pair]
+            vx, vy, vz = _relative_velocity(row, state.velocity, a, b)
+            rate = vx * row[0] + vy * row[1] + vz * row[2]
+            tx, ty, tz = vx - rate * row[0], vy - rate * row[1], vz - rate * row[2]
+            square = tx * tx + ty * ty + tz * tz
+            fn = normal_force(row[DEPTH], rate, p)
+            length = math.sqrt(row[10] * row[10] + row[11] * row[11] + row[12] * row[12])
+            limit = bristle_limit(fn, p)
+            held = limit / length if length > limit else 1.0
+            zx, zy, zz = held * row[10], held * row[11], held * row[12]
+            fx, fy, fz = 0.0, 0.0, 0.0
+            if fn > 0.0:
+                fx = friction_force(zx, bristle_rate(zx, tx, square, fn, p), tx, p)
+                fy = friction_force(zy, bristle_rate(zy, ty, square, fn, p), ty, p)
+                fz = friction_force(zz, bristle_rate(zz, tz, square, fn, p), tz, p)
+            # Friction drags the sensor along with the target; the target's surface normal points into the sensor.
+            lx = turn[0, 0] * fx + turn[1, 0] * fy + turn[2, 0] * fz
+            ly = turn[0, 1] * fx + turn[1, 1] * fy + turn[2, 1] * fz
+            lz = turn[0, 2] * fx + turn[1, 2] * fy + turn[2, 2] * fz
+            shape = world.texels[texel]
+            shear[texel, 0] += lx * shape[6] + ly * shape[7] + lz * shape[8]
+            shear[texel, 1] += lx * shape[9] + ly * shape[10] + lz * shape[11]
+            lx += fn * (turn[0, 0] * row[0] + turn[1, 0] * row[1] + turn[2, 0] * row[2])
+            ly += fn * (turn[0, 1] * row[0] + turn[1, 1] * row[1] + turn[2, 1] * row[2])
+            lz += fn * (turn[0, 2] * row[0] + turn[1, 2] * row[1] + turn[2, 2] * row[2])
+            px = turn[0, 0] * row[3] + turn[1, 0] * row[4] + turn[2, 0] * row[5]
+            py = turn[0, 1] * row[3] + turn[1, 1] * row[4] + turn[2, 1] * row[5]
+            pz = turn[0, 2] * row[3] + turn[1, 2] * row[4] + turn[2, 2] * row[5]
+            if not contact[texel] or fn > force[texel]:
+                slip[texel] = math.sqrt(square)
+            contact[texel] = True
+            force[texel] += fn
+            depth[texel] = max(depth[texel], row[DEPTH])
+            net[sensor, 0] += lx
+            net[sensor, 1] += ly
+            net[sensor, 2] += lz
+            net[sensor, 3] += py * lz - pz * ly
+            net[sensor, 4] += pz * lx - px * lz
+            net[sensor, 5] += px * ly - py * lx
+            moment[sensor, 0] += fn * px
+            moment[sensor, 1] += fn * py
+            moment[sensor, 2] += fn * pz
+            moment[sensor, 3] += fn
+        start = scratch.pair_stop[pair]
