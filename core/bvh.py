@@ -30,8 +30,8 @@ class Tree(NamedTuple):
         Low and high corner of each node's box.
     skip : (nn,) int
         Node to visit when a box is missed.
-    first, count : (nn,) int
-        Triangles of a leaf; count is zero in inner nodes.
+    first, number : (nn,) int
+        Triangles of a leaf; `number` is zero in inner nodes.
     corners : (nt, 3, 3) float, metres
         Triangles in leaf order.
     normals : (nt, 3) float
@@ -45,7 +45,7 @@ class Tree(NamedTuple):
     bounds: np.ndarray
     skip: np.ndarray
     first: np.ndarray
-    count: np.ndarray
+    number: np.ndarray
     corners: np.ndarray
     normals: np.ndarray
     source: np.ndarray
@@ -67,15 +67,15 @@ def build_tree(meshes: list[TriangleMesh]) -> Tree:
         order = np.arange(n)
         size = 2 * n + 1
         bounds, skip = np.empty((size, 6)), np.empty(size, np.int64)
-        first, count = np.zeros(size, np.int64), np.zeros(size, np.int64)
-        nodes = _build(corners, corners.mean(axis=1), order, LEAF_SIZE, bounds, skip, first, count)
-        leaf = count[:nodes] > 0
+        first, number = np.zeros(size, np.int64), np.zeros(size, np.int64)
+        nodes = _build(corners, corners.mean(axis=1), order, LEAF_SIZE, bounds, skip, first, number)
+        leaf = number[:nodes] > 0
         parts.append(
             (
                 bounds[:nodes],
                 skip[:nodes] + node_offset,
                 np.where(leaf, first[:nodes] + triangle_offset, 0),
-                count[:nodes],
+                number[:nodes],
                 corners[order],
                 face_normals(mesh)[order],
                 order,
@@ -85,7 +85,7 @@ def build_tree(meshes: list[TriangleMesh]) -> Tree:
         triangle_offset += n
         roots.append(node_offset)
     joined = [np.ascontiguousarray(np.concatenate(arrays)) for arrays in zip(*parts, strict=True)]
-    return Tree(*joined, roots=np.array(roots))
+    return Tree(*joined, np.array(roots))
 
 
 @kernel
@@ -113,7 +113,7 @@ def _select(order, centroid, axis, lo, hi, middle):
 
 
 @kernel
-def _build(corners, centroid, order, leaf_size, bounds, skip, first, count):
+def _build(corners, centroid, order, leaf_size, bounds, skip, first, number):
     """Split at the median of the longest axis until leaves are small; returns the number of nodes."""
     stack = np.empty((128, 3), np.int64)  # range of triangles, and the node whose skip the range's end decides
     stack[0, 0], stack[0, 1] = 0, len(order)
@@ -136,7 +136,7 @@ def _build(corners, centroid, order, leaf_size, bounds, skip, first, count):
                     bounds[node, 3 + axis] = max(bounds[node, 3 + axis], x)
         skip[node] = node + _node_count(hi - lo, leaf_size)
         if hi - lo <= leaf_size:
-            first[node], count[node] = lo, hi - lo
+            first[node], number[node] = lo, hi - lo
         else:
             axis = 0
             for other in range(1, 3):
@@ -208,7 +208,7 @@ def segment_entry(ox, oy, oz, dx, dy, dz, mesh, hint, tree):
         if box[0] > x1 or box[3] < x0 or box[1] > y1 or box[4] < y0 or box[2] > z1 or box[5] < z0:
             node = tree.skip[node]
             continue
-        for i in range(tree.first[node], tree.first[node] + tree.count[node]):
+        for i in range(tree.first[node], tree.first[node] + tree.number[node]):
             u = _cross_triangle(ox, oy, oz, dx, dy, dz, corners[i], normals[i])
             if 0.0 <= u <= 1.0:
                 # Of two triangles met at the very same point (a shared edge) the first in the list answers, hint or not.

@@ -114,7 +114,8 @@ def is_closed(triangles: np.ndarray) -> bool:
 
 
 def _corners(mesh: TriangleMesh) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    return tuple(mesh.vertices[mesh.triangles[:, i]] for i in range(3))  # type: ignore[return-value]
+    a, b, c = mesh.triangles.T
+    return mesh.vertices[a], mesh.vertices[b], mesh.vertices[c]
 
 
 def _longest_edges(mesh: TriangleMesh) -> np.ndarray:

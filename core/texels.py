@@ -90,9 +90,12 @@ def texels_from_region(mesh: TriangleMesh, region: np.ndarray, name: str = "sens
     index[vertex] = np.arange(len(vertex))
     position = mesh.vertices[vertex]
     local_triangles = index[triangles]
-    local_polygons = index[mesh.quads] if mesh.quads is not None else None
-    layout, along = grid_layout(position, normals, local_triangles, local_polygons)
-    if layout is None:
+    local_polygons = index[mesh.quads[region[mesh.quads].all(axis=1)]] if mesh.quads is not None else None
+    grid, along = grid_layout(position, normals, local_triangles, local_polygons)
+    layout: GridLayout | UVLayout
+    if grid is not None and along is not None:
+        layout = grid
+    else:
         layout, along = uv_layout(position, normals, local_triangles)
     tangent = along - np.einsum("ij,ij->i", along, normals)[:, None] * normals
     length = np.linalg.norm(tangent, axis=1)
