@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Build the extension zips: the package, its manifest and its wheels, one zip per platform and Python.
 
-Blender's installer picks wheels by platform only, so wheels for two Pythons must not share a zip. The same sources
-and wheels give the same bytes. Each zip is validated by Blender's own tool, which comes with bpy.
+Blender's installer picks wheels by platform only, so wheels for two Pythons must not share a zip. The same
+sources and wheels give the same bytes. Each zip is validated by Blender's own tool, which comes with bpy.
 
     python tools/build_zip.py                                            all platforms and Pythons, into dist/
     python tools/build_zip.py --platform linux-x64 --python-version 3.11
@@ -54,9 +54,7 @@ class BuildError(Exception):
 def package_files() -> list[Path]:
     """Files of the package, relative to the repository root, without the manifest."""
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
-    folders = {
-        package.split(".")[1] for package in project["tool"]["setuptools"]["packages"] if "." in package
-    }
+    folders = {package.split(".")[1] for package in project["tool"]["setuptools"]["packages"] if "." in package}
     files = [Path(name) for name in ROOT_FILES]
     for folder in sorted(folders):
         for path in sorted((ROOT / folder).rglob("*")):
@@ -106,14 +104,10 @@ def blender_extension_tool() -> Path:
     """Blender's own command line for extensions, as bpy carries it."""
     spec = importlib.util.find_spec("bpy")
     if spec is None or spec.origin is None:
-        raise BuildError(
-            "Validating a zip needs Blender's own tool; run this where bpy is installed, as `make zip` does."
-        )
+        raise BuildError("Validating a zip needs Blender's own tool; run this where bpy is installed, as `make zip` does.")
     found = sorted(Path(spec.origin).parent.glob("*/scripts/addons_core/bl_pkg/cli/blender_ext.py"))
     if not found:
-        raise BuildError(
-            f"The bpy in {Path(spec.origin).parent} carries no extension tool; use bpy 4.2 or later."
-        )
+        raise BuildError(f"The bpy in {Path(spec.origin).parent} carries no extension tool; use bpy 4.2 or later.")
     return found[-1]
 
 
@@ -160,9 +154,7 @@ def build(
     """
     if blender_range is None:
         if python not in BLENDER_RANGE:
-            raise BuildError(
-                f"No Blender ships Python {python}; for a distribution's, use --local with --blender-min."
-            )
+            raise BuildError(f"No Blender ships Python {python}; for a distribution's, use --local with --blender-min.")
         blender_range = BLENDER_RANGE[python]
     wheels = wheels_for(platform_name, python)
     entries = {f"wheels/{wheel.name}": wheel.read_bytes() for wheel in wheels}

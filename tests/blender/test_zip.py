@@ -1,0 +1,141 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The zip as a user gets it: built, installed into a Blender with nothing else in it, enabled, used and removed again."""
+
+from __future__ import annotations
+
+import importlib.metadata
+import json
+import os
+import re
+import subprocess
+import sys
+import tomllib
+import zipfile
+from pathlib import Path
+
+import build_zip
+import pytest
+
+HEAVY = {"numba", "llvmlite", "scipy", "matplotlib", "trimesh", "OpenEXR", "tqdm", "tomli_w"}
+
+
+@pytest.fixture(scope="module")
+def zip_path(tmp_path_factory):
+    return build_zip.build("linux-x64", "3.11", tmp_path_factory.mktemp("zip"))
+
+
+@pytest.fixture(scope="module")
+def life(zip_path, tmp_path_factory):
+    """Run the whole life of the extension in a process of its own and return what it noted at each stage."""
+    folder = tmp_path_factory.mktemp("life")
+    blender = folder / "only-blender"
+    blender.mkdir()
+    for name, path in what_blender_brings().items():
+        (blender / name).symlink_to(path)
+    user = folder / "user"
+    user.mkdir()
+    report = folder / "report.json"
+    script = Path(__file__).with_name("zip_life.py")
+    # -I -S: this environment's own packages, among them our dependencies, are out of sight
+    command = [sys.executable, "-I", "-S", str(script), str(blender), str(zip_path), str(report)]
+    run = subprocess.run(
+        command,
+        env=os.environ | {"BLENDER_USER_RESOURCES": str(user)},
+        capture_output=True,
+        text=True,
+        timeout=300,
+    )
+    assert run.returncode == 0, run.stdout + run.stderr
+    assert "Traceback" not in run.stdout + run.stderr, run.stdout + run.stderr
+    return json.loads(report.read_text(encoding="utf-8")) | {"user": user}
+
+
+def what_blender_brings() -> dict[str, Path]:
+    """Files and folders in site-packages of bpy and what it requires: what an official Blender has, and no more."""
+    found: dict[str, Path] = {}
+    open_ends, seen = ["bpy"], set()
+    while open_ends:
+        name = open_ends.pop()
+        if name in seen:
+            continue
+        seen.add(name)
+        distribution = importlib.metadata.distribution(name)
+        for file in distribution.files or []:
+            top = file.parts[0]
+            if top not in ("..", "__pycache__"):
+                found[top] = Path(distribution.locate_file(top))
+        for requirement in distribution.requires or []:
+            if "extra ==" not in requirement:
+                open_ends.append(re.split(r"[^A-Za-z0-9_.-]", requirement, maxsplit=1)[0])
+    assert not HEAVY & set(found)
+    return found
+
+
+def test_zip_holds_what_the_extension_needs_and_no_more(zip_path, repository):
+    with zipfile.ZipFile(zip_path) as archive:
+        names = set(archive.namelist())
+        manifest = tomllib.loads(archive.read("blender_manifest.toml").decode())
+    assert {"__init__.py", "LICENSE", "core/__init__.py", "addon/__init__.py"} <= names
+    rooms = {name.split("/")[0] for name in names if "/" in name}
+    assert rooms <= {"core", "addon", "operators", "panels", "commands", "sample_blends", "wheels"}
+    assert {f"./{name}" for name in names if name.startswith("wheels/")} == set(manifest["wheels"])
+    assert manifest["platforms"] == ["linux-x64"]
+    assert (manifest["blender_version_min"], manifest["blender_version_max"]) == ("4.2.0", "5.1.0")
+    assert not any("cp313" in name for name in names)
+    # the repository's own manifest is for development: it names no wheels
+    assert "wheels" not in tomllib.loads((repository / "blender_manifest.toml").read_text(encoding="utf-8"))
+
+
+def test_same_sources_give_the_same_zip(zip_path, tmp_path):
+    assert build_zip.build("linux-x64", "3.11", tmp_path).read_bytes() == zip_path.read_bytes()
+
+
+def test_blender_refuses_a_broken_zip(tmp_path):
+    broken = tmp_path / "broken.zip"
+    with zipfile.ZipFile(broken, "w") as archive:
+        archive.writestr("blender_manifest.toml", 'schema_version = "1.0.0"\nid = "palpate"\n')
+        archive.writestr("__init__.py", "")
+    with pytest.raises(build_zip.BuildError, match="refuses"):
+        build_zip.validate(broken)
+
+
+def test_installs_and_enables(life):
+    assert life["enabled"]["is_enabled"]
+    assert life["enabled"]["has_properties"]
+    assert life["enabled"]["commands"] == ["palpate"]
+    assert life["enabled"]["classes"]
+
+
+def test_enabling_loads_nothing_heavy(life):
+    assert not HEAVY & set(life["enabled"]["modules"])
+
+
+def test_the_wheels_are_the_ones_in_use(life):
+    site_packages = str(life["user"] / "extensions" / ".local")
+    assert set(life["wheels"]) >= {"numba", "OpenEXR", "trimesh", "tqdm", "matplotlib", "tomli_w"}
+    for name, origin in life["wheels"].items():
+        assert origin.startswith(site_packages), name
+    assert life["compiled"] == 45
+
+
+def test_disabling_leaves_nothing_registered(life):
+    before, after = life["before"], life["disabled"]
+    assert not after["is_enabled"]
+    assert not after["has_properties"]
+    assert after["commands"] == []
+    assert after["classes"] == []
+    assert after["menu_entries"] == before["menu_entries"]
+    assert after["handlers"] == before["handlers"]
+    assert after["keymap_items"] == before["keymap_items"]
+
+
+def test_enabling_again_works(life):
+    assert life["enabled_again"]["is_enabled"]
+    assert life["enabled_again"]["classes"] == life["enabled"]["classes"]
+
+
+def test_uninstalling_removes_the_files(life):
+    left = [path for path in (life["user"] / "extensions").rglob("*") if "palpate" in path.name or path.name == "numba"]
+    assert left == []
+    assert life["uninstalled"]["classes"] == []
+    assert life["uninstalled"]["handlers"] == life["before"]["handlers"]

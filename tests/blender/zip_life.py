@@ -1,0 +1,115 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The life of the extension in a fresh Blender, run by test_zip.py in a process of its own.
+
+python -I -S zip_life.py FOLDER_WITH_BPY_ONLY ZIP REPORT.json
+"""
+
+import json
+import sys
+
+only_blender, zip_path, report_path = sys.argv[1:]
+sys.path.insert(0, only_blender)
+
+import bpy  # noqa: E402
+
+MODULE = "bl_ext.user_default.palpate"
+commands = []
+
+
+def watch_commands():
+    """Blender has no list of its command line's commands, so they are counted as they come and go."""
+    register, unregister = bpy.utils.register_cli_command, bpy.utils.unregister_cli_command
+    names = {}
+
+    def counted_register(name, execute):
+        handle = register(name, execute)
+        names[id(handle)] = (name, handle)
+        commands.append(name)
+        return handle
+
+    def counted_unregister(handle):
+        if id(handle) in names:  # Blender's own command was registered before the watch began
+            commands.remove(names.pop(id(handle))[0])
+        return unregister(handle)
+
+    bpy.utils.register_cli_command, bpy.utils.unregister_cli_command = counted_register, counted_unregister
+
+
+def ours(thing):
+    return "palpate" in getattr(thing, "__module__", "").split(".")
+
+
+def every_class(base):
+    for kind in base.__subclasses__():
+        yield kind
+        yield from every_class(kind)
+
+
+def state():
+    """Everything an add-on can leave behind."""
+    import addon_utils
+
+    bases = [bpy.types.Operator, bpy.types.Panel, bpy.types.Menu, bpy.types.Header, bpy.types.UIList]
+    bases += [bpy.types.PropertyGroup, bpy.types.AddonPreferences]
+    kinds = {kind for base in bases for kind in every_class(base)}
+    drawn = [bpy.types.Menu, bpy.types.Panel, bpy.types.Header]
+    menu_entries = sum(
+        len(kind.draw._draw_funcs)
+        for base in drawn
+        for kind in set(every_class(base))
+        if hasattr(getattr(kind, "draw", None), "_draw_funcs")
+    )
+    lists = {name: value for name in dir(bpy.app.handlers) if isinstance(value := getattr(bpy.app.handlers, name), list)}
+    keymaps = bpy.context.window_manager.keyconfigs.addon
+    return {
+        "is_enabled": addon_utils.check(MODULE)[1],
+        "has_properties": hasattr(bpy.types.Object, "palpate"),
+        "commands": list(commands),
+        "classes": sorted(kind.__name__ for kind in kinds if ours(kind) and kind.is_registered),
+        "menu_entries": menu_entries,
+        "handlers": {name: sorted(f"{f.__module__}.{f.__name__}" for f in value) for name, value in lists.items()},
+        "keymap_items": sum(len(keymap.keymap_items) for keymap in keymaps.keymaps) if keymaps else 0,
+        "modules": sorted({name.partition(".")[0] for name in sys.modules}),
+    }
+
+
+def wheels():
+    """Where each heavy module comes from, and the sum that numba compiled."""
+    import matplotlib
+    import numba
+    import OpenEXR
+    import tomli_w
+    import tqdm
+    import trimesh
+
+    @numba.njit
+    def total(n):
+        result = 0
+        for i in range(n):
+            result += i
+        return result
+
+    return {m.__name__: m.__file__ for m in (matplotlib, numba, OpenEXR, tomli_w, tqdm, trimesh)}, total(10)
+
+
+def main():
+    watch_commands()
+    report = {"before": state()}
+    done = bpy.ops.extensions.package_install_files(repo="user_default", filepath=zip_path, enable_on_install=True)
+    assert done == {"FINISHED"}, done
+    report["enabled"] = state()
+    report["wheels"], report["compiled"] = wheels()
+    bpy.ops.preferences.addon_disable(module=MODULE)
+    report["disabled"] = state()
+    bpy.ops.preferences.addon_enable(module=MODULE)
+    report["enabled_again"] = state()
+    repos = bpy.context.preferences.extensions.repos
+    index = next(i for i, repo in enumerate(repos) if repo.module == "user_default")
+    done = bpy.ops.extensions.package_uninstall(repo_index=index, pkg_id="palpate")
+    assert done == {"FINISHED"}, done
+    report["uninstalled"] = state()
+    with open(report_path, "w", encoding="utf-8") as out:
+        json.dump(report, out)
+
+
+main()

@@ -1,0 +1,138 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A real Blender with the extension installed, for roads played in its window (see README.md)."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import subprocess
+from dataclasses import dataclass
+from pathlib import Path
+
+import build_zip
+import provision_blender
+import pytest
+
+SCREEN = (1600, 1000)
+# Folders of the repository and where the Blender inside sees them
+WORK, HERE = "/palpate-work", "/palpate-ui"
+
+
+@dataclass
+class RealBlender:
+    """Debian's Blender in its own small system, with a user folder that holds nothing but the extension."""
+
+    root: Path
+    work: Path
+    here: Path
+
+    def run(self, command: list[str], log: Path, timeout: float) -> int:
+        """Run a command inside, output into a log; return its status."""
+        environment = ["env", f"BLENDER_USER_RESOURCES={WORK}/user", "LIBGL_ALWAYS_SOFTWARE=1"]
+        inside = provision_blender.inside([*environment, *command], root=self.root, binds={self.work: WORK, self.here: HERE})
+        with log.open("w", encoding="utf-8") as out:
+            return subprocess.run(
+                inside, stdout=out, stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL, timeout=timeout
+            ).returncode
+
+    def install(self, zip_path: Path) -> None:
+        """Install and enable a zip by Blender's own command, as a user would."""
+        log = self.work / "install.log"
+        shutil.copy(zip_path, self.work / "palpate.zip")
+        install = ["extension", "install-file", "--repo", "user_default", "--enable", f"{WORK}/palpate.zip"]
+        # the splash screen would take the first click
+        quiet = "import bpy; bpy.context.preferences.view.show_splash = False; bpy.ops.wm.save_userpref()"
+        for command in (["--command", *install], ["--background", "--python-exit-code", "1", "--python-expr", quiet]):
+            code = self.run(["blender", *command], log, timeout=180)
+            text = log.read_text(encoding="utf-8", errors="replace")
+            if code != 0 or "Traceback" in text:
+                raise RuntimeError(f"Installing {zip_path.name} failed with status {code}:\n{text}")
+
+    def play(self, road: Path, out: Path, timeout: float) -> dict:
+        """Play a road in a window on a virtual screen; return its results.
+
+        Fails if the road broke off or a check did not hold, if Blender crashed, took too long or printed a
+        traceback (a panel that cannot draw says so only there), or if a screenshot is empty.
+        """
+        out.mkdir(parents=True)
+        log = out / "blender.log"
+        inner = f"{WORK}/{out.relative_to(self.work)}"
+        script = f"""
+            mkfifo /tmp/display
+            Xvfb -displayfd 3 -screen 0 {SCREEN[0]}x{SCREEN[1]}x24 +extension GLX -nolisten tcp 3>/tmp/display &
+            read -r number </tmp/display
+            DISPLAY=:$number; export DISPLAY
+            blender --enable-event-simulate -noaudio --window-geometry 0 0 {SCREEN[0]} {SCREEN[1]} \\
+                --python-exit-code 1 --python {HERE}/driver.py -- {HERE}/roads/{road.name} {inner}
+        """
+        try:
+            code: int | str = self.run(["sh", "-euc", script], log, timeout)
+        except subprocess.TimeoutExpired:
+            code = f"none, after {timeout:g} s"
+        said = log.read_text(encoding="utf-8", errors="replace")
+        results = out / "results.json"
+        result = json.loads(results.read_text(encoding="utf-8")) if results.is_file() else {"error": "no results"}
+
+        faults = [f"not so: {check['what']}" for check in result.get("checks", []) if not check["passed"]]
+        if result["error"]:
+            faults.append(result["error"])
+        elif not result["finished"]:
+            faults.append("the road did not reach its end")
+        elif not result["checks"]:
+            faults.append("the road checked nothing")
+        if code != 0:
+            faults.append(f"Blender's exit status: {code}")
+        if "Traceback (most recent call last)" in said:
+            faults.append("Blender printed a traceback")
+        for name in result.get("screenshots", []):
+            if blank(out / name):
+                faults.append(f"the screenshot {name} is empty")
+        if faults:
+            steps = "\n".join(result.get("steps", []))
+            tail = "\n".join(said.splitlines()[-40:])
+            text = "\n".join(faults)
+            pytest.fail(f"{road.name}:\n{text}\n--- steps\n{steps}\n--- {log}\n{tail}", pytrace=False)
+        return result
+
+
+def blank(picture: Path) -> bool:
+    """Tell whether a screenshot shows next to nothing: a Blender window has hundreds of colours."""
+    from PIL import Image
+
+    with Image.open(picture) as image:
+        small = image.convert("RGB").resize((200, 125), Image.Resampling.NEAREST)
+        return len(small.getcolors(maxcolors=200 * 125)) < 50
+
+
+@pytest.fixture(scope="session")
+def real_blender(repository):
+    """Return a real Blender with the zip of this very work tree installed."""
+    work = repository / "build" / "ui"
+    shutil.rmtree(work, ignore_errors=True)
+    work.mkdir(parents=True)
+    blender = RealBlender(provision_blender.provision(), work, Path(__file__).parent)
+    blender.install(
+        build_zip.build(
+            "linux-x64",
+            provision_blender.PYTHON_VERSION,
+            work,
+            blender_range=("4.2.0", None),
+            suffix="-local",
+        )
+    )
+    return blender
+
+
+@pytest.fixture
+def play_road(real_blender, repository):
+    """Return a function that plays a road by name and returns its results; pictures go to build/ui-screenshots."""
+
+    def play(name: str, timeout: float = 300.0) -> dict:
+        result = real_blender.play(Path(__file__).parent / "roads" / f"{name}.py", real_blender.work / name, timeout)
+        return result
+
+    yield play
+    shots = repository / "build" / "ui-screenshots"
+    shots.mkdir(parents=True, exist_ok=True)
+    for picture in real_blender.work.glob("*/*.png"):
+        shutil.copy(picture, shots / f"{picture.parent.name}-{picture.name}")
