@@ -1,0 +1,118 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Tactile images as OpenEXR: what Blender's image nodes read directly, and every other channel beside it.
+
+``R`` is the normal force and ``G``, ``B`` the shear along the texel's x and y axes, all in newtons; ``reading`` is in
+the sensor's unit, ``depth`` in metres, ``slip`` in metres per second, ``contact`` 0 or 1. All are 32-bit floats; pixels
+that show no texel are 0. Row 0 of the layout is the bottom of the picture.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import FileError
+from ..layout import GridLayout, UVLayout
+from ..recording import SensorFrame
+from .files import atomic_write
+
+CHANNELS = ("R", "G", "B", "reading", "depth", "slip", "contact")
+"""Names of the channels, in the order in which :func:`read_exr` returns them."""
+
+_PREFIX = "palpate."  # OpenEXR has header attributes of its own, some with a type ("name", "owner", "type")
+
+
+def exr_channels(layout: GridLayout | UVLayout, frame: SensorFrame) -> dict[str, np.ndarray]:
+    """Return the pictures of a frame by channel name, each (height, width) float32 with row 0 at the bottom.
+
+    Raises
+    ------
+    ValueError
+        A value is not finite or too large for 32 bits (a fault of the program, not of the user).
+    """
+    values = {
+        "R": frame.normal_force,
+        "G": frame.shear[:, 0],
+        "B": frame.shear[:, 1],
+        "reading": frame.reading,
+        "depth": frame.depth,
+        "slip": frame.slip,
+        "contact": frame.contact,
+    }
+    table = np.column_stack([np.asarray(values[name], float) for name in CHANNELS])
+    bad = ~(np.abs(table) <= np.finfo(np.float32).max)  # NaN compares false
+    if bad.any():
+        texel, channel = np.argwhere(bad)[0]
+        raise ValueError(f"channel '{CHANNELS[channel]}' of texel {texel} is {table[texel, channel]}: no 32-bit number")
+    image = layout.image(table)
+    image[..., CHANNELS.index("contact")] = image[..., CHANNELS.index("contact")] >= 0.5
+    return {name: image[..., i].astype(np.float32) for i, name in enumerate(CHANNELS)}
+
+
+def write_exr(path: str | os.PathLike, layout: GridLayout | UVLayout, frame: SensorFrame, metadata: Mapping[str, str]) -> None:
+    """Write one frame of one sensor, whole or not at all.
+
+    Parameters
+    ----------
+    path : path
+    layout : GridLayout or UVLayout
+        Of the sensor's texels.
+    frame : SensorFrame
+    metadata : mapping of str to str
+        Becomes header attributes named ``palpate.<key>``: unit, sensor, frame, time, digest, …
+
+    Raises
+    ------
+    FileError
+        The file cannot be written.
+    ValueError
+        See :func:`exr_channels`; nothing is written then.
+    """
+    import OpenEXR
+
+    pictures = exr_channels(layout, frame)
+    header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
+    header.update({_PREFIX + key: str(value) for key, value in metadata.items()})
+    # OpenEXR counts rows from the top; it also replaces the values of the dict it gets
+    channels = {name: np.ascontiguousarray(picture[::-1]) for name, picture in pictures.items()}
+    with atomic_write(path) as temporary:
+        try:
+            with OpenEXR.File(header, channels) as file:
+                file.write(str(temporary))
+        except RuntimeError as error:
+            raise FileError(f"'{path}' could not be written ({error}): choose another folder.") from error
+
+
+def read_exr(path: str | os.PathLike) -> tuple[dict[str, np.ndarray], dict[str, str]]:
+    """Read the channels and the metadata of a tactile image.
+
+    Returns
+    -------
+    channels : dict of str to (height, width) float32
+        Row 0 at the bottom; those of :data:`CHANNELS` first, others after them.
+    metadata : dict of str to str
+        As given to :func:`write_exr`.
+
+    Raises
+    ------
+    FileError
+        There is no such file, or it is damaged or not an OpenEXR image.
+    """
+    import OpenEXR
+
+    if not Path(path).is_file():
+        raise FileError(f"'{path}' does not exist: bake first, or choose another file.")
+    try:
+        with OpenEXR.File(os.fspath(path), separate_channels=True) as file:
+            found = {name: np.flipud(channel.pixels).copy() for name, channel in file.channels().items()}
+            header = dict(file.header())
+    except (RuntimeError, ValueError, MemoryError) as error:
+        raise FileError(f"'{path}' is damaged or not an OpenEXR image: bake again.") from error
+    order = [name for name in CHANNELS if name in found] + [name for name in found if name not in CHANNELS]
+    metadata = {
+        key.removeprefix(_PREFIX): value for key, value in header.items() if key.startswith(_PREFIX) and isinstance(value, str)
+    }
+    return {name: found[name] for name in order}, metadata
