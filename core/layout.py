@@ -410,7 +410,7 @@ def _main_axis(position: np.ndarray, mean: np.ndarray) -> np.ndarray:
     spread = spread - np.outer(spread @ mean, mean)
     values, vectors = np.linalg.eigh(spread.T @ spread)
     axis = vectors[:, 2]
-    if values[1] > 0.98 * values[2]:  # round or square: rounding would choose
+    if values[1] > 0.9 * values[2]:  # round or square: a trifle would choose
         body = np.eye(3)[0 if abs(mean[0]) < 0.9 else 1]
         axis = _unit(body - (body @ mean) * mean)
     return axis if _preference(axis) >= _preference(-axis) else -axis
