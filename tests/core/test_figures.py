@@ -1,0 +1,201 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Figures say what the recording says, at a size at which it can be read, and nothing else in the process notices them."""
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from palpate.core import figures
+from palpate.core.errors import FileError
+from palpate.core.mesh import TriangleMesh
+from palpate.core.recording import Recording, SensorRecording
+from palpate.core.scenario import SensorParameters
+from palpate.core.texels import texels_from_region
+
+ROWS, COLUMNS, PITCH = 5, 3, 0.004
+
+
+def grid_texels():
+    """A flat pad of 5 × 3 texels in z = 0."""
+    y, x = np.mgrid[0:ROWS, 0:COLUMNS]
+    vertices = np.stack([x.ravel() * PITCH, y.ravel() * PITCH, np.zeros(ROWS * COLUMNS)], axis=1)
+    quads = np.array(
+        [
+            [j * COLUMNS + i, j * COLUMNS + i + 1, (j + 1) * COLUMNS + i + 1, (j + 1) * COLUMNS + i]
+            for j in range(ROWS - 1)
+            for i in range(COLUMNS - 1)
+        ]
+    )
+    triangles = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
+    return texels_from_region(TriangleMesh(vertices, triangles, quads), np.ones(len(vertices), bool), "pad")
+
+
+def round_texels():
+    """A cap of a sphere, whose texels form no grid."""
+    angle = np.arange(12) * np.pi / 6
+    rim = np.stack([0.01 * np.cos(angle), 0.01 * np.sin(angle), np.zeros(12)], axis=1)
+    vertices = np.concatenate([[[0, 0, 0.004]], rim])
+    triangles = np.array([[0, 1 + i, 1 + (i + 1) % 12] for i in range(12)])
+    return texels_from_region(TriangleMesh(vertices, triangles), np.ones(13, bool), "cap")
+
+
+def recording_of(texels, frames=10):
+    """Forces that rise, slide along the rows, and vanish; nothing happens in the last three frames."""
+    n = len(texels)
+    load = np.clip(np.arange(frames) - 1, 0, None) * (np.arange(frames) < frames - 3)
+    normal = load[:, None] * np.linspace(0.01, 0.02, n)
+    shear = np.zeros((frames, n, 2))
+    shear[:, :, 1] = 0.2 * normal
+    zeros, vector = np.zeros((frames, n)), np.zeros((frames, 3))
+    sensor = SensorRecording(normal, shear, zeros, zeros, normal > 0, normal, vector, vector, vector)
+    return Recording(
+        frames=np.arange(1, frames + 1),
+        times=np.arange(frames) / 24,
+        sensors={"pad": sensor},
+        body_names=("pad",),
+        poses=np.zeros((frames, 1, 7)),
+        velocities=np.zeros((frames, 1, 6)),
+        dt=1e-4,
+    )
+
+
+def test_net_shear_of_a_flat_pad_is_the_plain_sum():
+    texels = grid_texels()
+    sensor = recording_of(texels).sensors["pad"]
+    expected = np.zeros((10, 3))
+    expected[:, 1] = sensor.shear[:, :, 1].sum(axis=1)  # rows run along +y
+    np.testing.assert_allclose(figures.net_shear(sensor, texels), expected, atol=1e-15)
+
+
+def test_mobilised_friction_is_shear_over_limit_and_zero_without_contact():
+    texels = grid_texels()
+    sensor = recording_of(texels).sensors["pad"]
+    ratio = figures.mobilised(sensor, texels, mus=0.4)
+    touching = sensor.normal_force.any(axis=1)
+    np.testing.assert_allclose(ratio[touching], 0.5)
+    assert (ratio[~touching] == 0).all()
+
+
+@pytest.mark.parametrize(("value", "limit"), [(0.11, 0.15), (1.0, 1.0), (0.026, 0.03), (9.9, 10.0), (3e-7, 3e-7)])
+def test_scales_end_at_round_numbers(value, limit):
+    assert figures.tidy_limit(value) == pytest.approx(limit)
+
+
+def test_frames_are_spread_over_what_happens():
+    recording = recording_of(grid_texels())
+    chosen = figures.choose_frames(recording, 4)
+    assert len(chosen) == 4
+    assert (np.diff(chosen) > 0).all()
+    assert chosen.max() <= 8  # the last three frames are alike
+    assert set(figures.choose_frames(recording, 100)) <= set(recording.frames)
+
+
+def test_frames_of_a_still_recording_are_spread_over_all_of_it():
+    recording = recording_of(grid_texels())
+    recording.sensors["pad"].normal_force[:] = 0.3
+    recording.sensors["pad"].shear[:] = 0
+    assert list(figures.choose_frames(recording, 2)) == [3, 8]
+
+
+@pytest.mark.parametrize("texels", [grid_texels(), round_texels()], ids=["grid", "uv"])
+@pytest.mark.parametrize("suffix", ["png", "pdf", "svg"])
+def test_strip_is_written_and_the_same_every_time(tmp_path, texels, suffix):
+    recording = recording_of(texels)
+    first, second = tmp_path / f"a.{suffix}", tmp_path / f"b.{suffix}"
+    for path in (first, second):
+        figures.tactile_strip(path, recording, {"pad": texels})
+    assert first.stat().st_size > 2000
+    if suffix != "svg":  # matplotlib gives an SVG's parts random names
+        assert first.read_bytes() == second.read_bytes()
+
+
+def test_colours_of_the_strip_are_the_forces(tmp_path):
+    """The pixel of the strongest texel has the colour that the map gives its share of the scale."""
+    from matplotlib import colormaps
+    from matplotlib.image import imread
+
+    texels = grid_texels()
+    recording = recording_of(texels)
+    recording.sensors["pad"].shear[:] = 0
+    recording.sensors["pad"].normal_force[:] = 0.0
+    recording.sensors["pad"].normal_force[5, :] = 0.12
+    figures.tactile_strip(tmp_path / "a.png", recording, {"pad": texels}, [6], colour_map="viridis", limit=0.2)
+    picture = imread(tmp_path / "a.png")[:, :, :3]
+    pixels = picture[:, : picture.shape[1] * 3 // 4].reshape(-1, 3)  # without the colour bar
+    expected = np.array(colormaps["viridis"](0.6)[:3])
+    assert (np.abs(pixels - expected).max(axis=1) < 0.01).sum() > 1000
+
+
+def test_no_text_is_smaller_than_eight_points_or_leaves_the_figure(tmp_path, monkeypatch):
+    seen = []
+
+    def look(figure, *_):
+        from matplotlib.text import Text
+
+        figure.canvas.draw()
+        renderer = figure.canvas.get_renderer()
+        width, height = figure.canvas.get_width_height()
+        for text in figure.findobj(Text):
+            if text.get_text().strip() and text.get_visible():
+                box = text.get_window_extent(renderer)
+                if box.width > 0:
+                    seen.append(
+                        (
+                            text.get_text(),
+                            text.get_fontsize(),
+                            box.x0 >= 0 and box.x1 <= width and box.y0 >= 0 and box.y1 <= height,
+                        )
+                    )
+
+    monkeypatch.setattr(figures, "_write", look)
+    texels = grid_texels()
+    recording = recording_of(texels)
+    long_name = "Index finger of the left hand"
+    recording.sensors[long_name] = recording.sensors["pad"]
+    both = {"pad": texels, long_name: texels}
+    figures.tactile_strip(tmp_path / "a.png", recording, both)
+    figures.force_curves(tmp_path / "b.png", recording, both, dict.fromkeys(both, SensorParameters()), {"pad": 9.81})
+    assert len(seen) > 20
+    assert [entry for entry in seen if entry[1] < 8 or not entry[2]] == []
+
+
+def test_labels_keep_the_size_of_the_picture(tmp_path):
+    from matplotlib.image import imread, imsave
+
+    source = tmp_path / "render.png"
+    imsave(source, np.full((360, 640, 3), 0.4))
+    texels = grid_texels()
+    figures.label_picture(
+        source,
+        tmp_path / "out.png",
+        recording_of(texels),
+        {"pad": texels},
+        6,
+        labels=[figures.Label("Pad\n1 N", (0.1, 0.8), (0.3, 0.5))],
+    )
+    out = imread(tmp_path / "out.png")
+    assert out.shape[:2] == (360, 640)
+    assert (out[:, :, :3] > 0.9).any()  # there are white words on the grey
+    with pytest.raises(KeyError):
+        figures.label_picture(source, tmp_path / "out.png", recording_of(texels), {"pad": texels}, 99)
+
+
+def test_a_missing_folder_is_one_sentence(tmp_path):
+    texels = grid_texels()
+    with pytest.raises(FileError, match="nowhere"):
+        figures.tactile_strip(tmp_path / "nowhere" / "a.png", recording_of(texels), {"pad": texels})
+
+
+def test_importing_figures_does_not_import_matplotlib():
+    code = "import sys, palpate.core.figures; sys.exit('matplotlib' in sys.modules or 'numba' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code]).returncode == 0
+
+
+def test_figures_leave_pyplot_alone(tmp_path):
+    code = (
+        "import sys; from palpate.core import figures; figures._save(figures._figure(1, 1), sys.argv[1], 50);"
+        "sys.exit('matplotlib.pyplot' in sys.modules)"
+    )
+    assert subprocess.run([sys.executable, "-c", code, str(tmp_path / "a.png")]).returncode == 0
