@@ -25,11 +25,11 @@ import bpy
 Steps = Generator[float | None, None, Any]
 
 TICK = 0.05  # seconds between two events, so that Blender handles and draws each
+GLIDE = 0.02  # where only the last of many counts
 KEY_NAMES = {" ": "SPACE", ".": "PERIOD", ",": "COMMA", "-": "MINUS", "/": "SLASH", "=": "EQUAL", "\\": "BACK_SLASH"}
 KEY_NAMES |= {"_": "MINUS", ":": "SEMI_COLON", ";": "SEMI_COLON", "'": "QUOTE", '"': "QUOTE", "+": "EQUAL"}
-KEY_NAMES |= dict(
-    zip("0123456789", ["ZERO", "ONE", "TWO", "THREE", "FOUR", "FIVE", "SIX", "SEVEN", "EIGHT", "NINE"], strict=True)
-)
+DIGITS = ["ZERO", "ONE", "TWO", "THREE", "FOUR", "FIVE", "SIX", "SEVEN", "EIGHT", "NINE"]
+KEY_NAMES |= {str(digit): name for digit, name in enumerate(DIGITS)}
 
 
 class UIError(Exception):
@@ -147,6 +147,12 @@ class UI:
             self.event("MOUSEMOVE", "NOTHING")
             yield TICK
 
+    def glide(self, x: float, y: float) -> Steps:
+        """Move the mouse on, in passing."""
+        self.x, self.y = round(x), round(y)
+        self.event("MOUSEMOVE", "NOTHING")
+        yield GLIDE
+
     def click(self, x: float, y: float, button: str = "LEFTMOUSE", **modifiers: bool) -> Steps:
         """Click a mouse button; `shift=True` and the like hold a key meanwhile."""
         yield from self.move(x, y)
@@ -190,7 +196,7 @@ class UI:
         yield from self.move(x, y)
         for _ in range(abs(notches)):
             self.event("WHEELDOWNMOUSE" if notches > 0 else "WHEELUPMOUSE")
-            yield TICK
+            yield GLIDE
         yield 0.2
 
     def wait_until(self, holds: Callable[[], object], what: str, timeout: float = 30.0) -> Steps:
@@ -228,7 +234,7 @@ class UI:
         region = self.region(area, "NAVIGATION_BAR")
         seen: dict[str, None] = {}
         for y in range(region.y + region.height - 8, region.y, -12):
-            yield from self.move(region.x + region.width / 2, y)
+            yield from self.glide(region.x + region.width / 2, y)
             if self.button_here(area, "NAVIGATION_BAR") == "context":
                 yield from self.click(self.x, self.y)
                 now = area.spaces.active.context
@@ -240,14 +246,16 @@ class UI:
         raise UIError(f"The Properties editor has no {name} tab now; it has {', '.join(seen)}.")
 
     def button_here(self, area: bpy.types.Area, kind: str = "WINDOW") -> str:
-        """Return what the button under the mouse does: "object.select_all", "palpate.k", or "" for none.
+        """Return what the button under the mouse does, or "" if there is none.
 
-        A button that runs an operator is named by the operator's id, a field by its property's path.
+        A button that runs an operator is named by the operator's id, as in "object.select_all", a field by its
+        property's path, as in "palpate.k" or "location[0]".
         """
         with self.context(area, kind):
             found = bpy.context.property
             if found is not None:
-                return found[1]
+                _owner, path, index = found
+                return path if index < 0 else f"{path}[{index}]"
             if not bpy.ops.ui.copy_python_command_button.poll():
                 return ""
             bpy.context.window_manager.clipboard = ""
@@ -280,20 +288,25 @@ class UI:
         area = area or self.area("PROPERTIES")
         region = self.region(area, kind)
         seen: dict[str, None] = {}
-        yield from self.scroll(*self.centre(area, kind), -40)
+        yield from self.move(*self.centre(area, kind))
+        unscrolled = True
         while True:
-            for y in range(region.y + region.height - 8, region.y + 4, -9):
-                for share in (0.35, 0.6, 0.85):
-                    yield from self.move(region.x + region.width * share, y)
+            for share in (0.6, 0.3, 0.85):
+                for y in range(region.y + region.height - 8, region.y + 4, -11):  # a row is 20 pixels high
+                    yield from self.glide(region.x + region.width * share, y)
                     here = self.button_here(area, kind)
                     seen[here] = None
-                    if here == name:
+                    if here != name:
+                        continue
+                    yield from self.move(self.x, self.y)  # the button under a gliding mouse wakes late: look again
+                    if self.button_here(area, kind) == name:
                         self.say(f"found {name} at {self.x}, {self.y}")
                         return self.x, self.y
             before = region.view2d.region_to_view(0, 0)
-            yield from self.scroll(*self.centre(area, kind), 8)
-            if region.view2d.region_to_view(0, 0) == before:
+            yield from self.scroll(*self.centre(area, kind), -60 if unscrolled else 8)
+            if not unscrolled and region.view2d.region_to_view(0, 0) == before:
                 raise UIError(f"No button {name!r} in {area.type}; there are: {', '.join(filter(None, seen))}.")
+            unscrolled = False
 
     def press(self, name: str, area: bpy.types.Area | None = None, kind: str = "WINDOW") -> Steps:
         """Find a button and click it."""

@@ -26,6 +26,6 @@ def road(ui):
     ui.check(not bpy.data.objects["Camera"].select_get(), "Ctrl Z takes that back")
 
     yield from ui.tab("OBJECT")
-    yield from ui.fill("location", "2.5")
+    yield from ui.fill("location[0]", "2.5")
     ui.value("location", list(bpy.data.objects["Cube"].location))
     yield from ui.screenshot("field-filled")
