@@ -24,7 +24,9 @@ def manifest(repository):
 
 
 def test_version_is_one(project, manifest):
-    assert project["project"]["version"] == manifest["version"]
+    import palpate
+
+    assert project["project"]["version"] == manifest["version"] == palpate.__version__
 
 
 def test_manifest_asks_only_for_files(manifest):
