@@ -219,9 +219,9 @@ def force_curves(
         shear = np.linalg.norm(net_shear(sensor, texels[name]), axis=1)
         axes.plot(recording.times, normal, color=NORMAL_COLOUR, lw=1.8, label="normal, sum of texels")
         if required and name in required:
-            axes.axhline(required[name], color=INK, lw=0.9, ls=(0, (4, 3)), label=f"required: {required[name]:.5g} N")
+            axes.axhline(required[name], color=INK, lw=0.9, ls=(0, (4, 3)), label=f"required: {required[name]:.4f} N")
             axes.annotate(
-                f"{normal[-1]:.5g} N",
+                f"{normal[-1]:.4f} N",
                 (recording.times[-1], normal[-1]),
                 (-4, -6),
                 textcoords="offset points",
