@@ -117,6 +117,39 @@ def turn_quaternion(quaternion, wx, wy, wz):
 
 
 @kernel
+def write_twist(velocity, dt, twist):
+    """How the points of a body move over a step that turns it by the angle ``|ω| dt``.
+
+    The point at arm r, seen from the step's beginning, moves by ``dt (V + W r)`` with ``W = (exp([ω dt]×) - 1) / dt``: the
+    chord of its arc, to rounding. With ``ω × r`` in its place two bodies turning as one would drift apart by the square of the
+    angle, and their bristles with them.
+
+    Parameters
+    ----------
+    velocity : (6,) float
+        Velocity of the reference point and angular velocity.
+    dt : float, seconds
+    twist : (12,) float
+        Written: V, then W row by row.
+    """
+    wx, wy, wz = velocity[3], velocity[4], velocity[5]
+    square = wx * wx + wy * wy + wz * wz
+    half = 0.5 * math.sqrt(square) * dt
+    sine = 1.0 if half < 1e-6 else math.sin(half) / half
+    s, c = sine * math.cos(half), 0.5 * dt * sine * sine
+    twist[0], twist[1], twist[2] = velocity[0], velocity[1], velocity[2]
+    twist[3], twist[4], twist[5] = c * (wx * wx - square), c * wx * wy - s * wz, c * wx * wz + s * wy
+    twist[6], twist[7], twist[8] = c * wx * wy + s * wz, c * (wy * wy - square), c * wy * wz - s * wx
+    twist[9], twist[10], twist[11] = c * wx * wz - s * wy, c * wy * wz + s * wx, c * (wz * wz - square)
+
+
+@kernel
+def look_back(velocity, dt, twist):
+    """Write the twist of the step that has just ended, as seen from its end: ``W = (1 - exp(-[ω dt]×)) / dt``."""
+    write_twist(velocity, -dt, twist)
+
+
+@kernel
 def write_world_inertia(rotation, inertia, out):
     """R I Rᵀ into `out` (3, 3)."""
     for i in range(3):

@@ -84,8 +84,8 @@ def build_tree(meshes: list[TriangleMesh]) -> Tree:
         node_offset += nodes
         triangle_offset += n
         roots.append(node_offset)
-    joined = [np.ascontiguousarray(np.concatenate(arrays)) for arrays in zip(*parts, strict=True)]
-    return Tree(*joined, np.array(roots))
+    arrays = [np.ascontiguousarray(np.concatenate(part)) for part in zip(*parts, strict=True)]
+    return Tree._make([*arrays, np.array(roots)])
 
 
 @kernel
@@ -194,8 +194,15 @@ def segment_entry(ox, oy, oz, dx, dy, dz, mesh, hint, tree):
     """
     t, triangle, leaving = 2.0, -1, 2.0
     corners, normals = tree.corners, tree.normals
+    # The axis along which the segment is longest, and the shear that lays it onto that axis.
+    d = (dx, dy, dz)
+    z = 0 if abs(dx) >= abs(dy) and abs(dx) >= abs(dz) else (1 if abs(dy) >= abs(dz) else 2)
+    x, y = (z + 1) % 3, (z + 2) % 3
+    if d[z] == 0.0:
+        return t, triangle, leaving
+    shear_x, shear_y = d[x] / d[z], d[y] / d[z]
     if hint >= 0:
-        u = _cross_triangle(ox, oy, oz, dx, dy, dz, corners[hint], normals[hint])
+        u = _cross_triangle(ox, oy, oz, dx, dy, dz, x, y, z, shear_x, shear_y, corners[hint], normals[hint])
         if 0.0 <= u <= 1.0:
             t, triangle = u, hint
     reach = min(t, 1.0)
@@ -209,7 +216,7 @@ def segment_entry(ox, oy, oz, dx, dy, dz, mesh, hint, tree):
             node = tree.skip[node]
             continue
         for i in range(tree.first[node], tree.first[node] + tree.number[node]):
-            u = _cross_triangle(ox, oy, oz, dx, dy, dz, corners[i], normals[i])
+            u = _cross_triangle(ox, oy, oz, dx, dy, dz, x, y, z, shear_x, shear_y, corners[i], normals[i])
             if 0.0 <= u <= 1.0:
                 # Of two triangles met at the very same point (a shared edge) the first in the list answers, hint or not.
                 if u < t or (u == t and i < triangle):
@@ -224,22 +231,30 @@ def segment_entry(ox, oy, oz, dx, dy, dz, mesh, hint, tree):
 
 
 @kernel
-def _cross_triangle(ox, oy, oz, dx, dy, dz, corner, normal):
-    """Position on the segment where it crosses a triangle: t in 0…1 entering, -3 - t leaving, 9 when it misses."""
-    ax, ay, az = corner[0, 0] - ox, corner[0, 1] - oy, corner[0, 2] - oz
-    bx, by, bz = corner[1, 0] - ox, corner[1, 1] - oy, corner[1, 2] - oz
-    cx, cy, cz = corner[2, 0] - ox, corner[2, 1] - oy, corner[2, 2] - oz
-    u = dx * (by * cz - cy * bz) + dy * (bz * cx - cz * bx) + dz * (bx * cy - cx * by)
-    v = dx * (cy * az - ay * cz) + dy * (cz * ax - az * cx) + dz * (cx * ay - ax * cy)
-    if u * v < 0.0:
+def _cross_triangle(ox, oy, oz, dx, dy, dz, x, y, z, shear_x, shear_y, corner, normal):
+    """Position on the segment where it crosses a triangle: t in 0…1 entering, -3 - t leaving, 9 when it misses.
+
+    The corners are seen along the segment as points of a plane, each computed from the corner alone, and the origin must lie on
+    one side of all three edges. Rounding may turn the sign of an edge into zero, which counts as inside on both sides, but never
+    into its opposite: nothing leaks between neighbours.
+    """
+    o = (ox, oy, oz)
+    az, bz, cz = corner[0, z] - o[z], corner[1, z] - o[z], corner[2, z] - o[z]
+    ax, ay = corner[0, x] - o[x] - shear_x * az, corner[0, y] - o[y] - shear_y * az
+    bx, by = corner[1, x] - o[x] - shear_x * bz, corner[1, y] - o[y] - shear_y * bz
+    u = ax * by - ay * bx
+    cx, cy = corner[2, x] - o[x] - shear_x * cz, corner[2, y] - o[y] - shear_y * cz
+    v = bx * cy - by * cx
+    if (u < 0.0 and v > 0.0) or (u > 0.0 and v < 0.0):
         return 9.0
-    w = dx * (ay * bz - by * az) + dy * (az * bx - bz * ax) + dz * (ax * by - bx * ay)
-    if u * w < 0.0 or v * w < 0.0 or (u == 0.0 and v == 0.0 and w == 0.0):
+    w = cx * ay - cy * ax
+    if (u < 0.0 or v < 0.0) and w > 0.0 or (u > 0.0 or v > 0.0) and w < 0.0 or (u == 0.0 and v == 0.0 and w == 0.0):
         return 9.0
     slope = normal[0] * dx + normal[1] * dy + normal[2] * dz
     if slope == 0.0:
         return 9.0
-    t = (normal[0] * ax + normal[1] * ay + normal[2] * az) / slope
+    height = normal[0] * (corner[0, 0] - ox) + normal[1] * (corner[0, 1] - oy) + normal[2] * (corner[0, 2] - oz)
+    t = height / slope
     if not 0.0 <= t <= 1.0:
         return 9.0
     return t if slope < 0.0 else -3.0 - t

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, fields
 
 import numpy as np
@@ -118,7 +119,9 @@ class Recording:
     warnings: tuple[str, ...] = field(default=())
 
     @classmethod
-    def stack(cls, frames: list[Frame], body_names, dt: float, digest: str = "", warnings=()) -> Recording:
+    def stack(
+        cls, frames: list[Frame], body_names: Sequence[str], dt: float, digest: str = "", warnings: Sequence[str] = ()
+    ) -> Recording:
         """Put single frames, in order, behind one another."""
         sensors = {
             name: SensorRecording(

@@ -7,6 +7,7 @@ import hashlib
 from dataclasses import dataclass, field, fields
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from .errors import ParameterError, SceneError
 from .mesh import TriangleMesh
@@ -88,9 +89,9 @@ class Motion:
     quaternions: np.ndarray
 
     @classmethod
-    def at_rest(cls, position=(0.0, 0.0, 0.0), quaternion=(1.0, 0.0, 0.0, 0.0)) -> Motion:
+    def at_rest(cls, position: ArrayLike = (0.0, 0.0, 0.0), quaternion: ArrayLike = (1.0, 0.0, 0.0, 0.0)) -> Motion:
         """Return the motion of a body that stays where it is."""
-        return cls(np.zeros(1), np.array([position], float), np.array([quaternion], float))
+        return cls(np.zeros(1), np.atleast_2d(np.array(position, float)), np.atleast_2d(np.array(quaternion, float)))
 
     def extended(self, time: float, position: np.ndarray, quaternion: np.ndarray) -> Motion:
         """Return this motion with one more sample at its end (the timeline learns poses frame by frame)."""
@@ -215,7 +216,7 @@ class Scenario:
         return digest.hexdigest()
 
 
-def _feed(digest, value) -> None:
+def _feed(digest: "hashlib._Hash", value: object) -> None:
     """Hash dataclasses field by field, arrays with type and shape, and everything else by its representation."""
     if hasattr(value, "__dataclass_fields__"):
         for item in fields(value):

@@ -16,9 +16,11 @@ from .bodies import (
     add_cross_block,
     add_force,
     add_own_block,
+    look_back,
     solve_positive,
     turn_quaternion,
     write_rotation,
+    write_twist,
     write_world_inertia,
 )
 from .contact import (
@@ -56,6 +58,10 @@ class Scratch(NamedTuple):
     ----------
     rotation, inertia : (b, 3, 3) float
         Orientation and world-axes inertia of each body.
+    twist : (b, 12) float
+        Velocity of each body's reference point and a matrix W (row by row): the points at arm r move by ``dt (V + W r)``.
+    known : (b, 12) float
+        The part of the twist that is not solved for.
     rows : (s, ROW) float
         One row per contact, those of a pair behind one another.
     slots : (s,) int
@@ -68,6 +74,8 @@ class Scratch(NamedTuple):
 
     rotation: np.ndarray
     inertia: np.ndarray
+    twist: np.ndarray
+    known: np.ndarray
     rows: np.ndarray
     slots: np.ndarray
     pair_stop: np.ndarray
@@ -79,10 +87,15 @@ class Scratch(NamedTuple):
 def scratch_for(world: World, state: State) -> Scratch:
     """Allocate the working memory of a run."""
     b, s = len(state.position), len(state.hint)
+    twist = np.zeros((b, 12))
+    for body in range(b):
+        look_back(state.velocity[body], 1e-9, twist[body])
     n = 6 * max(1, int(world.free_at.max()) + 1)
     return Scratch(
         rotation=np.zeros((b, 3, 3)),
         inertia=np.zeros((b, 3, 3)),
+        twist=twist,
+        known=np.zeros((b, 12)),
         rows=np.zeros((s, ROW)),
         slots=np.zeros(s, np.int64),
         pair_stop=np.zeros(len(world.pairs), np.int64),
@@ -93,13 +106,13 @@ def scratch_for(world: World, state: State) -> Scratch:
 
 
 @kernel
-def _relative_velocity(row, velocity, a, b):
+def _relative_velocity(row, twist, a, b):
     """Velocity of the target's point relative to the sensor's, world axes (Eq. 3)."""
-    va, vb = velocity[a], velocity[b]
+    ta, tb = twist[a], twist[b]
     return (
-        vb[0] + vb[4] * row[8] - vb[5] * row[7] - va[0] - va[4] * row[5] + va[5] * row[4],
-        vb[1] + vb[5] * row[6] - vb[3] * row[8] - va[1] - va[5] * row[3] + va[3] * row[5],
-        vb[2] + vb[3] * row[7] - vb[4] * row[6] - va[2] - va[3] * row[4] + va[4] * row[3],
+        tb[0] + tb[3] * row[6] + tb[4] * row[7] + tb[5] * row[8] - ta[0] - ta[3] * row[3] - ta[4] * row[4] - ta[5] * row[5],
+        tb[1] + tb[6] * row[6] + tb[7] * row[7] + tb[8] * row[8] - ta[1] - ta[6] * row[3] - ta[7] * row[4] - ta[8] * row[5],
+        tb[2] + tb[9] * row[6] + tb[10] * row[7] + tb[11] * row[8] - ta[2] - ta[9] * row[3] - ta[10] * row[4] - ta[11] * row[5],
     )
 
 
@@ -127,6 +140,7 @@ def _solve_velocities(dt, world, state, scratch):
     matrix, vector, momentum = scratch.matrix, scratch.vector, scratch.momentum
     n = 6 * int(free_at.max() + 1)
     for body in range(len(free_at)):
+        write_twist(velocity[body], dt, scratch.twist[body])
         at = 6 * free_at[body]
         if at >= 0:
             for i in range(3):
@@ -135,7 +149,10 @@ def _solve_velocities(dt, world, state, scratch):
                 for j in range(3):
                     total += inertia[body, i, j] * velocity[body, 3 + j]
                 momentum[at + 3 + i] = total
-    for _ in range(PASSES):
+    first_change = 0.0
+    for turn in range(PASSES):
+        for body in range(len(free_at)):
+            _write_known(velocity[body], scratch.twist[body], free_at[body] < 0, scratch.known[body])
         for i in range(n):
             vector[i] = momentum[i]
             for j in range(n):
@@ -148,12 +165,12 @@ def _solve_velocities(dt, world, state, scratch):
             p = world.parameters[sensor]
             for r in range(start, scratch.pair_stop[pair]):
                 row = scratch.rows[r]
-                vx, vy, vz = _relative_velocity(row, velocity, a, b)
+                vx, vy, vz = _relative_velocity(row, scratch.twist, a, b)
                 linearise(row, vx, vy, vz, dt, p)
                 if row[NORMAL_FORCE] <= 0.0 or (at_a < 0 and at_b < 0):
                     continue
                 # What the known part of the motion and the stored springs do to the target; the sensor gets the opposite.
-                ux, uy, uz = _known_velocity(row, velocity, a, b, at_a, at_b)
+                ux, uy, uz = _relative_velocity(row, scratch.known, a, b)
                 out = ux * row[0] + uy * row[1] + uz * row[2]
                 push = p[K] * row[DEPTH] + (row[STIFF_N] - row[STIFF_T]) * out
                 stick = friction_bias(row, dt, p)
@@ -182,45 +199,52 @@ def _solve_velocities(dt, world, state, scratch):
                     for j in range(i + 1):
                         matrix[at + 3 + i, at + 3 + j] += inertia[body, i, j]
         solve_positive(matrix, vector, n)
-        change, speed = 0.0, 0.0
+        change = 0.0
         for body in range(len(free_at)):
             at = 6 * free_at[body]
             if at >= 0:
                 for i in range(6):
                     change = max(change, abs(vector[at + i] - velocity[body, i]))
-                    speed = max(speed, abs(vector[at + i]))
                     velocity[body, i] = vector[at + i]
-        if change <= 1e-3 * speed or change < 1e-9:
+                write_twist(velocity[body], dt, scratch.twist[body])
+        if turn == 0:
+            first_change = change
+        if change <= 1e-6 * first_change or change < 1e-13:
             return
 
 
 @kernel
-def _known_velocity(row, velocity, a, b, at_a, at_b):
-    """Relative velocity of the contact point from the keyframed bodies alone."""
-    ux, uy, uz = 0.0, 0.0, 0.0
-    if at_b < 0:
-        v = velocity[b]
-        ux += v[0] + v[4] * row[8] - v[5] * row[7]
-        uy += v[1] + v[5] * row[6] - v[3] * row[8]
-        uz += v[2] + v[3] * row[7] - v[4] * row[6]
-    if at_a < 0:
-        v = velocity[a]
-        ux -= v[0] + v[4] * row[5] - v[5] * row[4]
-        uy -= v[1] + v[5] * row[3] - v[3] * row[5]
-        uz -= v[2] + v[3] * row[4] - v[4] * row[3]
-    return ux, uy, uz
+def _write_known(velocity, twist, keyframed, known):
+    """What the system does not solve for: all of a keyframed twist, a finite turn's excess over ``ω × r`` of a free one."""
+    for i in range(12):
+        known[i] = twist[i]
+    if not keyframed:
+        for i in range(3):
+            known[i] = 0.0
+        known[4] += velocity[5]
+        known[5] -= velocity[4]
+        known[6] -= velocity[5]
+        known[8] += velocity[3]
+        known[9] += velocity[4]
+        known[10] -= velocity[3]
 
 
 @kernel
-def _store_bristles(world, state, scratch):
+def _store_bristles(dt, world, state, scratch):
     """Bristle deflections at the step's end, back in the frame of the sensor's body."""
     start = 0
     for pair in range(len(world.pairs)):
         a, b = world.sensor_body[world.pairs[pair, 0]], world.target_body[world.pairs[pair, 1]]
-        turn = scratch.rotation[a]
+        turn, spin = scratch.rotation[a], scratch.twist[a]
         for r in range(start, scratch.pair_stop[pair]):
             row = scratch.rows[r]
-            vx, vy, vz = _relative_velocity(row, state.velocity, a, b)
+            vx, vy, vz = _relative_velocity(row, scratch.twist, a, b)
+            # As seen from the sensor, which itself has turned by 1 + dt W at the step's end.
+            vx, vy, vz = (
+                vx + dt * (spin[3] * vx + spin[6] * vy + spin[9] * vz),
+                vy + dt * (spin[4] * vx + spin[7] * vy + spin[10] * vz),
+                vz + dt * (spin[5] * vx + spin[8] * vy + spin[11] * vz),
+            )
             out = vx * row[0] + vy * row[1] + vz * row[2]
             zx = row[KEEP] * row[10] + row[GAIN] * (vx - out * row[0])
             zy = row[KEEP] * row[11] + row[GAIN] * (vy - out * row[1])
@@ -263,11 +287,13 @@ def advance_frame(dt, path_position, path_quaternion, path_velocity, world, tree
             if world.free_at[body] >= 0:
                 write_world_inertia(scratch.rotation[body], world.inertia[body], scratch.inertia[body])
         _solve_velocities(dt, world, state, scratch)
-        _store_bristles(world, state, scratch)
+        _store_bristles(dt, world, state, scratch)
         for body in range(len(world.free_at)):
             if world.free_at[body] >= 0:
                 _move_free(body, dt, world, state, scratch)
     _place_keyframed(len(path_velocity), path_position, path_quaternion, world, state)
+    for body in range(len(world.free_at)):
+        look_back(state.velocity[body], dt, scratch.twist[body])
     return worst
 
 
@@ -313,7 +339,7 @@ def feel(world, state, scratch, force, shear, depth, slip, contact, net, moment)
         for r in range(start, scratch.pair_stop[pair]):
             row = scratch.rows[r]
             texel = world.texel_start[sensor] + scratch.slots[r] - world.slot_start[pair]
-            vx, vy, vz = _relative_velocity(row, state.velocity, a, b)
+            vx, vy, vz = _relative_velocity(row, scratch.twist, a, b)
             rate = vx * row[0] + vy * row[1] + vz * row[2]
             tx, ty, tz = vx - rate * row[0], vy - rate * row[1], vz - rate * row[2]
             square = tx * tx + ty * ty + tz * tz

@@ -1,0 +1,65 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The contact law against the paper's formulas written out again, and against scipy's stiff solvers."""
+
+import numpy as np
+import pytest
+from palpate.core import contact
+from palpate.core.scenario import SensorParameters
+from scipy.integrate import solve_ivp
+
+PAPER = SensorParameters()  # Table 2; Fig. 7 was drawn with these and fn = 0.08 N
+ROW = np.array([PAPER.k, PAPER.cn, PAPER.ct, PAPER.sigma0, PAPER.sigma1, PAPER.x0, PAPER.mus, PAPER.mud])
+
+
+def g(speed, fn, p=PAPER):
+    """Eq. 10–12 with the exponential that was lost in print."""
+    return fn * p.mud + fn * (p.mus - p.mud) * np.exp(-((speed / p.x0) ** 2))
+
+
+def test_normal_force_never_pulls():
+    assert contact.normal_force(1e-3, 0.0, ROW) == pytest.approx(PAPER.k * 1e-3, rel=1e-15)
+    assert contact.normal_force(1e-3, 0.5, ROW) == pytest.approx(PAPER.k * 1e-3 + PAPER.cn * 0.5, rel=1e-15)
+    assert contact.normal_force(1e-3, -100.0, ROW) == 0.0
+
+
+@pytest.mark.parametrize("speed", [0.0, 1e-3, 0.05, 0.3, 1.0, 5.0])
+def test_steady_state_is_the_friction_curve_of_fig_7(speed):
+    """At steady sliding ż = 0, so ft = g(v) sign(v) + ct v (Eq. 9 and 13); reached by the step itself to 1e-9."""
+    fn = 0.08
+    assert contact.stribeck(speed**2, ROW) * fn == pytest.approx(g(speed, fn), rel=1e-14)
+    z = 0.0
+    for _ in range(400):
+        keep, gain = contact.bristle_step(speed**2, fn, 0.1, ROW)
+        z = keep * z + gain * speed
+    if speed > 0:
+        rate = contact.bristle_rate(z, speed, speed**2, fn, ROW)
+        expected = g(speed, fn) + PAPER.ct * speed
+        assert contact.friction_force(z, rate, speed, ROW) == pytest.approx(expected, rel=1e-9 if speed > 0.01 else 0.6)
+    else:
+        assert z == 0.0
+
+
+@pytest.mark.parametrize("dt", [1e-6, 1e-3, 0.1, 100.0])
+def test_bristle_step_is_the_exact_solution_at_constant_velocity(dt):
+    """Against scipy's Radau at 1e-11, for steps from far below to far above the bristle's own time."""
+    fn, speed, z0 = 0.08, 0.2, 0.004
+    exact = solve_ivp(
+        lambda _, z: speed - PAPER.sigma0 * speed / g(speed, fn) * z, (0, dt), [z0], method="Radau", rtol=1e-11, atol=1e-15
+    )
+    keep, gain = contact.bristle_step(speed**2, fn, dt, ROW)
+    assert keep * z0 + gain * speed == pytest.approx(exact.y[0, -1], rel=1e-8)
+
+
+def test_bristles_hold_nothing_without_normal_force_or_friction():
+    assert contact.bristle_step(1.0, 0.0, 1e-3, ROW) == (0.0, 0.0)
+    slippery = ROW.copy()
+    slippery[contact.MUS] = slippery[contact.MUD] = 0.0
+    assert contact.bristle_step(1.0, 1.0, 1e-3, slippery) == (0.0, 0.0)
+    assert contact.bristle_limit(1.0, slippery) == 0.0
+
+
+def test_sticking_is_for_ever():
+    """At zero velocity the bristle keeps every bit, whatever the step: no creep can come from the law itself."""
+    keep, gain = contact.bristle_step(0.0, 0.5, 1e-3, ROW)
+    assert keep == 1.0
+    assert gain == 1e-3

@@ -1,0 +1,431 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The solver against closed forms, conservation laws, scipy's ODE solvers and itself without numba."""
+
+import json
+import os
+import subprocess
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import trimesh
+from palpate.core.bodies import quaternion_product, rotation_matrices
+from palpate.core.errors import PalpateError
+from palpate.core.scenario import Body, Motion, Sensor, SensorParameters, Target
+from palpate.core.solve import Simulation, run, solve
+from scipy.integrate import solve_ivp
+from solver_scenes import GRAVITY, LEVEL, about, box, cube_on_pad, free_body, pad, pressed, shape
+
+STIFF_FRICTION = {"sigma0": 1e3, "sigma1": 10.0, "x0": 0.01}
+
+
+# --- loads -----------------------------------------------------------------------------------------------------------------------
+@pytest.mark.parametrize("mass", [0.1, 1.0, 4.0, 10.0])
+def test_texels_add_up_to_the_weight(mass):
+    """Table 3 of the paper, which reaches 1e-4; a level cube must be exact to rounding after it has settled (2 s)."""
+    recording = run(cube_on_pad(mass))
+    sensor = recording.sensors["pad"]
+    assert sensor.contact[-1].all()
+    assert sensor.normal_force[-1].sum() == pytest.approx(mass * GRAVITY, rel=1e-9)
+    assert -sensor.net_force[-1, 2] == pytest.approx(mass * GRAVITY, rel=1e-9)
+
+
+@pytest.mark.parametrize("n", [6, 32])
+def test_weight_does_not_depend_on_resolution(n):
+    texels = pad(n, n, 0.04 / (n - 1))
+    recording = run(cube_on_pad(1.0, texels=texels, k=84000 / n**2, cn=840 / n**2, dt=None))
+    assert recording.sensors["pad"].normal_force[-1].sum() == pytest.approx(GRAVITY, rel=1e-9)
+
+
+@pytest.mark.parametrize("dt", [1e-4, 1e-3, 4e-3])
+def test_what_rests_does_not_depend_on_the_step(dt):
+    recording = run(cube_on_pad(1.0, dt=dt))
+    assert recording.sensors["pad"].normal_force[-1].sum() == pytest.approx(GRAVITY, rel=1e-9)
+    depth = recording.sensors["pad"].depth[-1]
+    np.testing.assert_allclose(depth, GRAVITY / 84 / 1000, rtol=1e-9)
+
+
+# --- friction --------------------------------------------------------------------------------------------------------------------
+def test_tilted_cube_is_held_and_does_not_creep():
+    """Section 5.1.2 on a pad wide enough to carry the cube: shear m g sin 10°, position the same to 1e-10 m ten seconds later."""
+    texels = pad(14, 14, 0.0034)
+    recording = run(cube_on_pad(1.0, tilt=10.0, texels=texels, frames=480, dt=5e-4, **STIFF_FRICTION))
+    sensor = recording.sensors["pad"]
+    pull = GRAVITY * np.sin(np.radians(10))
+    assert abs(sensor.net_force[-1, 1]) == pytest.approx(pull, rel=1e-9)
+    assert np.abs(recording.poses[-1] - recording.poses[240]).max() < 1e-14
+    assert np.abs(sensor.slip[-1]).max() < 1e-14
+
+
+def plate_on_slope(mass, degrees, frames, fps, dt, **values):
+    """A thin plate that cannot rock, starting where its weight and the springs balance; returns also the direction down the slope."""
+    values = {"k": 1000.0, "cn": 10.0, **values}
+    turn, texels = about((1, 0, 0), degrees), pad(14, 14, 0.0034)
+    rotation, mesh = rotation_matrices(turn), box(0.06, 0.06, 0.001)
+    sunk = mass * GRAVITY * np.cos(np.radians(degrees)) / (len(texels) * values["k"])
+    scenario = cube_on_pad(mass, tilt=degrees, texels=texels, frames=frames, fps=fps, dt=dt, **values)
+    start = Motion.at_rest(rotation @ [0, 0, 0.0005 - sunk], turn)
+    plate = replace(scenario.bodies[1], inertia=np.eye(3) * 1e3, motion=start)
+    return replace(scenario, bodies=(scenario.bodies[0], plate), targets=(Target("plate", 1, mesh),)), -rotation[:, 1]
+
+
+def test_steeper_than_friction_holds_slides_with_the_right_acceleration():
+    """At 30° with mus = mud = 0.3 it accelerates with g (sin - mu cos) once its bristles are bent."""
+    values = {**STIFF_FRICTION, "sigma0": 1e4, "mus": 0.3, "mud": 0.3, "ct": 0.0}
+    scenario, down = plate_on_slope(1.0, 30.0, 9, 100.0, 1e-4, **values)
+    speed = run(scenario).velocities[:, 1, :3] @ down
+    expected = GRAVITY * (np.sin(np.radians(30)) - 0.3 * np.cos(np.radians(30)))
+    assert (speed[-1] - speed[-2]) * 100.0 == pytest.approx(expected, rel=1e-6)
+
+
+def test_shear_follows_the_stiff_ode_of_scipy_through_stick_slip_and_reversal():
+    """A plate pressed to constant depth and dragged to and fro: LuGre per texel against Radau on the same piecewise velocity."""
+    p = SensorParameters(k=100.0, cn=0.0, sigma0=400.0, sigma1=0.5, ct=0.05, x0=0.02)
+    fps, depth = 50.0, 1e-3
+    phase = np.linspace(0, 4 * np.pi, 101)
+    x = 3e-3 * np.sin(phase) * np.linspace(0.05, 1, 101)
+    path = np.stack([x, np.zeros_like(x), np.full_like(x, 0.01 - depth)], axis=1)
+    keys = ("k", "cn", "ct", "sigma0", "sigma1", "x0", "mus", "mud")
+    values = {key: getattr(p, key) for key in keys}
+    recording = run(pressed(box(0.08, 0.08, 0.02), path, fps=fps, dt=1e-3, **values))
+    fn = p.k * depth
+
+    def rate(z, v):
+        g = fn * p.mud + fn * (p.mus - p.mud) * np.exp(-((v / p.x0) ** 2))
+        return v - p.sigma0 * abs(v) / g * z
+
+    z, expected = 0.0, [0.0]
+    for before, after in zip(x[:-1], x[1:], strict=True):
+        v = (after - before) * fps
+        span = solve_ivp(lambda _, y, v=v: [rate(y[0], v)], (0, 1 / fps), [z], method="Radau", rtol=1e-10, atol=1e-14)
+        z = span.y[0, -1]
+        expected.append(p.sigma0 * z + p.sigma1 * rate(z, v) + p.ct * v)
+    shear = recording.sensors["pad"].shear
+    assert np.ptp(shear[:, :, 0], axis=1).max() < 1e-12  # every texel the same
+    assert np.abs(shear[:, :, 1]).max() < 1e-12
+    np.testing.assert_allclose(shear[:, 0, 0], expected, atol=1e-8 * np.abs(expected).max())
+    assert np.abs(expected).max() > 0.9 * p.mus * fn  # it did break away
+
+
+def test_presliding_of_a_free_body_follows_scipy():
+    """A plate on a tilted pad while it sticks: m ẍ = m g sin - n (sigma0 z + sigma1 ż + ct ẋ), the stiff ODE of the whole body."""
+    values = {"sigma0": 200.0, "sigma1": 2.0, "ct": 0.1, "x0": 0.05}
+    mass, tilt, fps = 0.5, np.radians(8), 200.0
+    scenario, down = plate_on_slope(mass, 8.0, 80, fps, 2.5e-5, **values)
+    recording = run(scenario)
+    n, fn = 196, mass * GRAVITY * np.cos(tilt) / 196
+
+    def derivative(_, y):
+        x, v, z = y
+        g = fn * 0.23 + fn * (0.435 - 0.23) * np.exp(-((v / values["x0"]) ** 2))
+        bristle = v - values["sigma0"] * abs(v) / g * z
+        force = values["sigma0"] * z + values["sigma1"] * bristle + values["ct"] * v
+        return [v, GRAVITY * np.sin(tilt) - n * force / mass, bristle]
+
+    exact = solve_ivp(derivative, (0, 79 / fps), [0, 0, 0], method="Radau", t_eval=recording.times, rtol=1e-9, atol=1e-12)
+    travel = (recording.poses[:, 1, :3] - recording.poses[0, 1, :3]) @ down
+    # First order in the step: 25 µs against a slowest time of about 10 ms.
+    np.testing.assert_allclose(travel, exact.y[0], atol=5e-3 * exact.y[0].max())
+    held = np.linalg.norm(recording.sensors["pad"].shear[-1], axis=1).sum()
+    assert held == pytest.approx(GRAVITY * mass * np.sin(tilt), rel=0.01)
+
+
+def test_friction_goes_when_the_load_goes():
+    """Slide, then lift straight up: shear never exceeds what the normal force holds, and ends with the contact."""
+    path = [[0, 0, 0.009], [0.002, 0, 0.009], [0.004, 0, 0.009], *([0.004, 0, 0.009 + 1e-4 * i] for i in range(1, 13))]
+    recording = run(pressed(box(0.08, 0.08, 0.02), path, k=100.0, sigma0=400.0, sigma1=0.0, ct=0.0, cn=0.0))
+    sensor = recording.sensors["pad"]
+    shear = np.linalg.norm(sensor.shear, axis=2)
+    assert shear[2].max() > 0.03
+    assert (shear <= 0.435 * sensor.normal_force + 1e-12).all()
+    assert (shear[-1] == 0).all()
+    assert not sensor.contact[-1].any()
+
+
+# --- shapes ----------------------------------------------------------------------------------------------------------------------
+def test_sphere_presses_as_an_elastic_foundation():
+    """Winkler foundation: F = k/a² π R d² for d ≪ R (exactly k/a² π (R d² - d³/3) for vertical springs with Eq. 4's slope factor
+    neglected); refined texels converge to it."""
+    radius, depth = 0.02, 0.0005
+    ball = shape(trimesh.creation.icosphere(6, radius))
+    exact = np.pi * (radius * depth**2 - depth**3 / 3)
+    errors = []
+    for pitch in (1e-3, 5e-4, 2.5e-4):
+        n = int(round(0.012 / pitch)) + 1
+        path = [[1e-4, 2e-4, radius - depth]]
+        recording = run(pressed(ball, path, texels=pad(n, n, pitch), k=1.0))
+        total = recording.sensors["pad"].normal_force[0].sum() * pitch**2
+        errors.append(abs(total / exact - 1))
+    assert errors[0] < 0.1
+    assert errors[-1] < 0.02
+    assert recording.sensors["pad"].contact[0].sum() * 2.5e-4**2 == pytest.approx(np.pi * 2 * radius * depth, rel=0.05)
+
+
+def test_depth_is_perpendicular_to_a_sloped_surface():
+    """Eq. 4 with the errata: a plane tilted by 20°, d = |s| cos 20°."""
+    turn = about((0, 1, 0), 20.0)
+    rotation = rotation_matrices(turn)
+    mesh = box(0.2, 0.2, 0.02)
+    # The bottom face passes 1 mm under the origin.
+    center = np.array([0, 0, -0.001]) + rotation @ [0, 0, 0.01]
+    texels = pad(3, 3, 1e-4)
+    recording = run(pressed(mesh, [center], texels=texels, turns=[turn], k=1.0))
+    expected = np.cos(np.radians(20)) * (0.001 + np.tan(np.radians(20)) * -texels.position[:, 0] * -1)
+    np.testing.assert_allclose(recording.sensors["pad"].depth[0], expected, rtol=1e-9)
+    into = recording.sensors["pad"].net_force[0] / recording.sensors["pad"].normal_force[0].sum()
+    np.testing.assert_allclose(into, -rotation[:, 2], atol=1e-12)
+
+
+def test_texels_past_their_reach_do_not_act_and_the_user_is_told_once():
+    path = [[0, 0, 0.009 - 0.002 * i] for i in range(8)]
+    recording = run(pressed(box(0.08, 0.08, 0.02), path, max_penetration=0.006))
+    force = recording.sensors["pad"].normal_force.sum(axis=1)
+    assert force[2] > 0
+    assert (force[3:] == 0).all()
+    assert len(recording.warnings) == 1
+    assert "'probe' into 'pad'" in recording.warnings[0]
+    assert "Frame 4: 84 texels" in recording.warnings[0]
+
+
+# --- conservation and symmetry ---------------------------------------------------------------------------------------------------
+def collision() -> tuple:
+    """A small pad on a free block hits a free cube in free space, askew and spinning: nothing else acts."""
+    block, cube = box(0.05, 0.05, 0.02), box(0.04, 0.04, 0.04)
+    texels = replace(pad(10, 10, 0.005), position=pad(10, 10, 0.005).position + [0, 0, 0.01])
+    scenario = cube_on_pad(1.0)
+    return replace(
+        scenario,
+        bodies=(
+            free_body("block", block, 0.7, (0, 0, 0), velocity=np.array([0, 0, 0.1]), angular_velocity=np.array([0.3, 0, 0.2])),
+            free_body("cube", cube, 0.4, (0.004, 0.002, 0.0302), about((1, 2, 3), 4.0), velocity=np.array([0.05, 0, -0.3])),
+        ),
+        sensors=(Sensor("pad", 0, texels, SensorParameters(k=500.0, cn=0.5, **STIFF_FRICTION)),),
+        targets=(Target("cube", 1, cube),),
+        gravity=np.zeros(3),
+        frame_end=40,
+        fps=500.0,
+        dt=1e-4,
+    )
+
+
+def energy_and_momenta(scenario, recording):
+    out = []
+    for poses, velocities in zip(recording.poses, recording.velocities, strict=True):
+        linear, angular, energy = np.zeros(3), np.zeros(3), 0.0
+        for body, pose, twist in zip(scenario.bodies, poses, velocities, strict=True):
+            rotation = rotation_matrices(pose[3:])
+            inertia = rotation @ body.inertia @ rotation.T
+            center = pose[:3] + rotation @ body.center_of_mass
+            linear += body.mass * twist[:3]
+            angular += body.mass * np.cross(center, twist[:3]) + inertia @ twist[3:]
+            energy += 0.5 * body.mass * twist[:3] @ twist[:3] + 0.5 * twist[3:] @ inertia @ twist[3:]
+        out.append((energy, linear, angular))
+    return [np.array(values) for values in zip(*out, strict=True)]
+
+
+def test_free_bodies_keep_their_momenta_and_gain_no_energy():
+    """Forces act at one point on both bodies, so momentum is kept to rounding, and angular momentum to the first order of a step's
+    travel; what the springs store is below what was lost."""
+    scenario = collision()
+    recording = run(scenario)
+    assert recording.sensors["pad"].contact.any()
+    energy, linear, angular = energy_and_momenta(scenario, recording)
+    np.testing.assert_allclose(linear, linear[:1].repeat(len(linear), axis=0), atol=1e-14)
+    scale = np.abs(angular[0]).max()
+    np.testing.assert_allclose(angular, angular[:1].repeat(len(angular), axis=0), atol=2e-3 * scale)
+    assert (energy <= energy[0] * (1 + 1e-9)).all()
+    assert energy[-1] < 0.9 * energy[0]
+
+
+def test_free_flight_is_exact():
+    """Gravity alone: position to the first order of the symplectic step, angular momentum to rounding."""
+    scenario = replace(collision(), gravity=np.array([0, 0, -GRAVITY]))
+    far = replace(
+        scenario.bodies[1],
+        motion=Motion.at_rest((1, 0, 0)),
+        inertia=np.diag([1e-4, 2e-4, 3e-4]),
+        angular_velocity=np.array([3.0, 2.0, 1.0]),
+    )
+    scenario = replace(scenario, bodies=(scenario.bodies[0], far))
+    recording = run(scenario)
+    t = recording.times
+    fall = recording.poses[:, 1, :3] - [1, 0, 0]
+    expected = far.velocity * t[:, None] + 0.5 * np.array([0, 0, -GRAVITY]) * t[:, None] ** 2
+    np.testing.assert_allclose(fall, expected, atol=0.6 * GRAVITY * 1e-4 * t[-1])
+    rotation = rotation_matrices(recording.poses[:, 1, 3:])
+    spin = np.einsum("fij,jk,flk,fl->fi", rotation, far.inertia, rotation, recording.velocities[:, 1, 3:])
+    np.testing.assert_allclose(spin, spin[:1].repeat(len(spin), axis=0), atol=1e-15)
+
+
+def test_the_whole_scene_turned_and_moved_feels_the_same():
+    """Frame invariance: bristles are carried along, so that a turned and translated world gives the same readings to 1e-9."""
+    path = [[0.0005 * i, 0.0002 * i, 0.0093 - 0.0001 * i] for i in range(10)]
+    plain = pressed(box(0.03, 0.02, 0.02), path, turns=[about((0, 0, 1), 2.0 * i) for i in range(10)], **STIFF_FRICTION)
+    turn, shift = about((1, -2, 0.5), 73.0), np.array([0.3, -0.2, 0.7])
+
+    def moved(body):
+        m = body.motion
+        return replace(
+            body,
+            motion=Motion(m.times, m.positions @ rotation_matrices(turn).T + shift, quaternion_product(turn, m.quaternions)),
+        )
+
+    other = replace(plain, bodies=tuple(moved(body) for body in plain.bodies))
+    a, b = run(plain).sensors["pad"], run(other).sensors["pad"]
+    assert np.abs(a.shear).max() > 1e-3
+    np.testing.assert_allclose(b.shear, a.shear, atol=1e-9 * np.abs(a.shear).max())
+    np.testing.assert_allclose(b.normal_force, a.normal_force, atol=1e-9 * a.normal_force.max())
+    np.testing.assert_allclose(b.net_torque, a.net_torque, atol=1e-9 * np.abs(a.net_torque).max())
+
+
+def test_both_carried_along_together_feel_nothing_new():
+    """Pad and probe on one accelerating, turning carrier: what the bristles hold stays as it was."""
+    fine = np.arange(20 * 100) / 100.0  # in frames; the pose is given a hundred times a frame, so that both follow the same arc
+    drag = np.zeros((len(fine), 3))
+    drag[:, 0] = np.minimum(fine, 3) * 1e-3
+    drag[:, 2] = 0.009
+    after = np.maximum(0, fine - 4.0)
+    turns = np.array([about((0.2, 0.3, 1), 5.0 * t) for t in after])
+    rotations, shift = rotation_matrices(turns), np.outer(after**2, [1e-3, 2e-3, -1e-3])
+    scenario = pressed(box(0.08, 0.08, 0.02), drag[:1], sigma0=100.0, sigma1=0.0, ct=0.0)
+    pad_motion = Motion(fine / 24.0, shift, turns)
+    probe_motion = Motion(fine / 24.0, np.einsum("fij,fj->fi", rotations, drag) + shift, turns)
+    bodies = (replace(scenario.bodies[0], motion=pad_motion), replace(scenario.bodies[1], motion=probe_motion))
+    recording = run(replace(scenario, bodies=bodies, dt=1.01 / 2400, frame_end=20))
+    shear = recording.sensors["pad"].shear
+    assert np.linalg.norm(recording.poses[-1, 0, :3]) > 0.5
+    # What is left is the rounding of poses half a metre away, integrated.
+    np.testing.assert_allclose(shear[5:], shear[4:5].repeat(15, axis=0), atol=1e-9 * np.abs(shear[4]).max())
+
+
+# --- several of everything -------------------------------------------------------------------------------------------------------
+def test_two_sensors_and_two_targets_do_not_mix():
+    one, two = cube_on_pad(1.0), cube_on_pad(2.0)
+    aside = np.array([1.0, 0, 0])
+    bodies = (
+        *one.bodies,
+        replace(two.bodies[0], name="pad 2", motion=Motion.at_rest(aside)),
+        replace(two.bodies[1], name="cube 2", motion=Motion.at_rest(two.bodies[1].motion.positions[0] + aside)),
+    )
+    sensors = (one.sensors[0], replace(two.sensors[0], name="pad 2", body=2))
+    targets = (one.targets[0], replace(two.targets[0], name="cube 2", body=3))
+    recording = run(replace(one, bodies=bodies, sensors=sensors, targets=targets))
+    assert recording.sensors["pad"].normal_force[-1].sum() == pytest.approx(GRAVITY, rel=1e-9)
+    assert recording.sensors["pad 2"].normal_force[-1].sum() == pytest.approx(2 * GRAVITY, rel=1e-9)
+    alone = run(one)
+    assert np.array_equal(alone.sensors["pad"].normal_force, recording.sensors["pad"].normal_force)
+
+
+def test_pads_act_and_report_nothing():
+    scenario = cube_on_pad(1.0)
+    quiet = replace(scenario.sensors[0], name="table", readout=False)
+    away = Sensor("elsewhere", 2, pad())
+    scenario = replace(scenario, bodies=(*scenario.bodies, Body("far", Motion.at_rest((5, 0, 0)))), sensors=(quiet, away))
+    recording = run(scenario)
+    assert list(recording.sensors) == ["elsewhere"]
+    assert recording.poses[-1, 1, 2] == pytest.approx(0.025 - GRAVITY / 84e3, abs=1e-9)
+
+
+def test_reading_is_the_linear_conversion():
+    scenario = cube_on_pad(1.0, gain=3.0, zero=7.0, unit="counts")
+    sensor = run(scenario).sensors["pad"]
+    np.testing.assert_allclose(sensor.reading, 7.0 + 3.0 * sensor.normal_force, rtol=1e-15)
+
+
+# --- determinism -----------------------------------------------------------------------------------------------------------------
+def test_same_scenario_same_bits():
+    first, second = run(cube_on_pad(1.0, tilt=5.0)), run(cube_on_pad(1.0, tilt=5.0))
+    assert first.digest == second.digest
+    assert np.array_equal(first.poses, second.poses)
+    assert np.array_equal(first.sensors["pad"].shear, second.sensors["pad"].shear)
+
+
+def test_learning_the_motion_frame_by_frame_gives_the_same_bits():
+    """The timeline knows only the poses so far; a bake knows them all."""
+    rng = np.random.default_rng(6)
+    path = np.array([0, 0, 0.0093]) + rng.normal(size=(12, 3)) * 2e-4
+    turns = np.array([about(rng.normal(size=3), 2.0) for _ in range(12)])
+    scenario = pressed(box(0.03, 0.02, 0.02), path, turns=turns, **STIFF_FRICTION)
+    known = run(scenario)
+    start = replace(scenario.bodies[1], motion=Motion.at_rest(path[0], turns[0]))
+    live = Simulation(replace(scenario, bodies=(scenario.bodies[0], start)))
+    assert np.array_equal(live.observe().sensors["pad"].shear, known.sensors["pad"].shear[0])
+    for i in range(1, 12):
+        live.extend({1: (path[i], turns[i])})
+        frame = live.advance()
+        assert np.array_equal(frame.sensors["pad"].shear, known.sensors["pad"].shear[i])
+        assert np.array_equal(frame.sensors["pad"].normal_force, known.sensors["pad"].normal_force[i])
+        assert np.array_equal(frame.poses, known.poses[i])
+
+
+PLAIN = """
+import json, sys
+sys.path.insert(0, {tests!r})
+from solver_scenes import cube_on_pad, pad
+from palpate.core import jit
+from palpate.core.solve import run
+assert not jit.COMPILED
+r = run(cube_on_pad(1.0, tilt=5.0, texels=pad(5, 4, 0.01), frames=4, dt=1e-3, sigma0=500.0))
+print(json.dumps([r.poses.tolist(), r.sensors["pad"].normal_force.tolist(), r.sensors["pad"].shear.tolist()]))
+"""
+
+
+def test_plain_python_gives_the_same_numbers():
+    """To 1e-12: compiled exp and sqrt may differ from Python's in the last place, nothing else may."""
+    tests = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
+    done = subprocess.run(
+        [sys.executable, "-c", PLAIN.format(tests=tests)],
+        env={**os.environ, "PALPATE_NUMBA": "0"},
+        capture_output=True,
+        text=True,
+    )
+    assert done.returncode == 0, done.stderr
+    poses, force, shear = (np.array(values) for values in json.loads(done.stdout))
+    r = run(cube_on_pad(1.0, tilt=5.0, texels=pad(5, 4, 0.01), frames=4, dt=1e-3, sigma0=500.0))
+    np.testing.assert_allclose(poses, r.poses, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(force, r.sensors["pad"].normal_force, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(shear, r.sensors["pad"].shear, rtol=0, atol=1e-12)
+
+
+# --- driving ---------------------------------------------------------------------------------------------------------------------
+def test_progress_counts_and_closing_stops():
+    generator = solve(cube_on_pad(1.0, frames=10))
+    steps = [next(generator) for _ in range(3)]
+    assert [(step.frame, step.done, step.total) for step in steps] == [(1, 1, 10), (2, 2, 10), (3, 3, 10)]
+    generator.close()
+    with pytest.raises(StopIteration):
+        next(generator)
+
+
+@pytest.mark.parametrize("k", [1.0, 1e6])
+@pytest.mark.parametrize("mass", [1e-3, 100.0])
+@pytest.mark.parametrize("dt", [1e-5, 1e-2])
+def test_corners_of_the_parameter_space_stay_finite_and_come_to_rest(k, mass, dt):
+    """A penalty method with explicit steps would explode in half of these."""
+    scenario = cube_on_pad(mass, k=k, cn=0.01 * k, sigma0=k, sigma1=0.01 * k, dt=dt, frames=12, gap=1e-5)
+    recording = run(scenario)
+    for sensor in recording.sensors.values():
+        assert np.isfinite(sensor.normal_force).all()
+        assert np.isfinite(sensor.shear).all()
+    speed = np.linalg.norm(recording.velocities[:, 1, :3], axis=1)
+    assert (speed <= GRAVITY * recording.times + 1e-9).all()  # never faster than free fall
+
+
+def test_a_scenario_that_makes_no_run_is_refused():
+    scenario = cube_on_pad(1.0)
+    with pytest.raises(PalpateError, match="runs backwards"):
+        run(replace(scenario, frame_start=10, frame_end=1))
+    with pytest.raises(PalpateError, match="no sensor"):
+        run(replace(scenario, sensors=()))
+    with pytest.raises(PalpateError, match="Nothing in 'scene' can touch"):
+        run(replace(scenario, targets=()))
+    with pytest.raises(PalpateError, match="k of sensor 'pad' is 0"):
+        run(replace(scenario, sensors=(replace(scenario.sensors[0], parameters=SensorParameters(k=0.0)),)))
+    with pytest.raises(PalpateError, match="mass of free body 'cube'"):
+        run(replace(scenario, bodies=(scenario.bodies[0], replace(scenario.bodies[1], mass=0.0))))
+    with pytest.raises(PalpateError, match="time step"):
+        run(replace(scenario, dt=-1.0))
+    bad = Motion(np.zeros(1), np.array([[np.nan, 0, 0]]), np.array([LEVEL]))
+    with pytest.raises(PalpateError, match="motion of 'pad'"):
+        run(replace(scenario, bodies=(replace(scenario.bodies[0], motion=bad), scenario.bodies[1])))

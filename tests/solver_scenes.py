@@ -1,0 +1,83 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Small scenarios that several tests press, tilt and shake."""
+
+import numpy as np
+import trimesh
+from palpate.core.bodies import rotation_matrices
+from palpate.core.mesh import TriangleMesh, checked_mesh, mass_properties
+from palpate.core.scenario import Body, Motion, Scenario, Sensor, SensorParameters, Target
+from palpate.core.texels import Texels, texels_from_region
+
+GRAVITY = 9.81
+LEVEL = (1.0, 0.0, 0.0, 0.0)
+
+
+def grid_mesh(rows: int = 14, columns: int = 6, pitch: float = 0.0034) -> TriangleMesh:
+    """A flat sheet in z = 0, centred, rows along +y, columns along +x, normals +z."""
+    y, x = np.mgrid[0:rows, 0:columns] * pitch
+    vertices = np.stack([x - x.mean(), y - y.mean(), np.zeros_like(x)], axis=-1).reshape(-1, 3)
+    corner = (np.arange(rows - 1)[:, None] * columns + np.arange(columns - 1)).ravel()
+    quads = np.stack([corner, corner + 1, corner + columns + 1, corner + columns], axis=1)
+    triangles = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
+    return checked_mesh(vertices, triangles, "pad", quads)[0]
+
+
+def pad(rows: int = 14, columns: int = 6, pitch: float = 0.0034) -> Texels:
+    """The texels of :func:`grid_mesh`."""
+    mesh = grid_mesh(rows, columns, pitch)
+    return texels_from_region(mesh, np.ones(len(mesh.vertices), bool), "pad")
+
+
+def shape(solid: trimesh.Trimesh, name: str = "object") -> TriangleMesh:
+    """A trimesh solid as a mesh of ours."""
+    return checked_mesh(solid.vertices, solid.faces, name)[0]
+
+
+def box(*size: float) -> TriangleMesh:
+    """A box of the given full sizes around the origin."""
+    return shape(trimesh.creation.box(size), "box")
+
+
+def about(axis, degrees: float) -> np.ndarray:
+    """Quaternion of a turn about an axis."""
+    half = np.radians(degrees) / 2
+    return np.concatenate([[np.cos(half)], np.sin(half) * np.asarray(axis, float) / np.linalg.norm(axis)])
+
+
+def free_body(name, mesh, mass, position, quaternion=LEVEL, **start) -> Body:
+    """A free body whose mass is spread through its mesh."""
+    center, inertia, _ = mass_properties(mesh, mass, name)
+    return Body(name, Motion.at_rest(position, quaternion), True, mass, center, inertia, **start)
+
+
+def cube_on_pad(mass=1.0, tilt=0.0, texels=None, size=0.05, frames=48, dt=1e-4, fps=24.0, gap=1e-4, **parameters) -> Scenario:
+    """The paper's section 5.1: a cube on a pad (k 1000, cn 10 unless told) that may be tilted about x, so along its rows."""
+    texels = pad() if texels is None else texels
+    values = {"k": 1000.0, "cn": 10.0, **parameters}
+    turn = about((1, 0, 0), tilt)
+    mesh = box(size, size, size)
+    above = rotation_matrices(turn) @ np.array([0.0, 0.0, size / 2 + gap])
+    return Scenario(
+        bodies=(Body("pad", Motion.at_rest(quaternion=turn)), free_body("cube", mesh, mass, above, turn)),
+        sensors=(Sensor("pad", 0, texels, SensorParameters(**values)),),
+        targets=(Target("cube", 1, mesh),),
+        frame_end=frames,
+        fps=fps,
+        gravity=np.array([0.0, 0.0, -GRAVITY]),
+        dt=dt,
+    )
+
+
+def pressed(mesh, path, texels=None, times=None, fps=24.0, dt=1e-3, turns=None, **parameters) -> Scenario:
+    """A keyframed object that follows `path` (m, 3), one sample per frame, over a pad that stays where it is."""
+    path = np.asarray(path, float)
+    turns = np.tile(LEVEL, (len(path), 1)) if turns is None else np.asarray(turns, float)
+    times = np.arange(len(path)) / fps if times is None else times
+    return Scenario(
+        bodies=(Body("pad", Motion.at_rest()), Body("probe", Motion(times, path, turns))),
+        sensors=(Sensor("pad", 0, pad() if texels is None else texels, SensorParameters(**parameters)),),
+        targets=(Target("probe", 1, mesh),),
+        frame_end=len(path),
+        fps=fps,
+        dt=dt,
+    )
