@@ -59,7 +59,7 @@ def save_recording(path: str | os.PathLike, recording: Recording) -> None:
             info.create_system = 3  # the same on every system
             info.external_attr = 0o644 << 16
             with archive.open(info, "w", force_zip64=array.nbytes > 1 << 30) as member:
-                np.lib.format.write_array(member, np.ascontiguousarray(array), allow_pickle=False)
+                np.lib.format.write_array(member, np.asarray(array, order="C"), allow_pickle=False)
 
 
 def load_recording(path: str | os.PathLike) -> Recording:

@@ -183,8 +183,8 @@ def folder_names(names: Iterable[str]) -> dict[str, str]:
     chosen: dict[str, str] = {}
     taken: set[str] = set()
     for name in dict.fromkeys(names):
-        clean = "".join(c if c.isalnum() or c in " ._-" else "_" for c in name).strip(" .")[:100]
-        if clean != name or clean.split(".")[0].lower() in _RESERVED or clean.casefold() in taken:
+        clean = "".join(c if c.isalnum() or c in " ._-" else "_" for c in name).strip(" .")[:60]
+        if not clean or clean != name or clean.split(".")[0].lower() in _RESERVED or clean.casefold() in taken:
             base = f"{clean or 'sensor'}-{zlib.crc32(name.encode('utf-8', 'surrogatepass')):08x}"
             clean = base if clean.split(".")[0].lower() not in _RESERVED else f"_{base}"
         while clean.casefold() in taken:

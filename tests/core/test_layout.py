@@ -168,6 +168,15 @@ def test_pad_that_faces_down_keeps_columns_along_x():
     assert lowest[0] == position[:, 0].min() and lowest[1] == position[:, 1].max()  # (−z) × x is −y
 
 
+def test_normals_decide_what_is_outside():
+    places, triangles, _ = grid_mesh(5, 3)
+    position = flat(places)
+    layout, along = grid_layout(position, np.tile([0, 0, -1.0], (15, 1)), triangles)
+    np.testing.assert_allclose(along, np.tile([1.0, 0, 0], (15, 1)), atol=1e-12)
+    np.testing.assert_array_equal(layout.row, 4 - places[:, 1])
+    np.testing.assert_array_equal(layout.column, places[:, 0])
+
+
 def test_quads_decide_where_triangles_cannot():
     angle = np.arange(8) * np.pi / 4
     position = np.vstack([np.zeros(3), np.column_stack([np.cos(angle), np.sin(angle), 0 * angle])])
@@ -510,6 +519,25 @@ def test_a_few_tiny_triangles_do_not_blow_up_the_picture():
     triangles = triangles[:-1]
     layout, _ = uv_layout(position, np.tile([0, 0, 1.0], (400, 1)), triangles)
     assert layout.cell == 0 and layout.width * layout.height < 60 * len(triangles)
+
+
+def test_one_tiny_flipped_triangle_needs_an_atlas():
+    places, triangles, _ = grid_mesh(20, 20)
+    position = flat(places, (1, 1))
+    triangles = triangles[:-1]
+    assert uv_layout(position, np.tile([0, 0, 1.0], (400, 1)), triangles)[0].cell == 0
+    position[41, 0] = 2 - 1e-3  # past its neighbour, by less than a pixel
+    position[42, 0] = 2 - 2e-3
+    assert uv_layout(position, np.tile([0, 0, 1.0], (400, 1)), triangles)[0].cell > 0
+
+
+def test_longest_edge_lies_across_the_cell_of_an_atlas():
+    position, triangles, _, layout, _ = lay_out(*compact(*next(rest[:2] for n, *rest in surfaces() if n == "torus")))
+    on_map, in_space = (
+        np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
+        for corners in (corner_pixels(layout), position[triangles])
+    )
+    np.testing.assert_array_equal(on_map.argmax(axis=1), in_space.argmax(axis=1))
 
 
 def test_same_input_same_picture():

@@ -1,0 +1,615 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Files are whole or not there, equal data are equal bytes, and a damaged file is one clear sentence."""
+
+from __future__ import annotations
+
+import copy
+import errno
+import json
+import os
+import signal
+import stat
+import subprocess
+import sys
+import zipfile
+from dataclasses import fields, replace
+from pathlib import Path
+
+import numpy as np
+import OpenEXR
+import pytest
+
+from palpate.core.errors import FileError, PalpateError
+from palpate.core.formats import files
+from palpate.core.formats.archive import load_recording, save_recording
+from palpate.core.formats.exr import CHANNELS, exr_channels, read_exr, write_exr
+from palpate.core.formats.files import (
+    Manifest,
+    atomic_write,
+    folder_names,
+    frame_file,
+    read_manifest,
+    remove_leftovers,
+    writable_folder,
+    write_manifest,
+)
+from palpate.core.layout import GridLayout, uv_layout
+from palpate.core.recording import Recording, SensorFrame, SensorRecording
+
+on_linux = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="looks at Linux's /proc and /dev")
+
+
+def one_sentence(error, *words):
+    """Check that a message is a single line that names what it is about."""
+    text = str(error.value)
+    assert isinstance(error.value, PalpateError)
+    assert "\n" not in text and text.endswith(".") and ":" in text
+    for word in words:
+        assert str(word) in text
+    return text
+
+
+# --- writing whole files
+
+
+def test_new_and_replaced_file(tmp_path):
+    target = tmp_path / "a.txt"
+    for content in ("first", "second"):
+        with atomic_write(target) as temporary:
+            assert temporary.parent == tmp_path and temporary.suffix == ".txt" and temporary != target
+            temporary.write_text(content)
+        assert target.read_text() == content
+        assert os.listdir(tmp_path) == ["a.txt"]
+
+
+def test_error_in_the_body_keeps_the_old_file(tmp_path):
+    target = tmp_path / "a.txt"
+    target.write_text("old")
+    for error in (ValueError, KeyboardInterrupt, GeneratorExit):
+        with pytest.raises(error), atomic_write(target) as temporary:
+            temporary.write_text("half")
+            raise error
+        assert target.read_text() == "old" and os.listdir(tmp_path) == ["a.txt"]
+
+
+@pytest.mark.parametrize("step", ["fsync", "replace"])
+def test_full_disk(tmp_path, monkeypatch, step):
+    target = tmp_path / "a.txt"
+    target.write_text("old")
+
+    def full(*_):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(files.os, step, full)
+    with pytest.raises(FileError) as error, atomic_write(target) as temporary:
+        temporary.write_text("new")
+    assert "free some space" in one_sentence(error, target)
+    assert target.read_text() == "old" and os.listdir(tmp_path) == ["a.txt"]
+
+
+def test_link_stays_a_link(tmp_path):
+    (tmp_path / "real").mkdir()
+    link = tmp_path / "link.txt"
+    link.symlink_to(tmp_path / "real" / "a.txt")
+    with atomic_write(link) as temporary:
+        temporary.write_text("text")
+    assert link.is_symlink() and (tmp_path / "real" / "a.txt").read_text() == "text"
+
+
+def test_umask_decides_who_may_read(tmp_path):
+    before = os.umask(0o027)
+    try:
+        with atomic_write(tmp_path / "a") as temporary:
+            temporary.write_text("text")
+    finally:
+        os.umask(before)
+    assert stat.S_IMODE((tmp_path / "a").stat().st_mode) == 0o640
+
+
+def cannot_write(path, *words):
+    """Check that nothing can be written at `path`."""
+    with pytest.raises(FileError) as error, atomic_write(path) as temporary:
+        temporary.write_text("never")
+    return one_sentence(error, *words)
+
+
+def test_wrong_places(tmp_path):
+    (tmp_path / "file").write_text("text")
+    assert "does not exist" in cannot_write(tmp_path / "missing" / "a.exr", tmp_path / "missing")
+    assert "is a file" in cannot_write(tmp_path / "file" / "a.exr", tmp_path / "file")
+    assert "is a file" in cannot_write(tmp_path / "file" / "deeper" / "a.exr", tmp_path / "file")
+    assert "is a folder" in cannot_write(tmp_path, tmp_path)
+    assert "shorter" in cannot_write(tmp_path / ("x" * 250), tmp_path)
+    assert os.listdir(tmp_path) == ["file"] and (tmp_path / "file").read_text() == "text"
+
+
+@on_linux
+def test_places_where_not_even_root_may_write():
+    cannot_write("/proc/a.exr", "/proc")
+    with pytest.raises(FileError) as error:
+        writable_folder("/proc")
+    one_sentence(error, "/proc")
+    assert "device" in cannot_write("/dev/null", "/dev/null")
+    assert Path("/dev/null").is_char_device()
+
+
+def test_read_only_folder(tmp_path, monkeypatch):
+    def forbidden(*_):
+        raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
+
+    monkeypatch.setattr(files.os, "open", forbidden)
+    assert "read-only" in cannot_write(tmp_path / "a.exr", tmp_path)
+    with pytest.raises(FileError) as error:
+        writable_folder(tmp_path)
+    assert "read-only" in one_sentence(error, tmp_path)
+
+
+def test_read_only_file(tmp_path, monkeypatch):
+    target = tmp_path / "a.exr"
+    target.write_text("old")
+    target.chmod(0o444)
+    monkeypatch.setattr(files.os, "access", lambda path, mode: path != target)  # root may write anything
+    assert "read-only" in cannot_write(target, target)
+    assert target.read_text() == "old"
+
+
+def test_writable_folder(tmp_path):
+    assert writable_folder(tmp_path) == tmp_path
+    with pytest.raises(FileError) as error:
+        writable_folder(tmp_path / "new")
+    one_sentence(error, tmp_path / "new")
+    assert writable_folder(tmp_path / "new", create=True).is_dir()
+    assert writable_folder(tmp_path / "new", create=True).is_dir()
+    with pytest.raises(FileError) as error:
+        writable_folder(tmp_path / "x" / "y", create=True)
+    one_sentence(error, tmp_path / "x")
+    (tmp_path / "file").write_text("")
+    for place in ("file", "file/deeper"):
+        with pytest.raises(FileError) as error:
+            writable_folder(tmp_path / place, create=True)
+        one_sentence(error, tmp_path / "file")
+    assert sorted(os.listdir(tmp_path)) == ["file", "new"]
+
+
+def test_kill_in_the_middle_leaves_the_old_file(tmp_path):
+    target = tmp_path / "manifest.json"
+    target.write_text("old")
+    program = (
+        "import os, signal, sys\n"
+        "from palpate.core.formats.files import atomic_write\n"
+        "with atomic_write(sys.argv[1]) as temporary:\n"
+        "    temporary.write_text('half')\n"
+        "    os.kill(os.getpid(), signal.SIGKILL)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", program, str(target)], check=False)
+    assert done.returncode == -signal.SIGKILL
+    assert target.read_text() == "old"
+    left = [name for name in os.listdir(tmp_path) if name != target.name]
+    assert len(left) == 1
+    mine = tmp_path / ".notes.partial.txt"  # the user's own, whatever it is
+    mine.write_text("mine")
+    assert [path.name for path in remove_leftovers(tmp_path)] == left
+    assert sorted(os.listdir(tmp_path)) == [mine.name, target.name]
+
+
+# --- names
+
+
+def test_folder_names():
+    names = ["Pad", "pad", "Pad 2", "a/b", "a_b", "..", "", "CON", "nul.x", "Daumen ü", "触" * 300, "a\\b", " a", "a\n"]
+    chosen = folder_names(names)
+    assert list(chosen) == names
+    for plain in ("Pad", "Pad 2", "a_b", "Daumen ü"):
+        assert chosen[plain] == plain
+    folded = [name.casefold() for name in chosen.values()]
+    assert len(set(folded)) == len(names)
+    for name in chosen.values():
+        assert name and name.strip(" .") == name and len(name.encode()) < 250
+        assert not set(name) & set('/\\:*?"<>|\n') and name.split(".")[0].lower() not in ("con", "nul")
+    assert chosen == folder_names(names)
+    assert folder_names(["a/b"])["a/b"] == chosen["a/b"]  # whoever else is there
+
+
+def test_frame_file():
+    assert [frame_file(frame) for frame in (1, 250, 12345)] == [
+        "tactile_0001.exr",
+        "tactile_0250.exr",
+        "tactile_12345.exr",
+    ]
+
+
+# --- the manifest
+
+
+def manifest(**changes):
+    """Return a manifest with something in every field."""
+    return replace(
+        Manifest(
+            sensor="Pad ü/1",
+            palpate="0.1.0",
+            frame_start=1,
+            frame_end=40,
+            fps=24.0,
+            dt=1 / 3e4,
+            digest="ab" * 32,
+            unit="kPa",
+            shape=(14, 6),
+            parameters={"k": 58.5, "unit": "N", "list": [1, 2.5]},
+            warnings=("Texel 3 of 'Pad' bottomed out at frame 7: raise k.",),
+            done=((1, 3), (7, 7)),
+            complete=False,
+        ),
+        **changes,
+    )
+
+
+def test_manifest_round_trip(tmp_path):
+    path = write_manifest(tmp_path, manifest())
+    assert path == tmp_path / "manifest.json" and os.listdir(tmp_path) == ["manifest.json"]
+    assert read_manifest(tmp_path) == manifest()
+    content = json.loads(path.read_text(encoding="utf-8"))
+    assert content["format"] == "palpate-bake/1" and content["sensor"] == "Pad ü/1" and content["dt"] == 1 / 3e4
+    before = path.read_bytes()
+    write_manifest(tmp_path, read_manifest(tmp_path))
+    assert path.read_bytes() == before
+
+
+def test_manifest_keeps_count_of_frames(tmp_path):
+    rng = np.random.default_rng(0)
+    state, expected = manifest(done=()), set()
+    for frame in rng.integers(1, 41, 60).tolist():
+        state = state.with_frame(frame)
+        expected.add(frame)
+        assert {f for f in range(-3, 50) if state.is_done(f)} == expected
+        assert all(a <= b < c - 1 for (a, b), (c, _) in zip(state.done, state.done[1:]))
+    for frame in expected:
+        (tmp_path / frame_file(frame)).touch()
+    assert state.missing(tmp_path) == sorted(set(range(1, 41)) - expected)
+    gone = sorted(expected)[3]
+    (tmp_path / frame_file(gone)).unlink()
+    assert gone in state.missing(tmp_path)
+    (tmp_path / frame_file(state.missing(tmp_path)[-1])).touch()  # a file that nobody vouches for does not count
+    assert len(state.missing(tmp_path)) == 41 - len(expected)
+
+
+@pytest.mark.parametrize("value", [float("nan"), float("inf"), object()])
+def test_manifest_without_meaning_is_our_fault(tmp_path, value):
+    with pytest.raises(ValueError):
+        write_manifest(tmp_path, manifest(parameters={"k": value}))
+    assert os.listdir(tmp_path) == []
+
+
+def test_damaged_manifest(tmp_path):
+    with pytest.raises(FileError) as error:
+        read_manifest(tmp_path)
+    one_sentence(error, tmp_path, "does not exist")
+    path = write_manifest(tmp_path, manifest())
+    whole = path.read_bytes()
+    good = json.loads(whole)
+    broken = [b"", b"{", b"[]", b"null", b"\xff\xfe", whole[: len(whole) // 2], b"[" * 100_000]
+    for key in good:
+        broken.append(json.dumps({k: v for k, v in good.items() if k != key}).encode())
+        for wrong in (None, {"a": []}, [[1]], "text", True):
+            if not isinstance(wrong, type(good[key])):
+                broken.append(json.dumps({**good, key: wrong}).encode())
+    broken.append(json.dumps({**good, "fps": float("nan")}).encode())
+    broken.append(json.dumps({**good, "format": "palpate-bake/2"}).encode())
+    for content in broken:
+        path.write_bytes(content)
+        with pytest.raises(FileError) as error:
+            read_manifest(tmp_path)
+        one_sentence(error, path)
+    path.unlink()
+    path.mkdir()
+    with pytest.raises(FileError) as error:
+        read_manifest(tmp_path)
+    one_sentence(error, path)
+
+
+# --- recordings
+
+
+def recording(seed=0, frames=5, sensors=(("Pad", 6), ("a/b\\..", 3)), bodies=3):
+    """Return a recording of random numbers, with the awkward ones among them."""
+    rng = np.random.default_rng(seed)
+    parts = {}
+    for name, count in sensors:
+        values = {
+            "normal_force": rng.random((frames, count)),
+            "shear": rng.normal(size=(frames, count, 2)),
+            "depth": rng.random((frames, count)) * 1e-3,
+            "slip": rng.random((frames, count)),
+            "contact": rng.random((frames, count)) < 0.5,
+            "reading": rng.normal(size=(frames, count)),
+            "net_force": rng.normal(size=(frames, 3)),
+            "net_torque": rng.normal(size=(frames, 3)),
+            "centre_of_pressure": rng.normal(size=(frames, 3)),
+        }
+        values["shear"][0, 0] = -0.0, 5e-324
+        values["reading"][0, :2] = np.finfo(float).max, -np.finfo(float).tiny
+        parts[name] = SensorRecording(**values)
+    return Recording(
+        frames=np.arange(-1, frames - 1),
+        times=np.arange(frames) / 24,
+        sensors=parts,
+        body_names=("Würfel", "ball", "")[:bodies],
+        poses=rng.normal(size=(frames, bodies, 7)),
+        velocities=rng.normal(size=(frames, bodies, 6)),
+        dt=1 / 30000,
+        digest="0123",
+        warnings=("One.", "Zwei ⚠."),
+    )
+
+
+def same(a, b):
+    """Check that two recordings are equal bit for bit."""
+    assert list(a.sensors) == list(b.sensors)
+    for item in fields(Recording):
+        if item.name == "sensors":
+            continue
+        x, y = getattr(a, item.name), getattr(b, item.name)
+        if isinstance(x, np.ndarray):
+            assert x.dtype == y.dtype and x.shape == y.shape and x.tobytes() == y.tobytes()
+        else:
+            assert x == y and type(x) is type(y)
+    for name, sensor in a.sensors.items():
+        for item in fields(SensorRecording):
+            x, y = getattr(sensor, item.name), getattr(b.sensors[name], item.name)
+            assert x.dtype == y.dtype and x.shape == y.shape and x.tobytes() == y.tobytes()
+
+
+def test_recording_round_trip(tmp_path):
+    for case in (recording(), recording(frames=1), recording(sensors=(), bodies=0), recording(sensors=(("x", 84),))):
+        save_recording(tmp_path / "recording.npz", case)
+        same(load_recording(tmp_path / "recording.npz"), case)
+        assert os.listdir(tmp_path) == ["recording.npz"]
+
+
+def test_same_recording_same_bytes(tmp_path, monkeypatch):
+    save_recording(tmp_path / "a.npz", recording())
+    monkeypatch.setattr("time.time", lambda: 2e9)
+    other = copy.deepcopy(recording())
+    other.poses = np.asfortranarray(other.poses)
+    other.sensors["Pad"].shear = np.repeat(other.sensors["Pad"].shear, 2, axis=1)[:, ::2]
+    save_recording(tmp_path / "another name.npz", other)
+    assert (tmp_path / "a.npz").read_bytes() == (tmp_path / "another name.npz").read_bytes()
+    save_recording(tmp_path / "c.npz", load_recording(tmp_path / "a.npz"))
+    assert (tmp_path / "a.npz").read_bytes() == (tmp_path / "c.npz").read_bytes()
+    save_recording(tmp_path / "d.npz", recording(seed=1))
+    assert (tmp_path / "a.npz").read_bytes() != (tmp_path / "d.npz").read_bytes()
+
+
+def test_numpy_alone_reads_a_recording(tmp_path):
+    save_recording(tmp_path / "recording.npz", recording())
+    with np.load(tmp_path / "recording.npz", allow_pickle=False) as members:
+        header = json.loads(str(members["header"]))
+        assert header["format"] == "palpate-recording/1" and header["sensors"] == ["Pad", "a/b\\.."]
+        np.testing.assert_array_equal(members["sensor_1/shear"], recording().sensors["a/b\\.."].shear)
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
+def test_recording_with_nan_is_our_fault(tmp_path, value):
+    save_recording(tmp_path / "recording.npz", recording())
+    before = (tmp_path / "recording.npz").read_bytes()
+    for place in ("times", "poses", "velocities", "dt", "shear", "net_torque"):
+        broken = copy.deepcopy(recording())
+        if place == "dt":
+            broken.dt = value
+        else:
+            getattr(broken.sensors["Pad"] if place in ("shear", "net_torque") else broken, place)[-1] = value
+        with pytest.raises(ValueError):
+            save_recording(tmp_path / "recording.npz", broken)
+        assert (tmp_path / "recording.npz").read_bytes() == before
+    short = recording()
+    short.sensors["Pad"].depth = short.sensors["Pad"].depth[:-1]
+    with pytest.raises(ValueError, match="sensor_0/depth"):
+        save_recording(tmp_path / "recording.npz", short)
+    short = recording()
+    short.poses = short.poses.astype(object)
+    with pytest.raises(ValueError, match="poses"):
+        save_recording(tmp_path / "recording.npz", short)
+    assert os.listdir(tmp_path) == ["recording.npz"]
+
+
+def cannot_load(read, path):
+    """Check that reading gives one sentence with the path."""
+    with pytest.raises(FileError) as error:
+        read(path)
+    return one_sentence(error, path)
+
+
+def test_damaged_recording(tmp_path):
+    path = tmp_path / "recording.npz"
+    assert "does not exist" in cannot_load(load_recording, path)
+    cannot_load(load_recording, tmp_path)
+    save_recording(path, recording())
+    whole = path.read_bytes()
+    rng = np.random.default_rng(0)
+    for length in (0, 1, 10, 100, *rng.integers(0, len(whole), 20)):
+        path.write_bytes(whole[:length])
+        cannot_load(load_recording, path)
+    refused = 0
+    for place in rng.integers(0, len(whole), 300):  # a flipped bit is noticed, or was in a date or an attribute
+        path.write_bytes(whole[:place] + bytes([whole[place] ^ (1 << rng.integers(8))]) + whole[place + 1 :])
+        try:
+            found = load_recording(path)
+        except FileError as error:
+            assert str(path) in str(error)
+            refused += 1
+        else:
+            same(found, recording())
+    assert refused > 200
+
+
+def test_other_files_are_no_recordings(tmp_path):
+    path = tmp_path / "other.npz"
+    np.savez(path, a=np.zeros(3))
+    assert "not a recording" in cannot_load(load_recording, path)
+    np.savez(path, header=np.array([{"a": 1}], dtype=object))  # a pickle is never opened
+    cannot_load(load_recording, path)
+    for header in ("[]", "{}", "nonsense", '{"format": "palpate-recording/9"}', '{"format": "palpate-recording/1"}'):
+        np.savez(path, header=np.array(header))
+        cannot_load(load_recording, path)
+    with open(path, "wb") as file:
+        np.save(file, np.zeros(3))
+    cannot_load(load_recording, path)
+    path.write_text("sensor,force\n")
+    cannot_load(load_recording, path)
+    save_recording(path, recording())
+    with zipfile.ZipFile(path) as archive:
+        members = {info.filename: archive.read(info) for info in archive.infolist()}
+    for gone in members:
+        with zipfile.ZipFile(path, "w") as archive:
+            for name, content in members.items():
+                if name != gone:
+                    archive.writestr(name, content)
+        cannot_load(load_recording, path)
+
+
+# --- tactile images
+
+
+def tactile_frame(count, seed=0):
+    """Return a frame of random numbers."""
+    rng = np.random.default_rng(seed)
+    return SensorFrame(
+        normal_force=rng.random(count),
+        shear=rng.normal(size=(count, 2)),
+        depth=rng.random(count) * 1e-3,
+        slip=rng.random(count),
+        contact=rng.random(count) < 0.5,
+        reading=rng.normal(size=count) * 1e3,
+        net_force=np.zeros(3),
+        net_torque=np.zeros(3),
+        centre_of_pressure=np.zeros(3),
+    )
+
+
+def grid_of(rows, columns, seed=0):
+    """Return a grid whose texels come in any order."""
+    order = np.random.default_rng(seed).permutation(rows * columns)
+    return GridLayout(rows, columns, order // columns, order % columns)
+
+
+METADATA = {"unit": "kPa", "sensor": "Daumen ü/1", "frame": "12", "time": "0.5", "digest": "ab" * 32, "palpate": "0.1.0"}
+
+
+def test_exr_round_trip(tmp_path):
+    for rows, columns in ((14, 6), (2, 2), (1, 7)):
+        layout, frame = grid_of(rows, columns), tactile_frame(rows * columns)
+        path = tmp_path / "tactile_0012.exr"
+        write_exr(path, layout, frame, METADATA)
+        assert os.listdir(tmp_path) == ["tactile_0012.exr"]
+        channels, metadata = read_exr(path)
+        assert metadata == METADATA
+        assert tuple(channels) == CHANNELS
+        for name, picture in channels.items():
+            assert picture.dtype == np.float32 and picture.shape == (rows, columns) and picture.flags.c_contiguous
+            np.testing.assert_array_equal(picture, exr_channels(layout, frame)[name])
+        texel = layout.row, layout.column
+        np.testing.assert_array_equal(channels["R"][texel], frame.normal_force.astype(np.float32))
+        np.testing.assert_array_equal(channels["G"][texel], frame.shear[:, 0].astype(np.float32))
+        np.testing.assert_array_equal(channels["B"][texel], frame.shear[:, 1].astype(np.float32))
+        for name in ("reading", "depth", "slip", "contact"):
+            np.testing.assert_array_equal(channels[name][texel], getattr(frame, name).astype(np.float32))
+
+
+def test_exr_as_any_other_program_reads_it(tmp_path):
+    layout, frame = grid_of(3, 5), tactile_frame(15)
+    write_exr(tmp_path / "a.exr", layout, frame, METADATA)
+    with OpenEXR.File(str(tmp_path / "a.exr"), separate_channels=True) as file:
+        header, channels = file.header(), file.channels()
+        assert header["compression"] == OpenEXR.ZIP_COMPRESSION and header["type"] == OpenEXR.scanlineimage
+        assert header["palpate.unit"] == "kPa"
+        assert list(channels) == sorted(channels)  # the order that the format asks for
+        last = channels["R"].pixels[-1]  # the lowest scan line is row 0
+    order = np.argsort(layout.column[layout.row == 0])
+    np.testing.assert_array_equal(last, frame.normal_force[layout.row == 0][order].astype(np.float32))
+
+
+def test_exr_of_a_texture_map(tmp_path):
+    position = np.array([[0, 0, 0], [1, 0, 0], [2, 0.2, 0], [0, 1, 0], [1, 1.2, 0]]) * 1.0
+    triangles = np.array([[0, 1, 3], [1, 4, 3], [1, 2, 4]])
+    layout, _ = uv_layout(position, np.tile([0, 0, 1.0], (5, 1)), triangles)
+    frame = tactile_frame(5)
+    frame.contact[:] = [True, False, False, True, True]
+    write_exr(tmp_path / "a.exr", layout, frame, {})
+    channels, metadata = read_exr(tmp_path / "a.exr")
+    assert metadata == {} and channels["R"].shape == layout.shape
+    assert set(np.unique(channels["contact"])) == {0.0, 1.0}
+    empty = layout.image(np.ones(5)) == 0
+    assert empty.any()
+    for picture in channels.values():
+        assert (picture[empty] == 0).all()
+    np.testing.assert_array_equal(channels["reading"], layout.image(frame.reading).astype(np.float32))
+
+
+def test_same_frame_same_bytes(tmp_path):
+    for name in ("a.exr", "b.exr"):
+        write_exr(tmp_path / name, grid_of(4, 4), tactile_frame(16), METADATA)
+    assert (tmp_path / "a.exr").read_bytes() == (tmp_path / "b.exr").read_bytes()
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf, 3.5e38, -1e300])
+@pytest.mark.parametrize("channel", ["normal_force", "shear", "reading", "slip"])
+def test_value_that_no_pixel_can_hold_is_our_fault(tmp_path, value, channel):
+    frame = tactile_frame(4)
+    getattr(frame, channel)[2] = value
+    with pytest.raises(ValueError, match="texel 2"):
+        write_exr(tmp_path / "a.exr", grid_of(2, 2), frame, METADATA)
+    assert os.listdir(tmp_path) == []
+
+
+def test_largest_and_smallest_values(tmp_path):
+    frame = tactile_frame(4)
+    frame.reading[:] = np.finfo(np.float32).max, -np.finfo(np.float32).max, 1e-300, -0.0
+    layout = grid_of(2, 2)
+    write_exr(tmp_path / "a.exr", layout, frame, METADATA)
+    channels, _ = read_exr(tmp_path / "a.exr")
+    np.testing.assert_array_equal(channels["reading"][layout.row, layout.column], frame.reading.astype(np.float32))
+
+
+def test_exr_in_wrong_places(tmp_path):
+    (tmp_path / "file").write_text("")
+    for path in (tmp_path / "missing" / "a.exr", tmp_path / "file" / "a.exr", tmp_path):
+        with pytest.raises(FileError) as error:
+            write_exr(path, grid_of(2, 2), tactile_frame(4), METADATA)
+        one_sentence(error, tmp_path)
+    assert os.listdir(tmp_path) == ["file"]
+
+
+def test_failing_writer_leaves_nothing(tmp_path, monkeypatch):
+    class Failing:
+        def __init__(self, *_):
+            pass
+
+        def __enter__(self):
+            return self
+
+        def __exit__(self, *_):
+            pass
+
+        def write(self, name):
+            Path(name).write_bytes(b"half")
+            raise RuntimeError("no space left on device")
+
+    monkeypatch.setattr(OpenEXR, "File", Failing)
+    with pytest.raises(FileError) as error:
+        write_exr(tmp_path / "a.exr", grid_of(2, 2), tactile_frame(4), METADATA)
+    one_sentence(error, tmp_path / "a.exr", "no space left")
+    assert os.listdir(tmp_path) == []
+
+
+def test_damaged_exr(tmp_path):
+    path = tmp_path / "a.exr"
+    assert "does not exist" in cannot_load(read_exr, path)
+    cannot_load(read_exr, tmp_path)
+    layout = grid_of(40, 30)
+    write_exr(path, layout, tactile_frame(1200), METADATA)
+    whole = path.read_bytes()
+    for length in (0, 3, 100, len(whole) // 2, len(whole) - 10):
+        path.write_bytes(whole[:length])
+        cannot_load(read_exr, path)
+    for content in (b"GIF89a", os.urandom(5000), whole[:500] + b"\0" * (len(whole) - 500)):
+        path.write_bytes(content)
+        cannot_load(read_exr, path)
