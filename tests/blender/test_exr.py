@@ -1,0 +1,157 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Blender shows a tactile image as it was meant, and its own OpenEXR and ours live in one process."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import bpy
+import numpy as np
+import pytest
+
+from palpate.core.formats.exr import CHANNELS, exr_channels, read_exr, write_exr
+from palpate.core.formats.files import frame_file
+from palpate.core.layout import GridLayout, uv_layout
+from palpate.core.recording import SensorFrame
+
+ROWS, COLUMNS = 5, 7
+
+
+@pytest.fixture(autouse=True)
+def scene():
+    """Return the scene of an empty file, without the add-on: a bake plays in any Blender."""
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    return bpy.context.scene
+
+
+def tactile_frame(count, seed=0):
+    """Return a frame in which every channel differs."""
+    rng = np.random.default_rng(seed)
+    return SensorFrame(
+        normal_force=rng.random(count),
+        shear=rng.normal(size=(count, 2)),
+        depth=5 + rng.random(count),
+        slip=10 + rng.random(count),
+        contact=np.ones(count, bool),
+        reading=20 + rng.random(count),
+        net_force=np.zeros(3),
+        net_torque=np.zeros(3),
+        centre_of_pressure=np.zeros(3),
+    )
+
+
+def grid():
+    """Return a grid layout, texels row by row."""
+    row, column = np.indices((ROWS, COLUMNS)).reshape(2, -1)
+    return GridLayout(ROWS, COLUMNS, row, column)
+
+
+def as_blender_sees(image):
+    """Return the (height, width, 4) pixels of an image datablock, its first row first."""
+    image.colorspace_settings.name = "Non-Color"
+    width, height = image.size
+    return np.array(image.pixels[:], np.float32).reshape(height, width, 4)
+
+
+def check(path, layout, frame):
+    """Write a frame, and compare what Blender and our own reader make of it."""
+    write_exr(path, layout, frame, {"unit": "kPa"})
+    expected = exr_channels(layout, frame)
+    image = bpy.data.images.load(str(path))
+    pixels = as_blender_sees(image)
+    assert image.type == "IMAGE" and image.is_float
+    for i, name in enumerate("RGB"):
+        np.testing.assert_array_equal(pixels[..., i], expected[name])
+    assert (pixels[..., 3] == 1).all()
+    channels, metadata = read_exr(path)
+    for name in CHANNELS:
+        np.testing.assert_array_equal(channels[name], expected[name])
+    assert metadata == {"unit": "kPa"}
+    bpy.data.images.remove(image)
+
+
+def test_first_row_is_the_lowest_and_named_channels_do_not_disturb(tmp_path):
+    frame = tactile_frame(ROWS * COLUMNS)
+    check(tmp_path / "a.exr", grid(), frame)
+    position = np.array([[0, 0, 0], [1, 0, 0], [1.2, 1, 0], [0, 1, 0], [2, 2, 0]]) * 1.0
+    layout, _ = uv_layout(position, np.tile([0, 0, 1.0], (5, 1)), np.array([[0, 1, 2], [0, 2, 3], [2, 4, 3]]))
+    check(tmp_path / "b.exr", layout, tactile_frame(5))
+
+
+def test_both_libraries_work_after_a_render(tmp_path, scene):
+    camera = bpy.data.objects.new("camera", bpy.data.cameras.new("camera"))
+    scene.collection.objects.link(camera)
+    scene.camera = camera
+    scene.render.engine = "CYCLES"
+    scene.cycles.samples = 1
+    scene.render.resolution_x, scene.render.resolution_y = 32, 24
+    scene.render.image_settings.file_format = "OPEN_EXR"
+    for turn in range(2):
+        check(tmp_path / f"{turn}.exr", grid(), tactile_frame(ROWS * COLUMNS, turn))
+        scene.render.filepath = str(tmp_path / f"render_{turn}.exr")
+        bpy.ops.render.render(write_still=True)
+        channels, _ = read_exr(tmp_path / f"render_{turn}.exr")
+        assert channels["R"].shape == (24, 32)
+
+
+@pytest.mark.parametrize("first", ["OpenEXR", "bpy"])
+def test_either_library_may_come_first(tmp_path, first):
+    write_exr(tmp_path / "a.exr", grid(), tactile_frame(ROWS * COLUMNS), {})
+    program = (
+        f"import sys, {first}\nimport bpy, OpenEXR\n"
+        "image = bpy.data.images.load(sys.argv[1])\n"
+        "image.colorspace_settings.name = 'Non-Color'\n"
+        "file = OpenEXR.File(sys.argv[1], separate_channels=True)\n"
+        "assert image.pixels[0] == file.channels()['R'].pixels[-1, 0] != 0\n"
+    )
+    subprocess.run([sys.executable, "-c", program, str(tmp_path / "a.exr")], check=True)
+
+
+def test_sequence_of_frames_plays(tmp_path, scene):
+    frames = [tactile_frame(ROWS * COLUMNS, seed) for seed in range(3)]
+    for i, frame in enumerate(frames):
+        write_exr(tmp_path / frame_file(i + 1), grid(), frame, {})
+    mesh = bpy.data.meshes.new("plane")
+    mesh.from_pydata([(-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)], [], [(0, 1, 2, 3)])
+    mesh.uv_layers.new().data.foreach_set("uv", [0, 0, 1, 0, 1, 1, 0, 1])
+    plane = bpy.data.objects.new("plane", mesh)
+    scene.collection.objects.link(plane)
+    material = bpy.data.materials.new("picture")
+    if bpy.app.version < (5, 0):
+        material.use_nodes = True  # later always
+    tree = material.node_tree
+    tree.nodes.clear()
+    texture, emission, output = (
+        tree.nodes.new(kind) for kind in ("ShaderNodeTexImage", "ShaderNodeEmission", "ShaderNodeOutputMaterial")
+    )
+    texture.image = bpy.data.images.load(str(tmp_path / frame_file(1)))
+    texture.image.source = "SEQUENCE"
+    texture.image.colorspace_settings.name = "Non-Color"
+    texture.interpolation = "Closest"
+    texture.image_user.frame_duration = len(frames)
+    texture.image_user.frame_start = 1
+    texture.image_user.use_auto_refresh = True
+    tree.links.new(texture.outputs["Color"], emission.inputs["Color"])
+    tree.links.new(emission.outputs[0], output.inputs["Surface"])
+    mesh.materials.append(material)
+    camera = bpy.data.objects.new("camera", bpy.data.cameras.new("camera"))
+    camera.data.type, camera.data.ortho_scale, camera.location = "ORTHO", 2.0, (0, 0, 1)
+    scene.collection.objects.link(camera)
+    scene.camera = camera
+    scene.render.engine = "CYCLES"
+    scene.cycles.samples = 1
+    scene.render.pixel_aspect_y = COLUMNS / ROWS  # one pixel of the render for each texel
+    scene.render.resolution_x, scene.render.resolution_y = COLUMNS, ROWS
+    scene.cycles.pixel_filter_type = "BOX"
+    scene.cycles.use_denoising = False
+    scene.render.image_settings.file_format = "OPEN_EXR"
+    scene.render.image_settings.color_depth = "32"
+    for i, frame in enumerate(frames):
+        scene.frame_set(i + 1)
+        scene.render.filepath = str(tmp_path / "render.exr")
+        bpy.ops.render.render(write_still=True)
+        channels, _ = read_exr(tmp_path / "render.exr")
+        expected = exr_channels(grid(), frame)
+        for name in "RGB":  # negative shear too
+            np.testing.assert_allclose(channels[name], expected[name], atol=1e-5)
