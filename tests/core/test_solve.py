@@ -10,17 +10,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import trimesh
+from scipy.integrate import solve_ivp
+from solver_scenes import GRAVITY, LEVEL, about, box, cube_on_pad, free_body, pad, pressed, shape
+
 from palpate.core.bodies import quaternion_product, rotation_matrices
 from palpate.core.errors import PalpateError
 from palpate.core.scenario import Body, Motion, Sensor, SensorParameters, Target
 from palpate.core.solve import Simulation, run, solve
-from scipy.integrate import solve_ivp
-from solver_scenes import GRAVITY, LEVEL, about, box, cube_on_pad, free_body, pad, pressed, shape
 
 STIFF_FRICTION = {"sigma0": 1e3, "sigma1": 10.0, "x0": 0.01}
 
 
-# --- loads -----------------------------------------------------------------------------------------------------------------------
+# ---- loads ----
 @pytest.mark.parametrize("mass", [0.1, 1.0, 4.0, 10.0])
 def test_texels_add_up_to_the_weight(mass):
     """Table 3 of the paper, which reaches 1e-4; a level cube must be exact to rounding after it has settled (2 s)."""
@@ -46,9 +47,9 @@ def test_what_rests_does_not_depend_on_the_step(dt):
     np.testing.assert_allclose(depth, GRAVITY / 84 / 1000, rtol=1e-9)
 
 
-# --- friction --------------------------------------------------------------------------------------------------------------------
+# ---- friction ----
 def test_tilted_cube_is_held_and_does_not_creep():
-    """Section 5.1.2 on a pad wide enough to carry the cube: shear m g sin 10°, position the same to 1e-10 m ten seconds later."""
+    """Section 5.1.2 on a pad wide enough to carry the cube: shear m g sin 10°, and no creep at all from 10 s to 20 s."""
     texels = pad(14, 14, 0.0034)
     recording = run(cube_on_pad(1.0, tilt=10.0, texels=texels, frames=480, dt=5e-4, **STIFF_FRICTION))
     sensor = recording.sensors["pad"]
@@ -59,7 +60,7 @@ def test_tilted_cube_is_held_and_does_not_creep():
 
 
 def plate_on_slope(mass, degrees, frames, fps, dt, **values):
-    """A thin plate that cannot rock, starting where its weight and the springs balance; returns also the direction down the slope."""
+    """A thin plate that cannot rock, starting where its weight and the springs balance; and the direction down the slope."""
     values = {"k": 1000.0, "cn": 10.0, **values}
     turn, texels = about((1, 0, 0), degrees), pad(14, 14, 0.0034)
     rotation, mesh = rotation_matrices(turn), box(0.06, 0.06, 0.001)
@@ -80,7 +81,7 @@ def test_steeper_than_friction_holds_slides_with_the_right_acceleration():
 
 
 def test_shear_follows_the_stiff_ode_of_scipy_through_stick_slip_and_reversal():
-    """A plate pressed to constant depth and dragged to and fro: LuGre per texel against Radau on the same piecewise velocity."""
+    """A plate pressed to constant depth and dragged to and fro: LuGre per texel against Radau on the same velocities."""
     p = SensorParameters(k=100.0, cn=0.0, sigma0=400.0, sigma1=0.5, ct=0.05, x0=0.02)
     fps, depth = 50.0, 1e-3
     phase = np.linspace(0, 4 * np.pi, 101)
@@ -109,7 +110,7 @@ def test_shear_follows_the_stiff_ode_of_scipy_through_stick_slip_and_reversal():
 
 
 def test_presliding_of_a_free_body_follows_scipy():
-    """A plate on a tilted pad while it sticks: m ẍ = m g sin - n (sigma0 z + sigma1 ż + ct ẋ), the stiff ODE of the whole body."""
+    """A plate on a slope while it sticks: m ẍ = m g sin - n (sigma0 z + sigma1 ż + ct ẋ), the stiff ODE of the whole body."""
     values = {"sigma0": 200.0, "sigma1": 2.0, "ct": 0.1, "x0": 0.05}
     mass, tilt, fps = 0.5, np.radians(8), 200.0
     scenario, down = plate_on_slope(mass, 8.0, 80, fps, 2.5e-5, **values)
@@ -143,10 +144,12 @@ def test_friction_goes_when_the_load_goes():
     assert not sensor.contact[-1].any()
 
 
-# --- shapes ----------------------------------------------------------------------------------------------------------------------
+# ---- shapes ----
 def test_sphere_presses_as_an_elastic_foundation():
-    """Winkler foundation: F = k/a² π R d² for d ≪ R (exactly k/a² π (R d² - d³/3) for vertical springs with Eq. 4's slope factor
-    neglected); refined texels converge to it."""
+    """Winkler foundation: F = (k/a²) π (R d² - d³/3), to which finer texels converge.
+
+    Eq. 4's depth is perpendicular to the surface, d cos θ in place of d, which for d ≪ R is less than the tolerance.
+    """
     radius, depth = 0.02, 0.0005
     ball = shape(trimesh.creation.icosphere(6, radius))
     exact = np.pi * (radius * depth**2 - depth**3 / 3)
@@ -188,7 +191,7 @@ def test_texels_past_their_reach_do_not_act_and_the_user_is_told_once():
     assert "Frame 4: 84 texels" in recording.warnings[0]
 
 
-# --- conservation and symmetry ---------------------------------------------------------------------------------------------------
+# ---- conservation and symmetry ----
 def collision() -> tuple:
     """A small pad on a free block hits a free cube in free space, askew and spinning: nothing else acts."""
     block, cube = box(0.05, 0.05, 0.02), box(0.04, 0.04, 0.04)
@@ -225,8 +228,10 @@ def energy_and_momenta(scenario, recording):
 
 
 def test_free_bodies_keep_their_momenta_and_gain_no_energy():
-    """Forces act at one point on both bodies, so momentum is kept to rounding, and angular momentum to the first order of a step's
-    travel; what the springs store is below what was lost."""
+    """Forces act at one point on both bodies, so momentum is kept to rounding, angular momentum to the first order of the step.
+
+    What the springs store at the end is below what was lost.
+    """
     scenario = collision()
     recording = run(scenario)
     assert recording.sensors["pad"].contact.any()
@@ -299,7 +304,7 @@ def test_both_carried_along_together_feel_nothing_new():
     np.testing.assert_allclose(shear[5:], shear[4:5].repeat(15, axis=0), atol=1e-9 * np.abs(shear[4]).max())
 
 
-# --- several of everything -------------------------------------------------------------------------------------------------------
+# ---- several of everything ----
 def test_two_sensors_and_two_targets_do_not_mix():
     one, two = cube_on_pad(1.0), cube_on_pad(2.0)
     aside = np.array([1.0, 0, 0])
@@ -333,7 +338,7 @@ def test_reading_is_the_linear_conversion():
     np.testing.assert_allclose(sensor.reading, 7.0 + 3.0 * sensor.normal_force, rtol=1e-15)
 
 
-# --- determinism -----------------------------------------------------------------------------------------------------------------
+# ---- determinism ----
 def test_same_scenario_same_bits():
     first, second = run(cube_on_pad(1.0, tilt=5.0)), run(cube_on_pad(1.0, tilt=5.0))
     assert first.digest == second.digest
@@ -388,7 +393,7 @@ def test_plain_python_gives_the_same_numbers():
     np.testing.assert_allclose(shear, r.sensors["pad"].shear, rtol=0, atol=1e-12)
 
 
-# --- driving ---------------------------------------------------------------------------------------------------------------------
+# ---- driving ----
 def test_progress_counts_and_closing_stops():
     generator = solve(cube_on_pad(1.0, frames=10))
     steps = [next(generator) for _ in range(3)]

@@ -1,0 +1,102 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Scenarios: what is refused, what the digest notices, and the step-size adviser."""
+
+from dataclasses import fields, replace
+
+import numpy as np
+import pytest
+from scipy.linalg import eigvals
+from solver_scenes import cube_on_pad, pressed
+
+from palpate.core.bodies import poses_at, quaternions_from_vectors, rotation_matrices, rotation_vectors
+from palpate.core.errors import ParameterError
+from palpate.core.scenario import Motion, SensorParameters
+from palpate.core.timestep import LONGEST, advise, stability_limit
+
+NUMBERS = [item.name for item in fields(SensorParameters) if item.type == "float"]
+
+
+@pytest.mark.parametrize("key", ["k", "sigma0", "x0", "max_penetration"])
+@pytest.mark.parametrize("value", [0.0, -1.0, np.nan, np.inf])
+def test_what_must_be_above_zero(key, value):
+    with pytest.raises(ParameterError, match=f"^{key} of sensor 'tip' is .*: give it a value above zero"):
+        replace(SensorParameters(), **{key: value}).check("tip")
+
+
+@pytest.mark.parametrize("key", ["cn", "ct", "sigma1", "mus", "mud"])
+@pytest.mark.parametrize("value", [-1.0, np.nan])
+def test_what_may_be_zero_but_not_less(key, value):
+    with pytest.raises(ParameterError, match=f"^{key} of sensor 'tip'"):
+        replace(SensorParameters(), **{key: value}).check("tip")
+
+
+def test_friction_coefficients_in_order_and_gain():
+    with pytest.raises(ParameterError, match="mud of sensor 'tip'"):
+        replace(SensorParameters(), mud=0.5).check("tip")
+    with pytest.raises(ParameterError, match="gain"):
+        replace(SensorParameters(), gain=0.0).check("tip")
+    SensorParameters().check("tip")
+
+
+def test_digest_is_stable_and_notices_every_number():
+    scenario = cube_on_pad()
+    digest = scenario.digest()
+    assert digest == cube_on_pad().digest()
+    for key in NUMBERS:
+        other = replace(scenario.sensors[0].parameters, **{key: getattr(scenario.sensors[0].parameters, key) * 1.25 + 0.5})
+        assert replace(scenario, sensors=(replace(scenario.sensors[0], parameters=other),)).digest() != digest, key
+    mesh = scenario.targets[0].mesh
+    nudged = mesh.vertices.copy()
+    nudged[0, 0] = np.nextafter(nudged[0, 0], 1)
+    moved = replace(scenario.targets[0], mesh=replace(mesh, vertices=nudged))
+    assert replace(scenario, targets=(moved,)).digest() != digest
+    assert replace(scenario, fps=25.0).digest() != digest
+    assert replace(scenario, frame_end=49).digest() != digest
+    assert replace(scenario, dt=None).digest() != digest
+
+
+@pytest.mark.parametrize(("k", "c", "m"), [(84000.0, 840.0, 1.0), (58.5, 0.0583, 1e-3), (1e6, 1e4, 1e-3), (1.0, 0.0, 100.0)])
+def test_stability_limit_is_where_the_eigenvalue_leaves_the_unit_circle(k, c, m):
+    def radius(dt):  # symplectic Euler: v' = v + dt (-k x - c v) / m, x' = x + dt v'
+        step = np.array([[1 - dt * dt * k / m, dt - dt * dt * c / m], [-dt * k / m, 1 - dt * c / m]])
+        return np.abs(eigvals(step)).max()
+
+    limit = stability_limit(k, c, m)
+    assert radius(0.999 * limit) <= 1 + 1e-9
+    assert radius(1.001 * limit) > 1
+
+
+def test_advice_names_the_body_and_its_reason():
+    advice = advise(cube_on_pad(1.0))
+    assert advice.dt == pytest.approx(0.2 * stability_limit(84e3, 840.0, 1.0))
+    assert "'cube'" in advice.reason
+    assert "stability limit" in advice.reason
+    moved = advise(pressed(cube_on_pad().targets[0].mesh, [[0, 0, 1]]))
+    assert moved.dt == LONGEST
+    assert np.isinf(moved.limit)
+
+
+def test_poses_meet_samples_exactly_and_turn_at_constant_speed():
+    rng = np.random.default_rng(7)
+    times = np.cumsum(rng.random(6) + 0.1)
+    quaternions = rng.normal(size=(6, 4))
+    quaternions /= np.linalg.norm(quaternions, axis=1, keepdims=True)
+    motion = Motion(times, rng.normal(size=(6, 3)), quaternions)
+    positions, turned = poses_at(motion, times)
+    assert np.array_equal(positions, motion.positions)
+    assert np.array_equal(turned, quaternions)
+    middle, half = poses_at(motion, np.array([0.5 * (times[0] + times[1])]))
+    np.testing.assert_allclose(middle[0], 0.5 * (motion.positions[0] + motion.positions[1]))
+    first, second = (rotation_matrices(half[0]).T @ rotation_matrices(q) for q in quaternions[:2])
+    np.testing.assert_allclose(first, second.T, atol=1e-12)
+    outside, _ = poses_at(motion, np.array([times[0] - 1, times[-1] + 1]))
+    assert np.array_equal(outside, motion.positions[[0, -1]])
+
+
+@pytest.mark.parametrize("size", [0.0, 1e-14, 1e-8, 1e-3, 1.0, 3.1])
+def test_rotation_vectors_go_both_ways(size):
+    vectors = np.random.default_rng(8).normal(size=(20, 3))
+    vectors *= size / np.linalg.norm(vectors, axis=1, keepdims=True)
+    quaternions = quaternions_from_vectors(vectors)
+    np.testing.assert_allclose(rotation_vectors(quaternions), vectors, atol=1e-14, rtol=1e-12)
+    np.testing.assert_allclose(rotation_vectors(-quaternions), vectors, atol=1e-14, rtol=1e-12)
