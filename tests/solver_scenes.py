@@ -3,6 +3,7 @@
 
 import numpy as np
 import trimesh
+
 from palpate.core.bodies import rotation_matrices
 from palpate.core.mesh import TriangleMesh, checked_mesh, mass_properties
 from palpate.core.scenario import Body, Motion, Scenario, Sensor, SensorParameters, Target

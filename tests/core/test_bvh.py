@@ -4,9 +4,10 @@
 import numpy as np
 import pytest
 import trimesh
+from solver_scenes import grid_mesh, shape
+
 from palpate.core import bvh
 from palpate.core.mesh import face_normals
-from solver_scenes import grid_mesh, shape
 
 NONE = 2.0
 

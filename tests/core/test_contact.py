@@ -3,9 +3,10 @@
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
+
 from palpate.core import contact
 from palpate.core.scenario import SensorParameters
-from scipy.integrate import solve_ivp
 
 PAPER = SensorParameters()  # Table 2; Fig. 7 was drawn with these and fn = 0.08 N
 ROW = np.array([PAPER.k, PAPER.cn, PAPER.ct, PAPER.sigma0, PAPER.sigma1, PAPER.x0, PAPER.mus, PAPER.mud])

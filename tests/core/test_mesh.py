@@ -4,6 +4,8 @@
 import numpy as np
 import pytest
 import trimesh
+from solver_scenes import box, grid_mesh, shape
+
 from palpate.core.errors import MeshError, ParameterError
 from palpate.core.mesh import (
     checked_mesh,
@@ -15,7 +17,6 @@ from palpate.core.mesh import (
     vertex_areas,
     vertex_normals,
 )
-from solver_scenes import box, grid_mesh, shape
 
 TRIANGLE = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]])
 
