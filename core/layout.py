@@ -103,12 +103,13 @@ class UVLayout:
         """
         values = np.asarray(values, float)
         pixel, triangle, weights, _ = self._pixels
-        table = values.reshape(len(values), -1)
-        picture = np.zeros((self.height * self.width, table.shape[1]))
-        for channel in range(table.shape[1]):
-            corners = table[:, channel][self.triangles]
-            picture[pixel, channel] = np.einsum("ij,ij->i", corners[triangle], weights)
-        return picture.reshape(*self.shape, *values.shape[1:])
+        table = values.reshape(len(values), -1).T
+        picture = np.zeros((len(table), self.height * self.width))
+        for values_of_channel, of_channel in zip(table, picture):
+            if values_of_channel.any():
+                of_channel[pixel] = np.einsum("ij,ij->i", values_of_channel[self.triangles][triangle], weights)
+        picture = picture.reshape(len(table), *self.shape)
+        return picture[0] if values.ndim == 1 else np.moveaxis(picture, 0, -1)
 
     def mask(self) -> np.ndarray:
         """Return (height, width) bool: which pixels show the sensor; the repeated rim does not count."""
