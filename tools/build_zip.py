@@ -13,6 +13,7 @@ sources and wheels give the same bytes. Each zip is validated by Blender's own t
 from __future__ import annotations
 
 import argparse
+import email
 import hashlib
 import importlib.util
 import platform
@@ -24,6 +25,8 @@ import zipfile
 from pathlib import Path
 
 import tomli_w
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name, parse_wheel_filename
 
 ROOT = Path(__file__).resolve().parents[1]
 WHEEL_LIST = ROOT / "tools" / "wheels.txt"
@@ -42,6 +45,14 @@ PLATFORMS = {
 }
 # Python → the first Blender that ships it, and the first that no longer does.
 BLENDER_RANGE = {"3.11": ("4.2.0", "5.1.0"), "3.13": ("5.1.0", None)}
+# What a wheel's requirements are judged by on each platform
+MARKERS = {
+    "linux-x64": {"sys_platform": "linux", "platform_system": "Linux", "os_name": "posix", "platform_machine": "x86_64"},
+    "windows-x64": {"sys_platform": "win32", "platform_system": "Windows", "os_name": "nt", "platform_machine": "AMD64"},
+    "macos-arm64": {"sys_platform": "darwin", "platform_system": "Darwin", "os_name": "posix", "platform_machine": "arm64"},
+}
+# Python → the oldest numpy that a Blender on it ships; another Python is newer than these.
+NUMPY = {"3.11": "1.24.3", "3.13": "2.2.4"}
 # The licence travels with the zip; everything else is in the package folders that pyproject.toml lists.
 ROOT_FILES = ["__init__.py", "LICENSE"]
 FIXED_TIME = (1980, 1, 1, 0, 0, 0)  # the earliest a zip can hold
@@ -86,6 +97,36 @@ def wheels_for(platform_name: str, python: str) -> list[Path]:
             )
         stamp.write_text(wanted)
     return sorted(folder.glob("*.whl"))
+
+
+def check_complete(wheels: list[Path], platform_name: str, python: str) -> None:
+    """Raise unless all that the wheels require is among them, or numpy, in a version that fits."""
+    versions = {"numpy": NUMPY.get(python, NUMPY["3.13"])}
+    for wheel in wheels:
+        name, version, _, _ = parse_wheel_filename(wheel.name)
+        versions[name] = str(version)
+    markers = {
+        **MARKERS[platform_name],
+        "python_version": python,
+        "python_full_version": f"{python}.0",
+        "implementation_name": "cpython",
+        "platform_python_implementation": "CPython",
+        "extra": "",
+    }
+    for wheel in wheels:
+        with zipfile.ZipFile(wheel) as archive:
+            metadata = next(name for name in archive.namelist() if name.endswith(".dist-info/METADATA"))
+            headers = email.message_from_bytes(archive.read(metadata))
+        for line in headers.get_all("Requires-Dist", []):
+            requirement = Requirement(line)
+            if requirement.marker is not None and not requirement.marker.evaluate(markers):
+                continue
+            version = versions.get(canonicalize_name(requirement.name))
+            if version is None or not requirement.specifier.contains(version, prereleases=True):
+                raise BuildError(
+                    f"{wheel.name} requires {line}, but the zip for {platform_name} and Python {python} has "
+                    f"{version or 'none'}; set it in {WHEEL_LIST.relative_to(ROOT)}."
+                )
 
 
 def manifest_for(platform_name: str, wheels: list[Path], blender_min: str, blender_max: str | None) -> bytes:
@@ -157,6 +198,7 @@ def build(
             raise BuildError(f"No Blender ships Python {python}; for a distribution's, use --local with --blender-min.")
         blender_range = BLENDER_RANGE[python]
     wheels = wheels_for(platform_name, python)
+    check_complete(wheels, platform_name, python)
     entries = {f"wheels/{wheel.name}": wheel.read_bytes() for wheel in wheels}
     entries |= {file.as_posix(): (ROOT / file).read_bytes() for file in package_files()}
     entries["blender_manifest.toml"] = manifest_for(platform_name, wheels, *blender_range)

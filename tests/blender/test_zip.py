@@ -99,6 +99,13 @@ def test_blender_refuses_a_broken_zip(tmp_path):
         build_zip.validate(broken)
 
 
+@pytest.mark.parametrize("missing", ["llvmlite", "tzdata"])
+def test_a_missing_wheel_is_noticed(missing):
+    wheels = [wheel for wheel in build_zip.wheels_for("linux-x64", "3.11") if not wheel.name.startswith(missing)]
+    with pytest.raises(build_zip.BuildError, match=missing):
+        build_zip.check_complete(wheels, "linux-x64", "3.11")
+
+
 def test_installs_and_enables(life):
     assert life["enabled"]["is_enabled"]
     assert life["enabled"]["has_properties"]
