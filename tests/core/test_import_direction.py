@@ -182,9 +182,7 @@ def test_a_fair_import_passes(file, source):
 
 def test_every_room_is_known():
     """A new package folder has to be given its place in the direction."""
-    packages = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["setuptools"][
-        "packages"
-    ]
+    packages = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["setuptools"]["packages"]
     rooms = {package.split(".")[1] for package in packages if "." in package}
     assert rooms == set(MAY_IMPORT) - {""}
 
