@@ -1,0 +1,81 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""F-curves of an object, in Blenders whose actions have slots (4.4 and later) and in those whose actions do not."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+
+LINEAR = bpy.types.Keyframe.bl_rna.properties["interpolation"].enum_items["LINEAR"].value
+
+
+def of(obj):
+    """Return the collection of an object's F-curves; None when it has none."""
+    data = obj.animation_data
+    if data is None or data.action is None:
+        return None
+    if not hasattr(data.action, "slots"):
+        return data.action.fcurves
+    bag = _channelbag(data, ensure=False)
+    return None if bag is None else bag.fcurves
+
+
+def ensure(obj, action_name: str) -> tuple[object, bool]:
+    """Return the collection of an object's F-curves, and whether an action had to be made for it."""
+    data = obj.animation_data or obj.animation_data_create()
+    made = data.action is None
+    if made:
+        data.action = bpy.data.actions.new(action_name)
+    if not hasattr(data.action, "slots"):
+        return data.action.fcurves, made
+    if data.action_slot is None:
+        data.action_slot = data.action.slots.new(id_type="OBJECT", name=obj.name)
+    return _channelbag(data, ensure=True).fcurves, made
+
+
+def _channelbag(data, ensure: bool):
+    action, slot = data.action, data.action_slot
+    if slot is None:
+        return None
+    for layer in action.layers:
+        for strip in layer.strips:
+            return strip.channelbag(slot, ensure=ensure)
+    if not ensure:
+        return None
+    layer = action.layers[0] if len(action.layers) else action.layers.new("Layer")
+    return layer.strips.new(type="KEYFRAME").channelbag(slot, ensure=True)
+
+
+def write(curves, path: str, frames: np.ndarray, values: np.ndarray) -> None:
+    """Replace the F-curves of a property by linear ones.
+
+    Parameters
+    ----------
+    curves : collection from :func:`ensure`
+    path : str
+    frames : (f,) int
+    values : (f, c) float
+        Column i becomes the curve with array index i.
+    """
+    remove(curves, (path,))
+    for index, column in enumerate(np.asarray(values, float).T):
+        curve = curves.new(path, index=index)
+        curve.keyframe_points.add(len(frames))
+        points = np.column_stack([frames, column]).astype(np.float32)
+        curve.keyframe_points.foreach_set("co", points.ravel())
+        curve.keyframe_points.foreach_set("interpolation", np.full(len(frames), LINEAR, dtype=np.int32))
+        curve.update()
+
+
+def remove(curves, paths) -> None:
+    """Take the F-curves of some properties out."""
+    for curve in [curve for curve in curves if curve.data_path in paths]:
+        curves.remove(curve)
+
+
+def animated_paths(obj) -> set[str]:
+    """Return the properties that keyframes or drivers of an object move."""
+    paths = {curve.data_path for curve in of(obj) or ()}
+    if obj.animation_data is not None:
+        paths |= {driver.data_path for driver in obj.animation_data.drivers}
+    return paths

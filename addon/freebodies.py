@@ -1,0 +1,184 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Free bodies: where they started, putting them where the solver says, and the keyframes of a bake.
+
+While a body is displaced by playing, or baked, its own location and rotation at the first frame are kept in its properties, so that
+it can be put back exactly.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from mathutils import Euler, Matrix, Quaternion
+
+from ..core.errors import SceneError
+from . import curves, transforms
+
+PATHS = ("location", "rotation_euler", "rotation_quaternion", "rotation_axis_angle")
+
+
+def check(obj) -> None:
+    """Raise SceneError when something else than forces moves a free body."""
+    if any(constraint.enabled for constraint in obj.constraints):
+        raise SceneError(f"Free body '{obj.name}' has constraints: disable them, or set its body to Keyframed.")
+    if not obj.palpate.is_baked and curves.animated_paths(obj) & set(PATHS):
+        raise SceneError(f"Free body '{obj.name}' has keyframes or drivers: remove them, or set its body to Keyframed.")
+
+
+def parent_matrix(obj, depsgraph) -> np.ndarray:
+    """(4, 4) float: what its parents do to a body's own matrix at the present frame."""
+    if obj.parent is None:
+        return np.eye(4)
+    found = obj.evaluated_get(depsgraph)
+    return transforms.array(found.matrix_world @ found.matrix_basis.inverted())
+
+
+def start_matrix(obj, depsgraph) -> np.ndarray:
+    """(4, 4) float: world matrix at the first frame; the kept one while the body is displaced."""
+    settings = obj.palpate
+    if settings.has_start:
+        return np.array(settings.start_matrix, dtype=float).reshape(4, 4)
+    return transforms.array(obj.evaluated_get(depsgraph).matrix_world)
+
+
+def remember(obj, matrix: np.ndarray) -> None:
+    """Keep where a body starts, before it is moved for the first time."""
+    settings = obj.palpate
+    if not settings.has_start:
+        settings.start_matrix = matrix.ravel()
+        settings.start_channels = _channels(obj)
+        settings.has_start = True
+
+
+def restore(obj) -> None:
+    """Put a body back to where it started, to the last bit, and forget that it was elsewhere."""
+    if obj.palpate.has_start:
+        _set_channels(obj, np.array(obj.palpate.start_channels))
+        obj.palpate.has_start = False
+
+
+def _channels(obj) -> np.ndarray:
+    return np.concatenate([obj.location, obj.rotation_euler, obj.rotation_quaternion, obj.rotation_axis_angle])
+
+
+def _set_channels(obj, channels: np.ndarray) -> None:
+    obj.location, obj.rotation_euler = channels[:3], channels[3:6]
+    obj.rotation_quaternion, obj.rotation_axis_angle = channels[6:10], channels[10:14]
+
+
+@dataclass(frozen=True)
+class Placement:
+    """From a pose of the solver to the location and rotation properties of one object.
+
+    Attributes
+    ----------
+    channels : (14,) float
+        Location, Euler, quaternion and axis-angle rotation at the start.
+    world, parent : (4, 4) float
+        The object's world matrix and its parents' share of it at the start.
+    scale : float
+        Metres per Blender unit.
+    """
+
+    obj: object
+    channels: np.ndarray
+    world: np.ndarray
+    parent: np.ndarray
+    scale: float
+
+    @classmethod
+    def of(cls, obj, matrix: np.ndarray, parent: np.ndarray, scale: float) -> Placement:
+        """Describe a body that starts at a world matrix; its kept start counts when it is displaced."""
+        settings = obj.palpate
+        channels = np.array(settings.start_channels) if settings.has_start else _channels(obj)
+        return cls(obj, channels.astype(float), matrix, parent, scale)
+
+    def pose(self, pose: np.ndarray, parent: np.ndarray, previous: np.ndarray | None = None) -> np.ndarray:
+        """Return the (14,) properties that put the body at a pose.
+
+        Parameters
+        ----------
+        pose : (7,) float
+            Position (m) and quaternion of the body's frame in the world.
+        parent : (4, 4) float
+            The parents' share at that frame.
+        previous : (14,) float, optional
+            Properties at the frame before, which the rotation should not jump away from.
+        """
+        start_location, start_quaternion, _ = transforms.split(self.world)
+        before = transforms.rigid(start_location, start_quaternion)
+        after = transforms.rigid(pose[:3] / self.scale, pose[3:])
+        moved = after @ np.linalg.inv(before) @ self.world
+        basis, basis_before = np.linalg.inv(parent) @ moved, np.linalg.inv(self.parent) @ self.world
+        turn = basis[:3, :3] @ np.linalg.inv(basis_before[:3, :3])
+        location = self.channels[:3] + basis[:3, 3] - basis_before[:3, 3]
+        return np.concatenate([location, self._rotations(turn, self.channels if previous is None else previous)])
+
+    def _rotations(self, turn: np.ndarray, previous: np.ndarray) -> np.ndarray:
+        """Apply a world-side rotation to the start's rotation properties; those of other modes stay as they are."""
+        mode = self.obj.rotation_mode
+        rest = self.channels[3:].copy()
+        turn = Matrix(turn).to_quaternion()
+        if mode == "QUATERNION":
+            delta = self.obj.delta_rotation_quaternion
+            result = delta.inverted() @ turn @ delta @ Quaternion(rest[3:7])
+            result.make_compatible(Quaternion(previous[6:10]))
+            rest[3:7] = result
+        elif mode == "AXIS_ANGLE":
+            result = turn @ Quaternion(rest[8:11], rest[7])
+            axis, angle = result.to_axis_angle()
+            rest[7], rest[8:11] = angle, axis
+        else:
+            delta = self.obj.delta_rotation_euler.to_quaternion()
+            result = delta.inverted() @ turn @ delta @ Euler(rest[:3], mode).to_quaternion()
+            rest[:3] = result.to_euler(mode, Euler(previous[3:6], mode))
+        return rest
+
+    def show(self, pose: np.ndarray, parent: np.ndarray) -> None:
+        """Move the object to a pose; keep where it was before it is moved for the first time."""
+        remember(self.obj, self.world)
+        _set_channels(self.obj, self.pose(pose, parent))
+
+
+def bake(placement: Placement, frames: np.ndarray, poses: np.ndarray, parents: np.ndarray) -> None:
+    """Keyframe a body's motion, linear between frames; what else its action holds stays.
+
+    Parameters
+    ----------
+    frames : (f,) int
+    poses : (f, 7) float
+    parents : (f, 4, 4) float
+    """
+    obj = placement.obj
+    rows = [placement.channels]
+    for pose, parent in zip(poses[1:], parents[1:], strict=True):
+        rows.append(placement.pose(pose, parent, rows[-1]))
+    table = np.array(rows)
+    remember(obj, placement.world)
+    found, made = curves.ensure(obj, f"{obj.name} Palpate")
+    curves.remove(found, PATHS)
+    curves.write(found, "location", frames, table[:, :3])
+    path, columns = {
+        "QUATERNION": ("rotation_quaternion", slice(6, 10)),
+        "AXIS_ANGLE": ("rotation_axis_angle", slice(10, 14)),
+    }.get(obj.rotation_mode, ("rotation_euler", slice(3, 6)))
+    curves.write(found, path, frames, table[:, columns])
+    obj.palpate.made_action = obj.palpate.made_action or made
+    obj.palpate.is_baked = True
+
+
+def clear(obj) -> None:
+    """Take the keyframes of a bake away and put the body back to where it started."""
+    import bpy
+
+    found = curves.of(obj)
+    if found is not None:
+        curves.remove(found, PATHS)
+        if obj.palpate.made_action and len(found) == 0:
+            data = obj.animation_data
+            bpy.data.actions.remove(data.action)
+            if not data.drivers and not data.nla_tracks:
+                obj.animation_data_clear()
+    obj.palpate.made_action = obj.palpate.is_baked = False
+    restore(obj)

@@ -1,0 +1,221 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the user says about objects and scenes. No state of a simulation lives here, only what has to be saved with the file.
+
+Numbers are in SI units with the unit in the name, since Blender has none for N/m; see :mod:`.units`.
+"""
+
+import bpy
+from bpy.props import (
+    BoolProperty,
+    EnumProperty,
+    FloatProperty,
+    FloatVectorProperty,
+    IntProperty,
+    PointerProperty,
+    StringProperty,
+)
+
+from ..core.migrate import VERSION
+from ..core.scenario import SensorParameters
+from . import identity, state
+
+ROLES = (
+    ("NONE", "None", "Takes no part"),
+    ("SENSOR", "Sensor", "Feels what touches it, in every texel"),
+    ("TARGET", "Target", "Presses on sensors and pads"),
+    ("PAD", "Pad", "Gives way like a sensor, but is not read out: a table, the back of a finger"),
+)
+COLOR_MAPS = (
+    ("VIRIDIS", "Viridis", "Dark blue to yellow, perceptually uniform"),
+    ("MAGMA", "Magma", "Black to pale yellow, perceptually uniform"),
+    ("PAPER", "White to Black", "White is no force, black the largest, as in the paper's Fig. 10"),
+)
+PARAMETERS = ("k", "cn", "ct", "sigma0", "sigma1", "x0", "mus", "mud", "max_penetration", "gain", "zero", "unit")
+"""Names that :class:`SensorParameters` and :class:`PALPATE_PG_object` share."""
+
+_default = SensorParameters()
+_fixed = {"options": set(), "override": {"LIBRARY_OVERRIDABLE"}}
+"""A parameter is one number for the whole run, so it has no keyframes."""
+
+
+def _role_changed(settings, context):
+    """Also a script that only sets the role gets an object that can be found again."""
+    settings.schema_version = VERSION
+    identity.ensure(settings.id_data)
+    state.participants_changed()
+
+
+def _number(name, key, text, **more):
+    """A parameter of the model with the paper's default."""
+    more = {"min": 0.0, "default": getattr(_default, key), "precision": 4, "step": 10, **more}
+    return FloatProperty(name=name, description=text, **more, **_fixed)
+
+
+class PALPATE_PG_object(bpy.types.PropertyGroup):
+    """`Object.palpate`"""
+
+    schema_version: IntProperty(options={"HIDDEN"})
+    uid: StringProperty(options={"HIDDEN"})
+    role: EnumProperty(name="Role", description="Part of this object", items=ROLES, update=_role_changed, **_fixed)
+
+    region: EnumProperty(
+        name="Region",
+        description="Which vertices become texels",
+        items=(
+            ("MESH", "Whole Mesh", "Every vertex"),
+            ("GROUP", "Vertex Group", "Vertices whose weight reaches the threshold"),
+        ),
+        **_fixed,
+    )
+    vertex_group: StringProperty(name="Vertex Group", description="Painted or assigned region of the sensor", **_fixed)
+    threshold: FloatProperty(
+        name="Threshold",
+        description="Least weight at which a vertex belongs to the sensor",
+        default=0.5,
+        min=0.0,
+        max=1.0,
+        subtype="FACTOR",
+        **_fixed,
+    )
+
+    k: _number(
+        "Stiffness k (N/m)",
+        "k",
+        "Normal stiffness of one texel, N/m (Eq. 8). Eq. 18 finds it from foam data. Table 2: 58.5; the pad of Table 3: 1000",
+    )
+    cn: _number(
+        "Damping cn (N·s/m)", "cn", "Normal damping of one texel, N·s/m (Eq. 8). About 1 % of k in number; Table 2 has 0.0583"
+    )
+    max_penetration: _number(
+        "Max Penetration (m)",
+        "max_penetration",
+        "Depth past which a texel no longer acts, m. About twice the thickness of the foam: 0.012 for 6 mm",
+        precision=5,
+        step=0.1,
+    )
+    sigma0: _number(
+        "Bristle Stiffness σ0 (N/m)", "sigma0", "Tangential stiffness before a texel slips, N/m (Eq. 9, 13). Table 2: 1"
+    )
+    sigma1: _number("Bristle Damping σ1 (N·s/m)", "sigma1", "Damping of the bristles, N·s/m (Eq. 13). Table 2: 0.1")
+    ct: _number("Viscous Friction ct (N·s/m)", "ct", "Friction that grows with sliding speed, N·s/m (Eq. 13). Table 2: 0.01")
+    mus: _number("Static Friction μs", "mus", "Coefficient at which sliding begins, no unit (Eq. 11). Foam on metal: 0.435")
+    mud: _number("Dynamic Friction μd", "mud", "Coefficient of fast sliding, no unit, at most μs (Eq. 12). Foam on metal: 0.23")
+    x0: _number(
+        "Stribeck Velocity ẋ0 (m/s)", "x0", "Speed at which static friction gives way to dynamic, m/s (Eq. 10). Table 2: 0.3"
+    )
+
+    gain: _number(
+        "Gain (unit/N)", "gain", "Reading = zero + gain · normal force; what one newton adds to the reading", min=-1e9
+    )
+    zero: _number("Zero (unit)", "zero", "Reading without load", min=-1e9)
+    unit: StringProperty(name="Unit", description="Of the reading, as in N, V or counts", default=_default.unit, **_fixed)
+
+    body: EnumProperty(
+        name="Body",
+        description="What moves this object",
+        items=(
+            ("KEYFRAMED", "Keyframed", "Its animation, parents and constraints; forces do not move it"),
+            ("FREE", "Free", "Gravity and the sensors' forces, from where it is at the first frame"),
+        ),
+        **_fixed,
+    )
+    mass: FloatProperty(
+        name="Mass (kg)",
+        description="Of a free body, kg; its inertia follows from the mesh, taken as a solid of uniform density",
+        default=1.0,
+        min=0.0,
+        precision=4,
+        **_fixed,
+    )
+    velocity: FloatVectorProperty(
+        name="Velocity (m/s)", description="Of a free body at the first frame, m/s, world axes", size=3, precision=4, **_fixed
+    )
+    angular_velocity: FloatVectorProperty(
+        name="Spin (rad/s)", description="Of a free body at the first frame, rad/s, world axes", size=3, precision=4, **_fixed
+    )
+
+    # Bookkeeping of a free body that was moved, and of a bake. Saved, because the file has to be put right after it is reopened.
+    has_start: BoolProperty(options={"HIDDEN"})
+    start_matrix: FloatVectorProperty(size=16, options={"HIDDEN"})
+    start_channels: FloatVectorProperty(size=14, options={"HIDDEN"})
+    is_baked: BoolProperty(options={"HIDDEN"})
+    made_action: BoolProperty(options={"HIDDEN"})
+    bake_folder: StringProperty(options={"HIDDEN"})
+
+
+class PALPATE_PG_scene(bpy.types.PropertyGroup):
+    """`Scene.palpate`"""
+
+    schema_version: IntProperty(options={"HIDDEN"})
+    folder: StringProperty(
+        name="Bake Folder",
+        description="Tactile images and recordings go here, in one folder per sensor; // is the folder of the .blend",
+        default="//palpate",
+        subtype="DIR_PATH",
+        options=set(),
+    )
+    use_auto_dt: BoolProperty(
+        name="Automatic Time Step",
+        description="Choose the substep from the stability limit of the stiffest contact",
+        default=True,
+        options=set(),
+    )
+    dt: FloatProperty(
+        name="Time Step (s)", description="Longest substep, s", default=1e-4, min=0.0, precision=6, step=0.001, options=set()
+    )
+    use_live: BoolProperty(
+        name="Simulate on Playback",
+        description="Playing forward from the first frame computes frame by frame; scrubbing shows what was computed",
+        default=True,
+        options=set(),
+    )
+    show_overlay: BoolProperty(
+        name="Live Heat Map",
+        description="Colour the texels in the 3D view while playing; nothing of it is saved",
+        default=True,
+        options=set(),
+    )
+    color_map: EnumProperty(name="Colour Map", description="Colours of the heat map", items=COLOR_MAPS, options=set())
+    use_auto_range: BoolProperty(
+        name="Automatic Range",
+        description="The heat map ends at the largest normal force of each sensor",
+        default=True,
+        options=set(),
+    )
+    range_max: FloatProperty(
+        name="Maximum (N)", description="Normal force at the end of the heat map, N", default=0.1, min=1e-9, options=set()
+    )
+    use_auto_arrow: BoolProperty(
+        name="Automatic Arrow Length",
+        description="The longest arrow of a bake is as long as the largest side of its sensor",
+        default=True,
+        options=set(),
+    )
+    arrow_scale: FloatProperty(
+        name="Arrow Scale (m/N)",
+        description="Length of the net-force arrow for each newton, m/N",
+        default=0.05,
+        min=0.0,
+        precision=5,
+        options=set(),
+    )
+    baked_digest: StringProperty(options={"HIDDEN"})
+    baked_start: IntProperty(options={"HIDDEN"})
+    baked_end: IntProperty(options={"HIDDEN"})
+
+
+CLASSES = (PALPATE_PG_object, PALPATE_PG_scene)
+
+
+def register():
+    for cls in CLASSES:
+        bpy.utils.register_class(cls)
+    bpy.types.Object.palpate = PointerProperty(type=PALPATE_PG_object, override={"LIBRARY_OVERRIDABLE"})
+    bpy.types.Scene.palpate = PointerProperty(type=PALPATE_PG_scene)
+
+
+def unregister():
+    del bpy.types.Scene.palpate
+    del bpy.types.Object.palpate
+    for cls in reversed(CLASSES):
+        bpy.utils.unregister_class(cls)

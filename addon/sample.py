@@ -1,0 +1,289 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A scene becomes a :class:`Scenario`: the only place that reads meshes and poses out of Blender.
+
+Who takes part: every object of the scene with a role that the view layer shows. Hidden and disabled objects are left out, with a
+warning; instances of collections never take part.
+
+Each object is a body of its own. Its frame has the location and rotation of the object; scale and shear go into the vertices. The
+shape of a mesh is that of the first frame. Keyframed bodies are sampled at every frame.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..core.errors import SceneError
+from ..core.mesh import TriangleMesh, checked_mesh, mass_properties
+from ..core.scenario import Body, Motion, Scenario, Sensor, SensorParameters, Target
+from ..core.texels import texels_from_region
+from . import freebodies, identity, meshes, properties, transforms, units
+from .jobs import Progress
+
+SAME_STRETCH = 1e-4
+"""Largest relative change of an object's scale over time that is put down to rounding."""
+
+Poses = dict[int, tuple[np.ndarray, np.ndarray]]
+
+
+@dataclass
+class Binding:
+    """Which body of a scenario is which object.
+
+    Attributes
+    ----------
+    keys : tuple of str
+        Of the objects (:mod:`.identity`), by body index.
+    names : tuple of str
+        For messages when one of them is gone.
+    scale : float
+        Metres per Blender unit.
+    stretch : (b, 3, 3) float
+        Of each object at the first frame (:mod:`.transforms`).
+    starts : dict of int to (4, 4) float
+        World matrices at the first frame of the free bodies, by body index.
+    parents : dict of int to list of (4, 4) float
+        What their parents do to free bodies, frame by frame.
+    warnings : tuple of str
+    """
+
+    keys: tuple[str, ...]
+    names: tuple[str, ...]
+    scale: float
+    stretch: np.ndarray
+    starts: dict[int, np.ndarray]
+    parents: dict[int, list[np.ndarray]]
+    warnings: tuple[str, ...]
+
+    def objects(self, scene) -> list:
+        """Return the objects by body index.
+
+        Raises
+        ------
+        SceneError
+            One of them was deleted or hidden from the scene.
+        """
+        found = identity.find(scene, self.keys)
+        for key, name in zip(self.keys, self.names, strict=True):
+            if key not in found:
+                raise SceneError(f"'{name}' was deleted while its forces were computed: undo that, or start again without it.")
+        return [found[key] for key in self.keys]
+
+
+def view_layer_of(scene):
+    """Return the view layer that decides what takes part: the window's, else the scene's first."""
+    import bpy
+
+    context = bpy.context
+    return context.view_layer if context.scene == scene and context.view_layer else scene.view_layers[0]
+
+
+def depsgraph_of(scene):
+    """Return the up-to-date dependency graph of a scene's present frame."""
+    layer = view_layer_of(scene)
+    layer.update()
+    return layer.depsgraph
+
+
+def participants(scene) -> tuple[list, list[str]]:
+    """Return the objects that take part, in the scene's order, and a warning for each that would but is hidden."""
+    layer = view_layer_of(scene)
+    found, warnings = [], []
+    for obj in scene.objects:
+        if obj.palpate.role == "NONE" or obj.type not in meshes.KINDS:
+            continue
+        if obj.visible_get(view_layer=layer):
+            found.append(obj)
+        else:
+            warnings.append(f"'{obj.name}' is hidden and takes no part.")
+    return found, warnings
+
+
+def sample_start(scene, depsgraph) -> tuple[Scenario, Binding]:
+    """Read a scene at its first frame, where it has to stand.
+
+    Returns
+    -------
+    scenario : Scenario
+        Keyframed bodies have one sample of their motion.
+    binding : Binding
+
+    Raises
+    ------
+    PalpateError
+        Something in the scene makes no run; the message names it.
+    """
+    objects, warnings = participants(scene)
+    for obj in objects:
+        identity.ensure(obj)
+    _check_parents(objects)
+    settings, scale = scene.palpate, units.metres_per_unit(scene)
+    bodies, sensors, targets, stretches, starts = [], [], [], [], {}
+    for index, obj in enumerate(objects):
+        free = obj.palpate.body == "FREE"
+        if free:
+            freebodies.check(obj)
+        matrix = freebodies.start_matrix(obj, depsgraph) if free else _world(obj, depsgraph)
+        position, quaternion, stretch = _split(obj, matrix)
+        stretches.append(stretch)
+        mesh, arrays_warnings = _mesh(obj, depsgraph, stretch * scale)
+        warnings += arrays_warnings
+        body = Body(obj.name, Motion.at_rest(position * scale, quaternion))
+        if free:
+            starts[index] = matrix
+            body, more = _free(obj, body, mesh)
+            warnings += more
+        bodies.append(body)
+        if obj.palpate.role == "TARGET":
+            targets.append(Target(obj.name, index, mesh))
+        else:
+            sensors.append(_sensor(obj, index, mesh))
+    scenario = Scenario(
+        bodies=tuple(bodies),
+        sensors=tuple(sensors),
+        targets=tuple(targets),
+        frame_start=scene.frame_start,
+        frame_end=scene.frame_end,
+        fps=units.frames_per_second(scene),
+        gravity=units.gravity(scene),
+        dt=None if settings.use_auto_dt else units.as_typed(settings.dt),
+        name=scene.name,
+    )
+    scenario.check()
+    binding = Binding(
+        keys=tuple(identity.key(obj) for obj in objects),
+        names=tuple(obj.name for obj in objects),
+        scale=scale,
+        stretch=np.array(stretches),
+        starts=starts,
+        parents={index: [freebodies.parent_matrix(objects[index], depsgraph)] for index in starts},
+        warnings=tuple(warnings),
+    )
+    return scenario, binding
+
+
+def sample_poses(scene, depsgraph, binding: Binding) -> tuple[Poses, dict[int, np.ndarray]]:
+    """Read where keyframed bodies, and the parents of free ones, are at the scene's present frame.
+
+    Returns
+    -------
+    poses : dict of body index to (position (3,) m, quaternion (4,))
+    parents : dict of body index to (4, 4) float
+    """
+    poses, parents = {}, {}
+    for index, obj in enumerate(binding.objects(scene)):
+        if index in binding.starts:
+            parents[index] = freebodies.parent_matrix(obj, depsgraph)
+            continue
+        position, quaternion, stretch = _split(obj, _world(obj, depsgraph))
+        if np.abs(stretch - binding.stretch[index]).max() > SAME_STRETCH * np.abs(binding.stretch[index]).max():
+            raise SceneError(
+                f"The scale of '{obj.name}' changes (frame {scene.frame_current}): bodies are rigid, keep the scale constant."
+            )
+        poses[index] = position * binding.scale, quaternion
+    return poses, parents
+
+
+def sample_scenario(scene) -> Generator[Progress, None, tuple[Scenario, Binding]]:
+    """Read a scene over its whole frame range, frame by frame, and leave it at the frame where it stood."""
+    _check_range(scene)
+    before = scene.frame_current, scene.frame_subframe
+    frames = range(scene.frame_start, scene.frame_end + 1)
+    try:
+        scene.frame_set(frames[0])
+        scenario, binding = sample_start(scene, depsgraph_of(scene))
+        motions = {index: body.motion for index, body in enumerate(scenario.bodies) if not body.free}
+        samples = {index: [(motion.positions[0], motion.quaternions[0])] for index, motion in motions.items()}
+        yield Progress("Reading", frames[0], 1, len(frames))
+        for frame in frames[1:]:
+            scene.frame_set(frame)
+            poses, parents = sample_poses(scene, depsgraph_of(scene), binding)
+            for index, pose in poses.items():
+                samples[index].append(pose)
+            for index, matrix in parents.items():
+                binding.parents[index].append(matrix)
+            yield Progress("Reading", frame, frame - frames[0] + 1, len(frames))
+    finally:
+        scene.frame_set(before[0], subframe=before[1])
+    times = np.array([(frame - frames[0]) / scenario.fps for frame in frames])
+    bodies = list(scenario.bodies)
+    for index, path in samples.items():
+        positions, quaternions = (np.array(part) for part in zip(*path, strict=True))
+        bodies[index] = replace(bodies[index], motion=Motion(times, positions, quaternions))
+    return replace(scenario, bodies=tuple(bodies)), binding
+
+
+def _check_range(scene) -> None:
+    if scene.frame_end < scene.frame_start:
+        raise SceneError(
+            f"The frame range of '{scene.name}' runs backwards ({scene.frame_start} to {scene.frame_end}): "
+            "set the end frame after the start frame."
+        )
+
+
+def _check_parents(objects) -> None:
+    free = {obj for obj in objects if obj.palpate.body == "FREE"}
+    for obj in objects:
+        above = obj.parent
+        while above is not None:
+            if above in free:
+                raise SceneError(
+                    f"'{obj.name}' is a child of free body '{above.name}': clear its parent, each is a body of its own."
+                )
+            above = above.parent
+
+
+def _world(obj, depsgraph) -> np.ndarray:
+    return transforms.array(obj.evaluated_get(depsgraph).matrix_world)
+
+
+def _split(obj, matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    if not np.isfinite(matrix).all():
+        raise SceneError(f"'{obj.name}' has a NaN or infinite location, rotation or scale: check its drivers and constraints.")
+    if transforms.is_singular(matrix):
+        raise SceneError(f"The scale of '{obj.name}' is zero in at least one direction: give it a scale, it has no volume.")
+    return transforms.split(matrix)
+
+
+def _mesh(obj, depsgraph, stretch: np.ndarray) -> tuple[TriangleMesh, list[str]]:
+    """Return an object's mesh in its body's frame, metres."""
+    if obj.palpate.role == "TARGET":
+        arrays, warnings = meshes.target_arrays(obj, depsgraph), []
+    else:
+        arrays, warnings = meshes.sensor_arrays(obj, depsgraph)
+    triangles, quads = arrays.triangles, arrays.quads
+    if np.linalg.det(stretch) < 0:
+        triangles, quads = triangles[:, ::-1], quads[:, ::-1]
+        warnings.append(f"The scale of '{obj.name}' mirrors it: its faces were turned so that they still point outwards.")
+    mesh, more = checked_mesh(arrays.vertices @ stretch.T, triangles, obj.name, quads)
+    return mesh, warnings + more
+
+
+def _free(obj, body: Body, mesh: TriangleMesh) -> tuple[Body, list[str]]:
+    settings = obj.palpate
+    mass = units.as_typed(settings.mass)
+    center, inertia, warnings = mass_properties(mesh, mass, obj.name)
+    return replace(
+        body,
+        free=True,
+        mass=mass,
+        center_of_mass=center,
+        inertia=inertia,
+        velocity=np.array([units.as_typed(value) for value in settings.velocity]),
+        angular_velocity=np.array([units.as_typed(value) for value in settings.angular_velocity]),
+    ), warnings
+
+
+def parameters(settings) -> SensorParameters:
+    """Return the parameters of an object's panel."""
+    values = {key: getattr(settings, key) for key in properties.PARAMETERS}
+    return SensorParameters(**{key: units.as_typed(v) if isinstance(v, float) else v for key, v in values.items()})
+
+
+def _sensor(obj, body: int, mesh: TriangleMesh) -> Sensor:
+    found = parameters(obj.palpate)
+    found.check(obj.name)
+    region = meshes.region(obj, len(mesh.vertices))
+    return Sensor(obj.name, body, texels_from_region(mesh, region, obj.name), found, readout=obj.palpate.role == "SENSOR")

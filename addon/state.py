@@ -1,0 +1,47 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the session remembers and no file does: who takes part, what is running, what should not be disturbed."""
+
+from __future__ import annotations
+
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+
+
+@dataclass
+class Session:
+    """What handlers, bake and panels share."""
+
+    participants_known: bool = False
+    """False when objects may have got or lost a role since they were last looked for."""
+    changed_geometry: set[str] = field(default_factory=set)
+    """Names of objects whose geometry was touched since the last look."""
+    suspended: int = 0
+    """Above zero while a bake reads the scene: the timeline must not simulate then."""
+    rendering: bool = False
+    bake: object = None
+    """The running bake's last Progress, for the panel."""
+    notes: dict[str, str] = field(default_factory=dict)
+    """By scene or object name: what is wrong with settings that could not be read."""
+
+
+session = Session()
+
+
+def participants_changed() -> None:
+    """Look for the participants anew next time."""
+    session.participants_known = False
+
+
+@contextmanager
+def suspended():
+    """Keep the timeline handler quiet."""
+    session.suspended += 1
+    try:
+        yield
+    finally:
+        session.suspended -= 1
+
+
+def reset() -> None:
+    """Start over, because another file is open or the add-on is being disabled."""
+    session.__init__()
