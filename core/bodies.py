@@ -162,17 +162,17 @@ def write_world_inertia(rotation, inertia, out):
 
 
 @kernel
-def add_own_block(matrix, at, row, arm, scale):
+def add_own_block(matrix, at, rows, r, arm, scale):
     """Add to a body's 6 × 6 block what one contact resists of its own motion.
 
     With the contact's damping tensor ``C = ct 1 + (cn - ct) n nᵀ`` and ``v = V + ω × r`` the block is ``Jᵀ C J``.
     Only the lower triangle is written; `scale` is the step's length.
     """
-    nx, ny, nz = row[0], row[1], row[2]
-    rx, ry, rz = row[arm], row[arm + 1], row[arm + 2]
+    nx, ny, nz = rows[r, 0], rows[r, 1], rows[r, 2]
+    rx, ry, rz = rows[r, arm], rows[r, arm + 1], rows[r, arm + 2]
     mx, my, mz = ry * nz - rz * ny, rz * nx - rx * nz, rx * ny - ry * nx
-    t = scale * row[STIFF_T]
-    e = scale * (row[STIFF_N] - row[STIFF_T])
+    t = scale * rows[r, STIFF_T]
+    e = scale * (rows[r, STIFF_N] - rows[r, STIFF_T])
     matrix[at, at] += t + e * nx * nx
     matrix[at + 1, at] += e * ny * nx
     matrix[at + 1, at + 1] += t + e * ny * ny
@@ -199,32 +199,32 @@ def add_own_block(matrix, at, row, arm, scale):
 
 
 @kernel
-def add_cross_block(matrix, at_low, at_high, row, arm_low, arm_high, scale):
+def add_cross_block(matrix, at_low, at_high, rows, r, arm_low, arm_high, scale):
     """Add the coupling of two free bodies through one contact, ``-J_highᵀ C J_low``, below the diagonal."""
-    t = scale * row[STIFF_T]
-    e = scale * (row[STIFF_N] - row[STIFF_T])
+    t = scale * rows[r, STIFF_T]
+    e = scale * (rows[r, STIFF_N] - rows[r, STIFF_T])
     high, low = np.zeros((3, 6)), np.zeros((3, 6))  # J of both bodies: velocity of the contact point from (V, ω)
     for i in range(3):
         high[i, i] = 1.0
         low[i, i] = 1.0
-    high[0, 4], high[0, 5], high[1, 5] = row[arm_high + 2], -row[arm_high + 1], row[arm_high]
-    high[1, 3], high[2, 3], high[2, 4] = -row[arm_high + 2], row[arm_high + 1], -row[arm_high]
-    low[0, 4], low[0, 5], low[1, 5] = row[arm_low + 2], -row[arm_low + 1], row[arm_low]
-    low[1, 3], low[2, 3], low[2, 4] = -row[arm_low + 2], row[arm_low + 1], -row[arm_low]
+    high[0, 4], high[0, 5], high[1, 5] = rows[r, arm_high + 2], -rows[r, arm_high + 1], rows[r, arm_high]
+    high[1, 3], high[2, 3], high[2, 4] = -rows[r, arm_high + 2], rows[r, arm_high + 1], -rows[r, arm_high]
+    low[0, 4], low[0, 5], low[1, 5] = rows[r, arm_low + 2], -rows[r, arm_low + 1], rows[r, arm_low]
+    low[1, 3], low[2, 3], low[2, 4] = -rows[r, arm_low + 2], rows[r, arm_low + 1], -rows[r, arm_low]
     for i in range(6):
         for j in range(6):
             total = 0.0
             for a in range(3):
                 for b in range(3):
-                    c = e * row[a] * row[b] + (t if a == b else 0.0)
+                    c = e * rows[r, a] * rows[r, b] + (t if a == b else 0.0)
                     total += high[a, i] * c * low[b, j]
             matrix[at_high + i, at_low + j] -= total
 
 
 @kernel
-def add_force(vector, at, fx, fy, fz, row, arm, scale):
+def add_force(vector, at, fx, fy, fz, rows, r, arm, scale):
     """Add a force at a contact point to a body's six entries."""
-    rx, ry, rz = row[arm], row[arm + 1], row[arm + 2]
+    rx, ry, rz = rows[r, arm], rows[r, arm + 1], rows[r, arm + 2]
     vector[at] += scale * fx
     vector[at + 1] += scale * fy
     vector[at + 2] += scale * fz

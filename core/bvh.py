@@ -10,6 +10,7 @@ and Wald, JCGT 2013).
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -32,10 +33,8 @@ class Tree(NamedTuple):
         Node to visit when a box is missed.
     first, number : (nn,) int
         Triangles of a leaf; `number` is zero in inner nodes.
-    corners : (nt, 3, 3) float, metres
-        Triangles in leaf order.
-    normals : (nt, 3) float
-        Outward unit normals in leaf order.
+    faces : (nt, 12) float
+        Triangles in leaf order: three corners (m) and the outward unit normal.
     source : (nt,) int
         Each triangle's index in the mesh it came from.
     roots : (m + 1,) int
@@ -46,8 +45,7 @@ class Tree(NamedTuple):
     skip: np.ndarray
     first: np.ndarray
     number: np.ndarray
-    corners: np.ndarray
-    normals: np.ndarray
+    faces: np.ndarray
     source: np.ndarray
     roots: np.ndarray
 
@@ -76,8 +74,7 @@ def build_tree(meshes: list[TriangleMesh]) -> Tree:
                 skip[:nodes] + node_offset,
                 np.where(leaf, first[:nodes] + triangle_offset, 0),
                 number[:nodes],
-                corners[order],
-                face_normals(mesh)[order],
+                np.hstack([corners[order].reshape(-1, 9), face_normals(mesh)[order]]),
                 order,
             )
         )
@@ -169,6 +166,30 @@ def _node_count(n, leaf_size):
     return total
 
 
+NEAR = 12
+"""Most triangles that are remembered as near a segment; where there are more, the tree is asked every time."""
+
+
+@kernel
+def _line_of_sight(dx, dy, dz):
+    """Axis along which a vector is longest, and the shear of the other two (in cyclic order) that lays it onto that axis."""
+    if abs(dx) >= abs(dy) and abs(dx) >= abs(dz):
+        return 0, dy / dx, dz / dx
+    if abs(dy) >= abs(dz):
+        return 1, dz / dy, dx / dy
+    return 2, dx / dz, dy / dz
+
+
+@kernel
+def _seen_along(x, y, z, axis, shear_x, shear_y):
+    """Project a point along the line of sight."""
+    if axis == 0:
+        return y - shear_x * x, z - shear_y * x
+    if axis == 1:
+        return z - shear_x * y, x - shear_y * y
+    return x - shear_x * z, y - shear_y * z
+
+
 @kernel
 def segment_entry(ox, oy, oz, dx, dy, dz, mesh, hint, tree):
     """Find where the segment from O to O + D first enters a surface from outside.
@@ -176,7 +197,7 @@ def segment_entry(ox, oy, oz, dx, dy, dz, mesh, hint, tree):
     Parameters
     ----------
     ox … dz : float
-        Base of the segment and the vector to its tip, in the mesh's frame.
+        Base of the segment and the vector to its tip (not zero), in the mesh's frame.
     mesh : int
         Which of the tree's meshes.
     hint : int
@@ -189,34 +210,30 @@ def segment_entry(ox, oy, oz, dx, dy, dz, mesh, hint, tree):
     triangle : int
         In leaf order, -1 when there is none.
     exit : float
-        Position of the nearest intersection that leaves a surface, as far as it lies before `t`; 2 when there is none. Smaller
-        than `t` means that the base is inside the object.
+        Where there is no entry: position of the nearest intersection that leaves a surface, which means that the base is inside
+        the object; 2 when there is none.
     """
     t, triangle, leaving = 2.0, -1, 2.0
-    corners, normals = tree.corners, tree.normals
-    # The axis along which the segment is longest, and the shear that lays it onto that axis.
-    d = (dx, dy, dz)
-    z = 0 if abs(dx) >= abs(dy) and abs(dx) >= abs(dz) else (1 if abs(dy) >= abs(dz) else 2)
-    x, y = (z + 1) % 3, (z + 2) % 3
-    if d[z] == 0.0:
-        return t, triangle, leaving
-    shear_x, shear_y = d[x] / d[z], d[y] / d[z]
+    axis, shear_x, shear_y = _line_of_sight(dx, dy, dz)
     if hint >= 0:
-        u = _cross_triangle(ox, oy, oz, dx, dy, dz, x, y, z, shear_x, shear_y, corners[hint], normals[hint])
+        u = cross_triangle(ox, oy, oz, dx, dy, dz, axis, shear_x, shear_y, tree.faces, hint)
         if 0.0 <= u <= 1.0:
             t, triangle = u, hint
     reach = min(t, 1.0)
     x0, x1 = min(ox, ox + reach * dx), max(ox, ox + reach * dx)
     y0, y1 = min(oy, oy + reach * dy), max(oy, oy + reach * dy)
     z0, z1 = min(oz, oz + reach * dz), max(oz, oz + reach * dz)
-    node, stop = tree.roots[mesh], tree.roots[mesh + 1]
+    bounds, node, stop = tree.bounds, tree.roots[mesh], tree.roots[mesh + 1]
     while node < stop:
-        box = tree.bounds[node]
-        if box[0] > x1 or box[3] < x0 or box[1] > y1 or box[4] < y0 or box[2] > z1 or box[5] < z0:
+        if (
+            bounds[node, 0] > x1 or bounds[node, 3] < x0
+            or bounds[node, 1] > y1 or bounds[node, 4] < y0
+            or bounds[node, 2] > z1 or bounds[node, 5] < z0
+        ):  # fmt: skip
             node = tree.skip[node]
             continue
         for i in range(tree.first[node], tree.first[node] + tree.number[node]):
-            u = _cross_triangle(ox, oy, oz, dx, dy, dz, x, y, z, shear_x, shear_y, corners[i], normals[i])
+            u = cross_triangle(ox, oy, oz, dx, dy, dz, axis, shear_x, shear_y, tree.faces, i)
             if 0.0 <= u <= 1.0:
                 # Of two triangles met at the very same point (a shared edge) the first in the list answers, hint or not.
                 if u < t or (u == t and i < triangle):
@@ -224,36 +241,99 @@ def segment_entry(ox, oy, oz, dx, dy, dz, mesh, hint, tree):
                     x0, x1 = min(ox, ox + u * dx), max(ox, ox + u * dx)
                     y0, y1 = min(oy, oy + u * dy), max(oy, oy + u * dy)
                     z0, z1 = min(oz, oz + u * dz), max(oz, oz + u * dz)
-            elif -4.0 <= u <= -3.0:
+            elif u < 0.0:
                 leaving = min(leaving, -3.0 - u)
         node += 1
     return t, triangle, leaving
 
 
 @kernel
-def _cross_triangle(ox, oy, oz, dx, dy, dz, x, y, z, shear_x, shear_y, corner, normal):
+def near_entry(ox, oy, oz, dx, dy, dz, near, slot, number, tree):
+    """Answer like :func:`segment_entry`, from a list of all triangles that the segment can meet (see :func:`find_near`)."""
+    t, triangle, leaving = 2.0, -1, 2.0
+    axis, shear_x, shear_y = _line_of_sight(dx, dy, dz)
+    for j in range(number):
+        i = near[slot, j]
+        u = cross_triangle(ox, oy, oz, dx, dy, dz, axis, shear_x, shear_y, tree.faces, i)
+        if 0.0 <= u <= 1.0:
+            if u < t:
+                t, triangle = u, i
+        elif u < 0.0:
+            leaving = min(leaving, -3.0 - u)
+    return t, triangle, leaving
+
+
+@kernel
+def find_near(ox, oy, oz, dx, dy, dz, mesh, skin, near, slot, tree):
+    """Write the triangles that a segment can meet as long as none of its points has moved by more than `skin`.
+
+    Neighbour lists as in molecular dynamics (Verlet 1967): collected with a skin, used until the motion has used the skin up.
+
+    Parameters
+    ----------
+    skin : float, metres
+    near : (s, NEAR) int
+        Written at `slot`, in the order of the tree.
+
+    Returns
+    -------
+    number : int
+        How many there are; -1 when there is no room for them.
+    """
+    axis, shear_x, shear_y = _line_of_sight(dx, dy, dz)
+    aside = skin * math.sqrt(1.0 + shear_x * shear_x + shear_y * shear_y)
+    x0, x1 = min(ox, ox + dx) - skin, max(ox, ox + dx) + skin
+    y0, y1 = min(oy, oy + dy) - skin, max(oy, oy + dy) + skin
+    z0, z1 = min(oz, oz + dz) - skin, max(oz, oz + dz) + skin
+    number = 0
+    bounds, node, stop = tree.bounds, tree.roots[mesh], tree.roots[mesh + 1]
+    while node < stop:
+        if (
+            bounds[node, 0] > x1 or bounds[node, 3] < x0
+            or bounds[node, 1] > y1 or bounds[node, 4] < y0
+            or bounds[node, 2] > z1 or bounds[node, 5] < z0
+        ):  # fmt: skip
+            node = tree.skip[node]
+            continue
+        for i in range(tree.first[node], tree.first[node] + tree.number[node]):
+            # Seen along the segment, the triangle must come within the skin of the origin.
+            low_x, high_x, low_y, high_y = np.inf, -np.inf, np.inf, -np.inf
+            for j in range(0, 9, 3):
+                px, py = _seen_along(
+                    tree.faces[i, j] - ox, tree.faces[i, j + 1] - oy, tree.faces[i, j + 2] - oz, axis, shear_x, shear_y
+                )
+                low_x, high_x, low_y, high_y = min(low_x, px), max(high_x, px), min(low_y, py), max(high_y, py)
+            if low_x <= aside and high_x >= -aside and low_y <= aside and high_y >= -aside:
+                if number == near.shape[1]:
+                    return -1
+                near[slot, number] = i
+                number += 1
+        node += 1
+    return number
+
+
+@kernel
+def cross_triangle(ox, oy, oz, dx, dy, dz, axis, shear_x, shear_y, faces, i):
     """Position on the segment where it crosses a triangle: t in 0…1 entering, -3 - t leaving, 9 when it misses.
 
     The corners are seen along the segment as points of a plane, each computed from the corner alone, and the origin must lie on
-    one side of all three edges. Rounding may turn the sign of an edge into zero, which counts as inside on both sides, but never
-    into its opposite: nothing leaks between neighbours.
+    one side of all three edges. Rounding may turn the sign of an edge into zero, which counts as inside on both sides, but
+    never into its opposite: nothing leaks between neighbours.
     """
-    o = (ox, oy, oz)
-    az, bz, cz = corner[0, z] - o[z], corner[1, z] - o[z], corner[2, z] - o[z]
-    ax, ay = corner[0, x] - o[x] - shear_x * az, corner[0, y] - o[y] - shear_y * az
-    bx, by = corner[1, x] - o[x] - shear_x * bz, corner[1, y] - o[y] - shear_y * bz
-    u = ax * by - ay * bx
-    cx, cy = corner[2, x] - o[x] - shear_x * cz, corner[2, y] - o[y] - shear_y * cz
-    v = bx * cy - by * cx
-    if (u < 0.0 and v > 0.0) or (u > 0.0 and v < 0.0):
+    ax, ay, az = faces[i, 0] - ox, faces[i, 1] - oy, faces[i, 2] - oz
+    bx, by, bz = faces[i, 3] - ox, faces[i, 4] - oy, faces[i, 5] - oz
+    cx, cy, cz = faces[i, 6] - ox, faces[i, 7] - oy, faces[i, 8] - oz
+    height = faces[i, 9] * ax + faces[i, 10] * ay + faces[i, 11] * az
+    ax, ay = _seen_along(ax, ay, az, axis, shear_x, shear_y)
+    bx, by = _seen_along(bx, by, bz, axis, shear_x, shear_y)
+    cx, cy = _seen_along(cx, cy, cz, axis, shear_x, shear_y)
+    u, v, w = ax * by - ay * bx, bx * cy - by * cx, cx * ay - cy * ax
+    low, high = min(u, v, w), max(u, v, w)
+    if (low < 0.0 and high > 0.0) or (low == 0.0 and high == 0.0):
         return 9.0
-    w = cx * ay - cy * ax
-    if (u < 0.0 or v < 0.0) and w > 0.0 or (u > 0.0 or v > 0.0) and w < 0.0 or (u == 0.0 and v == 0.0 and w == 0.0):
-        return 9.0
-    slope = normal[0] * dx + normal[1] * dy + normal[2] * dz
+    slope = faces[i, 9] * dx + faces[i, 10] * dy + faces[i, 11] * dz
     if slope == 0.0:
         return 9.0
-    height = normal[0] * (corner[0, 0] - ox) + normal[1] * (corner[0, 1] - oy) + normal[2] * (corner[0, 2] - oz)
     t = height / slope
     if not 0.0 <= t <= 1.0:
         return 9.0

@@ -20,7 +20,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .bvh import segment_entry
+from .bvh import find_near, near_entry, segment_entry
 from .jit import kernel
 
 # Columns of a contact row. One row per touching texel and target; the row is all that the solver's inner loop reads.
@@ -50,6 +50,12 @@ class World(NamedTuple):
     target_body : (targets,) int
     slot_start : (q,) int
         Where each pair's memory begins.
+    center : (m, 3) float, metres
+        Middle of each sensor's texels and their segments, in its body's frame relative to the reference point.
+    radius : (m,) float, metres
+        How far they reach from there.
+    skin : (q,) float, metres
+        How far a texel may move before the triangles near it are collected anew.
     free_at : (b,) int
         Place of each free body among the free ones, -1 for keyframed bodies.
     mass : (b,) float, kg
@@ -65,6 +71,9 @@ class World(NamedTuple):
     sensor_body: np.ndarray
     target_body: np.ndarray
     slot_start: np.ndarray
+    center: np.ndarray
+    radius: np.ndarray
+    skin: np.ndarray
     free_at: np.ndarray
     mass: np.ndarray
     inertia: np.ndarray
@@ -98,6 +107,8 @@ class State(NamedTuple):
 def stribeck(speed_squared, parameters):
     """Friction coefficient of steady sliding, mud + (mus - mud) exp(-|v|²/x0²) (Eq. 10–12 divided by fn)."""
     x0 = parameters[X0]
+    if speed_squared <= 1e-17 * x0 * x0:  # exp(-1e-17) is 1 to the last bit; at rest this saves the call
+        return parameters[MUS]
     return parameters[MUD] + (parameters[MUS] - parameters[MUD]) * math.exp(-speed_squared / (x0 * x0))
 
 
@@ -149,8 +160,97 @@ def normal_force(depth, rate, parameters):
     return max(parameters[K] * depth + parameters[CN] * rate, 0.0)
 
 
+class Neighbours(NamedTuple):
+    """Which triangles each texel can meet; a cache that changes the speed and never the numbers.
+
+    Attributes
+    ----------
+    near : (s, NEAR) int
+    number : (s,) int
+        Length of each list, -1 where the tree must be asked.
+    pose : (q, 13) float
+        Rotation (row by row) and position of each pair's sensor in the target's frame when its lists were made, and 1, or 0
+        while there are none.
+    """
+
+    near: np.ndarray
+    number: np.ndarray
+    pose: np.ndarray
+
+
 @kernel
-def gather(pair, world, tree, state, rotation, rows, slots, used):
+def _relative_pose(a, b, position, rotation, pose):
+    """Write the sensor's rotation (row by row) and position in the target's frame into `pose`."""
+    for i in range(3):
+        total = 0.0
+        for k in range(3):
+            total += rotation[b, k, i] * (position[a, k] - position[b, k])
+        pose[9 + i] = total
+        for j in range(3):
+            pose[3 * i + j] = (
+                rotation[b, 0, i] * rotation[a, 0, j]
+                + rotation[b, 1, i] * rotation[a, 1, j]
+                + rotation[b, 2, i] * rotation[a, 2, j]
+            )
+
+
+@kernel
+def _distance_to_box(pose, center, sensor, bounds, root):
+    """Distance of the sensor's middle from the target's box, metres."""
+    square = 0.0
+    for i in range(3):
+        x = pose[9 + i] + pose[3 * i] * center[sensor, 0]
+        x += pose[3 * i + 1] * center[sensor, 1] + pose[3 * i + 2] * center[sensor, 2]
+        out = max(bounds[root, i] - x, x - bounds[root, 3 + i], 0.0)
+        square += out * out
+    return math.sqrt(square)
+
+
+@kernel
+def _travel(pose, old, pair, center, sensor, radius):
+    """Bound on how far any point of the sensor has moved between two poses, metres."""
+    shift, turn = 0.0, 0.0
+    for i in range(3):
+        change = pose[9 + i] - old[pair, 9 + i]
+        for j in range(3):
+            difference = pose[3 * i + j] - old[pair, 3 * i + j]
+            change += difference * center[sensor, j]
+            turn += difference * difference
+        shift += change * change
+    return math.sqrt(shift) + math.sqrt(0.5 * turn) * radius
+
+
+@kernel
+def _renew_lists(pair, sensor, target, pose, world, tree, neighbours):
+    """Collect the triangles near each texel of a pair anew."""
+    texels, reach, slot = world.texels, world.reach[sensor], world.slot_start[pair]
+    for texel in range(world.texel_start[sensor], world.texel_start[sensor + 1]):
+        dx = reach * (pose[0] * texels[texel, 3] + pose[1] * texels[texel, 4] + pose[2] * texels[texel, 5])
+        dy = reach * (pose[3] * texels[texel, 3] + pose[4] * texels[texel, 4] + pose[5] * texels[texel, 5])
+        dz = reach * (pose[6] * texels[texel, 3] + pose[7] * texels[texel, 4] + pose[8] * texels[texel, 5])
+        ox = pose[9] + pose[0] * texels[texel, 0] + pose[1] * texels[texel, 1] + pose[2] * texels[texel, 2] - dx
+        oy = pose[10] + pose[3] * texels[texel, 0] + pose[4] * texels[texel, 1] + pose[5] * texels[texel, 2] - dy
+        oz = pose[11] + pose[6] * texels[texel, 0] + pose[7] * texels[texel, 1] + pose[8] * texels[texel, 2] - dz
+        neighbours.number[slot] = find_near(ox, oy, oz, dx, dy, dz, target, world.skin[pair], neighbours.near, slot, tree)
+        slot += 1
+    for i in range(12):
+        neighbours.pose[pair, i] = pose[i]
+    neighbours.pose[pair, 12] = 1.0
+
+
+@kernel
+def _forget(pair, sensor, world, state):
+    """Nothing of this pair touches: no triangle met, no bristle bent."""
+    start = world.slot_start[pair]
+    for slot in range(start, start + world.texel_start[sensor + 1] - world.texel_start[sensor]):
+        if state.hint[slot] != -1:
+            state.hint[slot] = -1
+            for i in range(4):
+                state.bristles[slot, i] = 0.0
+
+
+@kernel
+def gather(pair, world, tree, neighbours, state, rotation, rows, slots, used, pose):
     """Collect the contacts of one sensor with one target as rows behind the `used` rows that are there already.
 
     The segment of a texel runs from its vertex `reach` deep into the sensor; where it enters the target counts. Memory of the
@@ -161,12 +261,15 @@ def gather(pair, world, tree, state, rotation, rows, slots, used):
     pair : int
     world : World
     tree : Tree
+    neighbours : Neighbours
     state : State
     rotation : (b, 3, 3) float
         Orientation of each body.
     rows : (s, ROW) float
     slots : (s,) int
         Written: which place in the memory each row belongs to.
+    pose : (12,) float
+        Working memory.
 
     Returns
     -------
@@ -177,77 +280,77 @@ def gather(pair, world, tree, state, rotation, rows, slots, used):
     """
     sensor, target = world.pairs[pair, 0], world.pairs[pair, 1]
     a, b = world.sensor_body[sensor], world.target_body[target]
-    position_a, rotation_a, position_b, rotation_b = state.position[a], rotation[a], state.position[b], rotation[b]
-    hint, bristles, reach = state.hint, state.bristles, world.reach[sensor]
-    slot = world.slot_start[pair] - 1
-    ra00, ra01, ra02 = rotation_a[0, 0], rotation_a[0, 1], rotation_a[0, 2]
-    ra10, ra11, ra12 = rotation_a[1, 0], rotation_a[1, 1], rotation_a[1, 2]
-    ra20, ra21, ra22 = rotation_a[2, 0], rotation_a[2, 1], rotation_a[2, 2]
-    rb00, rb01, rb02 = rotation_b[0, 0], rotation_b[0, 1], rotation_b[0, 2]
-    rb10, rb11, rb12 = rotation_b[1, 0], rotation_b[1, 1], rotation_b[1, 2]
-    rb20, rb21, rb22 = rotation_b[2, 0], rotation_b[2, 1], rotation_b[2, 2]
-    gx, gy, gz = position_a[0] - position_b[0], position_a[1] - position_b[1], position_a[2] - position_b[2]
-    root = tree.bounds[tree.roots[target]]
-    sunk = 0
+    texels, hint, bristles = world.texels, state.hint, state.bristles
+    reach, root = world.reach[sensor], tree.roots[target]
+    _relative_pose(a, b, state.position, rotation, pose)
+    radius, skin = world.radius[sensor], world.skin[pair]
+    if _distance_to_box(pose, world.center, sensor, tree.bounds, root) > radius:
+        _forget(pair, sensor, world, state)
+        return used, 0
+    if neighbours.pose[pair, 12] == 0.0 or _travel(pose, neighbours.pose, pair, world.center, sensor, radius) > skin:
+        _renew_lists(pair, sensor, target, pose, world, tree, neighbours)
+    gx = state.position[a, 0] - state.position[b, 0]
+    gy = state.position[a, 1] - state.position[b, 1]
+    gz = state.position[a, 2] - state.position[b, 2]
+    sunk, slot = 0, world.slot_start[pair] - 1
     for texel in range(world.texel_start[sensor], world.texel_start[sensor + 1]):
         slot += 1
-        row = world.texels[texel]
-        # Lever arm of the texel and its normal in world axes, then both in the target's frame.
-        ax = ra00 * row[0] + ra01 * row[1] + ra02 * row[2]
-        ay = ra10 * row[0] + ra11 * row[1] + ra12 * row[2]
-        az = ra20 * row[0] + ra21 * row[1] + ra22 * row[2]
-        nx = ra00 * row[3] + ra01 * row[4] + ra02 * row[5]
-        ny = ra10 * row[3] + ra11 * row[4] + ra12 * row[5]
-        nz = ra20 * row[3] + ra21 * row[4] + ra22 * row[5]
-        wx, wy, wz = gx + ax, gy + ay, gz + az
-        tx = rb00 * wx + rb10 * wy + rb20 * wz
-        ty = rb01 * wx + rb11 * wy + rb21 * wz
-        tz = rb02 * wx + rb12 * wy + rb22 * wz
-        dx = reach * (rb00 * nx + rb10 * ny + rb20 * nz)
-        dy = reach * (rb01 * nx + rb11 * ny + rb21 * nz)
-        dz = reach * (rb02 * nx + rb12 * ny + rb22 * nz)
-        ox, oy, oz = tx - dx, ty - dy, tz - dz
-        met, triangle, leaving = 2.0, -1, 2.0
-        outside = (
-            min(ox, tx) > root[3] or max(ox, tx) < root[0]
-            or min(oy, ty) > root[4] or max(oy, ty) < root[1]
-            or min(oz, tz) > root[5] or max(oz, tz) < root[2]
-        )  # fmt: skip
         before = hint[slot]
-        if not outside:
+        number = neighbours.number[slot]
+        if number == 0 and before == -1:
+            continue
+        tx = pose[9] + pose[0] * texels[texel, 0] + pose[1] * texels[texel, 1] + pose[2] * texels[texel, 2]
+        ty = pose[10] + pose[3] * texels[texel, 0] + pose[4] * texels[texel, 1] + pose[5] * texels[texel, 2]
+        tz = pose[11] + pose[6] * texels[texel, 0] + pose[7] * texels[texel, 1] + pose[8] * texels[texel, 2]
+        dx = reach * (pose[0] * texels[texel, 3] + pose[1] * texels[texel, 4] + pose[2] * texels[texel, 5])
+        dy = reach * (pose[3] * texels[texel, 3] + pose[4] * texels[texel, 4] + pose[5] * texels[texel, 5])
+        dz = reach * (pose[6] * texels[texel, 3] + pose[7] * texels[texel, 4] + pose[8] * texels[texel, 5])
+        ox, oy, oz = tx - dx, ty - dy, tz - dz
+        if number >= 0:
+            met, triangle, leaving = near_entry(ox, oy, oz, dx, dy, dz, neighbours.near, slot, number, tree)
+        else:
             met, triangle, leaving = segment_entry(ox, oy, oz, dx, dy, dz, target, before, tree)
         if triangle < 0:
             # Sunk: the base is inside the object. Either the segment leaves it somewhere, or the object's surface has just run
             # past the base (it was within the last tenth of the reach a step ago) and has not come back since.
-            ran_past = not outside and (before == -2 or (before >= 0 and bristles[slot, 3] > 0.9))
+            in_box = (
+                min(ox, tx) <= tree.bounds[root, 3] and max(ox, tx) >= tree.bounds[root, 0]
+                and min(oy, ty) <= tree.bounds[root, 4] and max(oy, ty) >= tree.bounds[root, 1]
+                and min(oz, tz) <= tree.bounds[root, 5] and max(oz, tz) >= tree.bounds[root, 2]
+            )  # fmt: skip
+            ran_past = in_box and (before == -2 or (before >= 0 and bristles[slot, 3] > 0.9))
             if leaving <= 1.0 or ran_past:
                 sunk += 1
                 hint[slot] = -2
             else:
                 hint[slot] = -1
-            bristles[slot, 0] = 0.0
-            bristles[slot, 1] = 0.0
-            bristles[slot, 2] = 0.0
-            bristles[slot, 3] = 0.0
+            for i in range(4):
+                bristles[slot, i] = 0.0
             continue
         hint[slot] = triangle
-        normal = tree.normals[triangle]
-        cx = rb00 * normal[0] + rb01 * normal[1] + rb02 * normal[2]
-        cy = rb10 * normal[0] + rb11 * normal[1] + rb12 * normal[2]
-        cz = rb20 * normal[0] + rb21 * normal[1] + rb22 * normal[2]
-        back = (1.0 - met) * reach  # distance from the texel's tip to the intersection, along the texel's normal
-        depth = back * abs(nx * cx + ny * cy + nz * cz)
-        out = rows[used]
-        out[0], out[1], out[2] = cx, cy, cz
-        out[3], out[4], out[5] = ax - back * nx, ay - back * ny, az - back * nz
-        out[6], out[7], out[8] = out[3] + gx, out[4] + gy, out[5] + gz
-        out[9] = depth
+        nx, ny, nz = tree.faces[triangle, 9], tree.faces[triangle, 10], tree.faces[triangle, 11]
+        cx = rotation[b, 0, 0] * nx + rotation[b, 0, 1] * ny + rotation[b, 0, 2] * nz
+        cy = rotation[b, 1, 0] * nx + rotation[b, 1, 1] * ny + rotation[b, 1, 2] * nz
+        cz = rotation[b, 2, 0] * nx + rotation[b, 2, 1] * ny + rotation[b, 2, 2] * nz
+        rows[used, 0], rows[used, 1], rows[used, 2] = cx, cy, cz
+        # From the texel's tip back along its normal to the intersection, in the frame of the sensor's body.
+        back = (1.0 - met) * reach
+        px, py, pz = (
+            texels[texel, 0] - back * texels[texel, 3],
+            texels[texel, 1] - back * texels[texel, 4],
+            texels[texel, 2] - back * texels[texel, 5],
+        )
+        rows[used, 3] = rotation[a, 0, 0] * px + rotation[a, 0, 1] * py + rotation[a, 0, 2] * pz
+        rows[used, 4] = rotation[a, 1, 0] * px + rotation[a, 1, 1] * py + rotation[a, 1, 2] * pz
+        rows[used, 5] = rotation[a, 2, 0] * px + rotation[a, 2, 1] * py + rotation[a, 2, 2] * pz
+        rows[used, 6], rows[used, 7], rows[used, 8] = rows[used, 3] + gx, rows[used, 4] + gy, rows[used, 5] + gz
+        rows[used, 9] = (1.0 - met) * abs(dx * nx + dy * ny + dz * nz)
         bristles[slot, 3] = back / reach
         # The bristle turns with the sensor; what the surface's turn makes stand out of its plane is laid back into it.
         bx, by, bz = bristles[slot, 0], bristles[slot, 1], bristles[slot, 2]
-        zx = ra00 * bx + ra01 * by + ra02 * bz
-        zy = ra10 * bx + ra11 * by + ra12 * bz
-        zz = ra20 * bx + ra21 * by + ra22 * bz
+        zx = rotation[a, 0, 0] * bx + rotation[a, 0, 1] * by + rotation[a, 0, 2] * bz
+        zy = rotation[a, 1, 0] * bx + rotation[a, 1, 1] * by + rotation[a, 1, 2] * bz
+        zz = rotation[a, 2, 0] * bx + rotation[a, 2, 1] * by + rotation[a, 2, 2] * bz
         out_of_plane = zx * cx + zy * cy + zz * cz
         length = zx * zx + zy * zy + zz * zz
         zx -= out_of_plane * cx
@@ -255,43 +358,43 @@ def gather(pair, world, tree, state, rotation, rows, slots, used):
         zz -= out_of_plane * cz
         flat = zx * zx + zy * zy + zz * zz
         scale = math.sqrt(length / flat) if flat > 0.0 else 0.0
-        out[10], out[11], out[12] = scale * zx, scale * zy, scale * zz
+        rows[used, 10], rows[used, 11], rows[used, 12] = scale * zx, scale * zy, scale * zz
         slots[used] = slot
         used += 1
     return used, sunk
 
 
 @kernel
-def linearise(row, vx, vy, vz, dt, parameters):
+def linearise(rows, r, vx, vy, vz, dt, parameters):
     """Write into a contact row how its force depends on the relative velocity at the step's end, near velocity `v`.
 
     The force on the target is ``-(k d + STIFF_N ḋ) n - (bias + STIFF_T v_t)``; `v` is the target's velocity relative to the
     sensor, metres per second.
     """
-    rate = vx * row[0] + vy * row[1] + vz * row[2]
-    tx, ty, tz = vx - rate * row[0], vy - rate * row[1], vz - rate * row[2]
+    rate = vx * rows[r, 0] + vy * rows[r, 1] + vz * rows[r, 2]
+    tx, ty, tz = vx - rate * rows[r, 0], vy - rate * rows[r, 1], vz - rate * rows[r, 2]
     stiff = parameters[K] * dt + parameters[CN]
-    force = parameters[K] * row[DEPTH] + stiff * rate
+    force = parameters[K] * rows[r, DEPTH] + stiff * rate
     if force <= 0.0:  # separates within the step: no force at all
         for column in range(START, ROW):
-            row[column] = 0.0
+            rows[r, column] = 0.0
         return
     limit = bristle_limit(force, parameters)
-    length = math.sqrt(row[10] * row[10] + row[11] * row[11] + row[12] * row[12])
+    length = math.sqrt(rows[r, 10] * rows[r, 10] + rows[r, 11] * rows[r, 11] + rows[r, 12] * rows[r, 12])
     held = limit / length if length > limit else 1.0  # the load fell: what can no longer be held has slipped already
     keep, gain = bristle_step(tx * tx + ty * ty + tz * tz, force, dt, parameters)
     keep *= held
-    zx, zy, zz = keep * row[10] + gain * tx, keep * row[11] + gain * ty, keep * row[12] + gain * tz
+    zx, zy, zz = keep * rows[r, 10] + gain * tx, keep * rows[r, 11] + gain * ty, keep * rows[r, 12] + gain * tz
     length = math.sqrt(zx * zx + zy * zy + zz * zz)
     if length > limit:  # the closed solution for constant velocity would overshoot: slide at the limit instead
         keep *= limit / length
         gain *= limit / length
-    row[START], row[KEEP], row[GAIN], row[LIMIT] = held, keep, gain, limit
-    row[NORMAL_FORCE], row[STIFF_N] = force, stiff
-    row[STIFF_T] = (parameters[SIGMA0] + parameters[SIGMA1] / dt) * gain + parameters[CT]
+    rows[r, START], rows[r, KEEP], rows[r, GAIN], rows[r, LIMIT] = held, keep, gain, limit
+    rows[r, NORMAL_FORCE], rows[r, STIFF_N] = force, stiff
+    rows[r, STIFF_T] = (parameters[SIGMA0] + parameters[SIGMA1] / dt) * gain + parameters[CT]
 
 
 @kernel
-def friction_bias(row, dt, parameters):
+def friction_bias(rows, r, dt, parameters):
     """Factor of the old bristle deflection in the friction force of the step, N/m."""
-    return parameters[SIGMA0] * row[KEEP] + parameters[SIGMA1] * (row[KEEP] - row[START]) / dt
+    return parameters[SIGMA0] * rows[r, KEEP] + parameters[SIGMA1] * (rows[r, KEEP] - rows[r, START]) / dt

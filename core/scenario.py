@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import hashlib
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, is_dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -216,9 +216,9 @@ class Scenario:
         return digest.hexdigest()
 
 
-def _feed(digest: "hashlib._Hash", value: object) -> None:
+def _feed(digest: hashlib._Hash, value: object) -> None:
     """Hash dataclasses field by field, arrays with type and shape, and everything else by its representation."""
-    if hasattr(value, "__dataclass_fields__"):
+    if is_dataclass(value) and not isinstance(value, type):
         for item in fields(value):
             digest.update(item.name.encode())
             _feed(digest, getattr(value, item.name))

@@ -15,11 +15,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from .bodies import poses_at, quaternion_product, rotation_matrices, rotation_vectors
-from .bvh import build_tree
-from .contact import State, World
+from .bvh import NEAR, build_tree
+from .contact import Neighbours, State, World
 from .recording import Frame, Recording, SensorFrame
 from .respond import respond
-from .scenario import Scenario
+from .scenario import Scenario, Sensor, Target
 from .step import advance_frame, feel, gather_all, scratch_for
 from .timestep import advise
 
@@ -71,6 +71,7 @@ class Simulation:
         self._tree = build_tree(meshes)
         self._world = _world(scenario, self._center)
         self._state = _start(scenario, self._world, self._center)
+        self._neighbours = _neighbours(self._world, self._state)
         self._scratch = scratch_for(self._world, self._state)
 
     @property
@@ -101,7 +102,9 @@ class Simulation:
         conjugate = quaternions[:-1] * np.array([1.0, -1.0, -1.0, -1.0])
         turns = rotation_vectors(quaternion_product(quaternions[1:], conjugate))
         velocities = np.concatenate([np.diff(positions, axis=0), turns], axis=2) / self.dt
-        sunk = advance_frame(self.dt, positions, quaternions, velocities, self._world, self._tree, self._state, self._scratch)
+        sunk = advance_frame(
+            self.dt, positions, quaternions, velocities, self._world, self._tree, self._neighbours, self._state, self._scratch
+        )
         self.frame += 1
         if sunk:
             self._warn_once(sunk)
@@ -128,7 +131,7 @@ class Simulation:
 
     def observe(self) -> Frame:
         """What the sensors feel in the present state."""
-        gather_all(self._world, self._tree, self._state, self._scratch)
+        gather_all(self._world, self._tree, self._neighbours, self._state, self._scratch)
         n, m = len(self._world.texels), len(self.scenario.sensors)
         force, depth, slip, contact = np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n, dtype=np.bool_)
         shear, net, moment = np.zeros((n, 2)), np.zeros((m, 6)), np.zeros((m, 4))
@@ -171,6 +174,7 @@ def _world(scenario: Scenario, center: np.ndarray) -> World:
     keys = ("k", "cn", "ct", "sigma0", "sigma1", "x0", "mus", "mud")
     pairs = [(i, j) for i, s in enumerate(sensors) for j, t in enumerate(targets) if s.body != t.body]
     sizes = [len(sensors[i].texels) for i, _ in pairs]
+    extents = [_extent(sensor, center[sensor.body]) for sensor in sensors]
     return World(
         texels=np.ascontiguousarray(np.vstack(blocks)),
         texel_start=np.cumsum([0] + [len(s.texels) for s in sensors]),
@@ -180,11 +184,35 @@ def _world(scenario: Scenario, center: np.ndarray) -> World:
         sensor_body=np.array([s.body for s in sensors]),
         target_body=np.array([t.body for t in targets]),
         slot_start=np.cumsum([0, *sizes])[:-1],
+        center=np.array([middle for middle, _ in extents]),
+        radius=np.array([radius for _, radius in extents]),
+        skin=np.array([_skin(sensors[i], targets[j]) for i, j in pairs]),
         free_at=np.where(free, np.cumsum(free) - 1, -1),
         mass=np.array([body.mass for body in bodies], dtype=float),
         inertia=np.ascontiguousarray([body.inertia for body in bodies], dtype=float),
         gravity=np.array(scenario.gravity, dtype=float),
     )
+
+
+def _extent(sensor: Sensor, reference: np.ndarray) -> tuple[np.ndarray, float]:
+    """Middle and radius of a sensor's texels and the segments behind them, relative to the body's reference point."""
+    texels, reach = sensor.texels, sensor.parameters.max_penetration
+    points = np.vstack([texels.position, texels.position - reach * texels.normal]) - reference
+    middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
+    return middle, float(np.linalg.norm(points - middle, axis=1).max())
+
+
+def _skin(sensor: Sensor, target: Target) -> float:
+    """How far around a texel triangles are remembered: a tenth of the target's usual edge, so that they are few."""
+    a, b, _ = target.mesh.triangles.T
+    edge = np.median(np.linalg.norm(target.mesh.vertices[b] - target.mesh.vertices[a], axis=1))
+    return float(min(0.1 * edge, 0.1 * sensor.parameters.max_penetration))
+
+
+def _neighbours(world: World, state: State) -> Neighbours:
+    """Make room for the lists of triangles; they are filled when they are first needed."""
+    slots = len(state.hint)
+    return Neighbours(np.zeros((slots, NEAR), np.int32), np.zeros(slots, np.int32), np.zeros((len(world.pairs), 13)))
 
 
 def _start(scenario: Scenario, world: World, center: np.ndarray) -> State:

@@ -68,6 +68,8 @@ class Scratch(NamedTuple):
         Place of each row in the memory of :class:`.State`.
     pair_stop : (q,) int
         Where each pair's rows end.
+    pose : (12,) float
+        A relative pose.
     matrix, vector, momentum : (6 f, 6 f), (6 f,), (6 f,) float
         The linear system of the f free bodies.
     """
@@ -79,6 +81,7 @@ class Scratch(NamedTuple):
     rows: np.ndarray
     slots: np.ndarray
     pair_stop: np.ndarray
+    pose: np.ndarray
     matrix: np.ndarray
     vector: np.ndarray
     momentum: np.ndarray
@@ -99,6 +102,7 @@ def scratch_for(world: World, state: State) -> Scratch:
         rows=np.zeros((s, ROW)),
         slots=np.zeros(s, np.int64),
         pair_stop=np.zeros(len(world.pairs), np.int64),
+        pose=np.zeros(12),
         matrix=np.zeros((n, n)),
         vector=np.zeros(n),
         momentum=np.zeros(n),
@@ -106,24 +110,46 @@ def scratch_for(world: World, state: State) -> Scratch:
 
 
 @kernel
-def _relative_velocity(row, twist, a, b):
+def _relative_velocity(rows, r, twist, a, b):
     """Velocity of the target's point relative to the sensor's, world axes (Eq. 3)."""
-    ta, tb = twist[a], twist[b]
     return (
-        tb[0] + tb[3] * row[6] + tb[4] * row[7] + tb[5] * row[8] - ta[0] - ta[3] * row[3] - ta[4] * row[4] - ta[5] * row[5],
-        tb[1] + tb[6] * row[6] + tb[7] * row[7] + tb[8] * row[8] - ta[1] - ta[6] * row[3] - ta[7] * row[4] - ta[8] * row[5],
-        tb[2] + tb[9] * row[6] + tb[10] * row[7] + tb[11] * row[8] - ta[2] - ta[9] * row[3] - ta[10] * row[4] - ta[11] * row[5],
+        twist[b, 0]
+        + twist[b, 3] * rows[r, 6]
+        + twist[b, 4] * rows[r, 7]
+        + twist[b, 5] * rows[r, 8]
+        - twist[a, 0]
+        - twist[a, 3] * rows[r, 3]
+        - twist[a, 4] * rows[r, 4]
+        - twist[a, 5] * rows[r, 5],
+        twist[b, 1]
+        + twist[b, 6] * rows[r, 6]
+        + twist[b, 7] * rows[r, 7]
+        + twist[b, 8] * rows[r, 8]
+        - twist[a, 1]
+        - twist[a, 6] * rows[r, 3]
+        - twist[a, 7] * rows[r, 4]
+        - twist[a, 8] * rows[r, 5],
+        twist[b, 2]
+        + twist[b, 9] * rows[r, 6]
+        + twist[b, 10] * rows[r, 7]
+        + twist[b, 11] * rows[r, 8]
+        - twist[a, 2]
+        - twist[a, 9] * rows[r, 3]
+        - twist[a, 10] * rows[r, 4]
+        - twist[a, 11] * rows[r, 5],
     )
 
 
 @kernel
-def gather_all(world, tree, state, scratch):
+def gather_all(world, tree, neighbours, state, scratch):
     """Contacts of all pairs of sensor and target where the bodies are now. Returns how many texels are sunk too deep to act."""
     for body in range(len(state.position)):
         write_rotation(state.quaternion[body], scratch.rotation[body])
     used, sunk = 0, 0
     for pair in range(len(world.pairs)):
-        used, deep = gather(pair, world, tree, state, scratch.rotation, scratch.rows, scratch.slots, used)
+        used, deep = gather(
+            pair, world, tree, neighbours, state, scratch.rotation, scratch.rows, scratch.slots, used, scratch.pose
+        )
         sunk += deep
         scratch.pair_stop[pair] = used
     return sunk
@@ -137,7 +163,7 @@ def _solve_velocities(dt, world, state, scratch):
     would pull is left out of the next round. With no free body one round only linearises.
     """
     free_at, mass, velocity, inertia = world.free_at, world.mass, state.velocity, scratch.inertia
-    matrix, vector, momentum = scratch.matrix, scratch.vector, scratch.momentum
+    matrix, vector, momentum, rows = scratch.matrix, scratch.vector, scratch.momentum, scratch.rows
     n = 6 * int(free_at.max() + 1)
     for body in range(len(free_at)):
         write_twist(velocity[body], dt, scratch.twist[body])
@@ -164,30 +190,29 @@ def _solve_velocities(dt, world, state, scratch):
             at_a, at_b = 6 * free_at[a], 6 * free_at[b]
             p = world.parameters[sensor]
             for r in range(start, scratch.pair_stop[pair]):
-                row = scratch.rows[r]
-                vx, vy, vz = _relative_velocity(row, scratch.twist, a, b)
-                linearise(row, vx, vy, vz, dt, p)
-                if row[NORMAL_FORCE] <= 0.0 or (at_a < 0 and at_b < 0):
+                vx, vy, vz = _relative_velocity(rows, r, scratch.twist, a, b)
+                linearise(rows, r, vx, vy, vz, dt, p)
+                if rows[r, NORMAL_FORCE] <= 0.0 or (at_a < 0 and at_b < 0):
                     continue
                 # What the known part of the motion and the stored springs do to the target; the sensor gets the opposite.
-                ux, uy, uz = _relative_velocity(row, scratch.known, a, b)
-                out = ux * row[0] + uy * row[1] + uz * row[2]
-                push = p[K] * row[DEPTH] + (row[STIFF_N] - row[STIFF_T]) * out
-                stick = friction_bias(row, dt, p)
-                fx = -push * row[0] - stick * row[10] - row[STIFF_T] * ux
-                fy = -push * row[1] - stick * row[11] - row[STIFF_T] * uy
-                fz = -push * row[2] - stick * row[12] - row[STIFF_T] * uz
+                ux, uy, uz = _relative_velocity(rows, r, scratch.known, a, b)
+                out = ux * rows[r, 0] + uy * rows[r, 1] + uz * rows[r, 2]
+                push = p[K] * rows[r, DEPTH] + (rows[r, STIFF_N] - rows[r, STIFF_T]) * out
+                stick = friction_bias(rows, r, dt, p)
+                fx = -push * rows[r, 0] - stick * rows[r, 10] - rows[r, STIFF_T] * ux
+                fy = -push * rows[r, 1] - stick * rows[r, 11] - rows[r, STIFF_T] * uy
+                fz = -push * rows[r, 2] - stick * rows[r, 12] - rows[r, STIFF_T] * uz
                 if at_b >= 0:
-                    add_force(vector, at_b, fx, fy, fz, row, ARM_B, dt)
-                    add_own_block(matrix, at_b, row, ARM_B, dt)
+                    add_force(vector, at_b, fx, fy, fz, rows, r, ARM_B, dt)
+                    add_own_block(matrix, at_b, rows, r, ARM_B, dt)
                 if at_a >= 0:
-                    add_force(vector, at_a, -fx, -fy, -fz, row, ARM_A, dt)
-                    add_own_block(matrix, at_a, row, ARM_A, dt)
+                    add_force(vector, at_a, -fx, -fy, -fz, rows, r, ARM_A, dt)
+                    add_own_block(matrix, at_a, rows, r, ARM_A, dt)
                 if at_a >= 0 and at_b >= 0:
                     if at_a < at_b:
-                        add_cross_block(matrix, at_a, at_b, row, ARM_A, ARM_B, dt)
+                        add_cross_block(matrix, at_a, at_b, rows, r, ARM_A, ARM_B, dt)
                     else:
-                        add_cross_block(matrix, at_b, at_a, row, ARM_B, ARM_A, dt)
+                        add_cross_block(matrix, at_b, at_a, rows, r, ARM_B, ARM_A, dt)
             start = scratch.pair_stop[pair]
         if n == 0:
             return
@@ -232,34 +257,34 @@ def _write_known(velocity, twist, keyframed, known):
 @kernel
 def _store_bristles(dt, world, state, scratch):
     """Bristle deflections at the step's end, back in the frame of the sensor's body."""
-    start = 0
+    rows, start = scratch.rows, 0
     for pair in range(len(world.pairs)):
         a, b = world.sensor_body[world.pairs[pair, 0]], world.target_body[world.pairs[pair, 1]]
-        turn, spin = scratch.rotation[a], scratch.twist[a]
         for r in range(start, scratch.pair_stop[pair]):
-            row = scratch.rows[r]
-            vx, vy, vz = _relative_velocity(row, scratch.twist, a, b)
+            vx, vy, vz = _relative_velocity(rows, r, scratch.twist, a, b)
             # As seen from the sensor, which itself has turned by 1 + dt W at the step's end.
             vx, vy, vz = (
-                vx + dt * (spin[3] * vx + spin[6] * vy + spin[9] * vz),
-                vy + dt * (spin[4] * vx + spin[7] * vy + spin[10] * vz),
-                vz + dt * (spin[5] * vx + spin[8] * vy + spin[11] * vz),
+                vx + dt * (scratch.twist[a, 3] * vx + scratch.twist[a, 6] * vy + scratch.twist[a, 9] * vz),
+                vy + dt * (scratch.twist[a, 4] * vx + scratch.twist[a, 7] * vy + scratch.twist[a, 10] * vz),
+                vz + dt * (scratch.twist[a, 5] * vx + scratch.twist[a, 8] * vy + scratch.twist[a, 11] * vz),
             )
-            out = vx * row[0] + vy * row[1] + vz * row[2]
-            zx = row[KEEP] * row[10] + row[GAIN] * (vx - out * row[0])
-            zy = row[KEEP] * row[11] + row[GAIN] * (vy - out * row[1])
-            zz = row[KEEP] * row[12] + row[GAIN] * (vz - out * row[2])
+            out = vx * rows[r, 0] + vy * rows[r, 1] + vz * rows[r, 2]
+            zx = rows[r, KEEP] * rows[r, 10] + rows[r, GAIN] * (vx - out * rows[r, 0])
+            zy = rows[r, KEEP] * rows[r, 11] + rows[r, GAIN] * (vy - out * rows[r, 1])
+            zz = rows[r, KEEP] * rows[r, 12] + rows[r, GAIN] * (vz - out * rows[r, 2])
             length = math.sqrt(zx * zx + zy * zy + zz * zz)
-            scale = row[LIMIT] / length if length > row[LIMIT] else 1.0
+            scale = rows[r, LIMIT] / length if length > rows[r, LIMIT] else 1.0
             zx, zy, zz = scale * zx, scale * zy, scale * zz
             slot = scratch.slots[r]
             for i in range(3):
-                state.bristles[slot, i] = turn[0, i] * zx + turn[1, i] * zy + turn[2, i] * zz
+                state.bristles[slot, i] = (
+                    scratch.rotation[a, 0, i] * zx + scratch.rotation[a, 1, i] * zy + scratch.rotation[a, 2, i] * zz
+                )
         start = scratch.pair_stop[pair]
 
 
 @kernel
-def advance_frame(dt, path_position, path_quaternion, path_velocity, world, tree, state, scratch):
+def advance_frame(dt, path_position, path_quaternion, path_velocity, world, tree, neighbours, state, scratch):
     """Run the substeps of one frame; the state is brought forward in place.
 
     Parameters
@@ -282,7 +307,7 @@ def advance_frame(dt, path_position, path_quaternion, path_velocity, world, tree
             if world.free_at[body] < 0:
                 for i in range(6):
                     state.velocity[body, i] = path_velocity[step, body, i]
-        worst = max(worst, gather_all(world, tree, state, scratch))
+        worst = max(worst, gather_all(world, tree, neighbours, state, scratch))
         for body in range(len(world.free_at)):
             if world.free_at[body] >= 0:
                 write_world_inertia(scratch.rotation[body], world.inertia[body], scratch.inertia[body])
@@ -331,46 +356,68 @@ def feel(world, state, scratch, force, shear, depth, slip, contact, net, moment)
 
     `net` gets force and torque about the body's reference point, `moment` the sum of fn · point and of fn.
     """
-    start = 0
+    rows, start = scratch.rows, 0
     for pair in range(len(world.pairs)):
         sensor = world.pairs[pair, 0]
         a, b = world.sensor_body[sensor], world.target_body[world.pairs[pair, 1]]
-        p, turn = world.parameters[sensor], scratch.rotation[a]
+        p = world.parameters[sensor]
         for r in range(start, scratch.pair_stop[pair]):
-            row = scratch.rows[r]
             texel = world.texel_start[sensor] + scratch.slots[r] - world.slot_start[pair]
-            vx, vy, vz = _relative_velocity(row, scratch.twist, a, b)
-            rate = vx * row[0] + vy * row[1] + vz * row[2]
-            tx, ty, tz = vx - rate * row[0], vy - rate * row[1], vz - rate * row[2]
+            vx, vy, vz = _relative_velocity(rows, r, scratch.twist, a, b)
+            rate = vx * rows[r, 0] + vy * rows[r, 1] + vz * rows[r, 2]
+            tx, ty, tz = vx - rate * rows[r, 0], vy - rate * rows[r, 1], vz - rate * rows[r, 2]
             square = tx * tx + ty * ty + tz * tz
-            fn = normal_force(row[DEPTH], rate, p)
-            length = math.sqrt(row[10] * row[10] + row[11] * row[11] + row[12] * row[12])
+            fn = normal_force(rows[r, DEPTH], rate, p)
+            length = math.sqrt(rows[r, 10] * rows[r, 10] + rows[r, 11] * rows[r, 11] + rows[r, 12] * rows[r, 12])
             limit = bristle_limit(fn, p)
             held = limit / length if length > limit else 1.0
-            zx, zy, zz = held * row[10], held * row[11], held * row[12]
+            zx, zy, zz = held * rows[r, 10], held * rows[r, 11], held * rows[r, 12]
             fx, fy, fz = 0.0, 0.0, 0.0
             if fn > 0.0:
                 fx = friction_force(zx, bristle_rate(zx, tx, square, fn, p), tx, p)
                 fy = friction_force(zy, bristle_rate(zy, ty, square, fn, p), ty, p)
                 fz = friction_force(zz, bristle_rate(zz, tz, square, fn, p), tz, p)
             # Friction drags the sensor along with the target; the target's surface normal points into the sensor.
-            lx = turn[0, 0] * fx + turn[1, 0] * fy + turn[2, 0] * fz
-            ly = turn[0, 1] * fx + turn[1, 1] * fy + turn[2, 1] * fz
-            lz = turn[0, 2] * fx + turn[1, 2] * fy + turn[2, 2] * fz
-            shape = world.texels[texel]
-            shear[texel, 0] += lx * shape[6] + ly * shape[7] + lz * shape[8]
-            shear[texel, 1] += lx * shape[9] + ly * shape[10] + lz * shape[11]
-            lx += fn * (turn[0, 0] * row[0] + turn[1, 0] * row[1] + turn[2, 0] * row[2])
-            ly += fn * (turn[0, 1] * row[0] + turn[1, 1] * row[1] + turn[2, 1] * row[2])
-            lz += fn * (turn[0, 2] * row[0] + turn[1, 2] * row[1] + turn[2, 2] * row[2])
-            px = turn[0, 0] * row[3] + turn[1, 0] * row[4] + turn[2, 0] * row[5]
-            py = turn[0, 1] * row[3] + turn[1, 1] * row[4] + turn[2, 1] * row[5]
-            pz = turn[0, 2] * row[3] + turn[1, 2] * row[4] + turn[2, 2] * row[5]
+            lx = scratch.rotation[a, 0, 0] * fx + scratch.rotation[a, 1, 0] * fy + scratch.rotation[a, 2, 0] * fz
+            ly = scratch.rotation[a, 0, 1] * fx + scratch.rotation[a, 1, 1] * fy + scratch.rotation[a, 2, 1] * fz
+            lz = scratch.rotation[a, 0, 2] * fx + scratch.rotation[a, 1, 2] * fy + scratch.rotation[a, 2, 2] * fz
+            shear[texel, 0] += lx * world.texels[texel, 6] + ly * world.texels[texel, 7] + lz * world.texels[texel, 8]
+            shear[texel, 1] += lx * world.texels[texel, 9] + ly * world.texels[texel, 10] + lz * world.texels[texel, 11]
+            lx += fn * (
+                scratch.rotation[a, 0, 0] * rows[r, 0]
+                + scratch.rotation[a, 1, 0] * rows[r, 1]
+                + scratch.rotation[a, 2, 0] * rows[r, 2]
+            )
+            ly += fn * (
+                scratch.rotation[a, 0, 1] * rows[r, 0]
+                + scratch.rotation[a, 1, 1] * rows[r, 1]
+                + scratch.rotation[a, 2, 1] * rows[r, 2]
+            )
+            lz += fn * (
+                scratch.rotation[a, 0, 2] * rows[r, 0]
+                + scratch.rotation[a, 1, 2] * rows[r, 1]
+                + scratch.rotation[a, 2, 2] * rows[r, 2]
+            )
+            px = (
+                scratch.rotation[a, 0, 0] * rows[r, 3]
+                + scratch.rotation[a, 1, 0] * rows[r, 4]
+                + scratch.rotation[a, 2, 0] * rows[r, 5]
+            )
+            py = (
+                scratch.rotation[a, 0, 1] * rows[r, 3]
+                + scratch.rotation[a, 1, 1] * rows[r, 4]
+                + scratch.rotation[a, 2, 1] * rows[r, 5]
+            )
+            pz = (
+                scratch.rotation[a, 0, 2] * rows[r, 3]
+                + scratch.rotation[a, 1, 2] * rows[r, 4]
+                + scratch.rotation[a, 2, 2] * rows[r, 5]
+            )
             if not contact[texel] or fn > force[texel]:
                 slip[texel] = math.sqrt(square)
             contact[texel] = True
             force[texel] += fn
-            depth[texel] = max(depth[texel], row[DEPTH])
+            depth[texel] = max(depth[texel], rows[r, DEPTH])
             net[sensor, 0] += lx
             net[sensor, 1] += ly
             net[sensor, 2] += lz

@@ -393,6 +393,30 @@ def test_plain_python_gives_the_same_numbers():
     np.testing.assert_allclose(shear, r.sensors["pad"].shear, rtol=0, atol=1e-12)
 
 
+def test_neighbour_lists_change_nothing():
+    """A ball rolls and slides over a pad; with no list at all every query goes through the tree."""
+    ball = shape(trimesh.creation.icosphere(3, 0.012))
+    path = [[0.0008 * i - 0.006, 0.0004 * i, 0.0112 - 0.00005 * i] for i in range(16)]
+    turns = [about((1, 2, 0), 7.0 * i) for i in range(16)]
+    scenario = pressed(ball, path, turns=turns, dt=1e-3, **STIFF_FRICTION)
+    simulation = Simulation(scenario)
+    world = simulation._world
+    simulation._world = world._replace(
+        skin=np.full_like(world.skin, -1.0)
+    )  # no travel is small enough: new lists at every step
+    always = [simulation.observe()] + [simulation.advance() for _ in range(15)]
+    recording = run(scenario)
+    assert recording.sensors["pad"].contact[-1].sum() > 5
+    for i, frame in enumerate(always):
+        assert np.array_equal(frame.sensors["pad"].normal_force, recording.sensors["pad"].normal_force[i])
+        assert np.array_equal(frame.sensors["pad"].shear, recording.sensors["pad"].shear[i])
+    simulation = Simulation(scenario)
+    simulation._neighbours = simulation._neighbours._replace(near=np.zeros((len(simulation._neighbours.near), 0), np.int32))
+    for i in range(16):
+        frame = simulation.advance() if i else simulation.observe()
+        assert np.array_equal(frame.sensors["pad"].shear, recording.sensors["pad"].shear[i])
+
+
 # ---- driving ----
 def test_progress_counts_and_closing_stops():
     generator = solve(cube_on_pad(1.0, frames=10))
