@@ -1,0 +1,94 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Sample → solve → write, as one generator; the operator and the command line drive it."""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import bpy
+
+from ..core.errors import SceneError
+from ..core.recording import Recording
+from ..core.scenario import Scenario
+from . import dependencies, folders, sample, state, write
+from .jobs import Progress
+
+
+@dataclass(frozen=True)
+class Baked:
+    """What a bake leaves: the recording, what was solved, and the folder of each sensor."""
+
+    recording: Recording
+    scenario: Scenario
+    folders: dict[str, Path]
+
+
+def bake(scene) -> Generator[Progress, None, Baked]:
+    """Compute the whole frame range of a scene, write its files, and put the result into the scene.
+
+    Until the last step nothing in the scene changes, and an earlier bake stays as it is: closing the generator, an error and a
+    kill leave the old or the new bake, never half of one.
+
+    Raises
+    ------
+    PalpateError
+        Before anything is touched when the scene or the bake folder is not fit; later when the folder fills up or an object that
+        takes part is deleted.
+    """
+    with state.suspended():
+        try:
+            return (yield from _bake(scene, scene.name))
+        finally:
+            state.session.bake = None
+
+
+def _bake(scene, name: str) -> Generator[Progress, None, Baked]:
+    folder = folders.bake_folder(scene)
+    folders.check_folder(folder)
+    total = 2 * max(1, scene.frame_end - scene.frame_start + 1)
+
+    job = sample.sample_scenario(scene)
+    while True:
+        try:
+            step = next(job)
+        except StopIteration as stop:
+            scenario, binding = stop.value
+            break
+        yield _progress("Reading the scene", step.frame, step.done, total)
+
+    solver = dependencies.solver()
+    files = folders.Files(folder, scenario)
+    try:
+        job = solver.solve(scenario)
+        while True:
+            try:
+                step = next(job)
+            except StopIteration as stop:
+                recording = stop.value
+                break
+            files.write_frame(step.result)
+            binding.objects(_still_there(name))
+            yield _progress("Computing forces", step.frame, total // 2 + step.done, total)
+        recording = replace(recording, warnings=binding.warnings + recording.warnings)
+        scene = _still_there(name)
+        binding.objects(scene)
+        files.finish(recording)
+    except BaseException:
+        files.discard()
+        raise
+    write.commit(scene, scenario, binding, recording, files.folders)
+    return Baked(recording, scenario, files.folders)
+
+
+def _progress(stage: str, frame: int, done: int, total: int) -> Progress:
+    state.session.bake = Progress(stage, frame, done, total)
+    return state.session.bake
+
+
+def _still_there(name: str):
+    scene = bpy.data.scenes.get(name)
+    if scene is None:
+        raise SceneError(f"Scene '{name}' was deleted or renamed while it was baked: undo that, or start again.")
+    return scene

@@ -1,0 +1,170 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A heat map on the region's faces of a sensor: texture coordinates, material slot, and the way back."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..core.texels import Texels
+from . import materials
+
+OLD_MATERIAL = ".palpate_old_material"
+"""Face attribute: material index before the heat map; −1 on faces that were not touched."""
+MODIFIER = "Palpate Heat Map"
+
+
+def apply(obj, texels: Texels, image, frames: tuple[int, int], maximum: float, color_map: str) -> None:
+    """Show a baked sequence on a sensor; an earlier bake's heat map is replaced.
+
+    Parameters
+    ----------
+    obj : Object
+    texels : Texels
+    image : Image
+        From :func:`.materials.load_sequence`.
+    frames : (int, int)
+    maximum : float, N
+    color_map : str
+    """
+    clear(obj, keep_image=True)
+    uid, mesh = obj.palpate.uid, obj.data
+    uv = _one_uv_per_texel(texels)
+    on_vertices = uv is None
+    if on_vertices:
+        _store_texel_uv(mesh, texels)
+        modifier = obj.modifiers.new(MODIFIER, "NODES")
+        modifier.node_group = materials.force_nodes(uid, obj.name, image, frames)
+        obj.modifiers.move(len(obj.modifiers) - 1, 0)  # where the vertices are still the texels'
+    else:
+        _write_uv(mesh, texels, uv)
+    material = materials.heat_map(uid, obj.name, image, frames, maximum, color_map, on_vertices)
+    _assign(obj, texels, material)
+
+
+def clear(obj, keep_image: bool = False) -> None:
+    """Take the heat map off a sensor: its faces have their materials again, and nothing of ours is left."""
+    if obj.type != "MESH":
+        return
+    mesh, uid = obj.data, obj.palpate.uid
+    _unassign(obj)
+    modifier = obj.modifiers.get(MODIFIER)
+    if modifier is not None:
+        obj.modifiers.remove(modifier)
+    if not _others_show(obj):
+        layer = mesh.uv_layers.get(materials.UV_NAME)
+        if layer is not None:
+            mesh.uv_layers.remove(layer)
+        for name in (materials.TEXEL_UV, materials.FORCE):
+            attribute = mesh.attributes.get(name)
+            if attribute is not None:
+                mesh.attributes.remove(attribute)
+    materials.remove(uid, keep_image)
+
+
+def _one_uv_per_texel(texels: Texels) -> np.ndarray | None:
+    """(n, 2) texture coordinates; None when a texel has others in each of its triangles."""
+    layout = texels.layout
+    uv = layout.uv()
+    return uv if np.allclose(layout.corner_uv, uv[layout.triangles], atol=1e-9) else None
+
+
+def _write_uv(mesh, texels: Texels, uv: np.ndarray) -> None:
+    layer = mesh.uv_layers.get(materials.UV_NAME)
+    if layer is None:
+        active = mesh.uv_layers.active_index
+        layer = mesh.uv_layers.new(name=materials.UV_NAME, do_init=False)
+        if active >= 0:
+            mesh.uv_layers.active_index = active
+    table = np.zeros((len(mesh.vertices), 2))
+    table[texels.vertex] = uv
+    corner = np.empty(len(mesh.loops), dtype=np.int32)
+    mesh.loops.foreach_get("vertex_index", corner)
+    layer.data.foreach_set("uv", table[corner].astype(np.float32).ravel())
+
+
+def _store_texel_uv(mesh, texels: Texels) -> None:
+    attribute = mesh.attributes.get(materials.TEXEL_UV) or mesh.attributes.new(materials.TEXEL_UV, "FLOAT_VECTOR", "POINT")
+    table = np.zeros((len(mesh.vertices), 3), dtype=np.float32)
+    table[texels.vertex, :2] = texels.layout.uv()
+    attribute.data.foreach_set("vector", table.ravel())
+
+
+def region_faces(mesh, texels: Texels) -> np.ndarray:
+    """(nf,) bool: faces whose corners are all texels."""
+    inside = np.zeros(len(mesh.vertices), dtype=bool)
+    inside[texels.vertex] = True
+    corner = np.empty(len(mesh.loops), dtype=np.int32)
+    start = np.empty(len(mesh.polygons), dtype=np.int32)
+    mesh.loops.foreach_get("vertex_index", corner)
+    mesh.polygons.foreach_get("loop_start", start)
+    return np.logical_and.reduceat(inside[corner], start)
+
+
+def _assign(obj, texels: Texels, material) -> None:
+    """Put the material on the region's faces, in a slot of the object, since its mesh may have other users."""
+    mesh = obj.data
+    count = len(mesh.polygons)
+    index = np.empty(count, dtype=np.int32)
+    mesh.polygons.foreach_get("material_index", index)
+    faces = region_faces(mesh, texels)
+    old = mesh.attributes.get(OLD_MATERIAL)
+    if old is None:
+        if not len(mesh.materials):
+            mesh.materials.append(None)  # the faces outside keep the look of an object without material
+        mesh.materials.append(None)
+        slot = len(mesh.materials) - 1
+        old = mesh.attributes.new(OLD_MATERIAL, "INT", "FACE")
+        old.data.foreach_set("value", np.where(faces, index, -1).astype(np.int32))
+        mesh.polygons.foreach_set("material_index", np.where(faces, slot, index).astype(np.int32))
+        mesh.update()
+    else:
+        slot = _slot_of(mesh)
+    obj.material_slots[slot].link = "OBJECT"
+    obj.material_slots[slot].material = material
+
+
+def _slot_of(mesh) -> int:
+    """Return the slot of the heat maps on a mesh that has one."""
+    count = len(mesh.polygons)
+    index, old = np.empty(count, dtype=np.int32), np.empty(count, dtype=np.int32)
+    mesh.polygons.foreach_get("material_index", index)
+    mesh.attributes[OLD_MATERIAL].data.foreach_get("value", old)
+    return int(index[old >= 0][0])
+
+
+def _unassign(obj) -> None:
+    mesh = obj.data
+    attribute = mesh.attributes.get(OLD_MATERIAL)
+    if attribute is None:
+        return
+    slot = _slot_of(mesh)
+    if slot < len(obj.material_slots):
+        obj.material_slots[slot].material = None
+        obj.material_slots[slot].link = "DATA"
+    if _others_show(obj):
+        return
+    count = len(mesh.polygons)
+    index, old = np.empty(count, dtype=np.int32), np.empty(count, dtype=np.int32)
+    mesh.polygons.foreach_get("material_index", index)
+    attribute.data.foreach_get("value", old)
+    mesh.attributes.remove(attribute)
+    mesh.polygons.foreach_set("material_index", np.where(old >= 0, old, index).astype(np.int32))
+    mesh.materials.pop(index=slot)
+    if slot == 1 and mesh.materials[0] is None:  # the slot that stood for "no material"
+        mesh.materials.pop(index=0)
+    mesh.update()
+
+
+def _others_show(obj) -> bool:
+    """Whether another object with the same mesh shows a heat map."""
+    import bpy
+
+    if obj.data.users < 2 or obj.data.attributes.get(OLD_MATERIAL) is None:
+        return False
+    slot = _slot_of(obj.data)
+    for other in bpy.data.objects:
+        if other != obj and other.data == obj.data and slot < len(other.material_slots):
+            material = other.material_slots[slot].material
+            if material is not None and materials.MARK in material:
+                return True
+    return False

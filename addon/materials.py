@@ -1,0 +1,169 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The heat-map material: normal force from the baked images, coloured. It needs Blender's own nodes only, and plays without Palpate.
+
+Where a texture map of the region is in one piece, an image texture shows the EXR sequence pixel by pixel. On a region that had to be
+cut up (a whole sphere) no texture map of shared corners exists; there geometry nodes look the image up once per texel and hand
+the force to the material as an attribute.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+from . import colormaps
+
+UV_NAME = "Palpate"
+TEXEL_UV = "palpate_uv"
+FORCE = "palpate_force"
+"""Vertex attribute with the normal force (N): from geometry nodes after a bake, from the timeline while playing."""
+MARK = "palpate_sensor"
+"""Custom property that tells whose a material, an image, a node group or an arrow is."""
+RAMP_STOPS = 17
+
+
+def find(blocks, uid: str):
+    """Return the data-block of a sensor in a collection of bpy.data; None when there is none."""
+    return next((block for block in blocks if block.get(MARK) == uid), None)
+
+
+def load_sequence(uid: str, first: Path, relative: bool):
+    """Return the image that plays a baked sequence, by a path relative to the .blend or an absolute one."""
+    image = find(bpy.data.images, uid)
+    path = bpy.path.relpath(str(first)) if relative else str(first)
+    if image is None:
+        image = bpy.data.images.load(path)
+        image[MARK] = uid
+    image.name = f"Palpate {first.parent.name}"
+    image.filepath = path
+    image.source = "SEQUENCE"
+    image.colorspace_settings.name = "Non-Color"
+    image.reload()
+    return image
+
+
+def play(user, frame_start: int, frame_end: int) -> None:
+    """Make an image user show file number f at frame f, and hold the first and last beyond."""
+    user.frame_duration = frame_end - frame_start + 1
+    user.frame_start = frame_start
+    user.frame_offset = frame_start - 1
+    user.use_cyclic = False
+    user.use_auto_refresh = True
+
+
+def heat_map(uid: str, name: str, image, frames: tuple[int, int], maximum: float, color_map: str, on_vertices: bool):
+    """Return a sensor's heat-map material, made or made anew.
+
+    Parameters
+    ----------
+    uid, name : str
+        Of the sensor.
+    image : Image
+        From :func:`load_sequence`.
+    frames : (int, int)
+        First and last frame of the bake.
+    maximum : float, N
+        Normal force at the upper end of the colours.
+    color_map : str
+        Key of :data:`.colormaps.STOPS`.
+    on_vertices : bool
+        Take the force from the vertex attribute instead of the image.
+    """
+    material = find(bpy.data.materials, uid) or bpy.data.materials.new(f"Palpate {name}")
+    material[MARK] = uid
+    if material.node_tree is None:
+        material.use_nodes = True
+    tree = material.node_tree
+    tree.nodes.clear()
+    add = _Adder(tree)
+    if on_vertices:
+        force = add("ShaderNodeAttribute", attribute_name=FORCE).outputs["Fac"]
+    else:
+        texture = add("ShaderNodeTexImage", image=image, interpolation="Closest", extension="EXTEND")
+        play(texture.image_user, *frames)
+        uv = add("ShaderNodeUVMap", uv_map=UV_NAME)
+        tree.links.new(uv.outputs["UV"], texture.inputs["Vector"])
+        channels = add("ShaderNodeSeparateColor")
+        tree.links.new(texture.outputs["Color"], channels.inputs["Color"])
+        force = channels.outputs["Red"]
+    share = add("ShaderNodeMath", operation="DIVIDE", use_clamp=True, label="Normal force / maximum (N)")
+    tree.links.new(force, share.inputs[0])
+    share.inputs[1].default_value = maximum
+    ramp = add("ShaderNodeValToRGB")
+    _fill(ramp.color_ramp, color_map)
+    tree.links.new(share.outputs[0], ramp.inputs["Fac"])
+    surface = add("ShaderNodeBsdfPrincipled")
+    surface.inputs["Roughness"].default_value = 0.6
+    surface.inputs["Emission Strength"].default_value = 0.4
+    tree.links.new(ramp.outputs["Color"], surface.inputs["Base Color"])
+    tree.links.new(ramp.outputs["Color"], surface.inputs["Emission Color"])
+    output = add("ShaderNodeOutputMaterial")
+    tree.links.new(surface.outputs["BSDF"], output.inputs["Surface"])
+    return material
+
+
+class _Adder:
+    """Adds nodes from left to right."""
+
+    def __init__(self, tree):
+        self.tree, self.x = tree, 0.0
+
+    def __call__(self, kind: str, **settings):
+        node = self.tree.nodes.new(kind)
+        for key, value in settings.items():
+            setattr(node, key, value)
+        node.location = self.x, 0.0
+        self.x += 300.0
+        return node
+
+
+def _fill(ramp, color_map: str) -> None:
+    at = np.linspace(0.0, 1.0, RAMP_STOPS)
+    colors = colormaps.linear(colormaps.colors(color_map, at))
+    while len(ramp.elements) < RAMP_STOPS:
+        ramp.elements.new(1.0)
+    for element, position, color in zip(ramp.elements, at, colors, strict=True):
+        element.position = position
+        element.color = (*color, 1.0)
+
+
+def force_nodes(uid: str, name: str, image, frames: tuple[int, int]):
+    """Return the geometry nodes that look the image up at each texel and store the force on the vertices."""
+    group = find(bpy.data.node_groups, uid)
+    if group is None:
+        group = bpy.data.node_groups.new(f"Palpate {name}", "GeometryNodeTree")
+        group[MARK] = uid
+        group.interface.new_socket("Geometry", in_out="INPUT", socket_type="NodeSocketGeometry")
+        group.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
+    group.nodes.clear()
+    add, link = _Adder(group), group.links.new
+    start = add("NodeGroupInput")
+    where = add("GeometryNodeInputNamedAttribute", data_type="FLOAT_VECTOR")
+    where.inputs["Name"].default_value = TEXEL_UV
+    time = add("GeometryNodeInputSceneTime")
+    # A geometry node's Frame counts files from frame_start, like an image user with offset zero.
+    texture = add("GeometryNodeImageTexture", interpolation="Closest", extension="EXTEND")
+    texture.inputs["Image"].default_value = image
+    link(where.outputs["Attribute"], texture.inputs["Vector"])
+    clamp = add("ShaderNodeClamp")
+    clamp.inputs["Min"].default_value, clamp.inputs["Max"].default_value = frames
+    link(time.outputs["Frame"], clamp.inputs["Value"])
+    link(clamp.outputs["Result"], texture.inputs["Frame"])
+    channels = add("FunctionNodeSeparateColor")
+    link(texture.outputs["Color"], channels.inputs["Color"])
+    store = add("GeometryNodeStoreNamedAttribute", data_type="FLOAT", domain="POINT")
+    store.inputs["Name"].default_value = FORCE
+    link(start.outputs[0], store.inputs["Geometry"])
+    link(channels.outputs["Red"], store.inputs["Value"])
+    link(store.outputs["Geometry"], add("NodeGroupOutput").inputs[0])
+    return group
+
+
+def remove(uid: str, keep_image: bool = False) -> None:
+    """Remove everything of a sensor's heat map that is not on its mesh."""
+    for blocks in (bpy.data.materials, bpy.data.node_groups) + (() if keep_image else (bpy.data.images,)):
+        block = find(blocks, uid)
+        if block is not None:
+            blocks.remove(block)

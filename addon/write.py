@@ -1,0 +1,96 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A finished recording goes back into the scene: motion of free bodies, force arrows, heat maps. And out of it again."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from ..core.formats.files import frame_file
+from ..core.recording import Recording
+from ..core.scenario import Scenario
+from . import arrows, freebodies, heatmap, identity, materials, units
+from .sample import Binding
+
+LEAST_RANGE = 1e-6
+"""Newtons at the end of the heat map of a sensor that nothing touched."""
+
+
+def commit(scene, scenario: Scenario, binding: Binding, recording: Recording, folders: dict[str, Path]) -> None:
+    """Put a recording into its scene, replacing an earlier bake's.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        That was solved.
+    binding : Binding
+    recording : Recording
+    folders : dict of str to Path
+        Of the sensors, complete.
+    """
+    objects = binding.objects(scene)
+    taking_part = set(objects)
+    for obj in scene.objects:  # who took part in an earlier bake and no longer does
+        if obj.palpate.is_baked and obj not in taking_part:
+            clear_object(scene, obj)
+    for index in binding.starts:
+        _free_body(objects[index], index, binding, recording)
+    for sensor in scenario.sensors:
+        obj = objects[sensor.body]
+        if sensor.readout:
+            _sensor(scene, obj, sensor, binding, recording, folders[sensor.name])
+        elif obj.palpate.is_baked and sensor.body not in binding.starts:
+            clear_object(scene, obj)
+    settings = scene.palpate
+    settings.baked_digest = recording.digest
+    settings.baked_start, settings.baked_end = scenario.frame_start, scenario.frame_end
+
+
+def _free_body(obj, index: int, binding: Binding, recording: Recording) -> None:
+    placement = freebodies.Placement.of(obj, binding.starts[index], binding.parents[index][0], binding.scale)
+    freebodies.bake(placement, recording.frames, recording.poses[:, index], np.array(binding.parents[index]))
+
+
+def _sensor(scene, obj, sensor, binding: Binding, recording: Recording, folder: Path) -> None:
+    settings, felt = scene.palpate, recording.sensors[sensor.name]
+    frames = int(recording.frames[0]), int(recording.frames[-1])
+    largest = float(felt.normal_force.max(initial=0.0))
+    maximum = max(largest, LEAST_RANGE) if settings.use_auto_range else settings.range_max
+    relative = settings.folder.startswith("//")
+    image = materials.load_sequence(obj.palpate.uid, folder / frame_file(frames[0]), relative)
+    heatmap.apply(obj, sensor.texels, image, frames, maximum, settings.color_map)
+    arrows.bake(scene, obj, recording, sensor.name, sensor.body, binding.scale, _arrow_length(settings, sensor, felt, binding))
+    obj.palpate.bake_folder = str(folder)
+    obj.palpate.is_baked = True
+
+
+def _arrow_length(settings, sensor, felt, binding: Binding) -> float:
+    """Blender units per newton."""
+    if not settings.use_auto_arrow:
+        return units.as_typed(settings.arrow_scale) / binding.scale
+    largest = float(np.linalg.norm(felt.net_force, axis=1).max(initial=0.0))
+    size = float(np.ptp(sensor.texels.position, axis=0).max())
+    return size / binding.scale / largest if largest > 0 else 0.0
+
+
+def baked_objects(scene) -> list:
+    """Return the objects that hold a part of the scene's bake."""
+    return [obj for obj in scene.objects if obj.palpate.is_baked]
+
+
+def clear(scene) -> None:
+    """Take a bake out of its scene; its files stay."""
+    for obj in baked_objects(scene):
+        clear_object(scene, obj)
+    scene.palpate.baked_digest = ""
+
+
+def clear_object(scene, obj) -> None:
+    """Take one object's part of a bake away: keyframes, heat map, arrow; a free body is put back to its start."""
+    identity.ensure(obj)
+    freebodies.clear(obj)
+    if obj.palpate.bake_folder:
+        heatmap.clear(obj)
+        arrows.clear(scene, obj.palpate.uid)
+        obj.palpate.bake_folder = ""
