@@ -162,75 +162,118 @@ def write_world_inertia(rotation, inertia, out):
 
 
 @kernel
-def add_own_block(matrix, at, rows, r, arm, scale):
-    """Add to a body's 6 × 6 block what one contact resists of its own motion.
+def add_own_block(matrix, at, rows, start, stop, arm, scale):
+    """Add to a body's 6 × 6 block what its contacts resist of its own motion.
 
-    With the contact's damping tensor ``C = ct 1 + (cn - ct) n nᵀ`` and ``v = V + ω × r`` the block is ``Jᵀ C J``.
+    With a contact's damping tensor ``C = ct 1 + (cn - ct) n nᵀ`` and ``v = V + ω × r`` the block is the sum of ``Jᵀ C J``.
     Only the lower triangle is written; `scale` is the step's length.
     """
-    nx, ny, nz = rows[r, 0], rows[r, 1], rows[r, 2]
-    rx, ry, rz = rows[r, arm], rows[r, arm + 1], rows[r, arm + 2]
-    mx, my, mz = ry * nz - rz * ny, rz * nx - rx * nz, rx * ny - ry * nx
-    t = scale * rows[r, STIFF_T]
-    e = scale * (rows[r, STIFF_N] - rows[r, STIFF_T])
-    matrix[at, at] += t + e * nx * nx
-    matrix[at + 1, at] += e * ny * nx
-    matrix[at + 1, at + 1] += t + e * ny * ny
-    matrix[at + 2, at] += e * nz * nx
-    matrix[at + 2, at + 1] += e * nz * ny
-    matrix[at + 2, at + 2] += t + e * nz * nz
-    # Lower-left block: [r]× C.
-    matrix[at + 3, at] += e * mx * nx
-    matrix[at + 3, at + 1] += e * mx * ny - t * rz
-    matrix[at + 3, at + 2] += e * mx * nz + t * ry
-    matrix[at + 4, at] += e * my * nx + t * rz
-    matrix[at + 4, at + 1] += e * my * ny
-    matrix[at + 4, at + 2] += e * my * nz - t * rx
-    matrix[at + 5, at] += e * mz * nx - t * ry
-    matrix[at + 5, at + 1] += e * mz * ny + t * rx
-    matrix[at + 5, at + 2] += e * mz * nz
-    square = rx * rx + ry * ry + rz * rz
-    matrix[at + 3, at + 3] += e * mx * mx + t * (square - rx * rx)
-    matrix[at + 4, at + 3] += e * my * mx - t * ry * rx
-    matrix[at + 4, at + 4] += e * my * my + t * (square - ry * ry)
-    matrix[at + 5, at + 3] += e * mz * mx - t * rz * rx
-    matrix[at + 5, at + 4] += e * mz * my - t * rz * ry
-    matrix[at + 5, at + 5] += e * mz * mz + t * (square - rz * rz)
+    a00, a10, a11, a20, a21, a22 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    b00, b01, b02, b10, b11, b12, b20, b21, b22 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    c00, c10, c11, c20, c21, c22 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    for r in range(start, stop):
+        t = rows[r, STIFF_T]
+        e = rows[r, STIFF_N] - t
+        if e == 0.0 and t == 0.0:
+            continue
+        nx, ny, nz = rows[r, 0], rows[r, 1], rows[r, 2]
+        rx, ry, rz = rows[r, arm], rows[r, arm + 1], rows[r, arm + 2]
+        mx, my, mz = ry * nz - rz * ny, rz * nx - rx * nz, rx * ny - ry * nx
+        ex, ey, ez = e * nx, e * ny, e * nz
+        fx, fy, fz = e * mx, e * my, e * mz
+        tx, ty, tz = t * rx, t * ry, t * rz
+        square = t * (rx * rx + ry * ry + rz * rz)
+        a00 += t + ex * nx
+        a10 += ey * nx
+        a11 += t + ey * ny
+        a20 += ez * nx
+        a21 += ez * ny
+        a22 += t + ez * nz
+        # Lower-left block: [r]× C.
+        b00 += fx * nx
+        b01 += fx * ny - tz
+        b02 += fx * nz + ty
+        b10 += fy * nx + tz
+        b11 += fy * ny
+        b12 += fy * nz - tx
+        b20 += fz * nx - ty
+        b21 += fz * ny + tx
+        b22 += fz * nz
+        c00 += fx * mx + square - tx * rx
+        c10 += fy * mx - ty * rx
+        c11 += fy * my + square - ty * ry
+        c20 += fz * mx - tz * rx
+        c21 += fz * my - tz * ry
+        c22 += fz * mz + square - tz * rz
+    matrix[at, at] += scale * a00
+    matrix[at + 1, at] += scale * a10
+    matrix[at + 1, at + 1] += scale * a11
+    matrix[at + 2, at] += scale * a20
+    matrix[at + 2, at + 1] += scale * a21
+    matrix[at + 2, at + 2] += scale * a22
+    matrix[at + 3, at] += scale * b00
+    matrix[at + 3, at + 1] += scale * b01
+    matrix[at + 3, at + 2] += scale * b02
+    matrix[at + 4, at] += scale * b10
+    matrix[at + 4, at + 1] += scale * b11
+    matrix[at + 4, at + 2] += scale * b12
+    matrix[at + 5, at] += scale * b20
+    matrix[at + 5, at + 1] += scale * b21
+    matrix[at + 5, at + 2] += scale * b22
+    matrix[at + 3, at + 3] += scale * c00
+    matrix[at + 4, at + 3] += scale * c10
+    matrix[at + 4, at + 4] += scale * c11
+    matrix[at + 5, at + 3] += scale * c20
+    matrix[at + 5, at + 4] += scale * c21
+    matrix[at + 5, at + 5] += scale * c22
 
 
 @kernel
-def add_cross_block(matrix, at_low, at_high, rows, r, arm_low, arm_high, scale):
-    """Add the coupling of two free bodies through one contact, ``-J_highᵀ C J_low``, below the diagonal."""
-    t = scale * rows[r, STIFF_T]
-    e = scale * (rows[r, STIFF_N] - rows[r, STIFF_T])
-    high, low = np.zeros((3, 6)), np.zeros((3, 6))  # J of both bodies: velocity of the contact point from (V, ω)
-    for i in range(3):
-        high[i, i] = 1.0
-        low[i, i] = 1.0
-    high[0, 4], high[0, 5], high[1, 5] = rows[r, arm_high + 2], -rows[r, arm_high + 1], rows[r, arm_high]
-    high[1, 3], high[2, 3], high[2, 4] = -rows[r, arm_high + 2], rows[r, arm_high + 1], -rows[r, arm_high]
-    low[0, 4], low[0, 5], low[1, 5] = rows[r, arm_low + 2], -rows[r, arm_low + 1], rows[r, arm_low]
-    low[1, 3], low[2, 3], low[2, 4] = -rows[r, arm_low + 2], rows[r, arm_low + 1], -rows[r, arm_low]
-    for i in range(6):
-        for j in range(6):
-            total = 0.0
-            for a in range(3):
-                for b in range(3):
-                    c = e * rows[r, a] * rows[r, b] + (t if a == b else 0.0)
-                    total += high[a, i] * c * low[b, j]
-            matrix[at_high + i, at_low + j] -= total
+def add_cross_block(matrix, at_low, at_high, rows, start, stop, arm_low, arm_high, scale):
+    """Add the coupling of two free bodies through their contacts, the sum of ``-J_highᵀ C J_low``, below the diagonal."""
+    for r in range(start, stop):
+        t = scale * rows[r, STIFF_T]
+        e = scale * rows[r, STIFF_N] - t
+        hx, hy, hz = rows[r, arm_high], rows[r, arm_high + 1], rows[r, arm_high + 2]
+        lx, ly, lz = rows[r, arm_low], rows[r, arm_low + 1], rows[r, arm_low + 2]
+        nx, ny, nz = rows[r, 0], rows[r, 1], rows[r, 2]
+        n = (nx, ny, nz, hy * nz - hz * ny, hz * nx - hx * nz, hx * ny - hy * nx)
+        m = (nx, ny, nz, ly * nz - lz * ny, lz * nx - lx * nz, lx * ny - ly * nx)
+        for i in range(6):
+            for j in range(6):
+                matrix[at_high + i, at_low + j] -= e * n[i] * m[j]
+        for i in range(3):
+            matrix[at_high + i, at_low + i] -= t
+        # -[l]× above, [h]× on the left, and (h · l) 1 - l hᵀ below.
+        matrix[at_high, at_low + 4] -= t * lz
+        matrix[at_high, at_low + 5] += t * ly
+        matrix[at_high + 1, at_low + 3] += t * lz
+        matrix[at_high + 1, at_low + 5] -= t * lx
+        matrix[at_high + 2, at_low + 3] -= t * ly
+        matrix[at_high + 2, at_low + 4] += t * lx
+        matrix[at_high + 3, at_low + 1] += t * hz
+        matrix[at_high + 3, at_low + 2] -= t * hy
+        matrix[at_high + 4, at_low] -= t * hz
+        matrix[at_high + 4, at_low + 2] += t * hx
+        matrix[at_high + 5, at_low] += t * hy
+        matrix[at_high + 5, at_low + 1] -= t * hx
+        dot = hx * lx + hy * ly + hz * lz
+        h, low = (hx, hy, hz), (lx, ly, lz)
+        for i in range(3):
+            matrix[at_high + 3 + i, at_low + 3 + i] -= t * dot
+            for j in range(3):
+                matrix[at_high + 3 + i, at_low + 3 + j] += t * low[i] * h[j]
 
 
 @kernel
-def add_force(vector, at, fx, fy, fz, rows, r, arm, scale):
-    """Add a force at a contact point to a body's six entries."""
-    rx, ry, rz = rows[r, arm], rows[r, arm + 1], rows[r, arm + 2]
-    vector[at] += scale * fx
-    vector[at + 1] += scale * fy
-    vector[at + 2] += scale * fz
-    vector[at + 3] += scale * (ry * fz - rz * fy)
-    vector[at + 4] += scale * (rz * fx - rx * fz)
-    vector[at + 5] += scale * (rx * fy - ry * fx)
+def add_wrench(vector, at, fx, fy, fz, tx, ty, tz):
+    """Add a force and a torque to a body's six entries."""
+    vector[at] += fx
+    vector[at + 1] += fy
+    vector[at + 2] += fz
+    vector[at + 3] += tx
+    vector[at + 4] += ty
+    vector[at + 5] += tz
 
 
 @kernel

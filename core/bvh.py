@@ -248,13 +248,13 @@ def segment_entry(ox, oy, oz, dx, dy, dz, mesh, hint, tree):
 
 
 @kernel
-def near_entry(ox, oy, oz, dx, dy, dz, near, slot, number, tree):
+def near_entry(ox, oy, oz, dx, dy, dz, near, slot, number, faces):
     """Answer like :func:`segment_entry`, from a list of all triangles that the segment can meet (see :func:`find_near`)."""
     t, triangle, leaving = 2.0, -1, 2.0
     axis, shear_x, shear_y = _line_of_sight(dx, dy, dz)
     for j in range(number):
         i = near[slot, j]
-        u = cross_triangle(ox, oy, oz, dx, dy, dz, axis, shear_x, shear_y, tree.faces, i)
+        u = cross_triangle(ox, oy, oz, dx, dy, dz, axis, shear_x, shear_y, faces, i)
         if 0.0 <= u <= 1.0:
             if u < t:
                 t, triangle = u, i

@@ -55,7 +55,7 @@ class World(NamedTuple):
     radius : (m,) float, metres
         How far they reach from there.
     skin : (q,) float, metres
-        How far a texel may move before the triangles near it are collected anew.
+        How far a texel may move at the most before the triangles near it are collected anew.
     free_at : (b,) int
         Place of each free body among the free ones, -1 for keyframed bodies.
     mass : (b,) float, kg
@@ -168,9 +168,9 @@ class Neighbours(NamedTuple):
     near : (s, NEAR) int
     number : (s,) int
         Length of each list, -1 where the tree must be asked.
-    pose : (q, 13) float
-        Rotation (row by row) and position of each pair's sensor in the target's frame when its lists were made, and 1, or 0
-        while there are none.
+    pose : (q, 14) float
+        Rotation (row by row) and position of each pair's sensor in the target's frame when its lists were made, the skin they
+        were made with (-1 while there are none), and how often they have been used.
     """
 
     near: np.ndarray
@@ -221,8 +221,20 @@ def _travel(pose, old, pair, center, sensor, radius):
 
 
 @kernel
-def _renew_lists(pair, sensor, target, pose, world, tree, neighbours):
-    """Collect the triangles near each texel of a pair anew."""
+def _keep_lists(pair, sensor, target, pose, world, tree, neighbours):
+    """Collect the triangles near each texel of a pair anew when it has moved by more than the skin of the lists.
+
+    The skin follows the motion: some thirty steps' travel, so that lists are short and yet seldom made.
+    """
+    skin, used = neighbours.pose[pair, 12], neighbours.pose[pair, 13]
+    travel = _travel(pose, neighbours.pose, pair, world.center, sensor, world.radius[sensor])
+    neighbours.pose[pair, 13] = used + 1.0
+    wanted = world.skin[pair]
+    if skin >= 0.0:
+        wanted = min(max(32.0 * travel / (used + 1.0), 1e-3 * wanted), wanted)
+        too_wide = used == 255.0 and wanted < 0.5 * skin
+        if travel <= skin and not too_wide:
+            return
     texels, reach, slot = world.texels, world.reach[sensor], world.slot_start[pair]
     for texel in range(world.texel_start[sensor], world.texel_start[sensor + 1]):
         dx = reach * (pose[0] * texels[texel, 3] + pose[1] * texels[texel, 4] + pose[2] * texels[texel, 5])
@@ -231,11 +243,12 @@ def _renew_lists(pair, sensor, target, pose, world, tree, neighbours):
         ox = pose[9] + pose[0] * texels[texel, 0] + pose[1] * texels[texel, 1] + pose[2] * texels[texel, 2] - dx
         oy = pose[10] + pose[3] * texels[texel, 0] + pose[4] * texels[texel, 1] + pose[5] * texels[texel, 2] - dy
         oz = pose[11] + pose[6] * texels[texel, 0] + pose[7] * texels[texel, 1] + pose[8] * texels[texel, 2] - dz
-        neighbours.number[slot] = find_near(ox, oy, oz, dx, dy, dz, target, world.skin[pair], neighbours.near, slot, tree)
+        neighbours.number[slot] = find_near(ox, oy, oz, dx, dy, dz, target, wanted, neighbours.near, slot, tree)
         slot += 1
     for i in range(12):
         neighbours.pose[pair, i] = pose[i]
-    neighbours.pose[pair, 12] = 1.0
+    neighbours.pose[pair, 12] = wanted
+    neighbours.pose[pair, 13] = 0.0
 
 
 @kernel
@@ -283,12 +296,10 @@ def gather(pair, world, tree, neighbours, state, rotation, rows, slots, used, po
     texels, hint, bristles = world.texels, state.hint, state.bristles
     reach, root = world.reach[sensor], tree.roots[target]
     _relative_pose(a, b, state.position, rotation, pose)
-    radius, skin = world.radius[sensor], world.skin[pair]
-    if _distance_to_box(pose, world.center, sensor, tree.bounds, root) > radius:
+    if _distance_to_box(pose, world.center, sensor, tree.bounds, root) > world.radius[sensor]:
         _forget(pair, sensor, world, state)
         return used, 0
-    if neighbours.pose[pair, 12] == 0.0 or _travel(pose, neighbours.pose, pair, world.center, sensor, radius) > skin:
-        _renew_lists(pair, sensor, target, pose, world, tree, neighbours)
+    _keep_lists(pair, sensor, target, pose, world, tree, neighbours)
     gx = state.position[a, 0] - state.position[b, 0]
     gy = state.position[a, 1] - state.position[b, 1]
     gz = state.position[a, 2] - state.position[b, 2]
@@ -307,7 +318,7 @@ def gather(pair, world, tree, neighbours, state, rotation, rows, slots, used, po
         dz = reach * (pose[6] * texels[texel, 3] + pose[7] * texels[texel, 4] + pose[8] * texels[texel, 5])
         ox, oy, oz = tx - dx, ty - dy, tz - dz
         if number >= 0:
-            met, triangle, leaving = near_entry(ox, oy, oz, dx, dy, dz, neighbours.near, slot, number, tree)
+            met, triangle, leaving = near_entry(ox, oy, oz, dx, dy, dz, neighbours.near, slot, number, tree.faces)
         else:
             met, triangle, leaving = segment_entry(ox, oy, oz, dx, dy, dz, target, before, tree)
         if triangle < 0:
@@ -352,13 +363,15 @@ def gather(pair, world, tree, neighbours, state, rotation, rows, slots, used, po
         zy = rotation[a, 1, 0] * bx + rotation[a, 1, 1] * by + rotation[a, 1, 2] * bz
         zz = rotation[a, 2, 0] * bx + rotation[a, 2, 1] * by + rotation[a, 2, 2] * bz
         out_of_plane = zx * cx + zy * cy + zz * cz
-        length = zx * zx + zy * zy + zz * zz
-        zx -= out_of_plane * cx
-        zy -= out_of_plane * cy
-        zz -= out_of_plane * cz
-        flat = zx * zx + zy * zy + zz * zz
-        scale = math.sqrt(length / flat) if flat > 0.0 else 0.0
-        rows[used, 10], rows[used, 11], rows[used, 12] = scale * zx, scale * zy, scale * zz
+        if abs(out_of_plane) > 1e-300:
+            length = zx * zx + zy * zy + zz * zz
+            zx -= out_of_plane * cx
+            zy -= out_of_plane * cy
+            zz -= out_of_plane * cz
+            flat = zx * zx + zy * zy + zz * zz
+            scale = math.sqrt(length / flat) if flat > 0.0 else 0.0
+            zx, zy, zz = scale * zx, scale * zy, scale * zz
+        rows[used, 10], rows[used, 11], rows[used, 12] = zx, zy, zz
         slots[used] = slot
         used += 1
     return used, sunk
@@ -380,15 +393,17 @@ def linearise(rows, r, vx, vy, vz, dt, parameters):
             rows[r, column] = 0.0
         return
     limit = bristle_limit(force, parameters)
-    length = math.sqrt(rows[r, 10] * rows[r, 10] + rows[r, 11] * rows[r, 11] + rows[r, 12] * rows[r, 12])
-    held = limit / length if length > limit else 1.0  # the load fell: what can no longer be held has slipped already
+    square = rows[r, 10] * rows[r, 10] + rows[r, 11] * rows[r, 11] + rows[r, 12] * rows[r, 12]
+    held = 1.0
+    if square > limit * limit:  # the load fell: what can no longer be held has slipped already
+        held = limit / math.sqrt(square)
     keep, gain = bristle_step(tx * tx + ty * ty + tz * tz, force, dt, parameters)
     keep *= held
     zx, zy, zz = keep * rows[r, 10] + gain * tx, keep * rows[r, 11] + gain * ty, keep * rows[r, 12] + gain * tz
-    length = math.sqrt(zx * zx + zy * zy + zz * zz)
-    if length > limit:  # the closed solution for constant velocity would overshoot: slide at the limit instead
-        keep *= limit / length
-        gain *= limit / length
+    square = zx * zx + zy * zy + zz * zz
+    if square > limit * limit:  # the closed solution for constant velocity would overshoot: slide at the limit instead
+        keep *= limit / math.sqrt(square)
+        gain *= limit / math.sqrt(square)
     rows[r, START], rows[r, KEEP], rows[r, GAIN], rows[r, LIMIT] = held, keep, gain, limit
     rows[r, NORMAL_FORCE], rows[r, STIFF_N] = force, stiff
     rows[r, STIFF_T] = (parameters[SIGMA0] + parameters[SIGMA1] / dt) * gain + parameters[CT]

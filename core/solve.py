@@ -203,7 +203,7 @@ def _extent(sensor: Sensor, reference: np.ndarray) -> tuple[np.ndarray, float]:
 
 
 def _skin(sensor: Sensor, target: Target) -> float:
-    """How far around a texel triangles are remembered: a tenth of the target's usual edge, so that they are few."""
+    """How far around a texel triangles are remembered at the most: a tenth of the target's usual edge, so that they are few."""
     a, b, _ = target.mesh.triangles.T
     edge = np.median(np.linalg.norm(target.mesh.vertices[b] - target.mesh.vertices[a], axis=1))
     return float(min(0.1 * edge, 0.1 * sensor.parameters.max_penetration))
@@ -212,7 +212,9 @@ def _skin(sensor: Sensor, target: Target) -> float:
 def _neighbours(world: World, state: State) -> Neighbours:
     """Make room for the lists of triangles; they are filled when they are first needed."""
     slots = len(state.hint)
-    return Neighbours(np.zeros((slots, NEAR), np.int32), np.zeros(slots, np.int32), np.zeros((len(world.pairs), 13)))
+    pose = np.zeros((len(world.pairs), 14))
+    pose[:, 12] = -1.0
+    return Neighbours(np.zeros((slots, NEAR), np.int32), np.zeros(slots, np.int32), pose)
 
 
 def _start(scenario: Scenario, world: World, center: np.ndarray) -> State:

@@ -14,8 +14,8 @@ import numpy as np
 
 from .bodies import (
     add_cross_block,
-    add_force,
     add_own_block,
+    add_wrench,
     look_back,
     solve_positive,
     turn_quaternion,
@@ -189,10 +189,12 @@ def _solve_velocities(dt, world, state, scratch):
             a, b = world.sensor_body[sensor], world.target_body[world.pairs[pair, 1]]
             at_a, at_b = 6 * free_at[a], 6 * free_at[b]
             p = world.parameters[sensor]
-            for r in range(start, scratch.pair_stop[pair]):
+            stop = scratch.pair_stop[pair]
+            sx, sy, sz, qx, qy, qz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0  # force and torque on the target
+            for r in range(start, stop):
                 vx, vy, vz = _relative_velocity(rows, r, scratch.twist, a, b)
                 linearise(rows, r, vx, vy, vz, dt, p)
-                if rows[r, NORMAL_FORCE] <= 0.0 or (at_a < 0 and at_b < 0):
+                if rows[r, NORMAL_FORCE] <= 0.0:
                     continue
                 # What the known part of the motion and the stored springs do to the target; the sensor gets the opposite.
                 ux, uy, uz = _relative_velocity(rows, r, scratch.known, a, b)
@@ -202,17 +204,28 @@ def _solve_velocities(dt, world, state, scratch):
                 fx = -push * rows[r, 0] - stick * rows[r, 10] - rows[r, STIFF_T] * ux
                 fy = -push * rows[r, 1] - stick * rows[r, 11] - rows[r, STIFF_T] * uy
                 fz = -push * rows[r, 2] - stick * rows[r, 12] - rows[r, STIFF_T] * uz
-                if at_b >= 0:
-                    add_force(vector, at_b, fx, fy, fz, rows, r, ARM_B, dt)
-                    add_own_block(matrix, at_b, rows, r, ARM_B, dt)
-                if at_a >= 0:
-                    add_force(vector, at_a, -fx, -fy, -fz, rows, r, ARM_A, dt)
-                    add_own_block(matrix, at_a, rows, r, ARM_A, dt)
-                if at_a >= 0 and at_b >= 0:
-                    if at_a < at_b:
-                        add_cross_block(matrix, at_a, at_b, rows, r, ARM_A, ARM_B, dt)
-                    else:
-                        add_cross_block(matrix, at_b, at_a, rows, r, ARM_B, ARM_A, dt)
+                sx += fx
+                sy += fy
+                sz += fz
+                qx += rows[r, 7] * fz - rows[r, 8] * fy
+                qy += rows[r, 8] * fx - rows[r, 6] * fz
+                qz += rows[r, 6] * fy - rows[r, 7] * fx
+            if at_b >= 0:
+                add_wrench(vector, at_b, dt * sx, dt * sy, dt * sz, dt * qx, dt * qy, dt * qz)
+                add_own_block(matrix, at_b, rows, start, stop, ARM_B, dt)
+            if at_a >= 0:
+                # The same wrench, reversed and about the sensor's reference point.
+                gx = state.position[b, 0] - state.position[a, 0]
+                gy = state.position[b, 1] - state.position[a, 1]
+                gz = state.position[b, 2] - state.position[a, 2]
+                qx, qy, qz = qx + gy * sz - gz * sy, qy + gz * sx - gx * sz, qz + gx * sy - gy * sx
+                add_wrench(vector, at_a, -dt * sx, -dt * sy, -dt * sz, -dt * qx, -dt * qy, -dt * qz)
+                add_own_block(matrix, at_a, rows, start, stop, ARM_A, dt)
+            if at_a >= 0 and at_b >= 0:
+                if at_a < at_b:
+                    add_cross_block(matrix, at_a, at_b, rows, start, stop, ARM_A, ARM_B, dt)
+                else:
+                    add_cross_block(matrix, at_b, at_a, rows, start, stop, ARM_B, ARM_A, dt)
             start = scratch.pair_stop[pair]
         if n == 0:
             return
@@ -272,9 +285,10 @@ def _store_bristles(dt, world, state, scratch):
             zx = rows[r, KEEP] * rows[r, 10] + rows[r, GAIN] * (vx - out * rows[r, 0])
             zy = rows[r, KEEP] * rows[r, 11] + rows[r, GAIN] * (vy - out * rows[r, 1])
             zz = rows[r, KEEP] * rows[r, 12] + rows[r, GAIN] * (vz - out * rows[r, 2])
-            length = math.sqrt(zx * zx + zy * zy + zz * zz)
-            scale = rows[r, LIMIT] / length if length > rows[r, LIMIT] else 1.0
-            zx, zy, zz = scale * zx, scale * zy, scale * zz
+            square = zx * zx + zy * zy + zz * zz
+            if square > rows[r, LIMIT] * rows[r, LIMIT]:
+                scale = rows[r, LIMIT] / math.sqrt(square)
+                zx, zy, zz = scale * zx, scale * zy, scale * zz
             slot = scratch.slots[r]
             for i in range(3):
                 state.bristles[slot, i] = (
