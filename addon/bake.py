@@ -12,7 +12,7 @@ import bpy
 from ..core.errors import SceneError
 from ..core.recording import Recording
 from ..core.scenario import Scenario
-from . import dependencies, folders, sample, state, write
+from . import dependencies, folders, live, sample, state, write
 from .jobs import Progress
 
 
@@ -79,6 +79,7 @@ def _bake(scene, name: str) -> Generator[Progress, None, Baked]:
         files.discard()
         raise
     write.commit(scene, scenario, binding, recording, files.folders)
+    live.baked(recording, files.folders)
     return Baked(recording, scenario, files.folders)
 
 

@@ -47,7 +47,7 @@ def remember(obj, matrix: np.ndarray) -> None:
     settings = obj.palpate
     if not settings.has_start:
         settings.start_matrix = matrix.ravel()
-        settings.start_channels = _channels(obj)
+        settings.start_channels = channels(obj)
         settings.has_start = True
 
 
@@ -58,18 +58,19 @@ def restore(obj) -> None:
         obj.palpate.has_start = False
 
 
-def _channels(obj) -> np.ndarray:
+def channels(obj) -> np.ndarray:
+    """(14,) float: location, Euler, quaternion and axis-angle rotation."""
     return np.concatenate([obj.location, obj.rotation_euler, obj.rotation_quaternion, obj.rotation_axis_angle])
 
 
-def _set_channels(obj, channels: np.ndarray) -> None:
-    obj.location, obj.rotation_euler = channels[:3], channels[3:6]
-    obj.rotation_quaternion, obj.rotation_axis_angle = channels[6:10], channels[10:14]
+def _set_channels(obj, values: np.ndarray) -> None:
+    obj.location, obj.rotation_euler = values[:3], values[3:6]
+    obj.rotation_quaternion, obj.rotation_axis_angle = values[6:10], values[10:14]
 
 
 @dataclass(frozen=True)
 class Placement:
-    """From a pose of the solver to the location and rotation properties of one object.
+    """From a pose of the solver to the location and rotation properties of an object; the object itself is not kept.
 
     Attributes
     ----------
@@ -81,7 +82,6 @@ class Placement:
         Metres per Blender unit.
     """
 
-    obj: object
     channels: np.ndarray
     world: np.ndarray
     parent: np.ndarray
@@ -91,10 +91,10 @@ class Placement:
     def of(cls, obj, matrix: np.ndarray, parent: np.ndarray, scale: float) -> Placement:
         """Describe a body that starts at a world matrix; its kept start counts when it is displaced."""
         settings = obj.palpate
-        channels = np.array(settings.start_channels) if settings.has_start else _channels(obj)
-        return cls(obj, channels.astype(float), matrix, parent, scale)
+        start = np.array(settings.start_channels) if settings.has_start else channels(obj)
+        return cls(start.astype(float), matrix, parent, scale)
 
-    def pose(self, pose: np.ndarray, parent: np.ndarray, previous: np.ndarray | None = None) -> np.ndarray:
+    def pose(self, obj, pose: np.ndarray, parent: np.ndarray, previous: np.ndarray | None = None) -> np.ndarray:
         """Return the (14,) properties that put the body at a pose.
 
         Parameters
@@ -113,15 +113,15 @@ class Placement:
         basis, basis_before = np.linalg.inv(parent) @ moved, np.linalg.inv(self.parent) @ self.world
         turn = basis[:3, :3] @ np.linalg.inv(basis_before[:3, :3])
         location = self.channels[:3] + basis[:3, 3] - basis_before[:3, 3]
-        return np.concatenate([location, self._rotations(turn, self.channels if previous is None else previous)])
+        return np.concatenate([location, self._rotations(obj, turn, self.channels if previous is None else previous)])
 
-    def _rotations(self, turn: np.ndarray, previous: np.ndarray) -> np.ndarray:
+    def _rotations(self, obj, turn: np.ndarray, previous: np.ndarray) -> np.ndarray:
         """Apply a world-side rotation to the start's rotation properties; those of other modes stay as they are."""
-        mode = self.obj.rotation_mode
+        mode = obj.rotation_mode
         rest = self.channels[3:].copy()
         turn = Matrix(turn).to_quaternion()
         if mode == "QUATERNION":
-            delta = self.obj.delta_rotation_quaternion
+            delta = obj.delta_rotation_quaternion
             result = delta.inverted() @ turn @ delta @ Quaternion(rest[3:7])
             result.make_compatible(Quaternion(previous[6:10]))
             rest[3:7] = result
@@ -130,18 +130,18 @@ class Placement:
             axis, angle = result.to_axis_angle()
             rest[7], rest[8:11] = angle, axis
         else:
-            delta = self.obj.delta_rotation_euler.to_quaternion()
+            delta = obj.delta_rotation_euler.to_quaternion()
             result = delta.inverted() @ turn @ delta @ Euler(rest[:3], mode).to_quaternion()
             rest[:3] = result.to_euler(mode, Euler(previous[3:6], mode))
         return rest
 
-    def show(self, pose: np.ndarray, parent: np.ndarray) -> None:
+    def show(self, obj, pose: np.ndarray, parent: np.ndarray) -> None:
         """Move the object to a pose; keep where it was before it is moved for the first time."""
-        remember(self.obj, self.world)
-        _set_channels(self.obj, self.pose(pose, parent))
+        remember(obj, self.world)
+        _set_channels(obj, self.pose(obj, pose, parent))
 
 
-def bake(placement: Placement, frames: np.ndarray, poses: np.ndarray, parents: np.ndarray) -> None:
+def bake(obj, placement: Placement, frames: np.ndarray, poses: np.ndarray, parents: np.ndarray) -> None:
     """Keyframe a body's motion, linear between frames; what else its action holds stays.
 
     Parameters
@@ -150,10 +150,9 @@ def bake(placement: Placement, frames: np.ndarray, poses: np.ndarray, parents: n
     poses : (f, 7) float
     parents : (f, 4, 4) float
     """
-    obj = placement.obj
     rows = [placement.channels]
     for pose, parent in zip(poses[1:], parents[1:], strict=True):
-        rows.append(placement.pose(pose, parent, rows[-1]))
+        rows.append(placement.pose(obj, pose, parent, rows[-1]))
     table = np.array(rows)
     remember(obj, placement.world)
     found, made = curves.ensure(obj, f"{obj.name} Palpate")

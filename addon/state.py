@@ -12,9 +12,14 @@ class Session:
     """What handlers, bake and panels share."""
 
     participants_known: bool = False
-    """False when objects may have got or lost a role since they were last looked for."""
+    """False when objects may have got or lost a role since `has_roles` was filled."""
     changed_geometry: set[str] = field(default_factory=set)
     """Names of objects whose geometry was touched since the last look."""
+    changed_motion: set[str] = field(default_factory=set)
+    """Names of objects that were moved by hand, by a script or by an edited animation since a run began."""
+    has_roles: dict[int, bool] = field(default_factory=dict)
+    object_counts: dict[int, int] = field(default_factory=dict)
+    """By scene: whether any object takes part, and how many objects it had when that was found out."""
     suspended: int = 0
     """Above zero while a bake reads the scene: the timeline must not simulate then."""
     rendering: bool = False

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import bpy
 import numpy as np
 
 from ..core.formats.files import frame_file
@@ -49,7 +50,7 @@ def commit(scene, scenario: Scenario, binding: Binding, recording: Recording, fo
 
 def _free_body(obj, index: int, binding: Binding, recording: Recording) -> None:
     placement = freebodies.Placement.of(obj, binding.starts[index], binding.parents[index][0], binding.scale)
-    freebodies.bake(placement, recording.frames, recording.poses[:, index], np.array(binding.parents[index]))
+    freebodies.bake(obj, placement, recording.frames, recording.poses[:, index], np.array(binding.parents[index]))
 
 
 def _sensor(scene, obj, sensor, binding: Binding, recording: Recording, folder: Path) -> None:
@@ -61,7 +62,7 @@ def _sensor(scene, obj, sensor, binding: Binding, recording: Recording, folder: 
     image = materials.load_sequence(obj.palpate.uid, folder / frame_file(frames[0]), relative)
     heatmap.apply(obj, sensor.texels, image, frames, maximum, settings.color_map)
     arrows.bake(scene, obj, recording, sensor.name, sensor.body, binding.scale, _arrow_length(settings, sensor, felt, binding))
-    obj.palpate.bake_folder = str(folder)
+    obj.palpate.bake_folder = bpy.path.relpath(str(folder)) if relative else str(folder)
     obj.palpate.is_baked = True
 
 

@@ -1,0 +1,159 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What playing has computed so far. One run per scene, in memory only; the same numbers as a bake, frame by frame.
+
+A run begins at the first frame and can only go forward by one frame. It is dropped when anything that it was computed
+from has changed: settings (compared at every frame), geometry (compared when Blender reports a change), or the motion of
+a keyframed body (the poses of a remembered frame are compared with those that Blender has now).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..core.errors import PalpateError
+from ..core.recording import Frame
+from ..core.scenario import Scenario
+from . import dependencies, freebodies, meshes, properties, sample, state, units
+
+SETTINGS = (*properties.PARAMETERS, "role", "region", "vertex_group", "threshold", "body", "mass")
+
+
+@dataclass
+class Run:
+    """A simulation that follows the timeline.
+
+    Attributes
+    ----------
+    scenario, binding, simulation
+        The simulation stands at the last frame computed.
+    placements : dict of int to Placement
+        Of free bodies.
+    settings : tuple
+        What was set when it began.
+    geometry : dict of str to str
+        Fingerprint of each object that takes part.
+    frames : dict of int to Frame
+    poses, parents : dict of int to what :func:`.sample.sample_poses` found at that frame
+    written : dict of int to (14,) float
+        Where free bodies were last put, by body index.
+    """
+
+    scenario: Scenario
+    binding: sample.Binding
+    simulation: object
+    placements: dict[int, freebodies.Placement]
+    settings: tuple
+    geometry: dict[str, str]
+    frames: dict[int, Frame] = field(default_factory=dict)
+    poses: dict[int, sample.Poses] = field(default_factory=dict)
+    parents: dict[int, dict[int, np.ndarray]] = field(default_factory=dict)
+    written: dict[int, np.ndarray] = field(default_factory=dict)
+
+
+_runs: dict[int, Run] = {}
+
+
+def get(scene) -> Run | None:
+    """Return the run of a scene."""
+    return _runs.get(scene.session_uid)
+
+
+def drop(scene) -> None:
+    """Forget the run of a scene."""
+    _runs.pop(scene.session_uid, None)
+
+
+def clear() -> None:
+    """Forget all runs."""
+    _runs.clear()
+
+
+def begin(scene, depsgraph) -> Run:
+    """Start a run. Blender has to have evaluated the first frame.
+
+    Raises
+    ------
+    PalpateError
+        The scene makes no run.
+    """
+    drop(scene)
+    scenario, binding = sample.sample_start(scene, depsgraph)
+    objects = binding.objects(scene)
+    placements = {
+        index: freebodies.Placement.of(objects[index], matrix, binding.parents[index][0], binding.scale)
+        for index, matrix in binding.starts.items()
+    }
+    run = Run(
+        scenario=scenario,
+        binding=binding,
+        simulation=dependencies.solver().Simulation(scenario),
+        placements=placements,
+        settings=_settings(scene, objects),
+        geometry={obj.name: meshes.fingerprint(obj, depsgraph) for obj in objects},
+    )
+    first = scenario.frame_start
+    run.frames[first] = run.simulation.observe()
+    run.poses[first], run.parents[first] = sample.sample_poses(scene, depsgraph, binding)
+    state.session.changed_geometry.difference_update(run.geometry)
+    state.session.changed_motion.clear()
+    _runs[scene.session_uid] = run
+    return run
+
+
+def go_on(scene, depsgraph, run: Run) -> None:
+    """Compute the frame where the scene stands, which is the one after the last computed."""
+    frame = scene.frame_current
+    run.poses[frame], run.parents[frame] = sample.sample_poses(scene, depsgraph, run.binding)
+    run.simulation.extend(run.poses[frame])
+    run.frames[frame] = run.simulation.advance()
+
+
+def is_stale(scene, depsgraph, run: Run) -> bool:
+    """Whether something that a run was computed from has changed."""
+    try:
+        objects = run.binding.objects(scene)
+    except PalpateError:
+        return True
+    if _settings(scene, objects) != run.settings:
+        return True
+    names = {obj.name: index for index, obj in enumerate(objects)}
+    if any(names.get(name, -1) not in run.binding.starts for name in state.session.changed_motion if name in names):
+        return True
+    start = scene.frame_start
+    moved = any(not np.array_equal(freebodies.channels(objects[index]), put) for index, put in run.written.items())
+    if moved and all(not objects[index].palpate.has_start for index in run.written) and start in run.frames:
+        return True  # moved while it stood at the first frame: that is a new start
+    touched = state.session.changed_geometry & names.keys()
+    state.session.changed_geometry -= touched
+    return any(meshes.fingerprint(objects[names[name]], depsgraph) != run.geometry[name] for name in touched)
+
+
+def has_moved(scene, depsgraph, run: Run) -> bool:
+    """Whether keyframed bodies are elsewhere now than when the present frame was computed."""
+    remembered = run.poses[scene.frame_current]
+    try:
+        now, _ = sample.sample_poses(scene, depsgraph, run.binding)
+    except PalpateError:
+        return True
+    return any(not np.array_equal(now[i][part], remembered[i][part]) for i in remembered for part in (0, 1))
+
+
+def _settings(scene, objects) -> tuple:
+    """Return everything that is set by a number or a choice, in a form that can be compared."""
+    own = scene.palpate
+    hidden = [warning for warning in sample.participants(scene)[1]]
+    whole = (
+        scene.frame_start,
+        units.frames_per_second(scene),
+        units.metres_per_unit(scene),
+        tuple(units.gravity(scene)),
+        own.use_auto_dt or own.dt,
+        tuple(hidden),
+        len(objects),
+    )
+    return whole + tuple(
+        (obj.name, *(getattr(obj.palpate, key) for key in SETTINGS), *obj.palpate.velocity, *obj.palpate.angular_velocity)
+        for obj in objects
+    )

@@ -1,0 +1,104 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Blender's events, each handed on to the one place that deals with it."""
+
+from __future__ import annotations
+
+import bpy
+from bpy.app.handlers import persistent
+
+from . import freebodies, identity, live, migrations, overlays, sample, state
+
+
+@persistent
+def palpate_frame_change_pre(scene, _depsgraph=None):
+    live.before_frame(scene)
+
+
+@persistent
+def palpate_frame_change_post(scene, depsgraph):
+    if depsgraph is not None and depsgraph.view_layer.name == sample.view_layer_of(scene).name:
+        live.on_frame(scene, depsgraph)
+
+
+@persistent
+def palpate_depsgraph_update_post(_scene, depsgraph):
+    """Only note what was touched; whether it really changed is found out at the next frame."""
+    session = state.session
+    for update in depsgraph.updates:
+        block = update.id
+        if isinstance(block, bpy.types.Object):
+            if update.is_updated_geometry:
+                session.changed_geometry.add(block.name)
+            if update.is_updated_transform:
+                session.changed_motion.add(block.name)
+
+
+@persistent
+def palpate_load_post(_path):
+    state.reset()
+    identity.forget()
+    live.forget()
+    migrations.apply()
+    for scene in bpy.data.scenes:  # a file that was written without save_pre, as by a crash
+        for obj in scene.objects:
+            if obj.palpate.has_start and not obj.palpate.is_baked and obj.is_editable:
+                freebodies.restore(obj)
+
+
+@persistent
+def palpate_undo_post(_scene, _depsgraph=None):
+    live.forget()
+    state.participants_changed()
+
+
+@persistent
+def palpate_save_pre(_path):
+    for scene in bpy.data.scenes:
+        live.hide(scene)
+
+
+@persistent
+def palpate_save_post(_path):
+    for scene in bpy.data.scenes:
+        live.unhide(scene)
+
+
+@persistent
+def palpate_render_begins(_scene, _depsgraph=None):
+    state.session.rendering = True
+
+
+@persistent
+def palpate_render_ends(_scene, _depsgraph=None):
+    state.session.rendering = False
+
+
+LISTS = {
+    "frame_change_pre": palpate_frame_change_pre,
+    "frame_change_post": palpate_frame_change_post,
+    "depsgraph_update_post": palpate_depsgraph_update_post,
+    "load_post": palpate_load_post,
+    "undo_post": palpate_undo_post,
+    "redo_post": palpate_undo_post,
+    "save_pre": palpate_save_pre,
+    "save_post": palpate_save_post,
+    "save_post_fail": palpate_save_post,
+    "render_init": palpate_render_begins,
+    "render_complete": palpate_render_ends,
+    "render_cancel": palpate_render_ends,
+}
+
+
+def register():
+    for name, function in LISTS.items():
+        getattr(bpy.app.handlers, name).append(function)
+    overlays.register()
+
+
+def unregister():
+    overlays.unregister()
+    for name, function in LISTS.items():
+        getattr(bpy.app.handlers, name).remove(function)
+    live.forget()
+    identity.forget()
+    state.reset()

@@ -1,0 +1,228 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The timeline: playing forward computes and shows, scrubbing shows what was computed, and a saved file holds none of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+from ..core.errors import PalpateError
+from ..core.recording import Frame, Recording
+from . import cache, folders, freebodies, identity, materials, overlays, sample, state, write
+
+
+@dataclass(frozen=True)
+class Status:
+    """What the panel says about the present frame: `text`, and `frame` when there are numbers to show."""
+
+    text: str
+    frame: Frame | None = None
+
+
+_status: dict[int, Status] = {}
+_recordings: dict[Path, Recording | None] = {}
+"""Recordings of bakes that were read for the panel, by folder."""
+
+
+def status(scene) -> Status:
+    """Return what is known about a scene's present frame; cheap enough for drawing."""
+    return _status.get(scene.session_uid, Status("Not computed: go to the first frame and play."))
+
+
+def forget() -> None:
+    """Forget everything, because another file is open or undo has changed it."""
+    cache.clear()
+    overlays.clear()
+    _status.clear()
+    _recordings.clear()
+
+
+def is_baking() -> bool:
+    """Whether a bake is under way."""
+    return state.session.bake is not None
+
+
+def has_roles(scene) -> bool:
+    """Whether any object takes part; looked up again only when a role may have changed."""
+    session, key = state.session, scene.session_uid
+    if not session.participants_known or session.object_counts.get(key) != len(scene.objects):
+        if not session.participants_known:
+            session.has_roles.clear()
+        session.has_roles[key] = any(obj.palpate.role != "NONE" for obj in scene.objects)
+        session.object_counts[key] = len(scene.objects)
+        session.participants_known = True
+    return session.has_roles.get(key, True)
+
+
+def before_frame(scene) -> None:
+    """Begin a run at the frame that is being left: pressing play on the first frame starts with the second."""
+    if not _is_on(scene) or scene.frame_current != scene.frame_start + 1:
+        return
+    depsgraph = sample.view_layer_of(scene).depsgraph
+    if depsgraph is None or depsgraph.scene_eval.frame_current != scene.frame_start or depsgraph.scene_eval.frame_subframe:
+        return
+    run = cache.get(scene)
+    if run is None or cache.is_stale(scene, depsgraph, run):
+        _begin(scene, depsgraph)
+
+
+def on_frame(scene, depsgraph) -> None:
+    """Compute or show the frame that the scene has arrived at."""
+    if not has_roles(scene) or state.session.suspended or _renders_beside_window(scene):
+        return
+    if write.baked_objects(scene):
+        cache.drop(scene)
+        _show_bake(scene)
+        return
+    if not _is_on(scene) or scene.frame_subframe:
+        return
+    frame, run = scene.frame_current, cache.get(scene)
+    rendering = state.session.rendering
+    if run is not None and not rendering and (cache.is_stale(scene, depsgraph, run) or _elsewhere(scene, depsgraph, run)):
+        cache.drop(scene)
+        overlays.clear(scene)
+        run = None
+        _say(scene, "Changed: go to the first frame and play to compute again.")
+    if frame == scene.frame_start and run is None and not rendering:
+        run = _begin(scene, depsgraph)
+    elif run is not None and frame == run.simulation.frame + 1 and not rendering:
+        _attempt(scene, lambda: cache.go_on(scene, depsgraph, run))
+    if run is not None and frame in run.frames:
+        show(scene, run)
+    elif run is not None:
+        overlays.clear(scene)
+        _say(scene, f"Frame {frame} is not computed: play from frame {run.simulation.frame}.")
+
+
+def _is_on(scene) -> bool:
+    return scene.palpate.use_live and not state.session.suspended and has_roles(scene) and not write.baked_objects(scene)
+
+
+def _renders_beside_window(scene) -> bool:
+    """Whether a render runs in a thread of its own, while the window could touch the same objects."""
+    return state.session.rendering and not bpy.app.background and not scene.render.use_lock_interface
+
+
+def _elsewhere(scene, depsgraph, run) -> bool:
+    return scene.frame_current in run.frames and cache.has_moved(scene, depsgraph, run)
+
+
+def _begin(scene, depsgraph):
+    return _attempt(scene, lambda: cache.begin(scene, depsgraph))
+
+
+def _attempt(scene, work):
+    """Do it, or say in the panel why it cannot be done: a sentence at every frame would be in the way."""
+    try:
+        return work()
+    except PalpateError as error:
+        cache.drop(scene)
+        overlays.clear(scene)
+        _say(scene, str(error))
+        return None
+
+
+def _say(scene, text: str, frame: Frame | None = None) -> None:
+    _status[scene.session_uid] = Status(text, frame)
+
+
+def show(scene, run) -> None:
+    """Put free bodies and heat maps where the run has them at the present frame."""
+    number = scene.frame_current
+    frame = run.frames[number]
+    objects = run.binding.objects(scene)
+    for index, placement in run.placements.items():
+        if number == run.scenario.frame_start:
+            freebodies.restore(objects[index])
+        else:
+            placement.show(objects[index], frame.poses[index], run.parents[number][index])
+        run.written[index] = freebodies.channels(objects[index])
+    for sensor in run.scenario.sensors:
+        if sensor.readout:
+            _write_force(objects[sensor.body], sensor.texels.vertex, frame.sensors[sensor.name].normal_force)
+    overlays.show(scene, run, frame)
+    warnings = run.binding.warnings + tuple(run.simulation.warnings)
+    _say(scene, " ".join(warnings) or f"Frame {number} computed.", frame)
+
+
+def _write_force(obj, vertex: np.ndarray, force: np.ndarray) -> None:
+    mesh = obj.data
+    if obj.mode == "EDIT" or not mesh.is_editable:
+        return
+    attribute = mesh.attributes.get(materials.FORCE) or mesh.attributes.new(materials.FORCE, "FLOAT", "POINT")
+    values = np.zeros(len(mesh.vertices), dtype=np.float32)
+    values[vertex] = force
+    attribute.data.foreach_set("value", values)
+    mesh.update_tag()
+
+
+def _show_bake(scene) -> None:
+    """Keyframes and material show the bake by themselves; only the panel's numbers come from its recording."""
+    number = scene.frame_current
+    sensors, poses, velocities = {}, np.zeros((0, 7)), np.zeros((0, 6))
+    for obj in write.baked_objects(scene):
+        recording = _recording(obj.palpate.bake_folder)
+        if recording is not None and number in recording.frames:
+            frame = recording.at(number)
+            sensors.update(frame.sensors)
+    if sensors:
+        _say(scene, f"Frame {number} of the bake.", Frame(number, 0.0, sensors, poses, velocities))
+    else:
+        _say(scene, f"Frame {number} is outside of the bake.")
+
+
+def _recording(folder: str):
+    """Return the recording of a sensor's bake, read when it is first asked for; None when it is not there."""
+    if not folder:
+        return None
+    place = Path(bpy.path.abspath(folder))
+    if place not in _recordings:
+        try:
+            _recordings[place] = folders.stored_recording(place)
+        except PalpateError:
+            _recordings[place] = None
+    return _recordings[place]
+
+
+def baked(recording, places) -> None:
+    """Keep a new bake's recording for the panel."""
+    _recordings.clear()
+    for place in places.values():
+        _recordings[place] = recording
+
+
+# --- files hold nothing of it
+
+
+def hide(scene) -> None:
+    """Put everything back as it was before playing; what was computed is kept."""
+    run = cache.get(scene)
+    for obj in scene.objects:
+        settings = obj.palpate
+        if settings.has_start and not settings.is_baked:
+            freebodies.restore(obj)
+    if run is not None:
+        found = identity.find(scene, run.binding.keys)
+        for sensor in run.scenario.sensors:
+            obj = found.get(run.binding.keys[sensor.body])
+            attribute = obj.data.attributes.get(materials.FORCE) if obj is not None else None
+            if attribute is not None and obj.mode != "EDIT":
+                obj.data.attributes.remove(attribute)
+
+
+def unhide(scene) -> None:
+    """Show the present frame again after :func:`hide`."""
+    run = cache.get(scene)
+    if run is not None and scene.frame_current in run.frames:
+        _attempt(scene, lambda: show(scene, run))
+
+
+def reset(scene) -> None:
+    """Back to the start: free bodies where they were, nothing computed."""
+    hide(scene)
+    cache.drop(scene)
+    overlays.clear(scene)
+    _status.pop(scene.session_uid, None)

@@ -1,0 +1,45 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Settings in files of an older Palpate are brought forward when the file is opened; see :mod:`..core.migrate`."""
+
+from __future__ import annotations
+
+import bpy
+
+from ..core.errors import FileError
+from ..core.migrate import VERSION, migrate
+from . import state
+
+
+def apply() -> None:
+    """Bring the settings of all objects and scenes of the file forward."""
+    for kind, blocks in (("object", bpy.data.objects), ("scene", bpy.data.scenes)):
+        for block in blocks:
+            version = block.palpate.schema_version
+            if version not in (0, VERSION):
+                _bring_forward(block, kind)
+
+
+def _bring_forward(block, kind: str) -> None:
+    before = stored(block)
+    try:
+        after = migrate(before, kind, block.name)
+    except FileError as error:
+        state.session.notes[block.name] = str(error)
+        return
+    for key, value in after.items():
+        if before.get(key) != value and hasattr(block.palpate, key):
+            setattr(block.palpate, key, value)
+
+
+def stored(block) -> dict:
+    """Return what is saved of a block's settings, also under names that this version no longer knows."""
+    if hasattr(block, "bl_system_properties_get"):  # Blender 5.0 keeps it apart from custom properties
+        system = block.bl_system_properties_get()
+        group = system.get("palpate") if system is not None else None
+    else:
+        group = block.get("palpate")
+    return {key: _plain(value) for key, value in group.items()} if group is not None else {}
+
+
+def _plain(value):
+    return list(value) if hasattr(value, "to_list") else value

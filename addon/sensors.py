@@ -1,0 +1,107 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Making and unmaking sensors, targets and pads."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..core.errors import SensorError
+from . import meshes, write
+
+GROUP_NAME = "Palpate Sensor"
+
+
+def source_of(obj, mode: str) -> str:
+    """Return what AUTO means in a mode: the selection in Edit Mode, the painted group in Weight Paint, else the whole mesh."""
+    if mode == "EDIT":
+        obj.update_from_editmode()
+        if selected_vertices(obj).any():
+            return "SELECTION"
+    if mode == "WEIGHT_PAINT" and obj.vertex_groups.active is not None:
+        return "GROUP"
+    return "MESH"
+
+
+def selected_vertices(obj) -> np.ndarray:
+    """(nv,) bool: vertices selected in Edit Mode, as far as the object knows of them."""
+    chosen = np.zeros(len(obj.data.vertices), dtype=bool)
+    obj.data.vertices.foreach_get("select", chosen)
+    return chosen
+
+
+def make_sensor(obj, source: str, role: str = "SENSOR") -> int:
+    """Give a mesh object the role of a sensor, or of a pad, on a region.
+
+    Parameters
+    ----------
+    source : {"SELECTION", "GROUP", "MESH"}
+        SELECTION writes a vertex group, GROUP takes the active one.
+
+    Returns
+    -------
+    int
+        Number of vertices in the region.
+
+    Raises
+    ------
+    SensorError
+        The region has no vertices or no face. Nothing was changed then.
+    """
+    if obj.type != "MESH":
+        raise SensorError(f"'{obj.name}' is no mesh: convert it with Object › Convert › Mesh before it becomes a sensor.")
+    settings = obj.palpate
+    if source == "SELECTION":
+        chosen = selected_vertices(obj)
+    elif source == "GROUP":
+        group = obj.vertex_groups.active
+        if group is None:
+            raise SensorError(f"'{obj.name}' has no vertex group: paint one, or make the whole mesh a sensor.")
+        chosen = meshes.weights(obj.data, group.index) >= max(settings.threshold, 1e-6)
+    else:
+        chosen = np.ones(len(obj.data.vertices), dtype=bool)
+    _check(obj, chosen, source)
+    if source == "SELECTION":
+        group = obj.vertex_groups.get(GROUP_NAME) or obj.vertex_groups.new(name=GROUP_NAME)
+        group.remove(range(len(chosen)))
+        group.add(np.flatnonzero(chosen).tolist(), 1.0, "REPLACE")
+        obj.vertex_groups.active_index = group.index
+    if source == "MESH":
+        settings.region = "MESH"
+    else:
+        settings.region, settings.vertex_group = "GROUP", group.name
+    settings.role = role
+    return int(chosen.sum())
+
+
+def _check(obj, chosen: np.ndarray, source: str) -> None:
+    what = {
+        "SELECTION": "Nothing is selected",
+        "GROUP": f"No vertex has a weight of {obj.palpate.threshold:g} or more in the active vertex group",
+        "MESH": "There are no vertices",
+    }[source]
+    if not chosen.any():
+        raise SensorError(f"{what} on '{obj.name}': a sensor needs at least one face.")
+    if not any(all(chosen[vertex] for vertex in face.vertices) for face in obj.data.polygons):
+        raise SensorError(
+            f"The {int(chosen.sum())} chosen vertices of '{obj.name}' span no face: choose all corners of at least one face."
+        )
+
+
+def remove_role(scene, obj) -> None:
+    """Take an object out: its role, and its part of a bake. Parameters and vertex groups stay."""
+    if obj.palpate.is_baked:
+        write.clear_object(scene, obj)
+    obj.palpate.role = "NONE"
+
+
+def paint_group(obj):
+    """Return the vertex group to paint a sensor's region in: the one it has, else a new, empty one."""
+    settings = obj.palpate
+    group = obj.vertex_groups.get(settings.vertex_group) if settings.vertex_group else None
+    if group is None:
+        group = obj.vertex_groups.get(GROUP_NAME) or obj.vertex_groups.new(name=GROUP_NAME)
+    obj.vertex_groups.active_index = group.index
+    settings.region, settings.vertex_group = "GROUP", group.name
+    if settings.role == "NONE":
+        settings.role = "SENSOR"
+    return group

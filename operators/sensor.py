@@ -1,0 +1,130 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Give objects their roles."""
+
+import bpy
+from bpy.props import EnumProperty
+
+from ..addon import sensors
+from . import support
+
+
+class PALPATE_OT_sensor_add(support.Reporting, bpy.types.Operator):
+    """Make the active mesh a tactile sensor: each vertex of the region becomes a texel"""
+
+    bl_idname = "palpate.sensor_add"
+    bl_label = "Make Sensor"
+    bl_options = {"REGISTER", "UNDO"}
+
+    source: EnumProperty(
+        name="Region",
+        description="Which vertices become texels",
+        items=(
+            ("AUTO", "Automatic", "The selection in Edit Mode, the painted group in Weight Paint, else the whole mesh"),
+            ("SELECTION", "Selection", "Selected faces or vertices; they are kept in a vertex group"),
+            ("GROUP", "Active Vertex Group", "Vertices whose weight reaches the threshold"),
+            ("MESH", "Whole Mesh", "Every vertex"),
+        ),
+        default="AUTO",
+        options={"SKIP_SAVE"},
+    )
+    role: EnumProperty(
+        name="Role",
+        description="Whether it is read out",
+        items=(("SENSOR", "Sensor", "Feels and is read out"), ("PAD", "Pad", "Gives way, but is not read out")),
+        default="SENSOR",
+        options={"SKIP_SAVE"},
+    )
+
+    @classmethod
+    def poll(cls, context):
+        return support.mesh_object(cls, context)
+
+    def run(self, context):
+        obj = context.object
+        source = sensors.source_of(obj, obj.mode) if self.source == "AUTO" else self.source
+        support.leave_edit_mode(context)
+        count = sensors.make_sensor(obj, source, self.role)
+        self.report({"INFO"}, f"'{obj.name}' is a {self.role.lower()} of {count} texels")
+
+
+class PALPATE_OT_role_set(support.Reporting, bpy.types.Operator):
+    """Say what part the selected objects have"""
+
+    bl_idname = "palpate.role_set"
+    bl_label = "Set Role"
+    bl_options = {"REGISTER", "UNDO"}
+
+    role: EnumProperty(
+        name="Role",
+        description="Part of the objects",
+        items=(
+            ("TARGET", "Target", "Presses on sensors and pads"),
+            ("PAD", "Pad", "Gives way like a sensor, but is not read out"),
+            ("SENSOR", "Sensor", "Feels and is read out"),
+        ),
+        default="TARGET",
+        options={"SKIP_SAVE"},
+    )
+
+    @classmethod
+    def description(cls, _context, properties):
+        return {
+            "TARGET": "Make the active and the selected objects targets: what touches them on a sensor is felt",
+            "PAD": "Make the active object a pad: it gives way like a sensor, but is not read out",
+            "SENSOR": "Make the active object a sensor again, on the region it has",
+        }[properties.role]
+
+    @classmethod
+    def poll(cls, context):
+        return support.object_with_surface(cls, context)
+
+    def run(self, context):
+        support.leave_edit_mode(context)
+        chosen = [context.object]
+        if self.role == "TARGET":
+            chosen += [obj for obj in context.selected_objects if obj.palpate.role == "NONE" and obj.type == "MESH"]
+        for obj in dict.fromkeys(chosen):
+            if self.role != "TARGET" and obj.type != "MESH":
+                sensors.make_sensor(obj, "MESH")  # says why not
+            obj.palpate.role = self.role
+
+
+class PALPATE_OT_sensor_remove(support.Reporting, bpy.types.Operator):
+    """Take the active object out of the simulation, with its heat map, arrow and baked keyframes; vertex groups stay"""
+
+    bl_idname = "palpate.sensor_remove"
+    bl_label = "Remove Role"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context):
+        if not support.object_with_surface(cls, context):
+            return False
+        if context.object.palpate.role == "NONE":
+            cls.poll_message_set(f"'{context.object.name}' has no role")
+            return False
+        return True
+
+    def run(self, context):
+        support.leave_edit_mode(context)
+        sensors.remove_role(context.scene, context.object)
+
+
+class PALPATE_OT_weight_paint(support.Reporting, bpy.types.Operator):
+    """Paint the region of a sensor: weights at or above the threshold become texels"""
+
+    bl_idname = "palpate.weight_paint"
+    bl_label = "Paint Region"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context):
+        return support.mesh_object(cls, context)
+
+    def run(self, context):
+        support.leave_edit_mode(context)
+        sensors.paint_group(context.object)
+        bpy.ops.object.mode_set(mode="WEIGHT_PAINT")
+
+
+CLASSES = (PALPATE_OT_sensor_add, PALPATE_OT_role_set, PALPATE_OT_sensor_remove, PALPATE_OT_weight_paint)

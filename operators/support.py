@@ -1,0 +1,59 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What every operator shares: errors become one sentence in one place, and poll says why."""
+
+from __future__ import annotations
+
+from ..addon import meshes
+from ..core.errors import PalpateError
+
+
+class Reporting:
+    """Mixin: `run(context)` does the work; a PalpateError becomes a red sentence and nothing else."""
+
+    def execute(self, context):
+        return self.reporting(lambda: self.run(context))
+
+    def reporting(self, work):
+        """Do `work` and return its result, or report the user's error and return CANCELLED."""
+        try:
+            return work() or {"FINISHED"}
+        except PalpateError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+
+
+def object_with_surface(cls, context) -> bool:
+    """Poll: there is an active object that could take part."""
+    obj = context.object
+    if obj is None:
+        cls.poll_message_set("Make an object active first")
+    elif obj.type not in meshes.KINDS:
+        cls.poll_message_set(f"'{obj.name}' has no surface: choose a mesh, curve, surface, text or metaball")
+    elif not obj.is_editable:
+        cls.poll_message_set(f"'{obj.name}' is linked from another file: make a library override first")
+    else:
+        return True
+    return False
+
+
+def mesh_object(cls, context) -> bool:
+    """Poll: there is an active mesh object."""
+    if not object_with_surface(cls, context):
+        return False
+    if context.object.type != "MESH":
+        cls.poll_message_set(f"'{context.object.name}' is no mesh: use Object › Convert › Mesh first")
+        return False
+    return True
+
+
+def leave_edit_mode(context) -> str:
+    """Go to Object Mode and return the mode that was left.
+
+    In Edit Mode Blender's undo remembers the mesh being edited and no properties, so that undo could not take back a role.
+    """
+    import bpy
+
+    mode = context.object.mode
+    if mode != "OBJECT":
+        bpy.ops.object.mode_set(mode="OBJECT")
+    return mode

@@ -1,0 +1,57 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Object › Palpate in the 3D view. F3 finds what is in menus."""
+
+import bpy
+
+
+class PALPATE_MT_object(bpy.types.Menu):
+    bl_label = "Palpate"
+
+    def draw(self, _context):
+        layout = self.layout
+        layout.operator_context = "INVOKE_DEFAULT"
+        layout.operator("palpate.sensor_add", icon="PHYSICS")
+        layout.operator("palpate.role_set", text="Make Target").role = "TARGET"
+        layout.operator("palpate.sensor_add", text="Make Pad").role = "PAD"
+        layout.operator("palpate.weight_paint", icon="WPAINT_HLT")
+        layout.operator("palpate.sensor_remove", icon="X")
+        layout.separator()
+        layout.operator("palpate.bake", icon="RENDER_ANIMATION")
+        layout.operator("palpate.bake_clear")
+        layout.operator("palpate.reset")
+
+
+def _draw(self, _context):
+    self.layout.menu("PALPATE_MT_object")
+
+
+def _draw_edit(self, _context):
+    layout = self.layout
+    layout.separator()
+    layout.operator("palpate.sensor_add", text="Make Palpate Sensor")
+
+
+def _draw_weights(self, _context):
+    layout = self.layout
+    layout.separator()
+    layout.operator("palpate.sensor_add", text="Make Palpate Sensor")
+
+
+ENTRIES = (
+    ("VIEW3D_MT_object", _draw),
+    ("VIEW3D_MT_edit_mesh_faces", _draw_edit),
+    ("VIEW3D_MT_edit_mesh_vertices", _draw_edit),
+    ("VIEW3D_MT_paint_weight", _draw_weights),
+)
+
+
+def register():
+    bpy.utils.register_class(PALPATE_MT_object)
+    for menu, draw in ENTRIES:
+        getattr(bpy.types, menu).append(draw)
+
+
+def unregister():
+    for menu, draw in reversed(ENTRIES):
+        getattr(bpy.types, menu).remove(draw)
+    bpy.utils.unregister_class(PALPATE_MT_object)
