@@ -2,6 +2,7 @@
 """Settings of an older version are brought forward step by step; those of a newer one are left alone."""
 
 import pytest
+
 from palpate.core.errors import FileError
 from palpate.core.migrate import STEPS, VERSION, migrate
 

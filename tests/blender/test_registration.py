@@ -1,0 +1,144 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Enabling is instant and disabling leaves nothing behind, also when a dependency is missing."""
+
+import importlib.util
+import subprocess
+import sys
+
+import bpy
+import pytest
+
+import palpate
+
+
+def kinds_of(base):
+    for kind in base.__subclasses__():
+        yield kind
+        yield from kinds_of(kind)
+
+
+def traces() -> dict:
+    """Everything of ours that Blender knows."""
+    bases = (bpy.types.Operator, bpy.types.Panel, bpy.types.Menu, bpy.types.PropertyGroup)
+    classes = {kind for base in bases for kind in kinds_of(base)}
+    handlers = bpy.app.handlers
+    return {
+        "classes": sorted(kind.__name__ for kind in classes if "palpate" in kind.__module__ and kind.is_registered),
+        "object": hasattr(bpy.types.Object, "palpate"),
+        "scene": hasattr(bpy.types.Scene, "palpate"),
+        "operators": sorted(dir(bpy.ops.palpate)),
+        "handlers": {
+            name: sorted(function.__module__ for function in items if "palpate" in function.__module__)
+            for name in dir(handlers)
+            if isinstance(items := getattr(handlers, name), list)
+        },
+        "menus": sum(
+            "palpate" in function.__module__
+            for kind in set(kinds_of(bpy.types.Menu))
+            for function in getattr(getattr(kind, "draw", None), "_draw_funcs", ())
+        ),
+    }
+
+
+@pytest.fixture
+def commands(monkeypatch):
+    """Names of the command-line commands that are registered; Blender has no list of its own."""
+    known = {}
+    register, unregister = bpy.utils.register_cli_command, bpy.utils.unregister_cli_command
+
+    def add(name, run):
+        handle = register(name, run)
+        known[id(handle)] = name
+        return handle
+
+    def remove(handle):
+        del known[id(handle)]
+        unregister(handle)
+
+    palpate.unregister()
+    monkeypatch.setattr(bpy.utils, "register_cli_command", add)
+    monkeypatch.setattr(bpy.utils, "unregister_cli_command", remove)
+    yield known
+    monkeypatch.undo()
+    palpate.register()  # what the scene fixture left is disabled by the next one
+
+
+def test_disabling_leaves_nothing_and_enabling_again_works(commands):
+    without = traces()
+    assert not any(without[key] for key in ("classes", "object", "scene", "operators", "menus"))
+    assert not any(without["handlers"].values())
+    palpate.register()
+    first = traces()
+    assert first["object"] and first["scene"] and first["menus"] == 4
+    assert "PALPATE_PT_physics" in first["classes"] and "bake" in first["operators"]
+    assert list(commands.values()) == ["palpate"]
+    palpate.unregister()
+    assert traces() == without
+    assert not commands
+    palpate.register()
+    assert traces() == first
+    palpate.unregister()
+    assert traces() == without
+
+
+def test_a_missing_module_leaves_a_panel_that_says_so(commands, monkeypatch):
+    find = importlib.util.find_spec
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name, *rest: None if name == "OpenEXR" else find(name, *rest))
+    without = traces()
+    palpate.register()
+    assert traces()["classes"] == ["PALPATE_OT_debug_info_copy", "PALPATE_PT_missing"]
+    from palpate.panels.missing import PALPATE_PT_missing
+
+    assert PALPATE_PT_missing.lost == ("OpenEXR",)
+    from palpate.addon import dependencies
+
+    assert "missing: OpenEXR" in dependencies.debug_info()
+    assert bpy.ops.palpate.debug_info_copy() == {"FINISHED"}
+    palpate.unregister()
+    assert traces() == without
+    monkeypatch.undo()
+
+
+def test_a_failure_while_registering_is_seen_and_leaves_nothing(commands, monkeypatch):
+    without = traces()
+    from palpate.addon import handlers
+
+    def fail():
+        raise RuntimeError("broken")
+
+    monkeypatch.setattr(handlers, "register", fail)
+    with pytest.raises(RuntimeError, match="broken"):
+        palpate.register()
+    assert traces() == without
+    monkeypatch.undo()
+
+
+def test_enabling_imports_nothing_heavy():
+    code = (
+        "import sys, bpy, palpate; palpate.register(); palpate.unregister();"
+        "print(*sorted({name.partition('.')[0] for name in sys.modules}))"
+    )
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=True)
+    loaded = set(run.stdout.split())
+    assert "palpate" in loaded
+    assert not loaded & {"numba", "scipy", "matplotlib", "trimesh", "OpenEXR", "tqdm"}
+
+
+def test_a_process_that_forgets_to_disable_still_ends():
+    """Blender 4.5 as a module hangs at exit when classes are registered."""
+    code = "import bpy, palpate; palpate.register(); bpy.ops.wm.read_factory_settings(use_empty=True)"
+    subprocess.run([sys.executable, "-c", code], capture_output=True, timeout=60, check=True)
+
+
+def test_every_operator_and_panel_has_a_name_and_a_tooltip():
+    for base in (bpy.types.Operator, bpy.types.Panel, bpy.types.Menu):
+        for kind in kinds_of(base):
+            if kind.__module__.startswith("palpate."):
+                assert kind.bl_label
+                if base is bpy.types.Operator:
+                    assert kind.__doc__, kind
+                    room, name = kind.bl_idname.split(".")
+                    assert kind.__name__ == f"{room.upper()}_OT_{name}"
+    for group in (bpy.types.Object.bl_rna, bpy.types.Scene.bl_rna):
+        for item in group.properties["palpate"].fixed_type.properties:
+            assert item.is_hidden or item.identifier in ("rna_type", "name") or item.description, item.identifier

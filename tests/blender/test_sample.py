@@ -1,0 +1,245 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A scene becomes the Scenario that a person would write down by hand."""
+
+import math
+
+import bpy
+import numpy as np
+import pytest
+from blender_scenes import ball, cube, grid, press
+from mathutils import Matrix, Quaternion
+
+from palpate.addon import jobs, sample, transforms, units
+from palpate.core.errors import SceneError
+from palpate.core.mesh import face_normals
+
+
+def sampled(scene):
+    return jobs.run_blocking(sample.sample_scenario(scene))
+
+
+def of(scenario, name):
+    index = next(i for i, body in enumerate(scenario.bodies) if body.name == name)
+    target = next((t for t in scenario.targets if t.body == index), None)
+    sensor = next((s for s in scenario.sensors if s.body == index), None)
+    return scenario.bodies[index], target or sensor
+
+
+def test_roles_parameters_and_motion():
+    scene, pad, target = press(frames=5)
+    pad.palpate.k, pad.palpate.cn, pad.palpate.unit = 1000.0, 10.0, "mV"
+    scene.render.fps, scene.render.fps_base = 30, 1.001
+    scene.frame_set(3)
+    scenario, binding = sampled(scene)
+    assert scene.frame_current == 3
+    assert [s.name for s in scenario.sensors] == ["Pad"] and [t.name for t in scenario.targets] == ["Ball"]
+    parameters = scenario.sensors[0].parameters
+    assert (parameters.k, parameters.cn, parameters.unit) == (1000.0, 10.0, "mV")
+    assert parameters.sigma1 == 0.1  # what was typed, not its 32-bit neighbour
+    assert scenario.gravity.tolist() == [0.0, 0.0, -9.81]
+    assert scenario.fps == pytest.approx(29.97003, abs=1e-5)
+    body, _ = of(scenario, "Ball")
+    assert body.motion.times == pytest.approx(np.arange(5) / scenario.fps)
+    heights = []
+    for frame in range(1, 6):
+        scene.frame_set(frame)
+        heights.append(target.matrix_world.translation.z)
+    assert body.motion.positions[:, 2].tolist() == heights
+    assert binding.objects(scene) == [pad, target]
+
+
+def test_the_grid_of_the_pad_is_found():
+    scene, *_ = press()
+    texels = sampled(scene)[0].sensors[0].texels
+    assert texels.layout.shape == (14, 6)
+    assert texels.normal == pytest.approx(np.tile([0.0, 0.0, 1.0], (84, 1)))
+
+
+def test_unit_scale_makes_metres():
+    scene, pad, target = press()
+    here, _ = sampled(scene)
+    for obj in (pad, target):
+        obj.data.transform(Matrix.Scale(1000.0, 4))
+    for curve in _curves(target):
+        for point in curve.keyframe_points:
+            point.co.y *= 1000.0
+            point.handle_left.y *= 1000.0
+            point.handle_right.y *= 1000.0
+    scene.unit_settings.scale_length = 0.001
+    there, binding = sampled(scene)
+    assert binding.scale == pytest.approx(0.001)
+    for one, other in zip(here.bodies, there.bodies, strict=True):
+        assert other.motion.positions == pytest.approx(one.motion.positions, abs=1e-8)
+    assert there.sensors[0].texels.position == pytest.approx(here.sensors[0].texels.position, abs=1e-8)
+    assert there.gravity.tolist() == here.gravity.tolist()
+    scene.unit_settings.system = "NONE"
+    assert units.metres_per_unit(scene) == 1.0
+
+
+def _curves(obj):
+    from palpate.addon import curves
+
+    return curves.of(obj)
+
+
+@pytest.mark.parametrize("scale", [(2.0, 2.0, 2.0), (1.0, 2.0, 0.5), (-1.0, 1.0, 1.0), (1.0, -2.0, 3.0), (-1.0, -1.0, -1.0)])
+def test_scale_is_in_the_vertices(scale):
+    """Wherever the scale is split off, the world position of every vertex stays, and normals point outwards."""
+    scene, _, target = press()
+    target.animation_data_clear()
+    target.scale = scale
+    target.rotation_euler = (0.3, -0.2, 0.9)
+    scene.view_layers[0].update()
+    scenario, _ = sampled(scene)
+    body, found = of(scenario, "Ball")
+    world = found.mesh.vertices @ transforms.rotation(body.motion.quaternions[0]).T + body.motion.positions[0]
+    expected = np.array([target.matrix_world @ vertex.co for vertex in target.data.vertices])
+    assert world == pytest.approx(expected, abs=1e-7)
+    centres = found.mesh.vertices[found.mesh.triangles].mean(axis=1)
+    assert (np.einsum("ij,ij->i", face_normals(found.mesh), centres) > 0).all()
+
+
+def test_a_mirrored_object_is_mentioned():
+    scene, _, target = press()
+    target.scale.x = -1.0
+    assert "mirrors" in " ".join(sampled(scene)[1].warnings)
+
+
+def test_shear_is_in_the_vertices_too():
+    scene, _, target = press()
+    target.animation_data_clear()
+    bpy.ops.object.empty_add(rotation=(0.0, 0.0, 0.7))
+    parent = bpy.context.object
+    parent.scale = (2.0, 0.5, 1.0)
+    target.parent = parent
+    target.rotation_euler.z = 0.4
+    scene.view_layers[0].update()
+    body, found = of(sampled(scene)[0], "Ball")
+    rotation = transforms.rotation(body.motion.quaternions[0])
+    world = found.mesh.vertices @ rotation.T + body.motion.positions[0]
+    expected = np.array([target.matrix_world @ vertex.co for vertex in target.data.vertices])
+    assert world == pytest.approx(expected, abs=1e-7)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_quaternions_agree_with_blenders(seed):
+    rng = np.random.default_rng(seed)
+    q = rng.normal(size=4)
+    q /= np.linalg.norm(q)
+    matrix = transforms.array(Quaternion(q).to_matrix().to_4x4())
+    location, found, stretch = transforms.split(matrix)
+    assert found == pytest.approx(q if q[0] >= 0 else -q, abs=1e-6)
+    assert stretch == pytest.approx(np.eye(3), abs=1e-6)
+    assert transforms.rotation(found) == pytest.approx(matrix[:3, :3], abs=1e-6)
+
+
+@pytest.mark.parametrize("axis", range(3))
+def test_half_turns_have_a_quaternion(axis):
+    expected = np.zeros(4)
+    expected[1 + axis] = 1.0
+    assert np.abs(transforms.quaternion(transforms.rotation(expected))) == pytest.approx(expected)
+
+
+def test_animated_scale_is_named_with_its_frame():
+    scene, _, target = press(frames=5)
+    target.keyframe_insert("scale", frame=1)
+    target.scale.x = 2.0
+    target.keyframe_insert("scale", frame=5)
+    scene.frame_set(4)
+    with pytest.raises(SceneError, match=r"scale of 'Ball' changes \(frame 2\)"):
+        sampled(scene)
+    assert scene.frame_current == 4
+
+
+def test_hidden_objects_take_no_part_and_are_mentioned():
+    scene, _, target = press()
+    other = ball("Hidden")
+    other.palpate.role = "TARGET"
+    for hide in (lambda on: other.hide_set(on), lambda on: setattr(other, "hide_viewport", on)):
+        hide(True)
+        scenario, binding = sampled(scene)
+        assert [t.name for t in scenario.targets] == ["Ball"]
+        assert binding.warnings == ("'Hidden' is hidden and takes no part.",)
+        hide(False)
+    assert len(sampled(scene)[0].targets) == 2
+
+
+def test_modifiers_count():
+    scene, pad, target = press()
+    target.modifiers.new("Half", "DECIMATE").ratio = 0.5
+    wave = pad.modifiers.new("Bend", "SIMPLE_DEFORM")
+    wave.deform_method, wave.deform_axis, wave.angle = "BEND", "Z", math.radians(30)
+    scenario, binding = sampled(scene)
+    assert len(of(scenario, "Ball")[1].mesh.vertices) < len(target.data.vertices)
+    assert np.ptp(scenario.sensors[0].texels.position[:, 2]) + np.ptp(scenario.sensors[0].texels.position[:, 1]) != 0.05
+    assert binding.warnings == ()
+    pad.modifiers.new("More", "SUBSURF")
+    scenario, binding = sampled(scene)
+    assert len(scenario.sensors[0].texels) == 84
+    assert "number of vertices of sensor 'Pad'" in binding.warnings[0]
+
+
+def test_a_text_can_press():
+    scene, _, target = press()
+    target.palpate.role = "NONE"
+    bpy.ops.object.text_add(location=(0.0, 0.0, 0.01))
+    text = bpy.context.object
+    text.data.extrude = 0.01
+    text.palpate.role = "TARGET"
+    mesh = sampled(scene)[0].targets[0].mesh
+    assert len(mesh.triangles) > 100
+
+
+def test_a_free_body_has_mass_and_inertia():
+    scene, _, target = press()
+    box = cube(size=0.02)
+    box.palpate.role, box.palpate.body, box.palpate.mass = "TARGET", "FREE", 3.0
+    box.palpate.velocity = (0.0, 0.0, -1.0)
+    body, _ = of(sampled(scene)[0], "Cube")
+    assert body.free and body.mass == 3.0
+    assert body.inertia == pytest.approx(np.eye(3) * 3.0 * 0.02**2 / 6, rel=1e-6, abs=1e-12)
+    assert body.velocity.tolist() == [0.0, 0.0, -1.0]
+
+
+def test_a_free_body_with_keyframes_is_refused():
+    scene, *_ = press()
+    box = cube()
+    box.palpate.role, box.palpate.body = "TARGET", "FREE"
+    box.keyframe_insert("location", frame=1)
+    with pytest.raises(SceneError, match="'Cube' has keyframes"):
+        sampled(scene)
+
+
+def test_children_of_free_bodies_are_refused():
+    scene, pad, _ = press()
+    box = cube()
+    box.palpate.role, box.palpate.body = "TARGET", "FREE"
+    pad.parent = box
+    with pytest.raises(SceneError, match="'Pad' is a child of free body 'Cube'"):
+        sampled(scene)
+
+
+def test_two_scenes_are_sampled_apart():
+    scene, *_ = press()
+    other = bpy.data.scenes.new("Other")
+    with pytest.raises(SceneError, match="'Other' has no sensor"):
+        sampled(other)
+    assert len(sampled(scene)[0].sensors) == 1
+
+
+def test_the_region_is_the_vertex_group():
+    scene, pad, _ = press()
+    group = pad.vertex_groups.new(name="Tip")
+    group.add([0, 1, 2, 6, 7, 8], 1.0, "REPLACE")
+    group.add([12, 13, 14], 0.4, "REPLACE")
+    pad.palpate.region, pad.palpate.vertex_group = "GROUP", "Tip"
+    assert sampled(scene)[0].sensors[0].texels.vertex.tolist() == [0, 1, 2, 6, 7, 8]
+    pad.palpate.threshold = 0.4
+    assert len(sampled(scene)[0].sensors[0].texels) == 9
+
+
+def test_a_pad_is_not_read_out():
+    scene, *_ = press()
+    table = grid("Table", (0.1, 0.0, 0.0))
+    table.palpate.role = "PAD"
+    assert [(s.name, s.readout) for s in sampled(scene)[0].sensors] == [("Pad", True), ("Table", False)]

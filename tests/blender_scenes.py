@@ -1,0 +1,125 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Small scenes for the tests, and what a scene consists of, as text that can be compared."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+
+
+def grid(name="Pad", location=(0.0, 0.0, 0.0), columns=6, rows=14, size=0.05):
+    """Return a flat pad of columns × rows vertices."""
+    bpy.ops.mesh.primitive_grid_add(x_subdivisions=columns - 1, y_subdivisions=rows - 1, size=size, location=location)
+    bpy.context.object.name = name
+    return bpy.context.object
+
+
+def ball(name="Ball", location=(0.0, 0.0, 0.01), radius=0.008):
+    bpy.ops.mesh.primitive_uv_sphere_add(radius=radius, location=location, segments=24, ring_count=12)
+    bpy.context.object.name = name
+    return bpy.context.object
+
+
+def cube(name="Cube", location=(0.2, 0.0, 0.0101), size=0.02, rotation=(0.0, 0.0, 0.0)):
+    bpy.ops.mesh.primitive_cube_add(size=size, location=location, rotation=rotation)
+    bpy.context.object.name = name
+    return bpy.context.object
+
+
+def press(frames=8):
+    """A ball that is pressed into a pad, 2 mm deep at the last frame."""
+    scene = bpy.context.scene
+    scene.frame_start, scene.frame_end = 1, frames
+    pad, target = grid(), ball()
+    pad.palpate.role = "SENSOR"
+    target.palpate.role = "TARGET"
+    target.keyframe_insert("location", frame=1)
+    target.location = (0.001, 0.0005, 0.006)
+    target.keyframe_insert("location", frame=frames)
+    scene.frame_set(1)
+    return scene, pad, target
+
+
+def press_and_drop(frames=8):
+    """The same, and beside it a free cube that falls on a second pad."""
+    scene, pad, target = press(frames)
+    second = grid("Pad 2", (0.2, 0.0, 0.0))
+    second.palpate.role = "SENSOR"
+    free = cube(rotation=(0.0, 0.0, 0.3))
+    free.palpate.role, free.palpate.body, free.palpate.mass = "TARGET", "FREE", 0.05
+    scene.frame_set(1)
+    return scene, pad, target, second, free
+
+
+def save(folder, name="scene.blend"):
+    path = folder / name
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    return path
+
+
+def reopen(path):
+    bpy.ops.wm.open_mainfile(filepath=str(path))
+    return bpy.context.scene
+
+
+def dump(uids=True) -> dict[str, str]:
+    """Return everything about the file's data that the add-on could have changed, by a name for each piece."""
+    pieces = {kind: str(sorted(block.name for block in getattr(bpy.data, kind))) for kind in KINDS}
+    for scene in bpy.data.scenes:
+        pieces[f"{scene.name}: frame"] = str((scene.frame_current, scene.frame_subframe, scene.frame_start, scene.frame_end))
+        pieces[f"{scene.name}: settings"] = settings(scene.palpate)
+    for obj in bpy.data.objects:
+        pieces |= {f"{obj.name}: {what}": text for what, text in _object(obj, uids).items()}
+    for mesh in bpy.data.meshes:
+        pieces |= {f"{mesh.name}: {what}": text for what, text in _mesh(mesh).items()}
+    return pieces
+
+
+KINDS = ("objects", "meshes", "materials", "images", "actions", "node_groups", "collections", "curves")
+
+
+def settings(group, uids=True) -> str:
+    names = [key for key in group.bl_rna.properties.keys() if key not in ("rna_type", "name") and (uids or key != "uid")]
+    return str({key: _plain(getattr(group, key)) for key in names})
+
+
+def _plain(value):
+    return value if isinstance(value, str | int | float) else tuple(value)
+
+
+def _object(obj, uids) -> dict[str, str]:
+    found = {
+        "matrix": str([tuple(row) for row in obj.matrix_basis]),
+        "channels": str((tuple(obj.location), tuple(obj.rotation_euler), tuple(obj.rotation_quaternion), tuple(obj.scale))),
+        "settings": settings(obj.palpate, uids),
+        "custom": str({key: str(obj[key]) for key in obj.keys() if key != "palpate"}),
+        "groups": str([group.name for group in obj.vertex_groups]),
+        "modifiers": str([modifier.name for modifier in obj.modifiers]),
+        "slots": str([(slot.link, slot.material and slot.material.name) for slot in obj.material_slots]),
+        "action": str(obj.animation_data and obj.animation_data.action and obj.animation_data.action.name),
+    }
+    if obj.type == "MESH":
+        found["weights"] = str([[(g.group, g.weight) for g in vertex.groups] for vertex in obj.data.vertices])
+    return found
+
+
+def _mesh(mesh) -> dict[str, str]:
+    points = np.empty(3 * len(mesh.vertices), dtype=np.float32)
+    mesh.vertices.foreach_get("co", points)
+    return {
+        "points": points.tobytes().hex(),
+        "uv": str([layer.name for layer in mesh.uv_layers]),
+        "active uv": str(mesh.uv_layers.active_index),
+        "attributes": str(sorted(item.name for item in mesh.attributes if not item.is_internal)),
+        "materials": str([material and material.name for material in mesh.materials]),
+        "material indices": str([face.material_index for face in mesh.polygons]),
+    }
+
+
+def changes(before: dict[str, str], after: dict[str, str]) -> list[str]:
+    """Say what differs between two dumps."""
+    return [
+        f"{key}: {before.get(key)} → {after.get(key)}"
+        for key in sorted(before.keys() | after.keys())
+        if before.get(key) != after.get(key)
+    ]
