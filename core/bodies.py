@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Rigid bodies: poses over time, rotations, and the blocks of the linear system that moves the free ones."""
+"""Rigid bodies: poses over time, rotations, twists, and the linear algebra that moves the free ones."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ import math
 
 import numpy as np
 
-from .contact import STIFF_N, STIFF_T
 from .jit import kernel
 from .scenario import Motion
 
@@ -162,118 +161,38 @@ def write_world_inertia(rotation, inertia, out):
 
 
 @kernel
-def add_own_block(matrix, at, rows, start, stop, arm, scale):
-    """Add to a body's 6 × 6 block what its contacts resist of its own motion.
+def write_twist_map(rotation, gx, gy, gz, sign, out):
+    """Matrix (6, 6) from a body's twist in world axes to velocities near a sensor, in the axes of the sensor's body.
 
-    With a contact's damping tensor ``C = ct 1 + (cn - ct) n nᵀ`` and ``v = V + ω × r`` the block is the sum of ``Jᵀ C J``.
-    Only the lower triangle is written; `scale` is the step's length.
+    Parameters
+    ----------
+    rotation : (3, 3) float
+        Of the sensor's body.
+    gx, gy, gz : float, metres
+        From the body's reference point to that of the sensor's body, world axes.
+    sign : float
+        -1 for the sensor's own body, whose motion counts against the target's.
+    out : (6, 6) float
+        Written.
     """
-    a00, a10, a11, a20, a21, a22 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    b00, b01, b02, b10, b11, b12, b20, b21, b22 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    c00, c10, c11, c20, c21, c22 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    for r in range(start, stop):
-        t = rows[r, STIFF_T]
-        e = rows[r, STIFF_N] - t
-        if e == 0.0 and t == 0.0:
-            continue
-        nx, ny, nz = rows[r, 0], rows[r, 1], rows[r, 2]
-        rx, ry, rz = rows[r, arm], rows[r, arm + 1], rows[r, arm + 2]
-        mx, my, mz = ry * nz - rz * ny, rz * nx - rx * nz, rx * ny - ry * nx
-        ex, ey, ez = e * nx, e * ny, e * nz
-        fx, fy, fz = e * mx, e * my, e * mz
-        tx, ty, tz = t * rx, t * ry, t * rz
-        square = t * (rx * rx + ry * ry + rz * rz)
-        a00 += t + ex * nx
-        a10 += ey * nx
-        a11 += t + ey * ny
-        a20 += ez * nx
-        a21 += ez * ny
-        a22 += t + ez * nz
-        # Lower-left block: [r]× C.
-        b00 += fx * nx
-        b01 += fx * ny - tz
-        b02 += fx * nz + ty
-        b10 += fy * nx + tz
-        b11 += fy * ny
-        b12 += fy * nz - tx
-        b20 += fz * nx - ty
-        b21 += fz * ny + tx
-        b22 += fz * nz
-        c00 += fx * mx + square - tx * rx
-        c10 += fy * mx - ty * rx
-        c11 += fy * my + square - ty * ry
-        c20 += fz * mx - tz * rx
-        c21 += fz * my - tz * ry
-        c22 += fz * mz + square - tz * rz
-    matrix[at, at] += scale * a00
-    matrix[at + 1, at] += scale * a10
-    matrix[at + 1, at + 1] += scale * a11
-    matrix[at + 2, at] += scale * a20
-    matrix[at + 2, at + 1] += scale * a21
-    matrix[at + 2, at + 2] += scale * a22
-    matrix[at + 3, at] += scale * b00
-    matrix[at + 3, at + 1] += scale * b01
-    matrix[at + 3, at + 2] += scale * b02
-    matrix[at + 4, at] += scale * b10
-    matrix[at + 4, at + 1] += scale * b11
-    matrix[at + 4, at + 2] += scale * b12
-    matrix[at + 5, at] += scale * b20
-    matrix[at + 5, at + 1] += scale * b21
-    matrix[at + 5, at + 2] += scale * b22
-    matrix[at + 3, at + 3] += scale * c00
-    matrix[at + 4, at + 3] += scale * c10
-    matrix[at + 4, at + 4] += scale * c11
-    matrix[at + 5, at + 3] += scale * c20
-    matrix[at + 5, at + 4] += scale * c21
-    matrix[at + 5, at + 5] += scale * c22
+    for i in range(3):
+        rx, ry, rz = sign * rotation[0, i], sign * rotation[1, i], sign * rotation[2, i]
+        out[i, 0], out[i, 1], out[i, 2] = rx, ry, rz
+        out[i, 3], out[i, 4], out[i, 5] = gy * rz - gz * ry, gz * rx - gx * rz, gx * ry - gy * rx  # R (ω × g)
+        out[3 + i, 0], out[3 + i, 1], out[3 + i, 2] = 0.0, 0.0, 0.0
+        out[3 + i, 3], out[3 + i, 4], out[3 + i, 5] = rx, ry, rz
 
 
 @kernel
-def add_cross_block(matrix, at_low, at_high, rows, start, stop, arm_low, arm_high, scale):
-    """Add the coupling of two free bodies through their contacts, the sum of ``-J_highᵀ C J_low``, below the diagonal."""
-    for r in range(start, stop):
-        t = scale * rows[r, STIFF_T]
-        e = scale * rows[r, STIFF_N] - t
-        hx, hy, hz = rows[r, arm_high], rows[r, arm_high + 1], rows[r, arm_high + 2]
-        lx, ly, lz = rows[r, arm_low], rows[r, arm_low + 1], rows[r, arm_low + 2]
-        nx, ny, nz = rows[r, 0], rows[r, 1], rows[r, 2]
-        n = (nx, ny, nz, hy * nz - hz * ny, hz * nx - hx * nz, hx * ny - hy * nx)
-        m = (nx, ny, nz, ly * nz - lz * ny, lz * nx - lx * nz, lx * ny - ly * nx)
+def add_product(matrix, row, column, left, middle, right, scale):
+    """Add ``scale · leftᵀ middle right`` (all 6 × 6, `middle` symmetric and given by its lower triangle) into a larger
+    matrix.""" for j in range(6):
         for i in range(6):
-            for j in range(6):
-                matrix[at_high + i, at_low + j] -= e * n[i] * m[j]
-        for i in range(3):
-            matrix[at_high + i, at_low + i] -= t
-        # -[l]× above, [h]× on the left, and (h · l) 1 - l hᵀ below.
-        matrix[at_high, at_low + 4] -= t * lz
-        matrix[at_high, at_low + 5] += t * ly
-        matrix[at_high + 1, at_low + 3] += t * lz
-        matrix[at_high + 1, at_low + 5] -= t * lx
-        matrix[at_high + 2, at_low + 3] -= t * ly
-        matrix[at_high + 2, at_low + 4] += t * lx
-        matrix[at_high + 3, at_low + 1] += t * hz
-        matrix[at_high + 3, at_low + 2] -= t * hy
-        matrix[at_high + 4, at_low] -= t * hz
-        matrix[at_high + 4, at_low + 2] += t * hx
-        matrix[at_high + 5, at_low] += t * hy
-        matrix[at_high + 5, at_low + 1] -= t * hx
-        dot = hx * lx + hy * ly + hz * lz
-        h, low = (hx, hy, hz), (lx, ly, lz)
-        for i in range(3):
-            matrix[at_high + 3 + i, at_low + 3 + i] -= t * dot
-            for j in range(3):
-                matrix[at_high + 3 + i, at_low + 3 + j] += t * low[i] * h[j]
-
-
-@kernel
-def add_wrench(vector, at, fx, fy, fz, tx, ty, tz):
-    """Add a force and a torque to a body's six entries."""
-    vector[at] += fx
-    vector[at + 1] += fy
-    vector[at + 2] += fz
-    vector[at + 3] += tx
-    vector[at + 4] += ty
-    vector[at + 5] += tz
+            total = 0.0
+            for k in range(6):
+                total += (middle[i, k] if k <= i else middle[k, i]) * right[k, j]
+            for m in range(6):
+                matrix[row + m, column + j] += scale * left[i, m] * total
 
 
 @kernel

@@ -23,11 +23,15 @@ import numpy as np
 from .bvh import find_near, near_entry, segment_entry
 from .jit import kernel
 
-# Columns of a contact row. One row per touching texel and target; the row is all that the solver's inner loop reads.
-NORMAL, ARM_A, ARM_B, DEPTH, BRISTLE = 0, 3, 6, 9, 10  # unit vector on the object, lever arms (m), m, m
-START, KEEP, GAIN, LIMIT = 13, 14, 15, 16  # z(t) = START z, z(t + dt) = KEEP z + GAIN v, LIMIT = largest |z|
-NORMAL_FORCE, STIFF_N, STIFF_T = 17, 18, 19  # N at the step's end; d force / d velocity, N·s/m
-ROW = 20
+# Columns of a contact row: one row per touching texel and target, in the frame of the sensor's body. The row is all that the
+# solver's inner loop reads.
+NX, NY, NZ = 0, 1, 2  # the target's outward normal
+PX, PY, PZ = 3, 4, 5  # contact point from the body's reference point, m
+ZX, ZY, ZZ = 6, 7, 8  # bristle deflection, m
+DEPTH = 9  # m
+START, KEEP, GAIN, LIMIT = 10, 11, 12, 13  # z(t) = START z, z(t + dt) = KEEP z + GAIN v, LIMIT = largest |z|
+NORMAL_FORCE, STIFF_N, STIFF_T = 14, 15, 16  # N at the step's end; d force / d velocity, N·s/m
+ROW = 17
 
 # Columns of a parameter row, one per sensor or pad.
 K, CN, CT, SIGMA0, SIGMA1, X0, MUS, MUD = range(8)
@@ -300,9 +304,6 @@ def gather(pair, world, tree, neighbours, state, rotation, rows, slots, used, po
         _forget(pair, sensor, world, state)
         return used, 0
     _keep_lists(pair, sensor, target, pose, world, tree, neighbours)
-    gx = state.position[a, 0] - state.position[b, 0]
-    gy = state.position[a, 1] - state.position[b, 1]
-    gz = state.position[a, 2] - state.position[b, 2]
     sunk, slot = 0, world.slot_start[pair] - 1
     for texel in range(world.texel_start[sensor], world.texel_start[sensor + 1]):
         slot += 1
@@ -339,39 +340,30 @@ def gather(pair, world, tree, neighbours, state, rotation, rows, slots, used, po
                 bristles[slot, i] = 0.0
             continue
         hint[slot] = triangle
-        nx, ny, nz = tree.faces[triangle, 9], tree.faces[triangle, 10], tree.faces[triangle, 11]
-        cx = rotation[b, 0, 0] * nx + rotation[b, 0, 1] * ny + rotation[b, 0, 2] * nz
-        cy = rotation[b, 1, 0] * nx + rotation[b, 1, 1] * ny + rotation[b, 1, 2] * nz
-        cz = rotation[b, 2, 0] * nx + rotation[b, 2, 1] * ny + rotation[b, 2, 2] * nz
-        rows[used, 0], rows[used, 1], rows[used, 2] = cx, cy, cz
-        # From the texel's tip back along its normal to the intersection, in the frame of the sensor's body.
-        back = (1.0 - met) * reach
-        px, py, pz = (
-            texels[texel, 0] - back * texels[texel, 3],
-            texels[texel, 1] - back * texels[texel, 4],
-            texels[texel, 2] - back * texels[texel, 5],
-        )
-        rows[used, 3] = rotation[a, 0, 0] * px + rotation[a, 0, 1] * py + rotation[a, 0, 2] * pz
-        rows[used, 4] = rotation[a, 1, 0] * px + rotation[a, 1, 1] * py + rotation[a, 1, 2] * pz
-        rows[used, 5] = rotation[a, 2, 0] * px + rotation[a, 2, 1] * py + rotation[a, 2, 2] * pz
-        rows[used, 6], rows[used, 7], rows[used, 8] = rows[used, 3] + gx, rows[used, 4] + gy, rows[used, 5] + gz
-        rows[used, 9] = (1.0 - met) * abs(dx * nx + dy * ny + dz * nz)
-        bristles[slot, 3] = back / reach
-        # The bristle turns with the sensor; what the surface's turn makes stand out of its plane is laid back into it.
-        bx, by, bz = bristles[slot, 0], bristles[slot, 1], bristles[slot, 2]
-        zx = rotation[a, 0, 0] * bx + rotation[a, 0, 1] * by + rotation[a, 0, 2] * bz
-        zy = rotation[a, 1, 0] * bx + rotation[a, 1, 1] * by + rotation[a, 1, 2] * bz
-        zz = rotation[a, 2, 0] * bx + rotation[a, 2, 1] * by + rotation[a, 2, 2] * bz
-        out_of_plane = zx * cx + zy * cy + zz * cz
-        if abs(out_of_plane) > 1e-300:
+        fx, fy, fz = tree.faces[triangle, 9], tree.faces[triangle, 10], tree.faces[triangle, 11]
+        nx = pose[0] * fx + pose[3] * fy + pose[6] * fz
+        ny = pose[1] * fx + pose[4] * fy + pose[7] * fz
+        nz = pose[2] * fx + pose[5] * fy + pose[8] * fz
+        rows[used, NX], rows[used, NY], rows[used, NZ] = nx, ny, nz
+        # From the texel's tip back along its normal to the intersection.
+        inside = 1.0 - met
+        rows[used, PX] = texels[texel, 0] - inside * reach * texels[texel, 3]
+        rows[used, PY] = texels[texel, 1] - inside * reach * texels[texel, 4]
+        rows[used, PZ] = texels[texel, 2] - inside * reach * texels[texel, 5]
+        rows[used, DEPTH] = inside * abs(dx * fx + dy * fy + dz * fz)
+        bristles[slot, 3] = inside
+        # What the surface's turn makes stand out of its plane is laid back into it, as long as it was.
+        zx, zy, zz = bristles[slot, 0], bristles[slot, 1], bristles[slot, 2]
+        out_of_plane = zx * nx + zy * ny + zz * nz
+        if out_of_plane != 0.0:
             length = zx * zx + zy * zy + zz * zz
-            zx -= out_of_plane * cx
-            zy -= out_of_plane * cy
-            zz -= out_of_plane * cz
+            zx -= out_of_plane * nx
+            zy -= out_of_plane * ny
+            zz -= out_of_plane * nz
             flat = zx * zx + zy * zy + zz * zz
             scale = math.sqrt(length / flat) if flat > 0.0 else 0.0
             zx, zy, zz = scale * zx, scale * zy, scale * zz
-        rows[used, 10], rows[used, 11], rows[used, 12] = zx, zy, zz
+        rows[used, ZX], rows[used, ZY], rows[used, ZZ] = zx, zy, zz
         slots[used] = slot
         used += 1
     return used, sunk
@@ -384,8 +376,8 @@ def linearise(rows, r, vx, vy, vz, dt, parameters):
     The force on the target is ``-(k d + STIFF_N ḋ) n - (bias + STIFF_T v_t)``; `v` is the target's velocity relative to the
     sensor, metres per second.
     """
-    rate = vx * rows[r, 0] + vy * rows[r, 1] + vz * rows[r, 2]
-    tx, ty, tz = vx - rate * rows[r, 0], vy - rate * rows[r, 1], vz - rate * rows[r, 2]
+    rate = vx * rows[r, NX] + vy * rows[r, NY] + vz * rows[r, NZ]
+    tx, ty, tz = vx - rate * rows[r, NX], vy - rate * rows[r, NY], vz - rate * rows[r, NZ]
     stiff = parameters[K] * dt + parameters[CN]
     force = parameters[K] * rows[r, DEPTH] + stiff * rate
     if force <= 0.0:  # separates within the step: no force at all
@@ -393,13 +385,13 @@ def linearise(rows, r, vx, vy, vz, dt, parameters):
             rows[r, column] = 0.0
         return
     limit = bristle_limit(force, parameters)
-    square = rows[r, 10] * rows[r, 10] + rows[r, 11] * rows[r, 11] + rows[r, 12] * rows[r, 12]
+    square = rows[r, ZX] * rows[r, ZX] + rows[r, ZY] * rows[r, ZY] + rows[r, ZZ] * rows[r, ZZ]
     held = 1.0
     if square > limit * limit:  # the load fell: what can no longer be held has slipped already
         held = limit / math.sqrt(square)
     keep, gain = bristle_step(tx * tx + ty * ty + tz * tz, force, dt, parameters)
     keep *= held
-    zx, zy, zz = keep * rows[r, 10] + gain * tx, keep * rows[r, 11] + gain * ty, keep * rows[r, 12] + gain * tz
+    zx, zy, zz = keep * rows[r, ZX] + gain * tx, keep * rows[r, ZY] + gain * ty, keep * rows[r, ZZ] + gain * tz
     square = zx * zx + zy * zy + zz * zz
     if square > limit * limit:  # the closed solution for constant velocity would overshoot: slide at the limit instead
         keep *= limit / math.sqrt(square)

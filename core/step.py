@@ -13,27 +13,33 @@ from typing import NamedTuple
 import numpy as np
 
 from .bodies import (
-    add_cross_block,
-    add_own_block,
-    add_wrench,
+    add_product,
     look_back,
     solve_positive,
     turn_quaternion,
     write_rotation,
     write_twist,
+    write_twist_map,
     write_world_inertia,
 )
 from .contact import (
-    ARM_A,
-    ARM_B,
     DEPTH,
     GAIN,
     KEEP,
     LIMIT,
     NORMAL_FORCE,
+    NX,
+    NY,
+    NZ,
+    PX,
+    PY,
+    PZ,
     ROW,
     STIFF_N,
     STIFF_T,
+    ZX,
+    ZY,
+    ZZ,
     K,
     State,
     World,
@@ -70,6 +76,12 @@ class Scratch(NamedTuple):
         Where each pair's rows end.
     pose : (12,) float
         A relative pose.
+    motion, part : (12,) float
+        How a target's points move relative to a sensor, and the part of it that is not solved for: U, then W row by row.
+    block, wrench : (6, 6), (6,) float
+        What the contacts of one pair resist, and their force and torque on the target, both in the sensor's axes.
+    map_a, map_b : (6, 6) float
+        From the twists of both bodies to the relative motion.
     matrix, vector, momentum : (6 f, 6 f), (6 f,), (6 f,) float
         The linear system of the f free bodies.
     """
@@ -82,6 +94,12 @@ class Scratch(NamedTuple):
     slots: np.ndarray
     pair_stop: np.ndarray
     pose: np.ndarray
+    motion: np.ndarray
+    part: np.ndarray
+    block: np.ndarray
+    wrench: np.ndarray
+    map_a: np.ndarray
+    map_b: np.ndarray
     matrix: np.ndarray
     vector: np.ndarray
     momentum: np.ndarray
@@ -103,6 +121,12 @@ def scratch_for(world: World, state: State) -> Scratch:
         slots=np.zeros(s, np.int64),
         pair_stop=np.zeros(len(world.pairs), np.int64),
         pose=np.zeros(12),
+        motion=np.zeros(12),
+        part=np.zeros(12),
+        block=np.zeros((6, 6)),
+        wrench=np.zeros(6),
+        map_a=np.zeros((6, 6)),
+        map_b=np.zeros((6, 6)),
         matrix=np.zeros((n, n)),
         vector=np.zeros(n),
         momentum=np.zeros(n),
@@ -110,33 +134,35 @@ def scratch_for(world: World, state: State) -> Scratch:
 
 
 @kernel
-def _relative_velocity(rows, r, twist, a, b):
-    """Velocity of the target's point relative to the sensor's, world axes (Eq. 3)."""
+def _relative_motion(a, b, twist, position, rotation, motion):
+    """How the points of body `b` move relative to body `a`, in the axes of `a`: ``v = U + W p`` (Eq. 3), written into `motion`.
+
+    `p` is a point's place from the reference point of `a`. One motion serves all contacts of a pair.
+    """
+    for k in range(3):
+        motion[k] = 0.0
+        for m in range(3):
+            motion[3 + 3 * k + m] = 0.0
+    for i in range(3):
+        u = twist[b, i] - twist[a, i]
+        for j in range(3):
+            u += twist[b, 3 + 3 * i + j] * (position[a, j] - position[b, j])
+            w = twist[b, 3 + 3 * i + j] - twist[a, 3 + 3 * i + j]
+            for k in range(3):
+                for m in range(3):
+                    motion[3 + 3 * k + m] += rotation[a, i, k] * w * rotation[a, j, m]
+        for k in range(3):
+            motion[k] += rotation[a, i, k] * u
+
+
+@kernel
+def _velocity(rows, r, motion):
+    """Velocity of the target at a contact point relative to the sensor, in the axes of the sensor's body."""
+    px, py, pz = rows[r, PX], rows[r, PY], rows[r, PZ]
     return (
-        twist[b, 0]
-        + twist[b, 3] * rows[r, 6]
-        + twist[b, 4] * rows[r, 7]
-        + twist[b, 5] * rows[r, 8]
-        - twist[a, 0]
-        - twist[a, 3] * rows[r, 3]
-        - twist[a, 4] * rows[r, 4]
-        - twist[a, 5] * rows[r, 5],
-        twist[b, 1]
-        + twist[b, 6] * rows[r, 6]
-        + twist[b, 7] * rows[r, 7]
-        + twist[b, 8] * rows[r, 8]
-        - twist[a, 1]
-        - twist[a, 6] * rows[r, 3]
-        - twist[a, 7] * rows[r, 4]
-        - twist[a, 8] * rows[r, 5],
-        twist[b, 2]
-        + twist[b, 9] * rows[r, 6]
-        + twist[b, 10] * rows[r, 7]
-        + twist[b, 11] * rows[r, 8]
-        - twist[a, 2]
-        - twist[a, 9] * rows[r, 3]
-        - twist[a, 10] * rows[r, 4]
-        - twist[a, 11] * rows[r, 5],
+        motion[0] + motion[3] * px + motion[4] * py + motion[5] * pz,
+        motion[1] + motion[6] * px + motion[7] * py + motion[8] * pz,
+        motion[2] + motion[9] * px + motion[10] * py + motion[11] * pz,
     )
 
 
@@ -163,7 +189,7 @@ def _solve_velocities(dt, world, state, scratch):
     would pull is left out of the next round. With no free body one round only linearises.
     """
     free_at, mass, velocity, inertia = world.free_at, world.mass, state.velocity, scratch.inertia
-    matrix, vector, momentum, rows = scratch.matrix, scratch.vector, scratch.momentum, scratch.rows
+    matrix, vector, momentum = scratch.matrix, scratch.vector, scratch.momentum
     n = 6 * int(free_at.max() + 1)
     for body in range(len(free_at)):
         write_twist(velocity[body], dt, scratch.twist[body])
@@ -185,48 +211,15 @@ def _solve_velocities(dt, world, state, scratch):
                 matrix[i, j] = 0.0
         start = 0
         for pair in range(len(world.pairs)):
-            sensor = world.pairs[pair, 0]
-            a, b = world.sensor_body[sensor], world.target_body[world.pairs[pair, 1]]
-            at_a, at_b = 6 * free_at[a], 6 * free_at[b]
-            p = world.parameters[sensor]
+            a, b = world.sensor_body[world.pairs[pair, 0]], world.target_body[world.pairs[pair, 1]]
             stop = scratch.pair_stop[pair]
-            sx, sy, sz, qx, qy, qz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0  # force and torque on the target
-            for r in range(start, stop):
-                vx, vy, vz = _relative_velocity(rows, r, scratch.twist, a, b)
-                linearise(rows, r, vx, vy, vz, dt, p)
-                if rows[r, NORMAL_FORCE] <= 0.0:
-                    continue
-                # What the known part of the motion and the stored springs do to the target; the sensor gets the opposite.
-                ux, uy, uz = _relative_velocity(rows, r, scratch.known, a, b)
-                out = ux * rows[r, 0] + uy * rows[r, 1] + uz * rows[r, 2]
-                push = p[K] * rows[r, DEPTH] + (rows[r, STIFF_N] - rows[r, STIFF_T]) * out
-                stick = friction_bias(rows, r, dt, p)
-                fx = -push * rows[r, 0] - stick * rows[r, 10] - rows[r, STIFF_T] * ux
-                fy = -push * rows[r, 1] - stick * rows[r, 11] - rows[r, STIFF_T] * uy
-                fz = -push * rows[r, 2] - stick * rows[r, 12] - rows[r, STIFF_T] * uz
-                sx += fx
-                sy += fy
-                sz += fz
-                qx += rows[r, 7] * fz - rows[r, 8] * fy
-                qy += rows[r, 8] * fx - rows[r, 6] * fz
-                qz += rows[r, 6] * fy - rows[r, 7] * fx
-            if at_b >= 0:
-                add_wrench(vector, at_b, dt * sx, dt * sy, dt * sz, dt * qx, dt * qy, dt * qz)
-                add_own_block(matrix, at_b, rows, start, stop, ARM_B, dt)
-            if at_a >= 0:
-                # The same wrench, reversed and about the sensor's reference point.
-                gx = state.position[b, 0] - state.position[a, 0]
-                gy = state.position[b, 1] - state.position[a, 1]
-                gz = state.position[b, 2] - state.position[a, 2]
-                qx, qy, qz = qx + gy * sz - gz * sy, qy + gz * sx - gx * sz, qz + gx * sy - gy * sx
-                add_wrench(vector, at_a, -dt * sx, -dt * sy, -dt * sz, -dt * qx, -dt * qy, -dt * qz)
-                add_own_block(matrix, at_a, rows, start, stop, ARM_A, dt)
-            if at_a >= 0 and at_b >= 0:
-                if at_a < at_b:
-                    add_cross_block(matrix, at_a, at_b, rows, start, stop, ARM_A, ARM_B, dt)
-                else:
-                    add_cross_block(matrix, at_b, at_a, rows, start, stop, ARM_B, ARM_A, dt)
-            start = scratch.pair_stop[pair]
+            if start < stop:
+                _relative_motion(a, b, scratch.twist, state.position, scratch.rotation, scratch.motion)
+                _relative_motion(a, b, scratch.known, state.position, scratch.rotation, scratch.part)
+                _sum_contacts(start, stop, dt, world.parameters[world.pairs[pair, 0]], scratch)
+                if free_at[a] >= 0 or free_at[b] >= 0:
+                    _add_pair(a, b, dt, world, state, scratch)
+            start = stop
         if n == 0:
             return
         for body in range(len(free_at)):
@@ -252,6 +245,101 @@ def _solve_velocities(dt, world, state, scratch):
 
 
 @kernel
+def _sum_contacts(start, stop, dt, p, scratch):
+    """Linearise the contacts of a pair, and sum their forces on the target and what they resist.
+
+    With a contact's damping tensor ``C = ct 1 + (cn - ct) n nᵀ`` and velocities ``v + ω × p`` the block is the sum of
+    ``Jᵀ C J``, its lower triangle; the wrench is what the springs and the known part of the motion do.
+    """
+    rows, motion, part, block, wrench = scratch.rows, scratch.motion, scratch.part, scratch.block, scratch.wrench
+    a00, a10, a11, a20, a21, a22 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    b00, b01, b02, b10, b11, b12, b20, b21, b22 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    c00, c10, c11, c20, c21, c22 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    sx, sy, sz, qx, qy, qz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    for r in range(start, stop):
+        vx, vy, vz = _velocity(rows, r, motion)
+        linearise(rows, r, vx, vy, vz, dt, p)
+        if rows[r, NORMAL_FORCE] <= 0.0:
+            continue
+        nx, ny, nz = rows[r, NX], rows[r, NY], rows[r, NZ]
+        px, py, pz = rows[r, PX], rows[r, PY], rows[r, PZ]
+        t = rows[r, STIFF_T]
+        e = rows[r, STIFF_N] - t
+        ux, uy, uz = _velocity(rows, r, part)
+        push = p[K] * rows[r, DEPTH] + e * (ux * nx + uy * ny + uz * nz)
+        stick = friction_bias(rows, r, dt, p)
+        fx = -push * nx - stick * rows[r, ZX] - t * ux
+        fy = -push * ny - stick * rows[r, ZY] - t * uy
+        fz = -push * nz - stick * rows[r, ZZ] - t * uz
+        sx += fx
+        sy += fy
+        sz += fz
+        qx += py * fz - pz * fy
+        qy += pz * fx - px * fz
+        qz += px * fy - py * fx
+        mx, my, mz = py * nz - pz * ny, pz * nx - px * nz, px * ny - py * nx
+        ex, ey, ez = e * nx, e * ny, e * nz
+        gx, gy, gz = e * mx, e * my, e * mz
+        tx, ty, tz = t * px, t * py, t * pz
+        square = tx * px + ty * py + tz * pz
+        a00 += t + ex * nx
+        a10 += ey * nx
+        a11 += t + ey * ny
+        a20 += ez * nx
+        a21 += ez * ny
+        a22 += t + ez * nz
+        # Lower-left block: [p]× C.
+        b00 += gx * nx
+        b01 += gx * ny - tz
+        b02 += gx * nz + ty
+        b10 += gy * nx + tz
+        b11 += gy * ny
+        b12 += gy * nz - tx
+        b20 += gz * nx - ty
+        b21 += gz * ny + tx
+        b22 += gz * nz
+        c00 += gx * mx + square - tx * px
+        c10 += gy * mx - ty * px
+        c11 += gy * my + square - ty * py
+        c20 += gz * mx - tz * px
+        c21 += gz * my - tz * py
+        c22 += gz * mz + square - tz * pz
+    block[0, 0], block[1, 0], block[1, 1], block[2, 0], block[2, 1], block[2, 2] = a00, a10, a11, a20, a21, a22
+    block[3, 0], block[3, 1], block[3, 2] = b00, b01, b02
+    block[4, 0], block[4, 1], block[4, 2] = b10, b11, b12
+    block[5, 0], block[5, 1], block[5, 2] = b20, b21, b22
+    block[3, 3], block[4, 3], block[4, 4], block[5, 3], block[5, 4], block[5, 5] = c00, c10, c11, c20, c21, c22
+    wrench[0], wrench[1], wrench[2], wrench[3], wrench[4], wrench[5] = sx, sy, sz, qx, qy, qz
+
+
+@kernel
+def _add_pair(a, b, dt, world, state, scratch):
+    """Bring a pair's sums into the linear system of the free bodies."""
+    at_a, at_b = 6 * world.free_at[a], 6 * world.free_at[b]
+    map_a, map_b, block, wrench = scratch.map_a, scratch.map_b, scratch.block, scratch.wrench
+    write_twist_map(scratch.rotation[a], 0.0, 0.0, 0.0, -1.0, map_a)
+    gx = state.position[a, 0] - state.position[b, 0]
+    gy = state.position[a, 1] - state.position[b, 1]
+    gz = state.position[a, 2] - state.position[b, 2]
+    write_twist_map(scratch.rotation[a], gx, gy, gz, 1.0, map_b)
+    for i in range(6):
+        for j in range(6):
+            if at_a >= 0:
+                scratch.vector[at_a + i] += dt * map_a[j, i] * wrench[j]
+            if at_b >= 0:
+                scratch.vector[at_b + i] += dt * map_b[j, i] * wrench[j]
+    if at_a >= 0:
+        add_product(scratch.matrix, at_a, at_a, map_a, block, map_a, dt)
+    if at_b >= 0:
+        add_product(scratch.matrix, at_b, at_b, map_b, block, map_b, dt)
+    if at_a >= 0 and at_b >= 0:  # only the lower triangle of the system is read
+        if at_a > at_b:
+            add_product(scratch.matrix, at_a, at_b, map_a, block, map_b, dt)
+        else:
+            add_product(scratch.matrix, at_b, at_a, map_b, block, map_a, dt)
+
+
+@kernel
 def _write_known(velocity, twist, keyframed, known):
     """What the system does not solve for: all of a keyframed twist, a finite turn's excess over ``ω × r`` of a free one."""
     for i in range(12):
@@ -269,32 +357,43 @@ def _write_known(velocity, twist, keyframed, known):
 
 @kernel
 def _store_bristles(dt, world, state, scratch):
-    """Bristle deflections at the step's end, back in the frame of the sensor's body."""
-    rows, start = scratch.rows, 0
+    """Bristle deflections at the step's end, as the sensor sees them then."""
+    rows, motion, seen, start = scratch.rows, scratch.motion, scratch.part, 0
     for pair in range(len(world.pairs)):
-        a, b = world.sensor_body[world.pairs[pair, 0]], world.target_body[world.pairs[pair, 1]]
-        for r in range(start, scratch.pair_stop[pair]):
-            vx, vy, vz = _relative_velocity(rows, r, scratch.twist, a, b)
-            # As seen from the sensor, which itself has turned by 1 + dt W at the step's end.
-            vx, vy, vz = (
-                vx + dt * (scratch.twist[a, 3] * vx + scratch.twist[a, 6] * vy + scratch.twist[a, 9] * vz),
-                vy + dt * (scratch.twist[a, 4] * vx + scratch.twist[a, 7] * vy + scratch.twist[a, 10] * vz),
-                vz + dt * (scratch.twist[a, 5] * vx + scratch.twist[a, 8] * vy + scratch.twist[a, 11] * vz),
-            )
-            out = vx * rows[r, 0] + vy * rows[r, 1] + vz * rows[r, 2]
-            zx = rows[r, KEEP] * rows[r, 10] + rows[r, GAIN] * (vx - out * rows[r, 0])
-            zy = rows[r, KEEP] * rows[r, 11] + rows[r, GAIN] * (vy - out * rows[r, 1])
-            zz = rows[r, KEEP] * rows[r, 12] + rows[r, GAIN] * (vz - out * rows[r, 2])
+        stop = scratch.pair_stop[pair]
+        if start < stop:
+            a, b = world.sensor_body[world.pairs[pair, 0]], world.target_body[world.pairs[pair, 1]]
+            _relative_motion(a, b, scratch.twist, state.position, scratch.rotation, motion)
+            _seen_at_the_end(a, dt, scratch.twist, scratch.rotation, motion, seen)
+        for r in range(start, stop):
+            vx, vy, vz = _velocity(rows, r, seen)
+            out = vx * rows[r, NX] + vy * rows[r, NY] + vz * rows[r, NZ]
+            zx = rows[r, KEEP] * rows[r, ZX] + rows[r, GAIN] * (vx - out * rows[r, NX])
+            zy = rows[r, KEEP] * rows[r, ZY] + rows[r, GAIN] * (vy - out * rows[r, NY])
+            zz = rows[r, KEEP] * rows[r, ZZ] + rows[r, GAIN] * (vz - out * rows[r, NZ])
             square = zx * zx + zy * zy + zz * zz
             if square > rows[r, LIMIT] * rows[r, LIMIT]:
                 scale = rows[r, LIMIT] / math.sqrt(square)
                 zx, zy, zz = scale * zx, scale * zy, scale * zz
             slot = scratch.slots[r]
+            state.bristles[slot, 0], state.bristles[slot, 1], state.bristles[slot, 2] = zx, zy, zz
+        start = stop
+
+
+@kernel
+def _seen_at_the_end(a, dt, twist, rotation, motion, seen):
+    """Turn a relative motion by what the sensor itself turns during the step, ``(1 + dt W)ᵀ`` in its own axes."""
+    for i in range(12):
+        seen[i] = motion[i]
+    for k in range(3):
+        for m in range(3):
+            turn = 0.0  # entry (m, k) of the sensor's W in its own axes
             for i in range(3):
-                state.bristles[slot, i] = (
-                    scratch.rotation[a, 0, i] * zx + scratch.rotation[a, 1, i] * zy + scratch.rotation[a, 2, i] * zz
-                )
-        start = scratch.pair_stop[pair]
+                for j in range(3):
+                    turn += rotation[a, i, m] * twist[a, 3 + 3 * i + j] * rotation[a, j, k]
+            seen[k] += dt * turn * motion[m]
+            for j in range(3):
+                seen[3 + 3 * k + j] += dt * turn * motion[3 + 3 * m + j]
 
 
 @kernel
@@ -370,74 +469,45 @@ def feel(world, state, scratch, force, shear, depth, slip, contact, net, moment)
 
     `net` gets force and torque about the body's reference point, `moment` the sum of fn · point and of fn.
     """
-    rows, start = scratch.rows, 0
+    rows, texels, start = scratch.rows, world.texels, 0
     for pair in range(len(world.pairs)):
         sensor = world.pairs[pair, 0]
         a, b = world.sensor_body[sensor], world.target_body[world.pairs[pair, 1]]
         p = world.parameters[sensor]
+        _relative_motion(a, b, scratch.twist, state.position, scratch.rotation, scratch.motion)
         for r in range(start, scratch.pair_stop[pair]):
             texel = world.texel_start[sensor] + scratch.slots[r] - world.slot_start[pair]
-            vx, vy, vz = _relative_velocity(rows, r, scratch.twist, a, b)
-            rate = vx * rows[r, 0] + vy * rows[r, 1] + vz * rows[r, 2]
-            tx, ty, tz = vx - rate * rows[r, 0], vy - rate * rows[r, 1], vz - rate * rows[r, 2]
+            nx, ny, nz = rows[r, NX], rows[r, NY], rows[r, NZ]
+            vx, vy, vz = _velocity(rows, r, scratch.motion)
+            rate = vx * nx + vy * ny + vz * nz
+            tx, ty, tz = vx - rate * nx, vy - rate * ny, vz - rate * nz
             square = tx * tx + ty * ty + tz * tz
             fn = normal_force(rows[r, DEPTH], rate, p)
-            length = math.sqrt(rows[r, 10] * rows[r, 10] + rows[r, 11] * rows[r, 11] + rows[r, 12] * rows[r, 12])
-            limit = bristle_limit(fn, p)
+            zx, zy, zz = rows[r, ZX], rows[r, ZY], rows[r, ZZ]
+            length, limit = math.sqrt(zx * zx + zy * zy + zz * zz), bristle_limit(fn, p)
             held = limit / length if length > limit else 1.0
-            zx, zy, zz = held * rows[r, 10], held * rows[r, 11], held * rows[r, 12]
+            zx, zy, zz = held * zx, held * zy, held * zz
+            # Friction drags the sensor along with the target; the target's surface normal points into the sensor.
             fx, fy, fz = 0.0, 0.0, 0.0
             if fn > 0.0:
                 fx = friction_force(zx, bristle_rate(zx, tx, square, fn, p), tx, p)
                 fy = friction_force(zy, bristle_rate(zy, ty, square, fn, p), ty, p)
                 fz = friction_force(zz, bristle_rate(zz, tz, square, fn, p), tz, p)
-            # Friction drags the sensor along with the target; the target's surface normal points into the sensor.
-            lx = scratch.rotation[a, 0, 0] * fx + scratch.rotation[a, 1, 0] * fy + scratch.rotation[a, 2, 0] * fz
-            ly = scratch.rotation[a, 0, 1] * fx + scratch.rotation[a, 1, 1] * fy + scratch.rotation[a, 2, 1] * fz
-            lz = scratch.rotation[a, 0, 2] * fx + scratch.rotation[a, 1, 2] * fy + scratch.rotation[a, 2, 2] * fz
-            shear[texel, 0] += lx * world.texels[texel, 6] + ly * world.texels[texel, 7] + lz * world.texels[texel, 8]
-            shear[texel, 1] += lx * world.texels[texel, 9] + ly * world.texels[texel, 10] + lz * world.texels[texel, 11]
-            lx += fn * (
-                scratch.rotation[a, 0, 0] * rows[r, 0]
-                + scratch.rotation[a, 1, 0] * rows[r, 1]
-                + scratch.rotation[a, 2, 0] * rows[r, 2]
-            )
-            ly += fn * (
-                scratch.rotation[a, 0, 1] * rows[r, 0]
-                + scratch.rotation[a, 1, 1] * rows[r, 1]
-                + scratch.rotation[a, 2, 1] * rows[r, 2]
-            )
-            lz += fn * (
-                scratch.rotation[a, 0, 2] * rows[r, 0]
-                + scratch.rotation[a, 1, 2] * rows[r, 1]
-                + scratch.rotation[a, 2, 2] * rows[r, 2]
-            )
-            px = (
-                scratch.rotation[a, 0, 0] * rows[r, 3]
-                + scratch.rotation[a, 1, 0] * rows[r, 4]
-                + scratch.rotation[a, 2, 0] * rows[r, 5]
-            )
-            py = (
-                scratch.rotation[a, 0, 1] * rows[r, 3]
-                + scratch.rotation[a, 1, 1] * rows[r, 4]
-                + scratch.rotation[a, 2, 1] * rows[r, 5]
-            )
-            pz = (
-                scratch.rotation[a, 0, 2] * rows[r, 3]
-                + scratch.rotation[a, 1, 2] * rows[r, 4]
-                + scratch.rotation[a, 2, 2] * rows[r, 5]
-            )
+            shear[texel, 0] += fx * texels[texel, 6] + fy * texels[texel, 7] + fz * texels[texel, 8]
+            shear[texel, 1] += fx * texels[texel, 9] + fy * texels[texel, 10] + fz * texels[texel, 11]
+            fx, fy, fz = fx + fn * nx, fy + fn * ny, fz + fn * nz
             if not contact[texel] or fn > force[texel]:
                 slip[texel] = math.sqrt(square)
             contact[texel] = True
             force[texel] += fn
             depth[texel] = max(depth[texel], rows[r, DEPTH])
-            net[sensor, 0] += lx
-            net[sensor, 1] += ly
-            net[sensor, 2] += lz
-            net[sensor, 3] += py * lz - pz * ly
-            net[sensor, 4] += pz * lx - px * lz
-            net[sensor, 5] += px * ly - py * lx
+            px, py, pz = rows[r, PX], rows[r, PY], rows[r, PZ]
+            net[sensor, 0] += fx
+            net[sensor, 1] += fy
+            net[sensor, 2] += fz
+            net[sensor, 3] += py * fz - pz * fy
+            net[sensor, 4] += pz * fx - px * fz
+            net[sensor, 5] += px * fy - py * fx
             moment[sensor, 0] += fn * px
             moment[sensor, 1] += fn * py
             moment[sensor, 2] += fn * pz
