@@ -185,8 +185,8 @@ def write_twist_map(rotation, gx, gy, gz, sign, out):
 
 @kernel
 def add_product(matrix, row, column, left, middle, right, scale):
-    """Add ``scale · leftᵀ middle right`` (all 6 × 6, `middle` symmetric and given by its lower triangle) into a larger
-    matrix.""" for j in range(6):
+    """Add ``scale · leftᵀ middle right`` (6 × 6 each; of the symmetric `middle` the lower triangle is read) into `matrix`."""
+    for j in range(6):
         for i in range(6):
             total = 0.0
             for k in range(6):
