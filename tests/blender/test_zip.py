@@ -131,7 +131,8 @@ def test_disabling_leaves_nothing_registered(life):
     assert not after["has_properties"]
     assert after["commands"] == []
     assert after["classes"] == []
-    assert after["menu_entries"] == before["menu_entries"]
+    assert life["enabled"]["menu_entries"] > 0
+    assert after["menu_entries"] == before["menu_entries"] == 0
     assert after["handlers"] == before["handlers"]
     assert after["keymap_items"] == before["keymap_items"]
 

@@ -53,11 +53,12 @@ def state():
     bases += [bpy.types.PropertyGroup, bpy.types.AddonPreferences]
     kinds = {kind for base in bases for kind in every_class(base)}
     drawn = [bpy.types.Menu, bpy.types.Panel, bpy.types.Header]
+    # only ours: Blender moves a menu's own function into its list when the first entry is appended, and leaves it there
     menu_entries = sum(
-        len(kind.draw._draw_funcs)
+        ours(entry)
         for base in drawn
         for kind in set(every_class(base))
-        if hasattr(getattr(kind, "draw", None), "_draw_funcs")
+        for entry in getattr(getattr(kind, "draw", None), "_draw_funcs", [])
     )
     lists = {name: value for name in dir(bpy.app.handlers) if isinstance(value := getattr(bpy.app.handlers, name), list)}
     keymaps = bpy.context.window_manager.keyconfigs.addon
