@@ -143,7 +143,7 @@ def tactile_strip(
     columns = len(chosen)
 
     # Sizes in inches: the figure is as high as its rows need, so that images keep their shape and text its size.
-    left, right, above, gap = 0.95, 0.9, 0.42, 0.34
+    left, right, above, gap = 0.95, 0.9, 0.28, 0.36
     cell = max(0.72, (7.2 - left - right) / columns)
     width = left + right + columns * cell
     heights = [min(max(cell * 0.86 * view.height / view.width, 0.5), 2.4) for view in views]
@@ -186,7 +186,8 @@ def tactile_strip(
                 )
             axes.set_anchor("C")
         shown = strongest if np.linalg.norm(sensor.shear[index], axis=2).max(initial=0.0) > SMALLEST_ARROW * strongest else 0.0
-        _keys(figure, (left + 0.03, y - 0.2), view, shown, min((cell - 0.06) / view.width, heights[row] / view.height))
+        inches = min((cell - 0.06) / view.width, heights[row] / view.height)
+        _keys(figure, (left + 0.5 * (cell - inches * view.width), y - 0.2), view, shown, inches)
         y -= gap
     assert image is not None
     bar = figure.add_axes(((width - right + 0.1) / width, 0.2, 0.11 / width, 0.6))

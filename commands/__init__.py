@@ -1,0 +1,95 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The command line: ``palpate COMMAND …``, and the same as ``blender --command palpate COMMAND …``.
+
+Exit status: 0 done, 1 something the user can put right (one line on stderr), 2 wrong usage, 130 stopped with Ctrl-C.
+"""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import sys
+from collections.abc import Sequence
+
+from .. import __version__
+from ..core.errors import Cancelled, PalpateError
+from . import console
+
+COMMANDS = {
+    "demo": "build, bake and render the demo scene, and print what the pads feel",
+    "bake": "bake the sensors of a .blend to tactile images",
+    "render": "render the frames of a baked scene",
+    "export": "write a recording as CSV, NPZ or OpenRAVE data",
+    "fit": "estimate stiffness and friction from measurements",
+    "gap": "find what the model misses against a real sensor",
+    "paper": "repeat the experiments of the paper",
+    "sweep": "bake one scene over a range of parameters",
+    "openrave": "read and write OpenRAVE sensor definitions",
+}
+"""In the order in which the help lists them; those in `READY` have a module of their own name here."""
+
+READY = ("demo", "bake")
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run one command.
+
+    Parameters
+    ----------
+    argv : sequence of str, optional
+        The words after ``palpate``. Default: those of the process.
+
+    Returns
+    -------
+    int
+        The exit status.
+    """
+    say = "palpate:"
+    try:
+        with console.Interrupt.noted():
+            parser = _parser()
+            arguments, rest = parser.parse_known_args(argv)
+            if arguments.command is None:
+                parser.print_help(sys.stderr)
+                return 2
+            say = f"palpate {arguments.command}:"
+            if arguments.command not in READY:
+                print(say, "not yet", file=sys.stderr)
+                return 1
+            if rest:
+                parser.error(f"unrecognized arguments: {' '.join(rest)}")
+            return arguments.run(arguments)
+    except SystemExit as stop:  # argparse has printed its help or what is wrong with the usage
+        return int(stop.code or 0)
+    except KeyboardInterrupt:
+        print(say, "stopped; an earlier bake is still as it was.", file=sys.stderr)
+        return 130
+    except Cancelled as stop:
+        print(say, stop, file=sys.stderr)
+        return 130
+    except PalpateError as error:
+        print(say, error, file=sys.stderr)
+        return 1
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="palpate",
+        description="Make any mesh a tactile sensor: simulate, bake and render what it feels.",
+        epilog="palpate COMMAND --help says more about a command.",
+    )
+    parser.add_argument("--version", action="version", version=f"palpate {__version__}")
+    subparsers = parser.add_subparsers(dest="command", metavar="COMMAND", title="commands")
+    for name, summary in COMMANDS.items():
+        ready = name in READY
+        sub = subparsers.add_parser(
+            name,
+            help=summary if ready else f"{summary} (not yet)",
+            description=f"{summary[0].upper()}{summary[1:]}.",
+            add_help=ready,
+        )
+        if ready:
+            module = importlib.import_module(f".{name}", __package__)
+            module.add_arguments(sub)
+            sub.set_defaults(run=module.run)
+    return parser

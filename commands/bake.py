@@ -1,0 +1,121 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""``palpate bake``: a .blend becomes tactile images, and on request a .blend that shows them."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+import numpy as np
+
+from ..core.errors import SceneError
+from ..core.formats.files import writable_folder
+from . import blender, console
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("scene", metavar="SCENE.blend", help="file with sensors and what touches them")
+    parser.add_argument("--out", metavar="DIR", help="bake folder (default: the one in the file, beside it)")
+    parser.add_argument(
+        "--sensor",
+        metavar="NAME",
+        action="append",
+        help="read out only this sensor, and let the others act as pads; may be given again. Cannot be saved.",
+    )
+    parser.add_argument("--frames", metavar=("FIRST", "LAST"), nargs=2, type=int, help="frames (default: those of the scene)")
+    where = parser.add_mutually_exclusive_group()
+    where.add_argument("--save", action="store_true", help="save motion, heat maps and arrows into SCENE.blend itself")
+    where.add_argument("--save-as", metavar="FILE", help="save them into another .blend")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    if arguments.sensor and (arguments.save or arguments.save_as):
+        print("palpate bake: --sensor bakes a part of the scene, which cannot be saved: leave one of them out", file=sys.stderr)
+        return 2
+    with console.quiet():
+        bpy = blender.start()
+        blender.open_blend(arguments.scene)
+        scene = bpy.context.scene
+        if arguments.frames:
+            scene.frame_start, scene.frame_end = _frames(scene, *arguments.frames)
+        if arguments.out:
+            scene.palpate.folder = str(writable_folder(arguments.out, create=True))
+        if arguments.sensor:
+            _read_out_only(scene, arguments.sensor)
+        baked = bake_with_bar(scene)
+        saved = save(arguments)
+    print(report(baked))
+    print()
+    for name, folder in baked.folders.items():
+        print(f"{name}: {folder}")
+    if saved:
+        print(f"saved: {saved}")
+    return 0
+
+
+def bake_with_bar(scene):
+    """Bake a scene with a progress bar on stderr; Ctrl-C leaves an earlier bake as it was."""
+    from ..addon import bake, jobs
+
+    with console.progress_bar("bake", 1, unit="step") as bar:
+
+        def show(progress) -> None:
+            console.Interrupt.check()
+            bar.total = progress.total
+            bar.set_description(progress.stage, refresh=False)
+            bar.update(progress.done - bar.n)
+
+        return jobs.run_blocking(bake.bake(scene), show)
+
+
+def report(baked) -> str:
+    """Return what a bake did, in words for the terminal."""
+    recording = baked.recording
+    first, last = recording.frames[0], recording.frames[-1]
+    span = f"{first} to {last} ({recording.times[-1]:.2f} s), substep {recording.dt * 1e3:.3g} ms"
+    lines = [f"frames {span}"]
+    rows = [("sensor", "texels", "peak texel", "peak normal", "peak shear", "normal at end")]
+    for name in baked.folders:
+        felt = recording.sensors[name]
+        normal = felt.normal_force.sum(axis=1)
+        shear = np.linalg.norm(felt.shear.sum(axis=1), axis=1)
+        peaks = (felt.normal_force.max(initial=0.0), normal.max(), shear.max(), normal[-1])
+        rows.append((name, str(felt.normal_force.shape[1]), *(_newtons(value) for value in peaks)))
+    lines += ["", console.table(rows, "<>>>>>")]
+    lines += [f"warning: {warning}" for warning in recording.warnings]
+    return "\n".join(lines)
+
+
+def _newtons(value: float) -> str:
+    return f"{value if value > 1e-9 else 0.0:.4f} N"
+
+
+def save(arguments: argparse.Namespace) -> Path | None:
+    """Save the open scene where the user wants it, if anywhere."""
+    if not (arguments.save or arguments.save_as):
+        return None
+    path = Path(arguments.save_as or arguments.scene)
+    if path.suffix != ".blend":
+        path = path.with_name(f"{path.name}.blend")
+    blender.save_blend(path)
+    return path
+
+
+def _frames(scene, first: int, last: int) -> tuple[int, int]:
+    if last < first:
+        raise SceneError(f"--frames {first} {last} runs backwards: give the first frame first.")
+    if first < 0:
+        raise SceneError(f"--frames {first} {last} begins before frame 0: Blender's scenes begin there.")
+    return first, last
+
+
+def _read_out_only(scene, wanted: list[str]) -> None:
+    sensors = {obj.name: obj for obj in scene.objects if obj.palpate.role == "SENSOR"}
+    for name in wanted:
+        if name not in sensors:
+            known = ", ".join(f"'{known}'" for known in sensors) or "none"
+            raise SceneError(f"There is no sensor '{name}' in '{scene.name}': choose from {known}.")
+    for name, obj in sensors.items():
+        if name not in wanted:
+            obj.palpate.role = "PAD"

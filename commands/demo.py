@@ -1,0 +1,150 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""``palpate demo``: from nothing to a picture of what two finger pads feel, with the numbers beside it."""
+
+from __future__ import annotations
+
+import argparse
+import time
+from pathlib import Path
+
+import numpy as np
+
+from ..core import figures
+from ..core.formats.files import remove_leftovers, writable_folder
+from . import blender, console
+from .bake import bake_with_bar, report
+
+MAPS = {"VIRIDIS": "viridis", "MAGMA": "magma", "PAPER": "gray_r"}
+"""matplotlib's names of the scene's colour maps."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--out", metavar="DIR", default="palpate-demo", help="folder for all that is made (default: %(default)s)"
+    )
+    parser.add_argument(
+        "--size", metavar=("W", "H"), nargs=2, type=_positive, default=(1280, 720), help="of the picture, pixels (1280 720)"
+    )
+    parser.add_argument(
+        "--samples", metavar="N", type=_positive, default=16, help="per pixel of the picture (default: %(default)s)"
+    )
+    parser.add_argument("--no-render", action="store_true", help="leave the picture out, everything else takes seconds")
+
+
+def _positive(text: str) -> int:
+    value = int(text)
+    if not 0 < value <= 16384:
+        raise argparse.ArgumentTypeError(f"{value} is not between 1 and 16384")
+    return value
+
+
+def run(arguments: argparse.Namespace) -> int:
+    began = time.monotonic()
+    folder = writable_folder(arguments.out, create=True)
+    with console.quiet():
+        bpy = blender.start()
+        from ..sample_blends import demo
+
+        bpy.ops.wm.read_homefile(use_empty=True)
+        scene = bpy.context.scene
+        demo.build(scene)
+        demo.frame_picture(scene, arguments.size)
+        blend = folder / "demo.blend"
+        blender.save_blend(blend, backup=False)  # the bake folder is relative to it
+        baked = bake_with_bar(scene)
+        scene.frame_set(demo.PICTURE_FRAME)
+        blender.save_blend(blend, backup=False)
+    recording = baked.recording
+    sensors = {sensor.name: sensor for sensor in baked.scenario.sensors if sensor.readout}
+    texels = {name: sensor.texels for name, sensor in sensors.items()}
+    look = {"colour_map": MAPS[scene.palpate.color_map], "limit": demo.RANGE}
+    required = demo.CUBE_MASS * float(np.linalg.norm(baked.scenario.gravity))
+
+    strip, curves, picture = folder / "tactile-strip.png", folder / "forces.png", folder / "scene.png"
+    figures.tactile_strip(strip, recording, texels, **look)
+    parameters = {name: sensor.parameters for name, sensor in sensors.items()}
+    figures.force_curves(curves, recording, texels, parameters, {demo.PAD_B: required})
+    if not arguments.no_render:
+        _picture(scene, picture, recording, sensors, texels, arguments, look)
+
+    print(report(baked))
+    print()
+    print(_slide(recording, sensors[demo.PAD_A]))
+    print()
+    measured = recording.sensors[demo.PAD_B].normal_force[-1].sum()
+    print(f"{demo.CUBE} at rest on {demo.PAD_B}: required {required:.6f} N, measured {measured:.6f} N")
+    print()
+    for what, path in (
+        ("picture", picture),
+        ("tactile images", strip),
+        ("forces", curves),
+        ("scene", blend),
+        *((f"bake of {name}", place) for name, place in baked.folders.items()),
+    ):
+        if path.exists():
+            print(f"{what + ':':<18} {path}")
+    print(f"{'took:':<18} {time.monotonic() - began:.0f} s")
+    return 0
+
+
+def _picture(scene, path: Path, recording, sensors, texels, arguments, look) -> None:
+    """Render the scene and put the colour bar, tactile images and labels on it."""
+    from ..addon import render
+    from ..sample_blends import demo
+
+    stopped = "palpate demo: stopped while rendering; the bake and the scene are finished."
+    with (
+        console.progress_bar("Rendering the picture", 1, unit="picture") as bar,
+        console.stop_at_once(stopped, lambda: remove_leftovers(path.parent)),
+        console.quiet(),
+    ):
+        render.render_frame(scene, path, demo.PICTURE_FRAME, samples=arguments.samples, size=arguments.size)
+        scene.frame_set(demo.PICTURE_FRAME)
+        labels = _labels(scene, recording, sensors, demo)
+        bar.update()
+    figures.label_picture(path, path, recording, texels, demo.PICTURE_FRAME, labels=labels, **look)
+
+
+def _labels(scene, recording, sensors, demo) -> list[figures.Label]:
+    """Words for the ball and the cube, from what their pads feel."""
+    from ..addon import render
+
+    i = int(np.searchsorted(recording.frames, demo.PICTURE_FRAME))
+    pressed, at_rest = recording.sensors[demo.PAD_A], recording.sensors[demo.PAD_B]
+    normal = pressed.normal_force[i].sum()
+    shear = np.linalg.norm(figures.net_shear(pressed, sensors[demo.PAD_A].texels)[i])
+    weight, carriers = at_rest.normal_force[i].sum(), np.count_nonzero(at_rest.contact[i])
+    words = {
+        demo.BALL: f"Steel ball, slipping\n{normal:.2f} N normal, {shear:.2f} N shear",
+        demo.CUBE: f"Steel cube, 1 kg, at rest\n{weight:.4f} N on {carriers} texels",
+    }
+    labels = [figures.Label("\nArrows: the force with\nwhich a pad pushes back", (0.315, 0.14))]
+    for name, text in words.items():
+        box = np.array([render.picture_position(scene, point) for point in render.corners([scene.objects[name]])])
+        labels.append(figures.Label(text, (float(box[:, 0].min()), float(box[:, 1].max()) + 0.035)))
+    return labels
+
+
+def _slide(recording, sensor) -> str:
+    """Return how friction builds up under the ball until it slips, as a table."""
+    felt, mu = recording.sensors[sensor.name], sensor.parameters
+    normal = felt.normal_force.sum(axis=1)
+    shear = np.linalg.norm(figures.net_shear(felt, sensor.texels), axis=1)
+    share = figures.mobilised(felt, sensor.texels, mu.mus)
+    # The limit of each texel at its own sliding speed (Eq. 10): what its bristles can hold.
+    limit = felt.normal_force * (mu.mud + (mu.mus - mu.mud) * np.exp(-((felt.slip / mu.x0) ** 2)))
+    slipping = (np.linalg.norm(felt.shear, axis=2) >= 0.9 * limit) & felt.contact & (felt.slip > 1e-6)
+    rows = [("frame", "time", "normal", "shear", "shear / µs·normal", "texels slipping")]
+    touching = np.flatnonzero(normal > 0)
+    for i in touching[:: max(1, len(touching) // 10)]:
+        rows.append(
+            (
+                str(recording.frames[i]),
+                f"{recording.times[i]:.2f} s",
+                f"{normal[i]:.4f} N",
+                f"{shear[i]:.4f} N",
+                f"{share[i]:.2f}",
+                f"{np.count_nonzero(slipping[i])} of {np.count_nonzero(felt.contact[i])}",
+            )
+        )
+    return f"{sensor.name} under the ball:\n" + console.table(rows, ">>>>>>")

@@ -1,0 +1,146 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The demo: a steel ball that is pressed on one finger pad and slides until it slips, and 1 kg that comes to rest on another.
+
+Units are millimetres (``scale_length`` 0.001), so that view, snapping and clipping feel right at the size of a fingertip.
+"""
+
+from __future__ import annotations
+
+import math
+
+import bpy
+
+from ..addon import render
+from . import studio
+
+FPS = 24
+FRAME_END = 112
+PICTURE_FRAME = 78
+"""The frame that shows it best: the ball slips, the cube rests."""
+
+PAD_ROWS, PAD_COLUMNS = 14, 6
+PITCH_A, PITCH_B = 3.4, 4.5  # mm; the paper's pad, and one a little longer than the cube
+BALL_RADIUS = 16.0  # mm
+PRESS_DEPTH = 2.2  # mm
+CUBE_EDGE = 50.0  # mm, stainless steel: 8,000 kg/m³ make it 1 kg
+CUBE_MASS = 1.0  # kg
+DROP = 0.5  # mm
+RANGE = 0.15  # N, end of the heat maps' common scale
+PAD_HEIGHT = 16.0  # mm, upper side of the pads above the table
+
+BALL, CUBE, PAD_A, PAD_B = "Steel ball", "Cube 1 kg", "Finger A", "Finger B"
+
+
+def build(scene) -> None:
+    """Fill `scene`, which is emptied first, with the demo; the add-on's classes must be registered."""
+    studio.prepare(scene, FRAME_END, FPS)
+    rubber = studio.material("Rubber", (0.035, 0.036, 0.04), roughness=0.55)
+    black = studio.material("Black anodised", (0.012, 0.012, 0.014), metallic=0.6, roughness=0.32)
+    screw = studio.material("Screw", (0.55, 0.56, 0.58), metallic=1.0, roughness=0.25)
+    paper = studio.material("Backdrop", (0.30, 0.32, 0.35), roughness=0.85)
+
+    pad_a = _finger(scene, PAD_A, PITCH_A, (-44.0, -22.0), math.radians(24), rubber, black, screw)
+    pad_b = _finger(scene, PAD_B, PITCH_B, (26.0, 10.0), math.radians(24), rubber, black, screw)
+
+    ball = studio.ball(scene, BALL, BALL_RADIUS)
+    ball.data.materials.append(studio.ghost_steel("Steel, seen through (ball)", clear=0.85, groove=0.45))
+    _slide(ball, pad_a)
+
+    cube = studio.box(scene, CUBE, (CUBE_EDGE,) * 3, bevel=1.2, flat_bottom=True)
+    cube.data.materials.append(studio.ghost_steel("Steel, seen through", clear=0.86, edge=0.3))
+    cube.data.materials.append(studio.material("Steel", studio.STEEL, metallic=1.0, roughness=0.16))
+    cube.modifiers["Bevel"].material = 1  # its edges stay solid
+    cube.location = (pad_b.location.x, pad_b.location.y, PAD_HEIGHT + CUBE_EDGE / 2 + DROP)
+    cube.rotation_euler = (0.0, 0.0, pad_b.rotation_euler.z + math.radians(18))
+
+    _author(scene, pad_a, pad_b, ball, cube)
+    _light(scene, paper)
+    scene.frame_set(scene.frame_start)
+
+
+def _finger(scene, name: str, pitch: float, location, turn: float, rubber, black, screw):
+    """Return the pad of a gripper finger, whose texels are the vertex group "tactile"; its black base comes along."""
+    margin, thickness = 0.9 * pitch + 0.6, 6.0
+    vertices, faces, texels = studio.pad_mesh(PAD_ROWS, PAD_COLUMNS, pitch, margin, thickness)
+    pad = studio.mesh_object(scene, name, vertices, faces)
+    pad.location, pad.rotation_euler = (*location, PAD_HEIGHT), (0.0, 0.0, turn)
+    pad.data.materials.append(rubber)
+    pad.vertex_groups.new(name="tactile").add(texels, 1.0, "REPLACE")
+
+    wide = (PAD_COLUMNS - 1) * pitch + 2 * margin
+    long = (PAD_ROWS - 1) * pitch + 2 * margin
+    height = PAD_HEIGHT - thickness + 1.0
+    base = studio.box(scene, f"{name} base", (wide + 5, long + 22, height), bevel=2.2)
+    base.location, base.parent = (0.0, 6.0, 0.5 * height - PAD_HEIGHT), pad
+    base.data.materials.append(black)
+    for side in (-1, 1):
+        head = studio.cylinder(scene, f"{name} screw", 1.9, 1.4, bevel=0.3)
+        head.location = (side * (wide / 2 - 3.2), long / 2 + 11, height - PAD_HEIGHT + 0.4)
+        head.parent = pad
+        head.data.materials.append(screw)
+    return pad
+
+
+def _slide(ball, pad) -> None:
+    """Keyframe the ball: down, hold, along the rows while it turns against the slide, ease off, away.
+
+    One turn of the ball draws ten centimetres of steel over the texels while it travels along the pad. The bristles of the
+    paper's pad are soft (``sigma0`` = 1 N/m): a texel under 0.1 N holds on for ``mus · fn / sigma0`` ≈ 4 cm before it slips.
+    """
+    ball.rotation_mode = "XYZ"
+    up = PAD_HEIGHT + BALL_RADIUS
+    direction = pad.matrix_basis.to_3x3().col[1] if pad.parent is None else pad.matrix_world.to_3x3().col[1]
+    for frame, along, depth, turn in (
+        (1, -7.0, -5.0, 0.0),
+        (14, -7.0, PRESS_DEPTH, 0.0),
+        (20, -7.0, PRESS_DEPTH, 0.0),
+        (62, 4.0, PRESS_DEPTH, 250.0),
+        (88, 7.0, PRESS_DEPTH, 620.0),
+        (96, 8.5, -0.2, 680.0),
+        (108, 8.5, -9.0, 690.0),
+    ):
+        ball.location = (pad.location.x + along * direction.x, pad.location.y + along * direction.y, up - depth)
+        ball.rotation_euler = (math.radians(turn), 0.0, pad.rotation_euler.z)
+        ball.keyframe_insert("location", frame=frame)
+        ball.keyframe_insert("rotation_euler", frame=frame)
+
+
+def _author(scene, pad_a, pad_b, ball, cube) -> None:
+    """Say what is a sensor and what presses on it, as the panel in the Physics tab would."""
+    for pad in (pad_a, pad_b):
+        pad.palpate.role = "SENSOR"
+        pad.palpate.region = "GROUP"
+        pad.palpate.vertex_group = "tactile"
+    pad_b.palpate.k, pad_b.palpate.cn = 1000.0, 10.0
+    for target in (ball, cube):
+        target.palpate.role = "TARGET"
+    cube.palpate.body = "FREE"
+    cube.palpate.mass = CUBE_MASS
+    settings = scene.palpate
+    settings.color_map = "MAGMA"
+    settings.use_auto_range, settings.range_max = False, RANGE  # one scale for both pads
+
+
+def _light(scene, paper) -> None:
+    """Put up the studio: backdrop, three soft lamps, and a camera."""
+    studio.backdrop(scene).data.materials.append(paper)
+    studio.world(scene)
+    aim = (0.0, 0.0, 20.0)
+    studio.area_lamp(scene, "Key", (-320, -260, 420), aim, 260, 1.3e6, (1.0, 0.97, 0.93))
+    studio.area_lamp(scene, "Fill", (420, -180, 260), aim, 320, 4.0e5, (0.9, 0.95, 1.0))
+    studio.area_lamp(scene, "Rim", (-260, 330, 260), aim, 200, 9.0e5)
+    camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
+    scene.collection.objects.link(camera)
+    scene.camera = camera
+    camera.data.lens, camera.data.clip_end = 70.0, 5000.0
+    camera.location = (60.0, -300.0, 190.0)
+    camera.rotation_euler = studio.look_at(camera.location, aim)
+
+
+def frame_picture(scene, size) -> None:
+    """Frame pads and objects for a picture of `size` pixels, with room for the tactile images on the right."""
+    scene.render.resolution_x, scene.render.resolution_y = size
+    names = (PAD_A, PAD_B, BALL, CUBE, f"{PAD_A} base", f"{PAD_B} base")
+    scene.frame_set(PICTURE_FRAME)
+    render.frame_camera(scene, render.corners([scene.objects[name] for name in names]), (0.05, 0.06, 0.78, 0.88))
+    scene.frame_set(scene.frame_start)

@@ -1,0 +1,279 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the sample scenes are photographed in: a curved backdrop, soft lamps, materials, and shapes as plain meshes.
+
+Lengths in this room are Blender units of the sample scenes, which are millimetres.
+"""
+
+from __future__ import annotations
+
+import math
+
+import bpy
+import numpy as np
+
+
+def prepare(scene, frame_end: int, fps: int = 24) -> None:
+    """Empty `scene` and set it to millimetres, `fps`, and colours that come out of the render as they went in."""
+    for obj in list(scene.objects):
+        bpy.data.objects.remove(obj)
+    for collection in list(scene.collection.children):
+        bpy.data.collections.remove(collection)
+    scene.unit_settings.system = "METRIC"
+    scene.unit_settings.scale_length = 0.001
+    scene.unit_settings.length_unit = "MILLIMETERS"
+    scene.frame_start, scene.frame_end = 1, frame_end
+    scene.render.fps, scene.render.fps_base = fps, 1.0
+    scene.render.engine = "CYCLES"
+    # Standard, not Blender's filmic default: a heat map must have the colours of its colour bar.
+    scene.view_settings.view_transform = "Standard"
+    scene.view_settings.look = "None"
+    cycles = scene.cycles
+    cycles.device, cycles.samples, cycles.use_denoising = "CPU", 32, True
+    cycles.use_adaptive_sampling, cycles.adaptive_threshold = True, 0.05
+    cycles.max_bounces, cycles.diffuse_bounces, cycles.glossy_bounces = 5, 1, 3
+    cycles.transmission_bounces, cycles.transparent_max_bounces = 0, 12
+    cycles.caustics_reflective = cycles.caustics_refractive = False
+
+
+def mesh_object(scene, name: str, vertices, faces, smooth: bool = True):
+    """Return a new object of `scene` made of plain arrays."""
+    mesh = bpy.data.meshes.new(name)
+    mesh.from_pydata([tuple(map(float, v)) for v in vertices], [], [tuple(map(int, f)) for f in faces])
+    mesh.validate()
+    mesh.polygons.foreach_set("use_smooth", [smooth] * len(mesh.polygons))
+    mesh.update()
+    obj = bpy.data.objects.new(name, mesh)
+    scene.collection.objects.link(obj)
+    return obj
+
+
+def box(scene, name: str, size, bevel: float, flat_bottom: bool = False):
+    """Return a box of full `size` centred on its origin, with rounded edges; `flat_bottom` keeps the lower ones sharp."""
+    x, y, z = (s / 2 for s in size)
+    vertices = [(i, j, k) for i in (-x, x) for j in (-y, y) for k in (-z, z)]
+    faces = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+    obj = mesh_object(scene, name, vertices, faces)
+    modifier = obj.modifiers.new("Bevel", "BEVEL")
+    modifier.width, modifier.segments, modifier.harden_normals = bevel, 4, True
+    if flat_bottom:
+        modifier.limit_method = "WEIGHT"
+        weight = obj.data.attributes.new("bevel_weight_edge", "FLOAT", "EDGE")
+        for edge in obj.data.edges:
+            weight.data[edge.index].value = float(max(obj.data.vertices[v].co.z for v in edge.vertices) > 0)
+    return obj
+
+
+def cylinder(scene, name: str, radius: float, height: float, location=(0.0, 0.0, 0.0), bevel: float = 0.0):
+    """Return an upright cylinder centred on its origin."""
+    n = 48
+    angle = np.arange(n) * 2 * math.pi / n
+    ring = np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=1)
+    vertices = [(*p, -height / 2) for p in ring] + [(*p, height / 2) for p in ring]
+    faces = [(i, (i + 1) % n, n + (i + 1) % n, n + i) for i in range(n)]
+    faces += [tuple(range(n - 1, -1, -1)), tuple(range(n, 2 * n))]
+    obj = mesh_object(scene, name, vertices, faces)
+    obj.location = location
+    modifier = obj.modifiers.new("Bevel", "BEVEL")
+    modifier.width, modifier.segments, modifier.limit_method = max(bevel, 0.05), 3, "ANGLE"
+    modifier.harden_normals = True
+    return obj
+
+
+def ball(scene, name: str, radius: float):
+    """Return a sphere: a cube that modifiers subdivide and push onto the sphere exactly, so the file stays small."""
+    x = radius / math.sqrt(3)
+    vertices = [(i, j, k) for i in (-x, x) for j in (-x, x) for k in (-x, x)]
+    faces = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+    obj = mesh_object(scene, name, vertices, faces)
+    divide = obj.modifiers.new("Subdivide", "SUBSURF")
+    divide.levels = divide.render_levels = 6
+    cast = obj.modifiers.new("To Sphere", "CAST")
+    cast.cast_type, cast.factor, cast.use_radius_as_size, cast.size = "SPHERE", 1.0, False, radius
+    return obj
+
+
+def pad_mesh(rows: int, columns: int, pitch: float, margin: float, thickness: float, rounding: float = 1.5):
+    """Return (vertices, faces, texel vertex indices) of a pad with a flat grid of texels on its rounded top.
+
+    The grid is centred on the origin in z = 0, rows along +y, columns along +x. Around it comes a flat rim, so that every
+    texel's normal points straight up, then a rounded edge and the sides.
+    """
+    x = (np.arange(columns) - (columns - 1) / 2) * pitch
+    y = (np.arange(rows) - (rows - 1) / 2) * pitch
+    steps = 5
+    turn = np.linspace(0, math.pi / 2, steps + 1)
+    out = np.concatenate([[margin * 0.5], margin - rounding + rounding * np.sin(turn), [margin]])
+    down = np.concatenate([[0.0], rounding * (1 - np.cos(turn)), [thickness]])
+    n = len(out)
+    # Index space: `n` rings around the grid; vertex (i, j) sits on the ring that is farther out of its two.
+    vertices, index = [], {}
+    for j in range(-n, rows + n):
+        for i in range(-n, columns + n):
+            ring_x, ring_y = max(-i, i - columns + 1, 0), max(-j, j - rows + 1, 0)
+            ring = max(ring_x, ring_y)
+            corner = ring_x > 0 and ring_y > 0
+            if corner and ring_x != ring_y:
+                continue
+            along = out[ring - 1] if ring else 0.0
+            # A corner lies on a circle around the grid's corner texel, which rounds it in plan view.
+            reach = along * (0.78 if corner else 1.0)
+            cx, cy = min(max(i, 0), columns - 1), min(max(j, 0), rows - 1)
+            sx, sy = np.sign(i - cx), np.sign(j - cy)
+            index[i, j] = len(vertices)
+            vertices.append((x[cx] + sx * reach, y[cy] + sy * reach, -(down[ring - 1] if ring else 0.0)))
+    faces = []
+    for j in range(rows - 1):
+        for i in range(columns - 1):
+            faces.append((index[i, j], index[i + 1, j], index[i + 1, j + 1], index[i, j + 1]))
+    for ring in range(n):
+        loop_in, loop_out = _ring(rows, columns, ring), _ring(rows, columns, ring + 1)
+        faces += _bridge([index[c] for c in loop_in], [index[c] for c in loop_out], loop_in, loop_out)
+    bottom = [index[c] for c in _ring(rows, columns, n)]
+    faces.append(tuple(reversed(bottom)))
+    texels = [index[i, j] for j in range(rows) for i in range(columns)]
+    return np.array(vertices), faces, texels
+
+
+def _ring(rows: int, columns: int, ring: int) -> list[tuple[int, int]]:
+    """Grid cells of the ring number `ring` around the grid, counter-clockwise; ring 0 is the grid's own border."""
+    low, right, top = -ring, columns - 1 + ring, rows - 1 + ring
+    x, y = range(columns), range(rows)
+    lower = [(i, low) for i in x]
+    upper = [(i, top) for i in reversed(x)]
+    east = [(right, j) for j in y]
+    west = [(low, j) for j in reversed(y)]
+    if ring == 0:
+        return lower[:-1] + east[:-1] + upper[:-1] + west[:-1]
+    return [*lower, (right, low), *east, (right, top), *upper, (low, top), *west, (low, low)]
+
+
+def _bridge(inner: list[int], outer: list[int], cells_in, cells_out) -> list[tuple[int, ...]]:
+    """Faces between two rings; where the outer ring has a corner of its own and the inner has not, two quads meet there."""
+    if len(inner) == len(outer):
+        return [(inner[i - 1], outer[i - 1], outer[i], inner[i]) for i in range(len(inner))]
+    # The first ring outside the grid: each of its cells hangs on the nearest cell of the border.
+    x_max, y_max = max(c[0] for c in cells_in), max(c[1] for c in cells_in)
+    at = dict(zip(cells_in, inner, strict=True))
+    near = [at[min(max(i, 0), x_max), min(max(j, 0), y_max)] for i, j in cells_out]
+    faces = []
+    for i in range(len(outer)):
+        a, b = near[i - 1], near[i]
+        faces.append((a, outer[i - 1], outer[i]) if a == b else (a, outer[i - 1], outer[i], b))
+    return faces
+
+
+def material(name: str, color, metallic: float = 0.0, roughness: float = 0.5, **inputs):
+    """Return a Principled material; further inputs by their socket's name with underscores."""
+    made = bpy.data.materials.new(name)
+    made.use_nodes = True
+    shader = made.node_tree.nodes["Principled BSDF"]
+    shader.inputs["Base Color"].default_value = (*color, 1.0)
+    shader.inputs["Metallic"].default_value = metallic
+    shader.inputs["Roughness"].default_value = roughness
+    for key, value in inputs.items():
+        shader.inputs[key.replace("_", " ")].default_value = value
+    made.diffuse_color = (*color, 1.0)
+    made.metallic, made.roughness = metallic, roughness
+    return made
+
+
+STEEL = (0.62, 0.64, 0.67)
+
+
+def ghost_steel(name: str, clear: float, edge: float = 1.0, groove: float = 0.0):
+    """Return polished steel that one can look through.
+
+    The tactile image lies under the object that makes it, so an opaque object would hide exactly what the picture is about.
+    `clear` is how much passes face on, and `edge` how solid the object is at grazing angles. `groove` draws dark lines of that
+    half-width in the planes x = 0 and y = 0, so that one sees a ball turn.
+    """
+    made = material(name, STEEL, metallic=1.0, roughness=0.16)
+    nodes, links = made.node_tree.nodes, made.node_tree.links
+    shader, output = nodes["Principled BSDF"], nodes["Material Output"]
+    facing = nodes.new("ShaderNodeLayerWeight")
+    facing.inputs["Blend"].default_value = 0.35
+    solid = nodes.new("ShaderNodeMapRange")  # facing 0 (face on) → mostly clear; 1 (grazing) → solid
+    solid.inputs["From Min"].default_value, solid.inputs["From Max"].default_value = 0.0, 0.8
+    solid.inputs["To Min"].default_value, solid.inputs["To Max"].default_value = 1.0 - clear, edge
+    links.new(facing.outputs["Facing"], solid.inputs["Value"])
+    opacity = solid.outputs["Result"]
+    if groove > 0:
+        coordinates = nodes.new("ShaderNodeTexCoord")
+        split = nodes.new("ShaderNodeSeparateXYZ")
+        links.new(coordinates.outputs["Object"], split.inputs["Vector"])
+        lines = []
+        for axis in ("X", "Y"):
+            size = nodes.new("ShaderNodeMath")
+            size.operation = "ABSOLUTE"
+            links.new(split.outputs[axis], size.inputs[0])
+            inside = nodes.new("ShaderNodeMath")
+            inside.operation = "LESS_THAN"
+            inside.inputs[1].default_value = groove
+            links.new(size.outputs[0], inside.inputs[0])
+            lines.append(inside.outputs[0])
+        either = nodes.new("ShaderNodeMath")
+        either.operation = "MAXIMUM"
+        links.new(lines[0], either.inputs[0])
+        links.new(lines[1], either.inputs[1])
+        dark = nodes.new("ShaderNodeMix")
+        dark.data_type = "RGBA"
+        links.new(either.outputs[0], dark.inputs["Factor"])
+        a, b = [s for s in dark.inputs if s.type == "RGBA"]
+        a.default_value, b.default_value = (*STEEL, 1.0), (0.03, 0.03, 0.035, 1.0)
+        links.new(next(s for s in dark.outputs if s.type == "RGBA"), shader.inputs["Base Color"])
+    # The far side of the object would cover the pad a second time: only the near one is drawn.
+    geometry = nodes.new("ShaderNodeNewGeometry")
+    front = nodes.new("ShaderNodeMath")
+    front.operation = "SUBTRACT"
+    front.inputs[0].default_value = 1.0
+    links.new(geometry.outputs["Backfacing"], front.inputs[1])
+    visible = nodes.new("ShaderNodeMath")
+    visible.operation = "MULTIPLY"
+    links.new(opacity, visible.inputs[0])
+    links.new(front.outputs[0], visible.inputs[1])
+    clear_shader = nodes.new("ShaderNodeBsdfTransparent")
+    mix = nodes.new("ShaderNodeMixShader")
+    links.new(visible.outputs[0], mix.inputs[0])
+    links.new(clear_shader.outputs[0], mix.inputs[1])
+    links.new(shader.outputs[0], mix.inputs[2])
+    links.new(mix.outputs[0], output.inputs["Surface"])
+    return made
+
+
+def backdrop(scene, width: float = 4000.0, front: float = -1500.0, back: float = 350.0, height: float = 1500.0):
+    """Return a floor that bends up into a wall behind the scene, as photographers use it."""
+    radius = 400.0
+    turn = np.linspace(0, math.pi / 2, 24)
+    profile = [(front, 0.0), *((back + radius * math.sin(a), radius * (1 - math.cos(a))) for a in turn)]
+    profile.append((back + radius, height))
+    vertices = [(x, y, z) for y, z in profile for x in (-width / 2, width / 2)]
+    faces = [(2 * i, 2 * i + 1, 2 * i + 3, 2 * i + 2) for i in range(len(profile) - 1)]
+    return mesh_object(scene, "Backdrop", vertices, faces)
+
+
+def area_lamp(scene, name: str, location, target, size: float, power: float, color=(1.0, 1.0, 1.0)):
+    """Return a square area lamp at `location` that looks at `target`; power in Blender's W at this scene's size."""
+    lamp = bpy.data.lights.new(name, "AREA")
+    lamp.shape, lamp.size, lamp.energy, lamp.color = "SQUARE", size, power, color
+    obj = bpy.data.objects.new(name, lamp)
+    scene.collection.objects.link(obj)
+    obj.location = location
+    obj.rotation_euler = look_at(location, target)
+    return obj
+
+
+def look_at(location, target):
+    """Return the Euler angles of a lamp or camera at `location` that looks at `target`, upright."""
+    from mathutils import Vector
+
+    return (Vector(target) - Vector(location)).to_track_quat("-Z", "Y").to_euler()
+
+
+def world(scene, color=(0.9, 0.92, 1.0), strength: float = 0.35) -> None:
+    """Give `scene` an even, faint light from all around."""
+    made = bpy.data.worlds.new("Studio")
+    made.use_nodes = True
+    background = made.node_tree.nodes["Background"]
+    background.inputs["Color"].default_value = (*color, 1.0)
+    background.inputs["Strength"].default_value = strength
+    scene.world = made
