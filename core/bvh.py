@@ -281,7 +281,8 @@ def find_near(ox, oy, oz, dx, dy, dz, mesh, skin, near, slot, tree):
         How many there are; -1 when there is no room for them.
     """
     axis, shear_x, shear_y = _line_of_sight(dx, dy, dz)
-    aside = skin * math.sqrt(1.0 + shear_x * shear_x + shear_y * shear_y)
+    # The last term is the rounding of what follows, which must not leave out a triangle that is only just met.
+    aside = skin * math.sqrt(1.0 + shear_x * shear_x + shear_y * shear_y) + 1e-14 * (abs(ox) + abs(oy) + abs(oz))
     x0, x1 = min(ox, ox + dx) - skin, max(ox, ox + dx) + skin
     y0, y1 = min(oy, oy + dy) - skin, max(oy, oy + dy) + skin
     z0, z1 = min(oz, oz + dz) - skin, max(oz, oz + dz) + skin
@@ -297,13 +298,17 @@ def find_near(ox, oy, oz, dx, dy, dz, mesh, skin, near, slot, tree):
             continue
         for i in range(tree.first[node], tree.first[node] + tree.number[node]):
             # Seen along the segment, the triangle must come within the skin of the origin.
-            low_x, high_x, low_y, high_y = np.inf, -np.inf, np.inf, -np.inf
-            for j in range(0, 9, 3):
-                px, py = _seen_along(
-                    tree.faces[i, j] - ox, tree.faces[i, j + 1] - oy, tree.faces[i, j + 2] - oz, axis, shear_x, shear_y
-                )
-                low_x, high_x, low_y, high_y = min(low_x, px), max(high_x, px), min(low_y, py), max(high_y, py)
-            if low_x <= aside and high_x >= -aside and low_y <= aside and high_y >= -aside:
+            f = tree.faces
+            ax, ay = _seen_along(f[i, 0] - ox, f[i, 1] - oy, f[i, 2] - oz, axis, shear_x, shear_y)
+            bx, by = _seen_along(f[i, 3] - ox, f[i, 4] - oy, f[i, 5] - oz, axis, shear_x, shear_y)
+            cx, cy = _seen_along(f[i, 6] - ox, f[i, 7] - oy, f[i, 8] - oz, axis, shear_x, shear_y)
+            beside = min(ax, bx, cx) > aside or max(ax, bx, cx) < -aside or min(ay, by, cy) > aside or max(ay, by, cy) < -aside
+            u, v, w = ax * by - ay * bx, bx * cy - by * cx, cx * ay - cy * ax
+            side = 1.0 if u + v + w > 0.0 else -1.0
+            beside = beside or side * u < -aside * math.hypot(bx - ax, by - ay)
+            beside = beside or side * v < -aside * math.hypot(cx - bx, cy - by)
+            beside = beside or side * w < -aside * math.hypot(ax - cx, ay - cy)
+            if not beside:
                 if number == near.shape[1]:
                     return -1
                 near[slot, number] = i

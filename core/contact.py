@@ -130,7 +130,10 @@ def bristle_step(speed_squared, normal_force, dt, parameters):
     g = normal_force * stribeck(speed_squared, parameters)
     if g <= 0.0:  # frictionless: nothing holds the bristles
         return 0.0, 0.0
-    x = parameters[SIGMA0] * math.sqrt(speed_squared) / g * dt
+    pace = parameters[SIGMA0] * dt
+    if pace * pace * speed_squared < 1e-33 * g * g:  # 1 - x is 1 to the last bit; at rest this saves root and division
+        return 1.0, dt
+    x = pace * math.sqrt(speed_squared) / g
     if x < 1e-12:
         return 1.0 - x, dt
     keep = math.exp(-x)

@@ -156,6 +156,24 @@ def _relative_motion(a, b, twist, position, rotation, motion):
 
 
 @kernel
+def _values(motion):
+    """The twelve numbers of a motion as a tuple: the compiler keeps them in registers, which it may not do with an array's."""
+    return (
+        motion[0], motion[1], motion[2], motion[3], motion[4], motion[5],
+        motion[6], motion[7], motion[8], motion[9], motion[10], motion[11],
+    )  # fmt: skip
+
+
+@kernel
+def _law(parameters, sensor):
+    """A sensor's parameters as a tuple, for the same reason."""
+    return (
+        parameters[sensor, 0], parameters[sensor, 1], parameters[sensor, 2], parameters[sensor, 3],
+        parameters[sensor, 4], parameters[sensor, 5], parameters[sensor, 6], parameters[sensor, 7],
+    )  # fmt: skip
+
+
+@kernel
 def _velocity(rows, r, motion):
     """Velocity of the target at a contact point relative to the sensor, in the axes of the sensor's body."""
     px, py, pz = rows[r, PX], rows[r, PY], rows[r, PZ]
@@ -216,7 +234,7 @@ def _solve_velocities(dt, world, state, scratch):
             if start < stop:
                 _relative_motion(a, b, scratch.twist, state.position, scratch.rotation, scratch.motion)
                 _relative_motion(a, b, scratch.known, state.position, scratch.rotation, scratch.part)
-                _sum_contacts(start, stop, dt, world.parameters[world.pairs[pair, 0]], scratch)
+                _sum_contacts(start, stop, dt, _law(world.parameters, world.pairs[pair, 0]), scratch)
                 if free_at[a] >= 0 or free_at[b] >= 0:
                     _add_pair(a, b, dt, world, state, scratch)
             start = stop
@@ -251,7 +269,8 @@ def _sum_contacts(start, stop, dt, p, scratch):
     With a contact's damping tensor ``C = ct 1 + (cn - ct) n nᵀ`` and velocities ``v + ω × p`` the block is the sum of
     ``Jᵀ C J``, its lower triangle; the wrench is what the springs and the known part of the motion do.
     """
-    rows, motion, part, block, wrench = scratch.rows, scratch.motion, scratch.part, scratch.block, scratch.wrench
+    rows, block, wrench = scratch.rows, scratch.block, scratch.wrench
+    motion, part = _values(scratch.motion), _values(scratch.part)
     a00, a10, a11, a20, a21, a22 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     b00, b01, b02, b10, b11, b12, b20, b21, b22 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     c00, c10, c11, c20, c21, c22 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
@@ -365,8 +384,9 @@ def _store_bristles(dt, world, state, scratch):
             a, b = world.sensor_body[world.pairs[pair, 0]], world.target_body[world.pairs[pair, 1]]
             _relative_motion(a, b, scratch.twist, state.position, scratch.rotation, motion)
             _seen_at_the_end(a, dt, scratch.twist, scratch.rotation, motion, seen)
+        values = _values(seen)
         for r in range(start, stop):
-            vx, vy, vz = _velocity(rows, r, seen)
+            vx, vy, vz = _velocity(rows, r, values)
             out = vx * rows[r, NX] + vy * rows[r, NY] + vz * rows[r, NZ]
             zx = rows[r, KEEP] * rows[r, ZX] + rows[r, GAIN] * (vx - out * rows[r, NX])
             zy = rows[r, KEEP] * rows[r, ZY] + rows[r, GAIN] * (vy - out * rows[r, NY])
@@ -473,7 +493,7 @@ def feel(world, state, scratch, force, shear, depth, slip, contact, net, moment)
     for pair in range(len(world.pairs)):
         sensor = world.pairs[pair, 0]
         a, b = world.sensor_body[sensor], world.target_body[world.pairs[pair, 1]]
-        p = world.parameters[sensor]
+        p = _law(world.parameters, sensor)
         _relative_motion(a, b, scratch.twist, state.position, scratch.rotation, scratch.motion)
         for r in range(start, scratch.pair_stop[pair]):
             texel = world.texel_start[sensor] + scratch.slots[r] - world.slot_start[pair]
