@@ -34,8 +34,8 @@ def bake(scene) -> Generator[Progress, None, Baked]:
     Raises
     ------
     PalpateError
-        Before anything is touched when the scene or the bake folder is not fit; later when the folder fills up or an object that
-        takes part is deleted.
+        Before anything is touched when the scene or the bake folder is not fit; later when the folder fills up or an
+        object that takes part is deleted.
     """
     with state.suspended():
         try:
@@ -79,6 +79,7 @@ def _bake(scene, name: str) -> Generator[Progress, None, Baked]:
         files.discard()
         raise
     write.commit(scene, scenario, binding, recording, files.folders)
+    scene.frame_set(scene.frame_current, subframe=scene.frame_subframe)  # the new keyframes show
     live.baked(recording, files.folders)
     return Baked(recording, scenario, files.folders)
 

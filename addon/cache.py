@@ -102,12 +102,13 @@ def begin(scene, depsgraph) -> Run:
     return run
 
 
-def go_on(scene, depsgraph, run: Run) -> None:
+def go_on(scene, depsgraph, run: Run) -> Run:
     """Compute the frame where the scene stands, which is the one after the last computed."""
     frame = scene.frame_current
     run.poses[frame], run.parents[frame] = sample.sample_poses(scene, depsgraph, run.binding)
     run.simulation.extend(run.poses[frame])
     run.frames[frame] = run.simulation.advance()
+    return run
 
 
 def is_stale(scene, depsgraph, run: Run) -> bool:
@@ -143,7 +144,7 @@ def has_moved(scene, depsgraph, run: Run) -> bool:
 def _settings(scene, objects) -> tuple:
     """Return everything that is set by a number or a choice, in a form that can be compared."""
     own = scene.palpate
-    hidden = [warning for warning in sample.participants(scene)[1]]
+    taking_part, hidden = sample.participants(scene)
     whole = (
         scene.frame_start,
         units.frames_per_second(scene),
@@ -151,7 +152,7 @@ def _settings(scene, objects) -> tuple:
         tuple(units.gravity(scene)),
         own.use_auto_dt or own.dt,
         tuple(hidden),
-        len(objects),
+        tuple(obj.name for obj in taking_part),
     )
     return whole + tuple(
         (obj.name, *(getattr(obj.palpate, key) for key in SETTINGS), *obj.palpate.velocity, *obj.palpate.angular_velocity)

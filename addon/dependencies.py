@@ -42,8 +42,8 @@ def debug_info() -> str:
 def prepare_numba() -> None:
     """Let numba keep what it compiles in the extension's user folder.
 
-    Beside the source, where it would write by itself, an upgrade wipes it and a system-wide installation forbids it. Only before
-    numba is imported has this an effect; a folder that the user has chosen is kept.
+    Beside the source, where it would write by itself, an upgrade wipes it and a system-wide installation forbids it.
+    Only before numba is imported has this an effect; a folder that the user has chosen is kept.
     """
     if "NUMBA_CACHE_DIR" in os.environ or "numba" in sys.modules:
         return

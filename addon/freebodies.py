@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Free bodies: where they started, putting them where the solver says, and the keyframes of a bake.
 
-While a body is displaced by playing, or baked, its own location and rotation at the first frame are kept in its properties, so that
-it can be put back exactly.
+While a body is displaced by playing, or baked, its own location and rotation at the first frame are kept in its
+properties, so that it can be put back exactly.
 """
 
 from __future__ import annotations
@@ -55,7 +55,8 @@ def restore(obj) -> None:
     """Put a body back to where it started, to the last bit, and forget that it was elsewhere."""
     if obj.palpate.has_start:
         _set_channels(obj, np.array(obj.palpate.start_channels))
-        obj.palpate.has_start = False
+        for name in ("has_start", "start_matrix", "start_channels"):
+            obj.palpate.property_unset(name)
 
 
 def channels(obj) -> np.ndarray:

@@ -10,6 +10,8 @@ from . import materials
 
 OLD_MATERIAL = ".palpate_old_material"
 """Face attribute: material index before the heat map; −1 on faces that were not touched."""
+EMPTY_SLOT = "palpate_empty_slot"
+"""Custom property of a mesh that had no material slot."""
 MODIFIER = "Palpate Heat Map"
 
 
@@ -111,6 +113,7 @@ def _assign(obj, texels: Texels, material) -> None:
     if old is None:
         if not len(mesh.materials):
             mesh.materials.append(None)  # the faces outside keep the look of an object without material
+            mesh[EMPTY_SLOT] = 1
         mesh.materials.append(None)
         slot = len(mesh.materials) - 1
         old = mesh.attributes.new(OLD_MATERIAL, "INT", "FACE")
@@ -148,10 +151,15 @@ def _unassign(obj) -> None:
     mesh.polygons.foreach_get("material_index", index)
     attribute.data.foreach_get("value", old)
     mesh.attributes.remove(attribute)
-    mesh.polygons.foreach_set("material_index", np.where(old >= 0, old, index).astype(np.int32))
-    mesh.materials.pop(index=slot)
-    if slot == 1 and mesh.materials[0] is None:  # the slot that stood for "no material"
-        mesh.materials.pop(index=0)
+    index = np.where(old >= 0, old, index).astype(np.int32)
+    mesh.polygons.foreach_set("material_index", index)
+    if not index.any():  # no attribute says the same as zeros everywhere
+        mesh.attributes.remove(mesh.attributes["material_index"])
+    if EMPTY_SLOT in mesh:
+        mesh.materials.clear()
+        del mesh[EMPTY_SLOT]
+    else:
+        mesh.materials.pop(index=slot)
     mesh.update()
 
 

@@ -23,6 +23,8 @@ class Status:
 
 
 _status: dict[int, Status] = {}
+_refused: dict[int, str] = {}
+"""Why the last attempt to compute failed, by scene."""
 _recordings: dict[Path, Recording | None] = {}
 """Recordings of bakes that were read for the panel, by folder."""
 
@@ -37,6 +39,7 @@ def forget() -> None:
     cache.clear()
     overlays.clear()
     _status.clear()
+    _refused.clear()
     _recordings.clear()
 
 
@@ -81,20 +84,27 @@ def on_frame(scene, depsgraph) -> None:
         return
     frame, run = scene.frame_current, cache.get(scene)
     rendering = state.session.rendering
-    if run is not None and not rendering and (cache.is_stale(scene, depsgraph, run) or _elsewhere(scene, depsgraph, run)):
-        cache.drop(scene)
-        overlays.clear(scene)
-        run = None
-        _say(scene, "Changed: go to the first frame and play to compute again.")
-    if frame == scene.frame_start and run is None and not rendering:
-        run = _begin(scene, depsgraph)
-    elif run is not None and frame == run.simulation.frame + 1 and not rendering:
-        _attempt(scene, lambda: cache.go_on(scene, depsgraph, run))
+    if not rendering:
+        if run is not None and (cache.is_stale(scene, depsgraph, run) or _elsewhere(scene, depsgraph, run)):
+            cache.drop(scene)
+            run = None
+        if run is None and frame == scene.frame_start:
+            run = _begin(scene, depsgraph)
+        elif run is not None and frame == run.simulation.frame + 1:
+            run = _attempt(scene, lambda: cache.go_on(scene, depsgraph, run))
     if run is not None and frame in run.frames:
         show(scene, run)
-    elif run is not None:
+    else:
         overlays.clear(scene)
-        _say(scene, f"Frame {frame} is not computed: play from frame {run.simulation.frame}.")
+        _say(scene, _not_computed(scene, run))
+
+
+def _not_computed(scene, run) -> str:
+    frame = scene.frame_current
+    if run is not None:
+        return f"Frame {frame} is not computed: play from frame {run.simulation.frame}."
+    reason = _refused.get(scene.session_uid)
+    return reason or f"Frame {frame} is not computed: go to the first frame and play."
 
 
 def _is_on(scene) -> bool:
@@ -115,14 +125,15 @@ def _begin(scene, depsgraph):
 
 
 def _attempt(scene, work):
-    """Do it, or say in the panel why it cannot be done: a sentence at every frame would be in the way."""
+    """Do it, or keep for the panel why it cannot be done: a report at every frame would be in the way."""
     try:
-        return work()
+        result = work()
     except PalpateError as error:
         cache.drop(scene)
-        overlays.clear(scene)
-        _say(scene, str(error))
+        _refused[scene.session_uid] = str(error)
         return None
+    _refused.pop(scene.session_uid, None)
+    return result
 
 
 def _say(scene, text: str, frame: Frame | None = None) -> None:
@@ -226,3 +237,4 @@ def reset(scene) -> None:
     cache.drop(scene)
     overlays.clear(scene)
     _status.pop(scene.session_uid, None)
+    _refused.pop(scene.session_uid, None)

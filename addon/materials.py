@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The heat-map material: normal force from the baked images, coloured. It needs Blender's own nodes only, and plays without Palpate.
+"""The heat-map material: normal force from the baked images, coloured. Made of Blender's own nodes, so it plays without us.
 
-Where a texture map of the region is in one piece, an image texture shows the EXR sequence pixel by pixel. On a region that had to be
-cut up (a whole sphere) no texture map of shared corners exists; there geometry nodes look the image up once per texel and hand
-the force to the material as an attribute.
+Where a texture map of the region is in one piece, an image texture shows the EXR sequence pixel by pixel. On a region that
+had to be cut up (a whole sphere) no texture map of shared corners exists; there geometry nodes look the image up once per
+texel and hand the force to the material as an attribute.
 """
 
 from __future__ import annotations

@@ -75,7 +75,8 @@ def target_arrays(obj, depsgraph) -> Arrays:
 def sensor_arrays(obj, depsgraph) -> tuple[Arrays, list[str]]:
     """Return what a sensor is made of: its own vertices, where the modifiers put them.
 
-    Texels stand on vertices that the user can select and paint, so a modifier that makes other vertices is left out, with a warning.
+    Texels stand on vertices that the user can select and paint, so modifiers that make other vertices are left out, with a
+    warning.
     """
     if obj.type != "MESH":
         raise SensorError(f"'{obj.name}' is no mesh: convert it with Object › Convert › Mesh before it becomes a sensor.")

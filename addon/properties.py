@@ -134,7 +134,7 @@ class PALPATE_PG_object(bpy.types.PropertyGroup):
         name="Spin (rad/s)", description="Of a free body at the first frame, rad/s, world axes", size=3, precision=4, **_fixed
     )
 
-    # Bookkeeping of a free body that was moved, and of a bake. Saved, because the file has to be put right after it is reopened.
+    # Bookkeeping of a free body that was moved, and of a bake. Saved, so that a reopened file can be put right.
     has_start: BoolProperty(options={"HIDDEN"})
     start_matrix: FloatVectorProperty(size=16, options={"HIDDEN"})
     start_channels: FloatVectorProperty(size=14, options={"HIDDEN"})

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A scene becomes a :class:`Scenario`: the only place that reads meshes and poses out of Blender.
 
-Who takes part: every object of the scene with a role that the view layer shows. Hidden and disabled objects are left out, with a
-warning; instances of collections never take part.
+Who takes part: every object of the scene with a role that the view layer shows. Hidden and disabled objects are left out,
+with a warning; instances of collections never take part.
 
-Each object is a body of its own. Its frame has the location and rotation of the object; scale and shear go into the vertices. The
-shape of a mesh is that of the first frame. Keyframed bodies are sampled at every frame.
+Each object is a body of its own. Its frame has the location and rotation of the object; scale and shear go into the
+vertices. The shape of a mesh is that of the first frame. Keyframed bodies are sampled at every frame.
 """
 
 from __future__ import annotations

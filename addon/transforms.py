@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Blender's matrices and the solver's poses.
 
-A body's frame has the location and rotation of its object; what else is in the matrix, scale and shear, is its *stretch* and goes
-into the vertices: ``matrix = translation · rotation · stretch``.
+A body's frame has the location and rotation of its object; what else is in the matrix, scale and shear, is its *stretch*
+and goes into the vertices: ``matrix = translation · rotation · stretch``.
 """
 
 from __future__ import annotations

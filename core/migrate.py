@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Settings saved by an older Palpate become today's: plain dictionary in, plain dictionary out.
 
-Each step in :data:`STEPS` brings the settings of one kind from its version to the next. A saved version of 0 means that nothing was
-ever set. Settings of a newer Palpate are not touched.
+Each step in :data:`STEPS` brings the settings of one kind from its version to the next. A saved version of 0 means that
+nothing was ever set. Settings of a newer Palpate are not touched.
 """
 
 from __future__ import annotations

@@ -79,8 +79,9 @@ KINDS = ("objects", "meshes", "materials", "images", "actions", "node_groups", "
 
 
 def settings(group, uids=True) -> str:
-    names = [key for key in group.bl_rna.properties.keys() if key not in ("rna_type", "name") and (uids or key != "uid")]
-    return str({key: _plain(getattr(group, key)) for key in names})
+    names = [item.identifier for item in group.bl_rna.properties]
+    names = [name for name in names if name not in ("rna_type", "name") and (uids or name != "uid")]
+    return str({name: _plain(getattr(group, name)) for name in names})
 
 
 def _plain(value):
@@ -92,7 +93,7 @@ def _object(obj, uids) -> dict[str, str]:
         "matrix": str([tuple(row) for row in obj.matrix_basis]),
         "channels": str((tuple(obj.location), tuple(obj.rotation_euler), tuple(obj.rotation_quaternion), tuple(obj.scale))),
         "settings": settings(obj.palpate, uids),
-        "custom": str({key: str(obj[key]) for key in obj.keys() if key != "palpate"}),
+        "custom": str({key: str(value) for key, value in obj.items() if key != "palpate"}),
         "groups": str([group.name for group in obj.vertex_groups]),
         "modifiers": str([modifier.name for modifier in obj.modifiers]),
         "slots": str([(slot.link, slot.material and slot.material.name) for slot in obj.material_slots]),

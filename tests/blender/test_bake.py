@@ -1,0 +1,289 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A bake: files, keyframes, arrows, heat maps; what is there before and after it, and that it can be repeated bit for bit."""
+
+import bpy
+import numpy as np
+import pytest
+from blender_scenes import changes, cube, dump, grid, press, press_and_drop, reopen, save
+
+from palpate.addon import arrows, curves, heatmap, jobs, live, materials, sample, transforms
+from palpate.addon.bake import bake
+from palpate.core.formats.archive import load_recording
+from palpate.core.formats.exr import read_exr
+from palpate.core.formats.files import read_manifest
+
+
+def baked(scene):
+    return jobs.run_blocking(bake(scene))
+
+
+def test_one_folder_per_sensor(tmp_path):
+    scene, *_ = press_and_drop(frames=4)
+    save(tmp_path)
+    result = baked(scene)
+    assert sorted(path.name for path in (tmp_path / "palpate").iterdir()) == ["Pad", "Pad 2"]
+    for name, folder in result.folders.items():
+        files = sorted(path.name for path in folder.iterdir())
+        assert files == ["manifest.json", "recording.npz", *(f"tactile_{frame:04d}.exr" for frame in range(1, 5))]
+        manifest = read_manifest(folder)
+        assert manifest.complete and manifest.sensor == name and manifest.digest == result.recording.digest
+        recording = load_recording(folder / "recording.npz")
+        assert list(recording.sensors) == [name]
+        channels, about = read_exr(folder / "tactile_0004.exr")
+        force = recording.sensors[name].normal_force[-1]
+        assert channels["R"] == pytest.approx(np.float32(force).reshape(14, 6)) and force.max() > 0
+        assert about["digest"] == manifest.digest
+
+
+def test_progress_reaches_its_end(tmp_path):
+    scene, *_ = press(frames=4)
+    save(tmp_path)
+    seen = []
+    jobs.run_blocking(bake(scene), seen.append)
+    assert [step.done for step in seen] == list(range(1, 9)) and {step.total for step in seen} == {8}
+    assert not live.is_baking()
+
+
+@pytest.mark.parametrize("mode", ["XYZ", "ZXY", "QUATERNION", "AXIS_ANGLE"])
+@pytest.mark.parametrize("parented", [False, True])
+def test_keyframes_put_free_bodies_where_the_solver_had_them(tmp_path, mode, parented):
+    scene, _, _, _, free = press_and_drop(frames=6)
+    free.palpate.angular_velocity = (2.0, -3.0, 9.0)
+    free.scale = (1.0, 1.5, 0.5)
+    free.rotation_mode = mode
+    free.rotation_quaternion = (0.9, 0.1, -0.3, 0.2)
+    free.rotation_axis_angle = (0.5, 0.0, 0.6, 0.8)
+    if parented:
+        bpy.ops.object.empty_add(location=(0.1, 0.0, 0.0), rotation=(0.0, 0.0, 0.5))
+        free.parent = bpy.context.object
+        bpy.context.object.keyframe_insert("rotation_euler", frame=1)
+        bpy.context.object.rotation_euler.x = 0.3
+        bpy.context.object.keyframe_insert("rotation_euler", frame=6)
+    save(tmp_path)
+    result = baked(scene)
+    index = result.recording.body_names.index("Cube")
+    for i, frame in enumerate(range(1, 7)):
+        scene.frame_set(frame)
+        location, quaternion, _ = transforms.split(transforms.array(free.matrix_world))
+        assert location == pytest.approx(result.recording.poses[i, index, :3], abs=2e-7)
+        turned = transforms.rotation(result.recording.poses[i, index, 3:])
+        assert transforms.rotation(quaternion) == pytest.approx(turned, abs=2e-6)
+    paths = curves.animated_paths(free)
+    rotation = {"QUATERNION": "rotation_quaternion", "AXIS_ANGLE": "rotation_axis_angle"}.get(mode, "rotation_euler")
+    assert paths == {"location", rotation}
+    assert {point.interpolation for curve in curves.of(free) for point in curve.keyframe_points} == {"LINEAR"}
+
+
+def test_the_arrow_is_the_reaction_at_the_centre_of_pressure(tmp_path):
+    scene, pad, *_ = press(frames=6)
+    pad.rotation_euler = (0.1, 0.2, 0.3)
+    scene.palpate.use_auto_arrow, scene.palpate.arrow_scale = False, 0.5
+    save(tmp_path)
+    result = baked(scene)
+    arrow = materials.find(scene.objects, pad.palpate.uid)
+    felt = result.recording.sensors["Pad"]
+    assert felt.contact.any(axis=1).tolist()[0] is False and felt.contact[-1].any()
+    for i, frame in enumerate(range(1, 7)):
+        scene.frame_set(frame)
+        size = np.linalg.norm(felt.net_force[i])
+        assert list(arrow.scale) == pytest.approx([0.5 * size] * 3, rel=1e-5)
+        if size > 0:
+            world = transforms.array(arrow.matrix_world)
+            rotation = transforms.rotation(result.recording.poses[i, 0, 3:])
+            assert world[:3, 2] / 0.5 == pytest.approx(-rotation @ felt.net_force[i], rel=1e-4, abs=1e-6)
+            foot = result.recording.poses[i, 0, :3] + rotation @ felt.centre_of_pressure[i]
+            assert world[:3, 3] == pytest.approx(foot, abs=1e-7)
+
+
+def test_the_heat_map_is_on_the_region_only(tmp_path):
+    scene, pad, _ = press(frames=4)
+    pad.data.materials.append(bpy.data.materials.new("Rubber"))
+    group = pad.vertex_groups.new(name="Tip")
+    group.add([0, 1, 2, 6, 7, 8], 1.0, "REPLACE")
+    pad.palpate.region, pad.palpate.vertex_group = "GROUP", "Tip"
+    save(tmp_path)
+    baked(scene)
+    faces = [face.index for face in pad.data.polygons if face.material_index == 1]
+    assert [sorted(pad.data.polygons[i].vertices) for i in faces] == [[0, 1, 6, 7], [1, 2, 7, 8]]
+    assert pad.material_slots[1].material.name == "Palpate Pad"
+    image = next(node.image for node in pad.material_slots[1].material.node_tree.nodes if node.type == "TEX_IMAGE")
+    assert image.filepath == "//palpate/Pad/tactile_0001.exr"
+    assert (image.source, image.colorspace_settings.name) == ("SEQUENCE", "Non-Color")
+
+
+def test_clearing_brings_everything_back(tmp_path):
+    scene, pad, _, _, free = press_and_drop(frames=4)
+    bpy.ops.palpate.reset()
+    scene.palpate.use_live = False
+    pad.data.materials.append(bpy.data.materials.new("Rubber"))
+    free.keyframe_insert("hide_render", frame=1)  # an animation of its own stays
+    save(tmp_path)
+    scene.frame_set(1)
+    before = dump()
+    baked(scene)
+    assert bpy.ops.palpate.bake() == {"FINISHED"}  # twice, since the second replaces the first
+    scene.frame_set(3)
+    assert bpy.ops.palpate.bake_clear() == {"FINISHED"}
+    scene.frame_set(1)
+    assert [line for line in changes(before, dump()) if "baked_" not in line and "start_" not in line] == []
+    assert curves.animated_paths(free) == {"hide_render"}
+
+
+def test_baking_keeps_the_frame_and_moves_nothing_by_hand(tmp_path):
+    scene, *_ = press_and_drop(frames=4)
+    save(tmp_path)
+    scene.frame_set(3)
+    baked(scene)
+    assert scene.frame_current == 3
+
+
+def test_reopened_and_baked_again_it_is_the_same_bit_for_bit(tmp_path):
+    scene, *_ = press_and_drop(frames=6)
+    path = save(tmp_path)
+    names = ("Pad", "Pad 2")
+
+    def recordings():
+        return [(tmp_path / "palpate" / name / "recording.npz").read_bytes() for name in names]
+
+    for frame in range(1, 5):  # played before, as a user would
+        scene.frame_set(frame)
+    baked(scene)
+    first = recordings()
+    save(tmp_path)
+    for _ in range(2):
+        scene = reopen(path)
+        scene.frame_set(5)
+        baked(scene)
+        assert recordings() == first
+        save(tmp_path)
+    bpy.ops.palpate.bake_clear()
+    save(tmp_path)
+    baked(reopen(path))
+    assert recordings() == first
+
+
+def test_another_parameter_is_another_recording(tmp_path):
+    scene, pad, *_ = press(frames=3)
+    save(tmp_path)
+    first = baked(scene).recording
+    pad.palpate.k *= 2.0
+    second = baked(scene).recording
+    assert second.digest != first.digest
+    assert second.sensors["Pad"].normal_force[-1].max() == pytest.approx(
+        2.0 * first.sensors["Pad"].normal_force[-1].max(), rel=0.05
+    )
+
+
+def test_a_stopped_bake_leaves_the_old_one(tmp_path):
+    scene, pad, *_ = press_and_drop(frames=4)
+    save(tmp_path)
+    baked(scene)
+    files = {path: path.read_bytes() for path in (tmp_path / "palpate").rglob("*") if path.is_file()}
+    before = dump()
+    pad.palpate.k = 70.0
+    for steps in (1, 3, 5, 7):
+        work = jobs.Slice(bake(scene))
+        for _ in range(steps):
+            work.work(0.0)
+        work.cancel()
+        assert {path: path.read_bytes() for path in (tmp_path / "palpate").rglob("*") if path.is_file()} == files
+        assert [line for line in changes(before, dump()) if not line.startswith("Pad: settings")] == []
+        assert not live.is_baking()
+
+
+def test_a_kill_between_two_renames_is_put_right(tmp_path):
+    scene, *_ = press(frames=3)
+    save(tmp_path)
+    folder = baked(scene).folders["Pad"]
+    folder.rename(folder.with_name("Pad.old"))
+    folder.with_name("Pad.partial").mkdir()
+    baked(scene)
+    assert [path.name for path in folder.parent.iterdir()] == ["Pad"]
+
+
+def test_a_folder_with_other_files_is_not_overwritten(tmp_path):
+    scene, *_ = press(frames=3)
+    save(tmp_path)
+    mine = tmp_path / "palpate" / "Pad" / "thesis.txt"
+    mine.parent.mkdir(parents=True)
+    mine.write_text("years of work")
+    with pytest.raises(Exception, match="holds other files than a bake"):
+        baked(scene)
+    assert mine.read_text() == "years of work"
+    assert [path.name for path in (tmp_path / "palpate").iterdir()] == ["Pad"]
+
+
+def test_who_left_the_bake_is_cleaned(tmp_path):
+    scene, _, _, second, free = press_and_drop(frames=3)
+    save(tmp_path)
+    baked(scene)
+    second.palpate.role = free.palpate.role = "NONE"
+    baked(scene)
+    assert not second.palpate.is_baked and not free.palpate.is_baked
+    assert [obj.name for obj in scene.objects if obj.name.startswith("Net Force")] == ["Net Force Pad"]
+    assert curves.animated_paths(free) == set()
+
+
+def test_two_pads_with_one_mesh_have_a_heat_map_each(tmp_path):
+    scene, pad, target = press(frames=3)
+    twin = pad.copy()
+    twin.name, twin.location.x = "Twin", 0.1
+    scene.collection.objects.link(twin)
+    bpy.ops.palpate.reset()
+    before = dump(uids=False)
+    save(tmp_path)
+    baked(scene)
+    assert pad.material_slots[1].material.name == "Palpate Pad"
+    assert twin.material_slots[1].material.name == "Palpate Twin"
+    assert len(pad.data.materials) == 2
+    heatmap.clear(pad)
+    assert twin.material_slots[1].material.name == "Palpate Twin"
+    bpy.ops.palpate.bake_clear()
+    after = dump(uids=False)
+    assert [line for line in changes(before, after) if "settings" not in line and "baked_" not in line] == []
+
+
+def test_a_sensor_all_around_has_a_heat_map_on_its_vertices(tmp_path):
+    """No texture map of shared corners exists for a closed surface; the force arrives as an attribute then."""
+    scene, pad, target = press(frames=6)
+    pad.palpate.role = "NONE"
+    tip = cube("Tip", (0.0, 0.0, -0.01), size=0.02)
+    tip.palpate.role = "SENSOR"
+    save(tmp_path)
+    target.location.z = 0.0
+    felt = baked(scene).recording.sensors["Tip"]
+    for i in (0, 3, 5):
+        scene.frame_set(i + 1)
+        mesh = tip.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+        values = np.zeros(8, dtype=np.float32)
+        mesh.attributes[materials.FORCE].data.foreach_get("value", values)
+        assert values == pytest.approx(felt.normal_force[i], abs=1e-7)
+    scenario = jobs.run_blocking(sample.sample_scenario(scene))[0]  # its own nodes do not change what is sampled
+    assert scenario.digest() == jobs.run_blocking(bake(scene)).recording.digest
+
+
+def test_an_arrow_without_contact_has_no_size(tmp_path):
+    scene, pad, target = press(frames=3)
+    target.animation_data_clear()
+    target.location.z = 1.0
+    save(tmp_path)
+    baked(scene)
+    assert list(materials.find(scene.objects, pad.palpate.uid).scale) == [0.0, 0.0, 0.0]
+    assert arrows.MESH_MARK in materials.find(scene.objects, pad.palpate.uid).data
+
+
+def test_frame_zero_can_be_baked(tmp_path):
+    scene, *_ = press(frames=3)
+    scene.frame_start = 0
+    save(tmp_path)
+    folder = baked(scene).folders["Pad"]
+    assert (folder / "tactile_0000.exr").exists()
+
+
+def test_the_other_sensors_are_pads_to_a_grid(tmp_path):
+    scene, *_ = press(frames=3)
+    table = grid("Table", (0.0, 0.0, 0.001))
+    table.palpate.role = "PAD"
+    save(tmp_path)
+    assert list(baked(scene).folders) == ["Pad"]
+    assert not table.palpate.is_baked

@@ -1,0 +1,248 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The timeline: playing computes what a bake computes, scrubbing shows it, and files hold none of it."""
+
+from dataclasses import fields
+
+import bpy
+import numpy as np
+import pytest
+from blender_scenes import changes, dump, press, press_and_drop, reopen, save
+
+from palpate.addon import cache, jobs, live, materials, state
+from palpate.addon.bake import bake
+from palpate.core.recording import SensorFrame
+
+
+def play(scene, *frames):
+    for frame in frames:
+        scene.frame_set(frame)
+
+
+def shown_force(obj):
+    attribute = obj.data.attributes.get(materials.FORCE)
+    if attribute is None:
+        return None
+    values = np.zeros(len(obj.data.vertices), dtype=np.float32)
+    attribute.data.foreach_get("value", values)
+    return values
+
+
+def test_playing_gives_the_numbers_of_a_bake(tmp_path):
+    scene, *_ = press_and_drop(frames=8)
+    play(scene, *range(1, 9))
+    frames = dict(cache.get(scene).frames)
+    assert sorted(frames) == list(range(1, 9))
+    save(tmp_path)
+    recording = jobs.run_blocking(bake(scene)).recording
+    for number, frame in frames.items():
+        baked = recording.at(number)
+        assert frame.poses.tobytes() == baked.poses.tobytes()
+        for name, felt in frame.sensors.items():
+            for item in fields(SensorFrame):
+                one, other = getattr(felt, item.name), getattr(baked.sensors[name], item.name)
+                assert one.tobytes() == other.tobytes(), (number, name, item.name)
+    assert recording.sensors["Pad"].contact[-1].any() and recording.sensors["Pad 2"].contact[-1].any()
+
+
+def test_it_shows_forces_and_moves_free_bodies():
+    scene, pad, _, _, free = press_and_drop(frames=8)
+    start = free.location.z
+    play(scene, *range(1, 9))
+    frame = cache.get(scene).frames[8]
+    assert shown_force(pad) == pytest.approx(frame.sensors["Pad"].normal_force, abs=1e-7)
+    index = cache.get(scene).binding.names.index("Cube")
+    assert list(free.location) == pytest.approx(frame.poses[index, :3], abs=1e-7)
+    assert free.location.z < start
+    assert live.status(scene).frame is frame
+
+
+def test_scrubbing_reads_what_was_computed():
+    scene, pad, _, _, free = press_and_drop(frames=8)
+    play(scene, *range(1, 7))
+    heights = {}
+    for frame in (3, 6, 2, 5):
+        scene.frame_set(frame)
+        heights[frame] = free.location.z
+        assert shown_force(pad) == pytest.approx(cache.get(scene).frames[frame].sensors["Pad"].normal_force, abs=1e-7)
+    assert heights[2] > heights[3] and cache.get(scene).simulation.frame == 6
+    scene.frame_set(1)
+    assert not free.palpate.has_start
+
+
+def test_a_jump_shows_nothing_and_says_so():
+    scene, *_ = press(frames=20)
+    play(scene, 1, 2, 15)
+    assert sorted(cache.get(scene).frames) == [1, 2]
+    status = live.status(scene)
+    assert status.frame is None and status.text == "Frame 15 is not computed: play from frame 2."
+    play(scene, 3)
+    assert live.status(scene).frame.frame == 3
+
+
+def test_play_from_the_first_frame_starts_with_the_second():
+    """Blender reports no arrival at the frame where it already stands."""
+    scene, *_ = press(frames=8)
+    scene.palpate.use_live = False
+    scene.frame_set(1)
+    scene.palpate.use_live = True
+    cache.clear()
+    play(scene, 2, 3)
+    assert sorted(cache.get(scene).frames) == [1, 2, 3]
+
+
+def test_a_start_in_the_middle_computes_nothing():
+    scene, *_ = press(frames=8)
+    cache.clear()
+    play(scene, 5, 6)
+    assert cache.get(scene) is None
+    assert "go to the first frame" in live.status(scene).text
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda scene, pad, target: setattr(pad.palpate, "k", 99.0),
+        lambda scene, pad, target: setattr(target.palpate, "role", "NONE"),
+        lambda scene, pad, target: setattr(scene, "gravity", (0.0, 0.0, -1.6)),
+        lambda scene, pad, target: setattr(scene.render, "fps", 50),
+        lambda scene, pad, target: setattr(pad.data.vertices[5].co, "z", 0.01),
+        lambda scene, pad, target: setattr(pad.location, "z", 0.001),
+        lambda scene, pad, target: target.hide_set(True),
+        lambda scene, pad, target: bpy.data.objects.remove(target),
+    ],
+    ids=["parameter", "role", "gravity", "fps", "vertex", "location", "hidden", "deleted"],
+)
+def test_a_change_makes_it_stale(change):
+    scene, pad, target = press(frames=8)
+    play(scene, 1, 2, 3)
+    change(scene, pad, target)
+    pad.data.update()
+    bpy.context.view_layer.update()
+    play(scene, 4)
+    assert cache.get(scene) is None
+    assert live.status(scene).frame is None
+
+
+def test_its_own_writing_does_not_make_it_stale():
+    scene, *_ = press_and_drop(frames=8)
+    for frame in range(1, 9):
+        scene.frame_set(frame)
+        bpy.context.view_layer.update()  # as the window does between frames
+    assert sorted(cache.get(scene).frames) == list(range(1, 9))
+
+
+def test_edited_keyframes_make_it_stale():
+    scene, _, target = press(frames=8)
+    play(scene, 1, 2, 3)
+    target.location.z = 0.02
+    target.keyframe_insert("location", frame=3)
+    bpy.context.view_layer.update()
+    play(scene, 2)
+    assert cache.get(scene) is None
+
+
+def test_a_free_body_moved_at_the_first_frame_starts_there():
+    scene, _, _, _, free = press_and_drop(frames=8)
+    play(scene, 1, 2, 3, 1)
+    free.location.z = 0.05
+    bpy.context.view_layer.update()
+    play(scene, 2)
+    index = cache.get(scene).binding.names.index("Cube")
+    assert cache.get(scene).frames[1].poses[index, 2] == pytest.approx(0.05)
+
+
+def test_an_error_is_said_in_the_panel_and_not_at_every_frame(capfd):
+    scene, pad, _ = press(frames=4)
+    pad.palpate.mud = 0.9  # above mus
+    play(scene, 1, 2, 3)
+    assert "mud of sensor 'Pad'" in live.status(scene).text
+    assert "Traceback" not in capfd.readouterr().err
+
+
+def test_a_file_saved_while_playing_holds_none_of_it(tmp_path):
+    scene, pad, _, _, free = press_and_drop(frames=8)
+    bpy.ops.palpate.reset()
+    path = save(tmp_path)
+    before = dump()
+    play(scene, *range(1, 7))
+    moved = free.location.z
+    save(tmp_path)
+    assert free.location.z == moved and shown_force(pad) is not None  # shown again
+    scene = reopen(path)
+    assert scene.frame_current == 6
+    scene.palpate.use_live = False
+    scene.frame_set(1)
+    scene.palpate.use_live = True
+    assert changes(before, dump()) == []
+
+
+def test_undo_forgets_what_was_computed():
+    scene, _, _, _, free = press_and_drop(frames=8)
+    bpy.ops.palpate.reset()
+    start = tuple(free.location)
+    bpy.ops.ed.undo_push(message="before")
+    play(scene, *range(1, 5))
+    bpy.ops.ed.undo_push(message="played")
+    bpy.ops.ed.undo()
+    scene, free = bpy.context.scene, bpy.data.objects["Cube"]
+    assert cache.get(scene) is None
+    assert tuple(free.location) == start
+    bpy.ops.ed.redo()
+    scene, free = bpy.context.scene, bpy.data.objects["Cube"]
+    assert free.palpate.has_start
+    play(scene, 1)
+    assert tuple(free.location) == start
+    play(scene, 2, 3)
+    assert sorted(cache.get(scene).frames) == [1, 2, 3]
+
+
+def test_reset_puts_bodies_back():
+    scene, pad, _, _, free = press_and_drop(frames=8)
+    start = tuple(free.location), tuple(free.rotation_euler)
+    play(scene, *range(1, 6))
+    assert bpy.ops.palpate.reset() == {"FINISHED"}
+    assert (tuple(free.location), tuple(free.rotation_euler)) == start
+    assert shown_force(pad) is None and cache.get(scene) is None
+
+
+def test_rendering_never_simulates(tmp_path):
+    scene, _, _, _, free = press_and_drop(frames=4)
+    play(scene, 1, 2)
+    bpy.ops.object.camera_add(location=(0.2, -1.0, 0.1), rotation=(1.5, 0.0, 0.0))
+    scene.camera = bpy.context.object
+    render = scene.render
+    render.engine, scene.cycles.samples = "CYCLES", 1
+    render.resolution_x = render.resolution_y = 16
+    render.filepath = str(tmp_path / "frame_")
+    seen = []
+    bpy.app.handlers.render_post.append(lambda scene, *_: seen.append((scene.frame_current, free.location.z)))
+    bpy.ops.render.render(animation=True)
+    bpy.app.handlers.render_post.pop()
+    run = cache.get(scene)
+    assert sorted(run.frames) == [1, 2]
+    assert [frame for frame, _ in seen] == [1, 2, 3, 4]
+    index = run.binding.names.index("Cube")
+    assert seen[1][1] == pytest.approx(run.frames[2].poses[index, 2])  # remembered frames are shown
+    assert not state.session.rendering
+
+
+def test_a_baked_scene_is_not_simulated_again(tmp_path):
+    scene, pad, *_ = press_and_drop(frames=4)
+    save(tmp_path)
+    recording = jobs.run_blocking(bake(scene)).recording
+    path = save(tmp_path)
+    play(scene, 1, 2, 3)
+    assert cache.get(scene) is None
+    assert live.status(scene).frame.sensors["Pad"].normal_force.tolist() == recording.sensors["Pad"].normal_force[2].tolist()
+    scene = reopen(path)
+    play(scene, 4)
+    assert live.status(scene).frame.sensors["Pad"].normal_force.tolist() == recording.sensors["Pad"].normal_force[3].tolist()
+    play(scene, 9)
+    assert live.status(scene).frame is None
+
+
+def test_a_scene_without_roles_costs_nothing(monkeypatch):
+    scene = bpy.context.scene
+    scene.frame_set(1)
+    monkeypatch.setattr(live.write, "baked_objects", lambda scene: pytest.fail("looked at objects"))
+    play(scene, 2, 3)
