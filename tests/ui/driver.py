@@ -12,6 +12,7 @@ from __future__ import annotations
 import contextlib
 import importlib.util
 import json
+import re
 import subprocess
 import sys
 import time
@@ -235,7 +236,7 @@ class UI:
         seen: dict[str, None] = {}
         for y in range(region.y + region.height - 8, region.y, -12):
             yield from self.glide(region.x + region.width / 2, y)
-            if self.button_here(area, "NAVIGATION_BAR") == "context":
+            if self.button_here(area, "NAVIGATION_BAR").endswith(".context"):
                 yield from self.click(self.x, self.y)
                 now = area.spaces.active.context
                 seen[now] = None
@@ -245,23 +246,33 @@ class UI:
                     return
         raise UIError(f"The Properties editor has no {name} tab now; it has {', '.join(seen)}.")
 
+    def filter(self, words: str) -> Steps:
+        """Search the Properties editor (Ctrl F): shows only what matches and opens closed panels for it; "" ends it."""
+        yield from self.move(*self.centre(self.area("PROPERTIES")))
+        yield from self.key("F", alt=True)
+        if words:
+            yield from self.key("F", ctrl=True)
+            yield 0.3
+            yield from self.type(words)
+            yield from self.key("RET")
+        yield 0.5
+
     def button_here(self, area: bpy.types.Area, kind: str = "WINDOW") -> str:
         """Return what the button under the mouse does, or "" if there is none.
 
-        A button that runs an operator is named by the operator's id, as in "object.select_all", a field by its
-        property's path, as in "palpate.k" or "location[0]".
+        A button that runs an operator is named by its call, as in "palpate.sensor_add(role='PAD')", a field by
+        its property's path, as in "palpate.k" or "location[0]".
         """
+        clipboard = bpy.context.window_manager
+        clipboard.clipboard = ""
         with self.context(area, kind):
-            found = bpy.context.property
-            if found is not None:
-                _owner, path, index = found
-                return path if index < 0 else f"{path}[{index}]"
-            if not bpy.ops.ui.copy_python_command_button.poll():
-                return ""
-            bpy.context.window_manager.clipboard = ""
-            bpy.ops.ui.copy_python_command_button()
-            command = bpy.context.window_manager.clipboard
-        return command.removeprefix("bpy.ops.").partition("(")[0]
+            if bpy.context.property is not None:
+                # its own path lacks the groups the property is in; the one for the clipboard has them
+                bpy.ops.ui.copy_data_path_button(full_path=True)
+                return re.sub(r'^bpy\.data\.\w+\["(?:[^"\\]|\\.)*"\]\.', "", clipboard.clipboard)
+            if bpy.ops.ui.copy_python_command_button.poll():
+                bpy.ops.ui.copy_python_command_button()
+        return clipboard.clipboard.removeprefix("bpy.ops.")
 
     def find(self, name: str, area: bpy.types.Area | None = None, kind: str = "WINDOW") -> Steps:
         """Feel the way down a panel until the mouse is on a button; scrolls as far as the panel goes.
@@ -269,7 +280,7 @@ class UI:
         Parameters
         ----------
         name : str
-            What the button does, as `button_here` says it.
+            What the button does, as `button_here` says it; an operator's id alone stands for any call of it.
         area : Area, optional
             Where to look; by default the Properties editor.
         kind : str
@@ -296,11 +307,11 @@ class UI:
                     yield from self.glide(region.x + region.width * share, y)
                     here = self.button_here(area, kind)
                     seen[here] = None
-                    if here != name:
+                    if name not in (here, here.partition("(")[0]):
                         continue
                     yield from self.move(self.x, self.y)  # the button under a gliding mouse wakes late: look again
-                    if self.button_here(area, kind) == name:
-                        self.say(f"found {name} at {self.x}, {self.y}")
+                    if self.button_here(area, kind) == here:
+                        self.say(f"found {here} at {self.x}, {self.y}")
                         return self.x, self.y
             before = region.view2d.region_to_view(0, 0)
             yield from self.scroll(*self.centre(area, kind), -60 if unscrolled else 8)
