@@ -45,7 +45,7 @@ def run(arguments: argparse.Namespace) -> int:
         bpy = blender.start()
         from ..sample_blends import demo
 
-        bpy.ops.wm.read_homefile(use_empty=True)
+        bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
         scene = bpy.context.scene
         demo.build(scene)
         demo.frame_picture(scene, arguments.size)

@@ -8,8 +8,6 @@ from __future__ import annotations
 
 import math
 
-import bpy
-
 from ..addon import render
 from . import studio
 
@@ -54,7 +52,8 @@ def build(scene) -> None:
     cube.rotation_euler = (0.0, 0.0, pad_b.rotation_euler.z + math.radians(18))
 
     _author(scene, pad_a, pad_b, ball, cube)
-    _light(scene, paper)
+    studio.stage(scene, paper, aim=(0.0, 0.0, 20.0), camera=(60.0, -300.0, 190.0))
+    frame_picture(scene, (1280, 720))
     scene.frame_set(scene.frame_start)
 
 
@@ -89,7 +88,7 @@ def _slide(ball, pad) -> None:
     """
     ball.rotation_mode = "XYZ"
     up = PAD_HEIGHT + BALL_RADIUS
-    direction = pad.matrix_basis.to_3x3().col[1] if pad.parent is None else pad.matrix_world.to_3x3().col[1]
+    direction = pad.matrix_basis.to_3x3().col[1]  # +y of the pad, along its rows
     for frame, along, depth, turn in (
         (1, -7.0, -5.0, 0.0),
         (14, -7.0, PRESS_DEPTH, 0.0),
@@ -119,22 +118,6 @@ def _author(scene, pad_a, pad_b, ball, cube) -> None:
     settings = scene.palpate
     settings.color_map = "MAGMA"
     settings.use_auto_range, settings.range_max = False, RANGE  # one scale for both pads
-
-
-def _light(scene, paper) -> None:
-    """Put up the studio: backdrop, three soft lamps, and a camera."""
-    studio.backdrop(scene).data.materials.append(paper)
-    studio.world(scene)
-    aim = (0.0, 0.0, 20.0)
-    studio.area_lamp(scene, "Key", (-320, -260, 420), aim, 260, 1.3e6, (1.0, 0.97, 0.93))
-    studio.area_lamp(scene, "Fill", (420, -180, 260), aim, 320, 4.0e5, (0.9, 0.95, 1.0))
-    studio.area_lamp(scene, "Rim", (-260, 330, 260), aim, 200, 9.0e5)
-    camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
-    scene.collection.objects.link(camera)
-    scene.camera = camera
-    camera.data.lens, camera.data.clip_end = 70.0, 5000.0
-    camera.location = (60.0, -300.0, 190.0)
-    camera.rotation_euler = studio.look_at(camera.location, aim)
 
 
 def frame_picture(scene, size) -> None:

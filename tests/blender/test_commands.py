@@ -1,0 +1,263 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The command line: what it makes, what it says, and that a mistake of the user's is one line and changes nothing."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import bpy
+import pytest
+
+from palpate.commands import COMMANDS, READY, console, main
+from palpate.core.formats.archive import load_recording
+
+
+@pytest.fixture
+def demo_blend(repository):
+    return repository / "sample_blends" / "demo.blend"
+
+
+def lines_of(capfd):
+    out, err = capfd.readouterr()
+    return out.splitlines(), err.splitlines()
+
+
+def contents(folder):
+    return {str(path.relative_to(folder)): path.read_bytes() for path in sorted(folder.rglob("*")) if path.is_file()}
+
+
+# --- usage
+
+
+@pytest.mark.parametrize(
+    "words", [[], ["frobnicate"], ["bake"], ["bake", "a.blend", "--frobnicate"], ["demo", "--size", "0", "9"]]
+)
+def test_wrong_usage_is_status_2(words, capfd):
+    assert main(words) == 2
+    out, err = lines_of(capfd)
+    assert out == []
+    assert err[0].startswith("usage: palpate")
+
+
+@pytest.mark.parametrize("words", [["--help"], ["bake", "--help"], ["demo", "--help"], ["--version"]])
+def test_help_is_status_0(words, capfd):
+    assert main(words) == 0
+    assert "palpate" in capfd.readouterr().out
+
+
+@pytest.mark.parametrize("name", [name for name in COMMANDS if name not in READY])
+def test_what_is_planned_says_so(name, capfd):
+    assert main([name, "rig.toml", "--out", "somewhere"]) == 1
+    assert lines_of(capfd) == ([], [f"palpate {name}: not yet"])
+
+
+# --- mistakes
+
+
+def test_files_that_are_no_blend(tmp_path, demo_blend, capfd):
+    (tmp_path / "folder.blend").mkdir()
+    (tmp_path / "words.blend").write_bytes(b"hello world" * 100)
+    (tmp_path / "empty.blend").write_bytes(b"")
+    whole = demo_blend.read_bytes()
+    (tmp_path / "cut.blend").write_bytes(whole[: len(whole) // 2])
+    for name, reason in (
+        ("missing.blend", "no file"),
+        ("folder.blend", "is a folder"),
+        ("words.blend", "not a .blend"),
+        ("empty.blend", "not a .blend"),
+        ("cut.blend", "damaged"),
+    ):
+        assert main(["bake", str(tmp_path / name), "--out", str(tmp_path / "out")]) == 1
+        out, err = lines_of(capfd)
+        assert out == []
+        assert len(err) == 1
+        assert err[0].startswith("palpate bake: ")
+        assert name in err[0]
+        assert reason in err[0]
+        assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("more", "reason"),
+    [
+        (["--frames", "9", "3"], "runs backwards"),
+        (["--frames", "-5", "3"], "before frame 0"),
+        (["--sensor", "Thumb"], "'Finger A', 'Finger B'"),
+        (["--out", "{tmp}/nowhere/below"], "does not exist"),
+        (["--out", "{tmp}/file"], "a file where a folder"),
+        (["--frames", "1", "2", "--out", "{tmp}/out", "--save-as", "{tmp}/nowhere/new.blend"], "does not exist"),
+    ],
+)
+def test_mistakes_are_one_line(more, reason, tmp_path, demo_blend, capfd):
+    (tmp_path / "file").write_text("mine")
+    before = demo_blend.read_bytes()
+    assert main(["bake", str(demo_blend), *(word.format(tmp=tmp_path) for word in more)]) == 1
+    out, err = lines_of(capfd)
+    assert out == []
+    assert len(err) == 1
+    assert reason in err[0]
+    assert demo_blend.read_bytes() == before
+    assert (tmp_path / "file").read_text() == "mine"
+
+
+def test_a_scene_without_sensors_says_what_to_do(tmp_path, capfd):
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "bare.blend"))
+    capfd.readouterr()
+    assert main(["bake", str(tmp_path / "bare.blend")]) == 1
+    out, err = lines_of(capfd)
+    assert out == []
+    assert len(err) == 1
+    assert "Make Sensor" in err[0]
+
+
+def test_a_part_cannot_be_saved(tmp_path, demo_blend, capfd):
+    words = ["bake", str(demo_blend), "--sensor", "Finger A", "--save-as", str(tmp_path / "a.blend")]
+    assert main(words) == 2
+    assert "--sensor" in capfd.readouterr().err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_scripts_in_a_file_do_not_run(tmp_path, demo_blend):
+    bpy.ops.wm.open_mainfile(filepath=str(demo_blend))
+    text = bpy.data.texts.new("evil.py")
+    text.write(f"open({str(tmp_path / 'evil')!r}, 'w').close()")
+    text.use_module = True
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "a.blend"))
+    bpy.context.preferences.filepaths.use_scripts_auto_execute = True
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "a.blend"))
+    assert (tmp_path / "evil").exists()  # Blender would
+    (tmp_path / "evil").unlink()
+    assert main(["bake", str(tmp_path / "a.blend"), "--frames", "1", "2", "--out", str(tmp_path / "out")]) == 0
+    assert not (tmp_path / "evil").exists()
+
+
+# --- what bake makes
+
+
+def test_bake_writes_images_and_leaves_the_file_alone(tmp_path, demo_blend, capfd):
+    before = demo_blend.read_bytes()
+    assert main(["bake", str(demo_blend), "--frames", "1", "6", "--out", str(tmp_path / "out")]) == 0
+    out, err = lines_of(capfd)
+    assert err == []
+    assert out[0].startswith("frames 1 to 6")
+    assert any(line.startswith("Finger B") and "9.81" in line for line in out)  # the 1 kg cube
+    assert not [line for line in out if "Read" in line or "Saved" in line or "Info" in line]  # Blender's own words
+    for name in ("Finger A", "Finger B"):
+        files = {path.name for path in (tmp_path / "out" / name).iterdir()}
+        assert files == {*(f"tactile_{frame:04d}.exr" for frame in range(1, 7)), "recording.npz", "manifest.json"}
+    assert demo_blend.read_bytes() == before
+
+
+def test_save_as_keeps_the_bake_in_another_file(tmp_path, demo_blend):
+    words = [
+        "bake",
+        str(demo_blend),
+        "--frames",
+        "1",
+        "4",
+        "--out",
+        str(tmp_path / "out"),
+        "--save-as",
+        str(tmp_path / "baked"),
+    ]
+    assert main(words) == 0
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "baked.blend"))
+    scene = bpy.context.scene
+    assert (scene.frame_start, scene.frame_end) == (1, 4)
+    assert [obj.name for obj in scene.objects if obj.palpate.is_baked and obj.palpate.role == "SENSOR"] == [
+        "Finger A",
+        "Finger B",
+    ]
+
+
+def test_save_keeps_the_bake_in_the_file_itself(tmp_path, demo_blend):
+    mine = tmp_path / "mine.blend"
+    mine.write_bytes(demo_blend.read_bytes())
+    assert main(["bake", str(mine), "--frames", "1", "3", "--save"]) == 0
+    assert (tmp_path / "palpate" / "Finger A" / "recording.npz").is_file()  # the file's own folder, beside it
+    bpy.ops.wm.open_mainfile(filepath=str(mine))
+    assert bpy.context.scene.objects["Finger A"].palpate.is_baked
+
+
+def test_one_sensor_alone_feels_the_same(tmp_path, demo_blend):
+    both, alone = tmp_path / "both", tmp_path / "alone"
+    assert main(["bake", str(demo_blend), "--frames", "1", "5", "--out", str(both)]) == 0
+    assert main(["bake", str(demo_blend), "--frames", "1", "5", "--out", str(alone), "--sensor", "Finger B"]) == 0
+    assert [path.name for path in alone.iterdir()] == ["Finger B"]
+    first, second = (load_recording(folder / "Finger B" / "recording.npz").sensors["Finger B"] for folder in (both, alone))
+    assert (first.normal_force == second.normal_force).all()
+
+
+# --- the process
+
+
+def run(*words, **more):
+    command = [sys.executable, "-m", "palpate.commands", *words]
+    return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **more)
+
+
+def test_a_process_of_its_own_says_only_our_words_and_ends(tmp_path, demo_blend):
+    process = run("bake", str(demo_blend), "--frames", "1", "3", "--out", str(tmp_path / "out"))
+    out, err = process.communicate(timeout=120)
+    assert process.returncode == 0
+    assert err == ""
+    assert out.startswith("frames 1 to 3")
+    assert all(not line or line.startswith(("frames", "sensor", "Finger")) for line in out.splitlines())
+
+
+@pytest.mark.parametrize("delay", [0.7, 1.5])
+def test_ctrl_c_keeps_the_earlier_bake(delay, tmp_path, demo_blend):
+    out = tmp_path / "out"
+    assert main(["bake", str(demo_blend), "--frames", "1", "2", "--out", str(out)]) == 0
+    before = contents(out)
+    process = run("bake", str(demo_blend), "--frames", "1", "100000", "--out", str(out))
+    time.sleep(delay)
+    process.send_signal(signal.SIGINT)
+    words, err = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert words == ""
+    assert err == "palpate bake: stopped; an earlier bake is still as it was.\n"
+    assert contents(out) == before
+
+
+def test_ctrl_c_ends_a_call_into_blender_at_once(tmp_path):
+    """A render of a minute must not keep the user waiting for that minute."""
+    code = (
+        "import time, pathlib; from palpate.commands import console\n"
+        f"path = pathlib.Path({str(tmp_path / 'unfinished')!r}); path.touch()\n"
+        "with console.Interrupt.noted(), console.stop_at_once('stopped while rendering', path.unlink), console.quiet():\n"
+        "    print('chatter'); end = time.monotonic() + 30\n"
+        "    while time.monotonic() < end: time.sleep(0.01)\n"
+    )
+    process = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    while not (tmp_path / "unfinished").exists():
+        time.sleep(0.05)
+    time.sleep(0.3)
+    began = time.monotonic()
+    process.send_signal(signal.SIGINT)
+    out, err = process.communicate(timeout=60)
+    assert time.monotonic() - began < 5
+    assert process.returncode == 130
+    assert out == ""
+    assert err.strip() == "stopped while rendering"
+    assert not (tmp_path / "unfinished").exists()
+
+
+def test_blenders_words_come_back_when_something_is_wrong(capfd):
+    with pytest.raises(ZeroDivisionError), console.quiet():
+        os.write(1, b"what Blender said\n")
+        print(1 / 0)
+    out, err = capfd.readouterr()
+    assert "what Blender said" in err
+    assert out == ""
+    with console.quiet():
+        os.write(1, b"chatter\n")
+        os.write(2, b"chatter\n")
+        print("chatter")
+    assert capfd.readouterr() == ("", "")
+
+
+def test_tables_have_even_columns():
+    assert console.table([("a", "bb"), ("ccc", "d")], "<>") == "a    bb\nccc   d"

@@ -1,0 +1,223 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The demo and the sample files: what they promise to show."""
+
+import re
+
+import bpy
+import numpy as np
+import pytest
+
+from palpate.addon import jobs, render
+from palpate.addon.bake import bake
+from palpate.commands import main
+from palpate.core import figures
+from palpate.core.errors import SceneError
+from palpate.core.formats.archive import load_recording
+from palpate.sample_blends import build_samples, demo, studio
+
+
+def evaluated(obj):
+    """Vertices (n, 3) and faces of an object with its modifiers, in its own frame."""
+    found = obj.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    mesh = found.to_mesh()
+    vertices = np.array([v.co for v in mesh.vertices])
+    faces = [tuple(p.vertices) for p in mesh.polygons]
+    found.to_mesh_clear()
+    return vertices, faces
+
+
+# --- the scene
+
+
+def test_the_cube_weighs_what_steel_weighs(scene):
+    demo.build(scene)
+    size = np.ptp(evaluated(scene.objects[demo.CUBE])[0], axis=0) * scene.unit_settings.scale_length
+    assert scene.objects[demo.CUBE].palpate.mass / size.prod() == pytest.approx(8000, rel=0.01)
+
+
+def test_the_ball_is_a_sphere(scene):
+    demo.build(scene)
+    vertices, _ = evaluated(scene.objects[demo.BALL])
+    np.testing.assert_allclose(np.linalg.norm(vertices, axis=1), demo.BALL_RADIUS, rtol=1e-5)
+
+
+def test_the_cube_stands_on_a_flat_side(scene):
+    demo.build(scene)
+    vertices, _ = evaluated(scene.objects[demo.CUBE])
+    lowest = vertices[vertices[:, 2] < -demo.CUBE_EDGE / 2 + 1e-3]
+    assert np.abs(lowest[:, :2]).max() == pytest.approx(demo.CUBE_EDGE / 2, abs=1e-3)
+
+
+@pytest.mark.parametrize(("rows", "columns"), [(14, 6), (2, 2), (3, 9)])
+def test_pads_are_closed_and_flat_where_they_feel(rows, columns):
+    vertices, faces, texels = studio.pad_mesh(rows, columns, pitch=3.0, margin=3.0, thickness=6.0)
+    edges = [(face[i - 1], face[i]) for face in faces for i in range(len(face))]
+    assert len(set(edges)) == len(edges)  # no edge is walked twice in one direction …
+    assert set(edges) == {(b, a) for a, b in edges}  # … and each once in the other: closed and oriented
+    assert (vertices[texels, 2] == 0).all()
+    around = [face for face in faces if set(face) & set(texels)]
+    assert all((vertices[list(face), 2] == 0).all() for face in around)  # so every texel's normal is straight up
+    a, b, c = (vertices[[face[i] for face in around]] for i in (0, 1, 2))
+    assert (np.cross(b - a, c - a)[:, 2] > 0).all()
+
+
+# --- the command
+
+
+def test_demo_prints_and_draws_what_it_promises(tmp_path, capfd):
+    out = tmp_path / "demo"
+    assert main(["demo", "--out", str(out), "--no-render"]) == 0
+    words, err = capfd.readouterr()
+    assert err == ""
+    required, measured = (float(x) for x in re.search(r"required ([\d.]+) N, measured ([\d.]+) N", words).groups())
+    assert required == pytest.approx(9.81, abs=1e-6)
+    assert measured == pytest.approx(required, abs=5e-5)  # 9.8100: four digits behind the point
+    for name in ("tactile-strip.png", "forces.png", "demo.blend"):
+        assert (out / name).stat().st_size > 10_000
+        assert str(out / name) in words
+    assert not (out / "scene.png").exists()
+    assert not (out / "demo.blend1").exists()
+    assert (out / "demo.blend").stat().st_size < 1_000_000
+
+    felt = load_recording(out / "palpate" / demo.PAD_A / "recording.npz").sensors[demo.PAD_A]
+    normal = felt.normal_force.sum(axis=1)
+    shear = np.linalg.norm(felt.shear.sum(axis=1), axis=1)
+    share = np.divide(shear, 0.435 * normal, out=np.zeros_like(shear), where=normal > 0.1)
+    assert share[20] < 0.05  # pressed, not yet sliding
+    assert share[30] < 0.5  # sliding, the bristles hold
+    assert 0.9 < share[demo.PICTURE_FRAME - 1] < 1.05  # slips
+    assert normal[0] == 0
+    assert normal[-1] == 0  # lifted
+    assert felt.depth.max() < 0.012  # nothing bottomed out
+
+
+def test_the_demo_s_scene_shows_its_bake(tmp_path):
+    """Opened again, the file has the cube where it came to rest, arrows, and heat maps on the images of the bake."""
+    assert main(["demo", "--out", str(tmp_path), "--no-render"]) == 0
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "demo.blend"))
+    scene = bpy.context.scene
+    scene.frame_set(scene.frame_end)
+    cube = scene.objects[demo.CUBE]
+    sunk = demo.PAD_HEIGHT - (cube.matrix_world.translation.z - demo.CUBE_EDGE / 2)
+    assert sunk == pytest.approx(9.81 / (1000 * 70) * 1000, rel=1e-3)  # mm: 70 texels of 1000 N/m carry it
+    images = [image for image in bpy.data.images if image.source == "SEQUENCE"]
+    assert len(images) == 2
+    assert all(image.filepath.startswith("//palpate") for image in images)
+
+
+def test_demo_renders_heat_map_and_arrow(tmp_path):
+    from matplotlib.image import imread
+
+    assert main(["demo", "--out", str(tmp_path), "--size", "320", "180", "--samples", "2"]) == 0
+    picture = imread(tmp_path / "scene.png")[:, :, :3]
+    assert picture.shape == (180, 320, 3)
+    left = picture[:, :250]  # without the column of tactile images
+    red, green, blue = left[..., 0], left[..., 1], left[..., 2]
+    assert ((red > 0.75) & (green > 0.35) & (green < 0.7) & (blue < 0.35)).sum() > 100  # the orange arrows
+    assert ((red > 0.8) & (green > 0.7) & (blue > 0.45) & (red - blue > 0.15)).sum() > 100  # 0.14 N on the magma map
+
+
+def test_demo_into_a_place_that_is_none(tmp_path, capfd):
+    assert main(["demo", "--out", str(tmp_path / "a" / "b")]) == 1
+    out, err = capfd.readouterr()
+    assert out == ""
+    assert len(err.splitlines()) == 1
+    assert list(tmp_path.iterdir()) == []
+
+
+# --- the camera
+
+
+@pytest.mark.parametrize("size", [(1280, 720), (500, 800)])
+@pytest.mark.parametrize("region", [(0.05, 0.05, 0.95, 0.95), (0.1, 0.2, 0.6, 0.9)])
+def test_the_camera_frames_everything_and_no_more(scene, size, region):
+    demo.build(scene)
+    scene.render.resolution_x, scene.render.resolution_y = size
+    points = render.corners([scene.objects[name] for name in (demo.BALL, demo.CUBE, demo.PAD_A)])
+    render.frame_camera(scene, points, region)
+    places = np.array([render.picture_position(scene, point) for point in points])
+    left, bottom, right, top = region
+    assert places[:, 0].min() >= left - 1e-4
+    assert places[:, 0].max() <= right + 1e-4
+    assert places[:, 1].min() >= bottom - 1e-4
+    assert places[:, 1].max() <= top + 1e-4
+    fills_width = np.ptp(places[:, 0]) == pytest.approx(right - left, abs=1e-3)
+    fills_height = np.ptp(places[:, 1]) == pytest.approx(top - bottom, abs=1e-3)
+    assert fills_width or fills_height
+
+
+def test_positions_on_the_picture_are_blenders(scene):
+    from bpy_extras.object_utils import world_to_camera_view
+    from mathutils import Vector
+
+    demo.build(scene)
+    scene.camera.data.shift_x = 0.0
+    for point in ((0.0, 0.0, 20.0), (30.0, -10.0, 50.0), (-50.0, 5.0, 0.0)):
+        expected = world_to_camera_view(scene, scene.camera, Vector(point))
+        assert render.picture_position(scene, point) == pytest.approx((expected.x, expected.y), abs=1e-5)
+
+
+def test_rendering_leaves_the_scene_as_it_was(scene, tmp_path):
+    demo.build(scene)
+    scene.frame_set(7)
+    before = (scene.render.filepath, scene.render.resolution_x, scene.cycles.samples, scene.frame_current)
+    render.render_frame(scene, tmp_path / "a.png", 3, samples=1, size=(32, 18))
+    assert (scene.render.filepath, scene.render.resolution_x, scene.cycles.samples, scene.frame_current) == before
+    assert [path.name for path in tmp_path.iterdir()] == ["a.png"]
+
+
+def test_a_scene_without_camera_says_so(scene, tmp_path):
+    with pytest.raises(SceneError, match="no perspective camera"):
+        render.render_frame(scene, tmp_path / "a.png", 1)
+    assert list(tmp_path.iterdir()) == []
+
+
+# --- the committed files
+
+
+def described(scene):
+    """What a sample is made of, in plain numbers."""
+    found = {}
+    for obj in scene.objects:
+        settings = {}
+        if obj.palpate.role != "NONE":
+            skip = {"rna_type", "name", "uid", "schema_version"}
+            keys = [key for key in obj.palpate.bl_rna.properties.keys() if key not in skip]  # noqa: SIM118
+            values = {key: getattr(obj.palpate, key) for key in keys}
+            settings = {key: tuple(v) if hasattr(v, "__len__") and not isinstance(v, str) else v for key, v in values.items()}
+        shape = evaluated(obj)[0].round(4).tolist() if obj.type == "MESH" else None
+        found[obj.name] = (settings, shape)
+    for frame in range(scene.frame_start, scene.frame_end + 1, 7):
+        scene.frame_set(frame)
+        for obj in scene.objects:
+            found[obj.name, frame] = np.array(obj.matrix_world).round(4).tolist()
+    return found
+
+
+@pytest.mark.parametrize("name", build_samples.SAMPLES)
+def test_samples_are_what_their_scripts_build(name, repository, tmp_path):
+    path = repository / "sample_blends" / f"{name}.blend"
+    assert path.stat().st_size < 1_000_000
+    bpy.ops.wm.open_mainfile(filepath=str(path))
+    committed = described(bpy.context.scene)
+    made = next(made for made in build_samples.build_all(tmp_path) if made.stem == name)
+    bpy.ops.wm.open_mainfile(filepath=str(made))
+    assert described(bpy.context.scene) == committed
+
+
+@pytest.mark.parametrize("name", build_samples.SAMPLES)
+def test_samples_open_and_bake(name, repository, tmp_path):
+    bpy.ops.wm.open_mainfile(filepath=str(repository / "sample_blends" / f"{name}.blend"))
+    scene = bpy.context.scene
+    scene.palpate.folder = str(tmp_path / "bake")
+    baked = jobs.run_blocking(bake(scene))
+    assert baked.recording.warnings == ()
+    assert figures.peak_force(baked.recording) > 0.01
+    for sensor in baked.recording.sensors.values():
+        assert sensor.contact.any()
+        assert np.isfinite(sensor.normal_force).all()
+
+
+def test_every_blend_in_the_folder_is_a_sample(repository):
+    found = {path.stem for path in (repository / "sample_blends").glob("*.blend")}
+    assert found == set(build_samples.SAMPLES)
