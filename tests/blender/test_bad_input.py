@@ -1,0 +1,334 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a user can get wrong gets one clear sentence and changes nothing; what can be used is used, with a warning."""
+
+import os
+import re
+import subprocess
+import sys
+from types import SimpleNamespace
+
+import bpy
+import numpy as np
+import pytest
+from blender_scenes import ball, changes, cube, dump, press, press_and_drop, save
+
+from palpate.addon import jobs, sample
+from palpate.addon.bake import bake
+from palpate.core.errors import PalpateError, SceneError
+
+
+@pytest.fixture
+def pressed(tmp_path):
+    """A scene that bakes; each test spoils it."""
+    scene, pad, target = press(frames=4)
+    bpy.ops.palpate.reset()
+    scene.palpate.use_live = False
+    save(tmp_path)
+    return SimpleNamespace(scene=scene, pad=pad, target=target, folder=tmp_path)
+
+
+def refusal(operator=None) -> str:
+    """Run an operator that has to refuse; return its sentence. Nothing may have changed, in the file and in its folder."""
+    folder = os.path.dirname(bpy.data.filepath)
+    before, files = dump(), everything_in(folder)
+    with pytest.raises(RuntimeError) as caught:
+        (operator or bpy.ops.palpate.bake)()
+    assert changes(before, dump()) == []
+    assert everything_in(folder) == files
+    lines = str(caught.value).strip().splitlines()
+    assert len(lines) == 1, lines
+    sentence = lines[0].removeprefix("Error: ")
+    assert re.fullmatch(r"\S.*[^.]\.", sentence), sentence
+    assert "Traceback" not in sentence
+    return sentence
+
+
+def everything_in(folder):
+    return sorted(os.path.join(where, name) for where, folders, files in os.walk(folder) for name in folders + files)
+
+
+def warnings_of(scene):
+    return " ".join(jobs.run_blocking(bake(scene)).recording.warnings)
+
+
+def test_the_scene_bakes_when_nothing_is_wrong(pressed):
+    assert bpy.ops.palpate.bake() == {"FINISHED"}
+
+
+# --- regions
+
+
+def test_a_region_without_vertices(pressed):
+    pressed.pad.vertex_groups.new(name="Empty")
+    pressed.pad.palpate.region, pressed.pad.palpate.vertex_group = "GROUP", "Empty"
+    assert refusal().startswith("The region of sensor 'Pad' is empty")
+
+
+def test_a_region_without_faces(pressed):
+    pressed.pad.vertex_groups.new(name="Scattered").add([0, 8, 20], 1.0, "REPLACE")
+    pressed.pad.palpate.region, pressed.pad.palpate.vertex_group = "GROUP", "Scattered"
+    assert refusal().startswith("The 3 vertices of sensor 'Pad' span no face")
+
+
+def test_a_region_whose_group_was_deleted(pressed):
+    pressed.pad.palpate.region, pressed.pad.palpate.vertex_group = "GROUP", "Gone"
+    assert refusal().startswith("Sensor 'Pad' has no vertex group 'Gone'")
+
+
+def test_a_sensor_from_an_empty_selection(pressed):
+    pressed.pad.data.vertices.foreach_set("select", np.zeros(84, dtype=bool))
+    bpy.context.view_layer.objects.active = pressed.pad
+    sentence = refusal(lambda: bpy.ops.palpate.sensor_add(source="SELECTION"))
+    assert sentence.startswith("Nothing is selected on 'Pad'")
+
+
+def test_a_sensor_from_scattered_vertices(pressed):
+    chosen = np.zeros(84, dtype=bool)
+    chosen[[0, 8, 20]] = True
+    pressed.pad.data.vertices.foreach_set("select", chosen)
+    bpy.context.view_layer.objects.active = pressed.pad
+    sentence = refusal(lambda: bpy.ops.palpate.sensor_add(source="SELECTION"))
+    assert sentence.startswith("The 3 chosen vertices of 'Pad' span no face")
+
+
+def test_a_sensor_from_a_group_that_is_not_there(pressed):
+    bpy.context.view_layer.objects.active = pressed.pad
+    assert refusal(lambda: bpy.ops.palpate.sensor_add(source="GROUP")).startswith("'Pad' has no vertex group")
+
+
+# --- meshes
+
+
+def test_a_sensor_without_faces(pressed):
+    pressed.pad.data.clear_geometry()
+    assert refusal().startswith("'Pad' has no faces")
+
+
+def test_a_mesh_without_area(pressed):
+    for vertex in pressed.target.data.vertices:
+        vertex.co.y = vertex.co.z = 0.0
+    assert refusal().startswith("All faces of 'Ball' have zero area")
+
+
+def test_single_faces_without_area_are_left_out(pressed):
+    for index in pressed.target.data.polygons[0].vertices:
+        pressed.target.data.vertices[index].co = pressed.target.data.vertices[0].co
+    assert "faces of 'Ball' have zero area and were left out" in warnings_of(pressed.scene)
+
+
+def test_a_mesh_with_branching_edges_is_used(pressed):
+    mesh = pressed.target.data
+    a, b = mesh.edges[0].vertices
+    points = [tuple(vertex.co) for vertex in mesh.vertices] + [(0.0, 0.0, 0.02)]
+    faces = [tuple(face.vertices) for face in mesh.polygons] + [(a, b, len(points) - 1)]
+    mesh.clear_geometry()
+    mesh.from_pydata(points, [], faces)
+    assert "non-manifold" in warnings_of(pressed.scene)
+
+
+def test_a_vertex_that_is_no_number(pressed):
+    pressed.target.data.vertices[7].co.x = float("nan")
+    assert refusal().startswith("Vertex 7 of 'Ball' has a NaN or infinite coordinate")
+
+
+def test_an_object_at_no_place(pressed):
+    pressed.pad.location.x = float("nan")
+    assert refusal().startswith("'Pad' has a NaN or infinite location")
+
+
+# --- scale
+
+
+@pytest.mark.parametrize("scale", [(0.0, 0.0, 0.0), (1.0, 0.0, 1.0)])
+def test_zero_scale(pressed, scale):
+    pressed.target.scale = scale
+    assert refusal().startswith("The scale of 'Ball' is zero")
+
+
+def test_negative_scale_is_used(pressed):
+    pressed.target.scale = (1.0, -1.0, 1.0)
+    assert "The scale of 'Ball' mirrors it" in warnings_of(pressed.scene)
+
+
+def test_non_uniform_scale_is_exact(pressed):
+    """A ball of half the height, reached by scale, is felt like a mesh of half the height."""
+    pressed.target.scale = (1.0, 1.0, 0.5)
+    scaled = jobs.run_blocking(bake(pressed.scene)).recording
+    for vertex in pressed.target.data.vertices:
+        vertex.co.z *= 0.5
+    pressed.target.scale = (1.0, 1.0, 1.0)
+    modelled = jobs.run_blocking(bake(pressed.scene)).recording
+    assert scaled.warnings == ()
+    assert scaled.sensors["Pad"].normal_force == pytest.approx(modelled.sensors["Pad"].normal_force, abs=1e-9)
+
+
+# --- numbers
+
+
+def test_zero_mass(pressed):
+    box = cube()
+    box.palpate.role, box.palpate.body, box.palpate.mass = "TARGET", "FREE", 0.0
+    assert refusal().startswith("The mass of free body 'Cube' is 0 kg")
+
+
+@pytest.mark.parametrize("value", [0.0, -58.5, float("nan")])
+def test_stiffness_that_is_none(pressed, value):
+    write_raw(pressed.pad, "k", value)
+    sentence = refusal()
+    assert sentence.startswith("k of sensor 'Pad' is") and sentence.endswith("above zero.")
+
+
+def write_raw(obj, key, value):
+    """Write a property past its limits, as an older file or another program could have."""
+    if hasattr(obj, "bl_system_properties_get"):
+        obj.bl_system_properties_get()["palpate"][key] = value
+    else:
+        obj["palpate"][key] = value
+
+
+def test_dynamic_above_static_friction(pressed):
+    pressed.pad.palpate.mud = 0.8
+    assert refusal().startswith("mud of sensor 'Pad' (0.8) is larger than mus (0.435)")
+
+
+def test_a_time_step_of_zero(pressed):
+    pressed.scene.palpate.use_auto_dt, pressed.scene.palpate.dt = False, 0.0
+    assert refusal().startswith("The time step of 'Scene' is 0 s")
+
+
+def test_a_frame_range_that_runs_backwards():
+    """Blender's own buttons keep it straight; a file or a command line need not."""
+    with pytest.raises(SceneError, match=r"frame range of 'Shot' runs backwards \(9 to 3\): set the end frame after"):
+        sample._check_range(SimpleNamespace(name="Shot", frame_start=9, frame_end=3))
+    scene = bpy.context.scene
+    scene.frame_start, scene.frame_end = 9, 3
+    assert scene.frame_start <= scene.frame_end
+
+
+def test_a_frame_range_that_runs_backwards_on_the_command_line(pressed):
+    run = palpate("bake", bpy.data.filepath, "--frames", "9", "3")
+    assert run.returncode == 1 and "backwards" in one_line(run)
+
+
+# --- who takes part
+
+
+def test_no_sensor(pressed):
+    pressed.pad.palpate.role = "TARGET"
+    assert refusal().startswith("'Scene' has no sensor")
+
+
+def test_nothing_that_touches(pressed):
+    pressed.target.palpate.role = "NONE"
+    assert refusal().startswith("Nothing in 'Scene' can touch a sensor")
+
+
+def test_a_curve_as_sensor(pressed):
+    bpy.ops.curve.primitive_bezier_circle_add()
+    bpy.context.object.name = "Circle"
+    bpy.context.object.palpate.role = "SENSOR"
+    assert refusal().startswith("'Circle' is no mesh")
+
+
+def test_a_curve_without_surface_as_target(pressed):
+    bpy.ops.curve.primitive_bezier_circle_add()
+    bpy.context.object.name = "Circle"
+    bpy.context.object.palpate.role = "TARGET"
+    assert refusal().startswith("'Circle' has no faces")
+
+
+@pytest.mark.parametrize("steps", [1, 3, 5, 7])
+def test_a_target_deleted_while_its_bake_runs(tmp_path, steps):
+    scene, _, target, *_ = press_and_drop(frames=4)
+    bpy.ops.palpate.reset()
+    scene.palpate.use_live = False
+    save(tmp_path)
+    jobs.run_blocking(bake(scene))
+    other = ball("Other")
+    other.palpate.role = "TARGET"
+    files = {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
+    work = jobs.Slice(bake(scene))
+    for _ in range(steps):
+        work.work(0.0)
+    bpy.data.objects.remove(other)
+    scene.frame_set(1)
+    before = dump()
+    with pytest.raises(PalpateError, match=r"^'Other' was deleted while .*: undo that, or start again without it\.$"):
+        while not work.is_done:
+            work.work(0.0)
+    assert {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()} == files
+    scene.frame_set(1)
+    assert changes(before, dump()) == []
+
+
+def test_a_scene_deleted_while_its_bake_runs(tmp_path):
+    scene, *_ = press(frames=4)
+    save(tmp_path)
+    work = jobs.Slice(bake(scene))
+    for _ in range(6):
+        work.work(0.0)
+    bpy.data.scenes.new("Other")
+    bpy.data.scenes.remove(scene)
+    with pytest.raises(PalpateError, match="^Scene 'Scene' was deleted or renamed"):
+        while not work.is_done:
+            work.work(0.0)
+
+
+# --- files
+
+
+def test_a_file_that_was_never_saved():
+    press(frames=4)
+    bpy.context.scene.palpate.use_live = False
+    bpy.ops.palpate.reset()
+    before = dump()
+    with pytest.raises(RuntimeError, match=r"relative to a file that is not saved yet: save the \.blend first\."):
+        bpy.ops.palpate.bake()
+    assert changes(before, dump()) == []
+
+
+def test_a_folder_that_is_missing(pressed):
+    pressed.scene.palpate.folder = str(pressed.folder / "not" / "there")
+    assert "not' does not exist" in refusal()
+
+
+def test_a_folder_that_cannot_be_written(pressed):
+    locked = pressed.folder / "locked"
+    locked.mkdir()
+    locked.chmod(0o555)
+    if os.access(locked, os.W_OK):  # an administrator may write everywhere but here
+        locked = "/proc"
+    pressed.scene.palpate.folder = str(locked)
+    sentence = refusal()
+    assert "read-only" in sentence or "No file can be made" in sentence
+
+
+def test_a_file_where_the_folder_should_be(pressed):
+    (pressed.folder / "palpate").write_text("a file")
+    assert "is a file where a folder is needed" in refusal()
+
+
+def test_no_folder_at_all(pressed):
+    pressed.scene.palpate.folder = " "
+    assert refusal().startswith("The bake folder of 'Scene' is empty")
+
+
+def palpate(*arguments):
+    code = "import sys; from palpate.commands import main; sys.exit(main(sys.argv[1:]))"
+    return subprocess.run([sys.executable, "-c", code, *arguments], capture_output=True, text=True, timeout=120)
+
+
+def one_line(run) -> str:
+    lines = run.stderr.strip().splitlines()
+    assert len(lines) == 1, run.stderr
+    return lines[0]
+
+
+@pytest.mark.parametrize("content", [b"", b"this is a letter to my mother", b"BLENDER-v405garbage"])
+def test_a_blend_that_is_none(tmp_path, content):
+    path = tmp_path / "letter.blend"
+    path.write_bytes(content)
+    run = palpate("bake", str(path))
+    assert run.returncode == 1
+    assert "letter.blend" in one_line(run)
+    assert [file.name for file in tmp_path.iterdir()] == ["letter.blend"]

@@ -1,0 +1,108 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A baked .blend plays its heat maps, arrows and bodies in a Blender that has never heard of Palpate."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import bpy
+import numpy as np
+import pytest
+from blender_scenes import cube, press_and_drop, save
+
+from palpate.addon import colormaps, jobs
+from palpate.addon.bake import bake
+
+FRAMES = (1, 7, 8)
+SCRIPT = Path(__file__).with_name("without_addon.py")
+
+
+def look_from_above(scene, height=0.5, width=0.05):
+    """A camera straight above the first pad, and no light but the heat map's own."""
+    bpy.ops.object.camera_add(location=(0.0, 0.0, height), rotation=(0.0, 0.0, 0.0))
+    scene.camera = bpy.context.object
+    scene.camera.data.type, scene.camera.data.ortho_scale = "ORTHO", width
+    scene.render.engine = "CYCLES"
+    scene.cycles.samples, scene.cycles.use_denoising, scene.cycles.max_bounces = 4, False, 0
+    scene.cycles.pixel_filter_type = "BOX"
+    scene.render.resolution_x = scene.render.resolution_y = 56
+    scene.view_settings.view_transform = "Standard"
+    scene.world = None
+
+
+def watch(path, tmp_path, name, with_addon):
+    """Open a file in a Blender of its own and return what it saw."""
+    report = tmp_path / f"{name}.json"
+    command = [sys.executable, str(SCRIPT), str(path), str(report), str(int(with_addon)), *map(str, FRAMES)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=180)
+    assert report.exists(), done.stdout + done.stderr
+    return json.loads(report.read_text())
+
+
+@pytest.fixture
+def scene_file(tmp_path):
+    scene, pad, target, *_ = press_and_drop(frames=8)
+    tip, plate = cube("Tip", (0.0, 0.1, 0.0), size=0.02), cube("Plate", (0.0, 0.1, 0.0275), size=0.04)
+    tip.palpate.role, plate.palpate.role = "SENSOR", "TARGET"  # a tip's heat map goes by geometry nodes
+    plate.keyframe_insert("location", frame=1)
+    plate.location.z = 0.032
+    plate.keyframe_insert("location", frame=8)
+    for obj in (target, *[o for o in scene.objects if o.name == "Cube"]):
+        obj.hide_render = True  # see the pad and not what presses on it
+    look_from_above(scene)
+    folder = tmp_path / "project"
+    folder.mkdir()
+    path = save(folder)
+    recording = jobs.run_blocking(bake(scene)).recording
+    for obj in scene.objects:
+        if obj.name.startswith("Net Force"):
+            obj.hide_render = True
+    save(folder)
+    moved = tmp_path / "elsewhere"  # the paths are relative, so the folder can travel
+    folder.rename(moved)
+    return moved / path.name, recording
+
+
+def test_it_plays_without_the_addon(scene_file, tmp_path):
+    path, recording = scene_file
+    without = watch(path, tmp_path, "without", False)
+    with_it = watch(path, tmp_path, "with", True)
+    assert not without["has_addon"] and with_it["has_addon"]
+    assert without["frames"] == with_it["frames"]
+
+    arrows = [without["frames"][str(frame)]["arrows"]["Net Force Pad"] for frame in FRAMES]
+    lengths = [np.linalg.norm(np.array(matrix)[:3, 2]) for matrix in arrows]
+    forces = [np.linalg.norm(recording.sensors["Pad"].net_force[frame - 1]) for frame in FRAMES]
+    assert forces[0] == 0.0 and forces[2] > forces[1] > 0.0
+    assert np.array(lengths) / lengths[2] == pytest.approx(np.array(forces) / forces[2], abs=1e-5)
+
+    for frame in FRAMES:
+        shown = without["frames"][str(frame)]["tip"]
+        assert shown == pytest.approx(recording.sensors["Tip"].normal_force[frame - 1], abs=1e-7)
+    assert recording.sensors["Tip"].normal_force[0].max() > 0.0
+
+    cube_at = recording.body_names.index("Cube")
+    for frame in FRAMES:
+        matrix = np.array(without["frames"][str(frame)]["bodies"]["Cube"])
+        assert matrix[:3, 3] == pytest.approx(recording.poses[frame - 1, cube_at, :3], abs=1e-6)
+
+
+def test_every_texel_has_the_colour_of_its_force(scene_file, tmp_path):
+    """Seen from above in the dark, a pixel shows emission 0.4 times the colour of the texel under it."""
+    path, recording = scene_file
+    seen = watch(path, tmp_path, "seen", False)
+    force = recording.sensors["Pad"].normal_force
+    for frame in FRAMES:
+        shot = seen["frames"][str(frame)]
+        width, height = shot["size"]
+        pixels = np.array(shot["pixels"]).reshape(height, width, 4)
+        # the pad is 50 mm wide and fills the picture: 6 × 14 texels, those on the rim only half of their cell
+        column = np.clip(np.round((np.arange(6) / 5) * width - 0.5), 1, width - 2).astype(int)
+        row = np.clip(np.round((np.arange(14) / 13) * height - 0.5), 1, height - 2).astype(int)
+        found = pixels[np.ix_(row, column)][..., :3].reshape(-1, 3)
+        colors = colormaps.colors("VIRIDIS", force[frame - 1] / force.max())
+        glow = 0.4 * colormaps.linear(colors)
+        expected = np.where(glow <= 0.0031308, 12.92 * glow, 1.055 * glow ** (1 / 2.4) - 0.055)
+        assert np.abs(found - expected).max() < 0.03, frame
+    assert len({tuple(shot["pixels"]) for shot in seen["frames"].values()}) == 3

@@ -1,0 +1,40 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Open a baked .blend and look at it frame by frame; run by test_without_addon.py in a process of its own.
+
+python without_addon.py SCENE.blend REPORT.json WITH_ADDON(0/1) FRAME...
+"""
+
+import json
+import sys
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+scene_path, report_path, with_addon, *frames = sys.argv[1:]
+if int(with_addon):
+    import palpate
+
+    palpate.register()
+bpy.ops.wm.open_mainfile(filepath=scene_path)
+scene = bpy.context.scene
+render = scene.render
+render.image_settings.file_format = "PNG"
+report = {"has_addon": hasattr(bpy.types.Object, "palpate"), "frames": {}}
+for frame in map(int, frames):
+    scene.frame_set(frame)
+    path = Path(report_path).with_name(f"{Path(report_path).stem}_{frame}.png")
+    render.filepath = str(path)
+    bpy.ops.render.render(write_still=True)
+    picture = bpy.data.images.load(str(path))
+    pixels = np.empty(len(picture.pixels), dtype=np.float32)
+    picture.pixels.foreach_get(pixels)
+    tip = scene.objects["Tip"].evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+    report["frames"][frame] = {
+        "tip": [item.value for item in tip.attributes["palpate_force"].data],
+        "size": list(picture.size),
+        "pixels": np.round(pixels, 4).tolist(),
+        "arrows": {o.name: [list(row) for row in o.matrix_world] for o in scene.objects if o.name.startswith("Net Force")},
+        "bodies": {o.name: [list(row) for row in o.matrix_world] for o in scene.objects if o.name in ("Ball", "Cube")},
+    }
+Path(report_path).write_text(json.dumps(report))
