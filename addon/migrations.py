@@ -10,19 +10,18 @@ from ..core.migrate import VERSION, migrate
 from . import state
 
 
-def apply() -> None:
-    """Bring the settings of all objects and scenes of the file forward."""
+def apply(version: int = VERSION, steps=None) -> None:
+    """Bring the settings of all objects and scenes of the file forward; other versions and steps are for tests."""
     for kind, blocks in (("object", bpy.data.objects), ("scene", bpy.data.scenes)):
         for block in blocks:
-            version = block.palpate.schema_version
-            if version not in (0, VERSION):
-                _bring_forward(block, kind)
+            if block.palpate.schema_version not in (0, version):
+                _bring_forward(block, kind, version, steps)
 
 
-def _bring_forward(block, kind: str) -> None:
+def _bring_forward(block, kind: str, version: int, steps) -> None:
     before = stored(block)
     try:
-        after = migrate(before, kind, block.name)
+        after = migrate(before, kind, block.name, steps, version)
     except FileError as error:
         state.session.notes[block.name] = str(error)
         return

@@ -1,0 +1,55 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Files of other versions of Palpate: older ones are brought forward, newer ones are left alone and it is said."""
+
+import bpy
+from blender_scenes import press, reopen, save
+
+from palpate.addon import migrations, state
+from palpate.core.migrate import VERSION
+
+
+def write_raw(block, values):
+    """Write settings as another version of Palpate would have saved them."""
+    if hasattr(block, "bl_system_properties_get"):
+        group = block.bl_system_properties_get()["palpate"]
+    else:
+        group = block["palpate"]
+    for key, value in values.items():
+        group[key] = value
+
+
+def test_an_older_file_is_brought_forward(tmp_path):
+    _, pad, _ = press()
+    write_raw(pad, {"stiffness": 99.0})
+    path = save(tmp_path)
+    reopen(path)
+    pad = bpy.data.objects["Pad"]
+    assert migrations.stored(pad)["stiffness"] == 99.0
+
+    def renamed(settings):
+        settings["k"] = settings.pop("stiffness", 58.5)
+        return settings
+
+    migrations.apply(VERSION + 1, {("object", VERSION): renamed})
+    assert pad.palpate.k == 99.0 and pad.palpate.schema_version == VERSION + 1
+    assert pad.palpate.role == "SENSOR"
+
+
+def test_a_newer_file_is_left_alone_and_it_is_said(tmp_path):
+    _, pad, _ = press()
+    write_raw(pad, {"schema_version": VERSION + 5, "k": 77.0})
+    path = save(tmp_path)
+    reopen(path)
+    assert bpy.data.objects["Pad"].palpate.k == 77.0
+    assert bpy.data.objects["Pad"].palpate.schema_version == VERSION + 5
+    assert state.session.notes["Pad"].startswith("The settings of 'Pad' were saved by a newer Palpate")
+    bpy.ops.wm.read_homefile(use_empty=True)
+    assert state.session.notes == {}
+
+
+def test_todays_settings_are_not_touched(tmp_path):
+    _, pad, _ = press()
+    before = migrations.stored(pad)
+    assert before["schema_version"] == VERSION
+    migrations.apply()
+    assert migrations.stored(pad) == before
