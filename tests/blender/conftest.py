@@ -6,6 +6,7 @@ One pytest process serves all files, because starting Blender's module costs mor
 
 from __future__ import annotations
 
+import ctypes
 import os
 import shutil
 import tempfile
@@ -40,4 +41,6 @@ def scene():
     """Return the scene of an empty file in factory settings, with the add-on enabled."""
     bpy.ops.wm.read_factory_settings(use_empty=True)  # disables every add-on, ours too
     enable_palpate()
+    # Blender prints through C's own buffer; what earlier tests left there must not appear in what this one captures
+    ctypes.CDLL(None).fflush(None)
     return bpy.context.scene
