@@ -94,14 +94,18 @@ class PALPATE_PG_object(bpy.types.PropertyGroup):
         step=0.1,
     )
     sigma0: _number(
-        "Bristle Stiffness σ0 (N/m)", "sigma0", "Tangential stiffness before a texel slips, N/m (Eq. 9, 13). Table 2: 1"
+        "Bristles σ0 (N/m)",
+        "sigma0",
+        "Bristle stiffness: tangential stiffness before a texel slips, N/m (Eq. 9, 13). Table 2: 1",
     )
-    sigma1: _number("Bristle Damping σ1 (N·s/m)", "sigma1", "Damping of the bristles, N·s/m (Eq. 13). Table 2: 0.1")
-    ct: _number("Viscous Friction ct (N·s/m)", "ct", "Friction that grows with sliding speed, N·s/m (Eq. 13). Table 2: 0.01")
+    sigma1: _number("Bristles σ1 (N·s/m)", "sigma1", "Bristle damping, N·s/m (Eq. 13). Table 2: 0.1")
+    ct: _number("Viscous ct (N·s/m)", "ct", "Viscous friction: grows with sliding speed, N·s/m (Eq. 13). Table 2: 0.01")
     mus: _number("Static Friction μs", "mus", "Coefficient at which sliding begins, no unit (Eq. 11). Foam on metal: 0.435")
     mud: _number("Dynamic Friction μd", "mud", "Coefficient of fast sliding, no unit, at most μs (Eq. 12). Foam on metal: 0.23")
     x0: _number(
-        "Stribeck Velocity ẋ0 (m/s)", "x0", "Speed at which static friction gives way to dynamic, m/s (Eq. 10). Table 2: 0.3"
+        "Stribeck x0 (m/s)",
+        "x0",
+        "Stribeck velocity: speed at which static friction gives way to dynamic, m/s (Eq. 10). Table 2: 0.3",
     )
 
     gain: _number(

@@ -24,6 +24,8 @@ class Part(Physics):
     bl_parent_id = "PALPATE_PT_physics"
     bl_options = {"DEFAULT_CLOSED"}
     roles = {"SENSOR", "TARGET", "PAD"}
+    split = True
+    """False puts names inside the number fields: units fit there, beside the fields of a narrow editor they are cut off."""
 
     @classmethod
     def poll(cls, context):
@@ -31,7 +33,7 @@ class Part(Physics):
 
     def draw(self, context):
         layout = self.layout
-        layout.use_property_split = True
+        layout.use_property_split = self.split
         layout.use_property_decorate = False
         self.draw_part(layout, context.object.palpate, context)
 
@@ -78,6 +80,7 @@ class PALPATE_PT_region(Part, bpy.types.Panel):
 
 class PALPATE_PT_contact(Part, bpy.types.Panel):
     bl_label = "Contact"
+    split = False
     roles = {"SENSOR", "PAD"}
 
     def draw_part(self, layout, settings, _context):
@@ -89,6 +92,7 @@ class PALPATE_PT_contact(Part, bpy.types.Panel):
 
 class PALPATE_PT_friction(Part, bpy.types.Panel):
     bl_label = "Friction"
+    split = False
     roles = {"SENSOR", "PAD"}
 
     def draw_part(self, layout, settings, _context):
@@ -104,9 +108,10 @@ class PALPATE_PT_friction(Part, bpy.types.Panel):
 
 class PALPATE_PT_body(Part, bpy.types.Panel):
     bl_label = "Body"
+    split = False
 
     def draw_part(self, layout, settings, _context):
-        layout.prop(settings, "body")
+        layout.row().prop(settings, "body", expand=True)
         if settings.body == "FREE":
             layout.prop(settings, "mass")
             layout.column().prop(settings, "velocity")
@@ -115,6 +120,7 @@ class PALPATE_PT_body(Part, bpy.types.Panel):
 
 class PALPATE_PT_readout(Part, bpy.types.Panel):
     bl_label = "Readout"
+    split = False
     roles = {"SENSOR"}
 
     def draw_part(self, layout, settings, context):
@@ -129,9 +135,10 @@ class PALPATE_PT_readout(Part, bpy.types.Panel):
             box.label(text=status.text)
             return
         x, y, z = felt.net_force
-        box.label(text=f"Frame {status.frame.frame}: {int(felt.contact.sum())} of {len(felt.contact)} texels in contact")
-        box.label(text=f"Sum of normal forces: {felt.normal_force.sum():.4g} N, largest {felt.normal_force.max():.4g} N")
-        box.label(text=f"Net force on the sensor, its axes: {x:.4g}, {y:.4g}, {z:.4g} N")
+        box.label(text=f"Frame {status.frame.frame}: {int(felt.contact.sum())} of {len(felt.contact)} texels touch")
+        box.label(text=f"Normal: {felt.normal_force.sum():.4f} N")
+        box.label(text=f"Largest texel: {felt.normal_force.max():.4f} N")
+        box.label(text=f"Net x, y, z: {x:.3f}, {y:.3f}, {z:.3f} N")
 
 
 class PALPATE_PT_bake(Part, bpy.types.Panel):
