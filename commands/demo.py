@@ -61,7 +61,7 @@ def run(arguments: argparse.Namespace) -> int:
     required = demo.CUBE_MASS * float(np.linalg.norm(baked.scenario.gravity))
 
     strip, curves, picture = folder / "tactile-strip.png", folder / "forces.png", folder / "scene.png"
-    figures.tactile_strip(strip, recording, texels, **look)
+    figures.tactile_strip(strip, recording, texels, demo.STRIP_FRAMES, **look)
     parameters = {name: sensor.parameters for name, sensor in sensors.items()}
     figures.force_curves(curves, recording, texels, parameters, {demo.PAD_B: required})
     if not arguments.no_render:

@@ -15,6 +15,8 @@ FPS = 24
 FRAME_END = 112
 PICTURE_FRAME = 78
 """The frame that shows it best: the ball slips, the cube rests."""
+STRIP_FRAMES = (1, 17, 35, 53, 71, 89)
+"""Frames of the tactile strip: nothing yet, pressed, four of the slide."""
 
 PAD_ROWS, PAD_COLUMNS = 14, 6
 PITCH_A, PITCH_B = 3.4, 4.5  # mm; the paper's pad, and one a little longer than the cube

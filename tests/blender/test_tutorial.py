@@ -1,0 +1,81 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The tutorial of the README, step by step: its numbers and its words are true."""
+
+import re
+
+import bpy
+import numpy as np
+import pytest
+
+from palpate.core.formats.archive import load_recording
+
+
+def test_the_tutorial_does_what_it_says(scene, tmp_path, repository):
+    readme = (repository / "README.md").read_text(encoding="utf-8")
+    bpy.ops.mesh.primitive_grid_add(x_subdivisions=5, y_subdivisions=13, size=0.05)
+    grid = bpy.context.object
+    bpy.ops.transform.resize(value=(0.4, 1.0, 1.0))
+    assert bpy.ops.palpate.sensor_add() == {"FINISHED"}
+    bpy.ops.mesh.primitive_uv_sphere_add(radius=0.015, location=(0.0, 0.0, 0.02))
+    sphere = bpy.context.object
+    assert bpy.ops.palpate.role_set(role="TARGET") == {"FINISHED"}
+    scene.frame_set(1)
+    sphere.keyframe_insert("location")
+    scene.frame_set(30)
+    bpy.ops.transform.translate(value=(0.0, 0.0, -0.0075))
+    sphere.keyframe_insert("location")
+    scene.frame_end = 60
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "press.blend"))
+    bpy.context.view_layer.objects.active = grid
+    assert bpy.ops.palpate.bake() == {"FINISHED"}
+
+    felt = load_recording(tmp_path / "palpate" / "Grid" / "recording.npz").sensors["Grid"]
+    assert felt.normal_force.shape == (60, 84)
+    images = sorted(path.name for path in (tmp_path / "palpate" / "Grid").glob("*.exr"))
+    assert images[0] == "tactile_0001.exr"
+    assert len(images) == 60
+    promised = float(re.search(r"about ([\d.]+) N at frame 60", readme).group(1))
+    assert felt.normal_force[-1].sum() == pytest.approx(promised, abs=0.05)
+    nearest = 0.002**2 + (0.05 / 26) ** 2  # the texels next to the middle are half a pitch off, where the sphere is higher
+    assert felt.depth.max() == pytest.approx(0.0025 - nearest / (2 * 0.015), abs=5e-5)
+
+
+def test_every_name_in_the_tutorial_is_on_a_button(repository):
+    """What the README calls Physics › Palpate › … are names of our panels, operators and properties."""
+    readme = (repository / "README.md").read_text(encoding="utf-8")
+    tutorial = readme.split("## Five minutes")[1].split("\n## ")[0]
+    named = set(re.findall(r"\*\*Palpate › ([^*]+)\*\*", tutorial))
+    assert len(named) >= 4
+    words = set()
+    for cls in bpy.types.Panel.__subclasses__() + bpy.types.Operator.__subclasses__():
+        if cls.__module__.startswith("palpate"):
+            words.add(cls.bl_label)
+    panels = (repository / "panels" / "physics.py").read_text(encoding="utf-8")
+    words |= set(re.findall(r'text="([^"{]+)"', panels))
+    for path in named:
+        for part in path.split(" › "):
+            assert part in words, part
+
+
+def test_the_pictures_of_the_readme_are_there_and_small(repository):
+    readme = (repository / "README.md").read_text(encoding="utf-8")
+    pictures = re.findall(r'(?:src="|\]\()(docs/images/[^")]+)', readme)
+    assert pictures
+    for name in pictures:
+        assert 5_000 < (repository / name).stat().st_size < 400_000
+
+
+def test_links_of_the_pages_lead_somewhere(repository):
+    for page in [repository / "README.md", *(repository / "docs").glob("*.md")]:
+        for link in re.findall(r"\]\(([^)#\s]+)[^)]*\)", page.read_text(encoding="utf-8")):
+            if not link.startswith(("http:", "https:", "mailto:")):
+                assert (page.parent / link).exists(), f"{page.name}: {link}"
+
+
+def test_numbers_of_the_sphere(repository):
+    """Sanity of the promised force: a sphere pressed into springs of k per texel of area A feels k/A times the cap's volume."""
+    radius, depth, k, area = 0.015, 0.0025, 58.5, (0.02 / 5) * (0.05 / 13)
+    volume = np.pi * depth**2 * (radius - depth / 3)
+    readme = (repository / "README.md").read_text(encoding="utf-8")
+    promised = float(re.search(r"about ([\d.]+) N at frame 60", readme).group(1))
+    assert k / area * volume == pytest.approx(promised, rel=0.15)
