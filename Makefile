@@ -58,7 +58,11 @@ test-ui: env
 	$(BIN)/python tools/provision_blender.py
 	$(BIN)/python -m pytest tests/ui $(PYTEST_ARGS)
 
-bench: env
+$(VENV)/.bench: $(VENV)/.ready
+	$(BIN)/python -m pip install --quiet --editable '.[bench]'
+	touch $@
+
+bench: $(VENV)/.bench
 	@$(BIN)/python -m benchmarks $(ONLY)
 
 zip: env
