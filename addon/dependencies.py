@@ -8,7 +8,7 @@ import os
 import platform
 import sys
 
-NEEDED = ("numpy", "numba", "llvmlite", "OpenEXR", "trimesh")
+NEEDED = ("numpy", "numba", "llvmlite", "trimesh")
 
 
 def missing() -> list[str]:

@@ -17,6 +17,7 @@ import numpy as np
 from ..errors import FileError
 from ..layout import GridLayout, UVLayout
 from ..recording import SensorFrame
+from . import openexr
 from .files import atomic_write
 
 CHANNELS = ("R", "G", "B", "reading", "depth", "slip", "contact")
@@ -71,19 +72,10 @@ def write_exr(path: str | os.PathLike, layout: GridLayout | UVLayout, frame: Sen
     ValueError
         See :func:`exr_channels`; nothing is written then.
     """
-    import OpenEXR
-
     pictures = exr_channels(layout, frame)
-    header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
-    header.update({_PREFIX + key: str(value) for key, value in metadata.items()})
-    # OpenEXR counts rows from the top; it also replaces the values of the dict it gets
-    channels = {name: np.ascontiguousarray(picture[::-1]) for name, picture in pictures.items()}
+    from_top = {name: picture[::-1] for name, picture in pictures.items()}
     with atomic_write(path) as temporary:
-        try:
-            with OpenEXR.File(header, channels) as file:
-                file.write(str(temporary))
-        except RuntimeError as error:
-            raise FileError(f"'{path}' could not be written ({error}): choose another folder.") from error
+        openexr.write(temporary, from_top, {_PREFIX + key: str(value) for key, value in metadata.items()})
 
 
 def read_exr(path: str | os.PathLike) -> tuple[dict[str, np.ndarray], dict[str, str]]:
@@ -101,18 +93,16 @@ def read_exr(path: str | os.PathLike) -> tuple[dict[str, np.ndarray], dict[str, 
     FileError
         There is no such file, or it is damaged or not an OpenEXR image.
     """
-    import OpenEXR
-
     if not Path(path).is_file():
         raise FileError(f"'{path}' does not exist: bake first, or choose another file.")
     try:
-        with OpenEXR.File(os.fspath(path), separate_channels=True) as file:
-            found = {name: np.flipud(channel.pixels).copy() for name, channel in file.channels().items()}
-            header = dict(file.header())
-    except (RuntimeError, ValueError, MemoryError) as error:
-        raise FileError(f"'{path}' is damaged or not an OpenEXR image: bake again.") from error
+        pictures, attributes = openexr.read(path)
+    except OSError as error:
+        reason = (error.strerror or str(error)).lower()
+        raise FileError(f"'{path}' could not be read ({reason}): check its permissions.") from error
+    except openexr.FormatError as error:
+        raise FileError(f"'{path}' is damaged or not an OpenEXR image ({error}): bake again.") from error
+    found = {name: picture[::-1].astype(np.float32) for name, picture in pictures.items()}
     order = [name for name in CHANNELS if name in found] + [name for name in found if name not in CHANNELS]
-    metadata = {
-        key.removeprefix(_PREFIX): value for key, value in header.items() if key.startswith(_PREFIX) and isinstance(value, str)
-    }
+    metadata = {key.removeprefix(_PREFIX): value for key, value in attributes.items() if key.startswith(_PREFIX)}
     return {name: found[name] for name in order}, metadata

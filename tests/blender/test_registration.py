@@ -83,16 +83,16 @@ def test_disabling_leaves_nothing_and_enabling_again_works(commands):
 
 def test_a_missing_module_leaves_a_panel_that_says_so(commands, monkeypatch):
     find = importlib.util.find_spec
-    monkeypatch.setattr(importlib.util, "find_spec", lambda name, *rest: None if name == "OpenEXR" else find(name, *rest))
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name, *rest: None if name == "trimesh" else find(name, *rest))
     without = traces()
     palpate.register()
     assert traces()["classes"] == ["PALPATE_OT_debug_info_copy", "PALPATE_PT_missing"]
     from palpate.panels.missing import PALPATE_PT_missing
 
-    assert PALPATE_PT_missing.lost == ("OpenEXR",)
+    assert PALPATE_PT_missing.lost == ("trimesh",)
     from palpate.addon import dependencies
 
-    assert "missing: OpenEXR" in dependencies.debug_info()
+    assert "missing: trimesh" in dependencies.debug_info()
     assert bpy.ops.palpate.debug_info_copy() == {"FINISHED"}
     palpate.unregister()
     assert traces() == without

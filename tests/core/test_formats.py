@@ -20,7 +20,7 @@ import OpenEXR
 import pytest
 
 from palpate.core.errors import FileError, PalpateError
-from palpate.core.formats import files
+from palpate.core.formats import files, openexr
 from palpate.core.formats.archive import load_recording, save_recording
 from palpate.core.formats.exr import CHANNELS, exr_channels, read_exr, write_exr
 from palpate.core.formats.files import (
@@ -579,21 +579,11 @@ def test_exr_in_wrong_places(tmp_path):
 
 
 def test_failing_writer_leaves_nothing(tmp_path, monkeypatch):
-    class Failing:
-        def __init__(self, *_):
-            pass
+    def half(path, *_):
+        Path(path).write_bytes(b"half")
+        raise OSError(errno.ENOSPC, "No space left on device")
 
-        def __enter__(self):
-            return self
-
-        def __exit__(self, *_):
-            pass
-
-        def write(self, name):
-            Path(name).write_bytes(b"half")
-            raise RuntimeError("no space left on device")
-
-    monkeypatch.setattr(OpenEXR, "File", Failing)
+    monkeypatch.setattr(openexr, "write", half)
     with pytest.raises(FileError) as error:
         write_exr(tmp_path / "a.exr", grid_of(2, 2), tactile_frame(4), METADATA)
     one_sentence(error, tmp_path / "a.exr", "no space left")
@@ -613,3 +603,43 @@ def test_damaged_exr(tmp_path):
     for content in (b"GIF89a", os.urandom(5000), whole[:500] + b"\0" * (len(whole) - 500)):
         path.write_bytes(content)
         cannot_load(read_exr, path)
+
+
+@pytest.mark.parametrize("shape", [(1, 1), (16, 3), (17, 5), (100, 333)])
+def test_exr_agrees_with_the_library(tmp_path, shape):
+    """What we write the library reads, and what it writes, in every type and lossless compression, we read."""
+    rng = np.random.default_rng(1)
+    noise = rng.normal(size=shape).astype(np.float32)
+    channels = {"R": noise, "G": np.zeros(shape, np.float32), "depth": np.cumsum(noise, axis=1, dtype=np.float32)}
+    openexr.write(tmp_path / "ours.exr", channels, {"a": "ü", "palpate.x": ""})
+    with OpenEXR.File(str(tmp_path / "ours.exr"), separate_channels=True) as file:
+        for name, picture in channels.items():
+            np.testing.assert_array_equal(file.channels()[name].pixels, picture)
+        assert file.header()["a"] == "ü" and file.header()["palpate.x"] == ""
+    channels["half"] = noise.astype(np.float16)
+    channels["count"] = rng.integers(0, 1 << 32, shape).astype(np.uint32)
+    for compression in (OpenEXR.NO_COMPRESSION, OpenEXR.ZIPS_COMPRESSION, OpenEXR.ZIP_COMPRESSION):
+        copies = {name: picture.copy() for name, picture in channels.items()}
+        with OpenEXR.File({"compression": compression, "type": OpenEXR.scanlineimage, "b": "text"}, copies) as file:
+            file.write(str(tmp_path / "theirs.exr"))
+        found, attributes = openexr.read(tmp_path / "theirs.exr")
+        assert attributes["b"] == "text"
+        for name, picture in channels.items():
+            assert found[name].dtype == picture.dtype
+            np.testing.assert_array_equal(found[name], picture)
+
+
+def test_any_damage_to_an_exr_is_noticed_or_harmless(tmp_path):
+    """No byte can be changed so that reading ends in anything but a picture or a sentence."""
+    path = tmp_path / "a.exr"
+    write_exr(path, grid_of(5, 4), tactile_frame(20), METADATA)
+    whole = path.read_bytes()
+    rng = np.random.default_rng(2)
+    for at in range(0, len(whole), 7):
+        damaged = bytearray(whole)
+        damaged[at] = rng.integers(256)
+        path.write_bytes(damaged)
+        try:
+            read_exr(path)
+        except FileError as error:
+            assert "\n" not in str(error)

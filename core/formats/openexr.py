@@ -1,0 +1,214 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The part of the OpenEXR file format that tactile images need, in plain Python: scan lines, one part, ZIP compression.
+
+The OpenEXR library from PyPI cannot be used beside a real Blender: both carry the library, the dynamic linker mixes their
+symbols, and the first file written ends in a segmentation fault (seen in Debian's Blender 4.3). The format is small:
+https://openexr.com/en/latest/OpenEXRFileLayout.html
+"""
+
+from __future__ import annotations
+
+import os
+import struct
+import zlib
+from collections.abc import Mapping
+
+import numpy as np
+
+MAGIC = 20000630
+VERSION = 2
+_LONG_NAMES, _OTHER_FLAGS = 0x400, 0x1A00  # tiles, deep data and several parts: not for us
+_TYPES: dict[int, np.dtype] = {0: np.dtype("<u4"), 1: np.dtype("<f2"), 2: np.dtype("<f4")}
+_FLOAT = 2
+_LINES = {0: 1, 2: 1, 3: 16}
+"""Compression (none, ZIPS, ZIP) → scan lines in a block."""
+_ZIP = 3
+_LEVEL = 4
+
+
+class FormatError(ValueError):
+    """The file is damaged, or uses a part of the format that is not read here."""
+
+
+def write(path: str | os.PathLike, channels: Mapping[str, np.ndarray], attributes: Mapping[str, str]) -> None:
+    """Write an image.
+
+    Parameters
+    ----------
+    path : path
+    channels : mapping of str to (height, width) float32
+        The first row is the top of the picture.
+    attributes : mapping of str to str
+        Added to the header.
+    """
+    names = sorted(channels, key=lambda name: name.encode())
+    height, width = channels[names[0]].shape
+    table = np.stack([np.asarray(channels[name], "<f4") for name in names], axis=1)  # (height, channels, width)
+    step = _LINES[_ZIP]
+    blocks = [_pack(table[top : top + step].tobytes()) for top in range(0, height, step)]
+    header = _header(names, width, height, attributes)
+    at = len(header) + 8 * len(blocks)
+    with open(path, "wb") as file:
+        file.write(header)
+        for block in blocks:
+            file.write(struct.pack("<Q", at))
+            at += 8 + len(block)
+        for i, block in enumerate(blocks):
+            file.write(struct.pack("<ii", i * step, len(block)) + block)
+
+
+def _header(names: list[str], width: int, height: int, attributes: Mapping[str, str]) -> bytes:
+    window = struct.pack("<4i", 0, 0, width - 1, height - 1)
+    channels = b"".join(_text(name) + struct.pack("<iB3xii", _FLOAT, 0, 1, 1) for name in names) + b"\0"
+    entries = [
+        ("channels", "chlist", channels),
+        ("compression", "compression", bytes([_ZIP])),
+        ("dataWindow", "box2i", window),
+        ("displayWindow", "box2i", window),
+        ("lineOrder", "lineOrder", b"\0"),
+        ("pixelAspectRatio", "float", struct.pack("<f", 1.0)),
+        ("screenWindowCenter", "v2f", struct.pack("<2f", 0.0, 0.0)),
+        ("screenWindowWidth", "float", struct.pack("<f", 1.0)),
+        *((name, "string", value.encode("utf-8", "surrogatepass")) for name, value in attributes.items()),
+    ]
+    longest = max(len(name.encode()) for name in (*names, *attributes, ""))
+    flags = _LONG_NAMES if longest > 31 else 0
+    body = b"".join(_text(name) + _text(kind) + struct.pack("<i", len(value)) + value for name, kind, value in entries)
+    return struct.pack("<ii", MAGIC, VERSION | flags) + body + b"\0"
+
+
+def _text(text: str) -> bytes:
+    return text.encode("utf-8", "surrogatepass") + b"\0"
+
+
+def _pack(raw: bytes) -> bytes:
+    """Compress a block: even bytes before odd ones, differences of neighbours, zlib; as it is when that makes it longer."""
+    data = np.frombuffer(raw, np.uint8)
+    sorted_bytes = np.concatenate([data[::2], data[1::2]])
+    different = sorted_bytes.copy()
+    different[1:] = np.diff(sorted_bytes.astype(np.int16)) + 128 & 0xFF
+    packed = zlib.compress(different.tobytes(), _LEVEL)
+    return packed if len(packed) < len(raw) else raw
+
+
+def _unpack(packed: bytes, size: int) -> bytes:
+    if len(packed) == size:
+        return packed
+    engine = zlib.decompressobj()
+    data = np.frombuffer(engine.decompress(packed, size), np.uint8)
+    if len(data) != size or not engine.eof:
+        raise FormatError("a block has the wrong length")
+    summed = np.cumsum(data.astype(np.int64) - 128) + 128 & 0xFF
+    result = np.empty(size, np.uint8)
+    half = (size + 1) // 2
+    result[::2], result[1::2] = summed[:half], summed[half:]
+    return result.tobytes()
+
+
+def read(path: str | os.PathLike) -> tuple[dict[str, np.ndarray], dict[str, str]]:
+    """Read an image.
+
+    Returns
+    -------
+    channels : dict of str to (height, width) array
+        In the order of the file, the first row the top of the picture; float32, float16 or uint32 as in the file.
+    attributes : dict of str to str
+        Those of type string.
+
+    Raises
+    ------
+    FormatError
+    """
+    with open(path, "rb") as file:
+        data = file.read()
+    try:
+        return _read(data)
+    except (struct.error, IndexError, UnicodeDecodeError, zlib.error, OverflowError, MemoryError) as error:
+        raise FormatError(str(error)) from error
+
+
+def _read(data: bytes) -> tuple[dict[str, np.ndarray], dict[str, str]]:
+    magic, version = struct.unpack_from("<ii", data)
+    if magic != MAGIC or version & 0xFF != VERSION:
+        raise FormatError("it does not begin like an OpenEXR file")
+    if version & _OTHER_FLAGS:
+        raise FormatError("it has tiles or several parts")
+    entries, at = _entries(data, 8)
+    for name in ("channels", "compression", "dataWindow"):
+        if name not in entries:
+            raise FormatError(f"its header has no {name}")
+    compression = entries["compression"][1][0]
+    if compression not in _LINES:
+        raise FormatError("its compression is not ZIP")
+    left, bottom, right, top = struct.unpack("<4i", entries["dataWindow"][1])
+    width, height = right - left + 1, top - bottom + 1
+    if not (0 < width <= 1 << 20 and 0 < height <= 1 << 20):
+        raise FormatError("its size makes no sense")
+    kinds = _channels(entries["channels"][1])
+    channels = _pixels(data, at, kinds, width, height, bottom, compression)
+    texts = {name: value.decode("utf-8", "surrogatepass") for name, (kind, value) in entries.items() if kind == "string"}
+    return channels, texts
+
+
+def _entries(data: bytes, at: int) -> tuple[dict[str, tuple[str, bytes]], int]:
+    entries = {}
+    while data[at] != 0:
+        name, at = _word(data, at)
+        kind, at = _word(data, at)
+        (size,) = struct.unpack_from("<i", data, at)
+        at += 4
+        if size < 0 or at + size > len(data):
+            raise FormatError("its header is cut off")
+        entries[name] = kind, data[at : at + size]
+        at += size
+    return entries, at + 1
+
+
+def _word(data: bytes, at: int) -> tuple[str, int]:
+    end = data.find(b"\0", at, at + 256)
+    if end < 0:
+        raise FormatError("a name in its header does not end")
+    return data[at:end].decode("utf-8", "surrogatepass"), end + 1
+
+
+def _channels(data: bytes) -> dict[str, np.dtype]:
+    kinds: dict[str, np.dtype] = {}
+    at = 0
+    while data[at] != 0:
+        name, at = _word(data, at)
+        kind, _, across, down = struct.unpack_from("<iB3xii", data, at)
+        at += 16
+        if kind not in _TYPES or (across, down) != (1, 1):
+            raise FormatError(f"its channel {name} is stored in an unknown way")
+        kinds[name] = _TYPES[kind]
+    return kinds
+
+
+def _pixels(
+    data: bytes, at: int, kinds: dict[str, np.dtype], width: int, height: int, first: int, compression: int
+) -> dict[str, np.ndarray]:
+    channels = {name: np.zeros((height, width), kind) for name, kind in kinds.items()}
+    line = sum(kind.itemsize for kind in kinds.values()) * width
+    step = _LINES[compression]
+    count = -(-height // step)
+    seen = 0
+    for place in struct.unpack_from(f"<{count}Q", data, at):
+        y, size = struct.unpack_from("<ii", data, place)
+        top = y - first
+        if top % step or not 0 <= top < height or size < 0 or place + 8 + size > len(data):
+            raise FormatError("its blocks are not where they should be")
+        lines = min(step, height - top)
+        block = data[place + 8 : place + 8 + size]
+        raw = _unpack(block, lines * line) if compression else block
+        if len(raw) != lines * line:
+            raise FormatError("a block has the wrong length")
+        rows = np.frombuffer(raw, np.uint8).reshape(lines, line)
+        start = 0
+        for name, kind in kinds.items():
+            end = start + kind.itemsize * width
+            channels[name][top : top + lines] = np.ascontiguousarray(rows[:, start:end]).view(kind)
+            start = end
+        seen += lines
+    if seen != height:
+        raise FormatError("some of its lines are missing")
+    return channels
