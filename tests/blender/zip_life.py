@@ -78,7 +78,6 @@ def wheels():
     """Where each heavy module comes from, and the sum that numba compiled."""
     import matplotlib
     import numba
-    import OpenEXR
     import tomli_w
     import tqdm
     import trimesh
@@ -90,7 +89,7 @@ def wheels():
             result += i
         return result
 
-    return {m.__name__: m.__file__ for m in (matplotlib, numba, OpenEXR, tomli_w, tqdm, trimesh)}, total(10)
+    return {m.__name__: m.__file__ for m in (matplotlib, numba, tomli_w, tqdm, trimesh)}, total(10)
 
 
 def main():
