@@ -27,7 +27,7 @@ def start():
         raise PalpateError(
             f"This Python has no Blender ({error}): run 'pip install bpy', or 'blender --command palpate …' instead."
         ) from error
-    if bpy.app.module:
+    if not bpy.app.binary_path:  # bpy as a module; Blender itself ends in its own way
         console.hush_at_exit()
     if not hasattr(bpy.types.Object, "palpate"):
         # The package's root: "palpate" from pip, "bl_ext.<repository>.palpate" as an extension.
