@@ -108,19 +108,13 @@ def blank(picture: Path) -> bool:
 def real_blender(repository):
     """Return a real Blender with the zip of this very work tree installed."""
     work = repository / "build" / "ui"
-    shutil.rmtree(work, ignore_errors=True)
-    work.mkdir(parents=True)
-    blender = RealBlender(provision_blender.provision(), work, Path(__file__).parent)
-    blender.install(
-        build_zip.build(
-            "linux-x64",
-            provision_blender.PYTHON_VERSION,
-            work,
-            blender_range=("4.2.0", None),
-            suffix="-local",
-        )
-    )
-    return blender
+    with provision_blender.locked(repository / "build" / "ui.lock"):  # a second run waits for the first
+        shutil.rmtree(work, ignore_errors=True)
+        work.mkdir(parents=True)
+        blender = RealBlender(provision_blender.provision(), work, Path(__file__).parent)
+        python = provision_blender.PYTHON_VERSION
+        blender.install(build_zip.build("linux-x64", python, work, blender_range=("4.2.0", None), suffix="-local"))
+        yield blender
 
 
 @pytest.fixture
@@ -128,8 +122,7 @@ def play_road(real_blender, repository):
     """Return a function that plays a road by name and returns its results; pictures go to build/ui-screenshots."""
 
     def play(name: str, timeout: float = 300.0) -> dict:
-        result = real_blender.play(Path(__file__).parent / "roads" / f"{name}.py", real_blender.work / name, timeout)
-        return result
+        return real_blender.play(Path(__file__).parent / "roads" / f"{name}.py", real_blender.work / name, timeout)
 
     yield play
     shots = repository / "build" / "ui-screenshots"
