@@ -87,7 +87,7 @@ def render_frame(scene, path: str | os.PathLike, frame: int, *, samples: int | N
         Replaced whole or not at all.
     frame : int
     samples : int, optional
-        Samples per pixel for Cycles and EEVEE. Default: the scene's. Cycles takes four times as many where the scene wants
+        Samples per pixel for Cycles and EEVEE. Default: the scene's. Cycles takes twice as many where the scene wants
         its picture denoised and this Blender cannot.
     size : (2,) int, optional
         Width and height, pixels. Default: the scene's.
@@ -156,7 +156,7 @@ def _settings(scene, path: Path, frame: int, samples: int | None, size) -> Itera
         changes.append((scene.cycles, "use_denoising", False))
     if samples is not None:
         if render.engine == "CYCLES":
-            changes.append((scene.cycles, "samples", int(samples) if denoise else 4 * int(samples)))
+            changes.append((scene.cycles, "samples", int(samples) if denoise else 2 * int(samples)))
         elif hasattr(scene, "eevee"):
             changes.append((scene.eevee, "taa_render_samples", int(samples)))
     before = [(owner, name, getattr(owner, name)) for owner, name, _ in changes]
