@@ -80,7 +80,7 @@ def _bake(scene, name: str) -> Generator[Progress, None, Baked]:
         raise
     write.commit(scene, scenario, binding, recording, files.folders)
     scene.frame_set(scene.frame_current, subframe=scene.frame_subframe)  # the new keyframes show
-    live.baked(recording, files.folders)
+    live.baked(scene, recording, files.folders)
     return Baked(recording, scenario, files.folders)
 
 

@@ -78,6 +78,7 @@ def on_frame(scene, depsgraph) -> None:
         return
     if write.baked_objects(scene):
         cache.drop(scene)
+        overlays.clear(scene)
         _show_bake(scene)
         return
     if not _is_on(scene) or scene.frame_subframe:
@@ -198,11 +199,14 @@ def _recording(folder: str):
     return _recordings[place]
 
 
-def baked(recording, places) -> None:
-    """Keep a new bake's recording for the panel."""
+def baked(scene, recording, places) -> None:
+    """Give way to a new bake, and keep its recording for the panel."""
+    cache.drop(scene)
+    overlays.clear(scene)
     _recordings.clear()
     for place in places.values():
         _recordings[place] = recording
+    _show_bake(scene)
 
 
 # --- files hold nothing of it

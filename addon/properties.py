@@ -159,7 +159,7 @@ class PALPATE_PG_scene(bpy.types.PropertyGroup):
         options=set(),
     )
     use_auto_dt: BoolProperty(
-        name="Automatic Time Step",
+        name="Auto Time Step",
         description="Choose the substep from the stability limit of the stiffest contact",
         default=True,
         options=set(),
@@ -168,7 +168,7 @@ class PALPATE_PG_scene(bpy.types.PropertyGroup):
         name="Time Step (s)", description="Longest substep, s", default=1e-4, min=0.0, precision=6, step=0.001, options=set()
     )
     use_live: BoolProperty(
-        name="Simulate on Playback",
+        name="Live Playback",
         description="Playing forward from the first frame computes frame by frame; scrubbing shows what was computed",
         default=True,
         options=set(),
@@ -181,7 +181,7 @@ class PALPATE_PG_scene(bpy.types.PropertyGroup):
     )
     color_map: EnumProperty(name="Colour Map", description="Colours of the heat map", items=COLOR_MAPS, options=set())
     use_auto_range: BoolProperty(
-        name="Automatic Range",
+        name="Auto Range",
         description="The heat map ends at the largest normal force of each sensor",
         default=True,
         options=set(),
@@ -190,7 +190,7 @@ class PALPATE_PG_scene(bpy.types.PropertyGroup):
         name="Maximum (N)", description="Normal force at the end of the heat map, N", default=0.1, min=1e-9, options=set()
     )
     use_auto_arrow: BoolProperty(
-        name="Automatic Arrow Length",
+        name="Auto Arrow Length",
         description="The longest arrow of a bake is as long as the largest side of its sensor",
         default=True,
         options=set(),

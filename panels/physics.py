@@ -1,9 +1,20 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Palpate in the Physics tab of the properties editor."""
 
+import textwrap
+
 import bpy
 
 from ..addon import live, meshes, state, write
+
+
+def sentences(layout, text: str, icon: str, context) -> None:
+    """Show text over as many lines as the panel's width asks for."""
+    letters = int(context.region.width / (7.5 * context.preferences.system.ui_scale)) - 6
+    column = layout.column(align=True)
+    column.scale_y = 0.8
+    for i, line in enumerate(textwrap.wrap(text, max(letters, 20))):
+        column.label(text=line, icon=icon if i == 0 else "BLANK1")
 
 
 class Physics:
@@ -47,7 +58,7 @@ class PALPATE_PT_physics(Physics, bpy.types.Panel):
         settings = obj.palpate
         for name in (obj.name, context.scene.name):
             if name in state.session.notes:
-                layout.label(text=state.session.notes[name], icon="ERROR")
+                sentences(layout, state.session.notes[name], "ERROR", context)
         if settings.role == "NONE":
             column = layout.box().column()
             column.label(text=f"'{obj.name}' takes no part.")
@@ -132,7 +143,7 @@ class PALPATE_PT_readout(Part, bpy.types.Panel):
         felt = status.frame.sensors.get(context.object.name) if status.frame is not None else None
         box = layout.box().column()
         if felt is None:
-            box.label(text=status.text)
+            sentences(box, status.text, "INFO", context)
             return
         x, y, z = felt.net_force
         box.label(text=f"Frame {status.frame.frame}: {int(felt.contact.sum())} of {len(felt.contact)} texels touch")
@@ -165,7 +176,7 @@ class PALPATE_PT_bake(Part, bpy.types.Panel):
             row.operator("palpate.bake_clear", text="", icon="TRASH")
         else:
             layout.operator("palpate.reset", text="Reset Playback")
-        layout.label(text=live.status(scene).text, icon="INFO")
+        sentences(layout, live.status(scene).text, "INFO", context)
 
 
 class PALPATE_PT_display(Part, bpy.types.Panel):

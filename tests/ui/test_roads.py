@@ -16,3 +16,11 @@ def test_sensor(play_road):
     result = play_road("sensor")
     assert result["values"]["k"] == pytest.approx(1234.5)
     assert result["values"]["k after undo"] != pytest.approx(1234.5)
+
+
+def test_press(play_road):
+    """Played, scrubbed, stopped by ESC, baked, undone."""
+    result = play_road("press")
+    assert result["values"]["largest while playing"] > 0.0
+    assert result["values"]["files"][2:] == [f"tactile_{frame:04d}.exr" for frame in range(1, 41)]
+    assert result["values"]["arrow"][0] > 0.0
