@@ -86,7 +86,9 @@ def clear(scene, uid: str) -> None:
 def _make(scene, obj):
     arrow = bpy.data.objects.new(f"Net Force {obj.name}", _mesh())
     arrow[materials.MARK] = obj.palpate.uid
-    (obj.users_collection[0] if obj.users_collection else scene.collection).objects.link(arrow)
+    own = {scene.collection, *scene.collection.children_recursive}  # the sensor may be in other scenes, too
+    place = next((found for found in obj.users_collection if found in own and found.is_editable), scene.collection)
+    place.objects.link(arrow)
     return arrow
 
 

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import bpy
 import numpy as np
 
 from ..core.texels import Texels
@@ -52,7 +53,7 @@ def clear(obj, keep_image: bool = False) -> None:
     modifier = obj.modifiers.get(MODIFIER)
     if modifier is not None:
         obj.modifiers.remove(modifier)
-    if not _others_show(obj):
+    if _slot_of(mesh) is None:
         layer = mesh.uv_layers.get(materials.UV_NAME)
         if layer is not None:
             mesh.uv_layers.remove(layer)
@@ -120,59 +121,54 @@ def _assign(obj, texels: Texels, material) -> None:
         old.data.foreach_set("value", np.where(faces, index, -1).astype(np.int32))
         mesh.polygons.foreach_set("material_index", np.where(faces, slot, index).astype(np.int32))
         mesh.update()
-    else:
+    else:  # another object with this mesh shows its heat map there
         slot = _slot_of(mesh)
     obj.material_slots[slot].link = "OBJECT"
     obj.material_slots[slot].material = material
 
 
-def _slot_of(mesh) -> int:
-    """Return the slot of the heat maps on a mesh that has one."""
-    count = len(mesh.polygons)
-    index, old = np.empty(count, dtype=np.int32), np.empty(count, dtype=np.int32)
-    mesh.polygons.foreach_get("material_index", index)
-    mesh.attributes[OLD_MATERIAL].data.foreach_get("value", old)
-    return int(index[old >= 0][0])
+def _shown_slot(obj) -> int | None:
+    """Return the slot in which an object shows its heat map.
+
+    Found by our mark and not by the faces: these, the slots and what is in them may have been changed since.
+    """
+    for number, slot in enumerate(obj.material_slots):
+        if slot.link == "OBJECT" and slot.material is not None and materials.MARK in slot.material:
+            return number
+    return None
+
+
+def _slot_of(mesh) -> int | None:
+    """Return the slot of the heat maps on a mesh; None when nobody shows one."""
+    shown = (_shown_slot(obj) for obj in bpy.data.objects if obj.data == mesh)
+    return next((slot for slot in shown if slot is not None), None)
 
 
 def _unassign(obj) -> None:
+    """Give the faces their materials back, except those to which the user has given another since."""
     mesh = obj.data
-    attribute = mesh.attributes.get(OLD_MATERIAL)
-    if attribute is None:
+    attribute, slot = mesh.attributes.get(OLD_MATERIAL), _slot_of(mesh)
+    if attribute is None and slot is None:
         return
-    slot = _slot_of(mesh)
-    if slot < len(obj.material_slots):
+    if _shown_slot(obj) is not None:
         obj.material_slots[slot].material = None
         obj.material_slots[slot].link = "DATA"
-    if _others_show(obj):
+    if _slot_of(mesh) is not None:
         return
     count = len(mesh.polygons)
-    index, old = np.empty(count, dtype=np.int32), np.empty(count, dtype=np.int32)
+    index, old = np.empty(count, dtype=np.int32), np.zeros(count, dtype=np.int32)
     mesh.polygons.foreach_get("material_index", index)
-    attribute.data.foreach_get("value", old)
-    mesh.attributes.remove(attribute)
-    index = np.where(old >= 0, old, index).astype(np.int32)
-    mesh.polygons.foreach_set("material_index", index)
-    if not index.any():  # no attribute says the same as zeros everywhere
-        mesh.attributes.remove(mesh.attributes["material_index"])
+    if attribute is not None:  # a mesh that was made anew, as by Remesh, has lost it
+        attribute.data.foreach_get("value", old)
+        mesh.attributes.remove(attribute)
+    if slot is not None:
+        index = np.where((old >= 0) & (index == slot), old, index).astype(np.int32)
+        mesh.polygons.foreach_set("material_index", index)
+        mesh.materials.pop(index=slot)  # also counts the slots after it down, on the faces
     if EMPTY_SLOT in mesh:
-        mesh.materials.clear()
         del mesh[EMPTY_SLOT]
-    else:
-        mesh.materials.pop(index=slot)
+        if not any(mesh.materials):
+            mesh.materials.clear()
+    if not index.any() and "material_index" in mesh.attributes:  # no attribute says the same as zeros everywhere
+        mesh.attributes.remove(mesh.attributes["material_index"])
     mesh.update()
-
-
-def _others_show(obj) -> bool:
-    """Whether another object with the same mesh shows a heat map."""
-    import bpy
-
-    if obj.data.users < 2 or obj.data.attributes.get(OLD_MATERIAL) is None:
-        return False
-    slot = _slot_of(obj.data)
-    for other in bpy.data.objects:
-        if other != obj and other.data == obj.data and slot < len(other.material_slots):
-            material = other.material_slots[slot].material
-            if material is not None and materials.MARK in material:
-                return True
-    return False

@@ -287,3 +287,52 @@ def test_the_other_sensors_are_pads_to_a_grid(tmp_path):
     save(tmp_path)
     assert list(baked(scene).folders) == ["Pad"]
     assert not table.palpate.is_baked
+
+
+def test_materials_given_after_a_bake_outlive_the_next(tmp_path):
+    """In the slot that was empty, and on faces of the region."""
+    scene, pad, _ = press(frames=2)
+    save(tmp_path)
+    baked(scene)
+    rubber, tape = bpy.data.materials.new("Rubber"), bpy.data.materials.new("Tape")
+    pad.data.materials[0] = rubber
+    pad.data.materials.append(tape)
+    pad.data.polygons[0].material_index = 2
+    heatmap.clear(pad)
+    assert list(pad.data.materials) == [rubber, tape]
+    assert [face.material_index for face in pad.data.polygons] == [1] + [0] * 64
+    baked(scene)
+    assert list(pad.data.materials) == [rubber, tape, None]
+
+
+@pytest.mark.parametrize("change", ["faces", "slot"])
+def test_a_heat_map_that_was_taken_apart_can_be_cleared_and_baked_again(tmp_path, change):
+    scene, pad, _ = press(frames=2)
+    save(tmp_path)
+    baked(scene)
+    bpy.context.view_layer.objects.active = pad
+    if change == "faces":
+        region = pad.data.copy()
+        pad.data.clear_geometry()
+    else:
+        pad.active_material_index = 1
+        bpy.ops.object.material_slot_remove()
+    heatmap.clear(pad)
+    assert heatmap.OLD_MATERIAL not in pad.data.attributes and len(pad.data.materials) == 0
+    if change == "faces":
+        pad.data = region
+    baked(scene)
+    assert "Palpate Pad" in [slot.name for slot in pad.material_slots]
+
+
+def test_the_arrow_is_in_the_scene_that_was_baked(tmp_path):
+    """The sensor may be in several."""
+    first, pad, target = press(frames=2)
+    second = bpy.data.scenes.new("Scene Z")
+    second.frame_end = 2
+    for obj in (pad, target):
+        second.collection.objects.link(obj)
+    save(tmp_path)
+    baked(second)
+    assert materials.find(second.objects, pad.palpate.uid) is not None
+    assert materials.find(first.objects, pad.palpate.uid) is None
