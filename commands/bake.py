@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from ..core.errors import SceneError
+from ..core.figures import net_shear
 from ..core.formats.files import writable_folder
 from . import blender, console
 
@@ -75,11 +76,12 @@ def report(baked) -> str:
     first, last = recording.frames[0], recording.frames[-1]
     span = f"{first} to {last} ({recording.times[-1]:.2f} s), substep {recording.dt * 1e3:.3g} ms"
     lines = [f"frames {span}"]
+    texels = {sensor.name: sensor.texels for sensor in baked.scenario.sensors}
     rows = [("sensor", "texels", "peak texel", "peak normal", "peak shear", "normal at end")]
     for name in baked.folders:
         felt = recording.sensors[name]
         normal = felt.normal_force.sum(axis=1)
-        shear = np.linalg.norm(felt.shear.sum(axis=1), axis=1)
+        shear = np.linalg.norm(net_shear(felt, texels[name]), axis=1)
         peaks = (felt.normal_force.max(initial=0.0), normal.max(), shear.max(), normal[-1])
         rows.append((name, str(felt.normal_force.shape[1]), *(_newtons(value) for value in peaks)))
     lines += ["", console.table(rows, "<>>>>>")]

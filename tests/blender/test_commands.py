@@ -6,11 +6,14 @@ import signal
 import subprocess
 import sys
 import time
+from types import SimpleNamespace
 
 import bpy
+import numpy as np
 import pytest
 
 from palpate.commands import COMMANDS, READY, console, main
+from palpate.commands.bake import report
 from palpate.core.formats.archive import load_recording
 
 
@@ -261,3 +264,13 @@ def test_blenders_words_come_back_when_something_is_wrong(capfd):
 
 def test_tables_have_even_columns():
     assert console.table([("a", "bb"), ("ccc", "d")], "<>") == "a    bb\nccc   d"
+
+
+def test_peak_shear_adds_forces_and_not_numbers_of_different_axes():
+    """Two texels whose x axes point against each other, each pushed along its own by 1 N: the sensor feels nothing."""
+    texels = SimpleNamespace(tangent=np.array([[1.0, 0, 0], [-1.0, 0, 0]]), bitangent=np.array([[0, 1.0, 0], [0, 1.0, 0]]))
+    felt = SimpleNamespace(normal_force=np.ones((1, 2)), shear=np.array([[[1.0, 0.0], [1.0, 0.0]]]))
+    recording = SimpleNamespace(frames=[1], times=[0.0], dt=1e-3, warnings=(), sensors={"Tip": felt})
+    scenario = SimpleNamespace(sensors=[SimpleNamespace(name="Tip", texels=texels)])
+    row = report(SimpleNamespace(recording=recording, scenario=scenario, folders={"Tip": None})).splitlines()[-1]
+    assert row.split() == ["Tip", "2", "1.0000", "N", "2.0000", "N", "0.0000", "N", "2.0000", "N"]
