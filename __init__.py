@@ -51,7 +51,9 @@ class _CommandLine:
 
 
 def register():
-    """Called by Blender when the add-on is enabled."""
+    """Called by Blender when the add-on is enabled; a second call changes nothing."""
+    if _registered:
+        return
     atexit.register(unregister)  # as a Python module, Blender 4.5 hangs at exit when classes are still registered
     try:
         for room in _rooms():

@@ -81,6 +81,16 @@ def test_disabling_leaves_nothing_and_enabling_again_works(commands):
     assert traces() == without
 
 
+def test_registering_twice_is_registering_once(commands):
+    without = traces()
+    palpate.register()
+    once = traces()
+    palpate.register()
+    assert traces() == once
+    palpate.unregister()
+    assert traces() == without
+
+
 def test_a_missing_module_leaves_a_panel_that_says_so(commands, monkeypatch):
     find = importlib.util.find_spec
     monkeypatch.setattr(importlib.util, "find_spec", lambda name, *rest: None if name == "trimesh" else find(name, *rest))
