@@ -134,7 +134,7 @@ def write_twist(velocity, dt, twist):
     wx, wy, wz = velocity[3], velocity[4], velocity[5]
     square = wx * wx + wy * wy + wz * wz
     half = 0.5 * math.sqrt(square) * dt
-    sine = 1.0 if half < 1e-6 else math.sin(half) / half
+    sine = 1.0 if abs(half) < 1e-6 else math.sin(half) / half
     s, c = sine * math.cos(half), 0.5 * dt * sine * sine
     twist[0], twist[1], twist[2] = velocity[0], velocity[1], velocity[2]
     twist[3], twist[4], twist[5] = c * (wx * wx - square), c * wx * wy - s * wz, c * wx * wz + s * wy

@@ -7,8 +7,10 @@ lets the compiler reorder arithmetic: no fastmath, because "same seed, same bits
 
 from __future__ import annotations
 
+import hashlib
 import os
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 COMPILED = False
@@ -22,9 +24,27 @@ if os.environ.get("PALPATE_NUMBA", "1") != "0":
         COMPILED = False
 
 
+def _edition() -> str:
+    """Return a hash of all files with kernels in this folder.
+
+    A compiled kernel holds the machine code of those it calls, but numba looks only at a kernel's own file to see whether what
+    it kept is still good: after a change in another file, or an upgrade, the old code would go on running.
+    """
+    digest = hashlib.sha256()
+    for path in sorted(Path(__file__).parent.glob("*.py")):
+        source = path.read_bytes()
+        if b"@kernel" in source:
+            digest.update(source)
+    return digest.hexdigest()[:12]
+
+
+EDITION = _edition() if COMPILED else ""
+
+
 def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
     """Compile `function` for the types it is first called with, and keep the result in numba's cache."""
     if not COMPILED:
         return function
+    function.__qualname__ += f"_{EDITION}"  # part of the name under which numba keeps the result
     compiled: Callable[..., Any] = numba.njit(cache=True, fastmath=False, error_model="numpy", nogil=True)(function)
     return compiled
