@@ -90,7 +90,7 @@ def begin(scene, depsgraph) -> Run:
         binding=binding,
         simulation=dependencies.solver().Simulation(scenario),
         placements=placements,
-        settings=_settings(scene, objects),
+        settings=settings_of(scene, objects),
         geometry={obj.name: meshes.fingerprint(obj, depsgraph) for obj in objects},
     )
     first = scenario.frame_start
@@ -117,7 +117,7 @@ def is_stale(scene, depsgraph, run: Run) -> bool:
         objects = run.binding.objects(scene)
     except PalpateError:
         return True
-    if _settings(scene, objects) != run.settings:
+    if settings_of(scene, objects) != run.settings:
         return True
     names = {obj.name: index for index, obj in enumerate(objects)}
     if any(names.get(name, -1) not in run.binding.starts for name in state.session.changed_motion if name in names):
@@ -141,7 +141,7 @@ def has_moved(scene, depsgraph, run: Run) -> bool:
     return any(not np.array_equal(now[i][part], remembered[i][part]) for i in remembered for part in (0, 1))
 
 
-def _settings(scene, objects) -> tuple:
+def settings_of(scene, objects) -> tuple:
     """Return everything that is set by a number or a choice, in a form that can be compared."""
     own = scene.palpate
     taking_part, hidden = sample.participants(scene)

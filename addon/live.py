@@ -11,7 +11,7 @@ import numpy as np
 
 from ..core.errors import PalpateError
 from ..core.recording import Frame, Recording
-from . import cache, folders, freebodies, identity, materials, overlays, sample, state, write
+from . import cache, folders, freebodies, identity, materials, overlays, sample, stale, state, write
 
 
 @dataclass(frozen=True)
@@ -41,6 +41,7 @@ def forget() -> None:
     _status.clear()
     _refused.clear()
     _recordings.clear()
+    stale.forget()
 
 
 def is_baking() -> bool:
@@ -79,7 +80,7 @@ def on_frame(scene, depsgraph) -> None:
     if write.baked_objects(scene):
         cache.drop(scene)
         overlays.clear(scene)
-        _show_bake(scene)
+        _show_bake(scene, depsgraph)
         return
     if not _is_on(scene) or scene.frame_subframe:
         return
@@ -171,19 +172,23 @@ def _write_force(obj, vertex: np.ndarray, force: np.ndarray) -> None:
     mesh.update_tag()
 
 
-def _show_bake(scene) -> None:
+def _show_bake(scene, depsgraph) -> None:
     """Keyframes and material show the bake by themselves; only the panel's numbers come from its recording."""
     number = scene.frame_current
-    sensors, poses, velocities = {}, np.zeros((0, 7)), np.zeros((0, 6))
+    sensors, poses, velocities, recording = {}, np.zeros((0, 7)), np.zeros((0, 6)), None
     for obj in write.baked_objects(scene):
-        recording = _recording(obj.palpate.bake_folder)
-        if recording is not None and number in recording.frames:
-            frame = recording.at(number)
-            sensors.update(frame.sensors)
-    if sensors:
-        _say(scene, f"Frame {number} of the bake.", Frame(number, 0.0, sensors, poses, velocities))
-    else:
+        found = _recording(obj.palpate.bake_folder)
+        if found is not None:
+            recording = found
+            if number in found.frames:
+                sensors.update(found.at(number).sensors)
+    if not sensors:
         _say(scene, f"Frame {number} is outside of the bake.")
+        return
+    text = f"Frame {number} of the bake."
+    if stale.is_stale(scene, depsgraph, recording):
+        text = "The bake is out of date, something has changed since: bake again."
+    _say(scene, text, Frame(number, 0.0, sensors, poses, velocities))
 
 
 def _recording(folder: str):
@@ -206,7 +211,8 @@ def baked(scene, recording, places) -> None:
     _recordings.clear()
     for place in places.values():
         _recordings[place] = recording
-    _show_bake(scene)
+    scene.palpate.baked_fingerprint = stale.fingerprint(scene)
+    _show_bake(scene, sample.depsgraph_of(scene))
 
 
 # --- files hold nothing of it

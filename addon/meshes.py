@@ -124,12 +124,21 @@ def weights(mesh, group_index: int) -> np.ndarray:
 
 def fingerprint(obj, depsgraph) -> str:
     """Return a hash of everything about an object's geometry that forces depend on."""
-    digest = hashlib.blake2b(digest_size=16)
     with evaluated(obj, depsgraph) as mesh:
-        digest.update(vertices(mesh).tobytes())
-        corner = np.empty(len(mesh.loops), dtype=np.int32)
-        mesh.loops.foreach_get("vertex_index", corner)
-        digest.update(corner.tobytes())
+        return _fingerprint(obj, mesh)
+
+
+def own_fingerprint(obj) -> str:
+    """Return the same for the mesh without modifiers and animation; curves, text and metaballs have none."""
+    return _fingerprint(obj, obj.data) if obj.type == "MESH" else ""
+
+
+def _fingerprint(obj, mesh) -> str:
+    digest = hashlib.blake2b(digest_size=16)
+    digest.update(vertices(mesh).tobytes())
+    corner = np.empty(len(mesh.loops), dtype=np.int32)
+    mesh.loops.foreach_get("vertex_index", corner)
+    digest.update(corner.tobytes())
     settings = obj.palpate
     if settings.role in ("SENSOR", "PAD") and settings.region == "GROUP":
         group = obj.vertex_groups.get(settings.vertex_group)

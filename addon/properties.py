@@ -17,7 +17,7 @@ from bpy.props import (
 
 from ..core.migrate import VERSION
 from ..core.scenario import SensorParameters
-from . import identity, state
+from . import freebodies, identity, state
 
 ROLES = (
     ("NONE", "None", "Takes no part"),
@@ -43,6 +43,13 @@ def _role_changed(settings, context):
     settings.schema_version = VERSION
     identity.ensure(settings.id_data)
     state.participants_changed()
+    _body_changed(settings, context)
+
+
+def _body_changed(settings, _context):
+    """Put back what playing has moved, when no run will do it any more."""
+    if (settings.body != "FREE" or settings.role == "NONE") and not settings.is_baked:
+        freebodies.restore(settings.id_data)
 
 
 def _number(name, key, text, **more):
@@ -121,6 +128,7 @@ class PALPATE_PG_object(bpy.types.PropertyGroup):
             ("KEYFRAMED", "Keyframed", "Its animation, parents and constraints; forces do not move it"),
             ("FREE", "Free", "Gravity and the sensors' forces, from where it is at the first frame"),
         ),
+        update=_body_changed,
         **_fixed,
     )
     mass: FloatProperty(
@@ -190,7 +198,7 @@ class PALPATE_PG_scene(bpy.types.PropertyGroup):
         name="Maximum (N)", description="Normal force at the end of the heat map, N", default=0.1, min=1e-9, options=set()
     )
     use_auto_arrow: BoolProperty(
-        name="Auto Arrow Length",
+        name="Auto Length",
         description="The longest arrow of a bake is as long as the largest side of its sensor",
         default=True,
         options=set(),
@@ -204,6 +212,7 @@ class PALPATE_PG_scene(bpy.types.PropertyGroup):
         options=set(),
     )
     baked_digest: StringProperty(options={"HIDDEN"})
+    baked_fingerprint: StringProperty(options={"HIDDEN"})
     baked_start: IntProperty(options={"HIDDEN"})
     baked_end: IntProperty(options={"HIDDEN"})
 

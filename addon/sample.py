@@ -125,6 +125,8 @@ def sample_start(scene, depsgraph) -> tuple[Scenario, Binding]:
         free = obj.palpate.body == "FREE"
         if free:
             freebodies.check(obj)
+        elif obj.palpate.has_start:
+            raise SceneError(f"'{obj.name}' is Keyframed, but its keyframes are those of a bake: use Clear Bake first.")
         matrix = freebodies.start_matrix(obj, depsgraph) if free else _world(obj, depsgraph)
         position, quaternion, stretch = _split(obj, matrix)
         stretches.append(stretch)
@@ -189,6 +191,7 @@ def sample_poses(scene, depsgraph, binding: Binding) -> tuple[Poses, dict[int, n
 def sample_scenario(scene) -> Generator[Progress, None, tuple[Scenario, Binding]]:
     """Read a scene over its whole frame range, frame by frame, and leave it at the frame where it stood."""
     _check_range(scene)
+    _check_modes(participants(scene)[0])
     before = scene.frame_current, scene.frame_subframe
     frames = range(scene.frame_start, scene.frame_end + 1)
     try:
@@ -215,12 +218,25 @@ def sample_scenario(scene) -> Generator[Progress, None, tuple[Scenario, Binding]
     return replace(scenario, bodies=tuple(bodies)), binding
 
 
+def pose(scene, obj, depsgraph) -> np.ndarray:
+    """(7,) float: position (m) and quaternion of an object's body frame at the present frame."""
+    position, quaternion, _ = _split(obj, _world(obj, depsgraph))
+    return np.concatenate([position * units.metres_per_unit(scene), quaternion])
+
+
 def _check_range(scene) -> None:
     if scene.frame_end < scene.frame_start:
         raise SceneError(
             f"The frame range of '{scene.name}' runs backwards ({scene.frame_start} to {scene.frame_end}): "
             "set the end frame after the start frame."
         )
+
+
+def _check_modes(objects) -> None:
+    """Refuse meshes that are being edited: what a bake writes on them would be lost when the edit ends."""
+    for obj in objects:
+        if obj.mode == "EDIT":
+            raise SceneError(f"'{obj.name}' is in Edit Mode: leave it (Tab) before you bake.")
 
 
 def _check_parents(objects) -> None:

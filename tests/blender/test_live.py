@@ -205,6 +205,18 @@ def test_reset_puts_bodies_back():
     assert shown_force(pad) is None and cache.get(scene) is None
 
 
+@pytest.mark.parametrize("setting, value", [("body", "KEYFRAMED"), ("role", "NONE")])
+def test_a_body_that_is_no_longer_free_goes_back_to_its_start(setting, value):
+    scene, *_, free = press_and_drop(frames=8)
+    start = tuple(free.location), tuple(free.rotation_euler)
+    play(scene, *range(1, 6))
+    assert tuple(free.location) != start[0]
+    setattr(free.palpate, setting, value)
+    assert (tuple(free.location), tuple(free.rotation_euler)) == start
+    play(scene, 6, 1)
+    assert (tuple(free.location), tuple(free.rotation_euler)) == start
+
+
 def test_rendering_never_simulates(tmp_path):
     scene, _, _, _, free = press_and_drop(frames=4)
     play(scene, 1, 2)
@@ -246,3 +258,34 @@ def test_a_scene_without_roles_costs_nothing(monkeypatch):
     scene.frame_set(1)
     monkeypatch.setattr(live.write, "baked_objects", lambda scene: pytest.fail("looked at objects"))
     play(scene, 2, 3)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda scene, pad, target: setattr(pad.palpate, "k", 99.0),
+        lambda scene, pad, target: setattr(pad.data.vertices[5].co, "z", 0.01),
+        lambda scene, pad, target: setattr(pad.location, "z", 0.001),
+        lambda scene, pad, target: setattr(pad.palpate, "region", "GROUP"),
+        lambda scene, pad, target: target.animation_data_clear(),
+        lambda scene, pad, target: bpy.data.objects.remove(target),
+        lambda scene, pad, target: setattr(scene, "gravity", (0.0, 0.0, -1.6)),
+    ],
+    ids=["parameter", "vertex", "location", "region", "animation", "deleted", "gravity"],
+)
+def test_a_bake_that_is_out_of_date_says_so(tmp_path, change):
+    scene, *_ = press_and_drop(frames=4)
+    save(tmp_path)
+    jobs.run_blocking(bake(scene))
+    path = save(tmp_path)
+    scene = reopen(path)
+    for frame in (1, 2, 4, 3):
+        scene.frame_set(frame)
+        assert live.status(scene).text == f"Frame {frame} of the bake."
+    pad = bpy.data.objects["Pad"]
+    change(scene, pad, bpy.data.objects["Ball"])
+    pad.data.update()
+    bpy.context.view_layer.update()
+    play(scene, 2)
+    assert live.status(scene).text.startswith("The bake is out of date")
+    assert live.status(scene).frame is not None  # it is still shown

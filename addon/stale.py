@@ -1,0 +1,81 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Does a bake still show what the scene would give now? Looked at when a frame is shown, cheaply; bakes themselves compare digests.
+
+What is compared: settings and who takes part at every frame, the poses of keyframed bodies with the recorded ones at every
+frame, and the objects' own meshes and regions when Blender has reported a change of geometry.
+"""
+
+from __future__ import annotations
+
+import hashlib
+
+import numpy as np
+
+from ..core.errors import PalpateError
+from ..core.recording import Recording
+from . import cache, meshes, sample, state
+
+SAME_POSE = 1e-6
+"""Metres, and components of a quaternion, by which a recorded pose may differ: an evaluated matrix has 32 bits."""
+
+_geometry: dict[int, str] = {}
+"""Last fingerprint of the meshes, by scene."""
+
+
+def forget() -> None:
+    """Look at every mesh anew."""
+    _geometry.clear()
+
+
+def fingerprint(scene) -> str:
+    """Return a short text that changes when settings, meshes or regions do."""
+    objects, _ = sample.participants(scene)
+    names = {obj.name for obj in objects}
+    key, changed = scene.session_uid, state.session.changed_geometry & names
+    if key not in _geometry or changed:
+        _geometry[key] = _digest(*(meshes.own_fingerprint(obj) for obj in objects))
+        state.session.changed_geometry -= changed
+    return _digest(repr(cache.settings_of(scene, objects)), _geometry[key])
+
+
+def _digest(*parts: str) -> str:
+    digest = hashlib.blake2b(digest_size=16)
+    for part in parts:
+        digest.update(part.encode("utf-8", "surrogatepass"))
+    return digest.hexdigest()
+
+
+def is_stale(scene, depsgraph, recording: Recording | None) -> bool:
+    """Whether something that the scene's bake was computed from is different now.
+
+    Parameters
+    ----------
+    depsgraph : Depsgraph
+        Of the scene's present frame.
+    recording : Recording or None
+        Of the bake, when it can be read.
+    """
+    return fingerprint(scene) != scene.palpate.baked_fingerprint or (
+        recording is not None and _moved(scene, depsgraph, recording)
+    )
+
+
+def _moved(scene, depsgraph, recording: Recording) -> bool:
+    if scene.frame_current not in recording.frames or scene.frame_subframe:
+        return False
+    poses = recording.poses[int(np.searchsorted(recording.frames, scene.frame_current))]
+    for name, pose in zip(recording.body_names, poses, strict=True):
+        obj = scene.objects.get(name)
+        if obj is None:
+            return True
+        if obj.palpate.body == "FREE":
+            continue
+        try:
+            now = sample.pose(scene, obj, depsgraph)
+        except PalpateError:
+            return True
+        if np.abs(now[:3] - pose[:3]).max() > SAME_POSE:
+            return True
+        if min(np.abs(now[3:] - sign * pose[3:]).max() for sign in (1.0, -1.0)) > SAME_POSE:
+            return True
+    return False
