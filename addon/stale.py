@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Does a bake still show what the scene would give now? Looked at when a frame is shown, cheaply; bakes themselves compare digests.
+"""Does a bake still show what the scene would give now? Looked at, cheaply, whenever a frame of it is shown.
 
 What is compared: settings and who takes part at every frame, the poses of keyframed bodies with the recorded ones at every
 frame, and the objects' own meshes and regions when Blender has reported a change of geometry.
