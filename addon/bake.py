@@ -58,6 +58,7 @@ def _bake(scene, name: str) -> Generator[Progress, None, Baked]:
             break
         yield _progress("Reading the scene", step.frame, step.done, total)
 
+    write.check(scene, scenario, binding)
     solver = dependencies.solver()
     files = folders.Files(folder, scenario)
     try:

@@ -76,7 +76,11 @@ class Files:
         try:
             for place in self.folders.values():
                 _recover(place)
+                _check_replaceable(place)
                 _beside(place, "partial").mkdir()
+        except FileError:
+            self.discard()
+            raise
         except OSError as error:
             self.discard()
             raise _problem(self.folder, error) from error
@@ -161,11 +165,15 @@ def _recover(place: Path) -> None:
         shutil.rmtree(old)
 
 
+def _check_replaceable(place: Path) -> None:
+    if place.exists() and not (place / MANIFEST_NAME).exists() and any(place.iterdir()):
+        raise FileError(f"'{place}' holds other files than a bake: rename it, or choose another bake folder.")
+
+
 def _swap(place: Path) -> None:
     old = _beside(place, "old")
     if place.exists():
-        if not (place / MANIFEST_NAME).exists() and any(place.iterdir()):
-            raise FileError(f"'{place}' holds other files than a bake: rename it, or choose another bake folder.")
+        _check_replaceable(place)  # again: a bake takes long enough for somebody to put something there
         place.rename(old)
     _beside(place, "partial").rename(place)
     shutil.rmtree(old, ignore_errors=True)

@@ -8,6 +8,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 
+from ..core.errors import SceneError
 from ..core.formats.files import frame_file
 from ..core.recording import Recording
 from ..core.scenario import Scenario
@@ -16,6 +17,17 @@ from .sample import Binding
 
 LEAST_RANGE = 1e-6
 """Newtons at the end of the heat map of a sensor that nothing touched."""
+
+
+def check(scene, scenario: Scenario, binding: Binding) -> None:
+    """Raise SceneError when :func:`commit` could not write on an object."""
+    objects = binding.objects(scene)
+    for index in {*binding.starts, *(sensor.body for sensor in scenario.sensors if sensor.readout)}:
+        if not objects[index].is_editable:
+            raise SceneError(
+                f"'{objects[index].name}' is linked from another file, so that a bake cannot be put on it: "
+                "use Object › Relations › Make Local first."
+            )
 
 
 def commit(scene, scenario: Scenario, binding: Binding, recording: Recording, folders: dict[str, Path]) -> None:

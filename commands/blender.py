@@ -67,6 +67,8 @@ def open_blend(path: str | os.PathLike) -> None:
             f"'{path}' cannot be opened by Blender {bpy.app.version_string} ({reason}): it is damaged, cut short, "
             "or not a .blend; save it again or take a backup (.blend1)."
         ) from error
+    if bpy.context.object is not None and bpy.context.object.mode != "OBJECT":  # files keep the mode that they were saved in
+        bpy.ops.object.mode_set(mode="OBJECT")
 
 
 def save_blend(path: str | os.PathLike, backup: bool = True) -> None:

@@ -32,10 +32,12 @@ class PALPATE_OT_bake(support.Reporting, bpy.types.Operator):
         return self.reporting(lambda: self._start(context))
 
     def run(self, context):
+        support.leave_edit_mode(context)
         baked = jobs.run_blocking(bake(context.scene))
         self._say(baked)
 
     def _start(self, context):
+        support.leave_edit_mode(context)
         self._slice = jobs.Slice(bake(context.scene))
         self._slice.work(0.0)  # what is wrong from the beginning is said at once
         manager = context.window_manager
@@ -52,9 +54,12 @@ class PALPATE_OT_bake(support.Reporting, bpy.types.Operator):
             return {"CANCELLED"}
         if event.type != "TIMER":
             return {"RUNNING_MODAL"}  # nothing may change under the bake
-        result = self.reporting(lambda: self._work(context))
-        if result != {"RUNNING_MODAL"}:
-            self._end(context)
+        result = None
+        try:
+            result = self.reporting(lambda: self._work(context))
+        finally:  # an error of ours, too, ends the operator: no timer and no progress may be left of it
+            if result != {"RUNNING_MODAL"}:
+                self._end(context)
         return result
 
     def _work(self, context):
@@ -109,6 +114,7 @@ class PALPATE_OT_bake_clear(support.Reporting, bpy.types.Operator):
         return True
 
     def run(self, context):
+        support.leave_edit_mode(context)
         write.clear(context.scene)
         live.reset(context.scene)
 

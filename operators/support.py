@@ -46,14 +46,12 @@ def mesh_object(cls, context) -> bool:
     return True
 
 
-def leave_edit_mode(context) -> str:
-    """Go to Object Mode and return the mode that was left.
+def leave_edit_mode(context) -> None:
+    """Go to Object Mode.
 
     In Edit Mode Blender's undo remembers the mesh being edited and no properties, so that undo could not take back a role.
     """
     import bpy
 
-    mode = context.object.mode
-    if mode != "OBJECT":
+    if context.object is not None and context.object.mode != "OBJECT":
         bpy.ops.object.mode_set(mode="OBJECT")
-    return mode

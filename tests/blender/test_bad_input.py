@@ -223,6 +223,38 @@ def test_nothing_that_touches(pressed):
     assert refusal().startswith("Nothing in 'Scene' can touch a sensor")
 
 
+def test_a_mesh_in_edit_mode(pressed):
+    bpy.context.view_layer.objects.active = pressed.pad
+    bpy.ops.object.mode_set(mode="EDIT")
+    with pytest.raises(SceneError, match="'Pad' is in Edit Mode"):
+        jobs.run_blocking(bake(pressed.scene))
+
+
+def test_a_baked_body_that_is_no_longer_free(tmp_path):
+    """Its keyframes are the old bake's; taking them for the user's would make them into a motion that forces follow."""
+    scene, *_, free = press_and_drop(frames=3)
+    save(tmp_path)
+    bpy.ops.palpate.bake()
+    free.palpate.body = "KEYFRAMED"
+    assert refusal().startswith("'Cube' is Keyframed, but its keyframes are those of a bake")
+    bpy.ops.palpate.bake_clear()
+    assert bpy.ops.palpate.bake() == {"FINISHED"}
+
+
+def test_a_sensor_linked_from_another_file(tmp_path, pressed):
+    scene = bpy.data.scenes.new("Borrower")
+    bpy.context.window.scene = scene
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "empty.blend"))
+    for obj in (pressed.pad, pressed.target):
+        bpy.data.objects.remove(obj)
+    with bpy.data.libraries.load(str(tmp_path / "scene.blend"), link=True) as (_, wanted):
+        wanted.objects = ["Pad", "Ball"]
+    for obj in wanted.objects:
+        scene.collection.objects.link(obj)
+    scene.frame_end = 3
+    assert refusal().startswith("'Pad' is linked from another file")
+
+
 def test_a_curve_as_sensor(pressed):
     bpy.ops.curve.primitive_bezier_circle_add()
     bpy.context.object.name = "Circle"

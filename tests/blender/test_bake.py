@@ -207,8 +207,10 @@ def test_a_folder_with_other_files_is_not_overwritten(tmp_path):
     mine = tmp_path / "palpate" / "Pad" / "thesis.txt"
     mine.parent.mkdir(parents=True)
     mine.write_text("years of work")
+    stages = []
     with pytest.raises(Exception, match="holds other files than a bake"):
-        baked(scene)
+        jobs.run_blocking(bake(scene), lambda progress: stages.append(progress.stage))
+    assert set(stages) == {"Reading the scene"}  # nobody waits for forces that cannot be kept
     assert mine.read_text() == "years of work"
     assert [path.name for path in (tmp_path / "palpate").iterdir()] == ["Pad"]
 
@@ -336,3 +338,19 @@ def test_the_arrow_is_in_the_scene_that_was_baked(tmp_path):
     baked(second)
     assert materials.find(second.objects, pad.palpate.uid) is not None
     assert materials.find(first.objects, pad.palpate.uid) is None
+
+
+@pytest.mark.parametrize("mode", ["EDIT", "WEIGHT_PAINT"])
+def test_the_buttons_leave_the_mode_in_which_a_mesh_is_changed(tmp_path, mode):
+    scene, pad, _ = press(frames=2)
+    save(tmp_path)
+    bpy.context.view_layer.objects.active = pad
+    for button, is_baked in ((bpy.ops.palpate.bake, True), (bpy.ops.palpate.bake_clear, False)):
+        bpy.ops.object.mode_set(mode=mode)
+        assert button() == {"FINISHED"}
+        assert pad.mode == "OBJECT"
+        bpy.ops.object.mode_set(mode="EDIT")  # which would bring back what the mesh was before
+        bpy.ops.object.mode_set(mode="OBJECT")
+        assert pad.palpate.is_baked == is_baked
+        assert (materials.UV_NAME in pad.data.uv_layers) == is_baked
+        assert {face.material_index for face in pad.data.polygons} == {int(is_baked)}

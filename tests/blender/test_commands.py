@@ -11,6 +11,7 @@ from types import SimpleNamespace
 import bpy
 import numpy as np
 import pytest
+from blender_scenes import press, reopen, save
 
 from palpate.commands import COMMANDS, READY, console, main
 from palpate.commands.bake import report
@@ -182,6 +183,16 @@ def test_save_keeps_the_bake_in_the_file_itself(tmp_path, demo_blend):
     assert (tmp_path / "palpate" / "Finger A" / "recording.npz").is_file()  # the file's own folder, beside it
     bpy.ops.wm.open_mainfile(filepath=str(mine))
     assert bpy.context.scene.objects["Finger A"].palpate.is_baked
+
+
+def test_a_file_saved_in_edit_mode_can_be_baked(tmp_path, capfd):
+    scene, pad, _ = press(frames=2)
+    bpy.context.view_layer.objects.active = pad
+    bpy.ops.object.mode_set(mode="EDIT")
+    mine = save(tmp_path)
+    assert main(["bake", str(mine), "--save"]) == 0
+    pad = reopen(mine).objects["Pad"]
+    assert pad.palpate.is_baked and pad.material_slots[1].material.name == "Palpate Pad"
 
 
 def test_one_sensor_alone_feels_the_same(tmp_path, demo_blend):
