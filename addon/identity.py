@@ -14,7 +14,10 @@ def ensure(obj) -> None:
     settings = obj.palpate
     if not obj.is_editable:
         return
-    if not settings.uid or _owners.get(settings.uid, obj.session_uid) != obj.session_uid:
+    is_copy = _owners.get(settings.uid, obj.session_uid) != obj.session_uid
+    if is_copy and not settings.is_baked:
+        settings.property_unset("has_start")  # the original's; a copy starts where the user has put it
+    if not settings.uid or is_copy:
         settings.uid = uuid.uuid4().hex
     _owners[settings.uid] = obj.session_uid
 

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -177,7 +178,7 @@ def _show_bake(scene, depsgraph) -> None:
     number = scene.frame_current
     sensors, poses, velocities, recording = {}, np.zeros((0, 7)), np.zeros((0, 6)), None
     for obj in write.baked_objects(scene):
-        found = _recording(obj.palpate.bake_folder)
+        found = _recording(obj)
         if found is not None:
             recording = found
             if number in found.frames:
@@ -191,11 +192,15 @@ def _show_bake(scene, depsgraph) -> None:
     _say(scene, text, Frame(number, 0.0, sensors, poses, velocities))
 
 
-def _recording(folder: str):
-    """Return the recording of a sensor's bake, read when it is first asked for; None when it is not there."""
-    if not folder:
+def _recording(obj):
+    """Return the recording of a sensor's bake, read when it is first asked for; None when it is not there.
+
+    It lies beside the images: their path follows when the .blend is saved somewhere else, the text in our settings does not.
+    """
+    image = materials.find(bpy.data.images, obj.palpate.uid) if obj.palpate.bake_folder else None
+    if image is None:
         return None
-    place = Path(bpy.path.abspath(folder))
+    place = Path(os.path.abspath(bpy.path.abspath(image.filepath))).parent
     if place not in _recordings:
         try:
             _recordings[place] = folders.stored_recording(place)

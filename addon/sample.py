@@ -11,6 +11,7 @@ vertices. The shape of a mesh is that of the first frame. Keyframed bodies are s
 from __future__ import annotations
 
 from collections.abc import Generator
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -209,7 +210,8 @@ def sample_scenario(scene) -> Generator[Progress, None, tuple[Scenario, Binding]
                 binding.parents[index].append(matrix)
             yield Progress("Reading", frame, frame - frames[0] + 1, len(frames))
     finally:
-        scene.frame_set(before[0], subframe=before[1])
+        with suppress(ReferenceError):  # the scene went while its frames were read
+            scene.frame_set(before[0], subframe=before[1])
     times = np.array([(frame - frames[0]) / scenario.fps for frame in frames])
     bodies = list(scenario.bodies)
     for index, path in samples.items():

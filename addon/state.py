@@ -44,7 +44,7 @@ def suspended():
     try:
         yield
     finally:
-        session.suspended -= 1
+        session.suspended = max(0, session.suspended - 1)  # it is zero already when another file was opened meanwhile
 
 
 def reset() -> None:

@@ -217,6 +217,43 @@ def test_a_body_that_is_no_longer_free_goes_back_to_its_start(setting, value):
     assert (tuple(free.location), tuple(free.rotation_euler)) == start
 
 
+def test_a_copy_of_a_displaced_body_stays_where_it_was_put():
+    scene, *_, free = press_and_drop(frames=8)
+    start = free.location.x
+    play(scene, *range(1, 6))
+    copy = free.copy()
+    scene.collection.objects.link(copy)
+    copy.location.x += 0.1
+    here = tuple(copy.location)
+    play(scene, 6, 1)
+    assert tuple(copy.location) == here
+    assert free.location.x == start
+
+
+def test_another_file_opened_while_a_bake_is_half_done_can_be_played(tmp_path):
+    scene, *_ = press(frames=4)
+    path = save(tmp_path)
+    job = bake(scene)
+    next(job)
+    next(job)
+    scene = reopen(path)
+    job.close()
+    play(scene, 1, 2)
+    assert sorted(cache.get(scene).frames) == [1, 2]
+
+
+def test_the_numbers_of_a_bake_follow_a_file_saved_elsewhere(tmp_path):
+    (tmp_path / "here").mkdir()
+    (tmp_path / "there").mkdir()
+    scene, *_ = press(frames=4)
+    save(tmp_path / "here")
+    felt = jobs.run_blocking(bake(scene)).recording.sensors["Pad"]
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "there" / "scene.blend"), relative_remap=True)
+    scene = reopen(tmp_path / "there" / "scene.blend")
+    play(scene, 3)
+    assert live.status(scene).frame.sensors["Pad"].normal_force.tolist() == felt.normal_force[2].tolist()
+
+
 def test_rendering_never_simulates(tmp_path):
     scene, _, _, _, free = press_and_drop(frames=4)
     play(scene, 1, 2)
