@@ -37,6 +37,7 @@ def palpate_depsgraph_update_post(_scene, depsgraph):
 def palpate_load_post(_path):
     state.reset()
     identity.forget()
+    identity.claim(bpy.data.objects)
     live.forget()
     migrations.apply()
     for scene in bpy.data.scenes:  # a file that was written without save_pre, as by a crash

@@ -33,6 +33,13 @@ def find(scene, keys) -> dict:
     return {found: obj for obj in scene.objects if (found := key(obj)) in wanted}
 
 
+def claim(objects) -> None:
+    """As a file is opened, take the first object with a uid for its owner: by name, copies come after their originals."""
+    for obj in sorted(objects, key=lambda obj: obj.name_full):
+        if obj.palpate.uid:
+            _owners.setdefault(obj.palpate.uid, obj.session_uid)
+
+
 def forget() -> None:
     """Start over, because another file is open and session uids are new."""
     _owners.clear()

@@ -354,3 +354,17 @@ def test_the_buttons_leave_the_mode_in_which_a_mesh_is_changed(tmp_path, mode):
         assert pad.palpate.is_baked == is_baked
         assert (materials.UV_NAME in pad.data.uv_layers) == is_baked
         assert {face.material_index for face in pad.data.polygons} == {int(is_baked)}
+
+
+def test_clearing_a_copy_leaves_the_original_alone_in_a_reopened_file(tmp_path):
+    scene, pad, _ = press(frames=2)
+    save(tmp_path)
+    baked(scene)
+    twin = pad.copy()
+    scene.collection.objects.link(twin)
+    scene = reopen(save(tmp_path))
+    bpy.context.view_layer.objects.active = scene.objects["Pad.001"]
+    assert bpy.ops.palpate.sensor_remove() == {"FINISHED"}
+    pad = scene.objects["Pad"]
+    assert pad.material_slots[1].material.name == "Palpate Pad"
+    assert materials.find(scene.objects, pad.palpate.uid) is not None
