@@ -101,7 +101,9 @@ def render_frame(scene, path: str | os.PathLike, frame: int, *, samples: int | N
     """
     _camera(scene)
     path = Path(path)
-    with atomic_write(path.with_suffix(".png")) as temporary, _settings(scene, temporary, frame, samples, size):
+    if path.suffix.lower() != ".png":
+        path = path.with_name(path.name + ".png")
+    with atomic_write(path) as temporary, _settings(scene, temporary, frame, samples, size):
         temporary.unlink()  # so that a render which writes nothing is noticed
         try:
             bpy.ops.render.render(write_still=True, scene=scene.name)
@@ -110,7 +112,7 @@ def render_frame(scene, path: str | os.PathLike, frame: int, *, samples: int | N
             raise SceneError(f"Frame {frame} of '{scene.name}' could not be rendered: {reason}.") from error
         if not temporary.exists():
             raise FileError(f"The render of frame {frame} was not written to '{path}': check the space left on the disk.")
-    return path.with_suffix(".png")
+    return path
 
 
 def can_denoise() -> bool:

@@ -24,7 +24,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="append",
         help="read out only this sensor, and let the others act as pads; may be given again. Cannot be saved.",
     )
-    parser.add_argument("--frames", metavar=("FIRST", "LAST"), nargs=2, type=int, help="frames (default: those of the scene)")
+    parser.add_argument(
+        "--frames",
+        metavar=("FIRST", "LAST"),
+        nargs=2,
+        type=int,
+        help="frames (default: those of the scene); a scene that is saved keeps them",
+    )
     where = parser.add_mutually_exclusive_group()
     where.add_argument("--save", action="store_true", help="save motion, heat maps and arrows into SCENE.blend itself")
     where.add_argument("--save-as", metavar="FILE", help="save them into another .blend")

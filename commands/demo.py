@@ -127,12 +127,14 @@ def _labels(scene, recording, sensors, demo) -> list[figures.Label]:
 
 def _slide(recording, sensor) -> str:
     """Return how friction builds up under the ball until it slips, as a table."""
+    from ..core.contact import friction_limit
+
     felt, mu = recording.sensors[sensor.name], sensor.parameters
     normal = felt.normal_force.sum(axis=1)
     shear = np.linalg.norm(figures.net_shear(felt, sensor.texels), axis=1)
     share = figures.mobilised(felt, sensor.texels, mu.mus)
     # The limit of each texel at its own sliding speed (Eq. 10): what its bristles can hold.
-    limit = felt.normal_force * (mu.mud + (mu.mus - mu.mud) * np.exp(-((felt.slip / mu.x0) ** 2)))
+    limit = friction_limit(felt.normal_force, felt.slip, mu)
     slipping = (np.linalg.norm(felt.shear, axis=2) >= 0.9 * limit) & felt.contact & (felt.slip > 1e-6)
     rows = [("frame", "time", "normal", "shear", "shear / µs·normal", "texels slipping")]
     touching = np.flatnonzero(normal > 0)

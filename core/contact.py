@@ -22,6 +22,7 @@ import numpy as np
 
 from .bvh import find_near, near_entry, segment_entry
 from .jit import kernel
+from .scenario import SensorParameters
 
 # Columns of a contact row: one row per touching texel and target, in the frame of the sensor's body. The row is all that the
 # solver's inner loop reads.
@@ -35,6 +36,25 @@ ROW = 17
 
 # Columns of a parameter row, one per sensor or pad.
 K, CN, CT, SIGMA0, SIGMA1, X0, MUS, MUD = range(8)
+
+
+def parameter_row(parameters: SensorParameters) -> np.ndarray:
+    """Return the numbers of the contact law as the kernels want them, (8,) float."""
+    p = parameters
+    return np.array([p.k, p.cn, p.ct, p.sigma0, p.sigma1, p.x0, p.mus, p.mud], dtype=float)
+
+
+def friction_limit(normal_force: np.ndarray, speed: np.ndarray, parameters: SensorParameters) -> np.ndarray:
+    """Return what friction can hold at a sliding speed, ``g`` of Eq. 10.
+
+    Parameters
+    ----------
+    normal_force : (...) float, N
+    speed : (...) float, m/s
+    parameters : SensorParameters
+    """
+    row = parameter_row(parameters)
+    return normal_force * np.array([stribeck(v * v, row) for v in np.ravel(speed)]).reshape(np.shape(speed))
 
 
 class World(NamedTuple):

@@ -16,7 +16,7 @@ import numpy as np
 
 from .bodies import poses_at, quaternion_product, rotation_matrices, rotation_vectors
 from .bvh import NEAR, build_tree
-from .contact import Neighbours, State, World
+from .contact import Neighbours, State, World, parameter_row
 from .recording import Frame, Recording, SensorFrame
 from .respond import respond
 from .scenario import Scenario, Sensor, Target
@@ -171,14 +171,13 @@ def _world(scenario: Scenario, center: np.ndarray) -> World:
     blocks = [
         np.hstack([s.texels.position - center[s.body], s.texels.normal, s.texels.tangent, s.texels.bitangent]) for s in sensors
     ]
-    keys = ("k", "cn", "ct", "sigma0", "sigma1", "x0", "mus", "mud")
     pairs = [(i, j) for i, s in enumerate(sensors) for j, t in enumerate(targets) if s.body != t.body]
     sizes = [len(sensors[i].texels) for i, _ in pairs]
     extents = [_extent(sensor, center[sensor.body]) for sensor in sensors]
     return World(
         texels=np.ascontiguousarray(np.vstack(blocks)),
         texel_start=np.cumsum([0] + [len(s.texels) for s in sensors]),
-        parameters=np.array([[getattr(s.parameters, key) for key in keys] for s in sensors], dtype=float),
+        parameters=np.array([parameter_row(s.parameters) for s in sensors]),
         reach=np.array([s.parameters.max_penetration for s in sensors], dtype=float),
         pairs=np.array(pairs),
         sensor_body=np.array([s.body for s in sensors]),
