@@ -53,7 +53,7 @@ from .contact import (
 )
 from .jit import kernel
 
-PASSES = 12
+PASSES = 40
 """Most rounds in which contacts are linearised anew within a substep; two or three are usual, one at rest."""
 
 
@@ -204,7 +204,9 @@ def _solve_velocities(dt, world, state, scratch):
     """Velocities of the free bodies at the step's end, written into the state.
 
     Contacts are linearised at the current guess and the linear system solved, until the guess no longer moves; a contact that
-    would pull is left out of the next round. With no free body one round only linearises.
+    would pull is left out of the next round. Where the rounds go in circles (friction that was guessed for too much load throws
+    the contact off, without the contact there is no friction), the guess moves by a share of the way only. All that a share
+    mixes keeps the momentum. With no free body one round only linearises.
     """
     free_at, mass, velocity, inertia = world.free_at, world.mass, state.velocity, scratch.inertia
     matrix, vector, momentum = scratch.matrix, scratch.vector, scratch.momentum
@@ -219,7 +221,7 @@ def _solve_velocities(dt, world, state, scratch):
                 for j in range(3):
                     total += inertia[body, i, j] * velocity[body, 3 + j]
                 momentum[at + 3 + i] = total
-    first_change = 0.0
+    first_change, last_change, share = 0.0, 0.0, 1.0
     for turn in range(PASSES):
         for body in range(len(free_at)):
             _write_known(velocity[body], scratch.twist[body], free_at[body] < 0, scratch.known[body])
@@ -254,7 +256,14 @@ def _solve_velocities(dt, world, state, scratch):
             if at >= 0:
                 for i in range(6):
                     change = max(change, abs(vector[at + i] - velocity[body, i]))
-                    velocity[body, i] = vector[at + i]
+        if turn > 0 and change > 0.5 * last_change:
+            share *= 0.5
+        last_change = change
+        for body in range(len(free_at)):
+            at = 6 * free_at[body]
+            if at >= 0:
+                for i in range(6):
+                    velocity[body, i] = share * vector[at + i] + (1.0 - share) * velocity[body, i]
                 write_twist(velocity[body], dt, scratch.twist[body])
         if turn == 0:
             first_change = change

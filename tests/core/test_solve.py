@@ -439,6 +439,22 @@ def test_corners_of_the_parameter_space_stay_finite_and_come_to_rest(k, mass, dt
     assert (speed <= GRAVITY * recording.times + 1e-9).all()  # never faster than free fall
 
 
+def test_far_too_long_steps_ignore_no_contact():
+    """A gram on springs that would allow 16 µs, at 9 ms: it sinks no deeper than one step's fall and is not thrown up.
+
+    Contact on, thrown off by friction, contact off, contact on: the rounds of a step must not end where nothing touches.
+    """
+    fps = 1 / 0.0088
+    values = {"k": 22700.0, "cn": 0.0, "ct": 0.43, "sigma0": 1.23, "sigma1": 0.0, "x0": 0.0016, "mus": 0.75, "mud": 0.25}
+    scenario = cube_on_pad(1.2e-3, texels=pad(16, 16), size=0.04, gap=4e-3, frames=60, fps=fps, dt=1 / fps, **values)
+    cube = replace(scenario.bodies[1], angular_velocity=np.array([2.9, 1.9, 0.8]))
+    recording = run(replace(scenario, bodies=(scenario.bodies[0], cube)))
+    fall = np.sqrt(2 * GRAVITY * 4e-3) + GRAVITY / fps + 0.03 * 3.5
+    assert recording.sensors["pad"].contact.any()
+    assert recording.sensors["pad"].depth.max() < fall / fps
+    assert recording.poses[:, 1, 2].max() < 0.0241
+
+
 def test_a_scenario_that_makes_no_run_is_refused():
     scenario = cube_on_pad(1.0)
     with pytest.raises(PalpateError, match="runs backwards"):
