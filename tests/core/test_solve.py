@@ -322,6 +322,22 @@ def test_two_sensors_and_two_targets_do_not_mix():
     assert np.array_equal(alone.sensors["pad"].normal_force, recording.sensors["pad"].normal_force)
 
 
+@pytest.mark.parametrize("order", [(0, 1, 2), (1, 0, 2), (2, 1, 0)])
+def test_the_order_of_targets_on_one_texel_does_not_matter(order):
+    """Three plates in one another: forces add up, depth and slip are those of the one that presses hardest."""
+    depth, speed = np.array([1e-3, 6e-4, 1.5e-3]), np.array([1e-4, 2e-4, 3e-4])
+    scenario, plate = pressed(box(0.08, 0.08, 0.02), [[0, 0, 0]], k=100.0), box(0.08, 0.08, 0.02)
+    bodies, targets = [scenario.bodies[0]], []
+    for i in order:
+        path = np.array([[speed[i] * j, 0, 0.01 - depth[i]] for j in range(3)])
+        bodies.append(Body(f"plate {i}", Motion(np.arange(3) / 24.0, path, np.tile(LEVEL, (3, 1)))))
+        targets.append(Target(f"plate {i}", len(targets) + 1, plate))
+    sensor = run(replace(scenario, bodies=tuple(bodies), targets=tuple(targets), frame_end=3)).sensors["pad"]
+    np.testing.assert_allclose(sensor.normal_force[-1], 100.0 * depth.sum(), rtol=1e-9)
+    np.testing.assert_allclose(sensor.depth[-1], depth[2], rtol=1e-9)
+    np.testing.assert_allclose(sensor.slip[-1], speed[2] * 24.0, rtol=1e-9)
+
+
 def test_pads_act_and_report_nothing():
     scenario = cube_on_pad(1.0)
     quiet = replace(scenario.sensors[0], name="table", readout=False)
@@ -453,6 +469,13 @@ def test_far_too_long_steps_ignore_no_contact():
     assert recording.sensors["pad"].contact.any()
     assert recording.sensors["pad"].depth.max() < fall / fps
     assert recording.poses[:, 1, 2].max() < 0.0241
+
+
+@pytest.mark.parametrize("dt", [2e-3, 5e-3])
+def test_a_light_body_on_a_stiff_pad_comes_to_rest_at_far_too_long_steps(dt):
+    """Ten grams on 8.4 MN/m, steps a hundred times the explicit limit: contacts that come and go must not keep it hopping."""
+    recording = run(cube_on_pad(0.01, k=1e5, cn=1e3, dt=dt, frames=100, fps=200.0))
+    assert recording.sensors["pad"].normal_force[-1].sum() == pytest.approx(0.01 * GRAVITY, rel=1e-9)
 
 
 def test_a_scenario_that_makes_no_run_is_refused():
