@@ -60,7 +60,7 @@ def _bake(scene, name: str) -> Generator[Progress, None, Baked]:
 
     write.check(scene, scenario, binding)
     solver = dependencies.solver()
-    files = folders.Files(folder, scenario)
+    files = folders.Files(folder, scenario, bpy.data.filepath)
     try:
         job = solver.solve(scenario)
         while True:

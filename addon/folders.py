@@ -2,12 +2,14 @@
 """The files of a bake. They grow in folders named ``<sensor>.partial``, which take the sensors' places when all is done.
 
 A kill at any moment leaves the old bake or the new one. Between the two renames of a swap the old one is called
-``<sensor>.old``; the next bake puts that right.
+``<sensor>.old``; the next bake puts that right. What the user has put into a sensor's folder moves on into the new one.
 """
 
 from __future__ import annotations
 
+import re
 import shutil
+from contextlib import suppress
 from dataclasses import asdict, replace
 from pathlib import Path
 
@@ -27,6 +29,9 @@ from ..core.formats.files import (
 )
 from ..core.recording import Frame, Recording
 from ..core.scenario import Scenario
+
+OURS = re.compile(rf"tactile_-?\d+\.exr|{re.escape(RECORDING_NAME)}|{re.escape(MANIFEST_NAME)}")
+"""Names of the files in a sensor's folder that a bake writes and replaces."""
 
 
 def bake_folder(scene) -> Path:
@@ -60,14 +65,17 @@ class Files:
     folder : Path
         The bake folder; made when only it is missing.
     scenario : Scenario
+    blend : str
+        Path of the .blend that is baked; empty when it has none.
 
     Raises
     ------
     FileError
-        The folder cannot be made or written to.
+        The folder cannot be made or written to, or a sensor's folder holds something that must not be replaced.
     """
 
-    def __init__(self, folder: Path, scenario: Scenario):
+    def __init__(self, folder: Path, scenario: Scenario, blend: str = ""):
+        self._blend = Path(blend) if blend else None
         self.folder = writable_folder(folder, create=True)
         self._sensors = {sensor.name: sensor for sensor in scenario.sensors if sensor.readout}
         names = folder_names(self._sensors)
@@ -76,7 +84,7 @@ class Files:
         try:
             for place in self.folders.values():
                 _recover(place)
-                _check_replaceable(place)
+                self._check_replaceable(place)
                 _beside(place, "partial").mkdir()
         except FileError:
             self.discard()
@@ -99,8 +107,8 @@ class Files:
             shape=tuple(int(side) for side in sensor.texels.layout.shape),
             parameters=asdict(sensor.parameters),
             warnings=recording.warnings,
-            done=((scenario.frame_start, scenario.frame_end),),
             complete=True,
+            scene_file=self._blend.name if self._blend else "",
         )
 
     def write_frame(self, frame: Frame) -> None:
@@ -118,14 +126,15 @@ class Files:
             write_exr(path, sensor.texels.layout, frame.sensors[name], about)
 
     def finish(self, recording: Recording) -> None:
-        """Write the recordings and let the new folders take the place of the old ones."""
+        """Write the recordings and let the new folders take the place of the old ones: all of them, or none."""
         for name, place in self.folders.items():
             partial = _beside(place, "partial")
             save_recording(partial / RECORDING_NAME, replace(recording, sensors={name: recording.sensors[name]}))
             write_manifest(partial, self._manifest(name, recording))
+        for place in self.folders.values():
+            self._check_replaceable(place)  # again: a bake takes long enough for somebody to put something there
         try:
-            for place in self.folders.values():
-                _swap(place)
+            _swap(list(self.folders.values()))
         except OSError as error:
             raise _problem(self.folder, error) from error
 
@@ -134,20 +143,23 @@ class Files:
         for place in self.folders.values():
             shutil.rmtree(_beside(place, "partial"), ignore_errors=True)
 
+    def _check_replaceable(self, place: Path) -> None:
+        if not place.exists():
+            return
+        if not (place / MANIFEST_NAME).exists():
+            if any(place.iterdir()):
+                raise FileError(f"'{place}' holds other files than a bake: rename it, or choose another bake folder.")
+            return
+        other = _other_blend(place, self._blend)
+        if other:
+            raise FileError(
+                f"'{place}' holds the bake of '{other}', which lies beside '{self._blend.name}': choose another bake folder."
+            )
+
 
 def stored_recording(folder: Path) -> Recording:
     """Read the recording of one sensor's folder."""
     return load_recording(folder / RECORDING_NAME)
-
-
-def is_bake(folder: Path) -> bool:
-    """Whether a folder holds a finished bake of this version."""
-    if not (folder / MANIFEST_NAME).is_file():
-        return False
-    try:
-        return read_manifest(folder).complete
-    except FileError:
-        return False
 
 
 def _beside(place: Path, ending: str) -> Path:
@@ -162,21 +174,56 @@ def _recover(place: Path) -> None:
     if old.exists() and not place.exists():
         old.rename(place)
     if old.exists():
+        _hand_on(old, place)
         shutil.rmtree(old)
 
 
-def _check_replaceable(place: Path) -> None:
-    if place.exists() and not (place / MANIFEST_NAME).exists() and any(place.iterdir()):
-        raise FileError(f"'{place}' holds other files than a bake: rename it, or choose another bake folder.")
+def _other_blend(place: Path, blend: Path | None) -> str:
+    """Return the name of another .blend in the same folder whose bake is at `place`; empty when there is none."""
+    try:
+        name = read_manifest(place).scene_file
+    except FileError:
+        return ""  # a bake that nobody can read may be replaced
+    if blend is None or not name or name == blend.name:
+        return ""
+    other = blend.with_name(name)
+    # where case does not count, the old name of a renamed file is still found
+    return name if other.is_file() and not (blend.exists() and other.samefile(blend)) else ""
 
 
-def _swap(place: Path) -> None:
-    old = _beside(place, "old")
-    if place.exists():
-        _check_replaceable(place)  # again: a bake takes long enough for somebody to put something there
-        place.rename(old)
-    _beside(place, "partial").rename(place)
-    shutil.rmtree(old, ignore_errors=True)
+def _swap(places: list[Path]) -> None:
+    """Put the new folders where the old ones are; when one of them cannot be moved, those moved before it go back."""
+    try:
+        for place in places:
+            if place.exists():
+                place.rename(_beside(place, "old"))
+            _beside(place, "partial").rename(place)
+    except BaseException:
+        for place in places:
+            with suppress(OSError):
+                _swap_back(place)
+        raise
+    for place in places:
+        old = _beside(place, "old")
+        with suppress(OSError):  # the new bake is there; what could not be moved waits in the old folder for the next
+            if old.exists():
+                _hand_on(old, place)
+                shutil.rmtree(old, ignore_errors=True)
+
+
+def _swap_back(place: Path) -> None:
+    partial, old = _beside(place, "partial"), _beside(place, "old")
+    if not partial.exists():
+        place.rename(partial)
+    if old.exists() and not place.exists():
+        old.rename(place)
+
+
+def _hand_on(old: Path, new: Path) -> None:
+    """Move what no bake has written from one sensor's folder to another, unless something there has its name."""
+    for path in old.iterdir():
+        if not OURS.fullmatch(path.name) and not (new / path.name).exists():
+            path.rename(new / path.name)
 
 
 def _problem(folder: Path, error: OSError) -> FileError:

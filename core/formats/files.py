@@ -17,7 +17,7 @@ import secrets
 import zlib
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -204,7 +204,7 @@ def frame_file(frame: int) -> str:
 
 @dataclass(frozen=True)
 class Manifest:
-    """What one sensor's bake was made from and how far it has come.
+    """What one sensor's bake was made from.
 
     Attributes
     ----------
@@ -225,10 +225,10 @@ class Manifest:
     parameters : dict
         Of the sensor, JSON values.
     warnings : tuple of str
-    done : tuple of (int, int)
-        Runs of frames whose image is written, first and last of each, in order.
     complete : bool
-        True once the recording is written too.
+        True once all images and the recording are written.
+    scene_file : str
+        Name, without its folder, of the .blend that was baked; empty when it had none, or when the manifest is older.
     """
 
     sensor: str
@@ -242,33 +242,8 @@ class Manifest:
     shape: tuple[int, int]
     parameters: dict[str, Any] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
-    done: tuple[tuple[int, int], ...] = ()
     complete: bool = False
-
-    def with_frame(self, frame: int) -> Manifest:
-        """Return this manifest with one more frame done."""
-        if self.is_done(frame):
-            return self
-        runs: list[tuple[int, int]] = []
-        for first, last in sorted([*self.done, (frame, frame)]):
-            if runs and first == runs[-1][1] + 1:
-                runs[-1] = (runs[-1][0], last)
-            else:
-                runs.append((first, last))
-        return replace(self, done=tuple(runs))
-
-    def is_done(self, frame: int) -> bool:
-        """Tell whether the image of `frame` is written."""
-        return any(first <= frame <= last for first, last in self.done)
-
-    def missing(self, folder: str | os.PathLike) -> list[int]:
-        """Return the frames that a resumed bake still has to write: not done, or gone from `folder`."""
-        folder = Path(folder)
-        return [
-            frame
-            for frame in range(self.frame_start, self.frame_end + 1)
-            if not (self.is_done(frame) and (folder / frame_file(frame)).is_file())
-        ]
+    scene_file: str = ""
 
 
 def write_manifest(folder: str | os.PathLike, manifest: Manifest) -> Path:
@@ -332,8 +307,8 @@ def _manifest(content: dict[str, Any]) -> Manifest:
         shape=(int(height), int(width)),
         parameters=_typed(content, "parameters", dict),
         warnings=tuple(str(warning) for warning in _typed(content, "warnings", list)),
-        done=tuple((int(first), int(last)) for first, last in _typed(content, "done", list)),
         complete=_typed(content, "complete", bool),
+        scene_file=_typed({"scene_file": "", **content}, "scene_file", str),
     )
     if not (math.isfinite(manifest.fps) and math.isfinite(manifest.dt)):
         raise ValueError("fps and dt must be finite")

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A bake: files, keyframes, arrows, heat maps; what is there before and after it, and that it can be repeated bit for bit."""
 
+from pathlib import Path
+
 import bpy
 import numpy as np
 import pytest
@@ -8,6 +10,7 @@ from blender_scenes import changes, cube, dump, grid, press, press_and_drop, reo
 
 from palpate.addon import arrows, curves, heatmap, jobs, live, materials, sample, transforms
 from palpate.addon.bake import bake
+from palpate.core.errors import FileError
 from palpate.core.formats.archive import load_recording
 from palpate.core.formats.exr import read_exr
 from palpate.core.formats.files import read_manifest
@@ -213,6 +216,86 @@ def test_a_folder_with_other_files_is_not_overwritten(tmp_path):
     assert set(stages) == {"Reading the scene"}  # nobody waits for forces that cannot be kept
     assert mine.read_text() == "years of work"
     assert [path.name for path in (tmp_path / "palpate").iterdir()] == ["Pad"]
+
+
+def test_files_put_beside_the_images_outlive_the_next_bake(tmp_path):
+    scene, *_ = press(frames=3)
+    save(tmp_path)
+    folder = baked(scene).folders["Pad"]
+    mine = {"notes.txt": b"years of work", "tactile_mean.exr": b"mine", "plots/a.svg": b"<svg/>"}
+    (folder / "plots").mkdir()
+    for name, content in mine.items():
+        (folder / name).write_bytes(content)
+
+    def check(images):
+        assert {name: (folder / name).read_bytes() for name in mine} == mine
+        assert sorted(path.name for path in folder.glob("tactile_0*.exr")) == [f"tactile_{i:04d}.exr" for i in images]
+        assert [path.name for path in folder.parent.iterdir()] == ["Pad"]
+
+    scene.frame_end = 2
+    baked(scene)
+    check((1, 2))
+    # a kill after the swap, before they were moved into the new folder
+    old = folder.with_name("Pad.old")
+    folder.rename(old)
+    folder.mkdir()
+    for name in ("manifest.json", "recording.npz"):
+        (folder / name).write_bytes((old / name).read_bytes())
+    (folder / "notes.txt").write_bytes(mine["notes.txt"])
+    baked(scene)
+    check((1, 2))
+
+
+@pytest.mark.parametrize("failing", [1, 2, 3, 4])
+def test_a_swap_that_fails_is_taken_back(tmp_path, monkeypatch, failing):
+    scene, pad, *_ = press_and_drop(frames=3)
+    save(tmp_path)
+    folder = baked(scene).folders["Pad"]
+    (folder / "notes.txt").write_text("years of work")
+    files = {path: path.read_bytes() for path in (tmp_path / "palpate").rglob("*") if path.is_file()}
+    before = dump()
+    pad.palpate.k *= 2.0
+    rename, calls = Path.rename, []
+
+    def rename_but_one(path, target):
+        calls.append(path.name)
+        if len(calls) == failing:
+            raise PermissionError(13, "Permission denied")
+        return rename(path, target)
+
+    monkeypatch.setattr(Path, "rename", rename_but_one)
+    with pytest.raises(FileError, match=r"^The bake could not be written to '.*palpate' \(permission denied\)"):
+        baked(scene)
+    monkeypatch.undo()
+    assert calls[:failing] == ["Pad", "Pad.partial", "Pad 2", "Pad 2.partial"][:failing]
+    assert {path: path.read_bytes() for path in (tmp_path / "palpate").rglob("*") if path.is_file()} == files
+    assert sorted(path.name for path in (tmp_path / "palpate").iterdir()) == ["Pad", "Pad 2"]
+    assert [line for line in changes(before, dump()) if not line.startswith("Pad: settings")] == []
+    baked(scene)
+    assert (folder / "recording.npz").read_bytes() != files[folder / "recording.npz"]
+
+
+def test_the_bake_of_another_blend_beside_it_is_not_replaced(tmp_path):
+    scene, *_ = press(frames=3)
+    first = save(tmp_path, "first.blend")
+    folder = baked(scene).folders["Pad"]
+    assert read_manifest(folder).scene_file == "first.blend"
+    files = {path: path.read_bytes() for path in (tmp_path / "palpate").rglob("*") if path.is_file()}
+    save(tmp_path, "second.blend")
+    stages = []
+    with pytest.raises(FileError) as caught:
+        jobs.run_blocking(bake(scene), lambda progress: stages.append(progress.stage))
+    assert str(caught.value) == (
+        f"'{folder}' holds the bake of 'first.blend', which lies beside 'second.blend': choose another bake folder."
+    )
+    assert set(stages) == {"Reading the scene"}
+    assert {path: path.read_bytes() for path in (tmp_path / "palpate").rglob("*") if path.is_file()} == files
+    scene.palpate.folder = "//palpate second"
+    assert baked(scene).folders["Pad"].parent.name == "palpate second"
+    scene.palpate.folder = "//palpate"
+    first.unlink()  # it was renamed
+    baked(scene)
+    assert read_manifest(folder).scene_file == "second.blend"
 
 
 def test_who_left_the_bake_is_cleaned(tmp_path):
