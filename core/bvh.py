@@ -210,8 +210,8 @@ def segment_entry(ox, oy, oz, dx, dy, dz, mesh, hint, tree):
     triangle : int
         In leaf order, -1 when there is none.
     exit : float
-        Where there is no entry: position of the nearest intersection that leaves a surface, which means that the base is inside
-        the object; 2 when there is none.
+        Position of the nearest intersection that leaves a surface, as far as it lies before `t`: then the base is inside the
+        object. Beyond `t` it may be any such intersection; 2 when none was met.
     """
     t, triangle, leaving = 2.0, -1, 2.0
     axis, shear_x, shear_y = _line_of_sight(dx, dy, dz)

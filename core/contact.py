@@ -393,6 +393,41 @@ def gather(pair, world, tree, neighbours, state, rotation, rows, slots, used, po
 
 
 @kernel
+def count_buried(pair, world, tree, state, rotation, pose):
+    """Count the texels of a sensor that are deeper inside a closed target than they reach: they feel nothing, and nothing shows.
+
+    Looked for once a frame by a long segment from each texel's base; the arguments are those of :func:`gather`.
+    """
+    sensor, target = world.pairs[pair, 0], world.pairs[pair, 1]
+    _relative_pose(world.sensor_body[sensor], world.target_body[target], state.position, rotation, pose)
+    texels, reach, root = world.texels, world.reach[sensor], tree.roots[target]
+    size = 0.0
+    for i in range(3):
+        size += tree.bounds[root, 3 + i] - tree.bounds[root, i]
+    buried, slot = 0, world.slot_start[pair] - 1
+    for texel in range(world.texel_start[sensor], world.texel_start[sensor + 1]):
+        slot += 1
+        if state.hint[slot] >= 0:
+            continue
+        dx = pose[0] * texels[texel, 3] + pose[1] * texels[texel, 4] + pose[2] * texels[texel, 5]
+        dy = pose[3] * texels[texel, 3] + pose[4] * texels[texel, 4] + pose[5] * texels[texel, 5]
+        dz = pose[6] * texels[texel, 3] + pose[7] * texels[texel, 4] + pose[8] * texels[texel, 5]
+        ox = pose[9] + pose[0] * texels[texel, 0] + pose[1] * texels[texel, 1] + pose[2] * texels[texel, 2] - reach * dx
+        oy = pose[10] + pose[3] * texels[texel, 0] + pose[4] * texels[texel, 1] + pose[5] * texels[texel, 2] - reach * dy
+        oz = pose[11] + pose[6] * texels[texel, 0] + pose[7] * texels[texel, 1] + pose[8] * texels[texel, 2] - reach * dz
+        within = (
+            tree.bounds[root, 0] <= ox <= tree.bounds[root, 3]
+            and tree.bounds[root, 1] <= oy <= tree.bounds[root, 4]
+            and tree.bounds[root, 2] <= oz <= tree.bounds[root, 5]
+        )
+        if within:
+            t, _, leaving = segment_entry(ox, oy, oz, size * dx, size * dy, size * dz, target, -1, tree)
+            if leaving < t:
+                buried += 1
+    return buried
+
+
+@kernel
 def linearise(rows, r, vx, vy, vz, dt, parameters):
     """Write into a contact row how its force depends on the relative velocity at the step's end, near velocity `v`.
 

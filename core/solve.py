@@ -16,7 +16,8 @@ import numpy as np
 
 from .bodies import poses_at, quaternion_product, rotation_matrices, rotation_vectors
 from .bvh import NEAR, build_tree
-from .contact import Neighbours, State, World, parameter_row
+from .contact import Neighbours, State, World, count_buried, parameter_row
+from .mesh import is_closed
 from .recording import Frame, Recording, SensorFrame
 from .respond import respond
 from .scenario import Scenario, Sensor, Target
@@ -69,6 +70,8 @@ class Simulation:
         self._center = np.array([body.center_of_mass if body.free else np.zeros(3) for body in scenario.bodies])
         meshes = [replace(t.mesh, vertices=t.mesh.vertices - self._center[t.body]) for t in scenario.targets]
         self._tree = build_tree(meshes)
+        self._closed = [is_closed(mesh.triangles) for mesh in meshes]
+        self._sunk = 0  # most texels at once that the substeps of the last frame found past their reach
         self._world = _world(scenario, self._center)
         self._state = _start(scenario, self._world, self._center)
         self._neighbours = _neighbours(self._world, self._state)
@@ -102,36 +105,40 @@ class Simulation:
         conjugate = quaternions[:-1] * np.array([1.0, -1.0, -1.0, -1.0])
         turns = rotation_vectors(quaternion_product(quaternions[1:], conjugate))
         velocities = np.concatenate([np.diff(positions, axis=0), turns], axis=2) / self.dt
-        sunk = advance_frame(
+        self._sunk = advance_frame(
             self.dt, positions, quaternions, velocities, self._world, self._tree, self._neighbours, self._state, self._scratch
         )
         self.frame += 1
-        if sunk:
-            self._warn_once(sunk)
         return self.observe()
 
     def _time_of(self, frame: int) -> float:
         return (frame - self.scenario.frame_start) / self.scenario.fps
 
-    def _warn_once(self, sunk: int) -> None:
+    def _warn_of_sunk(self) -> None:
+        """Say once, at the first frame where it happens, that texels are pressed too deep to act."""
         if any("maximum penetration" in warning for warning in self.warnings):
             return
-        sensors, targets = self.scenario.sensors, self.scenario.targets
-        deep = self._state.hint == -2
-        names = [
-            f"'{targets[target].name}' into '{sensors[sensor].name}'"
-            for (sensor, target), start in zip(self._world.pairs, self._world.slot_start, strict=True)
-            if deep[start : start + len(sensors[sensor].texels)].any()
-        ]
-        where = ", ".join(names) or "an object"
-        self.warnings.append(
-            f"Frame {self.frame}: {sunk} texels are pressed past their maximum penetration by {where} and do not act; "
-            "press less deep, or raise k or the maximum penetration."
-        )
+        sensors, targets, total, names = self.scenario.sensors, self.scenario.targets, 0, []
+        for pair, (sensor, target) in enumerate(self._world.pairs):
+            start = self._world.slot_start[pair]
+            sunk = np.count_nonzero(self._state.hint[start : start + len(sensors[sensor].texels)] == -2)
+            if self._closed[target]:
+                buried = count_buried(pair, self._world, self._tree, self._state, self._scratch.rotation, self._scratch.pose)
+                sunk = max(sunk, buried)
+            if sunk:
+                names.append(f"'{targets[target].name}' into '{sensors[sensor].name}'")
+                total += sunk
+        total = max(total, self._sunk)
+        if total:
+            self.warnings.append(
+                f"Frame {self.frame}: {total} texels are pressed past their maximum penetration by "
+                f"{', '.join(names) or 'an object'} and do not act; press less deep, or raise k or the maximum penetration."
+            )
 
     def observe(self) -> Frame:
         """What the sensors feel in the present state."""
         gather_all(self._world, self._tree, self._neighbours, self._state, self._scratch)
+        self._warn_of_sunk()
         n, m = len(self._world.texels), len(self.scenario.sensors)
         force, depth, slip, contact = np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n, dtype=np.bool_)
         shear, net, moment = np.zeros((n, 2)), np.zeros((m, 6)), np.zeros((m, 4))

@@ -15,7 +15,7 @@ SHARE_OF_LIMIT = 0.2
 LONGEST = 1e-3
 """Longest step that is advised (s), so that fast motions are followed where nothing is stiff."""
 SHORTEST = 1e-6
-"""Shortest step that is advised (s); the solver is stable at any step, shorter ones only cost time."""
+"""Shortest step that is advised (s); the solver stays bounded at any step, shorter ones only cost time."""
 
 
 @dataclass(frozen=True)

@@ -191,6 +191,30 @@ def test_texels_past_their_reach_do_not_act_and_the_user_is_told_once():
     assert "Frame 4: 84 texels" in recording.warnings[0]
 
 
+@pytest.mark.parametrize("depth", [0.013, 0.05])
+def test_starting_deeper_than_the_reach_is_said_at_once(depth):
+    """Nothing is felt, and nothing would show why."""
+    recording = run(pressed(box(0.08, 0.08, 0.2), [[0, 0, 0.1 - depth]]))
+    assert (recording.sensors["pad"].normal_force == 0).all()
+    assert recording.warnings[0].startswith(
+        "Frame 1: 84 texels are pressed past their maximum penetration by 'probe' into 'pad'"
+    )
+
+
+def test_running_past_the_reach_within_one_step_is_said():
+    """3 cm per step, from above the pad to 2 cm below it."""
+    recording = run(pressed(box(0.08, 0.08, 0.2), [[0, 0, 0.11], [0, 0, 0.08]], fps=10.0, dt=0.1))
+    assert recording.warnings[0].startswith("Frame 2: 84 texels")
+
+
+def test_a_hole_is_not_inside():
+    """Texels in the middle of a ring are within its box and yet free."""
+    ring = shape(trimesh.creation.annulus(0.01, 0.06, 0.1))
+    recording = run(pressed(ring, [[0, 0, 0.03]], texels=pad(4, 4, 0.002)))
+    assert recording.warnings == ()
+    assert not recording.sensors["pad"].contact.any()
+
+
 # ---- conservation and symmetry ----
 def collision() -> tuple:
     """A small pad on a free block hits a free cube in free space, askew and spinning: nothing else acts."""
