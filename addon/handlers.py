@@ -6,7 +6,7 @@ from __future__ import annotations
 import bpy
 from bpy.app.handlers import persistent
 
-from . import freebodies, identity, live, migrations, overlays, sample, state
+from . import identity, live, migrations, overlays, sample, state
 
 
 @persistent
@@ -40,10 +40,8 @@ def palpate_load_post(_path):
     identity.claim(bpy.data.objects)
     live.forget()
     migrations.apply()
-    for scene in bpy.data.scenes:  # a file that was written without save_pre, as by a crash
-        for obj in scene.objects:
-            if obj.palpate.has_start and not obj.palpate.is_baked and obj.is_editable:
-                freebodies.restore(obj)
+    for scene in bpy.data.scenes:
+        live.hide(scene)  # a file that was written without save_pre, as by a crash
 
 
 @persistent

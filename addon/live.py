@@ -12,7 +12,7 @@ import numpy as np
 
 from ..core.errors import PalpateError
 from ..core.recording import Frame, Recording
-from . import cache, folders, freebodies, identity, materials, overlays, sample, stale, state, write
+from . import cache, folders, freebodies, materials, overlays, sample, stale, state, write
 
 
 @dataclass(frozen=True)
@@ -224,18 +224,19 @@ def baked(scene, recording, places) -> None:
 
 
 def hide(scene) -> None:
-    """Put everything back as it was before playing; what was computed is kept."""
-    run = cache.get(scene)
+    """Put everything back as it was before playing; what was computed is kept.
+
+    Also for files that were written without this, as by a crash, and for what a run has left that is stale by now.
+    """
     for obj in scene.objects:
         settings = obj.palpate
-        if settings.has_start and not settings.is_baked:
+        if settings.is_baked or not settings.uid:
+            continue
+        if settings.has_start and obj.is_editable:
             freebodies.restore(obj)
-    if run is not None:
-        found = identity.find(scene, run.binding.keys)
-        for sensor in run.scenario.sensors:
-            obj = found.get(run.binding.keys[sensor.body])
-            attribute = obj.data.attributes.get(materials.FORCE) if obj is not None else None
-            if attribute is not None and obj.mode != "EDIT":
+        if obj.type == "MESH" and obj.data.is_editable:
+            attribute = obj.data.attributes.get(materials.FORCE)
+            if attribute is not None:
                 obj.data.attributes.remove(attribute)
 
 

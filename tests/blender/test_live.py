@@ -176,6 +176,53 @@ def test_a_file_saved_while_playing_holds_none_of_it(tmp_path):
     assert changes(before, dump()) == []
 
 
+def stored_mesh(path, obj):
+    """Return the mesh of an object as a file has it, which opening the file would not show."""
+    copy = path.with_name("copy.blend")  # Blender does not append from the open file
+    copy.write_bytes(path.read_bytes())
+    with bpy.data.libraries.load(str(copy)) as (_, wanted):
+        wanted.meshes = [obj.data.name]
+    return wanted.meshes[0]
+
+
+def test_a_file_saved_in_edit_mode_while_playing_holds_none_of_it(tmp_path):
+    scene, pad, _ = press(frames=4)
+    play(scene, 1, 2, 3)
+    bpy.context.view_layer.objects.active = pad
+    bpy.ops.object.mode_set(mode="EDIT")
+    path = save(tmp_path)
+    assert materials.FORCE not in stored_mesh(path, pad).attributes
+    bpy.ops.object.mode_set(mode="OBJECT")
+    play(scene, *range(1, 5))
+    assert shown_force(pad).max() > 0.0  # it goes on
+
+
+def test_a_file_saved_when_what_was_played_is_stale_holds_none_of_it(tmp_path):
+    scene, pad, target = press(frames=4)
+    play(scene, 1, 2, 3)
+    pad.palpate.k *= 2.0
+    play(scene, 4)
+    assert cache.get(scene) is None
+    assert materials.FORCE not in stored_mesh(save(tmp_path), pad).attributes
+
+
+@pytest.mark.parametrize("mode", ["OBJECT", "EDIT"])
+def test_a_file_written_by_a_crash_is_cleaned_when_opened(tmp_path, mode):
+    scene, pad, _, _, free = press_and_drop(frames=6)
+    start = tuple(free.location)
+    play(scene, *range(1, 7))
+    bpy.context.view_layer.objects.active = pad
+    bpy.ops.object.mode_set(mode=mode)
+    hidden = bpy.app.handlers.save_pre.copy()
+    bpy.app.handlers.save_pre.clear()
+    path = save(tmp_path)
+    bpy.app.handlers.save_pre.extend(hidden)
+    assert materials.FORCE in stored_mesh(path, pad).attributes
+    scene = reopen(path)
+    assert materials.FORCE not in scene.objects["Pad"].data.attributes
+    assert tuple(scene.objects["Cube"].location) == start
+
+
 def test_undo_forgets_what_was_computed():
     scene, _, _, _, free = press_and_drop(frames=8)
     bpy.ops.palpate.reset()
