@@ -28,6 +28,13 @@ def check(scene, scenario: Scenario, binding: Binding) -> None:
                 f"'{objects[index].name}' is linked from another file, so that a bake cannot be put on it: "
                 "use Object › Relations › Make Local first."
             )
+    for sensor in scenario.sensors:
+        mesh = objects[sensor.body].data
+        if sensor.readout and (not mesh.is_editable or mesh.override_library is not None):  # Blender saves no changes of those
+            raise SceneError(
+                f"The mesh of sensor '{objects[sensor.body].name}' is linked from another file, so that its heat map would be "
+                "lost: use Object › Relations › Make Local › Selected Objects and Data first."
+            )
 
 
 def commit(scene, scenario: Scenario, binding: Binding, recording: Recording, folders: dict[str, Path]) -> None:

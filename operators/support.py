@@ -30,18 +30,24 @@ def object_with_surface(cls, context) -> bool:
     elif obj.type not in meshes.KINDS:
         cls.poll_message_set(f"'{obj.name}' has no surface: choose a mesh, curve, surface, text or metaball")
     elif not obj.is_editable:
-        cls.poll_message_set(f"'{obj.name}' is linked from another file: make a library override first")
+        cls.poll_message_set(f"'{obj.name}' is linked from another file: use Object › Relations › Make Local first")
     else:
         return True
     return False
 
 
 def mesh_object(cls, context) -> bool:
-    """Poll: there is an active mesh object."""
+    """Poll: there is an active mesh object whose mesh is of this file."""
     if not object_with_surface(cls, context):
         return False
     if context.object.type != "MESH":
         cls.poll_message_set(f"'{context.object.name}' is no mesh: use Object › Convert › Mesh first")
+        return False
+    if not context.object.data.is_editable:
+        cls.poll_message_set(
+            f"The mesh of '{context.object.name}' is linked from another file: "
+            "use Object › Relations › Make Local › Selected Objects and Data first"
+        )
         return False
     return True
 

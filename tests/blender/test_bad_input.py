@@ -255,6 +255,28 @@ def test_a_sensor_linked_from_another_file(tmp_path, pressed):
     assert refusal().startswith("'Pad' is linked from another file")
 
 
+def test_a_sensor_whose_mesh_is_linked(tmp_path, pressed):
+    """A library override: the object can be changed, its mesh cannot."""
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "borrower.blend"))
+    for obj in (pressed.pad, pressed.target):
+        bpy.data.objects.remove(obj)
+    with bpy.data.libraries.load(str(tmp_path / "scene.blend"), link=True) as (_, wanted):
+        wanted.objects = ["Pad"]
+    pad = wanted.objects[0].override_create(remap_local_usages=True)
+    pressed.scene.collection.objects.link(pad)
+    ball(location=(0.0, 0.0, 0.006)).palpate.role = "TARGET"
+    assert pad.is_editable
+    bpy.context.view_layer.update()
+    assert refusal().startswith("The mesh of sensor 'Pad' is linked from another file")
+    bpy.ops.object.select_all(action="DESELECT")
+    bpy.context.view_layer.objects.active = pad
+    pad.select_set(True)
+    with pytest.raises(RuntimeError, match="The mesh of 'Pad' is linked from another file: use Object › Relations"):
+        bpy.ops.palpate.sensor_add()
+    bpy.ops.object.make_local(type="SELECT_OBDATA")  # what the sentences say
+    assert bpy.ops.palpate.bake() == {"FINISHED"}
+
+
 def test_a_curve_as_sensor(pressed):
     bpy.ops.curve.primitive_bezier_circle_add()
     bpy.context.object.name = "Circle"
