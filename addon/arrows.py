@@ -68,14 +68,31 @@ def channels(recording: Recording, sensor: str, body: int, scale: float, length:
 def clear(scene, uid: str) -> None:
     """Remove the arrow of a sensor."""
     arrow = materials.find(scene.objects, uid)
-    if arrow is None:
-        return
+    if arrow is not None:
+        _remove(arrow)
+
+
+def sweep(uids) -> None:
+    """Remove the arrows of sensors that were deleted; `uids` are those of all objects."""
+    for arrow in of_deleted(bpy.data.objects, uids):
+        _remove(arrow)
+
+
+def of_deleted(objects, uids=None) -> list:
+    """Return the arrows among some objects whose sensor was deleted."""
+    arrows = [obj for obj in objects if materials.MARK in obj and obj.library is None]
+    if arrows and uids is None:
+        uids = {obj.palpate.uid for obj in bpy.data.objects}
+    return [arrow for arrow in arrows if arrow[materials.MARK] not in uids]
+
+
+def _remove(arrow) -> None:
     action = arrow.animation_data.action if arrow.animation_data else None
     mesh = arrow.data
     bpy.data.objects.remove(arrow)
     if action is not None and action.users == 0:
         bpy.data.actions.remove(action)
-    if mesh.users == 0:
+    if mesh is not None and mesh.users == 0:
         own = list(mesh.materials)
         bpy.data.meshes.remove(mesh)
         for material in own:

@@ -167,3 +167,11 @@ def remove(uid: str, keep_image: bool = False) -> None:
         block = find(blocks, uid)
         if block is not None:
             blocks.remove(block)
+
+
+def sweep(uids) -> None:
+    """Remove what heat maps of deleted sensors have left, as far as nobody uses it; `uids` are those of all objects."""
+    for blocks in (bpy.data.materials, bpy.data.node_groups, bpy.data.images):  # images last: the others use them
+        for block in list(blocks):
+            if block.users == 0 and block.library is None and MARK in block and block[MARK] not in uids:
+                blocks.remove(block)

@@ -62,6 +62,7 @@ def commit(scene, scenario: Scenario, binding: Binding, recording: Recording, fo
             _sensor(scene, obj, sensor, binding, recording, folders[sensor.name])
         elif obj.palpate.is_baked and sensor.body not in binding.starts:
             clear_object(scene, obj)
+    sweep()
     settings = scene.palpate
     settings.baked_digest = recording.digest
     settings.baked_start, settings.baked_end = scenario.frame_start, scenario.frame_end
@@ -103,7 +104,22 @@ def clear(scene) -> None:
     """Take a bake out of its scene; its files stay."""
     for obj in baked_objects(scene):
         clear_object(scene, obj)
+    sweep()
     scene.palpate.baked_digest = ""
+
+
+def sweep() -> None:
+    """Remove arrows, materials, nodes and images of sensors that were deleted."""
+    uids = {obj.palpate.uid for obj in bpy.data.objects}
+    arrows.sweep(uids)
+    materials.sweep(uids)
+
+
+def has_bake(scene) -> bool:
+    """Whether there is anything for :func:`clear`: an object's part of a bake, or the arrow of a deleted sensor."""
+    if baked_objects(scene):
+        return True
+    return bool(scene.palpate.baked_digest) and bool(arrows.of_deleted(scene.objects))
 
 
 def clear_object(scene, obj) -> None:

@@ -108,7 +108,7 @@ class PALPATE_OT_bake_clear(support.Reporting, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        if context.scene is None or not write.baked_objects(context.scene):
+        if context.scene is None or not write.has_bake(context.scene):
             cls.poll_message_set("Nothing is baked in this scene")
             return False
         return True

@@ -172,7 +172,7 @@ class PALPATE_PT_bake(Part, bpy.types.Panel):
             return
         row = layout.row(align=True)
         row.operator("palpate.bake", text=f"Bake {scene.frame_start}–{scene.frame_end}", icon="RENDER_ANIMATION")
-        if write.baked_objects(scene):
+        if write.has_bake(scene):
             row.operator("palpate.bake_clear", text="", icon="TRASH")
         else:
             layout.operator("palpate.reset", text="Reset Playback")

@@ -451,3 +451,42 @@ def test_clearing_a_copy_leaves_the_original_alone_in_a_reopened_file(tmp_path):
     pad = scene.objects["Pad"]
     assert pad.material_slots[1].material.name == "Palpate Pad"
     assert materials.find(scene.objects, pad.palpate.uid) is not None
+
+
+@pytest.mark.parametrize("around", [False, True])
+def test_nothing_is_left_of_a_deleted_sensor(tmp_path, around):
+    """Neither by the next bake nor by Clear Bake, also when it was the only one."""
+    scene, pad, target = press(frames=3)
+    if around:  # its heat map has geometry nodes, too
+        pad.palpate.role = "NONE"
+        pad = cube("Tip", (0.0, 0.0, -0.01), size=0.02)
+        pad.palpate.role = "SENSOR"
+    twin = grid("Pad 2", (0.2, 0.0, 0.0))
+    twin.palpate.role = "SENSOR"
+    bpy.ops.palpate.reset()
+    save(tmp_path)
+    kinds = ("materials", "images", "node_groups", "actions")
+
+    def ours():
+        arrows_left = [obj.name for obj in scene.objects if materials.MARK in obj]
+        return arrows_left, {kind: sorted(block.name for block in getattr(bpy.data, kind)) for kind in kinds}
+
+    baked(scene)
+    name = pad.name
+    assert f"Palpate {name}" in ours()[1]["materials"] and f"Palpate {name}" in ours()[1]["images"]
+    kept = bpy.data.materials.new("Mine")
+    kept[materials.MARK] = pad.palpate.uid  # a copy that the user has put on something
+    target.data.materials.append(kept)
+    bpy.data.objects.remove(pad)
+    baked(scene)
+    left, blocks = ours()
+    assert left == ["Net Force Pad 2"]
+    assert blocks["materials"] == ["Mine", "Palpate Arrow", "Palpate Pad 2"]
+    assert blocks["images"] == ["Palpate Pad 2"] and blocks["node_groups"] == []
+    bpy.data.objects.remove(twin)
+    assert bpy.ops.palpate.bake_clear.poll()
+    assert bpy.ops.palpate.bake_clear() == {"FINISHED"}
+    assert not bpy.ops.palpate.bake_clear.poll()
+    left, blocks = ours()
+    assert left == [] and blocks["materials"] == ["Mine"] and blocks["images"] == []
+    assert not [action for action in blocks["actions"] if action.startswith("Net Force")]
