@@ -29,7 +29,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar=("FIRST", "LAST"),
         nargs=2,
         type=int,
-        help="frames (default: those of the scene); a scene that is saved keeps them",
+        help="frames to compute (default: those of the scene); the bodies start at FIRST. A scene that is saved keeps them.",
     )
     where = parser.add_mutually_exclusive_group()
     where.add_argument("--save", action="store_true", help="save motion, heat maps and arrows into SCENE.blend itself")
@@ -44,15 +44,20 @@ def run(arguments: argparse.Namespace) -> int:
         bpy = blender.start()
         blender.open_blend(arguments.scene)
         scene = bpy.context.scene
+        own_start = scene.frame_start
         if arguments.frames:
             scene.frame_start, scene.frame_end = _frames(scene, *arguments.frames)
         if arguments.out:
             scene.palpate.folder = str(writable_folder(arguments.out, create=True))
+        if not arguments.save:
+            _leave_saved_bake(bpy, scene, arguments.scene)
         if arguments.sensor:
             _read_out_only(scene, arguments.sensor)
         baked = bake_with_bar(scene)
         saved = save(arguments)
     print(report(baked))
+    if scene.frame_start != own_start:
+        print(f"note: bodies and bristles started at frame {scene.frame_start}, not at the scene's {own_start}")
     print()
     for name, folder in baked.folders.items():
         print(f"{name}: {folder}")
@@ -108,6 +113,20 @@ def save(arguments: argparse.Namespace) -> Path | None:
         path = path.with_name(f"{path.name}.blend")
     blender.save_blend(path)
     return path
+
+
+def _leave_saved_bake(bpy, scene, blend: str) -> None:
+    """Raise SceneError when the bake that the saved file plays would be replaced, and the file not told."""
+    from ..addon import folders
+
+    target = folders.bake_folder(scene).resolve()
+    for obj in scene.objects:
+        played = obj.palpate.bake_folder
+        if played and Path(bpy.path.abspath(played)).resolve().parent == target:
+            raise SceneError(
+                f"'{blend}' plays the bake in '{target}', which would no longer fit it: "
+                "add --save to renew both, or --out DIR to bake elsewhere."
+            )
 
 
 def _frames(scene, first: int, last: int) -> tuple[int, int]:

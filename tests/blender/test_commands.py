@@ -185,6 +185,24 @@ def test_save_keeps_the_bake_in_the_file_itself(tmp_path, demo_blend):
     assert bpy.context.scene.objects["Finger A"].palpate.is_baked
 
 
+def test_the_bake_that_a_saved_file_plays_is_not_replaced_without_it(tmp_path, demo_blend, capfd):
+    mine = tmp_path / "mine.blend"
+    mine.write_bytes(demo_blend.read_bytes())
+    assert main(["bake", str(mine), "--frames", "1", "4", "--save"]) == 0
+    before = contents(tmp_path)
+    capfd.readouterr()
+    for more in ([], ["--save-as", str(tmp_path / "other.blend")]):
+        assert main(["bake", str(mine), "--frames", "2", "3", *more]) == 1
+        out, err = lines_of(capfd)
+        assert out == []
+        assert len(err) == 1
+        assert "add --save to renew both, or --out DIR" in err[0]
+        assert contents(tmp_path) == before
+    assert main(["bake", str(mine), "--frames", "2", "3", "--out", str(tmp_path / "elsewhere")]) == 0
+    assert "note: bodies and bristles started at frame 2, not at the scene's 1" in capfd.readouterr().out
+    assert {name: data for name, data in contents(tmp_path).items() if not name.startswith("elsewhere")} == before
+
+
 def test_a_file_saved_in_edit_mode_can_be_baked(tmp_path, capfd):
     scene, pad, _ = press(frames=2)
     bpy.context.view_layer.objects.active = pad
