@@ -22,6 +22,9 @@ FORCE = "palpate_force"
 MARK = "palpate_sensor"
 """Custom property that tells whose a material, an image, a node group or an arrow is."""
 RAMP_STOPS = 17
+MISSING = (1.0, 0.0, 1.0)
+"""What Blender shows for an image that it does not find. As forces in newtons it will not occur to the sixth digit."""
+MIX_SOCKETS = ("Factor_Float", "A_Color", "B_Color")
 
 
 def find(blocks, uid: str):
@@ -45,7 +48,7 @@ def load_sequence(uid: str, first: Path, relative: bool):
 
 
 def play(user, frame_start: int, frame_end: int) -> None:
-    """Make an image user show file number f at frame f, and hold the first and last beyond."""
+    """Make an image user show file number f at frame f and hold the last beyond; before the first it finds no file."""
     user.frame_duration = frame_end - frame_start + 1
     user.frame_start = frame_start
     user.frame_offset = frame_start - 1
@@ -78,6 +81,7 @@ def heat_map(uid: str, name: str, image, frames: tuple[int, int], maximum: float
     tree = material.node_tree
     tree.nodes.clear()
     add = _Adder(tree)
+    missing = None
     if on_vertices:
         force = add("ShaderNodeAttribute", attribute_name=FORCE).outputs["Fac"]
     else:
@@ -87,21 +91,40 @@ def heat_map(uid: str, name: str, image, frames: tuple[int, int], maximum: float
         tree.links.new(uv.outputs["UV"], texture.inputs["Vector"])
         channels = add("ShaderNodeSeparateColor")
         tree.links.new(texture.outputs["Color"], channels.inputs["Color"])
-        force = channels.outputs["Red"]
+        force, missing = channels.outputs["Red"], _is_missing(add, texture.outputs["Color"])
     share = add("ShaderNodeMath", operation="DIVIDE", use_clamp=True, label="Normal force / maximum (N)")
     tree.links.new(force, share.inputs[0])
     share.inputs[1].default_value = maximum
     ramp = add("ShaderNodeValToRGB")
     _fill(ramp.color_ramp, color_map)
     tree.links.new(share.outputs[0], ramp.inputs["Fac"])
+    color = ramp.outputs["Color"]
+    if missing is not None:
+        mix = add("ShaderNodeMix", data_type="RGBA", label="Magenta: no image")
+        factor, below, above = (next(s for s in mix.inputs if s.identifier == key) for key in MIX_SOCKETS)
+        tree.links.new(missing, factor)
+        tree.links.new(color, below)
+        above.default_value = (*MISSING, 1.0)
+        color = next(s for s in mix.outputs if s.identifier == "Result_Color")
     surface = add("ShaderNodeBsdfPrincipled")
     surface.inputs["Roughness"].default_value = 0.6
     surface.inputs["Emission Strength"].default_value = 0.4
-    tree.links.new(ramp.outputs["Color"], surface.inputs["Base Color"])
-    tree.links.new(ramp.outputs["Color"], surface.inputs["Emission Color"])
+    tree.links.new(color, surface.inputs["Base Color"])
+    tree.links.new(color, surface.inputs["Emission Color"])
     output = add("ShaderNodeOutputMaterial")
     tree.links.new(surface.outputs["BSDF"], output.inputs["Surface"])
     return material
+
+
+def _is_missing(add, color):
+    """Return a socket that is 1 where Blender found no image: its sign for that must not pass for a large force."""
+    distance = add("ShaderNodeVectorMath", operation="DISTANCE")
+    distance.inputs[1].default_value = MISSING
+    add.tree.links.new(color, distance.inputs[0])
+    near = add("ShaderNodeMath", operation="LESS_THAN")
+    near.inputs[1].default_value = 1e-6
+    add.tree.links.new(distance.outputs["Value"], near.inputs[0])
+    return near.outputs[0]
 
 
 class _Adder:

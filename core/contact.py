@@ -394,7 +394,7 @@ def gather(pair, world, tree, neighbours, state, rotation, rows, slots, used, po
 
 @kernel
 def count_buried(pair, world, tree, state, rotation, pose):
-    """Count the texels of a sensor that are deeper inside a closed target than they reach: they feel nothing, and nothing shows.
+    """Count the texels of a sensor that are deeper inside a closed target than they reach, and so feel nothing.
 
     Looked for once a frame by a long segment from each texel's base; the arguments are those of :func:`gather`.
     """

@@ -31,10 +31,10 @@ def look_from_above(scene, height=0.5, width=0.05):
     scene.world = None
 
 
-def watch(path, tmp_path, name, with_addon):
+def watch(path, tmp_path, name, with_addon, frames=FRAMES):
     """Open a file in a Blender of its own and return what it saw."""
     report = tmp_path / f"{name}.json"
-    command = [sys.executable, str(SCRIPT), str(path), str(report), str(int(with_addon)), *map(str, FRAMES)]
+    command = [sys.executable, str(SCRIPT), str(path), str(report), str(int(with_addon)), *map(str, frames)]
     done = subprocess.run(command, capture_output=True, text=True, timeout=180)
     assert report.exists(), done.stdout + done.stderr
     return json.loads(report.read_text())
@@ -86,6 +86,20 @@ def test_it_plays_without_the_addon(scene_file, tmp_path):
     for frame in FRAMES:
         matrix = np.array(without["frames"][str(frame)]["bodies"]["Cube"])
         assert matrix[:3, 3] == pytest.approx(recording.poses[frame - 1, cube_at, :3], abs=1e-6)
+
+
+def test_outside_of_the_bake_and_without_its_files_nothing_passes_for_a_force(scene_file, tmp_path):
+    """Before the first frame, and where a folder was lost, the pad is magenta; after the last frame it holds the last."""
+    path, _ = scene_file
+    inside = watch(path, tmp_path, "inside", False)["frames"]
+    outside = watch(path, tmp_path, "outside", False, frames=(0, 9))["frames"]
+    assert np.array(outside["9"]["pixels"]) == pytest.approx(np.array(inside["8"]["pixels"]), abs=1e-6)
+    (path.parent / "palpate").rename(path.parent / "lost")
+    lost = watch(path, tmp_path, "lost", False, frames=(7,))["frames"]
+    for shot in (outside["0"], lost["7"]):
+        width, height = shot["size"]
+        middle = np.array(shot["pixels"]).reshape(height, width, 4)[height // 2, width // 2]
+        assert middle[0] > 0.5 and middle[1] < 0.05 and middle[2] > 0.5
 
 
 def test_every_texel_has_the_colour_of_its_force(scene_file, tmp_path):
