@@ -131,6 +131,7 @@ class PALPATE_PT_body(Part, bpy.types.Panel):
 
 class PALPATE_PT_readout(Part, bpy.types.Panel):
     bl_label = "Readout"
+    bl_options = set()
     split = False
     roles = {"SENSOR"}
 
@@ -145,16 +146,24 @@ class PALPATE_PT_readout(Part, bpy.types.Panel):
         if felt is None:
             sentences(box, status.text, "INFO", context)
             return
-        x, y, z = felt.net_force
+        net = " ".join(f"{round(value, 3) + 0.0:.3f}" for value in felt.net_force)  # adding zero turns -0.0 into 0.0
         box.label(text=f"Frame {status.frame.frame}: {int(felt.contact.sum())} of {len(felt.contact)} texels touch")
-        box.label(text=f"Normal: {felt.normal_force.sum():.4f} N")
-        box.label(text=f"Largest texel: {felt.normal_force.max():.4f} N")
-        box.label(text=f"Net x, y, z: {x:.3f}, {y:.3f}, {z:.3f} N")
+        for name, value in (
+            ("Sum of normals", f"{felt.normal_force.sum():.4f} N"),
+            ("Largest normal", f"{felt.normal_force.max():.4f} N"),
+            ("Largest shear", f"{(felt.shear**2).sum(axis=1).max() ** 0.5:.4f} N"),
+            ("Net x y z", f"{net} N"),
+            ("Reading", f"{felt.reading.min():.4g} to {felt.reading.max():.4g} {settings.unit}"),
+        ):
+            row = box.split(factor=0.4)
+            row.label(text=name)
+            row.label(text=value)
 
 
 class PALPATE_PT_bake(Part, bpy.types.Panel):
     bl_label = "Bake"
     bl_options = set()
+    split = False
 
     def draw_part(self, layout, _settings, context):
         scene = context.scene
@@ -181,6 +190,7 @@ class PALPATE_PT_bake(Part, bpy.types.Panel):
 
 class PALPATE_PT_display(Part, bpy.types.Panel):
     bl_label = "Display"
+    split = False
 
     def draw_part(self, layout, _settings, context):
         own = context.scene.palpate

@@ -24,3 +24,12 @@ def test_press(play_road):
     assert result["values"]["largest while playing"] > 0.0
     assert result["values"]["files"][2:] == [f"tactile_{frame:04d}.exr" for frame in range(1, 41)]
     assert result["values"]["arrow"][0] > 0.0
+
+
+def test_tutorial(play_road):
+    """The README's five minutes, word by word."""
+    values = play_road("tutorial", timeout=600)["values"]
+    assert values["vertices"] == 84
+    assert values["size"] == pytest.approx([0.02, 0.05, 0], abs=1e-6)
+    assert values["force"] == pytest.approx(0.97, abs=0.005)
+    assert values["files"] == 62  # an image for each frame, the recording and the manifest
