@@ -147,3 +147,12 @@ def test_uninstalling_removes_the_files(life):
     assert left == []
     assert life["uninstalled"]["classes"] == []
     assert life["uninstalled"]["handlers"] == life["before"]["handlers"]
+
+
+def test_the_whole_road_runs_from_the_zip_alone(life):
+    """1 kg on the pad weighs 9.81 N, played and baked."""
+    road = life["road"]
+    assert road["played"] == pytest.approx(9.81, abs=1e-4)
+    assert road["baked"] == pytest.approx(9.81, abs=1e-6)
+    assert len([name for name in road["files"] if name.endswith(".exr")]) == 20
+    assert road["compiled"] > 0, "numba keeps what it compiled in the extension's user folder"

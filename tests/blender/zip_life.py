@@ -92,12 +92,48 @@ def wheels():
     return {m.__name__: m.__file__ for m in (matplotlib, numba, tomli_w, tqdm, trimesh)}, total(10)
 
 
+def road():
+    """Make a sensor, press it, play it, bake it, with nothing but what the zip brought."""
+    from pathlib import Path
+
+    for obj in list(bpy.data.objects):
+        bpy.data.objects.remove(obj)
+    bpy.ops.mesh.primitive_grid_add(x_subdivisions=5, y_subdivisions=13, size=0.05)
+    pad = bpy.context.object
+    bpy.ops.palpate.sensor_add(source="MESH")
+    pad.palpate.k = 1000.0
+    pad.palpate.cn = 10.0
+    bpy.ops.mesh.primitive_cube_add(size=0.06, location=(0.0, 0.0, 0.0301))
+    bpy.ops.palpate.role_set(role="TARGET")
+    bpy.context.object.palpate.body = "FREE"
+    scene = bpy.context.scene
+    scene.frame_end = 20
+    folder = Path(report_path).parent / "project"
+    folder.mkdir()
+    bpy.ops.wm.save_as_mainfile(filepath=str(folder / "scene.blend"))
+    for frame in range(1, 21):
+        scene.frame_set(frame)
+    played = sum(value.value for value in pad.data.attributes["palpate_force"].data)
+    bpy.ops.palpate.bake()
+    files = sorted(path.name for path in (folder / "palpate" / pad.name).iterdir())
+    archive = sys.modules[f"{MODULE}.core.formats.archive"]
+    recording = archive.load_recording(folder / "palpate" / pad.name / "recording.npz")
+    compiled = Path(bpy.utils.extension_path_user(MODULE, path="numba")).rglob("*.nbi")
+    return {
+        "played": played,
+        "baked": float(recording.sensors[pad.name].normal_force[-1].sum()),
+        "files": files,
+        "compiled": len(list(compiled)),
+    }
+
+
 def main():
     watch_commands()
     report = {"before": state()}
     done = bpy.ops.extensions.package_install_files(repo="user_default", filepath=zip_path, enable_on_install=True)
     assert done == {"FINISHED"}, done
     report["enabled"] = state()
+    report["road"] = road()
     report["wheels"], report["compiled"] = wheels()
     bpy.ops.preferences.addon_disable(module=MODULE)
     report["disabled"] = state()
