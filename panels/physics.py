@@ -146,18 +146,13 @@ class PALPATE_PT_readout(Part, bpy.types.Panel):
         if felt is None:
             sentences(box, status.text, "INFO", context)
             return
-        net = " ".join(f"{round(value, 3) + 0.0:.3f}" for value in felt.net_force)  # adding zero turns -0.0 into 0.0
+        net = ", ".join(f"{round(value, 3) + 0.0:.3f}" for value in felt.net_force)  # adding zero turns -0.0 into 0.0
         box.label(text=f"Frame {status.frame.frame}: {int(felt.contact.sum())} of {len(felt.contact)} texels touch")
-        for name, value in (
-            ("Sum of normals", f"{felt.normal_force.sum():.4f} N"),
-            ("Largest normal", f"{felt.normal_force.max():.4f} N"),
-            ("Largest shear", f"{(felt.shear**2).sum(axis=1).max() ** 0.5:.4f} N"),
-            ("Net x y z", f"{net} N"),
-            ("Reading", f"{felt.reading.min():.4g} to {felt.reading.max():.4g} {settings.unit}"),
-        ):
-            row = box.split(factor=0.4)
-            row.label(text=name)
-            row.label(text=value)
+        box.label(text=f"Sum of normals: {felt.normal_force.sum():.4f} N")
+        box.label(text=f"Largest normal: {felt.normal_force.max():.4f} N")
+        box.label(text=f"Largest shear: {(felt.shear**2).sum(axis=1).max() ** 0.5:.4f} N")
+        box.label(text=f"Net: {net} N")
+        box.label(text=f"Reading: {felt.reading.min():.4g} to {felt.reading.max():.4g} {settings.unit}")
 
 
 class PALPATE_PT_bake(Part, bpy.types.Panel):
@@ -168,7 +163,7 @@ class PALPATE_PT_bake(Part, bpy.types.Panel):
     def draw_part(self, layout, _settings, context):
         scene = context.scene
         own = scene.palpate
-        layout.prop(own, "folder")
+        layout.prop(own, "folder", text="")
         column = layout.column(align=True)
         column.prop(own, "use_auto_dt")
         if not own.use_auto_dt:
