@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Long work is a generator that yields Progress; these drive it: in one go, or beside Blender's window."""
+"""Long work is a generator that yields Progress; this drives it beside Blender's window, :mod:`..core.drive` in one go."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Generator
+from collections.abc import Generator
 from dataclasses import dataclass
 
 PATIENCE = 0.1  # seconds of work between two looks at the keyboard
@@ -21,20 +21,6 @@ class Progress:
 
 
 Job = Generator[Progress, None, object]
-
-
-def run_blocking(job: Job, on_progress: Callable[[Progress], None] | None = None):
-    """Run a job to its end and return its result; an exception, Ctrl-C as well, stops it cleanly."""
-    try:
-        while True:
-            try:
-                progress = next(job)
-            except StopIteration as stop:
-                return stop.value
-            if on_progress is not None:
-                on_progress(progress)
-    finally:
-        job.close()
 
 
 class Slice:

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ..core.drive import drive
 from ..core.errors import SceneError
 from ..core.figures import net_shear
 from ..core.formats.files import writable_folder
@@ -68,7 +69,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 def bake_with_bar(scene):
     """Bake a scene with a progress bar on stderr; Ctrl-C leaves an earlier bake as it was."""
-    from ..addon import bake, jobs
+    from ..addon import bake
 
     with console.progress_bar("bake", 1, unit="step") as bar:
 
@@ -78,7 +79,7 @@ def bake_with_bar(scene):
             bar.set_description(progress.stage, refresh=False)
             bar.update(progress.done - bar.n)
 
-        return jobs.run_blocking(bake.bake(scene), show)
+        return drive(bake.bake(scene), show)
 
 
 def report(baked) -> str:

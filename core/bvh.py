@@ -191,6 +191,16 @@ def _seen_along(x, y, z, axis, shear_x, shear_y):
 
 
 @kernel
+def _apart(bounds, node, x0, x1, y0, y1, z0, z1):
+    """Whether a node's box and the box from (x0, y0, z0) to (x1, y1, z1) have no point in common."""
+    return (
+        bounds[node, 0] > x1 or bounds[node, 3] < x0
+        or bounds[node, 1] > y1 or bounds[node, 4] < y0
+        or bounds[node, 2] > z1 or bounds[node, 5] < z0
+    )  # fmt: skip
+
+
+@kernel
 def segment_entry(ox, oy, oz, dx, dy, dz, mesh, hint, tree):
     """Find where the segment from O to O + D first enters a surface from outside.
 
@@ -225,11 +235,7 @@ def segment_entry(ox, oy, oz, dx, dy, dz, mesh, hint, tree):
     z0, z1 = min(oz, oz + reach * dz), max(oz, oz + reach * dz)
     bounds, node, stop = tree.bounds, tree.roots[mesh], tree.roots[mesh + 1]
     while node < stop:
-        if (
-            bounds[node, 0] > x1 or bounds[node, 3] < x0
-            or bounds[node, 1] > y1 or bounds[node, 4] < y0
-            or bounds[node, 2] > z1 or bounds[node, 5] < z0
-        ):  # fmt: skip
+        if _apart(bounds, node, x0, x1, y0, y1, z0, z1):
             node = tree.skip[node]
             continue
         for i in range(tree.first[node], tree.first[node] + tree.number[node]):
@@ -289,11 +295,7 @@ def find_near(ox, oy, oz, dx, dy, dz, mesh, skin, near, slot, tree):
     number = 0
     bounds, node, stop = tree.bounds, tree.roots[mesh], tree.roots[mesh + 1]
     while node < stop:
-        if (
-            bounds[node, 0] > x1 or bounds[node, 3] < x0
-            or bounds[node, 1] > y1 or bounds[node, 4] < y0
-            or bounds[node, 2] > z1 or bounds[node, 5] < z0
-        ):  # fmt: skip
+        if _apart(bounds, node, x0, x1, y0, y1, z0, z1):
             node = tree.skip[node]
             continue
         for i in range(tree.first[node], tree.first[node] + tree.number[node]):

@@ -17,6 +17,7 @@ import numpy as np
 from .bodies import poses_at, quaternion_product, rotation_matrices, rotation_vectors
 from .bvh import NEAR, build_tree
 from .contact import Neighbours, State, World, count_buried, parameter_row
+from .drive import drive
 from .mesh import is_closed
 from .recording import Frame, Recording, SensorFrame
 from .respond import respond
@@ -267,11 +268,4 @@ def solve(scenario: Scenario) -> Generator[Progress, None, Recording]:
 
 def run(scenario: Scenario, progress: Callable[[Progress], None] | None = None) -> Recording:
     """Run a scenario to its end and return the recording; `progress` is called after each frame."""
-    generator = solve(scenario)
-    while True:
-        try:
-            step = next(generator)
-        except StopIteration as stop:
-            return stop.value
-        if progress is not None:
-            progress(step)
+    return drive(solve(scenario), progress)

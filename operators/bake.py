@@ -5,6 +5,7 @@ import bpy
 
 from ..addon import jobs, live, write
 from ..addon.bake import bake
+from ..core.drive import drive
 from . import support
 
 
@@ -33,7 +34,7 @@ class PALPATE_OT_bake(support.Reporting, bpy.types.Operator):
 
     def run(self, context):
         support.leave_edit_mode(context)
-        baked = jobs.run_blocking(bake(context.scene))
+        baked = drive(bake(context.scene))
         self._say(baked)
 
     def _start(self, context):

@@ -14,6 +14,7 @@ from blender_scenes import ball, changes, cube, dump, press, press_and_drop, sav
 
 from palpate.addon import jobs, sample
 from palpate.addon.bake import bake
+from palpate.core.drive import drive
 from palpate.core.errors import PalpateError, SceneError
 
 
@@ -48,7 +49,7 @@ def everything_in(folder):
 
 
 def warnings_of(scene):
-    return " ".join(jobs.run_blocking(bake(scene)).recording.warnings)
+    return " ".join(drive(bake(scene)).recording.warnings)
 
 
 def test_the_scene_bakes_when_nothing_is_wrong(pressed):
@@ -153,11 +154,11 @@ def test_negative_scale_is_used(pressed):
 def test_non_uniform_scale_is_exact(pressed):
     """A ball of half the height, reached by scale, is felt like a mesh of half the height."""
     pressed.target.scale = (1.0, 1.0, 0.5)
-    scaled = jobs.run_blocking(bake(pressed.scene)).recording
+    scaled = drive(bake(pressed.scene)).recording
     for vertex in pressed.target.data.vertices:
         vertex.co.z *= 0.5
     pressed.target.scale = (1.0, 1.0, 1.0)
-    modelled = jobs.run_blocking(bake(pressed.scene)).recording
+    modelled = drive(bake(pressed.scene)).recording
     assert scaled.warnings == ()
     assert scaled.sensors["Pad"].normal_force == pytest.approx(modelled.sensors["Pad"].normal_force, abs=1e-9)
 
@@ -227,7 +228,7 @@ def test_a_mesh_in_edit_mode(pressed):
     bpy.context.view_layer.objects.active = pressed.pad
     bpy.ops.object.mode_set(mode="EDIT")
     with pytest.raises(SceneError, match="'Pad' is in Edit Mode"):
-        jobs.run_blocking(bake(pressed.scene))
+        drive(bake(pressed.scene))
 
 
 def test_a_baked_body_that_is_no_longer_free(tmp_path):
@@ -297,7 +298,7 @@ def test_a_target_deleted_while_its_bake_runs(tmp_path, steps):
     bpy.ops.palpate.reset()
     scene.palpate.use_live = False
     save(tmp_path)
-    jobs.run_blocking(bake(scene))
+    drive(bake(scene))
     other = ball("Other")
     other.palpate.role = "TARGET"
     files = {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}

@@ -10,6 +10,7 @@ from blender_scenes import changes, cube, dump, grid, press, press_and_drop, reo
 
 from palpate.addon import arrows, curves, heatmap, jobs, live, materials, sample, transforms
 from palpate.addon.bake import bake
+from palpate.core.drive import drive
 from palpate.core.errors import FileError
 from palpate.core.formats.archive import load_recording
 from palpate.core.formats.exr import read_exr
@@ -17,7 +18,7 @@ from palpate.core.formats.files import read_manifest
 
 
 def baked(scene):
-    return jobs.run_blocking(bake(scene))
+    return drive(bake(scene))
 
 
 def test_one_folder_per_sensor(tmp_path):
@@ -42,7 +43,7 @@ def test_progress_reaches_its_end(tmp_path):
     scene, *_ = press(frames=4)
     save(tmp_path)
     seen = []
-    jobs.run_blocking(bake(scene), seen.append)
+    drive(bake(scene), seen.append)
     assert [step.done for step in seen] == list(range(1, 9)) and {step.total for step in seen} == {8}
     assert not live.is_baking()
 
@@ -212,7 +213,7 @@ def test_a_folder_with_other_files_is_not_overwritten(tmp_path):
     mine.write_text("years of work")
     stages = []
     with pytest.raises(Exception, match="holds other files than a bake"):
-        jobs.run_blocking(bake(scene), lambda progress: stages.append(progress.stage))
+        drive(bake(scene), lambda progress: stages.append(progress.stage))
     assert set(stages) == {"Reading the scene"}  # nobody waits for forces that cannot be kept
     assert mine.read_text() == "years of work"
     assert [path.name for path in (tmp_path / "palpate").iterdir()] == ["Pad"]
@@ -284,7 +285,7 @@ def test_the_bake_of_another_blend_beside_it_is_not_replaced(tmp_path):
     save(tmp_path, "second.blend")
     stages = []
     with pytest.raises(FileError) as caught:
-        jobs.run_blocking(bake(scene), lambda progress: stages.append(progress.stage))
+        drive(bake(scene), lambda progress: stages.append(progress.stage))
     assert str(caught.value) == (
         f"'{folder}' holds the bake of 'first.blend', which lies beside 'second.blend': choose another bake folder."
     )
@@ -343,8 +344,8 @@ def test_a_sensor_all_around_has_a_heat_map_on_its_vertices(tmp_path):
         values = np.zeros(8, dtype=np.float32)
         mesh.attributes[materials.FORCE].data.foreach_get("value", values)
         assert values == pytest.approx(felt.normal_force[i], abs=1e-7)
-    scenario = jobs.run_blocking(sample.sample_scenario(scene))[0]  # its own nodes do not change what is sampled
-    assert scenario.digest() == jobs.run_blocking(bake(scene)).recording.digest
+    scenario = drive(sample.sample_scenario(scene))[0]  # its own nodes do not change what is sampled
+    assert scenario.digest() == drive(bake(scene)).recording.digest
 
 
 def test_an_arrow_without_contact_has_no_size(tmp_path):

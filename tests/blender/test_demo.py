@@ -7,10 +7,11 @@ import bpy
 import numpy as np
 import pytest
 
-from palpate.addon import jobs, render
+from palpate.addon import render
 from palpate.addon.bake import bake
 from palpate.commands import main
 from palpate.core import figures
+from palpate.core.drive import drive
 from palpate.core.errors import SceneError
 from palpate.core.formats.archive import load_recording
 from palpate.sample_blends import build_samples, demo, studio
@@ -220,7 +221,7 @@ def test_samples_open_and_bake(name, repository, tmp_path):
     bpy.ops.wm.open_mainfile(filepath=str(repository / "sample_blends" / f"{name}.blend"))
     scene = bpy.context.scene
     scene.palpate.folder = str(tmp_path / "bake")
-    baked = jobs.run_blocking(bake(scene))
+    baked = drive(bake(scene))
     assert baked.recording.warnings == ()
     assert figures.peak_force(baked.recording) > 0.01
     for sensor in baked.recording.sensors.values():

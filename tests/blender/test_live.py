@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 from blender_scenes import changes, dump, press, press_and_drop, reopen, save
 
-from palpate.addon import cache, jobs, live, materials, state
+from palpate.addon import cache, live, materials, state
 from palpate.addon.bake import bake
+from palpate.core.drive import drive
 from palpate.core.recording import SensorFrame
 
 
@@ -33,7 +34,7 @@ def test_playing_gives_the_numbers_of_a_bake(tmp_path):
     frames = dict(cache.get(scene).frames)
     assert sorted(frames) == list(range(1, 9))
     save(tmp_path)
-    recording = jobs.run_blocking(bake(scene)).recording
+    recording = drive(bake(scene)).recording
     for number, frame in frames.items():
         baked = recording.at(number)
         assert frame.poses.tobytes() == baked.poses.tobytes()
@@ -294,7 +295,7 @@ def test_the_numbers_of_a_bake_follow_a_file_saved_elsewhere(tmp_path):
     (tmp_path / "there").mkdir()
     scene, *_ = press(frames=4)
     save(tmp_path / "here")
-    felt = jobs.run_blocking(bake(scene)).recording.sensors["Pad"]
+    felt = drive(bake(scene)).recording.sensors["Pad"]
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "there" / "scene.blend"), relative_remap=True)
     scene = reopen(tmp_path / "there" / "scene.blend")
     play(scene, 3)
@@ -325,7 +326,7 @@ def test_rendering_never_simulates(tmp_path):
 def test_a_baked_scene_is_not_simulated_again(tmp_path):
     scene, pad, *_ = press_and_drop(frames=4)
     save(tmp_path)
-    recording = jobs.run_blocking(bake(scene)).recording
+    recording = drive(bake(scene)).recording
     path = save(tmp_path)
     play(scene, 1, 2, 3)
     assert cache.get(scene) is None
@@ -360,7 +361,7 @@ def test_a_scene_without_roles_costs_nothing(monkeypatch):
 def test_a_bake_that_is_out_of_date_says_so(tmp_path, change):
     scene, *_ = press_and_drop(frames=4)
     save(tmp_path)
-    jobs.run_blocking(bake(scene))
+    drive(bake(scene))
     path = save(tmp_path)
     scene = reopen(path)
     for frame in (1, 2, 4, 3):

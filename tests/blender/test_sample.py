@@ -9,13 +9,14 @@ import pytest
 from blender_scenes import ball, cube, grid, press
 from mathutils import Matrix, Quaternion
 
-from palpate.addon import jobs, sample, transforms, units
+from palpate.addon import sample, transforms, units
+from palpate.core.drive import drive
 from palpate.core.errors import SceneError
 from palpate.core.mesh import face_normals
 
 
 def sampled(scene):
-    return jobs.run_blocking(sample.sample_scenario(scene))
+    return drive(sample.sample_scenario(scene))
 
 
 def of(scenario, name):

@@ -11,8 +11,9 @@ import numpy as np
 import pytest
 from blender_scenes import cube, press_and_drop, save
 
-from palpate.addon import colormaps, jobs
+from palpate.addon import colormaps
 from palpate.addon.bake import bake
+from palpate.core.drive import drive
 
 FRAMES = (1, 7, 8)
 SCRIPT = Path(__file__).with_name("without_addon.py")
@@ -54,7 +55,7 @@ def scene_file(tmp_path):
     folder = tmp_path / "project"
     folder.mkdir()
     path = save(folder)
-    recording = jobs.run_blocking(bake(scene)).recording
+    recording = drive(bake(scene)).recording
     for obj in scene.objects:
         if obj.name.startswith("Net Force"):
             obj.hide_render = True
