@@ -10,6 +10,7 @@ import argparse
 import importlib
 import sys
 from collections.abc import Sequence
+from pathlib import Path
 
 from .. import __version__
 from ..core.errors import Cancelled, PalpateError
@@ -26,9 +27,9 @@ COMMANDS = {
     "sweep": "bake one scene over a range of parameters",
     "openrave": "read and write OpenRAVE sensor definitions",
 }
-"""In the order in which the help lists them; those in `READY` have a module of their own name here."""
+"""In the order in which the help lists them. A command works once it has a module of its own name here."""
 
-READY = ("demo", "bake")
+READY = tuple(name for name in COMMANDS if (Path(__file__).parent / f"{name}.py").is_file())
 
 
 def main(argv: Sequence[str] | None = None) -> int:
