@@ -90,8 +90,8 @@ def begin(scene, depsgraph) -> Run:
         binding=binding,
         simulation=dependencies.solver().Simulation(scenario),
         placements=placements,
-        settings=settings_of(scene, objects),
-        geometry={obj.name: meshes.fingerprint(obj, depsgraph) for obj in objects},
+        settings=settings_of(scene, binding.everyone(scene)),
+        geometry={obj.name: meshes.fingerprint(obj, depsgraph) for obj in binding.everyone(scene)},
     )
     first = scenario.frame_start
     run.frames[first] = run.simulation.observe()
@@ -117,7 +117,8 @@ def is_stale(scene, depsgraph, run: Run) -> bool:
         objects = run.binding.objects(scene)
     except PalpateError:
         return True
-    if settings_of(scene, objects) != run.settings:
+    everyone = {obj.name: obj for obj in run.binding.everyone(scene)}
+    if settings_of(scene, everyone.values()) != run.settings:
         return True
     names = {obj.name: index for index, obj in enumerate(objects)}
     if any(names.get(name, -1) not in run.binding.starts for name in state.session.changed_motion if name in names):
@@ -126,9 +127,9 @@ def is_stale(scene, depsgraph, run: Run) -> bool:
     moved = any(not np.array_equal(freebodies.channels(objects[index]), put) for index, put in run.written.items())
     if moved and all(not objects[index].palpate.has_start for index in run.written) and start in run.frames:
         return True  # moved while it stood at the first frame: that is a new start
-    touched = state.session.changed_geometry & names.keys()
+    touched = state.session.changed_geometry & everyone.keys()
     state.session.changed_geometry -= touched
-    return any(meshes.fingerprint(objects[names[name]], depsgraph) != run.geometry[name] for name in touched)
+    return any(meshes.fingerprint(everyone[name], depsgraph) != run.geometry[name] for name in touched)
 
 
 def has_moved(scene, depsgraph, run: Run) -> bool:

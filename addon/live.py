@@ -154,9 +154,9 @@ def show(scene, run) -> None:
         else:
             placement.show(objects[index], frame.poses[index], run.parents[number][index])
         run.written[index] = freebodies.channels(objects[index])
-    for sensor in run.scenario.sensors:
-        if sensor.readout:
-            _write_force(objects[sensor.body], sensor.texels.vertex, frame.sensors[sensor.name].normal_force)
+    for sensor, obj in zip(run.scenario.sensors, run.binding.sensor_objects(scene), strict=True):
+        if sensor.readout and obj is not None:
+            _write_force(obj, sensor.texels.vertex, frame.sensors[sensor.name].normal_force)
     overlays.show(scene, run, frame)
     warnings = run.binding.warnings + tuple(run.simulation.warnings)
     _say(scene, " ".join(warnings) or f"Frame {number} computed.", frame)

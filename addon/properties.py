@@ -127,6 +127,7 @@ class PALPATE_PG_object(bpy.types.PropertyGroup):
         items=(
             ("KEYFRAMED", "Keyframed", "Its animation, parents and constraints; forces do not move it"),
             ("FREE", "Free", "Gravity and the sensors' forces, from where it is at the first frame"),
+            ("PARENT", "Part of Parent", "It is fixed to its parent: what presses on it moves the parent's body"),
         ),
         update=_body_changed,
         **_fixed,

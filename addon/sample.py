@@ -4,8 +4,8 @@
 Who takes part: every object of the scene with a role that the view layer shows. Hidden and disabled objects are left out,
 with a warning; instances of collections never take part.
 
-Each object is a body of its own. Its frame has the location and rotation of the object; scale and shear go into the
-vertices. The shape of a mesh is that of the first frame. Keyframed bodies are sampled at every frame.
+Each object is a body of its own, unless it is part of its parent's (:mod:`.parts`). A body's frame has the location and
+rotation of its object; scale and shear go into the vertices. The shape of a mesh is that of the first frame. Keyframed bodies are sampled at every frame.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from ..core.errors import SceneError
 from ..core.mesh import TriangleMesh, checked_mesh, mass_properties
 from ..core.scenario import Body, Motion, Scenario, Sensor, SensorParameters, Target
 from ..core.texels import texels_from_region
-from . import freebodies, identity, meshes, properties, transforms, units
+from . import freebodies, identity, meshes, parts, properties, transforms, units
 from .jobs import Progress
 
 SAME_STRETCH = 1e-4
@@ -48,6 +48,10 @@ class Binding:
     parents : dict of int to list of (4, 4) float
         What their parents do to free bodies, frame by frame.
     warnings : tuple of str
+    sensor_keys : tuple of str
+        Of the objects that hold the sensors and pads, by sensor index.
+    parts : dict of str to (4, 4) float
+        Where the parts of other bodies are in those bodies' objects, by key.
     """
 
     keys: tuple[str, ...]
@@ -57,6 +61,13 @@ class Binding:
     starts: dict[int, np.ndarray]
     parents: dict[int, list[np.ndarray]]
     warnings: tuple[str, ...]
+    sensor_keys: tuple[str, ...]
+    parts: dict[str, np.ndarray]
+
+    def sensor_objects(self, scene) -> list:
+        """Return the objects that hold the sensors and pads, by sensor index; None for one that was deleted."""
+        found = identity.find(scene, self.sensor_keys)
+        return [found.get(key) for key in self.sensor_keys]
 
     def objects(self, scene) -> list:
         """Return the objects by body index.
@@ -71,6 +82,11 @@ class Binding:
             if key not in found:
                 raise SceneError(f"'{name}' was deleted while its forces were computed: undo that, or start again without it.")
         return [found[key] for key in self.keys]
+
+    def everyone(self, scene) -> list:
+        """Return the objects by body index, and behind them those that are parts of others' bodies, as far as they are there."""
+        found = identity.find(scene, self.parts)
+        return self.objects(scene) + [found[key] for key in self.parts if key in found]
 
 
 def view_layer_of(scene):
@@ -119,10 +135,12 @@ def sample_start(scene, depsgraph) -> tuple[Scenario, Binding]:
     objects, warnings = participants(scene)
     for obj in objects:
         identity.ensure(obj)
-    _check_parents(objects)
+    carriers = parts.carriers(objects)
+    parts.check(objects, carriers)
     settings, scale = scene.palpate, units.metres_per_unit(scene)
-    bodies, sensors, targets, stretches, starts = [], [], [], [], {}
-    for index, obj in enumerate(objects):
+    bodies, stretches, starts, matrices, own = [], [], {}, [], []
+    owners = [obj for obj in objects if carriers[obj] == obj]
+    for index, obj in enumerate(owners):
         free = obj.palpate.body == "FREE"
         if free:
             freebodies.check(obj)
@@ -131,7 +149,9 @@ def sample_start(scene, depsgraph) -> tuple[Scenario, Binding]:
         matrix = freebodies.start_matrix(obj, depsgraph) if free else _world(obj, depsgraph)
         position, quaternion, stretch = _split(obj, matrix)
         stretches.append(stretch)
+        matrices.append(matrix)
         mesh, arrays_warnings = _mesh(obj, depsgraph, stretch * scale)
+        own.append(mesh)
         warnings += arrays_warnings
         body = Body(obj.name, Motion.at_rest(position * scale, quaternion))
         if free:
@@ -139,10 +159,20 @@ def sample_start(scene, depsgraph) -> tuple[Scenario, Binding]:
             body, more = _free(obj, body, mesh)
             warnings += more
         bodies.append(body)
+    sensors, targets, sensor_keys, places = [], [], [], {}
+    for obj in objects:
+        index = owners.index(carriers[obj])
+        mesh = own[index]
+        if carriers[obj] != obj:
+            place = places[identity.key(obj)] = parts.place(obj, carriers[obj], depsgraph)
+            linear, offset = parts.into_body(matrices[index], place)
+            mesh, more = _mesh(obj, depsgraph, linear * scale, offset * scale)
+            warnings += more
         if obj.palpate.role == "TARGET":
             targets.append(Target(obj.name, index, mesh))
         else:
             sensors.append(_sensor(obj, index, mesh))
+            sensor_keys.append(identity.key(obj))
     scenario = Scenario(
         bodies=tuple(bodies),
         sensors=tuple(sensors),
@@ -156,13 +186,15 @@ def sample_start(scene, depsgraph) -> tuple[Scenario, Binding]:
     )
     scenario.check()
     binding = Binding(
-        keys=tuple(identity.key(obj) for obj in objects),
-        names=tuple(obj.name for obj in objects),
+        keys=tuple(identity.key(obj) for obj in owners),
+        names=tuple(obj.name for obj in owners),
         scale=scale,
         stretch=np.array(stretches),
         starts=starts,
-        parents={index: [freebodies.parent_matrix(objects[index], depsgraph)] for index in starts},
+        parents={index: [freebodies.parent_matrix(owners[index], depsgraph)] for index in starts},
         warnings=tuple(warnings),
+        sensor_keys=tuple(sensor_keys),
+        parts=places,
     )
     return scenario, binding
 
@@ -186,6 +218,8 @@ def sample_poses(scene, depsgraph, binding: Binding) -> tuple[Poses, dict[int, n
                 f"The scale of '{obj.name}' changes (frame {scene.frame_current}): bodies are rigid, keep the scale constant."
             )
         poses[index] = position * binding.scale, quaternion
+    if binding.parts:
+        parts.check_places(scene, depsgraph, binding.parts)
     return poses, parents
 
 
@@ -241,18 +275,6 @@ def _check_modes(objects) -> None:
             raise SceneError(f"'{obj.name}' is in Edit Mode: leave it (Tab) before you bake.")
 
 
-def _check_parents(objects) -> None:
-    free = {obj for obj in objects if obj.palpate.body == "FREE"}
-    for obj in objects:
-        above = obj.parent
-        while above is not None:
-            if above in free:
-                raise SceneError(
-                    f"'{obj.name}' is a child of free body '{above.name}': clear its parent, each is a body of its own."
-                )
-            above = above.parent
-
-
 def _world(obj, depsgraph) -> np.ndarray:
     return transforms.array(obj.evaluated_get(depsgraph).matrix_world)
 
@@ -265,8 +287,8 @@ def _split(obj, matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]
     return transforms.split(matrix)
 
 
-def _mesh(obj, depsgraph, stretch: np.ndarray) -> tuple[TriangleMesh, list[str]]:
-    """Return an object's mesh in its body's frame, metres."""
+def _mesh(obj, depsgraph, stretch: np.ndarray, offset: np.ndarray | float = 0.0) -> tuple[TriangleMesh, list[str]]:
+    """Return an object's mesh in its body's frame, metres: its vertices times `stretch` (3, 3), then moved by `offset` (3,)."""
     if obj.palpate.role == "TARGET":
         arrays, warnings = meshes.target_arrays(obj, depsgraph), []
     else:
@@ -275,7 +297,7 @@ def _mesh(obj, depsgraph, stretch: np.ndarray) -> tuple[TriangleMesh, list[str]]
     if np.linalg.det(stretch) < 0:
         triangles, quads = triangles[:, ::-1], quads[:, ::-1]
         warnings.append(f"The scale of '{obj.name}' mirrors it: its faces were turned so that they still point outwards.")
-    mesh, more = checked_mesh(arrays.vertices @ stretch.T, triangles, obj.name, quads)
+    mesh, more = checked_mesh(arrays.vertices @ stretch.T + offset, triangles, obj.name, quads)
     return mesh, warnings + more
 
 

@@ -22,19 +22,34 @@ LEAST_RANGE = 1e-6
 def check(scene, scenario: Scenario, binding: Binding) -> None:
     """Raise SceneError when :func:`commit` could not write on an object."""
     objects = binding.objects(scene)
-    for index in {*binding.starts, *(sensor.body for sensor in scenario.sensors if sensor.readout)}:
-        if not objects[index].is_editable:
+    read_out = [obj for sensor, obj in zip(scenario.sensors, sensor_objects(scene, binding)) if sensor.readout]
+    for obj in {*(objects[index] for index in binding.starts), *read_out}:
+        if not obj.is_editable:
             raise SceneError(
-                f"'{objects[index].name}' is linked from another file, so that a bake cannot be put on it: "
+                f"'{obj.name}' is linked from another file, so that a bake cannot be put on it: "
                 "use Object › Relations › Make Local first."
             )
-    for sensor in scenario.sensors:
-        mesh = objects[sensor.body].data
-        if sensor.readout and (not mesh.is_editable or mesh.override_library is not None):  # Blender saves no changes of those
+    for obj in read_out:
+        mesh = obj.data
+        if not mesh.is_editable or mesh.override_library is not None:  # Blender saves no changes of those
             raise SceneError(
-                f"The mesh of sensor '{objects[sensor.body].name}' is linked from another file, so that its heat map would be "
+                f"The mesh of sensor '{obj.name}' is linked from another file, so that its heat map would be "
                 "lost: use Object › Relations › Make Local › Selected Objects and Data first."
             )
+
+
+def sensor_objects(scene, binding: Binding) -> list:
+    """Return the objects that hold the sensors and pads, by sensor index.
+
+    Raises
+    ------
+    SceneError
+        One of them was deleted.
+    """
+    found = binding.sensor_objects(scene)
+    if any(obj is None for obj in found):
+        raise SceneError("A sensor was deleted while its forces were computed: undo that, or start again without it.")
+    return found
 
 
 def commit(scene, scenario: Scenario, binding: Binding, recording: Recording, folders: dict[str, Path]) -> None:
@@ -49,18 +64,18 @@ def commit(scene, scenario: Scenario, binding: Binding, recording: Recording, fo
     folders : dict of str to Path
         Of the sensors, complete.
     """
-    objects = binding.objects(scene)
-    taking_part = set(objects)
+    objects, sensors = binding.objects(scene), sensor_objects(scene, binding)
+    taking_part = {*objects, *sensors}
     for obj in scene.objects:  # who took part in an earlier bake and no longer does
         if obj.palpate.is_baked and obj not in taking_part:
             clear_object(scene, obj)
     for index in binding.starts:
         _free_body(objects[index], index, binding, recording)
-    for sensor in scenario.sensors:
-        obj = objects[sensor.body]
+    moved = {objects[index] for index in binding.starts}
+    for sensor, obj in zip(scenario.sensors, sensors):
         if sensor.readout:
             _sensor(scene, obj, sensor, binding, recording, folders[sensor.name])
-        elif obj.palpate.is_baked and sensor.body not in binding.starts:
+        elif obj.palpate.is_baked and obj not in moved:
             clear_object(scene, obj)
     sweep()
     settings = scene.palpate

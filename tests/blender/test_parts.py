@@ -1,0 +1,131 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Parts of a parent's body: sensors that ride on a free or keyframed object, several of them on one."""
+
+import bpy
+import numpy as np
+import pytest
+from blender_scenes import ball, cube, grid
+
+from palpate.addon import bake, sample
+from palpate.core.drive import drive
+from palpate.core.errors import SceneError
+from palpate.core.solve import run
+
+
+def on(parent, part):
+    """Parent an object where it is, as Ctrl P does."""
+    bpy.context.view_layer.update()
+    part.parent = parent
+    part.matrix_parent_inverse = parent.matrix_world.inverted()
+    part.palpate.body = "PARENT"
+
+
+def box_on_soles(frames=24):
+    """A free box of 0.2 kg with two small soles under it stands on a table, tilted poses and scales included."""
+    scene = bpy.context.scene
+    scene.frame_start, scene.frame_end = 1, frames
+    box = cube("Box", (0.0, 0.0, 0.0), 0.04, rotation=(0.0, 0.0, 0.4))
+    box.scale = (1.0, 1.0, 0.5)
+    box.palpate.role, box.palpate.body, box.palpate.mass = "TARGET", "FREE", 0.2
+    soles = []
+    for number, x in enumerate((-0.012, 0.012)):
+        sole = grid(f"Sole {number}", (x, 0.0, -0.0105), 4, 4, 0.014)
+        sole.rotation_euler = (np.pi, 0.0, 0.0)
+        on(box, sole)
+        sole.palpate.role, sole.palpate.k, sole.palpate.cn = "SENSOR", 400.0, 4.0
+        soles.append(sole)
+    table = cube("Table", (0.0, 0.0, -0.0206), 0.02)
+    table.scale = (10.0, 10.0, 1.0)
+    table.palpate.role = "TARGET"
+    return scene, box, soles, table
+
+
+def test_two_soles_carry_a_free_box():
+    scene, box, soles, _ = box_on_soles()
+    scenario, binding = drive(sample.sample_scenario(scene))
+    assert [body.name for body in scenario.bodies] == ["Box", "Table"]
+    assert [sensor.body for sensor in scenario.sensors] == [0, 0]
+    assert binding.sensor_objects(scene) == soles
+    recording = run(scenario)
+    forces = [recording.sensors[sole.name].normal_force[-1].sum() for sole in soles]
+    assert sum(forces) == pytest.approx(0.2 * 9.81, rel=1e-3)
+    assert forces[0] == pytest.approx(forces[1], rel=0.02)
+
+
+def test_texels_of_a_part_are_where_blender_shows_them():
+    scene, box, soles, _ = box_on_soles()
+    box.location = (0.1, -0.2, 0.3)
+    box.rotation_euler = (0.3, 0.5, -0.4)
+    bpy.context.view_layer.update()
+    scenario, _ = sample.sample_start(scene, sample.depsgraph_of(scene))
+    body = scenario.bodies[0].motion
+    from palpate.addon import transforms
+
+    rotation = transforms.rotation(body.quaternions[0])
+    for sensor, sole in zip(scenario.sensors, soles, strict=True):
+        there = body.positions[0] + sensor.texels.position @ rotation.T
+        shown = [sole.matrix_world @ sole.data.vertices[v].co for v in sensor.texels.vertex]
+        assert np.abs(there - np.array(shown)).max() < 1e-7
+
+
+def test_a_bake_puts_each_part_its_own_heat_map(tmp_path):
+    scene, box, soles, _ = box_on_soles(4)
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "box.blend"))
+    baked = drive(bake.bake(scene))
+    assert sorted(baked.folders) == ["Sole 0", "Sole 1"]
+    assert all(sole.palpate.is_baked and sole.modifiers or sole.data.uv_layers for sole in soles)
+    assert box.palpate.is_baked  # keyframed
+
+
+def test_a_part_of_something_that_takes_no_part_follows_it():
+    pad, stick = grid(), ball("Stick", (0.0, 0.0, -0.02))
+    target = ball()
+    pad.palpate.role, target.palpate.role = "SENSOR", "TARGET"
+    on(stick, pad)
+    stick.keyframe_insert("location", frame=1)
+    stick.location.z += 0.01
+    stick.keyframe_insert("location", frame=10)
+    scene = bpy.context.scene
+    scene.frame_start, scene.frame_end = 1, 10
+    scenario, _ = drive(sample.sample_scenario(scene))
+    assert [body.name for body in scenario.bodies] == ["Pad", "Ball"]
+    assert scenario.bodies[0].motion.positions[-1][2] - scenario.bodies[0].motion.positions[0][2] == pytest.approx(0.01)
+
+
+def test_a_part_never_touches_its_own_body():
+    scene, _, soles, table = box_on_soles(2)
+    soles[0].location.z += 0.003  # into the box, facing outwards
+    table.location.z = -1.0
+    recording = run(drive(sample.sample_scenario(scene))[0])
+    assert all(not recording.sensors[sole.name].contact.any() for sole in soles)
+
+
+def test_a_part_that_moves_on_its_parent_is_refused():
+    scene, _, soles, _ = box_on_soles(4)
+    soles[0].keyframe_insert("location", frame=1)
+    soles[0].location.z -= 0.01
+    soles[0].keyframe_insert("location", frame=4)
+    with pytest.raises(SceneError, match="'Sole 0' moves on its parent"):
+        drive(sample.sample_scenario(scene))
+
+
+def test_a_child_of_a_free_body_says_what_to_do():
+    scene, _, soles, _ = box_on_soles(4)
+    soles[0].palpate.body = "KEYFRAMED"
+    with pytest.raises(SceneError, match="Part of Parent"):
+        drive(sample.sample_scenario(scene))
+
+
+def test_playing_a_free_body_moves_its_parts_and_does_not_start_anew(monkeypatch):
+    from palpate.addon import cache
+
+    scene, box, soles, _ = box_on_soles(6)
+    box.location.z = 0.005
+    scene.frame_set(1)
+    for frame in range(1, 7):
+        scene.frame_set(frame)
+    found = cache.get(scene)
+    assert sorted(found.frames) == [1, 2, 3, 4, 5, 6]
+    scene.frame_set(3)
+    assert sorted(cache.get(scene).frames) == [1, 2, 3, 4, 5, 6]
+    assert box.location.z < 0.005
