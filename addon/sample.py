@@ -5,7 +5,8 @@ Who takes part: every object of the scene with a role that the view layer shows.
 with a warning; instances of collections never take part.
 
 Each object is a body of its own, unless it is part of its parent's (:mod:`.parts`). A body's frame has the location and
-rotation of its object; scale and shear go into the vertices. The shape of a mesh is that of the first frame. Keyframed bodies are sampled at every frame.
+rotation of its object; scale and shear go into the vertices. The shape of a mesh is that of the first frame. Keyframed
+bodies are sampled at every frame.
 """
 
 from __future__ import annotations
@@ -84,7 +85,7 @@ class Binding:
         return [found[key] for key in self.keys]
 
     def everyone(self, scene) -> list:
-        """Return the objects by body index, and behind them those that are parts of others' bodies, as far as they are there."""
+        """Return the objects by body index, and behind them the parts of their bodies, as far as they are there."""
         found = identity.find(scene, self.parts)
         return self.objects(scene) + [found[key] for key in self.parts if key in found]
 
