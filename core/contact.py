@@ -187,6 +187,30 @@ def normal_force(depth, rate, parameters):
     return max(parameters[K] * depth + parameters[CN] * rate, 0.0)
 
 
+@kernel
+def friction_trace(time, velocity, normal_force, parameters, force):
+    """Friction of one contact point along a straight path, from rest, under a constant normal force (Eq. 9, 13).
+
+    Parameters
+    ----------
+    time : (m,) float, seconds, increasing
+    velocity : (m,) float, m/s
+        Between samples the mean of its ends counts, for which Eq. 9 is solved exactly.
+    normal_force : float, N
+    parameters : (8,) float
+    force : (m,) float, N
+        Written.
+    """
+    z = 0.0
+    for i in range(len(time)):
+        if i > 0:
+            v = 0.5 * (velocity[i - 1] + velocity[i])
+            keep, gain = bristle_step(v * v, normal_force, time[i] - time[i - 1], parameters)
+            z = keep * z + gain * v
+        v = velocity[i]
+        force[i] = friction_force(z, bristle_rate(z, v, v * v, normal_force, parameters), v, parameters)
+
+
 class Neighbours(NamedTuple):
     """Which triangles each texel can meet; a cache that changes the speed and never the numbers.
 

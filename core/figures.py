@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .formats.files import atomic_write
+from .canvas import FONT, GREY, INK, NORMAL_COLOUR, SHEAR_COLOUR, new_figure, save_figure
 from .layout import GridLayout
 from .recording import Recording, SensorRecording
 from .scenario import SensorParameters
@@ -24,15 +24,10 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-FONT = 8.5
-"""Base size of the text, points."""
-
-INK, GREY = "#1c2430", "#68727f"
 SMALLEST_ARROW = 0.08
 """Share of the strongest shear below which no arrow is drawn."""
 
 ARROW = "simple,head_length=5,head_width=5,tail_width=1.5"
-NORMAL_COLOUR, SHEAR_COLOUR = "#1f5fa8", "#c8501e"
 
 
 def net_shear(sensor: SensorRecording, texels: Texels) -> np.ndarray:
@@ -149,7 +144,7 @@ def tactile_strip(
     heights = [min(max(cell * 0.86 * view.height / view.width, 0.5), 2.4) for view in views]
     below = 0.42
     height = above + sum(heights) + gap * (len(views) - 1) + below
-    figure = _figure(width, height)
+    figure = new_figure(width, height)
     y = height - above
     image = None
     for row, (name, view) in enumerate(zip(texels, views, strict=True)):
@@ -192,7 +187,7 @@ def tactile_strip(
     assert image is not None
     bar = figure.add_axes(((width - right + 0.1) / width, 0.2, 0.11 / width, 0.6))
     _colour_bar(figure, image, bar, top)
-    _save(figure, path, dpi)
+    save_figure(figure, path, dpi)
 
 
 def force_curves(
@@ -212,7 +207,7 @@ def force_curves(
         The normal force that a sensor ought to show at the end (a weight at rest), drawn as a dashed line.
     """
     names = list(texels)
-    figure = _figure(7.2, 0.75 + 1.75 * len(names))
+    figure = new_figure(7.2, 0.75 + 1.75 * len(names))
     grid = figure.subplots(len(names), 1, sharex=True, squeeze=False)[:, 0]
     for axes, name in zip(grid, names, strict=True):
         sensor, mu = recording.sensors[name], parameters[name]
@@ -256,7 +251,7 @@ def force_curves(
         left=0.08, right=0.72, top=1 - 0.3 / figure.get_figheight(), bottom=0.5 / figure.get_figheight(), hspace=0.45
     )
     figure.align_ylabels(list(grid))
-    _save(figure, path, dpi)
+    save_figure(figure, path, dpi)
 
 
 @dataclass(frozen=True)
@@ -304,7 +299,7 @@ def label_picture(
     # Text keeps its share of the picture, and its 8 pt when the picture is shown at eight inches of width.
     dpi = round(dpi * pixels_x / 1280)
     width, height = pixels_x / dpi, pixels_y / dpi
-    figure = _figure(width, height)
+    figure = new_figure(width, height)
     background = figure.add_axes((0, 0, 1, 1))
     background.imshow(picture, aspect="auto", interpolation="none")
     background.set_axis_off()
@@ -339,7 +334,7 @@ def label_picture(
         _colour_bar(figure, image, bar, top, ink="white")
     for label in labels:
         _draw_label(figure, label, width, height)
-    _save(figure, path, dpi)
+    save_figure(figure, path, dpi)
 
 
 def _draw_label(figure: Figure, label: Label, width: float, height: float) -> None:
@@ -526,34 +521,3 @@ def _colour_bar(figure: Figure, image: Any, axes: Axes, top: float, ink: str = I
     bar.set_label("normal force per texel (N)" if tall else "normal force\nper texel (N)", fontsize=FONT, color=ink)
     bar.outline.set_edgecolor(ink)
     bar.outline.set_linewidth(0.5)
-
-
-def _figure(width: float, height: float) -> Figure:
-    """A figure of its own, in inches, that no window and no other figure knows of."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(width, height), facecolor="white")
-    FigureCanvasAgg(figure)
-    return figure
-
-
-def _save(figure: Figure, path: str | Path, dpi: int) -> None:
-    """Write the figure, whole or not at all; PDF without a date, so that the same recording gives the same file."""
-    path = Path(path)
-    kind = path.suffix.lstrip(".").lower() or "png"
-    metadata = {"CreationDate": None} if kind == "pdf" else {"Date": None} if kind == "svg" else {"Software": "Palpate"}
-    for axes in figure.axes:
-        for label in (axes.xaxis.label, axes.yaxis.label, *axes.get_xticklabels(), *axes.get_yticklabels()):
-            if float(label.get_fontsize()) > FONT:
-                label.set_fontsize(FONT)
-    for axes in figure.axes:
-        legend = axes.get_legend()
-        for text in legend.get_texts() if legend else ():
-            text.set_fontsize(8)
-    _write(figure, path, dpi, kind, metadata)
-
-
-def _write(figure: Figure, path: Path, dpi: int, kind: str, metadata: dict[str, Any]) -> None:
-    with atomic_write(path) as temporary:
-        figure.savefig(temporary, dpi=dpi, format=kind, metadata=metadata)

@@ -7,7 +7,7 @@ import sys
 import numpy as np
 import pytest
 
-from palpate.core import figures
+from palpate.core import canvas, figures
 from palpate.core.errors import FileError
 from palpate.core.mesh import TriangleMesh
 from palpate.core.recording import Recording, SensorRecording
@@ -149,7 +149,7 @@ def test_no_text_is_smaller_than_eight_points_or_leaves_the_figure(tmp_path, mon
                 inside = box.x0 >= 0 and box.x1 <= width and box.y0 >= 0 and box.y1 <= height
                 seen.append((text.get_text(), text.get_fontsize(), inside))
 
-    monkeypatch.setattr(figures, "_write", look)
+    monkeypatch.setattr(canvas, "_write", look)
     texels = grid_texels()
     recording = recording_of(texels)
     long_name = "Index finger of the left hand"
@@ -195,7 +195,7 @@ def test_importing_figures_does_not_import_matplotlib():
 
 def test_figures_leave_pyplot_alone(tmp_path):
     code = (
-        "import sys; from palpate.core import figures; figures._save(figures._figure(1, 1), sys.argv[1], 50);"
+        "import sys; from palpate.core import canvas; canvas.save_figure(canvas.new_figure(1, 1), sys.argv[1], 50);"
         "sys.exit('matplotlib.pyplot' in sys.modules)"
     )
     assert subprocess.run([sys.executable, "-c", code, str(tmp_path / "a.png")]).returncode == 0

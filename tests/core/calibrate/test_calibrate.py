@@ -1,0 +1,181 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Stiffness and friction from measurements: known truths come back, intervals cover them, bad tables get a sentence."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from palpate.core.calibrate.friction import FrictionData, fit_friction, friction_over_time, read_friction, steady_friction
+from palpate.core.calibrate.stiffness import FoamData, fit_stiffness, read_foam, texel_stiffness
+from palpate.core.errors import FileError, ParameterError
+from palpate.core.formats.columns import read_columns
+from palpate.core.scenario import SensorParameters
+
+PAPER = SensorParameters(sigma0=1.0, sigma1=0.1, x0=0.3, ct=0.01, mus=0.435, mud=0.23)
+LOAD = 0.08
+
+
+def test_equation_18_with_the_papers_inputs():
+    """The print says 58.5; its own inputs give 58.39 (9810 · 0.00125 / (84 · 0.0025), by hand)."""
+    assert texel_stiffness(9810.0, 0.00125, 84, 0.0025) == pytest.approx(58.392857142857, rel=1e-12)
+
+
+def test_a_straight_foam_is_found_exactly():
+    x = np.linspace(0.5e-3, 4e-3, 8)
+    fit = fit_stiffness(FoamData(x, 3.9e6 * x), 0.00125, 84)
+    assert fit.k.value == pytest.approx(3.9e6 * 0.00125 / 84, rel=1e-12)
+    assert fit.dead_zone == pytest.approx(0.0, abs=1e-15)
+
+
+def test_an_offset_is_found_and_called_real():
+    x = np.linspace(0.5e-3, 4e-3, 12)
+    rng = np.random.default_rng(5)
+    fit = fit_stiffness(FoamData(x, 4e6 * (x - 0.3e-3) + rng.normal(0, 40, 12)), 0.00125, 84)
+    assert fit.offset_is_real
+    assert fit.dead_zone == pytest.approx(0.3e-3, rel=0.15)
+    assert fit.k_offset.low < 4e6 * 0.00125 / 84 < fit.k_offset.high
+    assert fit.k.value < fit.k_offset.value  # the line through zero has to carry less
+
+
+def test_foam_intervals_cover_the_truth_as_often_as_they_say():
+    """1,000 noisy foams: 95 % of the intervals hold the truth, give or take three standard deviations of that count."""
+    rng = np.random.default_rng(1)
+    x, truth = np.linspace(1e-3, 4e-3, 6), 5e6
+    held = 0
+    for _ in range(1000):
+        k = fit_stiffness(FoamData(x, truth * x + rng.normal(0, 300, 6)), 1.0, 1).k
+        held += k.low <= truth <= k.high
+    assert 930 <= held <= 970
+
+
+def test_foam_that_does_not_resist_is_refused():
+    with pytest.raises(ParameterError, match="does not rise"):
+        fit_stiffness(FoamData(np.array([1e-3, 2e-3, 3e-3]), np.array([30.0, 20.0, 10.0])), 1.0, 1)
+    with pytest.raises(ParameterError, match="two different"):
+        fit_stiffness(FoamData(np.array([1e-3, 1e-3]), np.array([30.0, 20.0])), 1.0, 1)
+
+
+def test_steady_sliding_is_what_the_bristles_settle_to():
+    """Against scipy's stiff solver on Eq. 9: after 40 m of sliding at constant velocity Eq. 13 is the steady curve (1e-9)."""
+    for v in (0.02, 0.1, 0.3, -0.6):
+        g = LOAD * (PAPER.mud + (PAPER.mus - PAPER.mud) * np.exp(-(v**2) / PAPER.x0**2))
+
+        def rate(_, z, v=v, g=g):
+            return v - PAPER.sigma0 * abs(v) / g * z
+
+        z = solve_ivp(rate, (0, 40 / abs(v)), [0.0], method="Radau", rtol=1e-10, atol=1e-13).y[0, -1]
+        settled = PAPER.sigma0 * z + PAPER.sigma1 * rate(0, z) + PAPER.ct * v
+        assert steady_friction(np.array([v]), LOAD, PAPER)[0] == pytest.approx(settled, abs=1e-9)
+
+
+def test_friction_over_time_agrees_with_an_ode_solver():
+    """A velocity that rises and falls; 2,000 samples, so that the mean of two samples is the velocity to 1e-7 N."""
+    time = np.linspace(0, 4, 2001)
+
+    def velocity(t):
+        return 0.25 * np.sin(1.7 * t) + 0.05 * t
+
+    def rate(t, z):
+        v = velocity(t)
+        return v - PAPER.sigma0 * abs(v) / (LOAD * (PAPER.mud + (PAPER.mus - PAPER.mud) * np.exp(-(v**2) / PAPER.x0**2))) * z
+
+    z = solve_ivp(rate, (0, 4), [0.0], method="Radau", rtol=1e-10, atol=1e-13, t_eval=time).y[0]
+    expected = PAPER.sigma0 * z + PAPER.sigma1 * np.array([rate(t, x) for t, x in zip(time, z, strict=True)])
+    expected += PAPER.ct * velocity(time)
+    assert friction_over_time(time, velocity(time), LOAD, PAPER) == pytest.approx(expected, abs=1e-6)
+
+
+def test_the_papers_curve_gives_its_parameters_back():
+    v = np.linspace(0.01, 1.5, 40)
+    fit = fit_friction(FrictionData(v, steady_friction(v, LOAD, PAPER)), LOAD)
+    for name in ("mus", "mud", "x0", "ct"):
+        assert getattr(fit.parameters, name) == pytest.approx(getattr(PAPER, name), rel=1e-6), name
+
+
+def test_a_recording_from_rest_gives_the_bristles_too():
+    time = np.linspace(0, 6, 600)
+    velocity = 0.3 * np.abs(np.sin(time)) * time / 3
+    fit = fit_friction(
+        FrictionData(velocity, friction_over_time(time, velocity, LOAD, PAPER), time),
+        LOAD,
+        SensorParameters(sigma0=3.0, sigma1=0.02),
+    )
+    for name in ("mus", "mud", "x0", "ct", "sigma0", "sigma1"):
+        assert getattr(fit.parameters, name) == pytest.approx(getattr(PAPER, name), rel=1e-4), name
+
+
+def test_friction_intervals_cover_the_truth():
+    """200 noisy curves, 95 % intervals of the four values: at least 90 % hold the truth (linearised, so not exactly 95 %)."""
+    rng = np.random.default_rng(3)
+    v = np.linspace(0.01, 1.2, 60)
+    clean = steady_friction(v, LOAD, PAPER)
+    held = dict.fromkeys(("mus", "mud", "x0", "ct"), 0)
+    for _ in range(200):
+        fit = fit_friction(FrictionData(v, clean + rng.normal(0, 2e-4, len(v))), LOAD)
+        for name in held:
+            held[name] += fit.estimates[name].low <= getattr(PAPER, name) <= fit.estimates[name].high
+    assert min(held.values()) >= 180 and max(held.values()) <= 200, held
+
+
+def test_what_a_curve_cannot_tell_is_said():
+    """All samples far above the Stribeck velocity: nothing there depends on mus or x0."""
+    v = np.linspace(3.0, 5.0, 30)
+    noise = np.random.default_rng(0).normal(0, 1e-4, 30)
+    fit = fit_friction(FrictionData(v, steady_friction(v, LOAD, PAPER) + noise), LOAD)
+    assert {"mus", "x0"} & set(fit.untold)
+
+
+def test_columns_in_other_units(tmp_path):
+    path = tmp_path / "foam.csv"
+    path.write_text("# made by hand\ncompression (mm);mass_g;note\n1.0;120;a\n2.0;240;b\n", encoding="utf-8")
+    columns = read_columns(path, {"compression": "m", "mass": "kg"})
+    assert columns["compression"] == pytest.approx([1e-3, 2e-3]) and columns["mass"] == pytest.approx([0.12, 0.24])
+    data = read_foam(path, weight_area=804.25e-6)
+    assert data.pressure == pytest.approx([0.12 * 9.80665 / 804.25e-6, 0.24 * 9.80665 / 804.25e-6])
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("", "is empty"),
+        ("compression,pressure\n", "no measurements"),
+        ("a,b\n1,2\n", "none of the columns"),
+        ("compression,pressure\n1,x\n", "Line 2 of"),
+        ("compression,pressure\n1,2\n1,nan\n", "Line 3 of"),
+        ("compression (furlong),pressure\n1,2\n", "unit that is not known"),
+        ("compression,compression_mm,pressure\n1,2,3\n", "two columns for compression"),
+        ("compression,depth\n1,2\n", "exactly one of the columns"),
+        ("pressure,force\n1,2\n", "no column 'compression'"),
+        ("compression,mass\n1,2\n", "on which area"),
+    ],
+)
+def test_bad_foam_tables_get_a_sentence(tmp_path, text, words):
+    path = tmp_path / "foam.csv"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(FileError, match=words):
+        read_foam(path)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("velocity\n1\n", "no column 'force'"),
+        ("velocity,force\n1,2\n", "needs 5 or more"),
+        ("time,velocity,force\n" + "0,1,1\n" * 6, "does not increase at measurement 2"),
+    ],
+)
+def test_bad_friction_tables_get_a_sentence(tmp_path, text, words):
+    path = tmp_path / "friction.csv"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(FileError, match=words):
+        read_friction(path)
+
+
+def test_a_missing_file_and_a_picture_get_a_sentence(tmp_path):
+    with pytest.raises(FileError, match="no file"):
+        read_foam(tmp_path / "none.csv")
+    (tmp_path / "picture.csv").write_bytes(b"\x89PNG\r\n\xff\xfe\x00\x80")
+    with pytest.raises(FileError, match="not a text file"):
+        read_foam(tmp_path / "picture.csv")
