@@ -16,7 +16,7 @@ import numpy as np
 
 from .bodies import poses_at, quaternion_product, rotation_matrices, rotation_vectors
 from .bvh import NEAR, build_tree
-from .contact import Neighbours, State, World, count_buried, parameter_row
+from .contact import DEPTH, NX, NZ, PX, PZ, Neighbours, State, World, count_buried, parameter_row
 from .drive import drive
 from .mesh import is_closed
 from .recording import Frame, Recording, SensorFrame
@@ -111,6 +111,53 @@ class Simulation:
         )
         self.frame += 1
         return self.observe()
+
+    def contacts_along(
+        self, body: int, positions: np.ndarray, quaternions: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, int]:
+        """Look where the first sensor meets the targets while one body goes through given poses; no time passes.
+
+        Parameters
+        ----------
+        body : int
+            A keyframed one; it is left at the last pose.
+        positions, quaternions : (T, 3) float, metres, and (T, 4) float
+
+        Returns
+        -------
+        depth : (T, n) float, metres
+            Zero where nothing touches.
+        normal : (T, n, 3) float
+            The target's outward normal, in the frame of the sensor's body; minus the texel's where nothing touches.
+        point : (T, n, 3) float, metres
+            Where the contact is, in the same frame.
+        sunk : int
+            Most texels at once that are pressed past their maximum penetration.
+        """
+        sensor = self.scenario.sensors[0]
+        shape, texels = (len(positions), len(sensor.texels)), sensor.texels
+        depth, normal = np.zeros(shape), np.tile(-texels.normal, (shape[0], 1, 1))
+        point, most = np.tile(texels.position, (shape[0], 1, 1)), 0
+        own = [pair for pair, (index, _) in enumerate(self._world.pairs) if index == 0]
+        for t in range(shape[0]):
+            self._state.position[body], self._state.quaternion[body] = positions[t], quaternions[t]
+            sunk = gather_all(self._world, self._tree, self._neighbours, self._state, self._scratch)
+            most = max(most, int(sunk))
+            for pair in own:
+                if self._closed[self._world.pairs[pair, 1]]:
+                    buried = count_buried(
+                        pair, self._world, self._tree, self._state, self._scratch.rotation, self._scratch.pose
+                    )
+                    most = max(most, int(buried))
+                rows = slice(int(self._scratch.pair_stop[pair - 1]) if pair else 0, int(self._scratch.pair_stop[pair]))
+                texel = self._scratch.slots[rows] - self._world.slot_start[pair]
+                found = self._scratch.rows[rows]
+                deeper = found[:, DEPTH] > depth[t, texel]
+                texel, found = texel[deeper], found[deeper]
+                depth[t, texel] = found[:, DEPTH]
+                normal[t, texel] = found[:, NX : NZ + 1]
+                point[t, texel] = found[:, PX : PZ + 1] + self._center[sensor.body]
+        return depth, normal, point, most
 
     def _time_of(self, frame: int) -> float:
         return (frame - self.scenario.frame_start) / self.scenario.fps

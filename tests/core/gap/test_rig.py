@@ -1,0 +1,213 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Rigs are read as docs/gap.md says, and each bad one gets a sentence that names what, where, and what to do."""
+
+import numpy as np
+import pytest
+import trimesh
+
+from palpate.core.errors import PalpateError
+from palpate.core.gap import tables
+from palpate.core.gap.rig import read_rig
+
+TEXELS = 6
+RIG = """
+format = "palpate-rig/1"
+name = "pad under a ball"
+[sensor]
+grid = { rows = 3, columns = 2, pitch = [0.003, 0.004] }
+thickness = 0.006
+k = 80.0
+[indenter]
+shape = { sphere = 0.008 }
+[[trial]]
+file = "press.csv"
+[[trial]]
+file = "again.csv"
+use = "check"
+"""
+
+
+def table(samples=20, names=("x", "y", "z"), texels=TEXELS, start=0.0):
+    """A CSV as a list of rows of words, header first."""
+    time = start + 0.02 * np.arange(samples)
+    stimulus = {
+        "x": 0.0 * time,
+        "y": 0.0 * time,
+        "z": 0.009 - 0.1 * time / max(samples, 1),
+        "depth": 0.001 * time,
+        "force": time,
+    }
+    header = ["time", *names, *(f"texel_{i}" for i in range(texels))]
+    columns = [time, *(stimulus.get(name, 0.0 * time) for name in names), *(0.1 * time + i for i in range(texels))]
+    return [header, *([f"{value:.9g}" for value in row] for row in zip(*columns, strict=True))]
+
+
+def write(folder, rig=RIG, **files):
+    """Write a rig with two recordings, of which `files` replaces some; return its path."""
+    for name, rows in {"press": table(), "again": table(), **files}.items():
+        text = rows if isinstance(rows, str) else "\n".join(",".join(row) for row in rows) + "\n"
+        (folder / f"{name}.csv").write_text(text)
+    path = folder / "rig.toml"
+    path.write_text(rig)
+    return path
+
+
+def edited(row, column, value, **options):
+    rows = table(**options)
+    rows[row][rows[0].index(column)] = value
+    return rows
+
+
+def changed(column, factor, add=0.0):
+    rows = table()
+    at = rows[0].index(column)
+    return [rows[0], *([*row[:at], str(float(row[at]) * factor + add), *row[at + 1 :]] for row in rows[1:])]
+
+
+def without(column, **options):
+    rows = table(**options)
+    at = rows[0].index(column)
+    return [row[:at] + row[at + 1 :] for row in rows]
+
+
+def test_a_rig_is_read(tmp_path):
+    rows = edited(4, "texel_3", "")
+    rig = read_rig(write(tmp_path, press=rows))
+    assert [trial.use for trial in rig.trials] == ["fit", "check"]
+    assert len(rig.texels) == TEXELS
+    # Texel 0 is row 0, column 0; columns run along +x, rows along +y, the grid is centred in z = 0.
+    np.testing.assert_allclose(rig.texels.position[:3], [[-0.0015, -0.004, 0], [0.0015, -0.004, 0], [-0.0015, 0.0, 0]])
+    assert rig.parameters.k == 80.0 and rig.parameters.cn == pytest.approx(0.8)  # 1 % of k in number
+    assert rig.parameters.max_penetration == 0.012  # twice the thickness
+    trial = rig.trials[0]
+    assert trial.stimulus == "pose" and trial.position.shape == (20, 3)
+    assert np.isnan(trial.reading[3, 3]) and np.isnan(trial.reading).sum() == 1
+
+
+def test_other_stimuli_meshes_and_forces(tmp_path):
+    trimesh.creation.box((0.02, 0.02, 0.02)).export(tmp_path / "pad.ply")
+    rig = RIG.replace("grid = { rows = 3, columns = 2, pitch = [0.003, 0.004] }", 'mesh = "pad.ply"')
+    names = ("depth", "slide_x", "slide_y", "force_x", "force_z")
+    press, again = table(names=names, texels=0), table(names=("force",), texels=8)
+    found = read_rig(write(tmp_path, rig, press=press, again=again))
+    assert len(found.texels) == 8
+    one, two = found.trials
+    assert one.stimulus == "depth" and one.reading is None
+    assert np.isnan(one.force[:, 1]).all() and not np.isnan(one.force[:, [0, 2]]).any()
+    assert two.stimulus == "force" and two.reading.shape == (20, 8)
+
+
+BAD = {
+    "missing column time": (dict(press=without("time")), "no column `time`"),
+    "missing column of the pose": (dict(press=without("y")), "no column y"),
+    "missing texel": (dict(press=without("texel_4")), "5 texel columns and the sensor has 6"),
+    "texel numbered wrong": (dict(press=edited(0, "texel_4", "texel_9")), "no column texel_4"),
+    "no stimulus": (dict(press=table(names=())), "no stimulus"),
+    "two stimuli": (dict(press=table(names=("depth", "force"))), "more than one stimulus"),
+    "no response": (dict(press=table(texels=0)), "no response"),
+    "time backwards": (dict(press=edited(7, "time", "0.01")), "goes backwards at line 8"),
+    "time stands": (dict(press=edited(7, "time", "0.1")), "stands still at line 8"),
+    "time in milliseconds": (dict(press=changed("time", 1e3)), "seconds"),
+    "nan": (dict(press=edited(7, "texel_2", "nan")), "Line 8 of 'press.csv' has nan for texel_2"),
+    "infinite": (dict(press=edited(7, "texel_2", "inf")), "Line 8"),
+    "words": (dict(press=edited(7, "texel_2", "low")), "'low' for texel_2"),
+    "ragged": (dict(press=[*table(), ["1", "2"]]), "Line 22 of 'press.csv' has 2 cells"),
+    "semicolons": (dict(press="time;depth;texel_0\n0;0;0\n"), "comma"),
+    "no header": (dict(press="\n".join(",".join(row) for row in table()[1:])), "begins with numbers"),
+    "column twice": (dict(press=edited(0, "texel_0", "texel_1")), "twice"),
+    "empty file": (dict(press=""), "empty"),
+    "empty trial": (dict(press=table(samples=0)), "no data"),
+    "one sample": (dict(press=table(samples=1)), "one sample"),
+    "millimetres": (dict(press=changed("z", 1e3, add=300.0)), "in metres"),
+    "depth in millimetres": (dict(press=edited(7, "depth", "2.5", names=("depth",))), "in metres"),
+    "binary": (dict(press=None), "not text"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", BAD)
+def test_bad_recordings_get_a_sentence(tmp_path, name):
+    files, words = BAD[name]
+    path = write(tmp_path, **{key: rows for key, rows in files.items() if rows is not None})
+    if name == "binary":
+        (tmp_path / "press.csv").write_bytes(b"\xff\xfe\x00\x81" * 20)
+    with pytest.raises(PalpateError, match=".") as caught:
+        read_rig(path)
+    message = str(caught.value)
+    assert words in message and "press" in message
+    assert message.endswith(".") and "\n" not in message and len(message) < 300
+
+
+BAD_RIGS = {
+    "other format": (('"palpate-rig/1"', '"palpate-rig/9"'), "not a rig"),
+    "no TOML": (("[sensor]", "[sensor"), "not TOML"),
+    "no sensor": (("[sensor]", "[senser]"), "senser"),
+    "unknown word": (("thickness", "thicknes"), "thicknes"),
+    "no shape": (("shape = { sphere = 0.008 }", ""), "needs either a shape or a mesh"),
+    "unknown shape": (("sphere", "cone"), "cone"),
+    "negative radius": (("0.008", "-0.008"), "above zero"),
+    "unit that is no text": (("k = 80.0", "k = 80.0\nunit = 3"), "unit"),
+    "k that is text": (("80.0", '"80"'), "give a number"),
+    "k below zero": (("80.0", "-80.0"), "above zero"),
+    "rows": (("rows = 3", "rows = 0"), "rows"),
+    "texel count": (("rows = 3", "rows = 4"), "6 texel columns and the sensor has 8"),
+    "no trial": (('[[trial]]\nfile = "press.csv"\n[[trial]]\nfile = "again.csv"\nuse = "check"', ""), "no [[trial]]"),
+    "use": (('use = "check"', 'use = "test"'), "fit"),
+    "nothing to fit": (('file = "press.csv"', 'file = "press.csv"\nuse = "check"'), "to fit"),
+    "twice": (('"again.csv"', '"press.csv"'), "once"),
+    "no such file": (('"again.csv"', '"never.csv"'), "not there"),
+    "outside": (('"again.csv"', '"../again.csv"'), "outside the rig's folder"),
+    "absolute": (('"again.csv"', '"/etc/passwd"'), "outside the rig's folder"),
+    "no name": (('"again.csv"', "3"), "names no file"),
+}
+
+
+@pytest.mark.parametrize("name", BAD_RIGS)
+def test_bad_rigs_get_a_sentence(tmp_path, name):
+    (old, new), words = BAD_RIGS[name]
+    assert old in RIG
+    folder = tmp_path / "inside"
+    folder.mkdir()
+    (tmp_path / "again.csv").write_text("time\n")
+    with pytest.raises(PalpateError) as caught:
+        read_rig(write(folder, RIG.replace(old, new)))
+    message = str(caught.value)
+    assert words in message and message.endswith(".") and "\n" not in message
+
+
+def test_a_link_out_of_the_folder_is_refused(tmp_path):
+    folder = tmp_path / "inside"
+    folder.mkdir()
+    path = write(folder)
+    (folder / "again.csv").rename(tmp_path / "again.csv")
+    (folder / "again.csv").symlink_to(tmp_path / "again.csv")
+    with pytest.raises(PalpateError, match="outside the rig's folder"):
+        read_rig(path)
+
+
+def test_all_zeros_are_refused(tmp_path):
+    rows = [[*row[:4], *(["0"] * TEXELS if i else row[4:])] for i, row in enumerate(table())]
+    with pytest.raises(PalpateError, match="All responses"):
+        read_rig(write(tmp_path, press=rows, again=rows))
+
+
+def test_ten_gigabytes_are_refused_without_reading_them(tmp_path):
+    path = write(tmp_path)
+    with open(tmp_path / "press.csv", "r+b") as file:
+        file.truncate(10 * 10**9)  # a sparse file: it takes no room
+    with pytest.raises(PalpateError, match=r"10\.0 GB"):
+        read_rig(path)
+
+
+def test_a_missing_rig_and_missing_stimulus_values(tmp_path):
+    with pytest.raises(PalpateError, match="no rig"):
+        read_rig(tmp_path / "none.toml")
+    rig = read_rig(write(tmp_path, press=edited(10, "z", "")))
+    z = rig.trials[0].position[:, 2]
+    assert z[9] == pytest.approx(0.5 * (z[8] + z[10]))
+    assert any("interpolated" in warning for warning in rig.warnings)
+
+
+def test_columns_without_meaning_are_said(tmp_path):
+    rig = read_rig(write(tmp_path, press=table(names=("x", "y", "z", "temperature"))))
+    assert any("temperature" in warning for warning in rig.warnings)
+    assert tables.LARGEST < 10**9

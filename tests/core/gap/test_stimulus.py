@@ -1,0 +1,107 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the texels of a rig meet, against geometry done by hand."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import trimesh
+
+from palpate.core.errors import PalpateError
+from palpate.core.gap.rig import Indenter, Rig, Trial, grid_texels
+from palpate.core.gap.stimulus import stimulus_of
+from palpate.core.mesh import checked_mesh
+from palpate.core.scenario import SensorParameters
+
+RADIUS = 0.008
+
+
+def trial(position, quaternion=None, time=None, **changes):
+    count = len(position)
+    time = 0.02 * np.arange(count) if time is None else time
+    turns = np.tile([1.0, 0.0, 0.0, 0.0], (count, 1)) if quaternion is None else quaternion
+    values = dict(position=np.asarray(position, float), quaternion=turns, level=None, slide=np.zeros((count, 2)))
+    values.update(reading=None, force=np.zeros((count, 3)))
+    values.update(changes)
+    return Trial("press", "fit", time, values.pop("stimulus", "pose"), **values)
+
+
+def rig(indenter, one):
+    return Rig("rig", grid_texels(14, 6, 0.0034, 0.0034), SensorParameters(), frozenset(), None, None, indenter, (one,))
+
+
+def solid(shape):
+    return checked_mesh(shape.vertices, shape.faces, "solid")[0]
+
+
+def test_a_ball_is_the_limit_of_its_meshes():
+    """Closed form and the solver's contact search agree ever better on finer balls: first order, as facets' normals do."""
+    rng = np.random.default_rng(1)
+    where = np.column_stack([rng.uniform(-4e-3, 4e-3, 40), rng.uniform(-9e-3, 9e-3, 40), RADIUS - rng.uniform(0, 3e-3, 40)])
+    one = trial(where)
+    exact = stimulus_of(one, rig(Indenter(solid(trimesh.creation.icosphere(2, RADIUS)), RADIUS), one))
+    errors = []
+    for subdivisions in (3, 4, 5):
+        ball = Indenter(solid(trimesh.creation.icosphere(subdivisions, RADIUS)), None)
+        errors.append(np.abs(stimulus_of(one, rig(ball, one)).depth - exact.depth).mean())
+    assert errors[0] > 2 * errors[1] > 4 * errors[2]
+    assert errors[2] < 2e-3 * exact.depth.max()
+
+
+def test_depth_rate_and_slide_of_a_ball_are_those_of_geometry():
+    time = np.linspace(0.0, 1.0, 201)
+    path = np.column_stack([2e-3 * time, 1e-3 * time, RADIUS - 1e-3 - 5e-4 * time**2])
+    one = trial(path, time=time)
+    found = stimulus_of(one, rig(Indenter(solid(trimesh.creation.icosphere(2, RADIUS)), RADIUS), one))
+    texels = grid_texels(14, 6, 0.0034, 0.0034)
+    for texel in np.flatnonzero((found.depth > 0).all(axis=0)):
+        offset = texels.position[texel, :2] - path[:, :2]
+        height = np.sqrt(RADIUS**2 - (offset**2).sum(axis=1))  # of the surface below the centre
+        normal = np.column_stack([offset, -height]) / RADIUS
+        expected = (height - path[:, 2]) * height / RADIUS  # perpendicular to the surface (Eq. 4)
+        np.testing.assert_allclose(found.depth[:, texel], expected, rtol=1e-12)
+        velocity = np.column_stack([np.full(201, 2e-3), np.full(201, 1e-3), -1e-3 * time])
+        inner = slice(1, -1)  # central differences are exact for a parabola, but not at its ends
+        np.testing.assert_allclose(found.rate[inner, texel], (velocity * normal).sum(axis=1)[inner], rtol=1e-9)
+        tangential = velocity - (velocity * normal).sum(axis=1)[:, None] * normal
+        np.testing.assert_allclose(found.slip[inner, texel], tangential[inner], atol=1e-12)
+        np.testing.assert_allclose(found.slide[inner, texel], np.linalg.norm(tangential, axis=1)[inner], rtol=1e-7)
+
+
+def test_a_turning_cylinder_rubs():
+    """A flat end that turns about its axis slides at ω r and presses nothing in."""
+    time = np.linspace(0.0, 0.5, 26)
+    angle = 2.0 * time
+    turns = np.column_stack([np.cos(angle / 2), 0 * time, 0 * time, np.sin(angle / 2)])
+    one = trial(np.tile([0.0, 0.0, 0.004], (26, 1)), turns, time)
+    cylinder = Indenter(solid(trimesh.creation.cylinder(0.007, 0.01, sections=128)))
+    found = stimulus_of(one, rig(cylinder, one))
+    away = np.linalg.norm(grid_texels(14, 6, 0.0034, 0.0034).position[:, :2], axis=1)
+    inside = away < 0.0069
+    np.testing.assert_allclose(found.depth[:, inside], 1e-3, rtol=1e-9)
+    assert not found.depth[:, away > 0.0071].any()
+    np.testing.assert_allclose(found.slide[:, inside], np.tile(2.0 * away[inside], (26, 1)), atol=1e-9)
+    assert np.abs(found.rate).max() < 1e-12
+
+
+def test_depth_and_force_trials_load_all_texels_alike():
+    time = 0.02 * np.arange(50)
+    level = np.clip(np.sin(6 * time), 0, None) * 1e-3
+    slide = np.column_stack([0.01 * time, 0 * time])
+    one = trial(np.zeros((50, 3)), stimulus="depth", level=level, slide=slide)
+    found = stimulus_of(one, rig(None, one))
+    np.testing.assert_array_equal(found.depth, np.tile(level[:, None], (1, 84)))
+    np.testing.assert_allclose(found.slip[level > 0], np.tile([0.01, 0.0, 0.0], (np.count_nonzero(level), 84, 1)), atol=1e-15)
+    pushed = stimulus_of(replace(one, stimulus="force"), rig(None, one))
+    np.testing.assert_allclose(pushed.load.sum(axis=1), level)
+
+
+def test_deeper_than_the_model_reaches_still_counts_and_right_through_is_refused():
+    path = np.tile([0.0, 0.0, RADIUS - 0.015], (10, 1))
+    one = trial(path)
+    found = stimulus_of(one, rig(Indenter(solid(trimesh.creation.icosphere(2, RADIUS)), RADIUS), one))
+    assert 0.012 < found.depth.max() < 0.015 and found.sunk > 0
+    through = trial(path - [0, 0, 1.0])
+    hollow = Indenter(solid(trimesh.creation.box((0.01, 0.01, 4.0))))
+    with pytest.raises(PalpateError, match="right through"):
+        stimulus_of(through, rig(hollow, through))
