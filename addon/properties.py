@@ -30,7 +30,10 @@ COLOR_MAPS = (
     ("MAGMA", "Magma", "Black to pale yellow, perceptually uniform"),
     ("PAPER", "White to Black", "White is no force, black the largest, as in the paper's Fig. 10"),
 )
-PARAMETERS = ("k", "cn", "ct", "sigma0", "sigma1", "x0", "mus", "mud", "max_penetration", "gain", "zero", "unit")
+PARAMETERS = (
+    "k", "cn", "ct", "sigma0", "sigma1", "x0", "mus", "mud", "max_penetration", "normal_law", "exponent", "dissipation",
+    "gain", "zero", "unit",
+)  # fmt: skip
 """Names that :class:`SensorParameters` and :class:`PALPATE_PG_object` share."""
 
 _default = SensorParameters()
@@ -99,6 +102,31 @@ class PALPATE_PG_object(bpy.types.PropertyGroup):
         "Depth past which a texel no longer acts, m. About twice the thickness of the foam: 0.012 for 6 mm",
         precision=5,
         step=0.1,
+    )
+    normal_law: EnumProperty(
+        name="Normal Law",
+        description="How the normal force follows from depth and its rate",
+        items=(
+            ("linear", "Linear", "k d + cn ḋ (Eq. 8): a spring and a damper"),
+            (
+                "hunt-crossley",
+                "Hunt–Crossley",
+                "k dᵖ (1 + 3/2 α ḋ): no force jump at first touch; e = 1 - α v for slow impacts",
+            ),
+        ),
+        **_fixed,
+    )
+    exponent: _number(
+        "Exponent p",
+        "exponent",
+        "Power of the depth (Hunt–Crossley); k then is in N/mᵖ. Hertz: 1.5",
+        min=1.0,
+        max=4.0,
+    )
+    dissipation: _number(
+        "Dissipation α (s/m)",
+        "dissipation",
+        "Hunt–Crossley, s/m: an impact at v m/s leaves with the share 1 - α v",
     )
     sigma0: _number(
         "Bristles σ0 (N/m)",

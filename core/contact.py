@@ -4,6 +4,7 @@
 Where the print is wrong or silent, this is what is computed (docs/model.md has the whole story):
 
 * Eq. 8: with `d` the penetration and ḋ its rate, ``fn = max(k d + cn ḋ, 0)``, along the object's surface normal. No adhesion.
+  On request the law of Hunt and Crossley in its place: ``fn = max(k dᵖ (1 + 3/2 α ḋ), 0)``.
 * Eq. 10: ``g = fn (mud + (mus - mud) exp(-|v|² / x0²))``; the exponential was lost in print.
 * Eq. 9, 13 as printed: ``ż = v - sigma0 |v| / g · z`` and ``ft = sigma0 z + sigma1 ż + ct v``.
 * The bristle deflection is carried along as the texel and the surface under it turn, and never exceeds what static friction
@@ -22,7 +23,7 @@ import numpy as np
 
 from .bvh import find_near, near_entry, segment_entry
 from .jit import kernel
-from .scenario import SensorParameters
+from .scenario import HUNT_CROSSLEY, SensorParameters
 
 # Columns of a contact row: one row per touching texel and target, in the frame of the sensor's body. The row is all that the
 # solver's inner loop reads.
@@ -32,16 +33,21 @@ ZX, ZY, ZZ = 6, 7, 8  # bristle deflection, m
 DEPTH = 9  # m
 START, KEEP, GAIN, LIMIT = 10, 11, 12, 13  # z(t) = START z, z(t + dt) = KEEP z + GAIN v, LIMIT = largest |z|
 NORMAL_FORCE, STIFF_N, STIFF_T = 14, 15, 16  # N at the step's end; d force / d velocity, N·s/m
-ROW = 17
+PUSH = 17  # normal force that a rate of zero would have on the tangent of the law, N
+ROW = 18
 
 # Columns of a parameter row, one per sensor or pad.
-K, CN, CT, SIGMA0, SIGMA1, X0, MUS, MUD = range(8)
+K, CN, CT, SIGMA0, SIGMA1, X0, MUS, MUD, EXPONENT, DISSIPATION = range(10)
+PARAMETERS = 10
+LINEAR = 0.0
+"""In the place of the exponent: Eq. 8. Any other exponent is that of Hunt and Crossley's law."""
 
 
 def parameter_row(parameters: SensorParameters) -> np.ndarray:
-    """Return the numbers of the contact law as the kernels want them, (8,) float."""
+    """Return the numbers of the contact law as the kernels want them, (PARAMETERS,) float."""
     p = parameters
-    return np.array([p.k, p.cn, p.ct, p.sigma0, p.sigma1, p.x0, p.mus, p.mud], dtype=float)
+    exponent = p.exponent if p.normal_law == HUNT_CROSSLEY else LINEAR
+    return np.array([p.k, p.cn, p.ct, p.sigma0, p.sigma1, p.x0, p.mus, p.mud, exponent, p.dissipation], dtype=float)
 
 
 def friction_limit(normal_force: np.ndarray, speed: np.ndarray, parameters: SensorParameters) -> np.ndarray:
@@ -65,7 +71,7 @@ class World(NamedTuple):
     texels : (N, 12) float
         Position, normal, x axis and y axis of each texel, in its body's frame and relative to the body's reference point.
     texel_start : (m + 1,) int
-    parameters : (m, 8) float
+    parameters : (m, PARAMETERS) float
     reach : (m,) float, metres
         Maximum penetration.
     pairs : (q, 2) int
@@ -183,8 +189,40 @@ def bristle_rate(z, velocity, speed_squared, normal_force, parameters):
 
 @kernel
 def normal_force(depth, rate, parameters):
-    """Eq. 8 without adhesion."""
-    return max(parameters[K] * depth + parameters[CN] * rate, 0.0)
+    """Eq. 8 without adhesion, or ``k dᵖ (1 + 3/2 α ḋ)`` of Hunt and Crossley (J. Appl. Mech. 42, 1975, eq. 8 and 13)."""
+    if parameters[EXPONENT] == LINEAR:
+        return max(parameters[K] * depth + parameters[CN] * rate, 0.0)
+    spring = parameters[K] * max(depth, 0.0) ** parameters[EXPONENT]
+    return max(spring * (1.0 + 1.5 * parameters[DISSIPATION] * rate), 0.0)
+
+
+@kernel
+def normal_tangent(depth, rate, dt, parameters):
+    """Tangent of the normal force at a step's end as a function of the rate: ``force = push + slope · rate``.
+
+    Parameters
+    ----------
+    depth : float, metres
+        At the step's beginning; at its end it is ``depth + dt · rate``.
+    rate : float, m/s
+        Where the law is touched; Eq. 8 is its own tangent everywhere.
+    dt : float, seconds
+
+    Returns
+    -------
+    push : float, N
+    slope : float, N·s/m
+        Never negative. Both are zero where the law of Hunt and Crossley gives no force.
+    """
+    if parameters[EXPONENT] == LINEAR:
+        return parameters[K] * depth, parameters[K] * dt + parameters[CN]
+    damping = 1.5 * parameters[DISSIPATION]
+    end, share = depth + dt * rate, 1.0 + damping * rate
+    if end <= 0.0 or share <= 0.0:
+        return 0.0, 0.0
+    spring = parameters[K] * end ** parameters[EXPONENT]
+    slope = spring * (parameters[EXPONENT] * dt * share / end + damping)
+    return spring * share - slope * rate, slope
 
 
 @kernel
@@ -455,13 +493,13 @@ def count_buried(pair, world, tree, state, rotation, pose):
 def linearise(rows, r, vx, vy, vz, dt, parameters):
     """Write into a contact row how its force depends on the relative velocity at the step's end, near velocity `v`.
 
-    The force on the target is ``-(k d + STIFF_N ḋ) n - (bias + STIFF_T v_t)``; `v` is the target's velocity relative to the
+    The force on the target is ``-(PUSH + STIFF_N ḋ) n - (bias + STIFF_T v_t)``; `v` is the target's velocity relative to the
     sensor, metres per second.
     """
     rate = vx * rows[r, NX] + vy * rows[r, NY] + vz * rows[r, NZ]
     tx, ty, tz = vx - rate * rows[r, NX], vy - rate * rows[r, NY], vz - rate * rows[r, NZ]
-    stiff = parameters[K] * dt + parameters[CN]
-    force = parameters[K] * rows[r, DEPTH] + stiff * rate
+    push, stiff = normal_tangent(rows[r, DEPTH], rate, dt, parameters)
+    force = push + stiff * rate
     if force <= 0.0:  # separates within the step: no force at all
         for column in range(START, ROW):
             rows[r, column] = 0.0
@@ -479,7 +517,7 @@ def linearise(rows, r, vx, vy, vz, dt, parameters):
         keep *= limit / math.sqrt(square)
         gain *= limit / math.sqrt(square)
     rows[r, START], rows[r, KEEP], rows[r, GAIN], rows[r, LIMIT] = held, keep, gain, limit
-    rows[r, NORMAL_FORCE], rows[r, STIFF_N] = force, stiff
+    rows[r, NORMAL_FORCE], rows[r, STIFF_N], rows[r, PUSH] = force, stiff, push
     rows[r, STIFF_T] = (parameters[SIGMA0] + parameters[SIGMA1] / dt) * gain + parameters[CT]
 
 

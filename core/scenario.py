@@ -13,6 +13,10 @@ from .errors import ParameterError, SceneError
 from .mesh import TriangleMesh
 from .texels import Texels
 
+HUNT_CROSSLEY = "hunt-crossley"
+NORMAL_LAWS = ("linear", HUNT_CROSSLEY)
+"""What the normal force may be: Eq. 8 of the paper, or ``k dᵖ (1 + 3/2 α ḋ)``."""
+
 
 @dataclass(frozen=True)
 class SensorParameters:
@@ -36,6 +40,12 @@ class SensorParameters:
         Static and dynamic friction coefficients (Eq. 11, 12).
     max_penetration : float, m
         Depth past which a texel no longer acts (section 3.3.3: about twice the foam's thickness).
+    normal_law : str
+        One of :data:`NORMAL_LAWS`.
+    exponent : float
+        `p` in the law of Hunt and Crossley (J. Appl. Mech. 42, 1975), whose `k` then is in N/mᵖ; 3/2 is Hertz's.
+    dissipation : float, s/m
+        `α` in that law, which has no `cn`: slow impacts at speed v leave with ``(1 - α v) v``.
     gain, zero : float
         Linear conversion to what the sensor reports: ``reading = zero + gain · force``, in `unit`.
     unit : str
@@ -50,6 +60,9 @@ class SensorParameters:
     mus: float = 0.435
     mud: float = 0.23
     max_penetration: float = 0.012
+    normal_law: str = "linear"
+    exponent: float = 1.5
+    dissipation: float = 0.2
     gain: float = 1.0
     zero: float = 0.0
     unit: str = "N"
@@ -64,6 +77,14 @@ class SensorParameters:
             value = getattr(self, key)
             if not (np.isfinite(value) and value >= 0):
                 raise ParameterError(f"{key} of sensor '{name}' is {value:g}: give it a value of zero or more.")
+        if self.normal_law not in NORMAL_LAWS:
+            raise ParameterError(
+                f"The normal law of sensor '{name}' is '{self.normal_law}': use one of {', '.join(NORMAL_LAWS)}."
+            )
+        if not 1.0 <= self.exponent <= 4.0:
+            raise ParameterError(f"exponent of sensor '{name}' is {self.exponent:g}: give it a value from 1 to 4.")
+        if not (np.isfinite(self.dissipation) and self.dissipation >= 0):
+            raise ParameterError(f"dissipation of sensor '{name}' is {self.dissipation:g}: give it a value of zero or more.")
         if self.mud > self.mus:
             raise ParameterError(
                 f"mud of sensor '{name}' ({self.mud:g}) is larger than mus ({self.mus:g}): "

@@ -31,6 +31,7 @@ from .contact import (
     NX,
     NY,
     NZ,
+    PUSH,
     PX,
     PY,
     PZ,
@@ -40,7 +41,6 @@ from .contact import (
     ZX,
     ZY,
     ZZ,
-    K,
     State,
     World,
     bristle_limit,
@@ -170,6 +170,7 @@ def _law(parameters, sensor):
     return (
         parameters[sensor, 0], parameters[sensor, 1], parameters[sensor, 2], parameters[sensor, 3],
         parameters[sensor, 4], parameters[sensor, 5], parameters[sensor, 6], parameters[sensor, 7],
+        parameters[sensor, 8], parameters[sensor, 9],
     )  # fmt: skip
 
 
@@ -295,7 +296,7 @@ def _sum_contacts(start, stop, dt, p, scratch):
         t = rows[r, STIFF_T]
         e = rows[r, STIFF_N] - t
         ux, uy, uz = _velocity(rows, r, part)
-        push = p[K] * rows[r, DEPTH] + e * (ux * nx + uy * ny + uz * nz)
+        push = rows[r, PUSH] + e * (ux * nx + uy * ny + uz * nz)
         stick = friction_bias(rows, r, dt, p)
         fx = -push * nx - stick * rows[r, ZX] - t * ux
         fy = -push * ny - stick * rows[r, ZY] - t * uy

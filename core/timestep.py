@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .scenario import Scenario, Sensor
+from .scenario import HUNT_CROSSLEY, Scenario, Sensor
 
 SHARE_OF_LIMIT = 0.2
 """Share of the explicit stability limit that is used: about thirty steps per period of the stiffest contact."""
@@ -81,4 +81,8 @@ def advise(scenario: Scenario) -> Advice:
 def _tangent_or_normal(sensor: Sensor) -> tuple[float, float]:
     """Stiffness and damping of all texels together, in the direction in which they are stiffer."""
     p, n = sensor.parameters, len(sensor.texels)
-    return n * max(p.k, p.sigma0), n * max(p.cn, p.sigma1 + p.ct)
+    k, cn = p.k, p.cn
+    if p.normal_law == HUNT_CROSSLEY:  # where it is stiffest: pressed in as far as it acts
+        k = p.k * p.exponent * p.max_penetration ** (p.exponent - 1.0)
+        cn = 1.5 * p.dissipation * p.k * p.max_penetration**p.exponent
+    return n * max(k, p.sigma0), n * max(cn, p.sigma1 + p.ct)

@@ -96,8 +96,13 @@ class PALPATE_PT_contact(Part, bpy.types.Panel):
 
     def draw_part(self, layout, settings, _context):
         column = layout.column()
+        column.prop(settings, "normal_law")
         column.prop(settings, "k")
-        column.prop(settings, "cn")
+        if settings.normal_law == "linear":
+            column.prop(settings, "cn")
+        else:
+            column.prop(settings, "exponent")
+            column.prop(settings, "dissipation")
         column.prop(settings, "max_penetration")
 
 

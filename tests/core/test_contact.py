@@ -9,7 +9,7 @@ from palpate.core import contact
 from palpate.core.scenario import SensorParameters
 
 PAPER = SensorParameters()  # Table 2; Fig. 7 was drawn with these and fn = 0.08 N
-ROW = np.array([PAPER.k, PAPER.cn, PAPER.ct, PAPER.sigma0, PAPER.sigma1, PAPER.x0, PAPER.mus, PAPER.mud])
+ROW = contact.parameter_row(PAPER)
 
 
 def g(speed, fn, p=PAPER):

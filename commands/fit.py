@@ -1,0 +1,92 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""``palpate fit``: parameters of a sensor from measurements of its foam and of its friction."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from ..core.scenario import SensorParameters
+from . import console
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    kinds = parser.add_subparsers(dest="kind", metavar="stiffness | friction", required=True)
+    foam = kinds.add_parser(
+        "stiffness",
+        help="stiffness k from the compression of the foam (Eq. 18)",
+        description="Stiffness of one texel from foam measurements: a CSV with the columns compression (m) and pressure (Pa), "
+        "force (N) or mass (kg). Other units are written into the header, as in 'compression (mm)'.",
+    )
+    foam.add_argument("file", metavar="FOAM.csv")
+    foam.add_argument("--area", type=float, required=True, metavar="M2", help="area of the whole sensor, m²")
+    foam.add_argument("--texels", type=int, required=True, metavar="N", help="number of texels on it")
+    foam.add_argument("--weight-area", type=float, metavar="M2", help="what forces or masses rested on, m²")
+    foam.set_defaults(fit=_stiffness)
+    slide = kinds.add_parser(
+        "friction",
+        help="mus, mud, x0 and ct from a force–velocity curve (Eq. 13); sigma0 and sigma1 too where it has a time column",
+        description="Friction of one texel: a CSV with the columns velocity (m/s) and force (N), each line in steady "
+        "sliding, or with a column time (s) as well, recorded from rest.",
+    )
+    slide.add_argument("file", metavar="FRICTION.csv")
+    slide.add_argument("--normal-force", type=float, required=True, metavar="N", help="on one texel, N")
+    slide.add_argument(
+        "--texels", type=int, default=1, metavar="N", help="how many texels shared the measured force (default: 1)"
+    )
+    slide.set_defaults(fit=_friction)
+    for kind in (foam, slide):
+        kind.add_argument("--plot", metavar="FILE", help="picture of measurements and fit: .png, .pdf or .svg")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    arguments.fit(arguments)
+    if arguments.plot:
+        print(f"plot: {Path(arguments.plot).absolute()}")
+    return 0
+
+
+def _stiffness(arguments: argparse.Namespace) -> None:
+    from ..core.calibrate.stiffness import fit_stiffness, read_foam
+
+    data = read_foam(arguments.file, arguments.weight_area)
+    fit = fit_stiffness(data, arguments.area, arguments.texels)
+    rows = [
+        ("line", "k of one texel", "95 % interval", "offset"),
+        ("through zero", f"{fit.k.value:.4g} N/m", f"{fit.k.low:.4g} to {fit.k.high:.4g}", "0 Pa"),
+        ("with offset", f"{fit.k_offset.value:.4g} N/m", f"{fit.k_offset.low:.4g} to {fit.k_offset.high:.4g}", _pascals(fit)),
+    ]
+    print(f"{len(data.compression)} measurements from '{arguments.file}', {arguments.texels} texels on {arguments.area:g} m²\n")
+    print(console.table(rows, "<>>>"))
+    if fit.offset_is_real and fit.offset.value < 0:
+        print(f"\nThe foam gives way by {fit.dead_zone * 1e3:.3g} mm before it carries: a dead zone, which the model's line")
+        print("through zero does not have; add the effect dead-zone to the sensor for it.")
+    print(f"\nSuggested: k = {fit.k.value:.4g} N/m, cn = {0.01 * fit.k.value:.3g} N·s/m (1 % of k)")
+    if arguments.plot:
+        from ..core.calibrate.plots import plot_stiffness
+
+        plot_stiffness(arguments.plot, fit)
+
+
+def _pascals(fit) -> str:
+    return f"{fit.offset.value:.4g} Pa ({fit.offset.low:.4g} to {fit.offset.high:.4g})"
+
+
+def _friction(arguments: argparse.Namespace) -> None:
+    from ..core.calibrate.friction import UNITS, fit_friction, read_friction
+
+    data = read_friction(arguments.file, arguments.texels)
+    fit = fit_friction(data, arguments.normal_force, SensorParameters())
+    kind = "steady sliding" if data.time is None else f"a recording of {data.time[-1] - data.time[0]:.3g} s from rest"
+    print(f"{len(data.force)} measurements from '{arguments.file}' as {kind}, {arguments.normal_force:g} N on a texel\n")
+    rows = [("parameter", "value", "95 % interval", "unit")]
+    for name, estimate in fit.estimates.items():
+        rows.append((name, f"{estimate.value:.4g}", f"{estimate.low:.4g} to {estimate.high:.4g}", UNITS[name]))
+    print(console.table(rows, "<>><"))
+    print(f"\nroot mean square of what is left: {fit.residual:.3g} N")
+    if fit.untold:
+        print(f"These measurements do not tell {', '.join(fit.untold)}: add some at other velocities.")
+    if arguments.plot:
+        from ..core.calibrate.plots import plot_friction
+
+        plot_friction(arguments.plot, fit)

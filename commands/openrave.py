@@ -1,0 +1,103 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""``palpate openrave``: sensor definitions in OpenRAVE's XML (paper, Table 2), into a scene and out of it."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from ..core.errors import SceneError
+from ..core.formats.openrave import NUMBERS, OpenRaveSensor, openrave_xml, read_openrave, write_openrave
+from . import blender, console
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    kinds = parser.add_subparsers(dest="kind", metavar="show | import | export", required=True)
+    show = kinds.add_parser("show", help="print the tactile sensors of an XML file")
+    show.add_argument("file", metavar="ROBOT.xml")
+    show.set_defaults(work=_show)
+    load = kinds.add_parser("import", help="put the parameters of an XML file on the sensors of a .blend")
+    load.add_argument("file", metavar="ROBOT.xml")
+    load.add_argument("scene", metavar="SCENE.blend")
+    load.add_argument("--from", dest="name", metavar="NAME", help="which sensor of the XML (default: the one there is)")
+    load.add_argument("--sensor", metavar="OBJECT", help="object that gets them (default: the one that <link> names)")
+    load.add_argument("--save-as", metavar="FILE", help="save into another .blend (default: SCENE.blend itself)")
+    load.set_defaults(work=_import)
+    save = kinds.add_parser("export", help="write the sensors of a .blend as XML")
+    save.add_argument("scene", metavar="SCENE.blend")
+    save.add_argument("--sensor", metavar="OBJECT", action="append", help="only this one; may be given again")
+    save.add_argument("--robot", metavar="NAME", help="put a <Robot> of this name around them")
+    save.add_argument("--out", metavar="FILE", help="where to write (default: print)")
+    save.set_defaults(work=_export)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    arguments.work(arguments)
+    return 0
+
+
+def _show(arguments: argparse.Namespace) -> None:
+    sensors = read_openrave(arguments.file)
+    rows = [("sensor", "link", "thickness", *NUMBERS)]
+    for sensor in sensors:
+        values = [getattr(sensor.parameters, key) for key in NUMBERS]
+        rows.append((sensor.name, sensor.link, f"{sensor.parameters.max_penetration / 2:g}", *(f"{v:g}" for v in values)))
+    print(console.table(rows, "<<" + ">" * (1 + len(NUMBERS))))
+    for sensor in sensors:
+        _say_missing(sensor)
+
+
+def _say_missing(sensor: OpenRaveSensor) -> None:
+    if sensor.missing:
+        print(f"note: '{sensor.name}' leaves out {', '.join(sensor.missing)}: the defaults are used")
+
+
+def _import(arguments: argparse.Namespace) -> None:
+    sensor = _chosen(read_openrave(arguments.file), arguments.name, arguments.file)
+    with console.quiet():
+        bpy = blender.start()
+        blender.open_blend(arguments.scene)
+        from ..addon import exchange
+
+        name = arguments.sensor or sensor.link
+        obj = bpy.context.scene.objects.get(name)
+        if obj is None:
+            raise SceneError(f"There is no object '{name}' in '{arguments.scene}': name the sensor's with --sensor.")
+        exchange.put_parameters(obj, sensor.parameters)
+        path = Path(arguments.save_as or arguments.scene)
+        blender.save_blend(path)
+    _say_missing(sensor)
+    print(f"'{sensor.name}' of '{arguments.file}' is now on '{obj.name}'; saved: {path}")
+
+
+def _chosen(sensors: list[OpenRaveSensor], name: str | None, file: str) -> OpenRaveSensor:
+    names = [sensor.name for sensor in sensors]
+    if name is None and len(sensors) == 1:
+        return sensors[0]
+    if name not in names:
+        known = ", ".join(f"'{known}'" for known in names)
+        what = "several sensors" if name is None else f"no sensor '{name}'"
+        raise SceneError(f"'{file}' has {what}: choose with --from one of {known}.")
+    return sensors[names.index(name)]
+
+
+def _export(arguments: argparse.Namespace) -> None:
+    with console.quiet():
+        bpy = blender.start()
+        blender.open_blend(arguments.scene)
+        from ..addon import exchange
+
+        found = {obj.name: obj for obj in bpy.context.scene.objects if obj.palpate.role in {"SENSOR", "PAD"}}
+        wanted = arguments.sensor or [name for name, obj in found.items() if obj.palpate.role == "SENSOR"]
+        for name in wanted:
+            if name not in found:
+                known = ", ".join(f"'{known}'" for known in found) or "none"
+                raise SceneError(f"There is no sensor '{name}' in '{arguments.scene}': choose from {known}.")
+        if not wanted:
+            raise SceneError(f"'{arguments.scene}' has no sensor: make one with Physics › Palpate › Make Sensor.")
+        sensors = [OpenRaveSensor(name, name, exchange.parameters(found[name])) for name in wanted]
+    if arguments.out:
+        write_openrave(arguments.out, sensors, arguments.robot)
+        print(f"{len(sensors)} sensors: {Path(arguments.out).absolute()}")
+    else:
+        print(openrave_xml(sensors, arguments.robot), end="")
