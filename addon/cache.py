@@ -17,7 +17,9 @@ from ..core.recording import Frame
 from ..core.scenario import Scenario
 from . import dependencies, freebodies, meshes, properties, sample, state, units
 
-SETTINGS = (*properties.PARAMETERS, "role", "region", "vertex_group", "threshold", "body", "mass")
+PAINTED = tuple(f"{key}_{part}" for key in meshes.PAINTED for part in ("map", "factor"))
+REGION = ("region", "vertex_group", "threshold", "material", "face_set")
+SETTINGS = (*properties.PARAMETERS, *PAINTED, *REGION, "role", "body", "mass")
 
 
 @dataclass

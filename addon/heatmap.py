@@ -8,9 +8,8 @@ import numpy as np
 
 from ..core.texels import Texels
 from . import materials
+from .meshes import OLD_MATERIAL
 
-OLD_MATERIAL = ".palpate_old_material"
-"""Face attribute: material index before the heat map; −1 on faces that were not touched."""
 EMPTY_SLOT = "palpate_empty_slot"
 """Custom property of a mesh that had no material slot."""
 MODIFIER = "Palpate Heat Map"

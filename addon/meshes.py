@@ -4,13 +4,18 @@
 from __future__ import annotations
 
 import hashlib
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 
 import numpy as np
 
 from ..core.errors import MeshError, SensorError
+from . import units
 
+PAINTED = ("k", "friction", "gain")
+"""Multipliers that can be painted; each has a `…_map` and a `…_factor` among the object's properties."""
+OLD_MATERIAL = ".palpate_old_material"
+"""Face attribute of a baked sensor: material index before the heat map; −1 on faces that were not touched."""
 KINDS = {"MESH", "CURVE", "SURFACE", "FONT", "META"}
 """Object types that have or become a mesh."""
 
@@ -99,17 +104,108 @@ def region(obj, count: int) -> np.ndarray:
     Raises
     ------
     SensorError
-        The vertex group does not exist.
+        What the region goes by does not exist.
     """
     settings = obj.palpate
     if settings.region == "MESH":
         return np.ones(count, dtype=bool)
-    group = obj.vertex_groups.get(settings.vertex_group)
-    if group is None:
+    if settings.region == "GROUP":
+        group = obj.vertex_groups.get(settings.vertex_group)
+        if group is None:
+            raise SensorError(
+                f"Sensor '{obj.name}' has no vertex group '{settings.vertex_group}': "
+                "choose one in its Region panel or paint one."
+            )
+        return weights(obj.data, group.index) >= max(settings.threshold, 1e-6)
+    faces = _faces_of_material(obj) if settings.region == "MATERIAL" else _faces_of_set(obj)
+    return corners_of(obj.data, faces)
+
+
+def _faces_of_material(obj) -> np.ndarray:
+    """(nf,) bool: faces that wear the region's material, or did before a heat map covered them."""
+    name = obj.palpate.material
+    slots = [index for index, slot in enumerate(obj.material_slots) if slot.material is not None and slot.material.name == name]
+    if not slots:
+        raise SensorError(f"Sensor '{obj.name}' wears no material '{name}': choose one in its Region panel (was it renamed?).")
+    index = np.empty(len(obj.data.polygons), dtype=np.int32)
+    obj.data.polygons.foreach_get("material_index", index)
+    covered = obj.data.attributes.get(OLD_MATERIAL)
+    if covered is not None and len(covered.data) == len(index):
+        before = np.empty(len(index), dtype=np.int32)
+        covered.data.foreach_get("value", before)
+        index = np.where(before >= 0, before, index)
+    return np.isin(index, slots)
+
+
+def face_sets(mesh) -> np.ndarray:
+    """(nf,) int: face set of each face; all are in set 1 while none was drawn."""
+    attribute = mesh.attributes.get(".sculpt_face_set")
+    sets = np.ones(len(mesh.polygons), dtype=np.int32)
+    if attribute is not None:
+        attribute.data.foreach_get("value", sets)
+    return sets
+
+
+def _faces_of_set(obj) -> np.ndarray:
+    number = obj.palpate.face_set
+    faces = face_sets(obj.data) == number
+    if not faces.any():
+        there = ", ".join(str(found) for found in np.unique(face_sets(obj.data))[:8])
+        raise SensorError(f"Sensor '{obj.name}' has no face set {number}: choose one of {there} in its Region panel.")
+    return faces
+
+
+def corners_of(mesh, faces: np.ndarray) -> np.ndarray:
+    """(nv,) bool: vertices of the faces that (nf,) bool chooses."""
+    corner = np.empty(len(mesh.loops), dtype=np.int32)
+    sides = np.empty(len(mesh.polygons), dtype=np.int32)
+    mesh.loops.foreach_get("vertex_index", corner)
+    mesh.polygons.foreach_get("loop_total", sides)
+    chosen = np.zeros(len(mesh.vertices), dtype=bool)
+    chosen[corner[np.repeat(faces, sides)]] = True
+    return chosen
+
+
+def is_map(attribute) -> bool:
+    """Whether an attribute of a mesh holds a number for each vertex that a user may mean."""
+    return attribute.domain == "POINT" and attribute.data_type == "FLOAT" and not attribute.name.startswith((".", "palpate_"))
+
+
+def multipliers(obj, key: str) -> np.ndarray | None:
+    """(nv,) float: what a parameter is multiplied by at each vertex, from the group or attribute that is painted for it.
+
+    Parameters
+    ----------
+    key : str
+        "k", "friction" or "gain".
+
+    Returns
+    -------
+    (nv,) float or None
+        None when nothing is painted.
+
+    Raises
+    ------
+    SensorError
+        The group or attribute does not exist, or holds what cannot be a factor.
+    """
+    name, factor = getattr(obj.palpate, f"{key}_map"), getattr(obj.palpate, f"{key}_factor")
+    if not name:
+        return None
+    group = obj.vertex_groups.get(name)
+    if group is not None:
+        return 1.0 + (units.as_typed(factor) - 1.0) * weights(obj.data, group.index).astype(float)
+    attribute = obj.data.attributes.get(name)
+    if attribute is None or not is_map(attribute):
         raise SensorError(
-            f"Sensor '{obj.name}' has no vertex group '{settings.vertex_group}': choose one in its Region panel or paint one."
+            f"Sensor '{obj.name}' has no vertex group or attribute '{name}' to take the {key} from: "
+            "choose another one in its panel, or empty the field."
         )
-    return weights(obj.data, group.index) >= max(settings.threshold, 1e-6)
+    values = np.empty(len(obj.data.vertices), dtype=np.float32)
+    attribute.data.foreach_get("value", values)
+    if not (np.isfinite(values).all() and (values >= 0).all()):
+        raise SensorError(f"Attribute '{name}' of '{obj.name}' holds a negative or NaN factor: make all of them zero or more.")
+    return values.astype(float)
 
 
 def weights(mesh, group_index: int) -> np.ndarray:
@@ -139,9 +235,10 @@ def _fingerprint(obj, mesh) -> str:
     corner = np.empty(len(mesh.loops), dtype=np.int32)
     mesh.loops.foreach_get("vertex_index", corner)
     digest.update(corner.tobytes())
-    settings = obj.palpate
-    if settings.role in ("SENSOR", "PAD") and settings.region == "GROUP":
-        group = obj.vertex_groups.get(settings.vertex_group)
-        if group is not None:
-            digest.update(np.packbits(weights(obj.data, group.index) >= settings.threshold).tobytes())
+    if obj.type == "MESH" and obj.palpate.role in ("SENSOR", "PAD"):
+        with suppress(SensorError):  # it is said when the scene is read
+            digest.update(np.packbits(region(obj, len(obj.data.vertices))).tobytes())
+            for key in PAINTED:
+                values = multipliers(obj, key)
+                digest.update(b"" if values is None else values.tobytes())
     return digest.hexdigest()

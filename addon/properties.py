@@ -17,7 +17,7 @@ from bpy.props import (
 
 from ..core.migrate import VERSION
 from ..core.scenario import SensorParameters
-from . import freebodies, identity, state
+from . import freebodies, identity, meshes, state
 
 ROLES = (
     ("NONE", "None", "Takes no part"),
@@ -61,6 +61,37 @@ def _number(name, key, text, **more):
     return FloatProperty(name=name, description=text, **more, **_fixed)
 
 
+def _maps(settings, context, typed):
+    """Offer what can hold a number for each vertex."""
+    obj = settings.id_data
+    names = [group.name for group in obj.vertex_groups]
+    if obj.type == "MESH":
+        names += [item.name for item in obj.data.attributes if meshes.is_map(item)]
+    return [name for name in names if typed.lower() in name.lower()]
+
+
+def _map(what: str, effect: str):
+    return StringProperty(
+        name=what,
+        description=f"Vertex group or attribute that says, texel by texel, how much {effect}. "
+        "A weight of 1 means the factor below, 0 leaves the texel as it is; an attribute holds the factors themselves",
+        search=_maps,
+        **_fixed,
+    )
+
+
+def _factor(what: str):
+    return FloatProperty(
+        name="At Full Weight (×)",
+        description=f"What {what} is multiplied by where the weight is 1",
+        default=0.5,
+        min=0.0,
+        soft_max=4.0,
+        precision=3,
+        **_fixed,
+    )
+
+
 class PALPATE_PG_object(bpy.types.PropertyGroup):
     """`Object.palpate`"""
 
@@ -74,9 +105,13 @@ class PALPATE_PG_object(bpy.types.PropertyGroup):
         items=(
             ("MESH", "Whole Mesh", "Every vertex"),
             ("GROUP", "Vertex Group", "Vertices whose weight reaches the threshold"),
+            ("MATERIAL", "Material", "Faces that wear a material"),
+            ("FACE_SET", "Face Set", "Faces of one of Sculpt Mode's face sets"),
         ),
         **_fixed,
     )
+    material: StringProperty(name="Material", description="Of the faces that belong to the sensor", **_fixed)
+    face_set: IntProperty(name="Face Set", description="Number of the face set that is the sensor", default=1, **_fixed)
     vertex_group: StringProperty(name="Vertex Group", description="Painted or assigned region of the sensor", **_fixed)
     threshold: FloatProperty(
         name="Threshold",
@@ -148,6 +183,13 @@ class PALPATE_PG_object(bpy.types.PropertyGroup):
     )
     zero: _number("Zero (unit)", "zero", "Reading without load", min=-1e9)
     unit: StringProperty(name="Unit", description="Of the reading, as in N, V or counts", default=_default.unit, **_fixed)
+
+    k_map: _map("Painted Stiffness", "stiffer or softer it is (stiffness and damping)")
+    k_factor: _factor("stiffness and damping")
+    friction_map: _map("Painted Friction", "rougher or smoother it is (static and dynamic friction)")
+    friction_factor: _factor("friction")
+    gain_map: _map("Painted Gain", "more or less it reports for the same force")
+    gain_factor: _factor("the gain")
 
     body: EnumProperty(
         name="Body",

@@ -3,12 +3,17 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 
 from ..core.errors import SensorError
-from . import meshes, write
+from . import meshes, properties, write
 
 GROUP_NAME = "Palpate Sensor"
+PRESETS = Path(__file__).parent / "presets"
+COPIED = (*properties.PARAMETERS, "k_factor", "friction_factor", "gain_factor")
+"""What is copied from sensor to sensor and kept in presets: everything that does not hang on one mesh."""
 
 
 def source_of(obj, mode: str) -> str:
@@ -34,8 +39,8 @@ def make_sensor(obj, source: str, role: str = "SENSOR") -> int:
 
     Parameters
     ----------
-    source : {"SELECTION", "GROUP", "MESH"}
-        SELECTION writes a vertex group, GROUP takes the active one.
+    source : {"SELECTION", "GROUP", "MATERIAL", "FACE_SET", "MESH"}
+        SELECTION writes a vertex group; GROUP and MATERIAL take the active one, FACE_SET that of the active face.
 
     Returns
     -------
@@ -57,6 +62,10 @@ def make_sensor(obj, source: str, role: str = "SENSOR") -> int:
         if group is None:
             raise SensorError(f"'{obj.name}' has no vertex group: paint one, or make the whole mesh a sensor.")
         chosen = meshes.weights(obj.data, group.index) >= max(settings.threshold, 1e-6)
+    elif source == "MATERIAL":
+        chosen, material = _active_material(obj)
+    elif source == "FACE_SET":
+        chosen, face_set = _active_face_set(obj)
     else:
         chosen = np.ones(len(obj.data.vertices), dtype=bool)
     _check(obj, chosen, source)
@@ -65,18 +74,47 @@ def make_sensor(obj, source: str, role: str = "SENSOR") -> int:
         group.remove(range(len(chosen)))
         group.add(np.flatnonzero(chosen).tolist(), 1.0, "REPLACE")
         obj.vertex_groups.active_index = group.index
-    if source == "MESH":
-        settings.region = "MESH"
+    if source == "MATERIAL":
+        settings.region, settings.material = source, material
+    elif source == "FACE_SET":
+        settings.region, settings.face_set = source, face_set
+    elif source == "MESH":
+        settings.region = source
     else:
         settings.region, settings.vertex_group = "GROUP", group.name
     settings.role = role
     return int(chosen.sum())
 
 
+def _active_material(obj) -> tuple[np.ndarray, str]:
+    """Vertices of the faces that wear the active material, and its name."""
+    material = obj.active_material
+    if material is None:
+        raise SensorError(f"'{obj.name}' has no active material: give the sensor's faces one in the Material tab.")
+    index = np.empty(len(obj.data.polygons), dtype=np.int32)
+    obj.data.polygons.foreach_get("material_index", index)
+    return meshes.corners_of(obj.data, index == obj.active_material_index), material.name
+
+
+def _active_face_set(obj) -> tuple[np.ndarray, int]:
+    """Vertices of the face set that the active face is in, and its number."""
+    sets, active = meshes.face_sets(obj.data), obj.data.polygons.active
+    number = int(sets[active]) if 0 <= active < len(sets) else obj.palpate.face_set
+    return meshes.corners_of(obj.data, sets == number), number
+
+
+def copy_parameters(source, target) -> None:
+    """Give a sensor what another one is made of; its region and its name stay."""
+    for name in COPIED:
+        setattr(target.palpate, name, getattr(source.palpate, name))
+
+
 def _check(obj, chosen: np.ndarray, source: str) -> None:
     what = {
         "SELECTION": "Nothing is selected",
         "GROUP": f"No vertex has a weight of {obj.palpate.threshold:g} or more in the active vertex group",
+        "MATERIAL": "No face wears the active material",
+        "FACE_SET": "No face is in that face set",
         "MESH": "There are no vertices",
     }[source]
     if not chosen.any():

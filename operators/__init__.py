@@ -3,20 +3,26 @@
 
 
 def _classes():
-    from . import bake, debug, sensor
+    from . import bake, debug, presets, sensor
 
-    return (*sensor.CLASSES, *bake.CLASSES, *debug.CLASSES)
+    return (*sensor.CLASSES, *presets.CLASSES, *bake.CLASSES, *debug.CLASSES)
 
 
 def register():
     import bpy
 
+    from . import presets
+
     for cls in _classes():
         bpy.utils.register_class(cls)
+    presets.register()
 
 
 def unregister():
     import bpy
 
+    from . import presets
+
+    presets.unregister()
     for cls in reversed(_classes()):
         bpy.utils.unregister_class(cls)

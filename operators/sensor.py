@@ -2,9 +2,10 @@
 """Give objects their roles."""
 
 import bpy
+import numpy as np
 from bpy.props import EnumProperty
 
-from ..addon import sensors
+from ..addon import meshes, sensors
 from . import support
 
 
@@ -22,6 +23,8 @@ class PALPATE_OT_sensor_add(support.Reporting, bpy.types.Operator):
             ("AUTO", "Automatic", "The selection in Edit Mode, the painted group in Weight Paint, else the whole mesh"),
             ("SELECTION", "Selection", "Selected faces or vertices; they are kept in a vertex group"),
             ("GROUP", "Active Vertex Group", "Vertices whose weight reaches the threshold"),
+            ("MATERIAL", "Active Material", "Faces that wear the active material"),
+            ("FACE_SET", "Face Set", "Faces of the set that the active face is in"),
             ("MESH", "Whole Mesh", "Every vertex"),
         ),
         default="AUTO",
@@ -127,4 +130,41 @@ class PALPATE_OT_weight_paint(support.Reporting, bpy.types.Operator):
         bpy.ops.object.mode_set(mode="WEIGHT_PAINT")
 
 
-CLASSES = (PALPATE_OT_sensor_add, PALPATE_OT_role_set, PALPATE_OT_sensor_remove, PALPATE_OT_weight_paint)
+def _face_sets(_operator, context):
+    """Items for a menu; Blender needs them kept alive."""
+    obj = context.object
+    if obj is None or obj.type != "MESH":
+        return []
+    numbers, counts = np.unique(meshes.face_sets(obj.data), return_counts=True)
+    _items[:] = [(str(n), f"Face Set {n}", f"{c} faces", int(n)) for n, c in zip(numbers, counts, strict=True)]
+    return _items
+
+
+_items: list = []
+
+
+class PALPATE_OT_face_set_choose(support.Reporting, bpy.types.Operator):
+    """Choose the face set that is the sensor"""
+
+    bl_idname = "palpate.face_set_choose"
+    bl_label = "Choose Face Set"
+    bl_options = {"REGISTER", "UNDO"}
+
+    face_set: EnumProperty(name="Face Set", description="Face set that is the sensor", items=_face_sets)
+
+    @classmethod
+    def poll(cls, context):
+        return support.mesh_object(cls, context) and support.sensor_object(cls, context)
+
+    def run(self, context):
+        settings = context.object.palpate
+        settings.region, settings.face_set = "FACE_SET", int(self.face_set)
+
+
+CLASSES = (
+    PALPATE_OT_face_set_choose,
+    PALPATE_OT_sensor_add,
+    PALPATE_OT_role_set,
+    PALPATE_OT_sensor_remove,
+    PALPATE_OT_weight_paint,
+)

@@ -52,6 +52,16 @@ def mesh_object(cls, context) -> bool:
     return True
 
 
+def sensor_object(cls, context) -> bool:
+    """Poll: the active object is a sensor or a pad that can be changed."""
+    if not object_with_surface(cls, context):
+        return False
+    if context.object.palpate.role not in {"SENSOR", "PAD"}:
+        cls.poll_message_set(f"'{context.object.name}' is no sensor: use Make Sensor first")
+        return False
+    return True
+
+
 def leave_edit_mode(context) -> None:
     """Go to Object Mode.
 

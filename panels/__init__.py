@@ -3,9 +3,9 @@
 
 
 def _classes():
-    from . import physics
+    from . import bake, body, sensor
 
-    return physics.CLASSES
+    return (*sensor.CLASSES, *body.CLASSES, *bake.CLASSES)
 
 
 def register():

@@ -50,8 +50,8 @@ def test_every_name_in_the_tutorial_is_on_a_button(repository):
     for cls in bpy.types.Panel.__subclasses__() + bpy.types.Operator.__subclasses__():
         if cls.__module__.startswith("palpate"):
             words.add(cls.bl_label)
-    panels = (repository / "panels" / "physics.py").read_text(encoding="utf-8")
-    words |= set(re.findall(r'text="([^"{]+)"', panels))
+    for file in (repository / "panels").glob("*.py"):
+        words |= set(re.findall(r'text="([^"{]+)"', file.read_text(encoding="utf-8")))
     for path in named:
         for part in path.split(" › "):
             assert part in words, part

@@ -1,0 +1,85 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Parameters of a sensor as Blender presets, and copied from one sensor to others."""
+
+import bpy
+from bl_operators.presets import AddPresetBase
+from bl_ui.utils import PresetPanel
+
+from ..addon import sensors
+from . import support
+
+SUBDIR = "palpate/sensor"
+
+
+class PALPATE_PT_presets(PresetPanel, bpy.types.Panel):
+    """Known materials and sensors, and your own"""
+
+    bl_label = "Sensor Presets"
+    preset_subdir = SUBDIR
+    preset_operator = "script.execute_preset"
+    preset_add_operator = "palpate.preset_add"
+
+
+class PALPATE_MT_presets(bpy.types.Menu):
+    bl_label = "Sensor Presets"
+    preset_subdir = SUBDIR
+    preset_operator = "script.execute_preset"
+    draw = bpy.types.Menu.draw_preset
+
+
+class PALPATE_OT_preset_add(AddPresetBase, bpy.types.Operator):
+    """Keep the parameters of the active sensor as a preset, or remove one"""
+
+    bl_idname = "palpate.preset_add"
+    bl_label = "Add Sensor Preset"
+    preset_menu = "PALPATE_MT_presets"
+    preset_defines = ["settings = bpy.context.object.palpate"]
+    preset_values = [f"settings.{name}" for name in sensors.COPIED]
+    preset_subdir = SUBDIR
+
+    @classmethod
+    def poll(cls, context):
+        return support.sensor_object(cls, context)
+
+
+class PALPATE_OT_parameters_copy(support.Reporting, bpy.types.Operator):
+    """Give the other selected sensors and pads the parameters and effects of the active one; regions stay"""
+
+    bl_idname = "palpate.parameters_copy"
+    bl_label = "Copy to Selected"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context):
+        if not support.sensor_object(cls, context):
+            return False
+        if not _others(context):
+            cls.poll_message_set("No other sensor or pad is selected: select them, and the one to copy from last")
+            return False
+        return True
+
+    def run(self, context):
+        support.leave_edit_mode(context)
+        others = _others(context)
+        for obj in others:
+            sensors.copy_parameters(context.object, obj)
+        self.report({"INFO"}, f"Copied the parameters of '{context.object.name}' to {len(others)} others")
+
+
+def _others(context) -> list:
+    return [
+        obj
+        for obj in context.selected_objects
+        if obj != context.object and obj.palpate.role in {"SENSOR", "PAD"} and obj.is_editable
+    ]
+
+
+CLASSES = (PALPATE_PT_presets, PALPATE_MT_presets, PALPATE_OT_preset_add, PALPATE_OT_parameters_copy)
+
+
+def register():
+    bpy.utils.register_preset_path(str(sensors.PRESETS.parent))
+
+
+def unregister():
+    bpy.utils.unregister_preset_path(str(sensors.PRESETS.parent))

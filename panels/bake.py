@@ -1,0 +1,56 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Panels of what the scene does: bake, and how results look."""
+
+from ..addon import live, state, write
+from .places import Part, everywhere, sentences
+
+
+class Bake(Part):
+    name = "bake"
+    bl_label = "Bake"
+    bl_options = set()
+    split = False
+
+    def draw_part(self, layout, _settings, context):
+        scene = context.scene
+        own = scene.palpate
+        layout.prop(own, "folder", text="")
+        column = layout.column(align=True)
+        column.prop(own, "use_auto_dt")
+        if not own.use_auto_dt:
+            column.prop(own, "dt")
+        layout.prop(own, "use_live")
+        progress = state.session.bake
+        if progress is not None:
+            text = f"{progress.stage}: frame {progress.frame} (ESC: stop)"
+            layout.progress(text=text, factor=progress.done / progress.total)
+            return
+        row = layout.row(align=True)
+        row.operator("palpate.bake", text=f"Bake {scene.frame_start}–{scene.frame_end}", icon="RENDER_ANIMATION")
+        if write.has_bake(scene):
+            row.operator("palpate.bake_clear", text="", icon="TRASH")
+        else:
+            layout.operator("palpate.reset", text="Reset Playback")
+        sentences(layout, live.status(scene).text, "INFO", context)
+
+
+class Display(Part):
+    name = "display"
+    bl_label = "Display"
+    split = False
+
+    def draw_part(self, layout, _settings, context):
+        own = context.scene.palpate
+        layout.prop(own, "show_overlay")
+        layout.prop(own, "color_map")
+        column = layout.column(align=True)
+        column.prop(own, "use_auto_range")
+        if not own.use_auto_range:
+            column.prop(own, "range_max")
+        column = layout.column(align=True)
+        column.prop(own, "use_auto_arrow")
+        if not own.use_auto_arrow:
+            column.prop(own, "arrow_scale")
+
+
+CLASSES = everywhere(Bake, Display)

@@ -1,0 +1,137 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Panels of one object: its role, and of a sensor or pad its region, its contact, its friction and what it reads."""
+
+from ..addon import live, state
+from ..operators import presets
+from .places import ROOT, Part, everywhere, sentences
+
+
+class Root(Part):
+    name = ROOT
+    parent = None
+    bl_label = "Palpate"
+    bl_options = set()
+    roles = {"NONE", "SENSOR", "TARGET", "PAD"}
+
+    def draw_header_preset(self, context):
+        if context.object.palpate.role in {"SENSOR", "PAD"}:
+            presets.PALPATE_PT_presets.draw_panel_header(self.layout)
+
+    def draw_part(self, layout, settings, context):
+        obj = context.object
+        for name in (obj.name, context.scene.name):
+            if name in state.session.notes:
+                sentences(layout, state.session.notes[name], "ERROR", context)
+        if settings.role == "NONE":
+            column = layout.box().column()
+            column.label(text=f"'{obj.name}' takes no part.")
+            column.operator("palpate.sensor_add", text="Make Sensor")
+            column.operator("palpate.role_set", text="Make Target").role = "TARGET"
+            column.operator("palpate.sensor_add", text="Make Pad").role = "PAD"
+            column.operator("palpate.weight_paint", text="Paint a Sensor", icon="WPAINT_HLT")
+            return
+        row = layout.row(align=True)
+        row.prop(settings, "role")
+        row.operator("palpate.sensor_remove", text="", icon="X")
+        if settings.role in {"SENSOR", "PAD"}:
+            layout.operator("palpate.parameters_copy", icon="COPYDOWN")
+
+
+class Region(Part):
+    name = "region"
+    bl_label = "Region"
+    bl_options = set()
+    roles = {"SENSOR", "PAD"}
+
+    def draw_part(self, layout, settings, context):
+        obj = context.object
+        layout.prop(settings, "region")
+        if settings.region == "GROUP":
+            layout.prop_search(settings, "vertex_group", obj, "vertex_groups")
+            layout.prop(settings, "threshold")
+        elif settings.region == "MATERIAL":
+            layout.prop_search(settings, "material", obj, "material_slots")
+        elif settings.region == "FACE_SET":
+            row = layout.row(align=True)
+            row.prop(settings, "face_set")
+            row.operator_menu_enum("palpate.face_set_choose", "face_set", text="", icon="DOWNARROW_HLT")
+        row = layout.row(align=True)
+        row.operator("palpate.weight_paint", icon="WPAINT_HLT")
+        again = row.operator("palpate.sensor_add", text="From Selection", icon="EDITMODE_HLT")
+        again.source, again.role = "SELECTION", settings.role
+
+
+def painted(layout, settings, key: str) -> None:
+    """Draw the field for a painted multiplier, and its factor when one is chosen."""
+    column = layout.column(align=True)
+    column.prop(settings, f"{key}_map", icon="GROUP_VERTEX", placeholder="Painted: none")
+    if getattr(settings, f"{key}_map"):
+        column.prop(settings, f"{key}_factor")
+
+
+class Contact(Part):
+    name = "contact"
+    bl_label = "Contact"
+    split = False
+    roles = {"SENSOR", "PAD"}
+
+    def draw_part(self, layout, settings, _context):
+        column = layout.column()
+        column.prop(settings, "normal_law")
+        column.prop(settings, "k")
+        if settings.normal_law == "linear":
+            column.prop(settings, "cn")
+        else:
+            column.prop(settings, "exponent")
+            column.prop(settings, "dissipation")
+        column.prop(settings, "max_penetration")
+        painted(layout, settings, "k")
+
+
+class Friction(Part):
+    name = "friction"
+    bl_label = "Friction"
+    split = False
+    roles = {"SENSOR", "PAD"}
+
+    def draw_part(self, layout, settings, _context):
+        column = layout.column(align=True)
+        column.prop(settings, "mus")
+        column.prop(settings, "mud")
+        column.prop(settings, "x0")
+        column = layout.column(align=True)
+        column.prop(settings, "sigma0")
+        column.prop(settings, "sigma1")
+        column.prop(settings, "ct")
+        painted(layout, settings, "friction")
+
+
+class Readout(Part):
+    name = "readout"
+    bl_label = "Readout"
+    bl_options = set()
+    split = False
+    roles = {"SENSOR"}
+
+    def draw_part(self, layout, settings, context):
+        column = layout.column()
+        column.prop(settings, "unit")
+        column.prop(settings, "gain")
+        column.prop(settings, "zero")
+        painted(layout, settings, "gain")
+        status = live.status(context.scene)
+        felt = status.frame.sensors.get(context.object.name) if status.frame is not None else None
+        box = layout.box().column()
+        if felt is None:
+            sentences(box, status.text, "INFO", context)
+            return
+        net = ", ".join(f"{round(value, 3) + 0.0:.3f}" for value in felt.net_force)  # adding zero turns -0.0 into 0.0
+        box.label(text=f"Frame {status.frame.frame}: {int(felt.contact.sum())} of {len(felt.contact)} texels touch")
+        box.label(text=f"Sum of normals: {felt.normal_force.sum():.4f} N")
+        box.label(text=f"Largest normal: {felt.normal_force.max():.4f} N")
+        box.label(text=f"Largest shear: {(felt.shear**2).sum(axis=1).max() ** 0.5:.4f} N")
+        box.label(text=f"Net: {net} N")
+        box.label(text=f"Reading: {felt.reading.min():.4g} to {felt.reading.max():.4g} {settings.unit}")
+
+
+CLASSES = everywhere(Root, Region, Contact, Friction, Readout)

@@ -1,0 +1,145 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Parameters as Blender presets, copied between sensors, and regions by material and face set."""
+
+import re
+from pathlib import Path
+
+import bpy
+import numpy as np
+import pytest
+from blender_scenes import ball, grid, press
+
+from palpate.addon import cache, meshes, sample, sensors
+from palpate.core.errors import SensorError
+from palpate.core.scenario import SensorParameters
+
+PRESETS = sorted((sensors.PRESETS / "palpate" / "sensor").glob("*.py"))
+
+
+def test_blender_finds_the_presets():
+    found = {Path(path) for path in bpy.utils.preset_paths("palpate/sensor")}
+    assert sensors.PRESETS / "palpate" / "sensor" in found
+
+
+@pytest.mark.parametrize("path", PRESETS, ids=lambda path: path.stem)
+def test_a_preset_makes_a_sensor_that_works_and_names_its_source(path):
+    pad = grid()
+    bpy.ops.palpate.sensor_add()
+    before = sample.parameters(pad.palpate)
+    assert bpy.ops.script.execute_preset(filepath=str(path), menu_idname="PALPATE_MT_presets") == {"FINISHED"}
+    after = sample.parameters(pad.palpate)
+    after.check(pad.name)
+    text = path.read_text(encoding="utf-8")
+    assert after.k == float(re.search(r"settings\.k = ([\d.]+)", text).group(1))
+    assert re.search(r"paper|bulletin|20\d\d", text)
+    if "Foam" in path.name:
+        assert after == SensorParameters() == before  # the paper's Table 2 is what a new sensor has
+    else:
+        assert after != before
+
+
+def test_the_stiffness_of_a_silicone_preset_is_the_sum_it_shows():
+    for path in PRESETS:
+        found = re.search(r"k = E · A / h = ([\d.]+) ([kM])Pa · (\d) mm² / (\d) mm = (\d+)", path.read_text(encoding="utf-8"))
+        if found:
+            modulus, prefix, area, thickness, k = found.groups()
+            expected = float(modulus) * {"k": 1e3, "M": 1e6}[prefix] * float(area) * 1e-6 / (float(thickness) * 1e-3)
+            assert float(k) == pytest.approx(expected, rel=0.01)
+
+
+def test_own_presets_are_kept_and_removed():
+    pad = grid()
+    bpy.ops.palpate.sensor_add()
+    pad.palpate.k, pad.palpate.unit = 123.0, "V"
+    assert bpy.ops.palpate.preset_add(name="Mine") == {"FINISHED"}
+    mine = [path for folder in bpy.utils.preset_paths("palpate/sensor") for path in Path(folder).glob("Mine.py")]
+    assert len(mine) == 1
+    pad.palpate.k, pad.palpate.unit = 1.0, "N"
+    bpy.ops.script.execute_preset(filepath=str(mine[0]), menu_idname="PALPATE_MT_presets")
+    assert (pad.palpate.k, pad.palpate.unit) == (123.0, "V")
+    bpy.ops.palpate.preset_add(name="Mine", remove_name=True)
+    assert not mine[0].exists()
+
+
+def test_copy_to_selected():
+    pad, other, third = grid(), grid("Other"), ball("Third")
+    for obj in (pad, other):
+        obj.palpate.role = "SENSOR"
+    third.palpate.role = "TARGET"
+    pad.palpate.k, pad.palpate.mus, pad.palpate.unit, pad.palpate.region = 77.0, 0.9, "V", "GROUP"
+    bpy.context.view_layer.objects.active = pad
+    assert not bpy.ops.palpate.parameters_copy.poll()
+    for obj in (pad, other, third):
+        obj.select_set(True)
+    assert bpy.ops.palpate.parameters_copy() == {"FINISHED"}
+    assert (other.palpate.k, other.palpate.mus, other.palpate.unit) == (77.0, pytest.approx(0.9), "V")
+    assert other.palpate.region == "MESH"
+    assert third.palpate.k == pytest.approx(58.5)
+
+
+# --- regions by material and face set
+
+
+def two_halves(pad):
+    """Left and right half of a 6 × 14 pad in two materials and two face sets; the right one has number 2 in both."""
+    mesh = pad.data
+    for name in ("Steel", "Rubber"):
+        mesh.materials.append(bpy.data.materials.new(name))
+    right = np.array([face.center.x > 0.01 for face in mesh.polygons])
+    mesh.polygons.foreach_set("material_index", right.astype(np.int32))
+    sets = mesh.attributes.new(".sculpt_face_set", "INT", "FACE")
+    sets.data.foreach_set("value", np.where(right, 2, 1).astype(np.int32))
+    return meshes.corners_of(mesh, right)
+
+
+@pytest.mark.parametrize("source", ["MATERIAL", "FACE_SET"])
+def test_a_material_or_face_set_becomes_the_region(source):
+    pad = grid()
+    right = two_halves(pad)
+    pad.active_material_index = 1
+    pad.data.polygons.active = int(np.argmax([face.center.x > 0.01 for face in pad.data.polygons]))
+    assert bpy.ops.palpate.sensor_add(source=source) == {"FINISHED"}
+    assert pad.palpate.region == source
+    assert (meshes.region(pad, len(right)) == right).all()
+    assert 0 < right.sum() < len(right)
+    if source == "FACE_SET":
+        assert bpy.ops.palpate.face_set_choose(face_set="1") == {"FINISHED"}
+        assert pad.palpate.face_set == 1
+        pad.palpate.face_set = 7
+        with pytest.raises(SensorError, match="no face set 7: choose one of 1, 2"):
+            meshes.region(pad, len(right))
+    else:
+        pad.palpate.material = "Gone"
+        with pytest.raises(SensorError, match="wears no material 'Gone'"):
+            meshes.region(pad, len(right))
+
+
+def test_a_region_by_material_survives_its_own_heat_map(tmp_path):
+    from palpate.addon.bake import bake
+    from palpate.core.drive import drive
+
+    scene, pad, _ = press(3)
+    right = two_halves(pad)
+    pad.palpate.region, pad.palpate.material = "MATERIAL", "Rubber"
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "halves.blend"))
+    for _ in range(2):
+        drive(bake(scene))
+        assert (meshes.region(pad, len(right)) == right).all()
+
+
+def test_a_changed_region_or_painted_map_is_noticed():
+    scene, pad, _ = press(4)
+    two_halves(pad)
+    pad.palpate.region, pad.palpate.material = "MATERIAL", "Rubber"
+    depsgraph = sample.depsgraph_of(scene)
+    run = cache.begin(scene, depsgraph)
+    assert not cache.is_stale(scene, depsgraph, run)
+    first = meshes.fingerprint(pad, depsgraph)
+    pad.data.polygons.foreach_set("material_index", np.ones(len(pad.data.polygons), dtype=np.int32))
+    assert meshes.fingerprint(pad, depsgraph) != first
+    second = meshes.fingerprint(pad, depsgraph)
+    group = pad.vertex_groups.new(name="Soft")
+    pad.palpate.k_map = "Soft"
+    group.add([0], 1.0, "REPLACE")
+    assert meshes.fingerprint(pad, depsgraph) != second
+    assert cache.is_stale(scene, depsgraph, run)
