@@ -19,7 +19,7 @@ import numpy as np
 
 from ..core.errors import SceneError
 from ..core.mesh import TriangleMesh, checked_mesh, mass_properties
-from ..core.scenario import Body, Motion, Scenario, Sensor, SensorParameters, Target
+from ..core.scenario import Body, Motion, Painted, Scenario, Sensor, SensorParameters, Target
 from ..core.texels import texels_from_region
 from . import freebodies, identity, meshes, parts, properties, transforms, units
 from .jobs import Progress
@@ -326,5 +326,12 @@ def parameters(settings) -> SensorParameters:
 def _sensor(obj, body: int, mesh: TriangleMesh) -> Sensor:
     found = parameters(obj.palpate)
     found.check(obj.name)
-    region = meshes.region(obj, len(mesh.vertices))
-    return Sensor(obj.name, body, texels_from_region(mesh, region, obj.name), found, readout=obj.palpate.role == "SENSOR")
+    texels = texels_from_region(mesh, meshes.region(obj, len(mesh.vertices)), obj.name)
+    readout, painted = obj.palpate.role == "SENSOR", _painted(obj, texels.vertex)
+    return Sensor(obj.name, body, texels, found, readout=readout, painted=painted)
+
+
+def _painted(obj, vertex: np.ndarray) -> Painted:
+    """Return what is painted at the vertices that the texels stand on."""
+    maps = {key: meshes.multipliers(obj, key) for key in meshes.PAINTED}
+    return Painted(**{key: None if values is None else values[vertex] for key, values in maps.items()})

@@ -72,6 +72,8 @@ class World(NamedTuple):
         Position, normal, x axis and y axis of each texel, in its body's frame and relative to the body's reference point.
     texel_start : (m + 1,) int
     parameters : (m, PARAMETERS) float
+    painted : (N, 2) float
+        Multipliers of each texel's stiffness and friction; without rows when nothing is painted.
     reach : (m,) float, metres
         Maximum penetration.
     pairs : (q, 2) int
@@ -96,6 +98,7 @@ class World(NamedTuple):
     texels: np.ndarray
     texel_start: np.ndarray
     parameters: np.ndarray
+    painted: np.ndarray
     reach: np.ndarray
     pairs: np.ndarray
     sensor_body: np.ndarray

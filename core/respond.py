@@ -16,4 +16,5 @@ def respond(sensor: Sensor, normal_force: np.ndarray) -> np.ndarray:
     sensor : Sensor
     normal_force : (n,) float, N
     """
-    return sensor.parameters.zero + sensor.parameters.gain * normal_force
+    gain = sensor.parameters.gain if sensor.painted.gain is None else sensor.parameters.gain * sensor.painted.gain
+    return sensor.parameters.zero + gain * normal_force

@@ -95,6 +95,42 @@ class SensorParameters:
 
 
 @dataclass(frozen=True)
+class Painted:
+    """Multipliers of a sensor's parameters, texel by texel; None is one everywhere.
+
+    Attributes
+    ----------
+    k : (n,) float or None
+        Of `k` and `cn`, as for more or less of the same foam.
+    friction : (n,) float or None
+        Of `mus` and `mud`.
+    gain : (n,) float or None
+        Of `gain`.
+    """
+
+    k: np.ndarray | None = None
+    friction: np.ndarray | None = None
+    gain: np.ndarray | None = None
+
+    def check(self, name: str, count: int) -> None:
+        """Raise :class:`ParameterError` for multipliers that mean nothing; `count` is the number of texels."""
+        for item in fields(self):
+            values = getattr(self, item.name)
+            if values is None:
+                continue
+            if values.shape != (count,):
+                raise ParameterError(
+                    f"The painted {item.name} of sensor '{name}' has {len(values)} values for {count} texels: paint it anew."
+                )
+            lowest = 0.0 if item.name == "friction" else np.nextafter(0.0, 1.0)
+            if not (np.isfinite(values).all() and values.min(initial=1.0) >= lowest):
+                raise ParameterError(
+                    f"The painted {item.name} of sensor '{name}' is {values.min():g} at texel {values.argmin()}: "
+                    "give every texel a factor above zero."
+                )
+
+
+@dataclass(frozen=True)
 class Motion:
     """Poses of a body's frame over time; between samples linear in position, constant in angular velocity.
 
@@ -151,13 +187,14 @@ class Body:
 
 @dataclass(frozen=True)
 class Sensor:
-    """Texels on a body. With `readout` False it is a pad: it acts, and reports nothing."""
+    """Texels on a body, which differ by what is painted. With `readout` False it is a pad: it acts, and reports nothing."""
 
     name: str
     body: int
     texels: Texels
     parameters: SensorParameters = field(default_factory=SensorParameters)
     readout: bool = True
+    painted: Painted = field(default_factory=Painted)
 
 
 @dataclass(frozen=True)
@@ -223,6 +260,7 @@ class Scenario:
             raise SceneError(f"Nothing in '{self.name}' can touch a sensor: give at least one other object the role Target.")
         for sensor in self.sensors:
             sensor.parameters.check(sensor.name)
+            sensor.painted.check(sensor.name, len(sensor.texels))
         for body in self.bodies:
             if body.free and not (np.isfinite(body.mass) and body.mass > 0):
                 raise ParameterError(f"The mass of free body '{body.name}' is {body.mass:g} kg: give it a value above zero.")

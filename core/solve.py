@@ -233,6 +233,7 @@ def _world(scenario: Scenario, center: np.ndarray) -> World:
         texels=np.ascontiguousarray(np.vstack(blocks)),
         texel_start=np.cumsum([0] + [len(s.texels) for s in sensors]),
         parameters=np.array([parameter_row(s.parameters) for s in sensors]),
+        painted=_painted(sensors),
         reach=np.array([s.parameters.max_penetration for s in sensors], dtype=float),
         pairs=np.array(pairs),
         sensor_body=np.array([s.body for s in sensors]),
@@ -246,6 +247,18 @@ def _world(scenario: Scenario, center: np.ndarray) -> World:
         inertia=np.ascontiguousarray([body.inertia for body in bodies], dtype=float),
         gravity=np.array(scenario.gravity, dtype=float),
     )
+
+
+def _painted(sensors: tuple[Sensor, ...]) -> np.ndarray:
+    """(N, 2) multipliers of stiffness and friction of all texels; no rows when no sensor is painted."""
+    if all(s.painted.k is None and s.painted.friction is None for s in sensors):
+        return np.zeros((0, 2))
+    ones = [np.ones(len(s.texels)) for s in sensors]
+    columns = [
+        np.concatenate([one if values is None else values for one, values in zip(ones, chosen, strict=True)])
+        for chosen in ([s.painted.k for s in sensors], [s.painted.friction for s in sensors])
+    ]
+    return np.ascontiguousarray(np.column_stack(columns), dtype=float)
 
 
 def _extent(sensor: Sensor, reference: np.ndarray) -> tuple[np.ndarray, float]:

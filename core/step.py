@@ -175,6 +175,15 @@ def _law(parameters, sensor):
 
 
 @kernel
+def _painted_law(p, painted, texel):
+    """A sensor's parameters with the multipliers of one of its texels; `p` itself where nothing is painted."""
+    if len(painted) == 0:
+        return p
+    k, friction = painted[texel, 0], painted[texel, 1]
+    return (p[0] * k, p[1] * k, p[2], p[3], p[4], p[5], p[6] * friction, p[7] * friction, p[8], p[9])
+
+
+@kernel
 def _velocity(rows, r, motion):
     """Velocity of the target at a contact point relative to the sensor, in the axes of the sensor's body."""
     px, py, pz = rows[r, PX], rows[r, PY], rows[r, PZ]
@@ -237,7 +246,9 @@ def _solve_velocities(dt, world, state, scratch):
             if start < stop:
                 _relative_motion(a, b, scratch.twist, state.position, scratch.rotation, scratch.motion)
                 _relative_motion(a, b, scratch.known, state.position, scratch.rotation, scratch.part)
-                _sum_contacts(start, stop, dt, _law(world.parameters, world.pairs[pair, 0]), scratch)
+                sensor = world.pairs[pair, 0]
+                first = world.texel_start[sensor] - world.slot_start[pair]
+                _sum_contacts(start, stop, dt, _law(world.parameters, sensor), world.painted, first, scratch)
                 if free_at[a] >= 0 or free_at[b] >= 0:
                     _add_pair(a, b, dt, world, state, scratch)
             start = stop
@@ -274,8 +285,10 @@ def _solve_velocities(dt, world, state, scratch):
 
 
 @kernel
-def _sum_contacts(start, stop, dt, p, scratch):
+def _sum_contacts(start, stop, dt, law, painted, first, scratch):
     """Linearise the contacts of a pair, and sum their forces on the target and what they resist.
+
+    The texel of a row is `first` plus its slot.
 
     With a contact's damping tensor ``C = ct 1 + (cn - ct) n nᵀ`` and velocities ``v + ω × p`` the block is the sum of
     ``Jᵀ C J``, its lower triangle; the wrench is what the springs and the known part of the motion do.
@@ -287,6 +300,7 @@ def _sum_contacts(start, stop, dt, p, scratch):
     c00, c10, c11, c20, c21, c22 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     sx, sy, sz, qx, qy, qz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for r in range(start, stop):
+        p = _painted_law(law, painted, first + scratch.slots[r])
         vx, vy, vz = _velocity(rows, r, motion)
         linearise(rows, r, vx, vy, vz, dt, p)
         if rows[r, NORMAL_FORCE] <= 0.0:
@@ -505,10 +519,11 @@ def feel(world, state, scratch, force, shear, depth, slip, contact, net, moment)
     for pair in range(len(world.pairs)):
         sensor = world.pairs[pair, 0]
         a, b = world.sensor_body[sensor], world.target_body[world.pairs[pair, 1]]
-        p = _law(world.parameters, sensor)
+        law = _law(world.parameters, sensor)
         _relative_motion(a, b, scratch.twist, state.position, scratch.rotation, scratch.motion)
         for r in range(start, scratch.pair_stop[pair]):
             texel = world.texel_start[sensor] + scratch.slots[r] - world.slot_start[pair]
+            p = _painted_law(law, world.painted, texel)
             nx, ny, nz = rows[r, NX], rows[r, NY], rows[r, NZ]
             vx, vy, vz = _velocity(rows, r, scratch.motion)
             rate = vx * nx + vy * ny + vz * nz

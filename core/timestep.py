@@ -80,9 +80,10 @@ def advise(scenario: Scenario) -> Advice:
 
 def _tangent_or_normal(sensor: Sensor) -> tuple[float, float]:
     """Stiffness and damping of all texels together, in the direction in which they are stiffer."""
-    p, n = sensor.parameters, len(sensor.texels)
+    p, factor = sensor.parameters, np.ones(len(sensor.texels)) if sensor.painted.k is None else sensor.painted.k
     k, cn = p.k, p.cn
     if p.normal_law == HUNT_CROSSLEY:  # where it is stiffest: pressed in as far as it acts
         k = p.k * p.exponent * p.max_penetration ** (p.exponent - 1.0)
         cn = 1.5 * p.dissipation * p.k * p.max_penetration**p.exponent
-    return n * max(k, p.sigma0), n * max(cn, p.sigma1 + p.ct)
+    stiffness, damping = np.maximum(factor * k, p.sigma0), np.maximum(factor * cn, p.sigma1 + p.ct)
+    return float(stiffness.sum()), float(damping.sum())

@@ -143,3 +143,48 @@ def test_a_changed_region_or_painted_map_is_noticed():
     group.add([0], 1.0, "REPLACE")
     assert meshes.fingerprint(pad, depsgraph) != second
     assert cache.is_stale(scene, depsgraph, run)
+
+
+# --- painted multipliers
+
+
+def test_painted_maps_reach_the_solver():
+    scene, pad, _ = press(2)
+    soft = pad.vertex_groups.new(name="Soft")
+    soft.add([0, 1, 2], 1.0, "REPLACE")
+    soft.add([3], 0.5, "REPLACE")
+    pad.palpate.k_map, pad.palpate.k_factor = "Soft", 0.2
+    rough = pad.data.attributes.new("Rough", "FLOAT", "POINT")
+    rough.data.foreach_set("value", np.linspace(0.5, 2.0, 84).astype(np.float32))
+    pad.palpate.friction_map = "Rough"
+    scenario, _ = sample.sample_start(scene, sample.depsgraph_of(scene))
+    painted = scenario.sensors[0].painted
+    assert painted.k[:5] == pytest.approx([0.2, 0.2, 0.2, 0.6, 1.0])
+    assert painted.friction == pytest.approx(np.linspace(0.5, 2.0, 84), rel=1e-6)
+    assert painted.gain is None
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "text"), [("Gone", 1.0, "no vertex group or attribute 'Gone'"), ("Bad", -1.0, "nega")]
+)
+def test_a_painted_map_that_cannot_be_used_says_so(name, value, text):
+    scene, pad, _ = press(2)
+    bad = pad.data.attributes.new("Bad", "FLOAT", "POINT")
+    bad.data.foreach_set("value", np.full(84, value, dtype=np.float32))
+    pad.palpate.gain_map = name
+    with pytest.raises(SensorError, match=text):
+        sample.sample_start(scene, sample.depsgraph_of(scene))
+
+
+def test_a_soft_tip_feels_less_under_the_same_ball():
+    scene, pad, _ = press(4)
+    forces = []
+    for factor in (1.0, 0.5):
+        group = pad.vertex_groups.get("Soft") or pad.vertex_groups.new(name="Soft")
+        group.add(range(84), 1.0, "REPLACE")
+        pad.palpate.k_map, pad.palpate.k_factor = "Soft", factor
+        from palpate.core.drive import drive
+        from palpate.core.solve import run
+
+        forces.append(run(drive(sample.sample_scenario(scene))[0]).sensors["Pad"].normal_force[-1].sum())
+    assert forces[1] == pytest.approx(0.5 * forces[0], rel=1e-6)
