@@ -22,6 +22,10 @@ class ParameterError(PalpateError):
     """A number outside the range in which the model means anything."""
 
 
+class EffectError(ParameterError):
+    """An effect that the library does not have, or a parameter of one that means nothing."""
+
+
 class SceneError(PalpateError):
     """A scene that does not add up to a simulation (nothing to touch, reversed frame range, zero scale)."""
 

@@ -25,15 +25,15 @@ if os.environ.get("PALPATE_NUMBA", "1") != "0":
 
 
 def _edition() -> str:
-    """Return a hash of all files with kernels in this folder.
+    """Return a hash of all files with kernels in this folder and those below it.
 
     A compiled kernel holds the machine code of those it calls, but numba looks only at a kernel's own file to see whether what
     it kept is still good: after a change in another file, or an upgrade, the old code would go on running.
     """
     digest = hashlib.sha256()
-    for path in sorted(Path(__file__).parent.glob("*.py")):
+    for path in sorted(Path(__file__).parent.rglob("*.py")):
         source = path.read_bytes()
-        if b"@kernel" in source:
+        if b"@kernel" in source or b"KIND = Kind(" in source:  # the laws of effects are compiled as well
             digest.update(source)
     return digest.hexdigest()[:12]
 

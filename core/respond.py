@@ -1,20 +1,23 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Forces → readings: what the sensor would report (paper, section 4: a linear conversion; effects join here)."""
+"""Forces → readings: what the sensor would report, a linear conversion (paper, section 4) and the sensor's effects on readings."""
 
 from __future__ import annotations
 
 import numpy as np
 
+from .effects.bound import Reader, readings, site_of
 from .scenario import Sensor
 
+__all__ = ["Reader", "respond"]
 
-def respond(sensor: Sensor, normal_force: np.ndarray) -> np.ndarray:
-    """Return the texels' readings in the sensor's unit.
+
+def respond(sensor: Sensor, time: np.ndarray, normal_force: np.ndarray) -> np.ndarray:
+    """Return the texels' readings over a whole signal, (t, n) float in the sensor's unit.
 
     Parameters
     ----------
     sensor : Sensor
-    normal_force : (n,) float, N
+    time : (t,) float, s, increasing
+    normal_force : (t, n) float, N
     """
-    gain = sensor.parameters.gain if sensor.painted.gain is None else sensor.parameters.gain * sensor.painted.gain
-    return sensor.parameters.zero + gain * normal_force
+    return readings(sensor.effects, site_of(sensor), time, normal_force)

@@ -9,6 +9,8 @@ from dataclasses import dataclass, field, fields, is_dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from .effects.base import Effect
+from .effects.library import check as check_effects
 from .errors import ParameterError, SceneError
 from .mesh import TriangleMesh
 from .texels import Texels
@@ -187,7 +189,11 @@ class Body:
 
 @dataclass(frozen=True)
 class Sensor:
-    """Texels on a body, which differ by what is painted. With `readout` False it is a pad: it acts, and reports nothing."""
+    """Texels on a body, which differ by what is painted. With `readout` False it is a pad: it acts, and reports nothing.
+
+    Its `effects` are what the base model leaves out (:mod:`.effects`); each has its place, so their order matters only between
+    two of a kind.
+    """
 
     name: str
     body: int
@@ -195,6 +201,7 @@ class Sensor:
     parameters: SensorParameters = field(default_factory=SensorParameters)
     readout: bool = True
     painted: Painted = field(default_factory=Painted)
+    effects: tuple[Effect, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -261,6 +268,7 @@ class Scenario:
         for sensor in self.sensors:
             sensor.parameters.check(sensor.name)
             sensor.painted.check(sensor.name, len(sensor.texels))
+            check_effects(sensor.effects, sensor.name, len(sensor.texels), sensor.parameters.gain)
         for body in self.bodies:
             if body.free and not (np.isfinite(body.mass) and body.mass > 0):
                 raise ParameterError(f"The mass of free body '{body.name}' is {body.mass:g} kg: give it a value above zero.")
@@ -285,6 +293,8 @@ def _feed(digest: hashlib._Hash, value: object) -> None:
         digest.update(f"[{len(value)}".encode())
         for item in value:
             _feed(digest, item)
+    elif isinstance(value, dict):
+        _feed(digest, sorted(value.items()))
     elif isinstance(value, np.ndarray):
         array = np.ascontiguousarray(value)
         digest.update(f"{array.dtype.str}{array.shape}".encode())

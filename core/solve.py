@@ -20,7 +20,7 @@ from .contact import DEPTH, NX, NZ, PX, PZ, Neighbours, State, World, count_buri
 from .drive import drive
 from .mesh import is_closed
 from .recording import Frame, Recording, SensorFrame
-from .respond import respond
+from .respond import Reader
 from .scenario import Scenario, Sensor, Target
 from .step import advance_frame, feel, gather_all, scratch_for
 from .timestep import advise
@@ -77,6 +77,7 @@ class Simulation:
         self._state = _start(scenario, self._world, self._center)
         self._neighbours = _neighbours(self._world, self._state)
         self._scratch = scratch_for(self._world, self._state)
+        self._readers = [Reader.of(sensor) for sensor in scenario.sensors]
 
     @property
     def time(self) -> float:
@@ -204,7 +205,7 @@ class Simulation:
                 depth=depth[own].copy(),
                 slip=slip[own].copy(),
                 contact=contact[own].copy(),
-                reading=respond(sensor, force[own]),
+                reading=self._readers[i].step(self.time, force[own]),
                 net_force=net[i, :3].copy(),
                 net_torque=net[i, 3:] + np.cross(center, net[i, :3]),
                 centre_of_pressure=moment[i, :3] / moment[i, 3] + center if pressed else np.zeros(3),

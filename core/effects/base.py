@@ -1,0 +1,238 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What an effect is: plain data on a sensor, a kind in the library, and the ways in which a form of it can act.
+
+A file of this folder that defines ``KIND`` is an effect; nothing else has to know of it. Its forms are different formulas for
+the same thing, since no two papers agree on one. A form acts in exactly one way:
+
+=============  ==============================================================================================================
+``law``        scalar law with memory, the same for the solver, for whole signals and for streams (see :data:`Law`)
+``shape``      formula on readings that needs no past: ``shape(x (t, n), time (t,), values, site, seed) → (t, n)``
+``delay``      seconds by which the reading comes late: ``delay(values) → float``
+``friction``   law of sliding: ``friction(speed, force, numbers, row) → (factor on the friction coefficient, N·s/m)``
+``place``      where the texels really are: ``place(position, normal, tangent, values) → the same three``
+=============  ==============================================================================================================
+
+Laws and friction are compiled, so they are plain functions of numbers and arrays that use nothing but :mod:`math`; this file
+and those of the effects import nothing heavy, because Blender's panels list them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+STAGES = ("contact", "pad", "readout")
+"""`contact`: the law of contact itself, without memory. `pad`: with memory; both act on the bodies. `readout`: only on what
+the sensor reports."""
+
+Value = float | tuple[float, ...]
+Values = Mapping[str, Value]
+
+Law = Callable[..., tuple[float, float]]
+"""``law(force, slope, depth, slide, numbers, row, memory, point, at, commit) → (force, slope)``
+
+Parameters
+----------
+force : float, N (of a readout law: the reading so far)
+    What the laws before this one give at the end of the step.
+slope : float, N/m
+    Its derivative by the depth at the end of the step.
+depth : float, m
+    Penetration at the end of the step, zero while nothing touches. A readout law gets zero.
+slide : float, m
+    Distance slid in the step. A readout law gets zero.
+numbers, row : (…, c) float, int
+    The law's constants for this length of step are ``numbers[row]``.
+memory, point, at : (…, m) float, int, int
+    The law's own memory are the columns from ``at`` on of ``memory[point]``; it is all zero at first.
+commit : bool
+    Write the memory. Without it the law is only asked what would be.
+"""
+
+
+@dataclass(frozen=True)
+class Effect:
+    """An effect on a sensor: plain data that a file can hold.
+
+    Attributes
+    ----------
+    name, form : str
+        Which effect of the library, and which of its formulas.
+    values : dict of str to float or tuple of float
+        By parameter name; a tuple has one number per texel. What is absent has the form's default.
+    seed : int
+        Of effects with chance in them; equal seeds give equal numbers.
+    """
+
+    name: str
+    form: str
+    values: dict[str, Value] = field(default_factory=dict)
+    seed: int = 0
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One number of a form.
+
+    Attributes
+    ----------
+    name : str
+    unit : str
+        "1", "N", "m", "s", … and "unit" for the sensor's own unit: default and bounds are then given for a gain of one unit
+        per newton; :meth:`scaled` gives those of a sensor.
+    default, low, high : float
+        Bounds are inclusive: outside them the formula means nothing or nothing real is like that.
+    text : str
+        One sentence for people.
+    log : bool
+        Looked for on a logarithmic scale.
+    per_texel : bool
+        One number per texel; a single number stands for all texels.
+    """
+
+    name: str
+    unit: str
+    default: float
+    low: float
+    high: float
+    text: str
+    log: bool = False
+    per_texel: bool = False
+
+    def scaled(self, gain: float) -> Parameter:
+        """Return the parameter as it is for a sensor with this gain."""
+        if not self.unit.startswith("unit"):
+            return self
+        size = abs(gain)
+        return Parameter(
+            self.name, self.unit, self.default * size, self.low * size, self.high * size, self.text, self.log, self.per_texel
+        )
+
+
+@dataclass(frozen=True)
+class Site:
+    """Where an effect sits: the texels and the linear conversion of the sensor it belongs to.
+
+    Attributes
+    ----------
+    position : (n, 3) float, m
+    area : (n,) float, m²
+    row, column : (n,) int or None
+        Of texels that form a grid.
+    gain, zero : float
+        Conversion from newtons to the sensor's unit.
+    painted : float or (n,) float
+        Multiplies the gain of each texel.
+    """
+
+    position: np.ndarray
+    area: np.ndarray
+    row: np.ndarray | None = None
+    column: np.ndarray | None = None
+    gain: float = 1.0
+    zero: float = 0.0
+    painted: float | np.ndarray = 1.0
+    name: str = "sensor"
+
+    def __len__(self) -> int:
+        return len(self.position)
+
+
+@dataclass(frozen=True)
+class Form:
+    """One formula of an effect.
+
+    Attributes
+    ----------
+    name : str
+    formula : str
+        As the documentation prints it.
+    reference : str
+    parameters : tuple of Parameter
+    off : dict of str to float
+        Values, possibly outside the bounds, at which the effect is not there: ``strength`` zero, a level of infinity.
+    law, shape, delay, friction, place
+        How it acts; exactly one is given (see the module's text).
+    constants : callable
+        ``constants(values, dt (m,)) → (m, c)``: the numbers of a law for steps of these lengths (s), of a friction law for
+        none in particular.
+    memory : int
+        How many numbers a law remembers.
+    stage : str
+        Where it differs from that of its kind.
+    after_conversion : bool
+        A readout form that acts on the reading in the sensor's unit, and not on newtons before gain and zero.
+    after_clip : bool
+        A law that acts after the force was cut off at zero, so that it may pull.
+    """
+
+    name: str
+    formula: str
+    reference: str
+    parameters: tuple[Parameter, ...]
+    off: dict[str, float]
+    law: Law | None = None
+    shape: Callable[..., np.ndarray] | None = None
+    delay: Callable[[Values], float] | None = None
+    friction: Callable[..., tuple[float, float]] | None = None
+    place: Callable[..., tuple[np.ndarray, np.ndarray, np.ndarray]] | None = None
+    constants: Callable[[Values, np.ndarray], np.ndarray] | None = None
+    memory: int = 0
+    stage: str = ""
+    after_conversion: bool = False
+    after_clip: bool = False
+    random: bool = False
+
+    def defaults(self, gain: float = 1.0) -> dict[str, Value]:
+        """Return the default of every parameter, for a sensor with this gain."""
+        return {parameter.name: parameter.scaled(gain).default for parameter in self.parameters}
+
+
+@dataclass(frozen=True)
+class Kind:
+    """An effect of the library.
+
+    Attributes
+    ----------
+    name : str
+        Its standard name: files and reports use it.
+    title : str
+        For people.
+    text : str
+        What it does, in one sentence.
+    stage : str
+        One of :data:`STAGES`.
+    order : float
+        Place in the chain among those of its stage.
+    forms : tuple of Form
+        The first is the usual one.
+    """
+
+    name: str
+    title: str
+    text: str
+    stage: str
+    order: float
+    forms: tuple[Form, ...]
+
+    def stage_of(self, form: Form) -> str:
+        """Return where a form of this kind acts."""
+        return form.stage or self.stage
+
+
+def number(values: Values, name: str) -> float:
+    """Return a value that is one number."""
+    value = values[name]
+    assert isinstance(value, float | int)
+    return float(value)
+
+
+def same_for_all_steps(*names: str) -> Callable[[Values, np.ndarray], np.ndarray]:
+    """Return the `constants` of a law whose numbers are its parameters of these names, whatever the step."""
+
+    def constants(values: Values, dt: np.ndarray) -> np.ndarray:
+        return np.tile([number(values, name) for name in names], (len(dt), 1))
+
+    return constants

@@ -1,0 +1,200 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What every form of every effect has to keep; a new file in the library is tested by this one as it is."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from palpate.core.effects import base
+from palpate.core.effects.base import Effect, Site
+from palpate.core.effects.bound import Reader, forces, friction, placed, readings
+from palpate.core.effects.laws import compile_program, surface_force, texel_force
+from palpate.core.effects.library import check, effect, form_of, from_dict, kind_of, library, to_dict
+from palpate.core.errors import EffectError
+from palpate.core.scenario import SensorParameters
+
+FORMS = [(kind.name, form.name) for kind in library().values() for form in kind.forms]
+every_form = pytest.mark.parametrize(("name", "form"), FORMS, ids=["-".join(names) for names in FORMS])
+
+ROWS, COLUMNS, PITCH = 4, 3, 0.0034
+PARAMETERS = SensorParameters(k=1000.0, cn=10.0)
+
+
+def site(gain=1.0, zero=0.0) -> Site:
+    row, column = (grid.ravel() for grid in np.mgrid[0:ROWS, 0:COLUMNS])
+    position = np.stack([column * PITCH, row * PITCH, np.zeros(ROWS * COLUMNS)], axis=1)
+    return Site(position, np.full(len(position), PITCH**2), row, column, gain, zero)
+
+
+def presses(samples=400, dt=0.02, seed=1) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Time stamps that are not quite even, depths (m) that come and go and differ from texel to texel, and slides (m)."""
+    random = np.random.default_rng(seed)
+    time = np.cumsum(dt * random.choice([0.5, 1.0, 1.5], samples)) - dt
+    heights = random.uniform(0.3, 1.0, ROWS * COLUMNS)
+    wave = np.sin(time) + 0.4 * np.sin(3.1 * time + 1.0) + 0.1 * (time > 4.0)
+    depth = np.maximum(0.002 * wave[:, None] * heights, 0.0)
+    return time, depth, 1e-4 * random.random(depth.shape) * (depth > 0)
+
+
+def corners(form, gain=1.0):
+    """The defaults, and every combination of least and largest values."""
+    yield form.defaults(gain)
+    scaled = [parameter.scaled(gain) for parameter in form.parameters]
+    for choice in range(2 ** len(scaled)):
+        yield {p.name: (p.high if choice >> i & 1 else p.low) for i, p in enumerate(scaled)}
+
+
+@every_form
+def test_a_form_says_what_it_is(name, form):
+    kind, found = kind_of(name), form_of(name, form)
+    assert kind.stage_of(found) in base.STAGES
+    assert kind.text.endswith(".") and found.formula and found.reference
+    ways = [found.law, found.shape, found.delay, found.friction, found.place]
+    assert sum(way is not None for way in ways) == 1
+    assert (found.constants is not None) == (found.law is not None or found.friction is not None)
+    assert set(found.off) <= {parameter.name for parameter in found.parameters}
+    for parameter in found.parameters:
+        assert parameter.low <= parameter.default <= parameter.high
+        assert parameter.text.endswith(".") and parameter.unit
+        assert not parameter.log or parameter.low > 0
+
+
+@every_form
+def test_nothing_is_left_of_it_when_it_is_off(name, form):
+    off = Effect(name, form, {**form_of(name, form).defaults(), **form_of(name, form).off}, seed=3)
+    time, depth, slide = presses()
+    base_force = forces((), PARAMETERS, time, depth)
+    np.testing.assert_allclose(forces((off,), PARAMETERS, time, depth, slide), base_force, rtol=1e-9, atol=1e-12)
+    there = site(gain=-2.0, zero=5.0)
+    np.testing.assert_allclose(readings((off,), there, time, base_force), 5.0 - 2.0 * base_force, rtol=1e-9, atol=1e-9)
+    factor, viscous = friction((off,), np.array([0.0, 0.1, 1.0]), 1.0)
+    np.testing.assert_allclose(factor, 1.0, rtol=1e-12)
+    np.testing.assert_allclose(viscous, 0.0, atol=1e-12)
+    normal, tangent = np.tile([0.0, 0.0, 1.0], (len(there), 1)), np.tile([1.0, 0.0, 0.0], (len(there), 1))
+    for found, given in zip(placed((off,), there.position, normal, tangent), (there.position, normal, tangent)):
+        np.testing.assert_allclose(found, given, atol=1e-15)
+
+
+@every_form
+def test_numbers_stay_finite_at_the_bounds(name, form):
+    time, depth, slide = presses()
+    depth[100:110] *= 10.0
+    for values in corners(form_of(name, form)):
+        item = Effect(name, form, values)
+        check((item,), "pad")
+        force = forces((item,), PARAMETERS, time, depth, slide)
+        assert np.isfinite(force).all()
+        assert np.isfinite(readings((item,), site(), time, force)).all()
+        assert np.isfinite(friction((item,), np.array([0.0, 1e-9, 1.0, 1e3]), 1.0)).all()
+
+
+@every_form
+def test_sample_by_sample_gives_what_the_whole_signal_gives(name, form):
+    """Both from the start, and after any pause; lengths of step are told apart to a billionth."""
+    item = effect(name, form, seed=7)
+    time, depth, slide = presses()
+    whole = forces((item,), PARAMETERS, time, depth, slide)
+    lengths = np.diff(time, prepend=time[0])
+    program = compile_program([(item,)], lengths)
+    memory, single = program.memory(depth.shape[1]), np.zeros_like(depth)
+    rate = np.diff(depth, axis=0, prepend=depth[:1]) / np.where(lengths > 0, lengths, 1.0)[:, None]
+    for i in range(len(time)):
+        for j in range(depth.shape[1]):
+            asked = (0, j, i, depth[i, j], rate[i, j], slide[i, j], PARAMETERS.k, PARAMETERS.cn, program, memory)
+            only_asked = texel_force(*asked, False)
+            single[i, j] = texel_force(*asked, True)[0]
+            assert only_asked[0] == single[i, j]
+    np.testing.assert_allclose(single, whole, rtol=1e-7, atol=1e-9)
+
+    reader = Reader((item,), site())
+    pieces = np.split(np.arange(len(time)), [1, 2, 17, 200])
+    stream = np.concatenate([reader.read(time[piece], whole[piece]) for piece in pieces])
+    np.testing.assert_allclose(stream, readings((item,), site(), time, whole), rtol=1e-7, atol=1e-9)
+
+
+@every_form
+def test_the_tangent_is_the_derivative_of_the_force(name, form):
+    item = effect(name, form)
+    program = compile_program([(item,)], [0.0, 0.01])
+    memory = program.memory(1)
+    for depth in (0.0, 5e-4, 1.5e-3, 1.2e-3):
+        texel_force(0, 0, 1, depth, 0.0, 0.0, 1000.0, 0.0, program, memory, True)
+    for depth in (1e-3, 1.9e-3):  # on the way back and on the way in
+        force, slope, _ = texel_force(0, 0, 1, depth, 0.0, 0.0, 1000.0, 0.0, program, memory, False)
+        above = texel_force(0, 0, 1, depth + 1e-9, 0.0, 0.0, 1000.0, 0.0, program, memory, False)[0]
+        below = texel_force(0, 0, 1, depth - 1e-9, 0.0, 0.0, 1000.0, 0.0, program, memory, False)[0]
+        assert slope == pytest.approx((above - below) / 2e-9, rel=1e-4, abs=1e-4)
+        assert surface_force(0, 0, 1, force, slope, depth, 0.0, program, memory, False)[0] <= force + 1e-12
+
+
+@every_form
+def test_the_same_moment_asked_twice_reads_the_same(name, form):
+    item = effect(name, form, seed=2)
+    time, depth, _ = presses(50)
+    reader = Reader((item,), site())
+    reader.read(time, 1000.0 * depth)
+    once = reader.step(time[-1] + 0.5, 1000.0 * depth[30])
+    np.testing.assert_array_equal(reader.step(time[-1] + 0.5, 1000.0 * depth[30]), once)
+
+
+@every_form
+def test_a_toml_table_brings_it_back(name, form):
+    item = effect(name, form, seed=5, gain=300.0)
+    back = from_dict(to_dict(item), gain=300.0)
+    assert back.values == item.values
+    assert (back.name, back.form) == (name, form)
+    assert back.seed == (5 if form_of(name, form).random else 0)
+
+
+@every_form
+def test_seeds(name, form):
+    found, (time, depth, _) = form_of(name, form), presses(60)
+    one, same, other = (readings((effect(name, form, seed=seed),), site(), time, 1000.0 * depth) for seed in (1, 1, 2))
+    np.testing.assert_array_equal(one, same)
+    assert found.random != np.array_equal(one, other)
+
+
+@every_form
+def test_a_value_outside_the_bounds_is_refused(name, form):
+    for parameter in form_of(name, form).parameters:
+        for value in (parameter.low - 1.0, 2.0 * abs(parameter.high) + 1.0, np.nan):
+            with pytest.raises(EffectError, match=f"{parameter.name} of effect '{name}'"):
+                effect(name, form, **{parameter.name: value})
+
+
+def test_wrong_words_get_a_hint():
+    with pytest.raises(EffectError, match="did you mean 'creep'"):
+        effect("crep")
+    with pytest.raises(EffectError, match="did you mean 'exponential'"):
+        effect("creep", "exponental")
+    with pytest.raises(EffectError, match="did you mean 'amount'"):
+        effect("creep", amout=0.1)
+    with pytest.raises(EffectError, match="one number"):
+        effect("creep", amount=[0.1, 0.2])
+    with pytest.raises(EffectError, match="needs name"):
+        from_dict({"form": "exponential"})
+    with pytest.raises(EffectError, match="whole number"):
+        from_dict({"name": "creep", "seed": -1})
+    with pytest.raises(EffectError, match="give it a number"):
+        from_dict({"name": "creep", "amount": "much"})
+
+
+def test_forms_differ_from_one_another():
+    """Two forms with equal formulas would be one too many."""
+    time, depth, slide = presses()
+    for kind in library().values():
+        seen = []
+        for form in kind.forms:
+            item = effect(kind.name, form.name, seed=1)
+            force = forces((item,), PARAMETERS, time, depth, slide)
+            reading = readings((item,), site(), time, force)
+            factor, viscous = friction((item,), np.linspace(0, 1, 9), np.linspace(0.5, 2, 9))
+            moved = placed((item,), site().position, np.ones((12, 3)), np.ones((12, 3)))
+            seen.append(np.concatenate([np.ravel(part) for part in (force, reading, factor, viscous, *moved)]))
+        for i, one in enumerate(seen):
+            assert not any(np.allclose(one, other, rtol=1e-6) for other in seen[:i]), kind.forms[i].name
+
+
+def test_effects_are_plain_data():
+    assert dataclasses.asdict(effect("creep", amount=0.5))["values"] == {"amount": 0.5, "time": 2.0}
