@@ -58,20 +58,24 @@ def forces(
         rate[1:] = np.diff(depth, axis=0) / np.diff(time)[:, None]
     lengths, step = _steps(time)
     inside = np.maximum(depth, 0.0)
-    ordered = [(item, form) for item, form in in_order(effects, readout=False) if form.law is not None]
-    force, clipped = parameters.k * inside, False
-    for item, form in ordered:
+    linear = parameters.normal_law == "linear"
+    force = parameters.k * (inside if linear else inside**parameters.exponent)
+    damping = parameters.cn * rate if linear else 1.5 * parameters.dissipation * rate
+    clipped = False
+    for item, form in in_order(effects, readout=False):
+        if form.law is None or form.constants is None:
+            continue
         if form.after_clip and not clipped:
-            force, clipped = _cut_off(force, inside, parameters.cn * rate), True
-        assert form.constants is not None
+            force, clipped = _cut_off(force, inside, damping, linear), True
         memory = np.zeros((depth.shape[1], form.memory))
         force = law_over_time(form, force, step, form.constants(complete_values(item), lengths), memory, inside, slide)
-    return force if clipped else _cut_off(force, inside, parameters.cn * rate)
+    return force if clipped else _cut_off(force, inside, damping, linear)
 
 
-def _cut_off(elastic: np.ndarray, depth: np.ndarray, damping: np.ndarray) -> np.ndarray:
-    """Elastic force and damping together never pull (Eq. 8)."""
-    return np.where(depth > 0.0, np.maximum(elastic + damping, 0.0), 0.0)
+def _cut_off(elastic: np.ndarray, depth: np.ndarray, damping: np.ndarray, linear: bool) -> np.ndarray:
+    """Elastic force and damping together never pull (Eq. 8, or Hunt and Crossley's law)."""
+    total = elastic + damping if linear else elastic * (1.0 + damping)
+    return np.where(depth > 0.0, np.maximum(total, 0.0), 0.0)
 
 
 def friction(effects: Sequence[Effect], speed: np.ndarray, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -284,11 +284,39 @@ def surface_force(sensor, point, step, force, slope, depth, slide, program, memo
 
 
 @kernel
-def texel_force(sensor, point, step, depth, rate, slide, k, cn, program, memory, commit):
-    """Normal force of a contact point, Eq. 8 with the effects: N; its derivatives by depth (N/m) and by rate (N·s/m)."""
-    force, slope = elastic_force(sensor, point, step, k * depth, k, depth, slide, program, memory, commit)
-    force += cn * rate
-    damping = cn
+def texel_force(sensor, point, step, depth, rate, slide, k, cn, exponent, dissipation, program, memory, commit):
+    """Normal force of a contact point with the effects on it, by the base law of Eq. 8 or of Hunt and Crossley.
+
+    Parameters
+    ----------
+    sensor, point, step, depth, slide, program, memory, commit
+        See :func:`elastic_force`.
+    rate : float, m/s
+        Of the depth, during the step.
+    k, cn, exponent, dissipation : float
+        As in :class:`.SensorParameters`; an exponent of zero is Eq. 8.
+
+    Returns
+    -------
+    force : float, N
+    slope : float, N/m
+        Its derivative by the depth at the step's end.
+    damping : float, N·s/m
+        Its derivative by the rate where the depth stays as it is.
+    """
+    force, slope, damping = 0.0, 0.0, 0.0
+    if depth > 0.0:
+        force, slope = k * depth, k
+        if exponent != 0.0:
+            force = k * depth**exponent
+            slope = exponent * force / depth
+    force, slope = elastic_force(sensor, point, step, force, slope, depth, slide, program, memory, commit)
+    if depth > 0.0:
+        damping = cn
+        if exponent != 0.0:
+            damping = 1.5 * dissipation * force
+            slope *= 1.0 + 1.5 * dissipation * rate
+        force += damping * rate
     if force <= 0.0 or depth <= 0.0:
         force, slope, damping = 0.0, 0.0, 0.0
     force, slope = surface_force(sensor, point, step, force, slope, depth, slide, program, memory, commit)

@@ -19,6 +19,7 @@ every_form = pytest.mark.parametrize(("name", "form"), FORMS, ids=["-".join(name
 
 ROWS, COLUMNS, PITCH = 4, 3, 0.0034
 PARAMETERS = SensorParameters(k=1000.0, cn=10.0)
+BASE = (PARAMETERS.k, PARAMETERS.cn, 0.0, 0.0)
 
 
 def site(gain=1.0, zero=0.0) -> Site:
@@ -101,7 +102,7 @@ def test_sample_by_sample_gives_what_the_whole_signal_gives(name, form):
     rate = np.diff(depth, axis=0, prepend=depth[:1]) / np.where(lengths > 0, lengths, 1.0)[:, None]
     for i in range(len(time)):
         for j in range(depth.shape[1]):
-            asked = (0, j, i, depth[i, j], rate[i, j], slide[i, j], PARAMETERS.k, PARAMETERS.cn, program, memory)
+            asked = (0, j, i, depth[i, j], rate[i, j], slide[i, j], *BASE, program, memory)
             only_asked = texel_force(*asked, False)
             single[i, j] = texel_force(*asked, True)[0]
             assert only_asked[0] == single[i, j]
@@ -119,11 +120,11 @@ def test_the_tangent_is_the_derivative_of_the_force(name, form):
     program = compile_program([(item,)], [0.0, 0.01])
     memory = program.memory(1)
     for depth in (0.0, 5e-4, 1.5e-3, 1.2e-3):
-        texel_force(0, 0, 1, depth, 0.0, 0.0, 1000.0, 0.0, program, memory, True)
+        texel_force(0, 0, 1, depth, 0.0, 0.0, 1000.0, 0.0, 0.0, 0.0, program, memory, True)
     for depth in (1e-3, 1.9e-3):  # on the way back and on the way in
-        force, slope, _ = texel_force(0, 0, 1, depth, 0.0, 0.0, 1000.0, 0.0, program, memory, False)
-        above = texel_force(0, 0, 1, depth + 1e-9, 0.0, 0.0, 1000.0, 0.0, program, memory, False)[0]
-        below = texel_force(0, 0, 1, depth - 1e-9, 0.0, 0.0, 1000.0, 0.0, program, memory, False)[0]
+        force, slope, _ = texel_force(0, 0, 1, depth, 0.0, 0.0, 1000.0, 0.0, 0.0, 0.0, program, memory, False)
+        above = texel_force(0, 0, 1, depth + 1e-9, 0.0, 0.0, 1000.0, 0.0, 0.0, 0.0, program, memory, False)[0]
+        below = texel_force(0, 0, 1, depth - 1e-9, 0.0, 0.0, 1000.0, 0.0, 0.0, 0.0, program, memory, False)[0]
         assert slope == pytest.approx((above - below) / 2e-9, rel=1e-4, abs=1e-4)
         assert surface_force(0, 0, 1, force, slope, depth, 0.0, program, memory, False)[0] <= force + 1e-12
 
@@ -161,6 +162,24 @@ def test_a_value_outside_the_bounds_is_refused(name, form):
         for value in (parameter.low - 1.0, 2.0 * abs(parameter.high) + 1.0, np.nan):
             with pytest.raises(EffectError, match=f"{parameter.name} of effect '{name}'"):
                 effect(name, form, **{parameter.name: value})
+
+
+def test_the_law_of_hunt_and_crossley_is_a_base_as_well():
+    """Step by step as over the whole signal, with an effect between its spring and its damping."""
+    parameters = SensorParameters(k=3e4, normal_law="hunt-crossley", exponent=1.5, dissipation=2.0)
+    time, depth, slide = presses(80)
+    items = (effect("stiffening"), effect("creep"))
+    whole = forces(items, parameters, time, depth)
+    lengths = np.diff(time, prepend=time[0])
+    program = compile_program([items], lengths)
+    memory = program.memory(1)
+    rate = np.diff(depth[:, 0], prepend=depth[0, 0]) / np.where(lengths > 0, lengths, 1.0)
+    for i in range(len(time)):
+        asked = (0, 0, i, depth[i, 0], rate[i], 0.0, 3e4, 0.0, 1.5, 2.0, program, memory)
+        assert texel_force(*asked, True)[0] == pytest.approx(whole[i, 0], rel=1e-9, abs=1e-12)
+    np.testing.assert_allclose(
+        forces((), parameters, time, depth, rate=np.zeros_like(depth)), 3e4 * depth**1.5, rtol=1e-12, atol=1e-12
+    )
 
 
 def test_wrong_words_get_a_hint():
