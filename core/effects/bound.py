@@ -86,7 +86,7 @@ def friction(effects: Sequence[Effect], speed: np.ndarray, force: np.ndarray) ->
     effects : sequence of Effect
     speed, force : (...) float, m/s and N
     """
-    speed, force = np.broadcast_arrays(np.asarray(speed, float), np.asarray(force, float))
+    speed, force = (np.array(values, dtype=float) for values in np.broadcast_arrays(speed, force))
     factor, viscous = np.ones(speed.size), np.zeros(speed.size)
     friction_over_all(speed.ravel(), force.ravel(), compile_program([effects], np.zeros(1)), factor, viscous)
     return factor.reshape(speed.shape), viscous.reshape(speed.shape)
