@@ -32,7 +32,7 @@ COLOR_MAPS = (
 )
 PARAMETERS = (
     "k", "cn", "ct", "sigma0", "sigma1", "x0", "mus", "mud", "max_penetration", "normal_law", "exponent", "dissipation",
-    "gain", "zero", "unit",
+    "points_per_texel", "gain", "zero", "unit",
 )  # fmt: skip
 """Names that :class:`SensorParameters` and :class:`PALPATE_PG_object` share."""
 
@@ -162,6 +162,18 @@ class PALPATE_PG_object(bpy.types.PropertyGroup):
         "Dissipation α (s/m)",
         "dissipation",
         "Hunt–Crossley, s/m: an impact at v m/s leaves with the share 1 - α v",
+    )
+    points_per_texel: EnumProperty(
+        name="Contact Points",
+        description="Per texel, spread over its cell; they share out its stiffness. More of them are slower and make force and "
+        "contact area of small or curved objects exact on coarser pads",
+        items=(
+            ("1", "1", "At the texel's vertex, as in the paper"),
+            ("4", "2 × 2", "Four points per texel"),
+            ("9", "3 × 3", "Nine points per texel"),
+            ("16", "4 × 4", "Sixteen points per texel"),
+        ),
+        **_fixed,
     )
     sigma0: _number(
         "Bristles σ0 (N/m)",

@@ -320,7 +320,8 @@ def _free(obj, body: Body, mesh: TriangleMesh) -> tuple[Body, list[str]]:
 def parameters(settings) -> SensorParameters:
     """Return the parameters of an object's panel."""
     values = {key: getattr(settings, key) for key in properties.PARAMETERS}
-    return SensorParameters(**{key: units.as_typed(v) if isinstance(v, float) else v for key, v in values.items()})
+    values = {key: units.as_typed(v) if isinstance(v, float) else v for key, v in values.items()}
+    return SensorParameters(**{**values, "points_per_texel": int(values["points_per_texel"])})
 
 
 def _sensor(obj, body: int, mesh: TriangleMesh) -> Sensor:

@@ -43,11 +43,20 @@ LINEAR = 0.0
 """In the place of the exponent: Eq. 8. Any other exponent is that of Hunt and Crossley's law."""
 
 
-def parameter_row(parameters: SensorParameters) -> np.ndarray:
-    """Return the numbers of the contact law as the kernels want them, (PARAMETERS,) float."""
+def parameter_row(parameters: SensorParameters, share: float = 1.0) -> np.ndarray:
+    """Return the numbers of the contact law as the kernels want them, (PARAMETERS,) float.
+
+    Parameters
+    ----------
+    parameters : SensorParameters
+    share : float
+        Of the forces of a texel; one of several contact points has only its share of them.
+    """
     p = parameters
     exponent = p.exponent if p.normal_law == HUNT_CROSSLEY else LINEAR
-    return np.array([p.k, p.cn, p.ct, p.sigma0, p.sigma1, p.x0, p.mus, p.mud, exponent, p.dissipation], dtype=float)
+    row = np.array([p.k, p.cn, p.ct, p.sigma0, p.sigma1, p.x0, p.mus, p.mud, exponent, p.dissipation], dtype=float)
+    row[[K, CN, CT, SIGMA0, SIGMA1]] *= share
+    return row
 
 
 def friction_limit(normal_force: np.ndarray, speed: np.ndarray, parameters: SensorParameters) -> np.ndarray:
@@ -64,16 +73,20 @@ def friction_limit(normal_force: np.ndarray, speed: np.ndarray, parameters: Sens
 
 
 class World(NamedTuple):
-    """What does not change during a run: b bodies, m sensors with N texels together, q pairs of sensor and target.
+    """What does not change during a run: b bodies, m sensors with N contact points, q pairs of sensor and target.
 
     Attributes
     ----------
-    texels : (N, 12) float
-        Position, normal, x axis and y axis of each texel, in its body's frame and relative to the body's reference point.
-    texel_start : (m + 1,) int
-    parameters : (m, PARAMETERS) float
+    points : (N, 12) float
+        Position and normal of each contact point, x axis and y axis of its texel, in its body's frame and relative to the
+        body's reference point.
+    point_start : (m + 1,) int
+    texel : (N,) int
+        Whose contact point it is, counted through all sensors.
+    parameters : (q, PARAMETERS) float
+        Of one contact point of each pair's sensor.
     painted : (N, 2) float
-        Multipliers of each texel's stiffness and friction; without rows when nothing is painted.
+        Multipliers of each contact point's stiffness and friction; without rows when nothing is painted.
     reach : (m,) float, metres
         Maximum penetration.
     pairs : (q, 2) int
@@ -83,11 +96,11 @@ class World(NamedTuple):
     slot_start : (q,) int
         Where each pair's memory begins.
     center : (m, 3) float, metres
-        Middle of each sensor's texels and their segments, in its body's frame relative to the reference point.
+        Middle of each sensor's contact points and their segments, in its body's frame relative to the reference point.
     radius : (m,) float, metres
         How far they reach from there.
     skin : (q,) float, metres
-        How far a texel may move at the most before the triangles near it are collected anew.
+        How far a contact point may move at the most before the triangles near it are collected anew.
     free_at : (b,) int
         Place of each free body among the free ones, -1 for keyframed bodies.
     mass : (b,) float, kg
@@ -95,8 +108,9 @@ class World(NamedTuple):
     gravity : (3,) float, m/s²
     """
 
-    texels: np.ndarray
-    texel_start: np.ndarray
+    points: np.ndarray
+    point_start: np.ndarray
+    texel: np.ndarray
     parameters: np.ndarray
     painted: np.ndarray
     reach: np.ndarray
@@ -124,7 +138,7 @@ class State(NamedTuple):
     velocity : (b, 6) float
         Linear (m/s) and angular (rad/s), world axes.
     hint : (s,) int
-        Triangle each texel met last, -1 for none, -2 once it was pressed past its reach.
+        Triangle each contact point met last, -1 for none, -2 once it was pressed past its reach.
     bristles : (s, 4) float
         Bristle deflection (m) in the frame of the sensor's body, and the share of the reach that is pressed in.
     """
@@ -253,7 +267,7 @@ def friction_trace(time, velocity, normal_force, parameters, force):
 
 
 class Neighbours(NamedTuple):
-    """Which triangles each texel can meet; a cache that changes the speed and never the numbers.
+    """Which triangles each contact point can meet; a cache that changes the speed and never the numbers.
 
     Attributes
     ----------
@@ -314,7 +328,7 @@ def _travel(pose, old, pair, center, sensor, radius):
 
 @kernel
 def _keep_lists(pair, sensor, target, pose, world, tree, neighbours):
-    """Collect the triangles near each texel of a pair anew when it has moved by more than the skin of the lists.
+    """Collect the triangles near each contact point of a pair anew when it has moved by more than the skin of the lists.
 
     The skin follows the motion: some thirty steps' travel, so that lists are short and yet seldom made.
     """
@@ -327,14 +341,14 @@ def _keep_lists(pair, sensor, target, pose, world, tree, neighbours):
         too_wide = used == 255.0 and wanted < 0.5 * skin
         if travel <= skin and not too_wide:
             return
-    texels, reach, slot = world.texels, world.reach[sensor], world.slot_start[pair]
-    for texel in range(world.texel_start[sensor], world.texel_start[sensor + 1]):
-        dx = reach * (pose[0] * texels[texel, 3] + pose[1] * texels[texel, 4] + pose[2] * texels[texel, 5])
-        dy = reach * (pose[3] * texels[texel, 3] + pose[4] * texels[texel, 4] + pose[5] * texels[texel, 5])
-        dz = reach * (pose[6] * texels[texel, 3] + pose[7] * texels[texel, 4] + pose[8] * texels[texel, 5])
-        ox = pose[9] + pose[0] * texels[texel, 0] + pose[1] * texels[texel, 1] + pose[2] * texels[texel, 2] - dx
-        oy = pose[10] + pose[3] * texels[texel, 0] + pose[4] * texels[texel, 1] + pose[5] * texels[texel, 2] - dy
-        oz = pose[11] + pose[6] * texels[texel, 0] + pose[7] * texels[texel, 1] + pose[8] * texels[texel, 2] - dz
+    points, reach, slot = world.points, world.reach[sensor], world.slot_start[pair]
+    for point in range(world.point_start[sensor], world.point_start[sensor + 1]):
+        dx = reach * (pose[0] * points[point, 3] + pose[1] * points[point, 4] + pose[2] * points[point, 5])
+        dy = reach * (pose[3] * points[point, 3] + pose[4] * points[point, 4] + pose[5] * points[point, 5])
+        dz = reach * (pose[6] * points[point, 3] + pose[7] * points[point, 4] + pose[8] * points[point, 5])
+        ox = pose[9] + pose[0] * points[point, 0] + pose[1] * points[point, 1] + pose[2] * points[point, 2] - dx
+        oy = pose[10] + pose[3] * points[point, 0] + pose[4] * points[point, 1] + pose[5] * points[point, 2] - dy
+        oz = pose[11] + pose[6] * points[point, 0] + pose[7] * points[point, 1] + pose[8] * points[point, 2] - dz
         neighbours.number[slot] = find_near(ox, oy, oz, dx, dy, dz, target, wanted, neighbours.near, slot, tree)
         slot += 1
     for i in range(12):
@@ -347,7 +361,7 @@ def _keep_lists(pair, sensor, target, pose, world, tree, neighbours):
 def _forget(pair, sensor, world, state):
     """Nothing of this pair touches: no triangle met, no bristle bent."""
     start = world.slot_start[pair]
-    for slot in range(start, start + world.texel_start[sensor + 1] - world.texel_start[sensor]):
+    for slot in range(start, start + world.point_start[sensor + 1] - world.point_start[sensor]):
         if state.hint[slot] != -1:
             state.hint[slot] = -1
             for i in range(4):
@@ -358,8 +372,8 @@ def _forget(pair, sensor, world, state):
 def gather(pair, world, tree, neighbours, state, rotation, rows, slots, used, pose):
     """Collect the contacts of one sensor with one target as rows behind the `used` rows that are there already.
 
-    The segment of a texel runs from its vertex `reach` deep into the sensor; where it enters the target counts. Memory of the
-    pair in `state` is brought up to date: the triangle met, and the bristles, which are zero where nothing touches.
+    The segment of a contact point runs from `reach` deep in the sensor to it; where it enters the target counts. Memory of
+    the pair in `state` is brought up to date: the triangle met, and the bristles, which are zero where nothing touches.
 
     Parameters
     ----------
@@ -381,11 +395,11 @@ def gather(pair, world, tree, neighbours, state, rotation, rows, slots, used, po
     used : int
         Rows in use now.
     sunk : int
-        Texels that were pressed past their maximum penetration and do not act.
+        Contact points that were pressed past their maximum penetration and do not act.
     """
     sensor, target = world.pairs[pair, 0], world.pairs[pair, 1]
     a, b = world.sensor_body[sensor], world.target_body[target]
-    texels, hint, bristles = world.texels, state.hint, state.bristles
+    points, hint, bristles = world.points, state.hint, state.bristles
     reach, root = world.reach[sensor], tree.roots[target]
     _relative_pose(a, b, state.position, rotation, pose)
     if _distance_to_box(pose, world.center, sensor, tree.bounds, root) > world.radius[sensor]:
@@ -393,18 +407,18 @@ def gather(pair, world, tree, neighbours, state, rotation, rows, slots, used, po
         return used, 0
     _keep_lists(pair, sensor, target, pose, world, tree, neighbours)
     sunk, slot = 0, world.slot_start[pair] - 1
-    for texel in range(world.texel_start[sensor], world.texel_start[sensor + 1]):
+    for point in range(world.point_start[sensor], world.point_start[sensor + 1]):
         slot += 1
         before = hint[slot]
         number = neighbours.number[slot]
         if number == 0 and before == -1:
             continue
-        tx = pose[9] + pose[0] * texels[texel, 0] + pose[1] * texels[texel, 1] + pose[2] * texels[texel, 2]
-        ty = pose[10] + pose[3] * texels[texel, 0] + pose[4] * texels[texel, 1] + pose[5] * texels[texel, 2]
-        tz = pose[11] + pose[6] * texels[texel, 0] + pose[7] * texels[texel, 1] + pose[8] * texels[texel, 2]
-        dx = reach * (pose[0] * texels[texel, 3] + pose[1] * texels[texel, 4] + pose[2] * texels[texel, 5])
-        dy = reach * (pose[3] * texels[texel, 3] + pose[4] * texels[texel, 4] + pose[5] * texels[texel, 5])
-        dz = reach * (pose[6] * texels[texel, 3] + pose[7] * texels[texel, 4] + pose[8] * texels[texel, 5])
+        tx = pose[9] + pose[0] * points[point, 0] + pose[1] * points[point, 1] + pose[2] * points[point, 2]
+        ty = pose[10] + pose[3] * points[point, 0] + pose[4] * points[point, 1] + pose[5] * points[point, 2]
+        tz = pose[11] + pose[6] * points[point, 0] + pose[7] * points[point, 1] + pose[8] * points[point, 2]
+        dx = reach * (pose[0] * points[point, 3] + pose[1] * points[point, 4] + pose[2] * points[point, 5])
+        dy = reach * (pose[3] * points[point, 3] + pose[4] * points[point, 4] + pose[5] * points[point, 5])
+        dz = reach * (pose[6] * points[point, 3] + pose[7] * points[point, 4] + pose[8] * points[point, 5])
         ox, oy, oz = tx - dx, ty - dy, tz - dz
         if number >= 0:
             met, triangle, leaving = near_entry(ox, oy, oz, dx, dy, dz, neighbours.near, slot, number, tree.faces)
@@ -433,11 +447,11 @@ def gather(pair, world, tree, neighbours, state, rotation, rows, slots, used, po
         ny = pose[1] * fx + pose[4] * fy + pose[7] * fz
         nz = pose[2] * fx + pose[5] * fy + pose[8] * fz
         rows[used, NX], rows[used, NY], rows[used, NZ] = nx, ny, nz
-        # From the texel's tip back along its normal to the intersection.
+        # From the point back along its normal to the intersection.
         inside = 1.0 - met
-        rows[used, PX] = texels[texel, 0] - inside * reach * texels[texel, 3]
-        rows[used, PY] = texels[texel, 1] - inside * reach * texels[texel, 4]
-        rows[used, PZ] = texels[texel, 2] - inside * reach * texels[texel, 5]
+        rows[used, PX] = points[point, 0] - inside * reach * points[point, 3]
+        rows[used, PY] = points[point, 1] - inside * reach * points[point, 4]
+        rows[used, PZ] = points[point, 2] - inside * reach * points[point, 5]
         rows[used, DEPTH] = inside * abs(dx * fx + dy * fy + dz * fz)
         bristles[slot, 3] = inside
         # What the surface's turn makes stand out of its plane is laid back into it, as long as it was.
@@ -459,27 +473,27 @@ def gather(pair, world, tree, neighbours, state, rotation, rows, slots, used, po
 
 @kernel
 def count_buried(pair, world, tree, state, rotation, pose):
-    """Count the texels of a sensor that are deeper inside a closed target than they reach, and so feel nothing.
+    """Count the contact points of a sensor that are deeper inside a closed target than they reach, and so feel nothing.
 
-    Looked for once a frame by a long segment from each texel's base; the arguments are those of :func:`gather`.
+    Looked for once a frame by a long segment from each segment's base; the arguments are those of :func:`gather`.
     """
     sensor, target = world.pairs[pair, 0], world.pairs[pair, 1]
     _relative_pose(world.sensor_body[sensor], world.target_body[target], state.position, rotation, pose)
-    texels, reach, root = world.texels, world.reach[sensor], tree.roots[target]
+    points, reach, root = world.points, world.reach[sensor], tree.roots[target]
     size = 0.0
     for i in range(3):
         size += tree.bounds[root, 3 + i] - tree.bounds[root, i]
     buried, slot = 0, world.slot_start[pair] - 1
-    for texel in range(world.texel_start[sensor], world.texel_start[sensor + 1]):
+    for point in range(world.point_start[sensor], world.point_start[sensor + 1]):
         slot += 1
         if state.hint[slot] >= 0:
             continue
-        dx = pose[0] * texels[texel, 3] + pose[1] * texels[texel, 4] + pose[2] * texels[texel, 5]
-        dy = pose[3] * texels[texel, 3] + pose[4] * texels[texel, 4] + pose[5] * texels[texel, 5]
-        dz = pose[6] * texels[texel, 3] + pose[7] * texels[texel, 4] + pose[8] * texels[texel, 5]
-        ox = pose[9] + pose[0] * texels[texel, 0] + pose[1] * texels[texel, 1] + pose[2] * texels[texel, 2] - reach * dx
-        oy = pose[10] + pose[3] * texels[texel, 0] + pose[4] * texels[texel, 1] + pose[5] * texels[texel, 2] - reach * dy
-        oz = pose[11] + pose[6] * texels[texel, 0] + pose[7] * texels[texel, 1] + pose[8] * texels[texel, 2] - reach * dz
+        dx = pose[0] * points[point, 3] + pose[1] * points[point, 4] + pose[2] * points[point, 5]
+        dy = pose[3] * points[point, 3] + pose[4] * points[point, 4] + pose[5] * points[point, 5]
+        dz = pose[6] * points[point, 3] + pose[7] * points[point, 4] + pose[8] * points[point, 5]
+        ox = pose[9] + pose[0] * points[point, 0] + pose[1] * points[point, 1] + pose[2] * points[point, 2] - reach * dx
+        oy = pose[10] + pose[3] * points[point, 0] + pose[4] * points[point, 1] + pose[5] * points[point, 2] - reach * dy
+        oz = pose[11] + pose[6] * points[point, 0] + pose[7] * points[point, 1] + pose[8] * points[point, 2] - reach * dz
         within = (
             tree.bounds[root, 0] <= ox <= tree.bounds[root, 3]
             and tree.bounds[root, 1] <= oy <= tree.bounds[root, 4]

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import hashlib
+import math
 from dataclasses import dataclass, field, fields, is_dataclass
 
 import numpy as np
@@ -18,6 +19,10 @@ from .texels import Texels
 HUNT_CROSSLEY = "hunt-crossley"
 NORMAL_LAWS = ("linear", HUNT_CROSSLEY)
 """What the normal force may be: Eq. 8 of the paper, or ``k dᵖ (1 + 3/2 α ḋ)``."""
+
+
+MOST_POINTS = 100
+"""Contact points that a texel may have."""
 
 
 @dataclass(frozen=True)
@@ -48,6 +53,9 @@ class SensorParameters:
         `p` in the law of Hunt and Crossley (J. Appl. Mech. 42, 1975), whose `k` then is in N/mᵖ; 3/2 is Hertz's.
     dissipation : float, s/m
         `α` in that law, which has no `cn`: slow impacts at speed v leave with ``(1 - α v) v``.
+    points_per_texel : int
+        Contact points in the cell of each texel, a square number; they share out all that the texel's spring, damper and
+        bristles do.
     gain, zero : float
         Linear conversion to what the sensor reports: ``reading = zero + gain · force``, in `unit`.
     unit : str
@@ -65,6 +73,7 @@ class SensorParameters:
     normal_law: str = "linear"
     exponent: float = 1.5
     dissipation: float = 0.2
+    points_per_texel: int = 1
     gain: float = 1.0
     zero: float = 0.0
     unit: str = "N"
@@ -79,6 +88,11 @@ class SensorParameters:
             value = getattr(self, key)
             if not (np.isfinite(value) and value >= 0):
                 raise ParameterError(f"{key} of sensor '{name}' is {value:g}: give it a value of zero or more.")
+        if not 1 <= self.points_per_texel <= MOST_POINTS or math.isqrt(self.points_per_texel) ** 2 != self.points_per_texel:
+            raise ParameterError(
+                f"points_per_texel of sensor '{name}' is {self.points_per_texel}: "
+                f"give it a square number, as 1, 4 or 9, of at most {MOST_POINTS}."
+            )
         if self.normal_law not in NORMAL_LAWS:
             raise ParameterError(
                 f"The normal law of sensor '{name}' is '{self.normal_law}': use one of {', '.join(NORMAL_LAWS)}."

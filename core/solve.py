@@ -19,10 +19,12 @@ from .bvh import NEAR, build_tree
 from .contact import DEPTH, NX, NZ, PX, PZ, Neighbours, State, World, count_buried, parameter_row
 from .drive import drive
 from .mesh import is_closed
+from .points import ContactPoints, contact_points
 from .recording import Frame, Recording, SensorFrame
 from .respond import Reader
 from .scenario import Scenario, Sensor, Target
 from .step import advance_frame, feel, gather_all, scratch_for
+from .texels import Texels
 from .timestep import advise
 
 
@@ -151,8 +153,10 @@ class Simulation:
                     )
                     most = max(most, int(buried))
                 rows = slice(int(self._scratch.pair_stop[pair - 1]) if pair else 0, int(self._scratch.pair_stop[pair]))
-                texel = self._scratch.slots[rows] - self._world.slot_start[pair]
+                texel = self._world.texel[self._scratch.slots[rows] - self._world.slot_start[pair]]
                 found = self._scratch.rows[rows]
+                order = np.argsort(found[:, DEPTH], kind="stable")  # of several points of a texel the deepest comes last
+                texel, found = texel[order], found[order]
                 deeper = found[:, DEPTH] > depth[t, texel]
                 texel, found = texel[deeper], found[deeper]
                 depth[t, texel] = found[:, DEPTH]
@@ -170,7 +174,8 @@ class Simulation:
         sensors, targets, total, names = self.scenario.sensors, self.scenario.targets, 0, []
         for pair, (sensor, target) in enumerate(self._world.pairs):
             start = self._world.slot_start[pair]
-            sunk = np.count_nonzero(self._state.hint[start : start + len(sensors[sensor].texels)] == -2)
+            points = self._world.point_start[sensor + 1] - self._world.point_start[sensor]
+            sunk = np.count_nonzero(self._state.hint[start : start + points] == -2)
             if self._closed[target]:
                 buried = count_buried(pair, self._world, self._tree, self._state, self._scratch.rotation, self._scratch.pose)
                 sunk = max(sunk, buried)
@@ -179,8 +184,9 @@ class Simulation:
                 total += sunk
         total = max(total, self._sunk)
         if total:
+            what = "texels" if all(sensor.parameters.points_per_texel == 1 for sensor in sensors) else "contact points"
             self.warnings.append(
-                f"Frame {self.frame}: {total} texels are pressed past their maximum penetration by "
+                f"Frame {self.frame}: {total} {what} are pressed past their maximum penetration by "
                 f"{', '.join(names) or 'an object'} and do not act; press less deep, or raise k or the maximum penetration."
             )
 
@@ -188,7 +194,8 @@ class Simulation:
         """What the sensors feel in the present state."""
         gather_all(self._world, self._tree, self._neighbours, self._state, self._scratch)
         self._warn_of_sunk()
-        n, m = len(self._world.texels), len(self.scenario.sensors)
+        starts = np.cumsum([0] + [len(sensor.texels) for sensor in self.scenario.sensors])
+        n, m = starts[-1], len(self.scenario.sensors)
         force, depth, slip, contact = np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n, dtype=np.bool_)
         shear, net, moment = np.zeros((n, 2)), np.zeros((m, 6)), np.zeros((m, 4))
         feel(self._world, self._state, self._scratch, force, shear, depth, slip, contact, net, moment)
@@ -196,7 +203,7 @@ class Simulation:
         for i, sensor in enumerate(self.scenario.sensors):
             if not sensor.readout:
                 continue
-            own = slice(self._world.texel_start[i], self._world.texel_start[i + 1])
+            own = slice(starts[i], starts[i + 1])
             center = self._center[sensor.body]
             pressed = moment[i, 3] > 0.0
             sensors[sensor.name] = SensorFrame(
@@ -224,17 +231,18 @@ def _world(scenario: Scenario, center: np.ndarray) -> World:
     """Flatten a scenario into the kernels' arrays; `center` (b, 3) is the reference point of each body in its frame."""
     bodies, sensors, targets = scenario.bodies, scenario.sensors, scenario.targets
     free = np.array([body.free for body in bodies])
-    blocks = [
-        np.hstack([s.texels.position - center[s.body], s.texels.normal, s.texels.tangent, s.texels.bitangent]) for s in sensors
-    ]
+    points = [contact_points(s.texels, s.parameters.points_per_texel) for s in sensors]
+    blocks = [_point_rows(s.texels, p, center[s.body]) for s, p in zip(sensors, points, strict=True)]
+    texel_start = np.cumsum([0] + [len(s.texels) for s in sensors])
     pairs = [(i, j) for i, s in enumerate(sensors) for j, t in enumerate(targets) if s.body != t.body]
-    sizes = [len(sensors[i].texels) for i, _ in pairs]
-    extents = [_extent(sensor, center[sensor.body]) for sensor in sensors]
+    sizes = [len(blocks[i]) for i, _ in pairs]
+    extents = [_extent(block, sensor.parameters.max_penetration) for block, sensor in zip(blocks, sensors, strict=True)]
     return World(
-        texels=np.ascontiguousarray(np.vstack(blocks)),
-        texel_start=np.cumsum([0] + [len(s.texels) for s in sensors]),
-        parameters=np.array([parameter_row(s.parameters) for s in sensors]),
-        painted=_painted(sensors),
+        points=np.ascontiguousarray(np.vstack(blocks)),
+        point_start=np.cumsum([0] + [len(block) for block in blocks]),
+        texel=np.concatenate([p.texel + start for p, start in zip(points, texel_start, strict=False)]),
+        parameters=np.array([parameter_row(p := sensors[i].parameters, 1.0 / p.points_per_texel) for i, _ in pairs]),
+        painted=_painted(sensors, points),
         reach=np.array([s.parameters.max_penetration for s in sensors], dtype=float),
         pairs=np.array(pairs),
         sensor_body=np.array([s.body for s in sensors]),
@@ -250,24 +258,30 @@ def _world(scenario: Scenario, center: np.ndarray) -> World:
     )
 
 
-def _painted(sensors: tuple[Sensor, ...]) -> np.ndarray:
-    """(N, 2) multipliers of stiffness and friction of all texels; no rows when no sensor is painted."""
+def _painted(sensors: tuple[Sensor, ...], points: list[ContactPoints]) -> np.ndarray:
+    """(N, 2) multipliers of stiffness and friction of all contact points; no rows when no sensor is painted."""
     if all(s.painted.k is None and s.painted.friction is None for s in sensors):
         return np.zeros((0, 2))
-    ones = [np.ones(len(s.texels)) for s in sensors]
     columns = [
-        np.concatenate([one if values is None else values for one, values in zip(ones, chosen, strict=True)])
+        np.concatenate(
+            [np.ones(len(p.texel)) if values is None else values[p.texel] for p, values in zip(points, chosen, strict=True)]
+        )
         for chosen in ([s.painted.k for s in sensors], [s.painted.friction for s in sensors])
     ]
     return np.ascontiguousarray(np.column_stack(columns), dtype=float)
 
 
-def _extent(sensor: Sensor, reference: np.ndarray) -> tuple[np.ndarray, float]:
-    """Middle and radius of a sensor's texels and the segments behind them, relative to the body's reference point."""
-    texels, reach = sensor.texels, sensor.parameters.max_penetration
-    points = np.vstack([texels.position, texels.position - reach * texels.normal]) - reference
-    middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
-    return middle, float(np.linalg.norm(points - middle, axis=1).max())
+def _point_rows(texels: Texels, points: ContactPoints, reference: np.ndarray) -> np.ndarray:
+    """Rows of :attr:`.World.points`."""
+    position, normal = points.positions(texels.position) - reference, points.normals(texels.normal)
+    return np.hstack([position, normal, texels.tangent[points.texel], texels.bitangent[points.texel]])
+
+
+def _extent(points: np.ndarray, reach: float) -> tuple[np.ndarray, float]:
+    """Middle and radius of contact points (rows of :attr:`.World.points`) and the segments behind them."""
+    ends = np.vstack([points[:, :3], points[:, :3] - reach * points[:, 3:6]])
+    middle = 0.5 * (ends.min(axis=0) + ends.max(axis=0))
+    return middle, float(np.linalg.norm(ends - middle, axis=1).max())
 
 
 def _skin(sensor: Sensor, target: Target) -> float:
@@ -292,7 +306,7 @@ def _start(scenario: Scenario, world: World, center: np.ndarray) -> State:
     velocity = [
         np.concatenate([body.velocity, body.angular_velocity]) if body.free else np.zeros(6) for body in scenario.bodies
     ]
-    slots = sum(len(scenario.sensors[sensor].texels) for sensor, _ in world.pairs)
+    slots = int(np.diff(world.point_start)[world.pairs[:, 0]].sum())
     return State(
         position=origin + np.einsum("bij,bj->bi", rotation_matrices(quaternion), center),
         quaternion=quaternion,

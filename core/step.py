@@ -165,21 +165,21 @@ def _values(motion):
 
 
 @kernel
-def _law(parameters, sensor):
-    """A sensor's parameters as a tuple, for the same reason."""
+def _law(parameters, pair):
+    """A pair's parameters as a tuple, for the same reason."""
     return (
-        parameters[sensor, 0], parameters[sensor, 1], parameters[sensor, 2], parameters[sensor, 3],
-        parameters[sensor, 4], parameters[sensor, 5], parameters[sensor, 6], parameters[sensor, 7],
-        parameters[sensor, 8], parameters[sensor, 9],
+        parameters[pair, 0], parameters[pair, 1], parameters[pair, 2], parameters[pair, 3],
+        parameters[pair, 4], parameters[pair, 5], parameters[pair, 6], parameters[pair, 7],
+        parameters[pair, 8], parameters[pair, 9],
     )  # fmt: skip
 
 
 @kernel
-def _painted_law(p, painted, texel):
-    """A sensor's parameters with the multipliers of one of its texels; `p` itself where nothing is painted."""
+def _painted_law(p, painted, point):
+    """A sensor's parameters with the multipliers of one of its contact points; `p` itself where nothing is painted."""
     if len(painted) == 0:
         return p
-    k, friction = painted[texel, 0], painted[texel, 1]
+    k, friction = painted[point, 0], painted[point, 1]
     return (p[0] * k, p[1] * k, p[2], p[3], p[4], p[5], p[6] * friction, p[7] * friction, p[8], p[9])
 
 
@@ -196,7 +196,7 @@ def _velocity(rows, r, motion):
 
 @kernel
 def gather_all(world, tree, neighbours, state, scratch):
-    """Contacts of all pairs of sensor and target where the bodies are now. Returns how many texels are sunk too deep to act."""
+    """Contacts of all pairs of sensor and target where the bodies are now. Returns how many points are sunk too deep to act."""
     for body in range(len(state.position)):
         write_rotation(state.quaternion[body], scratch.rotation[body])
     used, sunk = 0, 0
@@ -246,9 +246,8 @@ def _solve_velocities(dt, world, state, scratch):
             if start < stop:
                 _relative_motion(a, b, scratch.twist, state.position, scratch.rotation, scratch.motion)
                 _relative_motion(a, b, scratch.known, state.position, scratch.rotation, scratch.part)
-                sensor = world.pairs[pair, 0]
-                first = world.texel_start[sensor] - world.slot_start[pair]
-                _sum_contacts(start, stop, dt, _law(world.parameters, sensor), world.painted, first, scratch)
+                first = world.point_start[world.pairs[pair, 0]] - world.slot_start[pair]
+                _sum_contacts(start, stop, dt, _law(world.parameters, pair), world.painted, first, scratch)
                 if free_at[a] >= 0 or free_at[b] >= 0:
                     _add_pair(a, b, dt, world, state, scratch)
             start = stop
@@ -288,7 +287,7 @@ def _solve_velocities(dt, world, state, scratch):
 def _sum_contacts(start, stop, dt, law, painted, first, scratch):
     """Linearise the contacts of a pair, and sum their forces on the target and what they resist.
 
-    The texel of a row is `first` plus its slot.
+    The contact point of a row is `first` plus its slot.
 
     With a contact's damping tensor ``C = ct 1 + (cn - ct) n nᵀ`` and velocities ``v + ω × p`` the block is the sum of
     ``Jᵀ C J``, its lower triangle; the wrench is what the springs and the known part of the motion do.
@@ -456,7 +455,7 @@ def advance_frame(dt, path_position, path_quaternion, path_velocity, world, tree
     Returns
     -------
     sunk : int
-        Most texels that were sunk too deep to act in any one step.
+        Most contact points that were sunk too deep to act in any one step.
     """
     worst = 0
     for step in range(len(path_velocity)):
@@ -514,16 +513,17 @@ def feel(world, state, scratch, force, shear, depth, slip, contact, net, moment)
 
     `net` gets force and torque about the body's reference point, `moment` the sum of fn · point and of fn.
     """
-    rows, texels, start = scratch.rows, world.texels, 0
+    rows, points, start = scratch.rows, world.points, 0
     strongest = np.full(len(force), -1.0)
     for pair in range(len(world.pairs)):
         sensor = world.pairs[pair, 0]
         a, b = world.sensor_body[sensor], world.target_body[world.pairs[pair, 1]]
-        law = _law(world.parameters, sensor)
+        law = _law(world.parameters, pair)
         _relative_motion(a, b, scratch.twist, state.position, scratch.rotation, scratch.motion)
         for r in range(start, scratch.pair_stop[pair]):
-            texel = world.texel_start[sensor] + scratch.slots[r] - world.slot_start[pair]
-            p = _painted_law(law, world.painted, texel)
+            point = world.point_start[sensor] + scratch.slots[r] - world.slot_start[pair]
+            texel = world.texel[point]
+            p = _painted_law(law, world.painted, point)
             nx, ny, nz = rows[r, NX], rows[r, NY], rows[r, NZ]
             vx, vy, vz = _velocity(rows, r, scratch.motion)
             rate = vx * nx + vy * ny + vz * nz
@@ -540,10 +540,10 @@ def feel(world, state, scratch, force, shear, depth, slip, contact, net, moment)
                 fx = friction_force(zx, bristle_rate(zx, tx, square, fn, p), tx, p)
                 fy = friction_force(zy, bristle_rate(zy, ty, square, fn, p), ty, p)
                 fz = friction_force(zz, bristle_rate(zz, tz, square, fn, p), tz, p)
-            shear[texel, 0] += fx * texels[texel, 6] + fy * texels[texel, 7] + fz * texels[texel, 8]
-            shear[texel, 1] += fx * texels[texel, 9] + fy * texels[texel, 10] + fz * texels[texel, 11]
+            shear[texel, 0] += fx * points[point, 6] + fy * points[point, 7] + fz * points[point, 8]
+            shear[texel, 1] += fx * points[point, 9] + fy * points[point, 10] + fz * points[point, 11]
             fx, fy, fz = fx + fn * nx, fy + fn * ny, fz + fn * nz
-            if fn > strongest[texel]:  # the slip is that of the target which presses hardest
+            if fn > strongest[texel]:  # the slip is that of the target and the point which press hardest
                 strongest[texel] = fn
                 slip[texel] = math.sqrt(square)
             contact[texel] = True

@@ -85,6 +85,7 @@ class Contact(Part):
             column.prop(settings, "exponent")
             column.prop(settings, "dissipation")
         column.prop(settings, "max_penetration")
+        column.prop(settings, "points_per_texel")
         painted(layout, settings, "k")
 
 
