@@ -29,4 +29,5 @@ def put_parameters(obj, values: SensorParameters) -> None:
         raise SceneError(f"'{obj.name}' is no sensor: make it one with Physics › Palpate › Make Sensor first.")
     values.check(obj.name)
     for key in properties.PARAMETERS:
-        setattr(obj.palpate, key, getattr(values, key))
+        value = getattr(values, key)
+        setattr(obj.palpate, key, str(value) if key == "points_per_texel" else value)

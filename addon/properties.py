@@ -167,12 +167,10 @@ class PALPATE_PG_object(bpy.types.PropertyGroup):
         name="Contact Points",
         description="Per texel, spread over its cell; they share out its stiffness. More of them are slower and make force and "
         "contact area of small or curved objects exact on coarser pads",
-        items=(
+        items=[
             ("1", "1", "At the texel's vertex, as in the paper"),
-            ("4", "2 × 2", "Four points per texel"),
-            ("9", "3 × 3", "Nine points per texel"),
-            ("16", "4 × 4", "Sixteen points per texel"),
-        ),
+            *((str(n * n), f"{n} × {n}", f"{n * n} points in the cell of each texel") for n in range(2, 11)),
+        ],
         **_fixed,
     )
     sigma0: _number(

@@ -244,3 +244,15 @@ def test_a_pad_is_not_read_out():
     table = grid("Table", (0.1, 0.0, 0.0))
     table.palpate.role = "PAD"
     assert [(s.name, s.readout) for s in sampled(scene)[0].sensors] == [("Pad", True), ("Table", False)]
+
+
+def test_contact_points_and_normal_law_go_there_and_back():
+    from palpate.addon import exchange
+
+    scene, pad, _ = press()
+    pad.palpate.points_per_texel, pad.palpate.normal_law, pad.palpate.exponent = "9", "hunt-crossley", 2.0
+    found = sampled(scene)[0].sensors[0].parameters
+    assert (found.points_per_texel, found.normal_law, found.exponent) == (9, "hunt-crossley", 2.0)
+    pad.palpate.points_per_texel, pad.palpate.normal_law = "1", "linear"
+    exchange.put_parameters(pad, found)
+    assert sampled(scene)[0].sensors[0].parameters == found
