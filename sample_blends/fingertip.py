@@ -19,7 +19,7 @@ FINGER, ROD = "Fingertip", "Rod"
 def build(scene) -> None:
     """Fill `scene`, which is emptied first; the add-on's classes must be registered."""
     studio.prepare(scene, FRAME_END, FPS)
-    vertices, faces = _capsule()
+    vertices, faces = capsule()
     finger = studio.mesh_object(scene, FINGER, vertices, faces)
     finger.data.materials.append(studio.material("Rubber", (0.035, 0.036, 0.04), roughness=0.55))
     # The upper side, down to 60 degrees from the top.
@@ -51,7 +51,7 @@ def build(scene) -> None:
     scene.frame_set(scene.frame_start)
 
 
-def _capsule():
+def capsule():
     """Vertices and faces of a capsule along y, rounded at its far end, flat at the near one."""
     sides, caps, straight = 32, 8, 12
     profile = [(-LENGTH + LENGTH * i / straight, RADIUS) for i in range(straight + 1)]

@@ -295,3 +295,44 @@ def stage(scene, paper, aim, camera, size: float = 1.0) -> None:
     scene.camera = made
     made.data.lens, made.data.clip_end = 70.0, 5000.0
     made.location, made.rotation_euler = camera, look_at(camera, aim)
+
+
+def explain(text: str) -> None:
+    """Put a text into the file that says what it shows; the text editor shows it under "Read me"."""
+    made = bpy.data.texts.new("Read me")
+    made.from_string(text)
+
+
+def frame_objects(scene, objects, region=(0.06, 0.06, 0.94, 0.94), size=(960, 720)) -> None:
+    """Set the size of the picture (pixels) and let the camera frame the objects where they are now."""
+    from ..addon import render
+
+    scene.render.resolution_x, scene.render.resolution_y = size
+    bpy.context.view_layer.update()
+    render.frame_camera(scene, render.corners(objects), region)
+
+
+def needles(scene, sensor, length: float, look, radius: float = 0.26):
+    """Return thin needles on all texels of a sensor, along their normals and `length` long; they follow the sensor."""
+    from ..addon import meshes
+    from ..core.mesh import checked_mesh
+    from ..core.texels import texels_from_region
+
+    data = sensor.data
+    data.calc_loop_triangles()
+    triangles = [triangle.vertices[:] for triangle in data.loop_triangles]
+    quads = [face.vertices[:] for face in data.polygons if len(face.vertices) == 4]
+    mesh, _ = checked_mesh(
+        np.array([v.co[:] for v in data.vertices]) * 1e-3, np.array(triangles), sensor.name, np.array(quads, int).reshape(-1, 4)
+    )
+    texels = texels_from_region(mesh, meshes.region(sensor, len(data.vertices)), sensor.name)
+    side = np.array([[1.0, 0.0], [-0.5, 0.866], [-0.5, -0.866]]) * radius
+    foot = texels.position * 1e3  # studio scenes are in mm
+    corners = [foot + a * texels.tangent + b * texels.bitangent for a, b in side]
+    points = np.stack([*corners, foot + length * texels.normal], axis=1).reshape(-1, 3)
+    first = 4 * np.arange(len(texels))
+    faces = np.concatenate([np.stack([first + i, first + (i + 1) % 3, first + 3], axis=1) for i in range(3)])
+    made = mesh_object(scene, f"Normals of {sensor.name}", points, faces, smooth=False)
+    made.parent = sensor
+    made.data.materials.append(look)
+    return made

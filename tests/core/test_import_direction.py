@@ -23,9 +23,10 @@ MAY_IMPORT = {
     "addon": {"core"},
     "operators": {"core", "addon"},
     "panels": {"core", "addon", "operators"},
-    "commands": {"core", "addon", "sample_blends"},
+    "commands": {"core", "addon", "paper", "sample_blends"},
+    "paper": {"core", "addon", "sample_blends"},
     "sample_blends": {"core", "addon"},
-    "": {"core", "addon", "operators", "panels", "commands", "sample_blends"},
+    "": {"core", "addon", "operators", "panels", "commands", "paper", "sample_blends"},
 }
 BLENDER = {
     "bpy",

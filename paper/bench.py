@@ -1,0 +1,58 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the experiments share: a built scene, its scenario, its bake, its render."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+from ..addon import bake as baking
+from ..addon import render, sample
+from ..core.drive import drive
+from ..core.recording import Recording
+from ..core.scenario import Scenario
+
+SAMPLES = 12
+"""Samples per pixel of the renders: soft light needs few, and the denoiser does the rest."""
+
+
+def fresh(build: Callable) -> bpy.types.Scene:
+    """Return the scene of an empty file, filled by a sample's `build`."""
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    build(bpy.context.scene)
+    return bpy.context.scene
+
+
+def scenario_of(scene) -> Scenario:
+    """Return what the solver is given for a scene."""
+    scenario, _ = drive(sample.sample_scenario(scene))
+    return scenario
+
+
+def bake(scene, folder: Path, on_progress=None) -> Recording:
+    """Bake a scene into a folder, so that its heat maps show, and return the recording."""
+    scene.palpate.folder = str(folder)
+    return drive(baking.bake(scene), on_progress).recording
+
+
+def picture(scene, path: Path, frame: int, size=(640, 480)) -> Path:
+    """Render one frame."""
+    return render.render_frame(scene, path, frame, samples=SAMPLES, size=size)
+
+
+def with_mass(scenario: Scenario, name: str, mass: float) -> Scenario:
+    """Return the scenario with a free body of another mass, its inertia in proportion."""
+    bodies = tuple(
+        replace(body, mass=mass, inertia=np.asarray(body.inertia) * (mass / body.mass)) if body.name == name else body
+        for body in scenario.bodies
+    )
+    return replace(scenario, bodies=bodies)
+
+
+def place_of(recording: Recording, name: str) -> np.ndarray:
+    """(F, 3) float, metres: where a body was at every frame."""
+    return recording.poses[:, recording.body_names.index(name), :3]

@@ -1,0 +1,83 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The paper's Fig. 1 to 3: sensors made from a grid, from a sphere and from a fingertip, with every texel's normal drawn."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from . import fingertip, studio
+
+FPS = 24
+FRAME_END = 24
+GRID, SPHERE, TIP = "Grid", "Sphere", "Fingertip"
+SPHERE_RADIUS, BALL_RADIUS = 12.0, 7.0  # mm
+NEEDLE = 5.0  # mm, as long as the deepest penetration
+
+TEXT = """\
+Any mesh is a sensor (paper, section 3.1, Fig. 1 to 3)
+
+A grid, a sphere and a fingertip. Each vertex is a texel; the needles are the texels' normals, the sum of the unit normals of
+the triangles around the vertex, as long as the maximum penetration. A ball is pressed on each.
+"""
+
+
+def build(scene) -> None:
+    """Fill `scene`, which is emptied first; the add-on's classes must be registered."""
+    studio.prepare(scene, FRAME_END, FPS)
+    rubber = studio.material("Rubber", (0.10, 0.16, 0.22), roughness=0.6)
+    needle = studio.material("Normals", (0.85, 0.35, 0.06), roughness=0.5)
+    sensors = [_grid(scene), _sphere(scene), _tip(scene)]
+    steel = studio.ghost_steel("Steel, seen through", clear=0.75, edge=0.8)
+    for sensor, top in sensors:
+        sensor.data.materials.append(rubber)
+        settings = sensor.palpate
+        settings.role, settings.max_penetration = "SENSOR", 1e-3 * NEEDLE
+        settings.k, settings.cn = 30.0, 0.3
+        studio.needles(scene, sensor, NEEDLE, needle)
+        ball = studio.ball(scene, f"Ball on {sensor.name}", BALL_RADIUS)
+        ball.data.materials.append(steel)
+        ball.palpate.role = "TARGET"
+        for frame, depth in ((1, -16.0), (14, 2.0), (24, 2.0)):
+            ball.location = (sensor.location.x, sensor.location.y, top + BALL_RADIUS - depth)
+            ball.keyframe_insert("location", frame=frame)
+    paper = studio.material("Backdrop", (0.30, 0.32, 0.35), roughness=0.85)
+    studio.stage(scene, paper, aim=(0.0, 0.0, 15.0), camera=(60.0, -230.0, 150.0), size=0.6)
+    scene.frame_set(scene.frame_start)
+    studio.frame_objects(scene, [sensor for sensor, _ in sensors], region=(0.06, 0.06, 0.94, 0.62), size=(1100, 600))
+    studio.explain(TEXT)
+
+
+def _grid(scene):
+    vertices, faces, texels = studio.pad_mesh(10, 10, 3.0, 4.0, 6.0)
+    sensor = studio.mesh_object(scene, GRID, vertices, faces)
+    sensor.location = (-46.0, 0.0, 14.0)
+    _choose(sensor, texels)
+    return sensor, 14.0
+
+
+def _sphere(scene):
+    import bmesh
+
+    made = bmesh.new()
+    bmesh.ops.create_icosphere(made, subdivisions=3, radius=SPHERE_RADIUS)
+    sensor = studio.mesh_object(scene, SPHERE, [v.co for v in made.verts], [[v.index for v in f.verts] for f in made.faces])
+    made.free()
+    sensor.location = (0.0, 0.0, 14.0)
+    up = [v.index for v in sensor.data.vertices if v.co.z > -0.2 * SPHERE_RADIUS]
+    _choose(sensor, up)
+    return sensor, 14.0 + SPHERE_RADIUS
+
+
+def _tip(scene):
+    vertices, faces = fingertip.capsule()
+    sensor = studio.mesh_object(scene, TIP, vertices, faces)
+    sensor.location, sensor.rotation_euler = (44.0, 0.0, 14.0), (0.0, 0.0, math.radians(-125.0))
+    _choose(sensor, np.flatnonzero((vertices[:, 2] > 0.2 * fingertip.RADIUS) & (vertices[:, 1] > -14.0)))
+    return sensor, 14.0 + fingertip.RADIUS
+
+
+def _choose(sensor, vertices) -> None:
+    sensor.vertex_groups.new(name="tactile").add([int(i) for i in vertices], 1.0, "REPLACE")
+    sensor.palpate.region, sensor.palpate.vertex_group = "GROUP", "tactile"

@@ -1,0 +1,132 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A parallel gripper in the manner of a Schunk PG70 with a 14 × 6 tactile pad on each finger, and what it grasps.
+
+The fingers close along x; the rows of the pads run upwards. Lengths are millimetres.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from . import studio
+
+ROWS, COLUMNS, PITCH = 14, 6, 3.4
+PAD_WIDE, PAD_TALL = (COLUMNS - 1) * PITCH, (ROWS - 1) * PITCH
+MARGIN, THICKNESS = 0.5 * PITCH + 1.0, 6.0
+LEFT, RIGHT = "Left finger", "Right finger"
+
+K, CN, SIGMA0, SIGMA1 = 58.5, 0.585, 30.0, 0.3
+"""The paper's foam, with 1 % damping and bristles half as stiff as the foam: with Table 2's 1 N/m a grasped object would sag by
+a centimetre before friction holds it."""
+
+
+def materials() -> dict:
+    """Return the gripper's materials by name."""
+    return {
+        "rubber": studio.material("Rubber", (0.035, 0.036, 0.04), roughness=0.55),
+        "black": studio.material("Black anodised", (0.012, 0.012, 0.014), metallic=0.6, roughness=0.32),
+        "aluminium": studio.material("Aluminium", (0.55, 0.57, 0.6), metallic=1.0, roughness=0.34),
+    }
+
+
+def finger(scene, side: int, gap: float, height: float, look: dict):
+    """Return one finger's pad, a sensor, with its block as a child.
+
+    Parameters
+    ----------
+    side : {-1, 1}
+        The left finger stands at x < 0 and looks towards +x.
+    gap : float, mm
+        From the pad's surface to the middle plane.
+    height : float, mm
+        Of the pad's middle.
+    """
+    from mathutils import Matrix
+
+    name = LEFT if side < 0 else RIGHT
+    vertices, faces, texels = studio.pad_mesh(ROWS, COLUMNS, PITCH, MARGIN, THICKNESS, rounding=0.8)
+    pad = studio.mesh_object(scene, name, vertices, faces)
+    pad.data.materials.append(look["rubber"])
+    pad.vertex_groups.new(name="tactile").add(texels, 1.0, "REPLACE")
+    # Columns of the rotation: the pad's own x, y and z axis in the world. It looks inwards, and its rows run upwards.
+    inwards = -float(side)
+    turn = Matrix(((0.0, 0.0, inwards), (inwards, 0.0, 0.0), (0.0, 1.0, 0.0)))
+    pad.rotation_euler = turn.to_euler()
+    pad.location = (side * gap, 0.0, height)
+
+    tall = PAD_TALL + 2 * MARGIN
+    block = studio.box(scene, f"{name} block", (PAD_WIDE + 2 * MARGIN + 3, tall + 34, 9.0), bevel=1.6)
+    block.parent, block.location = pad, (0.0, 15.0, -THICKNESS - 4.0)
+    block.data.materials.append(look["black"])
+    foot = studio.box(scene, f"{name} foot", (PAD_WIDE + 2 * MARGIN + 3, 14.0, 26.0), bevel=1.6)
+    foot.parent, foot.location = pad, (0.0, tall / 2 + 27.0, -THICKNESS - 6.0)
+    foot.data.materials.append(look["aluminium"])
+
+    settings = pad.palpate
+    settings.role, settings.region, settings.vertex_group = "SENSOR", "GROUP", "tactile"
+    settings.k, settings.cn, settings.sigma0, settings.sigma1 = K, CN, SIGMA0, SIGMA1
+    return pad
+
+
+def housing(scene, height: float, look: dict):
+    """Return the gripper's body, which carries both fingers; `height` (mm) is that of the middle of the pads."""
+    z = height + (PAD_TALL + 2 * MARGIN) / 2 + 27.0 + 7.0 + 21.0
+    body = studio.box(scene, "Gripper", (150.0, 56.0, 42.0), bevel=4.0)
+    body.location = (0.0, 0.0, z)
+    body.data.materials.append(look["aluminium"])
+    rail = studio.box(scene, "Gripper rail", (140.0, 30.0, 8.0), bevel=1.0)
+    rail.parent, rail.location = body, (0.0, 0.0, -20.0)
+    rail.data.materials.append(look["black"])
+    flange = studio.cylinder(scene, "Gripper flange", 24.0, 20.0, bevel=1.5)
+    flange.parent, flange.location = body, (0.0, 0.0, 30.0)
+    flange.data.materials.append(look["black"])
+    return body
+
+
+def lathe(profile, sides: int = 64):
+    """Return vertices and faces of a body of revolution about z, closed at both ends.
+
+    Parameters
+    ----------
+    profile : (m, 2) float, mm
+        Radius and height, from the bottom up; radii above zero.
+    """
+    profile = np.asarray(profile, float)
+    angle = np.arange(sides) * 2 * math.pi / sides
+    rings = [np.stack([r * np.cos(angle), r * np.sin(angle), np.full(sides, z)], axis=1) for r, z in profile]
+    faces = [
+        (j * sides + i, j * sides + (i + 1) % sides, (j + 1) * sides + (i + 1) % sides, (j + 1) * sides + i)
+        for j in range(len(profile) - 1)
+        for i in range(sides)
+    ]
+    top = (len(profile) - 1) * sides
+    faces += [tuple(range(sides - 1, -1, -1)), tuple(range(top, top + sides))]
+    return np.concatenate(rings), faces
+
+
+def spray_bottle(scene, name: str):
+    """Return a spray bottle with a waist where fingers take it, its origin there; head and trigger are children."""
+    t = np.linspace(0.0, 1.0, 33)
+    body = [(21.0, -48.0), (23.5, -46.5), (24.0, -44.0)]
+    # From the belly through the waist to the shoulder: one smooth wave, then a quarter turn up to the neck.
+    body += [(24.0 - 6.5 * math.sin(math.pi * s) ** 2 - 2.0 * s, -44.0 + 78.0 * s) for s in t[1:]]
+    body += [(8.0 + 14.0 * math.cos(a), 34.0 + 10.0 * math.sin(a)) for a in np.linspace(0.0, math.pi / 2, 9)[1:]]
+    body += [(8.0, 52.0)]
+    vertices, faces = lathe(body)
+    bottle = studio.mesh_object(scene, name, vertices, faces)
+    plastic = studio.material("Blue plastic, seen through", (0.05, 0.22, 0.6), roughness=0.25)
+    bottle.data.materials.append(plastic)
+    white = studio.material("White plastic", (0.8, 0.8, 0.78), roughness=0.4)
+    cap = studio.cylinder(scene, f"{name} cap", 10.5, 12.0, (0.0, 0.0, 57.0), bevel=0.8)
+    head = studio.box(scene, f"{name} head", (13.0, 42.0, 13.0), bevel=3.0)
+    head.location = (0.0, -9.0, 69.0)
+    trigger = studio.box(scene, f"{name} trigger", (6.0, 4.0, 24.0), bevel=1.2)
+    trigger.location, trigger.rotation_euler = (0.0, -21.0, 54.0), (math.radians(-24), 0.0, 0.0)
+    nozzle = studio.cylinder(scene, f"{name} nozzle", 3.4, 7.0, (0.0, -32.5, 69.0), bevel=0.5)
+    nozzle.rotation_euler = (math.pi / 2, 0.0, 0.0)
+    for part in (cap, head, trigger, nozzle):
+        part.parent = bottle
+        part.data.materials.append(white)
+    return bottle

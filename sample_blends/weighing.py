@@ -1,0 +1,66 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The paper's section 5.1: a cube of steel that comes to rest on a finger's pad, level (Table 3) or tilted (Fig. 9)."""
+
+from __future__ import annotations
+
+import math
+
+from . import studio
+
+FPS = 24
+FRAME_END = 48
+EDGE = 50.0  # mm: 1 kg of steel
+PITCH = 3.4  # mm
+ROWS, COLUMNS = 14, 6
+HEIGHT = 16.0  # mm, of the pad's upper side above the table
+PAD, CUBE = "Finger", "Cube"
+K, CN = 1000.0, 10.0
+"""Stiffness (N/m) and damping (N·s/m) of one texel in section 5.1."""
+SIGMA0, SIGMA1 = 1000.0, 10.0
+"""Bristles as stiff as the foam. Table 2's 1 N/m would let 1 kg at 10 degrees travel 20 mm before it is held."""
+
+TEXT = """\
+Weighing (paper, section 5.1.1, Table 3)
+
+A 14 x 6 pad (k = 1000 N/m, cn = 10 N s/m per texel, as in the paper) carries a cube of steel. Once it has come to rest the
+normal forces of all texels add up to its weight. Change the cube's mass under Physics > Palpate to weigh something else.
+
+Press Space to play, or Bake for tactile images and keyframes.
+"""
+
+
+def build(scene) -> None:
+    """Fill `scene`, which is emptied first; the add-on's classes must be registered."""
+    weigh(scene, 1.0, 0.0)
+    studio.explain(TEXT)
+
+
+def weigh(scene, mass: float, tilt: float, frame_end: int = FRAME_END, fps: int = FPS) -> None:
+    """Put a cube of `mass` (kg) on a pad that is tilted by `tilt` degrees about x, so along its rows."""
+    studio.prepare(scene, frame_end, fps)
+    rubber = studio.material("Rubber", (0.035, 0.036, 0.04), roughness=0.55)
+    vertices, faces, texels = studio.pad_mesh(ROWS, COLUMNS, PITCH, 0.9 * PITCH + 0.6, 6.0)
+    pad = studio.mesh_object(scene, PAD, vertices, faces)
+    pad.data.materials.append(rubber)
+    pad.vertex_groups.new(name="tactile").add(texels, 1.0, "REPLACE")
+    turn = math.radians(tilt)
+    pad.location, pad.rotation_euler = (0.0, 0.0, HEIGHT), (turn, 0.0, 0.0)
+
+    cube = studio.box(scene, CUBE, (EDGE,) * 3, bevel=1.2, flat_bottom=True)
+    cube.data.materials.append(studio.ghost_steel("Steel, seen through", clear=0.86, edge=0.3))
+    cube.data.materials.append(studio.material("Steel", studio.STEEL, metallic=1.0, roughness=0.16))
+    cube.modifiers["Bevel"].material = 1
+    up = EDGE / 2 + 0.1
+    cube.location = (0.0, -up * math.sin(turn), HEIGHT + up * math.cos(turn))
+    cube.rotation_euler = (turn, 0.0, 0.0)
+
+    pad.palpate.role, pad.palpate.region, pad.palpate.vertex_group = "SENSOR", "GROUP", "tactile"
+    pad.palpate.k, pad.palpate.cn = K, CN
+    pad.palpate.sigma0, pad.palpate.sigma1 = SIGMA0, SIGMA1
+    cube.palpate.role, cube.palpate.body, cube.palpate.mass = "TARGET", "FREE", mass
+    scene.palpate.use_auto_dt, scene.palpate.dt = False, 1e-4  # the paper's step
+    scene.palpate.color_map = "MAGMA"
+
+    paper = studio.material("Backdrop", (0.30, 0.32, 0.35), roughness=0.85)
+    studio.stage(scene, paper, aim=(0.0, 0.0, 25.0), camera=(190.0, -170.0, 110.0), size=0.5)
+    studio.frame_objects(scene, (pad, cube))
