@@ -13,7 +13,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from . import colormaps
+from ..core import colormaps
 
 UV_NAME = "Palpate"
 TEXEL_UV = "palpate_uv"
@@ -21,7 +21,7 @@ FORCE = "palpate_force"
 """Vertex attribute with the normal force (N): from geometry nodes after a bake, from the timeline while playing."""
 MARK = "palpate_sensor"
 """Custom property that tells whose a material, an image, a node group or an arrow is."""
-RAMP_STOPS = 17
+RAMP_STOPS = 32
 MISSING = (1.0, 0.0, 1.0)
 """What Blender shows for an image that it does not find. As forces in newtons it will not occur to the sixth digit."""
 MIX_SOCKETS = ("Factor_Float", "A_Color", "B_Color")

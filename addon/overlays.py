@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
-from . import colormaps, transforms
+from ..core import colormaps
+from . import transforms
 
 LIFT = 0.004
 """Share of the sensor's size by which the picture hovers above its surface, so that the two do not flicker."""

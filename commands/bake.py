@@ -11,8 +11,8 @@ import numpy as np
 
 from ..core.drive import drive
 from ..core.errors import SceneError
-from ..core.figures import net_shear
 from ..core.formats.files import writable_folder
+from ..core.measures import net_shear
 from . import blender, console
 
 

@@ -9,13 +9,10 @@ from pathlib import Path
 
 import numpy as np
 
-from ..core import figures
+from ..core import figures, measures
 from ..core.formats.files import remove_leftovers, writable_folder
 from . import blender, console
 from .bake import bake_with_bar, report
-
-MAPS = {"VIRIDIS": "viridis", "MAGMA": "magma", "PAPER": "gray_r"}
-"""matplotlib's names of the scene's colour maps."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -57,13 +54,13 @@ def run(arguments: argparse.Namespace) -> int:
     recording = baked.recording
     sensors = {sensor.name: sensor for sensor in baked.scenario.sensors if sensor.readout}
     texels = {name: sensor.texels for name, sensor in sensors.items()}
-    look = {"colour_map": MAPS[scene.palpate.color_map], "limit": demo.RANGE}
+    look = figures.Look(scene.palpate.color_map, limit=demo.RANGE, dpi=200)
     required = demo.CUBE_MASS * float(np.linalg.norm(baked.scenario.gravity))
 
     strip, curves, picture = folder / "tactile-strip.png", folder / "forces.png", folder / "scene.png"
-    figures.tactile_strip(strip, recording, texels, demo.STRIP_FRAMES, **look)
+    figures.tactile_strip(strip, recording, texels, demo.STRIP_FRAMES, look)
     parameters = {name: sensor.parameters for name, sensor in sensors.items()}
-    figures.force_curves(curves, recording, texels, parameters, {demo.PAD_B: required})
+    figures.force_curves(curves, recording, texels, parameters, {demo.PAD_B: required}, look)
     if not arguments.no_render:
         _picture(scene, picture, recording, sensors, texels, arguments, look)
 
@@ -102,7 +99,7 @@ def _picture(scene, path: Path, recording, sensors, texels, arguments, look) -> 
         scene.frame_set(demo.PICTURE_FRAME)
         labels = _labels(scene, recording, sensors, demo)
         bar.update()
-    figures.label_picture(path, path, recording, texels, demo.PICTURE_FRAME, labels=labels, **look)
+    figures.label_picture(path, path, recording, texels, demo.PICTURE_FRAME, labels=labels, look=look)
 
 
 def _labels(scene, recording, sensors, demo) -> list[figures.Label]:
@@ -112,7 +109,7 @@ def _labels(scene, recording, sensors, demo) -> list[figures.Label]:
     i = int(np.searchsorted(recording.frames, demo.PICTURE_FRAME))
     pressed, at_rest = recording.sensors[demo.PAD_A], recording.sensors[demo.PAD_B]
     normal = pressed.normal_force[i].sum()
-    shear = np.linalg.norm(figures.net_shear(pressed, sensors[demo.PAD_A].texels)[i])
+    shear = np.linalg.norm(measures.net_shear(pressed, sensors[demo.PAD_A].texels)[i])
     weight, carriers = at_rest.normal_force[i].sum(), np.count_nonzero(at_rest.contact[i])
     words = {
         demo.BALL: f"Steel ball, slipping\n{normal:.2f} N normal, {shear:.2f} N shear",
@@ -127,15 +124,11 @@ def _labels(scene, recording, sensors, demo) -> list[figures.Label]:
 
 def _slide(recording, sensor) -> str:
     """Return how friction builds up under the ball until it slips, as a table."""
-    from ..core.contact import friction_limit
-
     felt, mu = recording.sensors[sensor.name], sensor.parameters
     normal = felt.normal_force.sum(axis=1)
-    shear = np.linalg.norm(figures.net_shear(felt, sensor.texels), axis=1)
-    share = figures.mobilised(felt, sensor.texels, mu.mus)
-    # The limit of each texel at its own sliding speed (Eq. 10): what its bristles can hold.
-    limit = friction_limit(felt.normal_force, felt.slip, mu)
-    slipping = (np.linalg.norm(felt.shear, axis=2) >= 0.9 * limit) & felt.contact & (felt.slip > 1e-6)
+    shear = np.linalg.norm(measures.net_shear(felt, sensor.texels), axis=1)
+    share = measures.mobilised(felt, sensor.texels, mu.mus)
+    slipping = measures.slipping(felt, mu)
     rows = [("frame", "time", "normal", "shear", "shear / µs·normal", "texels slipping")]
     touching = np.flatnonzero(normal > 0)
     for i in touching[:: max(1, len(touching) // 10)]:

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import bpy
 
-SAMPLES = ("demo", "fingertip")
+SAMPLES = ("demo", "fingertip", "grasp")
 """Modules of this folder with a function ``build(scene)``."""
 
 

@@ -22,9 +22,9 @@ def build(scene) -> None:
     vertices, faces = capsule()
     finger = studio.mesh_object(scene, FINGER, vertices, faces)
     finger.data.materials.append(studio.material("Rubber", (0.035, 0.036, 0.04), roughness=0.55))
-    # The upper side, down to 60 degrees from the top.
+    # The upper side, down to 60 degrees from the top, without the rim of the flat end: its face would belong to the sensor.
     group = finger.vertex_groups.new(name="tactile")
-    group.add([int(i) for i in np.flatnonzero(vertices[:, 2] > 0.5 * RADIUS)], 1.0, "REPLACE")
+    group.add([int(i) for i in np.flatnonzero((vertices[:, 2] > 0.5 * RADIUS) & (vertices[:, 1] > -LENGTH))], 1.0, "REPLACE")
     finger.location = (0.0, 0.0, 30.0)
 
     finger.palpate.max_penetration = 0.006  # less than the radius, or segments would come out on the other side

@@ -10,7 +10,7 @@ import pytest
 from palpate.addon import render
 from palpate.addon.bake import bake
 from palpate.commands import main
-from palpate.core import figures
+from palpate.core import measures
 from palpate.core.drive import drive
 from palpate.core.errors import SceneError
 from palpate.core.formats.archive import load_recording
@@ -223,7 +223,7 @@ def test_samples_open_and_bake(name, repository, tmp_path):
     scene.palpate.folder = str(tmp_path / "bake")
     baked = drive(bake(scene))
     assert baked.recording.warnings == ()
-    assert figures.peak_force(baked.recording) > 0.01
+    assert measures.peak_force(baked.recording) > 0.01
     for sensor in baked.recording.sensors.values():
         assert sensor.contact.any()
         assert np.isfinite(sensor.normal_force).all()

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from blender_scenes import cube, press_and_drop, save
 
-from palpate.addon import colormaps
 from palpate.addon.bake import bake
+from palpate.core import colormaps
 from palpate.core.drive import drive
 
 FRAMES = (1, 7, 8)

@@ -1,0 +1,78 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A grasp: two finger pads close on a steel cylinder that stands on a table, and lift it by friction alone.
+
+Units are millimetres, as in the other samples.
+"""
+
+from __future__ import annotations
+
+import math
+
+from . import studio
+
+FPS = 24
+FRAME_END = 60
+PICTURE_FRAME = 52
+"""The cylinder hangs between the fingers."""
+ROWS, COLUMNS, PITCH = 12, 8, 2.5
+THICKNESS = 6.0  # mm, of the pads
+RADIUS, HEIGHT = 14.0, 60.0  # mm
+MASS = 0.288  # kg: steel of 7,800 kg/m³
+SQUEEZE = 1.6  # mm, by which each pad is pressed
+OPEN, LIFT = 7.0, 32.0  # mm
+MIDDLE = 42.0  # mm, height of the fingers' middle above the table
+LEFT, RIGHT, CYLINDER, TABLE = "Left finger", "Right finger", "Cylinder", "Table"
+
+
+def build(scene) -> None:
+    """Fill `scene`, which is emptied first; the add-on's classes must be registered."""
+    studio.prepare(scene, FRAME_END, FPS)
+    rubber = studio.material("Rubber", (0.035, 0.036, 0.04), roughness=0.55)
+    black = studio.material("Black anodised", (0.012, 0.012, 0.014), metallic=0.6, roughness=0.32)
+    paper = studio.material("Backdrop", (0.30, 0.32, 0.35), roughness=0.85)
+
+    for name, side in ((LEFT, -1), (RIGHT, 1)):
+        _finger(scene, name, side, rubber, black)
+    cylinder = studio.cylinder(scene, CYLINDER, RADIUS, HEIGHT, bevel=0.0)
+    cylinder.modifiers.clear()  # its rim stays sharp: the lower one stands on the table
+    cylinder.data.materials.append(studio.ghost_steel("Steel, seen through", clear=0.8, edge=0.5))
+    cylinder.location.z = HEIGHT / 2
+
+    vertices, faces, texels = studio.pad_mesh(9, 9, 5.0, 4.0, 4.0)
+    table = studio.mesh_object(scene, TABLE, vertices, faces)
+    table.data.materials.append(rubber)
+    table.vertex_groups.new(name="tactile").add(texels, 1.0, "REPLACE")
+
+    for obj in (scene.objects[LEFT], scene.objects[RIGHT], table):
+        settings = obj.palpate
+        settings.role = "PAD" if obj == table else "SENSOR"
+        settings.region, settings.vertex_group = "GROUP", "tactile"
+        settings.k, settings.cn = 300.0, 3.0
+        settings.sigma0, settings.sigma1 = 300.0, 3.0  # bristles as stiff as the foam
+        settings.mus, settings.mud = 0.6, 0.5
+    cylinder.palpate.role, cylinder.palpate.body, cylinder.palpate.mass = "TARGET", "FREE", MASS
+    scene.palpate.color_map = "VIRIDIS"
+
+    studio.stage(scene, paper, aim=(0.0, 0.0, 50.0), camera=(190.0, -330.0, 130.0))
+    backdrop = scene.objects["Backdrop"]
+    backdrop.location.z = -4.0
+    scene.frame_set(scene.frame_start)
+
+
+def _finger(scene, name: str, side: int, rubber, black) -> None:
+    """Add a finger at x < 0 (side −1) or x > 0 whose pad looks at the middle; it closes and lifts."""
+    vertices, faces, texels = studio.pad_mesh(ROWS, COLUMNS, PITCH, 2.5, THICKNESS)
+    pad = studio.mesh_object(scene, name, vertices, faces)
+    pad.data.materials.append(rubber)
+    pad.vertex_groups.new(name="tactile").add(texels, 1.0, "REPLACE")
+    pad.rotation_mode = "XYZ"
+    # the pad's normal (its z) looks at the middle, its rows (its y) run upwards
+    pad.rotation_euler = (math.pi / 2, 0.0, -side * math.pi / 2)
+    closed = RADIUS - SQUEEZE
+    for frame, gap, height in ((1, OPEN, 0.0), (14, 0.0, 0.0), (20, 0.0, 0.0), (46, 0.0, LIFT), (60, 0.0, LIFT)):
+        pad.location = (side * (closed + gap + (SQUEEZE if frame == 1 else 0.0)), 0.0, MIDDLE + height)
+        pad.keyframe_insert("location", frame=frame)
+    long = ROWS * PITCH + 5.0
+    back = studio.box(scene, f"{name} back", (COLUMNS * PITCH + 6.0, long + 30.0, 9.0), bevel=2.2)
+    back.location, back.parent = (0.0, 14.0, -THICKNESS - 4.0), pad
+    back.data.materials.append(black)
