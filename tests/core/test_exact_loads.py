@@ -1,0 +1,31 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Weights at rest: the paper's Table 3 and Fig. 9, on pads of any resolution."""
+
+import numpy as np
+import pytest
+from oracles.loads import GRIDS, tilted, weight_error
+from solver_scenes import GRAVITY
+
+
+@pytest.mark.parametrize("mass", [0.1, 1.0, 4.0, 10.0])
+@pytest.mark.parametrize("grid", GRIDS)
+def test_texels_add_up_to_the_weight_and_all_are_lit(grid, mass):
+    """A level cube at rest is a linear system: what is left is its settling and the rounding of some thousand additions."""
+    error, dark = weight_error(grid, mass)
+    assert error < 1e-11
+    assert dark == 0
+
+
+def test_tilted_cube_neither_creeps_nor_sleeps():
+    """10°, 1 kg. The texels together carry m g sin 10° along the pad to rounding, and nothing moves any more after 10 s.
+
+    1,200 s are simulated by ``make bench ONLY=exactness``; the bar is the same, 1e-10 m.
+    """
+    along, friction, lean, creep = tilted(60.0)
+    pull = GRAVITY * np.sin(np.radians(10.0))
+    assert pull == pytest.approx(1.7035, abs=1e-4)
+    assert along == pytest.approx(pull, rel=1e-9)
+    # Friction acts in the cube's face, which leans downhill on its springs; what texels report is its part in their own plane.
+    assert 0.0 < lean < np.radians(0.2)
+    assert friction == pytest.approx(GRAVITY * np.sin(np.radians(10.0) + lean) * np.cos(lean), rel=1e-9)
+    assert creep < 1e-10
