@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -21,7 +22,7 @@ WEIGHT_AREA, WEIGHT = 804.25e-6, 0.30415  # m², kg
 LOAD = 0.08  # N on a texel, Fig. 7
 
 
-def stiffness(folder: Path) -> Chapter:
+def stiffness(folder: Path, progress: Callable) -> Chapter:
     """Eq. 18 on the printed inputs, and both lines of Fig. 6 on a foam like the paper's."""
     chapter = Chapter(
         "Stiffness from the compression of the foam",
@@ -43,16 +44,17 @@ def stiffness(folder: Path) -> Chapter:
     fit = fit_stiffness(FoamData(x, slope * (x - 0.3e-3) + noise), AREA, TEXELS)
     chapter.rows += [
         Row("line through zero, made-up foam", "—", "—", fit.k.text("N/m"), None, "the line that the model uses"),
-        compare("line with offset, made-up foam", "—", k, fit.k_offset.value, 0.05 * k, "N/m", "noise of 150 Pa", 4),
-        compare("compression before it carries", "—", 0.3, fit.dead_zone * 1e3, 0.05, "mm", "noise of 150 Pa", 3),
+        compare("line with offset, made-up foam", "—", k, fit.k_offset.value, 0.05 * k, "N/m", "noise of 150 Pa"),
+        compare("compression before it carries", "—", 0.3, fit.dead_zone * 1e3, 0.05, "mm", "noise of 150 Pa"),
     ]
     for kind in ("pdf", "png"):
         plot_stiffness(folder / f"fig6-foam.{kind}", fit)
     chapter.pictures.append(Picture(folder / "fig6-foam.png", "Foam compression with both straight lines (made-up points)."))
+    progress()
     return chapter
 
 
-def friction(folder: Path) -> Chapter:
+def friction(folder: Path, progress: Callable) -> Chapter:
     """The curve of Fig. 7 from its printed parameters, and a fit that finds them."""
     chapter = Chapter(
         "Friction from a force–velocity curve",
@@ -71,7 +73,7 @@ def friction(folder: Path) -> Chapter:
         truth = getattr(law, name)
         reach = max(1.5 * (estimate.high - estimate.low) / 2, 1e-12)
         chapter.rows.append(
-            compare(name, f"{truth:g}", truth, estimate.value, reach, "", f"95 %: {estimate.low:.3g} to {estimate.high:.3g}", 4)
+            compare(name, f"{truth:g}", truth, estimate.value, reach, "", f"95 %: {estimate.low:.3g} to {estimate.high:.3g}")
         )
     peak, fast, floor = map(float, steady_friction(np.array([0.0, 1.0, 5.0]), LOAD, law))
     chapter.rows += [
@@ -84,10 +86,11 @@ def friction(folder: Path) -> Chapter:
     for kind in ("pdf", "png"):
         plot_friction(folder / f"fig7-friction.{kind}", fit)
     chapter.pictures.append(Picture(folder / "fig7-friction.png", "Friction of one texel under 0.08 N."))
+    progress()
     return chapter
 
 
-def definition(folder: Path) -> Chapter:
+def definition(folder: Path, progress: Callable) -> Chapter:
     """Table 2, written, read and written again."""
     chapter = Chapter(
         "The definition in OpenRAVE's XML",
@@ -103,6 +106,7 @@ def definition(folder: Path) -> Chapter:
         _equal("values of Table 2 after a round trip", "to the last bit", back[0].parameters == SensorParameters()),
         _equal("text after a round trip", "to the letter", again == text),
     ]
+    progress()
     return chapter
 
 

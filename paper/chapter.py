@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -32,13 +33,14 @@ class Row:
     note: str = ""
 
 
-def compare(
-    what: str, printed: str, expected: float, measured: float, tolerance: float, unit: str, note: str = "", digits: int = 6
-) -> Row:
-    """Return the row of a number that has to be `expected` within an absolute `tolerance`."""
+def compare(what: str, printed: str, expected: float, measured: float, tolerance: float, unit: str, note: str = "") -> Row:
+    """Return the row of a number that has to be `expected` within an absolute `tolerance`, shown to a tenth of that."""
+    decimals = min(max(0, math.ceil(1 - math.log10(tolerance))), 9)
     kept = bool(abs(measured - expected) <= tolerance)
     words = f"within {tolerance:.2g} {unit}".rstrip() + (f"; {note}" if note else "")
-    return Row(what, printed, f"{expected:.{digits}g} {unit}".rstrip(), f"{measured:.{digits}g} {unit}".rstrip(), kept, words)
+    return Row(
+        what, printed, f"{expected:.{decimals}f} {unit}".rstrip(), f"{measured:.{decimals}f} {unit}".rstrip(), kept, words
+    )
 
 
 def below(what: str, printed: str, measured: float, limit: float, unit: str, note: str = "") -> Row:

@@ -40,12 +40,13 @@ def weigh(folder: Path, progress: Callable) -> Chapter:
         felt = recording.sensors[weighing.PAD]
         total, lit = float(felt.normal_force[-1].sum()), int(felt.contact[-1].sum())
         note = f"{lit} of {felt.contact.shape[1]} texels lit; the paper's tolerance is 1e-4"
-        chapter.rows.append(compare(f"{mass:g} kg", printed, required, total, 1e-6 * required, "N", note, 9))
+        chapter.rows.append(compare(f"{mass:g} kg", printed, required, total, 1e-6 * required, "N", note))
         progress()
     bench.bake(scene, folder / "bake-weighing")
     chapter.pictures.append(
         Picture(bench.picture(scene, folder / "weighing.png", scene.frame_end), "1 kg at rest; colours are each texel's force.")
     )
+    progress()
     return chapter
 
 
@@ -87,6 +88,7 @@ def hold(folder: Path, progress: Callable, minutes: float = MINUTES) -> Chapter:
         Picture(bench.picture(scene, folder / "tilt.png", scene.frame_end), "1 kg held at 10 degrees."),
         Picture(folder / "fig9-creep.png", "How far the cube is from where it was put (Fig. 9)."),
     ]
+    progress()
     return chapter
 
 

@@ -1,0 +1,29 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The list of experiments, in the order of the paper. A new one is a function here and a module beside this."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from . import calibration, geometries, weighing
+from .chapter import Chapter
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """How an experiment is run: with the folder for its figures and a function to call after each of its `steps`."""
+
+    run: Callable[[Path, Callable], Chapter]
+    steps: int
+
+
+EXPERIMENTS = {
+    "geometries": Experiment(geometries.sensors, 2),
+    "stiffness": Experiment(calibration.stiffness, 1),
+    "friction": Experiment(calibration.friction, 1),
+    "definition": Experiment(calibration.definition, 1),
+    "weighing": Experiment(weighing.weigh, 5),
+    "tilt": Experiment(weighing.hold, 3),
+}
