@@ -285,6 +285,8 @@ def find_near(ox, oy, oz, dx, dy, dz, mesh, skin, near, slot, tree):
     -------
     number : int
         How many there are; -1 when there is no room for them.
+    only : int
+        The triangle, where there is but one and the segment's line goes through it for certain, from outside; else -1.
     """
     axis, shear_x, shear_y = _line_of_sight(dx, dy, dz)
     # The last term is the rounding of what follows, which must not leave out a triangle that is only just met.
@@ -292,7 +294,7 @@ def find_near(ox, oy, oz, dx, dy, dz, mesh, skin, near, slot, tree):
     x0, x1 = min(ox, ox + dx) - skin, max(ox, ox + dx) + skin
     y0, y1 = min(oy, oy + dy) - skin, max(oy, oy + dy) + skin
     z0, z1 = min(oz, oz + dz) - skin, max(oz, oz + dz) + skin
-    number = 0
+    number, only = 0, -1
     bounds, node, stop = tree.bounds, tree.roots[mesh], tree.roots[mesh + 1]
     while node < stop:
         if _apart(bounds, node, x0, x1, y0, y1, z0, z1):
@@ -307,16 +309,24 @@ def find_near(ox, oy, oz, dx, dy, dz, mesh, skin, near, slot, tree):
             beside = min(ax, bx, cx) > aside or max(ax, bx, cx) < -aside or min(ay, by, cy) > aside or max(ay, by, cy) < -aside
             u, v, w = ax * by - ay * bx, bx * cy - by * cx, cx * ay - cy * ax
             side = 1.0 if u + v + w > 0.0 else -1.0
-            beside = beside or side * u < -aside * math.hypot(bx - ax, by - ay)
-            beside = beside or side * v < -aside * math.hypot(cx - bx, cy - by)
-            beside = beside or side * w < -aside * math.hypot(ax - cx, ay - cy)
-            if not beside:
-                if number == near.shape[1]:
-                    return -1
-                near[slot, number] = i
-                number += 1
+            if beside:
+                continue
+            # How far inside of each edge the origin is seen, times the edge's length.
+            margin_u = aside * math.hypot(bx - ax, by - ay)
+            margin_v = aside * math.hypot(cx - bx, cy - by)
+            margin_w = aside * math.hypot(ax - cx, ay - cy)
+            u, v, w = side * u, side * v, side * w
+            if u < -margin_u or v < -margin_v or w < -margin_w:
+                continue
+            if number == near.shape[1]:
+                return -1, -1
+            slope = f[i, 9] * dx + f[i, 10] * dy + f[i, 11] * dz
+            through = u > margin_u and v > margin_v and w > margin_w and slope < -2.0 * skin
+            only = i if number == 0 and through else -1
+            near[slot, number] = i
+            number += 1
         node += 1
-    return number
+    return number, only
 
 
 @kernel
@@ -345,3 +355,11 @@ def cross_triangle(ox, oy, oz, dx, dy, dz, axis, shear_x, shear_y, faces, i):
     if not 0.0 <= t <= 1.0:
         return 9.0
     return t if slope < 0.0 else -3.0 - t
+
+
+@kernel
+def cross_plane(ox, oy, oz, dx, dy, dz, faces, i):
+    """Position on the segment where it crosses a triangle's plane, the same bits as :func:`cross_triangle` has for it."""
+    ax, ay, az = faces[i, 0] - ox, faces[i, 1] - oy, faces[i, 2] - oz
+    height = faces[i, 9] * ax + faces[i, 10] * ay + faces[i, 11] * az
+    return height / (faces[i, 9] * dx + faces[i, 10] * dy + faces[i, 11] * dz)

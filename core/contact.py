@@ -21,20 +21,24 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .bvh import find_near, near_entry, segment_entry
-from .jit import kernel
+from .bvh import cross_plane, find_near, near_entry, segment_entry
+from .jit import inlined, kernel
 from .scenario import HUNT_CROSSLEY, SensorParameters
 
-# Columns of a contact row: one row per touching texel and target, in the frame of the sensor's body. The row is all that the
-# solver's inner loop reads.
-NX, NY, NZ = 0, 1, 2  # the target's outward normal
-PX, PY, PZ = 3, 4, 5  # contact point from the body's reference point, m
-ZX, ZY, ZZ = 6, 7, 8  # bristle deflection, m
-DEPTH = 9  # m
-START, KEEP, GAIN, LIMIT = 10, 11, 12, 13  # z(t) = START z, z(t + dt) = KEEP z + GAIN v, LIMIT = largest |z|
-NORMAL_FORCE, STIFF_N, STIFF_T = 14, 15, 16  # N at the step's end; d force / d velocity, N·s/m
-PUSH = 17  # normal force that a rate of zero would have on the tangent of the law, N
-ROW = 18
+# Contact rows: one per touching texel and target, in the frame of the sensor's body; they are all that the solver's inner loop
+# reads. LANES of them make a block, in which each column lies in one piece: row r of a pair is `rows[block, COLUMN + lane]`,
+# block and lane being divmod(r, LANES). A loop over the lanes then runs in vector registers, several rows at a time. Each pair
+# begins with a block of its own, and the lanes that its last block leaves over are zero, which is a contact without force.
+LANES = 16
+NX, NY, NZ = (LANES * i for i in range(3))  # the target's outward normal
+PX, PY, PZ = (LANES * i for i in range(3, 6))  # contact point from the body's reference point, m
+ZX, ZY, ZZ = (LANES * i for i in range(6, 9))  # bristle deflection, m
+DEPTH = LANES * 9  # m
+KEEP, GAIN = LANES * 10, LANES * 11  # z(t + dt) = KEEP z + GAIN v
+LIMIT = LANES * 12  # largest |z|, m
+PUSH, SLOPE = LANES * 13, LANES * 14  # tangent of the normal law where it is not the same for all contacts: N, N·s/m
+GRIP = LANES * 15  # painted multiplier of friction, written like these
+ROW = LANES * 16
 
 # Columns of a parameter row, one per sensor or pad.
 K, CN, CT, SIGMA0, SIGMA1, X0, MUS, MUD, EXPONENT, DISSIPATION = range(10)
@@ -150,16 +154,40 @@ class State(NamedTuple):
     bristles: np.ndarray
 
 
-@kernel
+SERIES = tuple(1.0 / math.factorial(n + 1) for n in range(13, -1, -1))
+"""Taylor coefficients of (1 - exp(-y)) / y without their signs, from y¹³ down to y⁰."""
+SMALLEST = 1.0 / math.factorial(15)
+"""The one before them, of y¹⁴."""
+
+
+@inlined
+def relaxation(x):
+    """Return exp(-x) and (1 - exp(-x)) / x for x ≥ 0, both to 1e-15 of one, zero included.
+
+    Written out so that it runs in vector registers, which a call of the library's exp forbids, and gives the same bits
+    everywhere. The series is exact to rounding up to y = 5/8; doubling y six times uses
+    ``(1 - exp(-2y)) / 2y = (1 - exp(-y)) / y · (1 + exp(-y)) / 2``, whose factors are positive, so that errors do not grow.
+    """
+    within = min(x, 40.0)  # exp(-40) is nothing beside one
+    half = within * 0.0078125
+    y = 2.0 * half
+    mean = SMALLEST
+    for coefficient in SERIES:
+        mean = coefficient - y * mean
+    for _ in range(6):
+        mean *= 1.0 - half * mean
+        half += half
+    return max(1.0 - within * mean, 0.0), (mean if x <= 40.0 else 1.0 / x)
+
+
+@inlined
 def stribeck(speed_squared, parameters):
     """Friction coefficient of steady sliding, mud + (mus - mud) exp(-|v|²/x0²) (Eq. 10–12 divided by fn)."""
-    x0 = parameters[X0]
-    if speed_squared <= 1e-17 * x0 * x0:  # exp(-1e-17) is 1 to the last bit; at rest this saves the call
-        return parameters[MUS]
-    return parameters[MUD] + (parameters[MUS] - parameters[MUD]) * math.exp(-speed_squared / (x0 * x0))
+    share, _ = relaxation(speed_squared / (parameters[X0] * parameters[X0]))
+    return parameters[MUD] + (parameters[MUS] - parameters[MUD]) * share
 
 
-@kernel
+@inlined
 def bristle_step(speed_squared, normal_force, dt, parameters):
     """Solve Eq. 9 over `dt` at constant velocity: z(t + dt) = keep · z(t) + gain · v.
 
@@ -168,25 +196,16 @@ def bristle_step(speed_squared, normal_force, dt, parameters):
     keep : float
     gain : float, seconds
     """
-    if normal_force <= 0.0:
-        return 0.0, 0.0
     g = normal_force * stribeck(speed_squared, parameters)
-    if g <= 0.0:  # frictionless: nothing holds the bristles
-        return 0.0, 0.0
-    pace = parameters[SIGMA0] * dt
-    if pace * pace * speed_squared < 1e-33 * g * g:  # 1 - x is 1 to the last bit; at rest this saves root and division
-        return 1.0, dt
-    x = pace * math.sqrt(speed_squared) / g
-    if x < 1e-12:
-        return 1.0 - x, dt
-    keep = math.exp(-x)
-    return keep, -math.expm1(-x) / x * dt
+    held = g > 0.0  # without friction nothing holds the bristles
+    keep, mean = relaxation(parameters[SIGMA0] * dt * math.sqrt(speed_squared) / g if held else 0.0)
+    return (keep if held else 0.0), (mean * dt if held else 0.0)
 
 
-@kernel
+@inlined
 def bristle_limit(normal_force, parameters):
     """Largest bristle deflection that static friction holds, metres."""
-    return max(normal_force, 0.0) * parameters[MUS] / parameters[SIGMA0]
+    return max(normal_force, 0.0) * (parameters[MUS] / parameters[SIGMA0])
 
 
 @kernel
@@ -274,6 +293,8 @@ class Neighbours(NamedTuple):
     near : (s, NEAR) int
     number : (s,) int
         Length of each list, -1 where the tree must be asked.
+    only : (s,) int
+        The triangle that a texel's line goes through for certain and alone as long as its list holds; else -1.
     pose : (q, 14) float
         Rotation (row by row) and position of each pair's sensor in the target's frame when its lists were made, the skin they
         were made with (-1 while there are none), and how often they have been used.
@@ -281,6 +302,7 @@ class Neighbours(NamedTuple):
 
     near: np.ndarray
     number: np.ndarray
+    only: np.ndarray
     pose: np.ndarray
 
 
@@ -349,7 +371,8 @@ def _keep_lists(pair, sensor, target, pose, world, tree, neighbours):
         ox = pose[9] + pose[0] * points[point, 0] + pose[1] * points[point, 1] + pose[2] * points[point, 2] - dx
         oy = pose[10] + pose[3] * points[point, 0] + pose[4] * points[point, 1] + pose[5] * points[point, 2] - dy
         oz = pose[11] + pose[6] * points[point, 0] + pose[7] * points[point, 1] + pose[8] * points[point, 2] - dz
-        neighbours.number[slot] = find_near(ox, oy, oz, dx, dy, dz, target, wanted, neighbours.near, slot, tree)
+        number, only = find_near(ox, oy, oz, dx, dy, dz, target, wanted, neighbours.near, slot, tree)
+        neighbours.number[slot], neighbours.only[slot] = number, only
         slot += 1
     for i in range(12):
         neighbours.pose[pair, i] = pose[i]
@@ -369,31 +392,31 @@ def _forget(pair, sensor, world, state):
 
 
 @kernel
-def gather(pair, world, tree, neighbours, state, rotation, rows, slots, used, pose):
-    """Collect the contacts of one sensor with one target as rows behind the `used` rows that are there already.
+def gather(pair, first, world, tree, neighbours, state, rotation, rows, slots, pose):
+    """Collect the contacts of one sensor with one target as rows, from block `first` on.
 
     The segment of a contact point runs from `reach` deep in the sensor to it; where it enters the target counts. Memory of
     the pair in `state` is brought up to date: the triangle met, and the bristles, which are zero where nothing touches.
 
     Parameters
     ----------
-    pair : int
+    pair, first : int
     world : World
     tree : Tree
     neighbours : Neighbours
     state : State
     rotation : (b, 3, 3) float
         Orientation of each body.
-    rows : (s, ROW) float
-    slots : (s,) int
+    rows : (blocks, ROW) float
+    slots : (blocks, LANES) int
         Written: which place in the memory each row belongs to.
     pose : (12,) float
         Working memory.
 
     Returns
     -------
-    used : int
-        Rows in use now.
+    count : int
+        Rows of this pair.
     sunk : int
         Contact points that were pressed past their maximum penetration and do not act.
     """
@@ -404,9 +427,10 @@ def gather(pair, world, tree, neighbours, state, rotation, rows, slots, used, po
     _relative_pose(a, b, state.position, rotation, pose)
     if _distance_to_box(pose, world.center, sensor, tree.bounds, root) > world.radius[sensor]:
         _forget(pair, sensor, world, state)
-        return used, 0
+        return 0, 0
     _keep_lists(pair, sensor, target, pose, world, tree, neighbours)
     sunk, slot = 0, world.slot_start[pair] - 1
+    block, lane = first, 0
     for point in range(world.point_start[sensor], world.point_start[sensor + 1]):
         slot += 1
         before = hint[slot]
@@ -420,7 +444,11 @@ def gather(pair, world, tree, neighbours, state, rotation, rows, slots, used, po
         dy = reach * (pose[3] * points[point, 3] + pose[4] * points[point, 4] + pose[5] * points[point, 5])
         dz = reach * (pose[6] * points[point, 3] + pose[7] * points[point, 4] + pose[8] * points[point, 5])
         ox, oy, oz = tx - dx, ty - dy, tz - dz
-        if number >= 0:
+        only = neighbours.only[slot]
+        if only >= 0:
+            met = cross_plane(ox, oy, oz, dx, dy, dz, tree.faces, only)
+            triangle, leaving = only if 0.0 <= met <= 1.0 else -1, 2.0
+        elif number >= 0:
             met, triangle, leaving = near_entry(ox, oy, oz, dx, dy, dz, neighbours.near, slot, number, tree.faces)
         else:
             met, triangle, leaving = segment_entry(ox, oy, oz, dx, dy, dz, target, before, tree)
@@ -446,29 +474,43 @@ def gather(pair, world, tree, neighbours, state, rotation, rows, slots, used, po
         nx = pose[0] * fx + pose[3] * fy + pose[6] * fz
         ny = pose[1] * fx + pose[4] * fy + pose[7] * fz
         nz = pose[2] * fx + pose[5] * fy + pose[8] * fz
-        rows[used, NX], rows[used, NY], rows[used, NZ] = nx, ny, nz
+        rows[block, NX + lane], rows[block, NY + lane], rows[block, NZ + lane] = nx, ny, nz
         # From the point back along its normal to the intersection.
         inside = 1.0 - met
-        rows[used, PX] = points[point, 0] - inside * reach * points[point, 3]
-        rows[used, PY] = points[point, 1] - inside * reach * points[point, 4]
-        rows[used, PZ] = points[point, 2] - inside * reach * points[point, 5]
-        rows[used, DEPTH] = inside * abs(dx * fx + dy * fy + dz * fz)
+        rows[block, PX + lane] = points[point, 0] - inside * reach * points[point, 3]
+        rows[block, PY + lane] = points[point, 1] - inside * reach * points[point, 4]
+        rows[block, PZ + lane] = points[point, 2] - inside * reach * points[point, 5]
+        rows[block, ZX + lane], rows[block, ZY + lane] = bristles[slot, 0], bristles[slot, 1]
+        rows[block, ZZ + lane] = bristles[slot, 2]
+        rows[block, DEPTH + lane] = inside * abs(dx * fx + dy * fy + dz * fz)
         bristles[slot, 3] = inside
-        # What the surface's turn makes stand out of its plane is laid back into it, as long as it was.
-        zx, zy, zz = bristles[slot, 0], bristles[slot, 1], bristles[slot, 2]
-        out_of_plane = zx * nx + zy * ny + zz * nz
-        if out_of_plane != 0.0:
+        slots[block, lane] = slot
+        lane += 1
+        if lane == LANES:
+            block, lane = block + 1, 0
+    count = (block - first) * LANES + lane
+    if lane > 0:
+        for unused in range(lane, LANES):
+            for column in range(0, ROW, LANES):
+                rows[block, column + unused] = 0.0
+    _lay_flat(first, count, rows)
+    return count, sunk
+
+
+@kernel
+def _lay_flat(first, count, rows):
+    """Lay back into the surface what its turn makes stand out of it of a bristle, which stays as long as it was."""
+    for block in range(first, first + (count + LANES - 1) // LANES):
+        for lane in range(LANES):
+            nx, ny, nz = rows[block, NX + lane], rows[block, NY + lane], rows[block, NZ + lane]
+            zx, zy, zz = rows[block, ZX + lane], rows[block, ZY + lane], rows[block, ZZ + lane]
+            out_of_plane = zx * nx + zy * ny + zz * nz
             length = zx * zx + zy * zy + zz * zz
-            zx -= out_of_plane * nx
-            zy -= out_of_plane * ny
-            zz -= out_of_plane * nz
-            flat = zx * zx + zy * zy + zz * zz
-            scale = math.sqrt(length / flat) if flat > 0.0 else 0.0
-            zx, zy, zz = scale * zx, scale * zy, scale * zz
-        rows[used, ZX], rows[used, ZY], rows[used, ZZ] = zx, zy, zz
-        slots[used] = slot
-        used += 1
-    return used, sunk
+            flat_x, flat_y, flat_z = zx - out_of_plane * nx, zy - out_of_plane * ny, zz - out_of_plane * nz
+            flat = flat_x * flat_x + flat_y * flat_y + flat_z * flat_z
+            scale = math.sqrt(length / flat) if flat > 0.0 and out_of_plane != 0.0 else 1.0
+            rows[block, ZX + lane], rows[block, ZY + lane] = scale * flat_x, scale * flat_y
+            rows[block, ZZ + lane] = scale * flat_z
 
 
 @kernel
@@ -506,39 +548,50 @@ def count_buried(pair, world, tree, state, rotation, pose):
     return buried
 
 
-@kernel
-def linearise(rows, r, vx, vy, vz, dt, parameters):
-    """Write into a contact row how its force depends on the relative velocity at the step's end, near velocity `v`.
+@inlined
+def linearise(nx, ny, nz, zx, zy, zz, push, stiff_n, grip, vx, vy, vz, dt, parameters):
+    """How a contact's force depends on the relative velocity at the step's end, near velocity `v`.
 
-    The force on the target is ``-(PUSH + STIFF_N ḋ) n - (bias + STIFF_T v_t)``; `v` is the target's velocity relative to the
-    sensor, metres per second.
+    The force on the target is ``-(push + stiff_n ḋ) n - (bias z + stiff_t v_t)``; `v` is the target's velocity relative to the
+    sensor, metres per second. All is zero where the contact separates within the step: no force at all.
+
+    Parameters
+    ----------
+    nx … zz : float
+        Normal and bristle deflection (m).
+    push, stiff_n : float, N and N·s/m
+        The normal law at the step's end (see :func:`normal_tangent`).
+    grip : float
+        Painted multiplier of the friction coefficients.
+    vx … vz : float, m/s
+
+    Returns
+    -------
+    limit : float, metres
+        How far the bristles can bend under the normal force at the step's end.
+    push, stiff_n : float, N and N·s/m
+    bias, stiff_t : float, N/m and N·s/m
+    keep, gain : float
+        What becomes of the bristles, ``z(t + dt) = keep z + gain v_t``.
     """
-    rate = vx * rows[r, NX] + vy * rows[r, NY] + vz * rows[r, NZ]
-    tx, ty, tz = vx - rate * rows[r, NX], vy - rate * rows[r, NY], vz - rate * rows[r, NZ]
-    push, stiff = normal_tangent(rows[r, DEPTH], rate, dt, parameters)
-    force = push + stiff * rate
-    if force <= 0.0:  # separates within the step: no force at all
-        for column in range(START, ROW):
-            rows[r, column] = 0.0
-        return
-    limit = bristle_limit(force, parameters)
-    square = rows[r, ZX] * rows[r, ZX] + rows[r, ZY] * rows[r, ZY] + rows[r, ZZ] * rows[r, ZZ]
-    held = 1.0
-    if square > limit * limit:  # the load fell: what can no longer be held has slipped already
-        held = limit / math.sqrt(square)
-    keep, gain = bristle_step(tx * tx + ty * ty + tz * tz, force, dt, parameters)
-    keep *= held
-    zx, zy, zz = keep * rows[r, ZX] + gain * tx, keep * rows[r, ZY] + gain * ty, keep * rows[r, ZZ] + gain * tz
+    rate = vx * nx + vy * ny + vz * nz
+    tx, ty, tz = vx - rate * nx, vy - rate * ny, vz - rate * nz
+    force = max(push + stiff_n * rate, 0.0)
+    load = grip * force
+    limit = bristle_limit(load, parameters)
     square = zx * zx + zy * zy + zz * zz
-    if square > limit * limit:  # the closed solution for constant velocity would overshoot: slide at the limit instead
-        keep *= limit / math.sqrt(square)
-        gain *= limit / math.sqrt(square)
-    rows[r, START], rows[r, KEEP], rows[r, GAIN], rows[r, LIMIT] = held, keep, gain, limit
-    rows[r, NORMAL_FORCE], rows[r, STIFF_N], rows[r, PUSH] = force, stiff, push
-    rows[r, STIFF_T] = (parameters[SIGMA0] + parameters[SIGMA1] / dt) * gain + parameters[CT]
-
-
-@kernel
-def friction_bias(rows, r, dt, parameters):
-    """Factor of the old bristle deflection in the friction force of the step, N/m."""
-    return parameters[SIGMA0] * rows[r, KEEP] + parameters[SIGMA1] * (rows[r, KEEP] - rows[r, START]) / dt
+    held = limit / math.sqrt(square) if square > limit * limit else 1.0  # the load fell: the rest has slipped already
+    keep, gain = bristle_step(tx * tx + ty * ty + tz * tz, load, dt, parameters)
+    keep *= held
+    zx, zy, zz = keep * zx + gain * tx, keep * zy + gain * ty, keep * zz + gain * tz
+    square = zx * zx + zy * zy + zz * zz
+    # The closed solution for constant velocity may overshoot: slide at the limit instead.
+    scale = limit / math.sqrt(square) if square > limit * limit else 1.0
+    keep, gain = scale * keep, scale * gain
+    bias = parameters[SIGMA0] * keep + parameters[SIGMA1] / dt * (keep - held)
+    stiff_t = (parameters[SIGMA0] + parameters[SIGMA1] / dt) * gain + parameters[CT]
+    on = force > 0.0
+    return (
+        limit, push if on else 0.0, stiff_n if on else 0.0, bias if on else 0.0, stiff_t if on else 0.0,
+        keep if on else 0.0, gain if on else 0.0,
+    )  # fmt: skip

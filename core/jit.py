@@ -33,7 +33,9 @@ def _edition() -> str:
     digest = hashlib.sha256()
     for path in sorted(Path(__file__).parent.rglob("*.py")):
         source = path.read_bytes()
-        if b"@kernel" in source or b"KIND = Kind(" in source:  # the laws of effects are compiled as well
+        if any(
+            mark in source for mark in (b"@kernel", b"@inlined", b"KIND = Kind(")
+        ):  # the laws of effects are compiled as well
             digest.update(source)
     return digest.hexdigest()[:12]
 
@@ -45,6 +47,21 @@ def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
     """Compile `function` for the types it is first called with, and keep the result in numba's cache."""
     if not COMPILED:
         return function
+    return _compiled(function)
+
+
+def inlined(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Do as :func:`kernel`, and become part of every caller, so that the caller's loops can run in vector registers.
+
+    A loop that calls is not vectorised. Such a function takes and returns numbers, and chooses with ``a if c else b`` where a
+    branch would do something.
+    """
+    if not COMPILED:
+        return function
+    return _compiled(function, forceinline=True)
+
+
+def _compiled(function: Callable[..., Any], **options: bool) -> Callable[..., Any]:
     function.__qualname__ += f"_{EDITION}"  # part of the name under which numba keeps the result
-    compiled: Callable[..., Any] = numba.njit(cache=True, fastmath=False, error_model="numpy", nogil=True)(function)
+    compiled: Callable[..., Any] = numba.njit(cache=True, fastmath=False, error_model="numpy", nogil=True, **options)(function)
     return compiled

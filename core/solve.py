@@ -16,14 +16,14 @@ import numpy as np
 
 from .bodies import poses_at, quaternion_product, rotation_matrices, rotation_vectors
 from .bvh import NEAR, build_tree
-from .contact import DEPTH, NX, NZ, PX, PZ, Neighbours, State, World, count_buried, parameter_row
+from .contact import Neighbours, State, World, count_buried, parameter_row
 from .drive import drive
 from .mesh import is_closed
 from .points import ContactPoints, contact_points
 from .recording import Frame, Recording, SensorFrame
 from .respond import Reader
 from .scenario import Scenario, Sensor, Target
-from .step import advance_frame, feel, gather_all, scratch_for
+from .step import advance_frame, contacts_of, feel, gather_all, scratch_for
 from .texels import Texels
 from .timestep import advise
 
@@ -152,16 +152,14 @@ class Simulation:
                         pair, self._world, self._tree, self._state, self._scratch.rotation, self._scratch.pose
                     )
                     most = max(most, int(buried))
-                rows = slice(int(self._scratch.pair_stop[pair - 1]) if pair else 0, int(self._scratch.pair_stop[pair]))
-                texel = self._world.texel[self._scratch.slots[rows] - self._world.slot_start[pair]]
-                found = self._scratch.rows[rows]
-                order = np.argsort(found[:, DEPTH], kind="stable")  # of several points of a texel the deepest comes last
-                texel, found = texel[order], found[order]
-                deeper = found[:, DEPTH] > depth[t, texel]
-                texel, found = texel[deeper], found[deeper]
-                depth[t, texel] = found[:, DEPTH]
-                normal[t, texel] = found[:, NX : NZ + 1]
-                point[t, texel] = found[:, PX : PZ + 1] + self._center[sensor.body]
+                slots, normals, points, depths = contacts_of(pair, self._scratch)
+                texel = self._world.texel[slots - self._world.slot_start[pair]]
+                deeper = np.argsort(depths, kind="stable")  # of several points of a texel the deepest comes last
+                deeper = deeper[depths[deeper] > depth[t, texel[deeper]]]
+                texel = texel[deeper]
+                depth[t, texel] = depths[deeper]
+                normal[t, texel] = normals[deeper]
+                point[t, texel] = points[deeper] + self._center[sensor.body]
         return depth, normal, point, most
 
     def _time_of(self, frame: int) -> float:
@@ -296,7 +294,7 @@ def _neighbours(world: World, state: State) -> Neighbours:
     slots = len(state.hint)
     pose = np.zeros((len(world.pairs), 14))
     pose[:, 12] = -1.0
-    return Neighbours(np.zeros((slots, NEAR), np.int32), np.zeros(slots, np.int32), pose)
+    return Neighbours(np.zeros((slots, NEAR), np.int32), np.zeros(slots, np.int32), np.full(slots, -1, np.int32), pose)
 
 
 def _start(scenario: Scenario, world: World, center: np.ndarray) -> State:

@@ -23,11 +23,15 @@ from .bodies import (
     write_world_inertia,
 )
 from .contact import (
+    CN,
     DEPTH,
+    EXPONENT,
     GAIN,
+    GRIP,
     KEEP,
+    LANES,
     LIMIT,
-    NORMAL_FORCE,
+    LINEAR,
     NX,
     NY,
     NZ,
@@ -36,25 +40,28 @@ from .contact import (
     PY,
     PZ,
     ROW,
-    STIFF_N,
-    STIFF_T,
+    SLOPE,
     ZX,
     ZY,
     ZZ,
+    K,
     State,
     World,
     bristle_limit,
     bristle_rate,
-    friction_bias,
     friction_force,
     gather,
     linearise,
     normal_force,
+    normal_tangent,
 )
-from .jit import kernel
+from .jit import inlined, kernel
 
 PASSES = 40
 """Most rounds in which contacts are linearised anew within a substep; two or three are usual, one at rest."""
+
+SUMS = 27
+"""Numbers that the contacts of a pair are summed up in: a symmetric (6, 6) block by its lower triangle, and a wrench."""
 
 
 class Scratch(NamedTuple):
@@ -68,12 +75,16 @@ class Scratch(NamedTuple):
         Velocity of each body's reference point and a matrix W (row by row): the points at arm r move by ``dt (V + W r)``.
     known : (b, 12) float
         The part of the twist that is not solved for.
-    rows : (s, ROW) float
-        One row per contact, those of a pair behind one another.
-    slots : (s,) int
+    rows : (blocks, ROW) float
+        One row per contact, in blocks (see :mod:`.contact`).
+    slots : (blocks, LANES) int
         Place of each row in the memory of :class:`.State`.
-    pair_stop : (q,) int
-        Where each pair's rows end.
+    first_block : (q,) int
+        Where each pair's rows begin.
+    contacts : (q,) int
+        How many rows each pair has in use.
+    sums : (SUMS · LANES,) float
+        Of the contacts of a pair, lane by lane.
     pose : (12,) float
         A relative pose.
     motion, part : (12,) float
@@ -92,7 +103,9 @@ class Scratch(NamedTuple):
     known: np.ndarray
     rows: np.ndarray
     slots: np.ndarray
-    pair_stop: np.ndarray
+    first_block: np.ndarray
+    contacts: np.ndarray
+    sums: np.ndarray
     pose: np.ndarray
     motion: np.ndarray
     part: np.ndarray
@@ -107,7 +120,9 @@ class Scratch(NamedTuple):
 
 def scratch_for(world: World, state: State) -> Scratch:
     """Allocate the working memory of a run."""
-    b, s = len(state.position), len(state.hint)
+    b = len(state.position)
+    slots = np.diff(world.slot_start, append=len(state.hint))
+    blocks = np.cumsum([0, *(-(-slots // LANES))])
     twist = np.zeros((b, 12))
     for body in range(b):
         look_back(state.velocity[body], 1e-9, twist[body])
@@ -117,9 +132,11 @@ def scratch_for(world: World, state: State) -> Scratch:
         inertia=np.zeros((b, 3, 3)),
         twist=twist,
         known=np.zeros((b, 12)),
-        rows=np.zeros((s, ROW)),
-        slots=np.zeros(s, np.int64),
-        pair_stop=np.zeros(len(world.pairs), np.int64),
+        rows=np.zeros((blocks[-1], ROW)),
+        slots=np.zeros((blocks[-1], LANES), np.int64),
+        first_block=blocks[:-1],
+        contacts=np.zeros(len(world.pairs), np.int64),
+        sums=np.zeros(SUMS * LANES),
         pose=np.zeros(12),
         motion=np.zeros(12),
         part=np.zeros(12),
@@ -131,6 +148,26 @@ def scratch_for(world: World, state: State) -> Scratch:
         vector=np.zeros(n),
         momentum=np.zeros(n),
     )
+
+
+def contacts_of(pair: int, scratch: Scratch) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Return the contacts of one pair, freshly gathered.
+
+    Returns
+    -------
+    slots : (n,) int
+        Place of each in the memory of :class:`.State`.
+    normal : (n, 3) float
+        The target's outward normal, in the frame of the sensor's body like the point.
+    point : (n, 3) float, metres
+        From the body's reference point.
+    depth : (n,) float, metres
+    """
+    count, first = scratch.contacts[pair], scratch.first_block[pair]
+    blocks = slice(first, first - (-count // LANES))
+    columns = scratch.rows[blocks].reshape(-1, ROW // LANES, LANES).swapaxes(1, 2).reshape(-1, ROW // LANES)[:count]
+    n, p = NX // LANES, PX // LANES
+    return scratch.slots[blocks].ravel()[:count], columns[:, n : n + 3], columns[:, p : p + 3], columns[:, DEPTH // LANES]
 
 
 @kernel
@@ -183,10 +220,9 @@ def _painted_law(p, painted, point):
     return (p[0] * k, p[1] * k, p[2], p[3], p[4], p[5], p[6] * friction, p[7] * friction, p[8], p[9])
 
 
-@kernel
-def _velocity(rows, r, motion):
+@inlined
+def _velocity(px, py, pz, motion):
     """Velocity of the target at a contact point relative to the sensor, in the axes of the sensor's body."""
-    px, py, pz = rows[r, PX], rows[r, PY], rows[r, PZ]
     return (
         motion[0] + motion[3] * px + motion[4] * py + motion[5] * pz,
         motion[1] + motion[6] * px + motion[7] * py + motion[8] * pz,
@@ -199,13 +235,14 @@ def gather_all(world, tree, neighbours, state, scratch):
     """Contacts of all pairs of sensor and target where the bodies are now. Returns how many points are sunk too deep to act."""
     for body in range(len(state.position)):
         write_rotation(state.quaternion[body], scratch.rotation[body])
-    used, sunk = 0, 0
+    sunk = 0
     for pair in range(len(world.pairs)):
-        used, deep = gather(
-            pair, world, tree, neighbours, state, scratch.rotation, scratch.rows, scratch.slots, used, scratch.pose
+        first = scratch.first_block[pair]
+        count, deep = gather(
+            pair, first, world, tree, neighbours, state, scratch.rotation, scratch.rows, scratch.slots, scratch.pose
         )
         sunk += deep
-        scratch.pair_stop[pair] = used
+        scratch.contacts[pair] = count
     return sunk
 
 
@@ -239,18 +276,15 @@ def _solve_velocities(dt, world, state, scratch):
             vector[i] = momentum[i]
             for j in range(n):
                 matrix[i, j] = 0.0
-        start = 0
         for pair in range(len(world.pairs)):
             a, b = world.sensor_body[world.pairs[pair, 0]], world.target_body[world.pairs[pair, 1]]
-            stop = scratch.pair_stop[pair]
-            if start < stop:
+            if scratch.contacts[pair] > 0:
                 _relative_motion(a, b, scratch.twist, state.position, scratch.rotation, scratch.motion)
                 _relative_motion(a, b, scratch.known, state.position, scratch.rotation, scratch.part)
                 first = world.point_start[world.pairs[pair, 0]] - world.slot_start[pair]
-                _sum_contacts(start, stop, dt, _law(world.parameters, pair), world.painted, first, scratch)
+                _sum_contacts(pair, first, dt, _law(world.parameters, pair), world.painted, scratch)
                 if free_at[a] >= 0 or free_at[b] >= 0:
                     _add_pair(a, b, dt, world, state, scratch)
-            start = stop
         if n == 0:
             return
         for body in range(len(free_at)):
@@ -284,7 +318,24 @@ def _solve_velocities(dt, world, state, scratch):
 
 
 @kernel
-def _sum_contacts(start, stop, dt, law, painted, first, scratch):
+def _write_tangents(pair, first_point, dt, motion, law, painted, scratch):
+    """Write what is not the same for all contacts of a pair, for the loop that must not call it itself.
+
+    The tangents of a curved normal law at the velocities of `motion`, and what was painted.
+    """
+    rows = scratch.rows
+    for r in range(scratch.contacts[pair]):
+        b, lane = scratch.first_block[pair] + r // LANES, r % LANES
+        point = first_point + scratch.slots[b, lane]
+        vx, vy, vz = _velocity(rows[b, PX + lane], rows[b, PY + lane], rows[b, PZ + lane], motion)
+        rate = vx * rows[b, NX + lane] + vy * rows[b, NY + lane] + vz * rows[b, NZ + lane]
+        p = _painted_law(law, painted, point)
+        rows[b, PUSH + lane], rows[b, SLOPE + lane] = normal_tangent(rows[b, DEPTH + lane], rate, dt, p)
+        rows[b, GRIP + lane] = painted[point, 1] if len(painted) > 0 else 1.0
+
+
+@kernel
+def _sum_contacts(pair, first_point, dt, p, painted, scratch):
     """Linearise the contacts of a pair, and sum their forces on the target and what they resist.
 
     The contact point of a row is `first` plus its slot.
@@ -292,67 +343,75 @@ def _sum_contacts(start, stop, dt, law, painted, first, scratch):
     With a contact's damping tensor ``C = ct 1 + (cn - ct) n nᵀ`` and velocities ``v + ω × p`` the block is the sum of
     ``Jᵀ C J``, its lower triangle; the wrench is what the springs and the known part of the motion do.
     """
-    rows, block, wrench = scratch.rows, scratch.block, scratch.wrench
+    rows, sums, block, wrench = scratch.rows, scratch.sums, scratch.block, scratch.wrench
     motion, part = _values(scratch.motion), _values(scratch.part)
-    a00, a10, a11, a20, a21, a22 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    b00, b01, b02, b10, b11, b12, b20, b21, b22 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    c00, c10, c11, c20, c21, c22 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    sx, sy, sz, qx, qy, qz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    for r in range(start, stop):
-        p = _painted_law(law, painted, first + scratch.slots[r])
-        vx, vy, vz = _velocity(rows, r, motion)
-        linearise(rows, r, vx, vy, vz, dt, p)
-        if rows[r, NORMAL_FORCE] <= 0.0:
-            continue
-        nx, ny, nz = rows[r, NX], rows[r, NY], rows[r, NZ]
-        px, py, pz = rows[r, PX], rows[r, PY], rows[r, PZ]
-        t = rows[r, STIFF_T]
-        e = rows[r, STIFF_N] - t
-        ux, uy, uz = _velocity(rows, r, part)
-        push = rows[r, PUSH] + e * (ux * nx + uy * ny + uz * nz)
-        stick = friction_bias(rows, r, dt, p)
-        fx = -push * nx - stick * rows[r, ZX] - t * ux
-        fy = -push * ny - stick * rows[r, ZY] - t * uy
-        fz = -push * nz - stick * rows[r, ZZ] - t * uz
-        sx += fx
-        sy += fy
-        sz += fz
-        qx += py * fz - pz * fy
-        qy += pz * fx - px * fz
-        qz += px * fy - py * fx
-        mx, my, mz = py * nz - pz * ny, pz * nx - px * nz, px * ny - py * nx
-        ex, ey, ez = e * nx, e * ny, e * nz
-        gx, gy, gz = e * mx, e * my, e * mz
-        tx, ty, tz = t * px, t * py, t * pz
-        square = tx * px + ty * py + tz * pz
-        a00 += t + ex * nx
-        a10 += ey * nx
-        a11 += t + ey * ny
-        a20 += ez * nx
-        a21 += ez * ny
-        a22 += t + ez * nz
-        # Lower-left block: [p]× C.
-        b00 += gx * nx
-        b01 += gx * ny - tz
-        b02 += gx * nz + ty
-        b10 += gy * nx + tz
-        b11 += gy * ny
-        b12 += gy * nz - tx
-        b20 += gz * nx - ty
-        b21 += gz * ny + tx
-        b22 += gz * nz
-        c00 += gx * mx + square - tx * px
-        c10 += gy * mx - ty * px
-        c11 += gy * my + square - ty * py
-        c20 += gz * mx - tz * px
-        c21 += gz * my - tz * py
-        c22 += gz * mz + square - tz * pz
-    block[0, 0], block[1, 0], block[1, 1], block[2, 0], block[2, 1], block[2, 2] = a00, a10, a11, a20, a21, a22
-    block[3, 0], block[3, 1], block[3, 2] = b00, b01, b02
-    block[4, 0], block[4, 1], block[4, 2] = b10, b11, b12
-    block[5, 0], block[5, 1], block[5, 2] = b20, b21, b22
-    block[3, 3], block[4, 3], block[4, 4], block[5, 3], block[5, 4], block[5, 5] = c00, c10, c11, c20, c21, c22
-    wrench[0], wrench[1], wrench[2], wrench[3], wrench[4], wrench[5] = sx, sy, sz, qx, qy, qz
+    for i in range(SUMS * LANES):
+        sums[i] = 0.0
+    vary = p[EXPONENT] != LINEAR or len(painted) > 0
+    if vary:
+        _write_tangents(pair, first_point, dt, motion, p, painted, scratch)
+    first = scratch.first_block[pair]
+    for b in range(first, first + (scratch.contacts[pair] + LANES - 1) // LANES):
+        for lane in range(LANES):  # runs in vector registers: no branches, no calls
+            nx, ny, nz = rows[b, NX + lane], rows[b, NY + lane], rows[b, NZ + lane]
+            px, py, pz = rows[b, PX + lane], rows[b, PY + lane], rows[b, PZ + lane]
+            zx, zy, zz = rows[b, ZX + lane], rows[b, ZY + lane], rows[b, ZZ + lane]
+            vx, vy, vz = _velocity(px, py, pz, motion)
+            push, slope, grip = p[K] * rows[b, DEPTH + lane], p[K] * dt + p[CN], 1.0
+            if vary:
+                push, slope, grip = rows[b, PUSH + lane], rows[b, SLOPE + lane], rows[b, GRIP + lane]
+            limit, push, stiff_n, bias, t, keep, gain = linearise(nx, ny, nz, zx, zy, zz, push, slope, grip, vx, vy, vz, dt, p)
+            rows[b, LIMIT + lane], rows[b, KEEP + lane], rows[b, GAIN + lane] = limit, keep, gain
+            e = stiff_n - t
+            ux, uy, uz = _velocity(px, py, pz, part)
+            push += e * (ux * nx + uy * ny + uz * nz)
+            fx = -push * nx - bias * zx - t * ux
+            fy = -push * ny - bias * zy - t * uy
+            fz = -push * nz - bias * zz - t * uz
+            mx, my, mz = py * nz - pz * ny, pz * nx - px * nz, px * ny - py * nx
+            ex, ey, ez = e * nx, e * ny, e * nz
+            gx, gy, gz = e * mx, e * my, e * mz
+            tx, ty, tz = t * px, t * py, t * pz
+            square = tx * px + ty * py + tz * pz
+            sums[0 * LANES + lane] += t + ex * nx
+            sums[1 * LANES + lane] += ey * nx
+            sums[2 * LANES + lane] += t + ey * ny
+            sums[3 * LANES + lane] += ez * nx
+            sums[4 * LANES + lane] += ez * ny
+            sums[5 * LANES + lane] += t + ez * nz
+            sums[6 * LANES + lane] += gx * nx
+            sums[7 * LANES + lane] += gx * ny - tz
+            sums[8 * LANES + lane] += gx * nz + ty
+            sums[9 * LANES + lane] += gx * mx + square - tx * px
+            sums[10 * LANES + lane] += gy * nx + tz
+            sums[11 * LANES + lane] += gy * ny
+            sums[12 * LANES + lane] += gy * nz - tx
+            sums[13 * LANES + lane] += gy * mx - ty * px
+            sums[14 * LANES + lane] += gy * my + square - ty * py
+            sums[15 * LANES + lane] += gz * nx - ty
+            sums[16 * LANES + lane] += gz * ny + tx
+            sums[17 * LANES + lane] += gz * nz
+            sums[18 * LANES + lane] += gz * mx - tz * px
+            sums[19 * LANES + lane] += gz * my - tz * py
+            sums[20 * LANES + lane] += gz * mz + square - tz * pz
+            sums[21 * LANES + lane] += fx
+            sums[22 * LANES + lane] += fy
+            sums[23 * LANES + lane] += fz
+            sums[24 * LANES + lane] += py * fz - pz * fy
+            sums[25 * LANES + lane] += pz * fx - px * fz
+            sums[26 * LANES + lane] += px * fy - py * fx
+    for half in (8, 4, 2, 1):  # the lanes, in pairs
+        for i in range(0, SUMS * LANES, LANES):
+            for lane in range(half):
+                sums[i + lane] += sums[i + lane + half]
+    at = 0
+    for i in range(6):
+        for j in range(i + 1):
+            block[i, j] = sums[at]
+            at += LANES
+    for i in range(6):
+        wrench[i] = sums[at]
+        at += LANES
 
 
 @kernel
@@ -401,27 +460,36 @@ def _write_known(velocity, twist, keyframed, known):
 @kernel
 def _store_bristles(dt, world, state, scratch):
     """Bristle deflections at the step's end, as the sensor sees them then."""
-    rows, motion, seen, start = scratch.rows, scratch.motion, scratch.part, 0
     for pair in range(len(world.pairs)):
-        stop = scratch.pair_stop[pair]
-        if start < stop:
+        if scratch.contacts[pair] > 0:
             a, b = world.sensor_body[world.pairs[pair, 0]], world.target_body[world.pairs[pair, 1]]
-            _relative_motion(a, b, scratch.twist, state.position, scratch.rotation, motion)
-            _seen_at_the_end(a, dt, scratch.twist, scratch.rotation, motion, seen)
-        values = _values(seen)
-        for r in range(start, stop):
-            vx, vy, vz = _velocity(rows, r, values)
-            out = vx * rows[r, NX] + vy * rows[r, NY] + vz * rows[r, NZ]
-            zx = rows[r, KEEP] * rows[r, ZX] + rows[r, GAIN] * (vx - out * rows[r, NX])
-            zy = rows[r, KEEP] * rows[r, ZY] + rows[r, GAIN] * (vy - out * rows[r, NY])
-            zz = rows[r, KEEP] * rows[r, ZZ] + rows[r, GAIN] * (vz - out * rows[r, NZ])
+            _relative_motion(a, b, scratch.twist, state.position, scratch.rotation, scratch.motion)
+            _seen_at_the_end(a, dt, scratch.twist, scratch.rotation, scratch.motion, scratch.part)
+            _bend_bristles(pair, _values(scratch.part), state, scratch)
+
+
+@kernel
+def _bend_bristles(pair, motion, state, scratch):
+    """Bring the bristles of a pair's contacts to the step's end, at the velocities of `motion`."""
+    rows, slots, bristles = scratch.rows, scratch.slots, state.bristles
+    first, left = scratch.first_block[pair], scratch.contacts[pair]
+    for b in range(first, first + (left + LANES - 1) // LANES):
+        for lane in range(LANES):
+            nx, ny, nz = rows[b, NX + lane], rows[b, NY + lane], rows[b, NZ + lane]
+            vx, vy, vz = _velocity(rows[b, PX + lane], rows[b, PY + lane], rows[b, PZ + lane], motion)
+            keep, gain, limit = rows[b, KEEP + lane], rows[b, GAIN + lane], rows[b, LIMIT + lane]
+            out = vx * nx + vy * ny + vz * nz
+            zx = keep * rows[b, ZX + lane] + gain * (vx - out * nx)
+            zy = keep * rows[b, ZY + lane] + gain * (vy - out * ny)
+            zz = keep * rows[b, ZZ + lane] + gain * (vz - out * nz)
             square = zx * zx + zy * zy + zz * zz
-            if square > rows[r, LIMIT] * rows[r, LIMIT]:
-                scale = rows[r, LIMIT] / math.sqrt(square)
-                zx, zy, zz = scale * zx, scale * zy, scale * zz
-            slot = scratch.slots[r]
-            state.bristles[slot, 0], state.bristles[slot, 1], state.bristles[slot, 2] = zx, zy, zz
-        start = stop
+            scale = limit / math.sqrt(square) if square > limit * limit else 1.0
+            rows[b, ZX + lane], rows[b, ZY + lane], rows[b, ZZ + lane] = scale * zx, scale * zy, scale * zz
+        for lane in range(min(left, LANES)):
+            slot = slots[b, lane]
+            bristles[slot, 0], bristles[slot, 1] = rows[b, ZX + lane], rows[b, ZY + lane]
+            bristles[slot, 2] = rows[b, ZZ + lane]
+        left -= LANES
 
 
 @kernel
@@ -513,24 +581,27 @@ def feel(world, state, scratch, force, shear, depth, slip, contact, net, moment)
 
     `net` gets force and torque about the body's reference point, `moment` the sum of fn · point and of fn.
     """
-    rows, points, start = scratch.rows, world.points, 0
+    rows, points = scratch.rows, world.points
     strongest = np.full(len(force), -1.0)
     for pair in range(len(world.pairs)):
         sensor = world.pairs[pair, 0]
         a, b = world.sensor_body[sensor], world.target_body[world.pairs[pair, 1]]
         law = _law(world.parameters, pair)
         _relative_motion(a, b, scratch.twist, state.position, scratch.rotation, scratch.motion)
-        for r in range(start, scratch.pair_stop[pair]):
-            point = world.point_start[sensor] + scratch.slots[r] - world.slot_start[pair]
+        motion = _values(scratch.motion)
+        for r in range(scratch.contacts[pair]):
+            block, lane = scratch.first_block[pair] + r // LANES, r % LANES
+            point = world.point_start[sensor] + scratch.slots[block, lane] - world.slot_start[pair]
             texel = world.texel[point]
             p = _painted_law(law, world.painted, point)
-            nx, ny, nz = rows[r, NX], rows[r, NY], rows[r, NZ]
-            vx, vy, vz = _velocity(rows, r, scratch.motion)
+            nx, ny, nz = rows[block, NX + lane], rows[block, NY + lane], rows[block, NZ + lane]
+            px, py, pz = rows[block, PX + lane], rows[block, PY + lane], rows[block, PZ + lane]
+            vx, vy, vz = _velocity(px, py, pz, motion)
             rate = vx * nx + vy * ny + vz * nz
             tx, ty, tz = vx - rate * nx, vy - rate * ny, vz - rate * nz
             square = tx * tx + ty * ty + tz * tz
-            fn = normal_force(rows[r, DEPTH], rate, p)
-            zx, zy, zz = rows[r, ZX], rows[r, ZY], rows[r, ZZ]
+            fn = normal_force(rows[block, DEPTH + lane], rate, p)
+            zx, zy, zz = rows[block, ZX + lane], rows[block, ZY + lane], rows[block, ZZ + lane]
             length, limit = math.sqrt(zx * zx + zy * zy + zz * zz), bristle_limit(fn, p)
             held = limit / length if length > limit else 1.0
             zx, zy, zz = held * zx, held * zy, held * zz
@@ -548,8 +619,7 @@ def feel(world, state, scratch, force, shear, depth, slip, contact, net, moment)
                 slip[texel] = math.sqrt(square)
             contact[texel] = True
             force[texel] += fn
-            depth[texel] = max(depth[texel], rows[r, DEPTH])
-            px, py, pz = rows[r, PX], rows[r, PY], rows[r, PZ]
+            depth[texel] = max(depth[texel], rows[block, DEPTH + lane])
             net[sensor, 0] += fx
             net[sensor, 1] += fy
             net[sensor, 2] += fz
@@ -560,4 +630,3 @@ def feel(world, state, scratch, force, shear, depth, slip, contact, net, moment)
             moment[sensor, 1] += fn * py
             moment[sensor, 2] += fn * pz
             moment[sensor, 3] += fn
-        start = scratch.pair_stop[pair]

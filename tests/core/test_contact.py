@@ -64,3 +64,12 @@ def test_sticking_is_for_ever():
     keep, gain = contact.bristle_step(0.0, 0.5, 1e-3, ROW)
     assert keep == 1.0
     assert gain == 1e-3
+
+
+def test_relaxation_is_exp_to_rounding():
+    """Against numpy's exp and expm1, from nothing to far beyond what doubles tell from zero."""
+    for x in [0.0, 5e-324, 1e-300, *np.logspace(-20, 6, 521)]:
+        left, mean = contact.relaxation(x)
+        assert left == pytest.approx(np.exp(-x), rel=0, abs=5e-16)
+        assert mean == pytest.approx(-np.expm1(-x) / x if x else 1.0, rel=2e-15)
+        assert 0.0 <= left <= 1.0

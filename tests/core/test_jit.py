@@ -2,13 +2,19 @@
 """Compiled kernels are never older than their source."""
 
 import os
+import platform
+import re
 import shutil
 import subprocess
 import sys
 
 import pytest
+from solver_scenes import cube_on_pad
 
-from palpate.core import jit
+from palpate.core import jit, step
+from palpate.core.solve import Simulation
+
+numba = pytest.importorskip("numba")
 
 CALLER = """
 from .callee import value
@@ -51,3 +57,18 @@ def test_a_kernel_is_compiled_anew_when_one_that_it_calls_has_changed(tmp_path):
         assert done.returncode == 0, done.stderr
         answers.append(done.stdout.split())
     assert answers == [["2.0", "0"], ["2.0", "1"], ["6.0", "0"]]
+
+
+@pytest.mark.skipif(not jit.COMPILED or platform.machine() not in ("x86_64", "AMD64"), reason="reads x86 machine code")
+@pytest.mark.parametrize("name", ["_sum_contacts", "_bend_bristles"])
+def test_loops_over_contacts_run_in_vector_registers(name):
+    """A call or a branch in such a loop changes no number and only makes it five times slower. Its root shows it."""
+    simulation = Simulation(cube_on_pad(1.0, frames=1, dt=1e-3))
+    scratch, law = simulation._scratch, step._law(simulation._world.parameters, 0)
+    compiled = numba.njit(error_model="numpy")(getattr(step, name).py_func)
+    if name == "_sum_contacts":
+        compiled(0, 0, 1e-3, law, simulation._world.painted, scratch)
+    else:
+        compiled(0, step._values(scratch.part), simulation._state, scratch)
+    (code,) = compiled.inspect_asm().values()
+    assert re.search(r"^\s+v?sqrtpd\s", code, re.MULTILINE), "the square root is taken of one number at a time"
