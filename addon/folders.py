@@ -27,10 +27,11 @@ from ..core.formats.files import (
     writable_folder,
     write_manifest,
 )
+from ..core.formats.sensors import SENSOR_NAME, save_sensor
 from ..core.recording import Frame, Recording
 from ..core.scenario import Scenario
 
-OURS = re.compile(rf"tactile_-?\d+\.exr|{re.escape(RECORDING_NAME)}|{re.escape(MANIFEST_NAME)}")
+OURS = re.compile(rf"tactile_-?\d+\.exr|{'|'.join(map(re.escape, (RECORDING_NAME, SENSOR_NAME, MANIFEST_NAME)))}")
 """Names of the files in a sensor's folder that a bake writes and replaces."""
 
 
@@ -130,6 +131,7 @@ class Files:
         for name, place in self.folders.items():
             partial = _beside(place, "partial")
             save_recording(partial / RECORDING_NAME, replace(recording, sensors={name: recording.sensors[name]}))
+            save_sensor(partial / SENSOR_NAME, self._sensors[name].texels, self._sensors[name].painted)
             write_manifest(partial, self._manifest(name, recording))
         for place in self.folders.values():
             self._check_replaceable(place)  # again: a bake takes long enough for somebody to put something there

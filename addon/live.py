@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -193,14 +192,10 @@ def _show_bake(scene, depsgraph) -> None:
 
 
 def _recording(obj):
-    """Return the recording of a sensor's bake, read when it is first asked for; None when it is not there.
-
-    It lies beside the images: their path follows when the .blend is saved somewhere else, the text in our settings does not.
-    """
-    image = materials.find(bpy.data.images, obj.palpate.uid) if obj.palpate.bake_folder else None
-    if image is None:
+    """Return the recording of a sensor's bake, read when it is first asked for; None when it is not there."""
+    place = write.bake_folder(obj)
+    if place is None:
         return None
-    place = Path(os.path.abspath(bpy.path.abspath(image.filepath))).parent
     if place not in _recordings:
         try:
             _recordings[place] = folders.stored_recording(place)

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import bpy
@@ -113,6 +114,20 @@ def _arrow_length(settings, sensor, felt, binding: Binding) -> float:
 def baked_objects(scene) -> list:
     """Return the objects that hold a part of the scene's bake."""
     return [obj for obj in scene.objects if obj.palpate.is_baked]
+
+
+def bake_folder(obj) -> Path | None:
+    """Return the folder of a sensor's bake; None when it shows none.
+
+    It is where the images are: their path follows when the .blend is saved somewhere else, the text in our settings does not.
+    """
+    image = materials.find(bpy.data.images, obj.palpate.uid) if obj.palpate.bake_folder else None
+    return None if image is None else Path(os.path.abspath(bpy.path.abspath(image.filepath))).parent
+
+
+def bake_folders(scene) -> list[Path]:
+    """Return the folders of all sensors of the scene's bake."""
+    return [place for obj in baked_objects(scene) if (place := bake_folder(obj)) is not None]
 
 
 def clear(scene) -> None:

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 
 from .recording import Recording, SensorFrame, SensorRecording
-from .scenario import SensorParameters
+from .scenario import Painted, SensorParameters
 from .texels import Texels
 
 AT_LIMIT = 0.9
@@ -46,8 +46,15 @@ def mobilised(sensor: SensorRecording, texels: Texels, mus: float) -> np.ndarray
     return np.divide(shear, limit, out=np.zeros_like(shear), where=limit > 0)
 
 
-def slipping(sensor: SensorRecording | SensorFrame, parameters: SensorParameters) -> np.ndarray:
+def slipping(sensor: SensorRecording | SensorFrame, parameters: SensorParameters, painted: Painted | None = None) -> np.ndarray:
     """Return which texels slip: they touch, move, and carry (almost) what friction can hold at their speed (Eq. 10).
+
+    Parameters
+    ----------
+    sensor : SensorRecording or SensorFrame
+    parameters : SensorParameters
+    painted : Painted, optional
+        Its friction multiplies what each texel can hold.
 
     Returns
     -------
@@ -57,11 +64,13 @@ def slipping(sensor: SensorRecording | SensorFrame, parameters: SensorParameters
 
     found = np.asarray(sensor.contact, bool) & (sensor.slip > CREEPING)
     limit = friction_limit(sensor.normal_force[found], sensor.slip[found], parameters)
+    if painted is not None and painted.friction is not None:
+        limit = limit * np.broadcast_to(painted.friction, found.shape)[found]
     found[found] = np.linalg.norm(sensor.shear[found], axis=-1) >= AT_LIMIT * limit
     return found
 
 
-def slip_share(sensor: SensorRecording, parameters: SensorParameters) -> np.ndarray:
+def slip_share(sensor: SensorRecording, parameters: SensorParameters, painted: Painted | None = None) -> np.ndarray:
     """Return how much of the normal force rests on texels that slip, 0 to 1; zero while nothing touches.
 
     Returns
@@ -69,7 +78,7 @@ def slip_share(sensor: SensorRecording, parameters: SensorParameters) -> np.ndar
     (F,) float
     """
     total = sensor.normal_force.sum(axis=1)
-    loose = np.where(slipping(sensor, parameters), sensor.normal_force, 0.0).sum(axis=1)
+    loose = np.where(slipping(sensor, parameters, painted), sensor.normal_force, 0.0).sum(axis=1)
     return np.divide(loose, total, out=np.zeros_like(total), where=total > 0)
 
 

@@ -11,6 +11,7 @@ import json
 import os
 import zipfile
 import zlib
+from collections.abc import Mapping
 from dataclasses import fields
 from pathlib import Path
 from typing import Any
@@ -22,6 +23,22 @@ from ..recording import Recording, SensorRecording
 from .files import atomic_write
 
 RECORDING_FORMAT = "palpate-recording/1"
+
+DAMAGED = (
+    ValueError,
+    KeyError,
+    TypeError,
+    AttributeError,
+    EOFError,
+    RuntimeError,
+    NotImplementedError,
+    MemoryError,
+    OverflowError,
+    SyntaxError,
+    zipfile.BadZipFile,
+    zlib.error,
+)
+"""What reading a damaged archive may raise."""
 
 _LONG_AGO = (1980, 1, 1, 0, 0, 0)  # the earliest time a zip can hold: the clock must not get into the bytes
 _SENSOR_FIELDS = tuple(item.name for item in fields(SensorRecording))
@@ -51,6 +68,17 @@ def save_recording(path: str | os.PathLike, recording: Recording) -> None:
         if array.dtype.kind not in "fiubU":
             raise ValueError(f"'{name}' of the recording has type {array.dtype}")
 
+    write_arrays(path, arrays)
+
+
+def write_arrays(path: str | os.PathLike, arrays: Mapping[str, np.ndarray]) -> None:
+    """Write arrays as .npz, whole or not at all; equal arrays give equal bytes.
+
+    Raises
+    ------
+    FileError
+        The file cannot be written.
+    """
     with atomic_write(path) as temporary, zipfile.ZipFile(temporary, "w") as archive:
         for name, array in arrays.items():
             info = zipfile.ZipInfo(f"{name}.npy", _LONG_AGO)
@@ -81,20 +109,7 @@ def load_recording(path: str | os.PathLike) -> Recording:
     except OSError as error:
         reason = (error.strerror or str(error)).lower()
         raise FileError(f"'{path}' could not be read ({reason}): choose another file.") from error
-    except (
-        ValueError,
-        KeyError,
-        TypeError,
-        AttributeError,
-        EOFError,
-        RuntimeError,
-        NotImplementedError,
-        MemoryError,
-        OverflowError,
-        SyntaxError,
-        zipfile.BadZipFile,
-        zlib.error,
-    ) as error:
+    except DAMAGED as error:
         raise FileError(f"'{path}' is damaged or no recording ({error}): bake again.") from error
 
 

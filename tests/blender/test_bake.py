@@ -28,7 +28,7 @@ def test_one_folder_per_sensor(tmp_path):
     assert sorted(path.name for path in (tmp_path / "palpate").iterdir()) == ["Pad", "Pad 2"]
     for name, folder in result.folders.items():
         files = sorted(path.name for path in folder.iterdir())
-        assert files == ["manifest.json", "recording.npz", *(f"tactile_{frame:04d}.exr" for frame in range(1, 5))]
+        assert files == ["manifest.json", "recording.npz", "sensor.npz", *(f"tactile_{frame:04d}.exr" for frame in range(1, 5))]
         manifest = read_manifest(folder)
         assert manifest.complete and manifest.sensor == name and manifest.digest == result.recording.digest
         recording = load_recording(folder / "recording.npz")

@@ -13,8 +13,10 @@ import numpy as np
 import pytest
 from blender_scenes import press, reopen, save
 
+from palpate.addon.bake import bake
 from palpate.commands import COMMANDS, READY, console, main
 from palpate.commands.bake import report
+from palpate.core.drive import drive
 from palpate.core.formats.archive import load_recording
 
 
@@ -303,3 +305,22 @@ def test_peak_shear_adds_forces_and_not_numbers_of_different_axes():
     scenario = SimpleNamespace(sensors=[SimpleNamespace(name="Tip", texels=texels)])
     row = report(SimpleNamespace(recording=recording, scenario=scenario, folders={"Tip": None})).splitlines()[-1]
     assert row.split() == ["Tip", "2", "1.0000", "N", "2.0000", "N", "0.0000", "N", "2.0000", "N"]
+
+
+@pytest.mark.parametrize("where", ["folder", "blend"])
+def test_export_of_a_baked_file(tmp_path, where, capsys):
+    scene, *_ = press(frames=3)
+    path = save(tmp_path)
+    recording = drive(bake(scene)).recording
+    save(tmp_path)
+    source = path if where == "blend" else tmp_path / "palpate"
+    assert main(["export", str(source), "--out", str(tmp_path / "out"), "--format", "npz"]) == 0
+    assert capsys.readouterr().out.splitlines()[-1] == str(tmp_path / "out" / "Pad.npz")
+    with np.load(tmp_path / "out" / "Pad.npz") as members:
+        assert members["normal_force"].tobytes() == recording.sensors["Pad"].normal_force.tobytes()
+
+
+def test_export_of_what_is_not_baked_is_one_line(tmp_path, capsys):
+    press(frames=3)
+    assert main(["export", str(save(tmp_path))]) == 1
+    assert "is not baked" in capsys.readouterr().err

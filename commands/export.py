@@ -1,0 +1,75 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""``palpate export``: a bake as CSV, NPZ, HDF5 or PNG."""
+
+from __future__ import annotations
+
+import argparse
+
+from ..core.bakes import Bake, read_bake, read_sensors
+from ..core.drive import drive
+from ..core.errors import SceneError
+from ..core.figures import Look
+from ..core.formats.export import KINDS, export
+from . import console, looks
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("bake", metavar="BAKE", help="a bake folder, the folder of one sensor in it, or a baked .blend")
+    parser.add_argument(
+        "--format", metavar="KIND", choices=KINDS, default="csv", help=f"{', '.join(KINDS)} (default: %(default)s)"
+    )
+    parser.add_argument("--out", metavar="DIR", default="palpate-export", help="folder to write to (default: %(default)s)")
+    parser.add_argument("--sensor", metavar="NAME", action="append", help="only this sensor; may be given again")
+    looks.add_arguments(parser)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    bake = find_bake(arguments.bake)
+    if arguments.sensor:
+        bake = bake.only(arguments.sensor)
+    look: Look = looks.of(arguments)
+    with console.progress_bar("export", len(bake.texels), unit="sensor") as bar:
+
+        def show(name: str) -> None:
+            console.Interrupt.check()
+            bar.set_description(name, refresh=False)
+            bar.update()
+
+        written = drive(export(bake, arguments.format, arguments.out, look), show)
+    for path in written:
+        print(path)
+    return 0
+
+
+def find_bake(where: str) -> Bake:
+    """Read a bake from its folder, or from the one that a .blend names.
+
+    Raises
+    ------
+    PalpateError
+        There is none.
+    """
+    if not where.endswith(".blend"):
+        return read_bake(where)
+    from . import blender
+
+    with console.quiet():
+        bpy = blender.start()
+        blender.open_blend(where)
+        return of_scene(bpy.context.scene)
+
+
+def of_scene(scene) -> Bake:
+    """Read the bake that a scene plays.
+
+    Raises
+    ------
+    PalpateError
+        It plays none, or its files are gone.
+    """
+    from ..addon import write
+
+    places = write.bake_folders(scene)
+    if not places:
+        raise SceneError(f"'{scene.name}' is not baked: run 'palpate bake' on it with --save first.")
+    return read_sensors(places)

@@ -1,0 +1,31 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Options of all commands that draw: colours, their scale, the width of the page."""
+
+from __future__ import annotations
+
+import argparse
+
+from ..core import colormaps
+from ..core.canvas import WIDTHS
+from ..core.figures import Look
+
+OPTIONS = ("colour_map", "quantity", "limit", "width", "dpi")
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    names = [name.lower() for name in colormaps.STOPS]
+    parser.add_argument("--colour-map", metavar="NAME", choices=names, help=f"{', '.join(names)} (default: the scene's)")
+    parser.add_argument(
+        "--quantity", choices=("force", "pressure"), help="what colours show: N per texel, or kPa (default: the scene's)"
+    )
+    parser.add_argument("--limit", metavar="VALUE", type=float, help="end of the colour scale, N or kPa (default: a round one)")
+    parser.add_argument("--width", choices=WIDTHS, help="journal column that figures fill (default: double)")
+    parser.add_argument("--dpi", metavar="N", type=int, help="of PNG figures (default: 300)")
+
+
+def of(arguments: argparse.Namespace, **others) -> Look:
+    """Return the look that the words ask for; `others` are what else than the usual is meant where they say nothing."""
+    given = {key: value for key in OPTIONS if (value := getattr(arguments, key)) is not None}
+    if "colour_map" in given:
+        given["colour_map"] = given["colour_map"].upper()
+    return Look(**{**others, **given})

@@ -1,0 +1,159 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A bake read back from its folder is the bake, and every export says the same numbers with their units."""
+
+import csv
+import json
+from dataclasses import asdict
+
+import numpy as np
+import pytest
+from recordings import grid_texels, recording_of, round_texels
+
+from palpate.core import colormaps
+from palpate.core.bakes import frame_index, read_bake
+from palpate.core.drive import drive
+from palpate.core.errors import FileError, PalpateError
+from palpate.core.figures import Look
+from palpate.core.formats.archive import save_recording
+from palpate.core.formats.export import export
+from palpate.core.formats.files import Manifest, write_manifest
+from palpate.core.formats.sensors import load_sensor, save_sensor
+from palpate.core.scenario import Painted, SensorParameters
+
+
+def put(folder, name, texels, painted=None, digest="d"):
+    """Write the folder of one sensor as a bake leaves it."""
+    place = folder / name.replace("/", "_")
+    place.mkdir(parents=True)
+    recording = recording_of(texels)
+    recording.sensors = {name: recording.sensors["pad"]}
+    recording.digest = digest
+    recording.sensors[name].slip[:] = 0.01
+    save_recording(place / "recording.npz", recording)
+    save_sensor(place / "sensor.npz", texels, painted)
+    parameters = SensorParameters(unit="V", gain=2.0)
+    write_manifest(
+        place, Manifest(name, "0", 1, 10, 24.0, 1e-4, digest, "V", texels.layout.shape, asdict(parameters), (), True)
+    )
+    return recording
+
+
+@pytest.fixture
+def bake(tmp_path):
+    put(tmp_path / "bake", "pad", grid_texels(), Painted(friction=np.linspace(0.5, 2.0, 15)))
+    put(tmp_path / "bake", "tip/1", round_texels())
+    return read_bake(tmp_path / "bake")
+
+
+@pytest.mark.parametrize("texels", [grid_texels(), round_texels()], ids=["grid", "uv"])
+def test_sensors_come_back_bit_for_bit(tmp_path, texels):
+    save_sensor(tmp_path / "a.npz", texels, Painted(gain=np.arange(1.0, len(texels) + 1)))
+    found, painted = load_sensor(tmp_path / "a.npz")
+    for name in ("vertex", "position", "normal", "tangent", "area"):
+        assert getattr(found, name).tobytes() == getattr(texels, name).tobytes()
+    assert type(found.layout) is type(texels.layout) and found.layout.shape == texels.layout.shape
+    values = np.random.default_rng(0).random(len(texels))
+    assert found.layout.image(values).tobytes() == texels.layout.image(values).tobytes()
+    assert painted.gain.tolist() == list(range(1, len(texels) + 1)) and painted.k is None
+
+
+@pytest.mark.parametrize("content", [b"", b"PK\x03\x04 half a zip", b"not a zip at all"])
+def test_a_damaged_sensor_file_is_one_sentence(tmp_path, content):
+    (tmp_path / "a.npz").write_bytes(content)
+    with pytest.raises(FileError, match="bake again"):
+        load_sensor(tmp_path / "a.npz")
+
+
+def test_a_folder_gives_all_its_sensors(bake, tmp_path):
+    assert list(bake.texels) == ["pad", "tip/1"] == list(bake.recording.sensors)
+    assert bake.parameters["pad"].unit == "V"
+    assert list(bake.only(["tip/1"]).recording.sensors) == ["tip/1"]
+    assert list(read_bake(tmp_path / "bake" / "pad").texels) == ["pad"]
+    with pytest.raises(FileError, match="choose from pad, tip/1"):
+        bake.only(["thumb"])
+    with pytest.raises(FileError, match="from 1 to 10"):
+        frame_index(bake.recording, 11)
+
+
+def test_sensors_of_two_runs_are_not_mixed(tmp_path):
+    put(tmp_path, "a", grid_texels(), digest="one")
+    put(tmp_path, "b", grid_texels(), digest="two")
+    with pytest.raises(FileError, match="different scenes"):
+        read_bake(tmp_path)
+
+
+@pytest.mark.parametrize("what", ["missing", "empty"])
+def test_no_bake_is_one_sentence(tmp_path, what):
+    if what == "empty":
+        (tmp_path / "empty").mkdir()
+    with pytest.raises(FileError, match="bake first"):
+        read_bake(tmp_path / what)
+
+
+def table(path):
+    with open(path, newline="") as file:
+        header, *rows = csv.reader(file)
+    return header, np.array(rows, float)
+
+
+def test_csv_holds_every_texel_and_the_sums(bake, tmp_path):
+    drive(export(bake, "csv", tmp_path / "out"))
+    assert sorted(path.name for path in (tmp_path / "out").iterdir())[:2] == ["bodies.csv", "pad"]
+    felt = bake.recording.sensors["pad"]
+    header, rows = table(tmp_path / "out" / "pad" / "normal_force.csv")
+    assert header[:3] == ["frame", "time", "texel_0"] and len(header) == 17
+    assert rows[:, 0].tolist() == list(range(1, 11))
+    np.testing.assert_allclose(rows[:, 1], bake.recording.times, rtol=1e-8)
+    np.testing.assert_allclose(rows[:, 2:], felt.normal_force, rtol=1e-8)
+    np.testing.assert_allclose(table(tmp_path / "out" / "pad" / "shear_y.csv")[1][:, 2:], felt.shear[:, :, 1], rtol=1e-8)
+    header, rows = table(tmp_path / "out" / "pad" / "sums.csv")
+    assert rows[3, header.index("normal")] == pytest.approx(felt.normal_force[3].sum())
+    header, rows = table(tmp_path / "out" / "pad" / "texels.csv")
+    texels = bake.texels["pad"]
+    np.testing.assert_allclose(rows[:, header.index("area")], texels.area, rtol=1e-8)
+    np.testing.assert_array_equal(rows[:, header.index("row")], texels.layout.row)
+
+
+def test_npz_and_hdf5_hold_the_same_arrays_in_full_precision(bake, tmp_path):
+    h5py = pytest.importorskip("h5py")
+    written = drive(export(bake, "npz", tmp_path / "out")) + drive(export(bake, "hdf5", tmp_path / "out"))
+    assert all(path.is_file() for path in written)
+    with h5py.File(tmp_path / "out" / "palpate.h5") as file, np.load(written[0]) as members:
+        group = file["sensors/pad"]
+        assert group["reading"].attrs["unit"] == "V" and group["normal_force"].attrs["unit"] == "N"
+        assert json.loads(group.attrs["parameters"])["gain"] == 2.0
+        assert file["sensors/tip_1"].attrs["name"] == "tip/1"
+        for key in ("normal_force", "shear", "reading", "net_torque", "texel_position", "texel_row"):
+            assert group[key][()].tobytes() == members[key].tobytes()
+        assert members["normal_force"].tobytes() == bake.recording.sensors["pad"].normal_force.tobytes()
+        assert file["bodies/pad/pose"].shape == (10, 7)
+
+
+def test_hdf5_without_its_package_says_how_to_get_it(bake, tmp_path, monkeypatch):
+    monkeypatch.setitem(__import__("sys").modules, "h5py", None)
+    with pytest.raises(PalpateError, match="pip install h5py"):
+        drive(export(bake, "hdf5", tmp_path / "out"))
+
+
+def test_png_has_one_scale_for_all_sensors(bake, tmp_path):
+    from matplotlib.image import imread
+
+    bake.recording.sensors["tip/1"].normal_force[4, 0] = 0.2
+    drive(export(bake, "png", tmp_path / "out", Look("PAPER", limit=0.4)))
+    scale = json.loads((tmp_path / "out" / "pad" / "scale.json").read_text())
+    assert scale["last_colour"] == 0.4 and scale["quantity"].endswith("(N)")
+    picture = imread(tmp_path / "out" / "pad" / "tactile_0005.png")
+    times = picture.shape[0] // 5
+    force = bake.recording.sensors["pad"].normal_force[4].reshape(5, 3)
+    seen = picture[times // 2 :: times, times // 2 :: times][::-1]  # row 0 is at the bottom
+    np.testing.assert_allclose(seen[..., 0], 1.0 - force / 0.4, atol=0.003)
+    assert (seen[..., 3] == 1.0).all()
+    tip = imread(next((tmp_path / "out").glob("tip_1*")) / "tactile_0005.png")
+    assert (tip[..., 3] == 0.0).any()  # nothing there
+    assert np.isclose(tip[..., 0][tip[..., 3] > 0].min(), 0.5, atol=0.1)
+    assert (colormaps.colors("PAPER", np.array([0.5])) == 0.5).all()
+
+
+def test_an_unknown_format_is_refused(bake, tmp_path):
+    with pytest.raises(PalpateError, match="csv, npz, hdf5, png"):
+        drive(export(bake, "xls", tmp_path))
