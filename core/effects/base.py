@@ -7,6 +7,7 @@ the same thing, since no two papers agree on one. A form acts in exactly one way
 =============  ==============================================================================================================
 ``law``        scalar law with memory, the same for the solver, for whole signals and for streams (see :data:`Law`)
 ``shape``      formula on readings that needs no past: ``shape(x (t, n), time (t,), values, site, seed) → (t, n)``
+``mix``        weights of a linear mix of texels: ``mix(values, site) → Mixing``, made once and applied to every sample
 ``delay``      seconds by which the reading comes late: ``delay(values) → float``
 ``friction``   law of sliding: ``friction(speed, force, numbers, row) → (factor on the friction coefficient, N·s/m)``
 ``place``      where the texels really are: ``place(position, normal, tangent, values) → the same three``
@@ -22,6 +23,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
+
+from .mixing import Mixing
 
 STAGES = ("contact", "pad", "readout")
 """`contact`: the law of contact itself, without memory. `pad`: with memory; both act on the bodies. `readout`: only on what
@@ -153,7 +156,7 @@ class Form:
     parameters : tuple of Parameter
     off : dict of str to float
         Values, possibly outside the bounds, at which the effect is not there: ``strength`` zero, a level of infinity.
-    law, shape, delay, friction, place
+    law, shape, mix, delay, friction, place
         How it acts; exactly one is given (see the module's text).
     constants : callable
         ``constants(values, dt (m,)) → (m, c)``: the numbers of a law for steps of these lengths (s), of a friction law for
@@ -166,6 +169,8 @@ class Form:
         A readout form that acts on the reading in the sensor's unit, and not on newtons before gain and zero.
     after_clip : bool
         A law that acts after the force was cut off at zero, so that it may pull.
+    random : bool
+        It depends on the seed.
     """
 
     name: str
@@ -175,6 +180,7 @@ class Form:
     off: dict[str, float]
     law: Law | None = None
     shape: Callable[..., np.ndarray] | None = None
+    mix: Callable[[Values, Site], Mixing] | None = None
     delay: Callable[[Values], float] | None = None
     friction: Callable[..., tuple[float, float]] | None = None
     place: Callable[..., tuple[np.ndarray, np.ndarray, np.ndarray]] | None = None
@@ -184,6 +190,12 @@ class Form:
     after_conversion: bool = False
     after_clip: bool = False
     random: bool = False
+
+    @property
+    def way(self) -> str:
+        """How it acts: the name of the one attribute that is given."""
+        ways = ("law", "shape", "mix", "delay", "friction", "place")
+        return next(name for name in ways if getattr(self, name) is not None)
 
     def defaults(self, gain: float = 1.0) -> dict[str, Value]:
         """Return the default of every parameter, for a sensor with this gain."""

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from .base import Effect, Form, Site, Values
 from .laws import compile_program, friction_over_all, in_order, law_over_time
 from .library import complete_values
+from .mixing import Mixing
 
 if TYPE_CHECKING:
     from ..scenario import Sensor, SensorParameters
@@ -126,7 +127,7 @@ class Reader:
 
     def __init__(self, effects: Iterable[Effect], site: Site):
         self.site = site
-        self._stages: list[_Pointwise | _Filter | _Delay | _Conversion] = []
+        self._stages: list[_Pointwise | _Mix | _Filter | _Delay | _Conversion] = []
         converted = False
         for item, form in in_order(effects, readout=True):
             if form.after_conversion and not converted:
@@ -135,6 +136,8 @@ class Reader:
             values = complete_values(item, site.gain)
             if form.law is not None:
                 self._stages.append(_Filter(form, values))
+            elif form.mix is not None:
+                self._stages.append(_Mix(form.mix(values, site)))
             elif form.delay is not None:
                 self._stages.append(_Delay(form.delay(values)))
             else:
@@ -181,6 +184,16 @@ class _Pointwise:
     def run(self, time: np.ndarray, signal: np.ndarray) -> np.ndarray:
         assert self.form.shape is not None
         return self.form.shape(signal, time, self.values, self.site, self.seed)
+
+
+class _Mix:
+    """A linear mix of texels."""
+
+    def __init__(self, weights: Mixing):
+        self.weights = weights
+
+    def run(self, time: np.ndarray, signal: np.ndarray) -> np.ndarray:
+        return self.weights.apply(signal)
 
 
 class _Filter:

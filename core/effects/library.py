@@ -98,8 +98,8 @@ def check(effects: Iterable[Effect], sensor: str, texels: int | None = None, gai
                 raise EffectError(f"{key} of {where} is a list of {numbers.size}: give it one number.")
             if numbers.ndim and texels is not None and len(numbers) != texels:
                 raise EffectError(f"{key} of {where} has {len(numbers)} numbers for {texels} texels: give one per texel.")
-            slack = 1e-9 * max(abs(parameter.low), abs(parameter.high))
-            outside = ~((numbers >= parameter.low - slack) & (numbers <= parameter.high + slack))
+            low, high = parameter.low - 1e-9 * abs(parameter.low), parameter.high + 1e-9 * abs(parameter.high)  # rounding
+            outside = ~((numbers >= low) & (numbers <= high))
             if outside.any():
                 worst = float(np.atleast_1d(numbers)[np.atleast_1d(outside)][0])
                 unit = "" if parameter.unit == "1" else f" {parameter.unit}"

@@ -51,7 +51,8 @@ def test_a_form_says_what_it_is(name, form):
     kind, found = kind_of(name), form_of(name, form)
     assert kind.stage_of(found) in base.STAGES
     assert kind.text.endswith(".") and found.formula and found.reference
-    ways = [found.law, found.shape, found.delay, found.friction, found.place]
+    ways = [found.law, found.shape, found.mix, found.delay, found.friction, found.place]
+    assert getattr(found, found.way) is not None
     assert sum(way is not None for way in ways) == 1
     assert (found.constants is not None) == (found.law is not None or found.friction is not None)
     assert set(found.off) <= {parameter.name for parameter in found.parameters}

@@ -1,0 +1,101 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The surfaces stick: the force at small depth is less than the spring's and may pull.
+
+A texel knows nothing of an object that no longer reaches into it, so the pull ends where the contact does.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from .base import Form, Kind, Parameter, Values, number, same_for_all_steps
+
+
+def constant(force, slope, depth, slide, numbers, row, memory, point, at, commit):
+    """``f − F · (1 − exp(−d/D))``."""
+    if depth <= 0.0:
+        return force, slope
+    left = math.exp(-depth / numbers[row, 1])
+    return force - numbers[row, 0] * (1.0 - left), slope - numbers[row, 0] * left / numbers[row, 1]
+
+
+def unloading(force, slope, depth, slide, numbers, row, memory, point, at, commit):
+    """``f − F u c``: u goes to 1 on the way back and to 0 on the way in, c grows with the time of contact (or is 1).
+
+    Memory: u, the last depth, c. Constants: F, D, how much of 1 − c is left after the step, least c.
+    """
+    if depth <= 0.0:
+        if commit:
+            memory[point, at], memory[point, at + 1], memory[point, at + 2] = 0.0, 0.0, 0.0
+        return force, slope
+    change = depth - memory[point, at + 1]
+    aim = 0.0 if change >= 0.0 else 1.0
+    u = aim + (memory[point, at] - aim) * math.exp(-abs(change) / numbers[row, 1])
+    old = 1.0 - (1.0 - memory[point, at + 2]) * numbers[row, 2]
+    c = max(old, numbers[row, 3])
+    if commit:
+        memory[point, at], memory[point, at + 1], memory[point, at + 2] = u, depth, old
+    pull = numbers[row, 0] * c
+    return force - pull * u, slope + pull * abs(aim - u) / numbers[row, 1]
+
+
+def _at_once(values: Values, dt: np.ndarray) -> np.ndarray:
+    return np.tile([number(values, "pull"), number(values, "depth"), 1.0, 1.0], (len(dt), 1))
+
+
+def _with_time(values: Values, dt: np.ndarray) -> np.ndarray:
+    left = np.exp(-np.asarray(dt) / number(values, "time"))
+    same = np.tile([number(values, "pull"), number(values, "depth")], (len(dt), 1))
+    return np.column_stack([same, left, np.zeros(len(dt))])
+
+
+_PULL = Parameter("pull", "N", 0.02, 0.0, 100.0, "Largest pull F of one texel.")
+_WAY = Parameter("depth", "m", 2e-4, 1e-6, 0.02, "Way back D after which the pull has come to 63 %.", log=True)
+
+KIND = Kind(
+    name="adhesion",
+    title="Adhesion",
+    text="Sticks: the force goes below that of the spring when the object comes off, and may pull.",
+    stage="pad",
+    order=50,
+    forms=(
+        Form(
+            "unloading",
+            "f = f₀ − F u,  u → 1 on the way back, → 0 on the way in, within D",
+            "Johnson, Kendall and Roberts, Proc. R. Soc. A 324 (1971): contact is held longer than it was made",
+            (_PULL, _WAY),
+            off={"pull": 0.0},
+            law=unloading,
+            constants=_at_once,
+            memory=3,
+            after_clip=True,
+        ),
+        Form(
+            "constant",
+            "f = f₀ − F · (1 − exp(−d/D))",
+            "Derjaguin, Muller and Toporov, J. Colloid Interface Sci. 53 (1975)",
+            (_PULL, Parameter("depth", "m", 1e-4, 1e-6, 0.02, "Depth D at which 63 % of the pull is there.", log=True)),
+            off={"pull": 0.0},
+            law=constant,
+            constants=same_for_all_steps("pull", "depth"),
+            after_clip=True,
+        ),
+        Form(
+            "dwell",
+            "f = f₀ − F u c,  c = 1 − exp(−t/τ) after the time t of contact",
+            "Chaudhury and Whitesides, Langmuir 7 (1991); Barquins (1992): adhesion grows with the time of contact",
+            (
+                _PULL,
+                _WAY,
+                Parameter("time", "s", 2.0, 0.01, 1000.0, "Time of contact τ that makes 63 % of the pull.", log=True),
+            ),
+            off={"pull": 0.0},
+            law=unloading,
+            constants=_with_time,
+            memory=3,
+            after_clip=True,
+        ),
+    ),
+)

@@ -1,0 +1,72 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The reading comes in steps."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from .base import Form, Kind, Parameter, Site, Values, number
+
+
+def rounded(x: np.ndarray, time: np.ndarray, values: Values, site: Site, seed: int) -> np.ndarray:
+    """To the nearest step."""
+    return _stepped(x, number(values, "step"), np.round)
+
+
+def cut(x: np.ndarray, time: np.ndarray, values: Values, site: Site, seed: int) -> np.ndarray:
+    """To the step below."""
+    return _stepped(x, number(values, "step"), np.floor)
+
+
+def converter(x: np.ndarray, time: np.ndarray, values: Values, site: Site, seed: int) -> np.ndarray:
+    """To the nearest of ``2^bits`` steps over a range."""
+    return _stepped(x, number(values, "range") / 2.0 ** number(values, "bits"), np.round)
+
+
+def _stepped(x: np.ndarray, step: float, way: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
+    return step * way(x / step) if step > 0.0 else x
+
+
+_STEP = Parameter("step", "unit", 0.01, 0.0, 1e4, "Width Δ of a step.")
+
+KIND = Kind(
+    name="quantization",
+    title="Quantization",
+    text="The reading comes in steps.",
+    stage="readout",
+    order=90,
+    forms=(
+        Form(
+            "round",
+            "r = Δ · round(r₀ / Δ)",
+            "IEEE Std 1241 (2010): mid-tread quantizer",
+            (_STEP,),
+            off={"step": 0.0},
+            shape=rounded,
+            after_conversion=True,
+        ),
+        Form(
+            "floor",
+            "r = Δ · floor(r₀ / Δ)",
+            "IEEE Std 1241 (2010): truncating quantizer",
+            (_STEP,),
+            off={"step": 0.0},
+            shape=cut,
+            after_conversion=True,
+        ),
+        Form(
+            "bits",
+            "r = Δ · round(r₀ / Δ),  Δ = R / 2ᵇ",
+            "IEEE Std 1241 (2010): converter of b bits",
+            (
+                Parameter("bits", "1", 8.0, 1.0, 24.0, "Bits b of the converter."),
+                Parameter("range", "unit", 1.0, 1e-6, 1e6, "Range R that they divide.", log=True),
+            ),
+            off={"range": 0.0},
+            shape=converter,
+            after_conversion=True,
+        ),
+    ),
+)
