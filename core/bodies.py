@@ -10,6 +10,9 @@ import numpy as np
 from .jit import kernel
 from .scenario import Motion
 
+KEYFRAMED, FREE, DRIVEN = 0, 1, 2
+"""What moves a body: its motion, forces, or its motion and a drive."""
+
 
 def rotation_matrices(quaternions: np.ndarray) -> np.ndarray:
     """(…, 4) unit quaternions (w, x, y, z) to (…, 3, 3) rotation matrices."""
@@ -184,14 +187,24 @@ def write_twist_map(rotation, gx, gy, gz, sign, out):
 
 
 @kernel
-def add_product(matrix, row, column, left, middle, right, scale):
-    """Add ``scale · leftᵀ middle right`` (6 × 6 each; of the symmetric `middle` the lower triangle is read) into `matrix`."""
-    for j in range(6):
+def keep_axis(axis, out):
+    """Leave in the first column of a twist map what a body's speed along `axis` (3,) does."""
+    for i in range(6):
+        out[i, 0] = axis[0] * out[i, 0] + axis[1] * out[i, 1] + axis[2] * out[i, 2]
+
+
+@kernel
+def add_product(matrix, row, column, left, left_width, middle, right, right_width, scale):
+    """Add ``scale · leftᵀ middle right`` into `matrix`.
+
+    `middle` is symmetric, 6 × 6, and its lower triangle is read; of `left` and `right` the first columns are used.
+    """
+    for j in range(right_width):
         for i in range(6):
             total = 0.0
             for k in range(6):
                 total += (middle[i, k] if k <= i else middle[k, i]) * right[k, j]
-            for m in range(6):
+            for m in range(left_width):
                 matrix[row + m, column + j] += scale * left[i, m] * total
 
 

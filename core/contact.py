@@ -105,11 +105,23 @@ class World(NamedTuple):
         How far they reach from there.
     skin : (q,) float, metres
         How far a contact point may move at the most before the triangles near it are collected anew.
-    free_at : (b,) int
-        Place of each free body among the free ones, -1 for keyframed bodies.
+    kind : (b,) int
+        KEYFRAMED, FREE or DRIVEN of :mod:`.bodies`.
+    at : (b,) int
+        Where each body's unknowns begin: six of a free body, one of a driven one, which coupled bodies share; -1 without.
+    unknowns : int
+        How many there are together.
     mass : (b,) float, kg
     inertia : (b, 3, 3) float, kg·m², body axes
     gravity : (3,) float, m/s²
+    axis : (b, 3) float
+        Direction in which the drive of each driven body moves it: in its own frame, or, `axis_in_world`, in the world.
+    axis_in_world : (b,) bool
+    drive_of : (b,) int
+    drive_at : (d,) int
+        The unknown of each drive.
+    drives : (d, 4) float
+        See :mod:`.servo`.
     """
 
     points: np.ndarray
@@ -125,10 +137,17 @@ class World(NamedTuple):
     center: np.ndarray
     radius: np.ndarray
     skin: np.ndarray
-    free_at: np.ndarray
+    kind: np.ndarray
+    at: np.ndarray
+    unknowns: int
     mass: np.ndarray
     inertia: np.ndarray
     gravity: np.ndarray
+    axis: np.ndarray
+    axis_in_world: np.ndarray
+    drive_of: np.ndarray
+    drive_at: np.ndarray
+    drives: np.ndarray
 
 
 class State(NamedTuple):
@@ -137,7 +156,7 @@ class State(NamedTuple):
     Attributes
     ----------
     position : (b, 3) float, metres
-        Reference point of each body: centre of mass of a free one, origin of a keyframed one.
+        Reference point of each body: centre of mass of a free or driven one, origin of a keyframed one.
     quaternion : (b, 4) float
     velocity : (b, 6) float
         Linear (m/s) and angular (rad/s), world axes.
@@ -145,6 +164,8 @@ class State(NamedTuple):
         Triangle each contact point met last, -1 for none, -2 once it was pressed past its reach.
     bristles : (s, 4) float
         Bristle deflection (m) in the frame of the sensor's body, and the share of the reach that is pressed in.
+    drives : (d, 3) float
+        Way along the axis (m), speed (m/s) and force (N) of each drive.
     """
 
     position: np.ndarray
@@ -152,6 +173,7 @@ class State(NamedTuple):
     velocity: np.ndarray
     hint: np.ndarray
     bristles: np.ndarray
+    drives: np.ndarray
 
 
 SERIES = tuple(1.0 / math.factorial(n + 1) for n in range(13, -1, -1))

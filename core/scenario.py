@@ -174,16 +174,111 @@ class Motion:
 
 
 @dataclass(frozen=True)
+class Signal:
+    """A number over time: linear between samples, held before the first and after the last.
+
+    Attributes
+    ----------
+    times : (m,) float, seconds, increasing
+    values : (m,) float
+    """
+
+    times: np.ndarray
+    values: np.ndarray
+
+    @classmethod
+    def constant(cls, value: float) -> Signal:
+        """Return the signal that never changes."""
+        return cls(np.zeros(1), np.array([float(value)]))
+
+    def at(self, times: np.ndarray) -> np.ndarray:
+        """(n,) values at (n,) times."""
+        return np.interp(times, self.times, self.values)
+
+    def extended(self, time: float, value: float) -> Signal:
+        """Return this signal with one more sample at its end."""
+        return Signal(np.append(self.times, time), np.append(self.values, value))
+
+
+CONTROLS = ("position", "velocity", "force")
+"""What the target of a :class:`Drive` is: metres along the axis, metres per second, or newtons of a sensor's tactile sum."""
+
+
+@dataclass(frozen=True)
+class Drive:
+    """A servo that slides its body along one axis, with no more than a certain force.
+
+    The body's motion is that of its carrier: the drive adds a way along the axis. The servo's force is
+    ``stiffness (x* - x) + damping (v* - v)`` with its own weight and its carrier's acceleration fed forward, all of it
+    together limited to `max_force`.
+
+    Attributes
+    ----------
+    control : str
+        One of :data:`CONTROLS`.
+    target : Signal
+        In m from where the motion has the body, m/s, or N.
+    axis : (3,) float
+        Unit vector, the direction of positive ways; a finger closes along it.
+    axis_in_world : bool
+        True when the axis stands still in the world; False when it is given in the body's own frame and turns along.
+    stiffness, damping : float, N/m and N·s/m
+    max_force : float, N
+    max_speed : float, m/s
+        That the servo asks for; force control approaches with it.
+    sensor : int
+        For force control: the sensor whose tactile sum is controlled.
+    settling, period : float, seconds
+        For force control: time constant of :class:`.control.GripControl`, and how often it is asked.
+    leader : int or None
+        Body whose drive moves this body as well, each along its own axis by the same way, as the two fingers of a parallel
+        gripper; then only the axis of this drive counts.
+    """
+
+    control: str = "position"
+    target: Signal = field(default_factory=lambda: Signal.constant(0.0))
+    axis: np.ndarray = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))
+    axis_in_world: bool = False
+    stiffness: float = 1e5
+    damping: float = 1e3
+    max_force: float = 40.0
+    max_speed: float = 0.05
+    sensor: int = -1
+    settling: float = 0.1
+    period: float = 1e-3
+    leader: int | None = None
+
+    def check(self, name: str) -> None:
+        """Raise :class:`ParameterError` for the first value that means nothing."""
+        if self.control not in CONTROLS:
+            raise ParameterError(f"The control of '{name}' is '{self.control}': choose one of {', '.join(CONTROLS)}.")
+        for key in ("damping", "max_speed", "settling", "period"):
+            value = getattr(self, key)
+            if not (np.isfinite(value) and value > 0):
+                raise ParameterError(f"{key} of driven body '{name}' is {value:g}: give it a value above zero.")
+        for key in ("stiffness", "max_force"):
+            value = getattr(self, key)
+            if not (np.isfinite(value) and value >= 0):
+                raise ParameterError(f"{key} of driven body '{name}' is {value:g}: give it a value of zero or more.")
+        if not (np.isfinite(self.axis).all() and abs(np.linalg.norm(self.axis) - 1.0) < 1e-6):
+            raise ParameterError(f"The axis of driven body '{name}' is not a unit vector: give it a direction.")
+        if not np.isfinite(self.target.values).all():
+            raise ParameterError(f"The target of driven body '{name}' is NaN or infinite: check its keyframes and drivers.")
+
+
+@dataclass(frozen=True)
 class Body:
-    """A rigid body.
+    """A rigid body: free when forces move it, driven when it has a drive, else keyframed.
 
     Attributes
     ----------
     name : str
     motion : Motion
-        Of a keyframed body: its path. Of a free body: the first sample is where it starts.
+        Of a keyframed body: its path. Of a driven body: its path without the way of its drive. Of a free body: the first
+        sample is where it starts.
     free : bool
         True when forces move it, False when `motion` does.
+    drive : Drive or None
     mass : float, kg
     center_of_mass : (3,) float, metres, body frame
     inertia : (3, 3) float, kg·m², about the centre of mass, body axes
@@ -199,6 +294,12 @@ class Body:
     inertia: np.ndarray = field(default_factory=lambda: np.eye(3))
     velocity: np.ndarray = field(default_factory=lambda: np.zeros(3))
     angular_velocity: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    drive: Drive | None = None
+
+    @property
+    def moved_by_forces(self) -> bool:
+        """Whether forces have a say in where it goes: it is free or driven."""
+        return self.free or self.drive is not None
 
 
 @dataclass(frozen=True)
@@ -284,11 +385,29 @@ class Scenario:
             sensor.painted.check(sensor.name, len(sensor.texels))
             check_effects(sensor.effects, sensor.name, len(sensor.texels), sensor.parameters.gain)
         for body in self.bodies:
-            if body.free and not (np.isfinite(body.mass) and body.mass > 0):
-                raise ParameterError(f"The mass of free body '{body.name}' is {body.mass:g} kg: give it a value above zero.")
+            if body.moved_by_forces and not (np.isfinite(body.mass) and body.mass > 0):
+                kind = "free" if body.free else "driven"
+                raise ParameterError(f"The mass of {kind} body '{body.name}' is {body.mass:g} kg: give it a value above zero.")
+            self._check_drive(body)
             path = (body.motion.positions, body.motion.quaternions)
             if not all(np.isfinite(values).all() for values in path):
                 raise SceneError(f"The motion of '{body.name}' has a NaN or infinite pose: check its keyframes and drivers.")
+
+    def _check_drive(self, body: Body) -> None:
+        drive = body.drive
+        if drive is None:
+            return
+        if body.free:
+            raise ParameterError(f"Body '{body.name}' is free and driven at once: choose one.")
+        drive.check(body.name)
+        if drive.leader is not None:
+            leader = self.bodies[drive.leader].drive if 0 <= drive.leader < len(self.bodies) else None
+            if leader is None or leader.leader is not None:
+                raise SceneError(
+                    f"Driven body '{body.name}' follows a body that has no drive of its own: choose another leader."
+                )
+        elif drive.control == "force" and not 0 <= drive.sensor < len(self.sensors):
+            raise SceneError(f"Driven body '{body.name}' has no sensor for its force control: choose one.")
 
     def digest(self) -> str:
         """Return a hash of everything that the forces depend on; equal digests give equal recordings, bit for bit."""

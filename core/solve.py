@@ -14,16 +14,18 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .bodies import poses_at, quaternion_product, rotation_matrices, rotation_vectors
+from .bodies import DRIVEN, FREE, KEYFRAMED, poses_at, quaternion_product, rotation_matrices, rotation_vectors
 from .bvh import NEAR, build_tree
 from .contact import Neighbours, State, World, count_buried, parameter_row
 from .drive import drive
 from .mesh import is_closed
+from .pilot import Pilot
 from .points import ContactPoints, contact_points
 from .recording import Frame, Recording, SensorFrame
 from .respond import Reader
 from .scenario import Scenario, Sensor, Target
-from .step import advance_frame, contacts_of, feel, gather_all, scratch_for
+from .servo import drive_table
+from .step import advance_steps, contacts_of, feel, gather_all, scratch_for
 from .texels import Texels
 from .timestep import advise
 
@@ -69,8 +71,8 @@ class Simulation:
         self.substeps = max(1, math.ceil(1.0 / (scenario.fps * longest) - 1e-9))
         self.dt = 1.0 / (scenario.fps * self.substeps)
         self._motions = [body.motion for body in scenario.bodies]
-        # Free bodies are followed at their centre of mass, keyframed ones at their origin.
-        self._center = np.array([body.center_of_mass if body.free else np.zeros(3) for body in scenario.bodies])
+        # Bodies that forces move are followed at their centre of mass, keyframed ones at their origin.
+        self._center = np.array([body.center_of_mass if body.moved_by_forces else np.zeros(3) for body in scenario.bodies])
         meshes = [replace(t.mesh, vertices=t.mesh.vertices - self._center[t.body]) for t in scenario.targets]
         self._tree = build_tree(meshes)
         self._closed = [is_closed(mesh.triangles) for mesh in meshes]
@@ -80,38 +82,49 @@ class Simulation:
         self._neighbours = _neighbours(self._world, self._state)
         self._scratch = scratch_for(self._world, self._state)
         self._readers = [Reader.of(sensor) for sensor in scenario.sensors]
+        self._pilot = Pilot(scenario)
+        self._texel_start = _texel_start(scenario)
 
     @property
     def time(self) -> float:
         """Seconds since the first frame."""
         return (self.frame - self.scenario.frame_start) / self.scenario.fps
 
-    def extend(self, poses: Mapping[int, tuple[np.ndarray, np.ndarray]]) -> None:
-        """Append where keyframed bodies will be at the next frame.
+    def extend(self, poses: Mapping[int, tuple[np.ndarray, np.ndarray]], targets: Mapping[int, float] | None = None) -> None:
+        """Append where keyframed bodies, and driven ones without their drives, will be at the next frame.
 
         Parameters
         ----------
         poses : mapping of body index to (position (3,) m, quaternion (4,))
+        targets : mapping of body index to float, optional
+            Of their drives.
         """
         time = self._time_of(self.frame + 1)
         for body, (position, quaternion) in poses.items():
             motion = self._motions[body]
             if motion.times[-1] < time - 1e-9:
                 self._motions[body] = motion.extended(time, position, quaternion)
+        self._pilot.extend(time, targets or {})
 
     def advance(self) -> Frame:
         """Bring the state one frame on and return what the sensors feel there."""
         times = self._time_of(self.frame) + np.arange(self.substeps + 1) * self.dt
         times[-1] = self._time_of(self.frame + 1)
         path = [poses_at(motion, times) for motion in self._motions]
-        positions = np.ascontiguousarray(np.stack([position for position, _ in path], axis=1))
         quaternions = np.ascontiguousarray(np.stack([quaternion for _, quaternion in path], axis=1))
+        positions = np.ascontiguousarray(np.stack([position for position, _ in path], axis=1))
+        for body in np.flatnonzero(self._world.kind == DRIVEN):
+            positions[:, body] += rotation_matrices(quaternions[:, body]) @ self._center[body]
         conjugate = quaternions[:-1] * np.array([1.0, -1.0, -1.0, -1.0])
         turns = rotation_vectors(quaternion_product(quaternions[1:], conjugate))
         velocities = np.concatenate([np.diff(positions, axis=0), turns], axis=2) / self.dt
-        self._sunk = advance_frame(
-            self.dt, positions, quaternions, velocities, self._world, self._tree, self._neighbours, self._state, self._scratch
-        )
+        self._sunk = 0
+        for first, last, commands in self._pilot.stretches(times, self.dt, self._tactile):
+            sunk = advance_steps(
+                self.dt, first, last, positions, quaternions, velocities, commands,
+                self._world, self._tree, self._neighbours, self._state, self._scratch,
+            )  # fmt: skip
+            self._sunk = max(self._sunk, sunk)
         self.frame += 1
         return self.observe()
 
@@ -188,20 +201,30 @@ class Simulation:
                 f"{', '.join(names) or 'an object'} and do not act; press less deep, or raise k or the maximum penetration."
             )
 
+    def _tactile(self, sensor: int) -> np.ndarray:
+        """(n,) normal forces of a sensor in the present state, for its controllers."""
+        gather_all(self._world, self._tree, self._neighbours, self._state, self._scratch)
+        force = self._feel()[0]
+        return force[self._texel_start[sensor] : self._texel_start[sensor + 1]]
+
+    def _feel(self) -> tuple[np.ndarray, ...]:
+        """Per texel normal force, shear, depth, slip and contact, per sensor the sums of :func:`feel`, from rows gathered."""
+        n, m = self._texel_start[-1], len(self.scenario.sensors)
+        force, depth, slip, contact = np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n, dtype=np.bool_)
+        shear, net, moment = np.zeros((n, 2)), np.zeros((m, 6)), np.zeros((m, 4))
+        feel(self._world, self._state, self._scratch, force, shear, depth, slip, contact, net, moment)
+        return force, shear, depth, slip, contact, net, moment
+
     def observe(self) -> Frame:
         """What the sensors feel in the present state."""
         gather_all(self._world, self._tree, self._neighbours, self._state, self._scratch)
         self._warn_of_sunk()
-        starts = np.cumsum([0] + [len(sensor.texels) for sensor in self.scenario.sensors])
-        n, m = starts[-1], len(self.scenario.sensors)
-        force, depth, slip, contact = np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n, dtype=np.bool_)
-        shear, net, moment = np.zeros((n, 2)), np.zeros((m, 6)), np.zeros((m, 4))
-        feel(self._world, self._state, self._scratch, force, shear, depth, slip, contact, net, moment)
+        force, shear, depth, slip, contact, net, moment = self._feel()
         sensors = {}
         for i, sensor in enumerate(self.scenario.sensors):
             if not sensor.readout:
                 continue
-            own = slice(starts[i], starts[i + 1])
+            own = slice(self._texel_start[i], self._texel_start[i + 1])
             center = self._center[sensor.body]
             pressed = moment[i, 3] > 0.0
             sensors[sensor.name] = SensorFrame(
@@ -228,10 +251,12 @@ class Simulation:
 def _world(scenario: Scenario, center: np.ndarray) -> World:
     """Flatten a scenario into the kernels' arrays; `center` (b, 3) is the reference point of each body in its frame."""
     bodies, sensors, targets = scenario.bodies, scenario.sensors, scenario.targets
-    free = np.array([body.free for body in bodies])
     points = [contact_points(s.texels, s.parameters.points_per_texel) for s in sensors]
     blocks = [_point_rows(s.texels, p, center[s.body]) for s, p in zip(sensors, points, strict=True)]
-    texel_start = np.cumsum([0] + [len(s.texels) for s in sensors])
+    texel_start = _texel_start(scenario)
+    kind = np.array([FREE if body.free else DRIVEN if body.drive is not None else KEYFRAMED for body in bodies])
+    drive_of, drives = drive_table(scenario)
+    at, drive_at, unknowns = _unknowns(kind, drive_of)
     pairs = [(i, j) for i, s in enumerate(sensors) for j, t in enumerate(targets) if s.body != t.body]
     sizes = [len(blocks[i]) for i, _ in pairs]
     extents = [_extent(block, sensor.parameters.max_penetration) for block, sensor in zip(blocks, sensors, strict=True)]
@@ -249,10 +274,17 @@ def _world(scenario: Scenario, center: np.ndarray) -> World:
         center=np.array([middle for middle, _ in extents]),
         radius=np.array([radius for _, radius in extents]),
         skin=np.array([_skin(sensors[i], targets[j]) for i, j in pairs]),
-        free_at=np.where(free, np.cumsum(free) - 1, -1),
+        kind=kind,
+        at=at,
+        unknowns=unknowns,
         mass=np.array([body.mass for body in bodies], dtype=float),
         inertia=np.ascontiguousarray([body.inertia for body in bodies], dtype=float),
         gravity=np.array(scenario.gravity, dtype=float),
+        axis=np.array([np.zeros(3) if body.drive is None else body.drive.axis for body in bodies], dtype=float),
+        axis_in_world=np.array([body.drive is not None and body.drive.axis_in_world for body in bodies]),
+        drive_of=drive_of,
+        drive_at=drive_at,
+        drives=drives,
     )
 
 
@@ -280,6 +312,29 @@ def _extent(points: np.ndarray, reach: float) -> tuple[np.ndarray, float]:
     ends = np.vstack([points[:, :3], points[:, :3] - reach * points[:, 3:6]])
     middle = 0.5 * (ends.min(axis=0) + ends.max(axis=0))
     return middle, float(np.linalg.norm(ends - middle, axis=1).max())
+
+
+def _texel_start(scenario: Scenario) -> np.ndarray:
+    """(m + 1,) int: where the texels of each sensor begin among those of all."""
+    return np.cumsum([0] + [len(sensor.texels) for sensor in scenario.sensors])
+
+
+def _unknowns(kind: np.ndarray, drive_of: np.ndarray) -> tuple[np.ndarray, np.ndarray, int]:
+    """Lay out the unknowns of a step: six for each free body, then one for each drive.
+
+    Returns
+    -------
+    at : (b,) int
+        Where those of each body begin, -1 for keyframed bodies.
+    drive_at : (d,) int
+    unknowns : int
+    """
+    free = kind == FREE
+    drives = int(drive_of.max(initial=-1)) + 1
+    drive_at = 6 * np.count_nonzero(free) + np.arange(drives)
+    at = np.where(free, 6 * (np.cumsum(free) - 1), -1)
+    at[kind == DRIVEN] = drive_at[drive_of[kind == DRIVEN]]
+    return at, drive_at, int(6 * np.count_nonzero(free) + drives)
 
 
 def _skin(sensor: Sensor, target: Target) -> float:
@@ -311,6 +366,7 @@ def _start(scenario: Scenario, world: World, center: np.ndarray) -> State:
         velocity=np.array(velocity, dtype=float),
         hint=np.full(slots, -1),
         bristles=np.zeros((slots, 4)),
+        drives=np.zeros((len(world.drives), 3)),
     )
 
 

@@ -13,7 +13,11 @@ from typing import NamedTuple
 import numpy as np
 
 from .bodies import (
+    DRIVEN,
+    FREE,
+    KEYFRAMED,
     add_product,
+    keep_axis,
     look_back,
     solve_positive,
     turn_quaternion,
@@ -56,6 +60,7 @@ from .contact import (
     normal_tangent,
 )
 from .jit import inlined, kernel
+from .servo import SPEED, add_servos, carry_driven, move_drives, place_driven
 
 PASSES = 40
 """Most rounds in which contacts are linearised anew within a substep; two or three are usual, one at rest."""
@@ -93,8 +98,14 @@ class Scratch(NamedTuple):
         What the contacts of one pair resist, and their force and torque on the target, both in the sensor's axes.
     map_a, map_b : (6, 6) float
         From the twists of both bodies to the relative motion.
-    matrix, vector, momentum : (6 f, 6 f), (6 f,), (6 f,) float
-        The linear system of the f free bodies.
+    matrix, vector, momentum, guess : (u, u), (u,), (u,), (u,) float
+        The linear system, and its u unknowns as they were guessed last.
+    axis : (b, 3) float
+        Direction of each drive in the world at the step's end.
+    carried : (b, 6) float
+        Velocity of a driven body without the speed of its drive.
+    drive_mass, drive_load : (d,) float
+        What each drive moves (kg), and the impulse that its weight and its carrier ask for in this step (N·s).
     """
 
     rotation: np.ndarray
@@ -116,6 +127,11 @@ class Scratch(NamedTuple):
     matrix: np.ndarray
     vector: np.ndarray
     momentum: np.ndarray
+    guess: np.ndarray
+    axis: np.ndarray
+    carried: np.ndarray
+    drive_mass: np.ndarray
+    drive_load: np.ndarray
 
 
 def scratch_for(world: World, state: State) -> Scratch:
@@ -126,7 +142,7 @@ def scratch_for(world: World, state: State) -> Scratch:
     twist = np.zeros((b, 12))
     for body in range(b):
         look_back(state.velocity[body], 1e-9, twist[body])
-    n = 6 * max(1, int(world.free_at.max()) + 1)
+    n = max(6, world.unknowns)
     return Scratch(
         rotation=np.zeros((b, 3, 3)),
         inertia=np.zeros((b, 3, 3)),
@@ -147,6 +163,11 @@ def scratch_for(world: World, state: State) -> Scratch:
         matrix=np.zeros((n, n)),
         vector=np.zeros(n),
         momentum=np.zeros(n),
+        guess=np.zeros(n),
+        axis=np.zeros((b, 3)),
+        carried=np.zeros((b, 6)),
+        drive_mass=np.zeros(len(world.drives)),
+        drive_load=np.zeros(len(world.drives)),
     )
 
 
@@ -247,33 +268,21 @@ def gather_all(world, tree, neighbours, state, scratch):
 
 
 @kernel
-def _solve_velocities(dt, world, state, scratch):
-    """Velocities of the free bodies at the step's end, written into the state.
+def _solve_velocities(dt, commands, world, state, scratch):
+    """Velocities of free and driven bodies at the step's end, written into the state.
 
-    Contacts are linearised at the current guess and the linear system solved, until the guess no longer moves; a contact that
-    would pull is left out of the next round. Where the rounds go in circles (friction that was guessed for too much load throws
-    the contact off, without the contact there is no friction), the guess moves by a share of the way only. All that a share
-    mixes keeps the momentum. With no free body one round only linearises.
+    Contacts and drives are linearised at the current guess and the linear system solved, until the guess no longer moves; a
+    contact that would pull is left out of the next round. Where the rounds go in circles (friction that was guessed for too
+    much load throws the contact off, without the contact there is no friction), the guess moves by a share of the way only.
+    All that a share mixes keeps the momentum. With nothing to solve for one round only linearises.
     """
-    free_at, mass, velocity, inertia = world.free_at, world.mass, state.velocity, scratch.inertia
-    matrix, vector, momentum = scratch.matrix, scratch.vector, scratch.momentum
-    n = 6 * int(free_at.max() + 1)
-    for body in range(len(free_at)):
-        write_twist(velocity[body], dt, scratch.twist[body])
-        at = 6 * free_at[body]
-        if at >= 0:
-            for i in range(3):
-                momentum[at + i] = mass[body] * (velocity[body, i] + dt * world.gravity[i])
-                total = 0.0
-                for j in range(3):
-                    total += inertia[body, i, j] * velocity[body, 3 + j]
-                momentum[at + 3 + i] = total
+    matrix, vector, guess, n = scratch.matrix, scratch.vector, scratch.guess, world.unknowns
+    _begin_guess(dt, world, state, scratch)
     first_change, last_change, share = 0.0, 0.0, 1.0
     for turn in range(PASSES):
-        for body in range(len(free_at)):
-            _write_known(velocity[body], scratch.twist[body], free_at[body] < 0, scratch.known[body])
+        _write_twists(dt, world, state, scratch)
         for i in range(n):
-            vector[i] = momentum[i]
+            vector[i] = scratch.momentum[i]
             for j in range(n):
                 matrix[i, j] = 0.0
         for pair in range(len(world.pairs)):
@@ -283,38 +292,89 @@ def _solve_velocities(dt, world, state, scratch):
                 _relative_motion(a, b, scratch.known, state.position, scratch.rotation, scratch.part)
                 first = world.point_start[world.pairs[pair, 0]] - world.slot_start[pair]
                 _sum_contacts(pair, first, dt, _law(world.parameters, pair), world.painted, scratch)
-                if free_at[a] >= 0 or free_at[b] >= 0:
+                if world.at[a] >= 0 or world.at[b] >= 0:
                     _add_pair(a, b, dt, world, state, scratch)
         if n == 0:
             return
-        for body in range(len(free_at)):
-            at = 6 * free_at[body]
-            if at >= 0:
+        for body in range(len(world.kind)):
+            if world.kind[body] == FREE:
+                at = world.at[body]
                 for i in range(3):
-                    matrix[at + i, at + i] += mass[body]
+                    matrix[at + i, at + i] += world.mass[body]
                     for j in range(i + 1):
-                        matrix[at + 3 + i, at + 3 + j] += inertia[body, i, j]
+                        matrix[at + 3 + i, at + 3 + j] += scratch.inertia[body, i, j]
+        add_servos(dt, commands, world, state, scratch)
         solve_positive(matrix, vector, n)
         change = 0.0
-        for body in range(len(free_at)):
-            at = 6 * free_at[body]
-            if at >= 0:
-                for i in range(6):
-                    change = max(change, abs(vector[at + i] - velocity[body, i]))
+        for i in range(n):
+            change = max(change, abs(vector[i] - guess[i]))
         # Contacts that come on and off in the first rounds find their own way; later ones shrink by 1 - share if all is well.
         if turn > 3 and change > (1.0 - 0.25 * share) * last_change:
             share *= 0.5
         last_change = change
-        for body in range(len(free_at)):
-            at = 6 * free_at[body]
-            if at >= 0:
-                for i in range(6):
-                    velocity[body, i] = share * vector[at + i] + (1.0 - share) * velocity[body, i]
-                write_twist(velocity[body], dt, scratch.twist[body])
+        for i in range(n):
+            guess[i] = share * vector[i] + (1.0 - share) * guess[i]
         if turn == 0:
             first_change = change
         if change <= 1e-6 * first_change or change < 1e-13:
-            return
+            break
+    _write_twists(dt, world, state, scratch)
+
+
+@kernel
+def _begin_guess(dt, world, state, scratch):
+    """Velocities as they are for a first guess, and what momentum the bodies would have without contacts and drives."""
+    momentum, guess, velocity = scratch.momentum, scratch.guess, state.velocity
+    for body in range(len(world.kind)):
+        at = world.at[body]
+        if world.kind[body] == FREE:
+            for i in range(3):
+                guess[at + i], guess[at + 3 + i] = velocity[body, i], velocity[body, 3 + i]
+                momentum[at + i] = world.mass[body] * (velocity[body, i] + dt * world.gravity[i])
+                total = 0.0
+                for j in range(3):
+                    total += scratch.inertia[body, i, j] * velocity[body, 3 + j]
+                momentum[at + 3 + i] = total
+        elif world.kind[body] == KEYFRAMED:
+            write_twist(velocity[body], dt, scratch.twist[body])
+            for i in range(12):
+                scratch.known[body, i] = scratch.twist[body, i]
+    for drive in range(len(world.drives)):
+        at = world.drive_at[drive]
+        guess[at] = state.drives[drive, SPEED]
+        momentum[at] = scratch.drive_mass[drive] * guess[at] - scratch.drive_load[drive]
+
+
+@kernel
+def _write_twists(dt, world, state, scratch):
+    """Velocities and twists that follow from the guess, and the part of the twists that is not solved for.
+
+    That is a finite turn's excess over ``ω × r`` of a free body, and what its carrier does of a driven one.
+    """
+    guess, velocity, twist, known = scratch.guess, state.velocity, scratch.twist, scratch.known
+    for body in range(len(world.kind)):
+        at = world.at[body]
+        if world.kind[body] == FREE:
+            for i in range(6):
+                velocity[body, i] = guess[at + i]
+            write_twist(velocity[body], dt, twist[body])
+            for i in range(3):
+                known[body, i] = 0.0
+            for i in range(3, 12):
+                known[body, i] = twist[body, i]
+            known[body, 4] += velocity[body, 5]
+            known[body, 5] -= velocity[body, 4]
+            known[body, 6] -= velocity[body, 5]
+            known[body, 8] += velocity[body, 3]
+            known[body, 9] += velocity[body, 4]
+            known[body, 10] -= velocity[body, 3]
+        elif world.kind[body] == DRIVEN:
+            for i in range(6):
+                velocity[body, i] = scratch.carried[body, i]
+            write_twist(velocity[body], dt, known[body])
+            for i in range(3):
+                velocity[body, i] += guess[at] * scratch.axis[body, i]
+            write_twist(velocity[body], dt, twist[body])
 
 
 @kernel
@@ -416,45 +476,36 @@ def _sum_contacts(pair, first_point, dt, p, painted, scratch):
 
 @kernel
 def _add_pair(a, b, dt, world, state, scratch):
-    """Bring a pair's sums into the linear system of the free bodies."""
-    at_a, at_b = 6 * world.free_at[a], 6 * world.free_at[b]
+    """Bring a pair's sums into the linear system."""
     map_a, map_b, block, wrench = scratch.map_a, scratch.map_b, scratch.block, scratch.wrench
-    write_twist_map(scratch.rotation[a], 0.0, 0.0, 0.0, -1.0, map_a)
-    gx = state.position[a, 0] - state.position[b, 0]
-    gy = state.position[a, 1] - state.position[b, 1]
-    gz = state.position[a, 2] - state.position[b, 2]
-    write_twist_map(scratch.rotation[a], gx, gy, gz, 1.0, map_b)
-    for i in range(6):
-        for j in range(6):
-            if at_a >= 0:
-                scratch.vector[at_a + i] += dt * map_a[j, i] * wrench[j]
-            if at_b >= 0:
-                scratch.vector[at_b + i] += dt * map_b[j, i] * wrench[j]
-    if at_a >= 0:
-        add_product(scratch.matrix, at_a, at_a, map_a, block, map_a, dt)
-    if at_b >= 0:
-        add_product(scratch.matrix, at_b, at_b, map_b, block, map_b, dt)
-    if at_a >= 0 and at_b >= 0:  # only the lower triangle of the system is read
-        if at_a > at_b:
-            add_product(scratch.matrix, at_a, at_b, map_a, block, map_b, dt)
-        else:
-            add_product(scratch.matrix, at_b, at_a, map_b, block, map_a, dt)
+    at_a, width_a = _write_map(a, a, -1.0, world, state, scratch, map_a)
+    at_b, width_b = _write_map(b, a, 1.0, world, state, scratch, map_b)
+    for j in range(6):
+        for i in range(width_a):
+            scratch.vector[at_a + i] += dt * map_a[j, i] * wrench[j]
+        for i in range(width_b):
+            scratch.vector[at_b + i] += dt * map_b[j, i] * wrench[j]
+    add_product(scratch.matrix, at_a, at_a, map_a, width_a, block, map_a, width_a, dt)
+    add_product(scratch.matrix, at_b, at_b, map_b, width_b, block, map_b, width_b, dt)
+    if at_a >= at_b:  # only the lower triangle of the system is read
+        add_product(scratch.matrix, at_a, at_b, map_a, width_a, block, map_b, width_b, dt)
+    if at_b >= at_a:  # coupled bodies share their unknown: both of the mixed products count there
+        add_product(scratch.matrix, at_b, at_a, map_b, width_b, block, map_a, width_a, dt)
 
 
 @kernel
-def _write_known(velocity, twist, keyframed, known):
-    """What the system does not solve for: all of a keyframed twist, a finite turn's excess over ``ω × r`` of a free one."""
-    for i in range(12):
-        known[i] = twist[i]
-    if not keyframed:
-        for i in range(3):
-            known[i] = 0.0
-        known[4] += velocity[5]
-        known[5] -= velocity[4]
-        known[6] -= velocity[5]
-        known[8] += velocity[3]
-        known[9] += velocity[4]
-        known[10] -= velocity[3]
+def _write_map(body, sensor_body, sign, world, state, scratch, out):
+    """From a body's unknowns to relative motion in the axes of the sensor's body; returns where they are and how many."""
+    gx = state.position[sensor_body, 0] - state.position[body, 0]
+    gy = state.position[sensor_body, 1] - state.position[body, 1]
+    gz = state.position[sensor_body, 2] - state.position[body, 2]
+    if world.kind[body] == KEYFRAMED:
+        return -1, 0
+    write_twist_map(scratch.rotation[sensor_body], gx, gy, gz, sign, out)
+    if world.kind[body] == FREE:
+        return world.at[body], 6
+    keep_axis(scratch.axis[body], out)
+    return world.at[body], 1
 
 
 @kernel
@@ -509,16 +560,23 @@ def _seen_at_the_end(a, dt, twist, rotation, motion, seen):
 
 
 @kernel
-def advance_frame(dt, path_position, path_quaternion, path_velocity, world, tree, neighbours, state, scratch):
-    """Run the substeps of one frame; the state is brought forward in place.
+def advance_steps(
+    dt, first, last, path_position, path_quaternion, path_velocity, commands, world, tree, neighbours, state, scratch
+):
+    """Run some of the substeps of one frame; the state is brought forward in place.
 
     Parameters
     ----------
     dt : float, seconds
+    first, last : int
+        Steps to run, the last one excluded.
     path_position, path_quaternion : (steps + 1, b, 3) and (steps + 1, b, 4) float
-        Where the keyframed bodies are at the beginning of each step, and at the end of the last.
+        Where the keyframed bodies are at the beginning of each step, and at the end of the last; driven ones without the way
+        of their drives.
     path_velocity : (steps, b, 6) float
         Their velocities during each step.
+    commands : (steps, d, 4) float
+        What the drives are told.
 
     Returns
     -------
@@ -526,35 +584,44 @@ def advance_frame(dt, path_position, path_quaternion, path_velocity, world, tree
         Most contact points that were sunk too deep to act in any one step.
     """
     worst = 0
-    for step in range(len(path_velocity)):
-        _place_keyframed(step, path_position, path_quaternion, world, state)
-        for body in range(len(world.free_at)):
-            if world.free_at[body] < 0:
+    for step in range(first, last):
+        _place(path_position[step], path_quaternion[step], world, state, scratch)
+        for drive in range(len(world.drives)):
+            scratch.drive_mass[drive] = scratch.drive_load[drive] = 0.0
+        for body in range(len(world.kind)):
+            if world.kind[body] == KEYFRAMED:
                 for i in range(6):
                     state.velocity[body, i] = path_velocity[step, body, i]
+            elif world.kind[body] == DRIVEN:
+                after = path_quaternion[step + 1, body]
+                carry_driven(body, dt, after, path_velocity[step, body], world, state, scratch)
         worst = max(worst, gather_all(world, tree, neighbours, state, scratch))
-        for body in range(len(world.free_at)):
-            if world.free_at[body] >= 0:
+        for body in range(len(world.kind)):
+            if world.kind[body] == FREE:
                 write_world_inertia(scratch.rotation[body], world.inertia[body], scratch.inertia[body])
-        _solve_velocities(dt, world, state, scratch)
+        _solve_velocities(dt, commands[step], world, state, scratch)
         _store_bristles(dt, world, state, scratch)
-        for body in range(len(world.free_at)):
-            if world.free_at[body] >= 0:
+        move_drives(dt, commands[step], world, state, scratch)
+        for body in range(len(world.kind)):
+            if world.kind[body] == FREE:
                 _move_free(body, dt, world, state, scratch)
-    _place_keyframed(len(path_velocity), path_position, path_quaternion, world, state)
-    for body in range(len(world.free_at)):
+    _place(path_position[last], path_quaternion[last], world, state, scratch)
+    for body in range(len(world.kind)):
         look_back(state.velocity[body], dt, scratch.twist[body])
     return worst
 
 
 @kernel
-def _place_keyframed(step, path_position, path_quaternion, world, state):
-    for body in range(len(world.free_at)):
-        if world.free_at[body] < 0:
-            for i in range(3):
-                state.position[body, i] = path_position[step, body, i]
+def _place(position, quaternion, world, state, scratch):
+    """Put keyframed and driven bodies where they are at the beginning of a step."""
+    for body in range(len(world.kind)):
+        if world.kind[body] != FREE:
             for i in range(4):
-                state.quaternion[body, i] = path_quaternion[step, body, i]
+                state.quaternion[body, i] = quaternion[body, i]
+            for i in range(3):
+                state.position[body, i] = position[body, i]
+            if world.kind[body] == DRIVEN:
+                place_driven(body, position[body], world, state, scratch.axis[body])
 
 
 @kernel

@@ -48,11 +48,11 @@ def stability_limit(stiffness: float, damping: float, mass: float) -> float:
 def advise(scenario: Scenario) -> Advice:
     """Choose a substep for a scenario.
 
-    The limit is that of each free body against every texel that could touch it at once.
+    The limit is that of each free or driven body against every texel that could touch it at once.
     """
     limit, culprit = math.inf, ""
     for i, body in enumerate(scenario.bodies):
-        if not body.free:
+        if not body.moved_by_forces:
             continue
         stiffness = damping = 0.0
         for sensor in scenario.sensors:
@@ -67,7 +67,9 @@ def advise(scenario: Scenario) -> Advice:
                 limit, culprit = found, body.name
     if math.isinf(limit):
         return Advice(
-            LONGEST, limit, f"{LONGEST * 1e3:g} ms: no free body touches a sensor, so only the motion has to be followed."
+            LONGEST,
+            limit,
+            f"{LONGEST * 1e3:g} ms: nothing that forces move touches a sensor, only the motion has to be followed.",
         )
     dt = float(np.clip(SHARE_OF_LIMIT * limit, SHORTEST, LONGEST))
     return Advice(
