@@ -27,6 +27,10 @@ class Pilot:
             i: body.drive for i, body in enumerate(scenario.bodies) if body.drive is not None and body.drive.leader is None
         }
         self._targets = {body: drive.target for body, drive in self._drives.items()}
+        self._coupled = {body: 1 for body in self._drives}
+        for other in scenario.bodies:
+            if other.drive is not None and other.drive.leader is not None:
+                self._coupled[other.drive.leader] += 1
         self._controllers = {
             body: GripControl(drive.max_speed, drive.max_force, drive.settling)
             for body, drive in self._drives.items()
@@ -88,5 +92,6 @@ class Pilot:
             rows, columns = len(values), 1
         told: Command = self._controllers[body].update(TactileData(rows, columns, values), target, seconds)
         command = np.zeros(4)
-        command[TO_SPEED], command[HOLDS_WAY], command[PUSH] = told.velocity, told.homing, told.push
+        command[TO_SPEED], command[HOLDS_WAY] = told.velocity, told.homing
+        command[PUSH] = told.push * self._coupled[body]
         return command

@@ -232,7 +232,7 @@ class Drive:
         For force control: time constant of :class:`.control.GripControl`, and how often it is asked.
     leader : int or None
         Body whose drive moves this body as well, each along its own axis by the same way, as the two fingers of a parallel
-        gripper; then only the axis of this drive counts.
+        gripper; then only the axis of this drive counts. What is said of forces is said of each of them.
     """
 
     control: str = "position"

@@ -28,7 +28,7 @@ def drive_table(scenario: Scenario) -> tuple[np.ndarray, np.ndarray]:
     drive_of : (b,) int
         Drive of each body, -1 without one; coupled bodies share it.
     drives : (d, 4) float
-        Stiffness, damping, largest force and speed.
+        Stiffness, damping, largest force and speed; forces are those on all coupled bodies together.
     """
     leaders = [i for i, body in enumerate(scenario.bodies) if body.drive is not None and body.drive.leader is None]
     drive_of = np.full(len(scenario.bodies), -1)
@@ -39,7 +39,8 @@ def drive_table(scenario: Scenario) -> tuple[np.ndarray, np.ndarray]:
     for i in leaders:
         drive = scenario.bodies[i].drive
         assert drive is not None
-        rows.append([drive.stiffness, drive.damping, drive.max_force, drive.max_speed])
+        bodies = np.count_nonzero(drive_of == len(rows))
+        rows.append([bodies * drive.stiffness, bodies * drive.damping, bodies * drive.max_force, drive.max_speed])
     return drive_of, np.array(rows, dtype=float).reshape(-1, 4)
 
 
@@ -92,11 +93,11 @@ def carry_driven(body, dt, quaternion_after, carrier, world, state, scratch):
 
 
 @kernel
-def servo_force(drive, speed, dt, command, world, state, scratch):
+def servo_force(drive, speed, limited, dt, command, world, state, scratch):
     """Force of a drive at a speed at the step's end, and how it falls with that speed, N and N·s/m.
 
     What its own weight and its carrier's acceleration ask for is part of it, so that neither displaces a servo that is
-    strong enough.
+    strong enough. Where it is not `limited`, largest force and speed are left out of account.
     """
     gains = world.drives[drive]
     wanted, slope = command[TO_SPEED], 1.0
@@ -104,20 +105,24 @@ def servo_force(drive, speed, dt, command, world, state, scratch):
         pace = gains[STIFFNESS] / gains[DAMPING]
         wanted += pace * (command[TO_WAY] - state.drives[drive, WAY] - dt * speed)
         slope += pace * dt
-    if abs(wanted) > gains[MAX_SPEED]:
+    if limited and abs(wanted) > gains[MAX_SPEED]:
         wanted, slope = (gains[MAX_SPEED] if wanted > 0.0 else -gains[MAX_SPEED]), 1.0
     force = command[PUSH] + gains[DAMPING] * (wanted - speed) + scratch.drive_load[drive] / dt
-    if abs(force) > gains[MAX_FORCE]:
+    if limited and abs(force) > gains[MAX_FORCE]:
         return (gains[MAX_FORCE] if force > 0.0 else -gains[MAX_FORCE]), 0.0
     return force, gains[DAMPING] * slope
 
 
 @kernel
-def add_servos(dt, commands, world, state, scratch):
-    """Bring the drives, linearised at the present guess, into the linear system."""
+def add_servos(dt, limited, commands, world, state, scratch):
+    """Bring the drives, linearised at the present guess, into the linear system.
+
+    The first round is without limits: a force that would be too large at the end of that is at its limit. The other way
+    round a strong drive would be thrown from limit to limit.
+    """
     for drive in range(len(world.drives)):
         at, guess = world.drive_at[drive], scratch.guess[world.drive_at[drive]]
-        force, slope = servo_force(drive, guess, dt, commands[drive], world, state, scratch)
+        force, slope = servo_force(drive, guess, limited, dt, commands[drive], world, state, scratch)
         scratch.matrix[at, at] += scratch.drive_mass[drive] + dt * slope
         scratch.vector[at] += dt * (force + slope * guess)
 
@@ -127,6 +132,6 @@ def move_drives(dt, commands, world, state, scratch):
     """Write down the ways, speeds and forces of the drives at the step's end."""
     for drive in range(len(world.drives)):
         speed = scratch.guess[world.drive_at[drive]]
-        force, _ = servo_force(drive, speed, dt, commands[drive], world, state, scratch)
+        force, _ = servo_force(drive, speed, True, dt, commands[drive], world, state, scratch)
         state.drives[drive, WAY] += dt * speed
         state.drives[drive, SPEED], state.drives[drive, FORCE] = speed, force

@@ -279,6 +279,7 @@ def _solve_velocities(dt, commands, world, state, scratch):
     matrix, vector, guess, n = scratch.matrix, scratch.vector, scratch.guess, world.unknowns
     _begin_guess(dt, world, state, scratch)
     first_change, last_change, share = 0.0, 0.0, 1.0
+    opening = min(1, len(world.drives))  # drives are without limits in the first round: what it changes says nothing yet
     for turn in range(PASSES):
         _write_twists(dt, world, state, scratch)
         for i in range(n):
@@ -303,7 +304,7 @@ def _solve_velocities(dt, commands, world, state, scratch):
                     matrix[at + i, at + i] += world.mass[body]
                     for j in range(i + 1):
                         matrix[at + 3 + i, at + 3 + j] += scratch.inertia[body, i, j]
-        add_servos(dt, commands, world, state, scratch)
+        add_servos(dt, turn > 0, commands, world, state, scratch)
         solve_positive(matrix, vector, n)
         change = 0.0
         for i in range(n):
@@ -314,9 +315,9 @@ def _solve_velocities(dt, commands, world, state, scratch):
         last_change = change
         for i in range(n):
             guess[i] = share * vector[i] + (1.0 - share) * guess[i]
-        if turn == 0:
+        if turn <= opening:
             first_change = change
-        if change <= 1e-6 * first_change or change < 1e-13:
+        if turn >= opening and (change <= 1e-6 * first_change or change < 1e-13):
             break
     _write_twists(dt, world, state, scratch)
 
@@ -477,7 +478,7 @@ def _sum_contacts(pair, first_point, dt, p, painted, scratch):
 @kernel
 def _add_pair(a, b, dt, world, state, scratch):
     """Bring a pair's sums into the linear system."""
-    map_a, map_b, block, wrench = scratch.map_a, scratch.map_b, scratch.block, scratch.wrench
+    map_a, map_b, wrench = scratch.map_a, scratch.map_b, scratch.wrench
     at_a, width_a = _write_map(a, a, -1.0, world, state, scratch, map_a)
     at_b, width_b = _write_map(b, a, 1.0, world, state, scratch, map_b)
     for j in range(6):
@@ -485,12 +486,23 @@ def _add_pair(a, b, dt, world, state, scratch):
             scratch.vector[at_a + i] += dt * map_a[j, i] * wrench[j]
         for i in range(width_b):
             scratch.vector[at_b + i] += dt * map_b[j, i] * wrench[j]
-    add_product(scratch.matrix, at_a, at_a, map_a, width_a, block, map_a, width_a, dt)
-    add_product(scratch.matrix, at_b, at_b, map_b, width_b, block, map_b, width_b, dt)
-    if at_a >= at_b:  # only the lower triangle of the system is read
-        add_product(scratch.matrix, at_a, at_b, map_a, width_a, block, map_b, width_b, dt)
-    if at_b >= at_a:  # coupled bodies share their unknown: both of the mixed products count there
-        add_product(scratch.matrix, at_b, at_a, map_b, width_b, block, map_a, width_a, dt)
+    if width_a > 0:
+        _add_block(at_a, map_a, width_a, at_a, map_a, width_a, dt, scratch)
+    if width_b > 0:
+        _add_block(at_b, map_b, width_b, at_b, map_b, width_b, dt, scratch)
+    if width_a > 0 and width_b > 0:
+        if at_a >= at_b:  # only the lower triangle of the system is read
+            _add_block(at_a, map_a, width_a, at_b, map_b, width_b, dt, scratch)
+        if at_b >= at_a:  # coupled bodies share their unknown: both of the mixed products count there
+            _add_block(at_b, map_b, width_b, at_a, map_a, width_a, dt, scratch)
+
+
+@kernel
+def _add_block(row, left, left_width, column, right, right_width, dt, scratch):
+    if left_width == 6 and right_width == 6:  # the usual case with its widths in plain sight of the compiler
+        add_product(scratch.matrix, row, column, left, 6, scratch.block, right, 6, dt)
+    else:
+        add_product(scratch.matrix, row, column, left, left_width, scratch.block, right, right_width, dt)
 
 
 @kernel

@@ -1,12 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Small scenarios that several tests press, tilt and shake."""
 
+from dataclasses import replace
+
 import numpy as np
 import trimesh
 
 from palpate.core.bodies import rotation_matrices
 from palpate.core.mesh import TriangleMesh, checked_mesh, mass_properties
-from palpate.core.scenario import Body, Motion, Scenario, Sensor, SensorParameters, Target
+from palpate.core.scenario import Body, Drive, Motion, Scenario, Sensor, SensorParameters, Signal, Target
 from palpate.core.texels import Texels, texels_from_region
 
 GRAVITY = 9.81
@@ -80,5 +82,48 @@ def pressed(mesh, path, texels=None, times=None, fps=24.0, dt=1e-3, turns=None, 
         targets=(Target("probe", 1, mesh),),
         frame_end=len(path),
         fps=fps,
+        dt=dt,
+    )
+
+
+def smooth_path(*knots: tuple[float, float], fps: float, end: float) -> np.ndarray:
+    """Heights, one per frame from 0 to `end` seconds, that go from knot (time, height) to knot with rest at both."""
+    times = np.arange(round(end * fps) + 1) / fps
+    heights = np.full(len(times), knots[0][1], dtype=float)
+    for (t0, h0), (t1, h1) in zip(knots, knots[1:], strict=False):
+        share = np.clip((times - t0) / (t1 - t0), 0, 1)
+        heights = np.where(times >= t0, h0 + (h1 - h0) * (3 * share**2 - 2 * share**3), heights)
+    return heights
+
+
+def gripper(solid, mass, force, heights, fps=24.0, dt=5e-4, opening=0.06, coupled=True, height=None, **parameters) -> Scenario:
+    """Two fingers with 14 × 6 pads, on a carrier that follows `heights`, close along x on an object that stands on a table.
+
+    `force` is the wanted tactile sum of the left finger, newtons: a number, or one for each frame.
+    """
+    values = {"k": 1000.0, "cn": 10.0, "sigma0": 2e3, "sigma1": 20.0, "mus": 0.6, "mud": 0.5, **parameters}
+    tall = float(np.ptp(solid.vertices[:, 2])) if height is None else height
+    times = np.arange(len(heights)) / fps
+    force = np.broadcast_to(np.asarray(force, float), len(heights))
+    finger = Sensor("left", 0, pad(), SensorParameters(**values))
+    closing = Drive("force", Signal(times, force), sensor=0, max_speed=0.05, max_force=200.0)
+    bodies = []
+    for name, side in (("left", -1.0), ("right", 1.0)):
+        path = np.stack([np.full(len(times), side * opening / 2), np.zeros(len(times)), heights], axis=1)
+        turn = np.tile(about((0, 1, 0), -90.0 * side), (len(times), 1))
+        bodies.append(Body(name, Motion(times, path, turn), mass=0.1, drive=closing))
+    if coupled:
+        bodies[1] = replace(bodies[1], drive=Drive(leader=0))
+    else:
+        bodies[1] = replace(bodies[1], drive=replace(closing, sensor=1))
+    table = Sensor("table", 3, pad(16, 16, 0.004), SensorParameters(**values), readout=False)
+    sunk = mass * GRAVITY / values["k"] / 144  # texels of the table under a box of 50 mm
+    return Scenario(
+        bodies=(*bodies, free_body("object", solid, mass, (0, 0, tall / 2 - sunk)), Body("table", Motion.at_rest())),
+        sensors=(finger, replace(finger, name="right", body=1), table),
+        targets=(Target("object", 2, solid),),
+        frame_end=len(heights),
+        fps=fps,
+        gravity=np.array([0.0, 0.0, -GRAVITY]),
         dt=dt,
     )
