@@ -35,7 +35,7 @@ def drive_table(scenario: Scenario) -> tuple[np.ndarray, np.ndarray]:
     for i, body in enumerate(scenario.bodies):
         if body.drive is not None:
             drive_of[i] = leaders.index(i if body.drive.leader is None else body.drive.leader)
-    rows = []
+    rows: list[list[float]] = []
     for i in leaders:
         drive = scenario.bodies[i].drive
         assert drive is not None
