@@ -46,6 +46,11 @@ def corners(form, gain=1.0):
         yield {p.name: (p.high if choice >> i & 1 else p.low) for i, p in enumerate(scaled)}
 
 
+def between(form) -> dict[str, float]:
+    """Values well inside the bounds."""
+    return {p.name: p.low**0.6 * p.high**0.4 if p.log else 0.6 * p.low + 0.4 * p.high for p in form.parameters}
+
+
 @every_form
 def test_a_form_says_what_it_is(name, form):
     kind, found = kind_of(name), form_of(name, form)
@@ -206,7 +211,7 @@ def test_forms_differ_from_one_another():
     for kind in library().values():
         seen = []
         for form in kind.forms:
-            item = effect(kind.name, form.name, seed=1)
+            item = effect(kind.name, form.name, seed=1, **between(form))
             force = forces((item,), PARAMETERS, time, depth, slide)
             reading = readings((item,), site(), time, force)
             factor, viscous = friction((item,), np.linspace(0, 1, 9), np.linspace(0.5, 2, 9))
