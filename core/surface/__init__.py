@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Texels laid onto a surface: arrays that are wrapped around it, and points spread evenly over it."""
