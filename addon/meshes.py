@@ -106,24 +106,36 @@ def region(obj, count: int) -> np.ndarray:
     SensorError
         What the region goes by does not exist.
     """
-    settings = obj.palpate
-    if settings.region == "MESH":
+    own = obj.palpate
+    return region_by(
+        obj,
+        count,
+        region=own.region,
+        vertex_group=own.vertex_group,
+        material=own.material,
+        face_set=own.face_set,
+        threshold=own.threshold,
+    )
+
+
+def region_by(
+    obj, count: int, region: str, vertex_group: str = "", material: str = "", face_set: int = 1, threshold: float = 0.5
+) -> np.ndarray:
+    """(nv,) bool: vertices of a region that is not, or not yet, the object's own; errors as those of :func:`region`."""
+    if region == "MESH":
         return np.ones(count, dtype=bool)
-    if settings.region == "GROUP":
-        group = obj.vertex_groups.get(settings.vertex_group)
+    if region == "GROUP":
+        group = obj.vertex_groups.get(vertex_group)
         if group is None:
             raise SensorError(
-                f"Sensor '{obj.name}' has no vertex group '{settings.vertex_group}': "
-                "choose one in its Region panel or paint one."
+                f"Sensor '{obj.name}' has no vertex group '{vertex_group}': choose one in its Region panel or paint one."
             )
-        return weights(obj.data, group.index) >= max(settings.threshold, 1e-6)
-    faces = _faces_of_material(obj) if settings.region == "MATERIAL" else _faces_of_set(obj)
-    return corners_of(obj.data, faces)
+        return weights(obj.data, group.index) >= max(threshold, 1e-6)
+    return corners_of(obj.data, _faces_of_material(obj, material) if region == "MATERIAL" else _faces_of_set(obj, face_set))
 
 
-def _faces_of_material(obj) -> np.ndarray:
-    """(nf,) bool: faces that wear the region's material, or did before a heat map covered them."""
-    name = obj.palpate.material
+def _faces_of_material(obj, name: str) -> np.ndarray:
+    """(nf,) bool: faces that wear a material, or did before a heat map covered them."""
     slots = [index for index, slot in enumerate(obj.material_slots) if slot.material is not None and slot.material.name == name]
     if not slots:
         raise SensorError(f"Sensor '{obj.name}' wears no material '{name}': choose one in its Region panel (was it renamed?).")
@@ -146,8 +158,7 @@ def face_sets(mesh) -> np.ndarray:
     return sets
 
 
-def _faces_of_set(obj) -> np.ndarray:
-    number = obj.palpate.face_set
+def _faces_of_set(obj, number: int) -> np.ndarray:
     faces = face_sets(obj.data) == number
     if not faces.any():
         there = ", ".join(str(found) for found in np.unique(face_sets(obj.data))[:8])

@@ -25,6 +25,13 @@ ROLES = (
     ("TARGET", "Target", "Presses on sensors and pads"),
     ("PAD", "Pad", "Gives way like a sensor, but is not read out: a table, the back of a finger"),
 )
+SKIN_METHODS = (
+    ("NONE", "None", "Not laid onto a surface"),
+    ("ARRAY", "Array", "Rows and columns of a given pitch, wrapped around the surface"),
+    ("GRID", "Rows at a Spacing", "Rows and columns at a spacing, as far as the region goes"),
+    ("NOISE", "Even", "Evenly spaced without rows (blue noise)"),
+    ("VERTICES", "Vertices", "One texel for each vertex of the region"),
+)
 COLOR_MAPS = (
     ("VIRIDIS", "Viridis", "Dark blue to yellow, perceptually uniform"),
     ("MAGMA", "Magma", "Black to pale yellow, perceptually uniform"),
@@ -90,6 +97,38 @@ def _factor(what: str):
         precision=3,
         **_fixed,
     )
+
+
+def _length(name: str, text: str, **more):
+    return FloatProperty(name=name, description=text, precision=5, step=0.01, options=set(), **more)
+
+
+class PALPATE_PG_skin(bpy.types.PropertyGroup):
+    """How the texels of a sensor were laid onto its parent's surface; `Object.palpate.skin`"""
+
+    method: EnumProperty(
+        name="Pattern",
+        description="How texels are laid onto the surface",
+        items=SKIN_METHODS,
+        options=set(),
+        override={"LIBRARY_OVERRIDABLE"},
+    )
+    rows: IntProperty(name="Rows", description="Of the array", default=14, min=2, options=set())
+    columns: IntProperty(name="Columns", description="Of the array", default=6, min=2, options=set())
+    pitch_x: _length("Column Pitch (m)", "From column to column, m", default=0.0034, min=1e-6)
+    pitch_y: _length("Row Pitch (m)", "From row to row, m", default=0.0034, min=1e-6)
+    shift_x: _length("Shift Across (m)", "Of the array's middle, along its rows, m")
+    shift_y: _length("Shift Along (m)", "Of the array's middle, from row to row, m")
+    angle: FloatProperty(
+        name="Turn", description="Of the rows, anticlockwise seen from outside", subtype="ANGLE", options=set()
+    )
+    spacing: _length("Spacing (m)", "From texel to texel, m", default=0.002, min=1e-6)
+    seed: IntProperty(name="Seed", description="Another pattern for each", min=0, options=set())
+    lift: _length("Lift (m)", "How far above the surface the texels are, m: so much earlier they are touched", min=0.0)
+    region: StringProperty(options={"HIDDEN"})
+    region_name: StringProperty(options={"HIDDEN"})
+    region_number: IntProperty(options={"HIDDEN"})
+    made_from: StringProperty(options={"HIDDEN"})
 
 
 class PALPATE_PG_object(bpy.types.PropertyGroup):
@@ -227,6 +266,10 @@ class PALPATE_PG_object(bpy.types.PropertyGroup):
         name="Spin (rad/s)", description="Of a free body at the first frame, rad/s, world axes", size=3, precision=4, **_fixed
     )
 
+    skin: PointerProperty(
+        type=PALPATE_PG_skin, description="How it was laid onto its parent's surface", override={"LIBRARY_OVERRIDABLE"}
+    )
+
     # Bookkeeping of a free body that was moved, and of a bake. Saved, so that a reopened file can be put right.
     has_start: BoolProperty(options={"HIDDEN"})
     start_matrix: FloatVectorProperty(size=16, options={"HIDDEN"})
@@ -298,7 +341,7 @@ class PALPATE_PG_scene(bpy.types.PropertyGroup):
     baked_end: IntProperty(options={"HIDDEN"})
 
 
-CLASSES = (PALPATE_PG_object, PALPATE_PG_scene)
+CLASSES = (PALPATE_PG_skin, PALPATE_PG_object, PALPATE_PG_scene)
 
 
 def register():

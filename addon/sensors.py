@@ -86,6 +86,34 @@ def make_sensor(obj, source: str, role: str = "SENSOR") -> int:
     return int(chosen.sum())
 
 
+def describe_region(obj, source: str) -> dict:
+    """Return what :func:`.meshes.region_by` needs for a region of an object that stays what it is; a selection becomes a group.
+
+    Parameters
+    ----------
+    source : {"OWN", "SELECTION", "GROUP", "MATERIAL", "FACE_SET", "MESH"}
+        OWN is the region that the object has as a sensor.
+    """
+    own = obj.palpate
+    if source == "OWN":
+        return {"region": own.region, "vertex_group": own.vertex_group, "material": own.material, "face_set": own.face_set}
+    if source == "SELECTION":
+        chosen = selected_vertices(obj)
+        _check(obj, chosen, source)
+        group = obj.vertex_groups.new(name=GROUP_NAME)  # of its own: another skin may lie on another selection
+        group.add(np.flatnonzero(chosen).tolist(), 1.0, "REPLACE")
+        return {"region": "GROUP", "vertex_group": group.name}
+    if source == "GROUP":
+        if obj.vertex_groups.active is None:
+            raise SensorError(f"'{obj.name}' has no vertex group: paint one, or use the whole mesh.")
+        return {"region": "GROUP", "vertex_group": obj.vertex_groups.active.name}
+    if source == "MATERIAL":
+        return {"region": "MATERIAL", "material": _active_material(obj)[1]}
+    if source == "FACE_SET":
+        return {"region": "FACE_SET", "face_set": _active_face_set(obj)[1]}
+    return {"region": "MESH"}
+
+
 def _active_material(obj) -> tuple[np.ndarray, str]:
     """Vertices of the faces that wear the active material, and its name."""
     material = obj.active_material

@@ -3,9 +3,9 @@
 
 
 def _classes():
-    from . import bake, debug, presets, sensor
+    from . import bake, debug, presets, sensor, skin
 
-    return (*sensor.CLASSES, *presets.CLASSES, *bake.CLASSES, *debug.CLASSES)
+    return (*sensor.CLASSES, *skin.CLASSES, *presets.CLASSES, *bake.CLASSES, *debug.CLASSES)
 
 
 def register():

@@ -14,6 +14,9 @@ class PALPATE_MT_object(bpy.types.Menu):
         layout.operator("palpate.role_set", text="Make Target").role = "TARGET"
         layout.operator("palpate.sensor_add", text="Make Pad").role = "PAD"
         layout.operator("palpate.weight_paint", icon="WPAINT_HLT")
+        layout.operator("palpate.skin_add", icon="MOD_SURFACEDEFORM")
+        layout.operator("palpate.skin_update")
+        layout.operator("palpate.parameters_copy")
         layout.operator("palpate.sensor_remove", icon="X")
         layout.separator()
         layout.operator("palpate.bake", icon="RENDER_ANIMATION")
@@ -29,6 +32,12 @@ def _draw_edit(self, _context):
     layout = self.layout
     layout.separator()
     layout.operator("palpate.sensor_add", text="Make Palpate Sensor")
+    layout.operator("palpate.skin_add", text="Lay Texels on Selection")
+
+
+def _draw_add(self, _context):
+    self.layout.separator()
+    self.layout.operator("palpate.pad_mesh_add", icon="MESH_GRID")
 
 
 def _draw_weights(self, _context):
@@ -38,6 +47,7 @@ def _draw_weights(self, _context):
 
 
 ENTRIES = (
+    ("VIEW3D_MT_mesh_add", _draw_add),
     ("VIEW3D_MT_object", _draw),
     ("VIEW3D_MT_edit_mesh_faces", _draw_edit),
     ("VIEW3D_MT_edit_mesh_vertices", _draw_edit),

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Panels of one object: its role, and of a sensor or pad its region, its contact, its friction and what it reads."""
 
-from ..addon import live, state
+from ..addon import live, skins, state
 from ..operators import presets
 from .places import ROOT, Part, everywhere, sentences
 
@@ -29,12 +29,55 @@ class Root(Part):
             column.operator("palpate.role_set", text="Make Target").role = "TARGET"
             column.operator("palpate.sensor_add", text="Make Pad").role = "PAD"
             column.operator("palpate.weight_paint", text="Paint a Sensor", icon="WPAINT_HLT")
+            column.operator("palpate.skin_add", icon="MOD_SURFACEDEFORM")
             return
         row = layout.row(align=True)
         row.prop(settings, "role")
         row.operator("palpate.sensor_remove", text="", icon="X")
         if settings.role in {"SENSOR", "PAD"}:
             layout.operator("palpate.parameters_copy", icon="COPYDOWN")
+
+
+class Skins(Part):
+    """Sensors that lie on this object, or what this sensor lies on"""
+
+    name = "skins"
+    bl_label = "Texels on This Surface"
+    bl_options = set()
+    roles = {"NONE", "SENSOR", "TARGET", "PAD"}
+
+    @classmethod
+    def poll(cls, context):
+        obj = context.object
+        return super().poll(context) and obj.type == "MESH" and (obj.palpate.role != "NONE" or bool(skins.skins_of(obj)))
+
+    def draw_part(self, layout, settings, context):
+        obj = context.object
+        if skins.is_skin(obj):
+            own = settings.skin
+            box = layout.box().column()
+            row = box.row(align=True)
+            row.label(text=f"Lies on '{obj.parent.name}'" if obj.parent else "Lies on nothing", icon="MOD_SURFACEDEFORM")
+            if obj.parent:
+                row.operator("palpate.object_activate", text="", icon="RESTRICT_SELECT_OFF").name = obj.parent.name
+            for name in SKIN_FIELDS[own.method]:
+                box.prop(own, name)
+            layout.operator("palpate.skin_update", icon="FILE_REFRESH")
+            return
+        for skin in skins.skins_of(obj):
+            row = layout.row(align=True)
+            row.prop(skin, "name", text="", icon="MOD_SURFACEDEFORM")
+            row.operator("palpate.object_activate", text="", icon="RESTRICT_SELECT_OFF").name = skin.name
+        layout.operator("palpate.skin_add", icon="ADD")
+
+
+SKIN_FIELDS = {
+    "ARRAY": ("rows", "columns", "pitch_x", "pitch_y", "shift_x", "shift_y", "angle", "lift"),
+    "GRID": ("spacing", "angle", "lift"),
+    "NOISE": ("spacing", "seed", "lift"),
+    "VERTICES": ("lift",),
+}
+"""Settings that each pattern is made from."""
 
 
 class Region(Part):
@@ -135,4 +178,4 @@ class Readout(Part):
         box.label(text=f"Reading: {felt.reading.min():.4g} to {felt.reading.max():.4g} {settings.unit}")
 
 
-CLASSES = everywhere(Root, Region, Contact, Friction, Readout)
+CLASSES = everywhere(Root, Skins, Region, Contact, Friction, Readout)

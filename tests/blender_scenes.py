@@ -26,6 +26,18 @@ def cube(name="Cube", location=(0.2, 0.0, 0.0101), size=0.02, rotation=(0.0, 0.0
     return bpy.context.object
 
 
+def select(obj, vertices):
+    """Select vertices of a mesh, and what they span."""
+    bpy.ops.object.mode_set(mode="OBJECT")
+    chosen = np.zeros(len(obj.data.vertices), dtype=bool)
+    chosen[list(vertices)] = True
+    obj.data.vertices.foreach_set("select", chosen)
+    for edge in obj.data.edges:
+        edge.select = all(chosen[v] for v in edge.vertices)
+    for face in obj.data.polygons:
+        face.select = all(chosen[v] for v in face.vertices)
+
+
 def press(frames=8):
     """A ball that is pressed into a pad, 2 mm deep at the last frame."""
     scene = bpy.context.scene
@@ -85,6 +97,8 @@ def settings(group, uids=True) -> str:
 
 
 def _plain(value):
+    if isinstance(value, bpy.types.PropertyGroup):
+        return settings(value)
     return value if isinstance(value, str | int | float) else tuple(value)
 
 

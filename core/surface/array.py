@@ -187,6 +187,26 @@ def middle_of(mesh: TriangleMesh) -> Place:
     return Surface(mesh).place(centre, heading)
 
 
+def shifted(mesh: TriangleMesh, place: Place, shift: tuple[float, float]) -> Place:
+    """Return the place that lies (across, along) its heading from another, measured on the surface, metres.
+
+    Raises
+    ------
+    SensorError
+        That is beyond the region.
+    """
+    surface = Surface(mesh)
+    found = _along(surface, place, shift[1])
+    if found is not None and shift[0]:
+        side = _along(surface, _turned(surface, found, -math.pi / 2), shift[0])
+        found = None if side is None else _turned(surface, side, math.pi / 2)
+    if found is None:
+        raise SensorError(
+            f"Shifted by {shift[0] * 1e3:g} and {shift[1] * 1e3:g} mm the array's middle lies beyond the region: shift it less."
+        )
+    return found
+
+
 def _turned(surface: Surface, place: Place, angle: float) -> Place:
     return place.turned(surface.normals[place.triangle], angle)
 

@@ -2,23 +2,10 @@
 """Making sensors, targets and pads: from a selection, a painted group or a whole mesh, and back by undo."""
 
 import bpy
-import numpy as np
 import pytest
-from blender_scenes import ball, changes, dump, grid
+from blender_scenes import ball, changes, dump, grid, select
 
 from palpate.addon import identity, sensors
-
-
-def select(obj, vertices):
-    """Select vertices of a mesh, and what they span."""
-    bpy.ops.object.mode_set(mode="OBJECT")
-    chosen = np.zeros(len(obj.data.vertices), dtype=bool)
-    chosen[list(vertices)] = True
-    obj.data.vertices.foreach_set("select", chosen)
-    for edge in obj.data.edges:
-        edge.select = all(chosen[v] for v in edge.vertices)
-    for face in obj.data.polygons:
-        face.select = all(chosen[v] for v in face.vertices)
 
 
 def members(obj, name):

@@ -1,0 +1,193 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Sensors with a mesh of their own: tactile pads, and texels laid onto the surface of another object."""
+
+import bpy
+from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty
+from bpy_extras.object_utils import AddObjectHelper, object_data_add
+
+from ..addon import properties, sensors, skins
+from . import support
+
+
+class PALPATE_OT_pad_mesh_add(support.Reporting, AddObjectHelper, bpy.types.Operator):
+    """Add a pad of texels in rows and columns, flat or bent to a radius, as a sensor"""
+
+    bl_idname = "palpate.pad_mesh_add"
+    bl_label = "Tactile Pad"
+    bl_options = {"REGISTER", "UNDO"}
+
+    rows: IntProperty(name="Rows", description="Texels along +Y", default=14, min=2, soft_max=128)
+    columns: IntProperty(name="Columns", description="Texels along +X", default=6, min=2, soft_max=128)
+    pitch_x: FloatProperty(
+        name="Column Pitch (m)", description="From column to column, m", default=0.0034, min=1e-6, precision=5, step=0.01
+    )
+    pitch_y: FloatProperty(
+        name="Row Pitch (m)", description="From row to row, m", default=0.0034, min=1e-6, precision=5, step=0.01
+    )
+    radius: FloatProperty(
+        name="Radius (m)",
+        description="Bend about Y, m: above zero outwards as on a finger, below zero inwards, zero is flat",
+        precision=5,
+        step=0.1,
+    )
+    make_sensor: BoolProperty(name="Make Sensor", description="Give it the role Sensor", default=True)
+
+    @classmethod
+    def poll(cls, context):
+        if context.mode != "OBJECT":
+            cls.poll_message_set("Leave the mode you are in first (Object Mode)")
+            return False
+        return True
+
+    def run(self, context):
+        mesh = skins.new_pad(context, self.rows, self.columns, (self.pitch_x, self.pitch_y), self.radius)
+        obj = object_data_add(context, mesh, operator=self)
+        if self.make_sensor:
+            sensors.make_sensor(obj, "MESH")
+        self.report({"INFO"}, f"'{obj.name}' has {self.rows} × {self.columns} texels")
+
+
+class PALPATE_OT_skin_add(support.Reporting, bpy.types.Operator):
+    """Lay texels onto the surface of the active mesh: a sensor of its own that is fixed to it; an object can carry several"""
+
+    bl_idname = "palpate.skin_add"
+    bl_label = "Lay Texels"
+    bl_options = {"REGISTER", "UNDO"}
+
+    source: EnumProperty(
+        name="Region",
+        description="Where on the surface texels are laid",
+        items=(
+            (
+                "AUTO",
+                "Automatic",
+                "Selection in Edit Mode, painted group in Weight Paint, sensor's region, or whole mesh",
+            ),
+            ("OWN", "Sensor's Region", "The region that the object has as a sensor"),
+            ("SELECTION", "Selection", "Selected faces; they are kept in a vertex group"),
+            ("GROUP", "Active Vertex Group", "Vertices whose weight is a half or more"),
+            ("MATERIAL", "Active Material", "Faces that wear the active material"),
+            ("FACE_SET", "Face Set", "Faces of the set that the active face is in"),
+            ("MESH", "Whole Mesh", "Everywhere"),
+        ),
+        default="AUTO",
+        options={"SKIP_SAVE"},
+    )
+    method: EnumProperty(name="Pattern", description="How texels are laid", items=properties.SKIN_METHODS[1:], default="NOISE")
+    spacing: FloatProperty(
+        name="Spacing (m)",
+        description="From texel to texel, m",
+        default=0.0,
+        min=0.0,
+        precision=5,
+        step=0.01,
+        options={"SKIP_SAVE"},
+    )
+    rows: IntProperty(name="Rows", description="Of the array", default=14, min=2, soft_max=128)
+    columns: IntProperty(name="Columns", description="Of the array", default=6, min=2, soft_max=128)
+    pitch_x: FloatProperty(
+        name="Column Pitch (m)", description="From column to column, m", default=0.0034, min=1e-6, precision=5, step=0.01
+    )
+    pitch_y: FloatProperty(
+        name="Row Pitch (m)", description="From row to row, m", default=0.0034, min=1e-6, precision=5, step=0.01
+    )
+    shift_x: FloatProperty(name="Shift Across (m)", description="Of the array's middle, along its rows", precision=5, step=0.01)
+    shift_y: FloatProperty(name="Shift Along (m)", description="Of the array's middle, from row to row", precision=5, step=0.01)
+    angle: FloatProperty(name="Turn", description="Of the rows, anticlockwise seen from outside", subtype="ANGLE")
+    seed: IntProperty(name="Seed", description="Another pattern for each", min=0)
+    lift: FloatProperty(
+        name="Lift (m)",
+        description="How far above the surface the texels are, m: so much earlier they are touched",
+        default=0.0,
+        min=0.0,
+        precision=6,
+        step=0.01,
+    )
+
+    @classmethod
+    def poll(cls, context):
+        return support.mesh_object(cls, context)
+
+    def invoke(self, context, _event):
+        if not self.spacing:
+            self.spacing = skins.usual_spacing(context.object, context.scene)
+        return self.execute(context)
+
+    def run(self, context):
+        carrier = context.object
+        source = self._source(carrier)
+        support.leave_edit_mode(context)
+        recipe = {key: getattr(self, key) for key in skins.RECIPE}
+        recipe["spacing"] = recipe["spacing"] or skins.usual_spacing(carrier, context.scene)
+        was_sensor = carrier.palpate.role == "SENSOR"
+        obj = skins.lay(context, carrier, source, recipe)
+        text = f"'{obj.name}' has {len(obj.data.vertices)} texels"
+        if was_sensor and source == "OWN":  # its own texels would feel the same load a second time
+            carrier.palpate.role = "TARGET" if carrier.palpate.body == "FREE" else "NONE"
+            text += f"; '{carrier.name}' itself is no sensor any more"
+        self.report({"INFO"}, text)
+
+    def _source(self, carrier) -> str:
+        if self.source != "AUTO":
+            return self.source
+        found = sensors.source_of(carrier, carrier.mode)
+        return "OWN" if found == "MESH" and carrier.palpate.role in {"SENSOR", "PAD"} else found
+
+    def draw(self, _context):
+        layout = self.layout
+        layout.use_property_split = True
+        layout.prop(self, "source")
+        layout.prop(self, "method")
+        names = {
+            "ARRAY": ("rows", "columns", "pitch_x", "pitch_y", "shift_x", "shift_y", "angle"),
+            "GRID": ("spacing", "angle"),
+            "NOISE": ("spacing", "seed"),
+            "VERTICES": (),
+        }[self.method]
+        column = layout.column()
+        for name in (*names, "lift"):
+            column.prop(self, name)
+
+
+class PALPATE_OT_skin_update(support.Reporting, bpy.types.Operator):
+    """Lay the texels of this sensor anew onto the surface as it is now; what was painted on it is lost"""
+
+    bl_idname = "palpate.skin_update"
+    bl_label = "Lay Anew"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context):
+        if not support.mesh_object(cls, context):
+            return False
+        if not skins.is_skin(context.object):
+            cls.poll_message_set(f"'{context.object.name}' was not laid onto a surface: use Lay Texels first")
+            return False
+        return True
+
+    def run(self, context):
+        support.leave_edit_mode(context)
+        count = skins.lay_anew(context, context.object)
+        self.report({"INFO"}, f"'{context.object.name}' has {count} texels")
+
+
+class PALPATE_OT_object_activate(support.Reporting, bpy.types.Operator):
+    """Go to this object: make it the active one"""
+
+    bl_idname = "palpate.object_activate"
+    bl_label = "Go to Object"
+    bl_options = {"REGISTER", "UNDO", "INTERNAL"}
+
+    name: bpy.props.StringProperty(name="Object", description="Name of the object", options={"SKIP_SAVE"})
+
+    def run(self, context):
+        obj = context.scene.objects.get(self.name)
+        if obj is not None:
+            support.leave_edit_mode(context)
+            for other in context.selected_objects:
+                other.select_set(False)
+            obj.select_set(True)
+            context.view_layer.objects.active = obj
+
+
+CLASSES = (PALPATE_OT_pad_mesh_add, PALPATE_OT_skin_add, PALPATE_OT_skin_update, PALPATE_OT_object_activate)

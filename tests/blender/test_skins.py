@@ -1,0 +1,197 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Tactile pads, and texels laid onto the surfaces of other objects."""
+
+import bpy
+import numpy as np
+import pytest
+from blender_scenes import ball, changes, cube, dump, grid, select
+
+from palpate.addon import sample, skins, transforms
+from palpate.core.drive import drive
+from palpate.core.solve import run
+
+
+def texels_of(obj):
+    scenario, binding = sample.sample_start(bpy.context.scene, sample.depsgraph_of(bpy.context.scene))
+    return scenario.sensors[binding.sensor_objects(bpy.context.scene).index(obj)].texels
+
+
+def finger(radius=0.01):
+    bpy.ops.mesh.primitive_uv_sphere_add(radius=radius, segments=48, ring_count=24)
+    obj = bpy.context.object
+    obj.name = "Finger"
+    return obj
+
+
+def upper(obj, share=0.3):
+    size = max(v.co.z for v in obj.data.vertices)
+    return [v.index for v in obj.data.vertices if v.co.z > share * size]
+
+
+def something_presses():
+    """Sampling a scene needs something that presses."""
+    target = ball("Target", (0.0, 0.0, 1.0))
+    target.palpate.role = "TARGET"
+    return target
+
+
+@pytest.mark.parametrize("radius", [0.0, 0.012])
+def test_a_tactile_pad_is_a_sensor_of_rows_and_columns(radius):
+    assert bpy.ops.palpate.pad_mesh_add(rows=7, columns=5, pitch_x=0.002, pitch_y=0.003, radius=radius) == {"FINISHED"}
+    pad = bpy.context.object
+    assert (pad.name, pad.palpate.role, pad.palpate.region) == ("Tactile Pad", "SENSOR", "MESH")
+    something_presses()
+    texels = texels_of(pad)
+    assert (texels.layout.rows, texels.layout.columns) == (7, 5)
+    assert pad.dimensions.y == pytest.approx(0.018)
+    assert (pad.dimensions.z > 1e-4) == bool(radius)
+    assert (texels.normal[:, 2] > 0).all()
+
+
+def test_a_pad_in_millimetres_is_as_large():
+    bpy.context.scene.unit_settings.scale_length = 0.001
+    bpy.ops.palpate.pad_mesh_add(rows=7, columns=5, pitch_x=0.002, pitch_y=0.003)
+    assert bpy.context.object.dimensions.y == pytest.approx(18.0)
+
+
+def test_a_pad_that_meets_itself_says_so():
+    with pytest.raises(RuntimeError, match="use a larger radius"):
+        bpy.ops.palpate.pad_mesh_add(columns=60, radius=0.01)
+
+
+@pytest.mark.parametrize(
+    ("method", "settings", "grid_size"),
+    [
+        ("ARRAY", {"rows": 6, "columns": 5, "pitch_x": 0.002, "pitch_y": 0.0025}, (6, 5)),
+        ("GRID", {"spacing": 0.002}, None),
+        ("NOISE", {"spacing": 0.002}, None),
+        ("VERTICES", {}, None),
+    ],
+)
+def test_texels_are_laid_onto_a_selection(method, settings, grid_size):
+    obj = finger()
+    select(obj, upper(obj))
+    bpy.ops.object.mode_set(mode="EDIT")
+    assert bpy.ops.palpate.skin_add(method=method, **settings) == {"FINISHED"}
+    skin = bpy.context.object
+    assert (skin.name, skin.parent, skin.palpate.role, skin.palpate.body) == ("Finger Skin", obj, "SENSOR", "PARENT")
+    assert obj.palpate.role == "NONE"
+    something_presses()
+    texels = texels_of(skin)
+    if grid_size:
+        assert (texels.layout.rows, texels.layout.columns) == grid_size
+    radius = np.linalg.norm(texels.position, axis=1)
+    assert radius == pytest.approx(0.01, rel=0.01)
+    assert np.einsum("ij,ij->i", texels.normal, texels.position).min() > 0
+    assert texels.position[:, 2].min() > 0.002  # only where it was selected
+
+
+def test_lift_and_turn():
+    obj = finger()
+    bpy.ops.palpate.skin_add(method="NOISE", spacing=0.003, source="MESH", lift=0.001)
+    points = np.array([v.co for v in bpy.context.object.data.vertices])
+    assert np.linalg.norm(points, axis=1) == pytest.approx(0.011, rel=0.01)
+    assert obj.palpate.role == "NONE"
+
+
+def test_one_object_carries_several_sensors_that_feel_on_their_own():
+    obj = finger()
+    names = []
+    for share, sign in ((0.5, 1), (0.5, -1)):
+        size = max(v.co.z for v in obj.data.vertices)
+        select(obj, [v.index for v in obj.data.vertices if sign * v.co.z > share * size])
+        bpy.context.view_layer.objects.active = obj
+        bpy.ops.palpate.skin_add(source="SELECTION", method="NOISE", spacing=0.002)
+        names.append(bpy.context.object.name)
+    assert names == ["Finger Skin", "Finger Skin.001"]
+    assert skins.skins_of(obj) == [bpy.data.objects[name] for name in names]
+    bpy.data.objects[names[1]].palpate.k = 117.0  # twice as stiff below
+    scene = bpy.context.scene
+    scene.frame_start, scene.frame_end = 1, 2
+    for z in (0.0195, -0.0195):
+        plate = cube("Plate", (0.0, 0.0, z), 0.02)
+        plate.palpate.role = "TARGET"
+    recording = run(drive(sample.sample_scenario(scene))[0])
+    above, below = (recording.sensors[name].normal_force[-1].sum() for name in names)
+    assert above > 0
+    assert below == pytest.approx(2 * above, rel=0.15)  # other patterns of the same density
+
+
+@pytest.mark.parametrize("scale", [(2.0, 2.0, 2.0), (1.0, 2.0, 1.0), (-1.0, 1.0, 1.0)])
+def test_spacing_is_in_metres_whatever_the_scale_of_the_object(scale):
+    obj = grid("Plate", size=0.04)
+    obj.scale = scale
+    bpy.context.view_layer.update()
+    bpy.ops.palpate.skin_add(source="MESH", method="GRID", spacing=0.004)
+    skin = bpy.context.object
+    something_presses()
+    texels = texels_of(skin)
+    apart = np.linalg.norm(texels.position[:, None] - texels.position, axis=2) + np.eye(len(texels))
+    assert apart.min(axis=1) == pytest.approx(0.004, rel=1e-4)
+    frame = transforms.rotation(transforms.split(np.array(skin.matrix_world, float))[1])
+    assert texels.normal @ frame.T == pytest.approx(np.tile([0, 0, 1.0], (len(texels), 1)), abs=1e-6)
+
+
+def test_the_region_of_a_sensor_is_resampled_and_the_old_texels_go():
+    obj = grid("Plate", size=0.04)
+    bpy.ops.palpate.sensor_add()
+    obj.palpate.k = 300.0
+    assert bpy.ops.palpate.skin_add(method="NOISE", spacing=0.004) == {"FINISHED"}
+    skin = bpy.context.object
+    assert obj.palpate.role == "NONE"
+    assert skin.palpate.k == 300.0
+
+
+def test_a_skin_is_laid_anew_when_the_surface_has_changed():
+    obj = finger()
+    select(obj, upper(obj))
+    bpy.ops.palpate.skin_add(source="SELECTION", method="NOISE", spacing=0.002)
+    skin = bpy.context.object
+    assert not skins.is_outdated(skin)
+    for vertex in obj.data.vertices:
+        vertex.co *= 1.5
+    assert skins.is_outdated(skin)
+    before = len(skin.data.vertices)
+    skin.palpate.k = 99.0
+    assert bpy.ops.palpate.skin_update() == {"FINISHED"}
+    assert not skins.is_outdated(skin)
+    points = np.array([v.co for v in skin.data.vertices])
+    assert np.linalg.norm(points, axis=1) == pytest.approx(0.015, rel=0.01)
+    assert len(points) == pytest.approx(1.5**2 * before, rel=0.2)
+    assert skin.palpate.k == 99.0
+    skin.palpate.skin.spacing = 0.004
+    bpy.ops.palpate.skin_update()
+    assert len(skin.data.vertices) == pytest.approx(len(points) / 4, rel=0.3)
+
+
+def test_what_cannot_be_laid_leaves_no_trace():
+    obj = finger()
+    select(obj, upper(obj, 0.8))
+    before = dump()
+    with pytest.raises(RuntimeError, match="beyond the region"):
+        bpy.ops.palpate.skin_add(source="SELECTION", method="ARRAY")
+    assert changes(before, dump()) == []
+    assert not bpy.ops.palpate.skin_update.poll()
+
+
+def test_undo_takes_a_skin_away():
+    obj = finger()
+    select(obj, upper(obj))
+    bpy.ops.ed.undo_push(message="before")
+    before = dump()
+    bpy.ops.palpate.skin_add("EXEC_DEFAULT", True, source="SELECTION", spacing=0.003)
+    assert changes(before, dump())
+    bpy.ops.ed.undo()
+    assert changes(before, dump()) == []
+
+
+def test_a_skin_that_lost_its_surface_says_so():
+    finger()
+    bpy.ops.palpate.skin_add(source="MESH", spacing=0.004)
+    bpy.context.object.parent = None
+    with pytest.raises(RuntimeError, match="has lost the mesh it lay on"):
+        bpy.ops.palpate.skin_update()
+
+
+def test_a_good_spacing_is_guessed():
+    assert skins.usual_spacing(grid(size=0.05), bpy.context.scene) == pytest.approx(0.0035, rel=0.3)
