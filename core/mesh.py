@@ -68,11 +68,7 @@ def checked_mesh(
 
     warnings = []
     mesh = TriangleMesh(vertices, triangles, quads)
-    area = triangle_areas(mesh)
-    longest = _longest_edges(mesh)
-    # A sliver whose height is lost in the rounding of its coordinates has no direction that could be trusted.
-    scale = np.abs(vertices).max() + longest.max()
-    solid = area > 1e-13 * scale * longest
+    solid = have_area(mesh)
     if not solid.any():
         raise MeshError(f"All faces of '{name}' have zero area: give it a size (check its scale and shape).")
     if not solid.all():
@@ -130,12 +126,22 @@ def triangle_areas(mesh: TriangleMesh) -> np.ndarray:
     return 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
 
 
+def have_area(mesh: TriangleMesh) -> np.ndarray:
+    """Whether each triangle has a direction that can be trusted, (nt,) bool.
+
+    A sliver whose height is lost in the rounding of its coordinates has none, whatever its corners' cross product says.
+    """
+    longest = _longest_edges(mesh)
+    scale = np.abs(mesh.vertices).max(initial=0.0) + longest.max(initial=0.0)
+    return triangle_areas(mesh) > 1e-13 * scale * longest
+
+
 def face_normals(mesh: TriangleMesh) -> np.ndarray:
-    """Outward unit normal of each triangle, (nt, 3) float."""
+    """Outward unit normal of each triangle, (nt, 3) float; zero for one without area (:func:`have_area`)."""
     a, b, c = _corners(mesh)
     normal = np.cross(b - a, c - a)
     length = np.linalg.norm(normal, axis=1, keepdims=True)
-    return np.divide(normal, length, out=np.zeros_like(normal), where=length > 0)
+    return np.divide(normal, length, out=np.zeros_like(normal), where=have_area(mesh)[:, None])
 
 
 def vertex_normals(mesh: TriangleMesh) -> np.ndarray:

@@ -306,9 +306,10 @@ def _solve_velocities(dt, commands, world, state, scratch):
                         matrix[at + 3 + i, at + 3 + j] += scratch.inertia[body, i, j]
         add_servos(dt, turn > 0, commands, world, state, scratch)
         solve_positive(matrix, vector, n)
-        change = 0.0
+        change = 0.0  # a length, so that a scene that is turned as a whole takes the same rounds
         for i in range(n):
-            change = max(change, abs(vector[i] - guess[i]))
+            change += (vector[i] - guess[i]) ** 2
+        change = math.sqrt(change)
         # Contacts that come on and off in the first rounds find their own way; later ones shrink by 1 - share if all is well.
         if turn > 3 and change > (1.0 - 0.25 * share) * last_change:
             share *= 0.5
