@@ -6,7 +6,7 @@ from __future__ import annotations
 import bpy
 from bpy.app.handlers import persistent
 
-from . import identity, live, migrations, overlays, sample, state
+from . import identity, live, migrations, overlays, preview, sample, state, texelview
 
 
 @persistent
@@ -29,6 +29,7 @@ def palpate_depsgraph_update_post(_scene, depsgraph):
         if isinstance(block, bpy.types.Object):
             if update.is_updated_geometry:
                 session.changed_geometry.add(block.name)
+                session.geometry_version += 1
             if update.is_updated_transform:
                 session.changed_motion.add(block.name)
 
@@ -39,6 +40,7 @@ def palpate_load_post(_path):
     identity.forget()
     identity.claim(bpy.data.objects)
     live.forget()
+    preview.forget()
     migrations.apply()
     for scene in bpy.data.scenes:
         live.hide(scene)  # a file that was written without save_pre, as by a crash
@@ -47,6 +49,7 @@ def palpate_load_post(_path):
 @persistent
 def palpate_undo_post(_scene, _depsgraph=None):
     live.forget()
+    preview.forget()
     state.participants_changed()
 
 
@@ -92,10 +95,13 @@ def register():
     for name, function in LISTS.items():
         getattr(bpy.app.handlers, name).append(function)
     overlays.register()
+    texelview.register()
 
 
 def unregister():
+    texelview.unregister()
     overlays.unregister()
+    preview.forget()
     for name, function in LISTS.items():
         getattr(bpy.app.handlers, name).remove(function)
     live.forget()

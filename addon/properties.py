@@ -266,6 +266,7 @@ class PALPATE_PG_object(bpy.types.PropertyGroup):
         name="Spin (rad/s)", description="Of a free body at the first frame, rad/s, world axes", size=3, precision=4, **_fixed
     )
 
+    made_vertices: IntProperty(options={"HIDDEN"})
     skin: PointerProperty(
         type=PALPATE_PG_skin, description="How it was laid onto its parent's surface", override={"LIBRARY_OVERRIDABLE"}
     )
@@ -304,6 +305,24 @@ class PALPATE_PG_scene(bpy.types.PropertyGroup):
         description="Playing forward from the first frame computes frame by frame; scrubbing shows what was computed",
         default=True,
         options=set(),
+    )
+    show_texels: BoolProperty(
+        name="Texels",
+        description="Mark the texels of the active sensor in the 3D view; red ones have a problem",
+        default=True,
+        options=set(),
+    )
+    show_normals: BoolProperty(
+        name="Normals", description="Show which way the texels of the active sensor feel", default=True, options=set()
+    )
+    show_numbers: BoolProperty(
+        name="Numbers",
+        description="Show row and column of the texels where they form a grid, and their number where not",
+        default=False,
+        options=set(),
+    )
+    show_reach: BoolProperty(
+        name="Max Penetration", description="Show how deep the texels of the active sensor reach", default=False, options=set()
     )
     show_overlay: BoolProperty(
         name="Live Heat Map",

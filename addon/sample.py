@@ -324,6 +324,19 @@ def parameters(settings) -> SensorParameters:
     return SensorParameters(**{**values, "points_per_texel": int(values["points_per_texel"])})
 
 
+def sensor_alone(scene, obj, depsgraph) -> tuple[Sensor, TriangleMesh]:
+    """Return a sensor in the frame of its own object, and its mesh.
+
+    Raises
+    ------
+    PalpateError
+        Its mesh or region makes no sensor.
+    """
+    _, _, stretch = _split(obj, _world(obj, depsgraph))
+    mesh, _ = _mesh(obj, depsgraph, stretch * units.metres_per_unit(scene))
+    return _sensor(obj, 0, mesh), mesh
+
+
 def _sensor(obj, body: int, mesh: TriangleMesh) -> Sensor:
     found = parameters(obj.palpate)
     found.check(obj.name)

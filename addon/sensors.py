@@ -79,7 +79,7 @@ def make_sensor(obj, source: str, role: str = "SENSOR") -> int:
     elif source == "FACE_SET":
         settings.region, settings.face_set = source, face_set
     elif source == "MESH":
-        settings.region = source
+        settings.region, settings.made_vertices = source, len(chosen)
     else:
         settings.region, settings.vertex_group = "GROUP", group.name
     settings.role = role

@@ -142,6 +142,7 @@ def _remember(obj, carrier, where: dict, recipe: dict) -> None:
     own.region, own.region_number = where["region"], where.get("face_set", 0)
     own.region_name = where.get({"GROUP": "vertex_group", "MATERIAL": "material"}.get(own.region, ""), "")
     own.made_from = _state_of(carrier, own)
+    obj.palpate.made_vertices = len(obj.data.vertices)
     identity.ensure(obj)
 
 

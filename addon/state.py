@@ -15,6 +15,8 @@ class Session:
     """False when objects may have got or lost a role since `has_roles` was filled."""
     changed_geometry: set[str] = field(default_factory=set)
     """Names of objects whose geometry was touched since the last look."""
+    geometry_version: int = 0
+    """Counts changes of any object's geometry, for what is shown while a sensor is made."""
     changed_motion: set[str] = field(default_factory=set)
     """Names of objects that were moved by hand, by a script or by an edited animation since a run began."""
     has_roles: dict[int, bool] = field(default_factory=dict)

@@ -1,11 +1,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Panels and menus: they draw what is there and compute nothing."""
 
+_panels: tuple = ()
+
 
 def _classes():
-    from . import bake, body, sensor
+    global _panels
+    if not _panels:
+        from . import bake, body, check, places, sensor
 
-    return (*sensor.CLASSES, *body.CLASSES, *bake.CLASSES)
+        parts = (sensor.Root, *check.PARTS, *sensor.PARTS, *body.PARTS, *bake.PARTS)
+        _panels = places.everywhere(*parts)
+    return _panels
 
 
 def register():

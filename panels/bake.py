@@ -2,7 +2,7 @@
 """Panels of what the scene does: bake, and how results look."""
 
 from ..addon import live, state, write
-from .places import Part, everywhere, sentences
+from .places import Part, sentences
 
 
 class Bake(Part):
@@ -53,4 +53,4 @@ class Display(Part):
             column.prop(own, "arrow_scale")
 
 
-CLASSES = everywhere(Bake, Display)
+PARTS = (Bake, Display)

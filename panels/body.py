@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Panel of what moves an object."""
 
-from .places import Part, everywhere, sentences
+from .places import Part, sentences
 
 
 class Body(Part):
@@ -21,4 +21,4 @@ class Body(Part):
             )
 
 
-CLASSES = everywhere(Body)
+PARTS = (Body,)

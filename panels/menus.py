@@ -17,6 +17,7 @@ class PALPATE_MT_object(bpy.types.Menu):
         layout.operator("palpate.skin_add", icon="MOD_SURFACEDEFORM")
         layout.operator("palpate.skin_update")
         layout.operator("palpate.parameters_copy")
+        layout.operator_menu_enum("palpate.fix", "kind")
         layout.operator("palpate.sensor_remove", icon="X")
         layout.separator()
         layout.operator("palpate.bake", icon="RENDER_ANIMATION")

@@ -3,7 +3,7 @@
 
 from ..addon import live, skins, state
 from ..operators import presets
-from .places import ROOT, Part, everywhere, sentences
+from .places import ROOT, Part, sentences
 
 
 class Root(Part):
@@ -178,4 +178,4 @@ class Readout(Part):
         box.label(text=f"Reading: {felt.reading.min():.4g} to {felt.reading.max():.4g} {settings.unit}")
 
 
-CLASSES = everywhere(Root, Skins, Region, Contact, Friction, Readout)
+PARTS = (Region, Skins, Contact, Friction, Readout)

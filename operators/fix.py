@@ -1,0 +1,40 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Put right what the panel says is wrong with a sensor."""
+
+import bpy
+from bpy.props import EnumProperty
+
+from ..addon import preview, problems
+from . import support
+
+
+class PALPATE_OT_fix(support.Reporting, bpy.types.Operator):
+    """Put this problem of the active sensor right"""
+
+    bl_idname = "palpate.fix"
+    bl_label = "Fix Sensor"
+    bl_options = {"REGISTER", "UNDO"}
+
+    kind: EnumProperty(
+        name="Problem",
+        description="What is put right",
+        items=[(kind, label, label) for kind, (label, _) in problems.FIXES.items()],
+        options={"SKIP_SAVE"},
+    )
+
+    @classmethod
+    def poll(cls, context):
+        return support.mesh_object(cls, context) and support.sensor_object(cls, context)
+
+    def run(self, context):
+        support.leave_edit_mode(context)
+        obj = context.object
+        problems.fix(obj, self.kind, preview.now(obj, context.scene))
+        left = preview.now(obj, context.scene).problems
+        if left:
+            self.report({"WARNING"}, left[0].text)
+        else:
+            self.report({"INFO"}, f"'{obj.name}' is all right now")
+
+
+CLASSES = (PALPATE_OT_fix,)

@@ -1,0 +1,44 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Panel of a sensor's texels: how many, how dense, how long a step may be, what is wrong and the button against it."""
+
+from ..addon import preview, problems
+from ..core.layout import GridLayout
+from .places import Part, sentences
+
+
+class Texels(Part):
+    name = "texels"
+    bl_label = "Texels"
+    bl_options = set()
+    roles = {"SENSOR", "PAD"}
+    split = False
+
+    def draw_part(self, layout, _settings, context):
+        own = context.scene.palpate
+        grid = layout.grid_flow(columns=2, even_columns=True, align=True)
+        for name in ("show_texels", "show_normals", "show_numbers", "show_reach"):
+            grid.prop(own, name)
+        report = preview.of(context.object, context.scene)
+        if report is None:
+            layout.label(text="Looking at it…", icon="SORTTIME")
+            return
+        box = layout.box().column(align=True)
+        if report.texels is not None:
+            shape = report.texels.layout
+            size = f"{shape.rows} × {shape.columns} = " if isinstance(shape, GridLayout) else ""
+            box.label(text=f"{size}{len(report.texels)} texels")
+            box.label(text=f"{report.area * 1e4:.4g} cm², {report.density:.3g} texels per cm²")
+        advice = report.advice
+        if advice is not None:
+            limit = f"{advice.limit * 1e3:.3g} ms" if advice.limit < 1e3 else "none, no body is free"
+            box.label(text=f"Stability limit: {limit}")
+            box.label(text=f"Advised step: {advice.dt * 1e3:.3g} ms")
+        elif report.missing:
+            sentences(box, report.missing, "INFO", context)
+        for problem in report.problems:
+            box = layout.box().column()
+            sentences(box, problem.text, "ERROR", context)
+            box.operator("palpate.fix", text=problems.FIXES[problem.kind][0]).kind = problem.kind
+
+
+PARTS = (Texels,)

@@ -1,0 +1,210 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the panel says about a sensor: counts, area, density, time step, and every problem with the button that fixes it."""
+
+import bpy
+import numpy as np
+import pytest
+from blender_scenes import ball, cube, grid, press_and_drop
+
+from palpate.addon import preview, problems, texelview
+
+
+def look(obj):
+    bpy.context.view_layer.update()
+    return preview.now(obj, bpy.context.scene)
+
+
+def kinds(obj):
+    return [problem.kind for problem in look(obj).problems]
+
+
+def sensor(obj):
+    bpy.context.view_layer.objects.active = obj
+    bpy.ops.palpate.sensor_add(source="MESH")
+    obj.palpate.max_penetration = 0.001
+    return obj
+
+
+def fix(obj, kind):
+    bpy.context.view_layer.objects.active = obj
+    assert bpy.ops.palpate.fix(kind=kind) == {"FINISHED"}
+
+
+def test_counts_area_and_density():
+    pad = sensor(grid(size=0.05))
+    report = look(pad)
+    assert not report.problems
+    assert len(report.texels) == 84
+    assert report.area == pytest.approx(0.05 * 0.05, rel=1e-6)
+    assert report.density == pytest.approx(84 / 25, rel=1e-6)
+
+
+def test_stability_limit_and_step_are_those_of_the_scene():
+    from palpate.addon import sample
+    from palpate.core.timestep import advise
+
+    scene, pad, *_ = press_and_drop()
+    report = look(pad)
+    expected = advise(sample.sample_start(scene, sample.depsgraph_of(scene))[0])
+    assert report.advice == expected
+    assert 0 < report.advice.dt < report.advice.limit < 1.0
+
+
+def test_a_scene_that_makes_no_run_says_what_is_missing():
+    assert "give at least one other object the role Target" in look(sensor(grid())).missing
+
+
+def flip(obj, faces):
+    for index in faces:
+        obj.data.polygons[index].flip()
+    obj.data.update()
+
+
+def test_a_flipped_face_is_turned():
+    obj = sensor(cube(size=0.05))
+    flip(obj, [2])
+    assert kinds(obj) == ["NORMALS"]
+    fix(obj, "NORMALS")
+    assert kinds(obj) == []
+
+
+def test_a_mesh_inside_out_is_flipped():
+    obj = sensor(ball(radius=0.02))
+    flip(obj, range(len(obj.data.polygons)))
+    report = look(obj)
+    assert [problem.kind for problem in report.problems] == ["FLIPPED"]
+    assert len(report.problems[0].texels) == len(report.texels)
+    fix(obj, "FLIPPED")
+    assert kinds(obj) == []
+
+
+def test_a_skin_that_faces_into_its_carrier_is_flipped():
+    ball(radius=0.02)
+    bpy.ops.palpate.skin_add(source="MESH", method="NOISE", spacing=0.004)
+    skin = bpy.context.object
+    skin.palpate.max_penetration = 0.001
+    assert kinds(skin) == []
+    flip(skin, range(len(skin.data.polygons)))
+    assert kinds(skin) == ["FLIPPED"]
+    fix(skin, "FLIPPED")
+    assert kinds(skin) == []
+
+
+def test_texels_inside_the_object_are_left_out():
+    """Two balls that overlap, joined: what is inside the other never touches anything."""
+    one, other = ball("One", (0, 0, 0), 0.02), ball("Other", (0.015, 0, 0), 0.02)
+    one.select_set(True)
+    other.select_set(True)
+    bpy.context.view_layer.objects.active = one
+    bpy.ops.object.join()
+    sensor(one)
+    found = look(one).problems
+    assert [problem.kind for problem in found] == ["INSIDE"]
+    points = np.array([v.co for v in one.data.vertices])
+    centres = np.array([[0, 0, 0], [0.015, 0, 0]]) + np.array(one.location) * 0
+    depth = np.array([0.02 - np.linalg.norm(points - centre, axis=1) for centre in centres])
+    inside = (depth > 4e-4).any(axis=0)  # below the facets
+    assert set(np.flatnonzero(inside)) <= set(found[0].texels)
+    fix(one, "INSIDE")
+    assert one.palpate.region == "GROUP"
+    assert "INSIDE" not in kinds(one)
+
+
+def test_texels_one_upon_another_are_merged():
+    one, other = grid("One"), grid("Other", (0.00005, 0, 0.00001))
+    for obj in (one, other):
+        obj.select_set(True)
+    bpy.context.view_layer.objects.active = one
+    bpy.ops.object.join()
+    sensor(one)
+    found = look(one).problems
+    assert "OVERLAP" in [problem.kind for problem in found]
+    assert len(next(p for p in found if p.kind == "OVERLAP").texels) == 84
+    fix(one, "OVERLAP")
+    assert "OVERLAP" not in kinds(one)
+    assert len(one.data.vertices) == 84
+
+
+def test_a_reach_through_a_thin_plate_is_shortened():
+    plate = cube(size=0.05)
+    plate.scale = (1, 1, 0.04)  # 2 mm
+    sensor(plate)
+    plate.palpate.max_penetration = 0.012
+    found = look(plate).problems
+    assert [problem.kind for problem in found] == ["THROUGH"]
+    assert "12 mm" in found[0].text
+    fix(plate, "THROUGH")
+    assert kinds(plate) == []
+    assert plate.palpate.max_penetration < 0.012
+
+
+def test_a_subdivided_sensor_s_modifier_is_applied():
+    obj = sensor(grid(columns=4, rows=4))
+    obj.modifiers.new("Subdivision", "SUBSURF").levels = 1
+    assert kinds(obj) == ["MODIFIER"]
+    fix(obj, "MODIFIER")
+    assert kinds(obj) == []
+    assert len(obj.data.vertices) == 49
+    assert len(look(obj).texels) == 49
+
+
+def test_a_joined_mesh_is_asked_about():
+    pad, other = sensor(grid()), cube()
+    for obj in (pad, other):
+        obj.select_set(True)
+    bpy.context.view_layer.objects.active = pad
+    bpy.ops.object.join()
+    found = look(pad).problems
+    assert "GROWN" in [problem.kind for problem in found]
+    assert "had 84 vertices" in next(p for p in found if p.kind == "GROWN").text
+    fix(pad, "GROWN")
+    assert "GROWN" not in kinds(pad)
+
+
+def test_a_region_that_is_gone_is_replaced():
+    pad = sensor(grid())
+    pad.palpate.region, pad.palpate.vertex_group = "GROUP", "Gone"
+    report = look(pad)
+    assert report.texels is None
+    assert [problem.kind for problem in report.problems] == ["REGION"]
+    fix(pad, "REGION")
+    assert kinds(pad) == []
+
+
+def test_an_outdated_skin_is_laid_anew_and_an_orphan_stands_alone():
+    carrier = ball(radius=0.02)
+    bpy.ops.palpate.skin_add(source="MESH", method="NOISE", spacing=0.005)
+    skin = bpy.context.object
+    skin.palpate.max_penetration = 0.001
+    for vertex in carrier.data.vertices:
+        vertex.co *= 1.2
+    assert "OUTDATED" in kinds(skin)
+    fix(skin, "OUTDATED")
+    assert kinds(skin) == []
+    skin.parent = None
+    assert kinds(skin) == ["ORPHAN"]
+    fix(skin, "ORPHAN")
+    assert skin.palpate.body == "KEYFRAMED"
+
+
+def test_every_problem_has_a_button_with_a_name():
+    assert all(label and call for label, call in problems.FIXES.values())
+    pad = sensor(grid())
+    with pytest.raises(RuntimeError, match="no such problem any more"):
+        bpy.context.view_layer.objects.active = pad
+        bpy.ops.palpate.fix(kind="FLIPPED")
+
+
+def test_what_is_drawn_is_where_the_texels_are():
+    pad = sensor(grid(size=0.05))
+    report = look(pad)
+    drawing = texelview.drawing_of(report)
+    assert drawing.labels[0][0] == "0,0"
+    assert drawing.labels[83][0] == "13,5"
+    assert [place[:2] for _, place in drawing.labels] == pytest.approx(report.texels.position[:, :2], abs=1e-9)
+    deep = drawing.lines["reach"].reshape(-1, 2, 3)
+    assert deep[:, 0, 2] - deep[:, 1, 2] == pytest.approx(0.001, rel=1e-6)
+    up = drawing.lines["normals"].reshape(-1, 2, 3)
+    assert (up[:, 1, 2] > up[:, 0, 2]).all()
+    assert len(drawing.spots["faulty"]) == 0
+    assert len(drawing.spots["fine"]) == 84 * texelview.SIDES * 3
