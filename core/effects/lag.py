@@ -6,6 +6,7 @@ from __future__ import annotations
 import numpy as np
 
 from .base import Form, Kind, Parameter, Values, number
+from .creep import shares_of_a_step
 
 
 def first_order(force, slope, depth, slide, numbers, row, memory, point, at, commit):
@@ -32,10 +33,7 @@ def second_order(force, slope, depth, slide, numbers, row, memory, point, at, co
 
 
 def _first(values: Values, dt: np.ndarray) -> np.ndarray:
-    x = np.asarray(dt, float) / max(number(values, "time"), 1e-12)
-    keep = np.exp(-x)
-    new = np.where(x > 1e-4, 1.0 + np.expm1(-x) / np.maximum(x, 1e-300), 0.5 * x - x * x / 6.0)
-    return np.stack([keep, 1.0 - keep - new, new], axis=1)
+    return np.stack(shares_of_a_step(np.asarray(dt, float) / max(number(values, "time"), 1e-12)), axis=1)
 
 
 def _second(values: Values, dt: np.ndarray) -> np.ndarray:
@@ -43,10 +41,12 @@ def _second(values: Values, dt: np.ndarray) -> np.ndarray:
     x = np.asarray(dt, float) / max(number(values, "time"), 1e-12)
     keep = first[:, 0]
     turn = np.where(np.isfinite(keep * x), keep * x, 0.0)
-    # Answer at the step's end to x growing from 0 to 1 over the step.
+    # Answers at the step's end to an input of 1, and to one that grows from 0 to 1; their series where digits would be lost.
+    small = x < 1e-2
+    whole = np.where(small, x * x / 2.0 - x**3 / 3.0 + x**4 / 8.0, 1.0 - keep - turn)
     exact = (x - 2.0 + 2.0 * keep + turn) / np.maximum(x, 1e-300)
-    new = np.where(x > 1e-2, exact, x * x / 6.0 - x**3 / 12.0 + x**4 / 40.0)
-    return np.column_stack([first, turn, 1.0 - keep - turn - new, new])
+    new = np.where(small, x * x / 6.0 - x**3 / 12.0 + x**4 / 40.0, exact)
+    return np.column_stack([first, turn, whole - new, new])
 
 
 _TIME = Parameter("time", "s", 0.05, 0.0, 100.0, "Time constant τ.")

@@ -46,9 +46,10 @@ def corners(form, gain=1.0):
         yield {p.name: (p.high if choice >> i & 1 else p.low) for i, p in enumerate(scaled)}
 
 
-def between(form) -> dict[str, float]:
-    """Values well inside the bounds."""
-    return {p.name: p.low**0.6 * p.high**0.4 if p.log else 0.6 * p.low + 0.4 * p.high for p in form.parameters}
+def noticeable(form) -> dict[str, float]:
+    """The defaults, but nothing that is off."""
+    defaults = form.defaults()
+    return {p.name: 0.9 * p.low + 0.1 * p.high for p in form.parameters if defaults[p.name] == form.off.get(p.name)}
 
 
 @every_form
@@ -211,10 +212,10 @@ def test_forms_differ_from_one_another():
     for kind in library().values():
         seen = []
         for form in kind.forms:
-            item = effect(kind.name, form.name, seed=1, **between(form))
+            item = effect(kind.name, form.name, seed=5, **noticeable(form))
             force = forces((item,), PARAMETERS, time, depth, slide)
             reading = readings((item,), site(), time, force)
-            factor, viscous = friction((item,), np.linspace(0, 1, 9), np.linspace(0.5, 2, 9))
+            factor, viscous = friction((item,), np.geomspace(1e-5, 1, 9), np.linspace(0.5, 2, 9))
             moved = placed((item,), site().position, np.ones((12, 3)), np.ones((12, 3)))
             seen.append(np.concatenate([np.ravel(part) for part in (force, reading, factor, viscous, *moved)]))
         for i, one in enumerate(seen):

@@ -1,0 +1,291 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Effects on readings against closed forms, SciPy and statistics."""
+
+import numpy as np
+import pytest
+from scipy.signal import TransferFunction, lsim
+
+from palpate.core.effects import chance
+from palpate.core.effects.base import Site
+from palpate.core.effects.bound import Reader, readings
+from palpate.core.effects.library import effect
+from palpate.core.effects.mixing import mixing, nearest_distance, pairs_within
+from palpate.core.errors import EffectError
+
+ROWS, COLUMNS, PITCH = 14, 6, 0.0034
+N = ROWS * COLUMNS
+ROW, COLUMN = (grid.ravel() for grid in np.mgrid[0:ROWS, 0:COLUMNS])
+POSITION = np.stack([COLUMN * PITCH, ROW * PITCH, np.zeros(N)], axis=1)
+GRID = Site(POSITION, np.full(N, PITCH**2), ROW, COLUMN)
+TIME = np.linspace(0.0, 10.0, 501)
+
+
+def read(item, force, time=TIME, site=GRID):
+    return readings((item,), site, time, np.asarray(force, float))
+
+
+def image(texel, value=1.0):
+    """One texel loaded, for one sample."""
+    force = np.zeros((1, N))
+    force[0, texel] = value
+    return force
+
+
+# --- formulas
+
+
+@pytest.mark.parametrize(
+    ("name", "form", "values", "formula"),
+    [
+        ("saturation", "clip", {"level": 0.8}, lambda f: np.clip(f, -0.8, 0.8)),
+        ("saturation", "tanh", {"level": 0.8}, lambda f: 0.8 * np.tanh(f / 0.8)),
+        ("saturation", "rational", {"level": 0.8}, lambda f: f / (1 + np.abs(f) / 0.8)),
+        ("dead-zone", "hard", {"threshold": 0.3}, lambda f: np.sign(f) * np.maximum(np.abs(f) - 0.3, 0)),
+        ("dead-zone", "soft", {"threshold": 0.3}, lambda f: np.sign(f) * f**2 / (np.abs(f) + 0.3)),
+        ("dead-zone", "step", {"threshold": 0.3}, lambda f: np.where(np.abs(f) > 0.3, f, 0)),
+        ("offset", "common", {"offset": -0.2}, lambda f: f - 0.2),
+        ("quantization", "round", {"step": 0.25}, lambda f: 0.25 * np.round(f / 0.25)),
+        ("quantization", "floor", {"step": 0.25}, lambda f: 0.25 * np.floor(f / 0.25)),
+        ("quantization", "bits", {"bits": 4, "range": 2.0}, lambda f: np.round(f * 8) / 8),
+        ("drift", "linear", {"rate": 0.03}, lambda f: f + 0.03 * TIME[:, None]),
+        ("drift", "warm-up", {"amount": 0.3, "time": 4.0}, lambda f: f + 0.3 * (1 - np.exp(-TIME[:, None] / 4))),
+    ],
+)
+def test_formulas(name, form, values, formula):
+    force = np.linspace(-0.5, 2.0, len(TIME))[:, None] * np.ones(N)
+    np.testing.assert_allclose(read(effect(name, form, **values), force), formula(force), rtol=1e-12, atol=1e-14)
+
+
+def test_saturation_counts_from_the_reading_without_load():
+    site = Site(POSITION, GRID.area, gain=-2.0, zero=5.0)
+    force = np.linspace(0.0, 3.0, len(TIME))[:, None] * np.ones(N)
+    found = read(effect("saturation", "clip", level=4.0), force, site=site)
+    np.testing.assert_allclose(found, np.maximum(5.0 - 2.0 * force, 1.0), rtol=1e-12)
+
+
+# --- with memory
+
+
+@pytest.mark.parametrize(("form", "denominator"), [("first-order", [0.3, 1.0]), ("second-order", [0.09, 0.6, 1.0])])
+def test_lag_is_the_linear_system_that_it_says(form, denominator):
+    random = np.random.default_rng(0)
+    signal = np.cumsum(random.normal(size=len(TIME)))
+    signal -= signal[0]
+    _, expected, _ = lsim(TransferFunction([1.0], denominator), signal, TIME)
+    found = read(effect("lag", form, time=0.3), signal[:, None])
+    np.testing.assert_allclose(found[:, 0], expected, atol=1e-9)
+
+
+@pytest.mark.parametrize("form", ["first-order", "second-order"])
+@pytest.mark.parametrize("step", [1e-7, 9e-5, 1.1e-4, 9e-3, 1.1e-2, 50.0])
+def test_lag_has_no_seam_between_its_series_and_its_formula(form, step):
+    """One step against a thousand small ones, over a ramp."""
+    coarse, fine = np.array([0.0, step]), np.linspace(0.0, step, 1001)
+    item = effect("lag", form, time=1.0)
+    one, many = (read(item, (time / step)[:, None], time)[-1, 0] for time in (coarse, fine))
+    assert one == pytest.approx(many, rel=1e-6, abs=1e-18)
+
+
+def test_lag_starts_at_rest():
+    for form in ("first-order", "second-order", "dead-time"):
+        np.testing.assert_allclose(read(effect("lag", form, time=0.5), np.full((501, 1), 3.0)), 3.0, rtol=1e-12)
+
+
+def test_dead_time():
+    signal = np.sin(TIME)[:, None]
+    found = read(effect("lag", "dead-time", time=0.5), signal)[:, 0]
+    np.testing.assert_allclose(found[TIME >= 0.5], np.sin(TIME[TIME >= 0.5] - 0.5), atol=6e-5)  # linear between samples
+    assert (found[TIME < 0.5] == 0.0).all()
+
+
+def test_a_reading_that_goes_on_rising():
+    step = np.where(TIME > 0, 1.0, 0.0)[:, None]
+    time = TIME.copy()
+    time[1:] -= TIME[1] - 1e-9  # the load comes on within a nanosecond
+    found = read(effect("creep", "rising-exponential", amount=0.3, time=2.0), step, time)[1:, 0]
+    np.testing.assert_allclose(found, 1 + 0.3 * (1 - np.exp(-time[1:] / 2.0)), atol=1e-8)
+    found = read(effect("creep", "rising-logarithmic", amount=0.1, time=0.5), step, time)[1:, 0]
+    np.testing.assert_allclose(found, 1 + 0.1 * np.log10(1 + time[1:] / 0.5), atol=1e-3)
+
+
+def test_play_keeps_its_distance():
+    """On a long way up and down the mean element trails by the force that was given."""
+    signal = np.concatenate([np.linspace(0, 2, 251), np.linspace(2, 0.5, 250)])[:, None]
+    found = read(effect("hysteresis", "play", share=0.5, force=0.1), signal)[:, 0]
+    assert found[250] == pytest.approx(2 - 0.5 * 0.1)
+    assert found[-1] == pytest.approx(0.5 + 0.5 * 0.1)
+    assert found[255] == pytest.approx(signal[255, 0] * 0.5 + 0.5 * (2 - 0.1))  # all stand still at first
+
+
+def test_trailing_reading():
+    signal = np.concatenate([np.linspace(0, 2, 251), np.linspace(2, 0.5, 250)])[:, None]
+    found = read(effect("hysteresis", "trailing", width=0.1, force=0.05), signal)[:, 0]
+    up = 1 - np.exp(-signal[:251, 0] / 0.05)
+    down = -1 + (up[-1] + 1) * np.exp(-(2 - signal[251:, 0]) / 0.05)
+    np.testing.assert_allclose(found, signal[:, 0] * (1 - 0.1 * np.concatenate([up, down])), rtol=1e-9)
+
+
+# --- mixes
+
+
+@pytest.mark.parametrize(
+    ("form", "weight"),
+    [
+        ("gaussian", lambda r: np.exp(-(r**2) / (2 * 0.003**2))),
+        ("exponential", lambda r: np.exp(-r / 0.003)),
+        ("half-space", lambda r: (1 + r**2 / 0.003**2) ** -2.5),
+    ],
+)
+def test_a_spread_load_keeps_its_sum_and_has_the_right_shape(form, weight):
+    texel = 7 * COLUMNS + 3
+    found = read(effect("load-spreading", form, **{"thickness" if form == "half-space" else "width": 0.003}), image(texel))[0]
+    assert found.sum() == pytest.approx(1.0, rel=1e-12)
+    distance = np.linalg.norm(POSITION - POSITION[texel], axis=1)
+    np.testing.assert_allclose(found / found[texel], weight(distance), rtol=1e-12)
+    random = np.random.default_rng(0).random((5, N))
+    np.testing.assert_allclose(read(effect("load-spreading", form), random).sum(axis=1), random.sum(axis=1), rtol=1e-12)
+
+
+def test_the_elastic_half_space_is_boussinesqs():
+    """On a fine, wide sheet the weights are the stress 3 P / (2 π h²) (1 + r²/h²)^(−5/2) times a texel's area."""
+    side, pitch, h = 37, 0.001, 0.003
+    y, x = np.mgrid[0:side, 0:side] * pitch
+    position = np.stack([x.ravel(), y.ravel(), np.zeros(side * side)], axis=1)
+    site = Site(position, np.full(side * side, pitch**2))
+    middle = side * side // 2
+    force = np.zeros((1, side * side))
+    force[0, middle] = 1.0
+    found = readings((effect("load-spreading", "half-space", thickness=h),), site, np.zeros(1), force)[0]
+    r = np.linalg.norm(position - position[middle], axis=1)
+    stress = 3 / (2 * np.pi * h**2) * (1 + (r / h) ** 2) ** -2.5
+    np.testing.assert_allclose(found, stress * pitch**2, rtol=1e-2)  # what lies beyond the sheet's edge, and the cells' size
+
+
+def test_crosstalk():
+    texel = 7 * COLUMNS + 3
+    found = read(effect("crosstalk", "neighbours", share=0.1), image(texel))[0].reshape(ROWS, COLUMNS)
+    expected = np.zeros((ROWS, COLUMNS))
+    expected[7, 3] = 1.0
+    expected[6, 3] = expected[8, 3] = expected[7, 2] = expected[7, 4] = 0.1
+    np.testing.assert_allclose(found, expected, atol=1e-15)
+    found = read(effect("crosstalk", "lines", share=0.6), image(texel))[0].reshape(ROWS, COLUMNS)
+    assert found[7, 0] == pytest.approx(0.6 / COLUMNS) and found[0, 3] == pytest.approx(0.6 / ROWS)
+    assert found[7, 3] == pytest.approx(1 + 0.6 / COLUMNS + 0.6 / ROWS) and found[0, 0] == 0.0
+    found = read(effect("crosstalk", "common", share=0.5), image(texel))[0]
+    assert found[0] == pytest.approx(0.5 / N)
+
+
+def test_lines_need_rows_and_columns():
+    with pytest.raises(EffectError, match="rows and columns"):
+        read(effect("crosstalk", "lines"), image(0), np.zeros(1), Site(POSITION, GRID.area, name="pad"))
+
+
+def test_the_near_part_of_a_matrix_does_what_the_whole_does(monkeypatch):
+    weight, reach = lambda r: np.where(r <= 0.008, np.exp(-r / 0.003), 0.0), 0.008  # noqa: E731
+    random = np.random.default_rng(3)
+    position, area, signal = random.uniform(0, 0.05, (N, 3)), random.uniform(1, 2, N), random.random((4, N))
+    for areas in (area, None):
+        whole = mixing(position, weight, reach, areas)
+        monkeypatch.setattr("palpate.core.effects.mixing.WHOLE", 0)
+        near = mixing(position, weight, reach, areas)
+        monkeypatch.undo()
+        assert near.matrix is None
+        np.testing.assert_allclose(near.apply(signal), whole.apply(signal), rtol=1e-12)
+
+
+def test_pairs_of_points():
+    position = np.random.default_rng(5).uniform(-1, 1, (200, 3))
+    distance = np.linalg.norm(position[:, None] - position, axis=2)
+    first, second, found = pairs_within(position, 0.4)
+    expected = np.argwhere(distance <= 0.4)
+    np.testing.assert_array_equal(np.stack([first, second], axis=1), expected)
+    np.testing.assert_allclose(found, distance[first, second])
+    np.fill_diagonal(distance, np.inf)
+    assert nearest_distance(position) == pytest.approx(np.median(distance.min(axis=1)))
+    assert nearest_distance(POSITION) == pytest.approx(PITCH)
+    assert nearest_distance(np.linspace(0, 1, 5)[:, None] * [1.0, 0, 0]) == pytest.approx(0.25)
+
+
+# --- texels by themselves
+
+
+def test_listed_values():
+    factor = np.linspace(0.5, 1.5, N)
+    force = np.random.default_rng(0).random((9, N))
+    np.testing.assert_allclose(read(effect("gain-mismatch", "listed", factor=factor), force, TIME[:9]), force * factor)
+    np.testing.assert_allclose(read(effect("offset", "listed", offset=factor), force, TIME[:9]), force + factor)
+    dead = (np.arange(N) % 5 == 0).astype(float)
+    np.testing.assert_allclose(read(effect("dead-texels", "listed", dead=dead), force, TIME[:9]), force * (1 - dead))
+
+
+def test_a_gradient_of_gains():
+    found = read(effect("gain-mismatch", "gradient", along_x=0.2, along_y=-0.1), np.ones((1, N)))[0].reshape(ROWS, COLUMNS)
+    assert found[0, 0] == pytest.approx(1 - 0.2 + 0.1) and found[-1, -1] == pytest.approx(1 + 0.2 - 0.1)
+
+
+MANY = Site(np.zeros((40_000, 3)), np.ones(40_000))
+
+
+def test_chance_has_the_distribution_that_it_says():
+    """40,000 texels: standard errors are below 0.75 % of the spread."""
+    one, level = np.ones((1, 40_000)), np.zeros(1)
+    gains = np.log(read(effect("gain-mismatch", spread=0.3), one, level, MANY)[0])
+    assert gains.mean() == pytest.approx(0, abs=0.006) and gains.std() == pytest.approx(0.3, rel=0.02)
+    offsets = read(effect("offset", "random", spread=0.3), one, level, MANY)[0] - 1
+    assert offsets.mean() == pytest.approx(0, abs=0.006) and offsets.std() == pytest.approx(0.3, rel=0.02)
+    assert abs(np.corrcoef(gains, offsets)[0, 1]) < 0.02  # one seed, two purposes
+    dead = read(effect("dead-texels", share=0.2), one, level, MANY)[0] == 0
+    assert dead.mean() == pytest.approx(0.2, abs=0.01)
+    stuck = read(effect("dead-texels", "stuck", share=0.2, level=7.0), one, level, MANY)[0] == 7
+    np.testing.assert_array_equal(stuck, dead)
+
+
+def test_noise():
+    """500 × 84 numbers: mean, spread, kurtosis, and no correlation in time or between texels."""
+    force = np.full((len(TIME), N), 2.0)
+    white = read(effect("noise", "white", spread=0.1, seed=1), force) - 2
+    assert white.mean() == pytest.approx(0, abs=0.002) and white.std() == pytest.approx(0.1, rel=0.02)
+    assert (white**4).mean() / 0.1**4 == pytest.approx(3, abs=0.15)
+    assert abs((white[1:] * white[:-1]).mean()) < 2e-4 and abs((white[:, 1:] * white[:, :-1]).mean()) < 2e-4
+    proportional = read(effect("noise", "proportional", share=0.05, seed=1), force) - 2
+    assert proportional.std() == pytest.approx(0.1, rel=0.02)
+    coloured = read(effect("noise", "coloured", spread=0.1, time=0.2, seed=1), force) - 2
+    assert coloured.std() == pytest.approx(0.1, rel=0.05)
+    near, far = ((coloured[lag:] * coloured[:-lag]).mean() / 0.01 for lag in (1, 30))
+    assert near > 0.9 and abs(far) < 0.1
+
+
+def test_a_random_walk():
+    """Increments are independent and their variance is the time between; both also across a power of two of seconds."""
+    time = np.linspace(0.0, 10.0, 201)
+    found = readings((effect("drift", "random-walk", spread=0.1, seed=4),), MANY, time, np.zeros((201, 4000)))
+    assert (found[0] == 0).all()
+    assert found[-1].std() == pytest.approx(0.1 * np.sqrt(10), rel=0.05)
+    steps = np.diff(found, axis=0)
+    np.testing.assert_allclose(steps.std(axis=1), 0.1 * np.sqrt(0.05), rtol=0.06)
+    for moment in (40, 80, 160):  # 2, 4 and 8 s
+        assert abs(np.corrcoef(steps[moment - 1], steps[moment])[0, 1]) < 0.06
+
+
+@pytest.mark.parametrize(("name", "form"), [("noise", "white"), ("noise", "coloured"), ("drift", "random-walk")])
+def test_any_moment_can_be_asked_for_by_itself(name, form):
+    item, force = effect(name, form, seed=9), np.ones((len(TIME), N))
+    whole = read(item, force)
+    for i in (500, 3, 77):
+        np.testing.assert_array_equal(Reader((item,), GRID).step(TIME[i], force[i]), whole[i])
+
+
+def test_uniform_numbers_fill_their_interval():
+    numbers = chance.uniform("test", 1, np.arange(100_000))
+    counts, _ = np.histogram(numbers, 100, (0, 1))
+    assert ((counts - 1000) ** 2 / 1000).sum() < 150  # chi-squared with 99 degrees of freedom: 1 in 1,000 is above 149
+    assert numbers.min() > 0 and numbers.max() < 1
+
+
+def test_the_chain_runs_in_the_order_of_a_sensor():
+    """Cover, transducer, converter: noise is quantized, not the other way round, however the stack is written."""
+    stack = (effect("quantization", step=0.25), effect("noise", spread=0.05), effect("load-spreading"))
+    force = np.random.default_rng(0).random((20, N))
+    found = readings(stack, GRID, TIME[:20], force)
+    np.testing.assert_array_equal(found, readings(stack[::-1], GRID, TIME[:20], force))
+    np.testing.assert_allclose(found / 0.25, np.round(found / 0.25), atol=1e-12)
