@@ -2,14 +2,7 @@
 """Bodies on an elastic foundation: force and contact area against closed forms, and how fast finer texels get there."""
 
 import pytest
-from oracles.foundation import PRESSINGS, convergence
-
-ORDERS = {  # of force and of area, from the contact's edge; see oracles/foundation.py
-    "sphere": (2.5, 1.5),
-    "flat cylinder": (1.5, 1.5),
-    "lying cylinder": (2.0, 1.0),
-    "tilted flat": (2.0, 1.0),
-}
+from oracles.foundation import ORDERS, PRESSINGS, convergence
 
 
 @pytest.mark.parametrize("name", PRESSINGS)

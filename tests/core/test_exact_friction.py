@@ -4,10 +4,9 @@
 import numpy as np
 import pytest
 from oracles.friction import (
-    COULOMB,
-    DEPTH,
     DISC,
     break_away,
+    disc_load,
     disc_resistance,
     hysteresis,
     lag,
@@ -93,14 +92,9 @@ def test_break_away_comes_sooner_the_faster_the_load_grows():
 
 
 # ---- torsion ----
-def full(n):
-    """µF of the whole disc by the closed form."""
-    return COULOMB.mus * COULOMB.k * DEPTH * np.pi * DISC**2 / (2.4 * DISC / n) ** 2
-
-
 def test_a_turning_disc_is_held_by_two_thirds_of_mu_f_r():
     """Edge effects of square texels on a round contact are 1 % at 64 a side and fall with the order of its edge, 1.5."""
-    errors = [abs(disc_resistance(0.0, 1.0, n)[0][1] / (full(n) * DISC) - 2 / 3) * 1.5 for n in (32, 64, 128)]
+    errors = [abs(disc_resistance(0.0, 1.0, n)[0][1] / (disc_load(n) * DISC) - 2 / 3) * 1.5 for n in (32, 64, 128)]
     assert errors[1] < 0.01
     assert errors[2] < 0.004
 
@@ -110,6 +104,6 @@ def test_sliding_and_turning_at_once_stay_on_the_limit_curve(ratio):
     """Speed : spin · R in every proportion. Each texel is slowed against its own velocity (1e-3: the disc moves a little while
     the bristles follow), and their sum lies on the integrated curve (1 %: square texels on a round edge, 96 a side)."""
     measured, summed = disc_resistance(ratio * DISC, 1.0, 96)
-    size = np.array([full(96), full(96) * DISC])
+    size = np.array([disc_load(96), disc_load(96) * DISC])
     np.testing.assert_allclose(measured / size, summed / size, atol=5e-3)
     np.testing.assert_allclose(measured / size, limit_curve(ratio * DISC, 1.0), atol=0.01)

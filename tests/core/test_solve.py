@@ -1,10 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The solver against closed forms, conservation laws, scipy's ODE solvers and itself without numba."""
 
-import json
-import os
-import subprocess
-import sys
 from dataclasses import replace
 
 import numpy as np
@@ -402,35 +398,6 @@ def test_learning_the_motion_frame_by_frame_gives_the_same_bits():
         assert np.array_equal(frame.sensors["pad"].shear, known.sensors["pad"].shear[i])
         assert np.array_equal(frame.sensors["pad"].normal_force, known.sensors["pad"].normal_force[i])
         assert np.array_equal(frame.poses, known.poses[i])
-
-
-PLAIN = """
-import json, sys
-sys.path.insert(0, {tests!r})
-from solver_scenes import cube_on_pad, pad
-from palpate.core import jit
-from palpate.core.solve import run
-assert not jit.COMPILED
-r = run(cube_on_pad(1.0, tilt=5.0, texels=pad(5, 4, 0.01), frames=4, dt=1e-3, sigma0=500.0))
-print(json.dumps([r.poses.tolist(), r.sensors["pad"].normal_force.tolist(), r.sensors["pad"].shear.tolist()]))
-"""
-
-
-def test_plain_python_gives_the_same_numbers():
-    """To 1e-12: compiled exp and sqrt may differ from Python's in the last place, nothing else may."""
-    tests = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
-    done = subprocess.run(
-        [sys.executable, "-c", PLAIN.format(tests=tests)],
-        env={**os.environ, "PALPATE_NUMBA": "0"},
-        capture_output=True,
-        text=True,
-    )
-    assert done.returncode == 0, done.stderr
-    poses, force, shear = (np.array(values) for values in json.loads(done.stdout))
-    r = run(cube_on_pad(1.0, tilt=5.0, texels=pad(5, 4, 0.01), frames=4, dt=1e-3, sigma0=500.0))
-    np.testing.assert_allclose(poses, r.poses, rtol=0, atol=1e-12)
-    np.testing.assert_allclose(force, r.sensors["pad"].normal_force, rtol=0, atol=1e-12)
-    np.testing.assert_allclose(shear, r.sensors["pad"].shear, rtol=0, atol=1e-12)
 
 
 def test_neighbour_lists_change_nothing():

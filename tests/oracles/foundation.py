@@ -147,6 +147,8 @@ def _pressings() -> dict[str, Pressing]:
 
 
 PRESSINGS = _pressings()
+ORDERS = {"sphere": (2.5, 1.5), "flat cylinder": (1.5, 1.5), "lying cylinder": (2.0, 1.0), "tilted flat": (2.0, 1.0)}
+"""Of force and of area; see above."""
 
 
 @dataclass(frozen=True)

@@ -159,6 +159,11 @@ COULOMB = SensorParameters(k=1e3, cn=0.0, sigma0=1e5, sigma1=0.0, ct=0.0, mus=0.
 DISC, DEPTH = 0.008, 1e-3
 
 
+def disc_load(n: int) -> float:
+    """µF of the disc, newtons, by its area: what it resists when it slides without turning."""
+    return COULOMB.mus * COULOMB.k * DEPTH * np.pi * DISC**2 / (2.4 * DISC / n) ** 2
+
+
 def disc_resistance(speed: float, spin: float, n: int = 64) -> tuple[np.ndarray, np.ndarray]:
     """Friction force along the way and torque about its axis of a flat disc that slides and turns.
 
