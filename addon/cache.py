@@ -15,7 +15,7 @@ import numpy as np
 from ..core.errors import PalpateError
 from ..core.recording import Frame
 from ..core.scenario import Scenario
-from . import dependencies, freebodies, meshes, properties, sample, state, units
+from . import dependencies, effects, freebodies, meshes, properties, sample, state, units
 
 PAINTED = tuple(f"{key}_{part}" for key in meshes.PAINTED for part in ("map", "factor"))
 REGION = ("region", "vertex_group", "threshold", "material", "face_set")
@@ -158,6 +158,12 @@ def settings_of(scene, objects) -> tuple:
         tuple(obj.name for obj in taking_part),
     )
     return whole + tuple(
-        (obj.name, *(getattr(obj.palpate, key) for key in SETTINGS), *obj.palpate.velocity, *obj.palpate.angular_velocity)
+        (
+            obj.name,
+            *(getattr(obj.palpate, key) for key in SETTINGS),
+            *obj.palpate.velocity,
+            *obj.palpate.angular_velocity,
+            *effects.settings(obj),
+        )
         for obj in objects
     )

@@ -7,6 +7,7 @@ Numbers are in SI units with the unit in the name, since Blender has none for N/
 import bpy
 from bpy.props import (
     BoolProperty,
+    CollectionProperty,
     EnumProperty,
     FloatProperty,
     FloatVectorProperty,
@@ -17,7 +18,7 @@ from bpy.props import (
 
 from ..core.migrate import VERSION
 from ..core.scenario import SensorParameters
-from . import freebodies, identity, meshes, state
+from . import effects, freebodies, identity, meshes, state
 
 ROLES = (
     ("NONE", "None", "Takes no part"),
@@ -266,6 +267,13 @@ class PALPATE_PG_object(bpy.types.PropertyGroup):
         name="Spin (rad/s)", description="Of a free body at the first frame, rad/s, world axes", size=3, precision=4, **_fixed
     )
 
+    effects: CollectionProperty(
+        type=effects.PALPATE_PG_effect,
+        name="Effects",
+        description="What real sensors do and the base model does not",
+        override={"LIBRARY_OVERRIDABLE", "USE_INSERTION"},
+    )
+
     made_vertices: IntProperty(options={"HIDDEN"})
     skin: PointerProperty(
         type=PALPATE_PG_skin, description="How it was laid onto its parent's surface", override={"LIBRARY_OVERRIDABLE"}
@@ -360,7 +368,7 @@ class PALPATE_PG_scene(bpy.types.PropertyGroup):
     baked_end: IntProperty(options={"HIDDEN"})
 
 
-CLASSES = (PALPATE_PG_skin, PALPATE_PG_object, PALPATE_PG_scene)
+CLASSES = (effects.PALPATE_PG_effect, PALPATE_PG_skin, PALPATE_PG_object, PALPATE_PG_scene)
 
 
 def register():

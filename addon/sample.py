@@ -21,7 +21,7 @@ from ..core.errors import SceneError
 from ..core.mesh import TriangleMesh, checked_mesh, mass_properties
 from ..core.scenario import Body, Motion, Painted, Scenario, Sensor, SensorParameters, Target
 from ..core.texels import texels_from_region
-from . import freebodies, identity, meshes, parts, properties, transforms, units
+from . import effects, freebodies, identity, meshes, parts, properties, transforms, units
 from .jobs import Progress
 
 SAME_STRETCH = 1e-4
@@ -342,7 +342,7 @@ def _sensor(obj, body: int, mesh: TriangleMesh) -> Sensor:
     found.check(obj.name)
     texels = texels_from_region(mesh, meshes.region(obj, len(mesh.vertices)), obj.name)
     readout, painted = obj.palpate.role == "SENSOR", _painted(obj, texels.vertex)
-    return Sensor(obj.name, body, texels, found, readout=readout, painted=painted)
+    return Sensor(obj.name, body, texels, found, readout=readout, painted=painted, effects=effects.stack(obj))
 
 
 def _painted(obj, vertex: np.ndarray) -> Painted:

@@ -3,9 +3,9 @@
 
 
 def _classes():
-    from . import bake, debug, fix, presets, sensor, skin
+    from . import bake, debug, effects, fix, presets, sensor, skin
 
-    return (*sensor.CLASSES, *skin.CLASSES, *presets.CLASSES, *fix.CLASSES, *bake.CLASSES, *debug.CLASSES)
+    return (*sensor.CLASSES, *skin.CLASSES, *presets.CLASSES, *effects.CLASSES, *fix.CLASSES, *bake.CLASSES, *debug.CLASSES)
 
 
 def register():

@@ -99,6 +99,8 @@ def settings(group, uids=True) -> str:
 def _plain(value):
     if isinstance(value, bpy.types.PropertyGroup):
         return settings(value)
+    if isinstance(value, bpy.types.bpy_prop_collection):
+        return [settings(item) for item in value]
     return value if isinstance(value, str | int | float) else tuple(value)
 
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What an effect is: plain data on a sensor, a kind in the library, and the ways in which a form of it can act.
 
-A file of this folder that defines ``KIND`` is an effect; nothing else has to know of it. Its forms are different formulas for
+Each file of this folder but its machinery defines a ``KIND``; nothing else has to know of it. Its forms are different formulas for
 the same thing, since no two papers agree on one. A form acts in exactly one way:
 
 =============  ==============================================================================================================

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""All effects there are: every file of this folder that defines ``KIND``."""
+"""All effects there are: every file of this folder but its machinery defines a ``KIND``."""
 
 from __future__ import annotations
 
@@ -17,15 +17,17 @@ from ..errors import EffectError
 from .base import STAGES, Effect, Form, Kind, Value, Values
 
 
+MACHINERY = {"base", "bound", "chance", "laws", "library", "mixing"}
+"""Files of this folder that are no effects; they are not even looked into, because some import the compiler."""
+
+
 @cache
 def library() -> dict[str, Kind]:
     """Return every kind by its standard name, in the order in which they act."""
     found = []
     for module in pkgutil.iter_modules([str(Path(__file__).parent)]):
-        if not module.name.startswith("_"):
-            kind = getattr(importlib.import_module(f".{module.name}", __package__), "KIND", None)
-            if kind is not None:
-                found.append(kind)
+        if module.name not in MACHINERY:
+            found.append(importlib.import_module(f".{module.name}", __package__).KIND)
     found.sort(key=lambda kind: (STAGES.index(kind.stage), kind.order, kind.name))
     return {kind.name: kind for kind in found}
 

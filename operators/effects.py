@@ -1,0 +1,81 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Put effects on a sensor, take them off, and move them."""
+
+import bpy
+from bpy.props import EnumProperty, IntProperty
+
+from ..addon import effects, units
+from ..core.effects import library
+from . import support
+
+
+class PALPATE_OT_effect_add(support.Reporting, bpy.types.Operator):
+    """Add what real sensors do and the base model does not: creep, hysteresis, noise and more"""
+
+    bl_idname = "palpate.effect_add"
+    bl_label = "Add Effect"
+    bl_options = {"REGISTER", "UNDO"}
+
+    effect: EnumProperty(name="Effect", description="What to add", items=effects.kind_items(), options={"SKIP_SAVE"})
+
+    @classmethod
+    def poll(cls, context):
+        return support.sensor_object(cls, context)
+
+    @classmethod
+    def description(cls, _context, properties):
+        return library.kind_of(properties.effect).text.removesuffix(".")
+
+    def run(self, context):
+        obj = context.object
+        gain = units.as_typed(obj.palpate.gain)
+        effects.add(obj, library.effect(self.effect, gain=gain))
+        self.report({"INFO"}, f"'{obj.name}' has {library.kind_of(self.effect).title.lower()}")
+
+
+class _OnEntry(support.Reporting):
+    @classmethod
+    def poll(cls, context):
+        if not support.sensor_object(cls, context):
+            return False
+        if not context.object.palpate.effects:
+            cls.poll_message_set(f"'{context.object.name}' has no effects: use Add Effect first")
+            return False
+        return True
+
+
+class PALPATE_OT_effect_remove(_OnEntry, bpy.types.Operator):
+    """Take the effect off the sensor"""
+
+    bl_idname = "palpate.effect_remove"
+    bl_label = "Remove Effect"
+    bl_options = {"REGISTER", "UNDO"}
+
+    index: IntProperty(name="Index", description="Place in the stack", min=0, options={"SKIP_SAVE"})
+
+    def run(self, context):
+        context.object.palpate.effects.remove(self.index)
+
+
+class PALPATE_OT_effect_move(_OnEntry, bpy.types.Operator):
+    """Move the effect in the stack. Effects act in an order of their own; it counts only for two of a kind"""
+
+    bl_idname = "palpate.effect_move"
+    bl_label = "Move Effect"
+    bl_options = {"REGISTER", "UNDO"}
+
+    index: IntProperty(name="Index", description="Place in the stack", min=0, options={"SKIP_SAVE"})
+    way: EnumProperty(
+        name="Direction",
+        description="Where to",
+        items=(("UP", "Up", "Towards the first"), ("DOWN", "Down", "Towards the last")),
+        options={"SKIP_SAVE"},
+    )
+
+    def run(self, context):
+        stack = context.object.palpate.effects
+        to = self.index + (-1 if self.way == "UP" else 1)
+        stack.move(self.index, min(max(to, 0), len(stack) - 1))
+
+
+CLASSES = (PALPATE_OT_effect_add, PALPATE_OT_effect_remove, PALPATE_OT_effect_move)
