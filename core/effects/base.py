@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What an effect is: plain data on a sensor, a kind in the library, and the ways in which a form of it can act.
 
-Each file of this folder but its machinery defines a ``KIND``; nothing else has to know of it. Its forms are different formulas for
-the same thing, since no two papers agree on one. A form acts in exactly one way:
+Each file of this folder but its machinery defines a ``KIND``; nothing else has to know of it. Its forms are different formulas
+for the same thing, since no two papers agree on one. A form acts in exactly one way:
 
 =============  ==============================================================================================================
 ``law``        scalar law with memory, the same for the solver, for whole signals and for streams (see :data:`Law`)

@@ -16,7 +16,6 @@ import numpy as np
 from ..errors import EffectError
 from .base import STAGES, Effect, Form, Kind, Value, Values
 
-
 MACHINERY = {"base", "bound", "chance", "laws", "library", "mixing"}
 """Files of this folder that are no effects; they are not even looked into, because some import the compiler."""
 
