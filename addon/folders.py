@@ -110,6 +110,7 @@ class Files:
             warnings=recording.warnings,
             complete=True,
             scene_file=self._blend.name if self._blend else "",
+            body=scenario.bodies[sensor.body].name,
         )
 
     def write_frame(self, frame: Frame) -> None:

@@ -15,7 +15,7 @@ EMPTY_SLOT = "palpate_empty_slot"
 MODIFIER = "Palpate Heat Map"
 
 
-def apply(obj, texels: Texels, image, frames: tuple[int, int], maximum: float, color_map: str) -> None:
+def apply(obj, texels: Texels, image, frames: tuple[int, int], maximum: float, color_map: str, pressure: bool = False) -> None:
     """Show a baked sequence on a sensor; an earlier bake's heat map is replaced.
 
     Parameters
@@ -25,8 +25,10 @@ def apply(obj, texels: Texels, image, frames: tuple[int, int], maximum: float, c
     image : Image
         From :func:`.materials.load_sequence`.
     frames : (int, int)
-    maximum : float, N
+    maximum : float, N or Pa
     color_map : str
+    pressure : bool
+        Colours show force over area.
     """
     clear(obj, keep_image=True)
     uid, mesh = obj.palpate.uid, obj.data
@@ -34,12 +36,16 @@ def apply(obj, texels: Texels, image, frames: tuple[int, int], maximum: float, c
     on_vertices = uv is None
     if on_vertices:
         _store_texel_uv(mesh, texels)
+        _store_area(mesh, texels)
         modifier = obj.modifiers.new(MODIFIER, "NODES")
         modifier.node_group = materials.force_nodes(uid, obj.name, image, frames)
         obj.modifiers.move(len(obj.modifiers) - 1, 0)  # where the vertices are still the texels'
     else:
         _write_uv(mesh, texels, uv)
-    material = materials.heat_map(uid, obj.name, image, frames, maximum, color_map, on_vertices)
+    area = None
+    if pressure:
+        area = materials.AREA if on_vertices else materials.area_image(uid, obj.name, texels.layout.image(texels.area))
+    material = materials.heat_map(uid, obj.name, None if on_vertices else image, frames, maximum, color_map, area)
     _assign(obj, texels, material)
 
 
@@ -56,7 +62,7 @@ def clear(obj, keep_image: bool = False) -> None:
         layer = mesh.uv_layers.get(materials.UV_NAME)
         if layer is not None:
             mesh.uv_layers.remove(layer)
-        for name in (materials.TEXEL_UV, materials.FORCE):
+        for name in (materials.TEXEL_UV, materials.FORCE, materials.AREA):
             attribute = mesh.attributes.get(name)
             if attribute is not None:
                 mesh.attributes.remove(attribute)
@@ -89,6 +95,13 @@ def _store_texel_uv(mesh, texels: Texels) -> None:
     table = np.zeros((len(mesh.vertices), 3), dtype=np.float32)
     table[texels.vertex, :2] = texels.layout.uv()
     attribute.data.foreach_set("vector", table.ravel())
+
+
+def _store_area(mesh, texels: Texels) -> None:
+    attribute = mesh.attributes.get(materials.AREA) or mesh.attributes.new(materials.AREA, "FLOAT", "POINT")
+    table = np.zeros(len(mesh.vertices), dtype=np.float32)
+    table[texels.vertex] = texels.area
+    attribute.data.foreach_set("value", table)
 
 
 def region_faces(mesh, texels: Texels) -> np.ndarray:

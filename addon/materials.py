@@ -19,6 +19,8 @@ UV_NAME = "Palpate"
 TEXEL_UV = "palpate_uv"
 FORCE = "palpate_force"
 """Vertex attribute with the normal force (N): from geometry nodes after a bake, from the timeline while playing."""
+AREA = "palpate_area"
+"""Vertex attribute with the area of the texel, m²."""
 MARK = "palpate_sensor"
 """Custom property that tells whose a material, an image, a node group or an arrow is."""
 RAMP_STOPS = 32
@@ -56,23 +58,39 @@ def play(user, frame_start: int, frame_end: int) -> None:
     user.use_auto_refresh = True
 
 
-def heat_map(uid: str, name: str, image, frames: tuple[int, int], maximum: float, color_map: str, on_vertices: bool):
+def area_image(uid: str, name: str, area: np.ndarray):
+    """Return an image of the texels' areas, (height, width) float in m², that is kept in the .blend."""
+    mark = f"{uid}:area"
+    image = find(bpy.data.images, mark)
+    if image is not None:
+        bpy.data.images.remove(image)
+    height, width = area.shape
+    image = bpy.data.images.new(f"Palpate {name} area", width, height, alpha=False, float_buffer=True, is_data=True)
+    image[MARK] = mark
+    pixels = np.ones((height, width, 4), dtype=np.float32)
+    pixels[..., :3] = area[..., None]
+    image.pixels.foreach_set(pixels.ravel())
+    image.pack()
+    return image
+
+
+def heat_map(uid: str, name: str, image, frames: tuple[int, int], maximum: float, color_map: str, area=None):
     """Return a sensor's heat-map material, made or made anew.
 
     Parameters
     ----------
     uid, name : str
         Of the sensor.
-    image : Image
-        From :func:`load_sequence`.
+    image : Image or None
+        From :func:`load_sequence`; None to take the force from the vertex attribute.
     frames : (int, int)
         First and last frame of the bake.
-    maximum : float, N
-        Normal force at the upper end of the colours.
+    maximum : float, N or Pa
+        At the upper end of the colours.
     color_map : str
         Key of :data:`.colormaps.STOPS`.
-    on_vertices : bool
-        Take the force from the vertex attribute instead of the image.
+    area : Image, str or None
+        What the force is divided by: an image as :func:`area_image` makes it, or the name of a vertex attribute.
     """
     material = find(bpy.data.materials, uid) or bpy.data.materials.new(f"Palpate {name}")
     material[MARK] = uid
@@ -80,20 +98,23 @@ def heat_map(uid: str, name: str, image, frames: tuple[int, int], maximum: float
         material.use_nodes = True
     tree = material.node_tree
     tree.nodes.clear()
-    add = _Adder(tree)
+    add = Adder(tree)
     missing = None
-    if on_vertices:
-        force = add("ShaderNodeAttribute", attribute_name=FORCE).outputs["Fac"]
+    if image is None:
+        value = add("ShaderNodeAttribute", attribute_name=FORCE).outputs["Fac"]
     else:
-        texture = add("ShaderNodeTexImage", image=image, interpolation="Closest", extension="EXTEND")
+        texture = _texture(add, image)
         play(texture.image_user, *frames)
-        uv = add("ShaderNodeUVMap", uv_map=UV_NAME)
-        tree.links.new(uv.outputs["UV"], texture.inputs["Vector"])
-        channels = add("ShaderNodeSeparateColor")
-        tree.links.new(texture.outputs["Color"], channels.inputs["Color"])
-        force, missing = channels.outputs["Red"], _is_missing(add, texture.outputs["Color"])
-    share = add("ShaderNodeMath", operation="DIVIDE", use_clamp=True, label="Normal force / maximum (N)")
-    tree.links.new(force, share.inputs[0])
+        value, missing = _red(add, texture), is_missing(add, texture.outputs["Color"])
+    if area is not None:
+        own = add("ShaderNodeAttribute", attribute_name=area).outputs["Fac"] if isinstance(area, str) else None
+        over = add("ShaderNodeMath", operation="DIVIDE", label="Pressure (Pa)")
+        tree.links.new(value, over.inputs[0])
+        tree.links.new(own or _red(add, _texture(add, area)), over.inputs[1])
+        value = over.outputs[0]
+    label = "Normal force / maximum (N)" if area is None else "Pressure / maximum (Pa)"
+    share = add("ShaderNodeMath", operation="DIVIDE", use_clamp=True, label=label)
+    tree.links.new(value, share.inputs[0])
     share.inputs[1].default_value = maximum
     ramp = add("ShaderNodeValToRGB")
     _fill(ramp.color_ramp, color_map)
@@ -116,7 +137,21 @@ def heat_map(uid: str, name: str, image, frames: tuple[int, int], maximum: float
     return material
 
 
-def _is_missing(add, color):
+def _texture(add, image):
+    """Return a node that shows an image by our texture coordinates, pixel by pixel."""
+    texture = add("ShaderNodeTexImage", image=image, interpolation="Closest", extension="EXTEND")
+    uv = add("ShaderNodeUVMap", uv_map=UV_NAME)
+    add.tree.links.new(uv.outputs["UV"], texture.inputs["Vector"])
+    return texture
+
+
+def _red(add, texture):
+    channels = add("ShaderNodeSeparateColor")
+    add.tree.links.new(texture.outputs["Color"], channels.inputs["Color"])
+    return channels.outputs["Red"]
+
+
+def is_missing(add, color):
     """Return a socket that is 1 where Blender found no image: its sign for that must not pass for a large force."""
     distance = add("ShaderNodeVectorMath", operation="DISTANCE")
     distance.inputs[1].default_value = MISSING
@@ -127,7 +162,7 @@ def _is_missing(add, color):
     return near.outputs[0]
 
 
-class _Adder:
+class Adder:
     """Adds nodes from left to right."""
 
     def __init__(self, tree):
@@ -152,17 +187,21 @@ def _fill(ramp, color_map: str) -> None:
         element.color = (*color, 1.0)
 
 
-def force_nodes(uid: str, name: str, image, frames: tuple[int, int]):
-    """Return the geometry nodes that look the image up at each texel and store the force on the vertices."""
-    group = find(bpy.data.node_groups, uid)
+def new_nodes(mark: str, name: str):
+    """Return an empty group of geometry nodes, a sensor's own by its mark; an earlier one is emptied."""
+    group = find(bpy.data.node_groups, mark)
     if group is None:
         group = bpy.data.node_groups.new(f"Palpate {name}", "GeometryNodeTree")
-        group[MARK] = uid
+        group[MARK] = mark
         group.interface.new_socket("Geometry", in_out="INPUT", socket_type="NodeSocketGeometry")
         group.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
     group.nodes.clear()
-    add, link = _Adder(group), group.links.new
-    start = add("NodeGroupInput")
+    return group
+
+
+def look_up(add, image, frames: tuple[int, int]):
+    """Return the socket of the image's colour at each texel: normal force, shear along x and along y, N."""
+    link = add.tree.links.new
     where = add("GeometryNodeInputNamedAttribute", data_type="FLOAT_VECTOR")
     where.inputs["Name"].default_value = TEXEL_UV
     time = add("GeometryNodeInputSceneTime")
@@ -174,8 +213,16 @@ def force_nodes(uid: str, name: str, image, frames: tuple[int, int]):
     clamp.inputs["Min"].default_value, clamp.inputs["Max"].default_value = frames
     link(time.outputs["Frame"], clamp.inputs["Value"])
     link(clamp.outputs["Result"], texture.inputs["Frame"])
+    return texture.outputs["Color"]
+
+
+def force_nodes(uid: str, name: str, image, frames: tuple[int, int]):
+    """Return the geometry nodes that look the image up at each texel and store the force on the vertices."""
+    group = new_nodes(uid, name)
+    add, link = Adder(group), group.links.new
+    start = add("NodeGroupInput")
     channels = add("FunctionNodeSeparateColor")
-    link(texture.outputs["Color"], channels.inputs["Color"])
+    link(look_up(add, image, frames), channels.inputs["Color"])
     store = add("GeometryNodeStoreNamedAttribute", data_type="FLOAT", domain="POINT")
     store.inputs["Name"].default_value = FORCE
     link(start.outputs[0], store.inputs["Geometry"])
@@ -186,9 +233,14 @@ def force_nodes(uid: str, name: str, image, frames: tuple[int, int]):
 
 def remove(uid: str, keep_image: bool = False) -> None:
     """Remove everything of a sensor's heat map that is not on its mesh."""
-    for blocks in (bpy.data.materials, bpy.data.node_groups) + (() if keep_image else (bpy.data.images,)):
-        block = find(blocks, uid)
-        if block is not None:
+    for blocks, mark in (
+        (bpy.data.materials, uid),
+        (bpy.data.node_groups, uid),
+        (bpy.data.images, f"{uid}:area"),
+        (bpy.data.images, uid),
+    ):
+        block = find(blocks, mark)
+        if block is not None and not (keep_image and mark == uid and blocks == bpy.data.images):
             blocks.remove(block)
 
 
@@ -196,5 +248,5 @@ def sweep(uids) -> None:
     """Remove what heat maps of deleted sensors have left, as far as nobody uses it; `uids` are those of all objects."""
     for blocks in (bpy.data.materials, bpy.data.node_groups, bpy.data.images):  # images last: the others use them
         for block in list(blocks):
-            if block.users == 0 and block.library is None and MARK in block and block[MARK] not in uids:
+            if block.users == 0 and block.library is None and MARK in block and block[MARK].partition(":")[0] not in uids:
                 blocks.remove(block)

@@ -16,6 +16,7 @@ from bpy.props import (
     StringProperty,
 )
 
+from ..core import colormaps
 from ..core.migrate import VERSION
 from ..core.scenario import SensorParameters
 from . import effects, freebodies, identity, meshes, state
@@ -33,10 +34,14 @@ SKIN_METHODS = (
     ("NOISE", "Even", "Evenly spaced without rows (blue noise)"),
     ("VERTICES", "Vertices", "One texel for each vertex of the region"),
 )
-COLOR_MAPS = (
-    ("VIRIDIS", "Viridis", "Dark blue to yellow, perceptually uniform"),
-    ("MAGMA", "Magma", "Black to pale yellow, perceptually uniform"),
-    ("PAPER", "White to Black", "White is no force, black the largest, as in the paper's Fig. 10"),
+COLOR_MAPS = tuple((name, *words) for name, words in colormaps.NAMES.items())
+OVERLAYS = (
+    ("FORCE", "Net Force", "Arrow at the centre of pressure: what the sensor pushes back with"),
+    ("TORQUE", "Free Moment", "Double arrow: the net torque about the centre of pressure, as the sensor pushes back"),
+    ("CENTRE", "Centre of Pressure", "Ball at the centre of pressure"),
+    ("SLIP", "Slip", "Ring around it, as wide as the share of the load on slipping texels"),
+    ("NORMALS", "Texel Normals", "Arrow at each texel, as long as its normal force"),
+    ("SHEARS", "Texel Shear", "Arrow at each texel, along the shear with which it pushes back"),
 )
 PARAMETERS = (
     "k", "cn", "ct", "sigma0", "sigma1", "x0", "mus", "mud", "max_penetration", "normal_law", "exponent", "dissipation",
@@ -341,8 +346,35 @@ class PALPATE_PG_scene(bpy.types.PropertyGroup):
     color_map: EnumProperty(name="Colour Map", description="Colours of the heat map", items=COLOR_MAPS, options=set())
     use_auto_range: BoolProperty(
         name="Auto Range",
-        description="The heat map ends at the largest normal force of each sensor",
+        description="The heat maps of all sensors end at the largest value of any of them",
         default=True,
+        options=set(),
+    )
+    quantity: EnumProperty(
+        name="Shows",
+        description="What the colours of heat maps and tactile images mean",
+        items=(
+            ("FORCE", "Force", "Normal force of the texel, N"),
+            ("PRESSURE", "Pressure", "Normal force over the area of the texel, kPa"),
+        ),
+        options=set(),
+    )
+    range_max_pressure: FloatProperty(
+        name="Maximum (kPa)", description="Pressure at the end of the heat map, kPa", default=10.0, min=1e-9, options=set()
+    )
+    overlays: EnumProperty(
+        name="On Baked Sensors",
+        description="What a bake puts on its sensors, besides the heat map",
+        items=OVERLAYS,
+        default={"FORCE"},
+        options={"ENUM_FLAG"},
+    )
+    texel_arrow_scale: FloatProperty(
+        name="Texel Arrow Scale (m/N)",
+        description="Length of the arrow at a texel for each newton, m/N",
+        default=0.1,
+        min=0.0,
+        precision=5,
         options=set(),
     )
     range_max: FloatProperty(
@@ -350,7 +382,7 @@ class PALPATE_PG_scene(bpy.types.PropertyGroup):
     )
     use_auto_arrow: BoolProperty(
         name="Auto Length",
-        description="The longest arrow of a bake is as long as the largest side of its sensor",
+        description="The longest arrow of a bake is as long as the largest side of any sensor",
         default=True,
         options=set(),
     )

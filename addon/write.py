@@ -10,14 +10,10 @@ import bpy
 import numpy as np
 
 from ..core.errors import SceneError
-from ..core.formats.files import frame_file
 from ..core.recording import Recording
 from ..core.scenario import Scenario
-from . import arrows, freebodies, heatmap, identity, materials, units
+from . import dress, freebodies, heatmap, identity, markers, materials
 from .sample import Binding
-
-LEAST_RANGE = 1e-6
-"""Newtons at the end of the heat map of a sensor that nothing touched."""
 
 
 def check(scene, scenario: Scenario, binding: Binding) -> None:
@@ -73,11 +69,14 @@ def commit(scene, scenario: Scenario, binding: Binding, recording: Recording, fo
     for index in binding.starts:
         _free_body(objects[index], index, binding, recording)
     moved = {objects[index] for index in binding.starts}
+    worn = []
     for sensor, obj in zip(scenario.sensors, sensors):
         if sensor.readout:
-            _sensor(scene, obj, sensor, binding, recording, folders[sensor.name])
+            worn.append(_worn(obj, objects[sensor.body], sensor, binding, recording, folders[sensor.name]))
+            obj.palpate.is_baked = True
         elif obj.palpate.is_baked and obj not in moved:
             clear_object(scene, obj)
+    dress.dress(scene, worn)
     sweep()
     settings = scene.palpate
     settings.baked_digest = recording.digest
@@ -89,26 +88,19 @@ def _free_body(obj, index: int, binding: Binding, recording: Recording) -> None:
     freebodies.bake(obj, placement, recording.frames, recording.poses[:, index], np.array(binding.parents[index]))
 
 
-def _sensor(scene, obj, sensor, binding: Binding, recording: Recording, folder: Path) -> None:
-    settings, felt = scene.palpate, recording.sensors[sensor.name]
-    frames = int(recording.frames[0]), int(recording.frames[-1])
-    largest = float(felt.normal_force.max(initial=0.0))
-    maximum = max(largest, LEAST_RANGE) if settings.use_auto_range else settings.range_max
-    relative = settings.folder.startswith("//")
-    image = materials.load_sequence(obj.palpate.uid, folder / frame_file(frames[0]), relative)
-    heatmap.apply(obj, sensor.texels, image, frames, maximum, settings.color_map)
-    arrows.bake(scene, obj, recording, sensor.name, sensor.body, binding.scale, _arrow_length(settings, sensor, felt, binding))
-    obj.palpate.bake_folder = bpy.path.relpath(str(folder)) if relative else str(folder)
-    obj.palpate.is_baked = True
-
-
-def _arrow_length(settings, sensor, felt, binding: Binding) -> float:
-    """Blender units per newton."""
-    if not settings.use_auto_arrow:
-        return units.as_typed(settings.arrow_scale) / binding.scale
-    largest = float(np.linalg.norm(felt.net_force, axis=1).max(initial=0.0))
-    size = float(np.ptp(sensor.texels.position, axis=0).max())
-    return size / binding.scale / largest if largest > 0 else 0.0
+def _worn(obj, body, sensor, binding: Binding, recording: Recording, folder: Path) -> markers.Worn:
+    return markers.Worn(
+        obj=obj,
+        body=body,
+        texels=sensor.texels,
+        painted=sensor.painted,
+        parameters=sensor.parameters,
+        felt=recording.sensors[sensor.name],
+        frames=recording.frames,
+        poses=recording.poses[:, sensor.body],
+        scale=binding.scale,
+        folder=folder,
+    )
 
 
 def baked_objects(scene) -> list:
@@ -125,9 +117,9 @@ def bake_folder(obj) -> Path | None:
     return None if image is None else Path(os.path.abspath(bpy.path.abspath(image.filepath))).parent
 
 
-def bake_folders(scene) -> list[Path]:
-    """Return the folders of all sensors of the scene's bake."""
-    return [place for obj in baked_objects(scene) if (place := bake_folder(obj)) is not None]
+def bake_folders(scene) -> dict:
+    """Return the folders of the scene's bake by the sensors' objects."""
+    return {obj: place for obj in baked_objects(scene) if (place := bake_folder(obj)) is not None}
 
 
 def clear(scene) -> None:
@@ -139,9 +131,9 @@ def clear(scene) -> None:
 
 
 def sweep() -> None:
-    """Remove arrows, materials, nodes and images of sensors that were deleted."""
+    """Remove markers, materials, nodes and images of sensors that were deleted."""
     uids = {obj.palpate.uid for obj in bpy.data.objects}
-    arrows.sweep(uids)
+    markers.sweep(uids)
     materials.sweep(uids)
 
 
@@ -149,7 +141,7 @@ def has_bake(scene) -> bool:
     """Whether there is anything for :func:`clear`: an object's part of a bake, or the arrow of a deleted sensor."""
     if baked_objects(scene):
         return True
-    return bool(scene.palpate.baked_digest) and bool(arrows.of_deleted(scene.objects))
+    return bool(scene.palpate.baked_digest) and bool(markers.of_deleted(scene.objects))
 
 
 def clear_object(scene, obj) -> None:
@@ -158,5 +150,5 @@ def clear_object(scene, obj) -> None:
     freebodies.clear(obj)
     if obj.palpate.bake_folder:
         heatmap.clear(obj)
-        arrows.clear(scene, obj.palpate.uid)
+        markers.clear(scene, obj.palpate.uid)
         obj.palpate.bake_folder = ""

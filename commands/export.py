@@ -72,4 +72,4 @@ def of_scene(scene) -> Bake:
     places = write.bake_folders(scene)
     if not places:
         raise SceneError(f"'{scene.name}' is not baked: run 'palpate bake' on it with --save first.")
-    return read_sensors(places)
+    return read_sensors(list(places.values()))

@@ -3,7 +3,7 @@
 
 import bpy
 
-from ..addon import jobs, live, write
+from ..addon import dress, jobs, live, write
 from ..addon.bake import bake
 from ..core.drive import drive
 from . import support
@@ -141,4 +141,23 @@ class PALPATE_OT_reset(support.Reporting, bpy.types.Operator):
         live.reset(context.scene)
 
 
-CLASSES = (PALPATE_OT_bake, PALPATE_OT_bake_clear, PALPATE_OT_reset)
+class PALPATE_OT_dress(support.Reporting, bpy.types.Operator):
+    """Show the bake with the present colours, scales, arrows and markers; nothing is computed"""
+
+    bl_idname = "palpate.dress"
+    bl_label = "Apply to Bake"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context):
+        if context.scene is None or not write.baked_objects(context.scene):
+            cls.poll_message_set("Nothing is baked in this scene")
+            return False
+        return True
+
+    def run(self, context):
+        support.leave_edit_mode(context)
+        dress.again(context.scene, write.bake_folders(context.scene))
+
+
+CLASSES = (PALPATE_OT_bake, PALPATE_OT_bake_clear, PALPATE_OT_reset, PALPATE_OT_dress)

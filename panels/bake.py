@@ -43,14 +43,20 @@ class Display(Part):
         own = context.scene.palpate
         layout.prop(own, "show_overlay")
         layout.prop(own, "color_map")
+        layout.prop(own, "quantity")
         column = layout.column(align=True)
         column.prop(own, "use_auto_range")
         if not own.use_auto_range:
-            column.prop(own, "range_max")
+            column.prop(own, "range_max_pressure" if own.quantity == "PRESSURE" else "range_max")
+        layout.label(text="On baked sensors:")
+        layout.grid_flow(columns=2, even_columns=True, align=True).prop(own, "overlays")
         column = layout.column(align=True)
         column.prop(own, "use_auto_arrow")
         if not own.use_auto_arrow:
             column.prop(own, "arrow_scale")
+            column.prop(own, "texel_arrow_scale")
+        if write.baked_objects(context.scene):
+            layout.operator("palpate.dress")
 
 
 PARTS = (Bake, Display)

@@ -229,6 +229,8 @@ class Manifest:
         True once all images and the recording are written.
     scene_file : str
         Name, without its folder, of the .blend that was baked; empty when it had none, or when the manifest is older.
+    body : str
+        Name of the body that carries the sensor, among those of the recording; empty when the manifest is older.
     """
 
     sensor: str
@@ -244,6 +246,7 @@ class Manifest:
     warnings: tuple[str, ...] = ()
     complete: bool = False
     scene_file: str = ""
+    body: str = ""
 
 
 def write_manifest(folder: str | os.PathLike, manifest: Manifest) -> Path:
@@ -309,6 +312,7 @@ def _manifest(content: dict[str, Any]) -> Manifest:
         warnings=tuple(str(warning) for warning in _typed(content, "warnings", list)),
         complete=_typed(content, "complete", bool),
         scene_file=_typed({"scene_file": "", **content}, "scene_file", str),
+        body=_typed({"body": "", **content}, "body", str),
     )
     if not (math.isfinite(manifest.fps) and math.isfinite(manifest.dt)):
         raise ValueError("fps and dt must be finite")

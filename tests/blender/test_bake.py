@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from blender_scenes import changes, cube, dump, grid, press, press_and_drop, reopen, save
 
-from palpate.addon import arrows, curves, heatmap, jobs, live, materials, sample, transforms
+from palpate.addon import curves, heatmap, jobs, live, materials, sample, shapes, transforms
 from palpate.addon.bake import bake
 from palpate.core.drive import drive
 from palpate.core.errors import FileError
@@ -355,7 +355,7 @@ def test_an_arrow_without_contact_has_no_size(tmp_path):
     save(tmp_path)
     baked(scene)
     assert list(materials.find(scene.objects, pad.palpate.uid).scale) == [0.0, 0.0, 0.0]
-    assert arrows.MESH_MARK in materials.find(scene.objects, pad.palpate.uid).data
+    assert shapes.MARK in materials.find(scene.objects, pad.palpate.uid).data
 
 
 def test_frame_zero_can_be_baked(tmp_path):

@@ -1,0 +1,87 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The meshes of markers, each shared by all sensors: turned around z, one unit long or wide, in a colour of their own."""
+
+from __future__ import annotations
+
+import math
+
+import bpy
+
+MARK = "palpate_arrow"
+"""Custom property of a shared mesh: its name in :data:`PROFILES`."""
+SHAFT, HEAD, HEAD_START = 0.025, 0.07, 0.75
+"""Radii of an arrow and where its head begins, as shares of its length."""
+SIDES = 24
+
+_ARROW = ((0.0, 0.0), (SHAFT, 0.0), (SHAFT, HEAD_START), (HEAD, HEAD_START), (0.0, 1.0))
+_TWICE = ((0.0, 0.0), (SHAFT, 0.0), (SHAFT, 0.5), (HEAD, 0.5), (SHAFT, 0.75), (HEAD, 0.75), (0.0, 1.0))
+_ARC = [math.pi * i / 12 for i in range(13)]
+_BALL = tuple((math.sin(a) if 0 < i < 12 else 0.0, -math.cos(a)) for i, a in enumerate(_ARC))
+_RING = tuple((1.0 + 0.1 * math.cos(2 * a), 0.1 * math.sin(2 * a)) for a in _ARC[:-1])
+
+PROFILES = {"Arrow": _ARROW, "Torque Arrow": _TWICE, "Ball": _BALL, "Ring": _RING}
+"""Radius and height of points along the outline; one that does not end on the axis is closed."""
+COLORS = {
+    "Arrow": (1.0, 0.25, 0.02),
+    "Torque Arrow": (0.1, 0.45, 1.0),
+    "Ball": (1.0, 1.0, 1.0),
+    "Ring": (0.9, 0.02, 0.12),
+    "Normal Arrow": (0.95, 0.95, 0.95),
+    "Shear Arrow": (1.0, 0.12, 0.4),
+}
+"""Scene-linear."""
+
+
+def shared_mesh(name: str):
+    """Return the mesh of a shape, made when there is none yet."""
+    # a file from before there were several has the number 1 on its arrow
+    found = next((mesh for mesh in bpy.data.meshes if mesh.get(MARK) in ((name, 1) if name == "Arrow" else (name,))), None)
+    if found is not None:
+        return found
+    mesh = bpy.data.meshes.new(f"Palpate {name}")
+    mesh.from_pydata(*lathe(PROFILES[name]))
+    mesh[MARK] = name
+    mesh.materials.append(material(name))
+    mesh.update()
+    return mesh
+
+
+def lathe(profile) -> tuple[list, list, list]:
+    """Return vertices, no edges, and faces of a profile turned around z; where it meets the axis it has a single vertex."""
+    vertices, rings, faces = [], [], []
+    for radius, height in profile:
+        start = len(vertices)
+        if radius == 0.0:
+            vertices.append((0.0, 0.0, height))
+            rings.append([start] * SIDES)
+            continue
+        turns = (2 * math.pi * side / SIDES for side in range(SIDES))
+        vertices += [(radius * math.cos(turn), radius * math.sin(turn), height) for turn in turns]
+        rings.append(list(range(start, start + SIDES)))
+    if profile[-1][0] > 0.0:
+        rings.append(rings[0])
+    for low, high in zip(rings, rings[1:]):
+        for side in range(SIDES):
+            after = (side + 1) % SIDES
+            corners = (low[side], low[after], high[after], high[side])
+            faces.append(tuple(dict.fromkeys(corners)))
+    return vertices, [], faces
+
+
+def material(name: str):
+    """Return the material of a shape, a little bright by itself."""
+    full = f"Palpate {name}"
+    found = next((block for block in bpy.data.materials if block.get(MARK) == name), None)
+    if found is not None:
+        return found
+    made = bpy.data.materials.new(full)
+    made[MARK] = name
+    color = (*COLORS[name], 1.0)
+    made.diffuse_color = color
+    if made.node_tree is None:
+        made.use_nodes = True
+    surface = next(node for node in made.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
+    surface.inputs["Base Color"].default_value = color
+    surface.inputs["Emission Color"].default_value = color
+    surface.inputs["Emission Strength"].default_value = 0.5
+    return made

@@ -1,0 +1,173 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What stands on a baked sensor says what its recording says: arrows, markers, colours on one scale; and it can be changed."""
+
+import bpy
+import numpy as np
+import pytest
+from blender_scenes import changes, cube, dump, press_and_drop, save
+
+from palpate.addon import dress, markers, materials, texelarrows, transforms, write
+from palpate.addon.bake import bake
+from palpate.core import measures
+from palpate.core.drive import drive
+from palpate.core.errors import PalpateError
+
+ALL = {"FORCE", "TORQUE", "CENTRE", "SLIP", "NORMALS", "SHEARS"}
+
+
+@pytest.fixture
+def baked(tmp_path):
+    scene, pad, target, *_ = press_and_drop(frames=8)
+    pad.rotation_euler, pad.scale = (0.03, 0.05, 0.3), (1.0, 1.2, 1.0)
+    target.location = (0.004, 0.002, 0.0045)
+    target.keyframe_insert("location", frame=8)
+    scene.frame_set(1)
+    scene.palpate.overlays = ALL
+    save(tmp_path)
+    return scene, pad, drive(bake(scene))
+
+
+def instances(obj):
+    """Return the matrices of the arrows that geometry nodes make on an object, by place."""
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    return [
+        transforms.array(found.matrix_world)
+        for found in depsgraph.object_instances
+        if found.is_instance and found.parent is not None and found.parent.original == obj
+    ]
+
+
+@pytest.mark.parametrize("kind", ["NORMALS", "SHEARS"])
+def test_texel_arrows_are_the_forces_of_their_texels(baked, kind):
+    scene, pad, result = baked
+    scene.frame_set(8)
+    body, texels = result.scenario.sensors[0].body, result.scenario.sensors[0].texels
+    felt = result.recording.at(8).sensors["Pad"]
+    rotation = transforms.rotation(result.recording.poses[-1, body, 3:])
+    force = felt.normal_force[:, None] * texels.normal
+    if kind == "SHEARS":
+        force = -felt.shear[:, :1] * texels.tangent - felt.shear[:, 1:] * texels.bitangent
+    found = instances(markers.find(scene.objects, pad.palpate.uid, kind))
+    size = np.linalg.norm(force, axis=1)
+    assert len(found) == (size > texelarrows.SMALLEST * size.max()).sum() >= 3
+    place = result.recording.poses[-1, body, :3] + texels.position @ rotation.T
+    ratios = []
+    for matrix in found:
+        texel = int(np.linalg.norm(place - matrix[:3, 3], axis=1).argmin())
+        assert np.linalg.norm(place[texel] - matrix[:3, 3]) < (1e-6 if kind == "NORMALS" else 2e-3)
+        expected = rotation @ force[texel]
+        assert matrix[:3, 2] / np.linalg.norm(matrix[:3, 2]) == pytest.approx(expected / size[texel], abs=1e-4)
+        ratios.append(np.linalg.norm(matrix[:3, 2]) / size[texel])
+    assert ratios == pytest.approx([ratios[0]] * len(ratios), rel=1e-4)
+
+
+def test_markers_stand_at_the_centre_of_pressure_and_show_moment_and_slip(baked):
+    scene, pad, result = baked
+    felt = result.recording.sensors["Pad"]
+    share = measures.slip_share(felt, result.scenario.sensors[0].parameters)
+    moment = measures.free_moment(felt)
+    radius = float(np.ptp(result.scenario.sensors[0].texels.position, axis=0).max()) * markers.RING_SHARE
+    for frame in (1, 6, 8):
+        scene.frame_set(frame)
+        i = frame - 1
+        rotation = transforms.rotation(result.recording.poses[i, 0, 3:])
+        foot = result.recording.poses[i, 0, :3] + rotation @ felt.centre_of_pressure[i]
+        for kind in ("TORQUE", "CENTRE", "SLIP"):
+            marker = markers.find(scene.objects, pad.palpate.uid, kind)
+            assert list(marker.location) == pytest.approx(foot, abs=1e-7)
+            assert (marker.scale.x > 0) <= bool(felt.contact[i].any())
+        assert marker.scale.x == pytest.approx(share[i] * radius, abs=1e-7)  # SLIP
+        arrow = markers.find(scene.objects, pad.palpate.uid, "TORQUE")
+        if felt.contact[i].any():
+            axis = transforms.array(arrow.matrix_world)[:3, 2] / arrow.scale.x
+            assert axis == pytest.approx(-rotation @ moment[i] / np.linalg.norm(moment[i]), abs=1e-4)
+
+
+def test_all_sensors_share_one_scale(baked):
+    scene, pad, result = baked
+    lengths = {}
+    scene.frame_set(8)
+    for name, obj in (("Pad", pad), ("Pad 2", scene.objects["Pad 2"])):
+        arrow = markers.find(scene.objects, obj.palpate.uid, "FORCE")
+        lengths[name] = arrow.scale.x / np.linalg.norm(result.recording.sensors[name].net_force[-1])
+    assert lengths["Pad"] == pytest.approx(lengths["Pad 2"], rel=1e-5)
+    ends = {
+        next(node.inputs[1].default_value for node in slot.material.node_tree.nodes if "maximum" in node.label)
+        for obj in (pad, scene.objects["Pad 2"])
+        for slot in obj.material_slots
+        if slot.material is not None and materials.MARK in slot.material
+    }
+    assert list(ends) == [pytest.approx(measures.peak_force(result.recording))]
+
+
+def test_display_settings_are_applied_to_a_bake_without_computing(baked, monkeypatch):
+    scene, pad, result = baked
+    monkeypatch.setattr("palpate.core.solve.Simulation", lambda *_: pytest.fail("computed"))
+    scene.palpate.overlays = {"CENTRE"}
+    scene.palpate.color_map = "CIVIDIS"
+    scene.palpate.use_auto_range, scene.palpate.range_max = False, 0.25
+    assert bpy.ops.palpate.dress() == {"FINISHED"}
+    left = [obj.name for obj in scene.objects if materials.MARK in obj]
+    assert sorted(left) == ["Centre of Pressure Pad", "Centre of Pressure Pad 2"]
+    kinds = {name: [block.name for block in getattr(bpy.data, name)] for name in ("node_groups", "materials")}
+    assert kinds["node_groups"] == [] and not [name for name in kinds["materials"] if "Arrow" in name]
+    nodes = pad.material_slots[-1].material.node_tree.nodes
+    assert next(node.inputs[1].default_value for node in nodes if "maximum" in node.label) == pytest.approx(0.25)
+
+
+def test_applying_without_the_files_says_so(baked, tmp_path):
+    scene, *_ = baked
+    (tmp_path / "palpate").rename(tmp_path / "lost")
+    with pytest.raises(PalpateError, match="bake"):
+        dress.again(scene, write.bake_folders(scene))
+
+
+def test_clearing_takes_all_overlays_away(tmp_path):
+    scene, *_ = press_and_drop(frames=4)
+    tip = cube("Tip", (0.0, 0.3, 0.0), size=0.02)
+    tip.palpate.role = "SENSOR"
+    scene.palpate.overlays, scene.palpate.quantity = ALL, "PRESSURE"
+    bpy.ops.palpate.reset()
+    save(tmp_path)
+    before = dump()
+    drive(bake(scene))
+    drive(bake(scene))
+    assert len([obj for obj in scene.objects if materials.MARK in obj]) == 18
+    assert bpy.ops.palpate.bake_clear() == {"FINISHED"}
+    assert [line for line in changes(before, dump()) if "baked_" not in line and "settings" not in line] == []
+
+
+@pytest.mark.parametrize("around", [False, True])
+def test_a_heat_map_of_pressure_divides_by_the_texels_area(tmp_path, around):
+    scene, pad, target, *_ = press_and_drop(frames=4)
+    if around:
+        pad.palpate.role = "NONE"
+        pad = cube("Tip", (0.0, 0.0, -0.01), size=0.02)
+        pad.palpate.role = "SENSOR"
+    scene.palpate.quantity = "PRESSURE"
+    save(tmp_path)
+    result = drive(bake(scene))
+    sensor = next(s for s in result.scenario.sensors if s.name == pad.name)
+    nodes = pad.material_slots[-1].material.node_tree.nodes
+    peak = measures.peak_pressure(result.recording, {s.name: s.texels for s in result.scenario.sensors if s.readout})
+    end = next(node.inputs[1].default_value for node in nodes if "Pressure / maximum" in node.label)
+    assert end == pytest.approx(peak, rel=1e-5)
+    if around:
+        values = np.zeros(8, dtype=np.float32)
+        pad.data.attributes[materials.AREA].data.foreach_get("value", values)
+        assert values == pytest.approx(sensor.texels.area, rel=1e-6)
+    else:
+        image = materials.find(bpy.data.images, f"{pad.palpate.uid}:area")
+        assert image.packed_file is not None
+        pixels = np.array(image.pixels[:]).reshape(14, 6, 4)
+        assert pixels[..., 0] == pytest.approx(sensor.texels.area.reshape(14, 6), rel=1e-6)
+
+
+def test_arrows_of_a_lost_image_do_not_show(baked, tmp_path):
+    scene, pad, _ = baked
+    assert texelarrows.KINDS.keys() <= ALL
+    (tmp_path / "palpate").rename(tmp_path / "lost")
+    materials.find(bpy.data.images, pad.palpate.uid).reload()
+    scene.frame_set(7)
+    scene.frame_set(8)
+    assert instances(markers.find(scene.objects, pad.palpate.uid, "NORMALS")) == []
