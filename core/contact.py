@@ -113,6 +113,8 @@ class World(NamedTuple):
         How many there are together.
     mass : (b,) float, kg
     inertia : (b, 3, 3) float, kg·m², body axes
+    inverse_inertia : (b, 3, 3) float, 1/(kg·m²), body axes
+        Zero for bodies that are not free.
     gravity : (3,) float, m/s²
     axis : (b, 3) float
         Direction in which the drive of each driven body moves it: in its own frame, or, `axis_in_world`, in the world.
@@ -142,6 +144,7 @@ class World(NamedTuple):
     unknowns: int
     mass: np.ndarray
     inertia: np.ndarray
+    inverse_inertia: np.ndarray
     gravity: np.ndarray
     axis: np.ndarray
     axis_in_world: np.ndarray

@@ -279,6 +279,7 @@ def _world(scenario: Scenario, center: np.ndarray) -> World:
         unknowns=unknowns,
         mass=np.array([body.mass for body in bodies], dtype=float),
         inertia=np.ascontiguousarray([body.inertia for body in bodies], dtype=float),
+        inverse_inertia=np.array([np.linalg.inv(body.inertia) if body.free else np.zeros((3, 3)) for body in bodies]),
         gravity=np.array(scenario.gravity, dtype=float),
         axis=np.array([np.zeros(3) if body.drive is None else body.drive.axis for body in bodies], dtype=float),
         axis_in_world=np.array([body.drive is not None and body.drive.axis_in_world for body in bodies]),

@@ -61,6 +61,7 @@ from .contact import (
 )
 from .jit import inlined, kernel
 from .servo import SPEED, add_servos, carry_driven, move_drives, place_driven
+from .tumble import mean_spin, product, spin_of
 
 PASSES = 40
 """Most rounds in which contacts are linearised anew within a substep; two or three are usual, one at rest."""
@@ -100,6 +101,8 @@ class Scratch(NamedTuple):
         From the twists of both bodies to the relative motion.
     matrix, vector, momentum, guess : (u, u), (u,), (u,), (u,) float
         The linear system, and its u unknowns as they were guessed last.
+    tumbling : (b, 3) float
+        By how much the mean spin of a free body over the step differs from its spin at the beginning if nothing acts, rad/s.
     axis : (b, 3) float
         Direction of each drive in the world at the step's end.
     carried : (b, 6) float
@@ -128,6 +131,7 @@ class Scratch(NamedTuple):
     vector: np.ndarray
     momentum: np.ndarray
     guess: np.ndarray
+    tumbling: np.ndarray
     axis: np.ndarray
     carried: np.ndarray
     drive_mass: np.ndarray
@@ -164,6 +168,7 @@ def scratch_for(world: World, state: State) -> Scratch:
         vector=np.zeros(n),
         momentum=np.zeros(n),
         guess=np.zeros(n),
+        tumbling=np.zeros((b, 3)),
         axis=np.zeros((b, 3)),
         carried=np.zeros((b, 6)),
         drive_mass=np.zeros(len(world.drives)),
@@ -330,13 +335,16 @@ def _begin_guess(dt, world, state, scratch):
     for body in range(len(world.kind)):
         at = world.at[body]
         if world.kind[body] == FREE:
+            inertia, spin = scratch.inertia[body], velocity[body, 3:]
+            lx, ly, lz = product(inertia, spin[0], spin[1], spin[2])
+            mean = mean_spin(scratch.rotation[body], world.inverse_inertia[body], lx, ly, lz, dt)
+            # The spin that is solved for is the mean over the step, so that a body tumbles as it should.
             for i in range(3):
-                guess[at + i], guess[at + 3 + i] = velocity[body, i], velocity[body, 3 + i]
+                guess[at + i] = velocity[body, i]
                 momentum[at + i] = world.mass[body] * (velocity[body, i] + dt * world.gravity[i])
-                total = 0.0
-                for j in range(3):
-                    total += scratch.inertia[body, i, j] * velocity[body, 3 + j]
-                momentum[at + 3 + i] = total
+                guess[at + 3 + i] = mean[i]
+                scratch.tumbling[body, i] = mean[i] - spin[i]
+            momentum[at + 3], momentum[at + 4], momentum[at + 5] = product(inertia, mean[0], mean[1], mean[2])
         elif world.kind[body] == KEYFRAMED:
             write_twist(velocity[body], dt, scratch.twist[body])
             for i in range(12):
@@ -639,20 +647,14 @@ def _place(position, quaternion, world, state, scratch):
 
 @kernel
 def _move_free(body, dt, world, state, scratch):
-    """Move a free body with its new velocity. What nothing touches keeps its angular momentum exactly."""
-    velocity, inertia, vector = state.velocity[body], scratch.inertia[body], scratch.vector
+    """Move a free body with its new velocity. What nothing touches keeps its angular momentum and its energy."""
+    velocity, rotation, extra = state.velocity[body], scratch.rotation[body], scratch.tumbling[body]
     for i in range(3):
         state.position[body, i] += dt * velocity[i]
-        vector[i] = inertia[i, 0] * velocity[3] + inertia[i, 1] * velocity[4] + inertia[i, 2] * velocity[5]
+    lx, ly, lz = product(scratch.inertia[body], velocity[3] - extra[0], velocity[4] - extra[1], velocity[5] - extra[2])
     turn_quaternion(state.quaternion[body], dt * velocity[3], dt * velocity[4], dt * velocity[5])
-    write_rotation(state.quaternion[body], scratch.rotation[body])
-    write_world_inertia(scratch.rotation[body], world.inertia[body], inertia)
-    for i in range(3):
-        for j in range(i + 1):
-            scratch.matrix[i, j] = inertia[i, j]
-    solve_positive(scratch.matrix, vector, 3)
-    for i in range(3):
-        velocity[3 + i] = vector[i]
+    write_rotation(state.quaternion[body], rotation)
+    velocity[3], velocity[4], velocity[5] = spin_of(rotation, world.inverse_inertia[body], lx, ly, lz)
 
 
 @kernel

@@ -3,7 +3,7 @@
 
 import numpy as np
 import pytest
-from oracles.balance import carried, collide, differences, round_and_round, tumbling, turned_and_moved
+from oracles.balance import carried, collide, differences, round_and_round, tumbling, tumbling_flight, turned_and_moved
 from solver_scenes import about
 
 
@@ -19,8 +19,23 @@ def test_what_one_body_gets_the_other_gives(seed, dt):
 
 @pytest.mark.parametrize("seed", range(6))
 def test_a_collision_gains_no_energy(seed):
-    """Motion, springs and bristles together; 1e-8 is the free tumbling of uneven bodies, which is first order in the step."""
-    assert collide(seed)[2] < 1e-8
+    """Motion, springs and bristles together; 1e-10 is where the rounds of a step end."""
+    assert collide(seed)[2] < 1e-10
+
+
+@pytest.mark.parametrize("dt", [1e-3, 1e-2])
+def test_an_uneven_body_tumbles_without_gaining_energy(dt):
+    """About its middle axis at 20 rad/s, 20 s: rounding alone is left, whatever the step (once it was twice the energy)."""
+    growth, momentum, _ = tumbling_flight(dt, 20.0)
+    assert growth < 1e-10
+    assert momentum < 1e-10
+
+
+def test_an_uneven_body_tumbles_as_eulers_equations_say():
+    """Second order in the step; the spin goes over from one side to the other within these two seconds."""
+    coarse, fine = tumbling_flight(2e-3, 2.0)[2], tumbling_flight(1e-3, 2.0)[2]
+    assert fine < 2e-4
+    assert coarse / fine == pytest.approx(4.0, abs=0.2)
 
 
 def test_a_scene_turned_as_a_whole_feels_the_same():

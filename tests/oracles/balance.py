@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import trimesh
+from scipy.integrate import solve_ivp
 from solver_scenes import about, box, cube_on_pad, free_body, pad, shape
 
 from oracles.sweep import moving, stored
@@ -85,6 +86,40 @@ def collide(seed: int, dt: float = 1e-4) -> tuple[float, float, float]:
         float(np.abs(angular - angular[0]).max() / turned),
         float((energy.max() - energy[0]) / energy[0]),
     )
+
+
+# ---- free flight ----
+MOMENTS, SPIN = np.diag([1e-4, 2e-4, 3e-4]), np.array([0.1, 20.0, 0.1])
+"""Of a body that turns about its middle axis and so tumbles over again and again."""
+
+
+def tumbling_flight(dt: float, seconds: float) -> tuple[float, float, float]:
+    """Let an uneven body fly freely.
+
+    Returns
+    -------
+    growth : float
+        Largest kinetic energy above the start's, as a share of it.
+    momentum : float
+        Largest change of its angular momentum, as a share of it.
+    error : float, rad/s
+        Distance of its spin at the end, body axes, from Euler's equations as scipy's DOP853 solves them.
+    """
+    scenario = collision(0, dt)
+    body = replace(
+        scenario.bodies[1], motion=Motion.at_rest((1, 0, 0)), inertia=MOMENTS, angular_velocity=SPIN, velocity=np.zeros(3)
+    )
+    frames = round(100.0 * seconds) + 1
+    recording = run(replace(scenario, bodies=(scenario.bodies[0], body), frame_end=frames, fps=100.0))
+    rotations = rotation_matrices(recording.poses[:, 1, 3:])
+    spins = np.einsum("fij,fi->fj", rotations, recording.velocities[:, 1, 3:])
+    energy = 0.5 * np.einsum("fi,ij,fj->f", spins, MOMENTS, spins)
+    momentum = np.einsum("fij,jk,fk->fi", rotations, MOMENTS, spins)
+    exact = solve_ivp(
+        lambda _, w: -np.cross(w, MOMENTS @ w) / np.diag(MOMENTS), (0, seconds), SPIN, method="DOP853", rtol=1e-12, atol=1e-12
+    )
+    change = np.linalg.norm(momentum - momentum[0], axis=1).max() / np.linalg.norm(momentum[0])
+    return float(energy.max() / energy[0] - 1.0), float(change), float(np.abs(spins[-1] - exact.y[:, -1]).max())
 
 
 # ---- invariance ----
