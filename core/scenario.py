@@ -5,13 +5,14 @@ from __future__ import annotations
 
 import hashlib
 import math
-from dataclasses import dataclass, field, fields, is_dataclass
+from dataclasses import dataclass, field, fields, is_dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from .effects.base import Effect
 from .effects.library import check as check_effects
+from .effects.library import placed
 from .errors import ParameterError, SceneError
 from .mesh import TriangleMesh
 from .texels import Texels
@@ -317,6 +318,13 @@ class Sensor:
     readout: bool = True
     painted: Painted = field(default_factory=Painted)
     effects: tuple[Effect, ...] = ()
+
+    @property
+    def mounted(self) -> Texels:
+        """The texels where they really are, with the effects that move them."""
+        texels = self.texels
+        position, normal, tangent = placed(self.effects, texels.position, texels.normal, texels.tangent)
+        return texels if position is texels.position else replace(texels, position=position, normal=normal, tangent=tangent)
 
 
 @dataclass(frozen=True)

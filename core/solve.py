@@ -151,7 +151,7 @@ class Simulation:
             Most texels at once that are pressed past their maximum penetration.
         """
         sensor = self.scenario.sensors[0]
-        shape, texels = (len(positions), len(sensor.texels)), sensor.texels
+        shape, texels = (len(positions), len(sensor.texels)), sensor.mounted
         depth, normal = np.zeros(shape), np.tile(-texels.normal, (shape[0], 1, 1))
         point, most = np.tile(texels.position, (shape[0], 1, 1)), 0
         own = [pair for pair, (index, _) in enumerate(self._world.pairs) if index == 0]
@@ -251,8 +251,9 @@ class Simulation:
 def _world(scenario: Scenario, center: np.ndarray) -> World:
     """Flatten a scenario into the kernels' arrays; `center` (b, 3) is the reference point of each body in its frame."""
     bodies, sensors, targets = scenario.bodies, scenario.sensors, scenario.targets
-    points = [contact_points(s.texels, s.parameters.points_per_texel) for s in sensors]
-    blocks = [_point_rows(s.texels, p, center[s.body]) for s, p in zip(sensors, points, strict=True)]
+    texels = [sensor.mounted for sensor in sensors]
+    points = [contact_points(t, s.parameters.points_per_texel) for s, t in zip(sensors, texels, strict=True)]
+    blocks = [_point_rows(t, p, center[s.body]) for s, t, p in zip(sensors, texels, points, strict=True)]
     texel_start = _texel_start(scenario)
     kind = np.array([FREE if body.free else DRIVEN if body.drive is not None else KEYFRAMED for body in bodies])
     drive_of, drives = drive_table(scenario)

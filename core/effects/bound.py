@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .base import Effect, Form, Site, Values
-from .laws import compile_program, friction_over_all, in_order, law_over_time
-from .library import complete_values
+from .laws import compile_program, friction_over_all, law_over_time
+from .library import complete_values, in_order
 from .mixing import Mixing
 
 if TYPE_CHECKING:
@@ -105,14 +105,6 @@ def readings(effects: Iterable[Effect], site: Site, time: np.ndarray, force: np.
     force : (t, n) float, N
     """
     return Reader(effects, site).read(np.asarray(time, float), np.asarray(force, float))
-
-
-def placed(effects: Iterable[Effect], position: np.ndarray, normal: np.ndarray, tangent: np.ndarray) -> tuple[np.ndarray, ...]:
-    """Where the texels really are, with the effects that move them: position (m), normal and tangent, each (n, 3)."""
-    for item, form in in_order(effects, readout=False):
-        if form.place is not None:
-            position, normal, tangent = form.place(position, normal, tangent, complete_values(item))
-    return position, normal, tangent
 
 
 class Reader:

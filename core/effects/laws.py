@@ -9,7 +9,7 @@ because what was pressed recovers. Where several targets press on one point, the
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from functools import cache
 from types import FunctionType
 from typing import Any, NamedTuple
@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike
 
 from ..jit import kernel
 from .base import Effect, Form
-from .library import complete_values, form_of, kind_of, library
+from .library import complete_values, form_of, in_order, library
 
 
 def _forms(way: str) -> list[tuple[str, str]]:
@@ -169,19 +169,6 @@ class Program(NamedTuple):
     def memory(self, points: int) -> np.ndarray:
         """Return the memory of that many untouched points, (points, columns) float."""
         return np.zeros((points, self.columns))
-
-
-def in_order(effects: Iterable[Effect], readout: bool) -> list[tuple[Effect, Form]]:
-    """Return a sensor's effects on forces, or those on readings, in the order in which they act."""
-    chosen = []
-    for item in effects:
-        kind, form = kind_of(item.name), form_of(item.name, item.form)
-        stage = kind.stage_of(form)
-        if (stage == "readout") == readout:
-            rank = (form.after_conversion, form.after_clip, stage == "pad", kind.order)
-            chosen.append((rank, item, form))
-    chosen.sort(key=lambda entry: entry[0])  # stable: of two alike the first in the stack acts first
-    return [(item, form) for _, item, form in chosen]
 
 
 def compile_program(stacks: Sequence[Sequence[Effect]], dt: ArrayLike) -> Program:

@@ -109,6 +109,27 @@ def check(effects: Iterable[Effect], sensor: str, texels: int | None = None, gai
                 )
 
 
+def in_order(effects: Iterable[Effect], readout: bool) -> list[tuple[Effect, Form]]:
+    """Return a sensor's effects on forces, or those on readings, in the order in which they act."""
+    chosen = []
+    for item in effects:
+        kind, form = kind_of(item.name), form_of(item.name, item.form)
+        stage = kind.stage_of(form)
+        if (stage == "readout") == readout:
+            rank = (form.after_conversion, form.after_clip, stage == "pad", kind.order)
+            chosen.append((rank, item, form))
+    chosen.sort(key=lambda entry: entry[0])  # stable: of two alike the first in the stack acts first
+    return [(item, form) for _, item, form in chosen]
+
+
+def placed(effects: Iterable[Effect], position: np.ndarray, normal: np.ndarray, tangent: np.ndarray) -> tuple[np.ndarray, ...]:
+    """Where the texels really are, with the effects that move them: position (m), normal and tangent, each (n, 3)."""
+    for item, form in in_order(effects, readout=False):
+        if form.place is not None:
+            position, normal, tangent = form.place(position, normal, tangent, complete_values(item))
+    return position, normal, tangent
+
+
 def to_dict(item: Effect) -> dict[str, Any]:
     """Return an effect as a TOML table: ``name``, ``form``, ``seed`` where chance plays a part, and its values."""
     seed = {"seed": item.seed} if form_of(item.name, item.form).random else {}

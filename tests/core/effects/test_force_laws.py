@@ -6,8 +6,8 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.special import erf
 
-from palpate.core.effects.bound import forces, friction, placed
-from palpate.core.effects.library import effect
+from palpate.core.effects.bound import forces, friction
+from palpate.core.effects.library import effect, placed
 from palpate.core.scenario import SensorParameters
 
 K = 1000.0

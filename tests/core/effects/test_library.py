@@ -8,9 +8,9 @@ import pytest
 
 from palpate.core.effects import base
 from palpate.core.effects.base import Effect, Site
-from palpate.core.effects.bound import Reader, forces, friction, placed, readings
+from palpate.core.effects.bound import Reader, forces, friction, readings
 from palpate.core.effects.laws import compile_program, surface_force, texel_force
-from palpate.core.effects.library import check, effect, form_of, from_dict, kind_of, library, to_dict
+from palpate.core.effects.library import check, effect, form_of, from_dict, kind_of, library, placed, to_dict
 from palpate.core.errors import EffectError
 from palpate.core.scenario import SensorParameters
 
