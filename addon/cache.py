@@ -15,11 +15,11 @@ import numpy as np
 from ..core.errors import PalpateError
 from ..core.recording import Frame
 from ..core.scenario import Scenario
-from . import dependencies, effects, freebodies, meshes, properties, sample, state, units
+from . import dependencies, drives, effects, freebodies, meshes, properties, sample, state, units
 
 PAINTED = tuple(f"{key}_{part}" for key in meshes.PAINTED for part in ("map", "factor"))
 REGION = ("region", "vertex_group", "threshold", "material", "face_set")
-SETTINGS = (*properties.PARAMETERS, *PAINTED, *REGION, "role", "body", "mass")
+SETTINGS = (*properties.PARAMETERS, *PAINTED, *REGION, *drives.SETTINGS, "role", "body", "mass")
 
 
 @dataclass
@@ -37,7 +37,7 @@ class Run:
     geometry : dict of str to str
         Fingerprint of each object that takes part.
     frames : dict of int to Frame
-    poses, parents : dict of int to what :func:`.sample.sample_poses` found at that frame
+    moments : dict of int to what :func:`.sample.sample_moment` found at that frame
     written : dict of int to (14,) float
         Where free bodies were last put, by body index.
     """
@@ -49,8 +49,7 @@ class Run:
     settings: tuple
     geometry: dict[str, str]
     frames: dict[int, Frame] = field(default_factory=dict)
-    poses: dict[int, sample.Poses] = field(default_factory=dict)
-    parents: dict[int, dict[int, np.ndarray]] = field(default_factory=dict)
+    moments: dict[int, sample.Moment] = field(default_factory=dict)
     written: dict[int, np.ndarray] = field(default_factory=dict)
 
 
@@ -97,7 +96,7 @@ def begin(scene, depsgraph) -> Run:
     )
     first = scenario.frame_start
     run.frames[first] = run.simulation.observe()
-    run.poses[first], run.parents[first] = sample.sample_poses(scene, depsgraph, binding)
+    run.moments[first] = sample.sample_moment(scene, depsgraph, binding)
     state.session.changed_geometry.difference_update(run.geometry)
     state.session.changed_motion.clear()
     _runs[scene.session_uid] = run
@@ -107,8 +106,8 @@ def begin(scene, depsgraph) -> Run:
 def go_on(scene, depsgraph, run: Run) -> Run:
     """Compute the frame where the scene stands, which is the one after the last computed."""
     frame = scene.frame_current
-    run.poses[frame], run.parents[frame] = sample.sample_poses(scene, depsgraph, run.binding)
-    run.simulation.extend(run.poses[frame])
+    moment = run.moments[frame] = sample.sample_moment(scene, depsgraph, run.binding)
+    run.simulation.extend(moment.poses, moment.targets)
     run.frames[frame] = run.simulation.advance()
     return run
 
@@ -136,12 +135,13 @@ def is_stale(scene, depsgraph, run: Run) -> bool:
 
 def has_moved(scene, depsgraph, run: Run) -> bool:
     """Whether keyframed bodies are elsewhere now than when the present frame was computed."""
-    remembered = run.poses[scene.frame_current]
+    before = run.moments[scene.frame_current]
     try:
-        now, _ = sample.sample_poses(scene, depsgraph, run.binding)
+        now = sample.sample_moment(scene, depsgraph, run.binding)
     except PalpateError:
         return True
-    return any(not np.array_equal(now[i][part], remembered[i][part]) for i in remembered for part in (0, 1))
+    moved = any(not np.array_equal(now.poses[i][part], before.poses[i][part]) for i in before.poses for part in (0, 1))
+    return moved or now.targets != before.targets
 
 
 def settings_of(scene, objects) -> tuple:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Free bodies: where they started, putting them where the solver says, and the keyframes of a bake.
+"""Free and driven bodies: where they started, putting them where the solver says, and the keyframes of a bake.
 
 While a body is displaced by playing, or baked, its own location and rotation at the first frame are kept in its
 properties, so that it can be put back exactly.
@@ -15,21 +15,30 @@ from mathutils import Euler, Matrix, Quaternion
 from ..core.errors import SceneError
 from . import curves, transforms
 
+MOVED = ("FREE", "DRIVEN")
+"""Values of `body` with which forces move an object."""
 PATHS = ("location", "rotation_euler", "rotation_quaternion", "rotation_axis_angle")
 
 
 def check(obj) -> None:
-    """Raise SceneError when something else than forces moves a free body."""
+    """Raise SceneError when something else than forces, parents and its drive moves a body."""
+    kind = "Free" if obj.palpate.body == "FREE" else "Driven"
     if any(constraint.enabled for constraint in obj.constraints):
-        raise SceneError(f"Free body '{obj.name}' has constraints: disable them, or set its body to Keyframed.")
+        raise SceneError(f"{kind} body '{obj.name}' has constraints: disable them, or set its body to Keyframed.")
     if not obj.palpate.is_baked and curves.animated_paths(obj) & set(PATHS):
-        raise SceneError(f"Free body '{obj.name}' has keyframes or drivers: remove them, or set its body to Keyframed.")
+        raise SceneError(
+            f"{kind} body '{obj.name}' has keyframes or drivers of its location or rotation: "
+            + ("remove them, " if kind == "Free" else "put them on a parent that carries it, ")
+            + "or set its body to Keyframed."
+        )
 
 
 def parent_matrix(obj, depsgraph) -> np.ndarray:
     """(4, 4) float: what its parents do to a body's own matrix at the present frame."""
     if obj.parent is None:
         return np.eye(4)
+    if obj.parent_type == "OBJECT" and obj.parent.type != "CURVE":  # the same bits wherever playing has put the body
+        return transforms.array(obj.parent.evaluated_get(depsgraph).matrix_world) @ transforms.array(obj.matrix_parent_inverse)
     found = obj.evaluated_get(depsgraph)
     return transforms.array(found.matrix_world @ found.matrix_basis.inverted())
 

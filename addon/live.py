@@ -151,7 +151,7 @@ def show(scene, run) -> None:
         if number == run.scenario.frame_start:
             freebodies.restore(objects[index])
         else:
-            placement.show(objects[index], frame.poses[index], run.parents[number][index])
+            placement.show(objects[index], frame.poses[index], run.moments[number].parents[index])
         run.written[index] = freebodies.channels(objects[index])
     for sensor, obj in zip(run.scenario.sensors, run.binding.sensor_objects(scene), strict=True):
         if sensor.readout and obj is not None:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..core.errors import SceneError
-from . import identity, transforms
+from . import freebodies, identity, transforms
 
 SAME_PLACE = 1e-4
 """Largest change of a part's place over time, relative to its entries, that is put down to rounding."""
@@ -31,14 +31,14 @@ def _carrier(obj, taking_part):
 
 
 def check(objects, carrier: dict) -> None:
-    """Raise SceneError when an object hangs on a free body without being part of it."""
-    free = {obj for obj in objects if obj.palpate.body == "FREE"}
+    """Raise SceneError when an object hangs on a free or driven body without being part of it."""
+    moved = {obj: obj.palpate.body.lower() for obj in objects if obj.palpate.body in freebodies.MOVED}
     for obj in objects:
         above = obj.parent
         while above is not None:
-            if above in free and carrier[obj] != above:
+            if above in moved and carrier[obj] != above:
                 raise SceneError(
-                    f"'{obj.name}' is a child of free body '{above.name}': "
+                    f"'{obj.name}' is a child of {moved[above]} body '{above.name}': "
                     "set its body to Part of Parent, or clear its parent, so that it is a body of its own."
                 )
             above = above.parent

@@ -18,7 +18,7 @@ from bpy.props import (
 
 from ..core import colormaps
 from ..core.migrate import VERSION
-from ..core.scenario import SensorParameters
+from ..core.scenario import Drive, SensorParameters
 from . import effects, freebodies, identity, meshes, state
 
 ROLES = (
@@ -64,7 +64,7 @@ def _role_changed(settings, context):
 
 def _body_changed(settings, _context):
     """Put back what playing has moved, when no run will do it any more."""
-    if (settings.body != "FREE" or settings.role == "NONE") and not settings.is_baked:
+    if (settings.body not in freebodies.MOVED or settings.role == "NONE") and not settings.is_baked:
         freebodies.restore(settings.id_data)
 
 
@@ -135,6 +135,12 @@ class PALPATE_PG_skin(bpy.types.PropertyGroup):
     region_name: StringProperty(options={"HIDDEN"})
     region_number: IntProperty(options={"HIDDEN"})
     made_from: StringProperty(options={"HIDDEN"})
+
+
+def _drive_number(name, key, text):
+    """A number of the drive with the solver's default."""
+    default = getattr(Drive(), key)
+    return FloatProperty(name=name, description=text, default=default, min=0.0, precision=4, step=10, **_fixed)
 
 
 class PALPATE_PG_object(bpy.types.PropertyGroup):
@@ -252,6 +258,7 @@ class PALPATE_PG_object(bpy.types.PropertyGroup):
         items=(
             ("KEYFRAMED", "Keyframed", "Its animation, parents and constraints; forces do not move it"),
             ("FREE", "Free", "Gravity and the sensors' forces, from where it is at the first frame"),
+            ("DRIVEN", "Driven", "A servo of limited force along one axis; its parent carries it. A gripper's finger"),
             ("PARENT", "Part of Parent", "It is fixed to its parent: what presses on it moves the parent's body"),
         ),
         update=_body_changed,
@@ -259,7 +266,7 @@ class PALPATE_PG_object(bpy.types.PropertyGroup):
     )
     mass: FloatProperty(
         name="Mass (kg)",
-        description="Of a free body, kg; its inertia follows from the mesh, taken as a solid of uniform density",
+        description="Of a free or driven body, kg; inertia follows from the mesh, taken as a solid of uniform density",
         default=1.0,
         min=0.0,
         precision=4,
@@ -282,6 +289,76 @@ class PALPATE_PG_object(bpy.types.PropertyGroup):
     made_vertices: IntProperty(options={"HIDDEN"})
     skin: PointerProperty(
         type=PALPATE_PG_skin, description="How it was laid onto its parent's surface", override={"LIBRARY_OVERRIDABLE"}
+    )
+
+    drive_control: EnumProperty(
+        name="Control",
+        description="What the drive aims at",
+        items=(
+            ("POSITION", "Position", "A way along its axis, from where the object starts on its parent"),
+            ("VELOCITY", "Velocity", "A speed along its axis"),
+            (
+                "FORCE",
+                "Tactile Force",
+                "The sum of a sensor's normal forces: approaches with the speed limit until it touches, then holds the sum",
+            ),
+        ),
+        **_fixed,
+    )
+    drive_axis: EnumProperty(
+        name="Axis",
+        description="Direction in which the drive moves it; a finger closes this way",
+        items=tuple((key, key, f"Along {key}") for key in ("X", "Y", "Z", "-X", "-Y", "-Z")),
+        default="Z",
+        **_fixed,
+    )
+    drive_space: EnumProperty(
+        name="Axis of",
+        description="Whose axis it is",
+        items=(
+            ("LOCAL", "Object", "The object's own; turns along with what carries it"),
+            ("PARENT", "Parent", "Its parent's at the first frame; turns along with what carries it"),
+            ("WORLD", "World", "Stands still"),
+        ),
+        **_fixed,
+    )
+    drive_position: FloatProperty(
+        name="Way (m)",
+        description="Target of position control, m from where the object starts; can be keyframed",
+        precision=5,
+        step=0.1,
+    )
+    drive_speed: FloatProperty(
+        name="Speed (m/s)", description="Target of velocity control, m/s; can be keyframed", precision=4, step=1
+    )
+    drive_force: FloatProperty(
+        name="Tactile Sum (N)",
+        description="Target of force control: sum of the sensor's normal forces, N; zero opens. Can be keyframed",
+        default=5.0,
+        precision=4,
+    )
+    drive_max_force: _drive_number("Max Force (N)", "max_force", "Largest force of the drive, N")
+    drive_max_speed: _drive_number(
+        "Max Speed (m/s)", "max_speed", "Speed that the drive asks for at the most, m/s; force control approaches with it"
+    )
+    drive_stiffness: _drive_number("Stiffness (N/m)", "stiffness", "Position control: force per metre that is lacking, N/m")
+    drive_damping: _drive_number("Damping (N·s/m)", "damping", "Force for each m/s that is lacking, N·s/m")
+    drive_settling: _drive_number(
+        "Settling (s)",
+        "settling",
+        "Force control: time in which the rest is made up, s; longer than the foam swings",
+    )
+    drive_sensor: PointerProperty(
+        name="Sensor",
+        description="Sensor whose tactile sum is controlled; the object itself when empty",
+        type=bpy.types.Object,
+        **_fixed,
+    )
+    drive_leader: PointerProperty(
+        name="Coupled With",
+        description="Driven object whose drive moves this one as well, each along its own axis: the other finger of a gripper",
+        type=bpy.types.Object,
+        **_fixed,
     )
 
     # Bookkeeping of a free body that was moved, and of a bake. Saved, so that a reopened file can be put right.

@@ -19,15 +19,34 @@ import numpy as np
 
 from ..core.errors import SceneError
 from ..core.mesh import TriangleMesh, checked_mesh, mass_properties
-from ..core.scenario import Body, Motion, Painted, Scenario, Sensor, SensorParameters, Target
+from ..core.scenario import Body, Motion, Painted, Scenario, Sensor, SensorParameters, Signal, Target
 from ..core.texels import texels_from_region
-from . import effects, freebodies, identity, meshes, parts, properties, transforms, units
+from . import drives, effects, freebodies, identity, meshes, parts, properties, transforms, units
 from .jobs import Progress
 
 SAME_STRETCH = 1e-4
 """Largest relative change of an object's scale over time that is put down to rounding."""
 
 Poses = dict[int, tuple[np.ndarray, np.ndarray]]
+
+
+@dataclass(frozen=True)
+class Moment:
+    """What a scene says at one frame, by body index.
+
+    Attributes
+    ----------
+    poses : dict of int to (position (3,) m, quaternion (4,))
+        Of keyframed bodies, and of driven ones without their drives.
+    parents : dict of int to (4, 4) float
+        What their parents do to free and driven bodies.
+    targets : dict of int to float
+        Of the drives.
+    """
+
+    poses: Poses
+    parents: dict[int, np.ndarray]
+    targets: dict[int, float]
 
 
 @dataclass
@@ -45,9 +64,11 @@ class Binding:
     stretch : (b, 3, 3) float
         Of each object at the first frame (:mod:`.transforms`).
     starts : dict of int to (4, 4) float
-        World matrices at the first frame of the free bodies, by body index.
+        World matrices at the first frame of the bodies that forces move, by body index.
     parents : dict of int to list of (4, 4) float
-        What their parents do to free bodies, frame by frame.
+        What their parents do to these bodies, frame by frame.
+    driven : tuple of int
+        Driven bodies.
     warnings : tuple of str
     sensor_keys : tuple of str
         Of the objects that hold the sensors and pads, by sensor index.
@@ -61,6 +82,7 @@ class Binding:
     stretch: np.ndarray
     starts: dict[int, np.ndarray]
     parents: dict[int, list[np.ndarray]]
+    driven: tuple[int, ...]
     warnings: tuple[str, ...]
     sensor_keys: tuple[str, ...]
     parts: dict[str, np.ndarray]
@@ -142,12 +164,12 @@ def sample_start(scene, depsgraph) -> tuple[Scenario, Binding]:
     bodies, stretches, starts, matrices, own = [], [], {}, [], []
     owners = [obj for obj in objects if carriers[obj] == obj]
     for index, obj in enumerate(owners):
-        free = obj.palpate.body == "FREE"
-        if free:
+        moved = obj.palpate.body in freebodies.MOVED
+        if moved:
             freebodies.check(obj)
         elif obj.palpate.has_start:
             raise SceneError(f"'{obj.name}' is Keyframed, but its keyframes are those of a bake: use Clear Bake first.")
-        matrix = freebodies.start_matrix(obj, depsgraph) if free else _world(obj, depsgraph)
+        matrix = freebodies.start_matrix(obj, depsgraph) if moved else _world(obj, depsgraph)
         position, quaternion, stretch = _split(obj, matrix)
         stretches.append(stretch)
         matrices.append(matrix)
@@ -155,12 +177,12 @@ def sample_start(scene, depsgraph) -> tuple[Scenario, Binding]:
         own.append(mesh)
         warnings += arrays_warnings
         body = Body(obj.name, Motion.at_rest(position * scale, quaternion))
-        if free:
+        if moved:
             starts[index] = matrix
-            body, more = _free(obj, body, mesh)
+            body, more = _moved(obj, body, mesh)
             warnings += more
         bodies.append(body)
-    sensors, targets, sensor_keys, places = [], [], [], {}
+    sensors, targets, sensor_objects, places = [], [], [], {}
     for obj in objects:
         index = owners.index(carriers[obj])
         mesh = own[index]
@@ -173,7 +195,14 @@ def sample_start(scene, depsgraph) -> tuple[Scenario, Binding]:
             targets.append(Target(obj.name, index, mesh))
         else:
             sensors.append(_sensor(obj, index, mesh))
-            sensor_keys.append(identity.key(obj))
+            sensor_objects.append(obj)
+    driven = tuple(index for index in starts if owners[index].palpate.body == "DRIVEN")
+    for index in driven:
+        drive = drives.drive_of(owners[index], matrices[index], depsgraph)
+        chosen = drives.leader(owners[index], owners)
+        if chosen is None and drive.control == "force":
+            drive = replace(drive, sensor=drives.sensor(owners[index], sensor_objects))
+        bodies[index] = replace(bodies[index], drive=replace(drive, leader=chosen))
     scenario = Scenario(
         bodies=tuple(bodies),
         sensors=tuple(sensors),
@@ -194,26 +223,26 @@ def sample_start(scene, depsgraph) -> tuple[Scenario, Binding]:
         starts=starts,
         parents={index: [freebodies.parent_matrix(owners[index], depsgraph)] for index in starts},
         warnings=tuple(warnings),
-        sensor_keys=tuple(sensor_keys),
+        driven=driven,
+        sensor_keys=tuple(identity.key(obj) for obj in sensor_objects),
         parts=places,
     )
     return scenario, binding
 
 
-def sample_poses(scene, depsgraph, binding: Binding) -> tuple[Poses, dict[int, np.ndarray]]:
-    """Read where keyframed bodies, and the parents of free ones, are at the scene's present frame.
-
-    Returns
-    -------
-    poses : dict of body index to (position (3,) m, quaternion (4,))
-    parents : dict of body index to (4, 4) float
-    """
-    poses, parents = {}, {}
+def sample_moment(scene, depsgraph, binding: Binding) -> Moment:
+    """Read what a scene says at its present frame."""
+    poses, parents, targets = {}, {}, {}
     for index, obj in enumerate(binding.objects(scene)):
         if index in binding.starts:
             parents[index] = freebodies.parent_matrix(obj, depsgraph)
-            continue
-        position, quaternion, stretch = _split(obj, _world(obj, depsgraph))
+            if index not in binding.driven:
+                continue
+            targets[index] = drives.target(obj, depsgraph)
+            matrix = drives.carried(binding.starts[index], binding.parents[index][0], parents[index])
+        else:
+            matrix = _world(obj, depsgraph)
+        position, quaternion, stretch = _split(obj, matrix)
         if np.abs(stretch - binding.stretch[index]).max() > SAME_STRETCH * np.abs(binding.stretch[index]).max():
             raise SceneError(
                 f"The scale of '{obj.name}' changes (frame {scene.frame_current}): bodies are rigid, keep the scale constant."
@@ -221,7 +250,7 @@ def sample_poses(scene, depsgraph, binding: Binding) -> tuple[Poses, dict[int, n
         poses[index] = position * binding.scale, quaternion
     if binding.parts:
         parts.check_places(scene, depsgraph, binding.parts)
-    return poses, parents
+    return Moment(poses, parents, targets)
 
 
 def sample_scenario(scene) -> Generator[Progress, None, tuple[Scenario, Binding]]:
@@ -235,13 +264,16 @@ def sample_scenario(scene) -> Generator[Progress, None, tuple[Scenario, Binding]
         scenario, binding = sample_start(scene, depsgraph_of(scene))
         motions = {index: body.motion for index, body in enumerate(scenario.bodies) if not body.free}
         samples = {index: [(motion.positions[0], motion.quaternions[0])] for index, motion in motions.items()}
+        targets = {index: list(scenario.bodies[index].drive.target.values) for index in binding.driven}
         yield Progress("Reading", frames[0], 1, len(frames))
         for frame in frames[1:]:
             scene.frame_set(frame)
-            poses, parents = sample_poses(scene, depsgraph_of(scene), binding)
-            for index, pose in poses.items():
+            moment = sample_moment(scene, depsgraph_of(scene), binding)
+            for index, pose in moment.poses.items():
                 samples[index].append(pose)
-            for index, matrix in parents.items():
+            for index, value in moment.targets.items():
+                targets[index].append(value)
+            for index, matrix in moment.parents.items():
                 binding.parents[index].append(matrix)
             yield Progress("Reading", frame, frame - frames[0] + 1, len(frames))
     finally:
@@ -252,6 +284,9 @@ def sample_scenario(scene) -> Generator[Progress, None, tuple[Scenario, Binding]
     for index, path in samples.items():
         positions, quaternions = (np.array(part) for part in zip(*path, strict=True))
         bodies[index] = replace(bodies[index], motion=Motion(times, positions, quaternions))
+    for index, values in targets.items():
+        drive = replace(bodies[index].drive, target=Signal(times, np.array(values)))
+        bodies[index] = replace(bodies[index], drive=drive)
     return replace(scenario, bodies=tuple(bodies)), binding
 
 
@@ -302,16 +337,17 @@ def _mesh(obj, depsgraph, stretch: np.ndarray, offset: np.ndarray | float = 0.0)
     return mesh, warnings + more
 
 
-def _free(obj, body: Body, mesh: TriangleMesh) -> tuple[Body, list[str]]:
+def _moved(obj, body: Body, mesh: TriangleMesh) -> tuple[Body, list[str]]:
+    """Return a body with its mass; a free one also with the velocity that it starts with."""
     settings = obj.palpate
     mass = units.as_typed(settings.mass)
     center, inertia, warnings = mass_properties(mesh, mass, obj.name)
+    body = replace(body, mass=mass, center_of_mass=center, inertia=inertia)
+    if settings.body == "DRIVEN":
+        return body, warnings
     return replace(
         body,
         free=True,
-        mass=mass,
-        center_of_mass=center,
-        inertia=inertia,
         velocity=np.array([units.as_typed(value) for value in settings.velocity]),
         angular_velocity=np.array([units.as_typed(value) for value in settings.angular_velocity]),
     ), warnings

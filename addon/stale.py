@@ -13,7 +13,7 @@ import numpy as np
 
 from ..core.errors import PalpateError
 from ..core.recording import Recording
-from . import cache, meshes, sample, state
+from . import cache, freebodies, meshes, sample, state
 
 SAME_POSE = 1e-6
 """Metres, and components of a quaternion, by which a recorded pose may differ: an evaluated matrix has 32 bits."""
@@ -68,7 +68,7 @@ def _moved(scene, depsgraph, recording: Recording) -> bool:
         obj = scene.objects.get(name)
         if obj is None:
             return True
-        if obj.palpate.body == "FREE":
+        if obj.palpate.body in freebodies.MOVED:
             continue
         try:
             now = sample.pose(scene, obj, depsgraph)

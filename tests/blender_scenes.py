@@ -101,7 +101,9 @@ def _plain(value):
         return settings(value)
     if isinstance(value, bpy.types.bpy_prop_collection):
         return [settings(item) for item in value]
-    return value if isinstance(value, str | int | float) else tuple(value)
+    if isinstance(value, bpy.types.Object):
+        return value.name
+    return value if value is None or isinstance(value, str | int | float) else tuple(value)
 
 
 def _object(obj, uids) -> dict[str, str]:
