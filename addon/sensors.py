@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from ..core.errors import SensorError
-from . import meshes, properties, write
+from . import effects, meshes, properties, write
 
 GROUP_NAME = "Palpate Sensor"
 PRESETS = Path(__file__).parent / "presets"
@@ -131,10 +131,24 @@ def _active_face_set(obj) -> tuple[np.ndarray, int]:
     return meshes.corners_of(obj.data, sets == number), number
 
 
+def set_brush(tools) -> None:
+    """Let the weight brush paint all of a region at once: weight and strength 1, no normalising against other groups."""
+    tools.use_auto_normalize = False
+    paint = tools.weight_paint
+    brush = paint.brush if paint is not None else None
+    shared = getattr(paint, "unified_paint_settings", None) or getattr(tools, "unified_paint_settings", None)
+    for part in ("weight", "strength"):  # shared by all brushes where the user has it so
+        if shared is not None and getattr(shared, f"use_unified_{part}"):
+            setattr(shared, part, 1.0)
+        elif brush is not None:
+            setattr(brush, part, 1.0)
+
+
 def copy_parameters(source, target) -> None:
-    """Give a sensor what another one is made of; its region and its name stay."""
+    """Give a sensor what another one is made of; its region and its name stay; effects that are switched off are left out."""
     for name in COPIED:
         setattr(target.palpate, name, getattr(source.palpate, name))
+    effects.put_stack(target, effects.stack(source))
 
 
 def _check(obj, chosen: np.ndarray, source: str) -> None:

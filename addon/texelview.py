@@ -9,7 +9,7 @@ import bpy
 import numpy as np
 
 from ..core.layout import GridLayout
-from . import preview, transforms
+from . import live, preview, transforms
 
 FINE, FAULTY, NORMAL, REACH = (0.1, 0.75, 0.95, 0.9), (1.0, 0.15, 0.1, 1.0), (0.2, 0.5, 1.0, 1.0), (1.0, 0.65, 0.1, 0.9)
 SIDES = 8
@@ -105,10 +105,12 @@ def _draw() -> None:
     with gpu.matrix.push_pop():
         gpu.matrix.multiply_matrix(_frame(obj))
         gpu.state.depth_test_set("NONE" if bpy.context.space_data.shading.show_xray else "LESS_EQUAL")
-        if own.show_texels:
+        felt = live.status(bpy.context.scene).frame
+        shown = obj.mode == "OBJECT" and felt is not None and obj.name in felt.sensors  # the heat map is where they are
+        if own.show_texels and not shown:
             _triangles(drawing, "fine", FINE)
             _triangles(drawing, "faulty", FAULTY)
-        if own.show_normals:
+        if own.show_normals and not shown:
             _lines(drawing, "normals", NORMAL)
         gpu.state.depth_test_set("NONE")  # it is inside the object
         if own.show_reach:

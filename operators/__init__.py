@@ -3,9 +3,10 @@
 
 
 def _classes():
-    from . import bake, debug, effects, fix, presets, sensor, skin
+    from . import bake, debug, effects, exchange, fits, fix, presets, probe, sensor, skin
 
-    return (*sensor.CLASSES, *skin.CLASSES, *presets.CLASSES, *effects.CLASSES, *fix.CLASSES, *bake.CLASSES, *debug.CLASSES)
+    rooms = (sensor, skin, presets, effects, fix, probe, fits, exchange, bake, debug)
+    return tuple(cls for room in rooms for cls in room.CLASSES)
 
 
 def register():

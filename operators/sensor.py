@@ -114,7 +114,7 @@ class PALPATE_OT_sensor_remove(support.Reporting, bpy.types.Operator):
 
 
 class PALPATE_OT_weight_paint(support.Reporting, bpy.types.Operator):
-    """Paint the region of a sensor: weights at or above the threshold become texels"""
+    """Paint the region of a sensor, with a brush of full weight: what is painted to the threshold or above becomes texels"""
 
     bl_idname = "palpate.weight_paint"
     bl_label = "Paint Region"
@@ -128,6 +128,7 @@ class PALPATE_OT_weight_paint(support.Reporting, bpy.types.Operator):
         support.leave_edit_mode(context)
         sensors.paint_group(context.object)
         bpy.ops.object.mode_set(mode="WEIGHT_PAINT")
+        sensors.set_brush(context.tool_settings)
 
 
 def _face_sets(_operator, context):

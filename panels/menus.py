@@ -14,11 +14,15 @@ class PALPATE_MT_object(bpy.types.Menu):
         layout.operator("palpate.role_set", text="Make Target").role = "TARGET"
         layout.operator("palpate.sensor_add", text="Make Pad").role = "PAD"
         layout.operator("palpate.weight_paint", icon="WPAINT_HLT")
-        layout.operator("palpate.skin_add", icon="MOD_SURFACEDEFORM")
+        layout.operator("palpate.skin_add", icon="MOD_SHRINKWRAP")
         layout.operator("palpate.skin_update")
+        layout.operator("palpate.probe_add")
         layout.operator("palpate.parameters_copy")
         layout.operator_menu_enum("palpate.fix", "kind")
         layout.operator("palpate.sensor_remove", icon="X")
+        layout.separator()
+        layout.operator("palpate.stiffness_fit")
+        layout.operator("palpate.friction_fit")
         layout.separator()
         layout.operator("palpate.bake", icon="RENDER_ANIMATION")
         layout.operator("palpate.bake_clear")
@@ -47,7 +51,19 @@ def _draw_weights(self, _context):
     layout.operator("palpate.sensor_add", text="Make Palpate Sensor")
 
 
+def _draw_import(self, _context):
+    self.layout.operator("palpate.openrave_import")
+    self.layout.operator("palpate.sensor_toml_import")
+
+
+def _draw_export(self, _context):
+    self.layout.operator("palpate.openrave_export")
+    self.layout.operator("palpate.sensor_toml_export")
+
+
 ENTRIES = (
+    ("TOPBAR_MT_file_import", _draw_import),
+    ("TOPBAR_MT_file_export", _draw_export),
     ("VIEW3D_MT_mesh_add", _draw_add),
     ("VIEW3D_MT_object", _draw),
     ("VIEW3D_MT_edit_mesh_faces", _draw_edit),

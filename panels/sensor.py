@@ -29,13 +29,15 @@ class Root(Part):
             column.operator("palpate.role_set", text="Make Target").role = "TARGET"
             column.operator("palpate.sensor_add", text="Make Pad").role = "PAD"
             column.operator("palpate.weight_paint", text="Paint a Sensor", icon="WPAINT_HLT")
-            column.operator("palpate.skin_add", icon="MOD_SURFACEDEFORM")
+            column.operator("palpate.skin_add", icon="MOD_SHRINKWRAP")
             return
         row = layout.row(align=True)
         row.prop(settings, "role")
         row.operator("palpate.sensor_remove", text="", icon="X")
         if settings.role in {"SENSOR", "PAD"}:
-            layout.operator("palpate.parameters_copy", icon="COPYDOWN")
+            row = layout.row(align=True)
+            row.operator("palpate.probe_add", icon="MESH_UVSPHERE")
+            row.operator("palpate.parameters_copy", icon="COPYDOWN")
 
 
 class Skins(Part):
@@ -57,7 +59,7 @@ class Skins(Part):
             own = settings.skin
             box = layout.box().column()
             row = box.row(align=True)
-            row.label(text=f"Lies on '{obj.parent.name}'" if obj.parent else "Lies on nothing", icon="MOD_SURFACEDEFORM")
+            row.label(text=f"Lies on '{obj.parent.name}'" if obj.parent else "Lies on nothing", icon="MOD_SHRINKWRAP")
             if obj.parent:
                 row.operator("palpate.object_activate", text="", icon="RESTRICT_SELECT_OFF").name = obj.parent.name
             for name in SKIN_FIELDS[own.method]:
@@ -66,7 +68,7 @@ class Skins(Part):
             return
         for skin in skins.skins_of(obj):
             row = layout.row(align=True)
-            row.prop(skin, "name", text="", icon="MOD_SURFACEDEFORM")
+            row.prop(skin, "name", text="", icon="MOD_SHRINKWRAP")
             row.operator("palpate.object_activate", text="", icon="RESTRICT_SELECT_OFF").name = skin.name
         layout.operator("palpate.skin_add", icon="ADD")
 
@@ -130,6 +132,7 @@ class Contact(Part):
         column.prop(settings, "max_penetration")
         column.prop(settings, "points_per_texel")
         painted(layout, settings, "k")
+        layout.operator("palpate.stiffness_fit", icon="FCURVE_SNAPSHOT")
 
 
 class Friction(Part):
@@ -148,6 +151,7 @@ class Friction(Part):
         column.prop(settings, "sigma1")
         column.prop(settings, "ct")
         painted(layout, settings, "friction")
+        layout.operator("palpate.friction_fit", icon="FCURVE_SNAPSHOT")
 
 
 class Readout(Part):

@@ -69,7 +69,7 @@ def test_disabling_leaves_nothing_and_enabling_again_works(commands):
     assert not any(without["handlers"].values())
     palpate.register()
     first = traces()
-    assert first["object"] and first["scene"] and first["menus"] == 5
+    assert first["object"] and first["scene"] and first["menus"] == 7
     assert "PALPATE_PT_physics" in first["classes"] and "bake" in first["operators"]
     assert list(commands.values()) == ["palpate"]
     palpate.unregister()
@@ -152,3 +152,13 @@ def test_every_operator_and_panel_has_a_name_and_a_tooltip():
     for group in (bpy.types.Object.bl_rna, bpy.types.Scene.bl_rna):
         for item in group.properties["palpate"].fixed_type.properties:
             assert item.is_hidden or item.identifier in ("rna_type", "name") or item.description, item.identifier
+
+
+def test_every_icon_exists(repository):
+    """A panel with a wrong icon fails only when it is drawn, in a window."""
+    import re
+
+    known = bpy.types.UILayout.bl_rna.functions["operator"].parameters["icon"].enum_items.keys()
+    for file in (repository / "panels").glob("*.py"):
+        for name in re.findall(r'icon="(\w+)"', file.read_text(encoding="utf-8")):
+            assert name in known, f"{file.name}: {name}"

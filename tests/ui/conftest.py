@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import json
 import shutil
 import subprocess
@@ -47,6 +48,12 @@ class RealBlender:
             text = log.read_text(encoding="utf-8", errors="replace")
             if code != 0 or "Traceback" in text:
                 raise RuntimeError(f"Installing {zip_path.name} failed with status {code}:\n{text}")
+
+    def give_brushes(self) -> None:
+        """Debian leaves out Blender's brushes (assets); those that come with bpy are the same."""
+        spec = importlib.util.find_spec("bpy")
+        assets = next(Path(spec.submodule_search_locations[0]).glob("*/datafiles/assets"))
+        shutil.copytree(assets, self.root / "usr/share/blender/datafiles/assets", dirs_exist_ok=True)
 
     def play(self, road: Path, out: Path, timeout: float) -> dict:
         """Play a road in a window on a virtual screen; return its results.
@@ -113,6 +120,7 @@ def real_blender(repository):
         work.mkdir(parents=True)
         blender = RealBlender(provision_blender.provision(), work, Path(__file__).parent)
         python = provision_blender.PYTHON_VERSION
+        blender.give_brushes()
         blender.install(build_zip.build("linux-x64", python, work, blender_range=("4.2.0", None), suffix="-local"))
         yield blender
 

@@ -337,6 +337,7 @@ class UI:
 
 def load_road(path: Path) -> Callable[[UI], Steps]:
     """Return a road's generator function."""
+    sys.path.insert(0, str(path.parent))  # roads share what users do again and again
     spec = importlib.util.spec_from_file_location(path.stem, path)
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)

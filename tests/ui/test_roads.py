@@ -33,3 +33,10 @@ def test_tutorial(play_road):
     assert values["size"] == pytest.approx([0.02, 0.05, 0], abs=1e-6)
     assert values["force"] == pytest.approx(0.97, abs=0.005)
     assert values["files"] == 62  # an image for each frame, the recording and the manifest
+
+
+def test_paint(play_road):
+    """From nothing to the first tactile image of a painted fingertip in less than two minutes of a person's time."""
+    values = play_road("paint", timeout=600)["values"]
+    assert values["seconds"] < 120
+    assert values["largest"] > 0

@@ -1,0 +1,85 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Something to press a new sensor with: a ball, a box or a rod that comes, presses, holds and goes, keyframed."""
+
+from __future__ import annotations
+
+import math
+
+import bmesh
+import bpy
+import numpy as np
+from mathutils import Matrix, Vector
+
+from ..core.errors import SensorError
+from . import preview, transforms
+
+APPROACH, PRESS, HOLD = 0.15, 0.45, 0.8
+"""Shares of the frame range at which it arrives, is deepest, and leaves again."""
+SIDES = 64
+
+
+def add(context, obj, shape: str, size: float, depth: float):
+    """Add a target that presses on the middle of a sensor along its normal.
+
+    Parameters
+    ----------
+    shape : {"BALL", "BOX", "ROD"}
+    size : float, metres
+        Radius; half the side of a box. 0: a third of the sensor's extent.
+    depth : float, metres
+        Of the deepest point. 0: a quarter of the maximum penetration.
+
+    Returns
+    -------
+    Object
+
+    Raises
+    ------
+    SensorError
+        The sensor has no texels.
+    """
+    report = preview.now(obj, context.scene)
+    if report.texels is None:
+        raise SensorError(report.problems[0].text)
+    texels, unit = report.texels, report.metres
+    extent = float(np.ptp(texels.position, axis=0).max())
+    size, depth = size or extent / 3, depth or report.reach / 4
+    weights = texels.area / texels.area.sum()
+    mean = weights @ texels.normal
+    mean = mean / np.linalg.norm(mean) if np.linalg.norm(mean) > 0.1 else texels.normal[0]
+    heights = texels.position @ mean
+    across = np.linalg.norm((texels.position - weights @ texels.position) @ (np.eye(3) - np.outer(mean, mean)), axis=1)
+    foot = texels.position[np.argmin(across - 1e-3 * heights)]  # of two texels over the middle, the outer one
+    location, quaternion, _ = transforms.split(transforms.array(obj.matrix_world))
+    rotation = transforms.rotation(quaternion)
+    normal, ground = rotation @ mean, location + rotation @ foot / unit
+    probe = bpy.data.objects.new("Probe", _mesh(shape, size / unit))
+    context.scene.collection.objects.link(probe)
+    probe.rotation_euler = Vector(normal).to_track_quat("Z", "Y").to_euler()
+    _animate(context.scene, probe, ground, normal, size / unit, depth / unit)
+    probe.palpate.role = "TARGET"
+    return probe
+
+
+def _animate(scene, probe, ground: np.ndarray, normal: np.ndarray, size: float, depth: float) -> None:
+    first, length = scene.frame_start, scene.frame_end - scene.frame_start
+    clear = max(2.0 * depth, 0.2 * size)
+    for share, height in ((0.0, clear), (APPROACH, 0.1 * depth), (PRESS, -depth), (HOLD, -depth), (1.0, clear)):
+        probe.location = ground + (size + height) * normal
+        probe.keyframe_insert("location", frame=round(first + share * length))
+
+
+def _mesh(shape: str, size: float):
+    mesh, data = bmesh.new(), bpy.data.meshes.new("Probe")
+    if shape == "BOX":
+        bmesh.ops.create_cube(mesh, size=2 * size)
+    elif shape == "ROD":
+        bmesh.ops.create_cone(mesh, cap_ends=True, segments=SIDES, radius1=size, radius2=size, depth=4 * size)
+        bmesh.ops.rotate(mesh, verts=mesh.verts, matrix=Matrix.Rotation(math.pi / 2, 3, "X"))
+    else:
+        bmesh.ops.create_uvsphere(mesh, u_segments=SIDES, v_segments=SIDES // 2, radius=size)
+        for face in mesh.faces:
+            face.smooth = True
+    mesh.to_mesh(data)
+    mesh.free()
+    return data

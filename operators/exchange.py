@@ -1,0 +1,112 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Sensors from and to files: OpenRAVE's XML (paper, Table 2) and the sensor as TOML."""
+
+from pathlib import Path
+
+import bpy
+from bpy.props import StringProperty
+from bpy_extras.io_utils import ExportHelper, ImportHelper
+
+from ..addon import exchange
+from ..core.errors import SceneError
+from . import support
+
+
+class PALPATE_OT_openrave_import(support.Reporting, ImportHelper, bpy.types.Operator):
+    """Read the parameters of the active sensor from OpenRAVE's XML (a SimTactileSensor, paper's Table 2)"""
+
+    bl_idname = "palpate.openrave_import"
+    bl_label = "OpenRAVE Tactile Sensor (.xml)"
+    bl_options = {"REGISTER", "UNDO"}
+
+    filename_ext = ".xml"
+    filter_glob: StringProperty(default="*.xml", options={"HIDDEN"})
+    sensor: StringProperty(
+        name="Sensor", description="Its name in the file, when there are several; else the one attached to this object", default=""
+    )
+
+    @classmethod
+    def poll(cls, context):
+        return support.sensor_object(cls, context)
+
+    def run(self, context):
+        from ..core.formats.openrave import read_openrave
+
+        obj = context.object
+        found = read_openrave(self.filepath)
+        matching = [item for item in found if item.name == self.sensor or (not self.sensor and item.link == obj.name)]
+        if len(found) == 1 and not self.sensor:
+            matching = found
+        if len(matching) != 1:
+            names = ", ".join(f"'{item.name}'" for item in found)
+            raise SceneError(f"'{Path(self.filepath).name}' has {len(found)} sensors: give the name of one, {names}.")
+        exchange.put_parameters(obj, matching[0].parameters)
+        self.report({"INFO"}, f"'{obj.name}' has the parameters of '{matching[0].name}'")
+        if matching[0].missing:
+            self.report({"WARNING"}, f"It leaves out {', '.join(matching[0].missing)}: the defaults are used")
+
+
+class PALPATE_OT_openrave_export(support.Reporting, ExportHelper, bpy.types.Operator):
+    """Write the selected sensors, or all of the scene when none is selected, as OpenRAVE's XML (paper's Table 2)"""
+
+    bl_idname = "palpate.openrave_export"
+    bl_label = "OpenRAVE Tactile Sensor (.xml)"
+
+    filename_ext = ".xml"
+    filter_glob: StringProperty(default="*.xml", options={"HIDDEN"})
+
+    @classmethod
+    def poll(cls, context):
+        if not any(obj.palpate.role == "SENSOR" for obj in context.scene.objects):
+            cls.poll_message_set("There is no sensor in this scene: use Make Sensor first")
+            return False
+        return True
+
+    def run(self, context):
+        from ..core.formats.openrave import OpenRaveSensor, write_openrave
+
+        sensors = [obj for obj in context.selected_objects if obj.palpate.role == "SENSOR"]
+        sensors = sensors or [obj for obj in context.scene.objects if obj.palpate.role == "SENSOR"]
+        write_openrave(self.filepath, [OpenRaveSensor(o.name, o.name, exchange.parameters(o)) for o in sensors])
+        self.report({"INFO"}, f"Wrote {len(sensors)} sensors to '{self.filepath}'")
+
+
+class PALPATE_OT_sensor_toml_import(support.Reporting, ImportHelper, bpy.types.Operator):
+    """Read a sensor.toml: parameters and effects for the active sensor, or a new pad when none is active and it has a grid"""
+
+    bl_idname = "palpate.sensor_toml_import"
+    bl_label = "Palpate Sensor (.toml)"
+    bl_options = {"REGISTER", "UNDO"}
+
+    filename_ext = ".toml"
+    filter_glob: StringProperty(default="*.toml", options={"HIDDEN"})
+
+    def run(self, context):
+        obj, effects = exchange.load_toml(context, self.filepath)
+        self.report({"INFO"}, f"'{obj.name}' has the parameters and {effects} effects of '{Path(self.filepath).name}'")
+
+
+class PALPATE_OT_sensor_toml_export(support.Reporting, ExportHelper, bpy.types.Operator):
+    """Write the active sensor as TOML: its parameters and effects, and its grid where it is a flat one"""
+
+    bl_idname = "palpate.sensor_toml_export"
+    bl_label = "Palpate Sensor (.toml)"
+
+    filename_ext = ".toml"
+    filter_glob: StringProperty(default="*.toml", options={"HIDDEN"})
+
+    @classmethod
+    def poll(cls, context):
+        return support.sensor_object(cls, context)
+
+    def run(self, context):
+        exchange.save_toml(context, context.object, self.filepath)
+        self.report({"INFO"}, f"Wrote '{context.object.name}' to '{self.filepath}'")
+
+
+CLASSES = (
+    PALPATE_OT_openrave_import,
+    PALPATE_OT_openrave_export,
+    PALPATE_OT_sensor_toml_import,
+    PALPATE_OT_sensor_toml_export,
+)

@@ -1,0 +1,129 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Parameters of a sensor from measurements: stiffness of its foam, friction of its surface; the plot is shown."""
+
+from pathlib import Path
+
+import bpy
+from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
+from bpy_extras.io_utils import ImportHelper
+
+from ..addon import exchange, preview
+from ..core.errors import SensorError
+from . import support
+
+DAMPING = 0.01
+"""Damping suggested for a stiffness, as a share of it in number (paper, section 3.4.1)."""
+
+
+class Fit(support.Reporting, ImportHelper):
+    """What both fits share: a CSV is chosen, values are put on the active sensor, and a picture is shown."""
+
+    filename_ext = ".csv"
+    filter_glob: StringProperty(default="*.csv;*.txt", options={"HIDDEN"})
+    plot: StringProperty(
+        name="Plot", description="Also write the plot here: .png, .pdf or .svg", subtype="FILE_PATH", options={"SKIP_SAVE"}
+    )
+
+    @classmethod
+    def poll(cls, context):
+        return support.sensor_object(cls, context)
+
+    def picture(self, context, draw, fit, title: str) -> None:
+        """Draw a fit, keep it in the .blend as an image, and show it."""
+        path = Path(bpy.app.tempdir) / f"{title}.png"
+        draw(path, fit)
+        if self.plot:
+            draw(Path(bpy.path.abspath(self.plot)), fit)
+        show_image(context, path, title)
+
+
+def show_image(context, path: Path, title: str) -> None:
+    """Put a picture into the file, and into an image editor: one that is open, else one in a window of its own."""
+    old = bpy.data.images.get(title)
+    if old is not None:
+        bpy.data.images.remove(old)
+    image = bpy.data.images.load(str(path))
+    image.name = title
+    image.pack()
+    if bpy.app.background:
+        return
+    areas = [area for window in context.window_manager.windows for area in window.screen.areas]
+    editor = next((area for area in areas if area.type == "IMAGE_EDITOR" and area.spaces.active.mode == "VIEW"), None)
+    if editor is None:
+        bpy.ops.wm.window_new()
+        editor = max(context.window_manager.windows[-1].screen.areas, key=lambda area: area.width * area.height)
+        editor.type = "IMAGE_EDITOR"
+    editor.spaces.active.image = image
+    editor.tag_redraw()
+
+
+class PALPATE_OT_stiffness_fit(Fit, bpy.types.Operator):
+    """Fit the stiffness k of the active sensor's texels to foam measurements (Eq. 18, Fig. 6): a CSV with the columns
+    compression (m) and pressure (Pa), force (N) or mass (kg)"""
+
+    bl_idname = "palpate.stiffness_fit"
+    bl_label = "Stiffness from Foam…"
+    bl_options = {"REGISTER", "UNDO"}
+
+    line: EnumProperty(
+        name="Line",
+        description="Which of the two lines gives the stiffness",
+        items=(
+            ("ZERO", "Through Zero", "No force without depth, as the model has it"),
+            ("OFFSET", "With Offset", "The slope alone; the foam may give way before it carries"),
+        ),
+    )
+    weight_area: FloatProperty(
+        name="Weight Area (m²)", description="What forces or masses rested on, m²; pressures need none", min=0.0, precision=8
+    )
+    with_damping: BoolProperty(name="Damping 1 % of k", description="Also set cn, to 1 % of k in number", default=True)
+
+    def run(self, context):
+        from ..core.calibrate.plots import plot_stiffness
+        from ..core.calibrate.stiffness import fit_stiffness, read_foam
+
+        obj = context.object
+        report = preview.now(obj, context.scene)
+        if report.texels is None:
+            raise SensorError(report.problems[0].text)
+        fit = fit_stiffness(read_foam(self.filepath, self.weight_area or None), report.area, len(report.texels))
+        chosen = fit.k if self.line == "ZERO" else fit.k_offset
+        obj.palpate.k = chosen.value
+        if self.with_damping:
+            obj.palpate.cn = DAMPING * chosen.value
+        self.picture(context, plot_stiffness, fit, "Palpate Stiffness Fit")
+        text = f"k = {chosen.value:.4g} N/m (95 %: {chosen.low:.4g} to {chosen.high:.4g}) for {len(report.texels)} texels"
+        if fit.offset_is_real and fit.dead_zone > 0:
+            text += f"; the foam gives way by {fit.dead_zone * 1e3:.3g} mm before it carries: add the effect dead-zone for it"
+        self.report({"INFO"}, text)
+
+
+class PALPATE_OT_friction_fit(Fit, bpy.types.Operator):
+    """Fit the friction of the active sensor's texels to a force–velocity curve (Eq. 13, Fig. 7): a CSV with the columns
+    velocity (m/s) and force (N), in steady sliding, or with a column time (s) as well, recorded from rest"""
+
+    bl_idname = "palpate.friction_fit"
+    bl_label = "Friction from Curve…"
+    bl_options = {"REGISTER", "UNDO"}
+
+    normal_force: FloatProperty(
+        name="Normal Force (N)", description="On one texel while it was measured, N", default=0.08, min=1e-9, precision=5
+    )
+    texels: IntProperty(name="Texels", description="How many texels shared the measured force", default=1, min=1)
+
+    def run(self, context):
+        from ..core.calibrate.friction import fit_friction, read_friction
+        from ..core.calibrate.plots import plot_friction
+
+        obj = context.object
+        fit = fit_friction(read_friction(self.filepath, self.texels), self.normal_force, exchange.parameters(obj))
+        exchange.put_parameters(obj, fit.parameters)
+        self.picture(context, plot_friction, fit, "Palpate Friction Fit")
+        values = ", ".join(f"{name} = {e.value:.3g} ({e.low:.3g} to {e.high:.3g})" for name, e in fit.estimates.items())
+        self.report({"INFO"}, values)
+        if fit.untold:
+            names = ", ".join(fit.untold)
+            self.report({"WARNING"}, f"These measurements do not tell {names}: add some at other velocities")
+
+
+CLASSES = (PALPATE_OT_stiffness_fit, PALPATE_OT_friction_fit)

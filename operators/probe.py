@@ -1,0 +1,49 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Try a sensor out."""
+
+import bpy
+from bpy.props import EnumProperty, FloatProperty
+
+from ..addon import probes
+from . import support
+
+
+class PALPATE_OT_probe_add(support.Reporting, bpy.types.Operator):
+    """Add something that presses on the middle of the active sensor, holds and goes, over the scene's frame range"""
+
+    bl_idname = "palpate.probe_add"
+    bl_label = "Add Probe"
+    bl_options = {"REGISTER", "UNDO"}
+
+    shape: EnumProperty(
+        name="Shape",
+        description="Of the probe",
+        items=(
+            ("BALL", "Ball", "A sphere"),
+            ("ROD", "Rod", "A cylinder that lies on the sensor"),
+            ("BOX", "Box", "A cube, flat on the sensor"),
+        ),
+    )
+    size: FloatProperty(
+        name="Radius (m)", description="Half a box's side; 0 is a third of the sensor's extent", min=0.0, precision=5, step=0.1
+    )
+    depth: FloatProperty(
+        name="Depth (m)",
+        description="How deep it presses; 0 is a quarter of the maximum penetration",
+        min=0.0,
+        precision=5,
+        step=0.01,
+    )
+
+    @classmethod
+    def poll(cls, context):
+        return support.mesh_object(cls, context) and support.sensor_object(cls, context)
+
+    def run(self, context):
+        support.leave_edit_mode(context)
+        probe = probes.add(context, context.object, self.shape, self.size, self.depth)
+        context.scene.frame_set(context.scene.frame_start)
+        self.report({"INFO"}, f"'{probe.name}' presses on '{context.object.name}': press Space to play")
+
+
+CLASSES = (PALPATE_OT_probe_add,)

@@ -1,0 +1,49 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Add Probe: something that presses on a new sensor, as deep as it says, wherever the sensor is."""
+
+import bpy
+import numpy as np
+import pytest
+from blender_scenes import ball, grid
+
+from palpate.addon import sample
+from palpate.core.drive import drive
+from palpate.core.solve import run
+
+
+@pytest.mark.parametrize("shape", ["BALL", "BOX", "ROD"])
+def test_it_presses_as_deep_as_it_says_and_goes(shape):
+    scene = bpy.context.scene
+    scene.frame_start, scene.frame_end = 1, 41
+    pad = grid(columns=15, rows=15)
+    pad.location, pad.rotation_euler = (0.1, -0.2, 0.3), (0.5, 1.0, -0.7)
+    bpy.ops.palpate.sensor_add()
+    assert bpy.ops.palpate.probe_add(shape=shape, size=0.01, depth=0.002) == {"FINISHED"}
+    assert bpy.context.object == pad  # the sensor stays active, so that its panel shows what it feels
+    assert bpy.data.objects["Probe"].palpate.role == "TARGET"
+    felt = run(drive(sample.sample_scenario(scene))[0]).sensors["Pad"]
+    assert felt.depth.max() == pytest.approx(0.002, rel=0.01)
+    assert felt.contact.any(axis=1).sum() > 15
+    assert not felt.contact[0].any() and not felt.contact[-1].any()
+    deepest = felt.depth.max(axis=1).argmax()
+    side = felt.centre_of_pressure[deepest]
+    assert np.linalg.norm(side) < 0.003
+
+
+def test_a_probe_for_a_curved_sensor_of_any_size():
+    ball(radius=0.05)
+    bpy.ops.palpate.skin_add(source="MESH", method="NOISE", spacing=0.01)
+    finger = bpy.context.object
+    bpy.context.scene.frame_end = 20
+    bpy.ops.palpate.probe_add()
+    felt = run(drive(sample.sample_scenario(bpy.context.scene))[0]).sensors[finger.name]
+    assert 0 < felt.depth.max() <= finger.palpate.max_penetration / 4 + 1e-6
+
+
+def test_without_a_sensor_there_is_no_probe():
+    grid()
+    assert not bpy.ops.palpate.probe_add.poll()
+    bpy.ops.palpate.sensor_add()
+    bpy.context.object.palpate.region = "GROUP"
+    with pytest.raises(RuntimeError, match="no vertex group"):
+        bpy.ops.palpate.probe_add()
