@@ -9,7 +9,7 @@ from bpy_extras.object_utils import object_data_add
 from ..core.errors import SceneError
 from ..core.layout import GridLayout
 from ..core.scenario import SensorParameters
-from . import effects, properties, sample, sensors, skins, units
+from . import effects, properties, sample, sensors, skins
 
 
 def parameters(obj) -> SensorParameters:
@@ -95,10 +95,11 @@ def _grid_words(context, obj) -> dict:
         return {}
     table = np.empty((layout.rows, layout.columns, 3))
     table[layout.row, layout.column] = texels.position
-    across, along = table[0, 1] - table[0, 0], table[1, 0] - table[0, 0]
+    across = (table[0, -1] - table[0, 0]) / (layout.columns - 1)
+    along = (table[-1, 0] - table[0, 0]) / (layout.rows - 1)
     steps = np.arange(layout.columns)[None, :, None] * across + np.arange(layout.rows)[:, None, None] * along
     pitch = [float(np.linalg.norm(across)), float(np.linalg.norm(along))]
     same = np.abs(table - table[0, 0] - steps).max() < 1e-3 * min(pitch)
     if not same or abs(across @ along) > 1e-3 * pitch[0] * pitch[1]:
         return {}
-    return {"grid": {"rows": layout.rows, "columns": layout.columns, "pitch": [units.as_typed(value) for value in pitch]}}
+    return {"grid": {"rows": layout.rows, "columns": layout.columns, "pitch": [float(f"{p:.6g}") for p in pitch]}}

@@ -22,7 +22,9 @@ class PALPATE_OT_openrave_import(support.Reporting, ImportHelper, bpy.types.Oper
     filename_ext = ".xml"
     filter_glob: StringProperty(default="*.xml", options={"HIDDEN"})
     sensor: StringProperty(
-        name="Sensor", description="Its name in the file, when there are several; else the one attached to this object", default=""
+        name="Sensor",
+        description="Its name in the file, when there are several; else the one attached to this object",
+        default="",
     )
 
     @classmethod

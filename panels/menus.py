@@ -19,6 +19,7 @@ class PALPATE_MT_object(bpy.types.Menu):
         layout.operator("palpate.probe_add")
         layout.operator("palpate.parameters_copy")
         layout.operator_menu_enum("palpate.fix", "kind")
+        layout.operator_menu_enum("palpate.effect_add", "effect")
         layout.operator("palpate.sensor_remove", icon="X")
         layout.separator()
         layout.operator("palpate.stiffness_fit")
@@ -26,6 +27,7 @@ class PALPATE_MT_object(bpy.types.Menu):
         layout.separator()
         layout.operator("palpate.bake", icon="RENDER_ANIMATION")
         layout.operator("palpate.bake_clear")
+        layout.operator("palpate.dress")
         layout.operator("palpate.reset")
 
 
