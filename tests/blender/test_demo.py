@@ -186,16 +186,23 @@ def test_a_scene_without_camera_says_so(scene, tmp_path):
 # --- the committed files
 
 
+def plain(value):
+    """Return settings, with the groups and lists inside them, as plain values."""
+    if isinstance(value, bpy.types.PropertyGroup):
+        skip = {"rna_type", "name", "uid", "schema_version"}
+        return {key: plain(getattr(value, key)) for key in value.bl_rna.properties.keys() if key not in skip}  # noqa: SIM118
+    if isinstance(value, bpy.types.ID):
+        return value.name
+    return [plain(item) for item in value] if hasattr(value, "__len__") and not isinstance(value, str) else value
+
+
 def described(scene):
     """What a sample is made of, in plain numbers."""
     found = {}
     for obj in scene.objects:
         settings = {}
         if obj.palpate.role != "NONE":
-            skip = {"rna_type", "name", "uid", "schema_version"}
-            keys = [key for key in obj.palpate.bl_rna.properties.keys() if key not in skip]  # noqa: SIM118
-            values = {key: getattr(obj.palpate, key) for key in keys}
-            settings = {key: tuple(v) if hasattr(v, "__len__") and not isinstance(v, str) else v for key, v in values.items()}
+            settings = plain(obj.palpate)
         shape = evaluated(obj)[0].round(4).tolist() if obj.type == "MESH" else None
         found[obj.name] = (settings, shape)
     for frame in range(scene.frame_start, scene.frame_end + 1, 7):
