@@ -148,7 +148,11 @@ def _settings(scene, path: Path, frame: int, samples: int | None, size) -> Itera
     changes: list[tuple[object, str, object]] = []
     if hasattr(image, "media_type"):  # Blender 5.0: decides which file formats there are to choose from
         changes.append((image, "media_type", "IMAGE"))
-    changes += [(image, "file_format", "PNG"), (image, "color_mode", "RGB"), (image, "color_depth", "8")]
+    changes += [
+        (image, "file_format", "PNG"),
+        (image, "color_mode", "RGBA" if render.film_transparent else "RGB"),
+        (image, "color_depth", "8"),
+    ]
     changes += [(render, "filepath", str(path)), (render, "use_file_extension", False), (render, "use_overwrite", True)]
     if size is not None:
         changes += [(render, "resolution_x", int(size[0])), (render, "resolution_y", int(size[1]))]

@@ -19,7 +19,7 @@ from . import console
 COMMANDS = {
     "demo": "build, bake and render the demo scene, and print what the pads feel",
     "bake": "bake the sensors of a .blend to tactile images",
-    "render": "render the frames of a baked scene",
+    "render": "make pictures, figures and a video of a baked scene",
     "export": "write a bake as CSV, NPZ, HDF5 or PNG",
     "fit": "estimate stiffness and friction from measurements",
     "gap": "find what the model misses against a real sensor",

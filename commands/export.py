@@ -5,9 +5,8 @@ from __future__ import annotations
 
 import argparse
 
-from ..core.bakes import Bake, read_bake, read_sensors
+from ..core.bakes import Bake, read_bake
 from ..core.drive import drive
-from ..core.errors import SceneError
 from ..core.figures import Look
 from ..core.formats.export import KINDS, export
 from . import console, looks
@@ -56,20 +55,6 @@ def find_bake(where: str) -> Bake:
     with console.quiet():
         bpy = blender.start()
         blender.open_blend(where)
-        return of_scene(bpy.context.scene)
+        from ..addon import pictures
 
-
-def of_scene(scene) -> Bake:
-    """Read the bake that a scene plays.
-
-    Raises
-    ------
-    PalpateError
-        It plays none, or its files are gone.
-    """
-    from ..addon import write
-
-    places = write.bake_folders(scene)
-    if not places:
-        raise SceneError(f"'{scene.name}' is not baked: run 'palpate bake' on it with --save first.")
-    return read_sensors(list(places.values()))
+        return pictures.bake_of(bpy.context.scene)

@@ -53,7 +53,7 @@ def tidy_axes(axes: Axes) -> None:
         axes.spines[side].set_linewidth(0.6)
 
 
-def save_figure(figure: Figure, path: str | Path, dpi: int) -> None:
+def save_figure(figure: Figure, path: str | Path, dpi: float) -> None:
     """Write the figure, whole or not at all, as PNG, PDF or SVG by its ending.
 
     The same figure gives the same bytes: PDF without a date. Fonts go into it as such, so that a journal can edit the text.
@@ -81,7 +81,7 @@ def save_figure(figure: Figure, path: str | Path, dpi: int) -> None:
     _write(figure, path, dpi, kind, metadata)
 
 
-def _write(figure: Figure, path: Path, dpi: int, kind: str, metadata: dict[str, Any]) -> None:
+def _write(figure: Figure, path: Path, dpi: float, kind: str, metadata: dict[str, Any]) -> None:
     import matplotlib
 
     plain = {"pdf.fonttype": 42, "svg.fonttype": "none", "svg.hashsalt": "palpate"}

@@ -8,6 +8,7 @@ written figure. What a figure looks like is said once, by a :class:`Look`, for a
 from .curves import force_curves, time_curves
 from .look import Look
 from .numbers import texel_numbers
+from .panels import side_by_side
 from .pictures import Label, label_picture
 from .strips import tactile_strip
 
@@ -16,6 +17,7 @@ __all__ = [
     "Look",
     "force_curves",
     "label_picture",
+    "side_by_side",
     "tactile_strip",
     "texel_numbers",
     "time_curves",

@@ -12,7 +12,7 @@ import pytest
 from blender_scenes import cube, press_and_drop, save
 
 from palpate.addon.bake import bake
-from palpate.core import colormaps
+from palpate.core import colormaps, measures
 from palpate.core.drive import drive
 
 FRAMES = (1, 7, 8)
@@ -108,7 +108,7 @@ def test_every_texel_has_the_colour_of_its_force(scene_file, tmp_path):
     path, recording = scene_file
     seen = watch(path, tmp_path, "seen", False)
     force = recording.sensors["Pad"].normal_force
-    end = max(sensor.normal_force.max() for sensor in recording.sensors.values())  # one scale for all
+    end = measures.scale_limit(measures.peak_force(recording))  # one scale for all
     for frame in FRAMES:
         shot = seen["frames"][str(frame)]
         width, height = shot["size"]

@@ -1,0 +1,83 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""``palpate render``: pictures of a baked scene, its tactile images, curves and numbers, and a video of both."""
+
+from __future__ import annotations
+
+import argparse
+
+from ..core.canvas import KINDS as FORMATS
+from ..core.drive import drive
+from ..core.formats.files import remove_leftovers, writable_folder
+from . import blender, console, looks
+
+FIGURES = ("scene", "strip", "curves", "numbers", "video")
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("scene", metavar="SCENE.blend", help="a baked file")
+    parser.add_argument("--out", metavar="DIR", default="palpate-figures", help="folder to write to (default: %(default)s)")
+    parser.add_argument(
+        "--only", metavar="FIGURE", action="append", choices=FIGURES,
+        help=f"{', '.join(FIGURES)}; may be given again (default: all but the video)",
+    )  # fmt: skip
+    parser.add_argument("--sensor", metavar="NAME", action="append", help="only this sensor; may be given again")
+    parser.add_argument(
+        "--frame", metavar="N", type=int, action="append",
+        help="frame of scene and numbers, two or more also of the strip; may be given again (default: with the largest force)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--format", metavar="KIND", action="append", choices=FORMATS, help="of figures: png, pdf, svg (default: png and pdf)"
+    )
+    parser.add_argument("--engine", choices=("cycles", "eevee", "workbench"), help="default: the scene's")
+    parser.add_argument("--size", metavar=("W", "H"), nargs=2, type=_positive, default=(1280, 960), help="of renders, pixels")
+    parser.add_argument("--samples", metavar="N", type=_positive, help="per pixel of renders (default: the scene's)")
+    parser.add_argument("--view", metavar=("AZIMUTH", "ELEVATION"), nargs=2, type=float, help="of the camera, degrees")
+    parser.add_argument("--own-camera", action="store_true", help="leave the scene's camera where it is")
+    parser.add_argument("--transparent", action="store_true", help="no background")
+    looks.add_arguments(parser)
+
+
+def _positive(text: str) -> int:
+    value = int(text)
+    if not 0 < value <= 16384:
+        raise argparse.ArgumentTypeError(f"{value} is not between 1 and 16384")
+    return value
+
+
+def run(arguments: argparse.Namespace) -> int:
+    folder = writable_folder(arguments.out, create=True)
+    with console.quiet():
+        bpy = blender.start()
+        from ..addon import pictures
+
+        blender.open_blend(arguments.scene)
+        scene = bpy.context.scene
+        wish = pictures.Wish(
+            look=looks.of(arguments, **vars(pictures.look_of(scene))),
+            frames=tuple(arguments.frame or ()),
+            sensors=tuple(arguments.sensor or ()),
+            engine=arguments.engine,
+            view=tuple(arguments.view) if arguments.view else None,
+            transparent=arguments.transparent,
+            own_camera=arguments.own_camera,
+            size=tuple(arguments.size),
+            samples=arguments.samples,
+            **({"kinds": tuple(arguments.only)} if arguments.only else {}),
+            **({"formats": tuple(arguments.format)} if arguments.format else {}),
+        )
+        stopped = "palpate render: stopped; figures that were finished are there."
+        with (
+            console.progress_bar("render", 1, unit="step") as bar,
+            console.stop_at_once(stopped, lambda: remove_leftovers(folder)),
+        ):
+
+            def show(progress) -> None:
+                console.Interrupt.check()
+                bar.total = progress.total
+                bar.set_description(f"{progress.stage}, frame {progress.frame}", refresh=False)
+                bar.update(progress.done - bar.n)
+
+            written = drive(pictures.make(scene, folder, wish), show)
+    for path in written:
+        print(path)
+    return 0

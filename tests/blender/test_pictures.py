@@ -1,0 +1,111 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""All figures of a baked scene in one go; the scene is afterwards what it was before."""
+
+import bpy
+import numpy as np
+import pytest
+from blender_scenes import changes, dump, press_and_drop, save
+
+from palpate.addon import pictures, render, studio, video
+from palpate.addon.bake import bake
+from palpate.commands import main
+from palpate.core.drive import drive
+from palpate.core.errors import FileError, ParameterError, SceneError
+from palpate.core.figures import Look
+
+
+@pytest.fixture
+def baked(tmp_path):
+    scene, *_ = press_and_drop(frames=4)
+    scene.render.engine = "CYCLES"
+    scene.cycles.samples, scene.cycles.use_denoising = 1, False
+    path = save(tmp_path)
+    drive(bake(scene))
+    save(tmp_path)
+    return scene, path
+
+
+def image(path):
+    from matplotlib.image import imread
+
+    return imread(path)
+
+
+def test_everything_at_once_and_nothing_left_behind(baked, tmp_path):
+    scene, _ = baked
+    before = dump()
+    worlds, lights, cameras = len(bpy.data.worlds), len(bpy.data.lights), len(bpy.data.cameras)
+    wish = pictures.Wish(pictures.KINDS, Look(dpi=50), frames=(3, 4), size=(96, 64), samples=1, formats=("png", "pdf"))
+    stages = []
+    written = drive(pictures.make(scene, tmp_path / "out", wish), lambda step: stages.append((step.done, step.total)))
+    assert {path.name for path in written} == {path.name for path in (tmp_path / "out").iterdir()}
+    assert {path.suffix for path in written} == {".png", ".pdf", ".mp4"}
+    assert image(tmp_path / "out" / "scene 0003.png").shape[:2] == (64, 96)
+    assert image(tmp_path / "out" / "scene and touch 0003.png").shape[0] == 64
+    assert (tmp_path / "out" / "video.mp4").stat().st_size > 1000
+    assert stages[-1][0] == stages[-1][1] and [done for done, _ in stages] == sorted(done for done, _ in stages)
+    assert [line for line in changes(before, dump()) if "Render Result" not in line] == []  # Blender's own
+    assert (len(bpy.data.worlds), len(bpy.data.lights), len(bpy.data.cameras)) == (worlds, lights, cameras)
+    assert len(bpy.data.scenes) == 1
+
+
+def test_the_video_has_a_picture_per_frame(baked, tmp_path):
+    from matplotlib.image import imsave
+
+    for i, grey in enumerate((0.1, 0.5, 0.9)):
+        imsave(tmp_path / f"{i}.png", np.full((64, 96, 3), grey))
+    path = video.encode([tmp_path / f"{i}.png" for i in range(3)], tmp_path / "out", 24.0)
+    clip = bpy.data.movieclips.load(str(path))
+    assert clip.frame_duration == 3 and tuple(clip.size) == (96, 64) and clip.fps == pytest.approx(24.0)
+    assert [path.name for path in tmp_path.glob("*.mp4")] == ["out.mp4"]
+
+
+def test_all_that_matters_is_in_the_picture_and_lit(baked, tmp_path):
+    scene, _ = baked
+    with studio.photographed(scene, [1, 4], view=(-60.0, 35.0), transparent=True):
+        points = render.corners(studio.seen_objects(scene))
+        places = np.array([render.picture_position(scene, point) for point in points])
+        render.render_frame(scene, tmp_path / "a.png", 4, samples=4, size=(96, 64))
+    assert (places > 0.0).all() and (places < 1.0).all()
+    picture = image(tmp_path / "a.png")
+    assert picture.shape[2] == 4 and (picture[..., 3] == 0.0).any()  # no background
+    covered = picture[..., 3] > 0.9
+    assert covered.any() and picture[covered][:, :3].mean() > 0.1
+
+
+def test_the_scene_shows_the_colours_of_the_colour_bar(baked):
+    """The heat map ends where the figures' colour bar does."""
+    scene, _ = baked
+    made = pictures.bake_of(scene)
+    pad = scene.objects["Pad"]
+    nodes = pad.material_slots[-1].material.node_tree.nodes
+    end = next(node.inputs[1].default_value for node in nodes if "maximum" in node.label)
+    assert end == pytest.approx(pictures.look_of(scene).top(made.recording, made.texels))
+
+
+def test_a_scene_that_is_not_baked_and_a_frame_that_is_not_are_one_sentence(baked, tmp_path):
+    scene, _ = baked
+    with pytest.raises(FileError, match="from 1 to 4"):
+        drive(pictures.make(scene, tmp_path / "out", pictures.Wish(frames=(9,))))
+    bpy.ops.palpate.bake_clear()
+    with pytest.raises(SceneError, match="is not baked"):
+        drive(pictures.make(scene, tmp_path / "out", pictures.Wish()))
+    with pytest.raises(ParameterError, match="choose from"):
+        pictures.Wish(kinds=("hologram",))
+
+
+def test_an_error_in_the_middle_puts_the_scene_back(baked):
+    scene, _ = baked
+    before = dump()
+    with pytest.raises(RuntimeError), studio.photographed(scene, [1], engine="workbench", transparent=True):
+        raise RuntimeError
+    assert changes(before, dump()) == [] and scene.camera is None and scene.render.engine == "CYCLES"
+
+
+def test_the_command(baked, tmp_path, capsys):
+    _, path = baked
+    words = ["render", str(path), "--out", str(tmp_path / "out"), "--only", "strip", "--only", "numbers", "--format", "pdf"]
+    assert main([*words, "--sensor", "Pad", "--colour-map", "paper", "--quantity", "pressure", "--width", "single"]) == 0
+    assert sorted(item.name for item in (tmp_path / "out").iterdir()) == ["numbers Pad 0004.pdf", "strip.pdf"]
+    assert main([*words, "--sensor", "Thumb"]) == 1
+    assert "There is no sensor 'Thumb'" in capsys.readouterr().err
