@@ -268,6 +268,38 @@ class Drive:
 
 
 @dataclass(frozen=True)
+class Deformation:
+    """A surface that changes its shape in its body's frame; linear between samples, held before the first and after the last.
+
+    Attributes
+    ----------
+    times : (m,) float, seconds, increasing
+    values : (m, n, c) float
+        Of a target: position of each vertex of its mesh, metres. Of a sensor: position (m), normal and tangent of each texel.
+    """
+
+    times: np.ndarray
+    values: np.ndarray
+
+    def extended(self, time: float, values: np.ndarray) -> Deformation:
+        """Return this with one more sample at its end and all but the last two left out (the timeline looks only ahead)."""
+        return Deformation(np.append(self.times[-1:], time), np.concatenate([self.values[-1:], values[None]]))
+
+    def check(self, name: str, shape: tuple[int, ...]) -> None:
+        """Raise :class:`SceneError` when the samples do not fit a surface of `shape`, or one is no number."""
+        if self.values.shape != (len(self.times), *shape):
+            raise SceneError(
+                f"'{name}' deforms with {self.values.shape[1]} vertices and has {shape[0]}: "
+                "use modifiers that keep the number of vertices."
+            )
+        if not np.isfinite(self.values).all():
+            time = self.times[np.flatnonzero(~np.isfinite(self.values).all(axis=(1, 2)))[0]]
+            raise SceneError(
+                f"A vertex of '{name}' is NaN or infinite {time:g} s after the first frame: check what deforms it."
+            )
+
+
+@dataclass(frozen=True)
 class Body:
     """A rigid body: free when forces move it, driven when it has a drive, else keyframed.
 
@@ -317,6 +349,7 @@ class Sensor:
     parameters: SensorParameters = field(default_factory=SensorParameters)
     readout: bool = True
     painted: Painted = field(default_factory=Painted)
+    deformation: Deformation | None = None
     effects: tuple[Effect, ...] = ()
 
     @property
@@ -329,11 +362,25 @@ class Sensor:
 
 @dataclass(frozen=True)
 class Target:
-    """A surface that presses on sensors; its mesh is in the frame of its body, metres."""
+    """A surface that presses on sensors.
+
+    Attributes
+    ----------
+    name : str
+    body : int
+    mesh : TriangleMesh
+        In the frame of its body, metres; its shape at the first frame.
+    deformation : Deformation or None
+        Where its vertices go, when it is not rigid.
+    smooth : bool
+        Whether the contact normals are interpolated between the vertices, as for smooth shading, or those of the triangles.
+    """
 
     name: str
     body: int
     mesh: TriangleMesh
+    deformation: Deformation | None = None
+    smooth: bool = False
 
 
 @dataclass(frozen=True)
@@ -391,6 +438,11 @@ class Scenario:
         for sensor in self.sensors:
             sensor.parameters.check(sensor.name)
             sensor.painted.check(sensor.name, len(sensor.texels))
+            if sensor.deformation is not None:
+                sensor.deformation.check(sensor.name, (len(sensor.texels), 9))
+        for target in self.targets:
+            if target.deformation is not None:
+                target.deformation.check(target.name, target.mesh.vertices.shape)
             check_effects(sensor.effects, sensor.name, len(sensor.texels), sensor.parameters.gain)
         for body in self.bodies:
             if body.moved_by_forces and not (np.isfinite(body.mass) and body.mass > 0):

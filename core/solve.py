@@ -15,9 +15,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from .bodies import DRIVEN, FREE, KEYFRAMED, poses_at, quaternion_product, rotation_matrices, rotation_vectors
-from .bvh import NEAR, build_tree
-from .contact import Neighbours, State, World, count_buried, parameter_row
+from .bvh import NEAR, Tree, build_tree
+from .contact import State, World, parameter_row
 from .drive import drive
+from .gather import Neighbours, count_buried
 from .mesh import is_closed
 from .pilot import Pilot
 from .points import ContactPoints, contact_points
@@ -25,8 +26,9 @@ from .recording import Frame, Recording, SensorFrame
 from .respond import Reader
 from .scenario import Scenario, Sensor, Target
 from .servo import drive_table
-from .step import advance_steps, contacts_of, feel, gather_all, scratch_for
-from .texels import Texels
+from .shapes import Shapes
+from .step import Scratch, advance_steps, contacts_of, feel, gather_all, scratch_for
+from .surfaces import Surfaces, extent, point_rows
 from .timestep import advise
 
 
@@ -77,28 +79,46 @@ class Simulation:
         self._tree = build_tree(meshes)
         self._closed = [is_closed(mesh.triangles) for mesh in meshes]
         self._sunk = 0  # most texels at once that the substeps of the last frame found past their reach
-        self._world = _world(scenario, self._center)
+        points = [contact_points(s.texels, s.parameters.points_per_texel) for s in scenario.sensors]
+        self._world = _world(scenario, self._center, points)
+        self._surfaces = Surfaces(scenario, self._center, points, self._tree, self._world)
+        self._shapes = self._surfaces.at(np.zeros(1))
         self._state = _start(scenario, self._world, self._center)
         self._neighbours = _neighbours(self._world, self._state)
-        self._scratch = scratch_for(self._world, self._state)
+        self._scratch = scratch_for(self._world, self._state, self._shapes)
         self._readers = [Reader.of(sensor) for sensor in scenario.sensors]
         self._pilot = Pilot(scenario)
         self._texel_start = _texel_start(scenario)
+
+    @property
+    def _arrays(self) -> tuple[World, Tree, Neighbours, Shapes, State, Scratch]:
+        """What the kernels work on."""
+        return self._world, self._tree, self._neighbours, self._shapes, self._state, self._scratch
 
     @property
     def time(self) -> float:
         """Seconds since the first frame."""
         return (self.frame - self.scenario.frame_start) / self.scenario.fps
 
-    def extend(self, poses: Mapping[int, tuple[np.ndarray, np.ndarray]], targets: Mapping[int, float] | None = None) -> None:
-        """Append where keyframed bodies, and driven ones without their drives, will be at the next frame.
+    def extend(
+        self,
+        poses: Mapping[int, tuple[np.ndarray, np.ndarray]],
+        targets: Mapping[int, float] | None = None,
+        vertices: Mapping[int, np.ndarray] | None = None,
+        texels: Mapping[int, np.ndarray] | None = None,
+    ) -> None:
+        """Append where keyframed bodies, and driven ones without their drives, will be next, and deforming surfaces.
 
         Parameters
         ----------
         poses : mapping of body index to (position (3,) m, quaternion (4,))
         targets : mapping of body index to float, optional
             Of their drives.
+        vertices : mapping of target index to (nv, 3) float, metres, in the body's frame, optional
+        texels : mapping of sensor index to (n, 9) float, optional
+            See :attr:`.Texels.frames`.
         """
+        self._surfaces.extend(self._time_of(self.frame + 1), vertices or {}, texels or {})
         time = self._time_of(self.frame + 1)
         for body, (position, quaternion) in poses.items():
             motion = self._motions[body]
@@ -118,12 +138,11 @@ class Simulation:
         conjugate = quaternions[:-1] * np.array([1.0, -1.0, -1.0, -1.0])
         turns = rotation_vectors(quaternion_product(quaternions[1:], conjugate))
         velocities = np.concatenate([np.diff(positions, axis=0), turns], axis=2) / self.dt
+        if self._surfaces.moves:
+            self._shapes = self._surfaces.at(times)
         self._sunk = 0
         for first, last, commands in self._pilot.stretches(times, self.dt, self._tactile):
-            sunk = advance_steps(
-                self.dt, first, last, positions, quaternions, velocities, commands,
-                self._world, self._tree, self._neighbours, self._state, self._scratch,
-            )  # fmt: skip
+            sunk = advance_steps(self.dt, first, last, positions, quaternions, velocities, commands, *self._arrays)
             self._sunk = max(self._sunk, sunk)
         self.frame += 1
         return self.observe()
@@ -157,13 +176,11 @@ class Simulation:
         own = [pair for pair, (index, _) in enumerate(self._world.pairs) if index == 0]
         for t in range(shape[0]):
             self._state.position[body], self._state.quaternion[body] = positions[t], quaternions[t]
-            sunk = gather_all(self._world, self._tree, self._neighbours, self._state, self._scratch)
+            sunk = gather_all(-self.dt, *self._arrays)
             most = max(most, int(sunk))
             for pair in own:
                 if self._closed[self._world.pairs[pair, 1]]:
-                    buried = count_buried(
-                        pair, self._world, self._tree, self._state, self._scratch.rotation, self._scratch.pose
-                    )
+                    buried = count_buried(pair, self._world, self._tree, self._shapes, self._state, self._scratch)
                     most = max(most, int(buried))
                 slots, normals, points, depths = contacts_of(pair, self._scratch)
                 texel = self._world.texel[slots - self._world.slot_start[pair]]
@@ -188,7 +205,7 @@ class Simulation:
             points = self._world.point_start[sensor + 1] - self._world.point_start[sensor]
             sunk = np.count_nonzero(self._state.hint[start : start + points] == -2)
             if self._closed[target]:
-                buried = count_buried(pair, self._world, self._tree, self._state, self._scratch.rotation, self._scratch.pose)
+                buried = count_buried(pair, self._world, self._tree, self._shapes, self._state, self._scratch)
                 sunk = max(sunk, buried)
             if sunk:
                 names.append(f"'{targets[target].name}' into '{sensors[sensor].name}'")
@@ -203,7 +220,7 @@ class Simulation:
 
     def _tactile(self, sensor: int) -> np.ndarray:
         """(n,) normal forces of a sensor in the present state, for its controllers."""
-        gather_all(self._world, self._tree, self._neighbours, self._state, self._scratch)
+        gather_all(-self.dt, *self._arrays)
         force = self._feel()[0]
         return force[self._texel_start[sensor] : self._texel_start[sensor + 1]]
 
@@ -217,7 +234,7 @@ class Simulation:
 
     def observe(self) -> Frame:
         """What the sensors feel in the present state."""
-        gather_all(self._world, self._tree, self._neighbours, self._state, self._scratch)
+        gather_all(-self.dt, *self._arrays)
         self._warn_of_sunk()
         force, shear, depth, slip, contact, net, moment = self._feel()
         sensors = {}
@@ -248,19 +265,17 @@ class Simulation:
         )
 
 
-def _world(scenario: Scenario, center: np.ndarray) -> World:
+def _world(scenario: Scenario, center: np.ndarray, points: list[ContactPoints]) -> World:
     """Flatten a scenario into the kernels' arrays; `center` (b, 3) is the reference point of each body in its frame."""
     bodies, sensors, targets = scenario.bodies, scenario.sensors, scenario.targets
-    texels = [sensor.mounted for sensor in sensors]
-    points = [contact_points(t, s.parameters.points_per_texel) for s, t in zip(sensors, texels, strict=True)]
-    blocks = [_point_rows(t, p, center[s.body]) for s, t, p in zip(sensors, texels, points, strict=True)]
+    blocks = [point_rows(s.mounted, p, center[s.body]) for s, p in zip(sensors, points, strict=True)]
     texel_start = _texel_start(scenario)
     kind = np.array([FREE if body.free else DRIVEN if body.drive is not None else KEYFRAMED for body in bodies])
     drive_of, drives = drive_table(scenario)
     at, drive_at, unknowns = _unknowns(kind, drive_of)
     pairs = [(i, j) for i, s in enumerate(sensors) for j, t in enumerate(targets) if s.body != t.body]
     sizes = [len(blocks[i]) for i, _ in pairs]
-    extents = [_extent(block, sensor.parameters.max_penetration) for block, sensor in zip(blocks, sensors, strict=True)]
+    extents = [extent(block, sensor.parameters.max_penetration) for block, sensor in zip(blocks, sensors, strict=True)]
     return World(
         points=np.ascontiguousarray(np.vstack(blocks)),
         point_start=np.cumsum([0] + [len(block) for block in blocks]),
@@ -303,19 +318,6 @@ def _painted(sensors: tuple[Sensor, ...], points: list[ContactPoints]) -> np.nda
     return np.ascontiguousarray(np.column_stack(columns), dtype=float)
 
 
-def _point_rows(texels: Texels, points: ContactPoints, reference: np.ndarray) -> np.ndarray:
-    """Rows of :attr:`.World.points`."""
-    position, normal = points.positions(texels.position) - reference, points.normals(texels.normal)
-    return np.hstack([position, normal, texels.tangent[points.texel], texels.bitangent[points.texel]])
-
-
-def _extent(points: np.ndarray, reach: float) -> tuple[np.ndarray, float]:
-    """Middle and radius of contact points (rows of :attr:`.World.points`) and the segments behind them."""
-    ends = np.vstack([points[:, :3], points[:, :3] - reach * points[:, 3:6]])
-    middle = 0.5 * (ends.min(axis=0) + ends.max(axis=0))
-    return middle, float(np.linalg.norm(ends - middle, axis=1).max())
-
-
 def _texel_start(scenario: Scenario) -> np.ndarray:
     """(m + 1,) int: where the texels of each sensor begin among those of all."""
     return np.cumsum([0] + [len(sensor.texels) for sensor in scenario.sensors])
@@ -349,7 +351,7 @@ def _skin(sensor: Sensor, target: Target) -> float:
 def _neighbours(world: World, state: State) -> Neighbours:
     """Make room for the lists of triangles; they are filled when they are first needed."""
     slots = len(state.hint)
-    pose = np.zeros((len(world.pairs), 14))
+    pose = np.zeros((len(world.pairs), 15))
     pose[:, 12] = -1.0
     return Neighbours(np.zeros((slots, NEAR), np.int32), np.zeros(slots, np.int32), np.full(slots, -1, np.int32), pose)
 

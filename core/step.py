@@ -54,13 +54,15 @@ from .contact import (
     bristle_limit,
     bristle_rate,
     friction_force,
-    gather,
     linearise,
     normal_force,
     normal_tangent,
 )
+from .gather import gather
 from .jit import inlined, kernel
 from .servo import SPEED, add_servos, carry_driven, move_drives, place_driven
+from .shapes import Shapes, refit, set_moment
+from .skin import OX, OY, OZ, turn_rows
 from .tumble import mean_spin, product, spin_of
 
 PASSES = 40
@@ -85,6 +87,9 @@ class Scratch(NamedTuple):
         One row per contact, in blocks (see :mod:`.contact`).
     slots : (blocks, LANES) int
         Place of each row in the memory of :class:`.State`.
+    own : (blocks, 3 · LANES) float
+        Velocity that a deforming target or sensor adds at each row, in the sensor's axes, m/s; read where `moving` says so.
+    moving : (q,) bool
     first_block : (q,) int
         Where each pair's rows begin.
     contacts : (q,) int
@@ -93,6 +98,8 @@ class Scratch(NamedTuple):
         Of the contacts of a pair, lane by lane.
     pose : (12,) float
         A relative pose.
+    turn : (3, 3, 3) float
+        Rotations that deforming surfaces need.
     motion, part : (12,) float
         How a target's points move relative to a sensor, and the part of it that is not solved for: U, then W row by row.
     block, wrench : (6, 6), (6,) float
@@ -117,10 +124,13 @@ class Scratch(NamedTuple):
     known: np.ndarray
     rows: np.ndarray
     slots: np.ndarray
+    own: np.ndarray
+    moving: np.ndarray
     first_block: np.ndarray
     contacts: np.ndarray
     sums: np.ndarray
     pose: np.ndarray
+    turn: np.ndarray
     motion: np.ndarray
     part: np.ndarray
     block: np.ndarray
@@ -138,7 +148,7 @@ class Scratch(NamedTuple):
     drive_load: np.ndarray
 
 
-def scratch_for(world: World, state: State) -> Scratch:
+def scratch_for(world: World, state: State, shapes: Shapes) -> Scratch:
     """Allocate the working memory of a run."""
     b = len(state.position)
     slots = np.diff(world.slot_start, append=len(state.hint))
@@ -147,6 +157,7 @@ def scratch_for(world: World, state: State) -> Scratch:
     for body in range(b):
         look_back(state.velocity[body], 1e-9, twist[body])
     n = max(6, world.unknowns)
+    moving = shapes.bends[world.pairs[:, 0]] | shapes.deforms[world.pairs[:, 1]]
     return Scratch(
         rotation=np.zeros((b, 3, 3)),
         inertia=np.zeros((b, 3, 3)),
@@ -154,10 +165,13 @@ def scratch_for(world: World, state: State) -> Scratch:
         known=np.zeros((b, 12)),
         rows=np.zeros((blocks[-1], ROW)),
         slots=np.zeros((blocks[-1], LANES), np.int64),
+        own=np.zeros((blocks[-1] if moving.any() else 0, 3 * LANES)),
+        moving=moving,
         first_block=blocks[:-1],
         contacts=np.zeros(len(world.pairs), np.int64),
         sums=np.zeros(SUMS * LANES),
         pose=np.zeros(12),
+        turn=np.zeros((3, 3, 3)),
         motion=np.zeros(12),
         part=np.zeros(12),
         block=np.zeros((6, 6)),
@@ -257,16 +271,14 @@ def _velocity(px, py, pz, motion):
 
 
 @kernel
-def gather_all(world, tree, neighbours, state, scratch):
+def gather_all(dt, world, tree, neighbours, shapes, state, scratch):
     """Contacts of all pairs of sensor and target where the bodies are now. Returns how many points are sunk too deep to act."""
     for body in range(len(state.position)):
         write_rotation(state.quaternion[body], scratch.rotation[body])
     sunk = 0
     for pair in range(len(world.pairs)):
         first = scratch.first_block[pair]
-        count, deep = gather(
-            pair, first, world, tree, neighbours, state, scratch.rotation, scratch.rows, scratch.slots, scratch.pose
-        )
+        count, deep = gather(pair, first, dt, world, tree, neighbours, shapes, state, scratch)
         sunk += deep
         scratch.contacts[pair] = count
     return sunk
@@ -398,6 +410,8 @@ def _write_tangents(pair, first_point, dt, motion, law, painted, scratch):
         b, lane = scratch.first_block[pair] + r // LANES, r % LANES
         point = first_point + scratch.slots[b, lane]
         vx, vy, vz = _velocity(rows[b, PX + lane], rows[b, PY + lane], rows[b, PZ + lane], motion)
+        if scratch.moving[pair]:
+            vx, vy, vz = vx + scratch.own[b, OX + lane], vy + scratch.own[b, OY + lane], vz + scratch.own[b, OZ + lane]
         rate = vx * rows[b, NX + lane] + vy * rows[b, NY + lane] + vz * rows[b, NZ + lane]
         p = _painted_law(law, painted, point)
         rows[b, PUSH + lane], rows[b, SLOPE + lane] = normal_tangent(rows[b, DEPTH + lane], rate, dt, p)
@@ -417,6 +431,7 @@ def _sum_contacts(pair, first_point, dt, p, painted, scratch):
     motion, part = _values(scratch.motion), _values(scratch.part)
     for i in range(SUMS * LANES):
         sums[i] = 0.0
+    own, moving = scratch.own, scratch.moving[pair]
     vary = p[EXPONENT] != LINEAR or len(painted) > 0
     if vary:
         _write_tangents(pair, first_point, dt, motion, p, painted, scratch)
@@ -427,13 +442,16 @@ def _sum_contacts(pair, first_point, dt, p, painted, scratch):
             px, py, pz = rows[b, PX + lane], rows[b, PY + lane], rows[b, PZ + lane]
             zx, zy, zz = rows[b, ZX + lane], rows[b, ZY + lane], rows[b, ZZ + lane]
             vx, vy, vz = _velocity(px, py, pz, motion)
+            ux, uy, uz = _velocity(px, py, pz, part)
+            if moving:
+                vx, vy, vz = vx + own[b, OX + lane], vy + own[b, OY + lane], vz + own[b, OZ + lane]
+                ux, uy, uz = ux + own[b, OX + lane], uy + own[b, OY + lane], uz + own[b, OZ + lane]
             push, slope, grip = p[K] * rows[b, DEPTH + lane], p[K] * dt + p[CN], 1.0
             if vary:
                 push, slope, grip = rows[b, PUSH + lane], rows[b, SLOPE + lane], rows[b, GRIP + lane]
             limit, push, stiff_n, bias, t, keep, gain = linearise(nx, ny, nz, zx, zy, zz, push, slope, grip, vx, vy, vz, dt, p)
             rows[b, LIMIT + lane], rows[b, KEEP + lane], rows[b, GAIN + lane] = limit, keep, gain
             e = stiff_n - t
-            ux, uy, uz = _velocity(px, py, pz, part)
             push += e * (ux * nx + uy * ny + uz * nz)
             fx = -push * nx - bias * zx - t * ux
             fy = -push * ny - bias * zy - t * uy
@@ -530,25 +548,43 @@ def _write_map(body, sensor_body, sign, world, state, scratch, out):
 
 
 @kernel
-def _store_bristles(dt, world, state, scratch):
+def _store_bristles(dt, world, shapes, state, scratch):
     """Bristle deflections at the step's end, as the sensor sees them then."""
     for pair in range(len(world.pairs)):
         if scratch.contacts[pair] > 0:
             a, b = world.sensor_body[world.pairs[pair, 0]], world.target_body[world.pairs[pair, 1]]
             _relative_motion(a, b, scratch.twist, state.position, scratch.rotation, scratch.motion)
-            _seen_at_the_end(a, dt, scratch.twist, scratch.rotation, scratch.motion, scratch.part)
+            _seen_at_the_end(a, dt, scratch.twist, scratch.rotation, scratch.motion, scratch.part, scratch.turn)
+            if scratch.moving[pair]:
+                _turn_own(pair, scratch)
+            if shapes.bends[world.pairs[pair, 0]]:
+                turn_rows(pair, world, shapes, scratch)
             _bend_bristles(pair, _values(scratch.part), state, scratch)
+
+
+@kernel
+def _turn_own(pair, scratch):
+    """Turn the velocities that deformation adds by what the sensor turns during the step."""
+    own, turn = scratch.own, scratch.turn
+    for r in range(scratch.contacts[pair]):
+        b, lane = scratch.first_block[pair] + r // LANES, r % LANES
+        u = own[b, OX + lane], own[b, OY + lane], own[b, OZ + lane]
+        for k in range(3):
+            own[b, k * LANES + lane] = turn[0, k, 0] * u[0] + turn[0, k, 1] * u[1] + turn[0, k, 2] * u[2]
 
 
 @kernel
 def _bend_bristles(pair, motion, state, scratch):
     """Bring the bristles of a pair's contacts to the step's end, at the velocities of `motion`."""
     rows, slots, bristles = scratch.rows, scratch.slots, state.bristles
+    own, moving = scratch.own, scratch.moving[pair]
     first, left = scratch.first_block[pair], scratch.contacts[pair]
     for b in range(first, first + (left + LANES - 1) // LANES):
         for lane in range(LANES):
             nx, ny, nz = rows[b, NX + lane], rows[b, NY + lane], rows[b, NZ + lane]
             vx, vy, vz = _velocity(rows[b, PX + lane], rows[b, PY + lane], rows[b, PZ + lane], motion)
+            if moving:
+                vx, vy, vz = vx + own[b, OX + lane], vy + own[b, OY + lane], vz + own[b, OZ + lane]
             keep, gain, limit = rows[b, KEEP + lane], rows[b, GAIN + lane], rows[b, LIMIT + lane]
             out = vx * nx + vy * ny + vz * nz
             zx = keep * rows[b, ZX + lane] + gain * (vx - out * nx)
@@ -565,8 +601,11 @@ def _bend_bristles(pair, motion, state, scratch):
 
 
 @kernel
-def _seen_at_the_end(a, dt, twist, rotation, motion, seen):
-    """Turn a relative motion by what the sensor itself turns during the step, ``(1 + dt W)ᵀ`` in its own axes."""
+def _seen_at_the_end(a, dt, twist, rotation, motion, seen, turned):
+    """Turn a relative motion by what the sensor itself turns during the step, ``(1 + dt W)ᵀ`` in its own axes.
+
+    That matrix is left in the first of `turned` (3, 3, 3).
+    """
     for i in range(12):
         seen[i] = motion[i]
     for k in range(3):
@@ -575,6 +614,7 @@ def _seen_at_the_end(a, dt, twist, rotation, motion, seen):
             for i in range(3):
                 for j in range(3):
                     turn += rotation[a, i, m] * twist[a, 3 + 3 * i + j] * rotation[a, j, k]
+            turned[0, k, m] = dt * turn + (1.0 if k == m else 0.0)
             seen[k] += dt * turn * motion[m]
             for j in range(3):
                 seen[3 + 3 * k + j] += dt * turn * motion[3 + 3 * m + j]
@@ -582,7 +622,7 @@ def _seen_at_the_end(a, dt, twist, rotation, motion, seen):
 
 @kernel
 def advance_steps(
-    dt, first, last, path_position, path_quaternion, path_velocity, commands, world, tree, neighbours, state, scratch
+    dt, first, last, path_position, path_quaternion, path_velocity, commands, world, tree, neighbours, shapes, state, scratch
 ):
     """Run some of the substeps of one frame; the state is brought forward in place.
 
@@ -605,6 +645,9 @@ def advance_steps(
         Most contact points that were sunk too deep to act in any one step.
     """
     worst = 0
+    moves = shapes.moves[0]
+    if moves and first == 0:
+        refit(shapes, tree)
     for step in range(first, last):
         _place(path_position[step], path_quaternion[step], world, state, scratch)
         for drive in range(len(world.drives)):
@@ -616,16 +659,20 @@ def advance_steps(
             elif world.kind[body] == DRIVEN:
                 after = path_quaternion[step + 1, body]
                 carry_driven(body, dt, after, path_velocity[step, body], world, state, scratch)
-        worst = max(worst, gather_all(world, tree, neighbours, state, scratch))
+        if moves:
+            set_moment(step, step + 1, dt, world, shapes)
+        worst = max(worst, gather_all(dt, world, tree, neighbours, shapes, state, scratch))
         for body in range(len(world.kind)):
             if world.kind[body] == FREE:
                 write_world_inertia(scratch.rotation[body], world.inertia[body], scratch.inertia[body])
         _solve_velocities(dt, commands[step], world, state, scratch)
-        _store_bristles(dt, world, state, scratch)
+        _store_bristles(dt, world, shapes, state, scratch)
         move_drives(dt, commands[step], world, state, scratch)
         for body in range(len(world.kind)):
             if world.kind[body] == FREE:
                 _move_free(body, dt, world, state, scratch)
+    if moves:
+        set_moment(last, last - 1, dt, world, shapes)
     _place(path_position[last], path_quaternion[last], world, state, scratch)
     for body in range(len(world.kind)):
         look_back(state.velocity[body], dt, scratch.twist[body])
@@ -679,6 +726,9 @@ def feel(world, state, scratch, force, shear, depth, slip, contact, net, moment)
             nx, ny, nz = rows[block, NX + lane], rows[block, NY + lane], rows[block, NZ + lane]
             px, py, pz = rows[block, PX + lane], rows[block, PY + lane], rows[block, PZ + lane]
             vx, vy, vz = _velocity(px, py, pz, motion)
+            if scratch.moving[pair]:
+                own = scratch.own
+                vx, vy, vz = vx + own[block, OX + lane], vy + own[block, OY + lane], vz + own[block, OZ + lane]
             rate = vx * nx + vy * ny + vz * nz
             tx, ty, tz = vx - rate * nx, vy - rate * ny, vz - rate * nz
             square = tx * tx + ty * ty + tz * tz

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -40,6 +40,18 @@ class Texels:
 
     def __len__(self) -> int:
         return len(self.position)
+
+    @property
+    def frames(self) -> np.ndarray:
+        """(n, 9) position (m), normal and tangent of each texel."""
+        return np.hstack([self.position, self.normal, self.tangent])
+
+    def with_frames(self, frames: np.ndarray) -> Texels:
+        """Return the same texels elsewhere; `frames` as in :attr:`frames`, made orthonormal."""
+        normal = frames[:, 3:6] / np.linalg.norm(frames[:, 3:6], axis=1, keepdims=True)
+        tangent = frames[:, 6:9] - np.einsum("ij,ij->i", frames[:, 6:9], normal)[:, None] * normal
+        tangent /= np.linalg.norm(tangent, axis=1, keepdims=True)
+        return replace(self, position=frames[:, :3], normal=normal, tangent=tangent)
 
     @property
     def bitangent(self) -> np.ndarray:

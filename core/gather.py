@@ -1,0 +1,288 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Where sensors meet targets: contact points' segments against the targets' trees, written as contact rows (kernels)."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from .bvh import cross_plane, find_near, near_entry, segment_entry
+from .contact import DEPTH, LANES, NX, NY, NZ, PX, PY, PZ, ROW, ZX, ZY, ZZ
+from .jit import kernel
+from .shapes import place_all, place_near
+from .skin import finish_rows
+
+
+class Neighbours(NamedTuple):
+    """Which triangles each contact point can meet; a cache that changes the speed and never the numbers.
+
+    Attributes
+    ----------
+    near : (s, NEAR) int
+    number : (s,) int
+        Length of each list, -1 where the tree must be asked.
+    only : (s,) int
+        The triangle that a texel's line goes through for certain and alone as long as its list holds; else -1.
+    pose : (q, 15) float
+        Rotation (row by row) and position of each pair's sensor in the target's frame when its lists were made, the skin they
+        were made with (-1 while there are none), how often they have been used, and how far deformation had moved either until
+        then.
+    """
+
+    near: np.ndarray
+    number: np.ndarray
+    only: np.ndarray
+    pose: np.ndarray
+
+
+@kernel
+def _relative_pose(a, b, position, rotation, pose):
+    """Write the sensor's rotation (row by row) and position in the target's frame into `pose`."""
+    for i in range(3):
+        total = 0.0
+        for k in range(3):
+            total += rotation[b, k, i] * (position[a, k] - position[b, k])
+        pose[9 + i] = total
+        for j in range(3):
+            pose[3 * i + j] = (
+                rotation[b, 0, i] * rotation[a, 0, j]
+                + rotation[b, 1, i] * rotation[a, 1, j]
+                + rotation[b, 2, i] * rotation[a, 2, j]
+            )
+
+
+@kernel
+def _distance_to_box(pose, center, sensor, bounds, root):
+    """Distance of the sensor's middle from the target's box, metres."""
+    square = 0.0
+    for i in range(3):
+        x = pose[9 + i] + pose[3 * i] * center[sensor, 0]
+        x += pose[3 * i + 1] * center[sensor, 1] + pose[3 * i + 2] * center[sensor, 2]
+        out = max(bounds[root, i] - x, x - bounds[root, 3 + i], 0.0)
+        square += out * out
+    return math.sqrt(square)
+
+
+@kernel
+def _travel(pose, old, pair, center, sensor, radius):
+    """Bound on how far any point of the sensor has moved between two poses, metres."""
+    shift, turn = 0.0, 0.0
+    for i in range(3):
+        change = pose[9 + i] - old[pair, 9 + i]
+        for j in range(3):
+            difference = pose[3 * i + j] - old[pair, 3 * i + j]
+            change += difference * center[sensor, j]
+            turn += difference * difference
+        shift += change * change
+    return math.sqrt(shift) + math.sqrt(0.5 * turn) * radius
+
+
+@kernel
+def _keep_lists(pair, sensor, target, pose, world, tree, neighbours, shapes):
+    """Collect the triangles near each contact point of a pair anew when it has moved by more than the skin of the lists.
+
+    The skin follows the motion: some thirty steps' travel, so that lists are short and yet seldom made.
+    """
+    skin, used = neighbours.pose[pair, 12], neighbours.pose[pair, 13]
+    deformed = shapes.travelled[target] + shapes.point_travelled[sensor]
+    travel = _travel(pose, neighbours.pose, pair, world.center, sensor, world.radius[sensor])
+    travel += deformed - neighbours.pose[pair, 14]
+    neighbours.pose[pair, 13] = used + 1.0
+    wanted = world.skin[pair]
+    if skin >= 0.0:
+        wanted = min(max(32.0 * travel / (used + 1.0), 1e-3 * wanted), wanted)
+        too_wide = used == 255.0 and wanted < 0.5 * skin
+        if travel <= skin and not too_wide:
+            return
+    place_all(target, shapes, tree)
+    points, reach, slot = world.points, world.reach[sensor], world.slot_start[pair]
+    for point in range(world.point_start[sensor], world.point_start[sensor + 1]):
+        dx = reach * (pose[0] * points[point, 3] + pose[1] * points[point, 4] + pose[2] * points[point, 5])
+        dy = reach * (pose[3] * points[point, 3] + pose[4] * points[point, 4] + pose[5] * points[point, 5])
+        dz = reach * (pose[6] * points[point, 3] + pose[7] * points[point, 4] + pose[8] * points[point, 5])
+        ox = pose[9] + pose[0] * points[point, 0] + pose[1] * points[point, 1] + pose[2] * points[point, 2] - dx
+        oy = pose[10] + pose[3] * points[point, 0] + pose[4] * points[point, 1] + pose[5] * points[point, 2] - dy
+        oz = pose[11] + pose[6] * points[point, 0] + pose[7] * points[point, 1] + pose[8] * points[point, 2] - dz
+        number, only = find_near(ox, oy, oz, dx, dy, dz, target, wanted, neighbours.near, slot, tree)
+        neighbours.number[slot], neighbours.only[slot] = number, only
+        slot += 1
+    for i in range(12):
+        neighbours.pose[pair, i] = pose[i]
+    neighbours.pose[pair, 12] = wanted
+    neighbours.pose[pair, 13] = 0.0
+    neighbours.pose[pair, 14] = deformed
+
+
+@kernel
+def _forget(pair, sensor, world, state):
+    """Nothing of this pair touches: no triangle met, no bristle bent."""
+    start = world.slot_start[pair]
+    for slot in range(start, start + world.point_start[sensor + 1] - world.point_start[sensor]):
+        if state.hint[slot] != -1:
+            state.hint[slot] = -1
+            for i in range(4):
+                state.bristles[slot, i] = 0.0
+
+
+@kernel
+def gather(pair, first, dt, world, tree, neighbours, shapes, state, scratch):
+    """Collect the contacts of one sensor with one target as rows, from block `first` on.
+
+    The segment of a contact point runs from `reach` deep in the sensor to it; where it enters the target counts. Memory of
+    the pair in `state` is brought up to date: the triangle met, and the bristles, which are zero where nothing touches.
+
+    Parameters
+    ----------
+    pair, first : int
+    dt : float, seconds
+        By which velocities of surfaces are told: the step that begins, or minus the step that has ended.
+    world : World
+    tree : Tree
+    neighbours : Neighbours
+    shapes : Shapes
+    state : State
+    scratch : Scratch
+        `rotation` is read; `rows`, `slots` (which place in the memory each row belongs to) and `own` are written.
+
+    Returns
+    -------
+    count : int
+        Rows of this pair.
+    sunk : int
+        Contact points that were pressed past their maximum penetration and do not act.
+    """
+    sensor, target = world.pairs[pair, 0], world.pairs[pair, 1]
+    a, b = world.sensor_body[sensor], world.target_body[target]
+    points, hint, bristles = world.points, state.hint, state.bristles
+    rows, slots, pose = scratch.rows, scratch.slots, scratch.pose
+    reach, root = world.reach[sensor], tree.roots[target]
+    _relative_pose(a, b, state.position, scratch.rotation, pose)
+    if _distance_to_box(pose, world.center, sensor, tree.bounds, root) > world.radius[sensor]:
+        _forget(pair, sensor, world, state)
+        return 0, 0
+    _keep_lists(pair, sensor, target, pose, world, tree, neighbours, shapes)
+    sunk, slot = 0, world.slot_start[pair] - 1
+    stop = slot + 1 + world.point_start[sensor + 1] - world.point_start[sensor]
+    place_near(target, slot + 1, stop, neighbours.near, neighbours.number, shapes, tree)
+    block, lane = first, 0
+    for point in range(world.point_start[sensor], world.point_start[sensor + 1]):
+        slot += 1
+        before = hint[slot]
+        number = neighbours.number[slot]
+        if number == 0 and before == -1:
+            continue
+        tx = pose[9] + pose[0] * points[point, 0] + pose[1] * points[point, 1] + pose[2] * points[point, 2]
+        ty = pose[10] + pose[3] * points[point, 0] + pose[4] * points[point, 1] + pose[5] * points[point, 2]
+        tz = pose[11] + pose[6] * points[point, 0] + pose[7] * points[point, 1] + pose[8] * points[point, 2]
+        dx = reach * (pose[0] * points[point, 3] + pose[1] * points[point, 4] + pose[2] * points[point, 5])
+        dy = reach * (pose[3] * points[point, 3] + pose[4] * points[point, 4] + pose[5] * points[point, 5])
+        dz = reach * (pose[6] * points[point, 3] + pose[7] * points[point, 4] + pose[8] * points[point, 5])
+        ox, oy, oz = tx - dx, ty - dy, tz - dz
+        only = neighbours.only[slot]
+        if only >= 0:
+            met = cross_plane(ox, oy, oz, dx, dy, dz, tree.faces, only)
+            triangle, leaving = only if 0.0 <= met <= 1.0 else -1, 2.0
+        elif number >= 0:
+            met, triangle, leaving = near_entry(ox, oy, oz, dx, dy, dz, neighbours.near, slot, number, tree.faces)
+        else:
+            met, triangle, leaving = segment_entry(ox, oy, oz, dx, dy, dz, target, before, tree)
+        if triangle < 0:
+            # Sunk: the base is inside the object. Either the segment leaves it somewhere, or the object's surface has just run
+            # past the base (it was within the last tenth of the reach a step ago) and has not come back since.
+            in_box = (
+                min(ox, tx) <= tree.bounds[root, 3] and max(ox, tx) >= tree.bounds[root, 0]
+                and min(oy, ty) <= tree.bounds[root, 4] and max(oy, ty) >= tree.bounds[root, 1]
+                and min(oz, tz) <= tree.bounds[root, 5] and max(oz, tz) >= tree.bounds[root, 2]
+            )  # fmt: skip
+            ran_past = in_box and (before == -2 or (before >= 0 and bristles[slot, 3] > 0.9))
+            if leaving <= 1.0 or ran_past:
+                sunk += 1
+                hint[slot] = -2
+            else:
+                hint[slot] = -1
+            for i in range(4):
+                bristles[slot, i] = 0.0
+            continue
+        hint[slot] = triangle
+        fx, fy, fz = tree.faces[triangle, 9], tree.faces[triangle, 10], tree.faces[triangle, 11]
+        nx = pose[0] * fx + pose[3] * fy + pose[6] * fz
+        ny = pose[1] * fx + pose[4] * fy + pose[7] * fz
+        nz = pose[2] * fx + pose[5] * fy + pose[8] * fz
+        rows[block, NX + lane], rows[block, NY + lane], rows[block, NZ + lane] = nx, ny, nz
+        # From the point back along its normal to the intersection.
+        inside = 1.0 - met
+        rows[block, PX + lane] = points[point, 0] - inside * reach * points[point, 3]
+        rows[block, PY + lane] = points[point, 1] - inside * reach * points[point, 4]
+        rows[block, PZ + lane] = points[point, 2] - inside * reach * points[point, 5]
+        rows[block, ZX + lane], rows[block, ZY + lane] = bristles[slot, 0], bristles[slot, 1]
+        rows[block, ZZ + lane] = bristles[slot, 2]
+        rows[block, DEPTH + lane] = inside * abs(dx * fx + dy * fy + dz * fz)
+        bristles[slot, 3] = inside
+        slots[block, lane] = slot
+        lane += 1
+        if lane == LANES:
+            block, lane = block + 1, 0
+    count = (block - first) * LANES + lane
+    if lane > 0:
+        for unused in range(lane, LANES):
+            for column in range(0, ROW, LANES):
+                rows[block, column + unused] = 0.0
+    if shapes.smooth[target] or shapes.deforms[target] or shapes.bends[sensor]:
+        finish_rows(pair, first, count, dt, world, tree, shapes, state, scratch)
+    _lay_flat(first, count, rows)
+    return count, sunk
+
+
+@kernel
+def _lay_flat(first, count, rows):
+    """Lay back into the surface what its turn makes stand out of it of a bristle, which stays as long as it was."""
+    for block in range(first, first + (count + LANES - 1) // LANES):
+        for lane in range(LANES):
+            nx, ny, nz = rows[block, NX + lane], rows[block, NY + lane], rows[block, NZ + lane]
+            zx, zy, zz = rows[block, ZX + lane], rows[block, ZY + lane], rows[block, ZZ + lane]
+            out_of_plane = zx * nx + zy * ny + zz * nz
+            length = zx * zx + zy * zy + zz * zz
+            flat_x, flat_y, flat_z = zx - out_of_plane * nx, zy - out_of_plane * ny, zz - out_of_plane * nz
+            flat = flat_x * flat_x + flat_y * flat_y + flat_z * flat_z
+            scale = math.sqrt(length / flat) if flat > 0.0 and out_of_plane != 0.0 else 1.0
+            rows[block, ZX + lane], rows[block, ZY + lane] = scale * flat_x, scale * flat_y
+            rows[block, ZZ + lane] = scale * flat_z
+
+
+@kernel
+def count_buried(pair, world, tree, shapes, state, scratch):
+    """Count the contact points of a sensor that are deeper inside a closed target than they reach, and so feel nothing.
+
+    Looked for once a frame by a long segment from each segment's base; the arguments are those of :func:`gather`.
+    """
+    sensor, target = world.pairs[pair, 0], world.pairs[pair, 1]
+    pose = scratch.pose
+    _relative_pose(world.sensor_body[sensor], world.target_body[target], state.position, scratch.rotation, pose)
+    place_all(target, shapes, tree)
+    points, reach, root = world.points, world.reach[sensor], tree.roots[target]
+    size = 0.0
+    for i in range(3):
+        size += tree.bounds[root, 3 + i] - tree.bounds[root, i]
+    buried, slot = 0, world.slot_start[pair] - 1
+    for point in range(world.point_start[sensor], world.point_start[sensor + 1]):
+        slot += 1
+        if state.hint[slot] >= 0:
+            continue
+        dx = pose[0] * points[point, 3] + pose[1] * points[point, 4] + pose[2] * points[point, 5]
+        dy = pose[3] * points[point, 3] + pose[4] * points[point, 4] + pose[5] * points[point, 5]
+        dz = pose[6] * points[point, 3] + pose[7] * points[point, 4] + pose[8] * points[point, 5]
+        ox = pose[9] + pose[0] * points[point, 0] + pose[1] * points[point, 1] + pose[2] * points[point, 2] - reach * dx
+        oy = pose[10] + pose[3] * points[point, 0] + pose[4] * points[point, 1] + pose[5] * points[point, 2] - reach * dy
+        oz = pose[11] + pose[6] * points[point, 0] + pose[7] * points[point, 1] + pose[8] * points[point, 2] - reach * dz
+        within = (
+            tree.bounds[root, 0] <= ox <= tree.bounds[root, 3]
+            and tree.bounds[root, 1] <= oy <= tree.bounds[root, 4]
+            and tree.bounds[root, 2] <= oz <= tree.bounds[root, 5]
+        )
+        if within:
+            t, _, leaving = segment_entry(ox, oy, oz, size * dx, size * dy, size * dz, target, -1, tree)
+            if leaving < t:
+                buried += 1
+    return buried
