@@ -85,7 +85,7 @@ KIND = Kind(
         Form(
             "dwell",
             "f = f₀ − F u c,  c = 1 − exp(−t/τ) after the time t of contact",
-            "Chaudhury and Whitesides, Langmuir 7 (1991); Barquins (1992): adhesion grows with the time of contact",
+            "Chaudhury and Whitesides, Langmuir 7 (1991): hysteresis of adhesion",
             (
                 _PULL,
                 _WAY,

@@ -103,8 +103,8 @@ _DECADE = Parameter("amount", "1", 0.05, 0.0, 0.15, "Share of the force that goe
 _RISE_DECADE = Parameter("amount", "1", 0.05, 0.0, 1.0, "Share by which the reading rises per decade of time.")
 _EXPONENT = Parameter("exponent", "1", 0.3, 0.05, 1.5, "Exponent p of the power law.")
 
-_VISCOELASTIC = "Fung, Biomechanics (1993), section 7.6: quasi-linear viscoelasticity; Tschoegl (1989), section 3.6"
-_LOG = "Findley, Lai and Onaran, Creep and Relaxation of Nonlinear Viscoelastic Materials (1976), section 4.2"
+_VISCOELASTIC = "Fung, Biomechanics (1993), section 7.6: quasi-linear viscoelasticity"
+_LOG = "Findley, Lai and Onaran, Creep and Relaxation of Nonlinear Viscoelastic Materials (1976)"
 _POWER = "Nutting (1921); Schapery and Park, Int. J. Solids Struct. 36 (1999): power law by exponentials"
 
 KIND = Kind(

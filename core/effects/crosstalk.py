@@ -45,7 +45,7 @@ KIND = Kind(
         Form(
             "neighbours",
             "rᵢ = fᵢ + c · Σ fⱼ over the texels next to i",
-            "Dahiya and Valle, Robotic Tactile Sensing (2013), section 5.3",
+            "Dahiya and Valle, Robotic Tactile Sensing (2013)",
             (Parameter("share", "1", 0.05, 0.0, 0.25, "Share c that each neighbour adds."),),
             off={"share": 0.0},
             mix=neighbours,
@@ -61,7 +61,7 @@ KIND = Kind(
         Form(
             "common",
             "rᵢ = fᵢ + c · mean of all f",
-            "Saxena, Bhan and Aggrawal, Int. J. Circuit Theory Appl. 36 (2008): drop of the common supply",
+            "Saxena, Bhan and Aggrawal, Sens. Actuators A 149 (2009): common parts of the readout of resistive arrays",
             (Parameter("share", "1", 0.2, 0.0, 5.0, "Share c of the mean of all texels that is added."),),
             off={"share": 0.0},
             shape=common,

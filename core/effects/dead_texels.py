@@ -40,7 +40,7 @@ KIND = Kind(
         Form(
             "random",
             "rᵢ = 0 for a share of the texels",
-            "IEEE Std 1451.0 (2007): open channel",
+            "Ni et al., ACM Trans. Sens. Netw. 5 (2009): fault types",
             (_SHARE,),
             off={"share": 0.0},
             shape=random,
@@ -49,7 +49,7 @@ KIND = Kind(
         Form(
             "listed",
             "rᵢ = (1 − deadᵢ) · fᵢ",
-            "IEEE Std 1451.0 (2007): open channel",
+            "Ni et al., ACM Trans. Sens. Netw. 5 (2009): fault types",
             (Parameter("dead", "1", 0.0, 0.0, 1.0, "1 for each dead texel, 0 for the others.", per_texel=True),),
             off={"dead": 0.0},
             shape=listed,

@@ -44,7 +44,7 @@ KIND = Kind(
         Form(
             "warm-up",
             "r = r₀ + a · (1 − exp(−t/τ))",
-            "Doebelin, Measurement Systems (2003), section 3.2: warm-up of an instrument",
+            "Doebelin, Measurement Systems (2003): warm-up of an instrument",
             (
                 Parameter("amount", "unit", 0.05, -1e4, 1e4, "Change a of the reading when warm."),
                 Parameter("time", "s", 30.0, 0.1, 1e5, "Time τ in which 63 % of it have come.", log=True),

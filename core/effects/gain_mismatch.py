@@ -37,7 +37,7 @@ KIND = Kind(
         Form(
             "random",
             "rᵢ = exp(s εᵢ) · fᵢ,  ε normal",
-            "Schürmann et al., IEEE ICRA (2011): scatter of the texels of a modular sensor",
+            "Schürmann et al., IEEE World Haptics (2011): a modular sensor, calibrated texel by texel",
             (Parameter("spread", "1", 0.1, 0.0, 1.5, "Standard deviation s of the factors' logarithm."),),
             off={"spread": 0.0},
             shape=random,
@@ -46,7 +46,7 @@ KIND = Kind(
         Form(
             "listed",
             "rᵢ = gᵢ · fᵢ",
-            "JCGM 100 (2008), section F.2.4.5: correction by calibration, texel by texel",
+            "ISO/IEC Guide 99 (2007), 2.39: calibration",
             (Parameter("factor", "1", 1.0, 0.0, 100.0, "Factor g of each texel.", per_texel=True),),
             off={"factor": 1.0},
             shape=listed,
@@ -54,7 +54,7 @@ KIND = Kind(
         Form(
             "gradient",
             "r = (1 + gₓ x + g_y y) · f,  x and y from −1 to 1 across the sensor",
-            "JCGM 100 (2008), section F.2.4.5: correction by calibration, first order in the place",
+            "ISO/IEC Guide 99 (2007), 2.39: calibration, to first order in the place",
             (
                 Parameter("along_x", "1", 0.2, -0.5, 0.5, "Change g of the factor from the middle to the end in +x."),
                 Parameter("along_y", "1", 0.0, -0.5, 0.5, "Change g of the factor from the middle to the end in +y."),

@@ -130,7 +130,7 @@ KIND = Kind(
         Form(
             "duhem",
             "f = fₑ · (1 + h z),  dz/dd = (sgn ḋ − z) / D",
-            "Visintin, Differential Models of Hysteresis (1994), section V: Duhem's model; Coleman and Hodgdon (1986)",
+            "Visintin, Differential Models of Hysteresis (1994): Duhem; Coleman and Hodgdon, Int. J. Eng. Sci. 24 (1986)",
             (_WIDTH, Parameter("depth", "m", 3e-4, 1e-6, 0.05, "Way D after which the other branch is reached.", log=True)),
             off={"width": 0.0},
             law=duhem,
@@ -178,7 +178,7 @@ KIND = Kind(
         Form(
             "trailing",
             "r = f · (1 − h z),  dz/df = (sgn ḟ − z) / F",
-            "Visintin, Differential Models of Hysteresis (1994), section V: Duhem's model",
+            "Visintin, Differential Models of Hysteresis (1994): Duhem's model",
             (_WIDTH, Parameter("force", "N", 0.02, 1e-6, 1e3, "Force F after which the other branch is reached.", log=True)),
             off={"width": 0.0},
             law=trailing,

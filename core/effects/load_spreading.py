@@ -55,7 +55,7 @@ KIND = Kind(
         Form(
             "half-space",
             "rᵢ = Σⱼ wᵢⱼ fⱼ,  w ∝ (1 + r²/h²)^(−5/2), Σᵢ wᵢⱼ = 1",
-            "Johnson, Contact Mechanics (1985), eq. 3.19: Boussinesq's stress at depth h under a point load",
+            "Johnson, Contact Mechanics (1985), section 3.2: Boussinesq's stress at depth h under a point load",
             (Parameter("thickness", "m", 0.003, 0.0, 0.1, "Thickness h of the cover above the texels."),),
             off={"thickness": 0.0},
             mix=half_space,

@@ -51,7 +51,7 @@ KIND = Kind(
         Form(
             "tanh",
             "r = L · tanh(r₀ / L)",
-            "Dahiya and Valle, Robotic Tactile Sensing (2013), section 3: response curves of transducers",
+            "Dahiya and Valle, Robotic Tactile Sensing (2013)",
             (_LEVEL,),
             off={"level": math.inf},
             shape=tanh,
@@ -60,7 +60,7 @@ KIND = Kind(
         Form(
             "rational",
             "r = r₀ / (1 + |r₀| / L)",
-            "Florez and Velasquez, Sensors 10 (2010): resistive sensor in a voltage divider",
+            "Flórez and Velásquez, IEEE ANDESCON (2010): force-sensing resistor in a voltage divider",
             (_LEVEL,),
             off={"level": math.inf},
             shape=rational,

@@ -58,7 +58,7 @@ KIND = Kind(
         Form(
             "ogden-roxburgh",
             "f = fₑ · (1 − s · erf((1 − W/Wₘ) / b)),  W = fₑ d / 2, Wₘ the largest W so far",
-            "Ogden and Roxburgh, Proc. R. Soc. A 455 (1999), eq. 4.1, without its constant m",
+            "Ogden and Roxburgh, Proc. R. Soc. A 455 (1999), without their constant m",
             (_SHARE, Parameter("width", "1", 0.5, 0.05, 3.0, "Width b of the way back to the first curve.")),
             off={"share": 0.0},
             law=ogden_roxburgh,
@@ -68,7 +68,7 @@ KIND = Kind(
         Form(
             "peak",
             "f = fₑ · (1 − s · (1 − exp(−dₘ/D))),  dₘ the largest depth so far",
-            "Simo, Comput. Methods Appl. Mech. Eng. 60 (1987), section 3: damage by the largest strain",
+            "Simo, Comput. Methods Appl. Mech. Eng. 60 (1987): damage by the largest strain",
             (_SHARE, Parameter("depth", "m", 0.002, 1e-5, 0.1, "Depth D that does 63 % of it.", log=True)),
             off={"share": 0.0},
             law=peak,

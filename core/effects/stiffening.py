@@ -58,7 +58,7 @@ KIND = Kind(
         Form(
             "polynomial",
             "f = k d · (1 + (d/D)ᵖ)",
-            "Hayward et al. (1999); ISO 3386: cushioning of foam as a polynomial of the strain",
+            "Rusch, J. Appl. Polym. Sci. 13 (1969): load of flexible foams with a power of the compression",
             (_DOUBLE, _POWER),
             off={"depth": math.inf},
             law=polynomial,
@@ -76,7 +76,7 @@ KIND = Kind(
         Form(
             "foam",
             "f = k d / (1 − (d/L)ᵖ)",
-            "Gibson and Ashby, Cellular Solids (1997), section 5.3: densification; Rusch, J. Appl. Polym. Sci. 13 (1969)",
+            "Gibson and Ashby, Cellular Solids (1997), chapter 5: densification",
             (
                 Parameter("depth", "m", 0.01, 2e-4, 0.1, "Depth L at which the foam's cells are closed.", log=True),
                 Parameter("exponent", "1", 2.0, 0.5, 8.0, "How suddenly it densifies."),

@@ -31,7 +31,7 @@ KIND = Kind(
         Form(
             "linear",
             "fₜ = fₜ₀ + c v",
-            "Armstrong-Hélouvry, Dupont and Canudas de Wit, Automatica 30 (1994), section 2",
+            "Armstrong-Hélouvry, Dupont and Canudas de Wit, Automatica 30 (1994)",
             (Parameter("viscosity", "N·s/m", 0.05, 0.0, 1e3, "Drag c of one texel per metre per second."),),
             off={"viscosity": 0.0},
             friction=linear,
@@ -40,7 +40,7 @@ KIND = Kind(
         Form(
             "load",
             "fₜ = fₜ₀ + c f v",
-            "Olsson et al., Eur. J. Control 4 (1998), section 2: viscous friction in proportion to the load",
+            "Bowden and Tabor, The Friction and Lubrication of Solids (1950): the area that is sheared grows with the load",
             (Parameter("viscosity", "s/m", 0.5, 0.0, 1e3, "Drag c per newton of load and metre per second."),),
             off={"viscosity": 0.0},
             friction=load,
@@ -49,7 +49,7 @@ KIND = Kind(
         Form(
             "power",
             "fₜ = fₜ₀ + C vᵖ",
-            "Olsson et al., Eur. J. Control 4 (1998), eq. 4",
+            "Olsson et al., Eur. J. Control 4 (1998)",
             (
                 Parameter("drag", "N·(s/m)^p", 0.05, 0.0, 1e3, "Drag C of one texel at one metre per second."),
                 Parameter("exponent", "1", 0.5, 0.2, 2.0, "Exponent p of the speed."),

@@ -52,7 +52,7 @@ KIND = Kind(
         Form(
             "exponential",
             "f = fₑ · exp(−A/L),  A the sum of all loads put on so far",
-            "Lemaitre and Desmorat, Engineering Damage Mechanics (2005), section 6: fatigue damage",
+            "Lemaitre and Desmorat, Engineering Damage Mechanics (2005): fatigue damage",
             (Parameter("life", "N", 100.0, 0.01, 1e9, "Sum L of loads that leaves 37 % of the force.", log=True),),
             off={"life": math.inf},
             law=exponential,

@@ -1,0 +1,293 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Write docs/effects.md and its picture from the library of effects: python tools/effects_page.py."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import numpy as np
+
+ROOT = Path(__file__).resolve().parents[1]
+PAGE = ROOT / "docs" / "effects.md"
+PICTURE = ROOT / "docs" / "images" / "effects.png"
+
+INTRODUCTION = """\
+# Effects
+
+<!-- Written by tools/effects_page.py from core/effects; change it there. -->
+
+A real sensor does more than the base model of [model.md](model.md) says: foam settles, transducers trail behind, wires leak.
+Each of these is an *effect* that a sensor can be given, in one of several formulas, since no two papers agree on one. In
+Blender: Physics › Palpate › Effects › *Add Effect*. In a script or a file, an effect is its name, its form and its values:
+
+```python
+from palpate.core.effects.library import effect
+
+sensor = dataclasses.replace(sensor, effects=(effect("creep", amount=0.3), effect("noise", "white", spread=2e-3, seed=1)))
+```
+
+```toml
+[[effect]]                # in sensor.toml
+name = "creep"
+form = "exponential"
+amount = 0.3
+time = 2.0
+```
+
+![What each effect does](images/effects.png)
+
+*What each effect does: grey the base model, coloured the forms with their default values, or a little more of them.*
+
+## Where effects act
+
+| stage | what it changes |
+| --- | --- |
+| contact | the law of contact itself, without memory: forces, and so the bodies, and what is read |
+| pad | the same, with memory of what happened to each texel |
+| readout | only what the sensor reports |
+
+Within a sensor they act in the order of this page, on the way from the contact to the reading, however they are stacked.
+Effects on readings come before the conversion `reading = zero + gain · force` (their parameters are in newtons), or after it
+(in the sensor's own unit; defaults and bounds below are for a gain of one unit per newton and grow with the gain). Names of
+parameters are those of files and scripts.
+
+In the formulas *fₑ* is the elastic force `k d` (or Hunt and Crossley's), to which the damping is added behind the effects of
+the pad; *f* the force that comes out; *r* the reading, *r₀* the one that comes in. What is called texel by texel in the pad has
+its memory in each contact point, whatever presses on it; what is pressed recovers while nothing touches, and hysteresis and
+adhesion forget then. Whatever acts by chance depends on its seed, the texel and the moment alone: a frame reads the same
+whether it is played, baked or asked for by itself. Time counts from the first frame. Effects with memory on readings
+take the force as linear between two frames.
+"""
+
+
+def page() -> str:
+    """Return the text of docs/effects.md."""
+    from palpate.core.effects.library import library
+
+    parts = [INTRODUCTION]
+    for kind in library().values():
+        parts.append(f"\n## {kind.title}\n\n`{kind.name}` · {kind.stage}. {kind.text}\n")
+        for form in kind.forms:
+            stage = kind.stage_of(form)
+            where = f" ({stage})" if stage != kind.stage else ""
+            side = ""
+            if stage == "readout":
+                side = " After the conversion." if form.after_conversion else " Before the conversion."
+            seed = " Takes a `seed`." if form.random else ""
+            parts.append(f"\n**{form.name}**{where}: {form.formula}.{side}{seed} *{form.reference}.*\n\n")
+            parts.append("| parameter | unit | default | from | to | |\n| --- | --- | ---: | ---: | ---: | --- |\n")
+            for p in form.parameters:
+                texels = " One number per texel, or one for all." if p.per_texel else ""
+                unit = "" if p.unit == "1" else p.unit
+                parts.append(f"| `{p.name}` | {unit} | {p.default:g} | {p.low:g} | {p.high:g} | {p.text}{texels} |\n")
+    return "".join(parts)
+
+
+# --- the picture
+
+ROWS, COLUMNS, PITCH = 14, 6, 0.0034
+ROOM = {"creep": 2.3, "lag": 1.6, "wear": 1.4}
+"""By how much more than the curves need some plots are high, for the legend."""
+
+
+def picture(path: Path) -> None:
+    """Draw each effect in the experiment that shows it best."""
+    from palpate.core.canvas import new_figure, save_figure
+    from palpate.core.effects.library import library
+
+    figure = new_figure(10.0, 11.6)
+    grid = figure.subplots(5, 4)
+    for axes, kind in zip(grid.ravel(), library().values(), strict=True):
+        DRAWN[kind.name](axes, kind)
+        axes.set_title(kind.title, fontsize=9.5, loc="left", color="#1c2430")
+    figure.subplots_adjust(left=0.055, right=0.985, top=0.972, bottom=0.04, wspace=0.34, hspace=0.5)
+    save_figure(figure, path, 110)
+
+
+def _setting():
+    from palpate.core.effects.base import Site
+    from palpate.core.scenario import SensorParameters
+
+    row, column = (index.ravel() for index in np.mgrid[0:ROWS, 0:COLUMNS])
+    position = np.stack([column * PITCH, row * PITCH, np.zeros(ROWS * COLUMNS)], axis=1)
+    return Site(position, np.full(len(position), PITCH**2), row, column), SensorParameters(k=1000.0, cn=0.0)
+
+
+def _curves(axes, kind, x, base, of_form, xlabel, ylabel, **values):
+    """Grey the base, in colour what each form makes of it; `values` by form name go beyond the defaults."""
+    from palpate.core.canvas import GREY, SERIES, tidy_axes
+    from palpate.core.effects.library import effect
+
+    if base is not None:
+        axes.plot(x, base, color=GREY, lw=1.0, label="_")
+    for form, colour in zip(kind.forms, SERIES, strict=False):
+        if any(parameter.per_texel for parameter in form.parameters):
+            continue
+        item = effect(kind.name, form.name, **{"seed": 1, **values.get(form.name.replace("-", "_"), {})})
+        axes.plot(x, of_form(item), color=colour, lw=1.1, label=form.name)
+    tidy_axes(axes)
+    axes.set_xlabel(xlabel, labelpad=1)
+    axes.set_ylabel(ylabel, labelpad=1)
+    axes.set_ylim(top=axes.get_ylim()[1] * ROOM.get(kind.name, 1.0))
+    place = "upper right" if kind.name in ROOM else "best"
+    axes.legend(fontsize=8, frameon=False, handlelength=1.0, borderpad=0.1, labelspacing=0.2, loc=place)
+
+
+def _pressed(time, depth, slide=None):
+    """Return what one texel reads over a history of depths, with an effect of whatever stage."""
+    from palpate.core.effects.bound import forces, readings
+
+    site, parameters = _setting()
+    one = type(site)(np.zeros((1, 3)), np.ones(1))
+    slide = None if slide is None else slide[:, None]
+    return lambda *items: readings(items, one, time, forces(items, parameters, time, depth[:, None], slide))[:, 0]
+
+
+def _force_over_depth(depth, ylabel="force (N)", **values):
+    def draw(axes, kind):
+        time = np.linspace(0, 20, len(depth))
+        texel = _pressed(time, depth)
+        _curves(axes, kind, depth * 1e3, texel(), texel, "depth (mm)", ylabel, **values)
+
+    return draw
+
+
+def _over_time(time, depth, ylabel="reading (N)", **values):
+    def draw(axes, kind):
+        texel = _pressed(time, depth)
+        _curves(axes, kind, time, texel(), texel, "time (s)", ylabel, **values)
+
+    return draw
+
+
+def _reading_over_force(**values):
+    def draw(axes, kind):
+        from palpate.core.effects.bound import readings
+
+        site, force = _setting()[0], np.linspace(0, 2, 801)
+        one = type(site)(np.zeros((1, 3)), np.ones(1))
+        texel = lambda item: readings((item,), one, force, force[:, None])[:, 0]  # noqa: E731
+        _curves(axes, kind, force, force, texel, "force (N)", "reading (N)", **values)
+
+    return draw
+
+
+def _over_speed(axes, kind):
+    from palpate.core.effects.bound import friction
+    from palpate.core.scenario import SensorParameters
+
+    v, p = np.linspace(0, 0.06, 400), SensorParameters()
+
+    def drag(*items):
+        factor, viscous = friction(items, v, np.ones_like(v)) if items else (1.0, 0.0)
+        return factor * (p.mud + (p.mus - p.mud) * np.exp(-((v / p.x0) ** 2))) + (viscous + p.ct) * v
+
+    more = {"linear": {"viscosity": 2.0}, "load": {"viscosity": 4.0}, "power": {"drag": 0.3}}
+    _curves(axes, kind, v * 1e3, drag(), drag, "sliding speed (mm/s)", "friction at 1 N (N)", **more)
+
+
+def _peaks(axes, kind):
+    """The highest reading of each of forty pressings, rubbed all the while."""
+    time = np.linspace(0, 40, 4001)
+    depth = _cycles(40)(time)
+    texel = _pressed(time, depth, np.full(len(time), 1e-3))
+    top = lambda *items: texel(*items)[1:].reshape(40, 100).max(axis=1)  # noqa: E731
+    _curves(axes, kind, np.arange(1, 41), top(), top, "pressing", "peak (N)", archard={"rate": 2e-4})
+
+
+def _across(axes, kind):
+    """A column of the pad under a load on one texel."""
+    from palpate.core.effects.bound import readings
+
+    site = _setting()[0]
+    force = np.zeros((1, ROWS * COLUMNS))
+    force[0, 7 * COLUMNS + 3] = 1.0
+    column = lambda *items: readings(items, site, np.zeros(1), force)[0].reshape(ROWS, COLUMNS)[:, 3]  # noqa: E731
+    more = {"neighbours": {"share": 0.2}, "lines": {"share": 1.0}, "common": {"share": 4.0}}
+    _curves(axes, kind, np.arange(ROWS), column(), column, "row", "reading (N)", **more)
+
+
+def _texels(**values):
+    def draw(axes, kind):
+        from palpate.core.effects.bound import readings
+
+        site = _setting()[0]
+        force = np.ones((1, ROWS * COLUMNS))
+        even = lambda *items: readings(items, site, np.zeros(1), force)[0][:36]  # noqa: E731
+        _curves(axes, kind, np.arange(36), even(), even, "texel", "reading (N)", **values)
+        axes.set_ylim(bottom=0)
+
+    return draw
+
+
+def _ball(axes, kind):
+    """What a ball on the middle of the pad reads along one column."""
+    from palpate.core.effects.library import placed
+
+    site = _setting()[0]
+    middle = site.position.mean(axis=0)
+    up, across = np.tile([0.0, 0.0, 1.0], (len(site), 1)), np.tile([1.0, 0.0, 0.0], (len(site), 1))
+
+    def felt(*items):
+        position, _, _ = placed(items, site.position, up, across)
+        r = np.linalg.norm((position - middle)[:, :2], axis=1)
+        depth = np.maximum(position[:, 2] + 0.002 - 0.04 + np.sqrt(np.maximum(0.04**2 - r**2, 0)), 0)
+        return 1000.0 * depth.reshape(ROWS, COLUMNS)[:, 3]
+
+    more = {"shift": {"x": 0.0, "y": 0.005}, "turn": {"x": 0.003, "y": 0.0, "about_z": 0.4}, "tilt": {"about_x": 0.08}}
+    _curves(axes, kind, np.arange(ROWS), felt(), felt, "row", "force of a ball (N)", **more)
+
+
+def _cycles(turns, top=0.002):
+    return lambda time: top * 0.5 * (1 - np.cos(2 * np.pi * turns * time / time[-1]))
+
+
+_LONG, _SHORT = np.linspace(0, 20, 2001), np.linspace(0, 1, 501)
+_HOLD = 0.002 * np.interp(_LONG, [0, 1, 1.3, 12, 12.3, 20], [0, 0, 1, 1, 0, 0])
+_SMALL = 0.0002 * np.interp(_LONG, [0, 10, 20], [0.0, 1.0, 0.0])
+
+DRAWN = {
+    "misalignment": _ball,
+    "stiffening": _force_over_depth(np.linspace(0, 0.004, 400)),
+    "stribeck": _over_speed,
+    "viscous-friction": _over_speed,
+    "softening": _force_over_depth(_cycles(2)(_LONG) * np.where(_LONG < 10, 0.7, 1.0), peak={"depth": 0.001}),
+    "hysteresis": _force_over_depth(
+        _cycles(1)(_LONG), bouc_wen={"force": 0.6, "share": 0.3}, maxwell_slip={"force": 0.3, "share": 0.6}, play={"force": 0.4}
+    ),
+    "creep": _over_time(_LONG, _HOLD),
+    "wear": _peaks,
+    "adhesion": _force_over_depth(
+        _SMALL, unloading={"depth": 3e-5}, constant={"depth": 3e-5}, dwell={"depth": 3e-5, "time": 30.0}
+    ),
+    "load-spreading": _across,
+    "dead-zone": _reading_over_force(hard={"threshold": 0.4}, soft={"threshold": 0.4}, step={"threshold": 0.4}),
+    "gain-mismatch": _texels(),
+    "dead-texels": _texels(random={"share": 0.12}, stuck={"share": 0.12, "level": 0.4, "seed": 2}),
+    "crosstalk": _across,
+    "lag": _over_time(_SHORT, 0.002 * (np.interp(_SHORT, [0.1, 0.12, 0.6, 0.62], [0, 1, 1, 0]))),
+    "offset": _over_time(_SHORT, 0.0002 * np.sin(np.pi * _SHORT) ** 2, common={"offset": 0.05}),
+    "drift": _over_time(
+        np.linspace(0, 120, 601), np.zeros(601), linear={"rate": 4e-4}, warm_up={}, random_walk={"spread": 0.004}
+    ),
+    "noise": _over_time(
+        _SHORT, 0.001 * np.sin(np.pi * _SHORT) ** 2, white={"spread": 0.03}, proportional={"share": 0.05},
+        coloured={"spread": 0.06},
+    ),
+    "saturation": _reading_over_force(),
+    "quantization": _reading_over_force(round={"step": 0.25}, floor={"step": 0.25}, bits={"bits": 4, "range": 2.4}),
+}  # fmt: skip
+"""The experiment that shows each effect."""
+
+
+def main() -> int:
+    """Write both files."""
+    PAGE.write_text(page(), encoding="utf-8", newline="\n")
+    picture(PICTURE)
+    print(f"wrote {PAGE} and {PICTURE}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
