@@ -154,6 +154,8 @@ def settings_of(scene, objects) -> tuple:
         units.metres_per_unit(scene),
         tuple(units.gravity(scene)),
         own.use_auto_dt or own.dt,
+        own.interpolation,
+        own.subframes,
         tuple(hidden),
         tuple(obj.name for obj in taking_part),
     )

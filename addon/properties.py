@@ -390,6 +390,24 @@ class PALPATE_PG_scene(bpy.types.PropertyGroup):
     dt: FloatProperty(
         name="Time Step (s)", description="Longest substep, s", default=1e-4, min=0.0, precision=6, step=0.001, options=set()
     )
+    interpolation: EnumProperty(
+        name="Between Frames",
+        description="How animated bodies move between the frames that are read",
+        items=(
+            ("LINEAR", "Linear", "Straight, with constant speed: speeds jump at the frames"),
+            ("SMOOTH", "Smooth", "Without jumps of speed"),
+        ),
+        options=set(),
+    )
+    subframes: IntProperty(
+        name="Samples per Frame",
+        description="How often a bake reads the motion of animated bodies in each frame. Playing reads whole frames only",
+        default=1,
+        min=1,
+        soft_max=16,
+        max=1000,
+        options=set(),
+    )
     use_live: BoolProperty(
         name="Live Playback",
         description="Playing forward from the first frame computes frame by frame; scrubbing shows what was computed",

@@ -213,6 +213,7 @@ def sample_start(scene, depsgraph) -> tuple[Scenario, Binding]:
         gravity=units.gravity(scene),
         dt=None if settings.use_auto_dt else units.as_typed(settings.dt),
         name=scene.name,
+        interpolation=settings.interpolation.lower(),
     )
     scenario.check()
     binding = Binding(
@@ -257,7 +258,7 @@ def sample_scenario(scene) -> Generator[Progress, None, tuple[Scenario, Binding]
     """Read a scene over its whole frame range, frame by frame, and leave it at the frame where it stood."""
     _check_range(scene)
     _check_modes(participants(scene)[0])
-    before = scene.frame_current, scene.frame_subframe
+    before, parts_of_frame = (scene.frame_current, scene.frame_subframe), scene.palpate.subframes
     frames = range(scene.frame_start, scene.frame_end + 1)
     try:
         scene.frame_set(frames[0])
@@ -267,19 +268,21 @@ def sample_scenario(scene) -> Generator[Progress, None, tuple[Scenario, Binding]
         targets = {index: list(scenario.bodies[index].drive.target.values) for index in binding.driven}
         yield Progress("Reading", frames[0], 1, len(frames))
         for frame in frames[1:]:
-            scene.frame_set(frame)
-            moment = sample_moment(scene, depsgraph_of(scene), binding)
-            for index, pose in moment.poses.items():
-                samples[index].append(pose)
-            for index, value in moment.targets.items():
-                targets[index].append(value)
+            for part in range(1, parts_of_frame + 1):
+                whole, rest = _whole_and_part(frame - 1, part, parts_of_frame)
+                scene.frame_set(whole, subframe=rest)
+                moment = sample_moment(scene, depsgraph_of(scene), binding)
+                for index, pose in moment.poses.items():
+                    samples[index].append(pose)
+                for index, value in moment.targets.items():
+                    targets[index].append(value)
             for index, matrix in moment.parents.items():
                 binding.parents[index].append(matrix)
             yield Progress("Reading", frame, frame - frames[0] + 1, len(frames))
     finally:
         with suppress(ReferenceError):  # the scene went while its frames were read
             scene.frame_set(before[0], subframe=before[1])
-    times = np.array([(frame - frames[0]) / scenario.fps for frame in frames])
+    times = np.array([step / (scenario.fps * parts_of_frame) for step in range((len(frames) - 1) * parts_of_frame + 1)])
     bodies = list(scenario.bodies)
     for index, path in samples.items():
         positions, quaternions = (np.array(part) for part in zip(*path, strict=True))
@@ -288,6 +291,10 @@ def sample_scenario(scene) -> Generator[Progress, None, tuple[Scenario, Binding]
         drive = replace(bodies[index].drive, target=Signal(times, np.array(values)))
         bodies[index] = replace(bodies[index], drive=drive)
     return replace(scenario, bodies=tuple(bodies)), binding
+
+
+def _whole_and_part(frame: int, part: int, parts_of_frame: int) -> tuple[int, float]:
+    return (frame + 1, 0.0) if part == parts_of_frame else (frame, part / parts_of_frame)
 
 
 def pose(scene, obj, depsgraph) -> np.ndarray:

@@ -8,7 +8,6 @@ import math
 import numpy as np
 
 from .jit import kernel
-from .scenario import Motion
 
 KEYFRAMED, FREE, DRIVEN = 0, 1, 2
 """What moves a body: its motion, forces, or its motion and a drive."""
@@ -55,36 +54,6 @@ def quaternions_from_vectors(vectors: np.ndarray) -> np.ndarray:
     vectors = np.asarray(vectors, float)
     angle = np.linalg.norm(vectors, axis=-1, keepdims=True)
     return np.concatenate([np.cos(angle / 2), 0.5 * np.sinc(angle / (2 * np.pi)) * vectors], axis=-1)
-
-
-def poses_at(motion: Motion, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Interpolate a motion: linear in position, constant angular velocity; held before its first and after its last sample.
-
-    Parameters
-    ----------
-    motion : Motion
-    times : (n,) float, seconds
-
-    Returns
-    -------
-    positions : (n, 3) float, metres
-    quaternions : (n, 4) float
-    """
-    if len(motion.times) == 1:
-        n = len(times)
-        return np.repeat(motion.positions, n, axis=0), np.repeat(motion.quaternions, n, axis=0)
-    times = np.clip(times, motion.times[0], motion.times[-1])
-    right = np.clip(np.searchsorted(motion.times, times, side="left"), 1, len(motion.times) - 1)
-    left = right - 1
-    share = ((times - motion.times[left]) / (motion.times[right] - motion.times[left]))[:, None]
-    start, end = motion.positions[left], motion.positions[right]
-    positions = np.where(share == 1.0, end, start + share * (end - start))  # a sample is met exactly, without rounding
-    from_quaternion, to_quaternion = motion.quaternions[left], motion.quaternions[right]
-    conjugate = from_quaternion * np.array([1.0, -1.0, -1.0, -1.0])
-    turn = rotation_vectors(quaternion_product(to_quaternion, conjugate))
-    turned = quaternion_product(quaternions_from_vectors(share * turn), from_quaternion)
-    quaternions = np.where(share == 1.0, to_quaternion, np.where(share == 0.0, from_quaternion, turned))
-    return positions, quaternions
 
 
 @kernel

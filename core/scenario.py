@@ -149,7 +149,7 @@ class Painted:
 
 @dataclass(frozen=True)
 class Motion:
-    """Poses of a body's frame over time; between samples linear in position, constant in angular velocity.
+    """Poses of a body's frame over time; what is between the samples, :attr:`Scenario.interpolation` says.
 
     Attributes
     ----------
@@ -398,6 +398,8 @@ class Scenario:
     gravity : (3,) float, m/s²
     dt : float or None, seconds
         Longest substep. None: the adviser chooses (:mod:`.timestep`).
+    interpolation : str
+        Of motions between their samples, ``linear`` or ``smooth`` (:mod:`.motions`).
     """
 
     bodies: tuple[Body, ...]
@@ -409,6 +411,7 @@ class Scenario:
     gravity: np.ndarray = field(default_factory=lambda: np.array([0.0, 0.0, -9.81]))
     dt: float | None = None
     name: str = "scene"
+    interpolation: str = "linear"
 
     @property
     def frames(self) -> range:
@@ -428,6 +431,8 @@ class Scenario:
             raise ParameterError(
                 f"The time step of '{self.name}' is {self.dt:g} s: give a value above zero, or leave it automatic."
             )
+        if self.interpolation not in ("linear", "smooth"):
+            raise ParameterError(f"The interpolation of '{self.name}' is '{self.interpolation}': choose linear or smooth.")
         if not self.sensors:
             raise SceneError(f"'{self.name}' has no sensor: make one with Physics › Palpate › Make Sensor.")
         if not any(sensor.readout for sensor in self.sensors):

@@ -14,12 +14,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .bodies import DRIVEN, FREE, KEYFRAMED, poses_at, quaternion_product, rotation_matrices, rotation_vectors
+from .bodies import DRIVEN, FREE, KEYFRAMED, quaternion_product, rotation_matrices, rotation_vectors
 from .bvh import NEAR, Tree, build_tree
 from .contact import State, World, parameter_row
 from .drive import drive
 from .gather import Neighbours, count_buried
 from .mesh import is_closed
+from .motions import poses_at
 from .pilot import Pilot
 from .points import ContactPoints, contact_points
 from .recording import Frame, Recording, SensorFrame
@@ -130,7 +131,7 @@ class Simulation:
         """Bring the state one frame on and return what the sensors feel there."""
         times = self._time_of(self.frame) + np.arange(self.substeps + 1) * self.dt
         times[-1] = self._time_of(self.frame + 1)
-        path = [poses_at(motion, times) for motion in self._motions]
+        path = [poses_at(motion, times, self.scenario.interpolation) for motion in self._motions]
         quaternions = np.ascontiguousarray(np.stack([quaternion for _, quaternion in path], axis=1))
         positions = np.ascontiguousarray(np.stack([position for position, _ in path], axis=1))
         for body in np.flatnonzero(self._world.kind == DRIVEN):

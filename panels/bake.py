@@ -16,6 +16,8 @@ class Bake(Part):
         own = scene.palpate
         layout.prop(own, "folder", text="")
         column = layout.column(align=True)
+        column.prop(own, "interpolation", text="")
+        column.prop(own, "subframes")
         column.prop(own, "use_auto_dt")
         if not own.use_auto_dt:
             column.prop(own, "dt")

@@ -8,8 +8,9 @@ import pytest
 from scipy.linalg import eigvals
 from solver_scenes import cube_on_pad, pressed
 
-from palpate.core.bodies import poses_at, quaternions_from_vectors, rotation_matrices, rotation_vectors
+from palpate.core.bodies import quaternions_from_vectors, rotation_matrices, rotation_vectors
 from palpate.core.errors import ParameterError
+from palpate.core.motions import poses_at
 from palpate.core.scenario import Motion, SensorParameters
 from palpate.core.timestep import LONGEST, advise, stability_limit
 
