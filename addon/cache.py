@@ -19,7 +19,7 @@ from . import dependencies, drives, effects, freebodies, meshes, properties, sam
 
 PAINTED = tuple(f"{key}_{part}" for key in meshes.PAINTED for part in ("map", "factor"))
 REGION = ("region", "vertex_group", "threshold", "material", "face_set")
-SETTINGS = (*properties.PARAMETERS, *PAINTED, *REGION, *drives.SETTINGS, "role", "body", "mass")
+SETTINGS = (*properties.PARAMETERS, *PAINTED, *REGION, *drives.SETTINGS, "role", "body", "mass", "contact_normals")
 
 
 @dataclass
@@ -107,7 +107,7 @@ def go_on(scene, depsgraph, run: Run) -> Run:
     """Compute the frame where the scene stands, which is the one after the last computed."""
     frame = scene.frame_current
     moment = run.moments[frame] = sample.sample_moment(scene, depsgraph, run.binding)
-    run.simulation.extend(moment.poses, moment.targets)
+    run.simulation.extend(moment.poses, moment.targets, moment.vertices, moment.texels)
     run.frames[frame] = run.simulation.advance()
     return run
 
@@ -130,7 +130,11 @@ def is_stale(scene, depsgraph, run: Run) -> bool:
         return True  # moved while it stood at the first frame: that is a new start
     touched = state.session.changed_geometry & everyone.keys()
     state.session.changed_geometry -= touched
-    return any(meshes.fingerprint(everyone[name], depsgraph) != run.geometry[name] for name in touched)
+    bending = {skin.name for skin in run.binding.skins}
+    if any(meshes.fingerprint(everyone[name], depsgraph) != run.geometry[name] for name in touched - bending):
+        return True
+    # What deforms looks different at every frame: it is compared with what it looked like at this one, if that is known.
+    return bool(touched & bending) and (scene.frame_current not in run.moments or has_moved(scene, depsgraph, run))
 
 
 def has_moved(scene, depsgraph, run: Run) -> bool:
@@ -141,7 +145,8 @@ def has_moved(scene, depsgraph, run: Run) -> bool:
     except PalpateError:
         return True
     moved = any(not np.array_equal(now.poses[i][part], before.poses[i][part]) for i in before.poses for part in (0, 1))
-    return moved or now.targets != before.targets
+    bent = any(not np.array_equal(found, before.shapes[place]) for place, found in now.shapes.items())
+    return moved or bent or now.targets != before.targets
 
 
 def settings_of(scene, objects) -> tuple:

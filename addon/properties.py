@@ -252,6 +252,19 @@ class PALPATE_PG_object(bpy.types.PropertyGroup):
     gain_map: _map("Painted Gain", "more or less it reports for the same force")
     gain_factor: _factor("the gain")
 
+    contact_normals: EnumProperty(
+        name="Contact Normals",
+        description="In which direction this object presses",
+        items=(
+            ("FLAT", "Flat", "Along the normals of its triangles"),
+            (
+                "SMOOTH",
+                "Smooth",
+                "Along normals interpolated between its vertices, as for smooth shading: for balls and fingers",
+            ),
+        ),
+        **_fixed,
+    )
     body: EnumProperty(
         name="Body",
         description="What moves this object",

@@ -5,8 +5,8 @@ Who takes part: every object of the scene with a role that the view layer shows.
 with a warning; instances of collections never take part.
 
 Each object is a body of its own, unless it is part of its parent's (:mod:`.parts`). A body's frame has the location and
-rotation of its object; scale and shear go into the vertices. The shape of a mesh is that of the first frame. Keyframed
-bodies are sampled at every frame.
+rotation of its object; scale and shear go into the vertices. Keyframed bodies, and surfaces that deform, are sampled at every
+frame.
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ import numpy as np
 
 from ..core.errors import SceneError
 from ..core.mesh import TriangleMesh, checked_mesh, mass_properties
-from ..core.scenario import Body, Motion, Painted, Scenario, Sensor, SensorParameters, Signal, Target
+from ..core.scenario import Body, Deformation, Motion, Painted, Scenario, Sensor, SensorParameters, Signal, Target
 from ..core.texels import texels_from_region
-from . import drives, effects, freebodies, identity, meshes, parts, properties, transforms, units
+from . import deform, drives, effects, freebodies, identity, meshes, parts, properties, transforms, units
 from .jobs import Progress
 
 SAME_STRETCH = 1e-4
@@ -42,11 +42,22 @@ class Moment:
         What their parents do to free and driven bodies.
     targets : dict of int to float
         Of the drives.
+    vertices, texels : dict of int to (n, 3) and (n, 9) float
+        Shapes of targets and sensors that may deform, by target and sensor index (see :class:`.Deformation`).
     """
 
     poses: Poses
     parents: dict[int, np.ndarray]
     targets: dict[int, float]
+    vertices: dict[int, np.ndarray]
+    texels: dict[int, np.ndarray]
+
+    @property
+    def shapes(self) -> dict[tuple[str, int], np.ndarray]:
+        """Both in one."""
+        return {("target", i): found for i, found in self.vertices.items()} | {
+            ("sensor", i): found for i, found in self.texels.items()
+        }
 
 
 @dataclass
@@ -74,6 +85,8 @@ class Binding:
         Of the objects that hold the sensors and pads, by sensor index.
     parts : dict of str to (4, 4) float
         Where the parts of other bodies are in those bodies' objects, by key.
+    skins : tuple of Skin
+        Surfaces that may deform.
     """
 
     keys: tuple[str, ...]
@@ -86,6 +99,7 @@ class Binding:
     warnings: tuple[str, ...]
     sensor_keys: tuple[str, ...]
     parts: dict[str, np.ndarray]
+    skins: tuple[deform.Skin, ...]
 
     def sensor_objects(self, scene) -> list:
         """Return the objects that hold the sensors and pads, by sensor index; None for one that was deleted."""
@@ -182,20 +196,22 @@ def sample_start(scene, depsgraph) -> tuple[Scenario, Binding]:
             body, more = _moved(obj, body, mesh)
             warnings += more
         bodies.append(body)
-    sensors, targets, sensor_objects, places = [], [], [], {}
+    sensors, targets, sensor_objects, places, skins = [], [], [], {}, []
     for obj in objects:
         index = owners.index(carriers[obj])
-        mesh = own[index]
+        mesh, linear, offset = own[index], stretches[index], np.zeros(3)
         if carriers[obj] != obj:
             place = places[identity.key(obj)] = parts.place(obj, carriers[obj], depsgraph)
             linear, offset = parts.into_body(matrices[index], place)
             mesh, more = _mesh(obj, depsgraph, linear * scale, offset * scale)
             warnings += more
         if obj.palpate.role == "TARGET":
-            targets.append(Target(obj.name, index, mesh))
+            targets.append(Target(obj.name, index, mesh, smooth=obj.palpate.contact_normals == "SMOOTH"))
+            skins.append(deform.skin_of(obj, depsgraph, targets[-1], len(targets) - 1, mesh, linear * scale, offset * scale))
         else:
             sensors.append(_sensor(obj, index, mesh))
             sensor_objects.append(obj)
+            skins.append(deform.skin_of(obj, depsgraph, sensors[-1], len(sensors) - 1, mesh, linear * scale, offset * scale))
     driven = tuple(index for index in starts if owners[index].palpate.body == "DRIVEN")
     for index in driven:
         drive = drives.drive_of(owners[index], matrices[index], depsgraph)
@@ -215,6 +231,14 @@ def sample_start(scene, depsgraph) -> tuple[Scenario, Binding]:
         name=scene.name,
         interpolation=settings.interpolation.lower(),
     )
+    skins = tuple(skin for skin in skins if skin is not None)
+    warnings += [
+        f"'{skin.name}' may deform while forces move it: its mass, centre and inertia stay those of the first frame."
+        for skin in skins
+        if bodies[skin.body].moved_by_forces and skin.follower is None and owners[skin.body].name == skin.name
+    ]
+    sensors, targets = deform.declared(scenario, skins)
+    scenario = replace(scenario, sensors=sensors, targets=targets)
     scenario.check()
     binding = Binding(
         keys=tuple(identity.key(obj) for obj in owners),
@@ -227,15 +251,18 @@ def sample_start(scene, depsgraph) -> tuple[Scenario, Binding]:
         driven=driven,
         sensor_keys=tuple(identity.key(obj) for obj in sensor_objects),
         parts=places,
+        skins=skins,
     )
     return scenario, binding
 
 
 def sample_moment(scene, depsgraph, binding: Binding) -> Moment:
     """Read what a scene says at its present frame."""
-    poses, parents, targets = {}, {}, {}
+    poses, parents, targets, matrices = {}, {}, {}, {}
+    may_change = {skin.body for skin in binding.skins}
     for index, obj in enumerate(binding.objects(scene)):
         if index in binding.starts:
+            matrices[index] = binding.starts[index]
             parents[index] = freebodies.parent_matrix(obj, depsgraph)
             if index not in binding.driven:
                 continue
@@ -243,15 +270,33 @@ def sample_moment(scene, depsgraph, binding: Binding) -> Moment:
             matrix = drives.carried(binding.starts[index], binding.parents[index][0], parents[index])
         else:
             matrix = _world(obj, depsgraph)
+        if index not in binding.starts:
+            matrices[index] = matrix
         position, quaternion, stretch = _split(obj, matrix)
-        if np.abs(stretch - binding.stretch[index]).max() > SAME_STRETCH * np.abs(binding.stretch[index]).max():
+        rigid = index not in may_change or not deform.has_animated_scale(obj)
+        if rigid and np.abs(stretch - binding.stretch[index]).max() > SAME_STRETCH * np.abs(binding.stretch[index]).max():
             raise SceneError(
-                f"The scale of '{obj.name}' changes (frame {scene.frame_current}): bodies are rigid, keep the scale constant."
+                f"The scale of '{obj.name}' changes (frame {scene.frame_current}) without keyframes or drivers of its own or a "
+                "parent: give it some, or keep the scale constant."
             )
         poses[index] = position * binding.scale, quaternion
     if binding.parts:
         parts.check_places(scene, depsgraph, binding.parts)
-    return Moment(poses, parents, targets)
+    return Moment(poses, parents, targets, *_shapes(scene, depsgraph, binding, matrices))
+
+
+def _shapes(scene, depsgraph, binding: Binding, matrices: dict[int, np.ndarray]) -> tuple[dict, dict]:
+    """Read what may deform: vertices by target index, frames of texels by sensor index."""
+    vertices, texels = {}, {}
+    for skin in binding.skins:
+        linear, offset, matrix = skin.linear, skin.offset, matrices[skin.body]
+        if skin.scaled:
+            place = binding.parts.get(skin.key)
+            linear, offset = (transforms.split(matrix)[2], np.zeros(3)) if place is None else parts.into_body(matrix, place)
+            linear, offset = linear * binding.scale, offset * binding.scale
+        found = vertices if skin.follower is None else texels
+        found[skin.index] = skin.at(scene, depsgraph, linear, offset)
+    return vertices, texels
 
 
 def sample_scenario(scene) -> Generator[Progress, None, tuple[Scenario, Binding]]:
@@ -266,6 +311,7 @@ def sample_scenario(scene) -> Generator[Progress, None, tuple[Scenario, Binding]
         motions = {index: body.motion for index, body in enumerate(scenario.bodies) if not body.free}
         samples = {index: [(motion.positions[0], motion.quaternions[0])] for index, motion in motions.items()}
         targets = {index: list(scenario.bodies[index].drive.target.values) for index in binding.driven}
+        shapes = Shapes(scenario)
         yield Progress("Reading", frames[0], 1, len(frames))
         for frame in frames[1:]:
             for part in range(1, parts_of_frame + 1):
@@ -278,6 +324,7 @@ def sample_scenario(scene) -> Generator[Progress, None, tuple[Scenario, Binding]
                     targets[index].append(value)
             for index, matrix in moment.parents.items():
                 binding.parents[index].append(matrix)
+            shapes.append(moment)
             yield Progress("Reading", frame, frame - frames[0] + 1, len(frames))
     finally:
         with suppress(ReferenceError):  # the scene went while its frames were read
@@ -290,7 +337,36 @@ def sample_scenario(scene) -> Generator[Progress, None, tuple[Scenario, Binding]
     for index, values in targets.items():
         drive = replace(bodies[index].drive, target=Signal(times, np.array(values)))
         bodies[index] = replace(bodies[index], drive=drive)
-    return replace(scenario, bodies=tuple(bodies)), binding
+    sensors, targets = shapes.finished(scenario, times)
+    return replace(scenario, bodies=tuple(bodies), sensors=sensors, targets=targets), binding
+
+
+class Shapes:
+    """Shapes of what may deform, frame after frame; those that never change take the room of one."""
+
+    def __init__(self, scenario: Scenario):
+        groups = (("target", scenario.targets), ("sensor", scenario.sensors))
+        self._known = {
+            (kind, index): [part.deformation.values[0]]
+            for kind, group in groups
+            for index, part in enumerate(group)
+            if part.deformation is not None
+        }
+
+    def append(self, moment: Moment) -> None:
+        """Add what one more frame says."""
+        for place, found in moment.shapes.items():
+            before = self._known[place][-1]
+            self._known[place].append(before if np.array_equal(found, before) else found)
+
+    def finished(self, scenario: Scenario, times: np.ndarray) -> tuple[tuple[Sensor, ...], tuple[Target, ...]]:
+        """Return sensors and targets with their deformations; without where nothing has changed."""
+        groups = {"sensor": list(scenario.sensors), "target": list(scenario.targets)}
+        for (kind, index), samples in self._known.items():
+            still = all(found is samples[0] for found in samples)
+            deformation = None if still else Deformation(times, np.array(samples))
+            groups[kind][index] = replace(groups[kind][index], deformation=deformation)
+        return tuple(groups["sensor"]), tuple(groups["target"])
 
 
 def _whole_and_part(frame: int, part: int, parts_of_frame: int) -> tuple[int, float]:

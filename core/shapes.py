@@ -215,8 +215,10 @@ def place_triangle(i, target, shapes, tree):
     nx, ny, nz = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
     length = math.sqrt(nx * nx + ny * ny + nz * nz)
     longest = max(ux * ux + uy * uy + uz * uz, vx * vx + vy * vy + vz * vz, wx * wx + wy * wy + wz * wz)
-    scale = 1.0 / length if length > FLAT * longest else 0.0
-    faces[i, 9], faces[i, 10], faces[i, 11] = scale * nx, scale * ny, scale * nz
+    if length > FLAT * longest:
+        faces[i, 9], faces[i, 10], faces[i, 11] = nx / length, ny / length, nz / length
+    else:
+        faces[i, 9], faces[i, 10], faces[i, 11] = 0.0, 0.0, 0.0
 
 
 @kernel

@@ -124,3 +124,64 @@ def texels_from_region(mesh: TriangleMesh, region: np.ndarray, name: str = "sens
         area=vertex_areas(mesh, inside)[vertex],
         layout=layout,
     )
+
+
+class Follower:
+    """Texels that go with a mesh whose vertices move.
+
+    Normals are computed anew; each texel's x axis keeps its angle to one edge of the mesh, the one nearest to its direction.
+
+    Parameters
+    ----------
+    texels : Texels
+    mesh : TriangleMesh
+        In the shape in which the texels were made.
+    """
+
+    def __init__(self, texels: Texels, mesh: TriangleMesh):
+        self._mesh, self._vertex, self.start = mesh, texels.vertex, mesh.vertices
+        edges = mesh.triangles[:, [0, 1, 1, 2, 2, 0, 1, 0, 2, 1, 0, 2]].reshape(-1, 2)
+        number = np.full(len(mesh.vertices), -1)
+        number[texels.vertex] = np.arange(len(texels))
+        edges = edges[number[edges[:, 0]] >= 0]
+        texel = number[edges[:, 0]]
+        across = _across(mesh.vertices[edges[:, 1]] - mesh.vertices[edges[:, 0]], texels.normal[texel])
+        along = np.einsum("ij,ij->i", across, texels.tangent[texel])
+        best = np.lexsort([-along, texel])
+        first = np.searchsorted(texel[best], np.arange(len(texels)))
+        chosen = best[first]
+        self._other = edges[chosen, 1]
+        self._cosine = along[chosen]
+        self._sine = np.einsum("ij,ij->i", np.cross(texels.normal, across[chosen]), texels.tangent)
+
+    def frames(self, vertices: np.ndarray, name: str) -> np.ndarray:
+        """Return :attr:`Texels.frames` on the mesh in another shape.
+
+        Parameters
+        ----------
+        vertices : (nv, 3) float, metres
+        name : str
+            Of the sensor, for the message.
+
+        Raises
+        ------
+        SensorError
+            A texel has no normal there.
+        """
+        normal = vertex_normals(TriangleMesh(vertices, self._mesh.triangles))[self._vertex]
+        edge = _across(vertices[self._other] - vertices[self._vertex], normal)
+        tangent = self._cosine[:, None] * edge + self._sine[:, None] * np.cross(normal, edge)
+        bad = (np.linalg.norm(normal, axis=1) < 0.5) | (np.linalg.norm(edge, axis=1) < 0.5)
+        if bad.any():
+            raise SensorError(
+                f"Vertex {self._vertex[bad][0]} of sensor '{name}' loses its normal as it deforms: "
+                "keep its faces from collapsing."
+            )
+        return np.hstack([vertices[self._vertex], normal, tangent])
+
+
+def _across(vectors: np.ndarray, normal: np.ndarray) -> np.ndarray:
+    """Unit vectors of what of (n, 3) vectors lies across the normals; zero where nothing does."""
+    flat = vectors - np.einsum("ij,ij->i", vectors, normal)[:, None] * normal
+    length = np.linalg.norm(flat, axis=1, keepdims=True)
+    return np.divide(flat, length, out=np.zeros_like(flat), where=length > 0)

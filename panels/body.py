@@ -14,6 +14,8 @@ class Body(Part):
         layout.prop(settings, "body", text="")
         if settings.body in freebodies.MOVED:
             layout.prop(settings, "mass")
+        if settings.role == "TARGET":
+            layout.prop(settings, "contact_normals")
         if settings.body == "DRIVEN":
             _draw_drive(layout, settings)
         if settings.body == "FREE":

@@ -141,11 +141,14 @@ def test_half_turns_have_a_quaternion(axis):
     assert np.abs(transforms.quaternion(transforms.rotation(expected))) == pytest.approx(expected)
 
 
-def test_animated_scale_is_named_with_its_frame():
+def test_scale_that_changes_for_no_known_reason_is_named_with_its_frame():
     scene, _, target = press(frames=5)
-    target.keyframe_insert("scale", frame=1)
-    target.scale.x = 2.0
-    target.keyframe_insert("scale", frame=5)
+    bpy.ops.object.empty_add()
+    empty = bpy.context.object
+    empty.keyframe_insert("scale", frame=1)
+    empty.scale.x = 2.0
+    empty.keyframe_insert("scale", frame=5)
+    target.constraints.new("COPY_SCALE").target = empty
     scene.frame_set(4)
     with pytest.raises(SceneError, match=r"scale of 'Ball' changes \(frame 2\)"):
         sampled(scene)

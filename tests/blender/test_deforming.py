@@ -1,0 +1,157 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Shape keys, armatures, modifiers and animated scale: what deforms in Blender presses as it looks, baked and played."""
+
+import math
+
+import bpy
+import numpy as np
+import pytest
+from blender_scenes import press
+
+from palpate.addon import live, sample, transforms
+from palpate.addon.bake import bake
+from palpate.core.drive import drive
+from palpate.core.errors import SceneError
+
+
+def sampled(scene):
+    return drive(sample.sample_scenario(scene))
+
+
+def world_of(scenario, values, body, frame):
+    motion = scenario.bodies[body].motion
+    return values @ transforms.rotation(motion.quaternions[frame]).T + motion.positions[frame]
+
+
+def evaluated(obj):
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    final = obj.evaluated_get(depsgraph)
+    mesh = final.to_mesh()
+    points = np.array([final.matrix_world @ vertex.co for vertex in mesh.vertices])
+    final.to_mesh_clear()
+    return points
+
+
+def grow(target, frames):
+    """A shape key that makes the ball half as large again."""
+    target.shape_key_add(name="Basis")
+    key = target.shape_key_add(name="Larger")
+    for point in key.data:
+        point.co *= 1.5
+    key.value = 0.0
+    key.keyframe_insert("value", frame=1)
+    key.value = 1.0
+    key.keyframe_insert("value", frame=frames)
+
+
+def wave(target, _frames):
+    modifier = target.modifiers.new("Wave", "WAVE")
+    modifier.height, modifier.width, modifier.narrowness = 0.002, 0.01, 100.0
+
+
+def scale(target, frames):
+    target.keyframe_insert("scale", frame=1)
+    target.scale = (1.2, 0.9, 1.4)
+    target.keyframe_insert("scale", frame=frames)
+
+
+def armature(target, frames):
+    """A bone that moves the ball by 1 mm and turns it."""
+    bpy.ops.object.armature_add(location=target.location)
+    rig = bpy.context.object
+    modifier = target.modifiers.new("Rig", "ARMATURE")
+    modifier.object = rig
+    group = target.vertex_groups.new(name="Bone")
+    group.add(range(len(target.data.vertices) // 2), 1.0, "REPLACE")
+    bone = rig.pose.bones[0]
+    bone.rotation_mode = "XYZ"
+    bone.keyframe_insert("rotation_euler", frame=1)
+    bone.rotation_euler = (0.0, 0.3, 0.0)
+    bone.keyframe_insert("rotation_euler", frame=frames)
+
+
+@pytest.mark.parametrize("how", [grow, wave, scale, armature])
+def test_targets_are_sampled_as_they_look(how):
+    scene, _, target = press(frames=6)
+    how(target, 6)
+    scene.frame_set(1)
+    scenario, _ = sampled(scene)
+    values = scenario.targets[0].deformation.values
+    assert len(values) == 6
+    for frame in (1, 3, 6):
+        scene.frame_set(frame)
+        world = world_of(scenario, values[frame - 1], scenario.targets[0].body, frame - 1)
+        np.testing.assert_allclose(world, evaluated(target), atol=2e-8)
+    assert np.abs(values[-1] - values[0]).max() > 1e-4
+
+
+def test_what_does_not_change_is_rigid():
+    scene, pad, target = press(frames=4)
+    target.modifiers.new("More", "SUBSURF")
+    target.shape_key_add(name="Basis")
+    pad.modifiers.new("Bend", "SIMPLE_DEFORM").angle = math.radians(10)
+    scenario, _ = sampled(scene)
+    assert scenario.targets[0].deformation is None
+    assert scenario.sensors[0].deformation is None
+
+
+def test_a_bending_sensor_carries_its_texels():
+    scene, pad, _ = press(frames=5)
+    pad.shape_key_add(name="Basis")
+    key = pad.shape_key_add(name="Bent")
+    for point in key.data:
+        point.co.z = -10.0 * point.co.x**2
+    key.value = 0.0
+    key.keyframe_insert("value", frame=1)
+    key.value = 1.0
+    key.keyframe_insert("value", frame=5)
+    scene.frame_set(1)
+    scenario, _ = sampled(scene)
+    sensor = scenario.sensors[0]
+    frames = sensor.deformation.values
+    scene.frame_set(5)
+    np.testing.assert_allclose(frames[-1][:, :3], evaluated(pad)[sensor.texels.vertex], atol=1e-8)
+    np.testing.assert_allclose(np.linalg.norm(frames[-1][:, 3:6], axis=1), 1.0, atol=1e-9)
+    np.testing.assert_allclose(np.einsum("ij,ij->i", frames[-1][:, 3:6], frames[-1][:, 6:9]), 0.0, atol=1e-9)
+    # The x axes go on pointing along the rows of the grid.
+    row = np.argsort(sensor.texels.layout.column[sensor.texels.layout.row == 3])
+    line = frames[-1][sensor.texels.layout.row == 3][row]
+    steps = np.diff(line[:, :3], axis=0)
+    steps /= np.linalg.norm(steps, axis=1, keepdims=True)
+    assert np.einsum("ij,ij->i", steps, line[:-1, 6:9]).min() > 0.97  # a chord against the tangent at its end
+    assert np.ptp(frames[-1][:, 3:6], axis=0).max() > 0.3
+
+
+def test_played_and_baked_alike(tmp_path):
+    scene, pad, target = press(frames=6)
+    grow(target, 6)
+    pad.modifiers.new("Wave", "WAVE").height = 0.0005
+    target.palpate.contact_normals = "SMOOTH"
+    scene.palpate.folder = str(tmp_path)
+    scene.frame_set(1)
+    played = []
+    for frame in range(1, 7):
+        scene.frame_set(frame)
+        played.append(live.status(scene).frame.sensors["Pad"].normal_force)
+    live.reset(scene)
+    recording = drive(bake(scene)).recording
+    assert recording.sensors["Pad"].contact[-1].any()
+    np.testing.assert_array_equal(np.array(played), recording.sensors["Pad"].normal_force)
+
+
+def test_another_number_of_vertices_is_named_with_its_frame():
+    scene, _, target = press(frames=5)
+    build = target.modifiers.new("Build", "BUILD")
+    build.frame_start, build.frame_duration = 0, 10
+    with pytest.raises(SceneError, match=r"'Ball' has \d+ vertices at frame 2 and had \d+ at the first"):
+        sampled(scene)
+
+
+def test_a_scale_that_turns_it_inside_out_is_named():
+    scene, _, target = press(frames=5)
+    target.keyframe_insert("scale", frame=1)
+    target.scale.x = -3.0
+    target.keyframe_insert("scale", frame=5)
+    scene.frame_set(1)
+    with pytest.raises(SceneError, match="turns it inside out at frame"):
+        sampled(scene)
