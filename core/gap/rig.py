@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -57,6 +57,7 @@ class Trial:
         Of its file, without the suffix.
     use : "fit" or "check"
     time : (T,) float, seconds, increasing
+        Since the first sample of the rig's first recording.
     stimulus : "pose", "depth" or "force"
     position, quaternion : (T, 3), (T, 4) float, or None
         Of the indenter in the sensor's frame.
@@ -155,6 +156,8 @@ def read_rig(path: str | Path) -> Rig:
         trial, said = _trial(entry, number, folder, path, len(texels), indenter is not None)
         trials.append(trial)
         warnings += said
+    began = min(float(trial.time[0]) for trial in trials)  # recordings of one clock keep their order on it
+    trials = [replace(trial, time=trial.time - began) for trial in trials]
     names = [trial.name for trial in trials]
     for name in names:
         if names.count(name) > 1:
@@ -444,7 +447,7 @@ def _clock(columns: Mapping[str, np.ndarray], file: Path) -> np.ndarray:
         raise FileError(
             f"The samples of '{file.name}' are {step:g} s apart: `time` must be in seconds, it looks like milliseconds."
         )
-    return time - time[0]
+    return time
 
 
 def _stimulus_kind(columns: Mapping[str, np.ndarray], file: Path, has_indenter: bool) -> str:

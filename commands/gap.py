@@ -1,0 +1,76 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""``palpate gap``: what the model of a sensor misses against measurements, as a report and as an amended sensor."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from ..core.errors import SceneError
+from ..core.formats.files import writable_folder
+from . import console
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("rig", metavar="RIG.toml", help="what was measured (docs/gap.md); its CSV files lie beside it")
+    parser.add_argument("--out", metavar="DIR", required=True, help="folder for gap.json, sensor.toml, report.html and plots")
+    parser.add_argument("--blend", metavar="SCENE.blend", help="also put the amended sensor into this file")
+    parser.add_argument("--sensor", metavar="NAME", help="the sensor in it (default: the only one)")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    from ..core.gap import report
+    from ..core.gap.amend import amended, numbers
+    from ..core.gap.diagnose import Diagnosis, diagnose
+    from ..core.gap.rig import read_rig
+
+    if arguments.sensor and not arguments.blend:
+        raise SceneError("--sensor names a sensor of a scene: give the scene with --blend.")
+    rig = read_rig(arguments.rig)
+    folder = writable_folder(arguments.out, create=True)
+    result = None
+    with console.progress_bar("gap", 1000, unit="step") as bar:
+
+        def show(stage: str, done: int) -> None:
+            console.Interrupt.check()
+            bar.set_description(stage, refresh=False)
+            bar.update(max(done - bar.n, 0))
+
+        for step in diagnose(rig):
+            if isinstance(step, Diagnosis):
+                result = step
+            else:
+                show(step.stage, int(0.95 * step.done))
+        assert result is not None
+        for stage, share in report.write(result, folder):
+            show(stage, 950 + int(50 * share))
+    print(report.headline(result))
+    rows = [("", "parameter", "value (95 % interval)")]
+    for one in numbers(result):
+        owner = "base model" if one.effect < 0 else result.best.model.effects[one.effect].name
+        rows.append((owner, one.name, report.interval_text(one)))
+    print()
+    print(console.table(rows, "<<<"))
+    print()
+    for text in report.summary(result)["warnings"]:
+        print(f"note: {text}")
+    print(f"report: {folder / 'report.html'}")
+    print(f"sensor: {folder / 'sensor.toml'}")
+    if arguments.blend:
+        print(f"saved:  {_into_scene(arguments.blend, arguments.sensor, amended(result))}")
+    return 0
+
+
+def _into_scene(blend: str, name: str | None, sensor) -> Path:
+    """Put the amended sensor on a sensor of a .blend and save it."""
+    from . import blender
+
+    with console.quiet():
+        bpy = blender.start()
+        blender.open_blend(blend)
+        from ..addon.measured import sensor_called, take_model
+
+        take_model(sensor_called(bpy.context.scene, name), sensor)
+        path = Path(blend)
+        blender.save_blend(path)
+    return path

@@ -1,0 +1,163 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The amended sensor, its numbers with intervals, and the experiment that would tell what these recordings do not."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..formats.sensor_toml import SHAPE_WORDS, SensorModel
+from .diagnose import Diagnosis
+from .fit import covariance, fit, value_of
+from .model import Model
+from .search import views_of
+
+LEVEL = 0.95
+"""Of the intervals."""
+
+
+@dataclass(frozen=True)
+class Number:
+    """A fitted number.
+
+    Attributes
+    ----------
+    effect : int
+        Index in the model's stack; -1 for the base model.
+    name : str
+    value, low, high : float
+        With its 95 % interval.
+    """
+
+    effect: int
+    name: str
+    value: float
+    low: float
+    high: float
+
+
+def numbers(result: Diagnosis) -> list[Number]:
+    """Return the numbers of the amended model that are not one per texel.
+
+    Intervals are from the scatter of the gradients of texels within trials, so that they hold for coloured noise, or from that
+    of whole trials where it is larger, as when the formula is not quite the sensor's; Student's t with the number of trials.
+    """
+    from scipy import stats
+
+    found = result.best
+    common = [item for item in found.free if not item.per_texel]
+    fine, coarse = covariance(found), covariance(found, by_trial=True)
+    groups = max(len(found.sse), 2)
+    made = []
+    for i, item in enumerate(common):
+        at = float(item.to(value_of(found.model, item)))
+        spread = float(np.sqrt(max(fine[i, i], 0.0))) * stats.norm.ppf(0.5 + 0.5 * LEVEL)
+        if groups > len(common) + 1:
+            wide = float(np.sqrt(max(coarse[i, i], 0.0))) * stats.t.ppf(0.5 + 0.5 * LEVEL, groups - 1)
+            spread = max(spread, wide)
+        ends = sorted((float(item.back(at - spread)), float(item.back(at + spread))))
+        made.append(Number(item.effect, item.name, float(value_of(found.model, item)), ends[0], ends[1]))
+    return made
+
+
+def normalised(result: Diagnosis) -> Model:
+    """Return the best model with the mean of its gains per texel put where it belongs: into `gain`, or `k` in newtons."""
+    model = result.best.model
+    touched = np.zeros(len(result.rig.texels), bool)
+    for predictor in result.of("fit"):
+        s = predictor.stimulus
+        touched |= ((s.depth if s.load is None else s.load) > 0).any(axis=0)
+    for index, effect in enumerate(model.effects):
+        if effect.name != "gain-mismatch" or "factor" not in effect.values or not touched.any():
+            continue
+        factor = np.asarray(effect.values["factor"], float)
+        mean = float(factor[touched].mean())
+        if mean <= 0 or any(other.name != "gain-mismatch" for other in model.effects):
+            continue  # beside other effects a common factor is not the same as a stiffer sensor
+        factor = np.where(touched, factor / mean, 1.0)
+        p = model.parameters
+        if p.unit == "N" and any(predictor.trial.stimulus != "force" for predictor in result.of("fit")):
+            p = replace(p, k=p.k * mean, cn=p.cn * mean)
+        else:
+            p = replace(p, gain=p.gain * mean)
+        effects = list(model.effects)
+        effects[index] = replace(effect, values={**effect.values, "factor": tuple(factor.tolist())})
+        model = Model(p, tuple(effects))
+    return model
+
+
+def amended(result: Diagnosis) -> SensorModel:
+    """Return the sensor with fitted parameters and what was found, ready to be written or loaded."""
+    model = normalised(result)
+    shape = {key: result.rig.words[key] for key in SHAPE_WORDS if key in result.rig.words}
+    return SensorModel(result.rig.name, model.parameters, model.effects, shape)
+
+
+def stages(result: Diagnosis) -> list[Model]:
+    """Return the base model and then, one effect more each, the models on the way to the amended one."""
+    made = [result.base.model]
+    effects = result.best.model.effects
+    if len(effects) > 1:
+        views = views_of(result.of("fit"), (result.noise[0].deviation, result.noise[1].deviation))
+        for count in range(1, len(effects)):
+            free = [item for item in result.best.free if item.effect < count]
+            begun = Model(result.best.model.parameters, effects[:count])
+            made.append(fit(views.whole, begun, free, turns=6, tolerance=1e-4).model)
+    if effects:
+        made.append(result.best.model)
+    return made
+
+
+EXPERIMENTS = {
+    "creep": "hold one depth for at least a minute, then release and wait as long",
+    "softening": "press the same spot ten times equally deep, then deeper, and again after an hour",
+    "hysteresis": "load and unload to the same depth at speeds a hundredfold apart, with partial unloadings",
+    "adhesion": "retract slowly after contacts of one second and of one minute, and record until well after release",
+    "wear": "repeat one cycle several hundred times on the same texels",
+    "load-spreading": "press single texels with a pin that is narrower than a texel",
+    "crosstalk": "press single texels with a pin, along one row and along one column, at two loads",
+    "gain-mismatch": "press every texel with the same flat indenter to the same depth",
+    "dead-texels": "press every texel once",
+    "dead-zone": "approach slowly, with many samples at the first touch, with a flat and with a round indenter",
+    "saturation": "go on to the highest load that the sensor may bear",
+    "stiffening": "go on to the largest depth that the sensor may bear, slowly",
+    "lag": "press and release as fast as the rig can, and record at a high rate",
+    "drift": "record an hour without touching the sensor",
+    "offset": "record a minute without touching the sensor, before and after a trial",
+    "quantization": "raise the load very slowly through its whole range",
+    "misalignment": "press at many known places, beyond the sensor's edges as well",
+    "stribeck": "slide at constant speeds from a tenth of a millimetre to a hundred millimetres per second",
+    "viscous-friction": "slide at constant speeds, up to the fastest that the rig can",
+    "noise": "record a minute at rest, unloaded and under a constant load",
+}
+"""What brings out each effect most clearly."""
+
+
+def next_experiment(result: Diagnosis) -> str:
+    """Return what to record next, in one sentence; empty when nothing is open."""
+    if result.ambiguous:
+        pair = result.ambiguous[0]
+        parts = [EXPERIMENTS.get(name, "") for name in pair[:2]]
+        text = f"To tell {pair[0]} from {pair[1]}: {'; and '.join(part for part in parts if part)}."
+        return text
+    c = result.coverage
+    lacking = []
+    if c.texels < 0.999:
+        lacking.append(f"touch the {1.0 - c.texels:.0%} of the texels that no trial reaches")
+    if c.cycles < 2:
+        lacking.append("repeat the cycle at least three times in one trial")
+    if c.longest_hold < 2.0:
+        lacking.append("hold one depth for some ten seconds")
+    if c.rates < 5.0:
+        lacking.append("press at speeds at least tenfold apart")
+    if not c.unloading:
+        lacking.append("record the unloading too")
+    if result.verdict == "unexplained":
+        hint = {
+            "common mode": "record the same seconds without touching the sensor, to see whether it is there as well",
+            "shared by loaded texels": "hold one constant load for as long as a trial, to see how the reading moves by itself",
+            "clock": "record as long without touching the sensor",
+        }.get(result.structure.strongest, "repeat one trial exactly, to see what of the difference comes again")
+        return f"To find out what it is: {'; '.join([hint, *lacking])}."
+    return f"What these recordings do not cover: {'; '.join(lacking)}." if lacking else ""

@@ -1,0 +1,126 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a texel goes through: phases of contact, and the quantities that a residual may depend on."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .model import Predictor
+from .stimulus import Stimulus
+
+PHASES = ("approach", "loading", "hold", "unloading", "released", "sliding")
+STILL = 0.02
+"""Share of its largest load per second below which a texel counts as held."""
+FAST_SLIDE = 2e-4
+"""Metres per second above which a held surface counts as sliding."""
+
+
+def load_of(stimulus: Stimulus) -> np.ndarray:
+    """Depth of a texel, or its share of a known force, as a share of the largest in the trial, (T, n) float."""
+    load = stimulus.depth if stimulus.load is None else stimulus.load
+    shares: np.ndarray = load / max(float(load.max(initial=0.0)), 1e-300)
+    return shares
+
+
+def phases(stimulus: Stimulus) -> np.ndarray:
+    """Return which of :data:`PHASES` each texel is in at each sample, (T, n) int."""
+    load = load_of(stimulus)
+    rate = np.gradient(load, stimulus.time, axis=0)
+    peak = np.maximum(load.max(axis=0, keepdims=True), 1e-12)
+    touching = load > 0
+    before = ~np.maximum.accumulate(touching, axis=0)
+    found = np.full(load.shape, PHASES.index("released"))
+    found[before] = PHASES.index("approach")
+    found[touching] = PHASES.index("hold")
+    found[touching & (rate > STILL * peak)] = PHASES.index("loading")
+    found[touching & (rate < -STILL * peak)] = PHASES.index("unloading")
+    found[touching & (np.abs(rate) <= 5 * STILL * peak) & (stimulus.slide > FAST_SLIDE)] = PHASES.index("sliding")
+    return found
+
+
+FEATURES: dict[str, str] = {
+    "depth": "how deep the texel is pressed",
+    "rate and direction": "how fast it is pressed, and whether it is loaded or unloaded",
+    "time since contact": "how long it has been touched",
+    "history": "how far and how often it was loaded before",
+    "neighbours": "what its neighbours carry",
+    "texel": "which texel it is",
+    "clock": "clock time, whatever is done",
+    "common mode": "what all texels do at the same moment, loaded or not",
+    "shared by loaded texels": "something that all loaded texels share at the same moment",
+}
+
+
+def features(predictor: Predictor, residual: np.ndarray) -> dict[str, np.ndarray]:
+    """What the residual of each texel at each sample may vary with: arrays (f, T, n) by group of :data:`FEATURES`.
+
+    Parameters
+    ----------
+    residual : (T, n) float
+        Only the last two groups look at it, and then at the other texels'.
+    """
+    s = predictor.stimulus
+    d = load_of(s)
+    time = s.time
+    rate = np.gradient(d, time, axis=0)
+    rate /= max(float(np.abs(rate).max(initial=0.0)), 1e-300)
+    touching = d > 0
+    since = _since(touching, time)
+    top = np.maximum.accumulate(d, axis=0)
+    step = np.diff(time, prepend=time[0])[:, None]
+    done = np.cumsum(d * step, axis=0)
+    done /= max(float(done.max(initial=0.0)), 1e-300)
+    falling = rate < -0.005
+    clock = np.broadcast_to(((time - time[0]) / max(time[-1] - time[0], 1e-300))[:, None], d.shape)
+    groups = {
+        "depth": [d, d**2, d**3, touching.astype(float)],
+        "rate and direction": [rate, np.abs(rate), d * falling, d**2 * falling, np.abs(rate) ** 0.3 * np.sign(rate)],
+        "time since contact": [
+            d * np.exp(-since / 0.1),
+            d * np.exp(-since),
+            d * np.exp(-since / 8.0),
+            np.exp(-since) * touching,
+        ],
+        "history": [top - d, (top - d) * touching, top**2 - d**2, done * d, done],
+        "clock": [clock, clock**2, clock * d],
+    }
+    n = d.shape[1]
+    if n > 1:
+        around = _neighbours(predictor, d)
+        groups["neighbours"] = [around - d, around * (d > 0), np.broadcast_to(d.mean(axis=1, keepdims=True), d.shape)]
+        others = (residual.sum(axis=1, keepdims=True) - residual) / (n - 1)
+        groups["common mode"] = [others]
+        shared = [_share_of_others(residual, d), _share_of_others(residual, rate)]
+        groups["shared by loaded texels"] = shared
+    return {name: np.stack(columns) for name, columns in groups.items()}
+
+
+def _since(touching: np.ndarray, time: np.ndarray) -> np.ndarray:
+    """Seconds since each texel was last touched anew, (T, n); zero where nothing touches."""
+    began = touching.copy()
+    began[1:] &= ~touching[:-1]
+    start = np.maximum.accumulate(np.where(began, time[:, None], -np.inf), axis=0)
+    return np.where(touching, time[:, None] - start, 0.0)
+
+
+def _neighbours(predictor: Predictor, d: np.ndarray) -> np.ndarray:
+    """Mean load of the four nearest texels."""
+    p = predictor.rig.texels.position
+    count = min(4, len(p) - 1)
+    if len(p) > 2000:  # the distances of all pairs would fill the memory
+        return np.broadcast_to(d.mean(axis=1, keepdims=True), d.shape)
+    distance = np.linalg.norm(p[:, None] - p[None], axis=2)
+    nearest = np.argsort(distance, axis=1)[:, 1 : count + 1]
+    mean = np.zeros_like(d)
+    for k in range(count):
+        mean += d[:, nearest[:, k]]
+    return mean / count
+
+
+def _share_of_others(residual: np.ndarray, shape: np.ndarray) -> np.ndarray:
+    """The residual that a texel would have if all followed `shape` with one amplitude per sample, found from the others."""
+    top = (residual * shape).sum(axis=1, keepdims=True) - residual * shape
+    square = (shape * shape).sum(axis=1, keepdims=True) - shape * shape
+    # A texel that is nearly alone says nothing about the others.
+    amplitude = np.where(square > 0.05, top / np.maximum(square, 0.05), 0.0)
+    return amplitude * shape

@@ -1,0 +1,322 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Looking for one effect more: a quick look at every form, a fit of those that promise something, a judgement on unseen trials.
+
+The quick look asks how much of the residual lies along what the effect would change, beside what the numbers that are free
+already can change (a score test). It and the first fits see a part of the texels, or of the samples where texels feel their
+neighbours; the last ones see everything.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from ..effects.base import Effect
+from .candidates import Candidate, Scales, is_spatial
+from .fit import Fit, Free, Share, changed, fit, held_out, value_of
+from .model import Model, Predictor
+
+FEW_TEXELS = 16
+"""Per trial, in the quick look."""
+THIN = 4
+"""Of so many samples one is looked at where texels feel their neighbours."""
+
+
+@dataclass
+class Views:
+    """The trials as the stages of the search look at them.
+
+    Attributes
+    ----------
+    whole : list of Share
+    narrow : list of Share
+        Few texels, all samples: for what a texel feels by itself.
+    thin : list of Share
+        All texels, few samples: for what texels feel of each other, and for where they are.
+    """
+
+    whole: list[Share]
+    narrow: list[Share]
+    thin: list[Share]
+
+    def quick(self, candidate: Candidate, model: Model) -> list[Share]:
+        """Return the view for a quick look at a candidate on top of a model."""
+        from ..effects.library import form_of
+
+        if candidate.name == "dead-texels":
+            return self.whole
+        forms = [candidate.form, *(form_of(e.name, e.form) for e in model.effects)]
+        if any(is_spatial(form) or form.place is not None for form in forms):
+            return self.thin
+        return self.narrow
+
+
+def views_of(predictors: Sequence[Predictor], noise: tuple[float, float]) -> Views:
+    """Prepare the views of some trials."""
+    whole = [Share(p, noise=noise, parts=2) for p in predictors]
+    narrow = [Share(p, _few(p), noise=noise) for p in predictors]
+    thin = []
+    for p in predictors:
+        every = slice(None, None, THIN if len(p.trial.time) >= 60 * THIN else 1)
+        t = p.trial
+        parts: dict[str, Any] = {
+            name: None if getattr(t, name) is None else getattr(t, name)[every]
+            for name in ("time", "position", "quaternion", "level", "slide", "reading", "force")
+        }
+        thin.append(Share(Predictor(replace(t, **parts), p.rig), noise=noise))
+    return Views(whole, narrow, thin)
+
+
+def _few(predictor: Predictor) -> np.ndarray | None:
+    """Texels for the quick look: some of each degree of load, and two that carry nothing."""
+    n = len(predictor.rig.texels)
+    if n <= FEW_TEXELS:
+        return None
+    s = predictor.stimulus
+    load = (s.depth if s.load is None else s.load).sum(axis=0)
+    order = np.argsort(load)[::-1]
+    loaded = order[load[order] > 0]
+    idle = order[load[order] <= 0]
+    picked = loaded[np.unique(np.linspace(0, len(loaded) - 1, min(len(loaded), FEW_TEXELS - 2)).astype(int))]
+    rest = idle[np.linspace(0, len(idle) - 1, min(len(idle), FEW_TEXELS - len(picked))).astype(int)]
+    return np.sort(np.concatenate([picked, rest]))
+
+
+@dataclass
+class Found:
+    """A candidate fitted on top of a model.
+
+    Attributes
+    ----------
+    candidate : Candidate
+    fit : Fit
+    unseen : (trials,) float
+        Squares of each trial as predicted by a fit that has not seen it, in units of the noise.
+    """
+
+    candidate: Candidate
+    fit: Fit
+    unseen: np.ndarray
+
+    @property
+    def mean(self) -> float:
+        """Mean square on unseen trials."""
+        return float(self.unseen.sum() / self.fit.count.sum())
+
+    @property
+    def numbers(self) -> int:
+        """How many numbers it takes."""
+        n = len(self.fit.model.effects)
+        values = self.fit.model.effects[n - 1].values
+        return sum(len(v) if isinstance(v, tuple) else 1 for v in values.values())
+
+
+class Direction:
+    """What the free numbers of a fit can already change about its residual, on one view."""
+
+    def __init__(self, shares: Sequence[Share], found: Fit):
+        self.shares, self.model = shares, found.model
+        free = [item for item in found.free if not item.per_texel]
+        at = [value_of(found.model, item) for item in free]
+        self.residual = [share.residual(found.model) for share in shares]
+        self.columns: list[np.ndarray] = []
+        for share, r in zip(shares, self.residual, strict=True):
+            stack = []
+            for i, item in enumerate(free):
+                x = item.to(at[i])
+                values = list(at)
+                values[i] = item.back(x + 1e-3)
+                if float(np.max(np.abs(item.to(values[i]) - x))) < 1e-6:
+                    values[i] = item.back(x - 1e-3)
+                stack.append((r - share.residual(changed(found.model, free, values))).ravel())
+            self.columns.append(np.array(stack).reshape(len(free), -1))
+        self.gram = sum(c @ c.T for c in self.columns)
+        self.gram = self.gram + 1e-10 * (1.0 + np.trace(self.gram)) * np.eye(len(self.gram))
+        self.along = sum(c @ r.ravel() for c, r in zip(self.columns, self.residual, strict=True))
+
+    def score(self, model: Model) -> tuple[float, float]:
+        """Return by how much the squares could fall along the change to another model, and the best length along it."""
+        cross, square, dot = np.zeros(len(self.gram)), 0.0, 0.0
+        for share, r, c in zip(self.shares, self.residual, self.columns, strict=True):
+            change = (r - share.residual(model)).ravel()
+            cross += c @ change
+            square += float(np.vdot(change, change))
+            dot += float(np.vdot(change, r.ravel()))
+        if not np.isfinite(square):
+            return 0.0, 0.0
+        weights = np.linalg.solve(self.gram, cross)
+        free_square, free_dot = square - float(weights @ cross), dot - float(weights @ self.along)
+        if free_square <= 1e-9 * square or free_square <= 0:
+            return 0.0, 0.0
+        return free_dot**2 / free_square, free_dot / free_square
+
+
+def promising(
+    candidate: Candidate, direction: Direction, whole: Sequence[Share], model: Model, scales: Scales, gain: float
+) -> list[tuple[float, Effect]]:
+    """Return places to begin the fit of a candidate, best first, each with what it promises."""
+    n, form = scales.texels, candidate.form
+    if candidate.name == "dead-texels":
+        effect = dead(whole, model, candidate, n)
+        return [] if effect is None else [(direction.score(model.with_effect(effect))[0], effect)]
+    if candidate.local:
+        parameter = next(q.scaled(gain) for q in form.parameters if q.per_texel)
+        moved = candidate.effect({parameter.name: float(parameter.default) + 0.01 * _local_size(parameter, scales)}, n, gain)
+        return [(_texel_score(direction, model.with_effect(moved)), candidate.effect({}, n, gain))]
+    if form.place is not None:
+        return [_placed_score(candidate, direction, model, scales, gain)]
+    strength, tried = candidate.strength(), []
+    for values in candidate.starts(scales, gain):
+        effect = candidate.effect(values, n, gain)
+        promise, length = direction.score(model.with_effect(effect))
+        if strength is not None:
+            parameter = next(q.scaled(gain) for q in form.parameters if q.name == strength)
+            if parameter.low >= 0.0 and length <= 0.0:
+                continue
+            scaled = float(np.clip(values[strength] * np.clip(length, -20.0, 20.0), parameter.low, parameter.high))
+            effect = candidate.effect({**values, strength: scaled}, n, gain)
+        elif length <= 0.0:
+            continue
+        tried.append((promise, effect))
+    return sorted(tried, key=lambda entry: -entry[0])
+
+
+def _local_size(parameter, scales: Scales) -> float:  # type: ignore[no-untyped-def]
+    return scales.reading if parameter.unit == "unit" else 1.0
+
+
+def _texel_score(direction: Direction, model: Model) -> float:
+    """What a number per texel promises, less what it would take from noise alone."""
+    n = len(direction.shares[0].predictor.rig.texels)
+    dot, square = np.zeros(n), np.zeros(n)
+    for share, r in zip(direction.shares, direction.residual, strict=True):
+        change = (r - share.residual(model))[:, : len(share.texels)]
+        dot[share.texels] += (change * r[:, : len(share.texels)]).sum(axis=0)
+        square[share.texels] += (change * change).sum(axis=0)
+    seen = square > 1e-12 * max(square.max(initial=0.0), 1e-300)
+    return max(float((dot[seen] ** 2 / square[seen]).sum()) - seen.sum(), 0.0)
+
+
+def _placed_score(
+    candidate: Candidate, direction: Direction, model: Model, scales: Scales, gain: float
+) -> tuple[float, Effect]:
+    """The same for a form that moves the texels: all its numbers at once, each by a small step from where texels should be."""
+    off = {name: 0.0 for name in candidate.form.off}
+    steps = [0.02 * scales.pitch if q.unit == "m" else 2e-3 for q in candidate.form.parameters]
+    changes = []
+    for q, step in zip(candidate.form.parameters, steps, strict=True):
+        other = model.with_effect(candidate.effect({**off, q.name: step}, scales.texels, gain))
+        changes.append([(r - s.residual(other)).ravel() for s, r in zip(direction.shares, direction.residual, strict=True)])
+    size = len(direction.gram)
+    gram, along = np.zeros((size + len(changes),) * 2), np.zeros(size + len(changes))
+    for i, r in enumerate(direction.residual):
+        x = np.vstack([direction.columns[i], *(c[i] for c in changes)])
+        gram += x @ x.T
+        along += x @ r.ravel()
+    gram += 1e-10 * (1.0 + np.trace(gram)) * np.eye(len(gram))
+    best = np.linalg.solve(gram, along)
+    promise = float(along @ best) - float(direction.along @ np.linalg.solve(direction.gram, direction.along))
+    limits = [0.5 * scales.pitch if q.unit == "m" else 0.1 for q in candidate.form.parameters]
+    lengths = [float(np.clip(b * s, -m, m)) for b, s, m in zip(best[size:], steps, limits, strict=True)]
+    values = {q.name: length for q, length in zip(candidate.form.parameters, lengths, strict=True)}
+    return promise, candidate.effect(values, scales.texels, gain)
+
+
+def dead(shares: Sequence[Share], model: Model, candidate: Candidate, texels: int) -> Effect | None:
+    """Return the effect with those texels dead that hardly follow the model although it loads them; None when all follow."""
+    dot, square = np.zeros(texels), np.zeros(texels)
+    for share in shares:
+        reading = share.predictor.trial.reading
+        if reading is None:
+            continue
+        predicted = (share.predictor.predict(model).reading - model.parameters.zero) / share.noise[0]
+        measured = np.nan_to_num((reading - model.parameters.zero) / share.noise[0])
+        dot += (predicted * measured).sum(axis=0)
+        square += (predicted**2 * np.isfinite(reading)).sum(axis=0)
+    loaded = square > 200.0  # by so much that the noise cannot hide whether it answers
+    if loaded.sum() < 4:
+        return None
+    slope = np.where(loaded, dot / np.where(loaded, square, 1.0), np.nan)
+    silent = loaded & (slope < 0.15 * np.nanmedian(slope))
+    if not silent.any() or silent.sum() > 0.4 * loaded.sum():
+        return None
+    return Effect(candidate.name, candidate.form.name, {"dead": tuple(silent.astype(float).tolist())})
+
+
+def free_of(found: Fit, candidate: Candidate, scales: Scales, gain: float) -> tuple[Free, ...]:
+    """Return the free numbers of a fit and those of one effect more on top of its model."""
+    if candidate.name == "dead-texels":  # a texel is dead or is not
+        return found.free
+    return (*found.free, *candidate.free(len(found.model.effects), scales, gain))
+
+
+def search(
+    views: Views, found: Fit, forms: Sequence[Candidate], scales: Scales, finalists: int = 4
+) -> Iterator[tuple[str, float, list[Found]]]:
+    """Look for one effect more on top of a fit.
+
+    Yields
+    ------
+    what : str
+        What is being done.
+    share : float
+        How much of it is done.
+    found : list of Found
+        Best first; complete at the last step.
+    """
+    gain = abs(found.model.parameters.gain)
+    directions: dict[int, Direction] = {}
+    begun: list[tuple[float, Candidate, list[tuple[float, Effect]]]] = []
+    for number, candidate in enumerate(forms):
+        shares = views.quick(candidate, found.model)
+        if id(shares) not in directions:
+            directions[id(shares)] = Direction(shares, found)
+        starts = promising(candidate, directions[id(shares)], views.whole, found.model, scales, gain)
+        total = sum(float(np.vdot(r, r)) for r in directions[id(shares)].residual)
+        if starts and starts[0][0] > 0:
+            begun.append((starts[0][0] / max(total, 1e-300), candidate, starts))
+        yield "looking at every effect", 0.35 * (number + 1) / len(forms), []
+    begun.sort(key=lambda entry: -entry[0])
+    if not begun:
+        yield "nothing promises anything", 1.0, []
+        return
+    best_kinds = list(dict.fromkeys(candidate.name for _, candidate, _ in begun))[:3]
+    kept: list[tuple[float, Candidate, list[tuple[float, Effect]]]] = []
+    for i, entry in enumerate(begun):
+        leads = all(other[1].name != entry[1].name for other in begun[:i])
+        least = 0.02 if entry[1].name in best_kinds else 0.05 if leads else 0.4
+        if entry[0] > least * begun[0][0] and len(kept) < 14:
+            kept.append(entry)
+    quick: list[tuple[float, Candidate, Fit]] = []
+    for number, (_, candidate, starts) in enumerate(kept):
+        shares = views.quick(candidate, found.model)
+        free = free_of(found, candidate, scales, gain)
+        total = sum(float(np.vdot(r, r)) for r in directions[id(shares)].residual)
+        tries = [fit(shares, found.model.with_effect(effect), free, turns=8, tolerance=1e-3) for _, effect in starts[:1]]
+        best = min(tries, key=lambda one: one.sse.sum())
+        quick.append((float(best.sse.sum()) / total, candidate, best))
+        yield "fitting those that promise most", 0.35 + 0.35 * (number + 1) / len(kept), []
+    quick.sort(key=lambda entry: entry[0])
+    last = _finalists(quick, finalists)
+    results: list[Found] = []
+    for number, (_, candidate, first) in enumerate(last):
+        free = free_of(found, candidate, scales, gain)
+        whole = fit(views.whole, first.model, free, turns=6, tolerance=1e-4)
+        results.append(Found(candidate, whole, held_out(views.whole, whole)))
+        results.sort(key=lambda one: one.mean)
+        yield "judging the best on trials they have not seen", 0.7 + 0.3 * (number + 1) / len(last), results
+
+
+def _finalists(quick: list[tuple[float, Candidate, Fit]], count: int) -> list[tuple[float, Candidate, Fit]]:
+    """The best form of each of the best kinds, and the second form of the best kind."""
+    chosen: list[tuple[float, Candidate, Fit]] = []
+    for entry in quick:
+        own = sum(1 for other in chosen if other[1].name == entry[1].name)
+        if own == 0 or (own == 1 and chosen and entry[1].name == chosen[0][1].name):
+            chosen.append(entry)
+        if len({other[1].name for other in chosen}) >= count and len(chosen) > count:
+            break
+    return chosen[: count + 1]
