@@ -7,14 +7,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..calibrate.regression import student
 from ..formats.sensor_toml import SHAPE_WORDS, SensorModel
 from .diagnose import Diagnosis
 from .fit import covariance, fit, value_of
 from .model import Model
 from .search import views_of
 
-LEVEL = 0.95
-"""Of the intervals."""
+NORMAL_REACH = 1.959964
+"""Standard deviations on either side that hold 95 % of a normal distribution."""
 
 
 @dataclass(frozen=True)
@@ -43,8 +44,6 @@ def numbers(result: Diagnosis) -> list[Number]:
     Intervals are from the scatter of the gradients of texels within trials, so that they hold for coloured noise, or from that
     of whole trials where it is larger, as when the formula is not quite the sensor's; Student's t with the number of trials.
     """
-    from scipy import stats
-
     found = result.best
     common = [item for item in found.free if not item.per_texel]
     fine, coarse = covariance(found), covariance(found, by_trial=True)
@@ -52,9 +51,9 @@ def numbers(result: Diagnosis) -> list[Number]:
     made = []
     for i, item in enumerate(common):
         at = float(item.to(value_of(found.model, item)))
-        spread = float(np.sqrt(max(fine[i, i], 0.0))) * stats.norm.ppf(0.5 + 0.5 * LEVEL)
+        spread = float(np.sqrt(max(fine[i, i], 0.0))) * NORMAL_REACH
         if groups > len(common) + 1:
-            wide = float(np.sqrt(max(coarse[i, i], 0.0))) * stats.t.ppf(0.5 + 0.5 * LEVEL, groups - 1)
+            wide = float(np.sqrt(max(coarse[i, i], 0.0))) * student(groups - 1)
             spread = max(spread, wide)
         ends = sorted((float(item.back(at - spread)), float(item.back(at + spread))))
         made.append(Number(item.effect, item.name, float(value_of(found.model, item)), ends[0], ends[1]))
