@@ -299,6 +299,10 @@ class PALPATE_PG_object(bpy.types.PropertyGroup):
         override={"LIBRARY_OVERRIDABLE", "USE_INSERTION"},
     )
 
+    measured: StringProperty(
+        name="Rig", description="Measurements of the real sensor: a rig.toml, with its CSV files beside it", **_fixed
+    )
+
     made_vertices: IntProperty(options={"HIDDEN"})
     skin: PointerProperty(
         type=PALPATE_PG_skin, description="How it was laid onto its parent's surface", override={"LIBRARY_OVERRIDABLE"}

@@ -68,9 +68,9 @@ def _into_scene(blend: str, name: str | None, sensor) -> Path:
     with console.quiet():
         bpy = blender.start()
         blender.open_blend(blend)
-        from ..addon.measured import sensor_called, take_model
+        from ..addon import measured
 
-        take_model(sensor_called(bpy.context.scene, name), sensor)
+        measured.put(measured.sensor_called(bpy.context.scene, name), sensor)
         path = Path(blend)
         blender.save_blend(path)
     return path

@@ -7,9 +7,9 @@ _panels: tuple = ()
 def _classes():
     global _panels
     if not _panels:
-        from . import bake, body, check, effects, places, sensor
+        from . import bake, body, check, effects, gap, places, sensor
 
-        parts = (sensor.Root, *check.PARTS, *sensor.PARTS, *effects.PARTS, *body.PARTS, *bake.PARTS)
+        parts = (sensor.Root, *check.PARTS, *sensor.PARTS, *effects.PARTS, *gap.PARTS, *body.PARTS, *bake.PARTS)
         _panels = places.everywhere(*parts)
     return _panels
 

@@ -71,3 +71,23 @@ def relaxing(amount=0.3, times=(0.4, 2.0)):
         return force
 
     return act
+
+
+def write(rig, folder):
+    """Write a rig as files; return the path of its TOML."""
+    lines = [
+        'format = "palpate-rig/1"',
+        f'name = "{rig.name}"',
+        "[sensor]",
+        f"grid = {{ rows = {ROWS}, columns = {COLUMNS}, pitch = [{PITCH}, {PITCH}] }}",
+        f"k = {rig.parameters.k}",
+        "[indenter]",
+        f"shape = {{ sphere = {RADIUS} }}",
+    ]
+    header = ",".join(["time", "x", "y", "z", *(f"texel_{i}" for i in range(ROWS * COLUMNS))])
+    for trial in rig.trials:
+        lines += ["[[trial]]", f'file = "{trial.name}.csv"', f'use = "{trial.use}"']
+        table = np.column_stack([trial.time, trial.position, trial.reading])
+        np.savetxt(folder / f"{trial.name}.csv", table, "%.9g", ",", header=header, comments="")
+    (folder / "rig.toml").write_text("\n".join(lines) + "\n")
+    return folder / "rig.toml"

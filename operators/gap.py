@@ -1,0 +1,212 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Measured data: choose a rig, find the gap, show it, add what is missing."""
+
+import bpy
+from bpy.props import BoolProperty, StringProperty
+from bpy_extras.io_utils import ImportHelper
+
+from ..addon import jobs, measured
+from ..core.drive import drive
+from . import support
+from .fits import show_image
+
+
+def found(cls, context) -> bool:
+    """Poll: something was found for the active sensor."""
+    if not support.sensor_object(cls, context):
+        return False
+    if measured.of(context.object) is None:
+        cls.poll_message_set("Nothing was found yet: use Find Gap first")
+        return False
+    return True
+
+
+class PALPATE_OT_measured_open(support.Reporting, ImportHelper, bpy.types.Operator):
+    """Choose measurements of the real sensor: a rig.toml with its CSV files beside it. They are read to see that they fit"""
+
+    bl_idname = "palpate.measured_open"
+    bl_label = "Open Rig…"
+    bl_options = {"REGISTER", "UNDO"}
+
+    filename_ext = ".toml"
+    filter_glob: StringProperty(default="*.toml", options={"HIDDEN"})
+
+    @classmethod
+    def poll(cls, context):
+        return support.sensor_object(cls, context)
+
+    def run(self, context):
+        from ..core.gap.rig import read_rig
+
+        rig = read_rig(self.filepath)
+        blend = bpy.data.filepath
+        context.object.palpate.measured = bpy.path.relpath(self.filepath) if blend else self.filepath
+        for warning in rig.warnings:
+            self.report({"WARNING"}, warning)
+        self.report({"INFO"}, f"'{rig.name}': {len(rig.trials)} trials on {len(rig.texels)} texels")
+
+
+class PALPATE_OT_gap_find(support.Reporting, bpy.types.Operator):
+    """Compare the model with the measurements, name what it misses and judge it on trials it has not seen. ESC stops it"""
+
+    bl_idname = "palpate.gap_find"
+    bl_label = "Find Gap"
+    bl_options = {"REGISTER"}
+
+    @classmethod
+    def poll(cls, context):
+        if not support.sensor_object(cls, context):
+            return False
+        if not context.object.palpate.measured:
+            cls.poll_message_set("Choose the sensor's measurements first: Open Rig")
+            return False
+        return True
+
+    def invoke(self, context, _event):
+        if bpy.app.background:
+            return self.execute(context)
+        return self.reporting(lambda: self._start(context))
+
+    def run(self, context):
+        drive(measured.find(context.object))
+        self._say(context.object)
+
+    def _start(self, context):
+        self._name = context.object.name
+        self._slice = jobs.Slice(measured.find(context.object))
+        self._slice.work(0.0)
+        manager = context.window_manager
+        self._timer = manager.event_timer_add(0.01, window=context.window)
+        manager.progress_begin(0.0, 1.0)
+        manager.modal_handler_add(self)
+        return {"RUNNING_MODAL"}
+
+    def modal(self, context, event):
+        if event.type == "ESC" and event.value == "PRESS":
+            self._end(context)
+            self.report({"WARNING"}, "Stopped; what was found before is unchanged")
+            return {"CANCELLED"}
+        if event.type != "TIMER":
+            return {"RUNNING_MODAL"}
+        result = None
+        try:
+            result = self.reporting(lambda: self._work(context))
+        finally:
+            if result != {"RUNNING_MODAL"}:
+                self._end(context)
+        return result
+
+    def _work(self, context):
+        self._slice.work()
+        if self._slice.is_done:
+            self._say(bpy.data.objects.get(self._name))
+            return {"FINISHED"}
+        progress = self._slice.progress
+        context.window_manager.progress_update(progress.done / progress.total)
+        context.workspace.status_text_set(f"{progress.stage}: {progress.done / progress.total:.0%}    ESC: stop")
+        return {"RUNNING_MODAL"}
+
+    def cancel(self, context):
+        """Blender closes, or loads another file."""
+        self._end(context)
+
+    def _end(self, context):
+        self._slice.cancel()
+        context.window_manager.event_timer_remove(self._timer)
+        context.window_manager.progress_end()
+        context.workspace.status_text_set(None)
+        for area in context.screen.areas:
+            area.tag_redraw()
+
+    def _say(self, obj):
+        result = measured.of(obj) if obj is not None else None
+        if result is not None:
+            self.report({"INFO"}, result.headline)
+
+
+class PALPATE_OT_gap_add(support.Reporting, bpy.types.Operator):
+    """Put the fitted parameters and the effects that were found on the sensor, instead of those it has"""
+
+    bl_idname = "palpate.gap_add"
+    bl_label = "Add to Sensor"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context):
+        return found(cls, context)
+
+    def run(self, context):
+        count = measured.add_found(context.object)
+        self.report({"INFO"}, f"'{context.object.name}' has the fitted parameters and {count} effects")
+
+
+class PALPATE_OT_gap_curves(support.Reporting, bpy.types.Operator):
+    """Show what was measured and what the model says, before and after"""
+
+    bl_idname = "palpate.gap_curves"
+    bl_label = "Before and After"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context):
+        return found(cls, context)
+
+    def run(self, context):
+        show_image(context, measured.of(context.object).pictures["curves"], "Palpate Gap Curves")
+
+
+class PALPATE_OT_gap_show(support.Reporting, bpy.types.Operator):
+    """Colour the sensor by the error of its texels, and mark the phases of the first trial on the timeline"""
+
+    bl_idname = "palpate.gap_show"
+    bl_label = "Show on Sensor"
+    bl_options = {"REGISTER", "UNDO"}
+
+    amended: BoolProperty(name="Amended", description="With what was found, on the same scale", options={"SKIP_SAVE"})
+
+    @classmethod
+    def poll(cls, context):
+        return support.mesh_object(cls, context) and found(cls, context)
+
+    def run(self, context):
+        support.leave_edit_mode(context)
+        top = measured.show_on_sensor(context, context.object, self.amended)
+        measured.mark_phases(context.scene, context.object)
+        self.report({"INFO"}, f"The brightest texel errs by {top:.2%} of the range")
+
+
+class PALPATE_OT_gap_report(support.Reporting, bpy.types.Operator):
+    """Write the report, the amended sensor and the plots into a folder"""
+
+    bl_idname = "palpate.gap_report"
+    bl_label = "Write Report…"
+    bl_options = {"REGISTER"}
+
+    directory: StringProperty(subtype="DIR_PATH", options={"SKIP_SAVE"})
+
+    @classmethod
+    def poll(cls, context):
+        return found(cls, context)
+
+    def invoke(self, context, _event):
+        context.window_manager.fileselect_add(self)
+        return {"RUNNING_MODAL"}
+
+    def run(self, context):
+        from ..core.formats.files import writable_folder
+        from ..core.gap import report
+
+        folder = writable_folder(bpy.path.abspath(self.directory), create=True)
+        for _ in report.write(measured.of(context.object).diagnosis, folder):
+            pass
+        self.report({"INFO"}, f"Wrote {folder / 'report.html'}")
+
+
+CLASSES = (
+    PALPATE_OT_measured_open,
+    PALPATE_OT_gap_find,
+    PALPATE_OT_gap_add,
+    PALPATE_OT_gap_curves,
+    PALPATE_OT_gap_show,
+    PALPATE_OT_gap_report,
+)

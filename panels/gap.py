@@ -1,0 +1,38 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Measured data of the real sensor: what the model misses against them."""
+
+from ..addon import measured
+from .places import Part, sentences
+
+
+class Measured(Part):
+    """Measurements of the real sensor, and what the model misses against them"""
+
+    name = "measured"
+    bl_label = "Measured Data"
+    roles = {"SENSOR", "PAD"}
+
+    def draw_part(self, layout, settings, context):
+        row = layout.row(align=True)
+        row.prop(settings, "measured", text="")
+        row.operator("palpate.measured_open", text="", icon="FILE_FOLDER")
+        layout.operator("palpate.gap_find", icon="VIEWZOOM")
+        result = measured.of(context.object)
+        if result is None:
+            return
+        box = layout.box()
+        sentences(box, result.headline, "INFO", context)
+        for line in result.lines:
+            sentences(box, line, "DOT", context)
+        if result.experiment:
+            sentences(box, result.experiment, "QUESTION", context)
+        if result.lines:
+            layout.operator("palpate.gap_add", icon="ADD")
+        layout.operator("palpate.gap_curves", icon="FCURVE")
+        row = layout.row(align=True)
+        row.operator("palpate.gap_show", text="Error: Base", icon="COLOR").amended = False
+        row.operator("palpate.gap_show", text="Amended").amended = True
+        layout.operator("palpate.gap_report", icon="EXPORT")
+
+
+PARTS = (Measured,)

@@ -1,0 +1,97 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Measured data in Blender: a rig is opened, its gap found and shown, and what is missing put on the sensor."""
+
+import json
+
+import bpy
+import gap_cases as cases
+import numpy as np
+import pytest
+from blender_scenes import grid
+
+from palpate.addon import jobs, measured
+from palpate.commands import main
+from palpate.core.errors import SceneError
+
+
+@pytest.fixture(scope="module")
+def rig_file(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("rig")
+    return cases.write(cases.rig(contact=cases.relaxing(), seed=7, trials=4, seconds=9.0), folder)
+
+
+def pad(columns=cases.COLUMNS, rows=cases.ROWS):
+    obj = grid(columns=columns, rows=rows)
+    bpy.ops.palpate.sensor_add(source="MESH")
+    return obj
+
+
+def test_from_a_rig_to_an_amended_sensor(scene, rig_file, tmp_path):
+    obj = pad()
+    assert not bpy.ops.palpate.gap_find.poll() and not bpy.ops.palpate.gap_add.poll()
+    assert bpy.ops.palpate.measured_open(filepath=str(rig_file)) == {"FINISHED"}
+    assert obj.palpate.measured == str(rig_file)
+    assert bpy.ops.palpate.gap_find() == {"FINISHED"}
+    result = measured.of(obj)
+    assert "creep" in result.headline
+
+    assert bpy.ops.palpate.gap_add() == {"FINISHED"}
+    assert [item.kind for item in obj.palpate.effects] == ["creep"]
+    assert obj.palpate.k == pytest.approx(80.0, rel=0.1)
+
+    assert bpy.ops.palpate.gap_show(amended=False) == {"FINISHED"}
+    layer = obj.data.color_attributes[measured.ATTRIBUTE]
+    colours = np.zeros(4 * len(obj.data.vertices))
+    layer.data.foreach_get("color", colours)
+    before = colours.reshape(-1, 4)[:, 0].max()
+    names = {marker.name for marker in scene.timeline_markers}
+    assert {"gap: approach", "gap: loading", "gap: unloading"} <= names
+    bpy.ops.palpate.gap_show(amended=True)
+    obj.data.color_attributes[measured.ATTRIBUTE].data.foreach_get("color", colours)
+    assert colours.reshape(-1, 4)[:, 0].max() < before  # on one scale the amended sensor is darker
+
+    assert bpy.ops.palpate.gap_curves() == {"FINISHED"}
+    assert bpy.data.images["Palpate Gap Curves"].size[0] > 500
+    assert bpy.ops.palpate.gap_report(directory=str(tmp_path / "report")) == {"FINISHED"}
+    assert json.loads((tmp_path / "report" / "gap.json").read_text())["found"][0]["effect"] == "creep"
+
+
+def test_stopping_keeps_what_was_known(scene, rig_file):
+    obj = pad()
+    obj.palpate.measured = str(rig_file)
+    work = jobs.Slice(measured.find(obj))
+    for _ in range(3):
+        work.work(0.0)
+    work.cancel()
+    assert measured.of(obj) is None
+
+
+def test_a_bad_rig_is_said_in_a_sentence(scene, tmp_path):
+    obj = pad()
+    (tmp_path / "rig.toml").write_text('format = "something else"\n')
+    with pytest.raises(RuntimeError, match="not a rig"):
+        bpy.ops.palpate.measured_open(filepath=str(tmp_path / "rig.toml"))
+    assert not obj.palpate.measured
+
+
+def test_another_grid_shows_no_residual(scene, rig_file):
+    obj = pad(columns=3)
+    obj.palpate.measured = str(rig_file)
+    bpy.ops.palpate.gap_find()
+    with pytest.raises(SceneError, match="24 texels and 'Pad' has 18"):
+        measured.show_on_sensor(bpy.context, obj, False)
+
+
+def test_the_command_puts_the_amended_sensor_into_a_scene(scene, rig_file, tmp_path, capsys):
+    obj = pad()
+    blend = tmp_path / "scene.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(blend))
+    assert main(["gap", str(rig_file), "--out", str(tmp_path / "out"), "--blend", str(blend), "--sensor", obj.name]) == 0
+    assert "Missing: creep" in capsys.readouterr().out
+    bpy.ops.wm.open_mainfile(filepath=str(blend))
+    assert [item.kind for item in bpy.data.objects["Pad"].palpate.effects] == ["creep"]
+
+
+def test_the_command_says_what_is_wrong(tmp_path, capsys):
+    assert main(["gap", str(tmp_path / "none.toml"), "--out", str(tmp_path / "out")]) == 1
+    assert "There is no rig" in capsys.readouterr().err
