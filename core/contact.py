@@ -78,6 +78,8 @@ def friction_limit(normal_force: np.ndarray, speed: np.ndarray, parameters: Sens
 class World(NamedTuple):
     """What does not change during a run: b bodies, m sensors with N contact points, q pairs of sensor and target.
 
+    A large sensor has several pairs with each target, one after the other, each with some of its points, for threads to share.
+
     Attributes
     ----------
     points : (N, 12) float
@@ -94,6 +96,8 @@ class World(NamedTuple):
         Maximum penetration.
     pairs : (q, 2) int
         Sensor and target.
+    point_first, point_stop : (q,) int
+        The contact points of each pair.
     sensor_body : (m,) int
     target_body : (targets,) int
     slot_start : (q,) int
@@ -132,6 +136,8 @@ class World(NamedTuple):
     painted: np.ndarray
     reach: np.ndarray
     pairs: np.ndarray
+    point_first: np.ndarray
+    point_stop: np.ndarray
     sensor_body: np.ndarray
     target_body: np.ndarray
     slot_start: np.ndarray

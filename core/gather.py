@@ -98,7 +98,7 @@ def _keep_lists(pair, sensor, target, pose, world, tree, neighbours, shapes):
             return
     place_all(target, shapes, tree)
     points, reach, slot = world.points, world.reach[sensor], world.slot_start[pair]
-    for point in range(world.point_start[sensor], world.point_start[sensor + 1]):
+    for point in range(world.point_first[pair], world.point_stop[pair]):
         dx = reach * (pose[0] * points[point, 3] + pose[1] * points[point, 4] + pose[2] * points[point, 5])
         dy = reach * (pose[3] * points[point, 3] + pose[4] * points[point, 4] + pose[5] * points[point, 5])
         dz = reach * (pose[6] * points[point, 3] + pose[7] * points[point, 4] + pose[8] * points[point, 5])
@@ -116,10 +116,10 @@ def _keep_lists(pair, sensor, target, pose, world, tree, neighbours, shapes):
 
 
 @kernel
-def _forget(pair, sensor, world, state):
+def _forget(pair, world, state):
     """Nothing of this pair touches: no triangle met, no bristle bent."""
     start = world.slot_start[pair]
-    for slot in range(start, start + world.point_start[sensor + 1] - world.point_start[sensor]):
+    for slot in range(start, start + world.point_stop[pair] - world.point_first[pair]):
         if state.hint[slot] != -1:
             state.hint[slot] = -1
             for i in range(4):
@@ -127,15 +127,15 @@ def _forget(pair, sensor, world, state):
 
 
 @kernel
-def gather(pair, first, dt, world, tree, neighbours, shapes, state, scratch):
-    """Collect the contacts of one sensor with one target as rows, from block `first` on.
+def gather(pair, dt, world, tree, neighbours, shapes, state, scratch):
+    """Collect the contacts of one pair as rows.
 
     The segment of a contact point runs from `reach` deep in the sensor to it; where it enters the target counts. Memory of
     the pair in `state` is brought up to date: the triangle met, and the bristles, which are zero where nothing touches.
 
     Parameters
     ----------
-    pair, first : int
+    pair : int
     dt : float, seconds
         By which velocities of surfaces are told: the step that begins, or minus the step that has ended.
     world : World
@@ -144,30 +144,25 @@ def gather(pair, first, dt, world, tree, neighbours, shapes, state, scratch):
     shapes : Shapes
     state : State
     scratch : Scratch
-        `rotation` is read; `rows`, `slots` (which place in the memory each row belongs to) and `own` are written.
-
-    Returns
-    -------
-    count : int
-        Rows of this pair.
-    sunk : int
-        Contact points that were pressed past their maximum penetration and do not act.
+        `rotation` is read; `rows`, `slots` (which place in the memory each row belongs to), `own`, `contacts` and `sunk` are
+        written.
     """
     sensor, target = world.pairs[pair, 0], world.pairs[pair, 1]
     a, b = world.sensor_body[sensor], world.target_body[target]
     points, hint, bristles = world.points, state.hint, state.bristles
-    rows, slots, pose = scratch.rows, scratch.slots, scratch.pose
+    rows, slots, pose, first = scratch.rows, scratch.slots, scratch.pose[pair], scratch.first_block[pair]
     reach, root = world.reach[sensor], tree.roots[target]
     _relative_pose(a, b, state.position, scratch.rotation, pose)
     if _distance_to_box(pose, world.center, sensor, tree.bounds, root) > world.radius[sensor]:
-        _forget(pair, sensor, world, state)
-        return 0, 0
+        _forget(pair, world, state)
+        scratch.contacts[pair], scratch.sunk[pair] = 0, 0
+        return
     _keep_lists(pair, sensor, target, pose, world, tree, neighbours, shapes)
     sunk, slot = 0, world.slot_start[pair] - 1
-    stop = slot + 1 + world.point_start[sensor + 1] - world.point_start[sensor]
+    stop = slot + 1 + world.point_stop[pair] - world.point_first[pair]
     place_near(target, slot + 1, stop, neighbours.near, neighbours.number, shapes, tree)
     block, lane = first, 0
-    for point in range(world.point_start[sensor], world.point_start[sensor + 1]):
+    for point in range(world.point_first[pair], world.point_stop[pair]):
         slot += 1
         before = hint[slot]
         number = neighbours.number[slot]
@@ -232,7 +227,7 @@ def gather(pair, first, dt, world, tree, neighbours, shapes, state, scratch):
     if shapes.smooth[target] or shapes.deforms[target] or shapes.bends[sensor]:
         finish_rows(pair, first, count, dt, world, tree, shapes, state, scratch)
     _lay_flat(first, count, rows)
-    return count, sunk
+    scratch.contacts[pair], scratch.sunk[pair] = count, sunk
 
 
 @kernel
@@ -258,7 +253,7 @@ def count_buried(pair, world, tree, shapes, state, scratch):
     Looked for once a frame by a long segment from each segment's base; the arguments are those of :func:`gather`.
     """
     sensor, target = world.pairs[pair, 0], world.pairs[pair, 1]
-    pose = scratch.pose
+    pose = scratch.pose[pair]
     _relative_pose(world.sensor_body[sensor], world.target_body[target], state.position, scratch.rotation, pose)
     place_all(target, shapes, tree)
     points, reach, root = world.points, world.reach[sensor], tree.roots[target]
@@ -266,7 +261,7 @@ def count_buried(pair, world, tree, shapes, state, scratch):
     for i in range(3):
         size += tree.bounds[root, 3 + i] - tree.bounds[root, i]
     buried, slot = 0, world.slot_start[pair] - 1
-    for point in range(world.point_start[sensor], world.point_start[sensor + 1]):
+    for point in range(world.point_first[pair], world.point_stop[pair]):
         slot += 1
         if state.hint[slot] >= 0:
             continue

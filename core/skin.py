@@ -95,7 +95,7 @@ def finish_rows(pair, first, count, dt, world, tree, shapes, state, scratch):
     """
     sensor, target = world.pairs[pair, 0], world.pairs[pair, 1]
     a, b = world.sensor_body[sensor], world.target_body[target]
-    rows, own, pose, turn = scratch.rows, scratch.own, scratch.pose, scratch.turn
+    rows, own, pose, turn = scratch.rows, scratch.own, scratch.pose[pair], scratch.turn[pair]
     smooth, deforms, bends = shapes.smooth[target], shapes.deforms[target], shapes.bends[sensor]
     still = shapes.clock[1] == shapes.clock[2]
     if deforms:
@@ -105,8 +105,8 @@ def finish_rows(pair, first, count, dt, world, tree, shapes, state, scratch):
     for r in range(count):
         block, lane = first + r // LANES, r % LANES
         slot = scratch.slots[block, lane]
-        triangle, i = state.hint[slot], slot - world.slot_start[pair]
-        point, along = world.point_start[sensor] + i, state.bristles[slot, 3] * world.reach[sensor]
+        triangle, point = state.hint[slot], world.point_first[pair] + slot - world.slot_start[pair]
+        i, along = point - world.point_start[sensor], state.bristles[slot, 3] * world.reach[sensor]
         px, py, pz = rows[block, PX + lane], rows[block, PY + lane], rows[block, PZ + lane]
         x = pose[9] + pose[0] * px + pose[1] * py + pose[2] * pz
         y = pose[10] + pose[3] * px + pose[4] * py + pose[5] * pz
@@ -142,11 +142,11 @@ def turn_rows(pair, world, shapes, scratch):
 
     A bristle is carried along with its texel, as a rigid sensor carries all of its own.
     """
-    sensor, rows, turn = world.pairs[pair, 0], scratch.rows, scratch.turn
+    sensor, rows, turn = world.pairs[pair, 0], scratch.rows, scratch.turn[pair]
     for r in range(scratch.contacts[pair]):
         block, lane = scratch.first_block[pair] + r // LANES, r % LANES
-        i = scratch.slots[block, lane] - world.slot_start[pair]
-        point, after = world.point_start[sensor] + i, frame_at(shapes, shapes.clock[2], sensor, i)
+        point = world.point_first[pair] + scratch.slots[block, lane] - world.slot_start[pair]
+        after = frame_at(shapes, shapes.clock[2], sensor, point - world.point_start[sensor])
         for row in range(3):
             for column in range(3):
                 turn[1, row, column] = 0.0

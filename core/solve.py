@@ -17,6 +17,7 @@ import numpy as np
 from .bodies import DRIVEN, FREE, KEYFRAMED, quaternion_product, rotation_matrices, rotation_vectors
 from .bvh import NEAR, Tree, build_tree
 from .contact import State, World, parameter_row
+from .crew import board_for, helpers
 from .drive import drive
 from .gather import Neighbours, count_buried
 from .mesh import is_closed
@@ -28,9 +29,12 @@ from .respond import Reader
 from .scenario import Scenario, Sensor, Target
 from .servo import drive_table
 from .shapes import Shapes
-from .step import Scratch, advance_steps, contacts_of, feel, gather_all, scratch_for
+from .step import Scratch, advance_steps, contacts_of, feel, gather_all, help_out, scratch_for
 from .surfaces import Surfaces, extent, point_rows
 from .timestep import advise
+
+PART = 512
+"""Most contact points of a pair: what a thread takes at a time."""
 
 
 @dataclass(frozen=True)
@@ -49,6 +53,8 @@ class Simulation:
     Parameters
     ----------
     scenario : Scenario
+    threads : int, optional
+        How many to compute with (see :func:`.crew.board_for`); the numbers are the same, bit by bit.
 
     Raises
     ------
@@ -65,7 +71,7 @@ class Simulation:
         One sentence each; grows while the simulation runs.
     """
 
-    def __init__(self, scenario: Scenario):
+    def __init__(self, scenario: Scenario, threads: int | None = None):
         scenario.check()
         self.scenario = scenario
         self.frame = scenario.frame_start
@@ -86,7 +92,8 @@ class Simulation:
         self._shapes = self._surfaces.at(np.zeros(1))
         self._state = _start(scenario, self._world, self._center)
         self._neighbours = _neighbours(self._world, self._state)
-        self._scratch = scratch_for(self._world, self._state, self._shapes)
+        board, self._helpers = board_for(len(self._state.hint), threads)
+        self._scratch = scratch_for(self._world, self._state, self._shapes, board)
         self._readers = [Reader.of(sensor) for sensor in scenario.sensors]
         self._pilot = Pilot(scenario)
         self._texel_start = _texel_start(scenario)
@@ -143,7 +150,8 @@ class Simulation:
             self._shapes = self._surfaces.at(times)
         self._sunk = 0
         for first, last, commands in self._pilot.stretches(times, self.dt, self._tactile):
-            sunk = advance_steps(self.dt, first, last, positions, quaternions, velocities, commands, *self._arrays)
+            with helpers(self._scratch.board, self._helpers, help_out, *self._arrays):
+                sunk = advance_steps(self.dt, first, last, positions, quaternions, velocities, commands, *self._arrays)
             self._sunk = max(self._sunk, sunk)
         self.frame += 1
         return self.observe()
@@ -184,7 +192,7 @@ class Simulation:
                     buried = count_buried(pair, self._world, self._tree, self._shapes, self._state, self._scratch)
                     most = max(most, int(buried))
                 slots, normals, points, depths = contacts_of(pair, self._scratch)
-                texel = self._world.texel[slots - self._world.slot_start[pair]]
+                texel = self._world.texel[self._world.point_first[pair] + slots - self._world.slot_start[pair]]
                 deeper = np.argsort(depths, kind="stable")  # of several points of a texel the deepest comes last
                 deeper = deeper[depths[deeper] > depth[t, texel[deeper]]]
                 texel = texel[deeper]
@@ -203,7 +211,7 @@ class Simulation:
         sensors, targets, total, names = self.scenario.sensors, self.scenario.targets, 0, []
         for pair, (sensor, target) in enumerate(self._world.pairs):
             start = self._world.slot_start[pair]
-            points = self._world.point_start[sensor + 1] - self._world.point_start[sensor]
+            points = self._world.point_stop[pair] - self._world.point_first[pair]
             sunk = np.count_nonzero(self._state.hint[start : start + points] == -2)
             if self._closed[target]:
                 buried = count_buried(pair, self._world, self._tree, self._shapes, self._state, self._scratch)
@@ -274,17 +282,27 @@ def _world(scenario: Scenario, center: np.ndarray, points: list[ContactPoints]) 
     kind = np.array([FREE if body.free else DRIVEN if body.drive is not None else KEYFRAMED for body in bodies])
     drive_of, drives = drive_table(scenario)
     at, drive_at, unknowns = _unknowns(kind, drive_of)
-    pairs = [(i, j) for i, s in enumerate(sensors) for j, t in enumerate(targets) if s.body != t.body]
-    sizes = [len(blocks[i]) for i, _ in pairs]
+    point_start = np.cumsum([0] + [len(block) for block in blocks])
+    parts = [  # sensor, target, first point, and the one after the last
+        (i, j, first, min(first + PART, point_start[i + 1]))
+        for i, s in enumerate(sensors)
+        for j, t in enumerate(targets)
+        if s.body != t.body
+        for first in range(point_start[i], point_start[i + 1], PART)
+    ]
+    pairs = [(i, j) for i, j, _, _ in parts]
+    sizes = [stop - first for _, _, first, stop in parts]
     extents = [extent(block, sensor.parameters.max_penetration) for block, sensor in zip(blocks, sensors, strict=True)]
     return World(
         points=np.ascontiguousarray(np.vstack(blocks)),
-        point_start=np.cumsum([0] + [len(block) for block in blocks]),
+        point_start=point_start,
         texel=np.concatenate([p.texel + start for p, start in zip(points, texel_start, strict=False)]),
         parameters=np.array([parameter_row(p := sensors[i].parameters, 1.0 / p.points_per_texel) for i, _ in pairs]),
         painted=_painted(sensors, points),
         reach=np.array([s.parameters.max_penetration for s in sensors], dtype=float),
         pairs=np.array(pairs),
+        point_first=np.array([first for _, _, first, _ in parts]),
+        point_stop=np.array([stop for _, _, _, stop in parts]),
         sensor_body=np.array([s.body for s in sensors]),
         target_body=np.array([t.body for t in targets]),
         slot_start=np.cumsum([0, *sizes])[:-1],
@@ -364,7 +382,7 @@ def _start(scenario: Scenario, world: World, center: np.ndarray) -> State:
     velocity = [
         np.concatenate([body.velocity, body.angular_velocity]) if body.free else np.zeros(6) for body in scenario.bodies
     ]
-    slots = int(np.diff(world.point_start)[world.pairs[:, 0]].sum())
+    slots = int((world.point_stop - world.point_first).sum())
     return State(
         position=origin + np.einsum("bij,bj->bi", rotation_matrices(quaternion), center),
         quaternion=quaternion,

@@ -58,12 +58,16 @@ from .contact import (
     normal_force,
     normal_tangent,
 )
+from .crew import LATE, SPINS, announce, hand_in, is_over, is_stopped, linger, take
 from .gather import gather
 from .jit import inlined, kernel
 from .servo import SPEED, add_servos, carry_driven, move_drives, place_driven
 from .shapes import Shapes, refit, set_moment
 from .skin import OX, OY, OZ, turn_rows
 from .tumble import mean_spin, product, spin_of
+
+GATHER, SUM, BEND = 2, 3, 4
+"""Phases of a step whose pairs are shared out: find the contacts, sum them up, bend the bristles."""
 
 PASSES = 40
 """Most rounds in which contacts are linearised anew within a substep; two or three are usual, one at rest."""
@@ -92,15 +96,15 @@ class Scratch(NamedTuple):
     moving : (q,) bool
     first_block : (q,) int
         Where each pair's rows begin.
-    contacts : (q,) int
-        How many rows each pair has in use.
-    sums : (SUMS · LANES,) float
-        Of the contacts of a pair, lane by lane.
-    pose : (12,) float
-        A relative pose.
-    turn : (3, 3, 3) float
+    contacts, sunk : (q,) int
+        How many rows each pair has in use, and how many of its points are pressed past their maximum penetration.
+    sums : (q, SUMS · LANES) float
+        Of the contacts of each pair, lane by lane.
+    pose : (q, 12) float
+        Rotation (row by row) and position of each pair's sensor in the target's frame.
+    turn : (q, 3, 3, 3) float
         Rotations that deforming surfaces need.
-    motion, part : (12,) float
+    motion, part : (q, 12) float
         How a target's points move relative to a sensor, and the part of it that is not solved for: U, then W row by row.
     block, wrench : (6, 6), (6,) float
         What the contacts of one pair resist, and their force and torque on the target, both in the sensor's axes.
@@ -116,6 +120,10 @@ class Scratch(NamedTuple):
         Velocity of a driven body without the speed of its drive.
     drive_mass, drive_load : (d,) float
         What each drive moves (kg), and the impulse that its weight and its carrier ask for in this step (N·s).
+    step : (1,) float, seconds
+        The time step that helpers are to reckon with.
+    board : (BOARD,) or (0,) int
+        Where helpers look for work (see :mod:`.crew`).
     """
 
     rotation: np.ndarray
@@ -128,6 +136,7 @@ class Scratch(NamedTuple):
     moving: np.ndarray
     first_block: np.ndarray
     contacts: np.ndarray
+    sunk: np.ndarray
     sums: np.ndarray
     pose: np.ndarray
     turn: np.ndarray
@@ -146,9 +155,11 @@ class Scratch(NamedTuple):
     carried: np.ndarray
     drive_mass: np.ndarray
     drive_load: np.ndarray
+    step: np.ndarray
+    board: np.ndarray
 
 
-def scratch_for(world: World, state: State, shapes: Shapes) -> Scratch:
+def scratch_for(world: World, state: State, shapes: Shapes, board: np.ndarray) -> Scratch:
     """Allocate the working memory of a run."""
     b = len(state.position)
     slots = np.diff(world.slot_start, append=len(state.hint))
@@ -169,11 +180,12 @@ def scratch_for(world: World, state: State, shapes: Shapes) -> Scratch:
         moving=moving,
         first_block=blocks[:-1],
         contacts=np.zeros(len(world.pairs), np.int64),
-        sums=np.zeros(SUMS * LANES),
-        pose=np.zeros(12),
-        turn=np.zeros((3, 3, 3)),
-        motion=np.zeros(12),
-        part=np.zeros(12),
+        sunk=np.zeros(len(world.pairs), np.int64),
+        sums=np.zeros((len(world.pairs), SUMS * LANES)),
+        pose=np.zeros((len(world.pairs), 12)),
+        turn=np.zeros((len(world.pairs), 3, 3, 3)),
+        motion=np.zeros((len(world.pairs), 12)),
+        part=np.zeros((len(world.pairs), 12)),
         block=np.zeros((6, 6)),
         wrench=np.zeros(6),
         map_a=np.zeros((6, 6)),
@@ -187,6 +199,8 @@ def scratch_for(world: World, state: State, shapes: Shapes) -> Scratch:
         carried=np.zeros((b, 6)),
         drive_mass=np.zeros(len(world.drives)),
         drive_load=np.zeros(len(world.drives)),
+        step=np.zeros(1),
+        board=board,
     )
 
 
@@ -275,17 +289,64 @@ def gather_all(dt, world, tree, neighbours, shapes, state, scratch):
     """Contacts of all pairs of sensor and target where the bodies are now. Returns how many points are sunk too deep to act."""
     for body in range(len(state.position)):
         write_rotation(state.quaternion[body], scratch.rotation[body])
-    sunk = 0
-    for pair in range(len(world.pairs)):
-        first = scratch.first_block[pair]
-        count, deep = gather(pair, first, dt, world, tree, neighbours, shapes, state, scratch)
-        sunk += deep
-        scratch.contacts[pair] = count
-    return sunk
+    scratch.step[0] = dt
+    _share_out(GATHER, world, tree, neighbours, shapes, state, scratch)
+    return scratch.sunk.sum()
 
 
 @kernel
-def _solve_velocities(dt, commands, world, state, scratch):
+def _share_out(phase, world, tree, neighbours, shapes, state, scratch):
+    """Do a phase for all pairs, alone or with helpers; surfaces that deform are moved on when first asked for, so alone."""
+    board, pairs = scratch.board, len(world.pairs)
+    if len(board) == 0 or pairs == 1 or shapes.moves[0]:
+        for pair in range(pairs):
+            _do(phase, pair, world, tree, neighbours, shapes, state, scratch)
+        return
+    announce(board, phase)
+    pair = 0
+    while pair < pairs:
+        _, pair = take(board, pairs)
+        if pair < pairs:
+            _do(phase, pair, world, tree, neighbours, shapes, state, scratch)
+            hand_in(board)
+    turn = 0
+    while not is_over(board, pairs):
+        linger(board, turn)
+        turn += 1
+    if turn >= SPINS:
+        board[LATE] += 1
+
+
+@kernel
+def help_out(world, tree, neighbours, shapes, state, scratch):
+    """Do what :func:`_share_out` puts on the board, until it says that the helpers may go home."""
+    board, pairs, turn = scratch.board, len(world.pairs), 0
+    while not is_stopped(board):
+        phase, pair = take(board, pairs)
+        if pair < pairs:
+            _do(phase, pair, world, tree, neighbours, shapes, state, scratch)
+            hand_in(board)
+            turn = 0
+        else:
+            linger(board, turn)
+            turn += 1
+
+
+@kernel
+def _do(phase, pair, world, tree, neighbours, shapes, state, scratch):
+    """One phase of one pair. What it writes belongs to this pair alone."""
+    dt = scratch.step[0]
+    if phase == GATHER:
+        gather(pair, dt, world, tree, neighbours, shapes, state, scratch)
+    elif scratch.contacts[pair] > 0:
+        if phase == SUM:
+            _sum_pair(pair, dt, world, state, scratch)
+        else:
+            _bend_pair(pair, dt, world, shapes, state, scratch)
+
+
+@kernel
+def _solve_velocities(dt, commands, world, tree, neighbours, shapes, state, scratch):
     """Velocities of free and driven bodies at the step's end, written into the state.
 
     Contacts and drives are linearised at the current guess and the linear system solved, until the guess no longer moves; a
@@ -303,15 +364,11 @@ def _solve_velocities(dt, commands, world, state, scratch):
             vector[i] = scratch.momentum[i]
             for j in range(n):
                 matrix[i, j] = 0.0
+        _share_out(SUM, world, tree, neighbours, shapes, state, scratch)
         for pair in range(len(world.pairs)):
             a, b = world.sensor_body[world.pairs[pair, 0]], world.target_body[world.pairs[pair, 1]]
-            if scratch.contacts[pair] > 0:
-                _relative_motion(a, b, scratch.twist, state.position, scratch.rotation, scratch.motion)
-                _relative_motion(a, b, scratch.known, state.position, scratch.rotation, scratch.part)
-                first = world.point_start[world.pairs[pair, 0]] - world.slot_start[pair]
-                _sum_contacts(pair, first, dt, _law(world.parameters, pair), world.painted, scratch)
-                if world.at[a] >= 0 or world.at[b] >= 0:
-                    _add_pair(a, b, dt, world, state, scratch)
+            if world.at[a] >= 0 or world.at[b] >= 0:
+                _add_pair(pair, a, b, dt, world, state, scratch)
         if n == 0:
             return
         for body in range(len(world.kind)):
@@ -419,16 +476,26 @@ def _write_tangents(pair, first_point, dt, motion, law, painted, scratch):
 
 
 @kernel
+def _sum_pair(pair, dt, world, state, scratch):
+    """Sum up the contacts of a pair at the velocities that are guessed."""
+    a, b = world.sensor_body[world.pairs[pair, 0]], world.target_body[world.pairs[pair, 1]]
+    _relative_motion(a, b, scratch.twist, state.position, scratch.rotation, scratch.motion[pair])
+    _relative_motion(a, b, scratch.known, state.position, scratch.rotation, scratch.part[pair])
+    first = world.point_first[pair] - world.slot_start[pair]
+    _sum_contacts(pair, first, dt, _law(world.parameters, pair), world.painted, scratch)
+
+
+@kernel
 def _sum_contacts(pair, first_point, dt, p, painted, scratch):
     """Linearise the contacts of a pair, and sum their forces on the target and what they resist.
 
-    The contact point of a row is `first` plus its slot.
+    The contact point of a row is `first_point` plus its slot.
 
     With a contact's damping tensor ``C = ct 1 + (cn - ct) n nᵀ`` and velocities ``v + ω × p`` the block is the sum of
     ``Jᵀ C J``, its lower triangle; the wrench is what the springs and the known part of the motion do.
     """
-    rows, sums, block, wrench = scratch.rows, scratch.sums, scratch.block, scratch.wrench
-    motion, part = _values(scratch.motion), _values(scratch.part)
+    rows, sums = scratch.rows, scratch.sums[pair]
+    motion, part = _values(scratch.motion[pair]), _values(scratch.part[pair])
     for i in range(SUMS * LANES):
         sums[i] = 0.0
     own, moving = scratch.own, scratch.moving[pair]
@@ -492,19 +559,32 @@ def _sum_contacts(pair, first_point, dt, p, painted, scratch):
         for i in range(0, SUMS * LANES, LANES):
             for lane in range(half):
                 sums[i + lane] += sums[i + lane + half]
-    at = 0
-    for i in range(6):
-        for j in range(i + 1):
-            block[i, j] = sums[at]
-            at += LANES
-    for i in range(6):
-        wrench[i] = sums[at]
-        at += LANES
 
 
 @kernel
-def _add_pair(a, b, dt, world, state, scratch):
-    """Bring a pair's sums into the linear system."""
+def _collect(pair, world, scratch):
+    """Add up what :func:`_sum_contacts` has left for the parts of a pair; returns whether that is all and anything touches."""
+    pairs, sums, block, wrench = world.pairs, scratch.sums[pair], scratch.block, scratch.wrench
+    if pair == 0 or pairs[pair, 0] != pairs[pair - 1, 0] or pairs[pair, 1] != pairs[pair - 1, 1]:
+        block[:], wrench[:] = 0.0, 0.0
+    if scratch.contacts[pair] > 0:
+        at = 0
+        for i in range(6):
+            for j in range(i + 1):
+                block[i, j] += sums[at]
+                at += LANES
+        for i in range(6):
+            wrench[i] += sums[at]
+            at += LANES
+    last = pair + 1 == len(pairs) or pairs[pair, 0] != pairs[pair + 1, 0] or pairs[pair, 1] != pairs[pair + 1, 1]
+    return last and block[0, 0] + block[1, 1] + block[2, 2] > 0.0  # zero where nothing touches
+
+
+@kernel
+def _add_pair(pair, a, b, dt, world, state, scratch):
+    """Bring a pair's sums into the linear system, all parts together with the last."""
+    if not _collect(pair, world, scratch):
+        return
     map_a, map_b, wrench = scratch.map_a, scratch.map_b, scratch.wrench
     at_a, width_a = _write_map(a, a, -1.0, world, state, scratch, map_a)
     at_b, width_b = _write_map(b, a, 1.0, world, state, scratch, map_b)
@@ -548,24 +628,23 @@ def _write_map(body, sensor_body, sign, world, state, scratch, out):
 
 
 @kernel
-def _store_bristles(dt, world, shapes, state, scratch):
+def _bend_pair(pair, dt, world, shapes, state, scratch):
     """Bristle deflections at the step's end, as the sensor sees them then."""
-    for pair in range(len(world.pairs)):
-        if scratch.contacts[pair] > 0:
-            a, b = world.sensor_body[world.pairs[pair, 0]], world.target_body[world.pairs[pair, 1]]
-            _relative_motion(a, b, scratch.twist, state.position, scratch.rotation, scratch.motion)
-            _seen_at_the_end(a, dt, scratch.twist, scratch.rotation, scratch.motion, scratch.part, scratch.turn)
-            if scratch.moving[pair]:
-                _turn_own(pair, scratch)
-            if shapes.bends[world.pairs[pair, 0]]:
-                turn_rows(pair, world, shapes, scratch)
-            _bend_bristles(pair, _values(scratch.part), state, scratch)
+    a, b = world.sensor_body[world.pairs[pair, 0]], world.target_body[world.pairs[pair, 1]]
+    motion, part = scratch.motion[pair], scratch.part[pair]
+    _relative_motion(a, b, scratch.twist, state.position, scratch.rotation, motion)
+    _seen_at_the_end(a, dt, scratch.twist, scratch.rotation, motion, part, scratch.turn[pair])
+    if scratch.moving[pair]:
+        _turn_own(pair, scratch)
+    if shapes.bends[world.pairs[pair, 0]]:
+        turn_rows(pair, world, shapes, scratch)
+    _bend_bristles(pair, _values(part), state, scratch)
 
 
 @kernel
 def _turn_own(pair, scratch):
     """Turn the velocities that deformation adds by what the sensor turns during the step."""
-    own, turn = scratch.own, scratch.turn
+    own, turn = scratch.own, scratch.turn[pair]
     for r in range(scratch.contacts[pair]):
         b, lane = scratch.first_block[pair] + r // LANES, r % LANES
         u = own[b, OX + lane], own[b, OY + lane], own[b, OZ + lane]
@@ -665,8 +744,8 @@ def advance_steps(
         for body in range(len(world.kind)):
             if world.kind[body] == FREE:
                 write_world_inertia(scratch.rotation[body], world.inertia[body], scratch.inertia[body])
-        _solve_velocities(dt, commands[step], world, state, scratch)
-        _store_bristles(dt, world, shapes, state, scratch)
+        _solve_velocities(dt, commands[step], world, tree, neighbours, shapes, state, scratch)
+        _share_out(BEND, world, tree, neighbours, shapes, state, scratch)
         move_drives(dt, commands[step], world, state, scratch)
         for body in range(len(world.kind)):
             if world.kind[body] == FREE:
@@ -716,11 +795,11 @@ def feel(world, state, scratch, force, shear, depth, slip, contact, net, moment)
         sensor = world.pairs[pair, 0]
         a, b = world.sensor_body[sensor], world.target_body[world.pairs[pair, 1]]
         law = _law(world.parameters, pair)
-        _relative_motion(a, b, scratch.twist, state.position, scratch.rotation, scratch.motion)
-        motion = _values(scratch.motion)
+        _relative_motion(a, b, scratch.twist, state.position, scratch.rotation, scratch.motion[pair])
+        motion = _values(scratch.motion[pair])
         for r in range(scratch.contacts[pair]):
             block, lane = scratch.first_block[pair] + r // LANES, r % LANES
-            point = world.point_start[sensor] + scratch.slots[block, lane] - world.slot_start[pair]
+            point = world.point_first[pair] + scratch.slots[block, lane] - world.slot_start[pair]
             texel = world.texel[point]
             p = _painted_law(law, world.painted, point)
             nx, ny, nz = rows[block, NX + lane], rows[block, NY + lane], rows[block, NZ + lane]

@@ -69,6 +69,6 @@ def test_loops_over_contacts_run_in_vector_registers(name):
     if name == "_sum_contacts":
         compiled(0, 0, 1e-3, law, simulation._world.painted, scratch)
     else:
-        compiled(0, step._values(scratch.part), simulation._state, scratch)
+        compiled(0, step._values(scratch.part[0]), simulation._state, scratch)
     (code,) = compiled.inspect_asm().values()
     assert re.search(r"^\s+v?sqrtpd\s", code, re.MULTILINE), "the square root is taken of one number at a time"
