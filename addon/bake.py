@@ -29,7 +29,7 @@ def bake(scene) -> Generator[Progress, None, Baked]:
     """Compute the whole frame range of a scene, write its files, and put the result into the scene.
 
     Until the last step nothing in the scene changes, and an earlier bake stays as it is: closing the generator, an error and a
-    kill leave the old or the new bake, never half of one.
+    kill leave the old or the new bake, never half of one. After a kill the next bake of the same scene goes on where it was.
 
     Raises
     ------
@@ -60,9 +60,11 @@ def _bake(scene, name: str) -> Generator[Progress, None, Baked]:
 
     write.check(scene, scenario, binding)
     solver = dependencies.solver()
+    simulation = solver.Simulation(scenario)
     files = folders.Files(folder, scenario, bpy.data.filepath)
     try:
-        job = solver.solve(scenario)
+        frames = files.resume(simulation)
+        job = solver.solve(scenario, simulation, frames)
         while True:
             try:
                 step = next(job)
@@ -70,6 +72,7 @@ def _bake(scene, name: str) -> Generator[Progress, None, Baked]:
                 recording = stop.value
                 break
             files.write_frame(step.result)
+            files.keep(simulation, frames)
             binding.objects(_still_there(name))
             yield _progress("Computing forces", step.frame, total // 2 + step.done, total)
         recording = replace(recording, warnings=binding.warnings + recording.warnings)

@@ -1,12 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The files of a bake. They grow in folders named ``<sensor>.partial``, which take the sensors' places when all is done.
 
-A kill at any moment leaves the old bake or the new one. Between the two renames of a swap the old one is called
+A kill at any moment leaves the old bake or the new one, and an unfinished one that the next bake goes on with
+(:mod:`.unfinished`). Between the two renames of a swap the old one is called
 ``<sensor>.old``; the next bake puts that right. What the user has put into a sensor's folder moves on into the new one.
 """
 
 from __future__ import annotations
 
+import os
 import re
 import shutil
 from contextlib import suppress
@@ -30,6 +32,7 @@ from ..core.formats.files import (
 from ..core.formats.sensors import SENSOR_NAME, save_sensor
 from ..core.recording import Frame, Recording
 from ..core.scenario import Scenario
+from .unfinished import Unfinished
 
 OURS = re.compile(rf"tactile_-?\d+\.exr|{'|'.join(map(re.escape, (RECORDING_NAME, SENSOR_NAME, MANIFEST_NAME)))}")
 """Names of the files in a sensor's folder that a bake writes and replaces."""
@@ -82,17 +85,40 @@ class Files:
         names = folder_names(self._sensors)
         self.folders = {name: self.folder / names[name] for name in self._sensors}
         self._scenario, self._digest = scenario, scenario.digest()
+        self._unfinished = Unfinished(self.folder, self._digest)
         try:
             for place in self.folders.values():
                 _recover(place)
                 self._check_replaceable(place)
-                _beside(place, "partial").mkdir()
         except FileError:
             self.discard()
             raise
         except OSError as error:
             self.discard()
             raise _problem(self.folder, error) from error
+
+    def resume(self, simulation) -> list[Frame]:
+        """Bring a new simulation to where a killed bake of the same scenario was, and return its frames, if there are any.
+
+        Raises
+        ------
+        FileError
+            The folders cannot be made.
+        """
+        partial = [_beside(place, "partial") for place in self.folders.values()]
+        frames = self._unfinished.resume(simulation) if all(place.is_dir() for place in partial) else None
+        try:
+            if frames is None:
+                self.discard()
+                for place in partial:
+                    place.mkdir()
+        except OSError as error:
+            raise _problem(self.folder, error) from error
+        return frames or []
+
+    def keep(self, simulation, frames: list[Frame]) -> None:
+        """Put the work so far aside, every few seconds, for the case that the process is killed."""
+        self._unfinished.keep(simulation, frames)
 
     def _manifest(self, name: str, recording: Recording) -> Manifest:
         sensor, scenario = self._sensors[name], self._scenario
@@ -125,7 +151,7 @@ class Files:
                 "digest": self._digest,
             }
             path = _beside(place, "partial") / frame_file(frame.frame)
-            write_exr(path, sensor.texels.layout, frame.sensors[name], about)
+            write_exr(path, sensor.texels.layout, frame.sensors[name], about, at_once=False)
 
     def finish(self, recording: Recording) -> None:
         """Write the recordings and let the new folders take the place of the old ones: all of them, or none."""
@@ -136,13 +162,17 @@ class Files:
             write_manifest(partial, self._manifest(name, recording))
         for place in self.folders.values():
             self._check_replaceable(place)  # again: a bake takes long enough for somebody to put something there
+        if hasattr(os, "sync"):
+            os.sync()  # once for all images: nobody sees them before the swap
         try:
             _swap(list(self.folders.values()))
+            self._unfinished.drop()
         except OSError as error:
             raise _problem(self.folder, error) from error
 
     def discard(self) -> None:
         """Remove what is unfinished."""
+        self._unfinished.drop()
         for place in self.folders.values():
             shutil.rmtree(_beside(place, "partial"), ignore_errors=True)
 
@@ -170,10 +200,8 @@ def _beside(place: Path, ending: str) -> Path:
 
 
 def _recover(place: Path) -> None:
-    """Put right what a kill left: an unfinished bake goes, a swap that was cut in two is taken back."""
-    partial, old = _beside(place, "partial"), _beside(place, "old")
-    if partial.exists():
-        shutil.rmtree(partial)
+    """Put right what a kill left of a swap: one that was cut in two is taken back."""
+    old = _beside(place, "old")
     if old.exists() and not place.exists():
         old.rename(place)
     if old.exists():

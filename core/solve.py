@@ -393,10 +393,20 @@ def _start(scenario: Scenario, world: World, center: np.ndarray) -> State:
     )
 
 
-def solve(scenario: Scenario) -> Generator[Progress, None, Recording]:
+def solve(
+    scenario: Scenario, simulation: Simulation | None = None, frames: list[Frame] | None = None
+) -> Generator[Progress, None, Recording]:
     """Run a scenario frame by frame.
 
     Closing the generator stops the run; nothing outside is touched.
+
+    Parameters
+    ----------
+    scenario : Scenario
+    simulation : Simulation, optional
+        Of this scenario, to go on with. Default: a new one.
+    frames : list of Frame, optional
+        Those that it has been through, the present one too; those to come are added to it.
 
     Yields
     ------
@@ -407,10 +417,12 @@ def solve(scenario: Scenario) -> Generator[Progress, None, Recording]:
     -------
     Recording
     """
-    simulation = Simulation(scenario)
+    simulation = simulation or Simulation(scenario)
     total = len(scenario.frames)
-    frames = [simulation.observe()]
-    yield Progress(simulation.frame, 1, total, frames[-1])
+    frames = [] if frames is None else frames
+    if not frames:
+        frames.append(simulation.observe())
+    yield Progress(simulation.frame, len(frames), total, frames[-1])
     while simulation.frame < scenario.frame_end:
         frames.append(simulation.advance())
         yield Progress(simulation.frame, len(frames), total, frames[-1])

@@ -53,7 +53,13 @@ def exr_channels(layout: GridLayout | UVLayout, frame: SensorFrame) -> dict[str,
     return {name: image[..., i].astype(np.float32) for i, name in enumerate(CHANNELS)}
 
 
-def write_exr(path: str | os.PathLike, layout: GridLayout | UVLayout, frame: SensorFrame, metadata: Mapping[str, str]) -> None:
+def write_exr(
+    path: str | os.PathLike,
+    layout: GridLayout | UVLayout,
+    frame: SensorFrame,
+    metadata: Mapping[str, str],
+    at_once: bool = True,
+) -> None:
     """Write one frame of one sensor, whole or not at all.
 
     Parameters
@@ -64,6 +70,9 @@ def write_exr(path: str | os.PathLike, layout: GridLayout | UVLayout, frame: Sen
     frame : SensorFrame
     metadata : mapping of str to str
         Becomes header attributes named ``palpate.<key>``: unit, sensor, frame, time, digest, …
+    at_once : bool
+        False writes the file where it is, a half one too when it is interrupted: many times faster, for a folder that nobody
+        reads before it is complete.
 
     Raises
     ------
@@ -74,8 +83,16 @@ def write_exr(path: str | os.PathLike, layout: GridLayout | UVLayout, frame: Sen
     """
     pictures = exr_channels(layout, frame)
     from_top = {name: picture[::-1] for name, picture in pictures.items()}
-    with atomic_write(path) as temporary:
-        openexr.write(temporary, from_top, {_PREFIX + key: str(value) for key, value in metadata.items()})
+    attributes = {_PREFIX + key: str(value) for key, value in metadata.items()}
+    if at_once:
+        with atomic_write(path) as temporary:
+            openexr.write(temporary, from_top, attributes)
+        return
+    try:
+        openexr.write(path, from_top, attributes)
+    except OSError as error:
+        reason = (error.strerror or str(error)).lower()
+        raise FileError(f"'{path}' could not be written ({reason}): free some space or choose another folder.") from error
 
 
 def read_exr(path: str | os.PathLike) -> tuple[dict[str, np.ndarray], dict[str, str]]:

@@ -1,0 +1,33 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Bake a .blend, slowly; run by test_resume.py in a process of its own, which kills it.
+
+python killed_bake.py SCENE.blend REPORT.json
+"""
+
+import json
+import sys
+from pathlib import Path
+
+import bpy
+
+import palpate
+
+palpate.register()
+from palpate.addon import unfinished  # noqa: E402
+from palpate.addon.bake import bake  # noqa: E402
+from palpate.core.drive import drive  # noqa: E402
+
+unfinished.PATIENCE = 0.0
+bpy.ops.wm.open_mainfile(filepath=sys.argv[1])
+computed = []
+
+
+def note(progress) -> None:
+    if progress.stage == "Computing forces":
+        computed.append(progress.frame)
+        print(progress.frame, flush=True)
+
+
+drive(bake(bpy.context.scene), note)
+bpy.ops.wm.save_mainfile()
+Path(sys.argv[2]).write_text(json.dumps(computed))

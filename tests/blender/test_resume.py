@@ -1,0 +1,130 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A bake that is killed, at whatever moment, goes on where it was, and ends with the same bytes as one that was not."""
+
+import json
+import random
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from blender_scenes import press_and_drop, save
+
+from palpate.addon import folders, jobs, unfinished
+from palpate.addon.bake import bake
+from palpate.core.drive import drive
+from palpate.core.formats.archive import load_recording
+
+SCRIPT = Path(__file__).with_name("killed_bake.py")
+FRAMES = 60
+
+
+def contents(folder):
+    return {str(path.relative_to(folder)): path.read_bytes() for path in sorted(folder.rglob("*")) if path.is_file()}
+
+
+def start(path, report):
+    command = [sys.executable, str(SCRIPT), str(path), str(report)]
+    return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
+
+
+def test_sigkill_at_any_moment(tmp_path):
+    scene, *_ = press_and_drop(frames=FRAMES)
+    scene.palpate.use_auto_dt, scene.palpate.dt = False, 5e-5
+    path = save(tmp_path)
+    expected = contents_of_a_whole_bake(scene, tmp_path)
+    report, dice, first_frames = tmp_path / "report.json", random.Random(4), []
+    for kill in range(4):
+        process = start(path, report)
+        wait_for = dice.randrange(5, 12)  # frames of its own, then a moment that nobody chose
+        seen = []
+        for line in process.stdout:
+            if line.strip().isdigit():
+                seen.append(int(line))
+            if len(seen) == wait_for:
+                break
+        time.sleep(dice.random() * 0.05)
+        process.send_signal(signal.SIGKILL)
+        process.wait()
+        assert seen, f"the bake ended by itself before kill {kill}"
+        first_frames.append(seen[0])
+        assert not report.exists() and not (tmp_path / "palpate" / "Pad").exists()
+    assert first_frames == sorted(first_frames) and first_frames[-1] > 10  # each went on where the one before was
+    process = start(path, report)
+    process.communicate(timeout=300)
+    assert json.loads(report.read_text())[0] > first_frames[-1]
+    assert contents(tmp_path / "palpate") == expected
+
+
+def contents_of_a_whole_bake(scene, tmp_path):
+    scene.palpate.folder = str(tmp_path / "whole")
+    drive(bake(scene))
+    return contents(tmp_path / "whole")
+
+
+def abandon(scene, steps):
+    """Stop a bake as a kill would: it cannot clean up."""
+    work = jobs.Slice(bake(scene))
+    discard = folders.Files.discard
+    folders.Files.discard = lambda self: None
+    try:
+        for _ in range(steps):
+            work.work(0.0)
+        work.cancel()
+    finally:
+        folders.Files.discard = discard
+
+
+@pytest.fixture
+def killed(tmp_path, monkeypatch):
+    """A scene whose bake was killed at its sixth frame."""
+    monkeypatch.setattr(unfinished, "PATIENCE", 0.0)
+    scene, pad, *_ = press_and_drop(frames=8)
+    save(tmp_path)
+    abandon(scene, 8 + 6)
+    assert (tmp_path / "palpate" / unfinished.FOLDER / unfinished.STATE).is_file()
+    return scene, pad
+
+
+def computed(scene):
+    frames = []
+    drive(bake(scene), lambda step: frames.append(step.frame) if step.stage == "Computing forces" else None)
+    return frames
+
+
+def test_the_next_bake_goes_on(killed, tmp_path):
+    scene, _ = killed
+    assert computed(scene)[0] == 6
+    assert sorted(path.name for path in (tmp_path / "palpate").iterdir()) == ["Pad", "Pad 2"]
+    assert load_recording(tmp_path / "palpate" / "Pad" / "recording.npz").frames.tolist() == list(range(1, 9))
+
+
+@pytest.mark.parametrize("what", ["parameter", "damaged state", "lost frames", "lost images"])
+def test_what_does_not_fit_is_begun_anew(killed, tmp_path, what):
+    scene, pad = killed
+    place = tmp_path / "palpate" / unfinished.FOLDER
+    if what == "parameter":
+        pad.palpate.k = 77.0
+    elif what == "damaged state":
+        (place / unfinished.STATE).write_bytes((place / unfinished.STATE).read_bytes()[:1000])
+    elif what == "lost frames":
+        next(place.glob("frames_*")).unlink()
+    else:
+        for path in sorted((tmp_path / "palpate" / "Pad.partial").iterdir()):
+            path.unlink()
+        (tmp_path / "palpate" / "Pad.partial").rmdir()
+    assert computed(scene)[0] == 1
+    assert sorted(path.name for path in (tmp_path / "palpate").iterdir()) == ["Pad", "Pad 2"]
+
+
+def test_escape_leaves_nothing(tmp_path, monkeypatch):
+    monkeypatch.setattr(unfinished, "PATIENCE", 0.0)
+    scene, *_ = press_and_drop(frames=8)
+    save(tmp_path)
+    work = jobs.Slice(bake(scene))
+    for _ in range(14):
+        work.work(0.0)
+    work.cancel()
+    assert list((tmp_path / "palpate").iterdir()) == []
