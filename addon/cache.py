@@ -40,6 +40,8 @@ class Run:
     moments : dict of int to what :func:`.sample.sample_moment` found at that frame
     written : dict of int to (14,) float
         Where free bodies were last put, by body index.
+    loads : dict of int to dict
+        Kept by :meth:`load`.
     """
 
     scenario: Scenario
@@ -51,6 +53,14 @@ class Run:
     frames: dict[int, Frame] = field(default_factory=dict)
     moments: dict[int, sample.Moment] = field(default_factory=dict)
     written: dict[int, np.ndarray] = field(default_factory=dict)
+    loads: dict[int, dict[str, float]] = field(default_factory=dict)
+
+    def load(self, number: int) -> dict[str, float]:
+        """Return the sums of the normal forces of a remembered frame by sensor, N."""
+        if number not in self.loads:
+            sensors = self.frames[number].sensors
+            self.loads[number] = {name: float(felt.normal_force.sum()) for name, felt in sensors.items()}
+        return self.loads[number]
 
 
 _runs: dict[int, Run] = {}

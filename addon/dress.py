@@ -76,9 +76,14 @@ def heat_range(settings, worn: list[markers.Worn]) -> float:
     """Return the end of the colours, N or Pa: what is set, or where the colour bars of figures end (:meth:`.Look.top`)."""
     unit = 1e3 if settings.quantity == "PRESSURE" else 1.0
     if not settings.use_auto_range:
-        return unit * (settings.range_max_pressure if settings.quantity == "PRESSURE" else settings.range_max)
+        return fixed_range(settings)
     largest = _largest(shown(settings, item.felt.normal_force, item.texels) for item in worn)
     return unit * measures.scale_limit(largest / unit) if largest > 0 else LEAST_RANGE
+
+
+def fixed_range(settings) -> float:
+    """Return the end of the colours that is set, N or Pa."""
+    return 1e3 * settings.range_max_pressure if settings.quantity == "PRESSURE" else settings.range_max
 
 
 def shown(settings, normal_force: np.ndarray, texels) -> np.ndarray:

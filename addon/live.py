@@ -3,15 +3,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import bpy
 import numpy as np
 
 from ..core.errors import PalpateError
+from ..core.formats.sensors import SENSOR_NAME, load_sensor
 from ..core.recording import Frame, Recording
-from . import cache, folders, freebodies, materials, overlays, sample, stale, state, write
+from ..core.texels import Texels
+from . import cache, dress, folders, freebodies, inset, materials, overlays, sample, stale, state, write
 
 
 @dataclass(frozen=True)
@@ -29,6 +31,10 @@ _recordings: dict[Path, Recording | None] = {}
 """Recordings of bakes that were read for the panel, by folder."""
 
 
+_known_texels: dict[Path, Texels | None] = {}
+"""Of their sensors, likewise."""
+
+
 def status(scene) -> Status:
     """Return what is known about a scene's present frame; cheap enough for drawing."""
     return _status.get(scene.session_uid, Status("Not computed: go to the first frame and play."))
@@ -41,6 +47,7 @@ def forget() -> None:
     _status.clear()
     _refused.clear()
     _recordings.clear()
+    _known_texels.clear()
     stale.forget()
 
 
@@ -188,7 +195,38 @@ def _show_bake(scene, depsgraph) -> None:
     text = f"Frame {number} of the bake."
     if stale.is_stale(scene, depsgraph, recording):
         text = "The bake is out of date, something has changed since: bake again."
-    _say(scene, text, Frame(number, 0.0, sensors, poses, velocities))
+    frame = Frame(number, 0.0, sensors, poses, velocities)
+    _say(scene, text, frame)
+    if scene.palpate.show_inset and not bpy.app.background:
+        _show_board(scene, frame)
+
+
+def _show_board(scene, frame: Frame) -> None:
+    """Show the tactile images and curves of a bake's present frame."""
+    sensors, texels, last = {}, {}, None
+    for obj in write.baked_objects(scene):
+        recording, own = _recording(obj), _texels(obj)
+        if recording is not None and own is not None and frame.frame in recording.frames:
+            last = recording
+            sensors.update(recording.sensors)
+            texels.update(dict.fromkeys(recording.sensors, own))
+    if last is None:
+        return
+    look = dress.look_of(scene)
+    top = look.top(replace(last, sensors=sensors), texels) * (1e3 if look.quantity == "pressure" else 1.0)
+    loads = {name: felt.normal_force.sum(axis=1) for name, felt in sensors.items()}
+    inset.show(scene, inset.board(scene, frame, texels, last.frames.astype(float), loads, top))
+
+
+def _texels(obj):
+    """Return the texels of a sensor's bake, read when they are first asked for; None when they are not there."""
+    place = write.bake_folder(obj)
+    if place is not None and place not in _known_texels:
+        try:
+            _known_texels[place] = load_sensor(place / SENSOR_NAME)[0]
+        except PalpateError:
+            _known_texels[place] = None
+    return _known_texels.get(place)
 
 
 def _recording(obj):
@@ -209,6 +247,7 @@ def baked(scene, recording, places) -> None:
     cache.drop(scene)
     overlays.clear(scene)
     _recordings.clear()
+    _known_texels.clear()
     for place in places.values():
         _recordings[place] = recording
     scene.palpate.baked_fingerprint = stale.fingerprint(scene)

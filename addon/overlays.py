@@ -9,7 +9,7 @@ import bpy
 import numpy as np
 
 from ..core import colormaps
-from . import transforms
+from . import dress, inset, redraw, transforms
 
 LIFT = 0.004
 """Share of the sensor's size by which the picture hovers above its surface, so that the two do not flicker."""
@@ -36,39 +36,68 @@ class Picture:
 
 
 _pictures: dict[int, list[Picture]] = {}
-_largest: dict[int, dict[str, tuple[float, float]]] = {}
-"""Largest normal force and net force of each sensor so far, by scene."""
+_largest: dict[int, tuple[float, float]] = {}
+"""Largest value and net force of any sensor so far, by scene."""
 _handle = None
 
 
 def show(scene, run, frame) -> None:
     """Show one frame of a run."""
+    if bpy.app.background:
+        return
     settings = scene.palpate
-    if bpy.app.background or not settings.show_overlay:
+    if not (settings.show_overlay or settings.show_inset):
         clear(scene)
         return
-    seen = _largest.setdefault(scene.session_uid, {})
-    pictures = []
-    for sensor in run.scenario.sensors:
-        if sensor.readout:
-            felt, pose = frame.sensors[sensor.name], frame.poses[sensor.body]
-            before = seen.get(sensor.name, (1e-9, 1e-9))
-            net = float(np.linalg.norm(felt.net_force))
-            largest = max(before[0], float(felt.normal_force.max(initial=0.0))), max(before[1], net)
-            seen[sensor.name] = largest
-            maximum = largest[0] if settings.use_auto_range else settings.range_max
-            pictures.append(_picture(sensor, felt, pose, maximum, largest[1], settings.color_map, run.binding.scale))
-    _pictures[scene.session_uid] = pictures
-    _redraw()
+    if settings.show_overlay:
+        _pictures[scene.session_uid] = pictures_of(scene, run, frame)
+    if settings.show_inset:
+        inset.show(scene, board_of(scene, run, frame))
+    redraw.views()
 
 
-def _picture(sensor, felt, pose, maximum: float, strongest: float, color_map: str, scale: float) -> Picture:
+def pictures_of(scene, run, frame) -> list[Picture]:
+    """Return the heat maps and arrows of one frame of a run, all sensors on one scale."""
+    maximum, strongest = _scale(scene, run, frame)
+    return [
+        _picture(scene, sensor, frame.sensors[sensor.name], frame.poses[sensor.body], maximum, strongest, run.binding.scale)
+        for sensor in _read_out(run)
+    ]
+
+
+def board_of(scene, run, frame) -> inset.Board:
+    """Return the tactile images and curves of one frame of a run."""
+    maximum, _ = _scale(scene, run, frame)
+    known = sorted(run.frames)
+    texels = {sensor.name: sensor.texels for sensor in _read_out(run)}
+    loads = {name: np.array([run.load(number)[name] for number in known]) for name in texels}
+    return inset.board(scene, frame, texels, np.array(known, float), loads, maximum)
+
+
+def _read_out(run) -> list:
+    return [sensor for sensor in run.scenario.sensors if sensor.readout]
+
+
+def _scale(scene, run, frame) -> tuple[float, float]:
+    """Return the end of the colours, N or Pa, and the net force of the longest arrow."""
+    settings = scene.palpate
+    key = hash((scene.session_uid, settings.quantity))
+    value, net = _largest.get(key, (1e-9, 1e-9))
+    for sensor in _read_out(run):
+        felt = frame.sensors[sensor.name]
+        value = max(value, float(dress.shown(settings, felt.normal_force, sensor.texels).max(initial=0.0)))
+        net = max(net, float(np.linalg.norm(felt.net_force)))
+    _largest[key] = value, net
+    return (value if settings.use_auto_range else dress.fixed_range(settings)), net
+
+
+def _picture(scene, sensor, felt, pose, maximum: float, strongest: float, scale: float) -> Picture:
     texels = sensor.texels
     rotation = transforms.rotation(pose[3:])
     size = float(np.ptp(texels.position, axis=0).max())
     points = texels.position + LIFT * size * texels.normal
     world = (pose[:3] + points @ rotation.T) / scale
-    rgb = colormaps.colors(color_map, felt.normal_force / maximum)
+    rgb = colormaps.colors(scene.palpate.color_map, dress.shown(scene.palpate, felt.normal_force, texels) / maximum)
     corner = texels.layout.triangles.ravel()
     colors = np.column_stack([rgb, np.ones(len(rgb))])[corner]
     line = None
@@ -84,18 +113,11 @@ def clear(scene=None) -> None:
     if scene is None:
         _pictures.clear()
         _largest.clear()
+        inset.clear()
     else:
         _pictures.pop(scene.session_uid, None)
-    _redraw()
-
-
-def _redraw() -> None:
-    if bpy.app.background:
-        return
-    for window in bpy.context.window_manager.windows:
-        for area in window.screen.areas:
-            if area.type in {"VIEW_3D", "PROPERTIES"}:
-                area.tag_redraw()
+        inset.clear(scene)
+    redraw.views()
 
 
 def _draw() -> None:
@@ -136,6 +158,7 @@ def _batches(picture: Picture) -> list:
 
 def register() -> None:
     global _handle
+    inset.register()
     if not bpy.app.background:
         _handle = bpy.types.SpaceView3D.draw_handler_add(_draw, (), "WINDOW", "POST_VIEW")
 
@@ -143,6 +166,7 @@ def register() -> None:
 def unregister() -> None:
     global _handle
     clear()
+    inset.unregister()
     if _handle is not None:
         bpy.types.SpaceView3D.draw_handler_remove(_handle, "WINDOW")
         _handle = None

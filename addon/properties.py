@@ -455,6 +455,12 @@ class PALPATE_PG_scene(bpy.types.PropertyGroup):
         default=True,
         options=set(),
     )
+    show_inset: BoolProperty(
+        name="Live Images and Curves",
+        description="Tactile images, their scale and the force over time in a corner of the 3D view",
+        default=True,
+        options=set(),
+    )
     color_map: EnumProperty(name="Colour Map", description="Colours of the heat map", items=COLOR_MAPS, options=set())
     use_auto_range: BoolProperty(
         name="Auto Range",

@@ -44,6 +44,7 @@ class Display(Part):
     def draw_part(self, layout, _settings, context):
         own = context.scene.palpate
         layout.prop(own, "show_overlay")
+        layout.prop(own, "show_inset")
         layout.prop(own, "color_map")
         layout.prop(own, "quantity")
         column = layout.column(align=True)

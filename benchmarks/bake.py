@@ -1,0 +1,112 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The timeline and the bake: showing a cached frame, and what a bake costs beside the solving in it.
+
+A cached frame is what scrubbing costs on top of Blender's own work: the same `frame_set` with playback on, less the time with
+it off. The bake is compared with solving the same scenario alone, in turn: it also samples, writes images, keyframes and files.
+"""
+
+from __future__ import annotations
+
+import os
+import statistics
+import tempfile
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+ROUNDS = 5
+GRIDS = {84: (14, 6), 16384: (128, 128)}
+GOALS = {84: 5.0, 16384: 20.0}
+"""Milliseconds for a cached frame."""
+
+
+def scene_of(texels: int, frames: int, folder: Path):
+    """Return a scene with a ball that is pressed into a pad of so many texels and drawn over it."""
+    import bpy
+
+    rows, columns = GRIDS[texels]
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    _enable()
+    scene = bpy.context.scene
+    scene.frame_start, scene.frame_end = 1, frames
+    bpy.ops.mesh.primitive_grid_add(x_subdivisions=columns - 1, y_subdivisions=rows - 1, size=0.05)
+    pad = bpy.context.object
+    pad.palpate.role, pad.palpate.k, pad.palpate.cn = "SENSOR", 5000.0 / texels, 50.0 / texels
+    bpy.ops.mesh.primitive_uv_sphere_add(radius=0.02, segments=64, ring_count=32, location=(-0.008, 0.0, 0.0215))
+    ball = bpy.context.object
+    ball.palpate.role = "TARGET"
+    for share, place in ((0.0, (-0.008, 0.0, 0.0215)), (0.2, (-0.008, 0.0, 0.018)), (1.0, (0.008, 0.0, 0.018))):
+        ball.location = place
+        ball.keyframe_insert("location", frame=round(1 + share * (frames - 1)))
+    scene.frame_set(1)
+    bpy.ops.wm.save_as_mainfile(filepath=str(folder / "scene.blend"))
+    return scene
+
+
+def _enable() -> None:
+    import bpy
+
+    import palpate
+
+    if not hasattr(bpy.types.Object, "palpate"):
+        palpate.register()
+
+
+def cached_frame(texels: int) -> float:
+    """Milliseconds that showing a remembered frame adds to Blender's own frame change, with a live picture as in a window."""
+    from palpate.addon import cache, live, overlays
+
+    with tempfile.TemporaryDirectory() as folder:
+        scene = scene_of(texels, 6, Path(folder))
+        for frame in range(1, 7):
+            scene.frame_set(frame)
+        run = cache.get(scene)
+        times = []
+        for frame in (2, 5, 3, 6, 4) * ROUNDS:
+            scene.palpate.use_live = False
+            scene.frame_set(frame - 1)
+            start = time.perf_counter()
+            scene.frame_set(frame)
+            plain = time.perf_counter() - start
+            scene.palpate.use_live = True
+            scene.frame_set(frame - 1)
+            start = time.perf_counter()
+            scene.frame_set(frame)
+            pictures = overlays.pictures_of(scene, run, run.frames[frame])  # in the background nothing is drawn
+            overlays.board_of(scene, run, run.frames[frame])
+            times.append(time.perf_counter() - start - plain)
+            if cache.get(scene) is not run or not pictures or live.status(scene).frame is None:
+                raise RuntimeError("the frame was computed anew or not shown: this would not be the same work")
+        return statistics.median(times) * 1e3
+
+
+def bake_and_solve(texels: int, frames: int) -> tuple[float, float]:
+    """Seconds of a bake, and of solving the same scenario."""
+    from palpate.addon.bake import bake
+    from palpate.core.drive import drive
+    from palpate.core.solve import run
+
+    with tempfile.TemporaryDirectory() as folder:
+        scene = scene_of(texels, frames, Path(folder))
+        scenario = drive(bake(scene)).scenario  # compiles and warms up
+        rounds = []
+        for _ in range(ROUNDS):
+            start = time.perf_counter()
+            drive(bake(scene))
+            middle = time.perf_counter()
+            run(scenario)
+            rounds.append((middle - start, time.perf_counter() - middle))
+        return tuple(statistics.median(column) for column in zip(*rounds, strict=True))
+
+
+def run() -> Iterator[dict]:
+    """Cached frames by number of texels, and the bake over the solve."""
+    os.environ.setdefault("BLENDER_USER_RESOURCES", tempfile.mkdtemp(prefix="palpate-bench-"))
+    for texels in GRIDS:
+        yield {"name": f"bake.cached_frame.{texels}", "value": cached_frame(texels), "unit": "ms", "goal": GOALS[texels]}
+    for texels, frames in ((84, 120), (16384, 24)):
+        whole, alone = bake_and_solve(texels, frames)
+        yield {
+            "name": f"bake.over_solve.{texels}", "value": whole, "unit": "s",
+            "peer": "the solve alone", "peer_value": alone, "ratio": whole / alone, "goal": 1.3,
+        }  # fmt: skip
