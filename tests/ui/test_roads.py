@@ -40,3 +40,9 @@ def test_paint(play_road):
     values = play_road("paint", timeout=600)["values"]
     assert values["seconds"] < 120
     assert values["largest"] > 0
+
+
+def test_authoring(play_road):
+    """Pads, laid texels, a problem put right, the sidebar, F3, effects and a fit."""
+    values = play_road("authoring", timeout=600)["values"]
+    assert values["texels"] > 50

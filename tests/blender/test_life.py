@@ -1,0 +1,240 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What happens to objects in a Blender session: duplicated, linked, appended, overridden, mirrored, joined, separated, scaled,
+renamed. The sensor stays right, or says what to do."""
+
+import bpy
+import numpy as np
+import pytest
+from blender_scenes import ball, grid, press, reopen, save, select
+
+from palpate.addon import bake, identity, preview, sample, transforms
+from palpate.core.drive import drive
+from palpate.core.errors import PalpateError
+from palpate.core.solve import run
+
+
+def forces(scene=None):
+    """Sum of the normal forces of every sensor at the last frame."""
+    scene = scene or bpy.context.scene
+    recording = run(drive(sample.sample_scenario(scene))[0])
+    return {name: float(felt.normal_force[-1].sum()) for name, felt in recording.sensors.items()}
+
+
+def choose(*objects):
+    for obj in bpy.context.scene.objects:
+        obj.select_set(obj in objects)
+    bpy.context.view_layer.objects.active = objects[-1]
+
+
+def kinds(obj):
+    bpy.context.view_layer.update()
+    return [problem.kind for problem in preview.now(obj, bpy.context.scene).problems]
+
+
+@pytest.mark.parametrize("linked", [False, True])
+def test_duplicated(linked):
+    """Shift D and Alt D: two sensors that feel the same at two places, each with a uid of its own."""
+    scene, pad, target = press(4)
+    choose(pad)
+    bpy.ops.object.duplicate(linked=linked)
+    copy = bpy.context.object
+    copy.location.x += 0.2
+    choose(target)
+    bpy.ops.object.duplicate()
+    other = bpy.context.object
+    other.delta_location.x = 0.2  # on top of its keyframes
+    felt = forces()
+    assert felt["Pad"] > 0
+    assert felt["Pad.001"] == pytest.approx(felt["Pad"], rel=1e-4)
+    assert identity.key(pad) != identity.key(copy)
+
+
+def test_a_duplicated_skin_lies_on_the_same_surface_and_one_with_its_carrier_on_the_copy():
+    finger = ball("Finger", radius=0.02)
+    bpy.ops.palpate.skin_add(source="MESH", spacing=0.006)
+    skin = bpy.context.object
+    choose(skin)
+    bpy.ops.object.duplicate()
+    assert bpy.context.object.parent == finger
+    choose(finger, skin)
+    bpy.ops.object.duplicate()
+    copies = {obj.name: obj for obj in bpy.context.selected_objects}
+    assert copies["Finger Skin.002"].parent == copies["Finger.001"]
+
+
+def test_scaled_with_and_without_applying_it():
+    """Twice as large under a ball twice as large: the same number of texels, and applying the scale changes nothing."""
+    scene, pad, target = press(4)
+    pad.scale = (1.5, 1.5, 1.5)
+    before = forces()
+    choose(pad)
+    bpy.ops.object.transform_apply(location=False, rotation=False, scale=True)
+    assert forces() == {name: pytest.approx(value, rel=1e-5) for name, value in before.items()}
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+def test_mirrored_by_a_negative_scale(axis):
+    scene, pad, target = press(4)
+    before = forces()
+    pad.scale[axis] = -1.0
+    assert forces()["Pad"] == pytest.approx(before["Pad"], rel=0.02)  # other diagonals of the quads
+
+
+def test_mirrored_upside_down_it_faces_down():
+    """As Blender shows it: a negative scale along the normal turns the normal around."""
+    scene, pad, _ = press(4)
+    pad.scale.z = -1.0
+    bpy.context.view_layer.update()
+    texels = preview.now(pad, scene).texels
+    frame = transforms.rotation(transforms.split(np.array(pad.matrix_world, float))[1])
+    assert texels.normal @ frame.T == pytest.approx(np.tile([0, 0, -1.0], (84, 1)), abs=1e-6)
+
+
+def test_a_mirror_modifier_says_what_to_do():
+    scene, pad, _ = press(2)
+    pad.modifiers.new("Mirror", "MIRROR")
+    assert kinds(pad) == ["MODIFIER"]
+    text = preview.now(pad, scene).problems[0].text
+    assert "apply it" in text
+    bpy.context.view_layer.objects.active = pad
+    assert bpy.ops.palpate.fix(kind="MODIFIER") == {"FINISHED"}
+    assert "MODIFIER" not in kinds(pad)
+
+
+def test_joined_by_region():
+    """Two painted pads joined are one sensor of both regions."""
+    scene, pad, target = press(2)
+    other = grid("Other", (0.1, 0, 0))
+    for obj in (pad, other):
+        select(obj, range(12))
+        bpy.context.view_layer.objects.active = obj
+        bpy.ops.palpate.sensor_add(source="SELECTION")
+    choose(other, pad)
+    bpy.ops.object.join()
+    assert len(preview.now(pad, scene).texels) == 24
+    assert kinds(pad) == []
+
+
+def test_joined_whole_meshes_are_asked_about():
+    pad, other = grid(), grid("Other", (0.1, 0, 0))
+    choose(pad)
+    bpy.ops.palpate.sensor_add(source="MESH")
+    choose(other, pad)
+    bpy.ops.object.join()
+    assert "GROWN" in kinds(pad)
+
+
+def test_separated():
+    """A sensor cut in two: each part is a sensor with its own share of the region and the same parameters."""
+    scene, pad, target = press(4)
+    pad.palpate.k = 99.0
+    select(pad, range(0, 42))
+    choose(pad)
+    bpy.ops.palpate.sensor_add(source="MESH")
+    bpy.ops.object.mode_set(mode="EDIT")
+    bpy.ops.mesh.select_mode(type="FACE")
+    bpy.ops.mesh.separate(type="SELECTED")
+    bpy.ops.object.mode_set(mode="OBJECT")
+    parts = [obj for obj in scene.objects if obj.name.startswith("Pad")]
+    assert len(parts) == 2
+    assert {obj.palpate.k for obj in parts} == {99.0}
+    assert len({identity.key(obj) for obj in parts if identity.ensure(obj) is None}) == 2
+    assert all("GROWN" in kinds(obj) for obj in parts)  # fewer vertices than were made a sensor: said, one click accepts it
+    assert set(forces()) == {obj.name for obj in parts}
+
+
+def test_separated_without_any_of_its_region_says_so():
+    pad = grid()
+    select(pad, range(12))
+    bpy.ops.palpate.sensor_add(source="SELECTION")
+    pad.vertex_groups.clear()
+    report = preview.now(pad, bpy.context.scene)
+    assert "no vertex group 'Palpate Sensor'" in report.problems[0].text
+
+
+def test_renamed(tmp_path):
+    """A renamed object keeps its sensor; its bake plays on; the next bake goes by the new name."""
+    scene, pad, _ = press(3)
+    save(tmp_path)
+    drive(bake.bake(scene))
+    pad.name = "Thumb"
+    assert forces_after_clearing(scene)["Thumb"] > 0
+    baked = drive(bake.bake(scene))
+    assert list(baked.folders) == ["Thumb"]
+
+
+def forces_after_clearing(scene):
+    bpy.ops.palpate.bake_clear()
+    return forces(scene)
+
+
+def test_a_renamed_group_or_material_says_what_to_do():
+    scene, pad, _ = press(2)
+    select(pad, range(12))
+    choose(pad)
+    bpy.ops.palpate.sensor_add(source="SELECTION")
+    pad.vertex_groups["Palpate Sensor"].name = "Mine"
+    with pytest.raises(PalpateError, match="choose one in its Region panel"):
+        forces()
+
+
+def _library(tmp_path):
+    press(4)
+    bpy.data.objects["Pad"].palpate.k = 88.0
+    expected = forces()
+    path = save(tmp_path, "library.blend")
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)  # an empty file; add-ons stay
+    return path, expected
+
+
+@pytest.mark.parametrize("link", [False, True])
+def test_appended_and_linked(tmp_path, link):
+    path, expected = _library(tmp_path)
+    with bpy.data.libraries.load(str(path), link=link) as (source, target):
+        target.objects = ["Pad", "Ball"]
+    for obj in target.objects:
+        bpy.context.scene.collection.objects.link(obj)
+    scene = bpy.context.scene
+    scene.frame_start, scene.frame_end = 1, 4
+    assert forces() == {name: pytest.approx(value, rel=1e-6) for name, value in expected.items()}
+    pad = target.objects[0]
+    bpy.context.view_layer.objects.active = pad
+    if link:
+        assert not bpy.ops.palpate.skin_add.poll()  # grey, with a message that names Make Local
+        assert not bpy.ops.palpate.fix.poll()
+    else:
+        assert bpy.ops.palpate.sensor_add(source="MESH") == {"FINISHED"}
+
+
+def test_overridden(tmp_path):
+    path, expected = _library(tmp_path)
+    with bpy.data.libraries.load(str(path), link=True) as (source, target):
+        target.objects = ["Pad", "Ball"]
+    for obj in target.objects:
+        bpy.context.scene.collection.objects.link(obj)
+    pad = target.objects[0].override_create(remap_local_usages=True)
+    pad.palpate.k = 176.0
+    bpy.context.view_layer.update()
+    scene = bpy.context.scene
+    scene.frame_start, scene.frame_end = 1, 4
+    felt = forces()
+    assert felt[pad.name] == pytest.approx(2 * expected["Pad"], rel=0.02)
+    path = save(tmp_path, "override.blend")
+    reopen(path)
+    local = next(obj for obj in bpy.data.objects if obj.override_library is not None and obj.name == "Pad")
+    assert local.palpate.k == 176.0
+
+
+def test_edited_while_it_is_a_sensor():
+    """Subdividing a painted region makes more texels; the count in the panel follows."""
+    pad = grid()
+    select(pad, range(84))
+    bpy.ops.palpate.sensor_add(source="SELECTION")
+    before = len(preview.now(pad, bpy.context.scene).texels)
+    bpy.ops.object.mode_set(mode="EDIT")
+    bpy.ops.mesh.select_all(action="SELECT")
+    bpy.ops.mesh.subdivide()
+    bpy.ops.object.mode_set(mode="OBJECT")
+    assert before == 84
+    assert len(preview.now(pad, bpy.context.scene).texels) == 11 * 27
+    assert np.isfinite(preview.now(pad, bpy.context.scene).density)
