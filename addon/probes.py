@@ -57,6 +57,7 @@ def add(context, obj, shape: str, size: float, depth: float):
     context.scene.collection.objects.link(probe)
     probe.rotation_euler = Vector(normal).to_track_quat("Z", "Y").to_euler()
     _animate(context.scene, probe, ground, normal, size / unit, depth / unit)
+    probe.display_type = "WIRE"  # the texels under it are what one wants to see
     probe.palpate.role = "TARGET"
     return probe
 

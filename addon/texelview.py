@@ -109,10 +109,11 @@ def _draw() -> None:
         shown = obj.mode == "OBJECT" and felt is not None and obj.name in felt.sensors  # the heat map is where they are
         if own.show_texels and not shown:
             _triangles(drawing, "fine", FINE)
-            _triangles(drawing, "faulty", FAULTY)
         if own.show_normals and not shown:
             _lines(drawing, "normals", NORMAL)
-        gpu.state.depth_test_set("NONE")  # it is inside the object
+        gpu.state.depth_test_set("NONE")  # what follows may be inside the object
+        if own.show_texels and not shown:
+            _triangles(drawing, "faulty", FAULTY)
         if own.show_reach:
             _lines(drawing, "reach", REACH)
     gpu.state.blend_set("NONE")

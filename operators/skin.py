@@ -46,6 +46,13 @@ class PALPATE_OT_pad_mesh_add(support.Reporting, AddObjectHelper, bpy.types.Oper
             sensors.make_sensor(obj, "MESH")
         self.report({"INFO"}, f"'{obj.name}' has {self.rows} × {self.columns} texels")
 
+    def draw(self, _context):
+        layout = self.layout
+        layout.use_property_split = True
+        column = layout.column()
+        for name in ("rows", "columns", "pitch_x", "pitch_y", "radius", "make_sensor", "align", "location", "rotation"):
+            column.prop(self, name)
+
 
 class PALPATE_OT_skin_add(support.Reporting, bpy.types.Operator):
     """Lay texels onto the surface of the active mesh: a sensor of its own that is fixed to it; an object can carry several"""

@@ -109,7 +109,8 @@ class Region(Part):
 def painted(layout, settings, key: str) -> None:
     """Draw the field for a painted multiplier, and its factor when one is chosen."""
     column = layout.column(align=True)
-    column.prop(settings, f"{key}_map", icon="GROUP_VERTEX", placeholder="Painted: none")
+    name = settings.bl_rna.properties[f"{key}_map"].name
+    column.prop(settings, f"{key}_map", text="", icon="GROUP_VERTEX", placeholder=f"{name}: none")
     if getattr(settings, f"{key}_map"):
         column.prop(settings, f"{key}_factor")
 

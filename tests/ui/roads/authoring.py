@@ -21,7 +21,7 @@ def road(ui):
     ui.check(
         pad.palpate.role == "SENSOR" and len(pad.data.vertices) == 84, "Add › Mesh › Tactile Pad makes a sensor of 84 texels"
     )
-    yield from adjust(ui, 10, 8, None, None, 0.02)
+    yield from adjust(ui, 10, 8, None, None, 0.02)  # rows, columns, and the radius of the bend
     ui.check(len(bpy.context.object.data.vertices) == 80, "rows and columns can be changed in the box")
     yield from ui.tab("PHYSICS")
     yield from ui.move(*ui.centre(view))
