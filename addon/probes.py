@@ -47,9 +47,10 @@ def add(context, obj, shape: str, size: float, depth: float):
     weights = texels.area / texels.area.sum()
     mean = weights @ texels.normal
     mean = mean / np.linalg.norm(mean) if np.linalg.norm(mean) > 0.1 else texels.normal[0]
-    heights = texels.position @ mean
-    across = np.linalg.norm((texels.position - weights @ texels.position) @ (np.eye(3) - np.outer(mean, mean)), axis=1)
-    foot = texels.position[np.argmin(across - 1e-3 * heights)]  # of two texels over the middle, the outer one
+    flat = np.eye(3) - np.outer(mean, mean)
+    across = np.linalg.norm((texels.position - weights @ texels.position) @ flat, axis=1)
+    facing = texels.normal @ mean > 0.5 * (texels.normal @ mean).max()  # not those on the back of a closed sensor
+    foot = texels.position[np.argmin(np.where(facing, across, np.inf))]
     location, quaternion, _ = transforms.split(transforms.array(obj.matrix_world))
     rotation = transforms.rotation(quaternion)
     normal, ground = rotation @ mean, location + rotation @ foot / unit
