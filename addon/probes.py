@@ -13,7 +13,7 @@ from mathutils import Matrix, Vector
 from ..core.errors import SensorError
 from . import preview, transforms
 
-APPROACH, PRESS, HOLD = 0.15, 0.45, 0.8
+APPROACH, PRESS, HOLD = 0.04, 0.2, 0.75
 """Shares of the frame range at which it arrives, is deepest, and leaves again."""
 SIDES = 64
 

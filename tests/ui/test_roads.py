@@ -37,12 +37,12 @@ def test_tutorial(play_road):
 
 def test_paint(play_road):
     """From nothing to the first tactile image of a painted fingertip in less than two minutes of a person's time."""
-    values = play_road("paint", timeout=600)["values"]
+    values = play_road("paint", timeout=1200)["values"]
     assert values["seconds"] < 120
     assert values["largest"] > 0
 
 
 def test_authoring(play_road):
     """Pads, laid texels, a problem put right, the sidebar, F3, effects and a fit."""
-    values = play_road("authoring", timeout=600)["values"]
+    values = play_road("authoring", timeout=1200)["values"]
     assert values["texels"] > 50

@@ -80,7 +80,7 @@ def road(ui):
     person.thinks()
     yield from ui.move(*ui.centre(view))
     yield from ui.key("SPACE")
-    yield from ui.wait_until(lambda: bpy.context.scene.frame_current >= 70, "frame 70 plays", timeout=180)
+    yield from ui.wait_until(lambda: bpy.context.scene.frame_current >= 32, "frame 32 plays", timeout=400)
     ui.value("seconds", person.seconds)
     ui.value("counts", dict(person.counts))
     yield from ui.screenshot("first-tactile-image")
