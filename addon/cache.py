@@ -19,7 +19,7 @@ from . import dependencies, drives, effects, freebodies, meshes, properties, sam
 
 PAINTED = tuple(f"{key}_{part}" for key in meshes.PAINTED for part in ("map", "factor"))
 REGION = ("region", "vertex_group", "threshold", "material", "face_set")
-SETTINGS = (*properties.PARAMETERS, *PAINTED, *REGION, *drives.SETTINGS, "role", "body", "mass", "contact_normals")
+SETTINGS = (*properties.PARAMETERS, *PAINTED, *REGION, *drives.SETTINGS, "role", "body", "mass", "contact_normals", "presses")
 
 
 @dataclass

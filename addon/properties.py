@@ -252,6 +252,11 @@ class PALPATE_PG_object(bpy.types.PropertyGroup):
     gain_map: _map("Painted Gain", "more or less it reports for the same force")
     gain_factor: _factor("the gain")
 
+    presses: BoolProperty(
+        name="Felt by Other Sensors",
+        description="Other sensors and pads feel this one's surface too; both skins share the overlap as springs in series",
+        **_fixed,
+    )
     contact_normals: EnumProperty(
         name="Contact Normals",
         description="In which direction this object presses",

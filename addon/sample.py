@@ -212,6 +212,12 @@ def sample_start(scene, depsgraph) -> tuple[Scenario, Binding]:
             sensors.append(_sensor(obj, index, mesh))
             sensor_objects.append(obj)
             skins.append(deform.skin_of(obj, depsgraph, sensors[-1], len(sensors) - 1, mesh, linear * scale, offset * scale))
+            if obj.palpate.presses:
+                smooth = obj.palpate.contact_normals == "SMOOTH"
+                targets.append(Target(obj.name, index, mesh, smooth=smooth, sensor=len(sensors) - 1))
+                skins.append(
+                    deform.skin_of(obj, depsgraph, targets[-1], len(targets) - 1, mesh, linear * scale, offset * scale)
+                )
     driven = tuple(index for index in starts if owners[index].palpate.body == "DRIVEN")
     for index in driven:
         drive = drives.drive_of(owners[index], matrices[index], depsgraph)

@@ -46,7 +46,7 @@ LINEAR = 0.0
 """In the place of the exponent: Eq. 8. Any other exponent is that of Hunt and Crossley's law."""
 
 
-def parameter_row(parameters: SensorParameters, share: float = 1.0) -> np.ndarray:
+def parameter_row(parameters: SensorParameters, share: float = 1.0, part: float = 1.0) -> np.ndarray:
     """Return the numbers of the contact law as the kernels want them, (PARAMETERS,) float.
 
     Parameters
@@ -54,11 +54,17 @@ def parameter_row(parameters: SensorParameters, share: float = 1.0) -> np.ndarra
     parameters : SensorParameters
     share : float
         Of the forces of a texel; one of several contact points has only its share of them.
+    part : float
+        Of the depth and its rate, and of the way of the bristles, that is the sensor's own (see :mod:`.series`).
     """
     p = parameters
     exponent = p.exponent if p.normal_law == HUNT_CROSSLEY else LINEAR
     row = np.array([p.k, p.cn, p.ct, p.sigma0, p.sigma1, p.x0, p.mus, p.mud, exponent, p.dissipation], dtype=float)
-    row[[K, CN, CT, SIGMA0, SIGMA1]] *= share
+    row[[K, CN, CT, SIGMA0, SIGMA1]] *= share * part
+    row[X0] /= part
+    if exponent != LINEAR:
+        row[K] *= part ** (exponent - 1.0)
+        row[DISSIPATION] *= part
     return row
 
 
@@ -90,6 +96,8 @@ class World(NamedTuple):
         Whose contact point it is, counted through all sensors.
     parameters : (q, PARAMETERS) float
         Of one contact point of each pair's sensor.
+    weight : (q,) float
+        How much of what a pair's sensor feels moves the bodies.
     painted : (N, 2) float
         Multipliers of each contact point's stiffness and friction; without rows when nothing is painted.
     reach : (m,) float, metres
@@ -133,6 +141,7 @@ class World(NamedTuple):
     point_start: np.ndarray
     texel: np.ndarray
     parameters: np.ndarray
+    weight: np.ndarray
     painted: np.ndarray
     reach: np.ndarray
     pairs: np.ndarray

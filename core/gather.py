@@ -185,13 +185,16 @@ def gather(pair, dt, world, tree, neighbours, shapes, state, scratch):
             met, triangle, leaving = segment_entry(ox, oy, oz, dx, dy, dz, target, before, tree)
         if triangle < 0:
             # Sunk: the base is inside the object. Either the segment leaves it somewhere, or the object's surface has just run
-            # past the base (it was within the last tenth of the reach a step ago) and has not come back since.
+            # past the base (it was within the last tenth of the reach a step ago, and is not just beside it now).
             in_box = (
                 min(ox, tx) <= tree.bounds[root, 3] and max(ox, tx) >= tree.bounds[root, 0]
                 and min(oy, ty) <= tree.bounds[root, 4] and max(oy, ty) >= tree.bounds[root, 1]
                 and min(oz, tz) <= tree.bounds[root, 5] and max(oz, tz) >= tree.bounds[root, 2]
             )  # fmt: skip
-            ran_past = in_box and (before == -2 or (before >= 0 and bristles[slot, 3] > 0.9))
+            ran_past = in_box and before == -2
+            if in_box and before >= 0 and bristles[slot, 3] > 0.9:
+                place_all(target, shapes, tree)
+                ran_past = _behind(ox, oy, oz, dx, dy, dz, target, tree)
             if leaving <= 1.0 or ran_past:
                 sunk += 1
                 hint[slot] = -2
@@ -247,37 +250,46 @@ def _lay_flat(first, count, rows):
 
 
 @kernel
-def count_buried(pair, world, tree, shapes, state, scratch):
-    """Count the contact points of a sensor that are deeper inside a closed target than they reach, and so feel nothing.
+def _behind(ox, oy, oz, dx, dy, dz, target, tree):
+    """Whether a long segment from O along D leaves the target's surface before it enters it: then O is inside, or behind it."""
+    root, size = tree.roots[target], 1.0
+    for i in range(3):
+        size += (tree.bounds[root, 3 + i] - tree.bounds[root, i]) / math.sqrt(dx * dx + dy * dy + dz * dz)
+    t, _, leaving = segment_entry(ox, oy, oz, size * dx, size * dy, size * dz, target, -1, tree)
+    return leaving < t
 
-    Looked for once a frame by a long segment from each segment's base; the arguments are those of :func:`gather`.
+
+@kernel
+def count_sunk(pair, closed, world, tree, shapes, state, scratch):
+    """Count the contact points of a sensor that are deeper inside a target than they reach, and so feel nothing.
+
+    Looked for once a frame by a long segment from each segment's base: among all points when the target is closed, else among
+    those that were seen to sink in. Points that have come out again elsewhere, as in a hole of the target, are forgotten.
+    The other arguments are those of :func:`gather`.
     """
     sensor, target = world.pairs[pair, 0], world.pairs[pair, 1]
-    pose = scratch.pose[pair]
+    pose, hint = scratch.pose[pair], state.hint
     _relative_pose(world.sensor_body[sensor], world.target_body[target], state.position, scratch.rotation, pose)
     place_all(target, shapes, tree)
     points, reach, root = world.points, world.reach[sensor], tree.roots[target]
-    size = 0.0
-    for i in range(3):
-        size += tree.bounds[root, 3 + i] - tree.bounds[root, i]
-    buried, slot = 0, world.slot_start[pair] - 1
+    sunk, slot = 0, world.slot_start[pair] - 1
     for point in range(world.point_first[pair], world.point_stop[pair]):
         slot += 1
-        if state.hint[slot] >= 0:
+        if hint[slot] >= 0 or (hint[slot] == -1 and not closed):
             continue
-        dx = pose[0] * points[point, 3] + pose[1] * points[point, 4] + pose[2] * points[point, 5]
-        dy = pose[3] * points[point, 3] + pose[4] * points[point, 4] + pose[5] * points[point, 5]
-        dz = pose[6] * points[point, 3] + pose[7] * points[point, 4] + pose[8] * points[point, 5]
-        ox = pose[9] + pose[0] * points[point, 0] + pose[1] * points[point, 1] + pose[2] * points[point, 2] - reach * dx
-        oy = pose[10] + pose[3] * points[point, 0] + pose[4] * points[point, 1] + pose[5] * points[point, 2] - reach * dy
-        oz = pose[11] + pose[6] * points[point, 0] + pose[7] * points[point, 1] + pose[8] * points[point, 2] - reach * dz
+        dx = reach * (pose[0] * points[point, 3] + pose[1] * points[point, 4] + pose[2] * points[point, 5])
+        dy = reach * (pose[3] * points[point, 3] + pose[4] * points[point, 4] + pose[5] * points[point, 5])
+        dz = reach * (pose[6] * points[point, 3] + pose[7] * points[point, 4] + pose[8] * points[point, 5])
+        ox = pose[9] + pose[0] * points[point, 0] + pose[1] * points[point, 1] + pose[2] * points[point, 2] - dx
+        oy = pose[10] + pose[3] * points[point, 0] + pose[4] * points[point, 1] + pose[5] * points[point, 2] - dy
+        oz = pose[11] + pose[6] * points[point, 0] + pose[7] * points[point, 1] + pose[8] * points[point, 2] - dz
         within = (
             tree.bounds[root, 0] <= ox <= tree.bounds[root, 3]
             and tree.bounds[root, 1] <= oy <= tree.bounds[root, 4]
             and tree.bounds[root, 2] <= oz <= tree.bounds[root, 5]
         )
-        if within:
-            t, _, leaving = segment_entry(ox, oy, oz, size * dx, size * dy, size * dz, target, -1, tree)
-            if leaving < t:
-                buried += 1
-    return buried
+        if (within or not closed) and _behind(ox, oy, oz, dx, dy, dz, target, tree):
+            sunk += 1
+        elif hint[slot] == -2:
+            hint[slot] = -1
+    return sunk

@@ -372,6 +372,8 @@ class Target:
         In the frame of its body, metres; its shape at the first frame.
     deformation : Deformation or None
         Where its vertices go, when it is not rigid.
+    sensor : int or None
+        The sensor whose surface this is, when it is soft: sensors then feel each other.
     smooth : bool
         Whether the contact normals are interpolated between the vertices, as for smooth shading, or those of the triangles.
     """
@@ -381,6 +383,7 @@ class Target:
     mesh: TriangleMesh
     deformation: Deformation | None = None
     smooth: bool = False
+    sensor: int | None = None
 
 
 @dataclass(frozen=True)

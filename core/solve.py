@@ -19,7 +19,7 @@ from .bvh import NEAR, Tree, build_tree
 from .contact import State, World, parameter_row
 from .crew import board_for, helpers
 from .drive import drive
-from .gather import Neighbours, count_buried
+from .gather import Neighbours, count_sunk
 from .mesh import is_closed
 from .motions import poses_at
 from .pilot import Pilot
@@ -27,6 +27,7 @@ from .points import ContactPoints, contact_points
 from .recording import Frame, Recording, SensorFrame
 from .respond import Reader
 from .scenario import Scenario, Sensor, Target
+from .series import coupling
 from .servo import drive_table
 from .shapes import Shapes
 from .step import Scratch, advance_steps, contacts_of, feel, gather_all, help_out, scratch_for
@@ -188,9 +189,7 @@ class Simulation:
             sunk = gather_all(-self.dt, *self._arrays)
             most = max(most, int(sunk))
             for pair in own:
-                if self._closed[self._world.pairs[pair, 1]]:
-                    buried = count_buried(pair, self._world, self._tree, self._shapes, self._state, self._scratch)
-                    most = max(most, int(buried))
+                most = max(most, self._count_sunk(pair))
                 slots, normals, points, depths = contacts_of(pair, self._scratch)
                 texel = self._world.texel[self._world.point_first[pair] + slots - self._world.slot_start[pair]]
                 deeper = np.argsort(depths, kind="stable")  # of several points of a texel the deepest comes last
@@ -210,14 +209,11 @@ class Simulation:
             return
         sensors, targets, total, names = self.scenario.sensors, self.scenario.targets, 0, []
         for pair, (sensor, target) in enumerate(self._world.pairs):
-            start = self._world.slot_start[pair]
-            points = self._world.point_stop[pair] - self._world.point_first[pair]
-            sunk = np.count_nonzero(self._state.hint[start : start + points] == -2)
-            if self._closed[target]:
-                buried = count_buried(pair, self._world, self._tree, self._shapes, self._state, self._scratch)
-                sunk = max(sunk, buried)
+            sunk = self._count_sunk(pair)
             if sunk:
-                names.append(f"'{targets[target].name}' into '{sensors[sensor].name}'")
+                name = f"'{targets[target].name}' into '{sensors[sensor].name}'"
+                if name not in names:  # a large sensor has several pairs with one target
+                    names.append(name)
                 total += sunk
         total = max(total, self._sunk)
         if total:
@@ -226,6 +222,11 @@ class Simulation:
                 f"Frame {self.frame}: {total} {what} are pressed past their maximum penetration by "
                 f"{', '.join(names) or 'an object'} and do not act; press less deep, or raise k or the maximum penetration."
             )
+
+    def _count_sunk(self, pair: int) -> int:
+        """Contact points of a pair that are sunk or buried in its target."""
+        closed = self._closed[self._world.pairs[pair, 1]]
+        return int(count_sunk(pair, closed, self._world, self._tree, self._shapes, self._state, self._scratch))
 
     def _tactile(self, sensor: int) -> np.ndarray:
         """(n,) normal forces of a sensor in the present state, for its controllers."""
@@ -291,13 +292,20 @@ def _world(scenario: Scenario, center: np.ndarray, points: list[ContactPoints]) 
         for first in range(point_start[i], point_start[i + 1], PART)
     ]
     pairs = [(i, j) for i, j, _, _ in parts]
+    couplings = [coupling(scenario, i, j) for i, j in pairs]
     sizes = [stop - first for _, _, first, stop in parts]
     extents = [extent(block, sensor.parameters.max_penetration) for block, sensor in zip(blocks, sensors, strict=True)]
     return World(
         points=np.ascontiguousarray(np.vstack(blocks)),
         point_start=point_start,
         texel=np.concatenate([p.texel + start for p, start in zip(points, texel_start, strict=False)]),
-        parameters=np.array([parameter_row(p := sensors[i].parameters, 1.0 / p.points_per_texel) for i, _ in pairs]),
+        parameters=np.array(
+            [
+                parameter_row(p := sensors[i].parameters, weight / p.points_per_texel, part)
+                for (i, _), (part, weight) in zip(pairs, couplings, strict=True)
+            ]
+        ),
+        weight=np.array([weight for _, weight in couplings]),
         painted=_painted(sensors, points),
         reach=np.array([s.parameters.max_penetration for s in sensors], dtype=float),
         pairs=np.array(pairs),

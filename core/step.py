@@ -794,7 +794,7 @@ def feel(world, state, scratch, force, shear, depth, slip, contact, net, moment)
     for pair in range(len(world.pairs)):
         sensor = world.pairs[pair, 0]
         a, b = world.sensor_body[sensor], world.target_body[world.pairs[pair, 1]]
-        law = _law(world.parameters, pair)
+        law, whole = _law(world.parameters, pair), 1.0 / world.weight[pair]
         _relative_motion(a, b, scratch.twist, state.position, scratch.rotation, scratch.motion[pair])
         motion = _values(scratch.motion[pair])
         for r in range(scratch.contacts[pair]):
@@ -822,6 +822,7 @@ def feel(world, state, scratch, force, shear, depth, slip, contact, net, moment)
                 fx = friction_force(zx, bristle_rate(zx, tx, square, fn, p), tx, p)
                 fy = friction_force(zy, bristle_rate(zy, ty, square, fn, p), ty, p)
                 fz = friction_force(zz, bristle_rate(zz, tz, square, fn, p), tz, p)
+            fx, fy, fz, fn = whole * fx, whole * fy, whole * fz, whole * fn
             shear[texel, 0] += fx * points[point, 6] + fy * points[point, 7] + fz * points[point, 8]
             shear[texel, 1] += fx * points[point, 9] + fy * points[point, 10] + fz * points[point, 11]
             fx, fy, fz = fx + fn * nx, fy + fn * ny, fz + fn * nz

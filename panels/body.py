@@ -14,7 +14,9 @@ class Body(Part):
         layout.prop(settings, "body", text="")
         if settings.body in freebodies.MOVED:
             layout.prop(settings, "mass")
-        if settings.role == "TARGET":
+        if settings.role in {"SENSOR", "PAD"}:
+            layout.prop(settings, "presses")
+        if settings.role == "TARGET" or settings.presses:
             layout.prop(settings, "contact_normals")
         if settings.body == "DRIVEN":
             _draw_drive(layout, settings)

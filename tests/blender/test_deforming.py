@@ -155,3 +155,23 @@ def test_a_scale_that_turns_it_inside_out_is_named():
     scene.frame_set(1)
     with pytest.raises(SceneError, match="turns it inside out at frame"):
         sampled(scene)
+
+
+def test_sensors_that_are_felt_by_others_share_the_overlap():
+    """A second pad turned over, 1 mm into the first: both read half of k times the overlap in the middle."""
+    scene, pad, target = press(frames=1)
+    target.palpate.role = "NONE"
+    second = pad.copy()
+    second.data = pad.data.copy()
+    scene.collection.objects.link(second)
+    second.name, second.location.z, second.rotation_euler.x = "Second", -0.001, math.pi
+    for obj in (pad, second):
+        obj.palpate.presses, obj.palpate.k = True, 100.0
+    scene.frame_set(1)
+    scenario, _ = sampled(scene)
+    assert [part.sensor for part in scenario.targets] == [0, 1]
+    from palpate.core.solve import run
+
+    for found in run(scenario).sensors.values():
+        inner = found.normal_force[0].reshape(14, 6)[1:-1, 1:-1]
+        np.testing.assert_allclose(inner, 0.05, rtol=1e-4)
