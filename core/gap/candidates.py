@@ -24,8 +24,10 @@ LIMITS = {
 """Tighter bounds than the effects' own: past them a formula is still sound, but it is another effect that it then describes (a
 reading that rises fivefold is a lag, a softening that leaves nothing is wear)."""
 
-NEVER = ("noise", "quantization")
-"""Kinds that are not found by fitting: noise is the floor, and quantization is read off the readings themselves."""
+NEVER = ("noise",)
+"""Kinds that are not found by fitting: noise is the floor of everything."""
+READ_OFF = ("dead-texels", "quantization")
+"""Kinds whose numbers are read off the recordings, since a texel is dead or is not, and a step is there or is not."""
 
 
 @dataclass(frozen=True)
@@ -190,7 +192,12 @@ def candidates(predictors: Sequence[Predictor], model: Model) -> list[Candidate]
             continue
         for form in kind.forms:
             acts_on_force = kind.stage_of(form) != "readout"
-            if form.random or (form.place is not None and not posed) or (form.friction is not None and not dragged):
+            if (
+                form.random
+                or form.name == "bits"
+                or (form.place is not None and not posed)
+                or (form.friction is not None and not dragged)
+            ):
                 continue
             if form.friction is None and acts_on_force and loaded:
                 continue  # known loads leave a law of contact nothing to say

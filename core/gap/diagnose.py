@@ -247,15 +247,20 @@ def _is_free_already(candidate: Candidate, free: Sequence[Free]) -> bool:
 
 
 def _admissible(found: Found, views: Views) -> bool:
-    """Adhesion is what pulls: a fit that never does describes something else in its words."""
+    """Adhesion is what pulls: a fit that never does, or does where the readings do not, describes something else."""
     if found.candidate.name != "adhesion":
         return True
-    lowest = 0.0
+    predicted, measured = [], []
     for share in views.whole:
-        reading = share.predictor.predict(found.fit.model, share.columns).reading
         p = found.fit.model.parameters
-        lowest = min(lowest, float(((reading - p.zero) / p.gain).min()) * abs(p.gain) / share.noise[0])
-    return lowest < -1.0
+        reading = (share.predictor.predict(found.fit.model).reading - p.zero) / p.gain * abs(p.gain) / share.noise[0]
+        pulled = reading < -0.5
+        if share.predictor.trial.reading is not None:
+            own = (share.predictor.trial.reading - p.zero) / p.gain * abs(p.gain) / share.noise[0]
+            predicted.append(reading[pulled])
+            measured.append(own[pulled])
+    pull, seen = np.concatenate(predicted), np.concatenate(measured)
+    return len(pull) > 20 and float(np.nanmean(seen)) < 0.4 * float(pull.mean()) < -0.3
 
 
 def _left(one: Found, floor: float, gap: float) -> float:

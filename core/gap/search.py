@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from ..effects.base import Effect
-from .candidates import Candidate, Scales, is_spatial
+from .candidates import READ_OFF, Candidate, Scales, is_spatial
 from .fit import Fit, Free, Share, changed, fit, held_out, value_of
 from .model import Model, Predictor
 
@@ -46,7 +46,7 @@ class Views:
         """Return the view for a quick look at a candidate on top of a model."""
         from ..effects.library import form_of
 
-        if candidate.name == "dead-texels":
+        if candidate.name in READ_OFF:
             return self.whole
         forms = [candidate.form, *(form_of(e.name, e.form) for e in model.effects)]
         if any(is_spatial(form) or form.place is not None for form in forms):
@@ -162,12 +162,17 @@ def promising(
     if candidate.name == "dead-texels":
         effect = dead(whole, model, candidate, n)
         return [] if effect is None else [(direction.score(model.with_effect(effect))[0], effect)]
+    if candidate.name == "quantization":
+        return [(_fall(direction, model.with_effect(effect)), effect) for effect in stepped(whole, model, candidate)]
     if candidate.local:
         parameter = next(q.scaled(gain) for q in form.parameters if q.per_texel)
         moved = candidate.effect({parameter.name: float(parameter.default) + 0.01 * _local_size(parameter, scales)}, n, gain)
         return [(_texel_score(direction, model.with_effect(moved)), candidate.effect({}, n, gain))]
     if form.place is not None:
-        return [_placed_score(candidate, direction, model, scales, gain)]
+        return sorted(
+            [_placed_score(candidate, direction, model, scales, gain), *_placed_far(candidate, direction, model, scales, gain)],
+            key=lambda entry: -entry[0],
+        )
     strength, tried = candidate.strength(), []
     for values in candidate.starts(scales, gain):
         effect = candidate.effect(values, n, gain)
@@ -225,6 +230,24 @@ def _placed_score(
     return promise, candidate.effect(values, scales.texels, gain)
 
 
+def _placed_far(
+    candidate: Candidate, direction: Direction, model: Model, scales: Scales, gain: float
+) -> list[tuple[float, Effect]]:
+    """Shifts by a good part of the pitch: under a flat end small ones change nothing, larger ones add and take texels."""
+    names = {q.name for q in candidate.form.parameters}
+    if not {"x", "y"} <= names or direction.shares[0].predictor.rig.indenter is None:
+        return []
+    if direction.shares[0].predictor.rig.indenter.radius is not None:  # a ball tells small shifts
+        return []
+    tried = []
+    for step in (0.3, 0.7):
+        for x, y in ((1, 0), (-1, 0), (0, 1), (0, -1), (1, 1), (1, -1), (-1, 1), (-1, -1)):
+            values = {**dict.fromkeys(names, 0.0), "x": step * x * scales.pitch, "y": step * y * scales.pitch}
+            effect = candidate.effect(values, scales.texels, gain)
+            tried.append((_fall(direction, model.with_effect(effect)), effect))
+    return tried
+
+
 def dead(shares: Sequence[Share], model: Model, candidate: Candidate, texels: int) -> Effect | None:
     """Return the effect with those texels dead that hardly follow the model although it loads them; None when all follow."""
     dot, square = np.zeros(texels), np.zeros(texels)
@@ -246,9 +269,47 @@ def dead(shares: Sequence[Share], model: Model, candidate: Candidate, texels: in
     return Effect(candidate.name, candidate.form.name, {"dead": tuple(silent.astype(float).tolist())})
 
 
+def _fall(direction: Direction, model: Model) -> float:
+    """By how much another model lowers the squares as it is."""
+    before = sum(float(np.vdot(r, r)) for r in direction.residual)
+    after = sum(float(np.vdot(r, r)) for r in (share.residual(model) for share in direction.shares))
+    return before - after
+
+
+def stepped(shares: Sequence[Share], model: Model, candidate: Candidate) -> list[Effect]:
+    """Return the effect with the step in which the readings come, if they do.
+
+    Readings in steps of q have a characteristic function that is large at the frequency 1/q, however they are spread otherwise
+    (Widrow and Kollár, Quantization Noise, 2008). Held values would look alike: only samples that change are taken.
+    """
+    moving = []
+    for share in shares:
+        reading = share.predictor.trial.reading
+        if reading is None:
+            return []
+        change = np.abs(np.gradient(share.predictor.predict(model).reading, axis=0))
+        values = reading[(change > 0.5 * share.noise[0]) & np.isfinite(reading)]
+        moving.append(values)
+    values = np.concatenate(moving) - model.parameters.zero
+    if len(values) < 400:
+        return []
+    values = values[:: max(1, len(values) // 6000)]
+    noise, full = shares[0].noise[0], float(np.ptp(values))
+    frequency = np.arange(2.0 / full, 1.0 / (2.5 * noise), 0.12 / full)
+    if not 2 < len(frequency) < 20000:
+        return []
+    size = np.array([abs(np.exp(2j * np.pi * f * values).mean()) for f in frequency])
+    if size.max() < 0.15 + 5.0 / np.sqrt(len(values)):
+        return []
+    best = frequency[int(np.argmax(size > 0.7 * size.max()))]
+    fine = best + np.linspace(-0.12, 0.12, 49) / full
+    top = fine[int(np.argmax([abs(np.exp(2j * np.pi * f * values).mean()) for f in fine]))]
+    return [Effect(candidate.name, candidate.form.name, {"step": float(1.0 / top)})]
+
+
 def free_of(found: Fit, candidate: Candidate, scales: Scales, gain: float) -> tuple[Free, ...]:
     """Return the free numbers of a fit and those of one effect more on top of its model."""
-    if candidate.name == "dead-texels":  # a texel is dead or is not
+    if candidate.name in READ_OFF:
         return found.free
     return (*found.free, *candidate.free(len(found.model.effects), scales, gain))
 
