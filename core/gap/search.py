@@ -295,13 +295,13 @@ def stepped(shares: Sequence[Share], model: Model, candidate: Candidate) -> list
         return []
     values = values[:: max(1, len(values) // 6000)]
     noise, full = shares[0].noise[0], float(np.ptp(values))
-    frequency = np.arange(2.0 / full, 1.0 / (2.5 * noise), 0.12 / full)
+    frequency = np.arange(5.0 / full, 1.0 / (2.5 * noise), 0.12 / full)  # coarser steps than a fifth are seen by eye
     if not 2 < len(frequency) < 20000:
         return []
     size = np.array([abs(np.exp(2j * np.pi * f * values).mean()) for f in frequency])
-    if size.max() < 0.15 + 5.0 / np.sqrt(len(values)):
+    if size.max() < 0.2 + 5.0 / np.sqrt(len(values)):
         return []
-    best = frequency[int(np.argmax(size > 0.7 * size.max()))]
+    best = frequency[int(np.argmax(size))]  # harmonics are smaller: noise blurs them more
     fine = best + np.linspace(-0.12, 0.12, 49) / full
     top = fine[int(np.argmax([abs(np.exp(2j * np.pi * f * values).mean()) for f in fine]))]
     return [Effect(candidate.name, candidate.form.name, {"step": float(1.0 / top)})]
