@@ -8,7 +8,9 @@ from __future__ import annotations
 
 import math
 
-from .base import Form, Kind, Parameter, same_for_all_steps
+import numpy as np
+
+from .base import Form, Kind, Parameter, Values, number, same_for_all_steps
 
 
 def exponential(force, slope, depth, slide, numbers, row, memory, point, at, commit):
@@ -27,6 +29,18 @@ def linear(force, slope, depth, slide, numbers, row, memory, point, at, commit):
         memory[point, at] += max(force - memory[point, at + 1], 0.0)
         memory[point, at + 1] = force
     return force * factor, slope * factor
+
+
+def dose(force, slope, depth, slide, numbers, row, memory, point, at, commit):
+    """``f exp(−B/L)`` with B the load summed over time. Memory: B. Constants: L and the length of the step."""
+    factor = math.exp(-memory[point, at] / numbers[row, 0])
+    if commit:
+        memory[point, at] += max(force, 0.0) * numbers[row, 1]
+    return force * factor, slope * factor
+
+
+def _with_step(values: Values, dt: np.ndarray) -> np.ndarray:
+    return np.column_stack([np.full(len(dt), number(values, "life")), dt])
 
 
 def archard(force, slope, depth, slide, numbers, row, memory, point, at, commit):
@@ -68,6 +82,16 @@ KIND = Kind(
             law=linear,
             constants=same_for_all_steps("life"),
             memory=2,
+        ),
+        Form(
+            "dose",
+            "f = fₑ · exp(−B/L),  Ḃ = fₑ",
+            "Lemaitre and Desmorat, Engineering Damage Mechanics (2005), section 5: creep damage",
+            (Parameter("life", "N·s", 100.0, 0.01, 1e9, "Load over time L that leaves 37 % of the force.", log=True),),
+            off={"life": math.inf},
+            law=dose,
+            constants=_with_step,
+            memory=1,
         ),
         Form(
             "archard",

@@ -87,6 +87,7 @@ def search_range(parameter: Parameter, scales: Scales) -> tuple[float, float]:
         "m": (min(0.05 * scales.depth, 0.3 * scales.pitch), max(5.0 * scales.depth, 2.0 * scales.pitch)),
         "s": (0.5 * scales.step, 2.0 * scales.seconds),
         "m/s": (0.02 * scales.speed, 2.0 * scales.speed),
+        "N·s": (0.1 * scales.force * scales.seconds, 50.0 * scales.force * scales.seconds),
         "1/N": (0.02 / scales.force, 2.0 / scales.force),
         "s/m": (0.02 / scales.speed, 2.0 / scales.speed),
         "unit/s": (-0.5 * scales.reading / scales.seconds, 0.5 * scales.reading / scales.seconds),

@@ -207,6 +207,13 @@ def test_wear_by_load():
     assert found[last] == pytest.approx(peak * (1 - m * peak / 50.0), rel=1.5 * step / 30.0)
 
 
+def test_wear_by_dose():
+    """Under a constant depth the elastic force that wears is constant, whatever is left of it: ``k d exp(-k d t / L)``."""
+    found = force(effect("wear", "dose", life=50.0), np.full(len(TIME), 0.002))
+    step = TIME[1] - TIME[0]  # a sample's load wears from the next sample on
+    np.testing.assert_allclose(found[1:], K * 0.002 * np.exp(-K * 0.002 * (TIME[1:] - step) / 50.0), rtol=1e-9)
+
+
 def test_wear_by_rubbing():
     """At constant depth and speed what is gone grows evenly: it is the elastic force that rubs, ``δ = κ k d s``."""
     way = 1e-3
