@@ -15,7 +15,7 @@ import numpy as np
 from ..core.errors import PalpateError
 from ..core.recording import Frame
 from ..core.scenario import Scenario
-from . import dependencies, drives, effects, freebodies, meshes, properties, sample, state, units
+from . import clock, dependencies, drives, effects, freebodies, meshes, properties, sample, state, units
 
 PAINTED = tuple(f"{key}_{part}" for key in meshes.PAINTED for part in ("map", "factor"))
 REGION = ("region", "vertex_group", "threshold", "material", "face_set")
@@ -115,7 +115,7 @@ def begin(scene, depsgraph) -> Run:
 
 def go_on(scene, depsgraph, run: Run) -> Run:
     """Compute the frame where the scene stands, which is the one after the last computed."""
-    frame = scene.frame_current
+    frame, _ = clock.moment(scene)
     moment = run.moments[frame] = sample.sample_moment(scene, depsgraph, run.binding)
     run.simulation.extend(moment.poses, moment.targets, moment.vertices, moment.texels)
     run.frames[frame] = run.simulation.advance()
@@ -144,12 +144,12 @@ def is_stale(scene, depsgraph, run: Run) -> bool:
     if any(meshes.fingerprint(everyone[name], depsgraph) != run.geometry[name] for name in touched - bending):
         return True
     # What deforms looks different at every frame: it is compared with what it looked like at this one, if that is known.
-    return bool(touched & bending) and (scene.frame_current not in run.moments or has_moved(scene, depsgraph, run))
+    return bool(touched & bending) and (clock.moment(scene)[0] not in run.moments or has_moved(scene, depsgraph, run))
 
 
 def has_moved(scene, depsgraph, run: Run) -> bool:
     """Whether keyframed bodies are elsewhere now than when the present frame was computed."""
-    before = run.moments[scene.frame_current]
+    before = run.moments[clock.moment(scene)[0]]
     try:
         now = sample.sample_moment(scene, depsgraph, run.binding)
     except PalpateError:

@@ -145,10 +145,10 @@ class Placement:
             rest[:3] = result.to_euler(mode, Euler(previous[3:6], mode))
         return rest
 
-    def show(self, obj, pose: np.ndarray, parent: np.ndarray) -> None:
-        """Move the object to a pose; keep where it was before it is moved for the first time."""
+    def put(self, obj, channels: np.ndarray) -> None:
+        """Give the object its (14,) properties; keep where it was before it is moved for the first time."""
         remember(obj, self.world)
-        _set_channels(obj, self.pose(obj, pose, parent))
+        _set_channels(obj, channels)
 
 
 def bake(obj, placement: Placement, frames: np.ndarray, poses: np.ndarray, parents: np.ndarray) -> None:

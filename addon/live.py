@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Generator
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -13,7 +15,8 @@ from ..core.errors import PalpateError
 from ..core.formats.sensors import SENSOR_NAME, load_sensor
 from ..core.recording import Frame, Recording
 from ..core.texels import Texels
-from . import cache, dress, folders, freebodies, inset, materials, overlays, sample, stale, state, write
+from . import cache, clock, dress, folders, freebodies, inset, materials, overlays, sample, stale, state, write
+from .jobs import Progress
 
 
 @dataclass(frozen=True)
@@ -89,11 +92,10 @@ def on_frame(scene, depsgraph) -> None:
         overlays.clear(scene)
         _show_bake(scene, depsgraph)
         return
-    if not _is_on(scene) or scene.frame_subframe:
+    if not _is_on(scene):
         return
-    frame, run = scene.frame_current, cache.get(scene)
-    rendering = state.session.rendering
-    if not rendering:
+    (frame, share), run = clock.moment(scene), cache.get(scene)
+    if not state.session.rendering and not share:
         if run is not None and (cache.is_stale(scene, depsgraph, run) or _elsewhere(scene, depsgraph, run)):
             cache.drop(scene)
             run = None
@@ -106,14 +108,50 @@ def on_frame(scene, depsgraph) -> None:
     else:
         overlays.clear(scene)
         _say(scene, _not_computed(scene, run))
+        if not bpy.app.background and not state.session.rendering and missing(scene):
+            bpy.app.timers.register(_ask_for_the_missing, first_interval=0.0)
 
 
 def _not_computed(scene, run) -> str:
-    frame = scene.frame_current
+    frame, _ = clock.moment(scene)
     if run is not None:
-        return f"Frame {frame} is not computed: play from frame {run.simulation.frame}."
+        return f"Frame {frame} is not computed: play from frame {run.simulation.frame}, or use Compute to Here."
     reason = _refused.get(scene.session_uid)
-    return reason or f"Frame {frame} is not computed: go to the first frame and play."
+    return reason or f"Frame {frame} is not computed: go to the first frame and play, or use Compute to Here."
+
+
+def missing(scene) -> range:
+    """Return the frames that have to be computed so that the present one can be shown; none where nothing can be done."""
+    if not _is_on(scene) or scene.session_uid in _refused:
+        return range(0)
+    (frame, share), run = clock.moment(scene), cache.get(scene)
+    first = scene.frame_start if run is None else run.simulation.frame + 1
+    return range(first, min(frame + bool(share), scene.frame_end) + 1)
+
+
+def catch_up(scene) -> Generator[Progress, None, None]:
+    """Compute what is missing up to the present frame, and come back to it. Closing the generator keeps what is computed."""
+    wanted, frames = (scene.frame_current, scene.frame_subframe), missing(scene)
+    state.session.catching_up = True
+    try:
+        with clock.unstretched(scene):
+            for done, number in enumerate(frames, 1):
+                scene.frame_set(number)
+                run = cache.get(scene)
+                if run is None or number not in run.frames:
+                    break  # the panel says why
+                yield Progress("Computing forces", number, done, len(frames))
+    finally:
+        state.session.catching_up = False
+        with suppress(ReferenceError):  # the scene went meanwhile
+            scene.frame_set(wanted[0], subframe=wanted[1])
+
+
+def _ask_for_the_missing() -> None:
+    """After a jump, in the window: what is missing is computed with progress. Not in the handler, which must not last."""
+    scene = bpy.context.scene
+    if scene is not None and not is_baking() and not state.session.catching_up and missing(scene):
+        bpy.ops.palpate.catch_up("INVOKE_DEFAULT")
 
 
 def _is_on(scene) -> bool:
@@ -126,7 +164,7 @@ def _renders_beside_window(scene) -> bool:
 
 
 def _elsewhere(scene, depsgraph, run) -> bool:
-    return scene.frame_current in run.frames and cache.has_moved(scene, depsgraph, run)
+    return clock.moment(scene)[0] in run.frames and cache.has_moved(scene, depsgraph, run)
 
 
 def _begin(scene, depsgraph):
@@ -151,14 +189,14 @@ def _say(scene, text: str, frame: Frame | None = None) -> None:
 
 def show(scene, run) -> None:
     """Put free bodies and heat maps where the run has them at the present frame."""
-    number = scene.frame_current
+    number, share = clock.moment(scene)
     frame = run.frames[number]
     objects = run.binding.objects(scene)
     for index, placement in run.placements.items():
-        if number == run.scenario.frame_start:
+        if number == run.scenario.frame_start and not share:
             freebodies.restore(objects[index])
         else:
-            placement.show(objects[index], frame.poses[index], run.moments[number].parents[index])
+            _place(run, objects[index], placement, index, number, share)
         run.written[index] = freebodies.channels(objects[index])
     for sensor, obj in zip(run.scenario.sensors, run.binding.sensor_objects(scene), strict=True):
         if sensor.readout and obj is not None:
@@ -166,6 +204,19 @@ def show(scene, run) -> None:
     overlays.show(scene, run, frame)
     warnings = run.binding.warnings + tuple(run.simulation.warnings)
     _say(scene, " ".join(warnings) or f"Frame {number} computed.", frame)
+
+
+def _place(run, obj, placement, index: int, number: int, share: float) -> None:
+    """Put a free body where it is at a frame, or on the way to the next, as the keyframes of a bake would."""
+
+    def channels(frame: int, before=None) -> np.ndarray:
+        return placement.pose(obj, run.frames[frame].poses[index], run.moments[frame].parents[index], before)
+
+    first = number == run.scenario.frame_start
+    here = placement.channels if first else channels(number)
+    if share and number + 1 in run.frames:
+        here = here + share * (channels(number + 1, here) - here)
+    placement.put(obj, here)
 
 
 def _write_force(obj, vertex: np.ndarray, force: np.ndarray) -> None:
@@ -181,7 +232,7 @@ def _write_force(obj, vertex: np.ndarray, force: np.ndarray) -> None:
 
 def _show_bake(scene, depsgraph) -> None:
     """Keyframes and material show the bake by themselves; only the panel's numbers come from its recording."""
-    number = scene.frame_current
+    number, _ = clock.moment(scene)
     sensors, poses, velocities, recording = {}, np.zeros((0, 7)), np.zeros((0, 6)), None
     for obj in write.baked_objects(scene):
         found = _recording(obj)
@@ -277,7 +328,7 @@ def hide(scene) -> None:
 def unhide(scene) -> None:
     """Show the present frame again after :func:`hide`."""
     run = cache.get(scene)
-    if run is not None and scene.frame_current in run.frames:
+    if run is not None and clock.moment(scene)[0] in run.frames:
         _attempt(scene, lambda: show(scene, run))
 
 

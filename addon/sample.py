@@ -21,7 +21,7 @@ from ..core.errors import SceneError
 from ..core.mesh import TriangleMesh, checked_mesh, mass_properties
 from ..core.scenario import Body, Deformation, Motion, Painted, Scenario, Sensor, SensorParameters, Signal, Target
 from ..core.texels import texels_from_region
-from . import deform, drives, effects, freebodies, identity, meshes, parts, properties, transforms, units
+from . import clock, deform, drives, effects, freebodies, identity, meshes, parts, properties, transforms, units
 from .jobs import Progress
 
 SAME_STRETCH = 1e-4
@@ -307,34 +307,40 @@ def _shapes(scene, depsgraph, binding: Binding, matrices: dict[int, np.ndarray])
 
 def sample_scenario(scene) -> Generator[Progress, None, tuple[Scenario, Binding]]:
     """Read a scene over its whole frame range, frame by frame, and leave it at the frame where it stood."""
-    _check_range(scene)
-    _check_modes(participants(scene)[0])
-    before, parts_of_frame = (scene.frame_current, scene.frame_subframe), scene.palpate.subframes
-    frames = range(scene.frame_start, scene.frame_end + 1)
+    before = scene.frame_current, scene.frame_subframe
     try:
-        scene.frame_set(frames[0])
-        scenario, binding = sample_start(scene, depsgraph_of(scene))
-        motions = {index: body.motion for index, body in enumerate(scenario.bodies) if not body.free}
-        samples = {index: [(motion.positions[0], motion.quaternions[0])] for index, motion in motions.items()}
-        targets = {index: list(scenario.bodies[index].drive.target.values) for index in binding.driven}
-        shapes = Shapes(scenario)
-        yield Progress("Reading", frames[0], 1, len(frames))
-        for frame in frames[1:]:
-            for part in range(1, parts_of_frame + 1):
-                whole, rest = _whole_and_part(frame - 1, part, parts_of_frame)
-                scene.frame_set(whole, subframe=rest)
-                moment = sample_moment(scene, depsgraph_of(scene), binding)
-                for index, pose in moment.poses.items():
-                    samples[index].append(pose)
-                for index, value in moment.targets.items():
-                    targets[index].append(value)
-            for index, matrix in moment.parents.items():
-                binding.parents[index].append(matrix)
-            shapes.append(moment)
-            yield Progress("Reading", frame, frame - frames[0] + 1, len(frames))
+        with clock.unstretched(scene):
+            return (yield from _sample_scenario(scene))
     finally:
         with suppress(ReferenceError):  # the scene went while its frames were read
             scene.frame_set(before[0], subframe=before[1])
+
+
+def _sample_scenario(scene) -> Generator[Progress, None, tuple[Scenario, Binding]]:
+    _check_range(scene)
+    _check_modes(participants(scene)[0])
+    parts_of_frame = scene.palpate.subframes
+    frames = range(scene.frame_start, scene.frame_end + 1)
+    scene.frame_set(frames[0])
+    scenario, binding = sample_start(scene, depsgraph_of(scene))
+    motions = {index: body.motion for index, body in enumerate(scenario.bodies) if not body.free}
+    samples = {index: [(motion.positions[0], motion.quaternions[0])] for index, motion in motions.items()}
+    targets = {index: list(scenario.bodies[index].drive.target.values) for index in binding.driven}
+    shapes = Shapes(scenario)
+    yield Progress("Reading", frames[0], 1, len(frames))
+    for frame in frames[1:]:
+        for part in range(1, parts_of_frame + 1):
+            whole, rest = _whole_and_part(frame - 1, part, parts_of_frame)
+            scene.frame_set(whole, subframe=rest)
+            moment = sample_moment(scene, depsgraph_of(scene), binding)
+            for index, pose in moment.poses.items():
+                samples[index].append(pose)
+            for index, value in moment.targets.items():
+                targets[index].append(value)
+        for index, matrix in moment.parents.items():
+            binding.parents[index].append(matrix)
+        shapes.append(moment)
+        yield Progress("Reading", frame, frame - frames[0] + 1, len(frames))
     times = np.array([step / (scenario.fps * parts_of_frame) for step in range((len(frames) - 1) * parts_of_frame + 1)])
     bodies = list(scenario.bodies)
     for index, path in samples.items():

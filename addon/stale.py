@@ -13,7 +13,7 @@ import numpy as np
 
 from ..core.errors import PalpateError
 from ..core.recording import Recording
-from . import cache, freebodies, meshes, sample, state
+from . import cache, clock, freebodies, meshes, sample, state
 
 SAME_POSE = 1e-6
 """Metres, and components of a quaternion, by which a recorded pose may differ: an evaluated matrix has 32 bits."""
@@ -61,9 +61,10 @@ def is_stale(scene, depsgraph, recording: Recording | None) -> bool:
 
 
 def _moved(scene, depsgraph, recording: Recording) -> bool:
-    if scene.frame_current not in recording.frames or scene.frame_subframe:
+    number, share = clock.moment(scene)
+    if number not in recording.frames or share:
         return False
-    poses = recording.poses[int(np.searchsorted(recording.frames, scene.frame_current))]
+    poses = recording.poses[int(np.searchsorted(recording.frames, number))]
     for name, pose in zip(recording.body_names, poses, strict=True):
         obj = scene.objects.get(name)
         if obj is None:

@@ -25,6 +25,8 @@ class Session:
     suspended: int = 0
     """Above zero while a bake reads the scene: the timeline must not simulate then."""
     rendering: bool = False
+    catching_up: bool = False
+    """While frames that a jump has left out are computed."""
     bake: object = None
     """The running bake's last Progress, for the panel."""
     notes: dict[str, str] = field(default_factory=dict)

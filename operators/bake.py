@@ -3,13 +3,12 @@
 
 import bpy
 
-from ..addon import dress, jobs, live, write
+from ..addon import dress, live, state, write
 from ..addon.bake import bake
-from ..core.drive import drive
-from . import support
+from . import support, working
 
 
-class PALPATE_OT_bake(support.Reporting, bpy.types.Operator):
+class PALPATE_OT_bake(working.Working, bpy.types.Operator):
     """Compute all frames of the scene and write tactile images, recordings, force arrows and heat maps. ESC stops it and keeps
     what was there before"""
 
@@ -27,66 +26,13 @@ class PALPATE_OT_bake(support.Reporting, bpy.types.Operator):
             return False
         return True
 
-    def invoke(self, context, _event):
-        if bpy.app.background:
-            return self.execute(context)
-        return self.reporting(lambda: self._start(context))
+    stopped = "Bake stopped; what was there before is unchanged"
 
-    def run(self, context):
+    def job(self, context):
         support.leave_edit_mode(context)
-        baked = drive(bake(context.scene))
-        self._say(baked)
+        return bake(context.scene)
 
-    def _start(self, context):
-        support.leave_edit_mode(context)
-        self._slice = jobs.Slice(bake(context.scene))
-        self._slice.work(0.0)  # what is wrong from the beginning is said at once
-        manager = context.window_manager
-        self._timer = manager.event_timer_add(0.01, window=context.window)
-        manager.progress_begin(0.0, 1.0)
-        manager.modal_handler_add(self)
-        return {"RUNNING_MODAL"}
-
-    def modal(self, context, event):
-        if event.type == "ESC" and event.value == "PRESS":
-            self._slice.cancel()
-            self._end(context)
-            self.report({"WARNING"}, "Bake stopped; what was there before is unchanged")
-            return {"CANCELLED"}
-        if event.type != "TIMER":
-            return {"RUNNING_MODAL"}  # nothing may change under the bake
-        result = None
-        try:
-            result = self.reporting(lambda: self._work(context))
-        finally:  # an error of ours, too, ends the operator: no timer and no progress may be left of it
-            if result != {"RUNNING_MODAL"}:
-                self._end(context)
-        return result
-
-    def _work(self, context):
-        self._slice.work()
-        if self._slice.is_done:
-            self._say(self._slice.result)
-            return {"FINISHED"}
-        progress = self._slice.progress
-        context.window_manager.progress_update(progress.done / progress.total)
-        context.workspace.status_text_set(f"{progress.stage}: frame {progress.frame}    ESC: stop")
-        _redraw_panels(context)
-        return {"RUNNING_MODAL"}
-
-    def cancel(self, context):
-        """Blender closes, or loads another file."""
-        self._slice.cancel()
-        self._end(context)
-
-    def _end(self, context):
-        self._slice.cancel()
-        context.window_manager.event_timer_remove(self._timer)
-        context.window_manager.progress_end()
-        context.workspace.status_text_set(None)
-        _redraw_panels(context)
-
-    def _say(self, baked):
+    def done(self, baked):
         for warning in baked.recording.warnings:
             self.report({"WARNING"}, warning)
         frames = baked.recording.frames
@@ -94,10 +40,28 @@ class PALPATE_OT_bake(support.Reporting, bpy.types.Operator):
         self.report({"INFO"}, f"Baked frames {frames[0]} to {frames[-1]} of {names}")
 
 
-def _redraw_panels(context):
-    for area in context.screen.areas:
-        if area.type in {"PROPERTIES", "VIEW_3D"}:
-            area.tag_redraw()
+class PALPATE_OT_catch_up(working.Working, bpy.types.Operator):
+    """Compute the frames that are missing up to the present one, and show it. ESC stops and keeps what was computed"""
+
+    bl_idname = "palpate.catch_up"
+    bl_label = "Compute to Here"
+    bl_options = {"REGISTER"}
+    stopped = "Stopped; what was computed is kept"
+
+    @classmethod
+    def poll(cls, context):
+        if context.scene is None or not live.missing(context.scene):
+            cls.poll_message_set("Nothing is missing up to the present frame")
+            return False
+        if live.is_baking() or state.session.catching_up:
+            cls.poll_message_set("Frames are being computed")
+            return False
+        return True
+
+    def job(self, context):
+        if context.screen is not None and context.screen.is_animation_playing:
+            bpy.ops.screen.animation_cancel(restore_frame=False)  # it would move the frame under the work
+        return live.catch_up(context.scene)
 
 
 class PALPATE_OT_bake_clear(support.Reporting, bpy.types.Operator):
@@ -160,4 +124,4 @@ class PALPATE_OT_dress(support.Reporting, bpy.types.Operator):
         dress.again(context.scene, write.bake_folders(context.scene))
 
 
-CLASSES = (PALPATE_OT_bake, PALPATE_OT_bake_clear, PALPATE_OT_reset, PALPATE_OT_dress)
+CLASSES = (PALPATE_OT_bake, PALPATE_OT_catch_up, PALPATE_OT_bake_clear, PALPATE_OT_reset, PALPATE_OT_dress)

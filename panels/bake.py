@@ -32,7 +32,9 @@ class Bake(Part):
         if write.has_bake(scene):
             row.operator("palpate.bake_clear", text="", icon="TRASH")
         else:
-            layout.operator("palpate.reset", text="Reset Playback")
+            row = layout.row(align=True)
+            row.operator("palpate.catch_up")
+            row.operator("palpate.reset", text="Reset")
         sentences(layout, live.status(scene).text, "INFO", context)
 
 

@@ -75,9 +75,92 @@ def test_a_jump_shows_nothing_and_says_so():
     play(scene, 1, 2, 15)
     assert sorted(cache.get(scene).frames) == [1, 2]
     status = live.status(scene)
-    assert status.frame is None and status.text == "Frame 15 is not computed: play from frame 2."
+    assert status.frame is None and status.text == "Frame 15 is not computed: play from frame 2, or use Compute to Here."
     play(scene, 3)
     assert live.status(scene).frame.frame == 3
+
+
+def test_a_jump_ahead_is_computed_with_progress(tmp_path):
+    scene, *_ = press_and_drop(frames=12)
+    play(scene, 1, 2, 9)
+    steps = []
+    drive(live.catch_up(scene), lambda step: steps.append((step.frame, step.done, step.total)))
+    assert steps == [(frame, frame - 2, 7) for frame in range(3, 10)] and scene.frame_current == 9
+    jumped = cache.get(scene).frames[9]
+    assert live.status(scene).frame is jumped
+    bpy.ops.palpate.reset()
+    play(scene, 1, 11)
+    assert bpy.ops.palpate.catch_up() == {"FINISHED"}
+    assert cache.get(scene).frames[9].poses.tobytes() == jumped.poses.tobytes()
+    assert not bpy.ops.palpate.catch_up.poll()
+    bpy.ops.palpate.reset()
+    play(scene, 7)  # from nothing
+    assert bpy.ops.palpate.catch_up() == {"FINISHED"} and sorted(cache.get(scene).frames) == list(range(1, 8))
+
+
+def test_a_stopped_jump_keeps_what_was_computed():
+    scene, *_ = press(frames=12)
+    play(scene, 1, 10)
+    job = live.catch_up(scene)
+    next(job), next(job)
+    job.close()
+    assert sorted(cache.get(scene).frames) == [1, 2, 3] and scene.frame_current == 10
+    assert not state.session.catching_up
+
+
+def watched(scene, obj, moments):
+    """Return where a body is and what the bake's nodes show at moments of the timeline."""
+    seen = []
+    for number, part in moments:
+        scene.frame_set(number, subframe=part)
+        matrix = obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).matrix_world
+        seen.append([list(row) for row in matrix])
+    return np.array(seen)
+
+
+def test_sub_frames_loops_steps_and_handlers_off_give_the_same_pictures(tmp_path):
+    moments = [(3, 0.25), (6, 0.5), (2, 0.0), (8, 0.0), (4, 0.75), (8, 0.0), (2, 0.0)]
+    scene, *_, free = press_and_drop(frames=8)
+    free.palpate.angular_velocity = (3.0, 5.0, -2.0)
+    play(scene, *range(1, 9))
+    played = watched(scene, free, moments)
+    bpy.ops.palpate.reset()
+    save(tmp_path)
+    drive(bake(scene))
+    baked = watched(scene, free, moments)
+    assert played == pytest.approx(baked, abs=1e-6)
+    live.forget()
+    handlers = {name: getattr(bpy.app.handlers, name).copy() for name in ("frame_change_pre", "frame_change_post")}
+    for name in handlers:
+        getattr(bpy.app.handlers, name).clear()
+    alone = watched(scene, free, moments)
+    for name, functions in handlers.items():
+        getattr(bpy.app.handlers, name).extend(functions)
+    assert alone.tolist() == baked.tolist()
+
+
+def test_time_stretching_shows_the_same_bake_slower(tmp_path):
+    """Twice as slow: frame 2 n of the timeline is frame n of the animation, for bodies, images and numbers alike."""
+    scene, pad, _, _, free = press_and_drop(frames=8)
+    save(tmp_path)
+    plain = drive(bake(scene)).recording
+    at_speed = watched(scene, free, [(number, 0.0) for number in range(1, 9)])
+    bpy.ops.palpate.bake_clear()
+    scene.render.frame_map_old, scene.render.frame_map_new = 100, 200
+    scene.palpate.overlays = {"NORMALS"}
+    slow = drive(bake(scene)).recording
+    assert slow.digest == plain.digest and slow.poses.tobytes() == plain.poses.tobytes()
+    assert (scene.render.frame_map_old, scene.render.frame_map_new) == (100, 200)
+    assert watched(scene, free, [(2 * number, 0.0) for number in range(1, 9)]) == pytest.approx(at_speed, abs=1e-6)
+    scene.frame_set(16)
+    assert live.status(scene).text == "Frame 8 of the bake."
+    arrows = {}
+    for number in (2, 16):  # of the timeline; nothing touches at the animation's frame 1
+        scene.frame_set(number)
+        depsgraph = bpy.context.evaluated_depsgraph_get()
+        parents = [found.parent.original.name for found in depsgraph.object_instances if found.is_instance and found.parent]
+        arrows[number] = parents.count("Normal Forces Pad")
+    assert arrows[2] == 0 and arrows[16] == np.count_nonzero(plain.sensors["Pad"].contact[-1])
 
 
 def test_play_from_the_first_frame_starts_with_the_second():
