@@ -8,16 +8,31 @@ not drown all else.
 
 from __future__ import annotations
 
-import csv
 import zlib
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from .other import MAKERS, OUTSIDE
 from .own import OWN
-from .world import COLUMNS, PITCH, RATE, ROWS, SECONDS, THICKNESS, Hidden, Pad, Probe, Signals, net_force, respond
+from .world import (
+    COLUMNS,
+    PITCH,
+    RATE,
+    ROWS,
+    SECONDS,
+    THICKNESS,
+    Contact,
+    Hidden,
+    Pad,
+    Probe,
+    Signals,
+    converted,
+    net_force,
+    respond,
+    touch,
+)
 
 TRIALS = (("fit", 4), ("check", 2))
 SHARE = (0.04, 0.12)
@@ -25,6 +40,10 @@ SHARE = (0.04, 0.12)
 IN_FORCE = ("stribeck", "viscous-friction")
 """Effects that show in the net force along the surface and not in the readings."""
 KINDS = ("other", "own", "none", "two", "outside", "poor")
+ORDER = list(MAKERS)
+"""The way from the contact to the reading, in which several effects act."""
+VAGUE = ("creep", "hysteresis", "lag", "softening")
+"""What a single slow press does not tell apart."""
 
 
 @dataclass(frozen=True)
@@ -40,6 +59,10 @@ class Case:
     probe : Probe
     times, paths : lists of arrays
     readings, forces : lists of arrays, with noise
+    clean : list of pairs of arrays
+        Readings and forces without noise.
+    share : tuple of float
+        What each effect does to the recording, root mean square over what was touched, of the full range.
     noise : float
         Standard deviation in the sensor's unit.
     words : dict
@@ -54,6 +77,8 @@ class Case:
     times: list[np.ndarray]
     paths: list[np.ndarray]
     readings: list[np.ndarray]
+    clean: list[tuple[np.ndarray, np.ndarray]]
+    share: tuple[float, ...]
     forces: list[np.ndarray]
     noise: float
     words: dict
@@ -78,17 +103,28 @@ def draw(kind: str, number: int) -> Case:
     names = _names(kind, number, rng, ball)
     makers = OWN if kind == "own" else {**MAKERS, **OUTSIDE}
     times, paths = _poor(rng, probe) if kind == "poor" else _trials(rng, probe, pad)
-    hidden: tuple[Hidden, ...] = ()
-    for name in names:
-        hidden += (_calibrated(makers[name], name, rng, pad, probe, times, paths),)
-    signals = [respond(probe, pad, time, path, hidden) for time, path in zip(times, paths, strict=True)]
+    plain = [touch(probe, pad, time, path) for time, path in zip(times, paths, strict=True)]
+    found = [_calibrated(makers[name], name, rng, pad, probe, plain) for name in names]
+    hidden = tuple(effect for effect, _ in found)
+    contacts = _moved(hidden, pad, probe, plain)
+    signals = [respond(contact, pad, hidden) for contact in contacts]
     full = max(float(np.abs(s.reading - pad.zero).max()) for s in signals)
     noise = rng.uniform(0.003, 0.01) * full
     coloured = kind == "none" and number % 3 == 2
-    readings = [s.reading + noise * _noise(rng, s.reading.shape, coloured) for s in signals]
+    readings = [converted(s.reading + noise * _noise(rng, s.reading.shape, coloured), pad, hidden) for s in signals]
     largest = max(float(np.abs(net_force(s)).max()) for s in signals)
     forces = [net_force(s) + 0.003 * largest * _noise(rng, (len(s.time), 3), coloured) for s in signals]
-    return Case(kind, number, hidden, pad, probe, times, paths, readings, forces, noise, _words(rng, pad, kind, number))
+    clean = [(converted(s.reading, pad, hidden), net_force(s)) for s in signals]
+    shares = tuple(share for _, share in found)
+    words = _words(rng, pad, kind, number)
+    return Case(kind, number, hidden, pad, probe, times, paths, readings, clean, shares, forces, noise, words)
+
+
+def _moved(hidden: tuple[Hidden, ...], pad: Pad, probe: Probe, plain: list[Contact]) -> list[Contact]:
+    """The contacts again, where something moves the texels."""
+    if all(effect.place is None for effect in hidden):
+        return plain
+    return [touch(probe, pad, contact.time, contact.path, hidden) for contact in plain]
 
 
 def _pad(rng) -> Pad:
@@ -106,7 +142,7 @@ def _pad(rng) -> Pad:
 
 def _names(kind: str, number: int, rng, ball: bool) -> list[str]:
     if kind in ("none", "poor"):
-        return [] if kind == "none" else [["creep", "hysteresis", "lag", "gain-mismatch"][number % 4]]
+        return [] if kind == "none" else [VAGUE[number % len(VAGUE)]]
     pool = names_for(kind) if kind != "two" else list(MAKERS)
     # A flat indenter loads all texels alike: where the pad sits, and what neighbours do, cannot show under it.
     blind = () if ball else ("misalignment", "load-spreading", "crosstalk")
@@ -114,8 +150,7 @@ def _names(kind: str, number: int, rng, ball: bool) -> list[str]:
         name = pool[number % len(pool)]
         return [name if name not in blind else pool[(number + 7) % len(pool)]]
     clear = [name for name in pool if name not in (*blind, "noise", "quantization", "offset", "dead-texels")]
-    first, second = rng.choice(clear, size=2, replace=False)
-    return [str(first), str(second)]
+    return sorted(map(str, rng.choice(clear, size=2, replace=False)), key=ORDER.index)
 
 
 def _words(rng, pad: Pad, kind: str, number: int) -> dict:
@@ -258,36 +293,41 @@ def _poor(rng, probe: Probe) -> tuple[list[np.ndarray], list[np.ndarray]]:
     return [time] * 6, [_path(time, knots, probe)] * 6
 
 
-def _calibrated(maker, name: str, rng, pad: Pad, probe: Probe, times, paths) -> Hidden:
-    """Return the effect at a strength at which it changes the recording by the wanted share of the full range."""
+def _calibrated(maker, name: str, rng, pad: Pad, probe: Probe, contacts: list[Contact]) -> tuple[Hidden, float]:
+    """Return the effect at a strength at which it changes the recording by the wanted share of the range, and the share."""
     seed = int(rng.integers(2**32))
     wanted = rng.uniform(*SHARE)
     slides = name in IN_FORCE
-    plain = [respond(probe, pad, time, path, slides=slides) for time, path in zip(times, paths, strict=True)]
+    plain = [respond(contact, pad, slides=slides) for contact in contacts]
+    full = max(float(np.abs(_seen(None, name, s, pad)).max()) for s in plain)
 
     def change(strength: float) -> float:
         effect = maker(np.random.default_rng(seed), strength)
-        total, full = 0.0, 0.0
-        for before, time, path in zip(plain, times, paths, strict=True):
-            after = respond(probe, pad, time, path, (effect,), slides)
-            a, b = (_seen(name, s, pad) for s in (after, before))
+        total = 0.0
+        for before, contact in zip(plain, _moved((effect,), pad, probe, contacts), strict=True):
+            after = respond(contact, pad, (effect,), slides)
+            a, b = _seen(effect, name, after, pad), _seen(None, name, before, pad)
             loaded = (after.depth > 0) | (before.depth > 0)
-            touched = loaded if a.ndim == 2 and a.shape == loaded.shape else loaded.any(axis=1)[:, None] & np.ones_like(a, bool)
+            touched = loaded if a.shape == loaded.shape else loaded.any(axis=1)[:, None] & np.ones_like(a, bool)
             total += float(((a - b)[touched] ** 2).mean())
-            full = max(full, float(np.abs(b).max()))
         return np.sqrt(total / len(plain)) / full
 
-    low, high = np.log(0.02), np.log(3.0)
-    if change(np.exp(high)) < wanted:
-        return maker(np.random.default_rng(seed), float(np.exp(high)))
-    for _ in range(7):
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if change(np.exp(middle)) < wanted else (low, middle)
-    return maker(np.random.default_rng(seed), float(np.exp(0.5 * (low + high))))
+    low, high, strength, share = 0.02, 3.0, 0.5, 0.0
+    for _ in range(8):  # regula falsi of a growing function, kept inside what is known
+        share = change(strength)
+        if abs(share / wanted - 1) < 0.05 or high < 1.001 * low:
+            break
+        low, high = (strength, high) if share < wanted else (low, strength)
+        guess = strength * wanted / max(share, 1e-9)
+        strength = guess if low < guess < high else np.sqrt(low * high)
+    return maker(np.random.default_rng(seed), float(strength)), float(share)
 
 
-def _seen(name: str, signals: Signals, pad: Pad) -> np.ndarray:
-    return net_force(signals)[:, :2] if name in IN_FORCE else signals.reading - pad.zero
+def _seen(effect: Hidden | None, name: str, signals: Signals, pad: Pad) -> np.ndarray:
+    """What an effect shows in, (T, channels)."""
+    if name in IN_FORCE:
+        return net_force(signals)[:, :2]
+    return converted(signals.reading, pad, () if effect is None else (effect,)) - pad.zero
 
 
 # --- files
@@ -313,17 +353,8 @@ def write(case: Case, folder: Path) -> Path:
     for i, use in enumerate(uses):
         lines += ["[[trial]]", f'file = "trial_{i}.csv"', f'use = "{use}"']
         table = np.hstack([case.times[i][:, None], case.paths[i], case.readings[i], case.forces[i]])
-        with open(folder / f"trial_{i}.csv", "w", newline="") as file:
-            out = csv.writer(file)
-            out.writerow(header)
-            out.writerows([[f"{value:.7g}" for value in row] for row in table])
+        rows = ["%.7g," * (table.shape[1] - 1) % tuple(row[:-1]) + f"{row[-1]:.7g}" for row in table.tolist()]
+        (folder / f"trial_{i}.csv").write_text("\n".join([",".join(header), *rows]) + "\n", encoding="utf-8")
     path = folder / "rig.toml"
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
     return path
-
-
-def without(case: Case) -> Case:
-    """Return the case with nothing hidden and the same noise level, to see what an effect has done."""
-    rng = np.random.default_rng(case.number)
-    signals = [respond(case.probe, case.pad, time, path) for time, path in zip(case.times, case.paths, strict=True)]
-    return replace(case, hidden=(), readings=[s.reading + case.noise * rng.normal(size=s.reading.shape) for s in signals])

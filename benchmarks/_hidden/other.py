@@ -48,18 +48,20 @@ def softening(rng, strength) -> Hidden:
 
 
 def hysteresis(rng, strength) -> Hidden:
-    """Dahl's model of friction inside the material: dh = r (1 - h sign(ḋ)) |dd|, the force is k d + h per texel."""
-    reach = rng.uniform(0.25e-3, 0.6e-3)
+    """Preisach: a crowd of relays in each texel, each on above one depth and off below a smaller one."""
+    count, deep = 160, 3.2e-3
+    off = deep * rng.uniform(0, 1, count)
+    on = off + deep * rng.uniform(0.1, 0.3) * rng.uniform(0, 1, count)
+    share = min(0.5 * strength, 0.9)
 
     def act(s, pad):
-        h = np.zeros(s.depth.shape[1])
-        for t in range(1, len(s.time)):
-            step = s.depth[t] - s.depth[t - 1]
-            h = h + (np.sign(step) - h) * (1 - np.exp(-np.abs(step) / reach))
-            h[s.depth[t] <= 0] = 0.0
-            s.force[t] = np.maximum(s.force[t] * (1 + 0.4 * strength * h), 0.0)
+        state = np.zeros((s.depth.shape[1], count), bool)
+        for t in range(len(s.time)):
+            depth = s.depth[t][:, None]
+            state = (state & (depth > off)) | (depth > on)
+            s.force[t] = (1 - share) * s.force[t] + share * pad.k * deep * state.mean(axis=1)
 
-    return Hidden("hysteresis", "dahl", strength, force=act)
+    return Hidden("hysteresis", "preisach", strength, elastic=act)
 
 
 def creep(rng, strength) -> Hidden:
@@ -83,7 +85,7 @@ def adhesion(rng, strength) -> Hidden:
 
     def act(s, pad):
         touched = np.maximum.accumulate(s.depth, axis=0) > 0.3e-3
-        leaving = touched & (s.pace < 0) & (s.depth > 0)
+        leaving = touched & (s.contact.pace < 0) & (s.depth > 0)
         pull = strength * pad.k * 1.2e-3 * np.exp(-((s.depth / width) ** 2)) * (1 - np.exp(-s.depth / (0.1 * width)))
         s.force = s.force - np.where(leaving, pull, 0.0)
 
@@ -94,10 +96,9 @@ def wear(rng, strength) -> Hidden:
     """Stiffness lost with the work of pressing and sliding, by a rational law."""
 
     def factor(s, pad):
-        speed = np.linalg.norm(np.gradient(s.path, s.time, axis=0), axis=1)[:, None]
-        work = np.cumsum(s.force * speed, axis=0) * s.dt
-        w = work / max(float(work[-1].max()), 1e-12)
-        return 1.0 / (1.0 + 1.5 * strength * w)
+        speed = np.linalg.norm(s.contact.velocity, axis=1)[:, None]
+        work = np.cumsum(s.force * speed, axis=0) * s.dt  # J
+        return 1.0 / (1.0 + 1.5 * strength * work / (pad.k * 3e-3 * 0.03))
 
     return Hidden("wear", "rational", strength, force=_elastic(factor))
 
@@ -122,26 +123,32 @@ def load_spreading(rng, strength) -> Hidden:
 
 
 def crosstalk(rng, strength) -> Hidden:
-    """Leakage along the wires: a share of the mean of a texel's row and of its column is added."""
+    """Traces side by side in a ribbon: each row and column couples into the others, the less the farther they are apart."""
+    fade = rng.uniform(1.0, 2.0)
 
     def act(s, pad):
         signal = (s.reading - pad.zero).reshape(-1, ROWS, COLUMNS)
-        leak = signal.mean(axis=1, keepdims=True) + signal.mean(axis=2, keepdims=True)
-        s.reading = pad.zero + (signal + 0.6 * strength * leak).reshape(s.reading.shape)
+        for axis, count in ((1, ROWS), (2, COLUMNS)):
+            apart = np.abs(np.subtract.outer(np.arange(count), np.arange(count)))
+            couple = np.where(apart == 0, 1.0, 0.15 * strength * np.exp(-(apart - 1) / fade))
+            signal = np.moveaxis(np.tensordot(signal, couple, (axis, 0)), -1, axis)
+        s.reading = pad.zero + signal.reshape(s.reading.shape)
 
-    return Hidden("crosstalk", "wires", strength, reading=act)
+    return Hidden("crosstalk", "ribbon", strength, reading=act)
 
 
 def gain_mismatch(rng, strength) -> Hidden:
-    """Log-normal gains on top of a slope across the pad."""
+    """Log-normal gains on top of a slope across the pad, of texels that are each bent a little as well."""
     y, x = np.mgrid[-1 : 1 : ROWS * 1j, -1 : 1 : COLUMNS * 1j]
     tilt = rng.normal(size=2)
     gain = np.exp(strength * (0.35 * rng.normal(size=ROWS * COLUMNS) + 0.2 * (tilt[0] * x + tilt[1] * y).ravel()))
+    bend = 0.15 * strength * rng.normal(size=ROWS * COLUMNS)
 
     def act(s, pad):
-        s.reading = pad.zero + (s.reading - pad.zero) * gain / gain.mean()
+        x = (s.reading - pad.zero) / (pad.gain * pad.k * 3e-3)
+        s.reading = s.reading + pad.gain * pad.k * 3e-3 * x * (gain / gain.mean() * (1 + bend * np.clip(x, -1.5, 1.5)) - 1)
 
-    return Hidden("gain-mismatch", "lognormal", strength, reading=act)
+    return Hidden("gain-mismatch", "lognormal and bent", strength, reading=act)
 
 
 def dead_texels(rng, strength) -> Hidden:
@@ -151,7 +158,7 @@ def dead_texels(rng, strength) -> Hidden:
     level = rng.choice([0.0, 0.0, 1.0], size=len(dead))
 
     def act(s, pad):
-        s.reading[:, dead] = pad.zero + pad.gain * 0.03 * level
+        s.reading[:, dead] = pad.zero + pad.gain * pad.k * 3e-3 * 0.2 * level
 
     return Hidden("dead-texels", "stuck", strength, reading=act, values={"texels": sorted(int(i) for i in dead)})
 
@@ -160,7 +167,7 @@ def dead_zone(rng, strength) -> Hidden:
     """Nothing up to a force, then a quadratic onset that runs into the line."""
 
     def act(s, pad):
-        start = 0.06 * strength
+        start = pad.k * 1.5e-3 * strength
         x = np.maximum(s.reading - pad.zero, 0) / pad.gain
         onset = np.maximum(x - 0.5 * start, 0.0)
         s.reading = pad.zero + pad.gain * np.where(onset < start, onset**2 / (2 * start), onset - start / 2)
@@ -172,7 +179,7 @@ def saturation(rng, strength) -> Hidden:
     """A voltage divider (Tekscan-like) put through an arctangent."""
 
     def act(s, pad):
-        top = 0.18 / strength
+        top = pad.k * 4e-3 / strength
         x = (s.reading - pad.zero) / pad.gain
         s.reading = pad.zero + pad.gain * top * 2 / np.pi * np.arctan(np.pi / 2 * x / top)
 
@@ -180,18 +187,18 @@ def saturation(rng, strength) -> Hidden:
 
 
 def lag(rng, strength) -> Hidden:
-    """Two equal low passes behind each other."""
-    tau = 0.12 * strength
+    """A dead time and a low pass behind it, as of a filtered converter that is asked over a bus."""
+    tau, dead = 0.15 * strength, 0.15 * strength * rng.uniform(0.3, 1.0)
 
     def act(s, pad):
         keep = np.exp(-s.dt / max(tau, 1e-6))
-        for _ in range(2):
-            state = s.reading[0].copy()
-            for t in range(len(s.time)):
-                state = keep * state + (1 - keep) * s.reading[t]
-                s.reading[t] = state
+        late = np.stack([np.interp(s.time - dead, s.time, channel) for channel in s.reading.T], axis=1)
+        state = late[0].copy()
+        for t in range(len(s.time)):
+            state = keep * state + (1 - keep) * late[t]
+            s.reading[t] = state
 
-    return Hidden("lag", "second order", strength, reading=act, values={"tau": tau})
+    return Hidden("lag", "dead time and low pass", strength, reading=act, values={"tau": tau, "dead": dead})
 
 
 def drift(rng, strength) -> Hidden:
@@ -199,29 +206,35 @@ def drift(rng, strength) -> Hidden:
     power, spread = rng.uniform(0.6, 1.5), 1 + 0.2 * rng.normal(size=ROWS * COLUMNS)
 
     def act(s, pad):
-        s.reading = s.reading + pad.gain * 0.05 * strength * ((s.time[:, None] - s.time[0]) / 25.0) ** power * spread
+        s.reading = (
+            s.reading + pad.gain * pad.k * 3e-3 * 0.2 * strength * ((s.time[:, None] - s.time[0]) / 25.0) ** power * spread
+        )
 
     return Hidden("drift", "power", strength, reading=act)
 
 
 def offset(rng, strength) -> Hidden:
-    """Each row of electronics has a zero of its own, and each texel one on top."""
-    zero = np.repeat(rng.normal(size=ROWS), COLUMNS) + 0.5 * rng.normal(size=ROWS * COLUMNS)
+    """A cover that is stretched over the texels presses on each of them, by row and by texel, until the load takes over."""
+    preload = np.abs(np.repeat(rng.normal(size=ROWS), COLUMNS) + 0.5 * rng.normal(size=ROWS * COLUMNS))
 
     def act(s, pad):
-        s.reading = s.reading + pad.gain * 0.03 * strength * zero
+        rest = 0.2 * strength * pad.k * 3e-3 * preload
+        load = np.maximum(s.reading - pad.zero, 0.0) / pad.gain
+        s.reading = s.reading + pad.gain * rest / (1.0 + load / (pad.k * 3e-3))
 
-    return Hidden("offset", "rows", strength, reading=act)
+    return Hidden("offset", "preload", strength, reading=act)
 
 
 def quantization(rng, strength) -> Hidden:
-    """An 8-bit-like converter that cuts off instead of rounding."""
+    """A converter with companding: steps that grow with the reading, and cut off instead of rounding."""
 
-    def act(s, pad):
-        step = pad.gain * 0.05 * strength
-        s.reading = step * np.floor(s.reading / step)
+    def act(reading, pad):
+        step, full = 0.15 * strength, pad.gain * pad.k * 3e-3
+        x = (reading - pad.zero) / full
+        root = np.sign(x) * np.sqrt(np.abs(x))
+        return pad.zero + full * np.sign(root) * (step * np.floor(np.abs(root) / step)) ** 2
 
-    return Hidden("quantization", "truncating", strength, reading=act)
+    return Hidden("quantization", "companding", strength, convert=act)
 
 
 def noise(rng, strength) -> Hidden:
@@ -235,18 +248,10 @@ def noise(rng, strength) -> Hidden:
 
 
 def misalignment(rng, strength) -> Hidden:
-    """The pad sits shifted, and turned about its normal, under the stage."""
-    turn, shift = rng.normal() * 0.08 * strength, rng.normal(size=2)
+    """The pad was glued on shifted and stretched."""
+    shift, stretch = rng.normal(size=2), 1.0 + 0.04 * strength * rng.uniform(0.3, 1.0) * rng.choice([-1, 1])
     shift = 3e-3 * strength * shift / np.linalg.norm(shift)
-    c, s = np.cos(turn), np.sin(turn)
-
-    def place(path):
-        moved = path.copy()
-        moved[:, 0] = c * path[:, 0] - s * path[:, 1] + shift[0]
-        moved[:, 1] = s * path[:, 0] + c * path[:, 1] + shift[1]
-        return moved
-
-    return Hidden("misalignment", "shift and turn", strength, place=place)
+    return Hidden("misalignment", "shift and stretch", strength, place=lambda places: stretch * places + shift)
 
 
 def stribeck(rng, strength) -> Hidden:
@@ -301,7 +306,7 @@ def hum(rng, strength) -> Hidden:
     pitch, phase = rng.uniform(2.5, 0.4 * RATE), rng.uniform(0, 6, size=ROWS * COLUMNS)
 
     def act(s, pad):
-        s.reading = s.reading + pad.gain * 0.06 * strength * np.sin(2 * np.pi * pitch * s.time[:, None] + phase)
+        s.reading = s.reading + pad.gain * pad.k * 3e-3 * 0.2 * strength * np.sin(2 * np.pi * pitch * s.time[:, None] + phase)
 
     return Hidden("hum", "sine", strength, reading=act)
 
@@ -312,7 +317,9 @@ def temperature(rng, strength) -> Hidden:
 
     def act(s, pad):
         swing = np.sin(2 * np.pi * s.time[:, None] / period + phase)
-        s.reading = pad.zero + (s.reading - pad.zero) * (1 + 0.35 * strength * swing) + pad.gain * 0.02 * strength * swing
+        s.reading = (
+            pad.zero + (s.reading - pad.zero) * (1 + 0.35 * strength * swing) + pad.gain * pad.k * 3e-3 * 0.1 * strength * swing
+        )
 
     return Hidden("temperature", "swing", strength, reading=act)
 

@@ -13,8 +13,6 @@ THICKNESS = 6e-3
 RATE = 50.0
 """Samples per second."""
 SECONDS = 25.0
-FINE = 4
-"""Steps of the friction between two samples."""
 
 
 @dataclass(frozen=True)
@@ -53,18 +51,35 @@ class Probe:
         return self.radius if self.radius is not None else self.size[2] / 2
 
 
-@dataclass
-class Signals:
-    """What happens in one trial: T samples of n texels. Hidden effects change it in place, stage by stage."""
+@dataclass(frozen=True)
+class Contact:
+    """Where the probe meets the texels during a trial: T samples of n texels; no force has a say in it."""
 
     time: np.ndarray
     path: np.ndarray  # (T, 3) m, the probe's middle
+    velocity: np.ndarray  # (T, 3) m/s, of the probe
     depth: np.ndarray  # (T, n) m
     normal: np.ndarray  # (T, n, 3) the probe's outward normal where it touches
     pace: np.ndarray  # (T, n) m/s, depth rate along the normal
-    force: np.ndarray  # (T, n) N, elastic and damped
-    shear: np.ndarray = field(default_factory=lambda: np.zeros(0))  # (T, n, 3) N
-    reading: np.ndarray = field(default_factory=lambda: np.zeros(0))  # (T, n) in the sensor's unit
+    sliding: np.ndarray  # (T, n, 3) m/s, of the probe along its surface
+
+
+@dataclass
+class Signals:
+    """What happens in one trial. Hidden effects change `force` and `reading` in place, stage by stage."""
+
+    contact: Contact
+    force: np.ndarray  # (T, n) N, at first elastic alone, then elastic and damped
+    shear: np.ndarray  # (T, n, 3) N
+    reading: np.ndarray  # (T, n) in the sensor's unit
+
+    @property
+    def time(self) -> np.ndarray:
+        return self.contact.time
+
+    @property
+    def depth(self) -> np.ndarray:
+        return self.contact.depth
 
     @property
     def dt(self) -> float:
@@ -73,55 +88,68 @@ class Signals:
 
 @dataclass(frozen=True)
 class Hidden:
-    """One hidden effect, cut into the stages at which it can act; each is a function of the signals, or None.
+    """One hidden effect, cut into the stages at which it can act; each is a function, or None.
 
-    `place` moves the path that the texels really meet, `force` changes normal forces, `friction` is a factor on the friction
-    coefficient and an extra viscous coefficient as functions of speed and normal force, `reading` changes readings.
+    `place` moves the texels' (n, 2) places, `elastic` changes forces before they are damped and cut off at zero, `force`
+    behind that, `friction` is a factor on the friction coefficient and an extra viscous coefficient as functions of speed and
+    normal force, `reading` changes readings, `convert` does so behind the noise. `values` are the true numbers of a form that
+    the library has, by its names; `/ k` and `/ k gain` stand for a number that goes with the pad.
     """
 
     name: str
     form: str
     strength: float
     place: Callable[[np.ndarray], np.ndarray] | None = None
+    elastic: Callable[[Signals, Pad], None] | None = None
     force: Callable[[Signals, Pad], None] | None = None
     friction: Callable[[np.ndarray, np.ndarray, Pad], tuple[np.ndarray, np.ndarray]] | None = None
     reading: Callable[[Signals, Pad], None] | None = None
+    convert: Callable[[np.ndarray, Pad], np.ndarray] | None = None
     values: dict = field(default_factory=dict)
 
 
-def touch(probe: Probe, pad: Pad, path: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Depth along the probe's normal (T, n) and that normal (T, n, 3) under a probe whose middle follows `path`."""
-    x, y = pad.place.T
+def touch(probe: Probe, pad: Pad, time: np.ndarray, path: np.ndarray, hidden: tuple[Hidden, ...] = ()) -> Contact:
+    """Return what the texels meet under a probe whose middle follows `path` (T, 3), m."""
+    places = pad.place
+    for effect in hidden:
+        if effect.place is not None:
+            places = effect.place(places)
+    x, y = places.T
     normal = np.zeros((len(path), len(x), 3))
     if probe.radius is None:
         inside = (np.abs(x - path[:, :1]) <= probe.size[0] / 2) & (np.abs(y - path[:, 1:2]) <= probe.size[1] / 2)
         sunk = probe.lowest - path[:, 2:]
         normal[..., 2] = -1.0
-        return np.where(inside & (sunk > 0), sunk, 0.0), normal
-    dx, dy = x - path[:, :1], y - path[:, 1:2]
-    left = probe.radius**2 - dx**2 - dy**2
-    high = np.sqrt(np.maximum(left, 0.0))  # of the ball's middle above the point where it meets the texel's line
-    sunk = high - path[:, 2:]
-    normal[..., 0], normal[..., 1], normal[..., 2] = dx / probe.radius, dy / probe.radius, -high / probe.radius
-    return np.where((left > 0) & (sunk > 0), sunk * high / probe.radius, 0.0), normal
-
-
-def respond(
-    probe: Probe, pad: Pad, time: np.ndarray, path: np.ndarray, hidden: tuple[Hidden, ...] = (), slides: bool = True
-) -> Signals:
-    """Run one trial with everything that is hidden in it, without noise; friction, the slowest part, only if it `slides`."""
-    for effect in hidden:
-        if effect.place is not None:
-            path = effect.place(path)
-    depth, normal = touch(probe, pad, path)
+        depth = np.where(inside & (sunk > 0), sunk, 0.0)
+    else:
+        dx, dy = x - path[:, :1], y - path[:, 1:2]
+        left = probe.radius**2 - dx**2 - dy**2
+        high = np.sqrt(np.maximum(left, 0.0))  # of the ball's middle above the point where it meets the texel's line
+        sunk = high - path[:, 2:]
+        normal[..., 0], normal[..., 1], normal[..., 2] = dx / probe.radius, dy / probe.radius, -high / probe.radius
+        depth = np.where((left > 0) & (sunk > 0), sunk * high / probe.radius, 0.0)
     velocity = np.gradient(path, time, axis=0)
-    pace = np.where(depth > 0, np.einsum("ti,tni->tn", velocity, normal), 0.0)
-    force = np.where(depth > 0, np.maximum(pad.k * depth + pad.cn * pace, 0.0), 0.0)
-    signals = Signals(time, path, depth, normal, pace, force)
+    along = np.einsum("ti,tni->tn", velocity, normal)
+    sliding = velocity[:, None, :] - normal * along[..., None]
+    return Contact(time, path, velocity, depth, normal, np.where(depth > 0, along, 0.0), sliding)
+
+
+def respond(contact: Contact, pad: Pad, hidden: tuple[Hidden, ...] = (), slides: bool = True) -> Signals:
+    """Run one trial with everything that is hidden in it, without noise; friction, the slowest part, only if it `slides`.
+
+    Effects that move texels have done so in `contact` already.
+    """
+    nothing = np.zeros_like(contact.normal)
+    signals = Signals(contact, pad.k * contact.depth, nothing, np.zeros(0))
+    for effect in hidden:
+        if effect.elastic is not None:
+            effect.elastic(signals, pad)
+    signals.force = np.where(contact.depth > 0, np.maximum(signals.force + pad.cn * contact.pace, 0.0), 0.0)
     for effect in hidden:
         if effect.force is not None:
             effect.force(signals, pad)
-    signals.shear = _friction(signals, pad, velocity, hidden) if slides else np.zeros_like(normal)
+    if slides:
+        signals.shear = _friction(signals, pad, hidden)
     signals.reading = pad.zero + pad.gain * signals.force
     for effect in hidden:
         if effect.reading is not None:
@@ -129,42 +157,44 @@ def respond(
     return signals
 
 
+def converted(reading: np.ndarray, pad: Pad, hidden: tuple[Hidden, ...]) -> np.ndarray:
+    """Return readings behind the converter, whose noise they have already."""
+    for effect in hidden:
+        if effect.convert is not None:
+            reading = effect.convert(reading, pad)
+    return reading
+
+
 def net_force(signals: Signals) -> np.ndarray:
     """(T, 3) N: what the probe does to the sensor, normal and friction together."""
-    return (signals.force[..., None] * signals.normal + signals.shear).sum(axis=1)
+    return (signals.force[..., None] * signals.contact.normal + signals.shear).sum(axis=1)
 
 
-def _friction(signals: Signals, pad: Pad, velocity: np.ndarray, hidden: tuple[Hidden, ...]) -> np.ndarray:
-    """LuGre per texel (Canudas de Wit 1995): dz/dt = v - sigma0 |v| z / g, exact for constant v between fine steps."""
-    sliding = velocity[:, None, :] - signals.normal * np.einsum("ti,tni->tn", velocity, signals.normal)[..., None]
-    shear = np.zeros_like(signals.normal)
-    z = np.zeros(signals.normal.shape[1:])
-    step = signals.dt / FINE
-    for t in range(len(signals.time)):
-        fn = np.maximum(signals.force[t], 0.0)
-        held = fn > 0
-        v = sliding[t]
-        speed = np.linalg.norm(v, axis=1)
-        mu = pad.mud + (pad.mus - pad.mud) * np.exp(-((speed / pad.x0) ** 2))
-        extra = np.zeros_like(speed)
-        for effect in hidden:
-            if effect.friction is not None:
-                factor, more = effect.friction(speed, fn, pad)
-                mu, extra = mu * factor, extra + more
-        g = np.maximum(fn * mu, 1e-12)
-        fade = pad.sigma0 * speed / g
-        with np.errstate(divide="ignore", invalid="ignore"):
-            keep = np.exp(-fade * step)
-            gain = np.where(fade * step > 1e-9, (1 - keep) / np.where(fade > 0, fade, 1.0), step)
-        if t > 0:
-            for _ in range(FINE):
-                z = z * keep[:, None] + gain[:, None] * v
-        z = np.where(held[:, None], z, 0.0)
-        z -= np.einsum("ni,ni->n", z, signals.normal[t])[:, None] * signals.normal[t]
-        reach = np.linalg.norm(z, axis=1)
-        most = pad.mus * fn / pad.sigma0
-        z *= np.where(reach > most, most / np.maximum(reach, 1e-30), 1.0)[:, None]
-        rate = v - fade[:, None] * z
-        force = pad.sigma0 * z + pad.sigma1 * rate + (pad.ct + extra)[:, None] * v
-        shear[t] = np.where(held[:, None], force, 0.0)
-    return shear
+def _friction(signals: Signals, pad: Pad, hidden: tuple[Hidden, ...]) -> np.ndarray:
+    """LuGre per texel (Canudas de Wit 1995): dz/dt = v - sigma0 |v| z / g, exact for a constant v between two samples."""
+    v, normal = signals.contact.sliding, signals.contact.normal
+    fn = np.maximum(signals.force, 0.0)
+    speed = np.linalg.norm(v, axis=2)
+    mu = pad.mud + (pad.mus - pad.mud) * np.exp(-((speed / pad.x0) ** 2))
+    most, extra = pad.mus * np.ones_like(fn), np.zeros_like(fn)
+    for effect in hidden:
+        if effect.friction is not None:
+            factor, more = effect.friction(speed, fn, pad)
+            at_rest, _ = effect.friction(np.zeros_like(speed), fn, pad)
+            mu, most, extra = mu * factor, most * at_rest, extra + more
+    fade = pad.sigma0 * speed / np.maximum(fn * mu, 1e-12)
+    keep = np.exp(-fade * signals.dt)
+    gain = np.where(fade * signals.dt > 1e-9, (1 - keep) / np.where(fade > 0, fade, 1.0), signals.dt)
+    step, most = gain[..., None] * v, most * fn / pad.sigma0
+    z, states = np.zeros(v.shape[1:]), np.zeros_like(v)
+    for t in range(1, len(v)):
+        (held,) = np.nonzero(fn[t] > 0)
+        now, n = z[held] * keep[t, held, None] + step[t, held], normal[t, held]
+        now -= (now * n).sum(axis=1)[:, None] * n
+        reach = np.sqrt((now * now).sum(axis=1))
+        now *= np.minimum(1.0, most[t, held] / np.maximum(reach, 1e-30))[:, None]
+        z = np.zeros_like(z)
+        z[held] = now
+        states[t] = z
+    force = pad.sigma0 * states + pad.sigma1 * (v - fade[..., None] * states) + (pad.ct + extra)[..., None] * v
+    return np.where(fn[..., None] > 0, force, 0.0)
