@@ -152,15 +152,16 @@ def gain_mismatch(rng, strength) -> Hidden:
 
 
 def dead_texels(rng, strength) -> Hidden:
-    """Texels whose reading is stuck, some at the value without load and some at another."""
+    """Texels with a broken joint: stuck at the value without load or at another one, or all but deaf."""
     middle = [r * COLUMNS + c for r in range(3, 11) for c in range(1, 5)]
     dead = rng.choice(middle, size=max(1, round(5 * min(strength, 1.6))), replace=False)
-    level = rng.choice([0.0, 0.0, 1.0], size=len(dead))
+    level, deaf = rng.choice([0.0, 0.0, 1.0], size=len(dead)), rng.choice([0.0, 0.0, 0.05], size=len(dead))
 
     def act(s, pad):
-        s.reading[:, dead] = pad.zero + pad.gain * pad.k * 3e-3 * 0.2 * level
+        stuck = pad.gain * pad.k * 3e-3 * 0.2 * level
+        s.reading[:, dead] = pad.zero + stuck + deaf * (s.reading[:, dead] - pad.zero)
 
-    return Hidden("dead-texels", "stuck", strength, reading=act, values={"texels": sorted(int(i) for i in dead)})
+    return Hidden("dead-texels", "broken", strength, reading=act, values={"texels": sorted(int(i) for i in dead)})
 
 
 def dead_zone(rng, strength) -> Hidden:
@@ -271,7 +272,7 @@ def viscous_friction(rng, strength) -> Hidden:
         drag = strength * 0.6 * np.maximum(fn, 0.0) * (np.maximum(speed, 1e-6) / 0.02) ** 0.6
         return np.ones_like(speed), drag / np.maximum(speed, 1e-6)
 
-    return Hidden("viscous-friction", "power", strength, friction=law)
+    return Hidden("viscous-friction", "film", strength, friction=law)
 
 
 MAKERS: dict[str, Maker] = {

@@ -1,0 +1,270 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""``palpate gap`` on recordings with something hidden in them (``_hidden``): what it says, held against the sealed answers.
+
+Whole run: 240 cases, hours. Results are kept in build/gap/, one line a case, and a run goes on where the last one stopped, as
+long as neither the workflow nor the generator has changed. Environment:
+
+``PALPATE_GAP_CASES``      how many cases (240), shared out over the kinds as in :data:`MIX`
+``PALPATE_GAP_PROCESSES``  how many at a time (2)
+``PALPATE_GAP_FIRST``      number of the first case of each kind; from 1000 on are those that nobody looks at (1000)
+``PALPATE_GAP_BASELINES``  on how many of them the baselines run as well (a quarter)
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import multiprocessing
+import os
+import sys
+import tempfile
+import time
+from collections import Counter
+from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ._hidden import cases
+
+HOUSE = Path(__file__).resolve().parent.parent
+MIX = {"own": 60, "other": 60, "none": 30, "two": 40, "outside": 30, "poor": 20}
+"""Cases of each kind in a whole run."""
+SURE = 0.5
+"""Confidence from which a name is meant as one; see docs/gap.md."""
+QUIET = ("noise",)
+"""Effects that leave no gap which a model could close."""
+
+
+def run() -> Iterator[dict]:
+    """Yield one figure for every bar; the confusion matrix goes to stderr and to build/gap/confusion.txt."""
+    total = int(os.environ.get("PALPATE_GAP_CASES", "240"))
+    first = int(os.environ.get("PALPATE_GAP_FIRST", "1000"))
+    plan = plan_of(total, first)
+    baselines = int(os.environ.get("PALPATE_GAP_BASELINES", str(total // 4)))
+    results = _results(plan, set(_spread(plan, baselines)))
+    matrix = confusion(results)
+    print(matrix, file=sys.stderr)
+    (_folder() / "confusion.txt").write_text(matrix + "\n", encoding="utf-8")
+    yield from figures(results)
+
+
+def plan_of(total: int, first: int) -> list[tuple[str, int]]:
+    """Return kinds and numbers of that many cases; every kind has at least one."""
+    whole = sum(MIX.values())
+    counts = {kind: max(1, round(total * share / whole)) for kind, share in MIX.items()}
+    return [(kind, first + i) for i in range(max(counts.values())) for kind in MIX if i < counts[kind]]
+
+
+def _spread(plan: list[tuple[str, int]], count: int) -> list[tuple[str, int]]:
+    """Some cases with one hidden effect, evenly from all of them."""
+    single = [entry for entry in plan if entry[0] in ("own", "other")]
+    return [single[i] for i in np.unique(np.linspace(0, len(single) - 1, min(count, len(single))).astype(int))] if count else []
+
+
+# --- cases, one after the other
+
+
+def _folder() -> Path:
+    folder = HOUSE / "build" / "gap"
+    folder.mkdir(parents=True, exist_ok=True)
+    return folder
+
+
+def _fingerprint() -> str:
+    """Of all that a result depends on."""
+    seen = hashlib.sha256()
+    for part in ("core/gap", "core/effects", "benchmarks/_hidden"):
+        for path in sorted((HOUSE / part).glob("*.py")):
+            seen.update(path.read_bytes())
+    return seen.hexdigest()[:12]
+
+
+def _results(plan: list[tuple[str, int]], compared: set[tuple[str, int]]) -> list[dict]:
+    path = _folder() / f"results-{_fingerprint()}.jsonl"
+    lines = path.read_text(encoding="utf-8").splitlines() if path.is_file() else []
+    done = {(r["kind"], r["number"]): r for r in map(json.loads, lines)}
+    todo = [entry for entry in plan if entry not in done or (entry in compared and "baselines" not in done[entry])]
+    processes = int(os.environ.get("PALPATE_GAP_PROCESSES", "2"))
+    os.environ.setdefault("OMP_NUM_THREADS", "1")
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    with ProcessPoolExecutor(processes, multiprocessing.get_context("spawn")) as pool, path.open("a", encoding="utf-8") as file:
+        waiting = [pool.submit(examine, kind, number, (kind, number) in compared) for kind, number in todo]
+        for count, future in enumerate(as_completed(waiting), start=1):
+            result = future.result()
+            done[result["kind"], result["number"]] = result
+            file.write(json.dumps(result) + "\n")
+            file.flush()
+            said = f"{result['kind']} {result['number']}: {result['outcome']}"
+            print(f"{count}/{len(todo)} {said} ({result['seconds']:.0f} s)", file=sys.stderr, flush=True)
+    return [done[entry] for entry in plan]
+
+
+def examine(kind: str, number: int, compare: bool = False) -> dict[str, Any]:
+    """Draw a case, have it diagnosed from its files, and hold the outcome against the answer."""
+    from palpate.core.gap.diagnose import Diagnosis, diagnose
+    from palpate.core.gap.rig import read_rig
+
+    case = cases.draw(kind, number)
+    with tempfile.TemporaryDirectory() as folder:
+        rig_path = cases.write(case, Path(folder))
+        began, used = time.perf_counter(), time.process_time()
+        result = None
+        for step in diagnose(read_rig(rig_path)):
+            if isinstance(step, Diagnosis):
+                result = step
+        assert result is not None
+        seconds, cpu = time.perf_counter() - began, time.process_time() - used
+    entry = {"kind": kind, "number": number, "answer": case.answer, "forms": [h.form for h in case.hidden]}
+    entry |= {"shape": "ball" if case.probe.radius else "flat", "share": list(case.share), **score(case, result)}
+    entry |= {"seconds": round(seconds, 2), "cpu_seconds": round(cpu, 2)}
+    if compare:
+        from . import _gap_baselines
+
+        entry["baselines"] = _gap_baselines.all_of(case, result, closed)
+    return entry
+
+
+# --- scoring
+
+
+def score(case: cases.Case, result: Any) -> dict[str, Any]:
+    """Return what was said of a case and how right it is."""
+    from palpate.core.gap.amend import next_experiment, normalised, numbers
+
+    model = normalised(result)
+    sure = [named.name for named in result.named if named.confidence >= SURE]
+    said = [[n.name, n.form, n.confidence] for n in result.named]
+    inside = []
+    for one in numbers(result):
+        true = _truth(case, one, model)
+        if true is not None:
+            inside.append([one.name, bool(min(one.low, one.high) <= true <= max(one.low, one.high))])
+    return {
+        "outcome": outcome(case.answer, sure, result.verdict, bool(result.ambiguous)),
+        "sure": sure,
+        "said": said,
+        "verdict": result.verdict,
+        "ambiguous": [list(pair) for pair in result.ambiguous],
+        "experiment": next_experiment(result),
+        "closed": closed(case, result, model),
+        "inside": inside,
+    }
+
+
+def outcome(answer: list[str], sure: list[str], verdict: str, ambiguous: bool) -> str:
+    """Return one word for what was said: right, part, wrong, ambiguous, unexplained or no gap.
+
+    `part` is some of several, and nothing wrong beside it.
+    """
+    if any(name not in answer for name in sure):
+        return "wrong"
+    if sure:
+        return "right" if set(sure) == set(answer) else "part"
+    if verdict == "explained" and ambiguous:
+        return "ambiguous"
+    return "unexplained" if verdict == "explained" else verdict
+
+
+def _truth(case: cases.Case, one: Any, model: Any) -> float | None:
+    """The true value of a fitted number, where the model has the formula that is hidden and the number is comparable."""
+    if case.kind != "own" or [(e.name, e.form) for e in model.effects] != [(h.name, h.form) for h in case.hidden]:
+        return None
+    if any(isinstance(value, tuple) for value in model.effects[0].values.values()):
+        return None  # a number per texel takes part of the common ones
+    if one.effect >= 0:
+        from ._hidden.own import true_value
+
+        return true_value(case.hidden[one.effect], one.name, case.pad)
+    return float(getattr(case.pad, one.name)) if hasattr(case.pad, one.name) else None
+
+
+def closed(case: cases.Case, result: Any, model: Any) -> float | None:
+    """Share of the gap on the check trials that a model closes, against the truth without noise; None without a gap.
+
+    The gap is the root mean square of truth minus prediction, readings and forces each in units of their range.
+    """
+    if case.kind not in ("own", "other", "two") or set(case.answer) & set(QUIET):
+        return None
+    before, after = (_miss(case, result, one) for one in (result.base.model, model))
+    return 1.0 - after / before
+
+
+def _miss(case: cases.Case, result: Any, model: Any) -> float:
+    square = count = 0.0
+    for predictor in result.of("check"):
+        clean = case.clean[int(predictor.trial.name.removeprefix("trial_"))]
+        predicted = predictor.predict(model)
+        for true, guess, size in zip(clean, (predicted.reading, predicted.force), result.full, strict=True):
+            miss = (true - guess) / size
+            square, count = square + float(np.vdot(miss, miss)), count + miss.size
+    return float(np.sqrt(square / count))
+
+
+# --- figures
+
+
+def confusion(results: list[dict]) -> str:
+    """Return a table: what was hidden, and how often what was said."""
+    rows = sorted({(r["kind"], " + ".join(r["answer"]) if r["kind"] != "two" else "two") for r in results})
+    text = [f"{'kind':8} {'hidden':18} {'cases':>5}  said"]
+    for kind, hidden in rows:
+        here = [r for r in results if r["kind"] == kind and (kind == "two" or " + ".join(r["answer"]) == hidden)]
+        said = Counter(" + ".join(r["sure"]) if r["sure"] and kind != "two" else r["outcome"] for r in here)
+        words = ", ".join(f"{name} {count}" for name, count in said.most_common())
+        text.append(f"{kind:8} {hidden or 'nothing':18} {len(here):5d}  {words}")
+    return "\n".join(text)
+
+
+def figures(results: list[dict]) -> Iterator[dict]:
+    """Yield one figure per bar."""
+    of = {kind: [r for r in results if r["kind"] == kind] for kind in MIX}
+
+    def rate(name: str, some: list[dict], good, goal: float | None) -> Iterator[dict]:
+        if some:
+            figure = {"name": f"gap.{name}", "value": float(np.mean([bool(good(r)) for r in some])), "unit": "share"}
+            yield figure | ({"goal": goal} if goal is not None else {})
+
+    for kind, right in (("other", 0.85), ("own", 0.95)):
+        yield from rate(f"{kind}.right", of[kind], lambda r: r["outcome"] == "right", right)
+        yield from rate(f"{kind}.wrong", of[kind], lambda r: r["outcome"] == "wrong", 0.05 if kind == "other" else None)
+        for word in ("ambiguous", "unexplained", "no gap"):
+            yield from rate(f"{kind}.{word.replace(' ', '_')}", of[kind], lambda r, w=word: r["outcome"] == w, None)
+    by_name: dict[str, list[dict]] = {}
+    for r in of["own"]:
+        by_name.setdefault(r["answer"][0], []).append(r)
+    if by_name:
+        worst = min(by_name, key=lambda name: np.mean([r["outcome"] == "right" for r in by_name[name]]))
+        yield from rate(f"own.worst_effect.{worst}", by_name[worst], lambda r: r["outcome"] == "right", 0.85)
+    yield from rate("none.false_alarm", of["none"], lambda r: r["verdict"] != "no gap", 0.02)
+    yield from rate("two.both", of["two"], lambda r: r["outcome"] == "right", 0.75)
+    yield from rate("two.one_and_none_wrong", of["two"], lambda r: r["outcome"] in ("right", "part"), 0.90)
+    yield from rate("outside.unexplained", of["outside"], lambda r: r["outcome"] == "unexplained", 0.90)
+    vague = ("ambiguous", "unexplained")
+    yield from rate("poor.open_with_experiment", of["poor"], lambda r: r["outcome"] in vague and r["experiment"], None)
+    yield from rate("poor.confident_and_wrong", of["poor"], lambda r: r["outcome"] == "wrong", 0.0)
+    for kind, goal in (("own", 0.80), ("other", 0.65), ("two", None)):
+        yield from _middle(f"{kind}.closed_on_check", [r["closed"] for r in of[kind]], "share", goal)
+    inside = [hit for r in of["own"] for _, hit in r["inside"]]
+    if inside:
+        yield {"name": "gap.own.interval_coverage", "value": float(np.mean(inside)), "unit": "share", "goal": 0.95}
+    yield from _middle("seconds", [r["cpu_seconds"] for r in results], "s", 30.0)
+    compared = [r for r in results if "baselines" in r]
+    for name in compared[0]["baselines"] if compared else ():
+        told = [r["baselines"][name] for r in compared]
+        for what in ("right", "wrong"):
+            share = float(np.mean([one[what] for one in told]))
+            own = float(np.mean([r["outcome"] == what for r in compared]))
+            yield {"name": f"gap.baseline.{what}", "value": own, "unit": "share", "peer": name, "peer_value": share}
+        both = [(r["closed"], one["closed"]) for r, one in zip(compared, told, strict=True) if r["closed"] is not None]
+        if both:
+            mine, other = np.median(np.array(both, float), axis=0).tolist()
+            yield {"name": "gap.baseline.closed", "value": mine, "unit": "share", "peer": name, "peer_value": other}
+
+
+def _middle(name: str, values: list[float | None], unit: str, goal: float | None) -> Iterator[dict]:
+    known = [value for value in values if value is not None]
+    if known:
+        yield {"name": f"gap.{name}", "value": float(np.median(known)), "unit": unit} | ({"goal": goal} if goal else {})

@@ -1,0 +1,124 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The generator of recordings with something hidden, and the scoring of what is said of them."""
+
+import ast
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from palpate.benchmarks import gap
+from palpate.benchmarks._hidden import cases, other, own, world
+from palpate.core.effects.library import library
+from palpate.core.gap.rig import read_rig
+
+HIDDEN = Path(cases.__file__).parent
+
+
+@pytest.mark.parametrize("path", sorted(HIDDEN.glob("*.py")), ids=lambda path: path.stem)
+def test_the_generator_shares_nothing_with_the_package(path):
+    allowed = {"__future__", "collections", "dataclasses", "pathlib", "zlib", "numpy", "scipy"}
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            assert {name.name.split(".")[0] for name in node.names} <= allowed
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 1 or (node.level == 0 and node.module.split(".")[0] in allowed)
+
+
+def test_every_effect_is_hidden_in_some_case():
+    assert set(other.MAKERS) == set(own.OWN) == set(library())
+    assert not set(other.OUTSIDE) & set(library())
+
+
+def test_own_forms_have_the_librarys_names_and_others_do_not():
+    forms = {name: {form.name for form in kind.forms} for name, kind in library().items()}
+    for seed in range(6):
+        for name in own.OWN:
+            assert own.OWN[name](np.random.default_rng(seed), 0.3).form in forms[name]
+            assert other.MAKERS[name](np.random.default_rng(seed), 0.3).form not in forms[name]
+
+
+def test_a_case_follows_from_kind_and_number(tmp_path):
+    first, again, next_one = (cases.draw("other", number) for number in (24, 24, 44))
+    files = [cases.write(case, tmp_path / name).parent for case, name in ((first, "a"), (again, "b"))]
+    for path in sorted(files[0].iterdir()):
+        assert path.read_bytes() == (files[1] / path.name).read_bytes()
+    assert first.answer == next_one.answer and not np.array_equal(first.readings[0], next_one.readings[0])
+
+
+def test_a_rig_is_read_and_does_not_tell_its_answer(tmp_path):
+    case = cases.draw("own", 12)
+    path = cases.write(case, tmp_path)
+    rig = read_rig(path)
+    assert [trial.use for trial in rig.trials] == ["fit"] * 4 + ["check"] * 2
+    np.testing.assert_allclose(rig.trials[2].reading, case.readings[2], rtol=1e-6, atol=1e-6 * np.abs(case.readings[2]).max())
+    assert not rig.warnings
+    assert not any(word in path.read_text(encoding="utf-8") for word in (*case.answer, case.hidden[0].form))
+
+
+@pytest.mark.parametrize("kind", ["own", "other"])
+@pytest.mark.parametrize("number", [3, 9, 12, 18])
+def test_what_is_hidden_has_the_size_it_is_said_to_have(kind, number):
+    case = cases.draw(kind, number)
+    low, high = cases.SHARE
+    assert all(0.9 * low < share < 1.6 * high for share in case.share)
+    noise = np.std(np.concatenate([(r - c[0]).ravel() for r, c in zip(case.readings, case.clean, strict=True)]))
+    np.testing.assert_allclose(noise, case.noise, rtol=0.02)
+
+
+def test_friction_is_coulombs_once_it_slides():
+    """A flat probe at constant speed and depth: after some bristle lengths the force is LuGre's steady state, Eq. 10–12."""
+    pad = world.Pad(60.0, 0.0, 0.6, 0.5, 0.01, 30.0, 0.3, 0.02, 1.0, 0.0, "N")
+    time = np.arange(0, 4, 0.02)
+    speed, depth = 0.02, 1e-3
+    path = np.stack([np.zeros_like(time), speed * time - 0.04, np.full_like(time, 0.01 - depth)], axis=1)
+    probe = world.Probe(None, (0.06, 0.4, 0.02))
+    shear = world.respond(world.touch(probe, pad, time, path), pad).shear[-1]
+    steady = pad.k * depth * (0.5 + 0.1 * np.exp(-4.0)) + pad.ct * speed
+    np.testing.assert_allclose(shear[:, 1], steady, rtol=1e-6)
+    np.testing.assert_allclose(shear[:, [0, 2]], 0.0, atol=1e-12)
+
+
+def test_low_pass_and_relaxation_against_closed_forms():
+    """``τ q' = x − q`` under a ramp, and the reading of a sensor with it hidden in it."""
+    t = np.arange(0, 5, 0.02)
+    got = own._low_pass(t[:, None] * 2.0, 0.02, 0.7, np.zeros(1))[:, 0]
+    np.testing.assert_allclose(got, 2.0 * (t - 0.7 * -np.expm1(-t / 0.7)), atol=1e-12)
+
+
+def test_outcomes():
+    say = gap.outcome
+    assert say(["creep"], ["creep"], "explained", False) == "right"
+    assert say(["creep"], ["lag"], "explained", False) == "wrong"
+    assert say(["creep"], ["creep", "lag"], "explained", False) == "wrong"
+    assert say(["creep"], [], "explained", True) == "ambiguous"
+    assert say(["creep"], [], "unexplained", False) == "unexplained"
+    assert say([], [], "no gap", False) == "no gap"
+    assert say([], ["drift"], "explained", False) == "wrong"
+    assert say(["creep", "lag"], ["lag"], "explained", False) == "part"
+
+
+def test_figures_and_confusion_from_results():
+    def one(kind, number, answer, sure, verdict="explained"):
+        outcome = gap.outcome(answer, sure, verdict, False)
+        return {
+            "kind": kind, "number": number, "answer": answer, "sure": sure, "verdict": verdict, "outcome": outcome,
+            "closed": 0.9 if answer else None, "inside": [["amount", True]] if kind == "own" else [], "experiment": "",
+            "cpu_seconds": 12.0,
+        }  # fmt: skip
+
+    results = [one("own", i, ["creep"], ["creep"]) for i in range(3)] + [one("own", 3, ["lag"], ["drift"])]
+    results += [one("none", 0, [], [], "no gap"), one("none", 1, [], ["drift"])]
+    found = {figure["name"]: figure["value"] for figure in gap.figures(results)}
+    assert found["gap.own.right"] == 0.75 and found["gap.own.wrong"] == 0.25
+    assert found["gap.own.worst_effect.lag"] == 0.0
+    assert found["gap.none.false_alarm"] == 0.5
+    assert found["gap.own.closed_on_check"] == 0.9 and found["gap.own.interval_coverage"] == 1.0
+    table = gap.confusion(results)
+    assert "creep 3" in table and "drift 1" in table
+
+
+def test_a_whole_run_has_every_kind_and_grows_without_changing():
+    small, whole = gap.plan_of(20, 1000), gap.plan_of(240, 1000)
+    assert len(whole) == 240 and {kind for kind, _ in small} == set(gap.MIX)
+    assert set(small) <= set(whole)
