@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from . import calibration, geometries, weighing
+from . import calibration, geometries, grasping, weighing
 from .chapter import Chapter
 
 
@@ -26,4 +26,8 @@ EXPERIMENTS = {
     "definition": Experiment(calibration.definition, 1),
     "weighing": Experiment(weighing.weigh, 5),
     "tilt": Experiment(weighing.hold, 3),
+    "grasps": Experiment(grasping.four_objects, 8),
+    "heavy": Experiment(grasping.too_heavy, 2),
+    "pick-and-place": Experiment(grasping.work_cycle, 7),
+    "hand": Experiment(grasping.finger_and_thumb, 2),
 }

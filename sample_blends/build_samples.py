@@ -12,24 +12,33 @@ from pathlib import Path
 
 import bpy
 
-SAMPLES = ("demo", "fingertip", "grasp")
-"""Modules of this folder with a function ``build(scene)``."""
+SAMPLES = {
+    "demo": ("demo", {}),
+    "fingertip": ("fingertip", {}),
+    "grasp": ("grasp", {}),
+    "geometries": ("geometries", {}),
+    "weighing": ("weighing", {}),
+    "tilt": ("tilt", {}),
+    **{f"grasp_{kind}": ("grasps", {"kind": kind}) for kind in ("sphere", "box", "cylinder", "bottle")},
+    "pick_and_place": ("pick_and_place", {}),
+    "hand": ("hand", {}),
+}
+"""Name of the file → module of this folder with a function ``build(scene, …)``, and what else it is given."""
 
 
-def build_all(folder: Path) -> list[Path]:
-    """Write one compressed .blend per sample into `folder`, and return their paths."""
-    made = []
-    for name in SAMPLES:
-        bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
-        importlib.import_module(f".{name}", __package__).build(bpy.context.scene)
-        path = folder / f"{name}.blend"
-        bpy.context.preferences.filepaths.save_version = 0
-        bpy.ops.wm.save_as_mainfile(filepath=str(path.absolute()), compress=True)
-        made.append(path)
-    return made
+def build_one(name: str, folder: Path) -> Path:
+    """Write one sample as a compressed .blend into `folder`, and return its path."""
+    module, more = SAMPLES[name]
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    importlib.import_module(f".{module}", __package__).build(bpy.context.scene, **more)
+    path = folder / f"{name}.blend"
+    bpy.context.preferences.filepaths.save_version = 0
+    bpy.ops.wm.save_as_mainfile(filepath=str(path.absolute()), compress=True)
+    return path
 
 
 if __name__ == "__main__":
     importlib.import_module(__package__.rpartition(".")[0]).register()
-    for path in build_all(Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parent):
+    for sample in SAMPLES:
+        path = build_one(sample, Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parent)
         print(f"{path}: {path.stat().st_size / 1000:.0f} kB")

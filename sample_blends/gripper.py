@@ -13,6 +13,9 @@ import numpy as np
 from . import studio
 
 ROWS, COLUMNS, PITCH = 14, 6, 3.4
+FINGER_MASS = 0.3  # kg
+FINGER_DAMPING = 60.0
+"""N·s/m: about 2 √(m k) of a finger on its foam, so that a grasp neither swings nor crawls to its force."""
 PAD_WIDE, PAD_TALL = (COLUMNS - 1) * PITCH, (ROWS - 1) * PITCH
 MARGIN, THICKNESS = 0.5 * PITCH + 1.0, 6.0
 LEFT, RIGHT = "Left finger", "Right finger"
@@ -130,3 +133,60 @@ def spray_bottle(scene, name: str):
         part.parent = bottle
         part.data.materials.append(white)
     return bottle
+
+
+def close(fingers, grip, speed: float, max_force: float) -> None:
+    """Let two coupled fingers close along their own z axes, by force control on what the first of them feels.
+
+    Parameters
+    ----------
+    fingers : two objects
+    grip : float or sequence of (frame, float), N
+        Wanted tactile sum; zero opens the fingers.
+    speed : float, m/s
+        Until the first touch.
+    max_force : float, N
+        Of the motor, on each finger.
+    """
+    drive(fingers, grip, speed, max_force, ("Z", "Z"))
+
+
+def drive(fingers, grip, speed: float, max_force: float, axes) -> None:
+    """Let fingers close along axes of their own, the second one coupled to the first."""
+    first = fingers[0]
+    for pad, axis in zip(fingers, axes, strict=True):
+        settings = pad.palpate
+        settings.body, settings.mass = "DRIVEN", FINGER_MASS
+        settings.drive_control, settings.drive_axis, settings.drive_space = "FORCE", axis, "LOCAL"
+        settings.drive_max_speed, settings.drive_max_force = speed, max_force
+        settings.drive_damping = FINGER_DAMPING
+        if pad != first:
+            settings.drive_leader = first
+    for frame, force in ((1, grip),) if isinstance(grip, float) else grip:
+        first.palpate.drive_force = force
+        if not isinstance(grip, float):
+            first.keyframe_insert("palpate.drive_force", frame=frame)
+    studio.step_keys(first)
+
+
+def mount(arm, fingers) -> None:
+    """Make fingers children of an arm without moving them."""
+    import bpy
+
+    bpy.context.view_layer.update()
+    for pad in fingers:
+        pad.parent = arm
+        pad.matrix_parent_inverse = arm.matrix_world.inverted()
+
+
+def table(scene, name: str, height: float):
+    """Return a table whose top is at `height` (mm): a pad that gives way under what stands on it, and is not read out."""
+    vertices, faces, texels = studio.pad_mesh(15, 15, 4.0, 8.0, 8.0, rounding=1.0)
+    made = studio.mesh_object(scene, name, vertices, faces)
+    made.location = (0.0, 0.0, height)
+    made.vertex_groups.new(name="top").add(texels, 1.0, "REPLACE")
+    made.data.materials.append(studio.material("Table", (0.2, 0.21, 0.23), roughness=0.6))
+    settings = made.palpate
+    settings.role, settings.region, settings.vertex_group = "PAD", "GROUP", "top"
+    settings.k, settings.cn, settings.sigma0, settings.sigma1 = 300.0, 6.0, 150.0, 1.5
+    return made

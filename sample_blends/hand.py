@@ -10,10 +10,11 @@ import math
 
 import numpy as np
 
-from . import studio
+from . import gripper, studio
 
 FPS = 24
-FRAME_END = 60
+FRAME_END = 72
+TABLE_STARTS, TABLE_GONE = 36, 54  # frames
 INDEX, THUMB, CYLINDER = "Index finger", "Thumb", "Cylinder"
 RADIUS, HEIGHT = 12.0, 60.0  # mm, of the cylinder
 GAP = 4.0  # mm, between finger tips and cylinder at the first frame
@@ -29,6 +30,43 @@ CURLED = (
     ((8, 92, 2, 9.6), (12, 64, 13, 8.8), (11, 47, -7, 8.4), (8, 64, -25, 7.6), (7, 79, -23, 6.6)),
     ((-8, 90, 1, 8.6), (-6, 68, 11, 7.8), (-6, 54, -6, 7.4), (-6, 68, -22, 6.6), (-6, 80, -20, 5.8)),
 )
+
+
+FORCE, SPEED, MAX_FORCE = 2.0, 0.02, 10.0  # N on the index finger, m/s, N
+MASS = 0.08  # kg, of the cylinder
+K, CN, SIGMA0, SIGMA1 = 40.0, 0.4, 20.0, 0.2  # per texel
+
+TEXT = """\
+Index finger and thumb (paper, section 5.3, Fig. 13)
+
+Both finger tips are sensors, made of the very meshes of the fingers: any shape will do. They close on a cylinder until the
+index finger feels 2 N; then the support under the cylinder sinks away, and friction alone holds it.
+"""
+
+
+def build(scene) -> None:
+    """Fill `scene`, which is emptied first; the add-on's classes must be registered."""
+    studio.prepare(scene, FRAME_END, FPS)
+    index, thumb, cylinder = bodies(scene)
+    for finger in (index, thumb):
+        settings = finger.palpate
+        settings.role, settings.region, settings.vertex_group = "SENSOR", "GROUP", "tactile"
+        settings.max_penetration = 0.006
+        settings.k, settings.cn, settings.sigma0, settings.sigma1 = K, CN, SIGMA0, SIGMA1
+    gripper.drive((index, thumb), FORCE, SPEED, MAX_FORCE, ("-X", "X"))
+    cylinder.palpate.role, cylinder.palpate.body, cylinder.palpate.mass = "TARGET", "FREE", MASS
+    table = gripper.table(scene, "Support", -HEIGHT / 2)
+    for frame, drop in ((1, 0.0), (TABLE_STARTS, 0.0), (TABLE_GONE, 45.0)):
+        table.location.z = -HEIGHT / 2 - drop
+        table.keyframe_insert("location", frame=frame)
+    scene.palpate.use_auto_dt, scene.palpate.dt = False, 5e-4
+    scene.palpate.color_map = "MAGMA"
+    paper = studio.material("Backdrop", (0.30, 0.32, 0.35), roughness=0.85)
+    studio.stage(scene, paper, aim=(0.0, 0.0, 0.0), camera=(-150.0, -210.0, 150.0), size=0.8)
+    scene.objects["Backdrop"].location.z = -90.0
+    scene.frame_set(scene.frame_start)
+    studio.frame_objects(scene, (index, thumb, cylinder), (0.05, 0.05, 0.95, 0.95))
+    studio.explain(TEXT)
 
 
 def bodies(scene):

@@ -336,3 +336,12 @@ def needles(scene, sensor, length: float, look, radius: float = 0.26):
     made.parent = sensor
     made.data.materials.append(look)
     return made
+
+
+def step_keys(obj) -> None:
+    """Let the animated numbers of an object jump at their keyframes, since a command changes at once."""
+    from ..addon import curves
+
+    for curve in curves.of(obj) or ():
+        for key in curve.keyframe_points:
+            key.interpolation = "CONSTANT"

@@ -1,0 +1,202 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Sections 5.2 and 5.3: four objects between two pads (Fig. 10), pick and place (Fig. 11, 12), finger and thumb (Fig. 13)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from ..core import figures
+from ..core.recording import Recording
+from ..core.scenario import Scenario
+from ..core.solve import run
+from ..sample_blends import grasps, gripper, hand, pick_and_place
+from . import bench
+from .chapter import Chapter, Picture, Row, below, compare
+
+LOOK = figures.Look(colour_map="PAPER", width="single")
+"""White is no force, black the largest, as in the paper."""
+HOLD, LAST = 60.0, 10.0
+"""Seconds that an object is held, and how many of them at the end it must not move in."""
+STILL = 1e-6  # m
+HEAVY_KIND, LIGHT, HEAVY = "box", 0.16, 0.40  # kg: the box, and masses around the one that friction can just hold
+FALLEN = 5e-3
+"""Metres of descent from which on a box is said to slip; what is held sinks by half a millimetre while the bristles bend."""
+
+
+def four_objects(folder: Path, progress: Callable) -> Chapter:
+    """Fig. 10: what two pads feel of a sphere, a box, a cylinder and a spray bottle, and whether they hold them."""
+    chapter = Chapter(
+        "Four objects between two fingers",
+        "Fig. 10, section 5.2.1",
+        "Two coupled fingers of a parallel gripper close on an object that stands on a table, until the left one feels 3 N; "
+        "the table sinks away and the object is held for a minute. For each object: the grasp, the tactile images of both "
+        "fingers (white 0, black the largest force), and the normal force of each texel of the right finger.",
+    )
+    for kind in grasps.OBJECTS:
+        _one_object(chapter, kind, folder, progress)
+    return chapter
+
+
+def _one_object(chapter: Chapter, kind: str, folder: Path, progress: Callable) -> None:
+    name = grasps.OBJECTS[kind].name
+    scene = bench.fresh(partial(grasps.build, kind=kind))
+    scenario = bench.scenario_of(scene)
+    texels = {sensor.name: sensor.texels for sensor in scenario.sensors if sensor.readout}
+    recording = bench.bake(scene, folder / f"bake-grasp-{kind}")
+    last = int(recording.frames[-1])
+    numbers = folder / f"fig10-{kind}-numbers"
+    _twice(numbers, lambda path: figures.texel_numbers(path, recording, texels, gripper.RIGHT, last, LOOK))
+    chapter.pictures += [
+        Picture(bench.picture(scene, folder / f"fig10-{kind}.png", last), f"{name}: the grasp."),
+        _strip(folder / f"fig10-{kind}-images", recording, texels, [last], f"{name}: both pads."),
+        Picture(numbers.with_suffix(".png"), f"{name}: each texel of the right finger."),
+    ]
+    progress()
+    chapter.rows += _held(scenario, name, gripper.LEFT, grasps.FORCE)
+    progress()
+
+
+def _held(scenario: Scenario, name: str, controlled: str, force: float, seconds: float = HOLD) -> list[Row]:
+    """Rows of a long hold: the controlled sum, and how far the object moved in the last ten seconds."""
+    held = run(replace(scenario, frame_end=scenario.frame_start + round(seconds * scenario.fps)))
+    path = bench.place_of(held, name)
+    last = held.times >= held.times[-1] - LAST
+    drift = float(np.linalg.norm(path[last] - path[last][0], axis=1).max())
+    total = float(held.sensors[controlled].normal_force[-1].sum())
+    return [
+        compare(
+            f"{name.lower()}: sum of the {controlled.lower()}", "—", force, total, 1e-6, "N", "what the controller was told"
+        ),
+        below(f"{name.lower()}: moved in the last 10 s of {seconds:g} s", "—", drift, STILL, "m", "no sleeping, no freezing"),
+    ]
+
+
+def too_heavy(folder: Path, progress: Callable) -> Chapter:
+    """How much two pads hold, by bisection, against Coulomb's limit."""
+    chapter = Chapter(
+        "What is too heavy slips",
+        "section 5.2.1, with Eq. 11",
+        "The box again, in masses between which a bisection looks for the one that just slips out of the fingers. Coulomb: two "
+        "pads with 3 N each hold 2 · mus · 3 N.",
+    )
+    scene = bench.fresh(partial(grasps.build, kind=HEAVY_KIND))
+    scenario = _slowly(bench.scenario_of(scene))
+    name, low, high = grasps.OBJECTS[HEAVY_KIND].name, LIGHT, HEAVY
+    mus = scenario.sensors[0].parameters.mus
+    expected = 2 * mus * grasps.FORCE / float(np.linalg.norm(scenario.gravity))
+    for mass, slips in ((low, False), (high, True)):
+        found = _slips(scenario, name, mass)
+        chapter.rows.append(
+            Row(f"{mass:g} kg", "—", "slips" if slips else "held", "slips" if found else "held", found == slips)
+        )
+    progress()
+    while high - low > 1e-3 * expected:
+        middle = 0.5 * (low + high)
+        low, high = (low, middle) if _slips(scenario, name, middle) else (middle, high)
+    limit = 0.5 * (low + high)
+    note = "1 % of 2 · mus · N / g"
+    chapter.rows.append(compare("mass that just slips", "—", expected, limit, 0.01 * expected, "kg", note))
+    progress()
+    return chapter
+
+
+def _slowly(scenario: Scenario, times: float = 3.0) -> Scenario:
+    """The same grasp with the table sinking several times as slowly, so that nothing but the weight pulls."""
+    bodies = tuple(
+        replace(body, motion=replace(body.motion, times=times * body.motion.times)) if not body.free else body
+        for body in scenario.bodies
+    )
+    frames = round(times * (scenario.frame_end - scenario.frame_start) + 4.0 * scenario.fps)
+    return replace(scenario, bodies=bodies, frame_end=scenario.frame_start + frames)
+
+
+def _slips(scenario: Scenario, name: str, mass: float) -> bool:
+    recording = run(bench.with_mass(scenario, name, mass))
+    path = bench.place_of(recording, name)
+    return bool(path[0, 2] - path[-1, 2] > FALLEN)
+
+
+def work_cycle(folder: Path, progress: Callable) -> Chapter:
+    """Fig. 11 and 12: approach, grasp, lift, move down, release."""
+    chapter = Chapter(
+        "Pick and place",
+        "Fig. 11 and 12, section 5.2.2",
+        "The arm is keyframed; the fingers close at constant speed until they touch, then control the tactile sum "
+        "(3 N). The controller knows the array's size, its values and their sum, and nothing of the simulation. The cube "
+        "covers 30 % of each pad. The paper's simulated pads show equal values; so must ours.",
+    )
+    scene = bench.fresh(pick_and_place.build)
+    scenario = bench.scenario_of(scene)
+    texels = {sensor.name: sensor.texels for sensor in scenario.sensors if sensor.readout}
+    recording = bench.bake(scene, folder / "bake-pick-and-place")
+    progress()
+    for stage, frame in pick_and_place.STAGES.items():
+        path = folder / f"fig12-{stage.replace(' ', '-')}.png"
+        chapter.pictures.append(Picture(bench.picture(scene, path, frame, (480, 480)), stage.capitalize() + "."))
+        progress()
+    frames = list(pick_and_place.STAGES.values())
+    chapter.pictures.append(_strip(folder / "fig12-images", recording, texels, frames, "Both pads at each stage."))
+    parameters = {sensor.name: sensor.parameters for sensor in scenario.sensors if sensor.readout}
+    _twice(folder / "fig12-forces", lambda path: figures.time_curves(path, recording, texels, parameters, ("force",), LOOK))
+    chapter.pictures.append(Picture(folder / "fig12-forces.png", "Forces over the work cycle."))
+    chapter.rows += _cycle_rows(recording)
+    progress()
+    return chapter
+
+
+def _cycle_rows(recording: Recording) -> list[Row]:
+    lifted = int(np.searchsorted(recording.frames, pick_and_place.STAGES["lift"]))
+    left, right = (recording.sensors[name].normal_force[lifted] for name in (gripper.LEFT, gripper.RIGHT))
+    path = bench.place_of(recording, pick_and_place.CUBE)
+    loaded = left[left > 0]
+    lit, uneven = len(loaded), float(np.ptp(loaded) / loaded.mean())
+    raised, beside = float(path[lifted, 2] - path[0, 2]) * 1e3, float(np.linalg.norm(path[-1, :2] - path[0, :2]))
+    released = float(recording.sensors[gripper.LEFT].normal_force[-1].sum())
+    force, height = pick_and_place.FORCE, pick_and_place.LIFT
+    why_lit = "4 of 14 rows have their middle on the cube"
+    why_uneven = "the cube hangs below the grip, which presses its lower edge a little more"
+    return [
+        Row("texels covered", "30 % of the area", "24 of 84", f"{lit} of {len(left)}", lit == 24, why_lit),
+        compare("tactile sum while lifted", "—", force, float(left.sum()), 1e-3, "N", "the arm has just come to rest"),
+        compare("right sum like the left", "similar", float(left.sum()), float(right.sum()), 1e-3, "N", "mirror images"),
+        Row("spread of the loaded texels", "none visible", "small", f"{100 * uneven:.2g} %", uneven < 0.5, why_uneven),
+        compare("lifted by", "—", height, raised, 2.0, "mm", "the bristles give"),
+        below("set down beside where it was", "where it was", beside, 1e-4, "m"),
+        Row("sum after the release", "0", "0 N", f"{released:.3g} N", released == 0.0),
+    ]
+
+
+def finger_and_thumb(folder: Path, progress: Callable) -> Chapter:
+    """Fig. 13: the meshes of two fingers are the sensors."""
+    chapter = Chapter(
+        "Index finger and thumb",
+        "Fig. 13, section 5.3",
+        "The finger tips of a hand modelled by script are sensors as they are; between them they hold a cylinder.",
+    )
+    scene = bench.fresh(hand.build)
+    recording = bench.bake(scene, folder / "bake-hand")
+    scenario = bench.scenario_of(scene)
+    texels = {sensor.name: sensor.texels for sensor in scenario.sensors if sensor.readout}
+    chapter.pictures.append(Picture(bench.picture(scene, folder / "fig13-hand.png", scene.frame_end), "The grasp."))
+    last = [int(recording.frames[-1])]
+    chapter.pictures.append(_strip(folder / "fig13-images", recording, texels, last, "Both finger tips, laid flat."))
+    progress()
+    chapter.rows += _held(scenario, hand.CYLINDER, hand.INDEX, hand.FORCE)
+    progress()
+    return chapter
+
+
+def _strip(stem: Path, recording: Recording, texels, frames, caption: str) -> Picture:
+    _twice(stem, lambda path: figures.tactile_strip(path, recording, texels, frames, LOOK))
+    return Picture(stem.with_suffix(".png"), caption)
+
+
+def _twice(stem: Path, draw: Callable[[Path], None]) -> None:
+    """Draw a figure as PDF and as PNG."""
+    for kind in (".pdf", ".png"):
+        draw(stem.with_suffix(kind))
