@@ -57,11 +57,11 @@ def _one_object(chapter: Chapter, kind: str, folder: Path, progress: Callable) -
         Picture(numbers.with_suffix(".png"), f"{name}: each texel of the right finger."),
     ]
     progress()
-    chapter.rows += _held(scenario, name, gripper.LEFT, grasps.FORCE)
+    chapter.rows += held_rows(scenario, name, gripper.LEFT, grasps.FORCE)
     progress()
 
 
-def _held(scenario: Scenario, name: str, controlled: str, force: float, seconds: float = HOLD) -> list[Row]:
+def held_rows(scenario: Scenario, name: str, controlled: str, force: float, seconds: float = HOLD) -> list[Row]:
     """Rows of a long hold: the controlled sum, and how far the object moved in the last ten seconds."""
     held = run(replace(scenario, frame_end=scenario.frame_start + round(seconds * scenario.fps)))
     path = bench.place_of(held, name)
@@ -85,19 +85,18 @@ def too_heavy(folder: Path, progress: Callable) -> Chapter:
         "pads with 3 N each hold 2 · mus · 3 N.",
     )
     scene = bench.fresh(partial(grasps.build, kind=HEAVY_KIND))
-    scenario = _slowly(bench.scenario_of(scene))
+    scenario = slowly(bench.scenario_of(scene))
     name, low, high = grasps.OBJECTS[HEAVY_KIND].name, LIGHT, HEAVY
-    mus = scenario.sensors[0].parameters.mus
-    expected = 2 * mus * grasps.FORCE / float(np.linalg.norm(scenario.gravity))
+    expected = coulomb_limit(scenario)
     for mass, slips in ((low, False), (high, True)):
-        found = _slips(scenario, name, mass)
+        found = slips(scenario, name, mass)
         chapter.rows.append(
             Row(f"{mass:g} kg", "—", "slips" if slips else "held", "slips" if found else "held", found == slips)
         )
     progress()
     while high - low > 1e-3 * expected:
         middle = 0.5 * (low + high)
-        low, high = (low, middle) if _slips(scenario, name, middle) else (middle, high)
+        low, high = (low, middle) if slips(scenario, name, middle) else (middle, high)
     limit = 0.5 * (low + high)
     note = "1 % of 2 · mus · N / g"
     chapter.rows.append(compare("mass that just slips", "—", expected, limit, 0.01 * expected, "kg", note))
@@ -105,7 +104,13 @@ def too_heavy(folder: Path, progress: Callable) -> Chapter:
     return chapter
 
 
-def _slowly(scenario: Scenario, times: float = 3.0) -> Scenario:
+def coulomb_limit(scenario: Scenario) -> float:
+    """Mass, kg, that two pads with the grasp's force can just hold."""
+    mus = scenario.sensors[0].parameters.mus
+    return 2 * mus * grasps.FORCE / float(np.linalg.norm(scenario.gravity))
+
+
+def slowly(scenario: Scenario, times: float = 3.0) -> Scenario:
     """The same grasp with the table sinking several times as slowly, so that nothing but the weight pulls."""
     bodies = tuple(
         replace(body, motion=replace(body.motion, times=times * body.motion.times)) if not body.free else body
@@ -115,7 +120,8 @@ def _slowly(scenario: Scenario, times: float = 3.0) -> Scenario:
     return replace(scenario, bodies=bodies, frame_end=scenario.frame_start + frames)
 
 
-def _slips(scenario: Scenario, name: str, mass: float) -> bool:
+def slips(scenario: Scenario, name: str, mass: float) -> bool:
+    """Whether the object of a mass slides out of the fingers."""
     recording = run(bench.with_mass(scenario, name, mass))
     path = bench.place_of(recording, name)
     return bool(path[0, 2] - path[-1, 2] > FALLEN)
@@ -144,12 +150,12 @@ def work_cycle(folder: Path, progress: Callable) -> Chapter:
     parameters = {sensor.name: sensor.parameters for sensor in scenario.sensors if sensor.readout}
     _twice(folder / "fig12-forces", lambda path: figures.time_curves(path, recording, texels, parameters, ("force",), LOOK))
     chapter.pictures.append(Picture(folder / "fig12-forces.png", "Forces over the work cycle."))
-    chapter.rows += _cycle_rows(recording)
+    chapter.rows += cycle_rows(recording)
     progress()
     return chapter
 
 
-def _cycle_rows(recording: Recording) -> list[Row]:
+def cycle_rows(recording: Recording) -> list[Row]:
     lifted = int(np.searchsorted(recording.frames, pick_and_place.STAGES["lift"]))
     left, right = (recording.sensors[name].normal_force[lifted] for name in (gripper.LEFT, gripper.RIGHT))
     path = bench.place_of(recording, pick_and_place.CUBE)
@@ -186,7 +192,7 @@ def finger_and_thumb(folder: Path, progress: Callable) -> Chapter:
     last = [int(recording.frames[-1])]
     chapter.pictures.append(_strip(folder / "fig13-images", recording, texels, last, "Both finger tips, laid flat."))
     progress()
-    chapter.rows += _held(scenario, hand.CYLINDER, hand.INDEX, hand.FORCE)
+    chapter.rows += held_rows(scenario, hand.CYLINDER, hand.INDEX, hand.FORCE)
     progress()
     return chapter
 

@@ -16,7 +16,8 @@ from palpate.paper import bench, grasping, page, weighing
 from palpate.paper.chapter import Chapter, Picture, Row, below, compare
 from palpate.sample_blends import grasps, gripper, hand, pick_and_place, tilt
 
-SECONDS = 30.0
+SECONDS = 16.0
+"""Of a hold: six to settle and the ten in which nothing may move; palpate paper holds for sixty."""
 
 
 def test_the_page_holds_every_row_and_picture(tmp_path):
@@ -76,29 +77,32 @@ def test_the_slope_holds():
     assert np.abs(path - path[0]).max() < 1e-10
 
 
-@pytest.mark.parametrize("kind", grasps.OBJECTS)
+@pytest.mark.parametrize("kind", ["sphere", "bottle"])
 def test_each_object_is_held(kind):
-    """Controlled sum within 1e-6 N, and not a micrometre in the last ten seconds of thirty (of sixty in palpate paper)."""
+    """Controlled sum within 1e-6 N, and not a micrometre in the last ten seconds."""
     scene = bench.fresh(partial(grasps.build, kind=kind))
-    rows = grasping._held(bench.scenario_of(scene), grasps.OBJECTS[kind].name, gripper.LEFT, grasps.FORCE, SECONDS)
+    rows = grasping.held_rows(bench.scenario_of(scene), grasps.OBJECTS[kind].name, gripper.LEFT, grasps.FORCE, SECONDS)
     assert all(row.kept for row in rows), rows
 
 
-def test_a_heavy_box_slips_at_coulombs_limit(tmp_path):
-    chapter = grasping.too_heavy(tmp_path, lambda: None)
-    assert chapter.kept, chapter.rows
+def test_a_heavy_box_slips_at_coulombs_limit():
+    """Held one per cent below 2 · mus · N, let go one per cent above it; palpate paper finds the limit by bisection."""
+    scenario = grasping.slowly(bench.scenario_of(bench.fresh(partial(grasps.build, kind="box"))))
+    limit = grasping.coulomb_limit(scenario)
+    assert not grasping.slips(scenario, "Box", 0.99 * limit)
+    assert grasping.slips(scenario, "Box", 1.01 * limit)
 
 
 def test_pick_and_place_sets_the_cube_down_where_it_was():
     scene = bench.fresh(pick_and_place.build)
     recording = run(bench.scenario_of(scene))
-    rows = grasping._cycle_rows(recording)
+    rows = grasping.cycle_rows(recording)
     assert all(row.kept for row in rows), rows
 
 
 def test_finger_and_thumb_hold():
     scene = bench.fresh(hand.build)
-    rows = grasping._held(bench.scenario_of(scene), hand.CYLINDER, hand.INDEX, hand.FORCE, SECONDS)
+    rows = grasping.held_rows(bench.scenario_of(scene), hand.CYLINDER, hand.INDEX, hand.FORCE, SECONDS)
     assert all(row.kept for row in rows), rows
 
 
