@@ -21,6 +21,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from .effects.laws import Program
 from .jit import inlined, kernel
 from .scenario import HUNT_CROSSLEY, SensorParameters
 
@@ -36,8 +37,8 @@ DEPTH = LANES * 9  # m
 KEEP, GAIN = LANES * 10, LANES * 11  # z(t + dt) = KEEP z + GAIN v
 LIMIT = LANES * 12  # largest |z|, m
 PUSH, SLOPE = LANES * 13, LANES * 14  # tangent of the normal law where it is not the same for all contacts: N, N·s/m
-GRIP = LANES * 15  # painted multiplier of friction, written like these
-ROW = LANES * 16
+GRIP, DRAG = LANES * 15, LANES * 16  # multiplier of friction, and what is added to ct (N·s/m), written like these
+ROW = LANES * 17
 
 # Columns of a parameter row, one per sensor or pad.
 K, CN, CT, SIGMA0, SIGMA1, X0, MUS, MUD, EXPONENT, DISSIPATION = range(10)
@@ -135,6 +136,10 @@ class World(NamedTuple):
         The unknown of each drive.
     drives : (d, 4) float
         See :mod:`.servo`.
+    program : Program
+        The sensors' effects on forces.
+    share, part : (q,) float
+        Of a texel's force that one of its contact points moves the bodies with; of the depth that is the sensor's own.
     """
 
     points: np.ndarray
@@ -165,6 +170,9 @@ class World(NamedTuple):
     drive_of: np.ndarray
     drive_at: np.ndarray
     drives: np.ndarray
+    program: Program
+    share: np.ndarray
+    part: np.ndarray
 
 
 class State(NamedTuple):
@@ -183,6 +191,8 @@ class State(NamedTuple):
         Bristle deflection (m) in the frame of the sensor's body, and the share of the reach that is pressed in.
     drives : (d, 3) float
         Way along the axis (m), speed (m/s) and force (N) of each drive.
+    memory : (N, columns) float
+        What effects remember, by contact point.
     """
 
     position: np.ndarray
@@ -191,6 +201,7 @@ class State(NamedTuple):
     hint: np.ndarray
     bristles: np.ndarray
     drives: np.ndarray
+    memory: np.ndarray
 
 
 SERIES = tuple(1.0 / math.factorial(n + 1) for n in range(13, -1, -1))
@@ -325,11 +336,12 @@ def friction_trace(time, velocity, normal_force, parameters, force):
 
 
 @inlined
-def linearise(nx, ny, nz, zx, zy, zz, push, stiff_n, grip, vx, vy, vz, dt, parameters):
+def linearise(nx, ny, nz, zx, zy, zz, push, stiff_n, grip, drag, sticks, vx, vy, vz, dt, parameters):
     """How a contact's force depends on the relative velocity at the step's end, near velocity `v`.
 
     The force on the target is ``-(push + stiff_n ḋ) n - (bias z + stiff_t v_t)``; `v` is the target's velocity relative to the
-    sensor, metres per second. All is zero where the contact separates within the step: no force at all.
+    sensor, metres per second. All is zero where the contact separates within the step: no force at all. Where it `sticks` the
+    normal force may pull; friction is zero then.
 
     Parameters
     ----------
@@ -338,7 +350,10 @@ def linearise(nx, ny, nz, zx, zy, zz, push, stiff_n, grip, vx, vy, vz, dt, param
     push, stiff_n : float, N and N·s/m
         The normal law at the step's end (see :func:`normal_tangent`).
     grip : float
-        Painted multiplier of the friction coefficients.
+        Multiplier of the friction coefficients.
+    drag : float, N·s/m
+        Added to `ct`.
+    sticks : bool
     vx … vz : float, m/s
 
     Returns
@@ -365,9 +380,10 @@ def linearise(nx, ny, nz, zx, zy, zz, push, stiff_n, grip, vx, vy, vz, dt, param
     scale = limit / math.sqrt(square) if square > limit * limit else 1.0
     keep, gain = scale * keep, scale * gain
     bias = parameters[SIGMA0] * keep + parameters[SIGMA1] / dt * (keep - held)
-    stiff_t = (parameters[SIGMA0] + parameters[SIGMA1] / dt) * gain + parameters[CT]
+    stiff_t = (parameters[SIGMA0] + parameters[SIGMA1] / dt) * gain + parameters[CT] + drag
     on = force > 0.0
+    acts = on or sticks
     return (
-        limit, push if on else 0.0, stiff_n if on else 0.0, bias if on else 0.0, stiff_t if on else 0.0,
+        limit, push if acts else 0.0, stiff_n if acts else 0.0, bias if on else 0.0, stiff_t if on else 0.0,
         keep if on else 0.0, gain if on else 0.0,
     )  # fmt: skip

@@ -65,3 +65,46 @@ def _compiled(function: Callable[..., Any], **options: bool) -> Callable[..., An
     function.__qualname__ += f"_{EDITION}"  # part of the name under which numba keeps the result
     compiled: Callable[..., Any] = numba.njit(cache=True, fastmath=False, error_model="numpy", nogil=True, **options)(function)
     return compiled
+
+
+# --- functions that compiled code finds by an address, so that it need not be compiled anew for each
+
+if COMPILED:
+    from llvmlite import ir
+    from numba import carray, types
+    from numba.extending import intrinsic
+
+    _POINTERS, _NUMBERS = (0, 2, 4, 7), 20
+    """Which of the numbers that such a function takes are addresses of arrays, and how many there are."""
+
+    def compiled_callback(function: Callable[..., Any]) -> Any:
+        """Compile `function` for calls by its `address`: twenty whole numbers, of which some are pointers to arrays."""
+        function.__qualname__ += f"_{EDITION}"
+        kinds = {0: types.float64, 2: types.int64, 4: types.float64, 7: types.float64}
+        arguments = [types.CPointer(kinds[i]) if i in kinds else types.int64 for i in range(_NUMBERS)]
+        return numba.cfunc(types.void(*arguments), cache=True, error_model="numpy")(function)
+
+    @intrinsic
+    def call_address(_context, address, *numbers):  # type: ignore[no-untyped-def]
+        """Call what :func:`compiled_callback` made, from a kernel."""
+        signature = types.void(types.int64, types.StarArgTuple.from_types([types.int64] * _NUMBERS))
+
+        def codegen(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
+            given = [builder.extract_value(arguments[1], i) for i in range(_NUMBERS)]
+            kinds = [ir.IntType(64)] * _NUMBERS
+            for i in _POINTERS:
+                kinds[i] = (ir.IntType(64) if i == 2 else ir.DoubleType()).as_pointer()
+                given[i] = builder.inttoptr(given[i], kinds[i])
+            kind = ir.FunctionType(ir.VoidType(), kinds)
+            builder.call(builder.inttoptr(arguments[0], kind.as_pointer()), given)
+            return context.get_dummy_value()
+
+        return signature, codegen
+
+else:
+
+    def compiled_callback(function: Callable[..., Any]) -> Any:
+        """Only compiled code has addresses."""
+        raise NotImplementedError
+
+    carray = call_address = compiled_callback

@@ -19,7 +19,7 @@ class SensorFrame:
     Attributes
     ----------
     normal_force : (n,) float, N
-        Magnitude of the force along the object's surface normal (paper, Eq. 8), never negative.
+        Of the force along the object's surface normal (paper, Eq. 8); below zero only where the effect adhesion pulls.
     shear : (n, 2) float, N
         Friction force along the texel's x and y axes (Eq. 13).
     depth : (n,) float, m

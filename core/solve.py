@@ -19,6 +19,7 @@ from .bvh import NEAR, Tree, build_tree
 from .contact import State, World, parameter_row
 from .crew import board_for, helpers
 from .drive import drive
+from .effects.laws import compile_program
 from .gather import Neighbours, count_sunk
 from .mesh import is_closed
 from .motions import poses_at
@@ -88,7 +89,7 @@ class Simulation:
         self._closed = [is_closed(mesh.triangles) for mesh in meshes]
         self._sunk = 0  # most texels at once that the substeps of the last frame found past their reach
         points = [contact_points(s.texels, s.parameters.points_per_texel) for s in scenario.sensors]
-        self._world = _world(scenario, self._center, points)
+        self._world = _world(scenario, self._center, points, self.dt)
         self._surfaces = Surfaces(scenario, self._center, points, self._tree, self._world)
         self._shapes = self._surfaces.at(np.zeros(1))
         self._state = _start(scenario, self._world, self._center)
@@ -275,7 +276,7 @@ class Simulation:
         )
 
 
-def _world(scenario: Scenario, center: np.ndarray, points: list[ContactPoints]) -> World:
+def _world(scenario: Scenario, center: np.ndarray, points: list[ContactPoints], dt: float) -> World:
     """Flatten a scenario into the kernels' arrays; `center` (b, 3) is the reference point of each body in its frame."""
     bodies, sensors, targets = scenario.bodies, scenario.sensors, scenario.targets
     blocks = [point_rows(s.mounted, p, center[s.body]) for s, p in zip(sensors, points, strict=True)]
@@ -329,6 +330,11 @@ def _world(scenario: Scenario, center: np.ndarray, points: list[ContactPoints]) 
         drive_of=drive_of,
         drive_at=drive_at,
         drives=drives,
+        program=compile_program([sensor.effects for sensor in sensors], [dt, 0.0]),  # STEP and NOW of core/pads.py
+        share=np.array(
+            [weight / sensors[i].parameters.points_per_texel for (i, _), (_, weight) in zip(pairs, couplings, strict=True)]
+        ),
+        part=np.array([part for part, _ in couplings]),
     )
 
 
@@ -398,6 +404,7 @@ def _start(scenario: Scenario, world: World, center: np.ndarray) -> State:
         hint=np.full(slots, -1),
         bristles=np.zeros((slots, 4)),
         drives=np.zeros((len(world.drives), 3)),
+        memory=world.program.memory(len(world.points)),
     )
 
 

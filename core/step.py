@@ -29,6 +29,7 @@ from .bodies import (
 from .contact import (
     CN,
     DEPTH,
+    DRAG,
     EXPONENT,
     GAIN,
     GRIP,
@@ -59,8 +60,21 @@ from .contact import (
     normal_tangent,
 )
 from .crew import LATE, SPINS, announce, hand_in, is_over, is_stopped, linger, take
+from .effects.laws import COLUMNS
 from .gather import gather
 from .jit import inlined, kernel
+from .pads import (
+    NOW,
+    STEP,
+    force_and_law,
+    has_effects,
+    let_effects_act,
+    may_pull,
+    note_pressed,
+    press_texel,
+    remember,
+    write_tangent,
+)
 from .servo import SPEED, add_servos, carry_driven, move_drives, place_driven
 from .shapes import Shapes, refit, set_moment
 from .skin import OX, OY, OZ, turn_rows
@@ -118,6 +132,12 @@ class Scratch(NamedTuple):
         Direction of each drive in the world at the step's end.
     carried : (b, 6) float
         Velocity of a driven body without the speed of its drive.
+    felt : (blocks, COLUMNS · LANES) float
+        What effects make of each contact (:mod:`.effects.laws`); without rows when none acts on forces.
+    pressed : (1, COLUMNS · N) float
+        What presses on each contact point at the step's end, the same way.
+    every : (N,) int
+        Numbers of the contact points.
     drive_mass, drive_load : (d,) float
         What each drive moves (kg), and the impulse that its weight and its carrier ask for in this step (N·s).
     step : (1,) float, seconds
@@ -153,6 +173,9 @@ class Scratch(NamedTuple):
     tumbling: np.ndarray
     axis: np.ndarray
     carried: np.ndarray
+    felt: np.ndarray
+    pressed: np.ndarray
+    every: np.ndarray
     drive_mass: np.ndarray
     drive_load: np.ndarray
     step: np.ndarray
@@ -197,6 +220,9 @@ def scratch_for(world: World, state: State, shapes: Shapes, board: np.ndarray) -
         tumbling=np.zeros((b, 3)),
         axis=np.zeros((b, 3)),
         carried=np.zeros((b, 6)),
+        felt=np.zeros((0 if world.program.is_empty else blocks[-1], COLUMNS * LANES)),
+        pressed=np.zeros((1, 0 if world.program.is_empty else COLUMNS * len(world.points))),
+        every=np.arange(len(world.points)),
         drive_mass=np.zeros(len(world.drives)),
         drive_load=np.zeros(len(world.drives)),
         step=np.zeros(1),
@@ -457,12 +483,13 @@ def _write_twists(dt, world, state, scratch):
 
 
 @kernel
-def _write_tangents(pair, first_point, dt, motion, law, painted, scratch):
+def _write_tangents(pair, first_point, dt, motion, law, world, memory, scratch):
     """Write what is not the same for all contacts of a pair, for the loop that must not call it itself.
 
-    The tangents of a curved normal law at the velocities of `motion`, and what was painted.
+    The tangents of a curved normal law at the velocities of `motion`, what effects make of them, and what was painted.
     """
-    rows = scratch.rows
+    rows, painted, sensor = scratch.rows, world.painted, world.pairs[pair, 0]
+    effects = has_effects(sensor, world.program)
     for r in range(scratch.contacts[pair]):
         b, lane = scratch.first_block[pair] + r // LANES, r % LANES
         point = first_point + scratch.slots[b, lane]
@@ -471,8 +498,20 @@ def _write_tangents(pair, first_point, dt, motion, law, painted, scratch):
             vx, vy, vz = vx + scratch.own[b, OX + lane], vy + scratch.own[b, OY + lane], vz + scratch.own[b, OZ + lane]
         rate = vx * rows[b, NX + lane] + vy * rows[b, NY + lane] + vz * rows[b, NZ + lane]
         p = _painted_law(law, painted, point)
-        rows[b, PUSH + lane], rows[b, SLOPE + lane] = normal_tangent(rows[b, DEPTH + lane], rate, dt, p)
-        rows[b, GRIP + lane] = painted[point, 1] if len(painted) > 0 else 1.0
+        rows[b, GRIP + lane], rows[b, DRAG + lane] = painted[point, 1] if len(painted) > 0 else 1.0, 0.0
+        if effects:
+            speed = math.sqrt(max(vx * vx + vy * vy + vz * vz - rate * rate, 0.0))
+            press_texel(scratch.felt, b, LANES, lane, pair, rows[b, DEPTH + lane] + dt * rate, rate, 0.0, speed, p, world)
+        else:
+            rows[b, PUSH + lane], rows[b, SLOPE + lane] = normal_tangent(rows[b, DEPTH + lane], rate, dt, p)
+    if effects:
+        first, left = scratch.first_block[pair], scratch.contacts[pair]
+        for b in range(first, first + (left + LANES - 1) // LANES):
+            count = min(left, LANES)
+            let_effects_act(sensor, STEP, b, 0, count, first_point, law, world, memory, scratch.slots, scratch.felt)
+            for lane in range(count):
+                write_tangent(pair, b, lane, dt, rows[b, GRIP + lane], world, scratch.felt, rows)
+            left -= LANES
 
 
 @kernel
@@ -482,11 +521,42 @@ def _sum_pair(pair, dt, world, state, scratch):
     _relative_motion(a, b, scratch.twist, state.position, scratch.rotation, scratch.motion[pair])
     _relative_motion(a, b, scratch.known, state.position, scratch.rotation, scratch.part[pair])
     first = world.point_first[pair] - world.slot_start[pair]
-    _sum_contacts(pair, first, dt, _law(world.parameters, pair), world.painted, scratch)
+    _sum_contacts(pair, first, dt, _law(world.parameters, pair), world, state.memory, scratch)
 
 
 @kernel
-def _sum_contacts(pair, first_point, dt, p, painted, scratch):
+def _remember(dt, world, state, scratch):
+    """Let the effects remember what happened in the step, at the velocities of its end."""
+    for pair in range(len(world.pairs)):
+        sensor = world.pairs[pair, 0]
+        if scratch.contacts[pair] > 0 and has_effects(sensor, world.program):
+            a, b = world.sensor_body[sensor], world.target_body[world.pairs[pair, 1]]
+            _relative_motion(a, b, scratch.twist, state.position, scratch.rotation, scratch.motion[pair])
+            _note_pair(pair, dt, _values(scratch.motion[pair]), _law(world.parameters, pair), world, scratch)
+    for pair in range(len(world.pairs)):
+        sensor = world.pairs[pair, 0]
+        if (pair == 0 or world.pairs[pair - 1, 0] != sensor) and has_effects(sensor, world.program):
+            remember(sensor, _law(world.parameters, pair), world, scratch.pressed, scratch.every, state.memory)
+
+
+@kernel
+def _note_pair(pair, dt, motion, law, world, scratch):
+    """Keep what presses on the points of a pair's sensor."""
+    rows = scratch.rows
+    for r in range(scratch.contacts[pair]):
+        b, lane = scratch.first_block[pair] + r // LANES, r % LANES
+        point = world.point_first[pair] + scratch.slots[b, lane] - world.slot_start[pair]
+        vx, vy, vz = _velocity(rows[b, PX + lane], rows[b, PY + lane], rows[b, PZ + lane], motion)
+        if scratch.moving[pair]:
+            vx, vy, vz = vx + scratch.own[b, OX + lane], vy + scratch.own[b, OY + lane], vz + scratch.own[b, OZ + lane]
+        rate = vx * rows[b, NX + lane] + vy * rows[b, NY + lane] + vz * rows[b, NZ + lane]
+        slide = dt * math.sqrt(max(vx * vx + vy * vy + vz * vz - rate * rate, 0.0))
+        p, end = _painted_law(law, world.painted, point), rows[b, DEPTH + lane] + dt * rate
+        note_pressed(point, pair, end, rate, slide, p, world, scratch.pressed)
+
+
+@kernel
+def _sum_contacts(pair, first_point, dt, p, world, memory, scratch):
     """Linearise the contacts of a pair, and sum their forces on the target and what they resist.
 
     The contact point of a row is `first_point` plus its slot.
@@ -499,9 +569,11 @@ def _sum_contacts(pair, first_point, dt, p, painted, scratch):
     for i in range(SUMS * LANES):
         sums[i] = 0.0
     own, moving = scratch.own, scratch.moving[pair]
-    vary = p[EXPONENT] != LINEAR or len(painted) > 0
+    sensor = world.pairs[pair, 0]
+    vary = p[EXPONENT] != LINEAR or len(world.painted) > 0 or has_effects(sensor, world.program)
+    sticks = may_pull(sensor, world.program)
     if vary:
-        _write_tangents(pair, first_point, dt, motion, p, painted, scratch)
+        _write_tangents(pair, first_point, dt, motion, p, world, memory, scratch)
     first = scratch.first_block[pair]
     for b in range(first, first + (scratch.contacts[pair] + LANES - 1) // LANES):
         for lane in range(LANES):  # runs in vector registers: no branches, no calls
@@ -513,10 +585,13 @@ def _sum_contacts(pair, first_point, dt, p, painted, scratch):
             if moving:
                 vx, vy, vz = vx + own[b, OX + lane], vy + own[b, OY + lane], vz + own[b, OZ + lane]
                 ux, uy, uz = ux + own[b, OX + lane], uy + own[b, OY + lane], uz + own[b, OZ + lane]
-            push, slope, grip = p[K] * rows[b, DEPTH + lane], p[K] * dt + p[CN], 1.0
+            push, slope, grip, drag = p[K] * rows[b, DEPTH + lane], p[K] * dt + p[CN], 1.0, 0.0
             if vary:
                 push, slope, grip = rows[b, PUSH + lane], rows[b, SLOPE + lane], rows[b, GRIP + lane]
-            limit, push, stiff_n, bias, t, keep, gain = linearise(nx, ny, nz, zx, zy, zz, push, slope, grip, vx, vy, vz, dt, p)
+                drag = rows[b, DRAG + lane]
+            limit, push, stiff_n, bias, t, keep, gain = linearise(
+                nx, ny, nz, zx, zy, zz, push, slope, grip, drag, sticks, vx, vy, vz, dt, p
+            )
             rows[b, LIMIT + lane], rows[b, KEEP + lane], rows[b, GAIN + lane] = limit, keep, gain
             e = stiff_n - t
             push += e * (ux * nx + uy * ny + uz * nz)
@@ -745,6 +820,8 @@ def advance_steps(
             if world.kind[body] == FREE:
                 write_world_inertia(scratch.rotation[body], world.inertia[body], scratch.inertia[body])
         _solve_velocities(dt, commands[step], world, tree, neighbours, shapes, state, scratch)
+        if len(scratch.felt) > 0:
+            _remember(dt, world, state, scratch)
         _share_out(BEND, world, tree, neighbours, shapes, state, scratch)
         move_drives(dt, commands[step], world, state, scratch)
         for body in range(len(world.kind)):
@@ -794,6 +871,7 @@ def feel(world, state, scratch, force, shear, depth, slip, contact, net, moment)
     for pair in range(len(world.pairs)):
         sensor = world.pairs[pair, 0]
         a, b = world.sensor_body[sensor], world.target_body[world.pairs[pair, 1]]
+        effects = has_effects(sensor, world.program)
         law, whole = _law(world.parameters, pair), 1.0 / world.weight[pair]
         _relative_motion(a, b, scratch.twist, state.position, scratch.rotation, scratch.motion[pair])
         motion = _values(scratch.motion[pair])
@@ -812,6 +890,11 @@ def feel(world, state, scratch, force, shear, depth, slip, contact, net, moment)
             tx, ty, tz = vx - rate * nx, vy - rate * ny, vz - rate * nz
             square = tx * tx + ty * ty + tz * tz
             fn = normal_force(rows[block, DEPTH + lane], rate, p)
+            if effects:
+                felt, offset = scratch.felt, world.point_first[pair] - world.slot_start[pair]
+                press_texel(felt, block, LANES, lane, pair, rows[block, DEPTH + lane], rate, 0.0, math.sqrt(square), p, world)
+                let_effects_act(sensor, NOW, block, lane, 1, offset, p, world, state.memory, scratch.slots, felt)
+                fn, p = force_and_law(pair, block, lane, p, world, felt)
             zx, zy, zz = rows[block, ZX + lane], rows[block, ZY + lane], rows[block, ZZ + lane]
             length, limit = math.sqrt(zx * zx + zy * zy + zz * zz), bristle_limit(fn, p)
             held = limit / length if length > limit else 1.0

@@ -10,7 +10,20 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .base import Effect, Form, Site, Values
-from .laws import compile_program, friction_over_all, law_over_time
+from .laws import (
+    COLUMNS,
+    DAMPING,
+    FACTOR,
+    FORCE,
+    SLOPE,
+    SPEED,
+    VISCOUS,
+    apply_friction,
+    apply_laws,
+    compile_program,
+    law_over_time,
+    press,
+)
 from .library import complete_values, in_order
 from .mixing import Mixing
 
@@ -87,10 +100,56 @@ def friction(effects: Sequence[Effect], speed: np.ndarray, force: np.ndarray) ->
     effects : sequence of Effect
     speed, force : (...) float, m/s and N
     """
-    speed, force = (np.array(values, dtype=float) for values in np.broadcast_arrays(speed, force))
-    factor, viscous = np.ones(speed.size), np.zeros(speed.size)
-    friction_over_all(speed.ravel(), force.ravel(), compile_program([effects], np.zeros(1)), factor, viscous)
-    return factor.reshape(speed.shape), viscous.reshape(speed.shape)
+    speed, force = np.broadcast_arrays(np.asarray(speed, float), np.asarray(force, float))
+    program, n = compile_program([effects], 0.0), speed.size
+    work = np.zeros((COLUMNS, n))
+    work[SPEED], work[FORCE] = speed.ravel(), force.ravel()
+    apply_friction(0, work.reshape(1, -1), 0, n, 0, n, np.arange(n), program, program.memory(n))
+    return work[FACTOR].reshape(speed.shape), work[VISCOUS].reshape(speed.shape)
+
+
+class Pad:
+    """Normal forces sample by sample, as the solver asks for them: any number of guesses, then the step itself.
+
+    Parameters
+    ----------
+    effects : sequence of Effect
+        Those on readings are left out.
+    parameters : SensorParameters
+    dt : (m,) float, s
+        Lengths of step that will occur.
+    points : int
+    """
+
+    def __init__(self, effects: Sequence[Effect], parameters: SensorParameters, dt: ArrayLike, points: int):
+        self.parameters = parameters
+        self.program = compile_program([effects], dt)
+        self.memory = self.program.memory(points)
+        self._work = np.zeros((COLUMNS, points))
+        self._every = np.arange(points)
+
+    def step(
+        self, length: int, depth: np.ndarray, rate: np.ndarray, slide: np.ndarray | None = None, commit: bool = True
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return the forces at the step's end (N), and their derivatives by depth (N/m) and by rate (N·s/m), each (n,) float.
+
+        Parameters
+        ----------
+        length : int
+            Which of the lengths of step.
+        depth, rate, slide : (n,) float, m, m/s, m
+            At the step's end, during it, and in it.
+        commit : bool
+            The step is done; without it one only asks.
+        """
+        p, n = self.parameters, len(depth)
+        slide = np.zeros(n) if slide is None else slide
+        linear = p.normal_law == "linear"
+        work = self._work.reshape(1, -1)
+        for i in range(n):
+            press(work, 0, n, i, depth[i], rate[i], slide[i], 0.0, p.k, p.cn, 0.0 if linear else p.exponent, p.dissipation)
+        apply_laws(0, length, work, 0, n, 0, n, self._every, 0, 0, linear, self.program, self.memory, commit)
+        return self._work[FORCE].copy(), self._work[SLOPE].copy(), self._work[DAMPING].copy()
 
 
 def readings(effects: Iterable[Effect], site: Site, time: np.ndarray, force: np.ndarray) -> np.ndarray:

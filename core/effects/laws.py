@@ -2,9 +2,9 @@
 """Compiled: what the solver asks of a sensor's effects in every step, and the same over a whole signal (kernels).
 
 A texel is one spring with one past, whatever presses on it. Per contact point of a sensor there is one row of memory, zero at
-first. In each step the solver may ask :func:`texel_force` as often as it likes with ``commit=False``; at the step's end it
-calls it once with ``commit=True`` for *every* point of the sensor, with depth, rate and slide zero where nothing touches,
-because what was pressed recovers. Where several targets press on one point, the deepest is the one that is remembered.
+first. In each step the solver may ask :func:`apply_laws` as often as it likes with ``commit=False``; at the step's end it asks
+once with ``commit=True`` for *every* point of the sensor, with depth, rate and slide zero where nothing touches, because what
+was pressed recovers. Where several targets press on one point, the deepest is the one that is remembered.
 """
 
 from __future__ import annotations
@@ -17,43 +17,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..jit import kernel
+from ..jit import COMPILED, call_address, carray, compiled_callback, kernel
 from .base import Effect, Form
-from .library import complete_values, form_of, in_order, library
+from .library import complete_values, in_order
 
-
-def _forms(way: str) -> list[tuple[str, str]]:
-    """Names of all forms that act this way; a form's place in the list is its code in the compiled chain."""
-    return [(kind.name, form.name) for kind in library().values() for form in kind.forms if getattr(form, way) is not None]
-
-
-LAWS, FRICTIONS = _forms("law"), _forms("friction")
-
-
-# What these three names stand for differs from copy to copy of the functions that use them, see _link.
-CODE: int = -1
+# What this name stands for differs from copy to copy of the functions that use it, see _link.
 ONE: Any = None
-REST: Any = None
-
-
-def _ask_law(code, force, slope, depth, slide, numbers, row, memory, point, at, commit):
-    if code == CODE:
-        return ONE(force, slope, depth, slide, numbers, row, memory, point, at, commit)
-    return REST(code, force, slope, depth, slide, numbers, row, memory, point, at, commit)
-
-
-def _no_law(code, force, slope, depth, slide, numbers, row, memory, point, at, commit):
-    return force, slope
-
-
-def _ask_friction(code, speed, force, numbers, row):
-    if code == CODE:
-        return ONE(speed, force, numbers, row)
-    return REST(code, speed, force, numbers, row)
-
-
-def _no_friction(code, speed, force, numbers, row):
-    return 1.0, 0.0
 
 
 def _law_over_time(force, depth, slide, step, numbers, memory, result):
@@ -65,15 +34,36 @@ def _law_over_time(force, depth, slide, step, numbers, memory, result):
             )
 
 
-def _link(function: Any, name: str, **meaning: Any) -> Any:
-    """Return a copy of a function, compiled, in which global names mean what is given.
+def _law_over_points(work, force, slope, depth, slide, count, slots, slot, offset, numbers, row, memory, at, commit):
+    for i in range(count):
+        point = offset + slots[slot + i]
+        work[force + i], work[slope + i] = ONE(
+            work[force + i], work[slope + i], work[depth + i], work[slide + i], numbers, row, memory, point, at, commit
+        )
 
-    numba has no table of functions that it could also keep on disk; the copies have names of their own, so it keeps each.
-    """
+
+def _friction_over_points(work, speed, force, factor, viscous, count, slots, slot, offset, numbers, row, memory, at, commit):
+    for i in range(count):
+        more, thicker = ONE(work[speed + i], work[force + i], numbers, row)
+        work[factor + i] *= more
+        work[viscous + i] += thicker
+
+
+def _entry(
+    work, works, slots, slotted, numbers, rows, width, memory, points, columns, a, b, c, d, count, slot, offset, row, at, commit
+):
+    ONE(
+        carray(work, (works,)), a, b, c, d, count, carray(slots, (slotted,)), slot, offset,
+        carray(numbers, (rows, width)), row, carray(memory, (points, columns)), at, commit != 0,
+    )  # fmt: skip
+
+
+def _link(function: Any, name: str, wrap: Callable[[Any], Any] = kernel, **meaning: Any) -> Any:
+    """Return a copy of a function, compiled, in which global names mean what is given, under a name of its own in the cache."""
     copy = FunctionType(function.__code__, {**meaning, "__name__": __name__})
     copy.__qualname__ = f"{function.__name__}_{name}"
     copy.__module__ = __name__
-    return kernel(copy)
+    return wrap(copy)
 
 
 @cache
@@ -81,23 +71,53 @@ def _compiled(function: Callable[..., Any]) -> Any:
     return kernel(function)
 
 
-def _chain(functions: Sequence[Callable[..., Any] | None], ask: Any, end: Any) -> Any:
-    """Return a kernel that calls the function with the code it is given; the optimiser makes a jump table of the chain."""
-    rest = kernel(end)
-    for code, function in reversed(list(enumerate(functions))):
-        assert function is not None
-        rest = _link(ask, str(code), CODE=code, ONE=_compiled(function), REST=rest)
-    return rest
-
-
-law_of_code = _chain([form_of(*names).law for names in LAWS], _ask_law, _no_law)
-friction_of_code = _chain([form_of(*names).friction for names in FRICTIONS], _ask_friction, _no_friction)
+def _name(function: Callable[..., Any]) -> str:
+    return f"{function.__module__.rpartition('.')[2]}_{function.__name__}"
 
 
 @cache
 def _over_time(law: Callable[..., Any]) -> Any:
-    name = f"{law.__module__.rpartition('.')[2]}_{law.__name__}"
-    return _link(_law_over_time, name, ONE=_compiled(law))
+    return _link(_law_over_time, _name(law), ONE=_compiled(law))
+
+
+# --- laws by number, for kernels that are compiled once and for all: which laws a sensor has is only known when it runs
+
+_UNCOMPILED: list[Callable[..., Any]] = []
+_ENTRIES: dict[int, Any] = {}
+
+
+@cache
+def _number_of(form_way: Callable[..., Any], loop: Any) -> int:
+    """Number under which :func:`call_law` knows a law: the address of its machine code; without numba its place in a list."""
+    over_points = _link(loop, _name(form_way), ONE=_compiled(form_way))
+    if not COMPILED:
+        _UNCOMPILED.append(over_points)
+        return len(_UNCOMPILED) - 1
+    entry = _link(_entry, _name(form_way), compiled_callback, ONE=over_points, carray=carray)
+    _ENTRIES[entry.address] = entry  # has to stay alive
+    return int(entry.address)
+
+
+if COMPILED:
+
+    @kernel
+    def call_law(number, work, block, a, b, c, d, count, slots, slot, offset, numbers, row, memory, at, commit):
+        """Let a law act on `count` points; see :func:`apply_laws`."""
+        start = block * work.shape[1]
+        call_address(
+            number, work.ctypes.data, work.size, slots.ctypes.data, slots.size, numbers.ctypes.data, numbers.shape[0],
+            numbers.shape[1], memory.ctypes.data, memory.shape[0], memory.shape[1], start + a, start + b, start + c, start + d,
+            count, slot, offset, row, at, 1 if commit else 0,
+        )  # fmt: skip
+else:
+
+    def call_law(number, work, block, a, b, c, d, count, slots, slot, offset, numbers, row, memory, at, commit):
+        """Let a law act on `count` points; see :func:`apply_laws`."""
+        start = block * work.shape[1]
+        _UNCOMPILED[number](
+            work.reshape(-1), start + a, start + b, start + c, start + d, count, slots.reshape(-1), slot, offset,
+            numbers, row, memory, at, commit,
+        )  # fmt: skip
 
 
 def law_over_time(
@@ -142,7 +162,8 @@ class Program(NamedTuple):
     clip : (m,) int
         From this index on laws act after the force was cut off at zero.
     code, at, row : (laws,) int
-        Which law; the first column of its memory; its row of constants for the first length of step, others follow.
+        Which law, for :func:`call_law`; the first column of its memory; its row of constants for the first length of step,
+        others follow.
     friction_start : (m + 1,) int
     friction_code, friction_row : (friction laws,) int
     numbers : (rows, c) float
@@ -197,13 +218,14 @@ def compile_program(stacks: Sequence[Sequence[Effect]], dt: ArrayLike) -> Progra
                 continue
             first = sum(len(table) for table in tables)
             if form.law is not None:
-                code.append(LAWS.index((item.name, form.name)))
+                code.append(_number_of(form.law, _law_over_points))
                 at.append(column)
                 row.append(first)
                 column += form.memory
                 after += form.after_clip
             else:
-                friction_code.append(FRICTIONS.index((item.name, form.name)))
+                assert form.friction is not None
+                friction_code.append(_number_of(form.friction, _friction_over_points))
                 friction_row.append(first)
             tables.append(form.constants(complete_values(item), lengths))
         start.append(len(code))
@@ -230,107 +252,98 @@ def compile_program(stacks: Sequence[Sequence[Effect]], dt: ArrayLike) -> Progra
     )
 
 
+# What presses on points, in blocks with the points of each column side by side; the first five are given, the others found.
+DEPTH, RATE, SLIDE, SPEED, DAMPING, FORCE, SLOPE, FACTOR, VISCOUS = range(9)
+COLUMNS = 9
+
+
 @kernel
-def elastic_force(sensor, point, step, force, slope, depth, slide, program, memory, commit):
-    """Elastic force of a contact point under the effects that act before the cut-off at zero.
+def press(work, block, stride, i, depth, rate, slide, speed, k, cn, exponent, dissipation):
+    """Write what the base law makes of a point.
 
     Parameters
     ----------
-    sensor, point, step : int
-        Point counts rows of `memory`, step the lengths of step the program was compiled for.
-    force, slope : float, N and N/m
-        What the base law gives without damping at the step's end, and its derivative by the depth there.
-    depth, slide : float, m
-        Depth at the step's end, distance slid in the step.
-    program : Program
-    memory : (points, columns) float
-    commit : bool
-        Write the memory: once per step and point, at the step's end.
-
-    Returns
-    -------
-    force, slope : float
-    """
-    for e in range(program.start[sensor], program.clip[sensor]):
-        row = program.row[e] + step
-        force, slope = law_of_code(
-            program.code[e], force, slope, depth, slide, program.numbers, row, memory, point, program.at[e], commit
-        )
-    return force, slope
-
-
-@kernel
-def surface_force(sensor, point, step, force, slope, depth, slide, program, memory, commit):
-    """Force under the effects that act after the cut-off at zero, and may pull; see :func:`elastic_force`."""
-    for e in range(program.clip[sensor], program.start[sensor + 1]):
-        row = program.row[e] + step
-        force, slope = law_of_code(
-            program.code[e], force, slope, depth, slide, program.numbers, row, memory, point, program.at[e], commit
-        )
-    return force, slope
-
-
-@kernel
-def texel_force(sensor, point, step, depth, rate, slide, k, cn, exponent, dissipation, program, memory, commit):
-    """Normal force of a contact point with the effects on it, by the base law of Eq. 8 or of Hunt and Crossley.
-
-    Parameters
-    ----------
-    sensor, point, step, depth, slide, program, memory, commit
-        See :func:`elastic_force`.
-    rate : float, m/s
-        Of the depth, during the step.
+    work : (blocks, COLUMNS · stride) float
+        Column c of point i is at ``work[block, c * stride + i]``.
+    block, stride, i : int
+    depth, rate : float, m and m/s
+        Depth at the step's end, zero or less where nothing touches; its rate during the step.
+    slide, speed : float, m and m/s
+        Distance slid in the step, and speed of it.
     k, cn, exponent, dissipation : float
         As in :class:`.SensorParameters`; an exponent of zero is Eq. 8.
-
-    Returns
-    -------
-    force : float, N
-    slope : float, N/m
-        Its derivative by the depth at the step's end.
-    damping : float, N·s/m
-        Its derivative by the rate where the depth stays as it is.
     """
-    force, slope, damping = 0.0, 0.0, 0.0
+    force, slope, damping = 0.0, 0.0, cn
     if depth > 0.0:
         force, slope = k * depth, k
         if exponent != 0.0:
             force = k * depth**exponent
             slope = exponent * force / depth
-    force, slope = elastic_force(sensor, point, step, force, slope, depth, slide, program, memory, commit)
-    if depth > 0.0:
-        damping = cn
-        if exponent != 0.0:
-            damping = 1.5 * dissipation * force
-            slope *= 1.0 + 1.5 * dissipation * rate
-        force += damping * rate
-    if force <= 0.0 or depth <= 0.0:
-        force, slope, damping = 0.0, 0.0, 0.0
-    force, slope = surface_force(sensor, point, step, force, slope, depth, slide, program, memory, commit)
-    return force, slope, damping
+    if exponent != 0.0:
+        damping = 1.5 * dissipation
+    work[block, DEPTH * stride + i], work[block, RATE * stride + i] = max(depth, 0.0), rate
+    work[block, SLIDE * stride + i], work[block, SPEED * stride + i] = slide, speed
+    work[block, FORCE * stride + i], work[block, SLOPE * stride + i] = force, slope
+    work[block, DAMPING * stride + i] = damping
 
 
 @kernel
-def sliding(sensor, speed, force, program):
-    """How the effects change friction at a sliding speed (m/s) under a normal force (N).
+def apply_laws(sensor, step, work, block, stride, begin, count, slots, slot, offset, linear, program, memory, commit):
+    """Let the effects act on what :func:`press` wrote.
 
-    Returns
-    -------
-    factor : float
-        On the friction coefficient of Eq. 10–12; at speed zero also on what static friction can hold.
-    viscous : float, N·s/m
-        To be added to `ct`.
+    FORCE is then the normal force (N), SLOPE and DAMPING its derivatives by the depth at the step's end (N/m) and by the rate
+    (N·s/m).
+
+    Parameters
+    ----------
+    sensor, step : int
+        Step counts the lengths of step that the program was compiled for.
+    work, block, stride
+        See :func:`press`.
+    begin, count : int
+        The first of the points in the block, and how many.
+    slots, slot, offset : (…) int, int, int
+        The memory of the i-th of them is row ``offset + slots.ravel()[slot + i]``.
+    linear : bool
+        The base law is Eq. 8.
+    program : Program
+    memory : (points, columns) float
+    commit : bool
+        Write the memory: once per step and point, at the step's end.
     """
-    factor, viscous = 1.0, 0.0
-    for e in range(program.friction_start[sensor], program.friction_start[sensor + 1]):
-        more, thicker = friction_of_code(program.friction_code[e], speed, force, program.numbers, program.friction_row[e])
-        factor *= more
-        viscous += thicker
-    return factor, viscous
+    force, slope, damping = FORCE * stride + begin, SLOPE * stride + begin, DAMPING * stride + begin
+    depth, slide, rate = DEPTH * stride + begin, SLIDE * stride + begin, RATE * stride + begin
+    for e in range(program.start[sensor], program.clip[sensor]):
+        call_law(
+            program.code[e], work, block, force, slope, depth, slide, count, slots, slot, offset,
+            program.numbers, program.row[e] + step, memory, program.at[e], commit,
+        )  # fmt: skip
+    for i in range(count):
+        if not linear:
+            work[block, slope + i] *= 1.0 + work[block, damping + i] * work[block, rate + i]
+            work[block, damping + i] *= work[block, force + i]
+        work[block, force + i] += work[block, damping + i] * work[block, rate + i]
+        if work[block, force + i] <= 0.0 or work[block, depth + i] <= 0.0:
+            work[block, force + i] = work[block, slope + i] = work[block, damping + i] = 0.0
+    for e in range(program.clip[sensor], program.start[sensor + 1]):
+        call_law(
+            program.code[e], work, block, force, slope, depth, slide, count, slots, slot, offset,
+            program.numbers, program.row[e] + step, memory, program.at[e], commit,
+        )  # fmt: skip
 
 
 @kernel
-def friction_over_all(speed, force, program, factor, viscous):
-    """:func:`sliding` of the program's first sensor for arrays of one length."""
-    for i in range(len(speed)):
-        factor[i], viscous[i] = sliding(0, speed[i], force[i], program)
+def apply_friction(sensor, work, block, stride, begin, count, slots, program, memory):
+    """How the effects change friction at SPEED under FORCE: written into FACTOR and VISCOUS.
+
+    FACTOR is on the friction coefficient of Eq. 10–12, at speed zero also on what static friction can hold; VISCOUS is to be
+    added to `ct`, N·s/m.
+    """
+    factor, viscous = FACTOR * stride + begin, VISCOUS * stride + begin
+    for i in range(count):
+        work[block, factor + i], work[block, viscous + i] = 1.0, 0.0
+    for e in range(program.friction_start[sensor], program.friction_start[sensor + 1]):
+        call_law(
+            program.friction_code[e], work, block, SPEED * stride + begin, FORCE * stride + begin, factor, viscous, count,
+            slots, 0, 0, program.numbers, program.friction_row[e], memory, 0, False,
+        )  # fmt: skip

@@ -5,11 +5,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from solver_scenes import box, pressed, shape
+from solver_scenes import box, cube_on_pad, pressed, shape
 from trimesh.creation import icosphere
 
-from palpate.core.effects.library import effect
+from palpate.core.effects.bound import forces
+from palpate.core.effects.library import effect, library
 from palpate.core.respond import respond
+from palpate.core.scenario import Painted, SensorParameters
 from palpate.core.solve import Simulation, run
 
 
@@ -81,3 +83,108 @@ def test_looking_twice_at_a_frame_changes_nothing():
         once = simulation.advance()
     again = simulation.observe()
     np.testing.assert_array_equal(once.sensors["pad"].reading, again.sensors["pad"].reading)
+
+
+# --- effects on forces act on the bodies
+
+
+def standing(*effects, mass=0.5, time=2.0, fps=24.0, dt=1e-3, **parameters):
+    """A cube that is put down on the pad from no height at all."""
+    values = {"k": 1000.0, "cn": 10.0, **parameters}
+    return with_effects(cube_on_pad(mass=mass, frames=round(time * fps), fps=fps, dt=dt, gap=0.0, **values), *effects)
+
+
+def test_a_cube_on_a_creeping_pad_sinks_as_the_closed_form_says():
+    """Under a load F on n texels the depth goes from F / nk to F / nk (1 − a), and ``exp(−(1 − a) t / τ)`` is what is left.
+
+    What is not in that formula is how the cube comes to rest in the first tenth of a second: 1e-2 of the way covers it from
+    half a second on, by when the pad has forgotten the most of it.
+    """
+    share, time = 0.5, 1.0
+    plain, creeping = run(standing(time=4.0)), run(standing(effect("creep", amount=share, time=time), time=4.0))
+    rest = 0.5 * 9.81 / 84 / 1000.0
+    depth = creeping.sensors["pad"].depth.mean(axis=1)
+    expected = rest / (1 - share) * (1 - share * np.exp(-(1 - share) * creeping.times / time))
+    late = creeping.times > 0.5
+    np.testing.assert_allclose(depth[late], expected[late], atol=1e-2 * rest)
+    assert plain.sensors["pad"].depth.mean(axis=1)[-1] == pytest.approx(rest, rel=1e-6)
+    sunk = plain.poses[-1, 1, 2] - creeping.poses[-1, 1, 2]
+    assert sunk == pytest.approx(expected[-1] - rest, rel=2e-2)
+    force = creeping.sensors["pad"].normal_force.sum(axis=1)[late]
+    np.testing.assert_allclose(force, 0.5 * 9.81, rtol=3e-3)  # the pad carries the cube all the while
+
+
+def test_a_cube_on_a_stiffening_pad_rests_where_the_law_carries_it():
+    felt = run(standing(effect("stiffening", "polynomial", depth=1e-4, exponent=1.0), mass=2.0)).sensors["pad"]
+    d, load = felt.depth[-1].mean(), 2.0 * 9.81 / 84
+    assert 1000.0 * d * (1 + d / 1e-4) == pytest.approx(load, rel=1e-6)
+    assert felt.normal_force[-1].sum() == pytest.approx(2.0 * 9.81, rel=1e-6)
+
+
+FORCE_FORMS = [
+    (kind.name, form.name)
+    for kind in library().values()
+    for form in kind.forms
+    if kind.stage_of(form) != "readout" and form.law is not None
+]
+
+
+@pytest.mark.parametrize(("name", "form"), FORCE_FORMS, ids=["-".join(names) for names in FORCE_FORMS])
+def test_the_solver_feels_what_the_law_says_over_time(name, form):
+    """A keyframed press: the run's forces are those of the whole signal, sampled at every substep."""
+    frames, fps, steps = 13, 24.0, 20
+    turn = np.linspace(0, 2 * np.pi, frames)
+    path = np.stack([np.zeros(frames), np.zeros(frames), 0.01 - 0.0012 * np.maximum(np.sin(turn) + 0.4, -0.1)], axis=1)
+    scenario = pressed(box(0.05, 0.06, 0.02), path, k=1000.0, cn=2.0, dt=1 / (fps * steps))
+    item = effect(name, form)
+    felt = run(with_effects(scenario, item)).sensors["pad"].normal_force
+    time = np.arange((frames - 1) * steps + 1) / (fps * steps)
+    depth = np.maximum(np.interp(time, np.arange(frames) / fps, 0.01 - path[:, 2]), 0.0)[:, None]
+    # The run begins with nothing done: what presses at its first frame counts from its first step on.
+    whole = forces((item,), scenario.sensors[0].parameters, time, depth)[::steps, 0]
+    scale = np.abs(whole).max()
+    np.testing.assert_allclose(felt.min(axis=1)[1:], whole[1:], atol=5e-3 * scale)
+    np.testing.assert_allclose(felt.max(axis=1)[1:], whole[1:], atol=5e-3 * scale)
+
+
+def test_several_contact_points_and_painted_stiffness_share_an_effect():
+    """Four points a texel under a flat probe are one texel; a texel painted twice as stiff has twice the force."""
+    item = effect("creep", amount=0.5, time=0.2)
+    one = run(press(item)).sensors["pad"].normal_force
+    four = press(item)
+    sensor = four.sensors[0]
+    spread = replace(sensor, parameters=replace(sensor.parameters, points_per_texel=4))
+    np.testing.assert_allclose(run(replace(four, sensors=(spread,))).sensors["pad"].normal_force, one, rtol=1e-9, atol=1e-12)
+    stiff = replace(sensor, painted=Painted(k=np.linspace(1.0, 2.0, 84)))
+    painted = run(replace(four, sensors=(stiff,))).sensors["pad"].normal_force
+    np.testing.assert_allclose(painted, one * np.linspace(1.0, 2.0, 84), rtol=1e-9, atol=1e-12)
+
+
+def slid(*effects, speed=0.02):
+    """A box that slides over the pad under a constant depth for half a second."""
+    frames, fps = 25, 48.0
+    path = np.stack([np.zeros(frames), -0.004 + speed * np.arange(frames) / fps, np.full(frames, 0.0095)], axis=1)
+    values = {"k": 1000.0, "cn": 0.0, "sigma0": 1e5, "sigma1": 0.0, "ct": 0.0}
+    scenario = pressed(box(0.06, 0.12, 0.02), path, fps=fps, dt=1e-3, **values)
+    return run(with_effects(scenario, *effects)).sensors["pad"].shear[-1, :, 1]
+
+
+def test_friction_effects_slow_what_slides():
+    """In steady sliding: Eq. 10–12 times the factor, plus the viscous part, 0.5 N on each texel."""
+    p, v = SensorParameters(), 0.02
+    mu = p.mud + (p.mus - p.mud) * np.exp(-((v / p.x0) ** 2))
+    np.testing.assert_allclose(slid(), 0.5 * mu, rtol=1e-3)
+    stribeck = effect("stribeck", "exponential", rise=0.8, speed=0.02)
+    np.testing.assert_allclose(slid(stribeck), 0.5 * mu * (1 + 0.8 * np.exp(-1)), rtol=1e-3)
+    np.testing.assert_allclose(slid(effect("viscous-friction", "load", viscosity=2.0)), 0.5 * mu + 2.0 * 0.5 * v, rtol=1e-3)
+
+
+def test_a_sticky_pad_holds_a_light_cube_back():
+    """Pulled off upwards, the pad lets go only when the spring and the pull are through: the force goes below zero."""
+    frames = 40
+    height = 0.01 - 0.0006 * np.interp(np.arange(frames), [0, 15, 39], [0.0, 1.0, -0.2])
+    path = np.stack([np.zeros(frames), np.zeros(frames), height], axis=1)
+    scenario = pressed(box(0.05, 0.06, 0.02), path, k=1000.0, cn=0.0)
+    felt = run(with_effects(scenario, effect("adhesion", "unloading", pull=0.3, depth=5e-5))).sensors["pad"].normal_force
+    assert felt.min() < -0.15
+    assert (felt[-1] == 0.0).all()

@@ -8,8 +8,7 @@ import pytest
 
 from palpate.core.effects import base
 from palpate.core.effects.base import Effect, Site
-from palpate.core.effects.bound import Reader, forces, friction, readings
-from palpate.core.effects.laws import compile_program, surface_force, texel_force
+from palpate.core.effects.bound import Pad, Reader, forces, friction, readings
 from palpate.core.effects.library import check, effect, form_of, from_dict, kind_of, library, placed, to_dict
 from palpate.core.errors import EffectError
 from palpate.core.scenario import SensorParameters
@@ -19,7 +18,6 @@ every_form = pytest.mark.parametrize(("name", "form"), FORMS, ids=["-".join(name
 
 ROWS, COLUMNS, PITCH = 4, 3, 0.0034
 PARAMETERS = SensorParameters(k=1000.0, cn=10.0)
-BASE = (PARAMETERS.k, PARAMETERS.cn, 0.0, 0.0)
 
 
 def site(gain=1.0, zero=0.0) -> Site:
@@ -104,15 +102,12 @@ def test_sample_by_sample_gives_what_the_whole_signal_gives(name, form):
     time, depth, slide = presses()
     whole = forces((item,), PARAMETERS, time, depth, slide)
     lengths = np.diff(time, prepend=time[0])
-    program = compile_program([(item,)], lengths)
-    memory, single = program.memory(depth.shape[1]), np.zeros_like(depth)
+    pad, single = Pad((item,), PARAMETERS, lengths, depth.shape[1]), np.zeros_like(depth)
     rate = np.diff(depth, axis=0, prepend=depth[:1]) / np.where(lengths > 0, lengths, 1.0)[:, None]
     for i in range(len(time)):
-        for j in range(depth.shape[1]):
-            asked = (0, j, i, depth[i, j], rate[i, j], slide[i, j], *BASE, program, memory)
-            only_asked = texel_force(*asked, False)
-            single[i, j] = texel_force(*asked, True)[0]
-            assert only_asked[0] == single[i, j]
+        asked, _, _ = pad.step(i, depth[i], rate[i], slide[i], commit=False)
+        single[i], _, _ = pad.step(i, depth[i], rate[i], slide[i])
+        np.testing.assert_array_equal(asked, single[i])
     np.testing.assert_allclose(single, whole, rtol=1e-7, atol=1e-9)
 
     reader = Reader((item,), site())
@@ -123,17 +118,15 @@ def test_sample_by_sample_gives_what_the_whole_signal_gives(name, form):
 
 @every_form
 def test_the_tangent_is_the_derivative_of_the_force(name, form):
-    item = effect(name, form)
-    program = compile_program([(item,)], [0.0, 0.01])
-    memory = program.memory(1)
+    pad = Pad((effect(name, form),), SensorParameters(k=1000.0, cn=0.0), [0.01], 1)
+    still = np.zeros(1)
     for depth in (0.0, 5e-4, 1.5e-3, 1.2e-3):
-        texel_force(0, 0, 1, depth, 0.0, 0.0, 1000.0, 0.0, 0.0, 0.0, program, memory, True)
+        pad.step(0, np.array([depth]), still)
     for depth in (1e-3, 1.9e-3):  # on the way back and on the way in
-        force, slope, _ = texel_force(0, 0, 1, depth, 0.0, 0.0, 1000.0, 0.0, 0.0, 0.0, program, memory, False)
-        above = texel_force(0, 0, 1, depth + 1e-9, 0.0, 0.0, 1000.0, 0.0, 0.0, 0.0, program, memory, False)[0]
-        below = texel_force(0, 0, 1, depth - 1e-9, 0.0, 0.0, 1000.0, 0.0, 0.0, 0.0, program, memory, False)[0]
-        assert slope == pytest.approx((above - below) / 2e-9, rel=1e-4, abs=1e-4)
-        assert surface_force(0, 0, 1, force, slope, depth, 0.0, program, memory, False)[0] <= force + 1e-12
+        (below, _, _), (_, slope, _), (above, _, _) = (
+            pad.step(0, np.array([depth + change]), still, commit=False) for change in (-1e-9, 0.0, 1e-9)
+        )
+        np.testing.assert_allclose(slope, (above - below) / 2e-9, rtol=1e-4, atol=1e-4)
 
 
 @every_form
@@ -178,12 +171,10 @@ def test_the_law_of_hunt_and_crossley_is_a_base_as_well():
     items = (effect("stiffening"), effect("creep"))
     whole = forces(items, parameters, time, depth)
     lengths = np.diff(time, prepend=time[0])
-    program = compile_program([items], lengths)
-    memory = program.memory(1)
-    rate = np.diff(depth[:, 0], prepend=depth[0, 0]) / np.where(lengths > 0, lengths, 1.0)
+    pad = Pad(items, parameters, lengths, depth.shape[1])
+    rate = np.diff(depth, axis=0, prepend=depth[:1]) / np.where(lengths > 0, lengths, 1.0)[:, None]
     for i in range(len(time)):
-        asked = (0, 0, i, depth[i, 0], rate[i], 0.0, 3e4, 0.0, 1.5, 2.0, program, memory)
-        assert texel_force(*asked, True)[0] == pytest.approx(whole[i, 0], rel=1e-9, abs=1e-12)
+        np.testing.assert_allclose(pad.step(i, depth[i], rate[i])[0], whole[i], rtol=1e-9, atol=1e-12)
     np.testing.assert_allclose(
         forces((), parameters, time, depth, rate=np.zeros_like(depth)), 3e4 * depth**1.5, rtol=1e-12, atol=1e-12
     )
