@@ -67,7 +67,7 @@ def test_loops_over_contacts_run_in_vector_registers(name):
     scratch, law = simulation._scratch, step._law(simulation._world.parameters, 0)
     compiled = numba.njit(error_model="numpy")(getattr(step, name).py_func)
     if name == "_sum_contacts":
-        compiled(0, 0, 1e-3, law, simulation._world.painted, scratch)
+        compiled(0, 0, 1e-3, law, simulation._world, simulation._state.memory, scratch)
     else:
         compiled(0, step._values(scratch.part[0]), simulation._state, scratch)
     (code,) = compiled.inspect_asm().values()
