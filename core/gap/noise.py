@@ -184,8 +184,8 @@ def coverage(predictors: Sequence[Predictor]) -> Coverage:
         unloading |= bool((rate < -0.02).any())
         still = (np.abs(rate) < 0.02) & (total > 0.05 * full)
         hold = max(hold, _longest(still, s.time))
-        starts = np.flatnonzero((total[1:] > 0) & (total[:-1] <= 0)) + 1
-        cycles = max(cycles, len(starts) + int(total[0] > 0))
+        starts = np.flatnonzero((total > 0) & (np.concatenate([[0.0], total[:-1]]) <= 0))
+        cycles = max(cycles, len(starts))
         for a, b in zip(starts, [*starts[1:], len(total)], strict=True):
             peaks.append(float(total[a:b].max()))
         slides |= bool(s.slide.max(initial=0.0) > 1e-5)

@@ -8,6 +8,8 @@ import pytest
 import trimesh
 
 from palpate.core.errors import PalpateError
+from palpate.core.gap.model import Predictor
+from palpate.core.gap.noise import coverage
 from palpate.core.gap.rig import Indenter, Rig, Trial, grid_texels
 from palpate.core.gap.stimulus import stimulus_of
 from palpate.core.mesh import checked_mesh
@@ -105,3 +107,9 @@ def test_deeper_than_the_model_reaches_still_counts_and_right_through_is_refused
     hollow = Indenter(solid(trimesh.creation.box((0.01, 0.01, 4.0))))
     with pytest.raises(PalpateError, match="right through"):
         stimulus_of(through, rig(hollow, through))
+
+
+def test_a_contact_that_is_never_broken_is_one_cycle():
+    one = replace(trial(np.zeros((50, 3))), stimulus="depth", position=None, quaternion=None, level=np.full(50, 1e-3))
+    found = coverage([Predictor(one, rig(None, one))])
+    assert found.cycles == 1 and not found.unloading and found.longest_hold > 0.9

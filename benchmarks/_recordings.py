@@ -1,0 +1,166 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Published recordings of real sensors and materials, converted into rigs; docs/gap-real.md says what they are."""
+
+from __future__ import annotations
+
+import json
+import zipfile
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+
+Columns = dict[str, np.ndarray]
+
+
+@dataclass(frozen=True)
+class Recording:
+    """A set of recordings: name of the rig, lines of its [sensor], and trials as (name, use, columns)."""
+
+    name: str
+    sensor: str
+    trials: list[tuple[str, str, Columns]]
+
+    def write(self, folder: Path) -> Path:
+        """Write it as a rig and return the path of its TOML file."""
+        folder.mkdir(parents=True, exist_ok=True)
+        lines = ['format = "palpate-rig/1"', f'name = "{self.name}"', "[sensor]", self.sensor]
+        for trial, use, columns in self.trials:
+            lines += ["[[trial]]", f'file = "{trial}.csv"', f'use = "{use}"']
+            table = np.column_stack(list(columns.values()))
+            np.savetxt(folder / f"{trial}.csv", table, delimiter=",", fmt="%.9g", header=",".join(columns), comments="")
+        path = folder / "rig.toml"
+        path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+        return path
+
+
+def thinned(values: np.ndarray, by: int) -> np.ndarray:
+    """Means of `by` samples each, along the first axis."""
+    whole = len(values) // by * by
+    return values[:whole].reshape(-1, by, *values.shape[1:]).mean(axis=1)
+
+
+def insole(data: Path, tared: bool = True) -> Recording:
+    """280 texels under air pressure (bar → newtons on a texel of 1 cm²); two recordings fitted, two held out.
+
+    Each texel rests at counts of its own. `tared` takes off the median of its first second in each recording.
+    """
+    from scipy.io import loadmat
+
+    names = (("calibration_dataset", "fit"), ("validation_dataset_1", "fit"))
+    names += (("validation_dataset_2", "check"), ("validation_dataset_3", "check"))
+    trials: list[tuple[str, str, Columns]] = []
+    for name, use in names:
+        found = loadmat(data / "insole_iit_280taxel" / f"{name}.mat", squeeze_me=True, struct_as_record=False)
+        recording = next(value for key, value in found.items() if not key.startswith("__"))
+        count = min(len(recording.C), len(recording.P))  # the pressure has no clock of its own
+        counts, bar = np.asarray(recording.C, float)[:count], np.asarray(recording.P, float)[:count]
+        if tared:
+            counts[:, 2:] -= np.median(counts[:50, 2:], axis=0)
+        by = max(1, count // 900)
+        time = thinned(counts[:, 1], by)
+        columns = {"time": time - time[0], "force": thinned(bar, by) * 1e5 * 1e-4 * 280}
+        trials.append((name, use, columns | {f"texel_{i}": c for i, c in enumerate(thinned(counts[:, 2:], by).T)}))
+    grid = "grid = { rows = 20, columns = 14, pitch = [0.01, 0.01] }"
+    return Recording("insole under air pressure", f'{grid}\nunit = "counts"', trials)
+
+
+def tube(data: Path) -> Recording:
+    """Mean of both pressures of a soft tube over the load cell's volts, taken as newtons."""
+    trials: list[tuple[str, str, Columns]] = []
+    for name, use in (("nowater", "fit"), ("10mm", "fit"), ("50mm", "check")):
+        found = np.load(data / "fsi_tube_tactile" / f"1D_underwater_{name}.npz")
+        load = -(found["force_V"] - np.median(found["force_V"][:50]))
+        pressure = 0.5 * (found["pl_V"] + found["pr_V"])
+        columns = {"time": thinned(found["t"], 4), "force": np.maximum(thinned(load, 4), 0.0)}
+        trials.append((name, use, columns | {"texel_0": thinned(pressure - np.median(pressure[:50]), 4)}))
+    return Recording("soft tube", 'grid = { rows = 1, columns = 1, pitch = 0.02 }\nunit = "V"', trials)
+
+
+def adhesive(data: Path) -> Recording:
+    """Shear stress (kPa, taken as newtons) of an adhesive over strain, a strain of one taken as a depth of 1 mm."""
+    trials: list[tuple[str, str, Columns]] = []
+    for name, use in (("1", "fit"), ("5", "fit"), ("2", "check")):
+        table = sheet(data / "oca_vhb_viscoelastic_mit" / f"shear_relaxation_{name}.xlsx")
+        time, first = np.unique(table[:, 0], return_index=True)
+        strain, stress = table[first, 4], table[first, 1]
+        even = np.linspace(time[0], time[-1], min(1200, 4 * len(time)))
+        columns = {"time": even - even[0], "depth": np.maximum(np.interp(even, time, strain), 0.0) * 1e-3}
+        trials.append((f"relaxation_{name}", use, columns | {"texel_0": np.interp(even, time, stress)}))
+    stiff = max(float(c["texel_0"].max() / c["depth"].max()) for _, _, c in trials)
+    words = f"grid = {{ rows = 1, columns = 1, pitch = 0.01 }}\nk = {stiff:.4g}\ncn = 0.0\nmax_penetration = 0.1"
+    return Recording("adhesive in shear", words, trials)
+
+
+def foam(data: Path) -> Recording:
+    """Compression of 10 mm of foam under 1 cm² at 1 % a second; held out is another foam, scaled to the same start."""
+    curves = {}
+    for name in ("leap", "turbo"):
+        table = np.loadtxt(data / "foam_leap_turbo_avg_mit" / f"{name}_foam_UC.csv", delimiter=",", skiprows=1)
+        order = np.argsort(-table[:, 0])
+        curves[name] = (1.0 - table[order, 0]) * 0.01, -table[order, 1] * 1e6 * 1e-4
+
+    def stiffness(depth, force):
+        low = (depth > 0) & (depth < 0.1 * depth.max())
+        return float(np.polyfit(depth[low], force[low], 1)[0])
+
+    trials, wanted = [], stiffness(*curves["leap"])
+    for (name, (depth, force)), use in zip(curves.items(), ("fit", "check"), strict=True):
+        time = depth / 1e-4
+        even = np.linspace(time[0], time[-1], 400)
+        scaled = force * wanted / stiffness(depth, force)
+        columns = {"time": even, "depth": np.interp(even, time, depth), "texel_0": np.interp(even, time, scaled)}
+        trials.append((name, use, columns))
+    words = f"grid = {{ rows = 1, columns = 1, pitch = 0.01 }}\nk = {wanted:.4g}\ncn = 0.0\nmax_penetration = 0.1"
+    return Recording("shoe foam", words, trials)
+
+
+def brake(data: Path) -> Recording:
+    """Friction force of a band brake over its travel; the normal force is not known and taken as constant."""
+    trials: list[tuple[str, str, Columns]] = []
+    for name, use in (("dataset-1_0.5Hz35lbtension", "fit"), ("dataset-1_1Hz35lbtension", "check")):
+        table = np.array(json.loads((data / "brfd_friction_backlash" / f"{name}.json").read_text())["data"], float)
+        table = thinned(table[:, :3], 8)
+        columns = {"time": table[:, 0], "depth": np.full(len(table), 1e-3), "slide_x": table[:, 1] * 0.0254}
+        trials.append((name.replace(".", "_"), use, columns | {"force_x": table[:, 2] * 4448.22}))
+    words = "k = 3e7\nsigma0 = 5e6\nsigma1 = 1e4\nct = 0.0\nmus = 0.5\nmud = 0.4\nx0 = 0.05\nmax_penetration = 0.1"
+    return Recording("band brake", f"grid = {{ rows = 1, columns = 1, pitch = 0.05 }}\n{words}", trials)
+
+
+SETS: dict[str, Callable[[Path], Recording]] = {
+    "insole-counts": partial(insole, tared=False),
+    "insole": insole,
+    "tube": tube,
+    "adhesive": adhesive,
+    "foam": foam,
+    "brake": brake,
+}
+"""How each set is read from the folder of all data."""
+
+
+def sheet(path: Path) -> np.ndarray:
+    """Return the numbers of the first sheet of an Excel file, NaN where there is none."""
+    space = "{http://schemas.openxmlformats.org/spreadsheetml/2006/main}"
+    with zipfile.ZipFile(path) as file:
+        root = ElementTree.fromstring(file.read("xl/worksheets/sheet1.xml"))
+    rows: list[dict[int, float]] = []
+    for row in root.iter(f"{space}row"):
+        cells = {}
+        for cell in row.iter(f"{space}c"):
+            value = cell.find(f"{space}v")
+            if value is not None and value.text and cell.get("t", "n") == "n":
+                cells[_column(cell.get("r", "A1"))] = float(value.text)
+        rows.append(cells)
+    width = 1 + max(max(cells, default=0) for cells in rows)
+    table = np.array([[cells.get(i, np.nan) for i in range(width)] for cells in rows])
+    return table[np.isfinite(table).any(axis=1)]
+
+
+def _column(name: str) -> int:
+    number = 0
+    for letter in name.rstrip("0123456789"):
+        number = 26 * number + ord(letter) - ord("A") + 1
+    return number - 1
