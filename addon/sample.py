@@ -238,11 +238,6 @@ def sample_start(scene, depsgraph) -> tuple[Scenario, Binding]:
         interpolation=settings.interpolation.lower(),
     )
     skins = tuple(skin for skin in skins if skin is not None)
-    warnings += [
-        f"'{skin.name}' may deform while forces move it: its mass, centre and inertia stay those of the first frame."
-        for skin in skins
-        if bodies[skin.body].moved_by_forces and skin.follower is None and owners[skin.body].name == skin.name
-    ]
     sensors, targets = deform.declared(scenario, skins)
     scenario = replace(scenario, sensors=sensors, targets=targets)
     scenario.check()
@@ -350,7 +345,18 @@ def _sample_scenario(scene) -> Generator[Progress, None, tuple[Scenario, Binding
         drive = replace(bodies[index].drive, target=Signal(times, np.array(values)))
         bodies[index] = replace(bodies[index], drive=drive)
     sensors, targets = shapes.finished(scenario, times)
-    return replace(scenario, bodies=tuple(bodies), sensors=sensors, targets=targets), binding
+    scenario = replace(scenario, bodies=tuple(bodies), sensors=sensors, targets=targets)
+    return scenario, replace(binding, warnings=binding.warnings + _unchanged_masses(scenario))
+
+
+def _unchanged_masses(scenario: Scenario) -> tuple[str, ...]:
+    """Say of which bodies that forces move the shape changes and the mass properties do not."""
+    return tuple(
+        f"'{target.name}' deforms while forces move it: its mass, centre and inertia stay those of the first frame."
+        for target in scenario.targets
+        if target.deformation is not None and scenario.bodies[target.body].name == target.name
+        if scenario.bodies[target.body].moved_by_forces
+    )
 
 
 class Shapes:

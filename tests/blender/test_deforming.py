@@ -6,7 +6,7 @@ import math
 import bpy
 import numpy as np
 import pytest
-from blender_scenes import press
+from blender_scenes import press, press_and_drop
 
 from palpate.addon import live, sample, transforms
 from palpate.addon.bake import bake
@@ -175,3 +175,15 @@ def test_sensors_that_are_felt_by_others_share_the_overlap():
     for found in run(scenario).sensors.values():
         inner = found.normal_force[0].reshape(14, 6)[1:-1, 1:-1]
         np.testing.assert_allclose(inner, 0.05, rtol=1e-4)
+
+
+def test_only_a_free_body_that_does_deform_is_warned_of():
+    """A modifier that rounds the edges changes nothing over time, and is nothing to warn of."""
+    cube = press_and_drop(frames=4)[-1]
+    cube.modifiers.new("Bevel", "BEVEL").width = 1e-3
+    _, binding = drive(sample.sample_scenario(bpy.context.scene))
+    assert not any("deforms" in warning for warning in binding.warnings)
+    wave = cube.modifiers.new("Wave", "WAVE")
+    wave.height, wave.speed = 1e-3, 1e-3
+    _, binding = drive(sample.sample_scenario(bpy.context.scene))
+    assert any("deforms while forces move it" in warning for warning in binding.warnings)
