@@ -137,6 +137,7 @@ class Files:
             complete=True,
             scene_file=self._blend.name if self._blend else "",
             body=scenario.bodies[sensor.body].name,
+            step_reason=recording.step_reason,
         )
 
     def write_frame(self, frame: Frame) -> None:

@@ -21,10 +21,11 @@ from .jobs import Progress
 
 @dataclass(frozen=True)
 class Status:
-    """What the panel says about the present frame: `text`, and `frame` when there are numbers to show."""
+    """What the panel says about the present frame: `text`, `frame` when there are numbers to show, and in what `step`s."""
 
     text: str
     frame: Frame | None = None
+    step: str = ""
 
 
 _status: dict[int, Status] = {}
@@ -183,8 +184,8 @@ def _attempt(scene, work):
     return result
 
 
-def _say(scene, text: str, frame: Frame | None = None) -> None:
-    _status[scene.session_uid] = Status(text, frame)
+def _say(scene, text: str, frame: Frame | None = None, step: str = "") -> None:
+    _status[scene.session_uid] = Status(text, frame, step)
 
 
 def show(scene, run) -> None:
@@ -203,7 +204,7 @@ def show(scene, run) -> None:
             _write_force(obj, sensor.texels.vertex, frame.sensors[sensor.name].normal_force)
     overlays.show(scene, run, frame)
     warnings = run.binding.warnings + tuple(run.simulation.warnings)
-    _say(scene, " ".join(warnings) or f"Frame {number} computed.", frame)
+    _say(scene, " ".join(warnings) or f"Frame {number} computed.", frame, run.simulation.step_reason)
 
 
 def _place(run, obj, placement, index: int, number: int, share: float) -> None:
@@ -247,7 +248,7 @@ def _show_bake(scene, depsgraph) -> None:
     if stale.is_stale(scene, depsgraph, recording):
         text = "The bake is out of date, something has changed since: bake again."
     frame = Frame(number, 0.0, sensors, poses, velocities)
-    _say(scene, text, frame)
+    _say(scene, text, frame, recording.step_reason)
     if scene.palpate.show_inset and not bpy.app.background:
         _show_board(scene, frame)
 

@@ -102,6 +102,8 @@ class Recording:
     velocities : (F, b, 6) float
     dt : float, seconds
         The substep that was used.
+    step_reason : str
+        Why that one, in words for the user.
     digest : str
         :meth:`Scenario.digest` of what was solved.
     warnings : tuple of str
@@ -117,10 +119,17 @@ class Recording:
     dt: float
     digest: str = ""
     warnings: tuple[str, ...] = field(default=())
+    step_reason: str = ""
 
     @classmethod
     def stack(
-        cls, frames: list[Frame], body_names: Sequence[str], dt: float, digest: str = "", warnings: Sequence[str] = ()
+        cls,
+        frames: list[Frame],
+        body_names: Sequence[str],
+        dt: float,
+        digest: str = "",
+        warnings: Sequence[str] = (),
+        step_reason: str = "",
     ) -> Recording:
         """Put single frames, in order, behind one another."""
         sensors = {
@@ -142,6 +151,7 @@ class Recording:
             dt=dt,
             digest=digest,
             warnings=tuple(warnings),
+            step_reason=step_reason,
         )
 
     def at(self, frame: int) -> Frame:

@@ -8,7 +8,6 @@ write down what the sensors feel.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Generator, Mapping
 from dataclasses import dataclass, replace
 
@@ -33,7 +32,7 @@ from .servo import drive_table
 from .shapes import Shapes
 from .step import Scratch, advance_steps, contacts_of, feel, gather_all, help_out, preload, scratch_for
 from .surfaces import Surfaces, extent, point_rows
-from .timestep import advise
+from .timestep import plan
 
 PART = 512
 """Most contact points of a pair: what a thread takes at a time."""
@@ -69,6 +68,8 @@ class Simulation:
         Where the state stands.
     dt : float, seconds
         Substep in use: a whole number of them makes a frame.
+    step_reason : str
+        What the step is and why, for the user.
     warnings : list of str
         One sentence each; grows while the simulation runs.
     """
@@ -78,9 +79,8 @@ class Simulation:
         self.scenario = scenario
         self.frame = scenario.frame_start
         self.warnings: list[str] = []
-        longest = advise(scenario).dt if scenario.dt is None else scenario.dt
-        self.substeps = max(1, math.ceil(1.0 / (scenario.fps * longest) - 1e-9))
-        self.dt = 1.0 / (scenario.fps * self.substeps)
+        chosen = plan(scenario)
+        self.dt, self.substeps, self.step_reason = chosen.dt, chosen.substeps, chosen.reason
         self._motions = [body.motion for body in scenario.bodies]
         # Bodies that forces move are followed at their centre of mass, keyframed ones at their origin.
         self._center = np.array([body.center_of_mass if body.moved_by_forces else np.zeros(3) for body in scenario.bodies])
@@ -444,7 +444,7 @@ def solve(
         frames.append(simulation.advance())
         yield Progress(simulation.frame, len(frames), total, frames[-1])
     names = [body.name for body in scenario.bodies]
-    return Recording.stack(frames, names, simulation.dt, scenario.digest(), simulation.warnings)
+    return Recording.stack(frames, names, simulation.dt, scenario.digest(), simulation.warnings, simulation.step_reason)
 
 
 def run(scenario: Scenario, progress: Callable[[Progress], None] | None = None) -> Recording:

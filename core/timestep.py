@@ -80,6 +80,37 @@ def advise(scenario: Scenario) -> Advice:
     )
 
 
+@dataclass(frozen=True)
+class Plan:
+    """The step that a run takes: a whole number of them makes a frame.
+
+    Attributes
+    ----------
+    dt : float, seconds
+    substeps : int
+        In each frame.
+    reason : str
+        One or two sentences for the user: what was chosen or set, and what was advised and why.
+    """
+
+    dt: float
+    substeps: int
+    reason: str
+
+
+def plan(scenario: Scenario) -> Plan:
+    """Return the step of a run: the advised one, or the longest that the scenario allows where that is set."""
+    advice = advise(scenario)
+    longest = advice.dt if scenario.dt is None else scenario.dt
+    substeps = max(1, math.ceil(1.0 / (scenario.fps * longest) - 1e-9))
+    dt = 1.0 / (scenario.fps * substeps)
+    number = f"{substeps} to a frame" if substeps > 1 else "one to a frame"
+    if scenario.dt is None:
+        return Plan(dt, substeps, f"Steps of {dt * 1e3:.3g} ms, {number}. Advised are {advice.reason}")
+    beyond = " Longer ones stay bounded, but follow the motion less exactly." if dt > 1.001 * advice.dt else ""
+    return Plan(dt, substeps, f"Steps of {dt * 1e3:.3g} ms, {number}, as set. Advised are {advice.reason}{beyond}")
+
+
 def _tangent_or_normal(sensor: Sensor) -> tuple[float, float]:
     """Stiffness and damping of all texels together, in the direction in which they are stiffer."""
     p, factor = sensor.parameters, np.ones(len(sensor.texels)) if sensor.painted.k is None else sensor.painted.k

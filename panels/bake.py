@@ -35,7 +35,10 @@ class Bake(Part):
             row = layout.row(align=True)
             row.operator("palpate.catch_up")
             row.operator("palpate.reset", text="Reset")
-        sentences(layout, live.status(scene).text, "INFO", context)
+        status = live.status(scene)
+        sentences(layout, status.text, "INFO", context)
+        if status.step:
+            sentences(layout, status.step, "PREVIEW_RANGE", context)
 
 
 class Display(Part):

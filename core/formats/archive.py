@@ -121,6 +121,7 @@ def _header(recording: Recording) -> dict[str, Any]:
         "dt": float(recording.dt),
         "digest": recording.digest,
         "warnings": list(recording.warnings),
+        "step_reason": recording.step_reason,
     }
 
 
@@ -146,4 +147,5 @@ def _recording(path: str | os.PathLike, members: Any) -> Recording:
         dt=float(header["dt"]),
         digest=str(header["digest"]),
         warnings=tuple(str(warning) for warning in header["warnings"]),
+        step_reason=str(header.get("step_reason", "")),
     )

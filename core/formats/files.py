@@ -216,6 +216,8 @@ class Manifest:
     fps : float, frames per second
     dt : float, seconds
         Substep.
+    step_reason : str
+        Why that one; empty when the manifest is older.
     digest : str
         :meth:`..scenario.Scenario.digest` of what is solved; another digest makes the bake stale.
     unit : str
@@ -247,6 +249,7 @@ class Manifest:
     complete: bool = False
     scene_file: str = ""
     body: str = ""
+    step_reason: str = ""
 
 
 def write_manifest(folder: str | os.PathLike, manifest: Manifest) -> Path:
@@ -313,6 +316,7 @@ def _manifest(content: dict[str, Any]) -> Manifest:
         complete=_typed(content, "complete", bool),
         scene_file=_typed({"scene_file": "", **content}, "scene_file", str),
         body=_typed({"body": "", **content}, "body", str),
+        step_reason=_typed({"step_reason": "", **content}, "step_reason", str),
     )
     if not (math.isfinite(manifest.fps) and math.isfinite(manifest.dt)):
         raise ValueError("fps and dt must be finite")

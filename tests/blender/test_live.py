@@ -77,6 +77,7 @@ def test_a_jump_shows_nothing_and_says_so():
     status = live.status(scene)
     assert status.frame is None and status.text == "Frame 15 is not computed: play from frame 2, or use Compute to Here."
     play(scene, 3)
+    assert live.status(scene).step == cache.get(scene).simulation.step_reason != ""
     assert live.status(scene).frame.frame == 3
 
 
@@ -154,6 +155,7 @@ def test_time_stretching_shows_the_same_bake_slower(tmp_path):
     assert watched(scene, free, [(2 * number, 0.0) for number in range(1, 9)]) == pytest.approx(at_speed, abs=1e-6)
     scene.frame_set(16)
     assert live.status(scene).text == "Frame 8 of the bake."
+    assert live.status(scene).step == plain.step_reason != ""
     arrows = {}
     for number in (2, 16):  # of the timeline; nothing touches at the animation's frame 1
         scene.frame_set(number)

@@ -12,7 +12,8 @@ from palpate.core.bodies import quaternions_from_vectors, rotation_matrices, rot
 from palpate.core.errors import ParameterError
 from palpate.core.motions import poses_at
 from palpate.core.scenario import Motion, SensorParameters
-from palpate.core.timestep import LONGEST, advise, stability_limit
+from palpate.core.solve import run
+from palpate.core.timestep import LONGEST, advise, plan, stability_limit
 
 NUMBERS = [item.name for item in fields(SensorParameters) if item.type == "float"]
 
@@ -101,3 +102,17 @@ def test_rotation_vectors_go_both_ways(size):
     quaternions = quaternions_from_vectors(vectors)
     np.testing.assert_allclose(rotation_vectors(quaternions), vectors, atol=1e-14, rtol=1e-12)
     np.testing.assert_allclose(rotation_vectors(-quaternions), vectors, atol=1e-14, rtol=1e-12)
+
+
+def test_the_step_of_a_run_is_explained():
+    """What is advised, what is taken (a whole number of steps makes a frame), and what was set against advice."""
+    scenario = cube_on_pad(1.0, dt=None)
+    advised, chosen = advise(scenario), plan(scenario)
+    assert chosen.dt <= advised.dt and chosen.dt * chosen.substeps == pytest.approx(1 / 24, rel=1e-12)
+    assert (
+        f"{chosen.substeps} to a frame" in chosen.reason and advised.reason in chosen.reason and "as set" not in chosen.reason
+    )
+    long = plan(replace(scenario, dt=0.01))
+    assert "as set" in long.reason and advised.reason in long.reason and "less exactly" in long.reason
+    assert "less exactly" not in plan(replace(scenario, dt=1e-5)).reason
+    assert run(replace(scenario, frame_end=2)).step_reason == chosen.reason
