@@ -82,20 +82,32 @@ def weighing(
     )
 
 
-def palpate_step(texels: int, solid: trimesh.Trimesh) -> Callable[[], float]:
-    """Return a function that gives the microseconds of one substep in full contact."""
-    simulation = Simulation(weighing(texels, solid))
+def palpate_step(
+    texels: int, solid: trimesh.Trimesh, threads: int = 1, clock: Callable[[], float] = time.thread_time
+) -> Callable[[], float]:
+    """Return a function that gives the microseconds of one substep in full contact.
+
+    Of one thread's own time, so that whatever else the machine does counts for neither; with several threads by the wall.
+    """
+    simulation = Simulation(weighing(texels, solid), threads)
     for _ in range(10):
         frame = simulation.advance()
     if not frame.sensors["pad"].contact.all():
         raise RuntimeError("the pad is not fully covered: this would not be the same work")
 
     def measure() -> float:
-        start = time.perf_counter()
+        start = clock()
         simulation.advance()
-        return (time.perf_counter() - start) / simulation.substeps * 1e6
+        return (clock() - start) / simulation.substeps * 1e6
 
     return measure
+
+
+def memory(texels: int, solid: trimesh.Trimesh) -> int:
+    """Return the bytes of all arrays that the inner loop works on, but for the object's own triangles."""
+    simulation = Simulation(weighing(texels, solid))
+    world, _, neighbours, _, state, scratch = simulation.arrays
+    return sum(array.nbytes for part in (world, neighbours, state, scratch) for array in part if isinstance(array, np.ndarray))
 
 
 def mujoco_model(texels: int, solid: trimesh.Trimesh, slope: float = 0.0, gap: float = 0.0):
@@ -133,9 +145,9 @@ def mujoco_step(texels: int, solid: trimesh.Trimesh) -> Callable[[], float]:
     mujoco.mj_step(model, data, 1000)
 
     def measure() -> float:
-        start = time.perf_counter()
-        mujoco.mj_step(model, data, 100)
-        return (time.perf_counter() - start) / 100 * 1e6
+        start = time.thread_time()
+        mujoco.mj_step(model, data, 300)
+        return (time.thread_time() - start) / 300 * 1e6
 
     return measure
 
@@ -258,6 +270,14 @@ def run() -> Iterator[dict]:
             "name": f"solver.step.cube.{texels}", "value": ours, "unit": "us",
             "peer": f"mujoco-{mujoco.__version__} tactile", "peer_value": theirs, "ratio": ours / theirs, "goal": 0.6,
         }  # fmt: skip
+    wall = time.perf_counter
+    two, one = in_turn(palpate_step(10000, solid, 2, wall), palpate_step(10000, solid, 1, wall), rounds=5)
+    yield {
+        "name": "solver.step.cube.10000.two_threads", "value": two, "unit": "us",
+        "peer": "palpate with one thread", "peer_value": one, "ratio": two / one,
+    }  # fmt: skip
+    for texels in GRIDS:
+        yield {"name": f"solver.memory.{texels}", "value": memory(texels, solid) / texels, "unit": "bytes per texel"}
     few, many = in_turn(palpate_step(84, cube(4)), palpate_step(84, cube(8)))
     yield {
         "name": "solver.step.faces.786k", "value": many, "unit": "us",

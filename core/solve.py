@@ -103,7 +103,7 @@ class Simulation:
         preload(self._world, self._state, self._scratch)
 
     @property
-    def _arrays(self) -> tuple[World, Tree, Neighbours, Shapes, State, Scratch]:
+    def arrays(self) -> tuple[World, Tree, Neighbours, Shapes, State, Scratch]:
         """What the kernels work on."""
         return self._world, self._tree, self._neighbours, self._shapes, self._state, self._scratch
 
@@ -154,8 +154,8 @@ class Simulation:
             self._shapes = self._surfaces.at(times)
         self._sunk = 0
         for first, last, commands in self._pilot.stretches(times, self.dt, self._tactile):
-            with helpers(self._scratch.board, self._helpers, help_out, *self._arrays):
-                sunk = advance_steps(self.dt, first, last, positions, quaternions, velocities, commands, *self._arrays)
+            with helpers(self._scratch.board, self._helpers, help_out, *self.arrays):
+                sunk = advance_steps(self.dt, first, last, positions, quaternions, velocities, commands, *self.arrays)
             self._sunk = max(self._sunk, sunk)
         self.frame += 1
         return self.observe()
@@ -189,7 +189,7 @@ class Simulation:
         own = [pair for pair, (index, _) in enumerate(self._world.pairs) if index == 0]
         for t in range(shape[0]):
             self._state.position[body], self._state.quaternion[body] = positions[t], quaternions[t]
-            sunk = gather_all(-self.dt, *self._arrays)
+            sunk = gather_all(-self.dt, *self.arrays)
             most = max(most, int(sunk))
             for pair in own:
                 most = max(most, self._count_sunk(pair))
@@ -233,7 +233,7 @@ class Simulation:
 
     def _tactile(self, sensor: int) -> np.ndarray:
         """(n,) normal forces of a sensor in the present state, for its controllers."""
-        gather_all(-self.dt, *self._arrays)
+        gather_all(-self.dt, *self.arrays)
         force = self._feel()[0]
         return force[self._texel_start[sensor] : self._texel_start[sensor + 1]]
 
@@ -247,7 +247,7 @@ class Simulation:
 
     def observe(self) -> Frame:
         """What the sensors feel in the present state."""
-        gather_all(-self.dt, *self._arrays)
+        gather_all(-self.dt, *self.arrays)
         self._warn_of_sunk()
         force, shear, depth, slip, contact, net, moment = self._feel()
         sensors = {}

@@ -1,0 +1,122 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Where the time of a substep goes, per contact, and how far that is from what memory and arithmetic allow here.
+
+The three phases of a step are run again and again, in one thread, where a cube rests on the pad. `flops` are the operations in
+the compiled loops per contact (a root or a division counts as one); `bytes` are those of the numbers that a contact's phase
+reads and writes, each once. Memory allows no less than bytes over the bandwidth of a copy that does not fit into the caches;
+arithmetic no less than flops over the rate of a loop that does nothing else. Both are measured here.
+"""
+
+from __future__ import annotations
+
+import functools
+import re
+import time
+from collections.abc import Callable, Iterator
+
+import numba
+import numpy as np
+
+from palpate.core import gather, step
+from palpate.core.solve import Simulation
+
+from .solver import GRIDS, cube, weighing
+
+ROUNDS = 5
+PHASES = {"find contacts": step.GATHER, "linearise and sum": step.SUM, "bend bristles": step.BEND}
+BYTES = {
+    # contact point 12, bristle 4 (both ways), triangle 12, hint and lists 3; columns of the row: 10 written, 6 and 3 laid flat
+    "find contacts": 8 * (12 + 8 + 12 + 3 + 10 + 9),
+    "linearise and sum": 8 * (10 + 3),
+    "bend bristles": 8 * (12 + 3 + 1 + 3),
+}
+
+
+@numba.njit(nogil=True)
+def _repeat(times, phase, world, tree, neighbours, shapes, state, scratch):
+    for _ in range(times):
+        step._share_out(phase, world, tree, neighbours, shapes, state, scratch)
+
+
+@numba.njit(nogil=True)
+def _copy(source, target):
+    for i in range(len(source)):
+        target[i] = source[i]
+
+
+@numba.njit(nogil=True)
+def _multiply_and_add(times, numbers):
+    for _ in range(times):
+        for i in range(len(numbers)):
+            x = numbers[i]
+            for _ in range(16):
+                x = x * 0.999999 + 1e-9
+            numbers[i] = x
+
+
+def best(work: Callable[[], object]) -> float:
+    """Return the shortest time of several tries, seconds of this thread."""
+    taken = []
+    for _ in range(ROUNDS):
+        start = time.thread_time()
+        work()
+        taken.append(time.thread_time() - start)
+    return min(taken)
+
+
+def bandwidth() -> float:
+    """Bytes per second that a copy reads and writes beyond the caches."""
+    source, target = np.ones(8_000_000), np.zeros(8_000_000)
+    _copy(source, target)
+    return 2 * source.nbytes / best(lambda: _copy(source, target))
+
+
+def arithmetic() -> float:
+    """Operations per second where everything stays in registers."""
+    numbers = np.ones(512)
+    _multiply_and_add(1, numbers)
+    return 2000 * 512 * 32 / best(lambda: _multiply_and_add(2000, numbers))
+
+
+def operations(kernel, *arguments: object) -> int:
+    """Operations on vectors in a kernel's compiled code, which are those per contact of its loop."""
+    fresh = numba.njit(error_model="numpy")(kernel.py_func)
+    fresh(*arguments)
+    (code,) = fresh.inspect_llvm().values()
+    vector = r"(?:fadd|fsub|fmul|fdiv|call \S*|tail call) <\d+ x double>"
+    return len(re.findall(vector, code))
+
+
+def run() -> Iterator[dict]:
+    """Time per contact of each phase, its bytes, and how it compares with what the machine allows."""
+    copied, computed = bandwidth(), arithmetic()
+    yield {"name": "profile.machine.copy", "value": copied / 1e9, "unit": "GB/s"}
+    yield {"name": "profile.machine.arithmetic", "value": computed / 1e9, "unit": "Gflop/s"}
+    solid = cube(4)
+    for texels in GRIDS:
+        simulation = Simulation(weighing(texels, solid), threads=1)
+        simulation.advance()
+        arrays, times, total = simulation.arrays, max(10, 100_000 // texels), 0.0
+        world, scratch = arrays[0], arrays[-1]
+        scratch.step[0] = simulation.dt
+        flops = {
+            "linearise and sum": operations(
+                step._sum_contacts, 0, 0, simulation.dt, step._law(world.parameters, 0), world.painted, scratch
+            ),
+            "bend bristles": operations(step._bend_bristles, 0, step._values(scratch.part[0]), arrays[-2], scratch),
+            "find contacts": 90 + operations(gather._lay_flat, 0, int(scratch.contacts[0]), scratch.rows),  # 90 by hand
+        }
+        for name, phase in PHASES.items():
+            _repeat(1, phase, *arrays)
+            taken = best(functools.partial(_repeat, times, phase, *arrays)) / times / texels
+            total += taken
+            least = max(BYTES[name] / copied, flops[name] / computed)
+            yield {
+                "name": f"profile.{texels}.{name.replace(' ', '_')}", "value": taken * 1e9, "unit": "ns per contact",
+                "peer": f"allowed for {BYTES[name]} bytes, {flops[name]} flops", "peer_value": least * 1e9,
+                "ratio": taken / least,
+            }  # fmt: skip
+        start = time.thread_time()
+        simulation.advance()
+        step_time = (time.thread_time() - start) / simulation.substeps
+        yield {"name": f"profile.{texels}.rest_of_the_step", "value": (step_time - total * texels) * 1e6, "unit": "us"}
