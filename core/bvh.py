@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .jit import kernel
+from .jit import allocating, kernel
 from .mesh import TriangleMesh, face_normals
 
 LEAF_SIZE = 4
@@ -109,7 +109,7 @@ def _select(order, centroid, axis, lo, hi, middle):
             return
 
 
-@kernel
+@allocating
 def _build(corners, centroid, order, leaf_size, bounds, skip, first, number):
     """Split at the median of the longest axis until leaves are small; returns the number of nodes."""
     stack = np.empty((128, 3), np.int64)  # range of triangles, and the node whose skip the range's end decides

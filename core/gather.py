@@ -10,7 +10,7 @@ import numpy as np
 
 from .bvh import cross_plane, find_near, near_entry, segment_entry
 from .contact import DEPTH, LANES, NX, NY, NZ, PX, PY, PZ, ROW, STORED, ZX, ZY, ZZ
-from .jit import kernel
+from .jit import inlined, kernel
 from .shapes import place_all, place_near
 from .skin import finish_rows
 
@@ -79,9 +79,9 @@ def _travel(pose, old, pair, center, sensor, radius):
     return math.sqrt(shift) + math.sqrt(0.5 * turn) * radius
 
 
-@kernel
-def _keep_lists(pair, sensor, target, pose, world, tree, neighbours, shapes):
-    """Collect the triangles near each contact point of a pair anew when it has moved by more than the skin of the lists.
+@inlined
+def _skin_to_make(pair, sensor, target, pose, world, neighbours, shapes):
+    """Skin of the lists that a pair needs anew since it has moved by more than that of its present ones, -1 if it has not.
 
     The skin follows the motion: some thirty steps' travel, so that lists are short and yet seldom made.
     """
@@ -95,7 +95,13 @@ def _keep_lists(pair, sensor, target, pose, world, tree, neighbours, shapes):
         wanted = min(max(32.0 * travel / (used + 1.0), 1e-3 * wanted), wanted)
         too_wide = used == 255.0 and wanted < 0.5 * skin
         if travel <= skin and not too_wide:
-            return
+            return -1.0
+    return wanted
+
+
+@kernel
+def _make_lists(pair, sensor, target, pose, skin, world, tree, neighbours, shapes):
+    """Collect the triangles near each contact point of a pair."""
     place_all(target, shapes, tree)
     points, reach, slot = world.points, world.reach[sensor], world.slot_start[pair]
     for point in range(world.point_first[pair], world.point_stop[pair]):
@@ -105,14 +111,14 @@ def _keep_lists(pair, sensor, target, pose, world, tree, neighbours, shapes):
         ox = pose[9] + pose[0] * points[point, 0] + pose[1] * points[point, 1] + pose[2] * points[point, 2] - dx
         oy = pose[10] + pose[3] * points[point, 0] + pose[4] * points[point, 1] + pose[5] * points[point, 2] - dy
         oz = pose[11] + pose[6] * points[point, 0] + pose[7] * points[point, 1] + pose[8] * points[point, 2] - dz
-        number, only = find_near(ox, oy, oz, dx, dy, dz, target, wanted, neighbours.near, slot, tree)
+        number, only = find_near(ox, oy, oz, dx, dy, dz, target, skin, neighbours.near, slot, tree)
         neighbours.number[slot], neighbours.only[slot] = number, only
         slot += 1
     for i in range(12):
         neighbours.pose[pair, i] = pose[i]
-    neighbours.pose[pair, 12] = wanted
+    neighbours.pose[pair, 12] = skin
     neighbours.pose[pair, 13] = 0.0
-    neighbours.pose[pair, 14] = deformed
+    neighbours.pose[pair, 14] = shapes.travelled[target] + shapes.point_travelled[sensor]
 
 
 @kernel
@@ -157,10 +163,13 @@ def gather(pair, dt, world, tree, neighbours, shapes, state, scratch):
         _forget(pair, world, state)
         scratch.contacts[pair], scratch.sunk[pair] = 0, 0
         return
-    _keep_lists(pair, sensor, target, pose, world, tree, neighbours, shapes)
+    skin = _skin_to_make(pair, sensor, target, pose, world, neighbours, shapes)
+    if skin >= 0.0:
+        _make_lists(pair, sensor, target, pose, skin, world, tree, neighbours, shapes)
     sunk, slot = 0, world.slot_start[pair] - 1
     stop = slot + 1 + world.point_stop[pair] - world.point_first[pair]
-    place_near(target, slot + 1, stop, neighbours.near, neighbours.number, shapes, tree)
+    if shapes.deforms[target]:
+        place_near(target, slot + 1, stop, neighbours.near, neighbours.number, shapes, tree)
     block, lane = first, 0
     for point in range(world.point_first[pair], world.point_stop[pair]):
         slot += 1

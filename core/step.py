@@ -64,7 +64,7 @@ from .contact import (
 from .crew import LATE, SPINS, announce, hand_in, is_over, is_stopped, linger, take
 from .effects.laws import COLUMNS
 from .gather import gather
-from .jit import inlined, kernel
+from .jit import allocating, inlined, kernel
 from .pads import (
     NOW,
     STEP,
@@ -312,7 +312,7 @@ def _velocity(px, py, pz, motion):
     )
 
 
-@kernel
+@inlined
 def gather_all(dt, world, tree, neighbours, shapes, state, scratch):
     """Contacts of all pairs of sensor and target where the bodies are now. Returns how many points are sunk too deep to act."""
     for body in range(len(state.position)):
@@ -322,7 +322,7 @@ def gather_all(dt, world, tree, neighbours, shapes, state, scratch):
     return scratch.sunk.sum()
 
 
-@kernel
+@inlined
 def _share_out(phase, world, tree, neighbours, shapes, state, scratch):
     """Do a phase for all pairs, alone or with helpers; surfaces that deform are moved on when first asked for, so alone."""
     board, pairs = scratch.board, len(world.pairs)
@@ -360,7 +360,7 @@ def help_out(world, tree, neighbours, shapes, state, scratch):
             turn += 1
 
 
-@kernel
+@inlined
 def _do(phase, pair, world, tree, neighbours, shapes, state, scratch):
     """One phase of one pair. What it writes belongs to this pair alone."""
     dt = scratch.step[0]
@@ -373,7 +373,7 @@ def _do(phase, pair, world, tree, neighbours, shapes, state, scratch):
             _bend_pair(pair, dt, world, shapes, state, scratch)
 
 
-@kernel
+@inlined
 def _solve_velocities(dt, commands, world, tree, neighbours, shapes, state, scratch):
     """Velocities of free and driven bodies at the step's end, written into the state.
 
@@ -406,7 +406,8 @@ def _solve_velocities(dt, commands, world, tree, neighbours, shapes, state, scra
                     matrix[at + i, at + i] += world.mass[body]
                     for j in range(i + 1):
                         matrix[at + 3 + i, at + 3 + j] += scratch.inertia[body, i, j]
-        add_servos(dt, turn > 0, commands, world, state, scratch)
+        if len(world.drives) > 0:
+            add_servos(dt, turn > 0, commands, world, state, scratch)
         solve_positive(matrix, vector, n)
         change = 0.0  # a length, so that a scene that is turned as a whole takes the same rounds
         for i in range(n):
@@ -425,7 +426,7 @@ def _solve_velocities(dt, commands, world, tree, neighbours, shapes, state, scra
     _write_twists(dt, world, state, scratch)
 
 
-@kernel
+@inlined
 def _begin_guess(dt, world, state, scratch):
     """Velocities as they are for a first guess, and what momentum the bodies would have without contacts and drives."""
     momentum, guess, velocity = scratch.momentum, scratch.guess, state.velocity
@@ -529,7 +530,7 @@ def _is_guarded(pair, world):
     return world.at[world.sensor_body[world.pairs[pair, 0]]] >= 0 or world.at[world.target_body[world.pairs[pair, 1]]] >= 0
 
 
-@kernel
+@inlined
 def _sum_pair(pair, dt, world, state, scratch):
     """Sum up the contacts of a pair at the velocities that are guessed."""
     a, b = world.sensor_body[world.pairs[pair, 0]], world.target_body[world.pairs[pair, 1]]
@@ -656,7 +657,7 @@ def _sum_contacts(pair, first_point, dt, p, world, memory, scratch):
                 sums[i + lane] += sums[i + lane + half]
 
 
-@kernel
+@inlined
 def _collect(pair, world, scratch):
     """Add up what :func:`_sum_contacts` has left for the parts of a pair; returns whether that is all and anything touches."""
     pairs, sums, block, wrench = world.pairs, scratch.sums[pair], scratch.block, scratch.wrench
@@ -675,7 +676,7 @@ def _collect(pair, world, scratch):
     return last and block[0, 0] + block[1, 1] + block[2, 2] > 0.0  # zero where nothing touches
 
 
-@kernel
+@inlined
 def _add_pair(pair, a, b, dt, world, state, scratch):
     """Bring a pair's sums into the linear system, all parts together with the last."""
     if not _collect(pair, world, scratch):
@@ -722,7 +723,7 @@ def _write_map(body, sensor_body, sign, world, state, scratch, out):
     return world.at[body], 1
 
 
-@kernel
+@inlined
 def _bend_pair(pair, dt, world, shapes, state, scratch):
     """Bristle deflections at the step's end, as the sensor sees them then."""
     a, b = world.sensor_body[world.pairs[pair, 0]], world.target_body[world.pairs[pair, 1]]
@@ -845,7 +846,8 @@ def advance_steps(
         if len(scratch.felt) > 0:
             _remember(dt, world, state, scratch)
         _share_out(BEND, world, tree, neighbours, shapes, state, scratch)
-        move_drives(dt, commands[step], world, state, scratch)
+        if len(world.drives) > 0:
+            move_drives(dt, commands[step], world, state, scratch)
         for body in range(len(world.kind)):
             if world.kind[body] == FREE:
                 _move_free(body, dt, world, state, scratch)
@@ -857,7 +859,7 @@ def advance_steps(
     return worst
 
 
-@kernel
+@inlined
 def _place(position, quaternion, world, state, scratch):
     """Put keyframed and driven bodies where they are at the beginning of a step."""
     for body in range(len(world.kind)):
@@ -870,7 +872,7 @@ def _place(position, quaternion, world, state, scratch):
                 place_driven(body, position[body], world, state, scratch.axis[body])
 
 
-@kernel
+@inlined
 def _move_free(body, dt, world, state, scratch):
     """Move a free body with its new velocity. What nothing touches keeps its angular momentum and its energy."""
     velocity, rotation, extra = state.velocity[body], scratch.rotation[body], scratch.tumbling[body]
@@ -914,7 +916,7 @@ def preload(world, state, scratch):
             state.bristles[slot, 4] = k * scratch.rows[b, DEPTH + lane] ** (power + 1.0) / (power + 1.0)
 
 
-@kernel
+@allocating
 def feel(world, state, scratch, force, shear, depth, slip, contact, net, moment):
     """What every texel feels right now, from rows freshly gathered (Eq. 8, 9, 13); forces on the sensor, in its body's frame.
 

@@ -60,7 +60,7 @@ def _half_turn(lx, ly, lz, dt, inverse):
         x, y, z = 0.25 * dt * wx, 0.25 * dt * wy, 0.25 * dt * wz
         change = abs(x - jx) + abs(y - jy) + abs(z - jz)
         jx, jy, jz = x, y, z
-        if change <= 1e-16 * (abs(x) + abs(y) + abs(z)):
+        if change <= 1e-15 * (abs(x) + abs(y) + abs(z)):  # rounding alone may keep it from less
             break
     return jx, jy, jz
 
