@@ -99,7 +99,7 @@ class Simulation:
         self._readers = [Reader.of(sensor) for sensor in scenario.sensors]
         self._pilot = Pilot(scenario)
         self._texel_start = _texel_start(scenario)
-        gather_all(-self.dt, *self._arrays)
+        gather_all(-self.dt, *self.arrays)
         preload(self._world, self._state, self._scratch)
 
     @property
