@@ -38,8 +38,7 @@ KEEP, GAIN = LANES * 10, LANES * 11  # z(t + dt) = KEEP z + GAIN v
 LIMIT = LANES * 12  # largest |z|, m
 PUSH, SLOPE = LANES * 13, LANES * 14  # tangent of the normal law where it is not the same for all contacts: N, N·s/m
 GRIP, DRAG = LANES * 15, LANES * 16  # multiplier of friction, and what is added to ct (N·s/m), written like these
-STORED = LANES * 17  # work that the contact has taken in and may give back, J
-ROW = LANES * 18
+ROW = LANES * 17
 
 # Columns of a parameter row, one per sensor or pad.
 K, CN, CT, SIGMA0, SIGMA1, X0, MUS, MUD, EXPONENT, DISSIPATION = range(10)
@@ -188,9 +187,8 @@ class State(NamedTuple):
         Linear (m/s) and angular (rad/s), world axes.
     hint : (s,) int
         Triangle each contact point met last, -1 for none, -2 once it was pressed past its reach.
-    bristles : (s, 5) float
-        Bristle deflection (m) in the frame of the sensor's body, the share of the reach that is pressed in, and the work that
-        was done on the contact and not yet given back (J).
+    bristles : (s, 4) float
+        Bristle deflection (m) in the frame of the sensor's body, and the share of the reach that is pressed in.
     drives : (d, 3) float
         Way along the axis (m), speed (m/s) and force (N) of each drive.
     memory : (N, columns) float
@@ -335,32 +333,6 @@ def friction_trace(time, velocity, normal_force, parameters, force):
             z = keep * z + gain * v
         v = velocity[i]
         force[i] = friction_force(z, bristle_rate(z, v, v * v, normal_force, parameters), v, parameters)
-
-
-@inlined
-def held_back(push, stiff_n, rate, depth, stored, dt):
-    """Tangent of a normal force that gives back no more work in a step than was done on the contact before.
-
-    Eq. 4 makes the depth jump where a texel passes from one face to the next, and with it the work that a spring could do: on
-    edges the law is no spring, and with little damping it would feed energy into what bounces on it. A force that is bounded
-    by ``stored / (-ḋ dt)`` while the contact opens cannot: bodies and stores together never gain energy, whatever the depth
-    does. What rests is not concerned (a motion of less than 1e-12 of the depth in a step counts as rest).
-
-    Parameters
-    ----------
-    push, stiff_n : float, N and N·s/m
-        The force at the step's end is ``push + stiff_n · rate``.
-    rate, depth, stored : float, m/s, m and J
-
-    Returns
-    -------
-    push, stiff_n : float
-    """
-    force, way = push + stiff_n * rate, -rate * dt
-    room = stored + 1e-12 * force * depth
-    most = room / way
-    over = way * force > room
-    return 2.0 * most if over else push, most * dt / way if over else stiff_n
 
 
 @inlined

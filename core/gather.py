@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .bvh import cross_plane, find_near, near_entry, segment_entry
-from .contact import DEPTH, LANES, NX, NY, NZ, PX, PY, PZ, ROW, STORED, ZX, ZY, ZZ
+from .contact import DEPTH, LANES, NX, NY, NZ, PX, PY, PZ, ROW, ZX, ZY, ZZ
 from .jit import inlined, kernel
 from .shapes import place_all, place_near
 from .skin import finish_rows
@@ -128,7 +128,7 @@ def _forget(pair, world, state):
     for slot in range(start, start + world.point_stop[pair] - world.point_first[pair]):
         if state.hint[slot] != -1:
             state.hint[slot] = -1
-            for i in range(5):
+            for i in range(4):
                 state.bristles[slot, i] = 0.0
 
 
@@ -209,7 +209,7 @@ def gather(pair, dt, world, tree, neighbours, shapes, state, scratch):
                 hint[slot] = -2
             else:
                 hint[slot] = -1
-            for i in range(5):
+            for i in range(4):
                 bristles[slot, i] = 0.0
             continue
         hint[slot] = triangle
@@ -226,7 +226,6 @@ def gather(pair, dt, world, tree, neighbours, shapes, state, scratch):
         rows[block, ZX + lane], rows[block, ZY + lane] = bristles[slot, 0], bristles[slot, 1]
         rows[block, ZZ + lane] = bristles[slot, 2]
         rows[block, DEPTH + lane] = inside * abs(dx * fx + dy * fy + dz * fz)
-        rows[block, STORED + lane] = bristles[slot, 4]
         bristles[slot, 3] = inside
         slots[block, lane] = slot
         lane += 1

@@ -30,7 +30,7 @@ from .scenario import Scenario, Sensor, Target
 from .series import coupling
 from .servo import drive_table
 from .shapes import Shapes
-from .step import Scratch, advance_steps, contacts_of, feel, gather_all, help_out, preload, scratch_for
+from .step import Scratch, advance_steps, contacts_of, feel, gather_all, help_out, scratch_for
 from .surfaces import Surfaces, extent, point_rows
 from .timestep import plan
 
@@ -99,8 +99,6 @@ class Simulation:
         self._readers = [Reader.of(sensor) for sensor in scenario.sensors]
         self._pilot = Pilot(scenario)
         self._texel_start = _texel_start(scenario)
-        gather_all(-self.dt, *self.arrays)
-        preload(self._world, self._state, self._scratch)
 
     @property
     def arrays(self) -> tuple[World, Tree, Neighbours, Shapes, State, Scratch]:
@@ -404,7 +402,7 @@ def _start(scenario: Scenario, world: World, center: np.ndarray) -> State:
         quaternion=quaternion,
         velocity=np.array(velocity, dtype=float),
         hint=np.full(slots, -1),
-        bristles=np.zeros((slots, 5)),
+        bristles=np.zeros((slots, 4)),
         drives=np.zeros((len(world.drives), 3)),
         memory=world.program.memory(len(world.points)),
     )

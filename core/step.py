@@ -46,7 +46,6 @@ from .contact import (
     PZ,
     ROW,
     SLOPE,
-    STORED,
     ZX,
     ZY,
     ZZ,
@@ -56,7 +55,6 @@ from .contact import (
     bristle_limit,
     bristle_rate,
     friction_force,
-    held_back,
     linearise,
     normal_force,
     normal_tangent,
@@ -517,19 +515,6 @@ def _write_tangents(pair, first_point, dt, motion, law, world, memory, scratch):
             left -= LANES
 
 
-@kernel
-def _is_guarded(pair, world):
-    """Whether the contacts of a pair may give back no more work than was done on them.
-
-    Damping of 1 % of the stiffness in number takes away more than edges can bring in: then nothing is held back, and the law
-    is smooth. Where no body is moved by forces nothing can gain energy, and a texel that pulls has its energy from the start.
-    """
-    damped = world.parameters[pair, EXPONENT] == LINEAR and world.parameters[pair, CN] >= 0.01 * world.parameters[pair, K]
-    if damped or may_pull(world.pairs[pair, 0], world.program):
-        return False
-    return world.at[world.sensor_body[world.pairs[pair, 0]]] >= 0 or world.at[world.target_body[world.pairs[pair, 1]]] >= 0
-
-
 @inlined
 def _sum_pair(pair, dt, world, state, scratch):
     """Sum up the contacts of a pair at the velocities that are guessed."""
@@ -587,7 +572,7 @@ def _sum_contacts(pair, first_point, dt, p, world, memory, scratch):
     own, moving = scratch.own, scratch.moving[pair]
     sensor = world.pairs[pair, 0]
     vary = p[EXPONENT] != LINEAR or len(world.painted) > 0 or has_effects(sensor, world.program)
-    sticks, guarded = may_pull(sensor, world.program), _is_guarded(pair, world)
+    sticks = may_pull(sensor, world.program)
     if vary:
         _write_tangents(pair, first_point, dt, motion, p, world, memory, scratch)
     first = scratch.first_block[pair]
@@ -602,18 +587,13 @@ def _sum_contacts(pair, first_point, dt, p, world, memory, scratch):
                 vx, vy, vz = vx + own[b, OX + lane], vy + own[b, OY + lane], vz + own[b, OZ + lane]
                 ux, uy, uz = ux + own[b, OX + lane], uy + own[b, OY + lane], uz + own[b, OZ + lane]
             push, slope, grip, drag = p[K] * rows[b, DEPTH + lane], p[K] * dt + p[CN], 1.0, 0.0
-            depth = rows[b, DEPTH + lane]
             if vary:
                 push, slope, grip = rows[b, PUSH + lane], rows[b, SLOPE + lane], rows[b, GRIP + lane]
                 drag = rows[b, DRAG + lane]
-            if guarded:
-                push, slope = held_back(push, slope, vx * nx + vy * ny + vz * nz, depth, rows[b, STORED + lane], dt)
             limit, push, stiff_n, bias, t, keep, gain = linearise(
                 nx, ny, nz, zx, zy, zz, push, slope, grip, drag, sticks, vx, vy, vz, dt, p
             )
             rows[b, LIMIT + lane], rows[b, KEEP + lane], rows[b, GAIN + lane] = limit, keep, gain
-            if guarded:
-                rows[b, PUSH + lane], rows[b, SLOPE + lane] = push, stiff_n
             e = stiff_n - t
             push += e * (ux * nx + uy * ny + uz * nz)
             fx = -push * nx - bias * zx - t * ux
@@ -729,8 +709,6 @@ def _bend_pair(pair, dt, world, shapes, state, scratch):
     a, b = world.sensor_body[world.pairs[pair, 0]], world.target_body[world.pairs[pair, 1]]
     motion, part = scratch.motion[pair], scratch.part[pair]
     _relative_motion(a, b, scratch.twist, state.position, scratch.rotation, motion)
-    if _is_guarded(pair, world):
-        _count_work(pair, dt, _values(motion), state, scratch)
     _seen_at_the_end(a, dt, scratch.twist, scratch.rotation, motion, part, scratch.turn[pair])
     if scratch.moving[pair]:
         _turn_own(pair, scratch)
@@ -882,38 +860,6 @@ def _move_free(body, dt, world, state, scratch):
     turn_quaternion(state.quaternion[body], dt * velocity[3], dt * velocity[4], dt * velocity[5])
     write_rotation(state.quaternion[body], rotation)
     velocity[3], velocity[4], velocity[5] = spin_of(rotation, world.inverse_inertia[body], lx, ly, lz)
-
-
-@kernel
-def _count_work(pair, dt, motion, state, scratch):
-    """Add to each contact's store the work that was done on it in the step."""
-    rows, slots, own, moving = scratch.rows, scratch.slots, scratch.own, scratch.moving[pair]
-    first, left = scratch.first_block[pair], scratch.contacts[pair]
-    for b in range(first, first + (left + LANES - 1) // LANES):
-        for lane in range(LANES):
-            vx, vy, vz = _velocity(rows[b, PX + lane], rows[b, PY + lane], rows[b, PZ + lane], motion)
-            if moving:
-                vx, vy, vz = vx + own[b, OX + lane], vy + own[b, OY + lane], vz + own[b, OZ + lane]
-            rate = vx * rows[b, NX + lane] + vy * rows[b, NY + lane] + vz * rows[b, NZ + lane]
-            force = max(rows[b, PUSH + lane] + rows[b, SLOPE + lane] * rate, 0.0)
-            rows[b, STORED + lane] = max(rows[b, STORED + lane] + dt * force * rate, 0.0)
-        for lane in range(min(left, LANES)):
-            state.bristles[slots[b, lane], 4] = rows[b, STORED + lane]
-        left -= LANES
-
-
-@kernel
-def preload(world, state, scratch):
-    """Credit contacts that are there at the very start, with their rows freshly gathered, with what their springs hold."""
-    for pair in range(len(world.pairs)):
-        p = _law(world.parameters, pair)
-        power = 1.0 if p[EXPONENT] == LINEAR else p[EXPONENT]
-        offset = world.point_first[pair] - world.slot_start[pair]
-        for r in range(scratch.contacts[pair]):
-            b, lane = scratch.first_block[pair] + r // LANES, r % LANES
-            slot = scratch.slots[b, lane]
-            k = _painted_law(p, world.painted, offset + slot)[K]
-            state.bristles[slot, 4] = k * scratch.rows[b, DEPTH + lane] ** (power + 1.0) / (power + 1.0)
 
 
 @allocating

@@ -417,7 +417,6 @@ def test_neighbour_lists_change_nothing():
         assert np.array_equal(frame.sensors["pad"].shear, recording.sensors["pad"].shear[i])
     simulation = Simulation(scenario)
     simulation._neighbours = simulation._neighbours._replace(near=np.zeros((len(simulation._neighbours.near), 0), np.int32))
-    simulation._neighbours.pose[:, 12] = -1.0  # what was made already had room
     simulation._neighbours.pose[:, 12] = -1.0  # as if no list had been made
     for i in range(16):
         frame = simulation.advance() if i else simulation.observe()
