@@ -41,4 +41,6 @@ def stored(block) -> dict:
 
 
 def _plain(value):
+    if hasattr(value, "to_dict"):  # settings within settings, and pointers to objects that point nowhere
+        return {key: _plain(item) for key, item in value.items()}
     return list(value) if hasattr(value, "to_list") else value

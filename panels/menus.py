@@ -28,7 +28,15 @@ class PALPATE_MT_object(bpy.types.Menu):
         layout.operator("palpate.bake", icon="RENDER_ANIMATION")
         layout.operator("palpate.bake_clear")
         layout.operator("palpate.dress")
+        layout.operator("palpate.catch_up")
         layout.operator("palpate.reset")
+        layout.separator()
+        layout.operator("palpate.measured_open")
+        layout.operator("palpate.gap_find")
+        layout.operator("palpate.gap_add")
+        layout.operator("palpate.gap_curves")
+        layout.operator("palpate.gap_show")
+        layout.operator("palpate.gap_report")
 
 
 def _draw(self, _context):
