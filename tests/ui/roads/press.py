@@ -55,7 +55,7 @@ def road(ui):
 
     yield from ui.move(*ui.centre(view))
     yield from ui.key("SPACE")
-    yield from ui.wait_until(lambda: scene.frame_current >= 25, "the timeline played to frame 25", timeout=90.0)
+    yield from ui.wait_until(lambda: scene.frame_current >= 25, "the timeline played to frame 25", timeout=400.0)
     yield from ui.key("SPACE")
     frame = scene.frame_current
     attribute = obj("Pad").data.attributes.get("palpate_force")
