@@ -310,6 +310,8 @@ def frame_objects(scene, objects, region=(0.06, 0.06, 0.94, 0.94), size=(960, 72
     scene.render.resolution_x, scene.render.resolution_y = size
     bpy.context.view_layer.update()
     render.frame_camera(scene, render.corners(objects), region)
+    # To a tenth of a millimetre: the last digits are not the same in all Blenders.
+    scene.camera.location = [round(x, 1) for x in scene.camera.location]
 
 
 def needles(scene, sensor, length: float, look, radius: float = 0.26):
