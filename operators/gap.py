@@ -11,16 +11,6 @@ from . import support
 from .fits import show_image
 
 
-def found(cls, context) -> bool:
-    """Poll: something was found for the active sensor."""
-    if not support.sensor_object(cls, context):
-        return False
-    if measured.of(context.object) is None:
-        cls.poll_message_set("Nothing was found yet: use Find Gap first")
-        return False
-    return True
-
-
 class PALPATE_OT_measured_open(support.Reporting, ImportHelper, bpy.types.Operator):
     """Choose measurements of the real sensor: a rig.toml with its CSV files beside it. They are read to see that they fit"""
 
@@ -133,7 +123,7 @@ class PALPATE_OT_gap_add(support.Reporting, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        return found(cls, context)
+        return support.gap_found(cls, context)
 
     def run(self, context):
         count = measured.add_found(context.object)
@@ -149,7 +139,7 @@ class PALPATE_OT_gap_curves(support.Reporting, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        return found(cls, context)
+        return support.gap_found(cls, context)
 
     def run(self, context):
         show_image(context, measured.of(context.object).pictures["curves"], "Palpate Gap Curves")
@@ -166,7 +156,7 @@ class PALPATE_OT_gap_show(support.Reporting, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        return support.mesh_object(cls, context) and found(cls, context)
+        return support.mesh_object(cls, context) and support.gap_found(cls, context)
 
     def run(self, context):
         support.leave_edit_mode(context)
@@ -186,7 +176,7 @@ class PALPATE_OT_gap_report(support.Reporting, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        return found(cls, context)
+        return support.gap_found(cls, context)
 
     def invoke(self, context, _event):
         context.window_manager.fileselect_add(self)

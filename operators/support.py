@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from ..addon import meshes
+from ..addon import measured, meshes
 from ..core.errors import PalpateError
 
 
@@ -71,3 +71,13 @@ def leave_edit_mode(context) -> None:
 
     if context.object is not None and context.object.mode != "OBJECT":
         bpy.ops.object.mode_set(mode="OBJECT")
+
+
+def gap_found(cls, context) -> bool:
+    """Poll: something was found for the active sensor."""
+    if not sensor_object(cls, context):
+        return False
+    if measured.of(context.object) is None:
+        cls.poll_message_set("Nothing was found yet: use Find Gap first")
+        return False
+    return True
