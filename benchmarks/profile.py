@@ -17,13 +17,13 @@ from collections.abc import Callable, Iterator
 import numba
 import numpy as np
 
-from palpate.core import gather, step
+from palpate.core import bristles, gather, pairs, phases, sums
 from palpate.core.solve import Simulation
 
 from .solver import GRIDS, cube, weighing
 
 ROUNDS = 5
-PHASES = {"find contacts": step.GATHER, "linearise and sum": step.SUM, "bend bristles": step.BEND}
+PHASES = {"find contacts": phases.GATHER, "linearise and sum": phases.SUM, "bend bristles": phases.BEND}
 BYTES = {
     # contact point 12, bristle 4 (both ways), triangle 12, hint and lists 3; columns of the row: 10 written, 6 and 3 laid flat
     "find contacts": 8 * (12 + 8 + 12 + 3 + 10 + 9),
@@ -35,7 +35,7 @@ BYTES = {
 @numba.njit(nogil=True)
 def _repeat(times, phase, world, tree, neighbours, shapes, state, scratch):
     for _ in range(times):
-        step._share_out(phase, world, tree, neighbours, shapes, state, scratch)
+        phases.share_out(phase, world, tree, neighbours, shapes, state, scratch)
 
 
 @numba.njit(nogil=True)
@@ -101,9 +101,9 @@ def run() -> Iterator[dict]:
         scratch.step[0] = simulation.dt
         flops = {
             "linearise and sum": operations(
-                step._sum_contacts, 0, 0, simulation.dt, step._law(world.parameters, 0), world.painted, scratch
+                sums._sum_contacts, 0, 0, simulation.dt, pairs.law_of(world.parameters, 0), world, arrays[-2].memory, scratch
             ),
-            "bend bristles": operations(step._bend_bristles, 0, step._values(scratch.part[0]), arrays[-2], scratch),
+            "bend bristles": operations(bristles._bend_bristles, 0, pairs.values(scratch.part[0]), arrays[-2], scratch),
             "find contacts": 90 + operations(gather._lay_flat, 0, int(scratch.contacts[0]), scratch.rows),  # 90 by hand
         }
         for name, phase in PHASES.items():

@@ -7,10 +7,35 @@ remembers for itself, whatever presses on it; of several targets at one point th
 
 from __future__ import annotations
 
-from .contact import CN, CT, DISSIPATION, DRAG, EXPONENT, GRIP, LANES, LINEAR, MUD, MUS, PUSH, SLOPE, K
+import math
+
+from .contact import (
+    CN,
+    CT,
+    DEPTH,
+    DISSIPATION,
+    DRAG,
+    EXPONENT,
+    GRIP,
+    LANES,
+    LINEAR,
+    MUD,
+    MUS,
+    NX,
+    NY,
+    NZ,
+    PUSH,
+    PX,
+    PY,
+    PZ,
+    SLOPE,
+    K,
+)
 from .effects import laws
-from .effects.laws import DAMPING, DEPTH, FACTOR, FORCE, RATE, VISCOUS, apply_friction, apply_laws, press
+from .effects.laws import DAMPING, FACTOR, FORCE, RATE, VISCOUS, apply_friction, apply_laws, press
 from .jit import kernel
+from .pairs import law_of, painted_law, relative_motion, values, velocity_at
+from .skin import OX, OY, OZ
 
 STEP, NOW = 0, 1
 """Lengths of time that laws are made for: a step, and none at all."""
@@ -62,7 +87,7 @@ def write_tangent(pair, block, lane, dt, grip, world, felt, rows):
     """
     share, rate = world.share[pair], felt[block, RATE * LANES + lane]
     force, slope = share * felt[block, FORCE * LANES + lane], 0.0
-    if felt[block, DEPTH * LANES + lane] > 0.0:
+    if felt[block, laws.DEPTH * LANES + lane] > 0.0:
         slope = share * max(felt[block, laws.SLOPE * LANES + lane] * dt + felt[block, DAMPING * LANES + lane], 0.0)
     rows[block, PUSH + lane], rows[block, SLOPE + lane] = force - slope * rate, world.part[pair] * slope
     rows[block, GRIP + lane] = grip * felt[block, FACTOR * LANES + lane]
@@ -81,7 +106,7 @@ def force_and_law(pair, block, lane, p, world, felt):
 def note_pressed(point, pair, depth, rate, slide, p, world, pressed):
     """Keep what presses on a point at the step's end, if nothing presses deeper."""
     points = pressed.shape[1] // laws.COLUMNS
-    if world.part[pair] * depth > pressed[0, DEPTH * points + point]:
+    if world.part[pair] * depth > pressed[0, laws.DEPTH * points + point]:
         press_texel(pressed, 0, points, point, pair, depth, rate, slide, 0.0, p, world)
 
 
@@ -94,3 +119,34 @@ def remember(sensor, p, world, pressed, every, memory):
     for column in range(laws.COLUMNS):
         for i in range(count):
             pressed[0, column * points + first + i] = 0.0
+
+
+@kernel
+def remember_step(dt, world, state, scratch):
+    """Let the effects remember what happened in the step, at the velocities of its end."""
+    for pair in range(len(world.pairs)):
+        sensor = world.pairs[pair, 0]
+        if scratch.contacts[pair] > 0 and has_effects(sensor, world.program):
+            a, b = world.sensor_body[sensor], world.target_body[world.pairs[pair, 1]]
+            relative_motion(a, b, scratch.twist, state.position, scratch.rotation, scratch.motion[pair])
+            _note_pair(pair, dt, values(scratch.motion[pair]), law_of(world.parameters, pair), world, scratch)
+    for pair in range(len(world.pairs)):
+        sensor = world.pairs[pair, 0]
+        if (pair == 0 or world.pairs[pair - 1, 0] != sensor) and has_effects(sensor, world.program):
+            remember(sensor, law_of(world.parameters, pair), world, scratch.pressed, scratch.every, state.memory)
+
+
+@kernel
+def _note_pair(pair, dt, motion, law, world, scratch):
+    """Keep what presses on the points of a pair's sensor."""
+    rows = scratch.rows
+    for r in range(scratch.contacts[pair]):
+        b, lane = scratch.first_block[pair] + r // LANES, r % LANES
+        point = world.point_first[pair] + scratch.slots[b, lane] - world.slot_start[pair]
+        vx, vy, vz = velocity_at(rows[b, PX + lane], rows[b, PY + lane], rows[b, PZ + lane], motion)
+        if scratch.moving[pair]:
+            vx, vy, vz = vx + scratch.own[b, OX + lane], vy + scratch.own[b, OY + lane], vz + scratch.own[b, OZ + lane]
+        rate = vx * rows[b, NX + lane] + vy * rows[b, NY + lane] + vz * rows[b, NZ + lane]
+        slide = dt * math.sqrt(max(vx * vx + vy * vy + vz * vz - rate * rate, 0.0))
+        p, end = painted_law(law, world.painted, point), rows[b, DEPTH + lane] + dt * rate
+        note_pressed(point, pair, end, rate, slide, p, world, scratch.pressed)

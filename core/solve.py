@@ -19,18 +19,21 @@ from .contact import State, World, parameter_row
 from .crew import board_for, helpers
 from .drive import drive
 from .effects.laws import compile_program
+from .feel import feel
 from .gather import Neighbours, count_sunk
 from .mesh import is_closed
 from .motions import poses_at
+from .phases import gather_all, help_out
 from .pilot import Pilot
 from .points import ContactPoints, contact_points
 from .recording import Frame, Recording, SensorFrame
 from .respond import Reader
 from .scenario import Scenario, Sensor, Target
+from .scratch import Scratch, contacts_of, scratch_for
 from .series import coupling
 from .servo import drive_table
 from .shapes import Shapes
-from .step import Scratch, advance_steps, contacts_of, feel, gather_all, help_out, scratch_for
+from .step import advance_steps
 from .surfaces import Surfaces, extent, point_rows
 from .timestep import plan
 

@@ -11,7 +11,7 @@ import sys
 import pytest
 from solver_scenes import cube_on_pad
 
-from palpate.core import jit, step
+from palpate.core import bristles, jit, pairs, sums
 from palpate.core.solve import Simulation
 
 numba = pytest.importorskip("numba")
@@ -64,11 +64,11 @@ def test_a_kernel_is_compiled_anew_when_one_that_it_calls_has_changed(tmp_path):
 def test_loops_over_contacts_run_in_vector_registers(name):
     """A call or a branch in such a loop changes no number and only makes it five times slower. Its root shows it."""
     simulation = Simulation(cube_on_pad(1.0, frames=1, dt=1e-3))
-    scratch, law = simulation._scratch, step._law(simulation._world.parameters, 0)
-    compiled = numba.njit(error_model="numpy")(getattr(step, name).py_func)
+    scratch, law = simulation._scratch, pairs.law_of(simulation._world.parameters, 0)
+    compiled = numba.njit(error_model="numpy")(getattr(sums if name == "_sum_contacts" else bristles, name).py_func)
     if name == "_sum_contacts":
         compiled(0, 0, 1e-3, law, simulation._world, simulation._state.memory, scratch)
     else:
-        compiled(0, step._values(scratch.part[0]), simulation._state, scratch)
+        compiled(0, pairs.values(scratch.part[0]), simulation._state, scratch)
     (code,) = compiled.inspect_asm().values()
     assert re.search(r"^\s+v?sqrtpd\s", code, re.MULTILINE), "the square root is taken of one number at a time"

@@ -1,0 +1,198 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The velocities at a substep's end (kernels).
+
+They are the unknowns of a linear system, implicit in the stiffness and damping of every contact, so that a stiff or heavily
+damped contact needs no small step.
+"""
+
+from __future__ import annotations
+
+import math
+
+from .bodies import DRIVEN, FREE, KEYFRAMED, add_product, keep_axis, solve_positive, write_twist, write_twist_map
+from .contact import LANES
+from .jit import inlined, kernel
+from .phases import SUM, share_out
+from .servo import SPEED, add_servos
+from .tumble import mean_spin, product
+
+PASSES = 40
+"""Most rounds in which contacts are linearised anew within a substep; two or three are usual, one at rest."""
+
+
+@inlined
+def solve_velocities(dt, commands, world, tree, neighbours, shapes, state, scratch):
+    """Velocities of free and driven bodies at the step's end, written into the state.
+
+    Contacts and drives are linearised at the current guess and the linear system solved, until the guess no longer moves; a
+    contact that would pull is left out of the next round. Where the rounds go in circles (friction that was guessed for too
+    much load throws the contact off, without the contact there is no friction), the guess moves by a share of the way only.
+    All that a share mixes keeps the momentum. With nothing to solve for one round only linearises.
+    """
+    matrix, vector, guess, n = scratch.matrix, scratch.vector, scratch.guess, world.unknowns
+    _begin_guess(dt, world, state, scratch)
+    first_change, last_change, share = 0.0, 0.0, 1.0
+    opening = min(1, len(world.drives))  # drives are without limits in the first round: what it changes says nothing yet
+    for turn in range(PASSES):
+        _write_twists(dt, world, state, scratch)
+        for i in range(n):
+            vector[i] = scratch.momentum[i]
+            for j in range(n):
+                matrix[i, j] = 0.0
+        share_out(SUM, world, tree, neighbours, shapes, state, scratch)
+        for pair in range(len(world.pairs)):
+            a, b = world.sensor_body[world.pairs[pair, 0]], world.target_body[world.pairs[pair, 1]]
+            if world.at[a] >= 0 or world.at[b] >= 0:
+                _add_pair(pair, a, b, dt, world, state, scratch)
+        if n == 0:
+            return
+        for body in range(len(world.kind)):
+            if world.kind[body] == FREE:
+                at = world.at[body]
+                for i in range(3):
+                    matrix[at + i, at + i] += world.mass[body]
+                    for j in range(i + 1):
+                        matrix[at + 3 + i, at + 3 + j] += scratch.inertia[body, i, j]
+        if len(world.drives) > 0:
+            add_servos(dt, turn > 0, commands, world, state, scratch)
+        solve_positive(matrix, vector, n)
+        change = 0.0  # a length, so that a scene that is turned as a whole takes the same rounds
+        for i in range(n):
+            change += (vector[i] - guess[i]) ** 2
+        change = math.sqrt(change)
+        # Contacts that come on and off in the first rounds find their own way; later ones shrink by 1 - share if all is well.
+        if turn > 3 and change > (1.0 - 0.25 * share) * last_change:
+            share *= 0.5
+        last_change = change
+        for i in range(n):
+            guess[i] = share * vector[i] + (1.0 - share) * guess[i]
+        if turn <= opening:
+            first_change = change
+        if turn >= opening and (change <= 1e-6 * first_change or change < 1e-13):
+            break
+    _write_twists(dt, world, state, scratch)
+
+
+@inlined
+def _begin_guess(dt, world, state, scratch):
+    """Velocities as they are for a first guess, and what momentum the bodies would have without contacts and drives."""
+    momentum, guess, velocity = scratch.momentum, scratch.guess, state.velocity
+    for body in range(len(world.kind)):
+        at = world.at[body]
+        if world.kind[body] == FREE:
+            inertia, spin = scratch.inertia[body], velocity[body, 3:]
+            lx, ly, lz = product(inertia, spin[0], spin[1], spin[2])
+            mean = mean_spin(scratch.rotation[body], world.inverse_inertia[body], lx, ly, lz, dt)
+            # The spin that is solved for is the mean over the step, so that a body tumbles as it should.
+            for i in range(3):
+                guess[at + i] = velocity[body, i]
+                momentum[at + i] = world.mass[body] * (velocity[body, i] + dt * world.gravity[i])
+                guess[at + 3 + i] = mean[i]
+                scratch.tumbling[body, i] = mean[i] - spin[i]
+            momentum[at + 3], momentum[at + 4], momentum[at + 5] = product(inertia, mean[0], mean[1], mean[2])
+        elif world.kind[body] == KEYFRAMED:
+            write_twist(velocity[body], dt, scratch.twist[body])
+            for i in range(12):
+                scratch.known[body, i] = scratch.twist[body, i]
+    for drive in range(len(world.drives)):
+        at = world.drive_at[drive]
+        guess[at] = state.drives[drive, SPEED]
+        momentum[at] = scratch.drive_mass[drive] * guess[at] - scratch.drive_load[drive]
+
+
+@kernel
+def _write_twists(dt, world, state, scratch):
+    """Velocities and twists that follow from the guess, and the part of the twists that is not solved for.
+
+    That is a finite turn's excess over ``ω × r`` of a free body, and what its carrier does of a driven one.
+    """
+    guess, velocity, twist, known = scratch.guess, state.velocity, scratch.twist, scratch.known
+    for body in range(len(world.kind)):
+        at = world.at[body]
+        if world.kind[body] == FREE:
+            for i in range(6):
+                velocity[body, i] = guess[at + i]
+            write_twist(velocity[body], dt, twist[body])
+            for i in range(3):
+                known[body, i] = 0.0
+            for i in range(3, 12):
+                known[body, i] = twist[body, i]
+            known[body, 4] += velocity[body, 5]
+            known[body, 5] -= velocity[body, 4]
+            known[body, 6] -= velocity[body, 5]
+            known[body, 8] += velocity[body, 3]
+            known[body, 9] += velocity[body, 4]
+            known[body, 10] -= velocity[body, 3]
+        elif world.kind[body] == DRIVEN:
+            for i in range(6):
+                velocity[body, i] = scratch.carried[body, i]
+            write_twist(velocity[body], dt, known[body])
+            for i in range(3):
+                velocity[body, i] += guess[at] * scratch.axis[body, i]
+            write_twist(velocity[body], dt, twist[body])
+
+
+@inlined
+def _collect(pair, world, scratch):
+    """Add up what :func:`_sum_contacts` has left for the parts of a pair; returns whether that is all and anything touches."""
+    pairs, sums, block, wrench = world.pairs, scratch.sums[pair], scratch.block, scratch.wrench
+    if pair == 0 or pairs[pair, 0] != pairs[pair - 1, 0] or pairs[pair, 1] != pairs[pair - 1, 1]:
+        block[:], wrench[:] = 0.0, 0.0
+    if scratch.contacts[pair] > 0:
+        at = 0
+        for i in range(6):
+            for j in range(i + 1):
+                block[i, j] += sums[at]
+                at += LANES
+        for i in range(6):
+            wrench[i] += sums[at]
+            at += LANES
+    last = pair + 1 == len(pairs) or pairs[pair, 0] != pairs[pair + 1, 0] or pairs[pair, 1] != pairs[pair + 1, 1]
+    return last and block[0, 0] + block[1, 1] + block[2, 2] > 0.0  # zero where nothing touches
+
+
+@inlined
+def _add_pair(pair, a, b, dt, world, state, scratch):
+    """Bring a pair's sums into the linear system, all parts together with the last."""
+    if not _collect(pair, world, scratch):
+        return
+    map_a, map_b, wrench = scratch.map_a, scratch.map_b, scratch.wrench
+    at_a, width_a = _write_map(a, a, -1.0, world, state, scratch, map_a)
+    at_b, width_b = _write_map(b, a, 1.0, world, state, scratch, map_b)
+    for j in range(6):
+        for i in range(width_a):
+            scratch.vector[at_a + i] += dt * map_a[j, i] * wrench[j]
+        for i in range(width_b):
+            scratch.vector[at_b + i] += dt * map_b[j, i] * wrench[j]
+    if width_a > 0:
+        _add_block(at_a, map_a, width_a, at_a, map_a, width_a, dt, scratch)
+    if width_b > 0:
+        _add_block(at_b, map_b, width_b, at_b, map_b, width_b, dt, scratch)
+    if width_a > 0 and width_b > 0:
+        if at_a >= at_b:  # only the lower triangle of the system is read
+            _add_block(at_a, map_a, width_a, at_b, map_b, width_b, dt, scratch)
+        if at_b >= at_a:  # coupled bodies share their unknown: both of the mixed products count there
+            _add_block(at_b, map_b, width_b, at_a, map_a, width_a, dt, scratch)
+
+
+@kernel
+def _add_block(row, left, left_width, column, right, right_width, dt, scratch):
+    if left_width == 6 and right_width == 6:  # the usual case with its widths in plain sight of the compiler
+        add_product(scratch.matrix, row, column, left, 6, scratch.block, right, 6, dt)
+    else:
+        add_product(scratch.matrix, row, column, left, left_width, scratch.block, right, right_width, dt)
+
+
+@kernel
+def _write_map(body, sensor_body, sign, world, state, scratch, out):
+    """From a body's unknowns to relative motion in the axes of the sensor's body; returns where they are and how many."""
+    gx = state.position[sensor_body, 0] - state.position[body, 0]
+    gy = state.position[sensor_body, 1] - state.position[body, 1]
+    gz = state.position[sensor_body, 2] - state.position[body, 2]
+    if world.kind[body] == KEYFRAMED:
+        return -1, 0
+    write_twist_map(scratch.rotation[sensor_body], gx, gy, gz, sign, out)
+    if world.kind[body] == FREE:
+        return world.at[body], 6
+    keep_axis(scratch.axis[body], out)
+    return world.at[body], 1
