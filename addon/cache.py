@@ -15,11 +15,22 @@ import numpy as np
 from ..core.errors import PalpateError
 from ..core.recording import Frame
 from ..core.scenario import Scenario
-from . import clock, dependencies, drives, effects, freebodies, meshes, properties, sample, state, units
+from . import clock, dependencies, drives, effects, freebodies, meshes, properties, sample, state, units, uvmaps
 
 PAINTED = tuple(f"{key}_{part}" for key in meshes.PAINTED for part in ("map", "factor"))
 REGION = ("region", "vertex_group", "threshold", "material", "face_set")
-SETTINGS = (*properties.PARAMETERS, *PAINTED, *REGION, *drives.SETTINGS, "role", "body", "mass", "contact_normals", "presses")
+SETTINGS = (
+    *properties.PARAMETERS,
+    *PAINTED,
+    *REGION,
+    *drives.SETTINGS,
+    *uvmaps.SETTINGS,
+    "role",
+    "body",
+    "mass",
+    "contact_normals",
+    "presses",
+)
 
 
 @dataclass

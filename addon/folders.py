@@ -18,7 +18,7 @@ from pathlib import Path
 from .. import __version__
 from ..core.errors import FileError
 from ..core.formats.archive import load_recording, save_recording
-from ..core.formats.exr import write_exr
+from ..core.formats.exr import describe, write_exr
 from ..core.formats.files import (
     MANIFEST_NAME,
     RECORDING_NAME,
@@ -144,13 +144,7 @@ class Files:
         """Write the tactile image of every sensor."""
         for name, place in self.folders.items():
             sensor = self._sensors[name]
-            about = {
-                "sensor": name,
-                "unit": sensor.parameters.unit,
-                "frame": str(frame.frame),
-                "time": repr(float(frame.time)),
-                "digest": self._digest,
-            }
+            about = describe(sensor, frame, self._digest)
             path = _beside(place, "partial") / frame_file(frame.frame)
             write_exr(path, sensor.texels.layout, frame.sensors[name], about, at_once=False)
 

@@ -6,6 +6,7 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
+from ..core.layout import UVLayout
 from ..core.texels import Texels
 from . import materials
 from .meshes import OLD_MATERIAL
@@ -31,21 +32,23 @@ def apply(obj, texels: Texels, image, frames: tuple[int, int], maximum: float, c
         Colours show force over area.
     """
     clear(obj, keep_image=True)
-    uid, mesh = obj.palpate.uid, obj.data
-    uv = _one_uv_per_texel(texels)
-    on_vertices = uv is None
+    uid, mesh, layout = obj.palpate.uid, obj.data, texels.layout
+    own_map = isinstance(layout, UVLayout) and layout.map_name
+    uv = None if own_map else _one_uv_per_texel(texels)
+    on_vertices = uv is None and not own_map
     if on_vertices:
         _store_texel_uv(mesh, texels)
         _store_area(mesh, texels)
         modifier = obj.modifiers.new(MODIFIER, "NODES")
         modifier.node_group = materials.force_nodes(uid, obj.name, image, frames)
         obj.modifiers.move(len(obj.modifiers) - 1, 0)  # where the vertices are still the texels'
-    else:
+    elif uv is not None:
         _write_uv(mesh, texels, uv)
     area = None
     if pressure:
-        area = materials.AREA if on_vertices else materials.area_image(uid, obj.name, texels.layout.image(texels.area))
-    material = materials.heat_map(uid, obj.name, None if on_vertices else image, frames, maximum, color_map, area)
+        area = materials.AREA if on_vertices else materials.area_image(uid, obj.name, layout.image(texels.area))
+    coordinates = materials.Coordinates(own_map, not layout.nearest) if own_map else materials.Coordinates()
+    material = materials.heat_map(uid, obj.name, None if on_vertices else image, frames, maximum, color_map, area, coordinates)
     _assign(obj, texels, material)
 
 

@@ -8,6 +8,7 @@ texel and hand the force to the material as an attribute.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 
 import bpy
@@ -74,7 +75,24 @@ def area_image(uid: str, name: str, area: np.ndarray):
     return image
 
 
-def heat_map(uid: str, name: str, image, frames: tuple[int, int], maximum: float, color_map: str, area=None):
+@dataclass(frozen=True)
+class Coordinates:
+    """Where an image lies on a sensor: by which UV map, and if its pixels are blended."""
+
+    uv_map: str = UV_NAME
+    smooth: bool = False
+
+
+def heat_map(
+    uid: str,
+    name: str,
+    image,
+    frames: tuple[int, int],
+    maximum: float,
+    color_map: str,
+    area=None,
+    coordinates: Coordinates = Coordinates(),
+):
     """Return a sensor's heat-map material, made or made anew.
 
     Parameters
@@ -91,6 +109,8 @@ def heat_map(uid: str, name: str, image, frames: tuple[int, int], maximum: float
         Key of :data:`.colormaps.STOPS`.
     area : Image, str or None
         What the force is divided by: an image as :func:`area_image` makes it, or the name of a vertex attribute.
+    coordinates : Coordinates
+        Of the images.
     """
     material = find(bpy.data.materials, uid) or bpy.data.materials.new(f"Palpate {name}")
     material[MARK] = uid
@@ -103,14 +123,14 @@ def heat_map(uid: str, name: str, image, frames: tuple[int, int], maximum: float
     if image is None:
         value = add("ShaderNodeAttribute", attribute_name=FORCE).outputs["Fac"]
     else:
-        texture = _texture(add, image)
+        texture = _texture(add, image, coordinates)
         play(texture.image_user, *frames)
         value, missing = _red(add, texture), is_missing(add, texture.outputs["Color"])
     if area is not None:
         own = add("ShaderNodeAttribute", attribute_name=area).outputs["Fac"] if isinstance(area, str) else None
         over = add("ShaderNodeMath", operation="DIVIDE", label="Pressure (Pa)")
         tree.links.new(value, over.inputs[0])
-        tree.links.new(own or _red(add, _texture(add, area)), over.inputs[1])
+        tree.links.new(own or _red(add, _texture(add, area, coordinates)), over.inputs[1])
         value = over.outputs[0]
     label = "Normal force / maximum (N)" if area is None else "Pressure / maximum (Pa)"
     share = add("ShaderNodeMath", operation="DIVIDE", use_clamp=True, label=label)
@@ -137,10 +157,11 @@ def heat_map(uid: str, name: str, image, frames: tuple[int, int], maximum: float
     return material
 
 
-def _texture(add, image):
-    """Return a node that shows an image by our texture coordinates, pixel by pixel."""
-    texture = add("ShaderNodeTexImage", image=image, interpolation="Closest", extension="EXTEND")
-    uv = add("ShaderNodeUVMap", uv_map=UV_NAME)
+def _texture(add, image, coordinates: Coordinates):
+    """Return a node that shows an image by texture coordinates."""
+    interpolation = "Linear" if coordinates.smooth else "Closest"
+    texture = add("ShaderNodeTexImage", image=image, interpolation=interpolation, extension="EXTEND")
+    uv = add("ShaderNodeUVMap", uv_map=coordinates.uv_map)
     add.tree.links.new(uv.outputs["UV"], texture.inputs["Vector"])
     return texture
 

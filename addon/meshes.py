@@ -252,4 +252,9 @@ def _fingerprint(obj, mesh) -> str:
             for key in PAINTED:
                 values = multipliers(obj, key)
                 digest.update(b"" if values is None else values.tobytes())
+        if obj.palpate.image_layout == "UV":
+            for layer in obj.data.uv_layers:
+                uv = np.empty(2 * len(layer.uv), dtype=np.float32)
+                layer.uv.foreach_get("vector", uv)
+                digest.update(layer.name.encode("utf-8", "surrogatepass") + uv.tobytes())
     return digest.hexdigest()

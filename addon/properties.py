@@ -245,6 +245,29 @@ class PALPATE_PG_object(bpy.types.PropertyGroup):
     zero: _number("Zero (unit)", "zero", "Reading without load", min=-1e9)
     unit: StringProperty(name="Unit", description="Of the reading, as in N, V or counts", default=_default.unit, **_fixed)
 
+    image_layout: EnumProperty(
+        name="Tactile Image",
+        description="How the texels become the images that a bake writes",
+        items=(
+            ("AUTO", "Automatic", "A pixel for each texel where they form rows and columns; other regions are flattened"),
+            ("UV", "UV Map", "As a UV map of the mesh lays the surface out"),
+        ),
+        **_fixed,
+    )
+    image_map: StringProperty(name="UV Map", description="Of the tactile image; empty: the one that renders use", **_fixed)
+    image_size: IntProperty(
+        name="Resolution", description="Side of the tactile image, pixels", default=256, min=16, max=4096, **_fixed
+    )
+    image_filter: EnumProperty(
+        name="Pixels",
+        description="What a pixel between texels shows",
+        items=(
+            ("SMOOTH", "Smooth", "Values that change linearly from texel to texel over the surface"),
+            ("NEAREST", "Nearest", "The value of the texel to whose part of the surface it belongs"),
+        ),
+        **_fixed,
+    )
+
     k_map: _map("Painted Stiffness", "stiffer or softer it is (stiffness and damping)")
     k_factor: _factor("stiffness and damping")
     friction_map: _map("Painted Friction", "rougher or smoother it is (static and dynamic friction)")

@@ -21,7 +21,7 @@ from ..core.errors import SceneError
 from ..core.mesh import TriangleMesh, checked_mesh, mass_properties
 from ..core.scenario import Body, Deformation, Motion, Painted, Scenario, Sensor, SensorParameters, Signal, Target
 from ..core.texels import texels_from_region
-from . import clock, deform, drives, effects, freebodies, identity, meshes, parts, properties, transforms, units
+from . import clock, deform, drives, effects, freebodies, identity, meshes, parts, properties, transforms, units, uvmaps
 from .jobs import Progress
 
 SAME_STRETCH = 1e-4
@@ -210,6 +210,7 @@ def sample_start(scene, depsgraph) -> tuple[Scenario, Binding]:
             skins.append(deform.skin_of(obj, depsgraph, targets[-1], len(targets) - 1, mesh, linear * scale, offset * scale))
         else:
             sensors.append(_sensor(obj, index, mesh))
+            warnings += uvmaps.notes(obj, sensors[-1].texels)
             sensor_objects.append(obj)
             skins.append(deform.skin_of(obj, depsgraph, sensors[-1], len(sensors) - 1, mesh, linear * scale, offset * scale))
             if obj.palpate.presses:
@@ -478,6 +479,8 @@ def _sensor(obj, body: int, mesh: TriangleMesh) -> Sensor:
     found = parameters(obj.palpate)
     found.check(obj.name)
     texels = texels_from_region(mesh, meshes.region(obj, len(mesh.vertices)), obj.name)
+    if obj.palpate.role == "SENSOR":
+        texels = uvmaps.laid_out(obj, texels)
     readout, painted = obj.palpate.role == "SENSOR", _painted(obj, texels.vertex)
     return Sensor(obj.name, body, texels, found, readout=readout, painted=painted, effects=effects.stack(obj))
 

@@ -479,9 +479,14 @@ class Scenario:
 
     def digest(self) -> str:
         """Return a hash of everything that the forces depend on; equal digests give equal recordings, bit for bit."""
-        digest = hashlib.sha256(b"palpate-scenario/1")
-        _feed(digest, self)
-        return digest.hexdigest()
+        return digest_of(self)
+
+
+def digest_of(value: object) -> str:
+    """Return a hash of a description: a dataclass of numbers, words, arrays and others of its kind, or a tuple of them."""
+    digest = hashlib.sha256(b"palpate-scenario/1")
+    _feed(digest, value)
+    return digest.hexdigest()
 
 
 def _feed(digest: hashlib._Hash, value: object) -> None:

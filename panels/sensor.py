@@ -168,6 +168,12 @@ class Readout(Part):
         column.prop(settings, "gain")
         column.prop(settings, "zero")
         painted(layout, settings, "gain")
+        column = layout.column()
+        column.prop(settings, "image_layout")
+        if settings.image_layout == "UV":
+            column.prop_search(settings, "image_map", context.object.data, "uv_layers", text="", icon="UV")
+            column.prop(settings, "image_size")
+            column.prop(settings, "image_filter", text="")
         status = live.status(context.scene)
         felt = status.frame.sensors.get(context.object.name) if status.frame is not None else None
         box = layout.box().column()

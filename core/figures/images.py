@@ -40,8 +40,8 @@ class View:
     seen : (n,) bool
         Which of them are not on the far side.
     triangles : (m, 3) int or None
-        What is drawn instead of an image, where the image is an atlas of single triangles that nobody could read: the side
-        of the surface that bears most, as one sees it from outside.
+        What is drawn instead of an image, where the image is an atlas of single triangles that nobody could read or a map
+        without true lengths: the side of the surface that bears most, as one sees it from outside.
     axes : (2, 3) float or None
         Of that view, in the frame of the sensor's body; elsewhere the texels' own axes are the image's.
     """
@@ -67,7 +67,7 @@ class View:
             points = np.stack([(layout.column + 0.5) * pitch_x, (layout.row + 0.5) * pitch_y], axis=1)
             whole = (0.0, columns * pitch_x, 0.0, rows * pitch_y)
             return cls(texels, whole, whole, points, np.ones(len(texels), bool))
-        if layout.cell:
+        if layout.cell or layout.map_name:
             return cls._from_outside(texels, load)
         size = _millimetres_per_pixel(texels)
         points = np.asarray(layout.uv()) * [columns, rows] * size

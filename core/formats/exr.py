@@ -16,12 +16,16 @@ import numpy as np
 
 from ..errors import FileError
 from ..layout import GridLayout, UVLayout
-from ..recording import SensorFrame
+from ..recording import Frame, SensorFrame
+from ..scenario import Sensor, digest_of
 from . import openexr
 from .files import atomic_write
 
 CHANNELS = ("R", "G", "B", "reading", "depth", "slip", "contact")
 """Names of the channels, in the order in which :func:`read_exr` returns them."""
+
+UNITS = {"R": "N", "G": "N", "B": "N", "depth": "m", "slip": "m/s", "contact": "1"}
+"""Units of the channels; that of ``reading`` is the sensor's."""
 
 _PREFIX = "palpate."  # OpenEXR has header attributes of its own, some with a type ("name", "owner", "type")
 
@@ -53,6 +57,26 @@ def exr_channels(layout: GridLayout | UVLayout, frame: SensorFrame) -> dict[str,
     return {name: image[..., i].astype(np.float32) for i, name in enumerate(CHANNELS)}
 
 
+def describe(sensor: Sensor, frame: Frame, digest: str) -> dict[str, str]:
+    """Return the metadata of a tactile image: whose it is, when, in which units, and what it was made from.
+
+    ``unit.R``, ``unit.depth``, … are the units of the channels; ``parameters`` is a hash of the sensor's parameters, of what is
+    painted on it and of its effects, ``digest`` one of everything that the forces depend on.
+    """
+    about = {
+        "sensor": sensor.name,
+        "frame": str(frame.frame),
+        "time": repr(float(frame.time)),
+        "unit": sensor.parameters.unit,
+        "digest": digest,
+        "parameters": digest_of((sensor.parameters, sensor.painted, sensor.effects)),
+    }
+    about |= {f"unit.{channel}": UNITS.get(channel, sensor.parameters.unit) for channel in CHANNELS}
+    if isinstance(sensor.texels.layout, UVLayout) and sensor.texels.layout.map_name:
+        about["map"] = sensor.texels.layout.map_name
+    return about
+
+
 def write_exr(
     path: str | os.PathLike,
     layout: GridLayout | UVLayout,
@@ -69,7 +93,7 @@ def write_exr(
         Of the sensor's texels.
     frame : SensorFrame
     metadata : mapping of str to str
-        Becomes header attributes named ``palpate.<key>``: unit, sensor, frame, time, digest, …
+        Becomes header attributes named ``palpate.<key>``, see :func:`describe`.
     at_once : bool
         False writes the file where it is, a half one too when it is interrupted: many times faster, for a folder that nobody
         reads before it is complete.

@@ -57,7 +57,8 @@ def load_sensor(path: str | os.PathLike) -> tuple[Texels, Painted]:
             if str(members["format"]) != SENSOR_FORMAT:
                 raise FileError(f"'{path}' is not a '{SENSOR_FORMAT}' file: bake again with this version.")
             cls = _LAYOUTS[str(members["layout"])]
-            layout: Any = cls(**{item.name: _plain(members[f"layout/{item.name}"]) for item in fields(cls)})
+            stored = {item.name: f"layout/{item.name}" for item in fields(cls)}
+            layout: Any = cls(**{name: _plain(members[key]) for name, key in stored.items() if key in members.files})
             texels = Texels(**{name: members[name] for name in _ARRAYS}, layout=layout)
             found = {item.name: f"painted/{item.name}" for item in fields(Painted)}
             return texels, Painted(**{name: members[key] for name, key in found.items() if key in members.files})

@@ -19,10 +19,11 @@ import numpy as np
 import OpenEXR
 import pytest
 
+from palpate.core.effects.base import Effect
 from palpate.core.errors import FileError, PalpateError
 from palpate.core.formats import files, openexr
 from palpate.core.formats.archive import load_recording, save_recording
-from palpate.core.formats.exr import CHANNELS, exr_channels, read_exr, write_exr
+from palpate.core.formats.exr import CHANNELS, describe, exr_channels, read_exr, write_exr
 from palpate.core.formats.files import (
     Manifest,
     atomic_write,
@@ -34,7 +35,10 @@ from palpate.core.formats.files import (
     write_manifest,
 )
 from palpate.core.layout import GridLayout, uv_layout
-from palpate.core.recording import Recording, SensorFrame, SensorRecording
+from palpate.core.mesh import TriangleMesh
+from palpate.core.recording import Frame, Recording, SensorFrame, SensorRecording
+from palpate.core.scenario import Painted, Sensor, SensorParameters
+from palpate.core.texels import texels_from_region
 
 on_linux = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="looks at Linux's /proc and /dev")
 
@@ -620,6 +624,32 @@ def test_exr_agrees_with_the_library(tmp_path, shape):
         for name, picture in channels.items():
             assert found[name].dtype == picture.dtype
             np.testing.assert_array_equal(found[name], picture)
+
+
+def test_the_library_reads_what_an_image_says_of_itself(tmp_path):
+    """Units of every channel, whose it is, when, and what it was made from; all channels are 32-bit floats."""
+    parameters = SensorParameters(k=123.0, unit="kPa")
+    texels = texels_from_region(TriangleMesh(np.eye(3), np.array([[0, 1, 2]])), np.ones(3, bool))
+    sensor = Sensor("Daumen ü/1", 0, texels, parameters)
+    felt = tactile_frame(3)
+    frame = Frame(12, 0.5, {sensor.name: felt}, np.zeros((1, 7)), np.zeros((1, 6)))
+    write_exr(tmp_path / "a.exr", texels.layout, felt, describe(sensor, frame, "ab" * 32))
+    with OpenEXR.File(str(tmp_path / "a.exr"), separate_channels=True) as file:
+        assert set(file.channels()) == set(CHANNELS)
+        assert all(channel.type() == OpenEXR.FLOAT for channel in file.channels().values())
+        about = {key[8:]: value for key, value in file.header().items() if key.startswith("palpate.")}
+    assert (about["sensor"], about["frame"], float(about["time"])) == ("Daumen ü/1", "12", 0.5)
+    assert {name: about[f"unit.{name}"] for name in CHANNELS} == {
+        "R": "N", "G": "N", "B": "N", "reading": "kPa", "depth": "m", "slip": "m/s", "contact": "1"
+    }  # fmt: skip
+    assert about["digest"] == "ab" * 32 and len(about["parameters"]) == 64
+    others = (
+        replace(sensor, parameters=replace(parameters, k=124.0)),
+        replace(sensor, painted=Painted(friction=np.ones(3))),
+        replace(sensor, effects=(Effect("offset", "constant", {"offset": 1.0}),)),
+    )
+    hashes = {describe(other, frame, "")["parameters"] for other in (sensor, replace(sensor, body=1), *others)}
+    assert len(hashes) == 4 and about["parameters"] in hashes
 
 
 def test_any_damage_to_an_exr_is_noticed_or_harmless(tmp_path):
