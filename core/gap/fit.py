@@ -219,7 +219,15 @@ class Fit:
         return float(self.sse.sum() / max(self.count.sum(), 1))
 
 
-def fit(shares: Sequence[Share], model: Model, free: Sequence[Free], turns: int = 15, tolerance: float = 1e-5) -> Fit:
+def fit(
+    shares: Sequence[Share],
+    model: Model,
+    free: Sequence[Free],
+    turns: int = 15,
+    tolerance: float = 1e-5,
+    held: int = 0,
+    judged: bool = True,
+) -> Fit:
     """Fit a model's free numbers by Levenberg–Marquardt steps.
 
     Parameters
@@ -232,6 +240,11 @@ def fit(shares: Sequence[Share], model: Model, free: Sequence[Free], turns: int 
         Most steps.
     tolerance : float
         Relative decrease of the sum of squares below which it ends.
+    held : int
+        Derivatives by so many of the first numbers are computed once and held for all steps, unless none leads down. It only
+        takes more steps; where they end is the same.
+    judged : bool
+        Whether the normal equations at the end are wanted as well.
     """
     free = tuple(free)
     counts = np.array([share.count for share in shares])
@@ -239,12 +252,17 @@ def fit(shares: Sequence[Share], model: Model, free: Sequence[Free], turns: int 
     model = changed(model, free, [item.back(x) for item, x in zip(free, at, strict=True)])
     residuals = [share.residual(model) for share in shares]
     best = sum(map(_square, residuals)) + _penalty(free, at)
-    damping, sums = 1e-3, None
-    for _ in range(turns):
-        sums = [_sums(share, model, free, at, r) for share, r in zip(shares, residuals, strict=True)]
+    tables = [np.empty((len(free), *residual.shape)) for residual in residuals]
+    damping, known, turn = 1e-3, 0, 0
+    while turn < turns:
+        turn += 1
+        for share, residual, table in zip(shares, residuals, tables, strict=True):
+            _derivatives(share, model, free, at, residual, table, known)
+        parts = zip(shares, residuals, tables, strict=True)
+        total = _total([_sum_of(share, free, table, residual) for share, residual, table in parts])
         improved = False
         for _ in range(6):
-            moved = _moved(at, free, _step(_flat(sums), free, at, damping))
+            moved = _moved(at, free, _step([total], free, at, damping))
             trial = changed(model, free, [item.back(x) for item, x in zip(free, moved, strict=True)])
             fresh = [share.residual(trial) for share in shares]
             found = sum(map(_square, fresh)) + _penalty(free, moved)
@@ -253,12 +271,22 @@ def fit(shares: Sequence[Share], model: Model, free: Sequence[Free], turns: int 
                 break
             damping = max(damping * 10.0, 1e-4)
         if not improved:
-            break
+            if known == 0:
+                break
+            known, damping = 0, 1e-3
+            continue
         gained = best - found
         at, model, residuals, best = moved, trial, fresh, found
-        damping = max(damping * 0.2, 1e-9)
+        damping, known = max(damping * 0.2, 1e-9), held
         if gained < tolerance * best:
             break
+    sums = None
+    if judged:
+        sums = []
+        for share, residual, table in zip(shares, residuals, tables, strict=True):
+            _derivatives(share, model, free, at, residual, table, 0)
+            rows = share.stretches(residual)
+            sums.append([_sum_of(share, free, table[:, part], residual[part]) for part in rows])
     return Fit(model, free, np.array([_square(r) for r in residuals]), counts, sums)
 
 
@@ -281,34 +309,35 @@ def _moved(at: list[np.ndarray], free: tuple[Free, ...], step: list[np.ndarray])
     return moved
 
 
-def _sums(share: Share, model: Model, free: tuple[Free, ...], at: list[np.ndarray], residual: np.ndarray) -> list[Sums]:
-    common = [i for i, item in enumerate(free) if not item.per_texel]
-    local = [i for i, item in enumerate(free) if item.per_texel]
-    columns = np.empty((len(free), *residual.shape))
-    for i, item in enumerate(free):
-        step = STEP
-        ahead = item.to(item.back(at[i] + step))
+def _derivatives(
+    share: Share,
+    model: Model,
+    free: tuple[Free, ...],
+    at: list[np.ndarray],
+    residual: np.ndarray,
+    table: np.ndarray,
+    known: int,
+) -> None:
+    """Write what a step along each free number takes off the residual into `table` (p, T, c + 3), but the first `known`."""
+    for i, item in list(enumerate(free))[known:]:
+        ahead = item.to(item.back(at[i] + STEP))
         moved = list(at)
         # At a bound the difference is taken inwards.
-        moved[i] = np.where(ahead - at[i] > 0.5 * step, ahead, item.to(item.back(at[i] - step)))
+        moved[i] = np.where(ahead - at[i] > 0.5 * STEP, ahead, item.to(item.back(at[i] - STEP)))
         change = moved[i] - at[i]
         values = [f.back(x) for f, x in zip(free, moved, strict=True)]
-        other = share.residual(changed(model, free, values))
+        np.subtract(residual, share.residual(changed(model, free, values)), out=table[i])
         if item.per_texel:
-            scale = np.concatenate([np.broadcast_to(change, (len(share.predictor.rig.texels),))[share.texels], np.ones(3)])
-            difference = (residual - other) / np.where(np.abs(scale) > 0, scale, np.inf)
-            difference[:, -3:] = 0.0
-        elif abs(float(change)) == 0.0:
-            difference = np.zeros_like(residual)
+            scale = np.broadcast_to(change, (len(share.predictor.rig.texels),))[share.texels]
+            table[i, :, :-3] /= np.where(np.abs(scale) > 0, scale, np.inf)
+            table[i, :, -3:] = 0.0
         else:
-            difference = (residual - other) / float(change)
-        columns[i] = difference
-    return [
-        _sum_of(share, columns[common][:, rows], columns[local][:, rows], residual[rows]) for rows in share.stretches(residual)
-    ]
+            table[i] /= float(change) if float(change) != 0.0 else np.inf
 
 
-def _sum_of(share: Share, common: np.ndarray, local: np.ndarray, residual: np.ndarray) -> Sums:
+def _sum_of(share: Share, free: tuple[Free, ...], table: np.ndarray, residual: np.ndarray) -> Sums:
+    own_each = np.array([item.per_texel for item in free], bool)
+    common, local = (table[~own_each], table[own_each]) if own_each.any() else (table, table[:0])
     flat = common.reshape(len(common), -1)
     n, texels, width = len(share.predictor.rig.texels), share.texels, len(share.texels)
     m = len(local)
@@ -319,7 +348,7 @@ def _sum_of(share: Share, common: np.ndarray, local: np.ndarray, residual: np.nd
         c[texels] = np.einsum("mtn,ktn->nmk", own, own)
         b[texels] = np.einsum("mtn,ptn->nmp", own, common[:, :, :width])
     gradient = np.zeros((n + 3, len(common)))
-    per_column = np.einsum("ptn,tn->np", common, residual)
+    per_column = (common * residual).sum(axis=1).T
     gradient[texels], gradient[n:] = per_column[:width], per_column[width:]
     return Sums(flat @ flat.T, flat @ residual.ravel(), b, c, h, _square(residual), gradient)
 

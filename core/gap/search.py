@@ -356,7 +356,10 @@ def search(
         shares = views.quick(candidate, found.model)
         free = free_of(found, candidate, scales, gain)
         total = sum(float(np.vdot(r, r)) for r in directions[id(shares)].residual)
-        tries = [fit(shares, found.model.with_effect(effect), free, turns=8, tolerance=1e-3) for _, effect in starts[:1]]
+        tries = [
+            fit(shares, found.model.with_effect(effect), free, turns=8, tolerance=1e-3, held=len(found.free), judged=False)
+            for _, effect in starts[:1]
+        ]
         best = min(tries, key=lambda one: one.sse.sum())
         quick.append((float(best.sse.sum()) / total, candidate, best))
         yield "fitting those that promise most", 0.35 + 0.35 * (number + 1) / len(kept), []
@@ -365,7 +368,7 @@ def search(
     results: list[Found] = []
     for number, (_, candidate, first) in enumerate(last):
         free = free_of(found, candidate, scales, gain)
-        whole = fit(views.whole, first.model, free, turns=6, tolerance=1e-4)
+        whole = fit(views.whole, first.model, free, turns=8, tolerance=1e-4, held=len(found.free))
         results.append(Found(candidate, whole, held_out(views.whole, whole)))
         results.sort(key=lambda one: one.mean)
         yield "judging the best on trials they have not seen", 0.7 + 0.3 * (number + 1) / len(last), results
