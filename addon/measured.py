@@ -83,13 +83,10 @@ def find(obj):
         yield Progress("drawing", 990, 1000)
         pictures[name] = folder / f"{name}.png"
         save_figure(PICTURES[name][0](diagnosis), pictures[name], 150)
-    lines = [
-        f"{named.name} ({named.form}), confidence {named.confidence:.0%}"
-        + (f"; or {', '.join(named.rivals)}" if named.rivals else "")
-        for named in diagnosis.named
-    ]
     identity.ensure(obj)
-    _results[identity.key(obj)] = Result(diagnosis, report.headline(diagnosis), lines, next_experiment(diagnosis), pictures)
+    _results[identity.key(obj)] = Result(
+        diagnosis, report.headline(diagnosis), report.evidence(diagnosis), next_experiment(diagnosis), pictures
+    )
     return diagnosis
 
 
@@ -152,12 +149,13 @@ def show_on_sensor(context, obj, amended: bool) -> float:
         mesh.color_attributes.remove(old)
     layer = mesh.color_attributes.new(ATTRIBUTE, "FLOAT_COLOR", "POINT")
     colours = np.full((len(mesh.vertices), 4), (0.2, 0.2, 0.2, 1.0))
-    colours[texels.vertex, :3] = colormaps.colors("INFERNO", values / max(top, 1e-300))
+    colours[texels.vertex, :3] = colormaps.linear(colormaps.colors("INFERNO", values / max(top, 1e-300)))
     layer.data.foreach_set("color", colours.ravel())
     mesh.color_attributes.active_color = layer
     for area in context.screen.areas if context.screen else ():
-        if area.type == "VIEW_3D":
+        if area.type == "VIEW_3D":  # the colours of the scale, not those of a lit surface
             area.spaces.active.shading.color_type = "VERTEX"
+            area.spaces.active.shading.light = "FLAT"
     return top
 
 

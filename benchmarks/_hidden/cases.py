@@ -44,6 +44,14 @@ ORDER = list(MAKERS)
 """The way from the contact to the reading, in which several effects act."""
 VAGUE = ("creep", "hysteresis", "lag", "softening")
 """What a single slow press does not tell apart."""
+POOR = {
+    "one slow press": VAGUE,
+    "never unloaded": ("stiffening", "dead-zone", "hysteresis", "creep"),
+    "one level": ("creep", "drift", "stiffening", "saturation"),
+    "one place": ("gain-mismatch", "misalignment", "crosstalk", "dead-texels"),
+    "too noisy": ("creep", "stiffening", "lag", "saturation"),
+}
+"""Ways in which a recording is too poor, and what is hidden in it; a case's number runs through the ways, then the effects."""
 
 
 @dataclass(frozen=True)
@@ -102,14 +110,15 @@ def draw(kind: str, number: int) -> Case:
     probe = Probe(rng.uniform(9e-3, 16e-3), None) if ball else Probe(None, (0.04, 0.07, 0.02))
     names = _names(kind, number, rng, ball)
     makers = OWN if kind == "own" else {**MAKERS, **OUTSIDE}
-    times, paths = _poor(rng, probe) if kind == "poor" else _trials(rng, probe, pad)
+    way = list(POOR)[number % len(POOR)] if kind == "poor" else ""
+    times, paths = _poor(way, rng, probe) if way in PROGRAMMES else _trials(rng, probe, pad)
     plain = [touch(probe, pad, time, path) for time, path in zip(times, paths, strict=True)]
     found = [_calibrated(makers[name], name, rng, pad, probe, plain) for name in names]
     hidden = tuple(effect for effect, _ in found)
     contacts = _moved(hidden, pad, probe, plain)
     signals = [respond(contact, pad, hidden) for contact in contacts]
     full = max(float(np.abs(s.reading - pad.zero).max()) for s in signals)
-    noise = rng.uniform(0.003, 0.01) * full
+    noise = rng.uniform(0.003, 0.01) * full * (30.0 if way == "too noisy" else 1.0)
     coloured = kind == "none" and number % 3 == 2
     readings = [converted(s.reading + noise * _noise(rng, s.reading.shape, coloured), pad, hidden) for s in signals]
     largest = max(float(np.abs(net_force(s)).max()) for s in signals)
@@ -141,8 +150,11 @@ def _pad(rng) -> Pad:
 
 
 def _names(kind: str, number: int, rng, ball: bool) -> list[str]:
-    if kind in ("none", "poor"):
-        return [] if kind == "none" else [VAGUE[number % len(VAGUE)]]
+    if kind == "none":
+        return []
+    if kind == "poor":
+        choice = POOR[list(POOR)[number % len(POOR)]]
+        return [choice[number // len(POOR) % len(choice)]]
     pool = names_for(kind) if kind != "two" else list(MAKERS)
     # A flat indenter loads all texels alike: where the pad sits, and what neighbours do, cannot show under it.
     blind = () if ball else ("misalignment", "load-spreading", "crosstalk")
@@ -286,11 +298,43 @@ def _mixture(rng, deep):
     return [*knots, (max(SECONDS, t), x, far, UP)]
 
 
-def _poor(rng, probe: Probe) -> tuple[list[np.ndarray], list[np.ndarray]]:
-    """Six times the same single slow press in one place: no rate, no hold, no other texels."""
+def _one_slow_press(rng):
+    """The same in every trial: no rate, no hold, no other texels."""
+    return [(0, 0, 0, UP), (1, 0, 0, UP), (13, 0, 0, 3e-3), (SECONDS, 0, 0, UP)]
+
+
+def _never_unloaded(rng):
+    """One ramp that ends where it is deepest."""
+    return [(0, 0, 0, UP), (1, 0, 0, UP), (SECONDS, 0, 0, 3e-3)]
+
+
+def _one_level(rng):
+    """Pressed before the recording begins, and until it ends."""
+    depth = rng.uniform(2e-3, 3e-3)
+    return [(0, 0, 0, depth), (SECONDS, 0, 0, depth)]
+
+
+def _one_place(rng):
+    """Cycles of one depth, in the middle of the pad: most texels are never touched."""
+    knots, t = [(0, 0, 0, UP), (1, 0, 0, UP)], 1.0
+    while t < SECONDS - 3:
+        knots += [(t + 1, 0, 0, 2e-3), (t + 2, 0, 0, 2e-3), (t + 3, 0, 0, UP)]
+        t += 3.0
+    return [*knots, (SECONDS, 0, 0, UP)]
+
+
+PROGRAMMES = {
+    "one slow press": _one_slow_press,
+    "never unloaded": _never_unloaded,
+    "one level": _one_level,
+    "one place": _one_place,
+}
+
+
+def _poor(way: str, rng, probe: Probe) -> tuple[list[np.ndarray], list[np.ndarray]]:
+    """Six times the same programme, of the poor ones."""
     time = np.arange(round(SECONDS * RATE) + 1) / RATE
-    knots = [(0, 0, 0, UP), (1, 0, 0, UP), (13, 0, 0, 3e-3), (25, 0, 0, UP)]
-    return [time] * 6, [_path(time, knots, probe)] * 6
+    return [time] * 6, [_path(time, PROGRAMMES[way](rng), probe) for _ in range(6)]
 
 
 def _calibrated(maker, name: str, rng, pad: Pad, probe: Probe, contacts: list[Contact]) -> tuple[Hidden, float]:

@@ -159,4 +159,4 @@ def next_experiment(result: Diagnosis) -> str:
             "clock": "record as long without touching the sensor",
         }.get(result.structure.strongest, "repeat one trial exactly, to see what of the difference comes again")
         return f"To find out what it is: {'; '.join([hint, *lacking])}."
-    return f"What these recordings do not cover: {'; '.join(lacking)}." if lacking else ""
+    return f"To cover what these recordings do not: {'; '.join(lacking)}." if lacking else ""

@@ -12,6 +12,8 @@ from ..effects.base import Effect, Form, Kind, Parameter, Site
 from ..effects.library import library
 from .fit import Free
 from .model import Model, Predictor
+from .noise import coverage
+from .telling import untold
 
 LIMITS = {
     ("creep", "rising-exponential", "amount"): 1.0,
@@ -187,9 +189,10 @@ def candidates(predictors: Sequence[Predictor], model: Model) -> list[Candidate]
     read = any(p.trial.reading is not None for p in predictors)
     several = len(predictors[0].rig.texels) > 1
     loaded = all(p.trial.stimulus == "force" for p in predictors)
+    cannot = untold(coverage(predictors))
     found = []
     for kind in library().values():
-        if kind.name in NEVER:
+        if kind.name in NEVER or kind.name in cannot:
             continue
         for form in kind.forms:
             acts_on_force = kind.stage_of(form) != "readout"

@@ -23,6 +23,7 @@ from .noise import Coverage, Noise, coverage, force_noise, reading_noise
 from .rig import Rig
 from .search import Found, Views, search, views_of
 from .structure import Structure, structure_of
+from .telling import untold
 
 FIRST, NEXT, NEXT_OF_ALL = 0.25, 0.45, 0.03
 """Least share of the gap that the first effect closes; of what is left that a further one closes; and of the whole gap."""
@@ -370,7 +371,7 @@ def _rule_out(result: Diagnosis, steps: list[list[Found]], mean0: float, floor: 
         if kind.name in named:
             continue
         if kind.name not in looked:
-            why = "these recordings cannot show it"
+            why = untold(result.coverage).get(kind.name, "these recordings cannot show it")
         elif kind.name in tried and result.verdict != "no gap":
             why = f"alone it closes {max(tried[kind.name], 0.0):.0%} of the squared gap on unseen trials"
         elif result.verdict == "no gap":

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .model import Predictor
+from .phases import pace_of
 
 SHORTEST = 8
 """Samples of a stretch without load that say something about noise."""
@@ -146,13 +147,12 @@ class Coverage:
         Ratio of fast to slow loading (90th to 10th percentile of the speed while loading).
     longest_hold : float, s
     unloading : bool
+        Whether a load was ever taken back by more than a tenth of the largest, while it was recorded.
     cycles : int
         Times that contact began, in the trial that has most.
     depths : float
         Smallest peak of a cycle by the largest: 1 when all go equally deep.
     slides : bool
-    places : int
-        How many different groups of texels were touched together.
     seconds : float
         Longest trial.
     """
@@ -179,10 +179,10 @@ def coverage(predictors: Sequence[Predictor]) -> Coverage:
         total = load.max(axis=1)
         full = max(total.max(initial=0.0), 1e-300)
         rate = np.gradient(total, s.time) / full
-        loading = rate > 0.02
-        speeds.append(rate[loading])
-        unloading |= bool((rate < -0.02).any())
-        still = (np.abs(rate) < 0.02) & (total > 0.05 * full)
+        pace = pace_of(rate[total > 0])
+        speeds.append(rate[rate > pace])
+        unloading |= bool((np.maximum.accumulate(total) - total).max() > 0.1 * full)
+        still = (np.abs(rate) < pace) & (total > 0.05 * full)
         hold = max(hold, _longest(still, s.time))
         starts = np.flatnonzero((total > 0) & (np.concatenate([[0.0], total[:-1]]) <= 0))
         cycles = max(cycles, len(starts))

@@ -9,8 +9,8 @@ from .model import Predictor
 from .stimulus import Stimulus
 
 PHASES = ("approach", "loading", "hold", "unloading", "released", "sliding")
-STILL = 0.02
-"""Share of its largest load per second below which a texel counts as held."""
+STILL, STILL_OF_PACE = 0.02, 0.2
+"""Share of the largest load per second below which a texel counts as held; in a slow trial so much of the trial's own pace."""
 FAST_SLIDE = 2e-4
 """Metres per second above which a held surface counts as sliding."""
 
@@ -22,19 +22,30 @@ def load_of(stimulus: Stimulus) -> np.ndarray:
     return shares
 
 
+def pace_of(rate: np.ndarray) -> float:
+    """Rate below which a load is held: a fixed one, or where all of a trial is slow, one that its fastest parts exceed by far.
+
+    Parameters
+    ----------
+    rate : float, 1/s
+        Of the load, as a share of the largest.
+    """
+    return float(min(STILL, STILL_OF_PACE * np.quantile(np.abs(rate), 0.99))) if rate.size else STILL
+
+
 def phases(stimulus: Stimulus) -> np.ndarray:
     """Return which of :data:`PHASES` each texel is in at each sample, (T, n) int."""
     load = load_of(stimulus)
     rate = np.gradient(load, stimulus.time, axis=0)
-    peak = np.maximum(load.max(axis=0, keepdims=True), 1e-12)
+    still = pace_of(rate[load > 0]) * np.maximum(load.max(axis=0, keepdims=True), 1e-12)
     touching = load > 0
     before = ~np.maximum.accumulate(touching, axis=0)
     found = np.full(load.shape, PHASES.index("released"))
     found[before] = PHASES.index("approach")
     found[touching] = PHASES.index("hold")
-    found[touching & (rate > STILL * peak)] = PHASES.index("loading")
-    found[touching & (rate < -STILL * peak)] = PHASES.index("unloading")
-    found[touching & (np.abs(rate) <= 5 * STILL * peak) & (stimulus.slide > FAST_SLIDE)] = PHASES.index("sliding")
+    found[touching & (rate > still)] = PHASES.index("loading")
+    found[touching & (rate < -still)] = PHASES.index("unloading")
+    found[touching & (np.abs(rate) <= 5 * still) & (stimulus.slide > FAST_SLIDE)] = PHASES.index("sliding")
     return found
 
 

@@ -129,6 +129,22 @@ def headline(result: Diagnosis) -> str:
     return f"Missing: {_names([n.name for n in result.named])}; {shrink}."
 
 
+def evidence(result: Diagnosis) -> list[str]:
+    """Return a sentence for each effect that was found, and one for the recordings that only judge."""
+    models = stages(result)
+    left = [nrmse(result.of("fit"), one, result.full) or 0.0 for one in models]
+    said = []
+    for named in result.named:
+        rivals = f"; it could as well be {' or '.join(named.rivals)}" if named.rivals else ""
+        before, after = left[named.effect], left[min(named.effect + 1, len(left) - 1)]
+        said.append(f"{named.name} ({named.form}): {before:.2%} → {after:.2%}, confidence {named.confidence:.0%}{rivals}")
+    check = result.of("check")
+    if check and result.named:
+        before, after = (nrmse(check, one, result.full) or 0.0 for one in (models[0], models[-1]))
+        said.append(f"never fitted: {before:.2%} → {after:.2%}; noise alone is {noise_floor(result):.2%}")
+    return said
+
+
 def _names(names: list[str]) -> str:
     return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}" if names else "nothing"
 

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import shutil
+
 import pytest
 
 
@@ -46,3 +48,12 @@ def test_authoring(play_road):
     """Pads, laid texels, a problem put right, the sidebar, F3, effects and a fit."""
     values = play_road("authoring", timeout=1200)["values"]
     assert values["texels"] > 50
+
+
+def test_gap(play_road, real_blender, repository):
+    """docs/gap.md on its sample rig: what was hidden in it is named, and ends up on the sensor."""
+    shutil.copytree(repository / "docs" / "sample-rig", real_blender.work / "sample-rig")
+    values = play_road("gap", timeout=1200)["values"]
+    assert sorted(values["named"]) == ["creep", "gain-mismatch"]
+    assert sorted(values["effects"]) == ["creep", "gain-mismatch"]
+    assert {"gap: loading", "gap: hold", "gap: unloading"} <= set(values["markers"])

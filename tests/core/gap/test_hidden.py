@@ -86,6 +86,23 @@ def test_low_pass_and_relaxation_against_closed_forms():
     np.testing.assert_allclose(got, 2.0 * (t - 0.7 * -np.expm1(-t / 0.7)), atol=1e-12)
 
 
+@pytest.mark.parametrize("number", range(len(cases.POOR)))
+def test_poor_recordings_are_poor(number):
+    way = list(cases.POOR)[number]
+    case = cases.draw("poor", number)
+    assert case.answer[0] in cases.POOR[way] and cases.draw("poor", number + len(cases.POOR)).answer != case.answer
+    touched = np.any([(path[:, 2] < case.probe.lowest).any() for path in case.paths])
+    assert touched
+    if way == "one level":
+        assert all(np.ptp(path[:, 2]) == 0 for path in case.paths)
+    if way == "never unloaded":
+        assert all((np.diff(path[:, 2]) <= 0).all() for path in case.paths)
+    if way in cases.PROGRAMMES:
+        assert all(np.array_equal(path[:, :2], case.paths[0][:, :2]) for path in case.paths)
+    full = max(np.abs(reading - case.pad.zero).max() for reading, _ in case.clean)
+    assert (case.noise > 0.08 * full) == (way == "too noisy")
+
+
 def test_outcomes():
     say = gap.outcome
     assert say(["creep"], ["creep"], "explained", False) == "right"

@@ -1,0 +1,55 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a recording covers is seen whatever its pace, and what it cannot tell is not asked."""
+
+import numpy as np
+import pytest
+
+from palpate.core.gap.candidates import candidates
+from palpate.core.gap.model import Model, Predictor
+from palpate.core.gap.noise import coverage
+from palpate.core.gap.phases import PHASES, phases
+from palpate.core.gap.rig import Rig, Trial, grid_texels
+from palpate.core.gap.telling import LEAVES_BEHIND, untold
+from palpate.core.scenario import SensorParameters
+
+PROGRAMMES = {
+    "ramp": ([0, 1], [0, 1]),
+    "press": ([0, 1, 2], [0, 1, 0]),
+    "held": ([0, 1, 9, 10], [0, 1, 1, 0]),
+    "stairs": ([0, 1, 4, 5, 9], [0, 0.5, 0.5, 1, 1]),
+}
+
+
+def predictor(programme, seconds):
+    """A pad of two texels, pressed to 1 mm by a programme that is stretched to so many seconds."""
+    at, depth = PROGRAMMES[programme]
+    time = np.linspace(0, seconds, 600)
+    level = 1e-3 * np.interp(time / seconds * at[-1], at, depth)
+    reading = 50.0 * level[:, None] * np.ones(2)
+    trial = Trial("t", "fit", time, "depth", None, None, level, np.zeros((600, 2)), reading, None)
+    texels = grid_texels(1, 2, 3e-3, 3e-3)
+    rig = Rig("two", texels, SensorParameters(k=50.0), frozenset({"k"}), None, (1, 2, (3e-3, 3e-3)), None, (trial,))
+    return Predictor(trial, rig)
+
+
+@pytest.mark.parametrize("seconds", [1.0, 20.0, 4000.0])
+@pytest.mark.parametrize(("programme", "unloads"), [("ramp", False), ("stairs", False), ("press", True), ("held", True)])
+def test_unloading_is_seen_at_any_pace(programme, unloads, seconds):
+    seen = coverage([predictor(programme, seconds)])
+    assert seen.unloading == unloads
+    assert set(untold(seen)) == (set() if unloads else set(LEAVES_BEHIND))
+
+
+@pytest.mark.parametrize("seconds", [20.0, 4000.0])
+def test_a_slow_ramp_is_no_hold(seconds):
+    assert coverage([predictor("ramp", seconds)]).longest_hold == 0.0
+    assert coverage([predictor("held", seconds)]).longest_hold == pytest.approx(0.8 * seconds, rel=0.02)
+    found = phases(predictor("ramp", seconds).stimulus)[5:]
+    assert (found == PHASES.index("loading")).all()
+
+
+def test_what_was_never_brought_out_is_no_candidate():
+    up, back = (predictor(programme, 20.0) for programme in ("ramp", "press"))
+    asked = [{c.name for c in candidates([one], Model(one.rig.parameters))} for one in (up, back)]
+    assert not asked[0] & set(LEAVES_BEHIND) and set(LEAVES_BEHIND) <= asked[1]
+    assert {"stiffening", "creep"} <= asked[0]
