@@ -93,6 +93,8 @@ def laws() -> Iterator[dict]:
     yield figure("invariance.turned", balance.differences(scene, turned), 1e-9)
     moved = balance.carried(scene, np.array([0.7, -0.3, 0.2]), np.zeros(3))
     yield figure("invariance.moving", balance.differences(scene, moved, 1), 1e-9)
+    lifted = balance.carried(scene, np.array([0.7, -0.3, 0.2]), np.array([1.0, 2.0, -0.5]))
+    yield figure("invariance.accelerating", balance.differences(scene, lifted, 1), 1e-9)
     yield figure("invariance.bristles_carried_round", balance.round_and_round(), 1e-9)
     solids = rays.solids()
     results = [rays.compare(name, mesh, -(-SEGMENTS // len(solids))) for name, mesh in solids.items()]

@@ -50,8 +50,10 @@ class Scratch(NamedTuple):
         What the contacts of one pair resist, and their force and torque on the target, both in the sensor's axes.
     map_a, map_b : (6, 6) float
         From the twists of both bodies to the relative motion.
-    matrix, vector, momentum, guess : (u, u), (u,), (u,), (u,) float
-        The linear system, and its u unknowns as they were guessed last.
+    matrix, vector, momentum, guess, alone : (u, u), (u,), (u,), (u,), (u,) float
+        The linear system, its u unknowns as they were guessed last, and as they would be if nothing touched.
+    earlier : (2, u) float
+        What the round before found, and by how much that changed its guess.
     tumbling : (b, 3) float
         By how much the mean spin of a free body over the step differs from its spin at the beginning if nothing acts, rad/s.
     axis : (b, 3) float
@@ -96,6 +98,8 @@ class Scratch(NamedTuple):
     vector: np.ndarray
     momentum: np.ndarray
     guess: np.ndarray
+    alone: np.ndarray
+    earlier: np.ndarray
     tumbling: np.ndarray
     axis: np.ndarray
     carried: np.ndarray
@@ -143,6 +147,8 @@ def scratch_for(world: World, state: State, shapes: Shapes, board: np.ndarray) -
         vector=np.zeros(n),
         momentum=np.zeros(n),
         guess=np.zeros(n),
+        alone=np.zeros(n),
+        earlier=np.zeros((2, n)),
         tumbling=np.zeros((b, 3)),
         axis=np.zeros((b, 3)),
         carried=np.zeros((b, 6)),

@@ -17,7 +17,10 @@ from .servo import SPEED, add_servos
 from .tumble import mean_spin, product
 
 PASSES = 40
-"""Most rounds in which contacts are linearised anew within a substep; two or three are usual, one at rest."""
+"""Most rounds in which contacts are linearised anew within a substep; four or five are usual, one at rest."""
+
+CONVERGED = 1e-9
+"""What a round may still change to be the last, as a share of the velocity that contacts give in the step."""
 
 
 @inlined
@@ -25,14 +28,14 @@ def solve_velocities(dt, commands, world, tree, neighbours, shapes, state, scrat
     """Velocities of free and driven bodies at the step's end, written into the state.
 
     Contacts and drives are linearised at the current guess and the linear system solved, until the guess no longer moves; a
-    contact that would pull is left out of the next round. Where the rounds go in circles (friction that was guessed for too
-    much load throws the contact off, without the contact there is no friction), the guess moves by a share of the way only.
-    All that a share mixes keeps the momentum. With nothing to solve for one round only linearises.
+    contact that would pull is left out of the next round. Rounds that close in are cut short by a secant. Where they go in
+    circles (friction that was guessed for too much load throws the contact off, without the contact there is no friction), the
+    guess moves by a share of the way only. All that is mixed keeps the momentum. With nothing to solve for one round only
+    linearises.
     """
     matrix, vector, guess, n = scratch.matrix, scratch.vector, scratch.guess, world.unknowns
     _begin_guess(dt, world, state, scratch)
-    first_change, last_change, share = 0.0, 0.0, 1.0
-    opening = min(1, len(world.drives))  # drives are without limits in the first round: what it changes says nothing yet
+    last_change, share = 0.0, 1.0
     for turn in range(PASSES):
         _write_twists(dt, world, state, scratch)
         for i in range(n):
@@ -56,27 +59,48 @@ def solve_velocities(dt, commands, world, tree, neighbours, shapes, state, scrat
         if len(world.drives) > 0:
             add_servos(dt, turn > 0, commands, world, state, scratch)
         solve_positive(matrix, vector, n)
-        change = 0.0  # a length, so that a scene that is turned as a whole takes the same rounds
+        change, given = 0.0, 0.0  # lengths, so that a scene that is turned as a whole takes the same rounds
         for i in range(n):
             change += (vector[i] - guess[i]) ** 2
-        change = math.sqrt(change)
+            given += (vector[i] - scratch.alone[i]) ** 2
+        change, given = math.sqrt(change), math.sqrt(given)
         # Contacts that come on and off in the first rounds find their own way; later ones shrink by 1 - share if all is well.
         if turn > 3 and change > (1.0 - 0.25 * share) * last_change:
             share *= 0.5
-        last_change = change
-        for i in range(n):
-            guess[i] = share * vector[i] + (1.0 - share) * guess[i]
-        if turn <= opening:
-            first_change = change
-        if turn >= opening and (change <= 1e-6 * first_change or change < 1e-13):
+        # Drives are without limits in the first round: what it changes says nothing yet.
+        last = (turn > 0 or len(world.drives) == 0) and (change <= CONVERGED * given or change < 1e-13)
+        _guess_again(share, not last and share == 1.0 and change < 0.9 * last_change, n, scratch)
+        if last:
             break
+        last_change = change
     _write_twists(dt, world, state, scratch)
+
+
+@kernel
+def _guess_again(share, ahead, n, scratch):
+    """Guess anew from what a round has found (`vector`): a share of the way there, or further `ahead`.
+
+    Rounds that close in on the solution do so by about the same factor each, most of all friction's. From the last two the
+    secant tells where they will end (Anderson, J. ACM 12, 1965, with one earlier round).
+    """
+    vector, guess, earlier = scratch.vector, scratch.guess, scratch.earlier
+    along, square = 0.0, 0.0
+    for i in range(n):
+        change = vector[i] - guess[i]
+        bend = change - earlier[1, i]
+        along += change * bend
+        square += bend * bend
+    further = along / square if ahead and square > 0.0 else 0.0
+    for i in range(n):
+        found, change = vector[i], vector[i] - guess[i]
+        guess[i] = share * (found - further * (found - earlier[0, i])) + (1.0 - share) * guess[i]
+        earlier[0, i], earlier[1, i] = found, change
 
 
 @inlined
 def _begin_guess(dt, world, state, scratch):
     """Velocities as they are for a first guess, and what momentum the bodies would have without contacts and drives."""
-    momentum, guess, velocity = scratch.momentum, scratch.guess, state.velocity
+    momentum, guess, alone, velocity = scratch.momentum, scratch.guess, scratch.alone, state.velocity
     for body in range(len(world.kind)):
         at = world.at[body]
         if world.kind[body] == FREE:
@@ -86,8 +110,9 @@ def _begin_guess(dt, world, state, scratch):
             # The spin that is solved for is the mean over the step, so that a body tumbles as it should.
             for i in range(3):
                 guess[at + i] = velocity[body, i]
-                momentum[at + i] = world.mass[body] * (velocity[body, i] + dt * world.gravity[i])
-                guess[at + 3 + i] = mean[i]
+                alone[at + i] = velocity[body, i] + dt * world.gravity[i]
+                momentum[at + i] = world.mass[body] * alone[at + i]
+                guess[at + 3 + i] = alone[at + 3 + i] = mean[i]
                 scratch.tumbling[body, i] = mean[i] - spin[i]
             momentum[at + 3], momentum[at + 4], momentum[at + 5] = product(inertia, mean[0], mean[1], mean[2])
         elif world.kind[body] == KEYFRAMED:
@@ -96,7 +121,7 @@ def _begin_guess(dt, world, state, scratch):
                 scratch.known[body, i] = scratch.twist[body, i]
     for drive in range(len(world.drives)):
         at = world.drive_at[drive]
-        guess[at] = state.drives[drive, SPEED]
+        guess[at] = alone[at] = state.drives[drive, SPEED]
         momentum[at] = scratch.drive_mass[drive] * guess[at] - scratch.drive_load[drive]
 
 
