@@ -50,7 +50,7 @@ def stepwise(result: Any, most: int = 3) -> tuple[list[str], Any]:
             starts = promising(candidate, direction, views.whole, current.model, result.scales, gain)
             if not starts:
                 continue
-            free = free_of(current, candidate, result.scales, gain)
+            free = free_of(current.free, current.model, candidate, result.scales)
             tried = fit(views.whole, current.model.with_effect(starts[0][1]), free, turns=4, tolerance=1e-3)
             value = float(tried.sse.sum()) + _size(free, result) * np.log(samples)
             if value < best_bic:

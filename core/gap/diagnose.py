@@ -17,7 +17,7 @@ import numpy as np
 
 from ..effects.library import kind_of
 from .candidates import Candidate, Scales, candidates, scales_of
-from .fit import Fit, Free, base_numbers, fit, held_out
+from .fit import FRICTION, Fit, Free, base_numbers, fit, held_out
 from .model import Model, Predictor
 from .noise import Coverage, Noise, coverage, force_noise, reading_noise
 from .rig import Rig
@@ -121,7 +121,7 @@ def free_base(rig: Rig, predictors: Sequence[Predictor]) -> list[str]:
     if own_unit and read:
         names.append("zero")
     if dragged:
-        names += ["mus", "mud", "sigma0", "x0", "ct"]
+        names += FRICTION
     return names
 
 
@@ -215,7 +215,8 @@ def _explain(result: Diagnosis, views: Views) -> Iterator[tuple[str, float]]:
     floors = [mean0 * (1.0 - structure.total)]
     for turn in range(MOST):
         mean = float(unseen.sum() / current.count.sum())
-        if turn > 0 and (mean - floor < LEAST or (structure.total < STRUCTURE and mean < 1.5)):
+        enough = max(LEAST, NEXT_OF_ALL * (mean0 - floor))  # of less, no effect could close as much as it has to
+        if turn > 0 and (mean - floor < enough or (structure.total < STRUCTURE and mean < 1.5)):
             break
         taken = {effect.name for effect in current.model.effects}
         forms = [c for c in candidates([s.predictor for s in views.whole], current.model) if c.name not in taken]

@@ -28,6 +28,10 @@ STEP = 1e-3
 
 PRIOR = 10.0
 """Inverse variance of a number per texel about its resting value, in its coordinate: a gain is within ± 0.3 unseen."""
+FRICTION = ("mus", "mud", "sigma0", "x0", "ct")
+"""Parameters of the base model that show in net forces alone."""
+TOLD = 0.1
+"""Least share of what all recordings tell of a number that some of them must tell, to find it from them."""
 
 
 @dataclass(frozen=True)
@@ -113,6 +117,8 @@ class Share:
         Standard deviation of readings and of forces, in their units.
     parts : int
         Into how many stretches of time the trial is cut for judging on what was not seen.
+    forces : bool
+        Whether net forces count where they were measured.
     """
 
     predictor: Predictor
@@ -120,6 +126,7 @@ class Share:
     rows: slice = field(default_factory=lambda: slice(None))
     noise: tuple[float, float] = (1.0, 1.0)
     parts: int = 1
+    forces: bool = True
 
     def stretches(self, residual: np.ndarray) -> list[slice]:
         """Return the stretches of time that are left out in turn, as rows of a residual."""
@@ -144,7 +151,7 @@ class Share:
     def residual(self, model: Model) -> np.ndarray:
         """Measured minus predicted in units of the noise, (T, c + 3); zero where nothing was measured."""
         trial = self.predictor.trial
-        predicted = self.predictor.predict(model, self.columns)
+        predicted = self.predictor.predict(model, self.columns, self.forces)
         reading, missing = self._measured
         width = len(self.texels)
         out = np.zeros((len(trial.time[self.rows]), width + 3))
@@ -153,7 +160,7 @@ class Share:
             out[:, :width] /= self.noise[0]
             if missing is not None:
                 out[:, :width][missing] = 0.0
-        if trial.force is not None:
+        if predicted.force is not None:
             out[:, width:] = np.nan_to_num((trial.force - predicted.force)[self.rows] / self.noise[1])
         return out
 
@@ -164,7 +171,7 @@ class Share:
         number = 0
         if trial.reading is not None:
             number += int(np.isfinite(trial.reading[self.rows][:, self.texels]).sum())
-        if trial.force is not None:
+        if trial.force is not None and self.forces:
             number += int(np.isfinite(trial.force[self.rows]).sum())
         return number
 
@@ -227,6 +234,7 @@ def fit(
     tolerance: float = 1e-5,
     held: int = 0,
     judged: bool = True,
+    begun: Sequence[np.ndarray] | None = None,
 ) -> Fit:
     """Fit a model's free numbers by Levenberg–Marquardt steps.
 
@@ -245,6 +253,8 @@ def fit(
         takes more steps; where they end is the same.
     judged : bool
         Whether the normal equations at the end are wanted as well.
+    begun : sequence of (held, T, c + 3) float, optional
+        Derivatives by the first numbers, of each share, near where it starts.
     """
     free = tuple(free)
     counts = np.array([share.count for share in shares])
@@ -254,10 +264,14 @@ def fit(
     best = sum(map(_square, residuals)) + _penalty(free, at)
     tables = [np.empty((len(free), *residual.shape)) for residual in residuals]
     damping, known, turn = 1e-3, 0, 0
+    if begun is not None:
+        known = held
+        for table, first in zip(tables, begun, strict=True):
+            table[:held] = first
     while turn < turns:
         turn += 1
         for share, residual, table in zip(shares, residuals, tables, strict=True):
-            _derivatives(share, model, free, at, residual, table, known)
+            derivatives(share, model, free, at, residual, table, known)
         parts = zip(shares, residuals, tables, strict=True)
         total = _total([_sum_of(share, free, table, residual) for share, residual, table in parts])
         improved = False
@@ -284,7 +298,7 @@ def fit(
     if judged:
         sums = []
         for share, residual, table in zip(shares, residuals, tables, strict=True):
-            _derivatives(share, model, free, at, residual, table, 0)
+            derivatives(share, model, free, at, residual, table, 0)
             rows = share.stretches(residual)
             sums.append([_sum_of(share, free, table[:, part], residual[part]) for part in rows])
     return Fit(model, free, np.array([_square(r) for r in residuals]), counts, sums)
@@ -309,7 +323,7 @@ def _moved(at: list[np.ndarray], free: tuple[Free, ...], step: list[np.ndarray])
     return moved
 
 
-def _derivatives(
+def derivatives(
     share: Share,
     model: Model,
     free: tuple[Free, ...],
@@ -359,22 +373,36 @@ def _total(sums: Sequence[Sums]) -> Sums:
     return replace(first, **{name: sum(getattr(s, name) for s in sums) for name in names})
 
 
-def _step(sums: Sequence[Sums], free: tuple[Free, ...], at: list[np.ndarray], damping: float) -> list[np.ndarray]:
-    """Solve the damped normal equations; a step per free number, in its coordinate."""
+def _reduced(sums: Sequence[Sums], free: tuple[Free, ...], at: list[np.ndarray], damping: float) -> tuple[np.ndarray, ...]:
+    """The damped normal equations of the common numbers, a (p, p) and rhs (p,), and how those per texel follow from them."""
     t = _total(sums)
     m = t.h.shape[1]
     a = t.a + damping * np.diag(np.diag(t.a)) + 1e-12 * (1.0 + np.trace(t.a)) * np.eye(len(t.a))
-    rhs = t.g.copy()
-    if m:
-        loads = np.einsum("nmm->nm", t.c)
-        local = [(item, x) for item, x in zip(free, at, strict=True) if item.per_texel]
-        h = t.h - PRIOR * np.stack([x - item.to(item.rest) for item, x in local], axis=1)
-        c = t.c + np.einsum("nm,mk->nmk", damping * loads + PRIOR, np.eye(m))
-        inverse_b, inverse_h = np.linalg.solve(c, t.b), np.linalg.solve(c, h[:, :, None])[:, :, 0]
-        a = a - np.einsum("nmp,nmq->pq", t.b, inverse_b)
-        rhs = rhs - np.einsum("nmp,nm->p", t.b, inverse_h)
-    common = np.linalg.lstsq(a, rhs, rcond=1e-13)[0]
-    own = inverse_h - inverse_b @ common if m else np.zeros((0, 0))
+    if not m:
+        return a, t.g, np.zeros((0, 0, len(a))), np.zeros((0, 0))
+    loads = np.einsum("nmm->nm", t.c)
+    local = [(item, x) for item, x in zip(free, at, strict=True) if item.per_texel]
+    h = t.h - PRIOR * np.stack([x - item.to(item.rest) for item, x in local], axis=1)
+    c = t.c + np.einsum("nm,mk->nmk", damping * loads + PRIOR, np.eye(m))
+    follow, alone = np.linalg.solve(c, t.b), np.linalg.solve(c, h[:, :, None])[:, :, 0]
+    return a - np.einsum("nmp,nmq->pq", t.b, follow), t.g - np.einsum("nmp,nm->p", t.b, alone), follow, alone
+
+
+def _step(
+    sums: Sequence[Sums], free: tuple[Free, ...], at: list[np.ndarray], damping: float, known: np.ndarray | None = None
+) -> list[np.ndarray]:
+    """Solve the damped normal equations; a step per free number, in its coordinate.
+
+    With `known` (p, p), the matrix of all recordings, there is no step along what these sums tell too little of.
+    """
+    a, rhs, follow, alone = _reduced(sums, free, at, damping)
+    if known is None:
+        common = np.linalg.lstsq(a, rhs, rcond=1e-13)[0]
+    else:
+        share, along = _shares(a, known)
+        weight = np.where(share > TOLD, 1.0 / np.maximum(share, TOLD), 0.0)
+        common = along @ (weight * (along.T @ rhs))
+    own = alone - follow @ common
     step: list[np.ndarray] = []
     p = q = 0
     for item in free:
@@ -387,24 +415,35 @@ def _step(sums: Sequence[Sums], free: tuple[Free, ...], at: list[np.ndarray], da
     return step
 
 
+def _shares(a: np.ndarray, known: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Of each of some directions (columns), which share of what is known of it is in `a`; ``known`` is one along them."""
+    inverse = np.linalg.inv(np.linalg.cholesky(known + 1e-10 * np.diag(np.diag(known)) + 1e-300 * np.eye(len(known))))
+    share, turned = np.linalg.eigh(inverse @ a @ inverse.T)
+    return share, inverse.T @ turned
+
+
 def held_out(shares: Sequence[Share], found: Fit) -> np.ndarray:
     """Sum of squares of each trial, predicted by a fit that has not seen it, (trials,) float.
 
-    A whole trial is left out at a time. Where a model has numbers per texel, or there is one trial only, it is a stretch of a
-    trial: what no other trial touches, none could tell. A step that would not even fit the others better (numbers that they
-    hardly tell) is shortened, at last to nothing.
+    A whole trial is left out at a time. Where the others tell too little of some number (those of friction, where only one
+    trial slides; those per texel), or there is one trial only, it is a stretch of a trial; what the rest does not tell even
+    then stays as it is. A step that would not even fit the others better is shortened, at last to nothing.
     """
     if found.sums is None:
         return found.sse.copy()
-    by_part = len(shares) == 1 or any(item.per_texel for item in found.free)
+    free, at = found.free, [item.to(value_of(found.model, item)) for item in found.free]
+    known, *_ = _reduced(_flat(found.sums), free, at, 0.0)
+    local = any(item.per_texel for item in free)
     errors = np.zeros(len(shares))
     for left, share in enumerate(shares):
-        for parts in [[part] for part in range(share.parts)] if by_part else [list(range(share.parts))]:
-            errors[left] += _unseen(shares, found, left, parts)
+        others = [one for i, trial in enumerate(found.sums) for one in trial if i != left]
+        whole = bool(others) and not local and _shares(_reduced(others, free, at, 0.0)[0], known)[0].min(initial=1.0) > TOLD
+        for parts in [list(range(share.parts))] if whole else [[part] for part in range(share.parts)]:
+            errors[left] += _unseen(shares, found, left, parts, known)
     return errors
 
 
-def _unseen(shares: Sequence[Share], found: Fit, left: int, parts: list[int]) -> float:
+def _unseen(shares: Sequence[Share], found: Fit, left: int, parts: list[int], known: np.ndarray) -> float:
     """Squares of some stretches of one trial under the fit to everything else."""
     assert found.sums is not None
     free, at = found.free, [item.to(value_of(found.model, item)) for item in found.free]
@@ -418,7 +457,7 @@ def _unseen(shares: Sequence[Share], found: Fit, left: int, parts: list[int]) ->
         return of_left(shares[left].residual(found.model))
     before, damping = sum(one.sse for one in sums) + _penalty(free, at), 1e-6
     for _ in range(3):
-        moved = _moved(at, free, _step(sums, free, at, damping))
+        moved = _moved(at, free, _step(sums, free, at, damping, known))
         tried = changed(found.model, free, [item.back(x) for item, x in zip(free, moved, strict=True)])
         residuals = [share.residual(tried) for share in shares]
         own = of_left(residuals[left])

@@ -62,7 +62,7 @@ class Predictor:
         self._totals: dict[object, np.ndarray] = {}
         self._readings: dict[object, np.ndarray] = {}
 
-    def predict(self, model: Model, columns: np.ndarray | None = None) -> Prediction:
+    def predict(self, model: Model, columns: np.ndarray | None = None, forces: bool = True) -> Prediction:
         """Return the prediction of a model; its arrays are kept and not to be written to.
 
         Parameters
@@ -70,8 +70,11 @@ class Predictor:
         model : Model
         columns : (c,) int, optional
             Only these texels; right as long as no effect lets texels feel their neighbours.
+        forces : bool
+            Whether the net force is wanted, where it was measured.
         """
-        return Prediction(self._reading(model, columns), None if self.trial.force is None else self._total(model))
+        wanted = forces and self.trial.force is not None
+        return Prediction(self._reading(model, columns), self._total(model) if wanted else None)
 
     def _reading(self, model: Model, columns: np.ndarray | None) -> np.ndarray:
         p = model.parameters
@@ -119,8 +122,9 @@ class Predictor:
         stimulus = self.placed(model)
         if stimulus.load is not None:
             return stimulus.load if columns is None else stimulus.load[:, columns]
-        if columns is not None and self.trial.force is not None:  # the net force asks for all of them anyway
-            return self.normal_force(model)[:, columns]
+        whole = self._forces.get(self._force_key(model, None))
+        if columns is not None and whole is not None:
+            return whole[:, columns]
         key = self._force_key(model, columns)
         if key not in self._forces:
             _keep(self._forces, key, self._felt_by(model, columns).force(model.parameters, _acting(model)), KEPT)

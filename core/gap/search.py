@@ -15,12 +15,15 @@ from typing import Any
 import numpy as np
 
 from ..effects.base import Effect
+from ..effects.library import form_of
 from .candidates import READ_OFF, Candidate, Scales, is_spatial
-from .fit import Fit, Free, Share, changed, fit, held_out, value_of
+from .fit import FRICTION, Fit, Free, Share, derivatives, fit, held_out, value_of
 from .model import Model, Predictor
 
 FEW_TEXELS = 16
 """Per trial, in the quick look."""
+BEHIND = 3.0
+"""A candidate that leaves so many times as much of the gap as the best, after a first fit, is not fitted to everything."""
 THIN = 4
 """Of so many samples one is looked at where texels feel their neighbours."""
 
@@ -33,31 +36,34 @@ class Views:
     ----------
     whole : list of Share
     narrow : list of Share
-        Few texels, all samples: for what a texel feels by itself.
+        Few texels, all samples, without net forces where there are readings: for what a texel feels by itself.
+    rubbed : list of Share
+        The same with net forces: for friction.
     thin : list of Share
         All texels, few samples: for what texels feel of each other, and for where they are.
     """
 
     whole: list[Share]
     narrow: list[Share]
+    rubbed: list[Share]
     thin: list[Share]
 
     def quick(self, candidate: Candidate, model: Model) -> list[Share]:
         """Return the view for a quick look at a candidate on top of a model."""
-        from ..effects.library import form_of
-
         if candidate.name in READ_OFF:
             return self.whole
         forms = [candidate.form, *(form_of(e.name, e.form) for e in model.effects)]
         if any(is_spatial(form) or form.place is not None for form in forms):
             return self.thin
-        return self.narrow
+        return self.rubbed if candidate.form.friction is not None else self.narrow
 
 
 def views_of(predictors: Sequence[Predictor], noise: tuple[float, float]) -> Views:
     """Prepare the views of some trials."""
     whole = [Share(p, noise=noise, parts=2) for p in predictors]
-    narrow = [Share(p, _few(p), noise=noise) for p in predictors]
+    rubbed = [Share(p, _few(p), noise=noise) for p in predictors]
+    read = all(p.trial.reading is not None for p in predictors)
+    narrow = [replace(share, forces=not read) for share in rubbed]
     thin = []
     for p in predictors:
         every = slice(None, None, THIN if len(p.trial.time) >= 60 * THIN else 1)
@@ -66,8 +72,8 @@ def views_of(predictors: Sequence[Predictor], noise: tuple[float, float]) -> Vie
             name: None if getattr(t, name) is None else getattr(t, name)[every]
             for name in ("time", "position", "quaternion", "level", "slide", "reading", "force")
         }
-        thin.append(Share(Predictor(replace(t, **parts), p.rig), noise=noise))
-    return Views(whole, narrow, thin)
+        thin.append(Share(Predictor(replace(t, **parts), p.rig), noise=noise, forces=not read))
+    return Views(whole, narrow, rubbed, thin)
 
 
 def _few(predictor: Predictor) -> np.ndarray | None:
@@ -114,28 +120,45 @@ class Found:
         return sum(len(v) if isinstance(v, tuple) else 1 for v in values.values())
 
 
+def visible(shares: Sequence[Share], found: Fit) -> tuple[Free, ...]:
+    """Return the free numbers of a fit that act on what shares look at: without net forces, friction does not show."""
+    if any(share.forces for share in shares):
+        return found.free
+
+    def rubs(item: Free) -> bool:
+        if item.effect < 0:
+            return item.name in FRICTION
+        effect = found.model.effects[item.effect]
+        return form_of(effect.name, effect.form).friction is not None
+
+    return tuple(item for item in found.free if not rubs(item))
+
+
 class Direction:
     """What the free numbers of a fit can already change about its residual, on one view."""
 
     def __init__(self, shares: Sequence[Share], found: Fit):
-        self.shares, self.model = shares, found.model
-        free = [item for item in found.free if not item.per_texel]
-        at = [value_of(found.model, item) for item in free]
+        self.shares, self.model, self.free = shares, found.model, visible(shares, found)
+        common = tuple(item for item in self.free if not item.per_texel)
+        at = [item.to(value_of(found.model, item)) for item in common]
         self.residual = [share.residual(found.model) for share in shares]
-        self.columns: list[np.ndarray] = []
-        for share, r in zip(shares, self.residual, strict=True):
-            stack = []
-            for i, item in enumerate(free):
-                x = item.to(at[i])
-                values = list(at)
-                values[i] = item.back(x + 1e-3)
-                if float(np.max(np.abs(item.to(values[i]) - x))) < 1e-6:
-                    values[i] = item.back(x - 1e-3)
-                stack.append((r - share.residual(changed(found.model, free, values))).ravel())
-            self.columns.append(np.array(stack).reshape(len(free), -1))
-        self.gram = sum(c @ c.T for c in self.columns)
-        self.gram = self.gram + 1e-10 * (1.0 + np.trace(self.gram)) * np.eye(len(self.gram))
+        self.tables = [np.empty((len(common), *r.shape)) for r in self.residual]
+        for share, r, table in zip(shares, self.residual, self.tables, strict=True):
+            derivatives(share, found.model, common, at, r, table, 0)
+        self.columns = [table.reshape(len(common), -1) for table in self.tables]
+        gram = np.sum([c @ c.T for c in self.columns], axis=0)
+        self.gram = gram + 1e-10 * (1.0 + np.trace(gram)) * np.eye(len(gram))
         self.along = sum(c @ r.ravel() for c, r in zip(self.columns, self.residual, strict=True))
+
+    @property
+    def begun(self) -> list[np.ndarray] | None:
+        """Derivatives with which a fit of these numbers and more may begin."""
+        return None if any(item.per_texel for item in self.free) else self.tables
+
+    @property
+    def total(self) -> float:
+        """Sum of squares of the residual."""
+        return sum(float(np.vdot(r, r)) for r in self.residual)
 
     def score(self, model: Model) -> tuple[float, float]:
         """Return by how much the squares could fall along the change to another model, and the best length along it."""
@@ -307,11 +330,11 @@ def stepped(shares: Sequence[Share], model: Model, candidate: Candidate) -> list
     return [Effect(candidate.name, candidate.form.name, {"step": float(1.0 / top)})]
 
 
-def free_of(found: Fit, candidate: Candidate, scales: Scales, gain: float) -> tuple[Free, ...]:
-    """Return the free numbers of a fit and those of one effect more on top of its model."""
+def free_of(free: Sequence[Free], model: Model, candidate: Candidate, scales: Scales) -> tuple[Free, ...]:
+    """Return some free numbers of a model and those of one effect more on top of it."""
     if candidate.name in READ_OFF:
-        return found.free
-    return (*found.free, *candidate.free(len(found.model.effects), scales, gain))
+        return tuple(free)
+    return (*free, *candidate.free(len(model.effects), scales, abs(model.parameters.gain)))
 
 
 def search(
@@ -335,52 +358,80 @@ def search(
         shares = views.quick(candidate, found.model)
         if id(shares) not in directions:
             directions[id(shares)] = Direction(shares, found)
-        starts = promising(candidate, directions[id(shares)], views.whole, found.model, scales, gain)
-        total = sum(float(np.vdot(r, r)) for r in directions[id(shares)].residual)
+        direction = directions[id(shares)]
+        starts = promising(candidate, direction, views.whole, found.model, scales, gain)
         if starts and starts[0][0] > 0:
-            begun.append((starts[0][0] / max(total, 1e-300), candidate, starts))
+            begun.append((starts[0][0] / max(direction.total, 1e-300), candidate, starts))
         yield "looking at every effect", 0.35 * (number + 1) / len(forms), []
-    begun.sort(key=lambda entry: -entry[0])
-    if not begun:
+    kept = _kept(begun)
+    if not kept:
         yield "nothing promises anything", 1.0, []
         return
+    quick: list[Quick] = []
+    for number, (_, candidate, starts) in enumerate(kept):
+        direction = directions[id(views.quick(candidate, found.model))]
+        quick.append(_quick(candidate, starts[0][1], direction, scales))
+        yield "fitting those that promise most", 0.35 + 0.35 * (number + 1) / len(kept), []
+    last, whole = _finalists(quick, finalists), Direction(views.whole, found)
+    results: list[Found] = []
+    for number, one in enumerate(last):
+        free, held = free_of(found.free, found.model, one.candidate, scales), len(found.free)
+        best = fit(views.whole, one.fit.model, free, turns=8, tolerance=1e-4, held=held, begun=whole.begun)
+        results.append(Found(one.candidate, best, held_out(views.whole, best)))
+        results.sort(key=lambda one: one.mean)
+        yield "judging the best on trials they have not seen", 0.7 + 0.3 * (number + 1) / len(last), results
+
+
+def _kept(
+    begun: list[tuple[float, Candidate, list[tuple[float, Effect]]]], most: int = 14
+) -> list[tuple[float, Candidate, list[tuple[float, Effect]]]]:
+    """Those worth a fit after the quick look: forms of the best kinds, the best form of others, all that are near the best."""
+    begun = sorted(begun, key=lambda entry: -entry[0])
     best_kinds = list(dict.fromkeys(candidate.name for _, candidate, _ in begun))[:3]
     kept: list[tuple[float, Candidate, list[tuple[float, Effect]]]] = []
     for i, entry in enumerate(begun):
         leads = all(other[1].name != entry[1].name for other in begun[:i])
         least = 0.02 if entry[1].name in best_kinds else 0.05 if leads else 0.4
-        if entry[0] > least * begun[0][0] and len(kept) < 14:
+        if entry[0] > least * begun[0][0] and len(kept) < most:
             kept.append(entry)
-    quick: list[tuple[float, Candidate, Fit]] = []
-    for number, (_, candidate, starts) in enumerate(kept):
-        shares = views.quick(candidate, found.model)
-        free = free_of(found, candidate, scales, gain)
-        total = sum(float(np.vdot(r, r)) for r in directions[id(shares)].residual)
-        tries = [
-            fit(shares, found.model.with_effect(effect), free, turns=8, tolerance=1e-3, held=len(found.free), judged=False)
-            for _, effect in starts[:1]
-        ]
-        best = min(tries, key=lambda one: one.sse.sum())
-        quick.append((float(best.sse.sum()) / total, candidate, best))
-        yield "fitting those that promise most", 0.35 + 0.35 * (number + 1) / len(kept), []
-    quick.sort(key=lambda entry: entry[0])
-    last = _finalists(quick, finalists)
-    results: list[Found] = []
-    for number, (_, candidate, first) in enumerate(last):
-        free = free_of(found, candidate, scales, gain)
-        whole = fit(views.whole, first.model, free, turns=8, tolerance=1e-4, held=len(found.free))
-        results.append(Found(candidate, whole, held_out(views.whole, whole)))
-        results.sort(key=lambda one: one.mean)
-        yield "judging the best on trials they have not seen", 0.7 + 0.3 * (number + 1) / len(last), results
+    return kept
 
 
-def _finalists(quick: list[tuple[float, Candidate, Fit]], count: int) -> list[tuple[float, Candidate, Fit]]:
-    """The best form of each of the best kinds, and the second form of the best kind."""
-    chosen: list[tuple[float, Candidate, Fit]] = []
+@dataclass(frozen=True)
+class Quick:
+    """A candidate fitted to a part of the recordings; `left` is the share of the gap there that it leaves."""
+
+    left: float
+    candidate: Candidate
+    fit: Fit
+
+
+def _quick(candidate: Candidate, start: Effect, direction: Direction, scales: Scales) -> Quick:
+    model, free = direction.model, free_of(direction.free, direction.model, candidate, scales)
+    held = len(direction.free)
+    best = fit(
+        direction.shares,
+        model.with_effect(start),
+        free,
+        turns=8,
+        tolerance=1e-3,
+        held=held,
+        judged=False,
+        begun=direction.begun,
+    )
+    count, square = float(best.count.sum()), float(best.sse.sum())
+    return Quick(max(square - count, 0.0) / max(direction.total - count, 0.01 * count), candidate, best)
+
+
+def _finalists(quick: list[Quick], count: int) -> list[Quick]:
+    """The best form of each of the best kinds, and the second form of the best kind; none that is far behind."""
+    quick = sorted(quick, key=lambda one: one.left)
+    chosen: list[Quick] = []
     for entry in quick:
-        own = sum(1 for other in chosen if other[1].name == entry[1].name)
-        if own == 0 or (own == 1 and chosen and entry[1].name == chosen[0][1].name):
+        own = sum(1 for other in chosen if other.candidate.name == entry.candidate.name)
+        near = entry.left < BEHIND * (quick[0].left + 0.04) or len(chosen) < 2
+        if near and (own == 0 or (own == 1 and entry.candidate.name == chosen[0].candidate.name)):
             chosen.append(entry)
-        if len({other[1].name for other in chosen}) >= count and len(chosen) > count:
+        if len({other.candidate.name for other in chosen}) >= count and len(chosen) > count:
             break
     return chosen[: count + 1]
