@@ -17,11 +17,13 @@ import numpy as np
 
 from .jit import allocating, kernel
 from .mesh import TriangleMesh, face_normals
+from .reference import by_reference
 
 LEAF_SIZE = 4
 """Triangles per leaf; two to eight measured alike."""
 
 
+@by_reference
 class Tree(NamedTuple):
     """One or several meshes' trees behind one another, ready for the kernels.
 

@@ -23,6 +23,7 @@ import numpy as np
 
 from .effects.laws import Program
 from .jit import inlined, kernel
+from .reference import by_reference
 from .scenario import HUNT_CROSSLEY, SensorParameters
 
 # Contact rows: one per touching texel and target, in the frame of the sensor's body; they are all that the solver's inner loop
@@ -82,6 +83,7 @@ def friction_limit(normal_force: np.ndarray, speed: np.ndarray, parameters: Sens
     return normal_force * np.array([stribeck(v * v, row) for v in np.ravel(speed)]).reshape(np.shape(speed))
 
 
+@by_reference
 class World(NamedTuple):
     """What does not change during a run: b bodies, m sensors with N contact points, q pairs of sensor and target.
 
@@ -175,6 +177,7 @@ class World(NamedTuple):
     part: np.ndarray
 
 
+@by_reference
 class State(NamedTuple):
     """What a run carries from step to step; copied, it is a checkpoint.
 

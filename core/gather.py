@@ -11,10 +11,12 @@ import numpy as np
 from .bvh import cross_plane, find_near, near_entry, segment_entry
 from .contact import DEPTH, LANES, NX, NY, NZ, PX, PY, PZ, ROW, ZX, ZY, ZZ
 from .jit import inlined, kernel
+from .reference import by_reference
 from .shapes import place_all, place_near
 from .skin import finish_rows
 
 
+@by_reference
 class Neighbours(NamedTuple):
     """Which triangles each contact point can meet; a cache that changes the speed and never the numbers.
 

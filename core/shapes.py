@@ -15,6 +15,7 @@ import numpy as np
 
 from .bvh import Tree
 from .jit import kernel
+from .reference import by_reference
 
 FLAT = 1e-13
 """Twice the area over the square of the longest edge below which a triangle has no normal, and so never answers."""
@@ -57,6 +58,7 @@ def window(times: np.ndarray, samples: np.ndarray, moments: np.ndarray) -> Windo
     return Window(samples[first : last + 1], right - 1 - first, share, np.diff(times[first : last + 1]))
 
 
+@by_reference
 class Track(NamedTuple):
     """The windows of several things behind one another, for the kernels. A *moment* is the beginning of a step or the last end.
 
@@ -92,6 +94,7 @@ def track(windows: Sequence[Window | None], columns: int, moments: int) -> Track
     return Track(np.ascontiguousarray(np.concatenate(values), dtype=float), stride, row, share)
 
 
+@by_reference
 class Shapes(NamedTuple):
     """What surfaces look like at the steps of one frame: T targets, m sensors.
 

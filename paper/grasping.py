@@ -88,10 +88,10 @@ def too_heavy(folder: Path, progress: Callable) -> Chapter:
     scenario = slowly(bench.scenario_of(scene))
     name, low, high = grasps.OBJECTS[HEAVY_KIND].name, LIGHT, HEAVY
     expected = coulomb_limit(scenario)
-    for mass, slips in ((low, False), (high, True)):
+    for mass, too_much in ((low, False), (high, True)):
         found = slips(scenario, name, mass)
         chapter.rows.append(
-            Row(f"{mass:g} kg", "—", "slips" if slips else "held", "slips" if found else "held", found == slips)
+            Row(f"{mass:g} kg", "—", "slips" if too_much else "held", "slips" if found else "held", found == too_much)
         )
     progress()
     while high - low > 1e-3 * expected:

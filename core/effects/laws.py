@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..jit import COMPILED, call_address, carray, compiled_callback, kernel
+from ..reference import by_reference
 from .base import Effect, Form
 from .library import complete_values, in_order
 
@@ -153,6 +154,7 @@ def law_over_time(
     return result
 
 
+@by_reference
 class Program(NamedTuple):
     """The laws of m sensors as arrays; of sensor s those with index ``start[s]`` to ``start[s + 1]``.
 
