@@ -65,8 +65,7 @@ def inlined(function: Callable[..., Any]) -> Callable[..., Any]:
     """Do as :func:`kernel`, and become part of every caller, so that the caller's loops can run in vector registers.
 
     A loop that calls is not vectorised. Such a function takes and returns numbers, and chooses with ``a if c else b`` where a
-    branch would do something. Also for what only hands the solver's arrays on: a call passes seven words for each of a hundred
-    arrays, which takes half a microsecond.
+    branch would do something.
     """
     if not COMPILED:
         return function
@@ -75,7 +74,9 @@ def inlined(function: Callable[..., Any]) -> Callable[..., Any]:
 
 def _compiled(function: Callable[..., Any], **options: bool) -> Callable[..., Any]:
     function.__qualname__ += f"_{EDITION}"  # part of the name under which numba keeps the result
-    compiled: Callable[..., Any] = numba.njit(cache=True, fastmath=False, error_model="numpy", nogil=True, **options)(function)
+    compiled: Callable[..., Any] = numba.njit(
+        cache=True, no_cfunc_wrapper=True, fastmath=False, error_model="numpy", nogil=True, **options
+    )(function)
     return compiled
 
 

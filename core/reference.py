@@ -12,6 +12,7 @@ that in registers whatever is written.
 
 from __future__ import annotations
 
+import hashlib
 from functools import cached_property
 from typing import Any, TypeVar, cast
 
@@ -40,12 +41,13 @@ else:
     _OWNERS = 2
     """How many words of a compiled array say who owns it; they come first."""
 
-    class Reference(types.Type):  # type: ignore[misc]
+    class Reference(types.Type):
         """Numba's type of such a tuple: its class, and the types of its fields."""
 
         def __init__(self, cls: Any, fields: tuple[Any, ...]) -> None:
             self.cls, self.fields = cls, fields
-            super().__init__(f"{cls.__name__}({', '.join(map(str, fields))})")
+            which = hashlib.sha256(repr(fields).encode()).hexdigest()[:12]
+            super().__init__(f"{cls.__name__}_{which}")  # short: it is part of the name of every function that takes one
 
         @property
         def key(self) -> Any:
@@ -53,14 +55,14 @@ else:
             return self.cls, self.fields
 
     @register_model(Reference)
-    class _Model(models.PrimitiveModel):  # type: ignore[misc]
-        """A pointer to the fields, one after the other, each at a multiple of eight bytes."""
+    class _Model(models.PrimitiveModel):
+        """A pointer to the fields, word by word."""
 
         def __init__(self, manager: Any, kind: Reference) -> None:
             super().__init__(manager, kind, _BYTES)
 
     @infer_getattr
-    class _Fields(AttributeTemplate):  # type: ignore[misc]
+    class _Fields(AttributeTemplate):
         key = Reference
 
         def generic_resolve(self, kind: Reference, name: str) -> Any:
@@ -68,16 +70,13 @@ else:
             names = kind.cls._fields
             return kind.fields[names.index(name)] if name in names else None
 
-    def _offsets(context: Any, kind: Reference) -> list[int]:
-        """Where each field begins, and the end."""
-        offsets = [0]
-        for field in kind.fields:
-            offsets.append(offsets[-1] + -(-context.get_abi_sizeof(context.get_value_type(field)) // 8) * 8)
-        return offsets
+    def _size(field: Any) -> int:
+        """How many words a field takes."""
+        return 5 + 2 * field.ndim if isinstance(field, types.Array) else 1
 
     def _field(context: Any, builder: Any, kind: Reference, pointer: Any, at: int) -> Any:
         """Pointer to a field."""
-        place = cgutils.gep_inbounds(builder, pointer, _offsets(context, kind)[at])
+        place = cgutils.gep_inbounds(builder, pointer, 8 * sum(map(_size, kind.fields[:at])))
         return builder.bitcast(place, context.get_value_type(kind.fields[at]).as_pointer())
 
     @lower_getattr_generic(Reference)
@@ -118,7 +117,7 @@ else:
         return [value.address if hasattr(value, "address") else int(value)]
 
     def by_reference(cls: Class) -> Class:
-        """Have kernels take instances of a NamedTuple as one pointer; fields are arrays, whole numbers, or such tuples again."""
+        """Have kernels take instances of a NamedTuple as one pointer; fields are arrays, integers, or such tuples again."""
 
         class Referred(cls):  # type: ignore[misc, valid-type]
             """With room to keep what compiled code asks for."""

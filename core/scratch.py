@@ -10,12 +10,14 @@ import numpy as np
 from .bodies import look_back
 from .contact import DEPTH, LANES, NX, PX, ROW, State, World
 from .effects.laws import COLUMNS
+from .reference import by_reference
 from .shapes import Shapes
 
 SUMS = 27
 """Numbers that the contacts of a pair are summed up in: a symmetric (6, 6) block by its lower triangle, and a wrench."""
 
 
+@by_reference
 class Scratch(NamedTuple):
     """Working memory of the kernels, so that nothing is allocated inside the loop.
 
