@@ -16,6 +16,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ..effects.library import kind_of
+from .admissible import admissible
 from .candidates import Candidate, Scales, candidates, scales_of
 from .fit import FRICTION, Fit, Free, base_numbers, fit, held_out
 from .model import Model, Predictor
@@ -225,7 +226,7 @@ def _explain(result: Diagnosis, views: Views) -> Iterator[tuple[str, float]]:
         for what, share, found in search(views, current, forms, result.scales):
             yield what, (turn + share) / MOST
             ranked = found or ranked
-        ranked = [one for one in ranked if _admissible(one, views)]
+        ranked = [one for one in ranked if admissible(one, views)]
         steps.append(ranked)
         if not ranked:
             break
@@ -246,23 +247,6 @@ def _explain(result: Diagnosis, views: Views) -> Iterator[tuple[str, float]]:
 def _is_free_already(candidate: Candidate, free: Sequence[Free]) -> bool:
     """A common offset is the sensor's `zero` where that is fitted."""
     return candidate.label == "offset/common" and any(item.effect < 0 and item.name == "zero" for item in free)
-
-
-def _admissible(found: Found, views: Views) -> bool:
-    """Adhesion is what pulls: a fit that never does, or does where the readings do not, describes something else."""
-    if found.candidate.name != "adhesion":
-        return True
-    predicted, measured = [], []
-    for share in views.whole:
-        p = found.fit.model.parameters
-        reading = (share.predictor.predict(found.fit.model).reading - p.zero) / p.gain * abs(p.gain) / share.noise[0]
-        pulled = reading < -0.5
-        if share.predictor.trial.reading is not None:
-            own = (share.predictor.trial.reading - p.zero) / p.gain * abs(p.gain) / share.noise[0]
-            predicted.append(reading[pulled])
-            measured.append(own[pulled])
-    pull, seen = np.concatenate(predicted), np.concatenate(measured)
-    return len(pull) > 20 and float(np.nanmean(seen)) < 0.4 * float(pull.mean()) < -0.3
 
 
 def _left(one: Found, floor: float, gap: float) -> float:
@@ -310,7 +294,7 @@ def _reconsider(
     for what, share, found in search(views, other, forms, result.scales):
         yield what, 0.9 + 0.1 * share
         ranked = found or ranked
-    ranked = [one for one in ranked if _admissible(one, views)]
+    ranked = [one for one in ranked if admissible(one, views)]
     steps = [*steps]
     if ranked:
         best = _simplest(ranked, floor)

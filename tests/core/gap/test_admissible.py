@@ -1,0 +1,47 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""An effect that the recordings refute where it is its own is not taken, however well its formula fits elsewhere."""
+
+import gap_cases as cases
+import numpy as np
+import pytest
+
+from palpate.core.effects.library import effect
+from palpate.core.gap.admissible import admissible
+from palpate.core.gap.candidates import Candidate, scales_of
+from palpate.core.gap.diagnose import begin
+from palpate.core.gap.fit import base_numbers, fit
+from palpate.core.gap.model import Model
+from palpate.core.gap.search import Found, views_of
+
+SPREAD = 0.02 * np.random.default_rng(1).normal(size=cases.ROWS * cases.COLUMNS)
+"""N, of each texel."""
+
+
+def offset_each(rig):
+    """An offset for each texel, fitted on top of the base model."""
+    predictors, noise, full = begin(rig)
+    views, none = views_of(predictors, (noise[0].deviation, 1.0)), tuple([0.0] * len(SPREAD))
+    from palpate.core.effects.library import form_of, kind_of
+
+    candidate = Candidate(kind_of("offset"), form_of("offset", "listed"))
+    free = base_numbers(rig.parameters, ("k", "cn"), full[0])
+    free += candidate.free(0, scales_of(predictors, Model(rig.parameters)), 1.0)
+    found = fit(views.whole, Model(rig.parameters, (effect("offset", "listed", offset=none),)), free)
+    return Found(candidate, found, found.sse), views
+
+
+def always(reading, _time):
+    return reading + SPREAD
+
+
+def only_under_load(reading, _time):
+    return reading + SPREAD * (reading > 0.01)
+
+
+@pytest.mark.parametrize(("change", "is_one"), [(always, True), (only_under_load, False)])
+def test_an_offset_is_there_without_load(change, is_one):
+    found, views = offset_each(cases.rig(change=change, seed=4, trials=6))
+    touched = np.any([(s.predictor.stimulus.depth > 0).any(axis=0) for s in views.whole], axis=0)
+    values = np.array(found.fit.model.effects[0].values["offset"])[touched]
+    assert np.corrcoef(values, SPREAD[touched])[0, 1] > 0.6  # it fits either way
+    assert admissible(found, views) == is_one
