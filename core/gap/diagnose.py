@@ -52,8 +52,10 @@ class Named:
     confidence : float
     rivals : tuple of str
         Kinds that explain as much.
-    gap_after : float
-        NRMSE on the fitted trials once it is in the model.
+    next_best : str
+        The kind that came nearest to it, "" where none did, and
+    leaves : float
+        how many times as much of the gap that one leaves.
     """
 
     effect: int
@@ -61,7 +63,8 @@ class Named:
     form: str
     confidence: float
     rivals: tuple[str, ...]
-    gap_after: float
+    next_best: str = ""
+    leaves: float = np.inf
 
 
 @dataclass
@@ -236,12 +239,13 @@ def _explain(result: Diagnosis, views: Views) -> Iterator[tuple[str, float]]:
         current, unseen = best.fit, best.unseen
         structure = _structure(views, current)
         floors.append(best.mean * (1.0 - structure.total))
-    chosen = len(current.model.effects)
-    if chosen >= 2:
+    alone = steps[0] if steps else []
+    if len(current.model.effects) >= 2:
         current, unseen, steps = yield from _reconsider(result, views, current, unseen, steps, floor)
     result.best, result.structure = current, _structure(views, current)
     floor = float(np.clip(min(floors), 0.8, 1.0))
-    _conclude(result, views, steps, mean0, float(unseen.sum() / current.count.sum()), floor)
+    _conclude(result, steps, mean0, float(unseen.sum() / current.count.sum()), floor)
+    _rule_out(result, alone, mean0, floor)
 
 
 def _is_free_already(candidate: Candidate, free: Sequence[Free]) -> bool:
@@ -302,13 +306,23 @@ def _reconsider(
         if alone - best.mean < max(LEAST, 0.3 * max(alone - floor, 0.0)):  # what came later does it all
             return other, held_out(views.whole, other), steps[1:]
         if best.mean < mean - 0.02 * max(mean - floor, 0.0) - 1e-6 or best.candidate.name == first.name:
-            order = [*steps[1 : len(other.model.effects) + 1], ranked]
-            return best.fit, best.unseen, order
+            order = [ranked, *steps[1 : len(other.model.effects) + 1]]
+            return _last_first(best.fit), best.unseen, order
     return current, unseen, steps
 
 
-def _conclude(result: Diagnosis, views: Views, steps: list[list[Found]], mean0: float, mean: float, floor: float) -> None:
-    """Write verdict, names, rivals and what was ruled out."""
+def _last_first(found: Fit) -> Fit:
+    """The same fit with the effect that joined last at the head of the stack, where it was in the order of finding."""
+    last = len(found.model.effects) - 1
+    effects = (found.model.effects[last], *found.model.effects[:last])
+    free = tuple(
+        item if item.effect < 0 else replace(item, effect=0 if item.effect == last else item.effect + 1) for item in found.free
+    )
+    return replace(found, model=Model(found.model.parameters, effects), free=free)
+
+
+def _conclude(result: Diagnosis, steps: list[list[Found]], mean0: float, mean: float, floor: float) -> None:
+    """Write verdict, names and rivals."""
     gap = mean0 - floor
     effects = result.best.model.effects
     structured = result.base_structure.total
@@ -322,10 +336,10 @@ def _conclude(result: Diagnosis, views: Views, steps: list[list[Found]], mean0: 
         ranked = next((s for s in steps if any(one.candidate.name == effect.name for one in s)), [])
         own = [one for one in ranked if one.candidate.name == effect.name]
         rivals: tuple[str, ...] = ()
+        others: dict[str, float] = {}
         weight = 1.0
         if own:
             least = _left(own[0], floor, gap)
-            others: dict[str, float] = {}
             for one in ranked:
                 if one.candidate.name != effect.name and one.candidate.name not in {e.name for e in effects}:
                     ratio = _left(one, floor, gap) / least
@@ -338,15 +352,17 @@ def _conclude(result: Diagnosis, views: Views, steps: list[list[Found]], mean0: 
         if rivals:
             confidence = min(confidence, 0.45)
             result.ambiguous.append((effect.name, *rivals))
-        result.named.append(Named(index, effect.name, effect.form, round(confidence, 3), rivals, 0.0))
-    _rule_out(result, steps, mean0, floor)
+        nearest = min(others, key=lambda name: others[name], default="")
+        result.named.append(
+            Named(index, effect.name, effect.form, round(confidence, 3), rivals, nearest, others.get(nearest, np.inf))
+        )
 
 
-def _rule_out(result: Diagnosis, steps: list[list[Found]], mean0: float, floor: float) -> None:
-    """Say of each kind why it was not named."""
+def _rule_out(result: Diagnosis, alone: list[Found], mean0: float, floor: float) -> None:
+    """Say of each kind why it was not named; `alone` are those that were fitted on top of the base model."""
     gap = max(mean0 - floor, 1e-12)
     tried: dict[str, float] = {}
-    for one in steps[0] if steps else []:
+    for one in alone:
         tried[one.candidate.name] = max(tried.get(one.candidate.name, -1.0), (mean0 - one.mean) / gap)
     named = {name for pair in result.ambiguous for name in pair} | {n.name for n in result.named}
     looked = {c.name for c in candidates(result.of("fit"), result.base.model)}
