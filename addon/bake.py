@@ -12,7 +12,7 @@ import bpy
 from ..core.errors import SceneError
 from ..core.recording import Recording
 from ..core.scenario import Scenario
-from . import dependencies, folders, live, sample, state, write
+from . import dependencies, folders, live, preparing, sample, state, write
 from .jobs import Progress
 
 
@@ -59,6 +59,9 @@ def _bake(scene, name: str) -> Generator[Progress, None, Baked]:
         yield _progress("Reading the scene", step.frame, step.done, total)
 
     write.check(scene, scenario, binding)
+    for step in preparing.wait():
+        state.session.bake = step
+        yield step
     solver = dependencies.solver()
     simulation = solver.Simulation(scenario)
     files = folders.Files(folder, scenario, bpy.data.filepath)

@@ -56,8 +56,12 @@ def prepare_numba() -> None:
 
 
 def solver():
-    """Return :mod:`..core.solve`, which loads numba."""
-    prepare_numba()
-    from ..core import solve
+    """Return :mod:`..core.solve`, which loads numba, compiled: at the first use ever that takes a minute.
 
+    Beside a window :mod:`.preparing` has seen to that before.
+    """
+    prepare_numba()
+    from ..core import solve, warm
+
+    warm.warm_aloud()
     return solve

@@ -6,7 +6,7 @@ from __future__ import annotations
 import bpy
 from bpy.app.handlers import persistent
 
-from . import identity, live, migrations, overlays, preview, sample, state, texelview
+from . import identity, live, migrations, overlays, preparing, preview, sample, state, texelview
 
 
 @persistent
@@ -44,6 +44,8 @@ def palpate_load_post(_path):
     migrations.apply()
     for scene in bpy.data.scenes:
         live.hide(scene)  # a file that was written without save_pre, as by a crash
+    if any(obj.palpate.role != "NONE" for obj in bpy.data.objects):
+        preparing.begin()
 
 
 @persistent
@@ -94,6 +96,7 @@ LISTS = {
 def register():
     for name, function in LISTS.items():
         getattr(bpy.app.handlers, name).append(function)
+    preparing.when_ready.append(live.solver_is_ready)
     overlays.register()
     texelview.register()
 
@@ -102,6 +105,8 @@ def unregister():
     texelview.unregister()
     overlays.unregister()
     preview.forget()
+    preparing.stop()
+    preparing.when_ready.clear()
     for name, function in LISTS.items():
         getattr(bpy.app.handlers, name).remove(function)
     live.forget()

@@ -12,12 +12,17 @@ PATIENCE = 0.1  # seconds of work between two looks at the keyboard
 
 @dataclass(frozen=True)
 class Progress:
-    """`done` of `total` steps; `stage` says in words what is being done, `frame` at which frame."""
+    """`done` of `total` steps; `stage` says in words what is being done, `frame` at which frame, where it is one."""
 
     stage: str
-    frame: int
+    frame: int | None
     done: int
     total: int
+
+    @property
+    def text(self) -> str:
+        """For people."""
+        return self.stage if self.frame is None else f"{self.stage}: frame {self.frame}"
 
 
 Job = Generator[Progress, None, object]

@@ -15,7 +15,7 @@ from ..core.errors import PalpateError
 from ..core.formats.sensors import SENSOR_NAME, load_sensor
 from ..core.recording import Frame, Recording
 from ..core.texels import Texels
-from . import cache, clock, dress, folders, freebodies, inset, materials, overlays, sample, stale, state, write
+from . import cache, clock, dress, folders, freebodies, inset, materials, overlays, preparing, sample, stale, state, write
 from .jobs import Progress
 
 
@@ -31,6 +31,8 @@ class Status:
 _status: dict[int, Status] = {}
 _refused: dict[int, str] = {}
 """Why the last attempt to compute failed, by scene."""
+_waiting: set[int] = set()
+"""Scenes that came to a frame before the solver was ready."""
 _recordings: dict[Path, Recording | None] = {}
 """Recordings of bakes that were read for the panel, by folder."""
 
@@ -50,6 +52,7 @@ def forget() -> None:
     overlays.clear()
     _status.clear()
     _refused.clear()
+    _waiting.clear()
     _recordings.clear()
     _known_texels.clear()
     stale.forget()
@@ -74,7 +77,7 @@ def has_roles(scene) -> bool:
 
 def before_frame(scene) -> None:
     """Begin a run at the frame that is being left: pressing play on the first frame starts with the second."""
-    if not _is_on(scene) or scene.frame_current != scene.frame_start + 1:
+    if not _is_on(scene) or scene.frame_current != scene.frame_start + 1 or not preparing.is_ready():
         return
     depsgraph = sample.view_layer_of(scene).depsgraph
     if depsgraph is None or depsgraph.scene_eval.frame_current != scene.frame_start or depsgraph.scene_eval.frame_subframe:
@@ -93,7 +96,7 @@ def on_frame(scene, depsgraph) -> None:
         overlays.clear(scene)
         _show_bake(scene, depsgraph)
         return
-    if not _is_on(scene):
+    if not _is_on(scene) or _waits_for_solver(scene):
         return
     (frame, share), run = clock.moment(scene), cache.get(scene)
     if not state.session.rendering and not share:
@@ -111,6 +114,30 @@ def on_frame(scene, depsgraph) -> None:
         _say(scene, _not_computed(scene, run))
         if not bpy.app.background and not state.session.rendering and missing(scene):
             bpy.app.timers.register(_ask_for_the_missing, first_interval=0.0)
+
+
+def _waits_for_solver(scene) -> bool:
+    """Whether nothing can be computed yet, because the solver is being prepared; the panel shows how far that is."""
+    if preparing.is_ready():
+        return False
+    preparing.begin()
+    _waiting.add(scene.session_uid)
+    overlays.clear(scene)
+    _say(scene, "Frames are computed as soon as the solver is ready.")
+    return True
+
+
+def solver_is_ready() -> None:
+    """Compute what had to wait; what plays begins anew."""
+    waiting = set(_waiting)
+    _waiting.clear()
+    if is_baking() or state.session.catching_up:
+        return
+    for window in bpy.context.window_manager.windows:
+        scene = window.scene
+        if scene.session_uid in waiting:
+            playing = window.screen.is_animation_playing
+            scene.frame_set(scene.frame_start if playing else scene.frame_current)
 
 
 def _not_computed(scene, run) -> str:
@@ -132,6 +159,7 @@ def missing(scene) -> range:
 
 def catch_up(scene) -> Generator[Progress, None, None]:
     """Compute what is missing up to the present frame, and come back to it. Closing the generator keeps what is computed."""
+    yield from preparing.wait()
     wanted, frames = (scene.frame_current, scene.frame_subframe), missing(scene)
     state.session.catching_up = True
     try:

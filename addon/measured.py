@@ -16,7 +16,7 @@ import numpy as np
 
 from ..core import colormaps
 from ..core.errors import SceneError
-from . import effects, exchange, identity, sample
+from . import effects, exchange, identity, preparing, sample
 
 if TYPE_CHECKING:
     from ..core.gap.diagnose import Diagnosis
@@ -67,6 +67,7 @@ def find(obj):
     from ..core.gap.plots import PICTURES
     from ..core.gap.rig import read_rig
 
+    yield from preparing.wait()
     yield Progress("reading the recordings", 0, 1000)
     rig = read_rig(rig_path(obj))
     diagnosis = None

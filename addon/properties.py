@@ -19,7 +19,7 @@ from bpy.props import (
 from ..core import colormaps
 from ..core.migrate import VERSION
 from ..core.scenario import Drive, SensorParameters
-from . import effects, freebodies, identity, meshes, state
+from . import effects, freebodies, identity, meshes, preparing, state
 
 ROLES = (
     ("NONE", "None", "Takes no part"),
@@ -59,6 +59,8 @@ def _role_changed(settings, context):
     settings.schema_version = VERSION
     identity.ensure(settings.id_data)
     state.participants_changed()
+    if settings.role in {"SENSOR", "PAD"}:
+        preparing.begin()
     _body_changed(settings, context)
 
 

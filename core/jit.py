@@ -7,11 +7,11 @@ lets the compiler reorder arithmetic: no fastmath, because "same seed, same bits
 
 from __future__ import annotations
 
-import hashlib
 import os
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
+
+from .edition import edition
 
 COMPILED = False
 
@@ -24,23 +24,10 @@ if os.environ.get("PALPATE_NUMBA", "1") != "0":
         COMPILED = False
 
 
-def _edition() -> str:
-    """Return a hash of all files with kernels in this folder and those below it.
+EDITION = edition() if COMPILED else ""
 
-    A compiled kernel holds the machine code of those it calls, but numba looks only at a kernel's own file to see whether what
-    it kept is still good: after a change in another file, or an upgrade, the old code would go on running.
-    """
-    digest = hashlib.sha256()
-    for path in sorted(Path(__file__).parent.rglob("*.py")):
-        source = path.read_bytes()
-        if any(
-            mark in source for mark in (b"@kernel", b"@inlined", b"@allocating", b"KIND = Kind(")
-        ):  # the laws of effects are compiled as well
-            digest.update(source)
-    return digest.hexdigest()[:12]
-
-
-EDITION = _edition() if COMPILED else ""
+KERNELS: list[Any] = []
+"""All that numba compiles when it is first called; for saying how far that is."""
 
 
 def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
@@ -77,6 +64,7 @@ def _compiled(function: Callable[..., Any], **options: bool) -> Callable[..., An
     compiled: Callable[..., Any] = numba.njit(
         cache=True, no_cfunc_wrapper=True, fastmath=False, error_model="numpy", nogil=True, **options
     )(function)
+    KERNELS.append(compiled)
     return compiled
 
 

@@ -58,7 +58,7 @@ class Working(support.Reporting):
             return {"FINISHED"}
         progress = self._slice.progress
         context.window_manager.progress_update(progress.done / progress.total)
-        context.workspace.status_text_set(f"{progress.stage}: frame {progress.frame}    ESC: stop")
+        context.workspace.status_text_set(f"{progress.text}    ESC: stop")
         redraw_panels(context)
         return {"RUNNING_MODAL"}
 

@@ -24,8 +24,7 @@ class Bake(Part):
         layout.prop(own, "use_live")
         progress = state.session.bake
         if progress is not None:
-            text = f"{progress.stage}: frame {progress.frame} (ESC: stop)"
-            layout.progress(text=text, factor=progress.done / progress.total)
+            layout.progress(text=f"{progress.text} (ESC: stop)", factor=progress.done / progress.total)
             return
         row = layout.row(align=True)
         row.operator("palpate.bake", text=f"Bake {scene.frame_start}–{scene.frame_end}", icon="RENDER_ANIMATION")

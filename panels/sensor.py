@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Panels of one object: its role, and of a sensor or pad its region, its contact, its friction and what it reads."""
 
-from ..addon import live, skins, state
+from ..addon import live, preparing, skins, state
 from ..operators import presets
 from .places import ROOT, Part, sentences
 
@@ -22,6 +22,10 @@ class Root(Part):
         for name in (obj.name, context.scene.name):
             if name in state.session.notes:
                 sentences(layout, state.session.notes[name], "ERROR", context)
+        coming = preparing.progress()
+        if coming is not None:
+            layout.progress(text="Preparing the solver", factor=coming.done / coming.total)
+            sentences(layout, f"{coming.text}. Only the first use of this version has to wait.", "SORTTIME", context)
         if settings.role == "NONE":
             column = layout.box().column()
             column.label(text=f"'{obj.name}' takes no part.")

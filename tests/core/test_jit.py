@@ -11,7 +11,7 @@ import sys
 import pytest
 from solver_scenes import cube_on_pad
 
-from palpate.core import bristles, jit, pairs, sums
+from palpate.core import bristles, edition, jit, pairs, sums
 from palpate.core.solve import Simulation
 
 numba = pytest.importorskip("numba")
@@ -42,7 +42,8 @@ def test_a_kernel_is_compiled_anew_when_one_that_it_calls_has_changed(tmp_path):
     package = tmp_path / "kernels"
     package.mkdir()
     (package / "__init__.py").touch()
-    shutil.copy(jit.__file__, package)
+    for module in (jit, edition):
+        shutil.copy(module.__file__, package)
     (package / "caller.py").write_text(CALLER)
     answers = []
     for number in (1.0, 1.0, 3.0):

@@ -8,6 +8,16 @@ import shutil
 import pytest
 
 
+def test_early_end(play_road):
+    """Blender closes at once while the solver is being compiled, and nothing goes on."""
+    play_road("early_end")
+
+
+def test_first_use(play_road):
+    """The solver is compiled beside the window, with nothing in numba's cache."""
+    play_road("first_use", timeout=1200)
+
+
 def test_window(play_road):
     result = play_road("window")
     assert result["values"]["location"][0] == pytest.approx(2.5)

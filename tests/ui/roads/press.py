@@ -6,8 +6,8 @@ from pathlib import Path
 import bpy
 
 
-def build(folder: Path) -> None:
-    """The scene: everything but the sensor's role, which the road gives by hand."""
+def build(folder: Path, sensors: bool = True) -> None:
+    """The scene: everything but the role of one sensor, which the road gives by hand, or of both."""
     for obj in list(bpy.data.objects):
         if obj.type == "MESH":
             bpy.data.objects.remove(obj)
@@ -28,7 +28,8 @@ def build(folder: Path) -> None:
         bpy.ops.mesh.primitive_grid_add(x_subdivisions=20, y_subdivisions=20, size=2.4, location=(x, 0.0, 0.0))
         bpy.context.object.name = name
         bpy.context.object.palpate.max_penetration = 1.0
-    bpy.data.objects["Pad 2"].palpate.role = "SENSOR"
+    if sensors:
+        bpy.data.objects["Pad 2"].palpate.role = "SENSOR"
     scene.unit_settings.scale_length = 0.01
     scene.frame_set(1)
     bpy.ops.wm.save_as_mainfile(filepath=str(folder / "press.blend"))

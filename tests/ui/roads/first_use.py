@@ -1,0 +1,72 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The very first use: the solver is compiled beside the window, which answers meanwhile and then computes what had to wait."""
+
+import importlib
+import sys
+import time
+
+import bpy
+import press
+
+
+def preparing():
+    return importlib.import_module("bl_ext.user_default.palpate.addon.preparing")
+
+
+def pad_forces():
+    attribute = press.obj("Pad").data.attributes.get("palpate_force")
+    return [item.value for item in attribute.data] if attribute else []
+
+
+def road(ui):
+    ui.check(not {"numba", "scipy"} & set(sys.modules), "enabling has loaded neither numba nor scipy")
+    ui.check(preparing().progress() is None, "without a sensor nothing is prepared")
+    press.build(ui.out, sensors=False)
+    view = ui.area("VIEW_3D")
+    scene = bpy.context.scene
+    for thing in scene.objects:
+        thing.select_set(thing.type == "MESH")
+    with ui.context(view):
+        bpy.ops.view3d.view_selected()
+    yield 0.5
+    yield from ui.tab("PHYSICS")
+    yield from ui.press("palpate.sensor_add()")
+    ui.check(preparing().progress() is not None, "the first sensor starts the compiler")
+
+    # The window answers
+    longest = 0.0
+    for name, point in (("Cube", (-2.5, 0.0, 0.5)), ("Pad", (1.1, -1.1, 0.0)), ("Cube", (-2.5, 0.0, 0.5))):
+        began = time.monotonic()
+        yield from ui.click(*ui.at(point))
+        longest = max(longest, time.monotonic() - began)
+        ui.check(bpy.context.view_layer.objects.active.name == name, f"a click selects {name}")
+    ui.value("longest click", longest)
+    yield from ui.click(*ui.at((1.1, -1.1, 0.0)))
+    yield from ui.filter("Bake")
+    yield 5.0
+    yield from ui.screenshot("preparing")
+
+    # Playing waits
+    yield from ui.move(*ui.centre(view))
+    yield from ui.key("SPACE")
+    yield from ui.wait_until(lambda: scene.frame_current >= 5, "the timeline plays on")
+    ui.check(not pad_forces() and "numba" not in sys.modules, "nothing is computed yet")
+    yield from ui.screenshot("playing")
+    yield from ui.key("SPACE")
+
+    # So does a bake, which ESC stops
+    yield from ui.press("palpate.bake()")
+    yield 1.0
+    ui.check(preparing().progress() is not None, "it is still being prepared")
+    yield from ui.screenshot("bake-waits")
+    yield from ui.key("ESC")
+    yield 0.5
+    ui.check(not press.obj("Pad").palpate.is_baked, "ESC stops the bake that waits")
+
+    yield from ui.move(*ui.centre(view))
+    yield from ui.key("SPACE")
+    yield from ui.wait_until(preparing().is_ready, "the solver is ready", timeout=600)
+    ui.check(preparing()._gave_up is False, "it was compiled beside the window")
+    yield from ui.wait_until(lambda: max(pad_forces(), default=0.0) > 0.0, "what plays is computed", timeout=60)
+    yield from ui.screenshot("computed")
+    yield from ui.key("SPACE")
