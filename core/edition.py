@@ -7,8 +7,8 @@ import hashlib
 from functools import cache
 from pathlib import Path
 
-MARKS = (b"@kernel", b"@inlined", b"@allocating", b"KIND = Kind(")
-"""What files with kernels hold; the laws of effects are compiled as well."""
+MARKS = (b"@kernel", b"@inlined", b"@allocating", b"KIND = Kind(", b"from numba")
+"""What files hold that have a say in what is compiled; the laws of effects are compiled as well."""
 
 
 @cache
