@@ -10,7 +10,6 @@ and Wald, JCGT 2013).
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 import numpy as np
@@ -41,6 +40,12 @@ class Tree(NamedTuple):
         Each triangle's index in the mesh it came from.
     roots : (m + 1,) int
         Node at which each mesh's tree starts; the last entry is the number of nodes.
+    across : (nt, 3) int
+        Triangle on the other side of the edges from first to second, second to third and third to first corner, in leaf order;
+        -1 unless that edge joins exactly two triangles of one orientation.
+    facing : (nn, 6) float
+        Low and high end of the normals of each node's triangles, by axis; ``±2`` where one of them has no neighbour. They are
+        those of the meshes as they were given.
     """
 
     bounds: np.ndarray
@@ -50,6 +55,8 @@ class Tree(NamedTuple):
     faces: np.ndarray
     source: np.ndarray
     roots: np.ndarray
+    across: np.ndarray
+    facing: np.ndarray
 
 
 def build_tree(meshes: list[TriangleMesh]) -> Tree:
@@ -69,22 +76,68 @@ def build_tree(meshes: list[TriangleMesh]) -> Tree:
         bounds, skip = np.empty((size, 6)), np.empty(size, np.int64)
         first, number = np.zeros(size, np.int64), np.zeros(size, np.int64)
         nodes = _build(corners, corners.mean(axis=1), order, LEAF_SIZE, bounds, skip, first, number)
-        leaf = number[:nodes] > 0
+        leaf, normals = number[:nodes] > 0, np.ascontiguousarray(face_normals(mesh)[order])
+        across, facing = _across(mesh.triangles[order]), np.empty((nodes, 6), np.float32)
+        _fit_normals(normals, across, skip, first, number, facing)
         parts.append(
             (
                 bounds[:nodes],
                 skip[:nodes] + node_offset,
                 np.where(leaf, first[:nodes] + triangle_offset, 0),
                 number[:nodes],
-                np.hstack([corners[order].reshape(-1, 9), face_normals(mesh)[order]]),
+                np.hstack([corners[order].reshape(-1, 9), normals]),
                 order,
+                np.where(across < 0, -1, across + triangle_offset).astype(np.int32),
+                facing,
             )
         )
         node_offset += nodes
         triangle_offset += n
         roots.append(node_offset)
-    arrays = [np.ascontiguousarray(np.concatenate(part)) for part in zip(*parts, strict=True)]
-    return Tree._make([*arrays, np.array(roots)])
+    bounds, skip, first, number, faces, source, across, facing = (
+        np.ascontiguousarray(np.concatenate(part)) for part in zip(*parts, strict=True)
+    )
+    return Tree(bounds, skip, first, number, faces, source, np.array(roots), across, facing)
+
+
+def _across(triangles: np.ndarray) -> np.ndarray:
+    """(n, 3) int: the triangle across each edge, -1 unless the edge joins exactly two of one orientation."""
+    start, end = triangles.ravel().astype(np.int64), np.roll(triangles, -1, axis=1).ravel().astype(np.int64)
+    low, high = np.minimum(start, end), np.maximum(start, end)
+    key = low * (int(triangles.max()) + 1) + high
+    order = np.argsort(key, kind="stable")
+    _, first, count = np.unique(key[order], return_index=True, return_counts=True)
+    one, other = order[first[count == 2]], order[first[count == 2] + 1]
+    turned = start[one] == end[other]  # each goes along the edge its own way
+    one, other = one[turned], other[turned]
+    across = np.full(len(key), -1)
+    across[one], across[other] = other // 3, one // 3
+    return across.reshape(-1, 3)
+
+
+@kernel
+def is_inner(i, normals, first, across):
+    """Whether a triangle has a normal, whose column is `first`, and a neighbour on each side."""
+    square = normals[i, first] ** 2 + normals[i, first + 1] ** 2 + normals[i, first + 2] ** 2
+    return square > 0.5 and across[i, 0] >= 0 and across[i, 1] >= 0 and across[i, 2] >= 0
+
+
+@kernel
+def _fit_normals(normals, across, skip, first, number, facing):
+    """Fill in :attr:`Tree.facing`; rounded away from what is inside, since it is kept in single precision."""
+    for node in range(len(facing) - 1, -1, -1):
+        for axis in range(3):
+            low, high = 2.0, -2.0
+            if number[node] > 0:
+                for i in range(first[node], first[node] + number[node]):
+                    whole = is_inner(i, normals, 0, across)
+                    low = min(low, normals[i, axis] - 1e-6 if whole else -2.0)
+                    high = max(high, normals[i, axis] + 1e-6 if whole else 2.0)
+            else:  # its children come behind it
+                left, right = node + 1, skip[node + 1]
+                low = min(facing[left, axis], facing[right, axis])
+                high = max(facing[left, 3 + axis], facing[right, 3 + axis])
+            facing[node, axis], facing[node, 3 + axis] = low, high
 
 
 @kernel
@@ -168,12 +221,8 @@ def _node_count(n, leaf_size):
     return total
 
 
-NEAR = 12
-"""Most triangles that are remembered as near a segment; where there are more, the tree is asked every time."""
-
-
 @kernel
-def _line_of_sight(dx, dy, dz):
+def line_of_sight(dx, dy, dz):
     """Axis along which a vector is longest, and the shear of the other two (in cyclic order) that lays it onto that axis."""
     if abs(dx) >= abs(dy) and abs(dx) >= abs(dz):
         return 0, dy / dx, dz / dx
@@ -183,7 +232,7 @@ def _line_of_sight(dx, dy, dz):
 
 
 @kernel
-def _seen_along(x, y, z, axis, shear_x, shear_y):
+def seen_along(x, y, z, axis, shear_x, shear_y):
     """Project a point along the line of sight."""
     if axis == 0:
         return y - shear_x * x, z - shear_y * x
@@ -193,7 +242,7 @@ def _seen_along(x, y, z, axis, shear_x, shear_y):
 
 
 @kernel
-def _apart(bounds, node, x0, x1, y0, y1, z0, z1):
+def apart(bounds, node, x0, x1, y0, y1, z0, z1):
     """Whether a node's box and the box from (x0, y0, z0) to (x1, y1, z1) have no point in common."""
     return (
         bounds[node, 0] > x1 or bounds[node, 3] < x0
@@ -226,7 +275,7 @@ def segment_entry(ox, oy, oz, dx, dy, dz, mesh, hint, tree):
         object. Beyond `t` it may be any such intersection; 2 when none was met.
     """
     t, triangle, leaving = 2.0, -1, 2.0
-    axis, shear_x, shear_y = _line_of_sight(dx, dy, dz)
+    axis, shear_x, shear_y = line_of_sight(dx, dy, dz)
     if hint >= 0:
         u = cross_triangle(ox, oy, oz, dx, dy, dz, axis, shear_x, shear_y, tree.faces, hint)
         if 0.0 <= u <= 1.0:
@@ -237,7 +286,7 @@ def segment_entry(ox, oy, oz, dx, dy, dz, mesh, hint, tree):
     z0, z1 = min(oz, oz + reach * dz), max(oz, oz + reach * dz)
     bounds, node, stop = tree.bounds, tree.roots[mesh], tree.roots[mesh + 1]
     while node < stop:
-        if _apart(bounds, node, x0, x1, y0, y1, z0, z1):
+        if apart(bounds, node, x0, x1, y0, y1, z0, z1):
             node = tree.skip[node]
             continue
         for i in range(tree.first[node], tree.first[node] + tree.number[node]):
@@ -256,82 +305,6 @@ def segment_entry(ox, oy, oz, dx, dy, dz, mesh, hint, tree):
 
 
 @kernel
-def near_entry(ox, oy, oz, dx, dy, dz, near, slot, number, faces):
-    """Answer like :func:`segment_entry`, from a list of all triangles that the segment can meet (see :func:`find_near`)."""
-    t, triangle, leaving = 2.0, -1, 2.0
-    axis, shear_x, shear_y = _line_of_sight(dx, dy, dz)
-    for j in range(number):
-        i = near[slot, j]
-        u = cross_triangle(ox, oy, oz, dx, dy, dz, axis, shear_x, shear_y, faces, i)
-        if 0.0 <= u <= 1.0:
-            if u < t:
-                t, triangle = u, i
-        elif u < 0.0:
-            leaving = min(leaving, -3.0 - u)
-    return t, triangle, leaving
-
-
-@kernel
-def find_near(ox, oy, oz, dx, dy, dz, mesh, skin, near, slot, tree):
-    """Write the triangles that a segment can meet as long as none of its points has moved by more than `skin`.
-
-    Neighbour lists as in molecular dynamics (Verlet 1967): collected with a skin, used until the motion has used the skin up.
-
-    Parameters
-    ----------
-    skin : float, metres
-    near : (s, NEAR) int
-        Written at `slot`, in the order of the tree.
-
-    Returns
-    -------
-    number : int
-        How many there are; -1 when there is no room for them.
-    only : int
-        The triangle, where there is but one and the segment's line goes through it for certain, from outside; else -1.
-    """
-    axis, shear_x, shear_y = _line_of_sight(dx, dy, dz)
-    # The last term is the rounding of what follows, which must not leave out a triangle that is only just met.
-    aside = skin * math.sqrt(1.0 + shear_x * shear_x + shear_y * shear_y) + 1e-14 * (abs(ox) + abs(oy) + abs(oz))
-    x0, x1 = min(ox, ox + dx) - skin, max(ox, ox + dx) + skin
-    y0, y1 = min(oy, oy + dy) - skin, max(oy, oy + dy) + skin
-    z0, z1 = min(oz, oz + dz) - skin, max(oz, oz + dz) + skin
-    number, only = 0, -1
-    bounds, node, stop = tree.bounds, tree.roots[mesh], tree.roots[mesh + 1]
-    while node < stop:
-        if _apart(bounds, node, x0, x1, y0, y1, z0, z1):
-            node = tree.skip[node]
-            continue
-        for i in range(tree.first[node], tree.first[node] + tree.number[node]):
-            # Seen along the segment, the triangle must come within the skin of the origin.
-            f = tree.faces
-            ax, ay = _seen_along(f[i, 0] - ox, f[i, 1] - oy, f[i, 2] - oz, axis, shear_x, shear_y)
-            bx, by = _seen_along(f[i, 3] - ox, f[i, 4] - oy, f[i, 5] - oz, axis, shear_x, shear_y)
-            cx, cy = _seen_along(f[i, 6] - ox, f[i, 7] - oy, f[i, 8] - oz, axis, shear_x, shear_y)
-            beside = min(ax, bx, cx) > aside or max(ax, bx, cx) < -aside or min(ay, by, cy) > aside or max(ay, by, cy) < -aside
-            u, v, w = ax * by - ay * bx, bx * cy - by * cx, cx * ay - cy * ax
-            side = 1.0 if u + v + w > 0.0 else -1.0
-            if beside:
-                continue
-            # How far inside of each edge the origin is seen, times the edge's length.
-            margin_u = aside * math.hypot(bx - ax, by - ay)
-            margin_v = aside * math.hypot(cx - bx, cy - by)
-            margin_w = aside * math.hypot(ax - cx, ay - cy)
-            u, v, w = side * u, side * v, side * w
-            if u < -margin_u or v < -margin_v or w < -margin_w:
-                continue
-            if number == near.shape[1]:
-                return -1, -1
-            slope = f[i, 9] * dx + f[i, 10] * dy + f[i, 11] * dz
-            through = u > margin_u and v > margin_v and w > margin_w and slope < -2.0 * skin
-            only = i if number == 0 and through else -1
-            near[slot, number] = i
-            number += 1
-        node += 1
-    return number, only
-
-
-@kernel
 def cross_triangle(ox, oy, oz, dx, dy, dz, axis, shear_x, shear_y, faces, i):
     """Position on the segment where it crosses a triangle: t in 0…1 entering, -3 - t leaving, 9 when it misses.
 
@@ -343,9 +316,9 @@ def cross_triangle(ox, oy, oz, dx, dy, dz, axis, shear_x, shear_y, faces, i):
     bx, by, bz = faces[i, 3] - ox, faces[i, 4] - oy, faces[i, 5] - oz
     cx, cy, cz = faces[i, 6] - ox, faces[i, 7] - oy, faces[i, 8] - oz
     height = faces[i, 9] * ax + faces[i, 10] * ay + faces[i, 11] * az
-    ax, ay = _seen_along(ax, ay, az, axis, shear_x, shear_y)
-    bx, by = _seen_along(bx, by, bz, axis, shear_x, shear_y)
-    cx, cy = _seen_along(cx, cy, cz, axis, shear_x, shear_y)
+    ax, ay = seen_along(ax, ay, az, axis, shear_x, shear_y)
+    bx, by = seen_along(bx, by, bz, axis, shear_x, shear_y)
+    cx, cy = seen_along(cx, cy, cz, axis, shear_x, shear_y)
     u, v, w = ax * by - ay * bx, bx * cy - by * cx, cx * ay - cy * ax
     low, high = min(u, v, w), max(u, v, w)
     if (low < 0.0 and high > 0.0) or (low == 0.0 and high == 0.0):

@@ -118,7 +118,9 @@ class World(NamedTuple):
     radius : (m,) float, metres
         How far they reach from there.
     skin : (q,) float, metres
-        How far a contact point may move at the most before the triangles near it are collected anew.
+        How far a contact point may move at the most before it is found out anew what is near it.
+    listed : (q,) float, metres
+        The same where triangles are listed.
     kind : (b,) int
         KEYFRAMED, FREE or DRIVEN of :mod:`.bodies`.
     at : (b,) int
@@ -160,6 +162,7 @@ class World(NamedTuple):
     center: np.ndarray
     radius: np.ndarray
     skin: np.ndarray
+    listed: np.ndarray
     kind: np.ndarray
     at: np.ndarray
     unknowns: int

@@ -4,39 +4,15 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 
-from .bvh import cross_plane, find_near, near_entry, segment_entry
+from .bvh import segment_entry
 from .contact import DEPTH, LANES, NX, NY, NZ, PX, PY, PZ, ROW, ZX, ZY, ZZ
 from .jit import inlined, kernel
-from .reference import by_reference
+from .near import entry, look_around
 from .shapes import place_all, place_near
 from .skin import finish_rows
-
-
-@by_reference
-class Neighbours(NamedTuple):
-    """Which triangles each contact point can meet; a cache that changes the speed and never the numbers.
-
-    Attributes
-    ----------
-    near : (s, NEAR) int
-    number : (s,) int
-        Length of each list, -1 where the tree must be asked.
-    only : (s,) int
-        The triangle that a texel's line goes through for certain and alone as long as its list holds; else -1.
-    pose : (q, 15) float
-        Rotation (row by row) and position of each pair's sensor in the target's frame when its lists were made, the skin they
-        were made with (-1 while there are none), how often they have been used, and how far deformation had moved either until
-        then.
-    """
-
-    near: np.ndarray
-    number: np.ndarray
-    only: np.ndarray
-    pose: np.ndarray
 
 
 @kernel
@@ -82,45 +58,56 @@ def _travel(pose, old, pair, center, sensor, radius):
 
 
 @inlined
-def _skin_to_make(pair, sensor, target, pose, world, neighbours, shapes):
-    """Skin of the lists that a pair needs anew since it has moved by more than that of its present ones, -1 if it has not.
+def _segment(point, reach, pose, points):
+    """Base of a contact point's segment in the target's frame, the vector to its tip, and the tip."""
+    tx = pose[9] + pose[0] * points[point, 0] + pose[1] * points[point, 1] + pose[2] * points[point, 2]
+    ty = pose[10] + pose[3] * points[point, 0] + pose[4] * points[point, 1] + pose[5] * points[point, 2]
+    tz = pose[11] + pose[6] * points[point, 0] + pose[7] * points[point, 1] + pose[8] * points[point, 2]
+    dx = reach * (pose[0] * points[point, 3] + pose[1] * points[point, 4] + pose[2] * points[point, 5])
+    dy = reach * (pose[3] * points[point, 3] + pose[4] * points[point, 4] + pose[5] * points[point, 5])
+    dz = reach * (pose[6] * points[point, 3] + pose[7] * points[point, 4] + pose[8] * points[point, 5])
+    return tx - dx, ty - dy, tz - dz, dx, dy, dz, tx, ty, tz
 
-    The skin follows the motion: some thirty steps' travel, so that lists are short and yet seldom made.
-    """
-    skin, used = neighbours.pose[pair, 12], neighbours.pose[pair, 13]
+
+@inlined
+def _keep_up(pair, sensor, target, pose, world, tree, neighbours, shapes, hint):
+    """Look around anew for those contact points that have moved by more than what they know holds for."""
+    known = neighbours.pose[pair]
     deformed = shapes.travelled[target] + shapes.point_travelled[sensor]
-    travel = _travel(pose, neighbours.pose, pair, world.center, sensor, world.radius[sensor])
-    travel += deformed - neighbours.pose[pair, 14]
-    neighbours.pose[pair, 13] = used + 1.0
-    wanted = world.skin[pair]
-    if skin >= 0.0:
-        wanted = min(max(32.0 * travel / (used + 1.0), 1e-3 * wanted), wanted)
-        too_wide = used == 255.0 and wanted < 0.5 * skin
-        if travel <= skin and not too_wide:
-            return -1.0
-    return wanted
+    travel = _travel(pose, neighbours.pose, pair, world.center, sensor, world.radius[sensor]) + deformed - known[14]
+    known[13] += 1.0
+    step = travel / known[13] if known[12] >= 0.0 else 0.0
+    # Wide tubes cost more to use, so they are narrowed where all has come to rest.
+    narrower = known[13] == 256.0 and 32.0 * step < 0.5 * known[15]
+    if travel > known[12] or narrower:
+        _look_around_all(pair, travel, step, narrower, pose, world, tree, neighbours, shapes, hint)
 
 
 @kernel
-def _make_lists(pair, sensor, target, pose, skin, world, tree, neighbours, shapes):
-    """Collect the triangles near each contact point of a pair."""
+def _look_around_all(pair, travel, step, narrower, pose, world, tree, neighbours, shapes, hint):
+    """Reckon distances from the present pose, and look around where that is due, or wherever something is near.
+
+    The radius of the tubes follows the motion: some thirty steps' travel. Of a target that deforms all is looked at anew, since
+    all of its triangles must be brought to the present moment for that.
+    """
+    sensor, target = world.pairs[pair, 0], world.pairs[pair, 1]
+    points, reach, known, until = world.points, world.reach[sensor], neighbours.pose[pair], neighbours.until
     place_all(target, shapes, tree)
-    points, reach, slot = world.points, world.reach[sensor], world.slot_start[pair]
+    first, deforms, listed = known[12] < 0.0, shapes.deforms[target], world.listed[pair]
+    radius = world.skin[pair] if first else min(max(32.0 * step, 1e-3 * listed), world.skin[pair])
+    soonest, slot = np.inf, world.slot_start[pair] - 1
     for point in range(world.point_first[pair], world.point_stop[pair]):
-        dx = reach * (pose[0] * points[point, 3] + pose[1] * points[point, 4] + pose[2] * points[point, 5])
-        dy = reach * (pose[3] * points[point, 3] + pose[4] * points[point, 4] + pose[5] * points[point, 5])
-        dz = reach * (pose[6] * points[point, 3] + pose[7] * points[point, 4] + pose[8] * points[point, 5])
-        ox = pose[9] + pose[0] * points[point, 0] + pose[1] * points[point, 1] + pose[2] * points[point, 2] - dx
-        oy = pose[10] + pose[3] * points[point, 0] + pose[4] * points[point, 1] + pose[5] * points[point, 2] - dy
-        oz = pose[11] + pose[6] * points[point, 0] + pose[7] * points[point, 1] + pose[8] * points[point, 2] - dz
-        number, only = find_near(ox, oy, oz, dx, dy, dz, target, skin, neighbours.near, slot, tree)
-        neighbours.number[slot], neighbours.only[slot] = number, only
         slot += 1
+        until[slot] -= travel
+        if until[slot] < 0.0 or deforms or first or (narrower and neighbours.number[slot] != 0):
+            ox, oy, oz, dx, dy, dz, _, _, _ = _segment(point, reach, pose, points)
+            empty = neighbours.number[slot] == 0 and hint[slot] < 0
+            look_around(slot, ox, oy, oz, dx, dy, dz, target, radius, listed, step, empty, not deforms, neighbours, tree)
+        soonest = min(soonest, until[slot])
     for i in range(12):
-        neighbours.pose[pair, i] = pose[i]
-    neighbours.pose[pair, 12] = skin
-    neighbours.pose[pair, 13] = 0.0
-    neighbours.pose[pair, 14] = shapes.travelled[target] + shapes.point_travelled[sensor]
+        known[i] = pose[i]
+    known[15] = radius if narrower or first else max(known[15], radius)
+    known[12], known[13], known[14] = soonest, 0.0, shapes.travelled[target] + shapes.point_travelled[sensor]
 
 
 @kernel
@@ -165,9 +152,7 @@ def gather(pair, dt, world, tree, neighbours, shapes, state, scratch):
         _forget(pair, world, state)
         scratch.contacts[pair], scratch.sunk[pair] = 0, 0
         return
-    skin = _skin_to_make(pair, sensor, target, pose, world, neighbours, shapes)
-    if skin >= 0.0:
-        _make_lists(pair, sensor, target, pose, skin, world, tree, neighbours, shapes)
+    _keep_up(pair, sensor, target, pose, world, tree, neighbours, shapes, hint)
     sunk, slot = 0, world.slot_start[pair] - 1
     stop = slot + 1 + world.point_stop[pair] - world.point_first[pair]
     if shapes.deforms[target]:
@@ -176,24 +161,10 @@ def gather(pair, dt, world, tree, neighbours, shapes, state, scratch):
     for point in range(world.point_first[pair], world.point_stop[pair]):
         slot += 1
         before = hint[slot]
-        number = neighbours.number[slot]
-        if number == 0 and before == -1:
+        if before == -1 and neighbours.number[slot] == 0:
             continue
-        tx = pose[9] + pose[0] * points[point, 0] + pose[1] * points[point, 1] + pose[2] * points[point, 2]
-        ty = pose[10] + pose[3] * points[point, 0] + pose[4] * points[point, 1] + pose[5] * points[point, 2]
-        tz = pose[11] + pose[6] * points[point, 0] + pose[7] * points[point, 1] + pose[8] * points[point, 2]
-        dx = reach * (pose[0] * points[point, 3] + pose[1] * points[point, 4] + pose[2] * points[point, 5])
-        dy = reach * (pose[3] * points[point, 3] + pose[4] * points[point, 4] + pose[5] * points[point, 5])
-        dz = reach * (pose[6] * points[point, 3] + pose[7] * points[point, 4] + pose[8] * points[point, 5])
-        ox, oy, oz = tx - dx, ty - dy, tz - dz
-        only = neighbours.only[slot]
-        if only >= 0:
-            met = cross_plane(ox, oy, oz, dx, dy, dz, tree.faces, only)
-            triangle, leaving = only if 0.0 <= met <= 1.0 else -1, 2.0
-        elif number >= 0:
-            met, triangle, leaving = near_entry(ox, oy, oz, dx, dy, dz, neighbours.near, slot, number, tree.faces)
-        else:
-            met, triangle, leaving = segment_entry(ox, oy, oz, dx, dy, dz, target, before, tree)
+        ox, oy, oz, dx, dy, dz, tx, ty, tz = _segment(point, reach, pose, points)
+        met, triangle, leaving = entry(ox, oy, oz, dx, dy, dz, slot, target, before, neighbours, tree)
         if triangle < 0:
             # Sunk: the base is inside the object. Either the segment leaves it somewhere, or the object's surface has just run
             # past the base (it was within the last tenth of the reach a step ago, and is not just beside it now).
@@ -288,12 +259,7 @@ def count_sunk(pair, closed, world, tree, shapes, state, scratch):
         slot += 1
         if hint[slot] >= 0 or (hint[slot] == -1 and not closed):
             continue
-        dx = reach * (pose[0] * points[point, 3] + pose[1] * points[point, 4] + pose[2] * points[point, 5])
-        dy = reach * (pose[3] * points[point, 3] + pose[4] * points[point, 4] + pose[5] * points[point, 5])
-        dz = reach * (pose[6] * points[point, 3] + pose[7] * points[point, 4] + pose[8] * points[point, 5])
-        ox = pose[9] + pose[0] * points[point, 0] + pose[1] * points[point, 1] + pose[2] * points[point, 2] - dx
-        oy = pose[10] + pose[3] * points[point, 0] + pose[4] * points[point, 1] + pose[5] * points[point, 2] - dy
-        oz = pose[11] + pose[6] * points[point, 0] + pose[7] * points[point, 1] + pose[8] * points[point, 2] - dz
+        ox, oy, oz, dx, dy, dz, _, _, _ = _segment(point, reach, pose, points)
         within = (
             tree.bounds[root, 0] <= ox <= tree.bounds[root, 3]
             and tree.bounds[root, 1] <= oy <= tree.bounds[root, 4]

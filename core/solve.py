@@ -14,15 +14,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from .bodies import DRIVEN, FREE, KEYFRAMED, quaternion_product, rotation_matrices, rotation_vectors
-from .bvh import NEAR, Tree, build_tree
+from .bvh import Tree, build_tree
 from .contact import State, World, parameter_row
 from .crew import board_for, helpers
 from .drive import drive
 from .effects.laws import compile_program
 from .feel import feel
-from .gather import Neighbours, count_sunk
+from .gather import count_sunk
 from .mesh import is_closed
 from .motions import poses_at
+from .near import WIDEST, Neighbours, neighbours_for
 from .phases import gather_all, help_out
 from .pilot import Pilot
 from .points import ContactPoints, contact_points
@@ -96,7 +97,7 @@ class Simulation:
         self._surfaces = Surfaces(scenario, self._center, points, self._tree, self._world)
         self._shapes = self._surfaces.at(np.zeros(1))
         self._state = _start(scenario, self._world, self._center)
-        self._neighbours = _neighbours(self._world, self._state)
+        self._neighbours = neighbours_for(len(self._state.hint), len(self._world.pairs))
         board, self._helpers = board_for(len(self._state.hint), threads)
         self._scratch = scratch_for(self._world, self._state, self._shapes, board)
         self._readers = [Reader.of(sensor) for sensor in scenario.sensors]
@@ -320,7 +321,8 @@ def _world(scenario: Scenario, center: np.ndarray, points: list[ContactPoints], 
         slot_start=np.cumsum([0, *sizes])[:-1],
         center=np.array([middle for middle, _ in extents]),
         radius=np.array([radius for _, radius in extents]),
-        skin=np.array([_skin(sensors[i], targets[j]) for i, j in pairs]),
+        skin=np.array([WIDEST * sensors[i].parameters.max_penetration for i, _ in pairs]),
+        listed=np.array([_listed(sensors[i], targets[j]) for i, j in pairs]),
         kind=kind,
         at=at,
         unknowns=unknowns,
@@ -377,19 +379,11 @@ def _unknowns(kind: np.ndarray, drive_of: np.ndarray) -> tuple[np.ndarray, np.nd
     return at, drive_at, int(6 * np.count_nonzero(free) + drives)
 
 
-def _skin(sensor: Sensor, target: Target) -> float:
-    """How far around a texel triangles are remembered at the most: a tenth of the target's usual edge, so that they are few."""
+def _listed(sensor: Sensor, target: Target) -> float:
+    """How far around a texel triangles are listed at the most: a tenth of the target's usual edge, so that they are few."""
     a, b, _ = target.mesh.triangles.T
     edge = np.median(np.linalg.norm(target.mesh.vertices[b] - target.mesh.vertices[a], axis=1))
     return float(min(0.1 * edge, 0.1 * sensor.parameters.max_penetration))
-
-
-def _neighbours(world: World, state: State) -> Neighbours:
-    """Make room for the lists of triangles; they are filled when they are first needed."""
-    slots = len(state.hint)
-    pose = np.zeros((len(world.pairs), 15))
-    pose[:, 12] = -1.0
-    return Neighbours(np.zeros((slots, NEAR), np.int32), np.zeros(slots, np.int32), np.full(slots, -1, np.int32), pose)
 
 
 def _start(scenario: Scenario, world: World, center: np.ndarray) -> State:
