@@ -9,13 +9,14 @@ from __future__ import annotations
 
 import numpy as np
 
+from .noise import AT_REST
 from .phases import load_of
 from .search import Found, Views
 
 PULLED = -0.5
 """Standard deviations of the noise below which a reading pulls."""
-AT_REST, ENOUGH = 0.03, 20
-"""Share of the largest load below which a texel rests, and samples of that from which on it says something."""
+ENOUGH = 20
+"""Samples without load from which on a texel's rest says something."""
 PRESENT = 0.4
 """Least share of what is claimed that must be seen there."""
 

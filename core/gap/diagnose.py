@@ -24,7 +24,7 @@ from .noise import Coverage, Noise, coverage, force_noise, reading_noise
 from .rig import Rig
 from .search import Found, Views, search, views_of
 from .structure import Structure, structure_of
-from .telling import untold
+from .telling import confounded, untold
 
 FIRST, NEXT, NEXT_OF_ALL = 0.25, 0.45, 0.03
 """Least share of the gap that the first effect closes; of what is left that a further one closes; and of the whole gap."""
@@ -216,6 +216,7 @@ def _explain(result: Diagnosis, views: Views) -> Iterator[tuple[str, float]]:
     mean0 = float(unseen.sum() / current.count.sum())
     floor = min(1.0, mean0)
     steps: list[list[Found]] = []
+    mixed = confounded(result.coverage)
     floors = [mean0 * (1.0 - structure.total)]
     for turn in range(MOST):
         mean = float(unseen.sum() / current.count.sum())
@@ -224,7 +225,7 @@ def _explain(result: Diagnosis, views: Views) -> Iterator[tuple[str, float]]:
             break
         taken = {effect.name for effect in current.model.effects}
         forms = [c for c in candidates([s.predictor for s in views.whole], current.model) if c.name not in taken]
-        forms = [c for c in forms if not _is_free_already(c, current.free)]
+        forms = [c for c in forms if not _is_free_already(c, current.free) and (turn == 0 or c.name not in mixed)]
         ranked: list[Found] = []
         for what, share, found in search(views, current, forms, result.scales):
             yield what, (turn + share) / MOST
@@ -233,7 +234,7 @@ def _explain(result: Diagnosis, views: Views) -> Iterator[tuple[str, float]]:
         steps.append(ranked)
         if not ranked:
             break
-        best = _simplest(ranked, floor)
+        best = _simplest([one for one in ranked if one.candidate.name not in mixed] or ranked, floor)
         if not _earns(best, unseen, mean, mean0, floor, first=turn == 0):
             break
         current, unseen = best.fit, best.unseen

@@ -11,6 +11,8 @@ import numpy as np
 from .model import Predictor
 from .phases import pace_of
 
+AT_REST = 0.03
+"""Share of the largest load of a trial up to which a texel counts as carrying nothing: zeros of load cells wander."""
 SHORTEST = 8
 """Samples of a stretch without load that say something about noise."""
 
@@ -153,6 +155,8 @@ class Coverage:
     depths : float
         Smallest peak of a cycle by the largest: 1 when all go equally deep.
     slides : bool
+    rest : float
+        Share of a trial between the first and the last moment at which a texel carries nothing; the largest of all trials.
     seconds : float
         Longest trial.
     """
@@ -164,6 +168,7 @@ class Coverage:
     cycles: int
     depths: float
     slides: bool
+    rest: float
     seconds: float
 
 
@@ -171,7 +176,7 @@ def coverage(predictors: Sequence[Predictor]) -> Coverage:
     """Look at what trials cover."""
     touched = np.zeros(len(predictors[0].rig.texels), bool)
     speeds: list[np.ndarray] = []
-    hold, unloading, cycles, peaks, slides = 0.0, False, 0, [], False
+    hold, unloading, cycles, peaks, slides, rest = 0.0, False, 0, [], False, 0.0
     for predictor in predictors:
         s = predictor.stimulus
         load = s.depth if s.load is None else s.load
@@ -184,6 +189,8 @@ def coverage(predictors: Sequence[Predictor]) -> Coverage:
         unloading |= bool((np.maximum.accumulate(total) - total).max() > 0.1 * full)
         still = (np.abs(rate) < pace) & (total > 0.05 * full)
         hold = max(hold, _longest(still, s.time))
+        idle = s.time[(load <= AT_REST * max(float(load.max(initial=0.0)), 1e-300)).any(axis=1)]
+        rest = max(rest, float(np.ptp(idle)) / float(np.ptp(s.time)) if len(idle) else 0.0)
         starts = np.flatnonzero((total > 0) & (np.concatenate([[0.0], total[:-1]]) <= 0))
         cycles = max(cycles, len(starts))
         for a, b in zip(starts, [*starts[1:], len(total)], strict=True):
@@ -199,6 +206,7 @@ def coverage(predictors: Sequence[Predictor]) -> Coverage:
         cycles=cycles,
         depths=min(peaks) / max(peaks) if peaks else 1.0,
         slides=slides,
+        rest=rest,
         seconds=max(float(p.trial.time[-1] - p.trial.time[0]) for p in predictors),
     )
 

@@ -24,6 +24,9 @@ FEW_TEXELS = 16
 """Per trial, in the quick look."""
 BEHIND = 3.0
 """A candidate that leaves so many times as much of the gap as the best, after a first fit, is not fitted to everything."""
+LITTLE = 20_000
+"""Measured values up to which a recording is so quick to fit that candidates are begun from several places and more of them are
+judged, in more of their forms: a quick look from one place loses those whose numbers bend most."""
 THIN = 4
 """Of so many samples one is looked at where texels feel their neighbours."""
 
@@ -363,20 +366,23 @@ def search(
         if starts and starts[0][0] > 0:
             begun.append((starts[0][0] / max(direction.total, 1e-300), candidate, starts))
         yield "looking at every effect", 0.35 * (number + 1) / len(forms), []
-    kept = _kept(begun)
+    little = sum(share.count for share in views.whole) < LITTLE
+    kept = _kept(begun, len(begun)) if little else _kept(begun)
+    turns, tolerance = (40, 1e-6) if little else (8, 1e-4)
     if not kept:
         yield "nothing promises anything", 1.0, []
         return
     quick: list[Quick] = []
     for number, (_, candidate, starts) in enumerate(kept):
         direction = directions[id(views.quick(candidate, found.model))]
-        quick.append(_quick(candidate, starts[0][1], direction, scales))
+        tries = [_quick(candidate, start, direction, scales, turns) for _, start in starts[: 4 if little else 1]]
+        quick.append(min(tries, key=lambda one: one.left))
         yield "fitting those that promise most", 0.35 + 0.35 * (number + 1) / len(kept), []
-    last, whole = _finalists(quick, finalists), Direction(views.whole, found)
+    last, whole = _finalists(quick, *(2 * finalists, 4) if little else (finalists, 2)), Direction(views.whole, found)
     results: list[Found] = []
     for number, one in enumerate(last):
         free, held = free_of(found.free, found.model, one.candidate, scales), len(found.free)
-        best = fit(views.whole, one.fit.model, free, turns=8, tolerance=1e-4, held=held, begun=whole.begun)
+        best = fit(views.whole, one.fit.model, free, turns=turns, tolerance=tolerance, held=held, begun=whole.begun)
         results.append(Found(one.candidate, best, held_out(views.whole, best)))
         results.sort(key=lambda one: one.mean)
         yield "judging the best on trials they have not seen", 0.7 + 0.3 * (number + 1) / len(last), results
@@ -406,14 +412,14 @@ class Quick:
     fit: Fit
 
 
-def _quick(candidate: Candidate, start: Effect, direction: Direction, scales: Scales) -> Quick:
+def _quick(candidate: Candidate, start: Effect, direction: Direction, scales: Scales, turns: int) -> Quick:
     model, free = direction.model, free_of(direction.free, direction.model, candidate, scales)
     held = len(direction.free)
     best = fit(
         direction.shares,
         model.with_effect(start),
         free,
-        turns=8,
+        turns=turns,
         tolerance=1e-3,
         held=held,
         judged=False,
@@ -423,15 +429,15 @@ def _quick(candidate: Candidate, start: Effect, direction: Direction, scales: Sc
     return Quick(max(square - count, 0.0) / max(direction.total - count, 0.01 * count), candidate, best)
 
 
-def _finalists(quick: list[Quick], count: int) -> list[Quick]:
-    """The best form of each of the best kinds, and the second form of the best kind; none that is far behind."""
+def _finalists(quick: list[Quick], count: int, forms: int) -> list[Quick]:
+    """The best form of each of the best kinds, and some more forms of the best kind; none that is far behind."""
     quick = sorted(quick, key=lambda one: one.left)
     chosen: list[Quick] = []
     for entry in quick:
         own = sum(1 for other in chosen if other.candidate.name == entry.candidate.name)
         near = entry.left < BEHIND * (quick[0].left + 0.04) or len(chosen) < 2
-        if near and (own == 0 or (own == 1 and entry.candidate.name == chosen[0].candidate.name)):
+        if near and (own == 0 or (own < forms and entry.candidate.name == chosen[0].candidate.name)):
             chosen.append(entry)
         if len({other.candidate.name for other in chosen}) >= count and len(chosen) > count:
             break
-    return chosen[: count + 1]
+    return chosen[: count + forms - 1]

@@ -11,6 +11,30 @@ LEAVES_BEHIND = ("hysteresis", "softening", "adhesion", "wear")
 than a spring that is not straight."""
 
 
+BY_TIME = ("creep", "lag", "drift")
+"""Known by what happens at one depth at different times, or at one time after different speeds."""
+ONE_SPEED = 1.5
+"""Ratio of fast to slow loading below which all of it was done at one speed."""
+
+
+NEVER_AT_REST = "nothing was left without load for long, so that moving by itself and settling under load are one"
+RESTS = 0.1
+"""Share of a trial from the first to the last time that a texel carries nothing, from which on a drift would show there."""
+
+
 def untold(coverage: Coverage) -> dict[str, str]:
     """Return the kinds of effects that recordings cannot tell, each with the reason."""
-    return {} if coverage.unloading else dict.fromkeys(LEAVES_BEHIND, NEVER_UNLOADED)
+    said = {} if coverage.unloading else dict.fromkeys(LEAVES_BEHIND, NEVER_UNLOADED)
+    if coverage.rest < RESTS:
+        said["drift"] = NEVER_AT_REST
+    return said
+
+
+def confounded(coverage: Coverage) -> tuple[str, ...]:
+    """Return the kinds that recordings cannot tell from a spring that is not straight.
+
+    Where a load only ever grew, at one speed and without a hold, time and depth are one. What is counted in time may be the
+    reason for a bend, and is weighed as a rival; the bend alone is the simpler explanation, and nothing in time joins it.
+    """
+    one = not coverage.unloading and coverage.rates < ONE_SPEED and coverage.longest_hold == 0.0
+    return BY_TIME if one else ()

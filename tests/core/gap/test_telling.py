@@ -9,7 +9,7 @@ from palpate.core.gap.model import Model, Predictor
 from palpate.core.gap.noise import coverage
 from palpate.core.gap.phases import PHASES, phases
 from palpate.core.gap.rig import Rig, Trial, grid_texels
-from palpate.core.gap.telling import LEAVES_BEHIND, untold
+from palpate.core.gap.telling import BY_TIME, LEAVES_BEHIND, confounded, untold
 from palpate.core.scenario import SensorParameters
 
 PROGRAMMES = {
@@ -37,7 +37,16 @@ def predictor(programme, seconds):
 def test_unloading_is_seen_at_any_pace(programme, unloads, seconds):
     seen = coverage([predictor(programme, seconds)])
     assert seen.unloading == unloads
-    assert set(untold(seen)) == (set() if unloads else set(LEAVES_BEHIND))
+    expected = set() if unloads else set(LEAVES_BEHIND)
+    assert set(untold(seen)) - {"drift"} == expected
+    assert ("drift" in untold(seen)) == (not unloads)  # those that unload end without load
+
+
+def test_time_and_depth_are_one_in_a_single_ramp():
+    assert confounded(coverage([predictor("ramp", 60.0)])) == BY_TIME
+    for programme in ("press", "held", "stairs"):
+        assert not confounded(coverage([predictor(programme, 60.0)]))
+    assert not confounded(coverage([predictor("ramp", 60.0), predictor("ramp", 6.0)]))
 
 
 @pytest.mark.parametrize("seconds", [20.0, 4000.0])
