@@ -108,6 +108,9 @@ def stages(result: Diagnosis) -> list[Model]:
     return made
 
 
+LOUD = 0.05
+"""Noise as a share of the range from which on it hides what is sought."""
+
 EXPERIMENTS = {
     "creep": "hold one depth for at least a minute, then release and wait as long",
     "softening": "press the same spot ten times equally deep, then deeper, and again after an hour",
@@ -142,6 +145,8 @@ def next_experiment(result: Diagnosis) -> str:
         return text
     c = result.coverage
     lacking = []
+    if result.noise[0].deviation > LOUD * result.full[0]:
+        lacking.append("press harder, or repeat a trial exactly and average, until the noise is below a hundredth of the range")
     if c.texels < 0.999:
         lacking.append(f"touch the {1.0 - c.texels:.0%} of the texels that no trial reaches")
     if c.cycles < 2:

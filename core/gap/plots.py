@@ -60,14 +60,14 @@ def curves(result: Diagnosis) -> Figure:
         axes.plot(time, measured, color=MEASURED, lw=1.5, label="measured")
         for label, model, colour in _models(result):
             axes.plot(time, pick(model), color=colour, lw=1.0, ls="--" if label == "base model" else "-", label=label)
-        axes.set_title(f"{predictor.trial.name} ({predictor.trial.use}): {name}", loc="left", fontsize=8.5, color=INK)
-        axes.set_ylabel(f"({result.rig.parameters.unit})" if "texel" in name else "(N)")
+        axes.set_title(f"{predictor.trial.name} ({predictor.trial.use})", loc="left", fontsize=8.5, color=INK)
+        axes.set_ylabel(f"{name} ({result.rig.parameters.unit if 'texel' in name else 'N'})")
         axes.margins(x=0)
         tidy_axes(axes)
     grid[0].legend(frameon=False, fontsize=8, ncols=3, loc="lower right", bbox_to_anchor=(1.0, 1.0), borderaxespad=0)
     grid[-1].set_xlabel("time (s)")
     height = figure.get_figheight()
-    figure.subplots_adjust(left=0.09, right=0.985, top=1 - 0.3 / height, bottom=0.45 / height, hspace=0.42)
+    figure.subplots_adjust(left=0.105, right=0.985, top=1 - 0.3 / height, bottom=0.45 / height, hspace=0.42)
     return figure
 
 
@@ -146,7 +146,7 @@ def loops(result: Diagnosis) -> Figure:
         x, label = 1e3 * s.depth.max(axis=1), "depth (mm)"
     figure = new_figure(WIDTHS["single"], 2.5)
     axes = figure.add_axes((0.19, 0.18, 0.78, 0.68))
-    axes.plot(x, measured, ".", ms=4.0, mew=0, color="#aab3bd", label="measured")
+    axes.plot(x, measured, ".", ms=4.0, mew=0, color=MEASURED, alpha=0.55, zorder=3, label="measured")
     for text, model, colour in _models(result):
         axes.plot(x, pick(model), lw=0.8, color=colour, ls="--" if text == "base model" else "-", label=text)
     axes.set_xlabel(label)
