@@ -180,23 +180,30 @@ def sum_forces(touches, force, factor, viscous, parameters, work, total):  # typ
         Added to; forces on the sensor.
     """
     plain = factor.shape[0] == 1
-    held, length, square, before = work[4], touches.length, touches.square, touches.square_between
+    held, length, now, before = work[4], touches.length, touches.square, touches.square_between
     keeps, gains, owns, fades = work[0], work[1], work[2], work[3]
     for i in range(force.shape[0]):
         held[i] = force[i] if plain else force[i] * factor[i]
     for i in range(force.shape[0]):
         keeps[i], gains[i] = bristle_step(before[i], held[i], length[i], parameters)
     for i in range(force.shape[0]):
-        owns[i] = bristle_rate(0.0, 1.0, square[i], held[i], parameters)
-        fades[i] = bristle_rate(-1.0, 0.0, square[i], held[i], parameters)
+        owns[i] = bristle_rate(0.0, 1.0, now[i], held[i], parameters)
+        fades[i] = bristle_rate(-1.0, 0.0, now[i], held[i], parameters)
     zx, zy, zz = 0.0, 0.0, 0.0
     for i in range(force.shape[0]):
         sample, weight, push = touches.sample[i], touches.weight[i], force[i] * touches.weight[i]
-        total[sample, 0] += push * touches.normal[i, 0]
-        total[sample, 1] += push * touches.normal[i, 1]
-        total[sample, 2] += push * touches.normal[i, 2]
+        nx, ny, nz = touches.normal[i, 0], touches.normal[i, 1], touches.normal[i, 2]
+        total[sample, 0] += push * nx
+        total[sample, 1] += push * ny
+        total[sample, 2] += push * nz
         if not touches.follows[i]:
             zx, zy, zz = 0.0, 0.0, 0.0
+        square, out = zx * zx + zy * zy + zz * zz, zx * nx + zy * ny + zz * nz
+        zx, zy, zz = zx - out * nx, zy - out * ny, zz - out * nz
+        flat = zx * zx + zy * zy + zz * zz
+        if flat > 0.0:  # the bristle turns with the surface and keeps its length
+            turned = (square / flat) ** 0.5
+            zx, zy, zz = turned * zx, turned * zy, turned * zz
         fn = held[i]
         if fn <= 0.0:
             zx, zy, zz = 0.0, 0.0, 0.0
