@@ -13,6 +13,7 @@ import re
 import shutil
 from contextlib import suppress
 from dataclasses import asdict, replace
+from functools import partial
 from pathlib import Path
 
 from .. import __version__
@@ -32,6 +33,7 @@ from ..core.formats.files import (
 from ..core.formats.sensors import SENSOR_NAME, save_sensor
 from ..core.recording import Frame, Recording
 from ..core.scenario import Scenario
+from .behind import Behind
 from .unfinished import Unfinished
 
 OURS = re.compile(rf"tactile_-?\d+\.exr|{'|'.join(map(re.escape, (RECORDING_NAME, SENSOR_NAME, MANIFEST_NAME)))}")
@@ -86,6 +88,7 @@ class Files:
         self.folders = {name: self.folder / names[name] for name in self._sensors}
         self._scenario, self._digest = scenario, scenario.digest()
         self._unfinished = Unfinished(self.folder, self._digest)
+        self._writer = Behind()
         try:
             for place in self.folders.values():
                 _recover(place)
@@ -105,12 +108,12 @@ class Files:
         FileError
             The folders cannot be made.
         """
-        partial = [_beside(place, "partial") for place in self.folders.values()]
-        frames = self._unfinished.resume(simulation) if all(place.is_dir() for place in partial) else None
+        growing = [_beside(place, "partial") for place in self.folders.values()]
+        frames = self._unfinished.resume(simulation) if all(place.is_dir() for place in growing) else None
         try:
             if frames is None:
-                self.discard()
-                for place in partial:
+                self._clean()
+                for place in growing:
                     place.mkdir()
         except OSError as error:
             raise _problem(self.folder, error) from error
@@ -118,7 +121,9 @@ class Files:
 
     def keep(self, simulation, frames: list[Frame]) -> None:
         """Put the work so far aside, every few seconds, for the case that the process is killed."""
-        self._unfinished.keep(simulation, frames)
+        if self._unfinished.is_due(frames):
+            self._writer.finish()  # a state belongs to images that are there
+            self._unfinished.keep(simulation, frames)
 
     def _manifest(self, name: str, recording: Recording) -> Manifest:
         sensor, scenario = self._sensors[name], self._scenario
@@ -141,20 +146,22 @@ class Files:
         )
 
     def write_frame(self, frame: Frame) -> None:
-        """Write the tactile image of every sensor."""
+        """Write the tactile image of every sensor, while the solver goes on."""
         for name, place in self.folders.items():
             sensor = self._sensors[name]
             about = describe(sensor, frame, self._digest)
             path = _beside(place, "partial") / frame_file(frame.frame)
-            write_exr(path, sensor.texels.layout, frame.sensors[name], about, at_once=False)
+            self._writer.do(partial(write_exr, path, sensor.texels.layout, frame.sensors[name], about, at_once=False))
 
     def finish(self, recording: Recording) -> None:
-        """Write the recordings and let the new folders take the place of the old ones: all of them, or none."""
+        """Write the recordings, and let the new folders take the place of the old ones: all of them, or none."""
         for name, place in self.folders.items():
-            partial = _beside(place, "partial")
-            save_recording(partial / RECORDING_NAME, replace(recording, sensors={name: recording.sensors[name]}))
-            save_sensor(partial / SENSOR_NAME, self._sensors[name].texels, self._sensors[name].painted)
-            write_manifest(partial, self._manifest(name, recording))
+            growing = _beside(place, "partial")
+            save_recording(growing / RECORDING_NAME, replace(recording, sensors={name: recording.sensors[name]}))
+            save_sensor(growing / SENSOR_NAME, self._sensors[name].texels, self._sensors[name].painted)
+            write_manifest(growing, self._manifest(name, recording))
+        self._writer.finish()
+        self._writer.stop()
         for place in self.folders.values():
             self._check_replaceable(place)  # again: a bake takes long enough for somebody to put something there
         if hasattr(os, "sync"):
@@ -167,6 +174,10 @@ class Files:
 
     def discard(self) -> None:
         """Remove what is unfinished."""
+        self._writer.stop()
+        self._clean()
+
+    def _clean(self) -> None:
         self._unfinished.drop()
         for place in self.folders.values():
             shutil.rmtree(_beside(place, "partial"), ignore_errors=True)

@@ -13,9 +13,11 @@ from pathlib import Path
 
 from ..core import figures
 from ..core.bakes import Bake, frame_index, read_sensors
+from ..core.drive import drive
 from ..core.errors import ParameterError, SceneError
 from ..core.figures import Look
 from ..core.figures.numbers import MOST
+from ..core.formats.export import export
 from ..core.formats.files import folder_names, writable_folder
 from . import dress, render, studio, video, write
 from .jobs import Progress
@@ -40,6 +42,8 @@ class Wish:
         None: all.
     formats : tuple of str
         Of figures that are no renders.
+    exports : tuple of str
+        Kinds of :func:`..formats.export.export`; each gets a folder of its own.
     engine, view, transparent
         See :func:`.studio.photographed`.
     own_camera : bool
@@ -55,6 +59,7 @@ class Wish:
     frames: tuple[int, ...] = ()
     sensors: tuple[str, ...] = ()
     formats: tuple[str, ...] = ("png", "pdf")
+    exports: tuple[str, ...] = ()
     engine: str | None = None
     view: tuple[float, float] | None = None
     transparent: bool = False
@@ -116,6 +121,9 @@ def make(scene, folder, wish: Wish) -> Generator[Progress, None, list[Path]]:
     if {"strip", "curves", "numbers"} & set(wish.kinds):
         yield steps.next("Drawing figures", frames[0])
         written += draw(bake, place, wish, frames)
+    for kind in wish.exports:
+        yield steps.next(f"Writing {kind.upper()}", frames[0])
+        written += drive(export(bake, kind, place / f"data {kind}", wish.look))
     if "video" in wish.kinds:
         yield from _video(scene, place, wish, bake, steps, written)
     return written
@@ -188,7 +196,7 @@ class _Steps:
 
     def __init__(self, wish: Wish, frames, whole: int):
         self.done = 0
-        self.total = len(frames) * ("scene" in wish.kinds) + 1 + (whole + 1) * ("video" in wish.kinds)
+        self.total = len(frames) * ("scene" in wish.kinds) + 1 + len(wish.exports) + (whole + 1) * ("video" in wish.kinds)
 
     def next(self, stage: str, frame: int) -> Progress:
         self.done = min(self.done + 1, self.total)

@@ -19,7 +19,7 @@ from bpy.props import (
 from ..core import colormaps
 from ..core.migrate import VERSION
 from ..core.scenario import Drive, SensorParameters
-from . import effects, freebodies, identity, meshes, preparing, state
+from . import effects, figures, freebodies, identity, meshes, preparing, state
 
 ROLES = (
     ("NONE", "None", "Takes no part"),
@@ -542,13 +542,14 @@ class PALPATE_PG_scene(bpy.types.PropertyGroup):
         precision=5,
         options=set(),
     )
+    figures: PointerProperty(type=figures.PALPATE_PG_figures, description="What figures are made of the bake, and how")
     baked_digest: StringProperty(options={"HIDDEN"})
     baked_fingerprint: StringProperty(options={"HIDDEN"})
     baked_start: IntProperty(options={"HIDDEN"})
     baked_end: IntProperty(options={"HIDDEN"})
 
 
-CLASSES = (effects.PALPATE_PG_effect, PALPATE_PG_skin, PALPATE_PG_object, PALPATE_PG_scene)
+CLASSES = (effects.PALPATE_PG_effect, figures.PALPATE_PG_figures, PALPATE_PG_skin, PALPATE_PG_object, PALPATE_PG_scene)
 
 
 def register():

@@ -61,10 +61,12 @@ class Unfinished:
         self._pieces, self._kept = len(pieces), len(frames)
         return frames
 
+    def is_due(self, frames: list[Frame]) -> bool:
+        """Whether enough work has come together to be put aside."""
+        return time.monotonic() - self._last >= PATIENCE and len(frames) > self._kept
+
     def keep(self, simulation, frames: list[Frame]) -> None:
-        """Put the work aside when enough of it has come together."""
-        if time.monotonic() - self._last < PATIENCE or len(frames) == self._kept:
-            return
+        """Put the work aside."""
         self.place.mkdir(exist_ok=True)
         names = [body.name for body in simulation.scenario.bodies]
         piece = Recording.stack(frames[self._kept :], names, simulation.dt)

@@ -3,9 +3,9 @@
 
 
 def _classes():
-    from . import bake, debug, effects, exchange, fits, fix, gap, presets, probe, sensor, skin
+    from . import bake, debug, effects, exchange, figures, fits, fix, gap, presets, probe, sensor, skin
 
-    rooms = (sensor, skin, presets, effects, fix, probe, fits, gap, exchange, bake, debug)
+    rooms = (sensor, skin, presets, effects, fix, probe, fits, gap, exchange, bake, figures, debug)
     return tuple(cls for room in rooms for cls in room.CLASSES)
 
 

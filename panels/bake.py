@@ -66,4 +66,31 @@ class Display(Part):
             layout.operator("palpate.dress")
 
 
-PARTS = (Bake, Display)
+class Figures(Part):
+    name = "figures"
+    bl_label = "Figures"
+
+    def draw_part(self, layout, _settings, context):
+        own = context.scene.palpate.figures
+        layout.prop(own, "folder", text="")
+        layout.grid_flow(columns=3, even_columns=True, align=True).prop(own, "kinds")
+        if own.kinds & {"STRIP", "CURVES", "NUMBERS"}:
+            layout.row(align=True).prop(own, "formats")
+            layout.prop(own, "width")
+            layout.prop(own, "dpi")
+        layout.prop(own, "sensors")
+        layout.prop(own, "frames")
+        if own.kinds & {"SCENE", "VIDEO"}:
+            column = layout.column()
+            column.prop(own, "engine")
+            column.prop(own, "camera")
+            if own.camera == "VIEW":
+                column.prop(own, "view", text="")
+            column.prop(own, "size")
+            column.prop(own, "samples")
+            column.prop(own, "transparent")
+        layout.row(align=True).prop(own, "exports")
+        layout.operator("palpate.figures_make", icon="RENDER_STILL")
+
+
+PARTS = (Bake, Display, Figures)

@@ -1,0 +1,40 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Figures, strips, curves, numbers, videos and data of a bake, all with one button."""
+
+import bpy
+
+from ..addon import figures, live, state, write
+from . import working
+
+
+class PALPATE_OT_figures_make(working.Working, bpy.types.Operator):
+    """Make the figures that are chosen above, of what is baked: nothing is computed. ESC stops; what is finished stays"""
+
+    bl_idname = "palpate.figures_make"
+    bl_label = "Make Figures"
+    bl_options = {"REGISTER"}
+    stopped = "Stopped; figures that were finished are there"
+
+    @classmethod
+    def poll(cls, context):
+        if context.scene is None or not write.bake_folders(context.scene):
+            cls.poll_message_set("Nothing is baked in this scene: bake first")
+            return False
+        if live.is_baking() or state.session.catching_up:
+            cls.poll_message_set("Frames are being computed")
+            return False
+        return True
+
+    def job(self, context):
+        from ..addon import pictures
+
+        scene = context.scene
+        return pictures.make(scene, figures.folder(scene), figures.wish(scene, context.object))
+
+    def done(self, result):
+        names = ", ".join(f"'{path.name}'" for path in result[:4])
+        more = f" and {len(result) - 4} more" if len(result) > 4 else ""
+        self.report({"INFO"}, f"Made {names}{more} in '{result[0].parent}'" if result else "There was nothing to make")
+
+
+CLASSES = (PALPATE_OT_figures_make,)

@@ -1,0 +1,86 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""One button makes what `palpate render` and `palpate export` make, with the same choices."""
+
+import argparse
+
+import bpy
+import pytest
+from blender_scenes import press, save
+
+from palpate.addon import figures
+from palpate.addon.bake import bake
+from palpate.commands import render
+from palpate.core.drive import drive
+from palpate.core.errors import ParameterError
+
+
+@pytest.fixture
+def baked(tmp_path):
+    scene, pad, _ = press(frames=4)
+    save(tmp_path)
+    drive(bake(scene))
+    return scene, pad, tmp_path
+
+
+def test_everything_that_is_chosen_is_made(baked):
+    scene, _, place = baked
+    own = scene.palpate.figures
+    own.kinds, own.exports = {"SCENE", "STRIP", "CURVES", "NUMBERS", "VIDEO"}, {"CSV", "NPZ", "PNG"}
+    own.formats, own.frames, own.width = {"PNG", "PDF"}, "2-3, 4", "SINGLE"
+    own.engine, own.size, own.transparent = "WORKBENCH", (160, 120), True
+    assert bpy.ops.palpate.figures_make() == {"FINISHED"}
+    names = {path.name for path in (place / "figures").iterdir()}
+    expected = {f"{kind}.{ending}" for kind in ("strip", "curves") for ending in ("png", "pdf")}
+    expected |= {f"numbers Pad {number:04d}.{ending}" for number in (2, 3, 4) for ending in ("png", "pdf")}
+    expected |= {f"{kind} {number:04d}.png" for kind in ("scene", "scene and touch") for number in (2, 3, 4)}
+    assert names == expected | {"video.mp4", "data csv", "data npz", "data png"}
+    assert (place / "figures" / "data csv" / "Pad" / "normal_force.csv").is_file()
+    picture = bpy.data.images.load(str(place / "figures" / "scene 0004.png"))
+    assert tuple(picture.size) == (160, 120) and picture.channels == 4
+
+
+def test_the_window_offers_what_the_command_offers():
+    parser = argparse.ArgumentParser()
+    render.add_arguments(parser)
+    here = {
+        "out": "folder", "only": "kinds", "sensor": "sensors", "frame": "frames", "format": "formats", "own_camera": "camera",
+    }  # fmt: skip
+    display = {"colour_map": "color_map", "quantity": "quantity", "limit": "range_max"}
+    scene = bpy.context.scene.palpate
+    for action in parser._actions:
+        if action.dest in ("help", "scene"):
+            continue
+        owner = scene if action.dest in display else scene.figures
+        name = display.get(action.dest) or here.get(action.dest, action.dest)
+        assert name in owner.bl_rna.properties, action.dest
+        for choice in action.choices or ():
+            known = owner.bl_rna.properties[name].enum_items.keys()
+            assert choice.upper() in known, (action.dest, choice)
+
+
+def test_what_cannot_be_made_is_one_sentence(baked):
+    scene, pad, _ = baked
+    own = scene.palpate.figures
+    own.frames = "12, x"
+    with pytest.raises(RuntimeError, match="'x' in Figures › Frames is no frame"):
+        bpy.ops.palpate.figures_make()
+    own.frames = "99"
+    with pytest.raises(RuntimeError, match="Frame 99 is not in the bake"):
+        bpy.ops.palpate.figures_make()
+    own.frames, own.sensors = "", "ACTIVE"
+    bpy.context.view_layer.objects.active = bpy.data.objects["Ball"]
+    with pytest.raises(RuntimeError, match="The active object is no sensor"):
+        bpy.ops.palpate.figures_make()
+    own.sensors, own.kinds = "ALL", set()
+    with pytest.raises(RuntimeError, match="Nothing is chosen"):
+        bpy.ops.palpate.figures_make()
+    bpy.ops.palpate.bake_clear()
+    assert not bpy.ops.palpate.figures_make.poll()
+
+
+def test_words_for_frames():
+    assert figures.frames_of("") == ()
+    assert figures.frames_of("5 3, 7-9; 8") == (5, 3, 7, 8, 9)
+    assert figures.frames_of("-2-1") == (-2, -1, 0, 1)
+    with pytest.raises(ParameterError, match="1.5"):
+        figures.frames_of("1.5")
