@@ -128,9 +128,25 @@ def go_on(scene, depsgraph, run: Run) -> Run:
     """Compute the frame where the scene stands, which is the one after the last computed."""
     frame, _ = clock.moment(scene)
     moment = run.moments[frame] = sample.sample_moment(scene, depsgraph, run.binding)
+    if scene.palpate.subframes > 1:
+        _read_between(scene, run, frame)
     run.simulation.extend(moment.poses, moment.targets, moment.vertices, moment.texels)
     run.frames[frame] = run.simulation.advance()
     return run
+
+
+def _read_between(scene, run: Run, frame: int) -> None:
+    """Read what a scene says between two frames, as a bake does, and come back to the second."""
+    before, parts = (scene.frame_current, scene.frame_subframe), scene.palpate.subframes
+    with state.suspended():
+        try:
+            with clock.unstretched(scene):
+                for part in range(1, parts):
+                    scene.frame_set(frame - 1, subframe=part / parts)
+                    moment = sample.sample_moment(scene, sample.depsgraph_of(scene), run.binding)
+                    run.simulation.extend(moment.poses, moment.targets, moment.vertices, moment.texels, share=part / parts)
+        finally:
+            scene.frame_set(before[0], subframe=before[1])
 
 
 def is_stale(scene, depsgraph, run: Run) -> bool:

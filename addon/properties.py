@@ -448,7 +448,7 @@ class PALPATE_PG_scene(bpy.types.PropertyGroup):
     )
     subframes: IntProperty(
         name="Samples per Frame",
-        description="How often a bake reads the motion of animated bodies in each frame. Playing reads whole frames only",
+        description="How often the motion of animated bodies is read in each frame, in a bake and while playing",
         default=1,
         min=1,
         soft_max=16,
@@ -545,6 +545,7 @@ class PALPATE_PG_scene(bpy.types.PropertyGroup):
     figures: PointerProperty(type=figures.PALPATE_PG_figures, description="What figures are made of the bake, and how")
     baked_digest: StringProperty(options={"HIDDEN"})
     baked_fingerprint: StringProperty(options={"HIDDEN"})
+    baked_shapes: StringProperty(options={"HIDDEN"})
     baked_start: IntProperty(options={"HIDDEN"})
     baked_end: IntProperty(options={"HIDDEN"})
 

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Generator
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -87,6 +87,8 @@ class Binding:
         Where the parts of other bodies are in those bodies' objects, by key.
     skins : tuple of Skin
         Surfaces that may deform.
+    looks : dict of str to list of str
+        Fingerprints, frame by frame, of what those and other objects that become meshes look like; by name.
     """
 
     keys: tuple[str, ...]
@@ -100,6 +102,7 @@ class Binding:
     sensor_keys: tuple[str, ...]
     parts: dict[str, np.ndarray]
     skins: tuple[deform.Skin, ...]
+    looks: dict[str, list[str]] = field(default_factory=dict)
 
     def sensor_objects(self, scene) -> list:
         """Return the objects that hold the sensors and pads, by sensor index; None for one that was deleted."""
@@ -319,6 +322,8 @@ def _sample_scenario(scene) -> Generator[Progress, None, tuple[Scenario, Binding
     frames = range(scene.frame_start, scene.frame_end + 1)
     scene.frame_set(frames[0])
     scenario, binding = sample_start(scene, depsgraph_of(scene))
+    watched = _watched(scene, binding)
+    _look(scene, watched, binding)
     motions = {index: body.motion for index, body in enumerate(scenario.bodies) if not body.free}
     samples = {index: [(motion.positions[0], motion.quaternions[0])] for index, motion in motions.items()}
     targets = {index: list(scenario.bodies[index].drive.target.values) for index in binding.driven}
@@ -333,9 +338,10 @@ def _sample_scenario(scene) -> Generator[Progress, None, tuple[Scenario, Binding
                 samples[index].append(pose)
             for index, value in moment.targets.items():
                 targets[index].append(value)
+            shapes.append(moment)
         for index, matrix in moment.parents.items():
             binding.parents[index].append(matrix)
-        shapes.append(moment)
+        _look(scene, watched, binding)
         yield Progress("Reading", frame, frame - frames[0] + 1, len(frames))
     times = np.array([step / (scenario.fps * parts_of_frame) for step in range((len(frames) - 1) * parts_of_frame + 1)])
     bodies = list(scenario.bodies)
@@ -348,6 +354,18 @@ def _sample_scenario(scene) -> Generator[Progress, None, tuple[Scenario, Binding
     sensors, targets = shapes.finished(scenario, times)
     scenario = replace(scenario, bodies=tuple(bodies), sensors=sensors, targets=targets)
     return scenario, replace(binding, warnings=binding.warnings + _unchanged_masses(scenario))
+
+
+def _watched(scene, binding: Binding) -> list:
+    """Return the objects whose evaluated mesh tells more than their own data: those that may deform, curves, texts."""
+    bending = {skin.name for skin in binding.skins}
+    return [obj for obj in participants(scene)[0] if obj.name in bending or obj.type != "MESH"]
+
+
+def _look(scene, watched, binding: Binding) -> None:
+    depsgraph = depsgraph_of(scene)
+    for obj in watched:
+        binding.looks.setdefault(obj.name, []).append(meshes.fingerprint(obj, depsgraph))
 
 
 def _unchanged_masses(scenario: Scenario) -> tuple[str, ...]:
@@ -373,7 +391,7 @@ class Shapes:
         }
 
     def append(self, moment: Moment) -> None:
-        """Add what one more frame says."""
+        """Add what one more sample says."""
         for place, found in moment.shapes.items():
             before = self._known[place][-1]
             self._known[place].append(before if np.array_equal(found, before) else found)

@@ -1,19 +1,22 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Does a bake still show what the scene would give now? Looked at, cheaply, whenever a frame of it is shown.
 
-What is compared: settings and who takes part at every frame, the poses of keyframed bodies with the recorded ones at every
-frame, and the objects' own meshes and regions when Blender has reported a change of geometry.
+What is compared: settings, who takes part, scales and animation curves; the poses of keyframed bodies, and what deforming
+objects and curves look like, with what was recorded of the frame that is shown; and the objects' own meshes and regions when
+Blender has reported a change of geometry.
 """
 
 from __future__ import annotations
 
 import hashlib
+import json
+from functools import lru_cache
 
 import numpy as np
 
 from ..core.errors import PalpateError
 from ..core.recording import Recording
-from . import cache, clock, freebodies, meshes, sample, state
+from . import cache, clock, curves, deform, freebodies, meshes, sample, state
 
 SAME_POSE = 1e-6
 """Metres, and components of a quaternion, by which a recorded pose may differ: an evaluated matrix has 32 bits."""
@@ -35,7 +38,64 @@ def fingerprint(scene) -> str:
     if key not in _geometry or changed:
         _geometry[key] = _digest(*(meshes.own_fingerprint(obj) for obj in objects))
         state.session.changed_geometry -= changed
-    return _digest(repr(cache.settings_of(scene, objects)), _geometry[key])
+    return _digest(repr(cache.settings_of(scene, objects)), _geometry[key], *(_animation(obj) for obj in objects))
+
+
+def _animation(obj) -> str:
+    """Return what keyframes say about an object and what carries it, between frames too, and its scale where that is constant.
+
+    Of a body that forces move only what carries it: its own keyframes are the bake's.
+    """
+    digest, own = hashlib.blake2b(digest_size=16), obj.palpate.body in freebodies.MOVED
+    scaled = deform.has_animated_scale(obj)
+    while obj is not None:
+        if not scaled:
+            digest.update(np.array([obj.scale, obj.delta_scale], dtype=np.float32).tobytes())
+        for curve in () if own else curves.of(obj) or ():
+            digest.update(f"{curve.data_path}[{curve.array_index}]{curve.mute}{curve.extrapolation}".encode())
+            for key, size, kind in _KEYFRAME:
+                values = np.empty(size * len(curve.keyframe_points), dtype=kind)
+                curve.keyframe_points.foreach_get(key, values)
+                digest.update(values.tobytes())
+        obj, own = obj.parent, False
+    return digest.hexdigest()
+
+
+_KEYFRAME = (
+    ("co", 2, np.float32), ("handle_left", 2, np.float32), ("handle_right", 2, np.float32), ("interpolation", 1, np.int32),
+)  # fmt: skip
+
+
+def pack(looks: dict[str, list[str]]) -> str:
+    """Return fingerprints, frame by frame, as text: of each object only where they change."""
+    changes = {
+        name: [[i, look] for i, look in enumerate(found) if i == 0 or look != found[i - 1]] for name, found in looks.items()
+    }
+    return json.dumps(changes)
+
+
+@lru_cache(maxsize=8)
+def _unpacked(text: str) -> dict[str, list]:
+    return json.loads(text) if text else {}
+
+
+def _reshaped(scene, depsgraph) -> bool:
+    """Whether something that may deform looks different from what it looked like when this frame was baked."""
+    number, share = clock.moment(scene)
+    index = number - scene.palpate.baked_start
+    if share or not 0 <= index <= scene.palpate.baked_end - scene.palpate.baked_start:
+        return False
+    for name, changes in _unpacked(scene.palpate.baked_shapes).items():
+        obj = scene.objects.get(name)
+        then = next(look for i, look in reversed(changes) if i <= index)
+        if obj is None or obj.type not in meshes.KINDS:
+            return True
+        try:
+            if meshes.fingerprint(obj, depsgraph) != then:
+                return True
+        except PalpateError:
+            return True
+    return False
 
 
 def _digest(*parts: str) -> str:
@@ -55,9 +115,9 @@ def is_stale(scene, depsgraph, recording: Recording | None) -> bool:
     recording : Recording or None
         Of the bake, when it can be read.
     """
-    return fingerprint(scene) != scene.palpate.baked_fingerprint or (
-        recording is not None and _moved(scene, depsgraph, recording)
-    )
+    if fingerprint(scene) != scene.palpate.baked_fingerprint or _reshaped(scene, depsgraph):
+        return True
+    return recording is not None and _moved(scene, depsgraph, recording)
 
 
 def _moved(scene, depsgraph, recording: Recording) -> bool:

@@ -12,7 +12,7 @@ import numpy as np
 from ..core.errors import SceneError
 from ..core.recording import Recording
 from ..core.scenario import Scenario
-from . import dress, freebodies, heatmap, identity, markers, materials
+from . import dress, freebodies, heatmap, identity, markers, materials, stale
 from .sample import Binding
 
 
@@ -80,6 +80,7 @@ def commit(scene, scenario: Scenario, binding: Binding, recording: Recording, fo
     sweep()
     settings = scene.palpate
     settings.baked_digest = recording.digest
+    settings.baked_shapes = stale.pack(binding.looks)
     settings.baked_start, settings.baked_end = scenario.frame_start, scenario.frame_end
 
 

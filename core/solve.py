@@ -120,6 +120,7 @@ class Simulation:
         targets: Mapping[int, float] | None = None,
         vertices: Mapping[int, np.ndarray] | None = None,
         texels: Mapping[int, np.ndarray] | None = None,
+        share: float = 1.0,
     ) -> None:
         """Append where keyframed bodies, and driven ones without their drives, will be next, and deforming surfaces.
 
@@ -131,9 +132,11 @@ class Simulation:
         vertices : mapping of target index to (nv, 3) float, metres, in the body's frame, optional
         texels : mapping of sensor index to (n, 9) float, optional
             See :attr:`.Texels.frames`.
+        share : float
+            Of the way to the next frame, for what is known in between: these come first, in order.
         """
-        self._surfaces.extend(self._time_of(self.frame + 1), vertices or {}, texels or {})
-        time = self._time_of(self.frame + 1)
+        time = self._time_of(self.frame + share)
+        self._surfaces.extend(time, vertices or {}, texels or {})
         for body, (position, quaternion) in poses.items():
             motion = self._motions[body]
             if motion.times[-1] < time - 1e-9:
@@ -205,7 +208,7 @@ class Simulation:
                 point[t, texel] = points[deeper] + self._center[sensor.body]
         return depth, normal, point, most
 
-    def _time_of(self, frame: int) -> float:
+    def _time_of(self, frame: float) -> float:
         return (frame - self.scenario.frame_start) / self.scenario.fps
 
     def _warn_of_sunk(self) -> None:

@@ -1,0 +1,137 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A bake says when it is out of date, whatever has changed; and playing gives its numbers, however finely motion is read."""
+
+import bpy
+import numpy as np
+import pytest
+from blender_scenes import ball, press, press_and_drop, reopen, save
+
+from palpate.addon import cache, live
+from palpate.addon.bake import bake
+from palpate.core.drive import drive
+
+FRESH, STALE = "Frame {} of the bake.", "The bake is out of date, something has changed since: bake again."
+
+
+def bent(scene, target):
+    """Give the target everything that can change its shape."""
+    target.modifiers.new("Cast", "CAST").factor = 0.1
+    target.shape_key_add(name="Basis")
+    key = target.shape_key_add(name="Bump")
+    for i in range(0, len(key.data), 3):
+        key.data[i].co *= 1.05
+    key.value = 0.0
+    key.keyframe_insert("value", frame=1)
+    key.value = 0.5
+    key.keyframe_insert("value", frame=6)
+    scene.frame_set(1)
+
+
+@pytest.fixture
+def baked(tmp_path):
+    """A scene with a ball that bends and a pad with a modifier that keeps its vertices, baked, saved and opened again."""
+    scene, pad, target = press(frames=6)
+    bent(scene, target)
+    pad.modifiers.new("Wave", "CAST").factor = 0.0
+    scene.collection.objects.link(bpy.data.objects.new("Arm", None))
+    target.parent = bpy.data.objects["Arm"]
+    save(tmp_path)
+    drive(bake(scene))
+    return reopen(save(tmp_path))
+
+
+def texts(scene, frames):
+    found = []
+    for frame in frames:
+        scene.frame_set(frame)
+        found.append(live.status(scene).text)
+    return found
+
+
+def test_nothing_changed_is_fresh_at_every_frame(baked):
+    frames = (1, 2, 3, 4, 5, 6, 4, 2, 1)
+    assert texts(baked, frames) == [FRESH.format(frame) for frame in frames]
+    baked.frame_set(3, subframe=0.5)
+    assert live.status(baked).text == FRESH.format(3)
+
+
+def curves_of(obj):
+    from palpate.addon import curves
+
+    return curves.of(obj)
+
+
+def bow(curve):
+    """Leave the curve's values at whole frames far from its middle alone, nearly: an ease that starts differently."""
+    for point in curve.keyframe_points:
+        point.interpolation = "QUAD"
+
+
+CHANGES = {
+    "modifier of a target": lambda pad, ball: setattr(ball.modifiers["Cast"], "factor", 0.2),
+    "modifier of a sensor": lambda pad, ball: setattr(pad.modifiers["Wave"], "factor", 0.1),
+    "modifier switched off": lambda pad, ball: setattr(ball.modifiers["Cast"], "show_viewport", False),
+    "shape key": lambda pad, ball: setattr(ball.data.shape_keys.key_blocks["Bump"].data[0], "co", (0.0, 0.0, 0.01)),
+    "scale": lambda pad, ball: setattr(ball, "scale", (1.0, 1.0, 1.01)),
+    "scale of a parent": lambda pad, ball: setattr(ball.parent, "scale", (1.01, 1.01, 1.01)),
+    "interpolation": lambda pad, ball: [bow(curve) for curve in curves_of(ball)],
+    "key in between": lambda pad, ball: ball.keyframe_insert("location", frame=2.5),
+    "samples per frame": lambda pad, ball: setattr(bpy.context.scene.palpate, "subframes", 4),
+    "effect": lambda pad, ball: bpy.ops.palpate.effect_add(effect="offset"),
+}
+
+
+@pytest.mark.parametrize("change", CHANGES)
+def test_a_change_is_noticed_at_whatever_frame_is_shown_next(baked, change):
+    pad, target = bpy.data.objects["Pad"], bpy.data.objects["Ball"]
+    bpy.context.view_layer.objects.active = pad
+    baked.frame_set(4)
+    CHANGES[change](pad, target)
+    bpy.context.view_layer.update()
+    assert texts(baked, [5, 2]) == [STALE, STALE]
+    assert live.status(baked).frame is not None  # it is still shown
+
+
+def test_a_target_that_is_a_curve_is_watched(tmp_path):
+    scene, pad, target = press(frames=3)
+    bpy.ops.curve.primitive_bezier_circle_add(radius=0.005, location=(0.01, 0.0, 0.002))
+    ring = bpy.context.object
+    ring.data.bevel_depth, ring.palpate.role = 0.002, "TARGET"
+    save(tmp_path)
+    drive(bake(scene))
+    assert texts(scene, [1, 2]) == [FRESH.format(1), FRESH.format(2)]
+    ring.data.bevel_depth = 0.003
+    bpy.context.view_layer.update()
+    assert texts(scene, [3]) == [STALE]
+
+
+@pytest.mark.parametrize("stretched", [False, True])
+@pytest.mark.parametrize("bends", [False, True])
+def test_playing_reads_between_frames_as_a_bake_does(tmp_path, stretched, bends):
+    scene, pad, target, *_ = press_and_drop(frames=6)
+    extra = ball("Tip", location=(0.012, 0.0, 0.0075), radius=0.008)  # turns fast: its way between frames is no straight line
+    extra.palpate.role, extra.rotation_mode = "TARGET", "XYZ"
+    arm = bpy.data.objects.new("Arm", None)
+    scene.collection.objects.link(arm)
+    extra.parent = arm
+    for frame, angle in ((1, 0.0), (6, 6.0)):
+        arm.rotation_euler.z = angle
+        arm.keyframe_insert("rotation_euler", frame=frame)
+    if bends:
+        bent(scene, target)
+    scene.palpate.subframes, scene.palpate.interpolation = 3, "SMOOTH"
+    if stretched:
+        scene.render.frame_map_old, scene.render.frame_map_new = 100, 200
+    scene.frame_set(1)
+    for frame in range(1, 13 if stretched else 7):
+        scene.frame_set(frame)
+    assert scene.frame_current == frame and scene.frame_subframe == 0.0
+    played = dict(cache.get(scene).frames)
+    bpy.ops.palpate.reset()
+    save(tmp_path)
+    recording = drive(bake(scene)).recording
+    felt = recording.sensors["Pad"].normal_force
+    assert felt[-1].max() > 0
+    for number in range(2 if stretched else 1, 7):
+        np.testing.assert_allclose(played[number].sensors["Pad"].normal_force, felt[number - 1], rtol=1e-9, atol=1e-12)
+        np.testing.assert_allclose(played[number].poses, recording.poses[number - 1], rtol=1e-9, atol=1e-12)
