@@ -149,6 +149,7 @@ def heat_map(
         color = next(s for s in mix.outputs if s.identifier == "Result_Color")
     surface = add("ShaderNodeBsdfPrincipled")
     surface.inputs["Roughness"].default_value = 0.6
+    surface.inputs["Specular IOR Level"].default_value = 0.1  # a shine would lighten the dark end of the colours
     surface.inputs["Emission Strength"].default_value = 0.4
     tree.links.new(color, surface.inputs["Base Color"])
     tree.links.new(color, surface.inputs["Emission Color"])

@@ -7,7 +7,8 @@ Nothing is computed: the scene plays its bake, and figures are drawn from the ba
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Generator, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -19,7 +20,7 @@ from ..core.figures import Look
 from ..core.figures.numbers import MOST
 from ..core.formats.export import export
 from ..core.formats.files import folder_names, writable_folder
-from . import dress, render, studio, video, write
+from . import dress, render, solid, studio, video, write
 from .jobs import Progress
 
 KINDS = ("scene", "strip", "curves", "numbers", "video")
@@ -153,9 +154,10 @@ def draw(bake: Bake, place: Path, wish: Wish, frames: Sequence[int]) -> list[Pat
 
 
 def _scene(scene, place, wish, bake, frames, steps, written):
-    with _photographed(scene, wish, frames):
+    with _photographed(scene, wish, bake, frames, wish.size) as show:
         for number in frames:
             yield steps.next("Rendering", number)
+            show(number)
             plain = place / f"scene {number:04d}.png"
             written.append(render.render_frame(scene, plain, number, samples=wish.samples, size=wish.size))
             beside = place / f"scene and touch {number:04d}.png"
@@ -169,9 +171,10 @@ def _video(scene, place, wish, bake, steps, written):
     size = (2 * round(0.5 * height * wish.size[0] / wish.size[1]), height)
     with tempfile.TemporaryDirectory(prefix="palpate-video-") as scratch:
         pictures = []
-        with _photographed(scene, wish, numbers):
+        with _photographed(scene, wish, bake, numbers, size) as show:
             for number in numbers:
                 yield steps.next("Rendering the video", number)
+                show(number)
                 picture = Path(scratch) / f"{number - numbers[0]:06d}.png"
                 render.render_frame(scene, picture, number, samples=wish.samples, size=size)
                 figures.side_by_side(picture, picture, bake.recording, bake.texels, number, wish.look, height)
@@ -180,10 +183,29 @@ def _video(scene, place, wish, bake, steps, written):
         written.append(video.encode(pictures, place / "video.mp4", bake.manifests[next(iter(bake.texels))].fps))
 
 
-def _photographed(scene, wish: Wish, frames):
-    return studio.photographed(
-        scene, frames, engine=wish.engine, view=wish.view, transparent=wish.transparent, frame=not wish.own_camera
-    )
+@contextmanager
+def _photographed(scene, wish: Wish, bake: Bake, frames, size) -> Iterator[Callable[[int], None]]:
+    """Prepare a scene for its pictures; yields what has to be called before each of them with its frame."""
+    with (
+        studio.photographed(
+            scene,
+            frames,
+            engine=wish.engine,
+            view=wish.view,
+            transparent=wish.transparent,
+            frame=not wish.own_camera,
+            size=size,
+        ),
+        ExitStack() as more,
+    ):
+        show = _nothing
+        if scene.render.engine == "BLENDER_WORKBENCH":
+            show = more.enter_context(solid.painted(write.bake_folders(scene), bake, wish.look))
+        yield show
+
+
+def _nothing(_number: int) -> None:
+    """Cycles and EEVEE draw the heat maps' materials."""
 
 
 def _busiest(bake: Bake) -> int:

@@ -20,6 +20,8 @@ VIEW = (-55.0, 30.0)
 """Azimuth, from +x towards +y, and elevation, degrees, from which a scene without a camera is looked at."""
 MARGIN = 0.06
 """Of the picture's width and height, left free around what is framed."""
+_FAR = 3.0
+"""Sizes of what is seen from which on an object that takes no part is a backdrop."""
 _LAMPS = (((-35.0, 50.0), 3.2, (1.0, 0.97, 0.93)), ((70.0, 30.0), 1.2, (0.9, 0.95, 1.0)), ((170.0, 45.0), 2.0, (1.0, 1.0, 1.0)))
 """Suns: azimuth from the camera's and elevation, degrees; strength; colour."""
 
@@ -60,7 +62,9 @@ def _shows(obj) -> bool:
 
 
 @contextmanager
-def photographed(scene, frames, *, engine: str | None = None, view=None, transparent: bool = False, frame: bool = True):
+def photographed(
+    scene, frames, *, engine: str | None = None, view=None, transparent: bool = False, frame: bool = True, size=None
+):
     """Prepare a scene for pictures, and put everything back.
 
     Parameters
@@ -72,9 +76,11 @@ def photographed(scene, frames, *, engine: str | None = None, view=None, transpa
     view : (2,) float, degrees, optional
         Azimuth and elevation of the camera. Default: the direction of the scene's camera, or :data:`VIEW`.
     transparent : bool
-        No background.
+        No background: no world, and no floor or backdrop that reaches far beyond everything else.
     frame : bool
         False leaves the scene's own camera where it is.
+    size : (2,) int, pixels, optional
+        Of the pictures. Default: the scene's.
     """
     made, changes = [], []
 
@@ -86,8 +92,13 @@ def photographed(scene, frames, *, engine: str | None = None, view=None, transpa
     try:
         if engine is not None:
             change(scene.render, "engine", engine_of(scene, engine))
+        if size is not None:
+            change(scene.render, "resolution_x", int(size[0]))
+            change(scene.render, "resolution_y", int(size[1]))
         if transparent:
             change(scene.render, "film_transparent", True)
+            for obj in _backdrops(scene):
+                change(obj, "hide_render", True)
         own = scene.camera if scene.camera is not None and scene.camera.data.type == "PERSP" else None
         if own is None or view is not None or frame:
             camera = _camera(scene, own, view)
@@ -116,6 +127,15 @@ def photographed(scene, frames, *, engine: str | None = None, view=None, transpa
         for block in made:
             _drop(block)
         scene.frame_set(now[0], subframe=now[1])
+
+
+def _backdrops(scene) -> list:
+    """Return what is only there to be in front of: it takes no part, carries nothing, and is far larger than what does."""
+    seen = seen_objects(scene)
+    carriers = {above for obj in seen for above in _above(obj)}
+    size = float(np.linalg.norm(np.ptp(render.corners(seen), axis=0))) if seen else 0.0
+    others = [obj for obj in scene.objects if _shows(obj) and obj not in seen and obj not in carriers]
+    return [obj for obj in others if np.linalg.norm(np.ptp(render.corners([obj]), axis=0)) > _FAR * size]
 
 
 def _camera(scene, own, view):
