@@ -3,9 +3,12 @@
 
 from __future__ import annotations
 
+import ctypes
 import os
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import lru_cache
 from pathlib import Path
 
 import bpy
@@ -14,6 +17,11 @@ from mathutils import Vector
 
 from ..core.errors import FileError, SceneError
 from ..core.formats.files import atomic_write
+
+NEED_GL = {"BLENDER_EEVEE_NEXT", "BLENDER_EEVEE", "BLENDER_WORKBENCH"}
+"""Engines that draw with the graphics card, or with Mesa's software in its place."""
+_SURFACELESS = 0x31DD
+"""EGL_PLATFORM_SURFACELESS_MESA"""
 
 
 def corners(objects) -> np.ndarray:
@@ -95,11 +103,16 @@ def render_frame(scene, path: str | os.PathLike, frame: int, *, samples: int | N
     Raises
     ------
     SceneError
-        The scene has no perspective camera, or Blender cannot render it.
+        The scene has no perspective camera, or Blender cannot render it with the scene's engine.
     FileError
         The picture cannot be written.
     """
     _camera(scene)
+    if scene.render.engine in NEED_GL and not can_draw():
+        raise SceneError(
+            f"EEVEE and Workbench need OpenGL, which this machine has not without a window, so '{scene.name}' cannot be "
+            "rendered: choose Cycles."
+        )
     path = Path(path)
     if path.suffix.lower() != ".png":
         path = path.with_name(path.name + ".png")
@@ -113,6 +126,23 @@ def render_frame(scene, path: str | os.PathLike, frame: int, *, samples: int | N
         if not temporary.exists():
             raise FileError(f"The render of frame {frame} was not written to '{path}': check the space left on the disk.")
     return path
+
+
+@lru_cache
+def can_draw() -> bool:
+    """Whether Blender can draw: without a window, and without EGL to draw beside one, EEVEE and Workbench end the process."""
+    if not bpy.app.background or not sys.platform.startswith("linux"):
+        return True
+    try:
+        egl = ctypes.CDLL("libEGL.so.1")
+    except OSError:
+        return False
+    egl.eglGetDisplay.argtypes, egl.eglGetDisplay.restype = [ctypes.c_void_p], ctypes.c_void_p
+    egl.eglGetPlatformDisplay.argtypes = [ctypes.c_uint, ctypes.c_void_p, ctypes.c_void_p]
+    egl.eglGetPlatformDisplay.restype = ctypes.c_void_p
+    egl.eglInitialize.argtypes = [ctypes.c_void_p] * 3
+    displays = egl.eglGetDisplay(None), egl.eglGetPlatformDisplay(_SURFACELESS, None, None)
+    return any(display and egl.eglInitialize(display, None, None) for display in displays)
 
 
 def can_denoise() -> bool:

@@ -1,6 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """All figures of a baked scene in one go; the scene is afterwards what it was before."""
 
+import os
+import subprocess
+import sys
+
 import bpy
 import numpy as np
 import pytest
@@ -109,3 +113,59 @@ def test_the_command(baked, tmp_path, capsys):
     assert sorted(item.name for item in (tmp_path / "out").iterdir()) == ["numbers Pad 0004.pdf", "strip.pdf"]
     assert main([*words, "--sensor", "Thumb"]) == 1
     assert "There is no sensor 'Thumb'" in capsys.readouterr().err
+
+
+def test_workbench_shows_the_heat_map_and_leaves_meshes_alone(baked, tmp_path):
+    """Where most force is, the picture has the colour of the map's upper end; beside it, that of the lower one."""
+    scene, _ = baked
+    pad, ball = scene.objects["Pad"], scene.objects["Ball"]
+    ball.hide_render = True
+    before, meshes = dump(), len(bpy.data.meshes)
+    wish = pictures.Wish(
+        ("scene",), Look(colour_map="MAGMA"), frames=(4,), sensors=("Pad",), size=(200, 160), engine="workbench", view=(-90, 89)
+    )
+    drive(pictures.make(scene, tmp_path / "out", wish))
+    picture = image(tmp_path / "out" / "scene 0004.png")[..., :3]
+    assert np.ptp(picture, axis=2).max() > 0.4  # the purples and oranges of magma, on grey
+    assert [line for line in changes(before, dump()) if "Render Result" not in line] == []
+    assert len(bpy.data.meshes) == meshes
+    assert pad.data.color_attributes.find("Palpate Colour") < 0
+
+
+def test_a_transparent_picture_leaves_the_backdrop_out_but_not_what_carries_a_sensor(baked, tmp_path):
+    scene, _ = baked
+    bpy.ops.mesh.primitive_plane_add(size=30.0, location=(0.0, 0.0, -0.1))
+    floor = bpy.context.object
+    bpy.ops.mesh.primitive_cube_add(size=3.0, location=(0.0, 0.0, -5.0))
+    robot = bpy.context.object
+    scene.objects["Pad"].parent = robot
+    for transparent, hidden in ((False, set()), (True, {floor})):
+        with studio.photographed(scene, [1], transparent=transparent):
+            assert {obj for obj in scene.objects if obj.hide_render} == hidden
+    assert not floor.hide_render
+
+
+@pytest.mark.parametrize("size", [(160, 90), (90, 160)])
+def test_the_picture_is_filled_whatever_its_shape(baked, size):
+    scene, _ = baked
+    with studio.photographed(scene, [1, 4], view=(-60.0, 35.0), size=size):
+        points = render.corners(studio.seen_objects(scene))
+        places = np.array([render.picture_position(scene, point) for point in points])
+        assert (scene.render.resolution_x, scene.render.resolution_y) == size
+    assert (places > 0.0).all() and (places < 1.0).all() and np.ptp(places, axis=0).max() > 0.7
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="hides Linux's EGL")
+def test_without_opengl_it_is_one_sentence(baked, tmp_path):
+    """Blender itself would end the process at once."""
+    _, path = baked
+    environment = {key: value for key, value in os.environ.items() if key not in ("DISPLAY", "WAYLAND_DISPLAY")}
+    environment["__EGL_VENDOR_LIBRARY_FILENAMES"] = str(tmp_path / "nowhere")
+    words = ["render", str(path), "--out", str(tmp_path / "out"), "--only", "scene", "--size", "32", "24", "--samples", "1"]
+    for engine, status in (("workbench", 1), ("eevee", 1), ("cycles", 0)):
+        run = subprocess.run(
+            [sys.executable, "-m", "palpate.commands", *words, "--engine", engine],
+            env=environment, capture_output=True, text=True, timeout=120,
+        )  # fmt: skip
+        assert run.returncode == status, run.stderr
+        assert ("choose Cycles" in run.stderr) == (status == 1)
