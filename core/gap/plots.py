@@ -60,8 +60,8 @@ def curves(result: Diagnosis) -> Figure:
         axes.plot(time, measured, color=MEASURED, lw=1.5, label="measured")
         for label, model, colour in _models(result):
             axes.plot(time, pick(model), color=colour, lw=1.0, ls="--" if label == "base model" else "-", label=label)
-        axes.set_title(f"{predictor.trial.name} ({predictor.trial.use})", loc="left", fontsize=8.5, color=INK)
-        axes.set_ylabel(f"{name} ({result.rig.parameters.unit if 'texel' in name else 'N'})")
+        axes.set_title(f"{predictor.trial.name} ({predictor.trial.use}): {name}", loc="left", fontsize=8.5, color=INK)
+        axes.set_ylabel(_quantity(result, name))
         axes.margins(x=0)
         tidy_axes(axes)
     grid[0].legend(frameon=False, fontsize=8, ncols=3, loc="lower right", bbox_to_anchor=(1.0, 1.0), borderaxespad=0)
@@ -69,6 +69,14 @@ def curves(result: Diagnosis) -> Figure:
     height = figure.get_figheight()
     figure.subplots_adjust(left=0.105, right=0.985, top=1 - 0.3 / height, bottom=0.45 / height, hspace=0.42)
     return figure
+
+
+def _quantity(result: Diagnosis, channel: str) -> str:
+    """What a channel measures, with its unit."""
+    if not channel.startswith("texel"):
+        return f"{channel} (N)"
+    unit = result.rig.parameters.unit
+    return "normal force (N)" if unit == "N" else f"reading ({unit})"
 
 
 def _worst_channel(result: Diagnosis, predictor: Predictor) -> tuple[str, np.ndarray, Callable[[Model], np.ndarray]]:
@@ -150,8 +158,8 @@ def loops(result: Diagnosis) -> Figure:
     for text, model, colour in _models(result):
         axes.plot(x, pick(model), lw=0.8, color=colour, ls="--" if text == "base model" else "-", label=text)
     axes.set_xlabel(label)
-    axes.set_ylabel(f"{name} ({result.rig.parameters.unit if 'texel' in name else 'N'})")
-    axes.set_title(trial.name, loc="left", fontsize=8.5, color=INK)
+    axes.set_ylabel(_quantity(result, name))
+    axes.set_title(f"{trial.name}: {name}", loc="left", fontsize=8.5, color=INK)
     tidy_axes(axes)
     axes.legend(frameon=False, fontsize=8, loc="best")
     return figure
