@@ -15,7 +15,7 @@ from mathutils.bvhtree import BVHTree
 from ..core.errors import PalpateError, SensorError
 from ..core.mesh import TriangleMesh, edge_defects, is_closed
 from ..core.texels import Texels
-from . import skins
+from . import clinging, skins
 
 TOO_NEAR = 0.1
 """Texels nearer than this share of the usual distance count as one upon another."""
@@ -95,6 +95,8 @@ def of_object(obj, notes: list[str]) -> list[Problem]:
             found.append(
                 Problem("OUTDATED", f"The surface of '{obj.parent.name}' has changed since '{obj.name}' was laid on it.")
             )
+        elif clinging.is_needed(obj.parent) and not clinging.clings(obj):
+            found.append(Problem("STILL", f"'{obj.parent.name}' may change its shape, and the texels of '{obj.name}' stay."))
     made = obj.palpate.made_vertices
     if obj.palpate.region == "MESH" and made and made != len(obj.data.vertices):
         found.append(
@@ -236,6 +238,10 @@ def _lay_anew(obj, _problem, _report) -> None:
     skins.lay_anew(bpy.context, obj)
 
 
+def _cling(obj, _problem, _report) -> None:
+    clinging.cling(bpy.context, obj, obj.parent)
+
+
 def _whole_mesh(obj, _problem, _report) -> None:
     obj.palpate.region = "MESH"
     obj.palpate.made_vertices = len(obj.data.vertices)
@@ -253,6 +259,7 @@ FIXES: dict[str, tuple[str, Callable]] = {
     "THROUGH": ("Shorten Max Penetration", _shorten),
     "MODIFIER": ("Apply Modifiers", _apply_modifiers),
     "OUTDATED": ("Lay Anew", _lay_anew),
+    "STILL": ("Bind to Surface", _cling),
     "ORPHAN": ("Keyframed Body", _on_its_own),
     "GROWN": ("That Is Meant", _accept),
     "REGION": ("Use Whole Mesh", _whole_mesh),

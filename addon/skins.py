@@ -18,7 +18,7 @@ from ..core.errors import SensorError
 from ..core.mesh import TriangleMesh, checked_mesh, vertex_normals
 from ..core.surface.array import Skin, fill, middle_of, pad, shifted, wrap
 from ..core.surface.noise import scatter
-from . import identity, meshes, sample, sensors, transforms, units
+from . import clinging, identity, meshes, sample, sensors, transforms, units
 
 RECIPE = ("method", "rows", "columns", "pitch_x", "pitch_y", "shift_x", "shift_y", "angle", "spacing", "seed", "lift")
 """Settings of :class:`.properties.PALPATE_PG_skin` that a skin is made from."""
@@ -64,6 +64,8 @@ def lay(context, carrier, source: str, recipe: dict):
     _remember(obj, carrier, where, recipe)
     if carrier.palpate.role in {"SENSOR", "PAD"}:
         sensors.copy_parameters(carrier, obj)
+    context.view_layer.update()
+    clinging.cling(context, obj, carrier)
     obj.palpate.body = "PARENT"
     obj.palpate.role = "SENSOR"
     for other in context.selected_objects:
@@ -74,7 +76,7 @@ def lay(context, carrier, source: str, recipe: dict):
 
 
 def lay_anew(context, obj) -> int:
-    """Make a skin again from the surface as it is now; returns the number of texels. Groups painted on it are lost.
+    """Make a skin again from the surface as it is now; returns the number of texels. What was painted on it is carried over.
 
     Raises
     ------
@@ -86,14 +88,14 @@ def lay_anew(context, obj) -> int:
     where = {"region": own.region, "vertex_group": own.region_name, "material": own.region_name, "face_set": own.region_number}
     recipe = recipe_of(obj)
     skin = _compute(context, carrier, _chosen(carrier, where), recipe)
-    old = obj.data
+    old, painted = obj.data, clinging.painted(obj)
     obj.data = _mesh_of(skin, old.name)
-    obj.vertex_groups.clear()
+    clinging.carry_over(obj, painted)
     for material in old.materials:
         obj.data.materials.append(material)
     if old.users == 0:
         bpy.data.meshes.remove(old)
-    obj.palpate.region = "MESH"
+    clinging.cling(context, obj, carrier)
     _remember(obj, carrier, where, recipe)
     return len(skin.vertices)
 

@@ -157,7 +157,7 @@ class PALPATE_OT_skin_add(support.Reporting, bpy.types.Operator):
 
 
 class PALPATE_OT_skin_update(support.Reporting, bpy.types.Operator):
-    """Lay the texels of this sensor anew onto the surface as it is now; what was painted on it is lost"""
+    """Lay the texels of this sensor anew onto the surface as it is now; what was painted on it is carried over"""
 
     bl_idname = "palpate.skin_update"
     bl_label = "Lay Anew"

@@ -24,7 +24,8 @@ class Bake(Part):
         layout.prop(own, "use_live")
         progress = state.session.bake
         if progress is not None:
-            layout.progress(text=f"{progress.text} (ESC: stop)", factor=progress.done / progress.total)
+            text = "Preparing the solver" if progress.frame is None else progress.text
+            layout.progress(text=f"{text} (ESC: stop)", factor=progress.done / progress.total)
             return
         row = layout.row(align=True)
         row.operator("palpate.bake", text=f"Bake {scene.frame_start}–{scene.frame_end}", icon="RENDER_ANIMATION")
