@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -21,6 +21,8 @@ SMALLEST_ARROW = 0.08
 """Share of the strongest shear below which no arrow is drawn."""
 MOST_ARROWS = 18
 """Along the longer side: where texels are denser, an arrow is the mean of several."""
+LEAST_ARROWS, ARROW_ROOM = 5, 0.09
+"""The fewest of them, and the inches that one needs to be seen."""
 ARROW = "simple,head_length=5,head_width=5,tail_width=1.5"
 _BARS = (0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100, 200, 500)
 
@@ -44,6 +46,8 @@ class View:
         without true lengths: the side of the surface that bears most, as one sees it from outside.
     axes : (2, 3) float or None
         Of that view, in the frame of the sensor's body; elsewhere the texels' own axes are the image's.
+    most : int
+        Arrows along the longer side.
     """
 
     texels: Texels
@@ -53,6 +57,7 @@ class View:
     seen: np.ndarray
     triangles: np.ndarray | None = None
     axes: np.ndarray | None = None
+    most: int = MOST_ARROWS
 
     @classmethod
     def of(cls, texels: Texels, load: np.ndarray | None = None) -> View:
@@ -124,13 +129,18 @@ class View:
         how = "flattened" if self.triangles is None else f"{self.seen.sum()} in view"
         return f"{len(self.texels)} texels,\n{how}"
 
+    def at_size(self, inches: float) -> View:
+        """Return the view with as many arrows as can be told apart where a millimetre is so many `inches`."""
+        longer = inches * max(self.width, self.height)
+        return replace(self, most=int(np.clip(longer / ARROW_ROOM, LEAST_ARROWS, MOST_ARROWS)))
+
     @property
     def arrow(self) -> float:
         """Length of the longest arrow, mm."""
         layout = self.texels.layout
-        if isinstance(layout, GridLayout) and max(layout.shape) <= MOST_ARROWS:
+        if isinstance(layout, GridLayout) and max(layout.shape) <= self.most:
             return 1.2 * self.width / layout.columns
-        return 1.4 * max(self.width, self.height) / MOST_ARROWS
+        return 1.4 * max(self.width, self.height) / self.most
 
     def draw(
         self, axes: Axes, values: np.ndarray, shear: np.ndarray, strongest: float, top: float, look: Look, edge: str = "#9aa3ad"
@@ -194,10 +204,10 @@ class View:
 
     def _thinned(self, shear: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return where arrows stand and the mean shear of the texels around them; every texel where there are few."""
-        cell = max(self.width, self.height) / MOST_ARROWS
+        cell = max(self.width, self.height) / self.most
         places = np.floor((self.points - [self.window[0], self.window[2]]) / cell).astype(int)
         layout = self.texels.layout
-        if isinstance(layout, GridLayout) and max(layout.shape) <= MOST_ARROWS:
+        if isinstance(layout, GridLayout) and max(layout.shape) <= self.most:
             return self.points, shear
         places, points, shear = places[self.seen], self.points[self.seen], shear[self.seen]
         _, which, count = np.unique(places, axis=0, return_inverse=True, return_counts=True)

@@ -43,6 +43,8 @@ def texel_numbers(
     KeyError
         The frame was not recorded.
     """
+    from matplotlib.patheffects import withStroke
+
     look = look or Look()
     own = texels[name]
     if len(own) > MOST:
@@ -77,7 +79,9 @@ def texel_numbers(
     colours = image.cmap(image.norm(values))
     for (x, y), word, colour in zip(view.points[view.seen], np.array(words)[view.seen], colours[view.seen], strict=True):
         light = float(np.dot(colour[:3], (0.299, 0.587, 0.114))) > 0.5
-        axes.text(x, y, word, fontsize=SMALL, color=INK if light else "white", ha="center", va="center_baseline")
+        ink, around = (INK, "white") if light else ("white", INK)
+        rim = [withStroke(linewidth=1.2, foreground=around, alpha=0.55)]  # texels on the very edge lie half on white
+        axes.text(x, y, word, fontsize=SMALL, color=ink, ha="center", va="center_baseline", path_effects=rim)
     time = recording.times[int(np.searchsorted(recording.frames, frame))]
     figure.text(
         side / width, 1 - 0.05 / height, f"{name}, {time:.2f} s, {unit}", fontsize=FONT, color=INK, weight="bold", va="top"

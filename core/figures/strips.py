@@ -61,6 +61,8 @@ def tactile_strip(
         y -= heights[row]
         sensor = recording.sensors[name]
         values = look.values(sensor, texels[name])
+        inches = min((cell - 0.06) / view.width, heights[row] / view.height)
+        view = view.at_size(inches)
         for column, i in enumerate(index):
             x = left + column * cell + 0.03
             axes = figure.add_axes((x / width, y / height, (cell - 0.06) / width, heights[row] / height))
@@ -72,7 +74,6 @@ def tactile_strip(
         figure.text(0.06 / width, middle + 0.04 / height, wrapped(name), fontsize=FONT, color=INK, weight="bold", va="bottom")
         figure.text(0.06 / width, middle, view.caption, fontsize=SMALL, color=GREY, va="top", linespacing=1.3)
         shown = strongest if np.linalg.norm(sensor.shear[index], axis=2).max(initial=0.0) > SMALLEST_ARROW * strongest else 0.0
-        inches = min((cell - 0.06) / view.width, heights[row] / view.height)
         start = min(left + 0.5 * (cell - inches * view.width), width - right - keys_width(view, shown, inches))
         keys(figure, (max(start, 0.06), y - 0.2), view, shown, inches)
         y -= gap
