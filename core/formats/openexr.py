@@ -23,7 +23,8 @@ _FLOAT = 2
 _LINES = {0: 1, 2: 1, 3: 16}
 """Compression (none, ZIPS, ZIP) → scan lines in a block."""
 _ZIP = 3
-_LEVEL = 4
+_LEVEL = 2
+"""Of zlib: 4 takes four times as long and makes tactile images 3 % smaller."""
 
 
 class FormatError(ValueError):
@@ -86,7 +87,7 @@ def _pack(raw: bytes) -> bytes:
     data = np.frombuffer(raw, np.uint8)
     sorted_bytes = np.concatenate([data[::2], data[1::2]])
     different = sorted_bytes.copy()
-    different[1:] = np.diff(sorted_bytes.astype(np.int16)) + 128 & 0xFF
+    different[1:] = sorted_bytes[1:] - sorted_bytes[:-1] + np.uint8(128)  # modulo 256
     packed = zlib.compress(different.tobytes(), _LEVEL)
     return packed if len(packed) < len(raw) else raw
 
