@@ -13,6 +13,7 @@ that in registers whatever is written.
 from __future__ import annotations
 
 import hashlib
+import operator
 from functools import cached_property
 from typing import Any, TypeVar, cast
 
@@ -110,11 +111,13 @@ else:
             c.pyapi.decref(answer)
         return NativeValue(builder.load(pointer), is_error=failed)
 
-    def _written(value: Any) -> list[int]:
+    def _written(value: Any) -> list[Any]:
         """Return the words that a field takes in compiled code."""
         if isinstance(value, np.ndarray):  # no reference is counted: the instance keeps its arrays
             return [0, id(value), value.size, value.itemsize, value.ctypes.data, *value.shape, *value.strides]
-        return [value.address if hasattr(value, "address") else int(value)]
+        if isinstance(value, tuple):
+            return [cast(Any, value).address]
+        return [operator.index(value)]
 
     def by_reference(cls: Class) -> Class:
         """Have kernels take instances of a NamedTuple as one pointer; fields are arrays, integers, or such tuples again."""
@@ -123,7 +126,7 @@ else:
             """With room to keep what compiled code asks for."""
 
             @cached_property
-            def kind(self) -> Reference:
+            def numba_type(self) -> Reference:
                 """Numba's type of this instance."""
                 return Reference(Referred, tuple(typeof(field) for field in self))
 
@@ -136,11 +139,14 @@ else:
                 """Where the fields are written down, for as long as this instance lives."""
                 return int(self._words.ctypes.data)
 
+        hidden = [name for name in Referred._fields if getattr(Referred, name) is not getattr(cls, name)]
+        if hidden:
+            raise TypeError(f"{cls.__name__}: a field may not be called {hidden[0]}")
         for name in ("__name__", "__qualname__", "__module__", "__doc__"):
             setattr(Referred, name, getattr(cls, name))
 
         @typeof_impl.register(Referred)
         def _typeof(value: Any, context: Any) -> Reference:
-            return cast(Reference, value.kind)
+            return cast(Reference, value.numba_type)
 
         return cast(Class, Referred)

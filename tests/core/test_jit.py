@@ -7,14 +7,35 @@ import re
 import shutil
 import subprocess
 import sys
+from typing import NamedTuple
 
+import numpy as np
 import pytest
 from solver_scenes import cube_on_pad
 
 from palpate.core import bristles, edition, jit, pairs, sums
+from palpate.core.reference import by_reference
 from palpate.core.solve import Simulation
 
 numba = pytest.importorskip("numba")
+
+
+@by_reference
+class Inner(NamedTuple):
+    values: np.ndarray
+
+
+@by_reference
+class Outer(NamedTuple):
+    kind: np.ndarray
+    inner: Inner
+    number: int
+
+
+@jit.kernel
+def total(outer):
+    return outer.kind[0, 1] + outer.inner.values[2] + outer.number
+
 
 CALLER = """
 from .callee import value
@@ -73,3 +94,22 @@ def test_loops_over_contacts_run_in_vector_registers(name):
         compiled(0, pairs.values(scratch.part[0]), simulation._state, scratch)
     (code,) = compiled.inspect_asm().values()
     assert re.search(r"^\s+v?sqrtpd\s", code, re.MULTILINE), "the square root is taken of one number at a time"
+
+
+def test_tuples_that_kernels_take_by_reference_stay_tuples():
+    """What a kernel reads through the pointer is what Python reads, in tuples within tuples as well."""
+
+    inner = Inner(np.array([1.0, 2.0, 3.0]))
+    outer = Outer(np.array([[10, 20], [30, 40]]), inner, 400)
+    assert (outer.kind[0, 1], outer.inner.values[2], outer.number) == (20, 3.0, 400)
+    assert total(outer) == 423.0
+    assert total(outer._replace(number=7, inner=Inner(np.array([0.0, 0.0, 0.5])))) == 27.5
+
+
+@pytest.mark.skipif(not jit.COMPILED, reason="only compiled code takes addresses")
+def test_a_field_may_not_hide_what_a_reference_keeps():
+    class Wrong(NamedTuple):
+        address: int
+
+    with pytest.raises(TypeError, match="address"):
+        by_reference(Wrong)
