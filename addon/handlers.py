@@ -9,8 +9,22 @@ from bpy.app.handlers import persistent
 from . import identity, live, migrations, overlays, preparing, preview, sample, state, texelview
 
 
+def _settle() -> None:
+    """Look through the file once: after it was opened, or at the first event after the add-on was enabled on an open one."""
+    if state.session.settled or state.session.rendering:
+        return
+    state.session.settled = True
+    identity.claim(bpy.data.objects)
+    migrations.apply()
+    for scene in bpy.data.scenes:
+        live.hide(scene)  # a file that was written without save_pre, as by a crash
+    if any(obj.palpate.role != "NONE" for obj in bpy.data.objects):
+        preparing.begin()
+
+
 @persistent
 def palpate_frame_change_pre(scene, _depsgraph=None):
+    _settle()
     live.before_frame(scene)
 
 
@@ -23,6 +37,7 @@ def palpate_frame_change_post(scene, depsgraph):
 @persistent
 def palpate_depsgraph_update_post(_scene, depsgraph):
     """Only note what was touched; whether it really changed is found out at the next frame."""
+    _settle()
     session = state.session
     for update in depsgraph.updates:
         block = update.id
@@ -38,14 +53,9 @@ def palpate_depsgraph_update_post(_scene, depsgraph):
 def palpate_load_post(_path):
     state.reset()
     identity.forget()
-    identity.claim(bpy.data.objects)
     live.forget()
     preview.forget()
-    migrations.apply()
-    for scene in bpy.data.scenes:
-        live.hide(scene)  # a file that was written without save_pre, as by a crash
-    if any(obj.palpate.role != "NONE" for obj in bpy.data.objects):
-        preparing.begin()
+    _settle()
 
 
 @persistent

@@ -11,6 +11,8 @@ from dataclasses import dataclass, field
 class Session:
     """What handlers, bake and panels share."""
 
+    settled: bool = False
+    """Whether what the file holds was looked through; also a file that was open before the add-on was enabled."""
     participants_known: bool = False
     """False when objects may have got or lost a role since `has_roles` was filled."""
     changed_geometry: set[str] = field(default_factory=set)

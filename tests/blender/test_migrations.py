@@ -47,6 +47,20 @@ def test_a_newer_file_is_left_alone_and_it_is_said(tmp_path):
     assert state.session.notes == {}
 
 
+def test_a_file_that_is_open_when_the_add_on_is_enabled_is_looked_through_as_well(tmp_path):
+    """At the first event, since Blender allows nothing while it enables an add-on."""
+    _, pad, _ = press()
+    write_raw(pad, {"schema_version": VERSION + 5})
+    path = save(tmp_path)
+    bpy.ops.preferences.addon_disable(module="palpate")
+    reopen(path)
+    bpy.ops.preferences.addon_enable(module="palpate")
+    assert state.session.notes == {}
+    bpy.data.objects["Pad"].location.x += 0.001
+    bpy.context.view_layer.update()
+    assert "newer Palpate" in state.session.notes["Pad"]
+
+
 def test_todays_settings_are_not_touched(tmp_path):
     _, pad, _ = press()
     before = migrations.stored(pad)
