@@ -27,7 +27,7 @@ LIMITS = {
 reading that rises fivefold is a lag, a softening that leaves nothing is wear)."""
 
 NEVER = ("noise",)
-"""Kinds that are not found by fitting: noise is the floor of everything."""
+"""Kinds that are not found by fitting but by what is left in the end (see :mod:`.tremble`)."""
 READ_OFF = ("dead-texels", "quantization")
 """Kinds whose numbers are read off the recordings, since a texel is dead or is not, and a step is there or is not."""
 

@@ -17,7 +17,7 @@ import numpy as np
 
 from ..effects.library import kind_of
 from .admissible import admissible
-from .candidates import Candidate, Scales, candidates, scales_of
+from .candidates import NEVER, Candidate, Scales, candidates, scales_of
 from .fit import FRICTION, Fit, Free, base_numbers, fit, held_out
 from .model import Model, Predictor
 from .noise import Coverage, Noise, coverage, force_noise, reading_noise
@@ -25,6 +25,7 @@ from .rig import Rig
 from .search import Found, Views, search, views_of
 from .structure import Structure, structure_of
 from .telling import confounded, untold
+from .tremble import trembling
 
 FIRST, NEXT, NEXT_OF_ALL = 0.25, 0.45, 0.03
 """Least share of the gap that the first effect closes; of what is left that a further one closes; and of the whole gap."""
@@ -36,6 +37,8 @@ STRUCTURE = 0.03
 """Share of a residual that can be predicted, below which it is noise."""
 RIVAL = 1.35
 """A rival is one that leaves at most so many times as much of the gap as the best does."""
+SMALL = 0.1
+"""One of several that closes a smaller share of the whole gap may be what the others' formulas lack: it is no sure name."""
 MOST = 3
 """Most effects that are looked for."""
 
@@ -217,7 +220,7 @@ def _explain(result: Diagnosis, views: Views) -> Iterator[tuple[str, float]]:
     floor = min(1.0, mean0)
     steps: list[list[Found]] = []
     mixed = confounded(result.coverage)
-    floors = [mean0 * (1.0 - structure.total)]
+    floors, gains = [mean0 * (1.0 - structure.total)], {}
     for turn in range(MOST):
         mean = float(unseen.sum() / current.count.sum())
         enough = max(LEAST, NEXT_OF_ALL * (mean0 - floor))  # of less, no effect could close as much as it has to
@@ -237,15 +240,22 @@ def _explain(result: Diagnosis, views: Views) -> Iterator[tuple[str, float]]:
         best = _simplest([one for one in ranked if one.candidate.name not in mixed] or ranked, floor)
         if not _earns(best, unseen, mean, mean0, floor, first=turn == 0):
             break
+        gains[best.candidate.name] = mean - best.mean
         current, unseen = best.fit, best.unseen
         structure = _structure(views, current)
         floors.append(best.mean * (1.0 - structure.total))
     alone = steps[0] if steps else []
     if len(current.model.effects) >= 2:
-        current, unseen, steps = yield from _reconsider(result, views, current, unseen, steps, floor)
+        current, unseen, steps = yield from _reconsider(result, views, current, unseen, steps, floor, gains)
     result.best, result.structure = current, _structure(views, current)
     floor = float(np.clip(min(floors), 0.8, 1.0))
-    _conclude(result, steps, mean0, float(unseen.sum() / current.count.sum()), floor)
+    if result.structure.total < STRUCTURE:
+        noise = trembling(views.whole, current.model)
+        if noise is not None:  # then all that is left is noise
+            result.best = replace(current, model=current.model.with_effect(noise))
+            floor = max(floor, float(unseen.sum() / current.count.sum()))
+    small = {name for name, gain in gains.items() if gain < SMALL * (mean0 - floor)}
+    _conclude(result, steps, small, mean0, float(unseen.sum() / current.count.sum()), floor)
     _rule_out(result, alone, mean0, floor)
 
 
@@ -283,7 +293,13 @@ def _earns(one: Found, unseen: np.ndarray, mean: float, mean0: float, floor: flo
 
 
 def _reconsider(
-    result: Diagnosis, views: Views, current: Fit, unseen: np.ndarray, steps: list[list[Found]], floor: float
+    result: Diagnosis,
+    views: Views,
+    current: Fit,
+    unseen: np.ndarray,
+    steps: list[list[Found]],
+    floor: float,
+    gains: dict[str, float],
 ) -> Generator[tuple[str, float], None, tuple[Fit, np.ndarray, list[list[Found]]]]:
     """The first effect was chosen without the others: look whether another does better beside them."""
     mean = float(unseen.sum() / current.count.sum())
@@ -304,6 +320,7 @@ def _reconsider(
     if ranked:
         best = _simplest(ranked, floor)
         alone = float(held_out(views.whole, other).sum() / other.count.sum())
+        gains[best.candidate.name] = alone - best.mean
         if alone - best.mean < max(LEAST, 0.3 * max(alone - floor, 0.0)):  # what came later does it all
             return other, held_out(views.whole, other), steps[1:]
         if best.mean < mean - 0.02 * max(mean - floor, 0.0) - 1e-6 or best.candidate.name == first.name:
@@ -322,12 +339,15 @@ def _last_first(found: Fit) -> Fit:
     return replace(found, model=Model(found.model.parameters, effects), free=free)
 
 
-def _conclude(result: Diagnosis, steps: list[list[Found]], mean0: float, mean: float, floor: float) -> None:
-    """Write verdict, names and rivals."""
+def _conclude(result: Diagnosis, steps: list[list[Found]], small: set[str], mean0: float, mean: float, floor: float) -> None:
+    """Write verdict, names and rivals; those that close little beside others are `small`."""
     gap = mean0 - floor
     effects = result.best.model.effects
     structured = result.base_structure.total
-    if not effects:
+    fitted = [effect for effect in effects if effect.name != "noise"]
+    if effects and not fitted:
+        result.verdict = "explained"
+    elif not effects:
         noise_only = structured < STRUCTURE and (mean0 < 2.0 or gap < LEAST)
         result.verdict = "no gap" if noise_only else "unexplained"
     else:
@@ -348,10 +368,11 @@ def _conclude(result: Diagnosis, steps: list[list[Found]], mean0: float, mean: f
                         others[one.candidate.name] = min(ratio, others.get(one.candidate.name, np.inf))
             rivals = tuple(name for name, ratio in others.items() if ratio < RIVAL)
             weight = 1.0 / (1.0 + sum(ratio**-3.0 for ratio in others.values()))
-        share = float(np.clip((mean0 - mean) / max(gap, 1e-12), 0.0, 1.0))
+        share = float(np.clip((mean0 - mean) / max(gap, 1e-12), 0.0, 1.0)) if fitted else 1.0
         confidence = weight * (0.5 + 0.5 * share) if result.verdict == "explained" else 0.5 * weight * share
-        if rivals:
+        if rivals or (effect.name in small and len(fitted) > 1):
             confidence = min(confidence, 0.45)
+        if rivals:
             result.ambiguous.append((effect.name, *rivals))
         nearest = min(others, key=lambda name: others[name], default="")
         result.named.append(
@@ -372,7 +393,9 @@ def _rule_out(result: Diagnosis, alone: list[Found], mean0: float, floor: float)
     for kind in library().values():
         if kind.name in named:
             continue
-        if kind.name not in looked:
+        if kind.name in NEVER:
+            why = "what is left does not tremble the more, the larger the reading"
+        elif kind.name not in looked:
             why = untold(result.coverage).get(kind.name, "these recordings cannot show it")
         elif kind.name in tried and result.verdict != "no gap":
             why = f"alone it closes {max(tried[kind.name], 0.0):.0%} of the squared gap on unseen trials"

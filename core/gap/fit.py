@@ -253,7 +253,7 @@ def fit(
         takes more steps; where they end is the same.
     judged : bool
         Whether the normal equations at the end are wanted as well.
-    begun : sequence of (held, T, c + 3) float, optional
+    begun : sequence of (held or more, T, c + 3) float, optional
         Derivatives by the first numbers, of each share, near where it starts.
     """
     free = tuple(free)
@@ -267,7 +267,7 @@ def fit(
     if begun is not None:
         known = held
         for table, first in zip(tables, begun, strict=True):
-            table[:held] = first
+            table[:held] = first[:held]
     while turn < turns:
         turn += 1
         for share, residual, table in zip(shares, residuals, tables, strict=True):
@@ -291,9 +291,10 @@ def fit(
             continue
         gained = best - found
         at, model, residuals, best = moved, trial, fresh, found
-        damping, known = max(damping * 0.2, 1e-9), held
-        if gained < tolerance * best:
+        damping, little = max(damping * 0.2, 1e-9), gained < tolerance * best
+        if little and (known == 0 or not judged):
             break
+        known = 0 if little else held  # held derivatives may lead nowhere long before the end
     sums = None
     if judged:
         sums = []

@@ -78,7 +78,8 @@ class Predictor:
 
     def _reading(self, model: Model, columns: np.ndarray | None) -> np.ndarray:
         p = model.parameters
-        reading = tuple(effect for effect in model.effects if stage_of(effect) == "readout")
+        # Noise is left out: what is predicted is what is to be expected.
+        reading = tuple(e for e in model.effects if stage_of(e) == "readout" and e.name != "noise")
         key = (self._force_key(model, columns), p.gain, p.zero, _key(reading))
         if key not in self._readings:
             site = bound.site_of(Sensor("sensor", 0, self.rig.texels, p))

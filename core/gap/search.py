@@ -388,6 +388,14 @@ def search(
         yield "judging the best on trials they have not seen", 0.7 + 0.3 * (number + 1) / len(last), results
 
 
+def _rubbing(shares: Sequence[Share], model: Model) -> Model:
+    """Return the model, or it with friction as the rig has it: what friction was fitted to without an effect may be far off."""
+    stated = shares[0].predictor.rig.parameters
+    other = replace(model, parameters=replace(model.parameters, **{name: getattr(stated, name) for name in FRICTION}))
+    square = [sum(float(np.vdot(r, r)) for r in (share.residual(one) for share in shares)) for one in (model, other)]
+    return other if square[1] < square[0] else model
+
+
 def _kept(
     begun: list[tuple[float, Candidate, list[tuple[float, Effect]]]], most: int = 14
 ) -> list[tuple[float, Candidate, list[tuple[float, Effect]]]]:
