@@ -132,6 +132,8 @@ class World(NamedTuple):
     inverse_inertia : (b, 3, 3) float, 1/(kg·m²), body axes
         Zero for bodies that are not free.
     gravity : (3,) float, m/s²
+    thrown : (b, 3) float, m/s
+        Velocity of each body at the very start.
     axis : (b, 3) float
         Direction in which the drive of each driven body moves it: in its own frame, or, `axis_in_world`, in the world.
     axis_in_world : (b,) bool
@@ -170,6 +172,7 @@ class World(NamedTuple):
     inertia: np.ndarray
     inverse_inertia: np.ndarray
     gravity: np.ndarray
+    thrown: np.ndarray
     axis: np.ndarray
     axis_in_world: np.ndarray
     drive_of: np.ndarray
@@ -199,6 +202,8 @@ class State(NamedTuple):
         Way along the axis (m), speed (m/s) and force (N) of each drive.
     memory : (N, columns) float
         What effects remember, by contact point.
+    tank : (q,) float, joules
+        What went into the contacts of each pair and has not come out again (see :mod:`.tank`).
     """
 
     position: np.ndarray
@@ -208,6 +213,7 @@ class State(NamedTuple):
     bristles: np.ndarray
     drives: np.ndarray
     memory: np.ndarray
+    tank: np.ndarray
 
 
 SERIES = tuple(1.0 / math.factorial(n + 1) for n in range(13, -1, -1))

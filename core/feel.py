@@ -15,7 +15,7 @@ from .skin import OX, OY, OZ
 
 
 @allocating
-def feel(world, state, scratch, force, shear, depth, slip, contact, net, moment):
+def feel(world, state, scratch, force, shear, friction, depth, slip, contact, net, moment):
     """What every texel feels right now, from rows freshly gathered (Eq. 8, 9, 13); forces on the sensor, in its body's frame.
 
     `net` gets force and torque about the body's reference point, `moment` the sum of fn · point and of fn.
@@ -60,9 +60,11 @@ def feel(world, state, scratch, force, shear, depth, slip, contact, net, moment)
                 fy = friction_force(zy, bristle_rate(zy, ty, square, fn, p), ty, p)
                 fz = friction_force(zz, bristle_rate(zz, tz, square, fn, p), tz, p)
             fx, fy, fz, fn = whole * fx, whole * fy, whole * fz, whole * fn
+            friction[texel] += math.sqrt(fx * fx + fy * fy + fz * fz)
+            # The whole force is what the texel's own plane gets its part of: where the object's surface leans, some is of fn.
+            fx, fy, fz = fx + fn * nx, fy + fn * ny, fz + fn * nz
             shear[texel, 0] += fx * points[point, 6] + fy * points[point, 7] + fz * points[point, 8]
             shear[texel, 1] += fx * points[point, 9] + fy * points[point, 10] + fz * points[point, 11]
-            fx, fy, fz = fx + fn * nx, fy + fn * ny, fz + fn * nz
             if fn > strongest[texel]:  # the slip is that of the target and the point which press hardest
                 strongest[texel] = fn
                 slip[texel] = math.sqrt(square)

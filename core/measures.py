@@ -66,7 +66,7 @@ def slipping(sensor: SensorRecording | SensorFrame, parameters: SensorParameters
     limit = friction_limit(sensor.normal_force[found], sensor.slip[found], parameters)
     if painted is not None and painted.friction is not None:
         limit = limit * np.broadcast_to(painted.friction, found.shape)[found]
-    found[found] = np.linalg.norm(sensor.shear[found], axis=-1) >= AT_LIMIT * limit
+    found[found] = sensor.friction[found] >= AT_LIMIT * limit
     return found
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, fields
 
 import numpy as np
 
-PER_TEXEL = ("normal_force", "shear", "depth", "slip", "contact", "reading")
+PER_TEXEL = ("normal_force", "shear", "friction", "depth", "slip", "contact", "reading")
 """Names of the per-texel channels, in the order in which every exporter writes them."""
 
 
@@ -21,7 +21,10 @@ class SensorFrame:
     normal_force : (n,) float, N
         Of the force along the object's surface normal (paper, Eq. 8); below zero only where the effect adhesion pulls.
     shear : (n, 2) float, N
-        Friction force along the texel's x and y axes (Eq. 13).
+        The part of the whole force that lies in the texel's own plane, along its x and y axes: on a flat sensor the texels'
+        shear adds up to the tangential part of `net_force`, to rounding.
+    friction : (n,) float, N
+        Magnitude of the friction force (Eq. 13), which lies in the object's surface; never above what friction can hold.
     depth : (n,) float, m
         Penetration, perpendicular to the object's surface (Eq. 4).
     slip : (n,) float, m/s
@@ -37,6 +40,7 @@ class SensorFrame:
 
     normal_force: np.ndarray
     shear: np.ndarray
+    friction: np.ndarray
     depth: np.ndarray
     slip: np.ndarray
     contact: np.ndarray
@@ -75,6 +79,7 @@ class SensorRecording:
 
     normal_force: np.ndarray
     shear: np.ndarray
+    friction: np.ndarray
     depth: np.ndarray
     slip: np.ndarray
     contact: np.ndarray

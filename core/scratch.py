@@ -7,9 +7,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .bodies import look_back
+from .bodies import DRIVEN, FREE, look_back
 from .contact import DEPTH, LANES, NX, PX, ROW, State, World
 from .effects.laws import COLUMNS
+from .pads import may_pull
 from .reference import by_reference
 from .shapes import Shapes
 
@@ -70,6 +71,16 @@ class Scratch(NamedTuple):
         Numbers of the contact points.
     drive_mass, drive_load : (d,) float
         What each drive moves (kg), and the impulse that its weight and its carrier ask for in this step (N·s).
+    before : (b, 6) float
+        Velocity of each body at the step's beginning.
+    counted : (q,) bool
+        Which pairs have a tank (see :mod:`.tank`): forces move one of their bodies, and nothing but they brings energy.
+        Adhesion pulls before it is pulled, prescribed deformation pushes from within, and drives push at will.
+    force, found, found_before : (q, 6) float
+        Force and torque on the target, in the axes of the sensor's body, that belong to the guess, and as a round and the one
+        before found them; those of all parts of a pair with the last, like the following.
+    work, left, hold, enough, too_much : (q,) float
+        Work that each pair does in the step and could do (J); the share of its forces that acts, and what it lies between.
     step : (1,) float, seconds
         The time step that helpers are to reckon with.
     board : (BOARD,) or (0,) int
@@ -110,6 +121,16 @@ class Scratch(NamedTuple):
     every: np.ndarray
     drive_mass: np.ndarray
     drive_load: np.ndarray
+    before: np.ndarray
+    counted: np.ndarray
+    force: np.ndarray
+    found: np.ndarray
+    found_before: np.ndarray
+    work: np.ndarray
+    left: np.ndarray
+    hold: np.ndarray
+    enough: np.ndarray
+    too_much: np.ndarray
     step: np.ndarray
     board: np.ndarray
 
@@ -159,9 +180,27 @@ def scratch_for(world: World, state: State, shapes: Shapes, board: np.ndarray) -
         every=np.arange(len(world.points)),
         drive_mass=np.zeros(len(world.drives)),
         drive_load=np.zeros(len(world.drives)),
+        before=np.zeros((b, 6)),
+        counted=_counted(world, moving),
+        force=np.zeros((len(world.pairs), 6)),
+        found=np.zeros((len(world.pairs), 6)),
+        found_before=np.zeros((len(world.pairs), 6)),
+        work=np.zeros(len(world.pairs)),
+        left=np.zeros(len(world.pairs)),
+        hold=np.ones(len(world.pairs)),
+        enough=np.zeros(len(world.pairs)),
+        too_much=np.ones(len(world.pairs)),
         step=np.zeros(1),
         board=board,
     )
+
+
+def _counted(world: World, moving: np.ndarray) -> np.ndarray:
+    sensor, target = world.pairs.T
+    kinds = world.kind[np.stack([world.sensor_body[sensor], world.target_body[target]])]
+    moved = (kinds == FREE).any(axis=0) & (kinds != DRIVEN).all(axis=0)
+    pulls = np.array([may_pull(i, world.program) for i in sensor], dtype=bool)
+    return moved & ~moving & ~pulls
 
 
 def contacts_of(pair: int, scratch: Scratch) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:

@@ -36,6 +36,7 @@ from .servo import drive_table
 from .shapes import Shapes
 from .step import advance_steps
 from .surfaces import Surfaces, extent, point_rows
+from .tank import fill_tanks
 from .timestep import plan
 
 PART = 512
@@ -157,6 +158,9 @@ class Simulation:
         velocities = np.concatenate([np.diff(positions, axis=0), turns], axis=2) / self.dt
         if self._surfaces.moves:
             self._shapes = self._surfaces.at(times)
+        if self.frame == self.scenario.frame_start:
+            gather_all(-self.dt, *self.arrays)
+            fill_tanks(self._world, self._state, self._scratch)
         self._sunk = 0
         for first, last, commands in self._pilot.stretches(times, self.dt, self._tactile):
             with helpers(self._scratch.board, self._helpers, help_out, *self.arrays):
@@ -243,18 +247,18 @@ class Simulation:
         return force[self._texel_start[sensor] : self._texel_start[sensor + 1]]
 
     def _feel(self) -> tuple[np.ndarray, ...]:
-        """Per texel normal force, shear, depth, slip and contact, per sensor the sums of :func:`feel`, from rows gathered."""
+        """What :func:`feel` writes, from rows gathered: per texel up to the contact, then per sensor."""
         n, m = self._texel_start[-1], len(self.scenario.sensors)
-        force, depth, slip, contact = np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n, dtype=np.bool_)
+        force, friction, depth, slip, contact = *np.zeros((4, n)), np.zeros(n, dtype=np.bool_)
         shear, net, moment = np.zeros((n, 2)), np.zeros((m, 6)), np.zeros((m, 4))
-        feel(self._world, self._state, self._scratch, force, shear, depth, slip, contact, net, moment)
-        return force, shear, depth, slip, contact, net, moment
+        feel(self._world, self._state, self._scratch, force, shear, friction, depth, slip, contact, net, moment)
+        return force, shear, friction, depth, slip, contact, net, moment
 
     def observe(self) -> Frame:
         """What the sensors feel in the present state."""
         gather_all(-self.dt, *self.arrays)
         self._warn_of_sunk()
-        force, shear, depth, slip, contact, net, moment = self._feel()
+        force, shear, friction, depth, slip, contact, net, moment = self._feel()
         sensors = {}
         for i, sensor in enumerate(self.scenario.sensors):
             if not sensor.readout:
@@ -265,6 +269,7 @@ class Simulation:
             sensors[sensor.name] = SensorFrame(
                 normal_force=force[own].copy(),
                 shear=shear[own].copy(),
+                friction=friction[own].copy(),
                 depth=depth[own].copy(),
                 slip=slip[own].copy(),
                 contact=contact[own].copy(),
@@ -333,6 +338,7 @@ def _world(scenario: Scenario, center: np.ndarray, points: list[ContactPoints], 
         inertia=np.ascontiguousarray([body.inertia for body in bodies], dtype=float),
         inverse_inertia=np.array([np.linalg.inv(body.inertia) if body.free else np.zeros((3, 3)) for body in bodies]),
         gravity=np.array(scenario.gravity, dtype=float),
+        thrown=np.array([body.velocity if body.free else np.zeros(3) for body in bodies], dtype=float),
         axis=np.array([np.zeros(3) if body.drive is None else body.drive.axis for body in bodies], dtype=float),
         axis_in_world=np.array([body.drive is not None and body.drive.axis_in_world for body in bodies]),
         drive_of=drive_of,
@@ -405,6 +411,7 @@ def _start(scenario: Scenario, world: World, center: np.ndarray) -> State:
         bristles=np.zeros((slots, 4)),
         drives=np.zeros((len(world.drives), 3)),
         memory=world.program.memory(len(world.points)),
+        tank=np.zeros(len(world.pairs)),
     )
 
 

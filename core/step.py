@@ -50,6 +50,8 @@ def advance_steps(
         for drive in range(len(world.drives)):
             scratch.drive_mass[drive] = scratch.drive_load[drive] = 0.0
         for body in range(len(world.kind)):
+            for i in range(6):
+                scratch.before[body, i] = state.velocity[body, i]
             if world.kind[body] == KEYFRAMED:
                 for i in range(6):
                     state.velocity[body, i] = path_velocity[step, body, i]

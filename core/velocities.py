@@ -9,11 +9,12 @@ from __future__ import annotations
 
 import math
 
-from .bodies import DRIVEN, FREE, KEYFRAMED, add_product, keep_axis, solve_positive, write_twist, write_twist_map
-from .contact import LANES
+from .bodies import DRIVEN, FREE, KEYFRAMED, solve_positive, write_twist
 from .jit import inlined, kernel
 from .phases import SUM, share_out
 from .servo import SPEED, add_servos
+from .system import add_pair, find_forces
+from .tank import HALVINGS, are_paid, open_tanks
 from .tumble import mean_spin, product
 
 PASSES = 40
@@ -31,10 +32,20 @@ def solve_velocities(dt, commands, world, tree, neighbours, shapes, state, scrat
     contact that would pull is left out of the next round. Rounds that close in are cut short by a secant. Where they go in
     circles (friction that was guessed for too much load throws the contact off, without the contact there is no friction), the
     guess moves by a share of the way only. All that is mixed keeps the momentum. With nothing to solve for one round only
-    linearises.
+    linearises. Where contacts would give more than they were given (see :mod:`.tank`), less of their forces acts.
     """
-    matrix, vector, guess, n = scratch.matrix, scratch.vector, scratch.guess, world.unknowns
     _begin_guess(dt, world, state, scratch)
+    open_tanks(world, state, scratch)
+    for halving in range(HALVINGS):
+        _solve_rounds(dt, commands, world, tree, neighbours, shapes, state, scratch)
+        if world.unknowns == 0 or are_paid(halving, dt, world, state, scratch):
+            break
+
+
+@inlined
+def _solve_rounds(dt, commands, world, tree, neighbours, shapes, state, scratch):
+    """Solve for the velocities with what is held back of the pairs' forces, from the present guess on."""
+    matrix, vector, guess, n = scratch.matrix, scratch.vector, scratch.guess, world.unknowns
     last_change, share = 0.0, 1.0
     for turn in range(PASSES):
         _write_twists(dt, world, state, scratch)
@@ -46,7 +57,7 @@ def solve_velocities(dt, commands, world, tree, neighbours, shapes, state, scrat
         for pair in range(len(world.pairs)):
             a, b = world.sensor_body[world.pairs[pair, 0]], world.target_body[world.pairs[pair, 1]]
             if world.at[a] >= 0 or world.at[b] >= 0:
-                _add_pair(pair, a, b, dt, world, state, scratch)
+                add_pair(pair, a, b, dt, world, state, scratch)
         if n == 0:
             return
         for body in range(len(world.kind)):
@@ -69,6 +80,7 @@ def solve_velocities(dt, commands, world, tree, neighbours, shapes, state, scrat
             share *= 0.5
         # Drives are without limits in the first round: what it changes says nothing yet.
         last = (turn > 0 or len(world.drives) == 0) and (change <= CONVERGED * given or change < 1e-13)
+        find_forces(world, state, scratch)
         _guess_again(share, not last and share == 1.0 and change < 0.9 * last_change, n, scratch)
         if last:
             break
@@ -95,6 +107,11 @@ def _guess_again(share, ahead, n, scratch):
         found, change = vector[i], vector[i] - guess[i]
         guess[i] = share * (found - further * (found - earlier[0, i])) + (1.0 - share) * guess[i]
         earlier[0, i], earlier[1, i] = found, change
+    for pair in range(len(scratch.counted)):  # forces are mixed as velocities are, so that both belong together
+        for i in range(6):
+            found, before = scratch.found[pair, i], scratch.found_before[pair, i]
+            scratch.force[pair, i] = share * (found - further * (found - before)) + (1.0 - share) * scratch.force[pair, i]
+            scratch.found_before[pair, i] = found
 
 
 @inlined
@@ -112,7 +129,7 @@ def _begin_guess(dt, world, state, scratch):
                 guess[at + i] = velocity[body, i]
                 alone[at + i] = velocity[body, i] + dt * world.gravity[i]
                 momentum[at + i] = world.mass[body] * alone[at + i]
-                guess[at + 3 + i] = alone[at + 3 + i] = mean[i]
+                guess[at + 3 + i] = alone[at + 3 + i] = scratch.before[body, 3 + i] = mean[i]
                 scratch.tumbling[body, i] = mean[i] - spin[i]
             momentum[at + 3], momentum[at + 4], momentum[at + 5] = product(inertia, mean[0], mean[1], mean[2])
         elif world.kind[body] == KEYFRAMED:
@@ -155,69 +172,3 @@ def _write_twists(dt, world, state, scratch):
             for i in range(3):
                 velocity[body, i] += guess[at] * scratch.axis[body, i]
             write_twist(velocity[body], dt, twist[body])
-
-
-@inlined
-def _collect(pair, world, scratch):
-    """Add up what :func:`_sum_contacts` has left for the parts of a pair; returns whether that is all and anything touches."""
-    pairs, sums, block, wrench = world.pairs, scratch.sums[pair], scratch.block, scratch.wrench
-    if pair == 0 or pairs[pair, 0] != pairs[pair - 1, 0] or pairs[pair, 1] != pairs[pair - 1, 1]:
-        block[:], wrench[:] = 0.0, 0.0
-    if scratch.contacts[pair] > 0:
-        at = 0
-        for i in range(6):
-            for j in range(i + 1):
-                block[i, j] += sums[at]
-                at += LANES
-        for i in range(6):
-            wrench[i] += sums[at]
-            at += LANES
-    last = pair + 1 == len(pairs) or pairs[pair, 0] != pairs[pair + 1, 0] or pairs[pair, 1] != pairs[pair + 1, 1]
-    return last and block[0, 0] + block[1, 1] + block[2, 2] > 0.0  # zero where nothing touches
-
-
-@inlined
-def _add_pair(pair, a, b, dt, world, state, scratch):
-    """Bring a pair's sums into the linear system, all parts together with the last."""
-    if not _collect(pair, world, scratch):
-        return
-    map_a, map_b, wrench = scratch.map_a, scratch.map_b, scratch.wrench
-    at_a, width_a = _write_map(a, a, -1.0, world, state, scratch, map_a)
-    at_b, width_b = _write_map(b, a, 1.0, world, state, scratch, map_b)
-    for j in range(6):
-        for i in range(width_a):
-            scratch.vector[at_a + i] += dt * map_a[j, i] * wrench[j]
-        for i in range(width_b):
-            scratch.vector[at_b + i] += dt * map_b[j, i] * wrench[j]
-    if width_a > 0:
-        _add_block(at_a, map_a, width_a, at_a, map_a, width_a, dt, scratch)
-    if width_b > 0:
-        _add_block(at_b, map_b, width_b, at_b, map_b, width_b, dt, scratch)
-    if width_a > 0 and width_b > 0:
-        if at_a >= at_b:  # only the lower triangle of the system is read
-            _add_block(at_a, map_a, width_a, at_b, map_b, width_b, dt, scratch)
-        if at_b >= at_a:  # coupled bodies share their unknown: both of the mixed products count there
-            _add_block(at_b, map_b, width_b, at_a, map_a, width_a, dt, scratch)
-
-
-@kernel
-def _add_block(row, left, left_width, column, right, right_width, dt, scratch):
-    if left_width == 6 and right_width == 6:  # the usual case with its widths in plain sight of the compiler
-        add_product(scratch.matrix, row, column, left, 6, scratch.block, right, 6, dt)
-    else:
-        add_product(scratch.matrix, row, column, left, left_width, scratch.block, right, right_width, dt)
-
-
-@kernel
-def _write_map(body, sensor_body, sign, world, state, scratch, out):
-    """From a body's unknowns to relative motion in the axes of the sensor's body; returns where they are and how many."""
-    gx = state.position[sensor_body, 0] - state.position[body, 0]
-    gy = state.position[sensor_body, 1] - state.position[body, 1]
-    gz = state.position[sensor_body, 2] - state.position[body, 2]
-    if world.kind[body] == KEYFRAMED:
-        return -1, 0
-    write_twist_map(scratch.rotation[sensor_body], gx, gy, gz, sign, out)
-    if world.kind[body] == FREE:
-        return world.at[body], 6
-    keep_axis(scratch.axis[body], out)
-    return world.at[body], 1

@@ -44,7 +44,9 @@ def recording_of(texels, frames=10):
     shear = np.zeros((frames, n, 2))
     shear[:, :, 1] = 0.2 * normal
     zeros, vector = np.zeros((frames, n)), np.zeros((frames, 3))
-    sensor = SensorRecording(normal, shear, zeros, zeros, normal > 0, normal, vector, vector, vector)
+    sensor = SensorRecording(
+        normal, shear, np.linalg.norm(shear, axis=2), zeros, zeros, normal > 0, normal, vector, vector, vector
+    )
     return Recording(
         frames=np.arange(1, frames + 1),
         times=np.arange(frames) / 24,

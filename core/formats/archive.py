@@ -22,7 +22,7 @@ from ..errors import FileError
 from ..recording import Recording, SensorRecording
 from .files import atomic_write
 
-RECORDING_FORMAT = "palpate-recording/1"
+RECORDING_FORMAT = "palpate-recording/2"
 
 DAMAGED = (
     ValueError,

@@ -31,6 +31,7 @@ def tactile_frame(count, seed=0):
     return SensorFrame(
         normal_force=rng.random(count),
         shear=rng.normal(size=(count, 2)),
+        friction=rng.random(count),
         depth=5 + rng.random(count),
         slip=10 + rng.random(count),
         contact=np.ones(count, bool),

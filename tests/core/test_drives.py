@@ -58,6 +58,15 @@ def test_a_position_servo_follows_the_ode_of_scipy_through_saturation():
     np.testing.assert_allclose(recording.poses[:, 1, 1], exact.y[0], atol=2e-3 * target.max())
 
 
+def test_a_body_is_driven_at_its_centre_of_mass_and_stays_where_its_carrier_has_it():
+    """Its origin is elsewhere; nothing asks the drive to move."""
+    drive = Drive("velocity", Signal.constant(0.0), np.array([1.0, 0, 0]), max_force=10.0)
+    scenario = slider(drive, frames=3)
+    body = replace(scenario.bodies[1], center_of_mass=np.array([0.01, -0.02, 0.03]))
+    recording = run(replace(scenario, bodies=(scenario.bodies[0], body)))
+    np.testing.assert_allclose(recording.poses[:, 1, :3], np.tile([0, 0, 10.0], (3, 1)), atol=1e-14)
+
+
 @pytest.mark.parametrize("dt", [1e-5, 1e-3, 1e-2])
 def test_no_gain_asks_for_a_small_step(dt):
     """Gains whose time constants are a thousandth of a step, and less: no overshoot, no swinging, the target in the end."""

@@ -313,6 +313,7 @@ def recording(seed=0, frames=5, sensors=(("Pad", 6), ("a/b\\..", 3)), bodies=3):
         values = {
             "normal_force": rng.random((frames, count)),
             "shear": rng.normal(size=(frames, count, 2)),
+            "friction": rng.random((frames, count)),
             "depth": rng.random((frames, count)) * 1e-3,
             "slip": rng.random((frames, count)),
             "contact": rng.random((frames, count)) < 0.5,
@@ -380,7 +381,7 @@ def test_numpy_alone_reads_a_recording(tmp_path):
     save_recording(tmp_path / "recording.npz", recording())
     with np.load(tmp_path / "recording.npz", allow_pickle=False) as members:
         header = json.loads(str(members["header"]))
-        assert header["format"] == "palpate-recording/1" and header["sensors"] == ["Pad", "a/b\\.."]
+        assert header["format"] == "palpate-recording/2" and header["sensors"] == ["Pad", "a/b\\.."]
         np.testing.assert_array_equal(members["sensor_1/shear"], recording().sensors["a/b\\.."].shear)
 
 
@@ -444,7 +445,7 @@ def test_other_files_are_no_recordings(tmp_path):
     assert "not a recording" in cannot_load(load_recording, path)
     np.savez(path, header=np.array([{"a": 1}], dtype=object))  # a pickle is never opened
     cannot_load(load_recording, path)
-    for header in ("[]", "{}", "nonsense", '{"format": "palpate-recording/9"}', '{"format": "palpate-recording/1"}'):
+    for header in ("[]", "{}", "nonsense", '{"format": "palpate-recording/9"}', '{"format": "palpate-recording/2"}'):
         np.savez(path, header=np.array(header))
         cannot_load(load_recording, path)
     with open(path, "wb") as file:
@@ -472,6 +473,7 @@ def tactile_frame(count, seed=0):
     return SensorFrame(
         normal_force=rng.random(count),
         shear=rng.normal(size=(count, 2)),
+        friction=rng.random(count),
         depth=rng.random(count) * 1e-3,
         slip=rng.random(count),
         contact=rng.random(count) < 0.5,

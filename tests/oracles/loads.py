@@ -31,13 +31,15 @@ def weight_error(grid: str, mass: float) -> tuple[float, int]:
     return abs(total / (mass * GRAVITY) - 1.0), int((sensor.normal_force[-1] <= 0.0).sum())
 
 
-def tilted(seconds: float, dt: float = 1e-3) -> tuple[float, float, float, float]:
+def tilted(seconds: float, dt: float = 1e-3) -> tuple[float, float, float, float, float]:
     """Section 5.1.2 of the paper: 1 kg on a 14 × 6 pad that is tilted by 10°.
 
     Returns
     -------
     along : float, newtons
         Force on the pad along its slope, at the end.
+    shear : float, newtons
+        The same as the sum of the texels' shear.
     friction : float, newtons
         Sum of the texels' friction forces.
     lean : float, radians
@@ -51,7 +53,8 @@ def tilted(seconds: float, dt: float = 1e-3) -> tuple[float, float, float, float
     normals = rotation_matrices(recording.poses[-1, :, 3:])[:, :, 2]
     return (
         abs(float(sensor.net_force[-1, 1])),
-        float(np.linalg.norm(sensor.shear[-1], axis=1).sum()),
+        float(np.linalg.norm(sensor.shear[-1].sum(axis=0))),
+        float(sensor.friction[-1].sum()),
         float(np.arcsin(np.linalg.norm(np.cross(normals[0], normals[1])))),
         float(np.linalg.norm(positions - positions[0], axis=1).max()),
     )

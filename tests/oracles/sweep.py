@@ -88,10 +88,15 @@ def random_case(seed: int) -> tuple[Scenario, float, str]:
 
 @dataclass(frozen=True)
 class Energies:
-    """What a run had at each step, joules: `total` with what springs and bristles store, `mechanical` without; and a scale."""
+    """What a run had at each step, joules, and a scale.
+
+    `mechanical` is motion and height, `total` has what contacts can give back as well: what springs and bristles hold, but no
+    more than was put into them. `unpaid` is by how much the depths that texels report stand for more than that.
+    """
 
     total: np.ndarray
     mechanical: np.ndarray
+    unpaid: np.ndarray
     scale: float
 
     @property
@@ -103,6 +108,11 @@ class Energies:
     def mechanical_growth(self) -> float:
         """The same for motion and height alone."""
         return float((self.mechanical.max() - self.total[0]) / self.scale)
+
+    @property
+    def overshoot(self) -> float:
+        """Largest energy that reported depths stand for above what was put in, as a share of the scale."""
+        return float(self.unpaid.max() / self.scale)
 
 
 def stored(simulation: Simulation, frame) -> float:
@@ -130,15 +140,27 @@ def moving(scenario: Scenario, frame) -> float:
     return total
 
 
+def lag(simulation: Simulation) -> float:
+    """Energy that free bodies have lost by falling with the velocity of each step's end, joules: ½ m dt g·(v - v₀)."""
+    scenario, total = simulation.scenario, 0.0
+    for body, velocity in zip(scenario.bodies, simulation._state.velocity, strict=True):
+        if body.free:
+            total += 0.5 * body.mass * simulation.dt * scenario.gravity @ (velocity[:3] - body.velocity)
+    return float(total)
+
+
 def energies(scenario: Scenario, steps: int, scale: float) -> Energies:
     """Run some steps and add up the energy after each."""
     simulation = Simulation(scenario)
-    total, mechanical = [], []
+    mechanical, held, paid = [], [], []
     for step in range(steps + 1):
         frame = simulation.advance() if step else simulation.observe()
         mechanical.append(moving(scenario, frame))
-        total.append(mechanical[-1] + stored(simulation, frame))
-    return Energies(np.array(total), np.array(mechanical), scale)
+        held.append(stored(simulation, frame))
+        paid.append(float(simulation._state.tank.sum()) + lag(simulation) if step else held[0])
+    motion, springs = np.array(mechanical), np.array(held)
+    back = np.minimum(springs, paid)
+    return Energies(motion + back, motion, springs - back, scale)
 
 
 def thrown(seed: int, steps: int = 300) -> tuple[Energies, str]:
