@@ -4,6 +4,7 @@
 from pathlib import Path
 
 import bpy
+import solver
 
 
 def build(folder: Path, sensors: bool = True) -> None:
@@ -54,9 +55,10 @@ def road(ui):
     yield from ui.press("palpate.sensor_add()")
     ui.check(obj("Pad").palpate.role == "SENSOR", "Make Sensor makes the pad a sensor")
 
+    yield from solver.wait(ui)
     yield from ui.move(*ui.centre(view))
     yield from ui.key("SPACE")
-    yield from ui.wait_until(lambda: scene.frame_current >= 25, "the timeline played to frame 25", timeout=400.0)
+    yield from ui.wait_until(lambda: scene.frame_current >= 25, "the timeline played to frame 25", timeout=120.0)
     yield from ui.key("SPACE")
     frame = scene.frame_current
     attribute = obj("Pad").data.attributes.get("palpate_force")

@@ -4,6 +4,7 @@
 import math
 
 import bpy
+import solver
 
 
 def grid():
@@ -120,12 +121,13 @@ def road(ui):
     yield from ui.click(*ui.at((0.008, -0.023, 0)))
     ui.check(bpy.context.view_layer.objects.active == grid(), "a click selects the grid")
     yield from ui.screenshot("5a-before-play")
+    yield from solver.wait(ui)
     yield from ui.move(*ui.centre(view))
     yield from ui.key("SPACE")
-    yield from ui.wait_until(lambda: bpy.context.scene.frame_current >= 40, "frame 40 plays", timeout=400)
+    yield from ui.wait_until(lambda: bpy.context.scene.frame_current >= 40, "frame 40 plays", timeout=120)
     yield from ui.screenshot("5b-playing")
-    yield from ui.wait_until(lambda: bpy.context.scene.frame_current >= 58, "frame 58 plays", timeout=400)
-    yield from ui.wait_until(lambda: bpy.context.scene.frame_current < 30, "it plays anew", timeout=400)
+    yield from ui.wait_until(lambda: bpy.context.scene.frame_current >= 58, "frame 58 plays", timeout=120)
+    yield from ui.wait_until(lambda: bpy.context.scene.frame_current < 30, "it plays anew", timeout=120)
     yield from ui.move(*ui.centre(view))
     yield from ui.key("SPACE")
     ui.check(not ui.window.screen.is_animation_playing, "Space stops")
