@@ -15,6 +15,9 @@ import numpy as np
 
 Columns = dict[str, np.ndarray]
 
+PLACES = 9
+"""Where the tube is pressed, in turn."""
+
 
 @dataclass(frozen=True)
 class Recording:
@@ -31,7 +34,8 @@ class Recording:
         for trial, use, columns in self.trials:
             lines += ["[[trial]]", f'file = "{trial}.csv"', f'use = "{use}"']
             table = np.column_stack(list(columns.values()))
-            np.savetxt(folder / f"{trial}.csv", table, delimiter=",", fmt="%.9g", header=",".join(columns), comments="")
+            rows = [",".join("" if np.isnan(value) else f"{value:.9g}" for value in row) for row in table.tolist()]
+            (folder / f"{trial}.csv").write_text("\n".join([",".join(columns), *rows]) + "\n", encoding="utf-8")
         path = folder / "rig.toml"
         path.write_text("\n".join(lines) + "\n", encoding="utf-8")
         return path
@@ -92,6 +96,24 @@ def tube(data: Path) -> Recording:
     return Recording("soft tube", 'grid = { rows = 1, columns = 1, pitch = 0.02 }\nunit = "V"', trials)
 
 
+def tube_by_place(data: Path) -> Recording:
+    """The same with a channel for each of the nine places that are pressed one after the other: the others are empty then."""
+    plain = tube(data)
+    trials: list[tuple[str, str, Columns]] = []
+    for name, use, columns in plain.trials:
+        pressed = columns["force"] > 0.3 * columns["force"].max()
+        edges = np.flatnonzero(np.diff(pressed.astype(int)))
+        begins, ends = edges[::2] + 1, edges[1::2] + 1
+        if len(begins) != PLACES or len(ends) != PLACES:
+            raise ValueError(f"{name} has {len(begins)} presses and not {PLACES}")
+        # A channel takes over shortly before its press: by then the answer to the one before has died away.
+        place = np.searchsorted(begins[1:] - (begins[1:] - ends[:-1]) // 4, np.arange(len(pressed)), side="right")
+        reading = {f"texel_{i}": np.where(place == i, columns["texel_0"], np.nan) for i in range(PLACES)}
+        trials.append((name, use, {"time": columns["time"], "force": PLACES * columns["force"], **reading}))
+    grid = f"grid = {{ rows = 1, columns = {PLACES}, pitch = 0.02 }}"
+    return Recording("soft tube, a channel for each place", f'{grid}\nunit = "V"', trials)
+
+
 def adhesive(data: Path) -> Recording:
     """Shear stress (kPa, taken as newtons) of an adhesive over strain, a strain of one taken as a depth of 1 mm."""
     trials: list[tuple[str, str, Columns]] = []
@@ -116,8 +138,9 @@ def foam(data: Path) -> Recording:
         curves[name] = (1.0 - table[order, 0]) * 0.01, -table[order, 1] * 1e6 * 1e-4
 
     def stiffness(depth, force):
-        low = (depth > 0) & (depth < 0.1 * depth.max())
-        return float(np.polyfit(depth[low], force[low], 1)[0])
+        """Steepest part of the first fifth: before it the plates settle, and that toe is not the foam's (ASTM D1621, A1)."""
+        low = (depth > 0) & (depth < 0.2 * depth.max())
+        return float(np.gradient(force[low], depth[low]).max())
 
     trials, wanted = [], stiffness(*curves["leap"])
     for (name, (depth, force)), use in zip(curves.items(), ("fit", "check"), strict=True):
@@ -146,6 +169,7 @@ SETS: dict[str, Callable[[Path], Recording]] = {
     "insole-counts": partial(insole, cleaned=False),
     "insole": insole,
     "tube": tube,
+    "tube-by-place": tube_by_place,
     "adhesive": adhesive,
     "foam": foam,
     "brake": brake,

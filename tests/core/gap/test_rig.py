@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 import trimesh
 
+from palpate.benchmarks._recordings import Recording
 from palpate.core.errors import PalpateError
 from palpate.core.gap import tables
 from palpate.core.gap.rig import read_rig
@@ -211,3 +212,12 @@ def test_columns_without_meaning_are_said(tmp_path):
     rig = read_rig(write(tmp_path, press=table(names=("x", "y", "z", "temperature"))))
     assert any("temperature" in warning for warning in rig.warnings)
     assert tables.LARGEST < 10**9
+
+
+def test_recordings_become_rigs_with_empty_cells_where_nothing_was_measured(tmp_path):
+    time, nan = np.arange(10) * 0.1, np.nan
+    reading = np.where(np.arange(10) < 5, 1.0, nan)
+    columns = {"time": time, "force": time, "texel_0": reading, "texel_1": reading[::-1]}
+    made = Recording("two", 'grid = { rows = 1, columns = 2, pitch = 0.01 }\nunit = "V"', [("press", "fit", columns)])
+    rig = read_rig(made.write(tmp_path))
+    np.testing.assert_array_equal(rig.trials[0].reading, np.stack([reading, reading[::-1]], axis=1))
