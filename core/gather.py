@@ -70,6 +70,15 @@ def _segment(point, reach, pose, points):
 
 
 @inlined
+def _own_travel(point, reach, pose, old, points):
+    """How far any point of a segment has moved between two poses at the most, metres: one of its ends."""
+    ox, oy, oz, _, _, _, tx, ty, tz = _segment(point, reach, pose, points)
+    px, py, pz, _, _, _, qx, qy, qz = _segment(point, reach, old, points)
+    base = (ox - px) ** 2 + (oy - py) ** 2 + (oz - pz) ** 2
+    return math.sqrt(max(base, (tx - qx) ** 2 + (ty - qy) ** 2 + (tz - qz) ** 2))
+
+
+@inlined
 def _keep_up(pair, sensor, target, pose, world, tree, neighbours, shapes, hint):
     """Look around anew for those contact points that have moved by more than what they know holds for."""
     known = neighbours.pose[pair]
@@ -95,10 +104,12 @@ def _look_around_all(pair, travel, step, narrower, pose, world, tree, neighbours
     place_all(target, shapes, tree)
     first, deforms, listed = known[12] < 0.0, shapes.deforms[target], world.listed[pair]
     radius = world.skin[pair] if first else min(max(32.0 * step, 1e-3 * listed), world.skin[pair])
+    deformed = shapes.travelled[target] + shapes.point_travelled[sensor] - known[14]
     soonest, slot = np.inf, world.slot_start[pair] - 1
     for point in range(world.point_first[pair], world.point_stop[pair]):
         slot += 1
-        until[slot] -= travel
+        near = 0.0 <= until[slot] < 16.0 * travel  # where the bound for all points is soon used up, the point's own way counts
+        until[slot] -= min(_own_travel(point, reach, pose, known, points) + deformed, travel) if near else travel
         if until[slot] < 0.0 or deforms or first or (narrower and neighbours.number[slot] != 0):
             ox, oy, oz, dx, dy, dz, _, _, _ = _segment(point, reach, pose, points)
             empty = neighbours.number[slot] == 0 and hint[slot] < 0
@@ -107,7 +118,7 @@ def _look_around_all(pair, travel, step, narrower, pose, world, tree, neighbours
     for i in range(12):
         known[i] = pose[i]
     known[15] = radius if narrower or first else max(known[15], radius)
-    known[12], known[13], known[14] = soonest, 0.0, shapes.travelled[target] + shapes.point_travelled[sensor]
+    known[12], known[13], known[14] = soonest, 0.0, known[14] + deformed
 
 
 @kernel

@@ -184,7 +184,7 @@ def look_around(slot, ox, oy, oz, dx, dy, dz, target, radius, listed, travel, em
     radius = min(radius, WIDEST * length)
     neighbours.only[slot] = -1
     if empty and radius > 0.0:
-        free = _clearance(ox, oy, oz, dx, dy, dz, target, 8.0 * radius, 0.25 * radius, tree)
+        free = _clearance(ox, oy, oz, dx, dy, dz, target, 2.0 * radius, 0.25 * radius, tree)
         if free > 0.0:
             neighbours.number[slot], neighbours.until[slot] = 0, free
             return
@@ -192,9 +192,9 @@ def look_around(slot, ox, oy, oz, dx, dy, dz, target, radius, listed, travel, em
         tube = radius if attempt == 0 else 0.125 * radius
         if not sheets or tube <= 2.0 * travel:
             break
-        count, triangle, margin = _survey(ox, oy, oz, dx, dy, dz, target, tube, tree)
-        if count == 0:
-            neighbours.number[slot], neighbours.until[slot] = 0, tube
+        count, triangle, margin, free = _survey(ox, oy, oz, dx, dy, dz, target, tube, tree)
+        if count == 0 or (count == 1 and free > 0.25 * tube):
+            neighbours.number[slot], neighbours.until[slot] = 0, tube if count == 0 else min(free, tube)
             return
         if count == 1:
             certain = margin > 0.25 * tube
@@ -217,17 +217,23 @@ def _clearance(ox, oy, oz, dx, dy, dz, mesh, far, least, tree):
     x0, x1 = min(ox, ox + dx), max(ox, ox + dx)
     y0, y1 = min(oy, oy + dy), max(oy, oy + dy)
     z0, z1 = min(oz, oz + dz), max(oz, oz + dz)
+    length = math.sqrt(dx * dx + dy * dy + dz * dz)
+    ax, ay, az = dx / length, dy / length, dz / length
+    tip = (ox + dx) * ax + (oy + dy) * ay + (oz + dz) * az
     bounds, node, stop = tree.bounds, tree.roots[mesh], tree.roots[mesh + 1]
     while node < stop:
+        # Along the axes, and along the segment: surfaces that face it are ahead of its tip.
+        low = min(ax * bounds[node, 0], ax * bounds[node, 3]) + min(ay * bounds[node, 1], ay * bounds[node, 4])
+        low += min(az * bounds[node, 2], az * bounds[node, 5])
         gap = max(
-            bounds[node, 0] - x1, x0 - bounds[node, 3], bounds[node, 1] - y1,
+            low - tip, bounds[node, 0] - x1, x0 - bounds[node, 3], bounds[node, 1] - y1,
             y0 - bounds[node, 4], bounds[node, 2] - z1, z0 - bounds[node, 5],
         )  # fmt: skip
         if gap >= far:
             node = tree.skip[node]
             continue
         size = max(bounds[node, 3] - bounds[node, 0], bounds[node, 4] - bounds[node, 1], bounds[node, 5] - bounds[node, 2])
-        if tree.number[node] == 0 and size > 0.5 * gap:
+        if tree.number[node] == 0 and size > gap:
             node += 1
             continue
         far = gap
@@ -259,6 +265,9 @@ def _survey(ox, oy, oz, dx, dy, dz, mesh, skin, tree):
         The one that it goes through; else -1.
     margin : float, metres
         How far inside of its edges.
+    free : float, metres
+        How far the segment's tip may come nearer without reaching it, less than zero where it does. Of this distance along the
+        segment a sheet that leans takes up one and a half parts where the tip moves aside, and one where it moves ahead.
     """
     length = math.sqrt(dx * dx + dy * dy + dz * dz)
     more = DRAWN_OUT * skin / length
@@ -271,7 +280,7 @@ def _survey(ox, oy, oz, dx, dy, dz, mesh, skin, tree):
     y0, y1 = min(fy, ty) - skin, max(fy, ty) + skin
     z0, z1 = min(fz, tz) - skin, max(fz, tz) + skin
     leaning = -FACING * length
-    count, triangle, margin = 0, -1, 0.0
+    count, triangle, margin, free = 0, -1, 0.0, 0.0
     faces, facing = tree.faces, tree.facing
     node, stop = tree.roots[mesh], tree.roots[mesh + 1]
     while node < stop:
@@ -291,19 +300,19 @@ def _survey(ox, oy, oz, dx, dy, dz, mesh, skin, tree):
                 continue
             slope = faces[i, 9] * dx + faces[i, 10] * dy + faces[i, 11] * dz
             if not (slope < leaning and is_inner(i, faces, 9, tree.across)):
-                return -1, -1, 0.0
+                return -1, -1, 0.0, 0.0
             u, v, w = ax * by - ay * bx, bx * cy - by * cx, cx * ay - cy * ax
             if min(u, v, w) < 0.0 and max(u, v, w) > 0.0:
                 continue
             t = cross_plane(ox, oy, oz, dx, dy, dz, faces, i)
             if -more <= t <= 1.0 + more:
                 if count == 1:
-                    return -1, -1, 0.0
-                count, triangle = 1, i
+                    return -1, -1, 0.0, 0.0
+                count, triangle, free = 1, i, 0.4 * length * (t - 1.0)
                 margin = abs(u) / math.hypot(bx - ax, by - ay)
                 margin = min(margin, abs(v) / math.hypot(cx - bx, cy - by), abs(w) / math.hypot(ax - cx, ay - cy))
         node += 1
-    return count, triangle, margin * skin / aside
+    return count, triangle, margin * skin / aside, free
 
 
 @kernel
