@@ -368,7 +368,7 @@ def search(
         yield "looking at every effect", 0.35 * (number + 1) / len(forms), []
     little = sum(share.count for share in views.whole) < LITTLE
     kept = _kept(begun, len(begun)) if little else _kept(begun)
-    turns, tolerance = (40, 1e-6) if little else (8, 1e-4)
+    turns, tolerance = (40, 1e-6) if little else (14, 1e-4)
     if not kept:
         yield "nothing promises anything", 1.0, []
         return
@@ -381,19 +381,13 @@ def search(
     last, whole = _finalists(quick, *(2 * finalists, 4) if little else (finalists, 2)), Direction(views.whole, found)
     results: list[Found] = []
     for number, one in enumerate(last):
-        free, held = free_of(found.free, found.model, one.candidate, scales), len(found.free)
+        free = free_of(found.free, found.model, one.candidate, scales)
+        # Friction is far from linear, and cheap: its derivatives are not held.
+        held = next((i for i, item in enumerate(found.free) if item.name in FRICTION), len(found.free))
         best = fit(views.whole, one.fit.model, free, turns=turns, tolerance=tolerance, held=held, begun=whole.begun)
         results.append(Found(one.candidate, best, held_out(views.whole, best)))
         results.sort(key=lambda one: one.mean)
         yield "judging the best on trials they have not seen", 0.7 + 0.3 * (number + 1) / len(last), results
-
-
-def _rubbing(shares: Sequence[Share], model: Model) -> Model:
-    """Return the model, or it with friction as the rig has it: what friction was fitted to without an effect may be far off."""
-    stated = shares[0].predictor.rig.parameters
-    other = replace(model, parameters=replace(model.parameters, **{name: getattr(stated, name) for name in FRICTION}))
-    square = [sum(float(np.vdot(r, r)) for r in (share.residual(one) for share in shares)) for one in (model, other)]
-    return other if square[1] < square[0] else model
 
 
 def _kept(
