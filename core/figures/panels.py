@@ -72,6 +72,7 @@ def side_by_side(
         figure.text(x / width, y / tall, name, fontsize=FONT, color=INK, weight="bold", va="top")
         place = figure.add_axes((x / width, (y - each + 0.12) / tall, room / width, (each - 0.32) / tall))
         view = View.of(own, felt.normal_force.sum(axis=0))
+        view = view.at_size(min(room / view.width, (each - 0.32) / view.height))
         image = view.draw(place, look.values(felt, own)[i], felt.shear[i], strongest, top, look)
         place.set_anchor("NW")
         y -= each

@@ -89,6 +89,7 @@ def label_picture(
         y -= each
         axes = figure.add_axes((x / width, y / height, column / width, each / height))
         values = look.values(felt[name], texels[name])
+        view = view.at_size(min(column / view.width, each / view.height))
         image = view.draw(axes, values, felt[name].shear, strongest, top, look, edge="#ffffff80")
     if image is not None:
         bar = figure.add_axes(((width - bar_room) / width, y / height, 0.12 / width, (y_top - y) / height))
