@@ -72,7 +72,8 @@ def texel_numbers(
         (side / width, side / height, inches * view.width / width, inches * view.height / height), anchor="NW"
     )
     image = view.draw(axes, values, np.zeros((len(own), 2)), 0.0, top, look)
-    if not isinstance(own.layout, GridLayout):  # texels lie on the very rim there: room for their numbers
+    on_grid = isinstance(own.layout, GridLayout)
+    if not on_grid:  # texels lie on the very rim there: room for their numbers
         room = 0.5 * letters / inches
         axes.set_xlim(view.window[0] - room, view.window[1] + room)
         axes.set_ylim(view.window[2] - room, view.window[3] + room)
@@ -80,7 +81,9 @@ def texel_numbers(
     for (x, y), word, colour in zip(view.points[view.seen], np.array(words)[view.seen], colours[view.seen], strict=True):
         light = float(np.dot(colour[:3], (0.299, 0.587, 0.114))) > 0.5
         ink, around = (INK, "white") if light else ("white", INK)
-        rim = [withStroke(linewidth=1.2, foreground=around, alpha=0.55)]  # texels on the very edge lie half on white
+        rim = (
+            [] if on_grid else [withStroke(linewidth=1.2, foreground=around, alpha=0.55)]
+        )  # on the edge they lie half on white
         axes.text(x, y, word, fontsize=SMALL, color=ink, ha="center", va="center_baseline", path_effects=rim)
     time = recording.times[int(np.searchsorted(recording.frames, frame))]
     figure.text(
