@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """``palpate gap`` on recordings with something hidden in them (``_hidden``): what it says, held against the sealed answers.
 
-Whole run: 240 cases, hours. Results are kept in build/gap/, one line a case, and a run goes on where the last one stopped, as
+The whole matrix is 240 cases, an hour of one core; a fifth of it by default. Results are kept in build/gap/, one line a case, and a run goes on where the last one stopped, as
 long as neither the workflow nor the generator has changed. Environment:
 
-``PALPATE_GAP_CASES``      how many cases (240), shared out over the kinds as in :data:`MIX`
+``PALPATE_GAP_CASES``      how many cases (48), shared out over the kinds as in :data:`MIX`
 ``PALPATE_GAP_PROCESSES``  how many at a time (2)
 ``PALPATE_GAP_FIRST``      number of the first case of each kind; from 1000 on are those that nobody looks at (1000)
 ``PALPATE_GAP_BASELINES``  on how many of them the baselines run as well (a quarter)
@@ -40,7 +40,7 @@ QUIET = ("noise",)
 
 def run() -> Iterator[dict]:
     """Yield one figure for every bar; the confusion matrix goes to stderr and to build/gap/confusion.txt."""
-    total = int(os.environ.get("PALPATE_GAP_CASES", "240"))
+    total = int(os.environ.get("PALPATE_GAP_CASES", "48"))
     first = int(os.environ.get("PALPATE_GAP_FIRST", "1000"))
     plan = plan_of(total, first)
     baselines = int(os.environ.get("PALPATE_GAP_BASELINES", str(total // 4)))
