@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """``palpate gap`` on recordings with something hidden in them (``_hidden``): what it says, held against the sealed answers.
 
-The whole matrix is 240 cases, an hour of one core; a fifth of it by default. Results are kept in build/gap/, one line a case, and a run goes on where the last one stopped, as
-long as neither the workflow nor the generator has changed. Environment:
+The whole matrix is 240 cases, an hour of one core; a fifth of it is run by default. Results are kept in build/gap/, one line a
+case, and a run goes on where the last one stopped, as long as neither the workflow nor the generator has changed.
+Environment:
 
 ``PALPATE_GAP_CASES``      how many cases (48), shared out over the kinds as in :data:`MIX`
 ``PALPATE_GAP_PROCESSES``  how many at a time (2)
