@@ -39,9 +39,9 @@ class Root(Part):
         row.prop(settings, "role")
         row.operator("palpate.sensor_remove", text="", icon="X")
         if settings.role in {"SENSOR", "PAD"}:
-            row = layout.row(align=True)
-            row.operator("palpate.probe_add", icon="MESH_UVSPHERE")
-            row.operator("palpate.parameters_copy", icon="COPYDOWN")
+            column = layout.column(align=True)  # beside one another their names are cut off in a narrow editor
+            column.operator("palpate.probe_add", icon="MESH_UVSPHERE")
+            column.operator("palpate.parameters_copy", icon="COPYDOWN")
 
 
 class Skins(Part):
