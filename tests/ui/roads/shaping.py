@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""More ways of making a sensor in the window: Edit Mode, material, face set, and copying."""
+"""More ways of making a sensor in the window: Edit Mode, material, face set, copying, a painted soft spot, files."""
 
 import importlib
 
 import bpy
+from tutorial import timeline
 
 
 def pad(name="Pad"):
@@ -44,6 +45,20 @@ def wheel(ui, name, notches):
     for _ in range(notches):
         ui.event("WHEELDOWNMOUSE", ctrl=True)
         yield 0.2
+
+
+def felt(ui, frame):
+    """Go to the start and to a frame; return what the sensor feels there."""
+    yield from timeline(ui, "frame_current", 1)
+    yield from timeline(ui, "frame_current", frame)
+    live = addon("live")
+
+    def known():
+        status = live.status(bpy.context.scene)
+        return status.frame is not None and status.frame.frame == frame
+
+    yield from ui.wait_until(known, f"frame {frame} is computed", timeout=120)
+    return live.status(bpy.context.scene).frame.sensors["Pad"]
 
 
 def road(ui):
@@ -92,3 +107,52 @@ def road(ui):
     bpy.context.view_layer.objects.active = pad()
     yield from ui.press("palpate.parameters_copy()")
     ui.check(pad("Other").palpate.k == 100.0, "Copy to Selected copies")
+
+    # A soft spot is painted
+    pad("Other").palpate.role = "NONE"
+    pad("Other").select_set(False)
+    with ui.context(view):
+        bpy.ops.palpate.probe_add()
+        bpy.context.view_layer.objects.active = pad()
+        pad().select_set(True)
+    preparing = addon("preparing")
+    yield from ui.wait_until(preparing.is_ready, "the solver is ready", timeout=900)
+    stiff = yield from felt(ui, 20)
+    ui.value("before", float(stiff.normal_force.sum()))
+    with ui.context(view):
+        pad().vertex_groups.new(name="Soft")
+        bpy.ops.object.mode_set(mode="WEIGHT_PAINT")
+        addon("sensors").set_brush(bpy.context.scene.tool_settings)
+    yield 1.0
+    x, y = ui.at((0.0, 0.0, 0.0))
+    for dy in (20, -10):
+        yield from ui.drag((x - 60, y + dy), (x + 60, y + dy), steps=12)
+    yield from ui.screenshot("soft-spot")
+    with ui.context(view):
+        bpy.ops.object.mode_set(mode="OBJECT")
+    yield from ui.filter("stiffness")
+    yield from ui.fill("palpate.k_map", "Soft")
+    ui.check(pad().palpate.k_map == "Soft", "the painted group is chosen")
+    yield from ui.screenshot("soft-spot-chosen")
+    yield from ui.filter("")
+    soft = yield from felt(ui, 20)
+    ui.value("after", float(soft.normal_force.sum()))
+    yield from ui.screenshot("soft-spot-felt")
+
+    # Out and in again, through the file browser
+    bpy.context.preferences.view.filebrowser_display_type = "SCREEN"
+    for name, suffix in (("openrave", "xml"), ("sensor_toml", "toml")):
+        path = ui.out / f"sensor.{suffix}"
+        with ui.context(ui.area("VIEW_3D")):
+            getattr(bpy.ops.palpate, f"{name}_export")("INVOKE_DEFAULT", filepath=str(path))
+        yield 1.5
+        yield from ui.screenshot(f"export-{suffix}")
+        yield from ui.key("RET")
+        yield from ui.wait_until(path.exists, f"the .{suffix} is written")
+        pad().palpate.k = 7.0
+        with ui.context(ui.area("VIEW_3D")):
+            getattr(bpy.ops.palpate, f"{name}_import")("INVOKE_DEFAULT", filepath=str(path))
+        yield 1.5
+        yield from ui.screenshot(f"import-{suffix}")
+        yield from ui.key("RET")
+        yield from ui.wait_until(lambda: pad().palpate.k == 100.0, f"the .{suffix} is read back")
