@@ -2,6 +2,7 @@
 """The generator of recordings with something hidden, and the scoring of what is said of them."""
 
 import ast
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ import pytest
 from palpate.benchmarks import gap
 from palpate.benchmarks._hidden import cases, other, own, world
 from palpate.core.effects.library import library
+from palpate.core.gap.model import Model, Predictor
 from palpate.core.gap.rig import read_rig
 
 HIDDEN = Path(cases.__file__).parent
@@ -139,3 +141,16 @@ def test_a_whole_run_has_every_kind_and_grows_without_changing():
     small, whole = gap.plan_of(20, 1000), gap.plan_of(240, 1000)
     assert len(whole) == 240 and {kind for kind, _ in small} == set(gap.MIX)
     assert set(small) <= set(whole)
+
+
+def test_net_force_under_a_sliding_ball_is_that_of_the_other_code(tmp_path):
+    """Two integrations of the same friction, second order both; where they differ is less than the force's noise."""
+
+    case = cases.draw("none", 2)
+    rig = read_rig(cases.write(case, tmp_path))
+    names = ("k", "cn", "mus", "mud", "x0", "sigma0", "sigma1", "ct", "gain", "zero")
+    true = Model(replace(rig.parameters, **{name: getattr(case.pad, name) for name in names}))
+    for trial, (reading, force), measured in zip(rig.trials, case.clean, case.forces, strict=True):
+        found = Predictor(trial, rig).predict(true)
+        assert np.sqrt(np.mean((found.force - force) ** 2)) < 0.6 * np.std(measured - force)
+        assert np.abs(found.reading - reading).max() < 0.01 * np.ptp(reading)

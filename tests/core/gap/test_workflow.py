@@ -152,3 +152,10 @@ def test_intervals_hold_what_was_hidden():
     assert [named.name for named in result.named] == ["saturation"]
     (level,) = (one for one in numbers(result) if one.name == "level")
     assert level.low < 0.15 < level.high and level.high - level.low < 0.03
+
+
+def test_noise_that_grows_with_the_reading_is_named():
+    rng = np.random.default_rng(12)
+    result = diagnosed(cases.rig(change=lambda r, t: r * (1 + 0.2 * rng.normal(size=r.shape)), noise=0.003, seed=12))
+    assert [named.name for named in result.named] == ["noise"] and result.verdict == "explained"
+    assert result.best.model.effects[-1].values["share"] == pytest.approx(0.2, rel=0.1)
