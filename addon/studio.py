@@ -22,6 +22,8 @@ MARGIN = 0.06
 """Of the picture's width and height, left free around what is framed."""
 _FAR = 3.0
 """Sizes of what is seen from which on an object that takes no part is a backdrop."""
+_MOST_LOOKED_AT = 60
+"""Frames at which a camera's view is made sure of."""
 _LAMPS = (((-35.0, 50.0), 3.2, (1.0, 0.97, 0.93)), ((70.0, 30.0), 1.2, (0.9, 0.95, 1.0)), ((170.0, 45.0), 2.0, (1.0, 1.0, 1.0)))
 """Suns: azimuth from the camera's and elevation, degrees; strength; colour."""
 
@@ -156,8 +158,9 @@ def _camera(scene, own, view):
 
 
 def _corners(scene, frames) -> np.ndarray:
-    """Corners of all that matters at the first, the middle and the last of some frames."""
-    chosen = sorted({frames[0], frames[len(frames) // 2], frames[-1]})
+    """Corners of all that matters at some frames; of many, at enough of them that an arrow's longest is not missed by much."""
+    places = np.linspace(0, len(frames) - 1, min(len(frames), _MOST_LOOKED_AT)).round().astype(int)
+    chosen = sorted({int(frames[place]) for place in places})
     found = []
     for number in chosen:
         scene.frame_set(number)

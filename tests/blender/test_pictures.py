@@ -169,3 +169,15 @@ def test_without_opengl_it_is_one_sentence(baked, tmp_path):
         )  # fmt: skip
         assert run.returncode == status, run.stderr
         assert ("choose Cycles" in run.stderr) == (status == 1)
+
+
+def test_what_moves_away_in_between_stays_in_the_picture(baked):
+    scene, _ = baked
+    ball = scene.objects["Ball"]
+    for frame, height in ((1, 0.01), (2, 0.4), (4, 0.01)):
+        ball.location.z = height
+        ball.keyframe_insert("location", frame=frame)
+    with studio.photographed(scene, [1, 2, 3, 4], view=(-60.0, 35.0)):
+        scene.frame_set(2)
+        places = np.array([render.picture_position(scene, point) for point in render.corners([ball])])
+    assert (places > 0.0).all() and (places < 1.0).all()
