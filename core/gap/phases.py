@@ -11,6 +11,8 @@ from .stimulus import Stimulus
 PHASES = ("approach", "loading", "hold", "unloading", "released", "sliding")
 STILL, STILL_OF_PACE = 0.02, 0.2
 """Share of the largest load per second below which a texel counts as held; in a slow trial so much of the trial's own pace."""
+CONSTANT = 1e-6
+"""Share of the largest load per second below which nothing but rounding moves."""
 FAST_SLIDE = 2e-4
 """Metres per second above which a held surface counts as sliding."""
 
@@ -30,7 +32,7 @@ def pace_of(rate: np.ndarray) -> float:
     rate : float, 1/s
         Of the load, as a share of the largest.
     """
-    return float(min(STILL, STILL_OF_PACE * np.quantile(np.abs(rate), 0.99))) if rate.size else STILL
+    return float(np.clip(STILL_OF_PACE * np.quantile(np.abs(rate), 0.99), CONSTANT, STILL)) if rate.size else STILL
 
 
 def phases(stimulus: Stimulus) -> np.ndarray:
