@@ -8,6 +8,7 @@ properties, so that it can be put back exactly.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from mathutils import Euler, Matrix, Quaternion
@@ -116,14 +117,20 @@ class Placement:
         previous : (14,) float, optional
             Properties at the frame before, which the rotation should not jump away from.
         """
-        start_location, start_quaternion, _ = transforms.split(self.world)
-        before = transforms.rigid(start_location, start_quaternion)
-        after = transforms.rigid(pose[:3] / self.scale, pose[3:])
-        moved = after @ np.linalg.inv(before) @ self.world
-        basis, basis_before = np.linalg.inv(parent) @ moved, np.linalg.inv(self.parent) @ self.world
-        turn = basis[:3, :3] @ np.linalg.inv(basis_before[:3, :3])
+        stretch, basis_before, unturned = self._start
+        moved = transforms.rigid(pose[:3] / self.scale, pose[3:]) @ stretch
+        basis = np.linalg.inv(parent) @ moved
+        turn = basis[:3, :3] @ unturned
         location = self.channels[:3] + basis[:3, 3] - basis_before[:3, 3]
         return np.concatenate([location, self._rotations(obj, turn, self.channels if previous is None else previous)])
+
+    @cached_property
+    def _start(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """The world matrix without the rigid motion in it, what the properties make of it, and the inverse of their turn."""
+        location, quaternion, _ = transforms.split(self.world)
+        basis = np.linalg.inv(self.parent) @ self.world
+        stretch = np.linalg.inv(transforms.rigid(location, quaternion)) @ self.world
+        return stretch, basis, np.linalg.inv(basis[:3, :3])
 
     def _rotations(self, obj, turn: np.ndarray, previous: np.ndarray) -> np.ndarray:
         """Apply a world-side rotation to the start's rotation properties; those of other modes stay as they are."""

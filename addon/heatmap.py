@@ -8,7 +8,7 @@ import numpy as np
 
 from ..core.layout import UVLayout
 from ..core.texels import Texels
-from . import materials
+from . import materials, meshes
 from .meshes import OLD_MATERIAL
 
 EMPTY_SLOT = "palpate_empty_slot"
@@ -88,8 +88,7 @@ def _write_uv(mesh, texels: Texels, uv: np.ndarray) -> None:
             mesh.uv_layers.active_index = active
     table = np.zeros((len(mesh.vertices), 2))
     table[texels.vertex] = uv
-    corner = np.empty(len(mesh.loops), dtype=np.int32)
-    mesh.loops.foreach_get("vertex_index", corner)
+    corner = meshes.corners(mesh)
     layer.data.foreach_set("uv", table[corner].astype(np.float32).ravel())
 
 

@@ -13,7 +13,7 @@ from ..core import colormaps
 from ..core.bakes import Bake, frame_index
 from ..core.figures import Look
 from ..core.texels import Texels
-from . import heatmap
+from . import heatmap, meshes
 
 NAME = "Palpate Colour"
 PLAIN = (0.8, 0.8, 0.8, 1.0)
@@ -81,8 +81,7 @@ def _in_material_colours(obj) -> np.ndarray:
 
 def _corners_of_region(mesh, texels: Texels) -> tuple[np.ndarray, np.ndarray]:
     """Return the corners of the faces that a sensor's texels span, and the texel of each."""
-    corner, sides = np.empty(len(mesh.loops), dtype=np.int32), np.empty(len(mesh.polygons), dtype=np.int32)
-    mesh.loops.foreach_get("vertex_index", corner)
+    corner, sides = meshes.corners(mesh), np.empty(len(mesh.polygons), dtype=np.int32)
     mesh.polygons.foreach_get("loop_total", sides)
     number = np.full(len(mesh.vertices), -1)
     number[texels.vertex] = np.arange(len(texels))

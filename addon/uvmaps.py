@@ -10,7 +10,7 @@ import numpy as np
 from ..core.errors import SensorError
 from ..core.layout import UVLayout, mapped_layout
 from ..core.texels import Texels
-from . import materials
+from . import materials, meshes
 
 SETTINGS = ("image_layout", "image_map", "image_size", "image_filter")
 """Names in :class:`.properties.PALPATE_PG_object`."""
@@ -103,6 +103,5 @@ def _triangles(mesh) -> tuple[np.ndarray, np.ndarray]:
     mesh.calc_loop_triangles()
     loops = np.empty(3 * len(mesh.loop_triangles), dtype=np.int32)
     mesh.loop_triangles.foreach_get("loops", loops)
-    corner = np.empty(len(mesh.loops), dtype=np.int32)
-    mesh.loops.foreach_get("vertex_index", corner)
+    corner = meshes.corners(mesh)
     return loops.reshape(-1, 3), corner
