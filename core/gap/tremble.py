@@ -72,14 +72,18 @@ def trembling(shares: Sequence[Share], model: Model) -> Effect | None:
 
 
 def _looked_at(size: np.ndarray, residual: np.ndarray, loaded: np.ndarray) -> _Trial:
-    """Correlations are of residuals in units of their local size, so that few large ones do not decide."""
-    unit = np.where(loaded, residual / np.maximum(size, 1.0), 0.0)
-    both = loaded[1:] & loaded[:-1]
+    """Correlations are of residuals in units of their local size, so that few large ones do not decide.
+
+    Only large readings count there: at small ones the noise that is always there hides what a model lacks.
+    """
+    large = loaded & (size > np.quantile(size[loaded], 0.67)) if loaded.any() else loaded
+    unit = np.where(large, residual / np.maximum(size, 1.0), 0.0)
+    both = large[1:] & large[:-1]
     square = float((unit * unit).sum())
     following = float((unit[1:] * unit[:-1])[both].sum()) / max(square, 1e-300)
     together = unit.sum(axis=1)
     pairs = float((together * together).sum()) - square
-    count = loaded.sum(axis=1)
+    count = large.sum(axis=1)
     possible = float((count * (count - 1)).sum()) / max(float(count.sum()), 1.0)
     between = pairs / max(square * possible, 1e-300) if possible > 0 else 0.0
     return _Trial(size[loaded], residual[loaded] ** 2, following, between)

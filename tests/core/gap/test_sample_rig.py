@@ -4,6 +4,8 @@
 import numpy as np
 import sample_rig
 
+from palpate.core.gap.diagnose import diagnose
+from palpate.core.gap.report import summary
 from palpate.core.gap.rig import read_rig
 
 
@@ -18,3 +20,11 @@ def test_the_sample_rig_is_what_its_script_writes(tmp_path):
         np.testing.assert_array_equal(one.position, other.position)
         assert np.abs(one.reading - other.reading).max() <= 1  # a count may be rounded otherwise on another machine
     assert sum(path.stat().st_size for path in sample_rig.FOLDER.iterdir()) < 500_000
+
+
+def test_what_is_hidden_in_the_sample_rig_is_named_and_nothing_else():
+    """What the library's creep and gain lack beside the generator's is no noise that grows with the reading."""
+    *_, found = diagnose(read_rig(sample_rig.FOLDER / "rig.toml"))
+    assert sorted(named.name for named in found.named) == ["creep", "gain-mismatch"]
+    gap = summary(found)["gap"]
+    assert gap["after"]["check"] < 0.01 < 0.02 < gap["before"]["check"]
