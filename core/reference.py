@@ -134,7 +134,7 @@ else:
             def _words(self) -> np.ndarray:
                 return np.array([word for field in self for word in _written(field)], np.int64)
 
-            @property
+            @cached_property
             def address(self) -> int:
                 """Where the fields are written down, for as long as this instance lives."""
                 return int(self._words.ctypes.data)

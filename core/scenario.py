@@ -6,6 +6,7 @@ from __future__ import annotations
 import hashlib
 import math
 from dataclasses import dataclass, field, fields, is_dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -358,6 +359,11 @@ class Sensor:
         texels = self.texels
         position, normal, tangent = placed(self.effects, texels.position, texels.normal, texels.tangent)
         return texels if position is texels.position else replace(texels, position=position, normal=normal, tangent=tangent)
+
+    @cached_property
+    def settings_digest(self) -> str:
+        """Hash of the parameters, of what is painted and of the effects."""
+        return digest_of((self.parameters, self.painted, self.effects))
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ import numpy as np
 from ..errors import FileError
 from ..layout import GridLayout, UVLayout
 from ..recording import Frame, SensorFrame
-from ..scenario import Sensor, digest_of
+from ..scenario import Sensor
 from . import openexr
 from .files import atomic_write
 
@@ -69,7 +69,7 @@ def describe(sensor: Sensor, frame: Frame, digest: str) -> dict[str, str]:
         "time": repr(float(frame.time)),
         "unit": sensor.parameters.unit,
         "digest": digest,
-        "parameters": digest_of((sensor.parameters, sensor.painted, sensor.effects)),
+        "parameters": sensor.settings_digest,
     }
     about |= {f"unit.{channel}": UNITS.get(channel, sensor.parameters.unit) for channel in CHANNELS}
     if isinstance(sensor.texels.layout, UVLayout) and sensor.texels.layout.map_name:
