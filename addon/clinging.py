@@ -37,7 +37,7 @@ def _has_own_cause(carrier) -> bool:
 def clings(skin) -> bool:
     """Whether the texels go with the shape of what they lie on."""
     modifier = skin.modifiers.get(MODIFIER)
-    return modifier is not None and modifier.node_group is not None and modifier.get(_socket(modifier)) == skin.parent
+    return modifier is not None and modifier.node_group is not None and _carrier_of(modifier) == skin.parent
 
 
 def cling(context, skin, carrier) -> None:
@@ -47,7 +47,7 @@ def cling(context, skin, carrier) -> None:
         _bind(context, skin, carrier)
         modifier = skin.modifiers.new(MODIFIER, "NODES")
         modifier.node_group = bpy.data.node_groups.get(NODES) or _nodes()
-        modifier[_socket(modifier)] = carrier
+        _hand(modifier, carrier)
         modifier.show_expanded = False
         skin.update_tag()
 
@@ -66,6 +66,20 @@ def let_go(skin) -> None:
 def _socket(modifier) -> str:
     items = modifier.node_group.interface.items_tree
     return next(item.identifier for item in items if item.in_out == "INPUT" and item.socket_type == "NodeSocketObject")
+
+
+def _hand(modifier, carrier) -> None:
+    """Give the nodes the surface. Newer Blenders (5.2) have properties for inputs, older ones custom properties."""
+    if hasattr(modifier, "properties"):
+        getattr(modifier.properties.inputs, _socket(modifier)).value = carrier
+    else:
+        modifier[_socket(modifier)] = carrier
+
+
+def _carrier_of(modifier):
+    if hasattr(modifier, "properties"):
+        return getattr(modifier.properties.inputs, _socket(modifier)).value
+    return modifier.get(_socket(modifier))
 
 
 def _bind(context, skin, carrier) -> None:
