@@ -477,7 +477,10 @@ class PALPATE_PG_scene(bpy.types.PropertyGroup):
         options=set(),
     )
     show_reach: BoolProperty(
-        name="Max Penetration", description="Show how deep the texels of the active sensor reach", default=False, options=set()
+        name="Reach",
+        description="Show the maximum penetration: how deep the texels of the active sensor reach",
+        default=False,
+        options=set(),
     )
     show_overlay: BoolProperty(
         name="Live Heat Map",
