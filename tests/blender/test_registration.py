@@ -154,6 +154,25 @@ def test_every_operator_and_panel_has_a_name_and_a_tooltip():
             assert item.is_hidden or item.identifier in ("rna_type", "name") or item.description, item.identifier
 
 
+CHANGE_NOTHING = {
+    "palpate.preset_add",  # writes a file
+    "palpate.gap_find",
+    "palpate.gap_report",
+    "palpate.openrave_export",
+    "palpate.sensor_toml_export",
+    "palpate.catch_up",
+    "palpate.figures_make",
+    "palpate.debug_info_copy",
+}
+
+
+def test_every_operator_that_changes_the_scene_can_be_undone():
+    """A new operator is undoable, or is named here as one that only writes files, looks or computes."""
+    kinds = [kind for kind in kinds_of(bpy.types.Operator) if kind.__module__.startswith("palpate.")]
+    without = {kind.bl_idname for kind in kinds if "UNDO" not in getattr(kind, "bl_options", ())}
+    assert without == CHANGE_NOTHING
+
+
 def test_every_icon_exists(repository):
     """A panel with a wrong icon fails only when it is drawn, in a window."""
     import re
