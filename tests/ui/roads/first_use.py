@@ -2,6 +2,8 @@
 """The very first use: the solver is compiled beside the window, which answers meanwhile and then computes what had to wait."""
 
 import importlib
+import os
+import signal
 import sys
 import time
 
@@ -11,6 +13,11 @@ import press
 
 def preparing():
     return importlib.import_module("bl_ext.user_default.palpate.addon.preparing")
+
+
+def hold(what):
+    """Stop the compiler where it is, or let it go on."""
+    os.kill(preparing()._work.process.pid, what)
 
 
 def pad_forces():
@@ -45,6 +52,8 @@ def road(ui):
     yield from ui.filter("Bake")
     yield 5.0
     yield from ui.screenshot("preparing")
+    # However fast the machine is, it is still being prepared while the road looks at what waits for it
+    hold(signal.SIGSTOP)
 
     # Playing waits
     yield from ui.move(*ui.centre(view))
@@ -63,6 +72,7 @@ def road(ui):
     yield 0.5
     ui.check(not press.obj("Pad").palpate.is_baked, "ESC stops the bake that waits")
 
+    hold(signal.SIGCONT)
     yield from ui.move(*ui.centre(view))
     yield from ui.key("SPACE")
     yield from ui.wait_until(preparing().is_ready, "the solver is ready", timeout=600)
