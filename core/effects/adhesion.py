@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The surfaces stick: the force at small depth is less than the spring's and may pull.
 
-A texel knows nothing of an object that no longer reaches into it, so the pull ends where the contact does.
+A texel knows nothing of an object that no longer reaches into it, so the pull ends where the contact does: abruptly, or
+with the traction of a cohesive zone, which rises and fades while the last of the depth is given back.
 """
 
 from __future__ import annotations
@@ -39,6 +40,25 @@ def unloading(force, slope, depth, slide, numbers, row, memory, point, at, commi
         memory[point, at], memory[point, at + 1], memory[point, at + 2] = u, depth, old
     pull = numbers[row, 0] * c
     return force - pull * u, slope + pull * abs(aim - u) / numbers[row, 1]
+
+
+def cohesive(force, slope, depth, slide, numbers, row, memory, point, at, commit):
+    """``f − F u x exp(1 − x)``, x = d/D: on the way back the last of the depth is a layer that parts; u as :func:`unloading`.
+
+    Memory: u and the last depth. Constants: F, D.
+    """
+    if depth <= 0.0:
+        if commit:
+            memory[point, at], memory[point, at + 1] = 0.0, 0.0
+        return force, slope
+    change, x = depth - memory[point, at + 1], depth / numbers[row, 1]
+    aim = 0.0 if change >= 0.0 else 1.0
+    u = aim + (memory[point, at] - aim) * math.exp(-abs(change) / numbers[row, 1])
+    if commit:
+        memory[point, at], memory[point, at + 1] = u, depth
+    traction = x * math.exp(1.0 - x)
+    bend = u * (1.0 - x) * math.exp(1.0 - x) - abs(aim - u) * traction
+    return force - numbers[row, 0] * u * traction, slope - numbers[row, 0] * bend / numbers[row, 1]
 
 
 def _at_once(values: Values, dt: np.ndarray) -> np.ndarray:
@@ -95,6 +115,21 @@ KIND = Kind(
             law=unloading,
             constants=_with_time,
             memory=3,
+            after_clip=True,
+        ),
+        Form(
+            "cohesive",
+            "f = f₀ − F u x exp(1 − x),  x = d/D;  u → 1 on the way back, → 0 on the way in, within D",
+            "Rose, Ferrante and Smith, Phys. Rev. Lett. 47 (1981); Xu and Needleman, Model. Simul. Mater. Sci. Eng. 1 (1993): "
+            "traction over separation",
+            (
+                _PULL,
+                Parameter("depth", "m", 2e-4, 1e-6, 0.02, "Depth D, before contact ends, at which it pulls most.", log=True),
+            ),
+            off={"pull": 0.0},
+            law=cohesive,
+            constants=same_for_all_steps("pull", "depth"),
+            memory=2,
             after_clip=True,
         ),
     ),

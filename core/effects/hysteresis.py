@@ -97,6 +97,24 @@ def play(force, slope, depth, slide, numbers, row, memory, point, at, commit):
     return (1.0 - share) * force + share * total / count, slope * (1.0 - share + share * moving / count)
 
 
+def preisach(force, slope, depth, slide, numbers, row, memory, point, at, commit):
+    """``(1 − a) x + a · mean of p_j``, where p_j stays between x − w_j and x, and above zero. Memory: the p_j.
+
+    Relays that switch on at b + w and off at b, b spread evenly from zero on, add up to p: max(x − w, 0) on a first way up.
+    """
+    share, count = numbers[row, 0], int(numbers[row, 1])
+    total, moving = 0.0, 0.0
+    for j in range(count):
+        before = memory[point, at + j]
+        p = min(max(before, force - numbers[row, 2 + j], 0.0), max(force, 0.0))
+        if p != before:
+            moving += 1.0
+        total += p
+        if commit:
+            memory[point, at + j] = p
+    return (1.0 - share) * force + share * total / count, slope * (1.0 - share + share * moving / count)
+
+
 def trailing(force, slope, depth, slide, numbers, row, memory, point, at, commit):
     """``x (1 − h z)`` with ``dz/dx = (±1 − z) / F``, plus on the way up. Memory: z and the last x."""
     change = force - memory[point, at + 1]
@@ -113,6 +131,13 @@ def _operators(values: Values, dt: np.ndarray) -> np.ndarray:
     """Share, how many elements, and their thresholds, whose mean is the given one."""
     spread = 2.0 * np.arange(1, ELEMENTS + 1) / (ELEMENTS + 1)
     row = np.concatenate([[number(values, "share"), ELEMENTS], number(values, "force") * spread])
+    return np.tile(row, (len(dt), 1))
+
+
+def _relays(values: Values, dt: np.ndarray) -> np.ndarray:
+    """Share, how many elements, and their widths: middles of equal parts of an exponential distribution of given mean."""
+    widths = -np.log1p(-(np.arange(ELEMENTS) + 0.5) / ELEMENTS)
+    row = np.concatenate([[number(values, "share"), ELEMENTS], number(values, "force") * widths / widths.mean()])
     return np.tile(row, (len(dt), 1))
 
 
@@ -172,6 +197,20 @@ KIND = Kind(
             off={"share": 0.0},
             law=play,
             constants=_operators,
+            memory=ELEMENTS,
+            stage="readout",
+        ),
+        Form(
+            "preisach",
+            "r = (1 − a) f + a · mean of pⱼ,  pⱼ between f − wⱼ and f, and never below zero",
+            "Preisach, Z. Phys. 94 (1935); Mayergoyz, Mathematical Models of Hysteresis (1991): relays of exponential widths",
+            (
+                Parameter("share", "1", 0.4, 0.0, 1.0, "Share a of the reading that goes through the relays."),
+                Parameter("force", "N", 0.1, 1e-6, 1e3, "Mean width w between switching on and off.", log=True),
+            ),
+            off={"share": 0.0},
+            law=preisach,
+            constants=_relays,
             memory=ELEMENTS,
             stage="readout",
         ),

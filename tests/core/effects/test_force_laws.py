@@ -239,6 +239,19 @@ def test_adhesion():
     np.testing.assert_allclose(found, (K * depth - 0.1 * u * np.minimum(c, shifted)) * (depth > 0), rtol=1e-2, atol=2e-4)
 
 
+def test_a_cohesive_zone_takes_the_work_of_adhesion():
+    """Pulled out from far above the zone: the traction of Xu and Needleman, whose work is e F D, and no jump at the end."""
+    pull, zone = 0.1, 1e-4
+    depth = np.concatenate([np.linspace(0.0, 30 * zone, 501), np.linspace(30 * zone, 0.0, 1500)])
+    lost = K * depth - force(effect("adhesion", "cohesive", pull=pull, depth=zone), depth)
+    assert np.abs(lost[:501]).max() == 0.0  # on the way in there is nothing to part
+    x, turned = depth[501:] / zone, 1 - np.exp(-(30 - depth[501:] / zone))
+    np.testing.assert_allclose(lost[501:], pull * turned * x * np.exp(1 - x), rtol=1e-9, atol=1e-13)
+    work = 0.5 * np.sum((lost[501:] + lost[500:-1]) * -np.diff(depth[500:]))
+    assert work == pytest.approx(np.e * pull * zone, rel=1e-3)  # trapezia of 0.02 D
+    assert abs(lost[-2]) < 0.06 * pull
+
+
 def test_adhesion_ends_with_the_contact():
     depth = np.where(TIME < 10, cycle(), 0.0)
     assert (force(effect("adhesion"), depth)[TIME >= 10] == 0.0).all()

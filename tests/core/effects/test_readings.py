@@ -117,6 +117,27 @@ def test_play_keeps_its_distance():
     assert found[255] == pytest.approx(signal[255, 0] * 0.5 + 0.5 * (2 - 0.1))  # all stand still at first
 
 
+def test_relays_close_their_loop_at_zero():
+    """Relays, switched one by one, do what the four elements do; a loop to X encloses ``a · mean of w (X − w)``."""
+    widths = -np.log1p(-(np.arange(4) + 0.5) / 4)
+    widths *= 0.2 / widths.mean()
+    signal = np.interp(np.arange(1201), [0, 300, 450, 700, 1000, 1200], [0.0, 1.7, 0.6, 2.0, 0.0, 1.0])
+    found = read(effect("hysteresis", "preisach", share=0.6, force=0.2), signal[:, None], np.arange(1201.0))[:, 0]
+    off = (np.arange(20000) + 0.5) * 1e-4  # from zero to the largest load, for each width
+    mean = np.zeros(len(signal))
+    for width in widths:
+        state = np.zeros(len(off), bool)
+        for i, load in enumerate(signal):
+            state = (state & (load > off)) | (load > off + width)
+            mean[i] += state.sum() * 1e-4 / 4
+    np.testing.assert_allclose(found, 0.4 * signal + 0.6 * mean, atol=2e-4)  # two relays
+    assert found[1000] == 0.0
+    loop = np.concatenate([np.linspace(0, 2, 4001), np.linspace(2, 0, 4001)])
+    found = read(effect("hysteresis", "preisach", share=0.6, force=0.2), loop[:, None], np.arange(8002.0))[:, 0]
+    enclosed = -0.5 * np.sum((found[1:] + found[:-1]) * np.diff(loop))
+    assert enclosed == pytest.approx(0.6 * np.mean(widths * (2.0 - widths)), rel=1e-6)
+
+
 def test_trailing_reading():
     signal = np.concatenate([np.linspace(0, 2, 251), np.linspace(2, 0.5, 250)])[:, None]
     found = read(effect("hysteresis", "trailing", width=0.1, force=0.05), signal)[:, 0]
