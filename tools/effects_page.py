@@ -254,13 +254,20 @@ DRAWN = {
     "viscous-friction": _over_speed,
     "softening": _force_over_depth(_cycles(2)(_LONG) * np.where(_LONG < 10, 0.7, 1.0), peak={"depth": 0.001}),
     "hysteresis": _force_over_depth(
-        _cycles(1)(_LONG), bouc_wen={"force": 0.6, "share": 0.3}, maxwell_slip={"force": 0.3, "share": 0.6}, play={"force": 0.4},
+        _cycles(1)(_LONG),
+        bouc_wen={"force": 0.6, "share": 0.3},
+        maxwell_slip={"force": 0.3, "share": 0.6},
+        play={"force": 0.4},
         preisach={"force": 0.5, "share": 0.8},
     ),
     "creep": _over_time(_LONG, _HOLD),
     "wear": _peaks,
     "adhesion": _force_over_depth(
-        _SMALL, unloading={"depth": 3e-5}, constant={"depth": 3e-5}, dwell={"depth": 3e-5, "time": 30.0}, cohesive={"pull": 0.06, "depth": 4e-5}
+        _SMALL,
+        unloading={"depth": 3e-5},
+        constant={"depth": 3e-5},
+        dwell={"depth": 3e-5, "time": 30.0},
+        cohesive={"pull": 0.06, "depth": 4e-5},
     ),
     "load-spreading": _across,
     "dead-zone": _reading_over_force(hard={"threshold": 0.4}, soft={"threshold": 0.4}, step={"threshold": 0.4}),
