@@ -7,6 +7,7 @@ Made when a scene is baked, and made anew from the bake's files when only the di
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import combinations
 
 import bpy
 import numpy as np
@@ -22,6 +23,10 @@ LEAST_RANGE = 1e-6
 """Newtons, or pascals, at the end of the heat maps of sensors that nothing touched."""
 TEXEL_ARROW = 0.2
 """Longest arrow of a texel, in sizes of the largest sensor, where its length is chosen automatically."""
+FACING = 0.7
+"""Cosine of the angle within which the force of one sensor points at another."""
+ARROW_GAP = 0.94
+"""Of the way between two such sensors that their arrows take up together."""
 
 
 @dataclass(frozen=True)
@@ -55,7 +60,7 @@ class Scales:
         turn = _largest(np.linalg.norm(measures.free_moment(item.felt), axis=1) for item in worn)
         force = units.as_typed(settings.arrow_scale) / unit
         if settings.use_auto_arrow:
-            force = size / net if net > 0 else 0.0
+            force = min(size / net, _room_between(worn)) if net > 0 else 0.0
         peaks = {
             "NORMALS": _largest(item.felt.normal_force for item in worn),
             "SHEARS": _largest(np.linalg.norm(item.felt.shear, axis=2) for item in worn),
@@ -66,6 +71,23 @@ class Scales:
         longest = {kind: texel[kind] * peak for kind, peak in peaks.items()}
         moment = 0.6 * size / turn if turn > 0 else 0.0
         return cls(heat_range(settings, worn), force, moment, texel, longest)
+
+
+def _room_between(worn: list[markers.Worn]) -> float:
+    """Return the Blender units per newton up to which arrows of sensors that face each other, as in a grasp, do not cross."""
+    room = np.inf
+    ways = [item.in_world() for item in worn]
+    touching = [item.felt.contact.any(axis=1) for item in worn]
+    for a, b in combinations(range(len(worn)), 2):
+        frames = touching[a] & touching[b]
+        (from_a, push_a), (from_b, push_b) = ((foot[frames], push[frames]) for foot, push in (ways[a], ways[b]))
+        distance = np.linalg.norm(from_b - from_a, axis=1)
+        way = (from_b - from_a) / np.maximum(distance, 1e-12)[:, None]
+        strengths = [np.maximum(np.linalg.norm(push, axis=1), 1e-12) for push in (push_a, push_b)]
+        towards = (push_a * way).sum(axis=1) / strengths[0], -(push_b * way).sum(axis=1) / strengths[1]
+        facing = (np.minimum(*towards) > FACING) & (distance > 0)
+        room = min(room, (0.5 * ARROW_GAP * distance / np.maximum(*strengths))[facing].min(initial=np.inf))
+    return room
 
 
 def _largest(tables) -> float:

@@ -75,6 +75,12 @@ class Worn:
         """Longest side of the sensor, Blender units."""
         return float(np.ptp(self.texels.position, axis=0).max()) / self.scale
 
+    def in_world(self) -> tuple[np.ndarray, np.ndarray]:
+        """(F, 3) float: where the net force acts, Blender units, and with what the sensor pushes back there, N."""
+        rotation = np.array([transforms.rotation(pose[3:]) for pose in self.poses])
+        foot = self.poses[:, :3] + np.einsum("fij,fj->fi", rotation, self.felt.centre_of_pressure)
+        return foot / self.scale, -np.einsum("fij,fj->fi", rotation, self.felt.net_force)
+
 
 def find(objects, uid: str, kind: str):
     """Return a sensor's marker among some objects; None when there is none."""

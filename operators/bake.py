@@ -3,7 +3,7 @@
 
 import bpy
 
-from ..addon import dress, live, state, write
+from ..addon import dress, live, write
 from ..addon.bake import bake
 from . import support, working
 
@@ -21,10 +21,7 @@ class PALPATE_OT_bake(working.Working, bpy.types.Operator):
         if context.scene is None or not live.has_roles(context.scene):
             cls.poll_message_set("No object has a role: make a sensor and a target first")
             return False
-        if live.is_baking():
-            cls.poll_message_set("A bake is running")
-            return False
-        return True
+        return support.idle(cls)
 
     stopped = "Bake stopped; what was there before is unchanged"
 
@@ -53,10 +50,7 @@ class PALPATE_OT_catch_up(working.Working, bpy.types.Operator):
         if context.scene is None or not live.missing(context.scene):
             cls.poll_message_set("Nothing is missing up to the present frame")
             return False
-        if live.is_baking() or state.session.catching_up:
-            cls.poll_message_set("Frames are being computed")
-            return False
-        return True
+        return support.idle(cls)
 
     def job(self, context):
         if context.screen is not None and context.screen.is_animation_playing:

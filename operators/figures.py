@@ -3,8 +3,8 @@
 
 import bpy
 
-from ..addon import figures, live, state, write
-from . import working
+from ..addon import figures, write
+from . import support, working
 
 
 class PALPATE_OT_figures_make(working.Working, bpy.types.Operator):
@@ -20,10 +20,7 @@ class PALPATE_OT_figures_make(working.Working, bpy.types.Operator):
         if context.scene is None or not write.bake_folders(context.scene):
             cls.poll_message_set("Nothing is baked in this scene: bake first")
             return False
-        if live.is_baking() or state.session.catching_up:
-            cls.poll_message_set("Frames are being computed")
-            return False
-        return True
+        return support.idle(cls)
 
     def job(self, context):
         from ..addon import pictures

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from ..addon import measured, meshes
+from ..addon import live, measured, meshes, state
 from ..core.errors import PalpateError
 
 
@@ -20,6 +20,14 @@ class Reporting:
         except PalpateError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
+
+
+def idle(cls) -> bool:
+    """Poll: no frames are being computed, by a bake or after a jump on the timeline."""
+    if live.is_baking() or state.session.catching_up:
+        cls.poll_message_set("Frames are being computed")
+        return False
+    return True
 
 
 def object_with_surface(cls, context) -> bool:

@@ -15,6 +15,15 @@ RADIUS, LENGTH = 8.0, 20.0  # mm: a capsule
 ROD_RADIUS = 5.0  # mm
 FINGER, ROD = "Fingertip", "Rod"
 
+TEXT = """\
+A curved fingertip
+
+A steel rod rolls across a rubber fingertip. The sensor is a vertex group of a capsule; its texels form no grid, so the tactile
+image is their surface, flattened.
+
+Space plays; Bake writes the tactile images and puts heat map, net force and an arrow of shear at every texel on the fingertip.
+"""
+
 
 def build(scene) -> None:
     """Fill `scene`, which is emptied first; the add-on's classes must be registered."""
@@ -45,9 +54,11 @@ def build(scene) -> None:
     finger.palpate.vertex_group = "tactile"
     finger.palpate.k, finger.palpate.cn = 20.0, 0.2
     rod.palpate.role = "TARGET"
+    scene.palpate.overlays = {"FORCE", "SHEARS"}
 
     paper = studio.material("Backdrop", (0.30, 0.32, 0.35), roughness=0.85)
     studio.stage(scene, paper, aim=(0.0, -3.0, 32.0), camera=(95.0, 90.0, 85.0), size=0.3)
+    studio.explain(TEXT)
     scene.frame_set(scene.frame_start)
 
 

@@ -23,6 +23,15 @@ OPEN, LIFT = 7.0, 32.0  # mm
 MIDDLE = 42.0  # mm, height of the fingers' middle above the table
 LEFT, RIGHT, CYLINDER, TABLE = "Left finger", "Right finger", "Cylinder", "Table"
 
+TEXT = """\
+A grasp of two fingers
+
+Two finger pads close on a steel cylinder of 288 g, which stands on a table, and lift it by friction alone: each of them bears
+half of its weight, 1.41 N, as shear. The cylinder is free; the table is a pad, which presses on it and is not read out.
+
+Space plays; Bake writes the tactile images of both fingers and puts heat maps, net forces and shear on them.
+"""
+
 
 def build(scene) -> None:
     """Fill `scene`, which is emptied first; the add-on's classes must be registered."""
@@ -52,10 +61,12 @@ def build(scene) -> None:
         settings.mus, settings.mud = 0.6, 0.5
     cylinder.palpate.role, cylinder.palpate.body, cylinder.palpate.mass = "TARGET", "FREE", MASS
     scene.palpate.color_map = "VIRIDIS"
+    scene.palpate.overlays = {"FORCE", "SHEARS"}
 
     studio.stage(scene, paper, aim=(0.0, 0.0, 50.0), camera=(190.0, -330.0, 130.0))
     backdrop = scene.objects["Backdrop"]
     backdrop.location.z = -4.0
+    studio.explain(TEXT)
     scene.frame_set(scene.frame_start)
 
 

@@ -197,8 +197,8 @@ def plain(value):
 
 
 def described(scene):
-    """What a sample is made of, in plain numbers."""
-    found = {}
+    """What a sample is made of, in plain numbers, and what it says of itself."""
+    found = {"Read me": bpy.data.texts["Read me"].as_string()}
     for obj in scene.objects:
         settings = {}
         if obj.palpate.role != "NONE":

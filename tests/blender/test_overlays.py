@@ -11,6 +11,7 @@ from palpate.addon.bake import bake
 from palpate.core import measures
 from palpate.core.drive import drive
 from palpate.core.errors import PalpateError
+from palpate.sample_blends import grasp
 
 ALL = {"FORCE", "TORQUE", "CENTRE", "SLIP", "NORMALS", "SHEARS"}
 
@@ -98,6 +99,19 @@ def test_all_sensors_share_one_scale(baked):
         if slot.material is not None and materials.MARK in slot.material
     }
     assert list(ends) == [pytest.approx(measures.scale_limit(measures.peak_force(result.recording)))]
+
+
+def test_arrows_of_fingers_that_face_each_other_do_not_cross(tmp_path):
+    """In a grasp the two net forces point at each other: together they are shorter than the way between the fingers."""
+    scene = bpy.context.scene
+    grasp.build(scene)
+    scene.frame_start, scene.frame_end = 10, 15
+    save(tmp_path)
+    drive(bake(scene))
+    scene.frame_set(15)
+    left, right = (markers.find(scene.objects, scene.objects[name].palpate.uid, "FORCE") for name in (grasp.LEFT, grasp.RIGHT))
+    between = right.location.x - left.location.x
+    assert left.scale.z + right.scale.z == pytest.approx(0.94 * between, rel=0.05)  # the tightest is of another frame
 
 
 def test_display_settings_are_applied_to_a_bake_without_computing(baked, monkeypatch):
