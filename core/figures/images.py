@@ -242,6 +242,8 @@ def _millimetres_per_pixel(texels: Texels) -> float:
     return float(np.quantile(metres[whole] / pixels[whole], 0.05)) * 1e3
 
 
+KEYS_LINE = 0.17
+"""Inches from the scale bar to the arrow where that stands below."""
 _LETTER = 0.066
 """Inches that a letter of the small text takes, on average."""
 
@@ -250,6 +252,12 @@ def _arrow_key(view: View, strongest: float, inches: float) -> tuple[str, float]
     """Words for the arrow below the images, and its length in inches."""
     value = float(f"{strongest:.1g}")
     return f"{newtons(value)} shear", value / strongest * view.arrow * inches
+
+
+def widest_key(view: View, strongest: float, inches: float) -> float:
+    """Return the room, in inches, that :func:`keys` needs on two lines."""
+    alone = keys_width(view, 0.0, inches)
+    return max(alone, keys_width(view, strongest, inches) - alone - 0.2)
 
 
 def keys_width(view: View, strongest: float, inches: float) -> float:
@@ -261,10 +269,19 @@ def keys_width(view: View, strongest: float, inches: float) -> float:
     return width
 
 
-def keys(figure: Figure, at: tuple[float, float], view: View, strongest: float, inches: float, ink: str = INK) -> None:
+def keys(
+    figure: Figure,
+    at: tuple[float, float],
+    view: View,
+    strongest: float,
+    inches: float,
+    ink: str = INK,
+    room: float | None = None,
+) -> None:
     """Below a row of images, at (x, y) inches: how long some millimetres and some newtons of shear are drawn.
 
-    `inches` is the size of a millimetre; without a `strongest` shear there is no arrow.
+    `inches` is the size of a millimetre; without a `strongest` shear there is no arrow. Where both need more than `room`
+    inches, the arrow stands below the bar.
     """
     from matplotlib.lines import Line2D
     from matplotlib.patches import FancyArrowPatch
@@ -277,6 +294,8 @@ def keys(figure: Figure, at: tuple[float, float], view: View, strongest: float, 
         figure.add_artist(Line2D([x / width, stop / width], [y / height] * 2, color=ink, lw=2.0, solid_capstyle="butt"))
         figure.text((stop + 0.07) / width, y / height, f"{view.bar:g} mm", **words)
         x = stop + 0.07 + _LETTER * len(f"{view.bar:g} mm") + 0.2
+    if room is not None and view.bar > 0 and keys_width(view, strongest, inches) > room:
+        x, y = at[0], y - KEYS_LINE
     if strongest > 0:
         label, length = _arrow_key(view, strongest, inches)
         stop = x + length
@@ -297,14 +316,16 @@ def keys(figure: Figure, at: tuple[float, float], view: View, strongest: float, 
 
 
 def colour_bar(figure: Figure, image: Any, axes: Axes, look: Look, ink: str = INK) -> None:
-    """Fill `axes` with the colour bar of an image."""
+    """Fill `axes` with the colour bar of an image; it lies where the axes are wider than high."""
     from matplotlib.ticker import MaxNLocator
 
-    bar = figure.colorbar(image, cax=axes)
+    place, (width, height) = axes.get_position(), figure.get_size_inches()
+    lies = place.width * width > place.height * height
+    bar = figure.colorbar(image, cax=axes, orientation="horizontal" if lies else "vertical")
     bar.locator = MaxNLocator(5, steps=[1, 2, 2.5, 5, 10])
     bar.update_ticks()
     bar.ax.tick_params(labelsize=FONT, colors=ink, length=2.5, width=0.6)
-    tall = axes.get_position().height * figure.get_figheight() > 1.9  # inches; else the words need two lines
-    bar.set_label((" " if tall else "\n").join(look.words), fontsize=FONT, color=ink)
+    long = (place.width * width if lies else place.height * height) > 1.9  # inches; else the words need two lines
+    bar.set_label((" " if long or lies else "\n").join(look.words), fontsize=FONT, color=ink, labelpad=2.0)
     bar.outline.set_edgecolor(ink)
     bar.outline.set_linewidth(0.5)

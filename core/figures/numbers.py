@@ -87,10 +87,16 @@ def texel_numbers(
         axes.text(x, y, word, fontsize=SMALL, color=ink, ha="center", va="center_baseline", path_effects=rim)
     time = recording.times[int(np.searchsorted(recording.frames, frame))]
     figure.text(
-        side / width, 1 - 0.05 / height, f"{name}, {time:.2f} s, {unit}", fontsize=FONT, color=INK, weight="bold", va="top"
+        side / width,
+        1 - 0.05 / height,
+        f"{name}, {time:.2f} s, numbers in {unit}",
+        fontsize=FONT,
+        color=INK,
+        weight="bold",
+        va="top",
     )
-    tall = min(height - 0.5, 3.2)
-    bar = figure.add_axes(((width - right + 0.08) / width, (side + 0.05) / height, 0.11 / width, tall / height))
+    tall = max(inches * view.height, 1.2)
+    bar = figure.add_axes(((width - right + 0.08) / width, side / height, 0.11 / width, tall / height))
     colour_bar(figure, image, bar, look)
     save_figure(figure, path, look.dpi)
 

@@ -17,6 +17,8 @@ from .look import Look
 
 COLUMNS = {"single": 3, "middle": 5, "double": 6}
 """Images in a row, by the figure's width, where the frames are not chosen by hand."""
+LEAST_HEIGHT, LYING_BAR = 1.9, 0.55
+"""Inches: of a figure with the colour bar at its side; lower ones have it below, where it takes up so much."""
 
 
 def tactile_strip(
@@ -49,11 +51,22 @@ def tactile_strip(
 
     # Sizes in inches: the figure is as high as its rows need, so that images keep their shape and text its size.
     left, right, above, gap, below = 0.95, 0.9, 0.28, 0.36, 0.42
+
+    def rows(cell: float) -> list[float]:
+        return [min(max(cell * 0.86 * view.height / view.width, 0.5), 2.4) for view in views]
+
+    def whole(heights: list[float]) -> float:
+        return above + sum(heights) + gap * (len(views) - 1) + below
+
     width = look.inches
     cell = max(0.5, (width - left - right) / columns)
+    lies = whole(rows(cell)) < LEAST_HEIGHT  # the colour bar: it would be higher than all else
+    if lies:
+        right = 0.1
+        cell = max(0.5, (width - left - right) / columns)
     width = max(width, left + right + columns * cell)
-    heights = [min(max(cell * 0.86 * view.height / view.width, 0.5), 2.4) for view in views]
-    height = max(above + sum(heights) + gap * (len(views) - 1) + below, 1.9)
+    heights = rows(cell)
+    height = whole(heights) + lies * LYING_BAR
     figure = new_figure(width, height)
     y = height - above
     image = None
@@ -78,8 +91,13 @@ def tactile_strip(
         keys(figure, (max(start, 0.06), y - 0.2), view, shown, inches)
         y -= gap
     assert image is not None
-    tall = min(height - 0.5, 3.2)
-    bar = figure.add_axes(((width - right + 0.1) / width, 0.5 * (1 - tall / height), 0.11 / width, tall / height))
+    if lies:
+        long = min(0.5 * width, 3.2)
+        place = (left + 0.03, LYING_BAR - 0.15, long, 0.11)
+    else:
+        tall = min(height - 0.5, 3.2)
+        place = (width - right + 0.1, 0.5 * (height - tall), 0.11, tall)
+    bar = figure.add_axes((place[0] / width, place[1] / height, place[2] / width, place[3] / height))
     colour_bar(figure, image, bar, look)
     save_figure(figure, path, look.dpi)
 

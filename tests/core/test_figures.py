@@ -82,6 +82,8 @@ def test_colours_of_the_strip_are_the_forces(tmp_path):
 
 
 def test_no_text_is_smaller_than_eight_points_or_leaves_the_figure(tmp_path, monkeypatch):
+    from matplotlib.image import imsave
+
     seen = []
 
     def look(figure, *_):
@@ -95,7 +97,7 @@ def test_no_text_is_smaller_than_eight_points_or_leaves_the_figure(tmp_path, mon
             for axis, (low, high) in ((axes.xaxis, axes.get_xlim()), (axes.yaxis, axes.get_ylim())):
                 ticks |= {label for tick in axis.majorTicks for label in (tick.label1, tick.label2)}
                 places = zip(axis.get_majorticklocs(), axis.get_majorticklabels(), strict=False)
-                drawn |= {label for place, label in places if low <= place <= high}
+                drawn |= {label for place, label in places if axes.axison and low <= place <= high}
         for text in set(figure.findobj(Text)) - (ticks - drawn):
             if text.get_text().strip() and text.get_visible():
                 box = text.get_window_extent(renderer)
@@ -116,6 +118,11 @@ def test_no_text_is_smaller_than_eight_points_or_leaves_the_figure(tmp_path, mon
             figures.time_curves(tmp_path / "c.png", recording, both, parameters, look=look)
             figures.texel_numbers(tmp_path / "d.png", recording, both, "pad", 5, look)
     figures.force_curves(tmp_path / "b.png", recording, both, parameters, {"pad": 9.81})
+    source = tmp_path / "scene.png"
+    imsave(source, np.full((480, 640, 3), 0.4))
+    for shown in ({"pad": texels}, both, dict.fromkeys((*both, "c", "d"), texels)):
+        recording.sensors.update(dict.fromkeys(shown, recording.sensors["pad"]))
+        figures.side_by_side(source, tmp_path / "e.png", recording, shown, 5)
     assert len(seen) > 20
     assert [entry for entry in seen if entry[1] < 8 or not entry[2]] == []
 
