@@ -13,7 +13,7 @@ import numpy as np
 from .. import measures
 from ..bakes import frame_index
 from ..canvas import FONT, INK, SERIES, SMALL, new_figure, save_figure, tidy_axes
-from ..recording import Recording
+from ..recording import Recording, SensorRecording
 from ..texels import Texels
 from .images import KEYS_LINE, SMALLEST_ARROW, View, colour_bar, keys, keys_width, widest_key
 from .look import Look
@@ -104,7 +104,7 @@ class _Part:
     room: float = 0.0
 
     @classmethod
-    def of(cls, texels: Texels, felt, strongest: float) -> _Part:
+    def of(cls, texels: Texels, felt: SensorRecording, strongest: float) -> _Part:
         own = float(np.linalg.norm(felt.shear, axis=2).max(initial=0.0))
         view = View.of(texels, felt.normal_force.sum(axis=0))
         return cls(view, strongest if own > SMALLEST_ARROW * strongest else 0.0)
