@@ -58,7 +58,7 @@ def main(argv: Sequence[str] | None = None) -> int:
                 print(say, "not yet", file=sys.stderr)
                 return 1
             if rest:
-                parser.error(f"unrecognized arguments: {' '.join(rest)}")
+                _complain(parser, arguments.command, rest)
             return arguments.run(arguments)
     except SystemExit as stop:  # argparse has printed its help or what is wrong with the usage
         return int(stop.code or 0)
@@ -71,6 +71,15 @@ def main(argv: Sequence[str] | None = None) -> int:
     except PalpateError as error:
         print(say, error, file=sys.stderr)
         return 1
+
+
+def _complain(parser: argparse.ArgumentParser, command: str, rest: list[str]) -> None:
+    """Say what is wrong with words that a command does not know, and stop."""
+    if any(word.startswith("-") for word in rest):
+        advice = f"palpate {command} --help lists what it knows"
+    else:
+        advice = f"palpate {command} takes one file at a time, so run it once for each"
+    parser.error(f"unrecognized arguments: {' '.join(rest)}: {advice}")
 
 
 def _parser() -> argparse.ArgumentParser:

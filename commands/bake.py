@@ -32,6 +32,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=int,
         help="frames to compute (default: those of the scene); the bodies start at FIRST. A scene that is saved keeps them.",
     )
+    parser.add_argument(
+        "--model",
+        metavar="[NAME=]SENSOR.toml",
+        action="append",
+        default=[],
+        help="parameters and effects of the sensor, or of the one with this name; may be given again. A scene that is saved "
+        "keeps them.",
+    )
     where = parser.add_mutually_exclusive_group()
     where.add_argument("--save", action="store_true", help="save motion, heat maps and arrows into SCENE.blend itself")
     where.add_argument("--save-as", metavar="FILE", help="save them into another .blend")
@@ -46,6 +54,8 @@ def run(arguments: argparse.Namespace) -> int:
         blender.open_blend(arguments.scene)
         scene = bpy.context.scene
         own_start = scene.frame_start
+        for words in arguments.model:
+            _put_model(scene, words)
         if arguments.frames:
             scene.frame_start, scene.frame_end = _frames(scene, *arguments.frames)
         if arguments.out:
@@ -128,6 +138,18 @@ def _leave_saved_bake(bpy, scene, blend: str) -> None:
                 f"'{blend}' plays the bake in '{target}', which would no longer fit it: "
                 "add --save to renew both, or --out DIR to bake elsewhere."
             )
+
+
+def _put_model(scene, words: str) -> None:
+    """Put what ``[NAME=]SENSOR.toml`` says on a sensor."""
+    from ..addon import measured
+    from ..core.formats.sensor_toml import read_sensor
+
+    name, _, file = ("", "", words) if Path(words).is_file() else words.partition("=")
+    if not file:
+        name, file = "", name
+    model = read_sensor(file)
+    measured.put(measured.sensor_called(scene, name or None, f"write --model NAME={file}"), model)
 
 
 def _frames(scene, first: int, last: int) -> tuple[int, int]:

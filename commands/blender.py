@@ -5,12 +5,18 @@ from __future__ import annotations
 
 import importlib
 import os
+import secrets
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from ..core.errors import FileError, PalpateError
 from . import console
 
 _COMPRESSED = (b"\x28\xb5\x2f\xfd", b"\x1f\x8b")  # Zstandard, and gzip in files from before Blender 3.0
+_SEEKABLE_END = b"\xb1\xea\x92\x8f"
+"""Last bytes of Zstandard's seekable format, in which Blender compresses."""
 
 
 def start():
@@ -77,7 +83,7 @@ def save_blend(path: str | os.PathLike, backup: bool = True) -> None:
     Raises
     ------
     FileError
-        It cannot be written.
+        It cannot be written. A file that was there is still as it was.
     """
     import bpy
 
@@ -91,9 +97,38 @@ def save_blend(path: str | os.PathLike, backup: bool = True) -> None:
     versions = files.save_version
     try:
         files.save_version = versions if backup else 0
-        bpy.ops.wm.save_as_mainfile(filepath=str(path), compress=True, relative_remap=True)
-    except RuntimeError as error:
+        with _kept(path):
+            bpy.ops.wm.save_as_mainfile(filepath=str(path), compress=True, relative_remap=True)
+            if not _is_whole(path):
+                raise OSError("it was cut short")
+    except (RuntimeError, OSError) as error:
         reason = " ".join(str(error).removeprefix("Error:").split()).rstrip(".")
         raise FileError(f"'{path}' could not be saved ({reason}): check the folder and the space left on the disk.") from error
     finally:
         files.save_version = versions
+
+
+def _is_whole(path: Path) -> bool:
+    """Tell whether a compressed .blend ends with its table of frames: on a full disk Blender cuts it off and says nothing."""
+    with path.open("rb") as file:
+        file.seek(-len(_SEEKABLE_END), os.SEEK_END)
+        return file.read() == _SEEKABLE_END
+
+
+@contextmanager
+def _kept(path: Path) -> Iterator[None]:
+    """Put a file back, or remove what has come in its place, when the body raises; a second name of it takes no space."""
+    second = path.with_name(f".{path.name}.{secrets.token_hex(4)}.partial") if path.exists() else None
+    if second is not None:
+        try:
+            os.link(path, second)
+        except OSError:  # a file system without links
+            shutil.copy2(path, second)
+    try:
+        yield
+    except BaseException:
+        with suppress(OSError):
+            os.replace(second, path) if second is not None else path.unlink()
+        raise
+    if second is not None:
+        second.unlink()

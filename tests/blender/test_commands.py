@@ -14,9 +14,10 @@ import pytest
 from blender_scenes import press, reopen, save
 
 from palpate.addon.bake import bake
-from palpate.commands import COMMANDS, READY, console, main
+from palpate.commands import COMMANDS, READY, blender, console, main
 from palpate.commands.bake import report
 from palpate.core.drive import drive
+from palpate.core.errors import FileError
 from palpate.core.formats.archive import load_recording
 
 
@@ -125,6 +126,33 @@ def test_a_part_cannot_be_saved(tmp_path, demo_blend, capfd):
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.parametrize("words", [["a.blend", "b.blend"], ["a.blend", "--modle", "x.toml"]])
+def test_what_is_too_much_says_what_to_do(words, capfd):
+    assert main(["bake", *words]) == 2
+    assert ("one file at a time" if words[1] == "b.blend" else "--help") in capfd.readouterr().err
+
+
+def test_a_full_disk_leaves_the_scene_as_it_was(tmp_path, demo_blend, capfd):
+    """A limit on the size of files stands for the disk: Blender itself then writes half a file and calls it saved."""
+    bpy.ops.wm.open_mainfile(filepath=str(demo_blend))
+    resource = pytest.importorskip("resource")
+    mine, new = tmp_path / "mine.blend", tmp_path / "new.blend"
+    mine.write_bytes(demo_blend.read_bytes())
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (mine.stat().st_size // 2, limits[1]))
+    try:
+        for path in (mine, new):
+            with pytest.raises(FileError, match=f"'{path}' could not be saved .*space"):
+                blender.save_blend(path)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    assert mine.read_bytes() == demo_blend.read_bytes()
+    assert not new.exists()
+    assert {path.name for path in tmp_path.iterdir()} <= {"mine.blend", "mine.blend1"}
+    blender.save_blend(mine)
+    blender.open_blend(mine)
+
+
 def test_scripts_in_a_file_do_not_run(tmp_path, demo_blend):
     bpy.ops.wm.open_mainfile(filepath=str(demo_blend))
     text = bpy.data.texts.new("evil.py")
@@ -154,6 +182,27 @@ def test_bake_writes_images_and_leaves_the_file_alone(tmp_path, demo_blend, capf
         files = {path.name for path in (tmp_path / "out" / name).iterdir()}
         assert files == {*(f"tactile_{frame:04d}.exr" for frame in range(1, 7)), "recording.npz", "sensor.npz", "manifest.json"}
     assert demo_blend.read_bytes() == before
+
+
+def test_bake_with_a_model_from_a_file(tmp_path, demo_blend, capfd):
+    """`--model` puts parameters and effects on a sensor; of several it wants the name."""
+    model = tmp_path / "soft.toml"
+    model.write_text(
+        'format = "palpate-sensor-toml/1"\n[sensor]\nk = 29.25\ncn = 0.0583\nunit = "V"\n'
+        '[[effect]]\nname = "offset"\nform = "common"\noffset = 0.5\n',
+        encoding="utf-8",
+    )
+    words = ["bake", str(demo_blend), "--frames", "24", "26"]
+    assert main([*words, "--out", str(tmp_path / "plain")]) == 0
+    assert main([*words, "--out", str(tmp_path / "no"), "--model", str(model)]) == 1
+    assert "NAME=" in capfd.readouterr().err
+    assert not (tmp_path / "no").exists() or not list((tmp_path / "no").iterdir())
+    assert main([*words, "--out", str(tmp_path / "soft"), "--model", f"Finger A={model}"]) == 0
+    plain, soft = (
+        load_recording(tmp_path / name / "Finger A" / "recording.npz").sensors["Finger A"] for name in ("plain", "soft")
+    )
+    assert soft.normal_force.max() < 0.6 * plain.normal_force.max()  # half as stiff
+    assert np.allclose(soft.reading - soft.normal_force, 0.5)
 
 
 def test_save_as_keeps_the_bake_in_another_file(tmp_path, demo_blend):
