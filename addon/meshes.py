@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..core.errors import MeshError, SensorError
+from ..core.errors import MeshError, PaintedError, RegionError, SensorError
 from . import units
 
 PAINTED = ("k", "friction", "gain")
@@ -146,9 +146,8 @@ def region_by(
     if region == "GROUP":
         group = obj.vertex_groups.get(vertex_group)
         if group is None:
-            raise SensorError(
-                f"Sensor '{obj.name}' has no vertex group '{vertex_group}': choose one in its Region panel or paint one."
-            )
+            there = f"has no vertex group '{vertex_group}' (was it renamed?)" if vertex_group else "names no vertex group yet"
+            raise RegionError(f"Sensor '{obj.name}' {there}: choose one in its Region panel or paint one.")
         return weights(obj.data, group.index) >= max(threshold, 1e-6)
     return corners_of(obj.data, _faces_of_material(obj, material) if region == "MATERIAL" else _faces_of_set(obj, face_set))
 
@@ -157,7 +156,7 @@ def _faces_of_material(obj, name: str) -> np.ndarray:
     """(nf,) bool: faces that wear a material, or did before a heat map covered them."""
     slots = [index for index, slot in enumerate(obj.material_slots) if slot.material is not None and slot.material.name == name]
     if not slots:
-        raise SensorError(f"Sensor '{obj.name}' wears no material '{name}': choose one in its Region panel (was it renamed?).")
+        raise RegionError(f"Sensor '{obj.name}' wears no material '{name}': choose one in its Region panel (was it renamed?).")
     index = np.empty(len(obj.data.polygons), dtype=np.int32)
     obj.data.polygons.foreach_get("material_index", index)
     covered = obj.data.attributes.get(OLD_MATERIAL)
@@ -181,7 +180,7 @@ def _faces_of_set(obj, number: int) -> np.ndarray:
     faces = face_sets(obj.data) == number
     if not faces.any():
         there = ", ".join(str(found) for found in np.unique(face_sets(obj.data))[:8])
-        raise SensorError(f"Sensor '{obj.name}' has no face set {number}: choose one of {there} in its Region panel.")
+        raise RegionError(f"Sensor '{obj.name}' has no face set {number}: choose one of {there} in its Region panel.")
     return faces
 
 
@@ -216,7 +215,7 @@ def multipliers(obj, key: str) -> np.ndarray | None:
 
     Raises
     ------
-    SensorError
+    PaintedError
         The group or attribute does not exist, or holds what cannot be a factor.
     """
     name, factor = getattr(obj.palpate, f"{key}_map"), getattr(obj.palpate, f"{key}_factor")
@@ -227,14 +226,15 @@ def multipliers(obj, key: str) -> np.ndarray | None:
         return 1.0 + (units.as_typed(factor) - 1.0) * weights(obj.data, group.index).astype(float)
     attribute = obj.data.attributes.get(name)
     if attribute is None or not is_map(attribute):
-        raise SensorError(
-            f"Sensor '{obj.name}' has no vertex group or attribute '{name}' to take the {key} from: "
-            "choose another one in its panel, or empty the field."
+        what = obj.palpate.bl_rna.properties[f"{key}_map"].name
+        raise PaintedError(
+            f"Sensor '{obj.name}' has no vertex group or attribute '{name}' any more, which its {what} names: "
+            "choose another one there, or empty the field."
         )
     values = np.empty(len(obj.data.vertices), dtype=np.float32)
     attribute.data.foreach_get("value", values)
     if not (np.isfinite(values).all() and (values >= 0).all()):
-        raise SensorError(f"Attribute '{name}' of '{obj.name}' holds a negative or NaN factor: make all of them zero or more.")
+        raise PaintedError(f"Attribute '{name}' of '{obj.name}' holds a negative or NaN factor: make all of them zero or more.")
     return values.astype(float)
 
 

@@ -134,7 +134,7 @@ def _look(obj, scene) -> Report:
         around = _around(obj, depsgraph, metres) if skins.is_skin(obj) and obj.parent else None
         found = problems.of_object(obj, notes) + problems.of_texels(obj, mesh, sensor.texels, reach, around)
     except PalpateError as error:
-        return Report(None, reach, metres, None, [problems.of_region(error)], advice, missing)
+        return Report(None, reach, metres, None, [problems.of_error(obj, error)], advice, missing)
     return Report(sensor.texels, reach, metres, mesh if around is None else around, found, advice, missing)
 
 

@@ -12,10 +12,10 @@ import numpy as np
 from mathutils import Vector
 from mathutils.bvhtree import BVHTree
 
-from ..core.errors import PalpateError, SensorError
+from ..core.errors import ImageError, PaintedError, PalpateError, RegionError, SensorError
 from ..core.mesh import TriangleMesh, edge_defects, is_closed
 from ..core.texels import Texels
-from . import clinging, skins
+from . import clinging, meshes, skins
 
 TOO_NEAR = 0.1
 """Texels nearer than this share of the usual distance count as one upon another."""
@@ -32,7 +32,7 @@ class Problem:
     Attributes
     ----------
     kind : str
-        A key of :data:`FIXES`.
+        A key of :data:`FIXES`, where there is a button for it.
     text : str
         One sentence: what and where.
     texels : (k,) int
@@ -247,6 +247,23 @@ def _whole_mesh(obj, _problem, _report) -> None:
     obj.palpate.made_vertices = len(obj.data.vertices)
 
 
+def _active_group(obj, _problem, _report) -> None:
+    obj.palpate.vertex_group = obj.vertex_groups.active.name
+
+
+def _automatic_image(obj, _problem, _report) -> None:
+    obj.palpate.image_layout = "AUTO"
+
+
+def _nothing_painted(obj, _problem, _report) -> None:
+    """Empty the fields for painted multipliers that cannot be read."""
+    for key in ("k", "friction", "gain"):
+        try:
+            meshes.multipliers(obj, key)
+        except PaintedError:
+            setattr(obj.palpate, f"{key}_map", "")
+
+
 def _on_its_own(obj, _problem, _report) -> None:
     obj.palpate.body = "KEYFRAMED"
 
@@ -263,6 +280,9 @@ FIXES: dict[str, tuple[str, Callable]] = {
     "ORPHAN": ("Keyframed Body", _on_its_own),
     "GROWN": ("That Is Meant", _accept),
     "REGION": ("Use Whole Mesh", _whole_mesh),
+    "GROUP": ("Use Active Group", _active_group),
+    "IMAGE": ("Automatic Image", _automatic_image),
+    "PAINTED": ("Empty the Field", _nothing_painted),
 }
 """By kind: the name of the button, and what it does to (object, problem, report)."""
 
@@ -281,6 +301,12 @@ def fix(obj, kind: str, report) -> None:
     FIXES[kind][1](obj, problem, report)
 
 
-def of_region(error: PalpateError) -> Problem:
-    """Return the problem of a region that makes no texels."""
-    return Problem("REGION", str(error))
+def of_error(obj, error: PalpateError) -> Problem:
+    """Return the problem of a sensor that has no texels because of an error; some kinds have no button."""
+    own = obj.palpate
+    if isinstance(error, RegionError):
+        lost = own.region == "GROUP" and own.vertex_group not in obj.vertex_groups and len(obj.vertex_groups) > 0
+        return Problem("GROUP" if lost else "REGION", str(error))
+    if isinstance(error, ImageError):
+        return Problem("IMAGE", str(error))
+    return Problem("PAINTED" if isinstance(error, PaintedError) else "OTHER", str(error))

@@ -316,10 +316,20 @@ class PALPATE_PG_object(bpy.types.PropertyGroup):
         **_fixed,
     )
     velocity: FloatVectorProperty(
-        name="Velocity (m/s)", description="Of a free body at the first frame, m/s, world axes", size=3, precision=4, **_fixed
+        name="Velocity (m/s)",
+        description="Of a free body at the first frame, m/s, world axes",
+        size=3,
+        subtype="XYZ",
+        precision=4,
+        **_fixed,
     )
     angular_velocity: FloatVectorProperty(
-        name="Spin (rad/s)", description="Of a free body at the first frame, rad/s, world axes", size=3, precision=4, **_fixed
+        name="Spin (rad/s)",
+        description="Of a free body at the first frame, rad/s, world axes",
+        size=3,
+        subtype="XYZ",
+        precision=4,
+        **_fixed,
     )
 
     effects: CollectionProperty(

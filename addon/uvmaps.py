@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..core.errors import SensorError
+from ..core.errors import ImageError
 from ..core.layout import UVLayout, mapped_layout
 from ..core.texels import Texels
 from . import materials, meshes
@@ -24,7 +24,7 @@ def laid_out(obj, texels: Texels) -> Texels:
 
     Raises
     ------
-    SensorError
+    ImageError
         The UV map is missing, or no picture can be made of it.
     """
     own = obj.palpate
@@ -50,23 +50,23 @@ def uv_layer(obj):
 
     Raises
     ------
-    SensorError
+    ImageError
         There is none, or the mesh is being edited.
     """
     layers = [layer for layer in obj.data.uv_layers if layer.name != materials.UV_NAME]
     wanted = obj.palpate.image_map
     if not layers:
-        raise SensorError(
+        raise ImageError(
             f"Sensor '{obj.name}' has no UV map for its tactile image: unwrap it (Edit Mode, UV › Smart UV Project), "
             "or set Readout › Tactile Image to Automatic."
         )
     if wanted and all(layer.name != wanted for layer in layers):
         there = ", ".join(f"'{layer.name}'" for layer in layers)
-        raise SensorError(f"Sensor '{obj.name}' has no UV map '{wanted}': choose one of {there} in its Readout panel.")
+        raise ImageError(f"Sensor '{obj.name}' has no UV map '{wanted}': choose one of {there} in its Readout panel.")
     found = next((layer for layer in layers if layer.name == wanted), None)
     found = found or next((layer for layer in layers if layer.active_render), layers[0])
     if len(found.uv) != len(obj.data.loops):
-        raise SensorError(f"The UV map of sensor '{obj.name}' cannot be read in Edit Mode: leave it (Tab) first.")
+        raise ImageError(f"The UV map of sensor '{obj.name}' cannot be read in Edit Mode: leave it (Tab) first.")
     return found
 
 

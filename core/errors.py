@@ -18,6 +18,18 @@ class SensorError(PalpateError):
     """A sensor that cannot be built from its region or its parameters."""
 
 
+class RegionError(SensorError):
+    """A region that is gone, is empty or spans no face."""
+
+
+class ImageError(SensorError):
+    """A UV map that cannot lay out a tactile image."""
+
+
+class PaintedError(SensorError):
+    """A painted multiplier that is gone or holds what cannot be a factor."""
+
+
 class ParameterError(PalpateError):
     """A number outside the range in which the model means anything."""
 

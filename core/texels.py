@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .errors import SensorError
+from .errors import RegionError, SensorError
 from .layout import GridLayout, UVLayout, grid_layout, uv_layout
 from .mesh import TriangleMesh, vertex_areas, vertex_normals
 
@@ -80,10 +80,10 @@ def texels_from_region(mesh: TriangleMesh, region: np.ndarray, name: str = "sens
     region = np.asarray(region, dtype=bool)
     vertex = np.flatnonzero(region)
     if len(vertex) == 0:
-        raise SensorError(f"The region of sensor '{name}' is empty: select or paint at least three vertices of one face.")
+        raise RegionError(f"The region of sensor '{name}' is empty: select or paint at least three vertices of one face.")
     inside = region[mesh.triangles].all(axis=1)
     if not inside.any():
-        raise SensorError(
+        raise RegionError(
             f"The {len(vertex)} vertices of sensor '{name}' span no face: select or paint all corners of at least one face."
         )
     triangles = mesh.triangles[inside]

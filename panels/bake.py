@@ -2,7 +2,7 @@
 """Panels of what the scene does: bake, and how results look."""
 
 from ..addon import live, state, write
-from .places import Part, sentences
+from .places import Part, named, sentences
 
 
 class Bake(Part):
@@ -16,7 +16,7 @@ class Bake(Part):
         own = scene.palpate
         layout.prop(own, "folder", text="")
         column = layout.column(align=True)
-        column.prop(own, "interpolation", text="")
+        named(column, own, "interpolation", "Motion")
         column.prop(own, "subframes")
         column.prop(own, "use_auto_dt")
         if not own.use_auto_dt:
@@ -50,14 +50,14 @@ class Display(Part):
         own = context.scene.palpate
         layout.prop(own, "show_overlay")
         layout.prop(own, "show_inset")
-        layout.prop(own, "color_map")
-        layout.prop(own, "quantity")
+        named(layout, own, "color_map", "Colours")
+        named(layout, own, "quantity")
         column = layout.column(align=True)
         column.prop(own, "use_auto_range")
         if not own.use_auto_range:
             column.prop(own, "range_max_pressure" if own.quantity == "PRESSURE" else "range_max")
         layout.label(text="On baked sensors:")
-        layout.grid_flow(columns=2, even_columns=True, align=True).prop(own, "overlays")
+        layout.grid_flow(even_columns=True, align=True).prop(own, "overlays")
         column = layout.column(align=True)
         column.prop(own, "use_auto_arrow")
         if not own.use_auto_arrow:
@@ -90,6 +90,8 @@ class Figures(Part):
             column.prop(own, "size")
             column.prop(own, "samples")
             column.prop(own, "transparent")
+        layout.use_property_split = False
+        layout.label(text="Data:")
         layout.row(align=True).prop(own, "exports")
         layout.operator("palpate.figures_make", icon="RENDER_STILL")
 

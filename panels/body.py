@@ -2,7 +2,7 @@
 """Panel of what moves an object."""
 
 from ..addon import drives, freebodies
-from .places import Part, sentences
+from .places import Part, named, sentences
 
 
 class Body(Part):
@@ -17,7 +17,7 @@ class Body(Part):
         if settings.role in {"SENSOR", "PAD"}:
             layout.prop(settings, "presses")
         if settings.role == "TARGET" or settings.presses:
-            layout.prop(settings, "contact_normals")
+            named(layout, settings, "contact_normals", "Normals")
         if settings.body == "DRIVEN":
             _draw_drive(layout, settings)
         if settings.body == "FREE":
@@ -30,13 +30,12 @@ class Body(Part):
 
 
 def _draw_drive(layout, settings) -> None:
-    layout.prop(settings, "drive_leader")
-    row = layout.row(align=True)
-    row.prop(settings, "drive_axis", text="")
-    row.prop(settings, "drive_space", text="")
+    named(layout, settings, "drive_leader", "Coupled")
+    named(layout, settings, "drive_axis")
+    named(layout, settings, "drive_space")
     if settings.drive_leader is not None:
         return
-    layout.prop(settings, "drive_control", text="")
+    named(layout, settings, "drive_control")
     column = layout.column(align=True)
     column.use_property_decorate = True
     column.prop(settings, drives.TARGETS[settings.drive_control])
@@ -47,7 +46,7 @@ def _draw_drive(layout, settings) -> None:
     if settings.drive_control != "VELOCITY":
         column.prop(settings, "drive_stiffness")
     if settings.drive_control == "FORCE":
-        layout.prop(settings, "drive_sensor")
+        named(layout, settings, "drive_sensor")
         layout.prop(settings, "drive_settling")
 
 

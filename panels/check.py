@@ -38,7 +38,8 @@ class Texels(Part):
         for problem in report.problems:
             box = layout.box().column()
             sentences(box, problem.text, "ERROR", context)
-            box.operator("palpate.fix", text=problems.FIXES[problem.kind][0]).kind = problem.kind
+            if problem.kind in problems.FIXES:
+                box.operator("palpate.fix", text=problems.FIXES[problem.kind][0]).kind = problem.kind
 
 
 PARTS = (Texels,)

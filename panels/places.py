@@ -51,9 +51,17 @@ def _panel(part, prefix: str, where: dict):
     return type(f"PALPATE_PT_{prefix}{part.name}", (part, bpy.types.Panel), members)
 
 
+def named(layout, settings, key: str, text: str = "") -> None:
+    """Draw a list or a pointer with its name beside it, with room enough for the name in a narrow editor."""
+    name = text or settings.bl_rna.properties[key].name
+    split = layout.split(factor=0.42)
+    split.label(text=f"{name}:")
+    split.prop(settings, key, text="")
+
+
 def sentences(layout, text: str, icon: str, context) -> None:
     """Show text over as many lines as the panel's width asks for."""
-    letters = int(context.region.width / (7.5 * context.preferences.system.ui_scale)) - 6
+    letters = int((context.region.width / context.preferences.system.ui_scale - 70) / 6.2)
     column = layout.column(align=True)
     column.scale_y = 0.8
     for i, line in enumerate(textwrap.wrap(text, max(letters, 20))):

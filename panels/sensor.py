@@ -3,7 +3,7 @@
 
 from ..addon import live, preparing, skins, state
 from ..operators import presets
-from .places import ROOT, Part, sentences
+from .places import ROOT, Part, named, sentences
 
 
 class Root(Part):
@@ -116,7 +116,7 @@ def painted(layout, settings, key: str) -> None:
     name = settings.bl_rna.properties[f"{key}_map"].name
     column.prop(settings, f"{key}_map", text="", icon="GROUP_VERTEX", placeholder=f"{name}: none")
     if getattr(settings, f"{key}_map"):
-        column.prop(settings, f"{key}_factor")
+        column.prop(settings, f"{key}_factor", text=f"{name.removeprefix('Painted ')} × at Weight 1")
 
 
 class Contact(Part):
@@ -127,7 +127,7 @@ class Contact(Part):
 
     def draw_part(self, layout, settings, _context):
         column = layout.column()
-        column.prop(settings, "normal_law")
+        named(column, settings, "normal_law")
         column.prop(settings, "k")
         if settings.normal_law == "linear":
             column.prop(settings, "cn")
@@ -135,7 +135,7 @@ class Contact(Part):
             column.prop(settings, "exponent")
             column.prop(settings, "dissipation")
         column.prop(settings, "max_penetration")
-        column.prop(settings, "points_per_texel")
+        named(column, settings, "points_per_texel", "Points")
         painted(layout, settings, "k")
         layout.operator("palpate.stiffness_fit", icon="FCURVE_SNAPSHOT")
 
@@ -168,12 +168,12 @@ class Readout(Part):
 
     def draw_part(self, layout, settings, context):
         column = layout.column()
-        column.prop(settings, "unit")
+        named(column, settings, "unit")
         column.prop(settings, "gain")
         column.prop(settings, "zero")
         painted(layout, settings, "gain")
         column = layout.column()
-        column.prop(settings, "image_layout")
+        named(column, settings, "image_layout", "Image")
         if settings.image_layout == "UV":
             column.prop_search(settings, "image_map", context.object.data, "uv_layers", text="", icon="UV")
             column.prop(settings, "image_size")

@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ..errors import SensorError
+from ..errors import ImageError
 from .raster import GUTTER, OverlapError, rasterise, rasterise_cells
 from .vectors import preference, unit
 
@@ -144,21 +144,21 @@ def mapped_layout(
 
     Raises
     ------
-    SensorError
+    ImageError
         The map has no area, reaches beyond its square, or lays parts of the region over one another.
     """
     known = f"The UV map '{map_name}' of sensor '{sensor}'"
     remedy = "unwrap it (Edit Mode, UV › Smart UV Project), or set Readout › Tactile Image to Automatic"
     if not np.isfinite(corner_uv).all() or corner_uv.min() < -_SLACK or corner_uv.max() > 1 + _SLACK:
-        raise SensorError(f"{known} reaches beyond its square: use UV › Pack Islands, or {remedy}.")
+        raise ImageError(f"{known} reaches beyond its square: use UV › Pack Islands, or {remedy}.")
     a, b = corner_uv[:, 1] - corner_uv[:, 0], corner_uv[:, 2] - corner_uv[:, 0]
     if not (np.abs(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]) > 1e-12).any():
-        raise SensorError(f"{known} has no area where the texels are: {remedy}.")
+        raise ImageError(f"{known} has no area where the texels are: {remedy}.")
     layout = UVLayout(triangles, np.clip(corner_uv, 0.0, 1.0), side, side, 0, map_name, nearest, _MAP_MARGIN)
     try:
         layout._pixels  # noqa: B018 computed once and kept
     except OverlapError:
-        raise SensorError(f"{known} lays parts of the region over one another: {remedy}.") from None
+        raise ImageError(f"{known} lays parts of the region over one another: {remedy}.") from None
     return layout
 
 

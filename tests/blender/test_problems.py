@@ -171,6 +171,41 @@ def test_a_region_that_is_gone_is_replaced():
     assert kinds(pad) == []
 
 
+def test_a_renamed_group_offers_the_active_one():
+    pad = sensor(grid())
+    pad.palpate.region, pad.palpate.vertex_group = "GROUP", "Tip"
+    assert kinds(pad) == ["REGION"]
+    group = pad.vertex_groups.new(name="Tip")
+    group.add(range(20, 60), 1.0, "REPLACE")
+    before = len(look(pad).texels)
+    group.name = "Finger Tip"
+    assert "was it renamed?" in look(pad).problems[0].text
+    fix(pad, "GROUP")
+    assert kinds(pad) == []
+    assert (pad.palpate.vertex_group, len(look(pad).texels)) == ("Finger Tip", before)
+
+
+def test_what_is_not_the_regions_fault_leaves_the_region():
+    """A lost painted group and a missing UV map have buttons of their own, and the region stays."""
+    pad = sensor(grid())
+    group = pad.vertex_groups.new(name="Tip")
+    group.add(range(20, 60), 1.0, "REPLACE")
+    pad.palpate.region, pad.palpate.vertex_group = "GROUP", "Tip"
+    pad.palpate.k_map, pad.palpate.gain_map = "Gone", "Tip"
+    assert "Painted Stiffness" in look(pad).problems[0].text
+    fix(pad, "PAINTED")
+    assert (pad.palpate.k_map, pad.palpate.gain_map) == ("", "Tip")
+    for layer in list(pad.data.uv_layers):
+        pad.data.uv_layers.remove(layer)
+    pad.palpate.image_layout = "UV"
+    fix(pad, "IMAGE")
+    assert kinds(pad) == []
+    assert pad.palpate.region == "GROUP"
+    pad.palpate.mus = 0.1  # below the dynamic one: told, and no button guesses a value
+    pad.palpate.mud = 0.2
+    assert not set(kinds(pad)) & set(problems.FIXES)
+
+
 def test_an_outdated_skin_is_laid_anew_and_an_orphan_stands_alone():
     carrier = ball(radius=0.02)
     bpy.ops.palpate.skin_add(source="MESH", method="NOISE", spacing=0.005)
