@@ -3,7 +3,8 @@
 
 A kill at any moment leaves the old bake or the new one, and an unfinished one that the next bake goes on with
 (:mod:`.unfinished`). Between the two renames of a swap the old one is called
-``<sensor>.old``; the next bake puts that right. What the user has put into a sensor's folder moves on into the new one.
+``<sensor>.old``; the next bake puts that right. What the user has put into a sensor's folder moves on into the new one. Then
+the old one is removed while the user goes on (:func:`settle` waits for it): that may take as long as the bake.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ from __future__ import annotations
 import os
 import re
 import shutil
+import threading
 from contextlib import suppress
 from dataclasses import asdict, replace
 from functools import partial
@@ -38,6 +40,10 @@ from .unfinished import Unfinished
 
 OURS = re.compile(rf"tactile_-?\d+\.exr|{'|'.join(map(re.escape, (RECORDING_NAME, SENSOR_NAME, MANIFEST_NAME)))}")
 """Names of the files in a sensor's folder that a bake writes and replaces."""
+SYNCS = hasattr(os, "sync")
+"""Whether all that was written can be brought onto the disk at once; else it is done file by file."""
+
+_removals: list[threading.Thread] = []
 
 
 def bake_folder(scene) -> Path:
@@ -89,6 +95,7 @@ class Files:
         self._scenario, self._digest = scenario, scenario.digest()
         self._unfinished = Unfinished(self.folder, self._digest)
         self._writer = Behind()
+        settle()
         try:
             for place in self.folders.values():
                 _recover(place)
@@ -157,15 +164,16 @@ class Files:
         """Write the recordings, and let the new folders take the place of the old ones: all of them, or none."""
         for name, place in self.folders.items():
             growing = _beside(place, "partial")
-            save_recording(growing / RECORDING_NAME, replace(recording, sensors={name: recording.sensors[name]}))
-            save_sensor(growing / SENSOR_NAME, self._sensors[name].texels, self._sensors[name].painted)
-            write_manifest(growing, self._manifest(name, recording))
+            own, sensor = replace(recording, sensors={name: recording.sensors[name]}), self._sensors[name]
+            save_recording(growing / RECORDING_NAME, own, at_once=not SYNCS)
+            save_sensor(growing / SENSOR_NAME, sensor.texels, sensor.painted, at_once=not SYNCS)
+            write_manifest(growing, self._manifest(name, recording), at_once=not SYNCS)
         self._writer.finish()
         self._writer.stop()
         for place in self.folders.values():
             self._check_replaceable(place)  # again: a bake takes long enough for somebody to put something there
-        if hasattr(os, "sync"):
-            os.sync()  # once for all images: nobody sees them before the swap
+        if SYNCS:
+            os.sync()  # once for all files: nobody sees them before the swap
         try:
             _swap(list(self.folders.values()))
             self._unfinished.drop()
@@ -240,12 +248,30 @@ def _swap(places: list[Path]) -> None:
             with suppress(OSError):
                 _swap_back(place)
         raise
+    emptied = []
     for place in places:
         old = _beside(place, "old")
         with suppress(OSError):  # the new bake is there; what could not be moved waits in the old folder for the next
             if old.exists():
                 _hand_on(old, place)
-                shutil.rmtree(old, ignore_errors=True)
+                emptied.append(old)
+    _remove_behind(emptied)
+
+
+def _remove_behind(folders: list[Path]) -> None:
+    """Remove folders while the user goes on; Blender, or the command, does not end before it is done."""
+    if folders:
+        work = threading.Thread(
+            target=lambda: [shutil.rmtree(old, ignore_errors=True) for old in folders], name="palpate-remover", daemon=False
+        )
+        _removals.append(work)
+        work.start()
+
+
+def settle() -> None:
+    """Return when the folders of bakes that were replaced are gone."""
+    while _removals:
+        _removals.pop().join()
 
 
 def _swap_back(place: Path) -> None:

@@ -65,11 +65,14 @@ def read(mesh) -> Arrays:
 
 def vertices(mesh) -> np.ndarray:
     """(nv, 3) float."""
-    return _places(mesh).astype(float).reshape(-1, 3)
+    return places(mesh).astype(float).reshape(-1, 3)
 
 
-def _places(mesh) -> np.ndarray:
-    """(3 · nv,) float32. Attributes are copied at once, properties one by one, which takes ten times as long and more."""
+def places(mesh) -> np.ndarray:
+    """(3 · nv,) float32: places of the vertices.
+
+    Attributes are copied at once, properties one by one, which takes ten times as long and more.
+    """
     found = np.empty(3 * len(mesh.vertices), dtype=np.float32)
     attribute = mesh.attributes.get("position")
     if attribute is None or 3 * len(attribute.data) != len(found):  # empty in Edit Mode
@@ -260,18 +263,30 @@ def own_fingerprint(obj) -> str:
 
 
 def _fingerprint(obj, mesh) -> str:
+    return fingerprint_of(places(mesh), corners(mesh), region_bytes(obj))
+
+
+def fingerprint_of(places: np.ndarray, corners: np.ndarray, region: bytes) -> str:
+    """Return the hash of :func:`places`, :func:`corners` and :func:`region_bytes`."""
     digest = hashlib.blake2b(digest_size=16)
-    digest.update(_places(mesh))
-    digest.update(corners(mesh))
-    if obj.type == "MESH" and obj.palpate.role in ("SENSOR", "PAD"):
-        with suppress(SensorError):  # it is said when the scene is read
-            digest.update(np.packbits(region(obj, len(obj.data.vertices))).tobytes())
-            for key in PAINTED:
-                values = multipliers(obj, key)
-                digest.update(b"" if values is None else values.tobytes())
-        if obj.palpate.image_layout == "UV":
-            for layer in obj.data.uv_layers:
-                uv = np.empty(2 * len(layer.uv), dtype=np.float32)
-                layer.uv.foreach_get("vector", uv)
-                digest.update(layer.name.encode("utf-8", "surrogatepass") + uv.tobytes())
+    for part in (places, corners, region):
+        digest.update(part)
     return digest.hexdigest()
+
+
+def region_bytes(obj) -> bytes:
+    """Return what a sensor's or pad's own mesh says beside its shape: region, what is painted, the map of its images."""
+    if obj.type != "MESH" or obj.palpate.role not in ("SENSOR", "PAD"):
+        return b""
+    parts = []
+    with suppress(SensorError):  # it is said when the scene is read
+        parts.append(np.packbits(region(obj, len(obj.data.vertices))).tobytes())
+        for key in PAINTED:
+            values = multipliers(obj, key)
+            parts.append(b"" if values is None else values.tobytes())
+    if obj.palpate.image_layout == "UV":
+        for layer in obj.data.uv_layers:
+            uv = np.empty(2 * len(layer.uv), dtype=np.float32)
+            layer.uv.foreach_get("vector", uv)
+            parts.append(layer.name.encode("utf-8", "surrogatepass") + uv.tobytes())
+    return b"".join(parts)

@@ -23,6 +23,7 @@ from ..core.scenario import Body, Deformation, Motion, Painted, Scenario, Sensor
 from ..core.texels import texels_from_region
 from . import clock, deform, drives, effects, freebodies, identity, meshes, parts, properties, transforms, units, uvmaps
 from .jobs import Progress
+from .seen import Seen
 
 SAME_STRETCH = 1e-4
 """Largest relative change of an object's scale over time that is put down to rounding."""
@@ -89,6 +90,8 @@ class Binding:
         Surfaces that may deform.
     looks : dict of str to list of str
         Fingerprints, frame by frame, of what those and other objects that become meshes look like; by name.
+    seen : Seen
+        Their surfaces as they were read last.
     """
 
     keys: tuple[str, ...]
@@ -103,6 +106,7 @@ class Binding:
     parts: dict[str, np.ndarray]
     skins: tuple[deform.Skin, ...]
     looks: dict[str, list[str]] = field(default_factory=dict)
+    seen: Seen = field(default_factory=Seen)
 
     def sensor_objects(self, scene) -> list:
         """Return the objects that hold the sensors and pads, by sensor index; None for one that was deleted."""
@@ -293,14 +297,18 @@ def sample_moment(scene, depsgraph, binding: Binding) -> Moment:
 def _shapes(scene, depsgraph, binding: Binding, matrices: dict[int, np.ndarray]) -> tuple[dict, dict]:
     """Read what may deform: vertices by target index, frames of texels by sensor index."""
     vertices, texels = {}, {}
+    binding.seen.begin()
+    objects = identity.find(scene, {skin.key for skin in binding.skins})
     for skin in binding.skins:
+        if skin.key not in objects:
+            raise SceneError(f"'{skin.name}' was deleted while its forces were computed: undo that, or start again without it.")
         linear, offset, matrix = skin.linear, skin.offset, matrices[skin.body]
         if skin.scaled:
             place = binding.parts.get(skin.key)
             linear, offset = (transforms.split(matrix)[2], np.zeros(3)) if place is None else parts.into_body(matrix, place)
             linear, offset = linear * binding.scale, offset * binding.scale
         found = vertices if skin.follower is None else texels
-        found[skin.index] = skin.at(scene, depsgraph, linear, offset)
+        found[skin.index] = skin.at(binding.seen.of(objects[skin.key], depsgraph), scene.frame_current, linear, offset)
     return vertices, texels
 
 
@@ -365,7 +373,7 @@ def _watched(scene, binding: Binding) -> list:
 def _look(scene, watched, binding: Binding) -> None:
     depsgraph = depsgraph_of(scene)
     for obj in watched:
-        binding.looks.setdefault(obj.name, []).append(meshes.fingerprint(obj, depsgraph))
+        binding.looks.setdefault(obj.name, []).append(binding.seen.look(obj, depsgraph))
 
 
 def _unchanged_masses(scenario: Scenario) -> tuple[str, ...]:
@@ -394,7 +402,7 @@ class Shapes:
         """Add what one more sample says."""
         for place, found in moment.shapes.items():
             before = self._known[place][-1]
-            self._known[place].append(before if np.array_equal(found, before) else found)
+            self._known[place].append(before if found is before or np.array_equal(found, before) else found)
 
     def finished(self, scenario: Scenario, times: np.ndarray) -> tuple[tuple[Sensor, ...], tuple[Target, ...]]:
         """Return sensors and targets with their deformations; without where nothing has changed."""

@@ -7,6 +7,8 @@ and goes into the vertices: ``matrix = translation · rotation · stretch``.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 SHEAR = 1e-5
@@ -15,7 +17,7 @@ SHEAR = 1e-5
 
 def array(matrix) -> np.ndarray:
     """(4, 4) float64 of a mathutils Matrix."""
-    return np.array(matrix, dtype=float)
+    return np.array([*map(tuple, matrix)])
 
 
 def split(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -33,41 +35,55 @@ def split(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     stretch : (3, 3) float
         Diagonal unless the matrix is sheared; of negative determinant where the matrix mirrors.
     """
-    linear = matrix[:3, :3]
-    lengths = np.linalg.norm(linear, axis=0)
-    axes = linear / lengths
-    if np.abs(axes.T @ axes - np.eye(3)).max() < SHEAR:
-        rotation, stretch = axes, np.diag(lengths)
+    (a, b, c, x), (d, e, f, y), (g, h, i, z), _ = matrix.tolist()  # one by one, a tenth of what arrays take
+    columns = (a, d, g), (b, e, h), (c, f, i)
+    lengths = [math.sqrt(_dot(column, column)) for column in columns]
+    u, v, w = ([value / length for value in column] for column, length in zip(columns, lengths, strict=True))
+    if max(abs(_dot(u, v)), abs(_dot(v, w)), abs(_dot(w, u))) < SHEAR:
+        rotation, stretch = list(zip(u, v, w, strict=True)), np.diag(lengths)
     else:  # polar decomposition: the rotation nearest to the matrix
-        left, size, right = np.linalg.svd(linear)
-        rotation, stretch = left @ right, right.T @ np.diag(size) @ right
-    if np.linalg.det(linear) < 0:  # as Blender does: mirror all three axes
-        rotation, stretch = -rotation, -stretch
-    return matrix[:3, 3].copy(), quaternion(rotation), stretch
+        left, size, right = np.linalg.svd(matrix[:3, :3])
+        rotation, stretch = (left @ right).tolist(), right.T @ np.diag(size) @ right
+    if _det(a, b, c, d, e, f, g, h, i) < 0:  # as Blender does: mirror all three axes
+        rotation, stretch = [[-value for value in row] for row in rotation], -stretch
+    return np.array([x, y, z]), np.array(_quaternion(rotation)), stretch
+
+
+def _det(a: float, b: float, c: float, d: float, e: float, f: float, g: float, h: float, i: float) -> float:
+    return a * (e * i - f * h) + b * (f * g - d * i) + c * (d * h - e * g)
+
+
+def _dot(one, other) -> float:
+    return one[0] * other[0] + one[1] * other[1] + one[2] * other[2]
 
 
 def is_singular(matrix: np.ndarray) -> bool:
     """Whether a matrix flattens what it moves."""
+    (a, b, c, _), (d, e, f, _), (g, h, i, _), _ = rows = matrix.tolist()
+    squares = sum(_dot(row, row) for row in rows[:3])
+    if abs(_det(a, b, c, d, e, f, g, h, i)) > 1e-6 * squares**1.5:
+        return False  # the smallest size is the determinant over the others, which are at most the root of `squares`
     size = np.linalg.svd(matrix[:3, :3], compute_uv=False)
     return not size[2] > 1e-6 * size[0]
 
 
 def quaternion(rotation: np.ndarray) -> np.ndarray:
     """(4,) unit quaternion with w ≥ 0 of a (3, 3) rotation matrix."""
-    m = rotation
-    four = np.array(
-        [
-            [m[0, 0] + m[1, 1] + m[2, 2], m[2, 1] - m[1, 2], m[0, 2] - m[2, 0], m[1, 0] - m[0, 1]],
-            [0.0, m[0, 0] - m[1, 1] - m[2, 2], m[0, 1] + m[1, 0], m[0, 2] + m[2, 0]],
-            [0.0, 0.0, m[1, 1] - m[0, 0] - m[2, 2], m[1, 2] + m[2, 1]],
-            [0.0, 0.0, 0.0, m[2, 2] - m[0, 0] - m[1, 1]],
-        ]
+    return np.array(_quaternion(rotation.tolist()))
+
+
+def _quaternion(rotation) -> list[float]:
+    (a, b, c), (d, e, f), (g, h, i) = rotation
+    # The rows of 4 q qᵀ, each parallel to q; the longest loses the fewest digits.
+    rows = (
+        (1 + a + e + i, h - f, c - g, d - b),
+        (h - f, 1 + a - e - i, b + d, c + g),
+        (c - g, b + d, 1 - a + e - i, f + h),
+        (d - b, c + g, f + h, 1 - a - e + i),
     )
-    # 4 q qᵀ = I + this symmetric matrix, so every row is parallel to q; the longest loses the fewest digits.
-    outer = four + np.triu(four, 1).T + np.eye(4)
-    best = outer[np.argmax(np.diag(outer))]
-    result = best / np.linalg.norm(best)
-    return -result if result[0] < 0 else result
+    best = rows[max(range(4), key=lambda k: rows[k][k])]
+    length = math.sqrt(sum(value * value for value in best))
+    return [value / (-length if best[0] < 0 else length) for value in best]
 
 
 def rotation(quaternion: np.ndarray) -> np.ndarray:

@@ -20,7 +20,7 @@ import numpy as np
 
 from ..errors import FileError
 from ..recording import Recording, SensorRecording
-from .files import atomic_write
+from .files import written
 
 RECORDING_FORMAT = "palpate-recording/2"
 
@@ -44,8 +44,8 @@ _LONG_AGO = (1980, 1, 1, 0, 0, 0)  # the earliest time a zip can hold: the clock
 _SENSOR_FIELDS = tuple(item.name for item in fields(SensorRecording))
 
 
-def save_recording(path: str | os.PathLike, recording: Recording) -> None:
-    """Write a recording as .npz, whole or not at all; the same recording gives the same bytes.
+def save_recording(path: str | os.PathLike, recording: Recording, at_once: bool = True) -> None:
+    """Write a recording as .npz, as :func:`.files.written` does; the same recording gives the same bytes.
 
     Raises
     ------
@@ -68,18 +68,18 @@ def save_recording(path: str | os.PathLike, recording: Recording) -> None:
         if array.dtype.kind not in "fiubU":
             raise ValueError(f"'{name}' of the recording has type {array.dtype}")
 
-    write_arrays(path, arrays)
+    write_arrays(path, arrays, at_once)
 
 
-def write_arrays(path: str | os.PathLike, arrays: Mapping[str, np.ndarray]) -> None:
-    """Write arrays as .npz, whole or not at all; equal arrays give equal bytes.
+def write_arrays(path: str | os.PathLike, arrays: Mapping[str, np.ndarray], at_once: bool = True) -> None:
+    """Write arrays as .npz, as :func:`.files.written` does; equal arrays give equal bytes.
 
     Raises
     ------
     FileError
         The file cannot be written.
     """
-    with atomic_write(path) as temporary, zipfile.ZipFile(temporary, "w") as archive:
+    with written(path, at_once) as temporary, zipfile.ZipFile(temporary, "w") as archive:
         for name, array in arrays.items():
             info = zipfile.ZipInfo(f"{name}.npy", _LONG_AGO)
             info.compress_type = zipfile.ZIP_DEFLATED

@@ -19,7 +19,7 @@ from ..layout import GridLayout, UVLayout
 from ..recording import Frame, SensorFrame
 from ..scenario import Sensor
 from . import openexr
-from .files import atomic_write
+from .files import written
 
 CHANNELS = ("R", "G", "B", "reading", "depth", "slip", "contact")
 """Names of the channels, in the order in which :func:`read_exr` returns them."""
@@ -84,7 +84,7 @@ def write_exr(
     metadata: Mapping[str, str],
     at_once: bool = True,
 ) -> None:
-    """Write one frame of one sensor, whole or not at all.
+    """Write one frame of one sensor.
 
     Parameters
     ----------
@@ -95,8 +95,7 @@ def write_exr(
     metadata : mapping of str to str
         Becomes header attributes named ``palpate.<key>``, see :func:`describe`.
     at_once : bool
-        False writes the file where it is, a half one too when it is interrupted: many times faster, for a folder that nobody
-        reads before it is complete.
+        See :func:`.files.written`.
 
     Raises
     ------
@@ -108,15 +107,8 @@ def write_exr(
     pictures = exr_channels(layout, frame)
     from_top = {name: picture[::-1] for name, picture in pictures.items()}
     attributes = {_PREFIX + key: str(value) for key, value in metadata.items()}
-    if at_once:
-        with atomic_write(path) as temporary:
-            openexr.write(temporary, from_top, attributes)
-        return
-    try:
-        openexr.write(path, from_top, attributes)
-    except OSError as error:
-        reason = (error.strerror or str(error)).lower()
-        raise FileError(f"'{path}' could not be written ({reason}): free some space or choose another folder.") from error
+    with written(path, at_once) as place:
+        openexr.write(place, from_top, attributes)
 
 
 def read_exr(path: str | os.PathLike) -> tuple[dict[str, np.ndarray], dict[str, str]]:

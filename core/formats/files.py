@@ -76,6 +76,37 @@ def atomic_write(path: str | os.PathLike) -> Iterator[Path]:
     _sync_folder(target.parent)
 
 
+@contextmanager
+def written(path: str | os.PathLike, at_once: bool = True) -> Iterator[Path]:
+    """Write a file whole or not at all (:func:`atomic_write`), or where it is.
+
+    Parameters
+    ----------
+    path : path
+    at_once : bool
+        False writes `path` itself, which is a half one when that is interrupted, and does not wait until it lies on the disk:
+        many times faster, for a folder that nobody reads before it is complete.
+
+    Yields
+    ------
+    Path
+        The file to write and close.
+
+    Raises
+    ------
+    FileError
+        As :func:`atomic_write`.
+    """
+    if at_once:
+        with atomic_write(path) as temporary:
+            yield temporary
+        return
+    try:
+        yield Path(path)
+    except OSError as error:
+        raise FileError(f"'{path}' could not be written ({_reason(error)}): {_remedy(error)}.") from error
+
+
 def writable_folder(path: str | os.PathLike, create: bool = False) -> Path:
     """Make sure that files can be written into a folder, by writing one.
 
@@ -252,8 +283,8 @@ class Manifest:
     step_reason: str = ""
 
 
-def write_manifest(folder: str | os.PathLike, manifest: Manifest) -> Path:
-    """Write ``manifest.json`` into `folder`, whole or not at all, and return its path.
+def write_manifest(folder: str | os.PathLike, manifest: Manifest, at_once: bool = True) -> Path:
+    """Write ``manifest.json`` into `folder`, as :func:`written` does, and return its path.
 
     Raises
     ------
@@ -268,7 +299,7 @@ def write_manifest(folder: str | os.PathLike, manifest: Manifest) -> Path:
     except TypeError as error:
         raise ValueError(f"the manifest of '{manifest.sensor}' holds something that is not JSON: {error}") from error
     path = Path(folder) / MANIFEST_NAME
-    with atomic_write(path) as temporary:
+    with written(path, at_once) as temporary:
         temporary.write_bytes((text + "\n").encode("utf-8", "surrogatepass"))
     return path
 

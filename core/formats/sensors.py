@@ -23,8 +23,8 @@ _ARRAYS = tuple(item.name for item in fields(Texels) if item.name != "layout")
 _LAYOUTS: dict[str, type[GridLayout] | type[UVLayout]] = {"grid": GridLayout, "uv": UVLayout}
 
 
-def save_sensor(path: str | os.PathLike, texels: Texels, painted: Painted | None = None) -> None:
-    """Write texels, their layout and what is painted on them as .npz, whole or not at all.
+def save_sensor(path: str | os.PathLike, texels: Texels, painted: Painted | None = None, at_once: bool = True) -> None:
+    """Write texels, their layout and what is painted on them as .npz, as :func:`.files.written` does.
 
     Raises
     ------
@@ -39,7 +39,7 @@ def save_sensor(path: str | os.PathLike, texels: Texels, painted: Painted | None
         values = getattr(painted, item.name, None)
         if values is not None:
             arrays[f"painted/{item.name}"] = np.asarray(values)
-    write_arrays(path, arrays)
+    write_arrays(path, arrays, at_once)
 
 
 def load_sensor(path: str | os.PathLike) -> tuple[Texels, Painted]:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from blender_scenes import changes, cube, dump, grid, press, press_and_drop, reopen, save
 
-from palpate.addon import curves, heatmap, jobs, live, materials, sample, shapes, transforms
+from palpate.addon import curves, folders, heatmap, jobs, live, materials, sample, shapes, transforms
 from palpate.addon.bake import bake
 from palpate.core.drive import drive
 from palpate.core.errors import FileError
@@ -18,7 +18,9 @@ from palpate.core.formats.files import read_manifest
 
 
 def baked(scene):
-    return drive(bake(scene))
+    result = drive(bake(scene))
+    folders.settle()
+    return result
 
 
 def test_one_folder_per_sensor(tmp_path):

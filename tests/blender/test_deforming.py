@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from blender_scenes import press, press_and_drop
 
-from palpate.addon import live, sample, transforms
+from palpate.addon import live, meshes, sample, transforms
 from palpate.addon.bake import bake
 from palpate.core.drive import drive
 from palpate.core.errors import SceneError
@@ -83,6 +83,24 @@ def test_targets_are_sampled_as_they_look(how):
         world = world_of(scenario, values[frame - 1], scenario.targets[0].body, frame - 1)
         np.testing.assert_allclose(world, evaluated(target), atol=2e-8)
     assert np.abs(values[-1] - values[0]).max() > 1e-4
+
+
+@pytest.mark.parametrize("how", [grow, wave, armature])
+def test_looks_are_the_fingerprints_of_every_frame(how):
+    scene, pad, target = press(frames=6)
+    pad.vertex_groups.new(name="Part").add(range(40), 1.0, "REPLACE")
+    pad.palpate.region, pad.palpate.vertex_group = "GROUP", "Part"
+    pad.modifiers.new("Bend", "SIMPLE_DEFORM").angle = math.radians(10)
+    how(target, 4)  # and stays as it is at frames 5 and 6
+    scene.frame_set(1)
+    _, binding = sampled(scene)
+    expected = {"Pad": [], "Ball": []}
+    for frame in range(1, 7):
+        scene.frame_set(frame)
+        for name, found in expected.items():
+            found.append(meshes.fingerprint(scene.objects[name], sample.depsgraph_of(scene)))
+    assert binding.looks == expected
+    assert len(set(expected["Ball"][:4])) > 2 and len(set(expected["Pad"])) == 1
 
 
 def test_what_does_not_change_is_rigid():

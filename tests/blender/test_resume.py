@@ -91,6 +91,7 @@ def killed(tmp_path, monkeypatch):
 def computed(scene):
     frames = []
     drive(bake(scene), lambda step: frames.append(step.frame) if step.stage == "Computing forces" else None)
+    folders.settle()
     return frames
 
 

@@ -134,6 +134,19 @@ def test_quaternions_agree_with_blenders(seed):
     assert transforms.rotation(found) == pytest.approx(matrix[:3, :3], abs=1e-6)
 
 
+def test_flat_matrices_are_told_by_their_smallest_size():
+    rng = np.random.default_rng(2)
+    for _ in range(300):
+        left, _, right = np.linalg.svd(rng.normal(size=(3, 3)))
+        size = 10.0 ** rng.uniform(-3, 3) * 10.0 ** np.array([0.0, rng.uniform(-6, 0), rng.uniform(-9, 0)])
+        matrix = np.eye(4)
+        matrix[:3, :3] = left @ np.diag(size) @ right
+        share = size.min() / size.max()
+        if not 0.99e-6 < share < 1.01e-6:
+            assert transforms.is_singular(matrix) == (share < 1e-6)
+    assert transforms.is_singular(np.zeros((4, 4)))
+
+
 @pytest.mark.parametrize("axis", range(3))
 def test_half_turns_have_a_quaternion(axis):
     expected = np.zeros(4)
