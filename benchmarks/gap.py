@@ -134,7 +134,8 @@ def examine(kind: str, number: int, compare: bool = False) -> dict[str, Any]:
 
 def score(case: cases.Case, result: Any) -> dict[str, Any]:
     """Return what was said of a case and how right it is."""
-    from palpate.core.gap.amend import next_experiment, normalised, numbers
+    from palpate.core.gap.amend import next_experiment, normalised
+    from palpate.core.gap.intervals import numbers
 
     model = normalised(result)
     sure = [named.name for named in result.named if named.confidence >= SURE]

@@ -20,8 +20,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     from ..core.gap import report
-    from ..core.gap.amend import amended, numbers
+    from ..core.gap.amend import amended
     from ..core.gap.diagnose import Diagnosis, diagnose
+    from ..core.gap.intervals import numbers
     from ..core.gap.rig import read_rig
 
     if arguments.sensor and not arguments.blend:

@@ -1,63 +1,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The amended sensor, its numbers with intervals, and the experiment that would tell what these recordings do not."""
+"""The amended sensor, and the experiment that would tell what these recordings do not."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
-from ..calibrate.regression import student
 from ..formats.sensor_toml import SHAPE_WORDS, SensorModel
 from .diagnose import Diagnosis
-from .fit import covariance, fit, value_of
+from .fit import fit
 from .model import Model
 from .search import views_of
-
-NORMAL_REACH = 1.959964
-"""Standard deviations on either side that hold 95 % of a normal distribution."""
-
-
-@dataclass(frozen=True)
-class Number:
-    """A fitted number.
-
-    Attributes
-    ----------
-    effect : int
-        Index in the model's stack; -1 for the base model.
-    name : str
-    value, low, high : float
-        With its 95 % interval.
-    """
-
-    effect: int
-    name: str
-    value: float
-    low: float
-    high: float
-
-
-def numbers(result: Diagnosis) -> list[Number]:
-    """Return the numbers of the amended model that are not one per texel.
-
-    Intervals are from the scatter of the gradients of texels within trials, so that they hold for coloured noise, or from that
-    of whole trials where it is larger, as when the formula is not quite the sensor's; Student's t with the number of trials.
-    """
-    found = result.best
-    common = [item for item in found.free if not item.per_texel]
-    fine, coarse = covariance(found), covariance(found, by_trial=True)
-    groups = max(len(found.sse), 2)
-    made = []
-    for i, item in enumerate(common):
-        at = float(item.to(value_of(found.model, item)))
-        spread = float(np.sqrt(max(fine[i, i], 0.0))) * NORMAL_REACH
-        if groups > len(common) + 1:
-            wide = float(np.sqrt(max(coarse[i, i], 0.0))) * student(groups - 1)
-            spread = max(spread, wide)
-        ends = sorted((float(item.back(at - spread)), float(item.back(at + spread))))
-        made.append(Number(item.effect, item.name, float(value_of(found.model, item)), ends[0], ends[1]))
-    return made
 
 
 def normalised(result: Diagnosis) -> Model:
@@ -139,10 +93,10 @@ EXPERIMENTS = {
 def next_experiment(result: Diagnosis) -> str:
     """Return what to record next, in one sentence; empty when nothing is open."""
     if result.ambiguous:
-        pair = result.ambiguous[0]
-        parts = [EXPERIMENTS.get(name, "") for name in pair[:2]]
-        text = f"To tell {pair[0]} from {pair[1]}: {'; and '.join(part for part in parts if part)}."
-        return text
+        pairs = [f"{names[0]} from {' and '.join(names[1:])}" for names in result.ambiguous]
+        involved = list(dict.fromkeys(name for names in result.ambiguous for name in names))
+        parts = [EXPERIMENTS[name] for name in involved if name in EXPERIMENTS]
+        return f"To tell {', and '.join(pairs)}: {'; and '.join(dict.fromkeys(parts))}."
     c = result.coverage
     lacking = []
     if result.noise[0].deviation > LOUD * result.full[0]:
@@ -163,5 +117,10 @@ def next_experiment(result: Diagnosis) -> str:
             "shared by loaded texels": "hold one constant load for as long as a trial, to see how the reading moves by itself",
             "clock": "record as long without touching the sensor",
         }.get(result.structure.strongest, "repeat one trial exactly, to see what of the difference comes again")
+        if result.line is not None:
+            hint = (
+                f"record the same seconds without touching the sensor, with mains, motors and fans off in turn: what hums at "
+                f"{result.line.frequency:.3g} Hz (or was folded down to that by the sampling) is there without any load"
+            )
         return f"To find out what it is: {'; '.join([hint, *lacking])}."
     return f"To cover what these recordings do not: {'; '.join(lacking)}." if lacking else ""

@@ -1,46 +1,35 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What is missing: one effect after the other joins the model as long as it earns its place, and those that could as well be it
-are said.
-
-All judgements are made on stretches of the recordings that a fit has not seen, in units of the noise's variance. With M₀ the
-mean square of the base model and F that of the noise, ``M₀ - F`` is the gap; an effect closes a share of it. How large a share
-is large enough, and how near a rival must come to be one, are the constants below; they were set on simulated sensors whose
-hidden effects follow other formulas than the library's.
+"""What is missing in a sensor's model: recordings are checked, the base model is refitted, effects are looked for, and what was
+found is put into words: names with a confidence, rivals that would do as well, what is ruled out and why.
 """
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 
-from ..effects.library import kind_of
-from .admissible import admissible
-from .candidates import NEVER, Candidate, Scales, candidates, scales_of
-from .fit import FRICTION, Fit, Free, base_numbers, fit, held_out
+from ..effects.library import library
+from .candidates import NEVER, Scales, candidates, scales_of
+from .explain import FORCES, LEAST, READINGS, STRUCTURE, Account, Explainer, Ground, Step, means_of
+from .fit import FRICTION, Fit, base_numbers, fit, held_out
+from .lines import Line, line_of
 from .model import Model, Predictor
-from .noise import Coverage, Noise, coverage, force_noise, reading_noise
+from .noise import SHORTEST, Coverage, Noise, coverage, force_noise, reading_noise
 from .rig import Rig
-from .search import Found, Views, search, views_of
+from .search import Views, views_of
 from .structure import Structure, structure_of
-from .telling import confounded, untold
+from .telling import untold
 from .tremble import trembling
 
-FIRST, NEXT, NEXT_OF_ALL = 0.25, 0.45, 0.03
-"""Least share of the gap that the first effect closes; of what is left that a further one closes; and of the whole gap."""
-LEAST = 0.02
-"""Least decrease of the mean square on unseen trials, in units of the noise's variance."""
 EXPLAINED = 0.6
 """Share of the gap that must be closed for the verdict "explained"."""
-STRUCTURE = 0.03
-"""Share of a residual that can be predicted, below which it is noise."""
 RIVAL = 1.35
 """A rival is one that leaves at most so many times as much of the gap as the best does."""
 SMALL = 0.1
 """One of several that closes a smaller share of the whole gap may be what the others' formulas lack: it is no sure name."""
-MOST = 3
-"""Most effects that are looked for."""
 
 
 @dataclass(frozen=True)
@@ -88,7 +77,7 @@ class Diagnosis:
     named: list[Named] = field(default_factory=list)
     ambiguous: list[tuple[str, ...]] = field(default_factory=list)
     ruled_out: list[tuple[str, str]] = field(default_factory=list)
-    step: float = 0.0
+    line: Line | None = None
 
     def of(self, use: str) -> list[Predictor]:
         """Return the predictors of the trials of one use."""
@@ -214,163 +203,66 @@ def _force_structure(views: Views, residuals: list[np.ndarray]) -> Structure:
 
 def _explain(result: Diagnosis, views: Views) -> Iterator[tuple[str, float]]:
     """Add effects to the base model while they earn their place; write everything into `result`."""
-    current, structure = result.base, result.base_structure
-    unseen = held_out(views.whole, current)
-    mean0 = float(unseen.sum() / current.count.sum())
-    floor = min(1.0, mean0)
-    steps: list[list[Found]] = []
-    mixed = confounded(result.coverage)
-    floors, gains = [mean0 * (1.0 - structure.total)], {}
-    for turn in range(MOST):
-        mean = float(unseen.sum() / current.count.sum())
-        enough = max(LEAST, NEXT_OF_ALL * (mean0 - floor))  # of less, no effect could close as much as it has to
-        if turn > 0 and (mean - floor < enough or (structure.total < STRUCTURE and mean < 1.5)):
-            break
-        taken = {effect.name for effect in current.model.effects}
-        forms = [c for c in candidates([s.predictor for s in views.whole], current.model) if c.name not in taken]
-        forms = [c for c in forms if not _is_free_already(c, current.free) and (turn == 0 or c.name not in mixed)]
-        ranked: list[Found] = []
-        for what, share, found in search(views, current, forms, result.scales):
-            yield what, (turn + share) / MOST
-            ranked = found or ranked
-        ranked = [one for one in ranked if admissible(one, views)]
-        steps.append(ranked)
-        if not ranked:
-            break
-        best = _simplest([one for one in ranked if one.candidate.name not in mixed] or ranked, floor)
-        if not _earns(best, unseen, mean, mean0, floor, first=turn == 0):
-            break
-        gains[best.candidate.name] = mean - best.mean
-        current, unseen = best.fit, best.unseen
-        structure = _structure(views, current)
-        floors.append(best.mean * (1.0 - structure.total))
-    alone = steps[0] if steps else []
-    if len(current.model.effects) >= 2:
-        current, unseen, steps = yield from _reconsider(result, views, current, unseen, steps, floor, gains)
-    result.best, result.structure = current, _structure(views, current)
-    floor = float(np.clip(min(floors), 0.8, 1.0))
-    if result.structure.total < STRUCTURE:
-        noise = trembling(views.whole, current.model)
-        if noise is not None:  # then all that is left is noise
-            result.best = replace(current, model=current.model.with_effect(noise))
-            floor = max(floor, float(unseen.sum() / current.count.sum()))
-    small = {name for name, gain in gains.items() if gain < SMALL * (mean0 - floor)}
-    _conclude(result, steps, small, mean0, float(unseen.sum() / current.count.sum()), floor)
-    _rule_out(result, alone, mean0, floor)
+    base = Account(result.base, held_out(views.whole, result.base))
+    start = base.means
+    floor = np.array([min(1.0, start[READINGS]), min(_trembling_at_rest(views, result.base), start[FORCES])])
+    ground = Ground(start, floor, result.base.count.sum(axis=0).astype(float))
+    explainer = Explainer(views, result.scales, result.coverage, ground)
+    account = yield from explainer.run(base, partial(_structure, views))
+    result.best, result.structure = account.fit, _structure(views, account.fit)
+    result.line = line_of(views.whole, account.fit.model)
+    main, mean = ground.main, float(account.means[ground.main])
+    noise = min(start[main] * (1.0 - result.base_structure.total), mean * (1.0 - result.structure.total))
+    ground.floor[main] = float(np.clip(noise, 0.8, 1.0))
+    if result.structure.total < STRUCTURE and result.line is None:
+        tremble = trembling(views.whole, account.fit.model)
+        if tremble is not None:  # then all that is left is noise
+            result.best = replace(account.fit, model=account.fit.model.with_effect(tremble))
+            ground.floor[main] = max(ground.floor[main], mean)
+    _conclude(result, account, ground)
+    _rule_out(result, account.first, ground)
 
 
-def _is_free_already(candidate: Candidate, free: Sequence[Free]) -> bool:
-    """A common offset is the sensor's `zero` where that is fitted."""
-    return candidate.label == "offset/common" and any(item.effect < 0 and item.name == "zero" for item in free)
+def _trembling_at_rest(views: Views, found: Fit) -> float:
+    """Mean square of the forces' residual while nothing touches; at least 1, which is what white noise has."""
+    squares = []
+    for share in views.whole:
+        stimulus = share.predictor.stimulus
+        load = stimulus.depth if stimulus.load is None else stimulus.load
+        rest = ~(load > 0).any(axis=1)
+        if share.forces and share.predictor.trial.force is not None and rest.sum() >= SHORTEST:
+            squares.append(share.residual(found.model)[rest, -3:] ** 2)
+    return max(float(np.concatenate(squares).mean()), 1.0) if squares else 1.0
 
 
-def _left(one: Found, floor: float, gap: float) -> float:
-    """What a candidate leaves of the gap, with a little for what no fit can tell."""
-    return max(one.mean - floor, 0.0) + 0.004 * gap + 0.01
-
-
-def _simplest(ranked: Sequence[Found], floor: float) -> Found:
-    """The best, or one with far fewer numbers that leaves hardly more."""
-    gap = max(one.mean for one in ranked) - floor
-    least = _left(ranked[0], floor, gap)
-    near = [one for one in ranked if _left(one, floor, gap) < 1.15 * least and one.numbers < 0.5 * ranked[0].numbers]
-    listed = [one for one in ranked if one.candidate.name == "dead-texels" and _left(one, floor, gap) < 1.5 * least]
-    if ranked[0].candidate.local and listed:
-        return listed[0]
-    return near[0] if near else ranked[0]
-
-
-def _earns(one: Found, unseen: np.ndarray, mean: float, mean0: float, floor: float, first: bool) -> bool:
-    """Whether a candidate closes enough of the gap, in most stretches of the recordings."""
-    gained = mean - one.mean
-    gap, left = max(mean0 - floor, 1e-12), max(mean - floor, 1e-12)
-    better = float(np.mean(one.unseen < unseen))
-    if gained < LEAST or better < 0.6:
-        return False
-    if first:
-        return gained >= FIRST * gap
-    return gained >= NEXT * left and gained >= NEXT_OF_ALL * gap
-
-
-def _reconsider(
-    result: Diagnosis,
-    views: Views,
-    current: Fit,
-    unseen: np.ndarray,
-    steps: list[list[Found]],
-    floor: float,
-    gains: dict[str, float],
-) -> Generator[tuple[str, float], None, tuple[Fit, np.ndarray, list[list[Found]]]]:
-    """The first effect was chosen without the others: look whether another does better beside them."""
-    mean = float(unseen.sum() / current.count.sum())
-    first = current.model.effects[0]
-    rest = tuple(
-        replace(item, effect=item.effect - 1) if item.effect > 0 else item for item in current.free if item.effect != 0
-    )
-    other = fit(views.whole, current.model.without(0), rest, turns=6, tolerance=1e-4)
-    taken = {effect.name for effect in other.model.effects}
-    forms = [c for c in candidates([s.predictor for s in views.whole], other.model) if c.name not in taken]
-    forms = [c for c in forms if not _is_free_already(c, other.free)]
-    ranked: list[Found] = []
-    for what, share, found in search(views, other, forms, result.scales):
-        yield what, 0.9 + 0.1 * share
-        ranked = found or ranked
-    ranked = [one for one in ranked if admissible(one, views)]
-    steps = [*steps]
-    if ranked:
-        best = _simplest(ranked, floor)
-        alone = float(held_out(views.whole, other).sum() / other.count.sum())
-        gains[best.candidate.name] = alone - best.mean
-        if alone - best.mean < max(LEAST, 0.3 * max(alone - floor, 0.0)):  # what came later does it all
-            return other, held_out(views.whole, other), steps[1:]
-        if best.mean < mean - 0.02 * max(mean - floor, 0.0) - 1e-6 or best.candidate.name == first.name:
-            order = [ranked, *steps[1 : len(other.model.effects) + 1]]
-            return _last_first(best.fit), best.unseen, order
-    return current, unseen, steps
-
-
-def _last_first(found: Fit) -> Fit:
-    """The same fit with the effect that joined last at the head of the stack, where it was in the order of finding."""
-    last = len(found.model.effects) - 1
-    effects = (found.model.effects[last], *found.model.effects[:last])
-    free = tuple(
-        item if item.effect < 0 else replace(item, effect=0 if item.effect == last else item.effect + 1) for item in found.free
-    )
-    return replace(found, model=Model(found.model.parameters, effects), free=free)
-
-
-def _conclude(result: Diagnosis, steps: list[list[Found]], small: set[str], mean0: float, mean: float, floor: float) -> None:
-    """Write verdict, names and rivals; those that close little beside others are `small`."""
-    gap = mean0 - floor
+def _conclude(result: Diagnosis, account: Account, ground: Ground) -> None:
+    """Write verdict, names and rivals; those that close little beside others are no sure names."""
     effects = result.best.model.effects
-    structured = result.base_structure.total
     fitted = [effect for effect in effects if effect.name != "noise"]
+    closed = [ground.closed(account.means, side) for side in (READINGS, FORCES)]
     if effects and not fitted:
         result.verdict = "explained"
     elif not effects:
-        noise_only = structured < STRUCTURE and (mean0 < 2.0 or gap < LEAST)
-        result.verdict = "no gap" if noise_only else "unexplained"
+        mean, gap = float(ground.start[ground.main]), ground.gap(ground.main)
+        quiet = result.base_structure.total < STRUCTURE and (mean < 2.0 or gap < LEAST) and result.line is None
+        quiet = quiet and not (ground.both and ground.matters(FORCES))
+        result.verdict = "no gap" if quiet else "unexplained"
     else:
-        closed = (mean0 - mean) / max(gap, 1e-12)
-        result.verdict = "explained" if closed >= EXPLAINED else "unexplained"
+        open_sides = [side for side in (READINGS, FORCES) if ground.matters(side) and closed[side] < EXPLAINED]
+        result.verdict = "unexplained" if open_sides else "explained"
     for index, effect in enumerate(effects):
-        ranked = next((s for s in steps if any(one.candidate.name == effect.name for one in s)), [])
-        own = [one for one in ranked if one.candidate.name == effect.name]
-        rivals: tuple[str, ...] = ()
+        step = account.steps.get(effect.name, Step([], []))
         others: dict[str, float] = {}
-        weight = 1.0
-        if own:
-            least = _left(own[0], floor, gap)
-            for one in ranked:
-                if one.candidate.name != effect.name and one.candidate.name not in {e.name for e in effects}:
-                    ratio = _left(one, floor, gap) / least
-                    if not (own[0].candidate.name == "dead-texels" and one.candidate.local):
-                        others[one.candidate.name] = min(ratio, others.get(one.candidate.name, np.inf))
-            rivals = tuple(name for name, ratio in others.items() if ratio < RIVAL)
-            weight = 1.0 / (1.0 + sum(ratio**-3.0 for ratio in others.values()))
-        share = float(np.clip((mean0 - mean) / max(gap, 1e-12), 0.0, 1.0)) if fitted else 1.0
-        confidence = weight * (0.5 + 0.5 * share) if result.verdict == "explained" else 0.5 * weight * share
-        if rivals or (effect.name in small and len(fitted) > 1):
+        own = step.of(effect.name)
+        for one, left in zip(step.ranked, step.left, strict=True):
+            name = one.candidate.name
+            if name not in {e.name for e in effects} and not (effect.name == "dead-texels" and one.candidate.local):
+                others[name] = min(left / own, others.get(name, np.inf))
+        rivals = tuple(name for name, ratio in others.items() if ratio < RIVAL)
+        weight = 1.0 / (1.0 + sum(ratio**-3.0 for ratio in others.values()))
+        share = closed[ground.side(effect.name)] if fitted else 1.0
+        confidence = weight * (0.5 + 0.5 * share) if share >= EXPLAINED else 0.5 * weight * share
+        if rivals or (account.gains.get(effect.name, 1.0) < SMALL and len(fitted) > 1):
             confidence = min(confidence, 0.45)
         if rivals:
             result.ambiguous.append((effect.name, *rivals))
@@ -380,16 +272,15 @@ def _conclude(result: Diagnosis, steps: list[list[Found]], small: set[str], mean
         )
 
 
-def _rule_out(result: Diagnosis, alone: list[Found], mean0: float, floor: float) -> None:
+def _rule_out(result: Diagnosis, alone: Step, ground: Ground) -> None:
     """Say of each kind why it was not named; `alone` are those that were fitted on top of the base model."""
-    gap = max(mean0 - floor, 1e-12)
     tried: dict[str, float] = {}
-    for one in alone:
-        tried[one.candidate.name] = max(tried.get(one.candidate.name, -1.0), (mean0 - one.mean) / gap)
+    for one in alone.ranked:
+        name = one.candidate.name
+        closed = ground.closed(means_of(one.unseen, one.fit), ground.side(name))
+        tried[name] = max(tried.get(name, 0.0), closed)
     named = {name for pair in result.ambiguous for name in pair} | {n.name for n in result.named}
     looked = {c.name for c in candidates(result.of("fit"), result.base.model)}
-    from ..effects.library import library
-
     for kind in library().values():
         if kind.name in named:
             continue
@@ -398,9 +289,9 @@ def _rule_out(result: Diagnosis, alone: list[Found], mean0: float, floor: float)
         elif kind.name not in looked:
             why = untold(result.coverage).get(kind.name, "these recordings cannot show it")
         elif kind.name in tried and result.verdict != "no gap":
-            why = f"alone it closes {max(tried[kind.name], 0.0):.0%} of the squared gap on unseen trials"
+            why = f"alone it closes {tried[kind.name]:.0%} of the squared gap on unseen trials"
         elif result.verdict == "no gap":
             why = "nothing is left for it to explain"
         else:
             why = "a first look promised far less than what was fitted"
-        result.ruled_out.append((kind_of(kind.name).name, why))
+        result.ruled_out.append((kind.name, why))

@@ -30,6 +30,8 @@ PRIOR = 10.0
 """Inverse variance of a number per texel about its resting value, in its coordinate: a gain is within ± 0.3 unseen."""
 FRICTION = ("mus", "mud", "sigma0", "x0", "ct")
 """Parameters of the base model that show in net forces alone."""
+BLOCKS = 12
+"""Blocks of time of each stretch in which gradients are summed, each long against the memory of the noise."""
 TOLD = 0.1
 """Least share of what all recordings tell of a number that some of them must tell, to find it from them."""
 
@@ -164,16 +166,20 @@ class Share:
             out[:, width:] = np.nan_to_num((trial.force - predicted.force)[self.rows] / self.noise[1])
         return out
 
-    @property
-    def count(self) -> int:
-        """How many values were measured."""
-        trial = self.predictor.trial
-        number = 0
+    @cached_property
+    def counts(self) -> np.ndarray:
+        """How many values were measured, (2,) int: of readings, and of forces."""
+        trial, number = self.predictor.trial, np.zeros(2, int)
         if trial.reading is not None:
-            number += int(np.isfinite(trial.reading[self.rows][:, self.texels]).sum())
+            number[0] = np.isfinite(trial.reading[self.rows][:, self.texels]).sum()
         if trial.force is not None and self.forces:
-            number += int(np.isfinite(trial.force[self.rows]).sum())
+            number[1] = np.isfinite(trial.force[self.rows]).sum()
         return number
+
+    def squares(self, residual: np.ndarray) -> np.ndarray:
+        """Sum of squares of (some samples of) a residual, (2,) float: of readings, and of forces."""
+        width = len(self.texels)
+        return np.array([_square(residual[:, :width]), _square(residual[:, width:])])
 
 
 @dataclass
@@ -186,8 +192,8 @@ class Sums:
     b : (n, m, p)
     c, h : (n, m, m), (n, m)
     sse : float
-    texel_gradient : (n + 3, p)
-        Share of each texel, and of each component of the force, in `g`.
+    gradients : (blocks, n + 3, p)
+        Share in `g` of each texel, and of each component of the force, by blocks of time.
     """
 
     a: np.ndarray
@@ -196,7 +202,7 @@ class Sums:
     c: np.ndarray
     h: np.ndarray
     sse: float
-    texel_gradient: np.ndarray
+    gradients: np.ndarray
 
 
 @dataclass
@@ -207,9 +213,9 @@ class Fit:
     ----------
     model : Model
     free : tuple of Free
-    sse : (trials,) float
-        Sum of squares per trial, in units of the noise.
-    count : (trials,) int
+    sse : (trials, 2) float
+        Sum of squares per trial, of readings and of forces, in units of the noise.
+    count : (trials, 2) int
     sums : list of list of Sums, or None
         By trial and stretch.
     """
@@ -257,7 +263,7 @@ def fit(
         Derivatives by the first numbers, of each share, near where it starts.
     """
     free = tuple(free)
-    counts = np.array([share.count for share in shares])
+    counts = np.array([share.counts for share in shares])
     at = [item.to(value_of(model, item)) for item in free]
     model = changed(model, free, [item.back(x) for item, x in zip(free, at, strict=True)])
     residuals = [share.residual(model) for share in shares]
@@ -273,7 +279,7 @@ def fit(
         for share, residual, table in zip(shares, residuals, tables, strict=True):
             derivatives(share, model, free, at, residual, table, known)
         parts = zip(shares, residuals, tables, strict=True)
-        total = _total([_sum_of(share, free, table, residual) for share, residual, table in parts])
+        total = total_of([_sum_of(share, free, table, residual) for share, residual, table in parts])
         improved = False
         for _ in range(6):
             moved = _moved(at, free, _step([total], free, at, damping))
@@ -302,7 +308,8 @@ def fit(
             derivatives(share, model, free, at, residual, table, 0)
             rows = share.stretches(residual)
             sums.append([_sum_of(share, free, table[:, part], residual[part]) for part in rows])
-    return Fit(model, free, np.array([_square(r) for r in residuals]), counts, sums)
+    squares = np.array([share.squares(r) for share, r in zip(shares, residuals, strict=True)])
+    return Fit(model, free, squares, counts, sums)
 
 
 def _penalty(free: tuple[Free, ...], at: list[np.ndarray]) -> float:
@@ -310,7 +317,8 @@ def _penalty(free: tuple[Free, ...], at: list[np.ndarray]) -> float:
     return sum(PRIOR * float(np.sum((x - item.to(item.rest)) ** 2)) for item, x in zip(free, at, strict=True) if item.per_texel)
 
 
-def _flat(sums: Sequence[Sequence[Sums]]) -> list[Sums]:
+def flattened(sums: Sequence[Sequence[Sums]]) -> list[Sums]:
+    """Return the equations of all stretches of all trials in one list."""
     return [one for trial in sums for one in trial]
 
 
@@ -362,21 +370,23 @@ def _sum_of(share: Share, free: tuple[Free, ...], table: np.ndarray, residual: n
         h[texels] = np.einsum("mtn,tn->nm", own, residual[:, :width])
         c[texels] = np.einsum("mtn,ktn->nmk", own, own)
         b[texels] = np.einsum("mtn,ptn->nmp", own, common[:, :, :width])
-    gradient = np.zeros((n + 3, len(common)))
-    per_column = (common * residual).sum(axis=1).T
-    gradient[texels], gradient[n:] = per_column[:width], per_column[width:]
-    return Sums(flat @ flat.T, flat @ residual.ravel(), b, c, h, _square(residual), gradient)
+    starts = np.unique(np.linspace(0, len(residual), BLOCKS, endpoint=False).astype(int))
+    gradients = np.zeros((len(starts), n + 3, len(common)))
+    per_column = np.add.reduceat(common * residual, starts, axis=1).transpose(1, 2, 0)
+    gradients[:, texels], gradients[:, n:] = per_column[:, :width], per_column[:, width:]
+    return Sums(flat @ flat.T, flat @ residual.ravel(), b, c, h, _square(residual), gradients)
 
 
-def _total(sums: Sequence[Sums]) -> Sums:
+def total_of(sums: Sequence[Sums]) -> Sums:
+    """Add equations up, all but their gradients by blocks."""
     first = sums[0]
-    names = ("a", "g", "b", "c", "h", "sse", "texel_gradient")
+    names = ("a", "g", "b", "c", "h", "sse")
     return replace(first, **{name: sum(getattr(s, name) for s in sums) for name in names})
 
 
 def _reduced(sums: Sequence[Sums], free: tuple[Free, ...], at: list[np.ndarray], damping: float) -> tuple[np.ndarray, ...]:
     """The damped normal equations of the common numbers, a (p, p) and rhs (p,), and how those per texel follow from them."""
-    t = _total(sums)
+    t = total_of(sums)
     m = t.h.shape[1]
     a = t.a + damping * np.diag(np.diag(t.a)) + 1e-12 * (1.0 + np.trace(t.a)) * np.eye(len(t.a))
     if not m:
@@ -424,7 +434,7 @@ def _shares(a: np.ndarray, known: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def held_out(shares: Sequence[Share], found: Fit) -> np.ndarray:
-    """Sum of squares of each trial, predicted by a fit that has not seen it, (trials,) float.
+    """Sum of squares of each trial, of readings and of forces, predicted by a fit that has not seen it, (trials, 2) float.
 
     A whole trial is left out at a time. Where the others tell too little of some number (those of friction, where only one
     trial slides; those per texel), or there is one trial only, it is a stretch of a trial; what the rest does not tell even
@@ -433,9 +443,9 @@ def held_out(shares: Sequence[Share], found: Fit) -> np.ndarray:
     if found.sums is None:
         return found.sse.copy()
     free, at = found.free, [item.to(value_of(found.model, item)) for item in found.free]
-    known, *_ = _reduced(_flat(found.sums), free, at, 0.0)
+    known, *_ = _reduced(flattened(found.sums), free, at, 0.0)
     local = any(item.per_texel for item in free)
-    errors = np.zeros(len(shares))
+    errors = np.zeros((len(shares), 2))
     for left, share in enumerate(shares):
         others = [one for i, trial in enumerate(found.sums) for one in trial if i != left]
         whole = bool(others) and not local and _shares(_reduced(others, free, at, 0.0)[0], known)[0].min(initial=1.0) > TOLD
@@ -444,14 +454,15 @@ def held_out(shares: Sequence[Share], found: Fit) -> np.ndarray:
     return errors
 
 
-def _unseen(shares: Sequence[Share], found: Fit, left: int, parts: list[int], known: np.ndarray) -> float:
+def _unseen(shares: Sequence[Share], found: Fit, left: int, parts: list[int], known: np.ndarray) -> np.ndarray:
     """Squares of some stretches of one trial under the fit to everything else."""
     assert found.sums is not None
     free, at = found.free, [item.to(value_of(found.model, item)) for item in found.free]
 
-    def of_left(residual: np.ndarray) -> float:
+    def of_left(residual: np.ndarray) -> np.ndarray:
         rows = shares[left].stretches(residual)
-        return sum(_square(residual[rows[part]]) for part in parts)
+        squares: np.ndarray = np.sum([shares[left].squares(residual[rows[part]]) for part in parts], axis=0)
+        return squares
 
     sums = [one for i, trial in enumerate(found.sums) for j, one in enumerate(trial) if i != left or j not in parts]
     if not sums:
@@ -462,7 +473,7 @@ def _unseen(shares: Sequence[Share], found: Fit, left: int, parts: list[int], kn
         tried = changed(found.model, free, [item.back(x) for item, x in zip(free, moved, strict=True)])
         residuals = [share.residual(tried) for share in shares]
         own = of_left(residuals[left])
-        if sum(map(_square, residuals)) - own + _penalty(free, moved) <= before * (1.0 + 1e-9):
+        if sum(map(_square, residuals)) - own.sum() + _penalty(free, moved) <= before * (1.0 + 1e-9):
             return own
         damping = max(1e-2, 30.0 * damping)
     return of_left(shares[left].residual(found.model))
@@ -470,35 +481,6 @@ def _unseen(shares: Sequence[Share], found: Fit, left: int, parts: list[int], kn
 
 def _square(residual: np.ndarray) -> float:
     return float(np.einsum("ij,ij->", residual, residual))
-
-
-def covariance(found: Fit, by_trial: bool = False) -> np.ndarray:
-    """Covariance of the common numbers in their coordinates, (p, p).
-
-    The squares of the residual are summed in groups of one texel in one trial (or of a whole trial), within which noise may be
-    as coloured as it likes (Liang and Zeger, Biometrika 73, 1986).
-    """
-    assert found.sums is not None
-    t = _total(_flat(found.sums))
-    m = t.h.shape[1]
-    a = t.a + 1e-12 * (1.0 + np.trace(t.a)) * np.eye(len(t.a))
-    shift = np.zeros((t.b.shape[0], m, len(t.a)))
-    if m:
-        c = t.c + PRIOR * np.eye(m)
-        shift = np.linalg.solve(c, t.b)
-        a = a - np.einsum("nmp,nmq->pq", t.b, shift)
-    bread = np.linalg.pinv(a)
-    scatter, groups = np.zeros_like(a), 0
-    for trial in found.sums:
-        gradient = np.sum([one.texel_gradient for one in trial], axis=0)
-        if m:
-            gradient[: len(shift)] -= np.einsum("nmp,nm->np", shift, np.sum([one.h for one in trial], axis=0))
-        if by_trial:
-            gradient = gradient.sum(axis=0, keepdims=True)
-        scatter += gradient.T @ gradient
-        groups += int((np.abs(gradient).sum(axis=1) > 0).sum())
-    factor = groups / max(groups - len(a), 1)
-    return factor * bread @ scatter @ bread
 
 
 def base_numbers(parameters: SensorParameters, wanted: Sequence[str], full: float) -> list[Free]:

@@ -10,9 +10,10 @@ from typing import Any
 
 from ..formats.files import atomic_write
 from ..formats.sensor_toml import write_sensor
-from .amend import LOUD, Number, amended, next_experiment, normalised, numbers, stages
+from .amend import LOUD, amended, next_experiment, normalised, stages
 from .compare import noise_floor, nrmse, where
 from .diagnose import Diagnosis
+from .intervals import Number, numbers
 from .page import page
 from .phases import FEATURES
 from .plots import draw

@@ -102,8 +102,8 @@ class Found:
     ----------
     candidate : Candidate
     fit : Fit
-    unseen : (trials,) float
-        Squares of each trial as predicted by a fit that has not seen it, in units of the noise.
+    unseen : (trials, 2) float
+        Squares of each trial, of readings and of forces, as predicted by a fit that has not seen it, in units of the noise.
     """
 
     candidate: Candidate
@@ -366,7 +366,7 @@ def search(
         if starts and starts[0][0] > 0:
             begun.append((starts[0][0] / max(direction.total, 1e-300), candidate, starts))
         yield "looking at every effect", 0.35 * (number + 1) / len(forms), []
-    little = sum(share.count for share in views.whole) < LITTLE
+    little = sum(int(share.counts.sum()) for share in views.whole) < LITTLE
     kept = _kept(begun, len(begun)) if little else _kept(begun)
     turns, tolerance = (40, 1e-6) if little else (14, 1e-4)
     if not kept:
