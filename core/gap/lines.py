@@ -82,7 +82,7 @@ def line_of(shares: Sequence[Share], model: Model) -> Line | None:
 
 
 def _at_rest(share: Share, model: Model) -> tuple[float, np.ndarray, np.ndarray, np.ndarray] | None:
-    """Step, times, and the residual of texels while nothing touches them, about its mean and zero elsewhere, and where that is."""
+    """Step, times, the residual of texels while nothing touches them (about its mean, zero elsewhere), and where that is."""
     reading = share.predictor.trial.reading
     time = share.predictor.stimulus.time
     if reading is None or len(time) < 4 * AROUND:

@@ -124,6 +124,10 @@ def headline(result: Diagnosis) -> str:
     if result.verdict == "unexplained":
         strongest = FEATURES.get(result.structure.strongest, "nothing that was looked at")
         part = f" {_names([n.name for n in sure])} is part of it." if sure else ""
+        if result.line is not None:
+            line, unit = result.line, result.rig.parameters.unit
+            said = f"a line at {line.frequency:.3g} Hz of {line.amplitude:.3g} {unit}, there without load too"
+            return f"Unexplained: {said}, is {line.share:.0%} of what trembles at rest.{part}"
         return f"Unexplained: what is left ({after:.2%} of the range) varies most with {strongest}.{part}"
     shrink = f"the error shrinks from {before:.2%} to {after:.2%} of the range"
     if result.ambiguous:
