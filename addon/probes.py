@@ -9,6 +9,7 @@ import bmesh
 import bpy
 import numpy as np
 from mathutils import Matrix, Vector
+from mathutils.bvhtree import BVHTree
 
 from ..core.errors import SensorError
 from . import preview, transforms
@@ -27,7 +28,7 @@ def add(context, obj, shape: str, size: float, depth: float):
     size : float, metres
         Radius; half the side of a box. 0: a third of the sensor's extent.
     depth : float, metres
-        Of the deepest point. 0: a quarter of the maximum penetration.
+        Of the deepest point, from where it first touches. 0: a quarter of the maximum penetration.
 
     Returns
     -------
@@ -55,12 +56,40 @@ def add(context, obj, shape: str, size: float, depth: float):
     rotation = transforms.rotation(quaternion)
     normal, ground = rotation @ mean, location + rotation @ foot / unit
     probe = bpy.data.objects.new("Probe", _mesh(shape, size / unit))
-    context.scene.collection.objects.link(probe)
-    probe.rotation_euler = Vector(normal).to_track_quat("Z", "Y").to_euler()
+    _home(context.scene, obj).objects.link(probe)
+    turn = Vector(normal).to_track_quat("Z", "Y")
+    probe.rotation_euler = turn.to_euler()
+    around = (texels.position - foot) / unit @ rotation.T @ transforms.array(turn.to_matrix())
+    ground = ground + _meeting(probe.data, around, size / unit) * normal
     _animate(context.scene, probe, ground, normal, size / unit, depth / unit)
     probe.display_type = "WIRE"  # the texels under it are what one wants to see
     probe.palpate.role = "TARGET"
     return probe
+
+
+def _home(scene, obj):
+    """The collection that the sensor is in: the probe is shown, and bakes, where the sensor does."""
+    return next((found for found in obj.users_collection if found.is_editable), scene.collection)
+
+
+def _meeting(mesh, points: np.ndarray, size: float) -> float:
+    """How much higher than `size` above the foot the probe's middle is when it first touches one of the texels.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        Of the probe, which comes down along its own z.
+    points : (n, 3) float
+        Texels relative to the foot, along the probe's axes.
+    """
+    tree = BVHTree.FromPolygons([vertex.co for vertex in mesh.vertices], [face.vertices for face in mesh.polygons])
+    under = Vector((0.0, 0.0, -10.0 * size))
+    heights = [0.0]  # above the foot itself
+    for x, y, z in points:
+        place = tree.ray_cast(under + Vector((x, y, 0.0)), Vector((0.0, 0.0, 1.0)))[0]
+        if place is not None:
+            heights.append(z - place.z - size)
+    return max(heights)
 
 
 def _animate(scene, probe, ground: np.ndarray, normal: np.ndarray, size: float, depth: float) -> None:

@@ -99,7 +99,7 @@ class PALPATE_OT_sensor_toml_export(support.Reporting, ExportHelper, bpy.types.O
 
     @classmethod
     def poll(cls, context):
-        return support.sensor_object(cls, context)
+        return support.any_sensor_object(cls, context)
 
     def run(self, context):
         exchange.save_toml(context, context.object, self.filepath)

@@ -37,7 +37,7 @@ class PALPATE_OT_probe_add(support.Reporting, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        return support.mesh_object(cls, context) and support.sensor_object(cls, context)
+        return support.any_sensor_object(cls, context)
 
     def run(self, context):
         support.leave_edit_mode(context)

@@ -62,7 +62,13 @@ def mesh_object(cls, context) -> bool:
 
 def sensor_object(cls, context) -> bool:
     """Poll: the active object is a sensor or a pad that can be changed."""
-    if not object_with_surface(cls, context):
+    return object_with_surface(cls, context) and any_sensor_object(cls, context)
+
+
+def any_sensor_object(cls, context) -> bool:
+    """Poll: the active object is a sensor or a pad, perhaps of another file; enough for what does not change it."""
+    if context.object is None:
+        cls.poll_message_set("Make an object active first")
         return False
     if context.object.palpate.role not in {"SENSOR", "PAD"}:
         cls.poll_message_set(f"'{context.object.name}' is no sensor: use Make Sensor first")

@@ -40,6 +40,46 @@ def test_a_probe_for_a_curved_sensor_of_any_size():
     assert 0 < felt.depth.max() <= finger.palpate.max_penetration / 4 + 1e-6
 
 
+def test_bumps_beside_the_middle_are_not_pressed_from_the_start():
+    """It first touches what is highest under it, and goes as deep as it says from there."""
+    scene = bpy.context.scene
+    scene.frame_start, scene.frame_end = 1, 41
+    pad = grid(columns=15, rows=15)
+    for vertex in pad.data.vertices:
+        vertex.co.z += 0.01 * (vertex.co.xy.length > 0.012)
+    pad.rotation_euler = (0.5, 1.0, -0.7)
+    bpy.ops.palpate.sensor_add()
+    pad.palpate.max_penetration = 0.004
+    assert bpy.ops.palpate.probe_add(shape="BOX", size=0.02, depth=0.001) == {"FINISHED"}
+    felt = run(drive(sample.sample_scenario(scene))[0]).sensors["Pad"]
+    assert not felt.contact[0].any()
+    assert felt.depth.max() == pytest.approx(0.001, rel=0.2)  # along normals that lean
+
+
+def test_it_goes_where_the_sensor_is(tmp_path):
+    """Into the sensor's collection; also for a sensor that is linked, which it does not change."""
+    pad = grid()
+    home = bpy.data.collections.new("Rig")
+    bpy.context.scene.collection.children.link(home)
+    bpy.context.scene.collection.objects.unlink(pad)
+    home.objects.link(pad)
+    bpy.context.view_layer.objects.active = pad
+    bpy.ops.palpate.sensor_add()
+    bpy.ops.palpate.probe_add()
+    assert bpy.data.objects["Probe"].users_collection[0] == home
+    path = str(tmp_path / "library.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=path)
+    bpy.ops.wm.read_homefile(use_empty=True)
+    with bpy.data.libraries.load(path, link=True) as (_, wanted):
+        wanted.objects = ["Pad"]
+    linked = wanted.objects[0]
+    bpy.context.scene.collection.objects.link(linked)
+    bpy.context.view_layer.objects.active = linked
+    assert bpy.ops.palpate.probe_add() == {"FINISHED"}
+    assert bpy.ops.palpate.sensor_toml_export(filepath=str(tmp_path / "sensor.toml")) == {"FINISHED"}
+    assert not bpy.ops.palpate.weight_paint.poll()
+
+
 def test_without_a_sensor_there_is_no_probe():
     grid()
     assert not bpy.ops.palpate.probe_add.poll()
