@@ -81,7 +81,7 @@ def texels_from_region(mesh: TriangleMesh, region: np.ndarray, name: str = "sens
     vertex = np.flatnonzero(region)
     if len(vertex) == 0:
         raise RegionError(
-            f"The region of sensor '{name}' is empty: select or paint at least three vertices of one face, or take its role away."
+            f"The region of sensor '{name}' is empty: select or paint all corners of at least one face, or take its role away."
         )
     inside = region[mesh.triangles].all(axis=1)
     if not inside.any():
