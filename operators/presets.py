@@ -1,11 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Parameters of a sensor as Blender presets, and copied from one sensor to others."""
 
+from pathlib import Path
+
 import bpy
 from bl_operators.presets import AddPresetBase
 from bl_ui.utils import PresetPanel
+from bpy.props import StringProperty
 
 from ..addon import sensors
+from ..core.errors import FileError
 from . import support
 
 SUBDIR = "palpate/sensor"
@@ -16,15 +20,38 @@ class PALPATE_PT_presets(PresetPanel, bpy.types.Panel):
 
     bl_label = "Sensor Presets"
     preset_subdir = SUBDIR
-    preset_operator = "script.execute_preset"
+    preset_operator = "palpate.preset_load"
     preset_add_operator = "palpate.preset_add"
 
 
 class PALPATE_MT_presets(bpy.types.Menu):
     bl_label = "Sensor Presets"
     preset_subdir = SUBDIR
-    preset_operator = "script.execute_preset"
+    preset_operator = "palpate.preset_load"
     draw = bpy.types.Menu.draw_preset
+
+
+class PALPATE_OT_preset_load(support.Reporting, bpy.types.Operator):
+    """Give the active sensor the values of this preset"""
+
+    # Blender's own script.execute_preset cannot be undone.
+    bl_idname = "palpate.preset_load"
+    bl_label = "Load Sensor Preset"
+    bl_options = {"REGISTER", "UNDO"}
+
+    filepath: StringProperty(subtype="FILE_PATH", options={"HIDDEN", "SKIP_SAVE"})
+
+    @classmethod
+    def poll(cls, context):
+        return support.sensor_object(cls, context)
+
+    def run(self, context):
+        path = Path(self.filepath)
+        if not path.is_file():
+            raise FileError(f"There is no preset '{path}': choose one from the list in the panel's header.")
+        support.leave_edit_mode(context)
+        bpy.utils.execfile(str(path))
+        self.report({"INFO"}, f"'{context.object.name}' has the values of '{bpy.path.display_name(path.name)}'")
 
 
 class PALPATE_OT_preset_add(AddPresetBase, bpy.types.Operator):
@@ -74,7 +101,13 @@ def _others(context) -> list:
     ]
 
 
-CLASSES = (PALPATE_PT_presets, PALPATE_MT_presets, PALPATE_OT_preset_add, PALPATE_OT_parameters_copy)
+CLASSES = (
+    PALPATE_PT_presets,
+    PALPATE_MT_presets,
+    PALPATE_OT_preset_load,
+    PALPATE_OT_preset_add,
+    PALPATE_OT_parameters_copy,
+)
 
 
 def register():

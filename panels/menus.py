@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Object › Palpate in the 3D view. F3 finds what is in menus."""
+"""Object › Palpate Tactile Sensors in the 3D view. F3 finds what is in menus, by the words of the whole path."""
 
 import bpy
 
 
 class PALPATE_MT_object(bpy.types.Menu):
-    bl_label = "Palpate"
+    bl_label = "Palpate Tactile Sensors"
 
-    def draw(self, _context):
+    def draw(self, context):
         layout = self.layout
         layout.operator_context = "INVOKE_DEFAULT"
         layout.operator("palpate.sensor_add", icon="PHYSICS")
@@ -18,6 +18,9 @@ class PALPATE_MT_object(bpy.types.Menu):
         layout.operator("palpate.skin_update")
         layout.operator("palpate.probe_add")
         layout.operator("palpate.parameters_copy")
+        presets = layout.column()
+        presets.enabled = context.object is not None and context.object.palpate.role in {"SENSOR", "PAD"}
+        presets.menu("PALPATE_MT_presets")
         layout.operator_menu_enum("palpate.fix", "kind")
         layout.operator_menu_enum("palpate.effect_add", "effect")
         layout.operator("palpate.sensor_remove", icon="X")
@@ -38,6 +41,8 @@ class PALPATE_MT_object(bpy.types.Menu):
         layout.operator("palpate.gap_curves")
         layout.operator("palpate.gap_show")
         layout.operator("palpate.gap_report")
+        layout.separator()
+        layout.operator("palpate.debug_info_copy")
 
 
 def _draw(self, _context):
@@ -54,12 +59,6 @@ def _draw_edit(self, _context):
 def _draw_add(self, _context):
     self.layout.separator()
     self.layout.operator("palpate.pad_mesh_add", icon="MESH_GRID")
-
-
-def _draw_weights(self, _context):
-    layout = self.layout
-    layout.separator()
-    layout.operator("palpate.sensor_add", text="Make Palpate Sensor")
 
 
 def _draw_import(self, _context):
@@ -79,7 +78,9 @@ ENTRIES = (
     ("VIEW3D_MT_object", _draw),
     ("VIEW3D_MT_edit_mesh_faces", _draw_edit),
     ("VIEW3D_MT_edit_mesh_vertices", _draw_edit),
-    ("VIEW3D_MT_paint_weight", _draw_weights),
+    ("VIEW3D_MT_edit_mesh", _draw),
+    ("VIEW3D_MT_paint_weight", _draw),
+    ("VIEW3D_MT_sculpt", _draw),
 )
 
 

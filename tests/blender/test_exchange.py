@@ -162,8 +162,8 @@ def test_every_operator_is_in_a_menu(repository):
         "effect_move",
         "effect_remove",
         "object_activate",
-        "debug_info_copy",
         "preset_add",
+        "preset_load",
         "face_set_choose",
         "effect_copy",
     }

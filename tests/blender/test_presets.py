@@ -26,7 +26,8 @@ def test_a_preset_makes_a_sensor_that_works_and_names_its_source(path):
     pad = grid()
     bpy.ops.palpate.sensor_add()
     before = sample.parameters(pad.palpate)
-    assert bpy.ops.script.execute_preset(filepath=str(path), menu_idname="PALPATE_MT_presets") == {"FINISHED"}
+    pad.palpate.normal_law = "hunt-crossley"  # a preset's k is that of the linear law
+    assert bpy.ops.palpate.preset_load(filepath=str(path)) == {"FINISHED"}
     after = sample.parameters(pad.palpate)
     after.check(pad.name)
     text = path.read_text(encoding="utf-8")
@@ -55,10 +56,18 @@ def test_own_presets_are_kept_and_removed():
     mine = [path for folder in bpy.utils.preset_paths("palpate/sensor") for path in Path(folder).glob("Mine.py")]
     assert len(mine) == 1
     pad.palpate.k, pad.palpate.unit = 1.0, "N"
-    bpy.ops.script.execute_preset(filepath=str(mine[0]), menu_idname="PALPATE_MT_presets")
+    bpy.ops.palpate.preset_load(filepath=str(mine[0]))
     assert (pad.palpate.k, pad.palpate.unit) == (123.0, "V")
     bpy.ops.palpate.preset_add(name="Mine", remove_name=True)
     assert not mine[0].exists()
+
+
+def test_a_preset_needs_a_sensor_and_a_file():
+    grid()
+    assert not bpy.ops.palpate.preset_load.poll()
+    bpy.ops.palpate.sensor_add()
+    with pytest.raises(RuntimeError, match="no preset"):
+        bpy.ops.palpate.preset_load(filepath="/nowhere/none.py")
 
 
 def test_copy_to_selected():

@@ -69,7 +69,7 @@ def test_disabling_leaves_nothing_and_enabling_again_works(commands):
     assert not any(without["handlers"].values())
     palpate.register()
     first = traces()
-    assert first["object"] and first["scene"] and first["menus"] == 7
+    assert first["object"] and first["scene"] and first["menus"] == 9
     assert "PALPATE_PT_physics" in first["classes"] and "bake" in first["operators"]
     assert list(commands.values()) == ["palpate"]
     palpate.unregister()

@@ -6,6 +6,7 @@
 import bpy
 
 settings = bpy.context.object.palpate
+settings.normal_law = "linear"
 settings.k = 593.0
 settings.cn = 5.93
 settings.max_penetration = 0.004

@@ -4,6 +4,7 @@
 import bpy
 
 settings = bpy.context.object.palpate
+settings.normal_law = "linear"
 settings.k = 58.5
 settings.cn = 0.0583
 settings.max_penetration = 0.012

@@ -6,6 +6,7 @@
 import bpy
 
 settings = bpy.context.object.palpate
+settings.normal_law = "linear"
 settings.k = 46.0
 settings.cn = 0.46
 settings.max_penetration = 0.006

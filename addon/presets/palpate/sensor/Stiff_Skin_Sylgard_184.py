@@ -6,6 +6,7 @@
 import bpy
 
 settings = bpy.context.object.palpate
+settings.normal_law = "linear"
 settings.k = 2640.0
 settings.cn = 26.4
 settings.max_penetration = 0.002

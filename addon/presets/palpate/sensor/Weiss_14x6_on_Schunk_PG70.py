@@ -4,6 +4,7 @@
 import bpy
 
 settings = bpy.context.object.palpate
+settings.normal_law = "linear"
 settings.k = 1000.0
 settings.cn = 10.0
 settings.max_penetration = 0.012
