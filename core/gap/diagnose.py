@@ -21,7 +21,7 @@ from .noise import SHORTEST, Coverage, Noise, coverage, force_noise, reading_noi
 from .rig import Rig
 from .search import Views, views_of
 from .structure import Structure, structure_of
-from .telling import untold
+from .telling import alike, untold
 from .tremble import trembling
 
 EXPLAINED = 0.6
@@ -258,7 +258,8 @@ def _conclude(result: Diagnosis, account: Account, ground: Ground) -> None:
             name = one.candidate.name
             if name not in {e.name for e in effects} and not (effect.name == "dead-texels" and one.candidate.local):
                 others[name] = min(left / own, others.get(name, np.inf))
-        rivals = tuple(name for name, ratio in others.items() if ratio < RIVAL)
+        same = [name for name in alike(result.coverage, effect.name) if name not in {e.name for e in effects}]
+        rivals = tuple(dict.fromkeys([*(name for name, ratio in others.items() if ratio < RIVAL), *same]))
         weight = 1.0 / (1.0 + sum(ratio**-3.0 for ratio in others.values()))
         share = closed[ground.side(effect.name)] if fitted else 1.0
         confidence = weight * (0.5 + 0.5 * share) if share >= EXPLAINED else 0.5 * weight * share

@@ -159,6 +159,8 @@ class Coverage:
         Share of a trial between the first and the last moment at which a texel carries nothing; the largest of all trials.
     seconds : float
         Longest trial.
+    roams : bool
+        Whether what presses part of the texels did so at more than one place.
     """
 
     texels: float
@@ -170,17 +172,22 @@ class Coverage:
     slides: bool
     rest: float
     seconds: float
+    roams: bool = True
 
 
 def coverage(predictors: Sequence[Predictor]) -> Coverage:
     """Look at what trials cover."""
-    touched = np.zeros(len(predictors[0].rig.texels), bool)
+    texels = predictors[0].rig.texels
+    touched, middles = np.zeros(len(texels), bool), []
     speeds: list[np.ndarray] = []
     hold, unloading, cycles, peaks, slides, rest = 0.0, False, 0, [], False, 0.0
     for predictor in predictors:
         s = predictor.stimulus
         load = s.depth if s.load is None else s.load
         touched |= (load > 0).any(axis=0)
+        pressed = load.sum(axis=1)
+        at = pressed > 0.05 * max(float(pressed.max(initial=0.0)), 1e-300)
+        middles.append(load[at] @ texels.position / pressed[at, None])
         total = load.max(axis=1)
         full = max(total.max(initial=0.0), 1e-300)
         rate = np.gradient(total, s.time) / full
@@ -208,7 +215,15 @@ def coverage(predictors: Sequence[Predictor]) -> Coverage:
         slides=slides,
         rest=rest,
         seconds=max(float(p.trial.time[-1] - p.trial.time[0]) for p in predictors),
+        roams=_roams(np.concatenate(middles), texels.area, touched),
     )
+
+
+def _roams(middle: np.ndarray, area: np.ndarray, touched: np.ndarray) -> bool:
+    """Whether the middle of the load (T, 3) moved by more than a texel's width; where most texels are touched it need not."""
+    if len(middle) == 0 or touched.mean() > 0.5:
+        return True
+    return float(np.ptp(middle, axis=0).max()) > float(np.sqrt(np.median(area)))
 
 
 def _longest(flag: np.ndarray, time: np.ndarray) -> float:

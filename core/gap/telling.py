@@ -22,6 +22,14 @@ RESTS = 0.1
 """Share of a trial from the first to the last time that a texel carries nothing, from which on a drift would show there."""
 
 
+BY_PLACE = ("load-spreading", "crosstalk", "gain-mismatch", "misalignment")
+"""Known by how neighbours differ as the load moves on: at one place each is some pattern of texels that grows with the load."""
+BY_CYCLE = ("hysteresis", "softening", "wear")
+"""Known by how a second cycle differs from the first: in one alone, each makes the way back lie below the way in."""
+SHORT = 0.5
+"""Seconds of a hold below which it tells nothing of settling."""
+
+
 def untold(coverage: Coverage) -> dict[str, str]:
     """Return the kinds of effects that recordings cannot tell, each with the reason."""
     said = {} if coverage.unloading else dict.fromkeys(LEAVES_BEHIND, NEVER_UNLOADED)
@@ -38,3 +46,17 @@ def confounded(coverage: Coverage) -> tuple[str, ...]:
     """
     one = not coverage.unloading and coverage.rates < ONE_SPEED and coverage.longest_hold == 0.0
     return BY_TIME if one else ()
+
+
+def alike(coverage: Coverage, name: str) -> tuple[str, ...]:
+    """Return the kinds that recordings cannot tell from one of this name, however much better one of them fits.
+
+    The sensor need follow none of the formulas: a better fit is no evidence where the mark of the effect was not brought out.
+    """
+    groups: list[tuple[str, ...]] = []
+    if not coverage.roams:
+        groups.append(BY_PLACE)
+    if coverage.unloading and coverage.cycles < 2:
+        still = coverage.rates < ONE_SPEED and coverage.longest_hold < SHORT
+        groups.append((*BY_CYCLE, "creep", "lag") if still else BY_CYCLE)
+    return tuple(dict.fromkeys(other for group in groups if name in group for other in group if other != name))

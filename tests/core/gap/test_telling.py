@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What a recording covers is seen whatever its pace, and what it cannot tell is not asked."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -9,7 +11,7 @@ from palpate.core.gap.model import Model, Predictor
 from palpate.core.gap.noise import coverage
 from palpate.core.gap.phases import PHASES, phases
 from palpate.core.gap.rig import Rig, Trial, grid_texels
-from palpate.core.gap.telling import BY_TIME, LEAVES_BEHIND, confounded, untold
+from palpate.core.gap.telling import BY_CYCLE, BY_PLACE, BY_TIME, LEAVES_BEHIND, alike, confounded, untold
 from palpate.core.scenario import SensorParameters
 
 PROGRAMMES = {
@@ -62,3 +64,25 @@ def test_what_was_never_brought_out_is_no_candidate():
     asked = [{c.name for c in candidates([one], Model(one.rig.parameters))} for one in (up, back)]
     assert not asked[0] & set(LEAVES_BEHIND) and set(LEAVES_BEHIND) <= asked[1]
     assert {"stiffening", "creep"} <= asked[0]
+
+
+def test_one_cycle_does_not_tell_what_a_second_would():
+    once = coverage([predictor("press", 20.0)])
+    assert set(alike(once, "softening")) == {*BY_CYCLE, "creep", "lag"} - {"softening"}
+    assert set(alike(coverage([predictor("held", 20.0)]), "softening")) == set(BY_CYCLE) - {"softening"}
+    assert alike(replace(once, cycles=3), "softening") == () == alike(once, "stiffening")
+
+
+@pytest.mark.parametrize(("stays", "told"), [(True, False), (False, True)])
+def test_one_place_does_not_tell_neighbours_from_gains(stays, told):
+    """A ball on one of six rows of texels, or on one after the other."""
+    texels = grid_texels(6, 2, 3e-3, 3e-3)
+    rig = Rig("six", texels, SensorParameters(k=50.0), frozenset({"k"}), None, (6, 2, (3e-3, 3e-3)), None, ())
+    time = np.linspace(0, 6, 600)
+    row = np.zeros(600, int) if stays else np.minimum(time, 1.9).astype(int)
+    depth = 1e-3 * np.abs(np.sin(np.pi * time))[:, None] * (np.repeat(np.arange(6), 2) == row[:, None])
+    trial = Trial("t", "fit", time, "depth", None, None, depth.max(axis=1), np.zeros((600, 2)), 50.0 * depth, None)
+    one = Predictor(trial, rig)
+    one.stimulus = replace(one.stimulus, depth=depth)
+    assert (alike(coverage([one]), "crosstalk") == ()) == told
+    assert told or set(alike(coverage([one]), "crosstalk")) == set(BY_PLACE) - {"crosstalk"}
