@@ -40,11 +40,14 @@ class Indenter:
     radius : float or None, metres
         Of a ball; then contact is computed from the true sphere.
     name : str
+    edges : (3,) float or None, metres
+        Full sizes of a box about the pose's point; then contact is computed from them.
     """
 
     mesh: TriangleMesh
     radius: float | None = None
     name: str = "indenter"
+    edges: tuple[float, ...] | None = None
 
 
 @dataclass(frozen=True)
@@ -352,19 +355,21 @@ def _indenter(words: dict[str, Any], folder: Path, path: Path) -> Indenter:
     import trimesh
 
     ((kind, size),) = shape.items()
+    edges = None
     if kind == "sphere":
         (radius,) = _numbers(size, 1, "The sphere's radius", path)
         solid = trimesh.creation.icosphere(subdivisions=4, radius=radius)
         name = f"{2e3 * radius:g} mm ball"
     elif kind == "box":
         size, radius = _numbers(size, 3, "The box's size", path), None
-        solid = trimesh.creation.box(size)
+        solid, edges = trimesh.creation.box(size), tuple(map(float, size))
         name = " × ".join(f"{1e3 * edge:g}" for edge in size) + " mm box"
     else:
         (across, height), radius = _numbers(size, 2, "The cylinder's size", path), None
         solid = trimesh.creation.cylinder(radius=across, height=height, sections=256)
         name = f"cylinder of {2e3 * across:g} mm"
-    return Indenter(checked_mesh(solid.vertices, solid.faces, "the indenter")[0], radius if kind == "sphere" else None, name)
+    mesh = checked_mesh(solid.vertices, solid.faces, "the indenter")[0]
+    return Indenter(mesh, radius if kind == "sphere" else None, name, edges)
 
 
 # --- trials

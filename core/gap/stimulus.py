@@ -2,7 +2,8 @@
 """What each texel meets during a trial: depth, its rate, the direction of the push, and sliding.
 
 None of it depends on the parameters that are fitted, so it is computed once per trial. A ball is computed in closed form, so
-that facets are not taken for an effect; every other indenter goes through the solver's own contact search.
+that facets are not taken for an effect, and a box, whose flat end is common, so that texels can be tried at many places; every
+other indenter goes through the solver's own contact search.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..bodies import quaternion_product, rotation_vectors
+from ..bodies import quaternion_product, rotation_matrices, rotation_vectors
 from ..errors import SceneError
 from ..scenario import Body, Motion, Scenario, Sensor, Target
 from ..solve import Simulation
@@ -94,6 +95,9 @@ def _posed(trial: Trial, rig: Rig, texels: Texels, along: np.ndarray | None) -> 
     for _ in range(6):
         if radius is not None:
             depth, normal, point, deep = ball_contact(trial.position, radius, texels.position, texels.normal, reach)
+        elif rig.indenter.edges is not None:
+            pose, edges = (trial.position, trial.quaternion), np.array(rig.indenter.edges)
+            depth, normal, point, deep = box_contact(*pose, edges, texels.position, texels.normal, reach)
         else:
             depth, normal, point, deep = _mesh_contact(trial, rig, texels, reach)
         if not deep:
@@ -170,6 +174,33 @@ def ball_contact(
     point = position - np.where(touching, reach - s, 0.0)[:, :, None] * outward
     sunk = (inside < 0).sum(axis=1).max(initial=0)
     return depth, normal, point, int(sunk)
+
+
+def box_contact(
+    center: np.ndarray, quaternion: np.ndarray, edges: np.ndarray, position: np.ndarray, outward: np.ndarray, reach: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, int]:
+    """The same for a box of full sizes `edges` (3,), turned by `quaternion` (T, 4): the segment against three pairs of planes.
+
+    Its returns are those of :func:`ball_contact`.
+    """
+    frame = rotation_matrices(quaternion)  # box → sensor
+    base = position - reach * outward - center[:, None, :]
+    base, way = base @ frame, np.broadcast_to(outward, base.shape) @ frame  # rows by the matrix: into the box's frame
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ends = [(np.sign(way) * side * 0.5 * edges - base) / way for side in (-1.0, 1.0)]
+    beside = way == 0.0  # along a pair of planes: always between them, or never
+    between = np.abs(base) < 0.5 * edges
+    enter = np.where(beside, np.where(between, -np.inf, np.inf), ends[0])
+    leave = np.where(beside, np.where(between, np.inf, -np.inf), ends[1])
+    s, face = enter.max(axis=2), enter.argmax(axis=2)
+    touching = (s <= leave.min(axis=2)) & (s >= 0) & (s < reach)
+    hit = np.arange(3) == face[:, :, None]
+    own = np.where(hit, -np.sign(way), 0.0) @ frame.transpose(0, 2, 1)
+    normal = np.where(touching[:, :, None], own, -outward)
+    left = np.where(touching, reach - s, 0.0)
+    depth = left * np.abs(_dot(normal, outward))
+    sunk = between.all(axis=2).sum(axis=1).max(initial=0)
+    return depth, normal, position - left[:, :, None] * outward, int(sunk)
 
 
 def _mesh_contact(trial: Trial, rig: Rig, texels: Texels, reach: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, int]:

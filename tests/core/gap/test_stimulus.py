@@ -50,6 +50,23 @@ def test_a_ball_is_the_limit_of_its_meshes():
     assert errors[2] < 2e-3 * exact.depth.max()
 
 
+@pytest.mark.parametrize("turned", [False, True])
+def test_a_box_is_its_mesh(turned):
+    """Closed form and the solver's contact search agree to rounding, for boxes smaller and larger than the pad, and askew."""
+    rng = np.random.default_rng(2)
+    for edges in ((0.01, 0.015, 0.008), (0.04, 0.07, 0.02)):
+        where = np.column_stack([*rng.uniform(-5e-3, 5e-3, (2, 40)), 0.5 * edges[2] - rng.uniform(-1e-3, 3e-3, 40)])
+        turns = np.column_stack([np.ones(40), 0.08 * rng.normal(size=(40, 3))])
+        turns /= np.linalg.norm(turns, axis=1)[:, None]
+        one = trial(where, turns if turned else None)
+        mesh = solid(trimesh.creation.box(edges))
+        plain, exact = (stimulus_of(one, rig(Indenter(mesh, None, "box", size), one)) for size in (None, edges))
+        differ = np.abs(plain.depth - exact.depth) > 1e-12  # where a segment just meets an edge, rounding decides
+        assert differ.mean() < 1e-3 and exact.depth.max() > 1e-3
+        for name in ("rate", "normal", "slide"):
+            np.testing.assert_allclose(getattr(plain, name)[~differ], getattr(exact, name)[~differ], atol=1e-9)
+
+
 def test_depth_rate_and_slide_of_a_ball_are_those_of_geometry():
     time = np.linspace(0.0, 1.0, 201)
     path = np.column_stack([2e-3 * time, 1e-3 * time, RADIUS - 1e-3 - 5e-4 * time**2])
