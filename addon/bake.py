@@ -25,8 +25,10 @@ class Baked:
     folders: dict[str, Path]
 
 
-def bake(scene) -> Generator[Progress, None, Baked]:
+def bake(scene, into_scene: bool = True) -> Generator[Progress, None, Baked]:
     """Compute the whole frame range of a scene, write its files, and put the result into the scene.
+
+    With `into_scene` False only files are written, also of objects that are linked and could not hold a bake.
 
     Until the last step nothing in the scene changes, and an earlier bake stays as it is: closing the generator, an error and a
     kill leave the old or the new bake, never half of one. After a kill the next bake of the same scene goes on where it was.
@@ -39,12 +41,12 @@ def bake(scene) -> Generator[Progress, None, Baked]:
     """
     with state.suspended():
         try:
-            return (yield from _bake(scene, scene.name))
+            return (yield from _bake(scene, scene.name, into_scene))
         finally:
             state.session.bake = None
 
 
-def _bake(scene, name: str) -> Generator[Progress, None, Baked]:
+def _bake(scene, name: str, into_scene: bool) -> Generator[Progress, None, Baked]:
     folder = folders.bake_folder(scene)
     folders.check_folder(folder)
     total = 2 * max(1, scene.frame_end - scene.frame_start + 1)
@@ -58,7 +60,8 @@ def _bake(scene, name: str) -> Generator[Progress, None, Baked]:
             break
         yield _progress("Reading the scene", step.frame, step.done, total)
 
-    write.check(scene, scenario, binding)
+    if into_scene:
+        write.check(scene, scenario, binding)
     for step in preparing.wait():
         state.session.bake = step
         yield step
@@ -85,9 +88,10 @@ def _bake(scene, name: str) -> Generator[Progress, None, Baked]:
     except BaseException:
         files.discard()
         raise
-    write.commit(scene, scenario, binding, recording, files.folders)
-    scene.frame_set(scene.frame_current, subframe=scene.frame_subframe)  # the new keyframes show
-    live.baked(scene, recording, files.folders)
+    if into_scene:
+        write.commit(scene, scenario, binding, recording, files.folders)
+        scene.frame_set(scene.frame_current, subframe=scene.frame_subframe)  # the new keyframes show
+        live.baked(scene, recording, files.folders)
     return Baked(recording, scenario, files.folders)
 
 

@@ -24,14 +24,15 @@ def check(scene, scenario: Scenario, binding: Binding) -> None:
         if not obj.is_editable:
             raise SceneError(
                 f"'{obj.name}' is linked from another file, so that a bake cannot be put on it: "
-                "use Object › Relations › Make Local first."
+                "use Object › Relations › Make Local first, or `palpate bake` without --save, which writes files alone."
             )
     for obj in read_out:
         mesh = obj.data
         if not mesh.is_editable or mesh.override_library is not None:  # Blender saves no changes of those
             raise SceneError(
                 f"The mesh of sensor '{obj.name}' is linked from another file, so that its heat map would be "
-                "lost: use Object › Relations › Make Local › Selected Objects and Data first."
+                "lost: use Object › Relations › Make Local › Selected Objects and Data first, "
+                "or `palpate bake` without --save, which writes files alone."
             )
 
 

@@ -64,7 +64,7 @@ def run(arguments: argparse.Namespace) -> int:
             _leave_saved_bake(bpy, scene, arguments.scene)
         if arguments.sensor:
             _read_out_only(scene, arguments.sensor)
-        baked = bake_with_bar(scene)
+        baked = bake_with_bar(scene, into_scene=bool(arguments.save or arguments.save_as))
         saved = save(arguments)
     print(report(baked))
     if scene.frame_start != own_start:
@@ -77,7 +77,7 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def bake_with_bar(scene):
+def bake_with_bar(scene, into_scene: bool = True):
     """Bake a scene with a progress bar on stderr; Ctrl-C leaves an earlier bake as it was."""
     from ..addon import bake
 
@@ -89,7 +89,7 @@ def bake_with_bar(scene):
             bar.set_description(progress.stage, refresh=False)
             bar.update(progress.done - bar.n)
 
-        return drive(bake.bake(scene), show)
+        return drive(bake.bake(scene, into_scene), show)
 
 
 def report(baked) -> str:

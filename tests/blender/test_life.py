@@ -8,8 +8,10 @@ import pytest
 from blender_scenes import ball, grid, press, reopen, save, select
 
 from palpate.addon import bake, identity, preview, sample, transforms
+from palpate.commands import main
 from palpate.core.drive import drive
 from palpate.core.errors import PalpateError
+from palpate.core.formats.archive import load_recording
 from palpate.core.solve import run
 
 
@@ -204,6 +206,23 @@ def test_appended_and_linked(tmp_path, link):
         assert not bpy.ops.palpate.fix.poll()
     else:
         assert bpy.ops.palpate.sensor_add(source="MESH") == {"FINISHED"}
+
+
+def test_linked_it_is_baked_into_files_alone(tmp_path, capfd):
+    """What is linked cannot hold heat maps and keyframes; the command line needs none where it does not save."""
+    path, expected = _library(tmp_path)
+    with bpy.data.libraries.load(str(path), link=True) as (_, target):
+        target.objects = ["Pad", "Ball"]
+    for obj in target.objects:
+        bpy.context.scene.collection.objects.link(obj)
+    bpy.context.scene.frame_end = 4
+    (tmp_path / "scene").mkdir()
+    scene = str(save(tmp_path / "scene", "links.blend"))
+    assert main(["bake", scene, "--save"]) == 1
+    assert "without --save" in capfd.readouterr().err
+    assert main(["bake", scene]) == 0
+    felt = load_recording(tmp_path / "scene" / "palpate" / "Pad" / "recording.npz").sensors["Pad"]
+    assert felt.normal_force[-1].sum() == pytest.approx(expected["Pad"], rel=0.02)
 
 
 def test_overridden(tmp_path):
