@@ -52,14 +52,22 @@ def _label(parameter: Parameter) -> str:
     return name if parameter.unit == "1" else f"{name} ({parameter.unit})"
 
 
-def _property(parameter: Parameter):
+def _tooltip(form: Form, parameter: Parameter) -> str:
+    """What a parameter does, its unit and bounds, and where the formula comes from."""
+    unit = "no unit" if parameter.unit == "1" else parameter.unit
+    bounds = "" if parameter.unit.startswith("unit") else f"; {parameter.low:g} to {parameter.high:g}"
+    return f"{parameter.text.removesuffix('.')} ({unit}{bounds}). Source: {form.reference.removesuffix('.')}"
+
+
+def _property(form: Form, parameter: Parameter):
+    text = _tooltip(form, parameter)
     if parameter.per_texel:
-        text = f"{parameter.text} Numbers separated by commas, one per texel or one for all"
+        text = f"Numbers separated by commas, one per texel or one for all. {text}"
         return StringProperty(name=_label(parameter), description=text, **_fixed)
     limits = {} if parameter.unit.startswith("unit") else {"min": parameter.low, "max": parameter.high}
     return FloatProperty(
         name=_label(parameter),
-        description=parameter.text.removesuffix("."),
+        description=text,
         default=parameter.default,
         precision=5,
         step=0.1 if parameter.unit == "m" else 1,
@@ -82,7 +90,7 @@ def _annotations() -> dict:
         )
         for form in kind.forms:
             for parameter in form.parameters:
-                made[value_key(kind, form, parameter)] = _property(parameter)
+                made[value_key(kind, form, parameter)] = _property(form, parameter)
     return made
 
 

@@ -98,7 +98,7 @@ def _map(what: str, effect: str):
 def _factor(what: str):
     return FloatProperty(
         name="At Full Weight (×)",
-        description=f"What {what} is multiplied by where the weight is 1",
+        description=f"What {what} is multiplied by where the weight is 1, no unit; 1 changes nothing",
         default=0.5,
         min=0.0,
         soft_max=4.0,
@@ -242,9 +242,9 @@ class PALPATE_PG_object(bpy.types.PropertyGroup):
     )
 
     gain: _number(
-        "Gain (unit/N)", "gain", "Reading = zero + gain · normal force; what one newton adds to the reading", min=-1e9
+        "Gain (unit/N)", "gain", "Reading = zero + gain · normal force; what one newton adds to the reading, unit/N", min=-1e9
     )
-    zero: _number("Zero (unit)", "zero", "Reading without load", min=-1e9)
+    zero: _number("Zero (unit)", "zero", "Reading without load, in the unit above", min=-1e9)
     unit: StringProperty(name="Unit", description="Of the reading, as in N, V or counts", default=_default.unit, **_fixed)
 
     image_layout: EnumProperty(

@@ -25,11 +25,15 @@ class PALPATE_OT_probe_add(support.Reporting, bpy.types.Operator):
         ),
     )
     size: FloatProperty(
-        name="Radius (m)", description="Half a box's side; 0 is a third of the sensor's extent", min=0.0, precision=5, step=0.1
+        name="Radius (m)",
+        description="Of a ball or rod, half of a box's side, m; 0 is a third of the sensor's extent",
+        min=0.0,
+        precision=5,
+        step=0.1,
     )
     depth: FloatProperty(
         name="Depth (m)",
-        description="How deep it presses; 0 is a quarter of the maximum penetration",
+        description="How deep it presses, m; 0 is a quarter of the maximum penetration",
         min=0.0,
         precision=5,
         step=0.01,
