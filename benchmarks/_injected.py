@@ -1,19 +1,28 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A known effect, in a formula that the library does not have, put on top of real recordings."""
+"""A known effect, in a formula that the library does not have, put on top of real recordings.
+
+The recordings keep their stimulus, their noise and all that no effect of the library explains; what the workflow did find in
+them is taken out first, since the question is about one effect more. How large that one is, is counted in units of what was
+left unexplained (root mean squares), without what a refitted gain, zero or damping takes up of it.
+"""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
-from ._recordings import Recording
+from ._recordings import Columns, Recording
 
-SHARE = 0.08
-"""Root mean square of what is injected, of the range of the readings."""
-
+SIZES = (1.0, 2.0, 4.0)
+"""How many times as large as what was left unexplained."""
+LARGEST = 0.3
+"""Share of the range: what is larger is no effect on a sensor but another sensor."""
 Change = Callable[[np.ndarray, np.ndarray, float], np.ndarray]
+"""From times (T,) and readings (T, n) in shares of the largest, with a strength, to what a sensor with the effect reads."""
 
 
 def _low_pass(time: np.ndarray, x: np.ndarray, tau: float) -> np.ndarray:
@@ -52,28 +61,124 @@ def creep(time, x, strength):
     return x + strength * (0.3 * _low_pass(time, x, 0.03 * long) + 0.3 * _low_pass(time, x, 0.15 * long))
 
 
-CHANGES: dict[str, Change] = {"lag": lag, "saturation": saturation, "dead-zone": dead_zone, "drift": drift, "creep": creep}
+def hysteresis(time, x, strength):
+    """Each way back bulges out over the way in, by a parabola between nothing and the largest load before it."""
+    size, out = np.abs(x), x.copy()
+    top = np.zeros(x.shape[1])
+    for t in range(len(x)):
+        top = np.where(size[t] < 0.02, size[t], np.maximum(top, size[t]))
+        out[t] = x[t] + strength * x[t] * (1.0 - size[t] / np.maximum(top, 1e-9))
+    return out
 
 
-def with_effect(recording: Recording, name: str) -> Recording:
-    """Return recordings in which an effect changes all readings by :data:`SHARE` of their range."""
-    columns = [key for key in recording.trials[0][2] if key.startswith("texel_")]
-    readings = [np.stack([trial[key] for key in columns], axis=1) for _, _, trial in recording.trials]
-    zero = np.median([r[0] for r in readings], axis=0)
-    full = max(float(np.abs(r - zero).max()) for r in readings)
+def gain_mismatch(time, x, strength):
+    """Gains spread by the logarithm."""
+    return x * np.exp(0.3 * strength * np.random.default_rng(1).normal(size=x.shape[1]))
 
-    def changed(strength: float) -> list[np.ndarray]:
-        made = []
-        for (_, _, trial), r in zip(recording.trials, readings, strict=True):
-            made.append(zero + full * CHANGES[name](trial["time"], (r - zero) / full, strength))
-        return made
 
-    low, high = 1e-3, 30.0
-    for _ in range(30):
+def offset(time, x, strength):
+    """Zeros spread evenly."""
+    return x + 0.3 * strength * np.random.default_rng(2).uniform(-1.0, 1.0, x.shape[1])
+
+
+CHANGES: dict[str, Change] = {
+    "lag": lag,
+    "saturation": saturation,
+    "dead-zone": dead_zone,
+    "drift": drift,
+    "creep": creep,
+    "hysteresis": hysteresis,
+    "gain-mismatch": gain_mismatch,
+    "offset": offset,
+}
+BETWEEN_TEXELS = ("gain-mismatch", "offset")
+
+
+@dataclass(frozen=True)
+class Ground:
+    """Recordings without what was found in them.
+
+    Attributes
+    ----------
+    recording : Recording
+    rest : float
+        Root mean square of what was left unexplained, in the sensor's unit, and
+    share : float
+        the same as a share of the range.
+    """
+
+    recording: Recording
+    rest: float
+    share: float
+
+
+def without_what_was_found(recording: Recording, result: Any) -> Ground:
+    """Take what the effects that were found change in the model off the readings."""
+    trials, left = [], []
+    for predictor, (name, use, columns) in zip(result.predictors, recording.trials, strict=True):
+        best, base = (predictor.predict(model).reading for model in (result.best.model, result.base.model))
+        freed = predictor.trial.reading - (best - base)
+        left.append((predictor.trial.reading - best).ravel())
+        trials.append((name, use, columns | {f"texel_{i}": texel for i, texel in enumerate(freed.T)}))
+    rest = float(np.sqrt(np.nanmean(np.concatenate(left) ** 2)))
+    return Ground(replace(recording, trials=trials), rest, rest / result.full[0])
+
+
+def every(recording: Recording, step: int) -> Recording:
+    """The same recordings of each `step`-th texel under a force that all share."""
+    trials: list[tuple[str, str, Columns]] = []
+    for name, use, columns in recording.trials:
+        texels = [value for key, value in columns.items() if key.startswith("texel_")]
+        kept = texels[::step]
+        rest = {"time": columns["time"], "force": columns["force"] * len(kept) / len(texels)}
+        trials.append((name, use, rest | {f"texel_{i}": value for i, value in enumerate(kept)}))
+    return replace(recording, sensor=re.sub(r"columns = \d+", f"columns = {len(kept)}", recording.sensor), trials=trials)
+
+
+def with_effect(ground: Ground, name: str, size: float) -> Recording | None:
+    """Return recordings with an effect of a size in units of what was left unexplained; None where it does not get so large."""
+    trials = ground.recording.trials
+    texels = [key for key in trials[0][2] if key.startswith("texel_")]
+    if name in BETWEEN_TEXELS and len(texels) == 1:
+        return None
+    readings = [np.stack([columns[key] for key in texels], axis=1) for _, _, columns in trials]
+    zero = np.nanmedian([np.nanmedian(r[:5], axis=0) for r in readings], axis=0)
+    zero = np.where(np.isfinite(zero), zero, np.nanmedian(zero))
+    full = max(float(np.nanmax(np.abs(r - zero))) for r in readings)
+    plain = [np.nan_to_num((r - zero) / full) for r in readings]  # a channel that is not read out is at rest
+
+    def changes(strength: float) -> list[np.ndarray]:
+        times = [columns["time"] for _, _, columns in trials]
+        pairs = zip(times, plain, readings, strict=True)
+        return [np.where(np.isnan(r), np.nan, full * (CHANGES[name](t, x, strength) - x)) for t, x, r in pairs]
+
+    def size_of(made: list[np.ndarray]) -> float:
+        return _beyond_refitting(made, readings, [columns["time"] for _, _, columns in trials])
+
+    strengths = np.geomspace(1e-3, 30.0, 40)
+    sizes = [size_of(changes(float(s))) for s in strengths[::3]]
+    enough = np.flatnonzero(np.array(sizes) >= size * ground.rest)
+    if not len(enough):
+        return None
+    high = float(strengths[::3][enough[0]])
+    low = high / float(strengths[3] / strengths[0])
+    for _ in range(20):
         middle = float(np.sqrt(low * high))
-        moved = np.concatenate([(a - b).ravel() for a, b in zip(changed(middle), readings, strict=True)])
-        low, high = (middle, high) if np.sqrt(np.mean(moved**2)) < SHARE * full else (low, middle)
-    trials = []
-    for (trial, use, old), new in zip(recording.trials, changed(low), strict=True):
-        trials.append((trial, use, old | {key: new[:, i] for i, key in enumerate(columns)}))
-    return replace(recording, name=f"{recording.name} with {name}", trials=trials)
+        low, high = (middle, high) if size_of(changes(middle)) < size * ground.rest else (low, middle)
+    made = changes(high)
+    if np.sqrt(np.nanmean(np.concatenate([m.ravel() for m in made]) ** 2)) > LARGEST * ground.rest / ground.share:
+        return None
+    changed = []
+    for (trial, use, columns), reading, change in zip(trials, readings, made, strict=True):
+        changed.append((trial, use, columns | {key: (reading + change)[:, i] for i, key in enumerate(texels)}))
+    return replace(ground.recording, name=f"{ground.recording.name} with {name}", trials=changed)
+
+
+def _beyond_refitting(changes: list[np.ndarray], readings: list[np.ndarray], times: list[np.ndarray]) -> float:
+    """Root mean square of what a common gain, zero and damping cannot make of the readings."""
+    rates = [np.gradient(r, t, axis=0) for r, t in zip(readings, times, strict=True)]
+    change, reading, rate = (np.concatenate([a.ravel() for a in arrays]) for arrays in (changes, readings, rates))
+    good = np.isfinite(change) & np.isfinite(reading) & np.isfinite(rate)
+    table = np.column_stack([reading[good], np.ones(good.sum()), rate[good]])
+    weights, *_ = np.linalg.lstsq(table / np.linalg.norm(table, axis=0), change[good], rcond=None)
+    return float(np.sqrt(np.mean((change[good] - table / np.linalg.norm(table, axis=0) @ weights) ** 2)))

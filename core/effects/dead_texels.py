@@ -28,6 +28,13 @@ def stuck(x: np.ndarray, time: np.ndarray, values: Values, site: Site, seed: int
     return np.where(_dead(values, seed, x.shape[1]), site.zero + number(values, "level"), x)
 
 
+def held(x: np.ndarray, time: np.ndarray, values: Values, site: Site, seed: int) -> np.ndarray:
+    """A reading of its own for ever where a texel is listed as dead."""
+    gone = np.asarray(values["dead"])
+    return (1.0 - gone) * x + gone * (site.zero + np.asarray(values["level"]))
+
+
+_DEAD = Parameter("dead", "1", 0.0, 0.0, 1.0, "1 for each dead texel, 0 for the others.", per_texel=True)
 _SHARE = Parameter("share", "1", 0.1, 0.0, 1.0, "Share of the texels that are dead.")
 
 KIND = Kind(
@@ -50,9 +57,23 @@ KIND = Kind(
             "listed",
             "rᵢ = (1 − deadᵢ) · fᵢ",
             "Ni et al., ACM Trans. Sens. Netw. 5 (2009): fault types",
-            (Parameter("dead", "1", 0.0, 0.0, 1.0, "1 for each dead texel, 0 for the others.", per_texel=True),),
+            (_DEAD,),
             off={"dead": 0.0},
             shape=listed,
+        ),
+        Form(
+            "held",
+            "rᵢ = (1 − deadᵢ) · r₀ᵢ + deadᵢ · (r₀ + Lᵢ),  r₀ without load",
+            "Ni et al., ACM Trans. Sens. Netw. 5 (2009): stuck-at fault",
+            (
+                _DEAD,
+                Parameter(
+                    "level", "unit", 0.0, -1e5, 1e5, "Reading L of a dead texel, above the one without load.", per_texel=True
+                ),
+            ),
+            off={"dead": 0.0},
+            shape=held,
+            after_conversion=True,
         ),
         Form(
             "stuck",

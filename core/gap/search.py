@@ -275,24 +275,34 @@ def _placed_far(
 
 
 def dead(shares: Sequence[Share], model: Model, candidate: Candidate, texels: int) -> Effect | None:
-    """Return the effect with those texels dead that hardly follow the model although it loads them; None when all follow."""
-    dot, square = np.zeros(texels), np.zeros(texels)
-    for share in shares:
-        reading = share.predictor.trial.reading
-        if reading is None:
-            continue
-        predicted = (share.predictor.predict(model).reading - model.parameters.zero) / share.noise[0]
-        measured = np.nan_to_num((reading - model.parameters.zero) / share.noise[0])
-        dot += (predicted * measured).sum(axis=0)
-        square += (predicted**2 * np.isfinite(reading)).sum(axis=0)
-    loaded = square > 200.0  # by so much that the noise cannot hide whether it answers
+    """Return the effect with those texels dead that hardly follow the model although it loads them; None when all follow.
+
+    One that goes to a rail as soon as it is touched is as dead: loaded it reads the same always, and far from what it should.
+    """
+    known = [share for share in shares if share.predictor.trial.reading is not None]
+    if not known:
+        return None
+    zero, noise = model.parameters.zero, known[0].noise[0]
+    predicted = np.concatenate([(share.predictor.predict(model).reading - zero) / noise for share in known])
+    measured = np.concatenate([(share.predictor.trial.reading - zero) / noise for share in known])
+    good = np.isfinite(measured)
+    loaded = (predicted**2 * good).sum(axis=0) > 200.0  # by so much that the noise cannot hide whether it answers
     if loaded.sum() < 4:
         return None
-    slope = np.where(loaded, dot / np.where(loaded, square, 1.0), np.nan)
-    silent = loaded & (slope < 0.15 * np.nanmedian(slope))
+    slope, level, railed = np.full(texels, np.nan), np.zeros(texels), np.zeros(texels, bool)
+    for i in np.flatnonzero(loaded):
+        x, y = predicted[good[:, i], i], measured[good[:, i], i]
+        slope[i] = (x - x.mean()) @ (y - y.mean()) / max(float((x - x.mean()) @ (x - x.mean())), 1e-12)
+        pressed = np.abs(x) > 0.5 * np.abs(x).max()
+        level[i] = np.median(y[pressed])
+        should, does = (float(np.subtract(*np.quantile(a[pressed], (0.75, 0.25)))) for a in (x, y))
+        railed[i] = should > 20.0 and does < 0.15 * should and abs(level[i]) > 3.0 * float(np.abs(x[pressed]).max())
+    silent = railed | (loaded & (slope < 0.15 * np.nanmedian(slope[~railed])))
     if not silent.any() or silent.sum() > 0.4 * loaded.sum():
         return None
-    return Effect(candidate.name, candidate.form.name, {"dead": tuple(silent.astype(float).tolist())})
+    values = {"dead": silent.astype(float), "level": np.where(silent, level * noise, 0.0)}
+    own = [q.name for q in candidate.form.parameters]
+    return Effect(candidate.name, candidate.form.name, {name: tuple(values[name].tolist()) for name in own})
 
 
 def _fall(direction: Direction, model: Model) -> float:

@@ -237,6 +237,8 @@ def test_listed_values():
     np.testing.assert_allclose(read(effect("offset", "listed", offset=factor), force, TIME[:9]), force + factor)
     dead = (np.arange(N) % 5 == 0).astype(float)
     np.testing.assert_allclose(read(effect("dead-texels", "listed", dead=dead), force, TIME[:9]), force * (1 - dead))
+    found = read(effect("dead-texels", "held", dead=dead, level=0.01 * np.arange(N)), force, TIME[:9])
+    np.testing.assert_allclose(found, np.where(dead > 0, 0.01 * np.arange(N), force))
 
 
 def test_a_gradient_of_gains():
