@@ -68,7 +68,7 @@ KIND = Kind(
             (
                 _DEAD,
                 Parameter(
-                    "level", "unit", 0.0, -1e5, 1e5, "Reading L of a dead texel, above the one without load.", per_texel=True
+                    "level", "unit", 0.1, -1e5, 1e5, "Reading L of a dead texel, above the one without load.", per_texel=True
                 ),
             ),
             off={"dead": 0.0},

@@ -279,12 +279,12 @@ def dead(shares: Sequence[Share], model: Model, candidate: Candidate, texels: in
 
     One that goes to a rail as soon as it is touched is as dead: loaded it reads the same always, and far from what it should.
     """
-    known = [share for share in shares if share.predictor.trial.reading is not None]
+    pairs = [(share.predictor.predict(model).reading, share.predictor.trial.reading) for share in shares]
+    known = [(a, b) for a, b in pairs if b is not None]
     if not known:
         return None
-    zero, noise = model.parameters.zero, known[0].noise[0]
-    predicted = np.concatenate([(share.predictor.predict(model).reading - zero) / noise for share in known])
-    measured = np.concatenate([(share.predictor.trial.reading - zero) / noise for share in known])
+    noise = shares[0].noise[0]
+    predicted, measured = ((np.concatenate(side) - model.parameters.zero) / noise for side in zip(*known, strict=True))
     good = np.isfinite(measured)
     loaded = (predicted**2 * good).sum(axis=0) > 200.0  # by so much that the noise cannot hide whether it answers
     if loaded.sum() < 4:
