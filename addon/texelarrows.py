@@ -50,6 +50,7 @@ def bake(scene, worn: markers.Worn, image, kinds, lengths: dict, longest: dict) 
         _, _, stretch = transforms.split(transforms.array(worn.body.matrix_world))
         made.matrix_parent_inverse = Matrix(np.vstack([np.column_stack([np.linalg.inv(stretch), np.zeros(3)]), [0, 0, 0, 1]]))
         made.hide_select = True
+        made.color = (*shapes.COLORS[look], 1.0)  # Workbench shows these of what nodes make
         modifier = made.modifiers.new(MODIFIER, "NODES")
         modifier.node_group = _nodes(
             f"{uid}:{kind}", made.name, image, frames, kind, lengths[kind], longest[kind], shapes.material(look)

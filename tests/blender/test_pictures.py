@@ -116,10 +116,13 @@ def test_the_command(baked, tmp_path, capsys):
 
 
 def test_workbench_shows_the_heat_map_and_leaves_meshes_alone(baked, tmp_path):
-    """Where most force is, the picture has the colour of the map's upper end; beside it, that of the lower one."""
+    """Where most force is, the picture has the colour of the map's upper end, seen through the glass ball that presses."""
     scene, _ = baked
     pad, ball = scene.objects["Pad"], scene.objects["Ball"]
-    ball.hide_render = True
+    glass = bpy.data.materials.new("Glass")
+    glass.use_nodes = True
+    glass.node_tree.nodes["Principled BSDF"].inputs["Transmission Weight"].default_value = 1.0
+    ball.data.materials.append(glass)
     before, meshes = dump(), len(bpy.data.meshes)
     wish = pictures.Wish(
         ("scene",), Look(colour_map="MAGMA"), frames=(4,), sensors=("Pad",), size=(200, 160), engine="workbench", view=(-90, 89)
