@@ -9,6 +9,7 @@ import bpy
 import numpy as np
 
 from ..core import colormaps
+from ..core.layout import GridLayout
 from . import dress, redraw
 
 MOST = 4
@@ -16,7 +17,7 @@ MOST = 4
 IMAGE, GAP, CURVE, BAR = 120.0, 12.0, 56.0, 10.0
 """Sides of the images, distances, height of the curve and width of the colour bar; pixels at a resolution scale of one."""
 LARGEST = 256
-"""Pixels along a side of an image: larger ones are thinned out, the screen has no more for them."""
+"""Pixels along a side of an image: larger ones are thinned out, the screen has no more for them, and few texels get many."""
 COLORS = ((0.34, 0.7, 0.91), (1.0, 0.62, 0.25), (0.4, 0.85, 0.6), (0.9, 0.6, 0.8))
 BACK, FRAME = (0.05, 0.05, 0.06, 0.72), (1.0, 1.0, 1.0, 0.35)
 
@@ -77,7 +78,11 @@ def picture(layout, values: np.ndarray, maximum: float, color_map: str) -> np.nd
     step = -(-max(image.shape) // LARGEST)
     image, mask = image[::step, ::step], mask[::step, ::step]
     rgb = colormaps.colors(color_map, image.ravel() / maximum).reshape(*image.shape, 3)
-    return np.dstack([rgb, mask]).astype(np.float32)
+    pixels = np.dstack([rgb, mask]).astype(np.float32)
+    if isinstance(layout, GridLayout):  # the screen blends pixels, and texels are to stay apart
+        times = -(-LARGEST // max(image.shape))
+        pixels = pixels.repeat(times, axis=0).repeat(times, axis=1)
+    return pixels
 
 
 def board(scene, frame, texels: dict, frames: np.ndarray, loads: dict, maximum: float) -> Board:
@@ -181,9 +186,9 @@ def _draw_curves(board: Board, canvas, x: float, y: float, width: float) -> None
     span = max(last - first, 1.0)
     canvas.line([(x, y + height), (x, y), (x + width, y)], FRAME, 1.0)
     if largest > 0.0:
-        for inset, color in zip(board.insets, COLORS):
+        for below, (inset, color) in zip(range(len(board.insets) - 1, -1, -1), zip(board.insets, COLORS)):
             points = np.column_stack([x + (inset.frames - first) / span * width, y + inset.force / largest * height])
-            canvas.line(points, (*color, 1.0), 1.5)
+            canvas.line(points, (*color, 1.0), 1.5 + 2.0 * below)  # the first are wider: equal curves do not hide each other
     now = x + (board.frame - first) / span * width
     canvas.line([(now, y), (now, y + height)], FRAME, 1.0)
     text = ",  ".join(f"{inset.now:.3g} N" for inset in board.insets)

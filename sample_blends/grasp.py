@@ -64,6 +64,8 @@ def build(scene) -> None:
     scene.palpate.overlays = {"FORCE", "SHEARS"}
 
     studio.stage(scene, paper, aim=(0.0, 0.0, 50.0), camera=(190.0, -330.0, 130.0))
+    scene.objects["Key"].visible_glossy = False  # else its reflection in the steel covers a pad
+    scene.objects["Key"].data.specular_factor = 0.0
     backdrop = scene.objects["Backdrop"]
     backdrop.location.z = -4.0
     studio.explain(TEXT)
