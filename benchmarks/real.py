@@ -63,20 +63,15 @@ def _found_in(name: str, recording: Recording) -> Iterator[dict]:
         share = gap["after"][use] / gap["before"][use]
         figure = {"name": f"real.{name}.{found}.{use}", "value": share, "unit": "gap after / before"}
         yield figure | ({"goal": GOALS[name]} if use == "check" and GOALS[name] else {})
-    if any(predictor.trial.force is not None and predictor.stimulus.slide.any() for predictor in result.predictors):
-        yield from _friction(name, result)
+    yield from _friction(name, result)
 
 
 def _friction(name: str, result: Any) -> Iterator[dict]:
     """What the base model's own friction closes, of the error of a sensor without any: it is in every base, and no effect."""
-    from dataclasses import replace
+    from palpate.core.gap.compare import nrmse, without_friction
 
-    from palpate.core.gap.compare import nrmse
-
-    base = result.base.model
-    smooth = replace(base, parameters=replace(base.parameters, mus=0.0, mud=0.0, ct=0.0))
-    for use in ("fit", "check"):
-        without, own = (nrmse(result.of(use), model, result.full) for model in (smooth, base))
+    for use, without in (without_friction(result) or {}).items():
+        own = nrmse(result.of(use), result.base.model, result.full)
         figure = {"name": f"real.{name}.friction_of_the_base.{use}", "value": own / without, "unit": "gap with / without"}
         yield figure | ({"goal": GOALS[name]} if use == "check" else {})
 

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -33,6 +34,18 @@ def nrmse(predictors: Sequence[Predictor], model: Model, full: tuple[float, floa
             square += float(miss @ miss)
             count += len(miss)
     return float(np.sqrt(square / count)) if count else None
+
+
+def without_friction(result: Diagnosis) -> dict[str, float | None] | None:
+    """NRMSE by use that a base model without any friction has; None where nothing slides or no net force was measured.
+
+    Friction is the base model's own, so it is in every error that is reported, and no missing effect.
+    """
+    if not any(p.trial.force is not None and p.stimulus.slide.any() for p in result.predictors):
+        return None
+    base = result.base.model
+    smooth = replace(base, parameters=replace(base.parameters, mus=0.0, mud=0.0, ct=0.0))
+    return {use: nrmse(result.of(use), smooth, result.full) for use in ("fit", "check")}
 
 
 def noise_floor(result: Diagnosis) -> float:

@@ -51,6 +51,12 @@ def phases(stimulus: Stimulus) -> np.ndarray:
     return found
 
 
+ALWAYS = 1e-9
+"""Share of the largest load within which a load never changes, and nothing can vary with it."""
+WAYS = (0.0, 0.02, 0.04, 0.06, 0.09, 0.12, 0.16, 0.2, 0.25, 0.32, 0.4, 1.01)
+"""Bands of the way since the surface turned back, as shares of the longest."""
+
+
 FEATURES: dict[str, str] = {
     "depth": "how deep the texel is pressed",
     "rate and direction": "how fast it is pressed, and whether it is loaded or unloaded",
@@ -58,6 +64,8 @@ FEATURES: dict[str, str] = {
     "history": "how far and how often it was loaded before",
     "neighbours": "what its neighbours carry",
     "texel": "which texel it is",
+    "sliding": "which way and how fast the surface slides",
+    "turning": "how far the surface has slid since it last turned back",
     "clock": "clock time, whatever is done",
     "common mode": "what all texels do at the same moment, loaded or not",
     "shared by loaded texels": "something that all loaded texels share at the same moment",
@@ -97,6 +105,10 @@ def features(predictor: Predictor, residual: np.ndarray) -> dict[str, np.ndarray
         "history": [top - d, (top - d) * touching, top**2 - d**2, done * d, done],
         "clock": [clock, clock**2, clock * d],
     }
+    if np.ptp(d) < ALWAYS:
+        del groups["depth"]
+    if predictor.trial.reading is None and s.slip is not None:
+        groups |= _sliding(s.slip, time, d.shape)
     n = d.shape[1]
     if n > 1:
         around = _neighbours(predictor, d)
@@ -106,6 +118,30 @@ def features(predictor: Predictor, residual: np.ndarray) -> dict[str, np.ndarray
         shared = [_share_of_others(residual, d), _share_of_others(residual, rate)]
         groups["shared by loaded texels"] = shared
     return {name: np.stack(columns) for name, columns in groups.items()}
+
+
+def _sliding(slip: np.ndarray, time: np.ndarray, shape: tuple[int, ...]) -> dict[str, list[np.ndarray]]:
+    """Speed along the direction in which the surface slides most, and the way since that speed last changed its sign.
+
+    Parameters
+    ----------
+    slip : (T, n, 3) float, m/s
+    shape : (int, int)
+        Of what is returned.
+    """
+    mean = slip.mean(axis=1)
+    _, _, axes = np.linalg.svd(mean, full_matrices=False)
+    along = axes[0] * np.sign(axes[0][np.argmax(np.abs(axes[0]))])  # the same in every trial
+    speed = mean @ along
+    sign, fast = np.where(speed < 0, -1.0, 1.0), max(float(np.abs(speed).max()), 1e-300)
+    step = np.abs(speed) * np.diff(time, prepend=time[0])
+    way = np.cumsum(step)
+    turned = np.concatenate([[False], sign[1:] * sign[:-1] < 0])
+    since = way - np.maximum.accumulate(np.where(turned, way, 0.0))
+    since /= max(float(since.max()), 1e-300)
+    wide = lambda x: np.broadcast_to(x[:, None], shape)  # noqa: E731
+    bands = [wide(sign * ((since >= a) & (since < b))) for a, b in zip(WAYS[:-1], WAYS[1:], strict=True)]
+    return {"sliding": [wide(x) for x in (np.ones(len(sign)), sign, speed / fast, (speed / fast) ** 2)], "turning": bands}
 
 
 def _since(touching: np.ndarray, time: np.ndarray) -> np.ndarray:

@@ -11,7 +11,7 @@ from typing import Any
 from ..formats.files import atomic_write
 from ..formats.sensor_toml import write_sensor
 from .amend import LOUD, amended, next_experiment, normalised, stages
-from .compare import noise_floor, nrmse, where
+from .compare import noise_floor, nrmse, where, without_friction
 from .diagnose import Diagnosis
 from .intervals import Number, numbers
 from .page import page
@@ -54,6 +54,7 @@ def summary(result: Diagnosis) -> dict[str, Any]:
             "parameters": {one.name: getattr(model.parameters, one.name) for one in counted if one.effect < 0},
             "intervals": {one.name: [one.low, one.high] for one in counted if one.effect < 0},
             "without_effects": {item.name: getattr(result.base.model.parameters, item.name) for item in result.base.free},
+            "gap_without_friction": without_friction(result),
         },
         "gap": {
             "before": {use: nrmse(trials, result.base.model, result.full) for use, trials in (("fit", fit), ("check", check))},
@@ -128,7 +129,7 @@ def headline(result: Diagnosis) -> str:
             line, unit = result.line, result.rig.parameters.unit
             said = f"a line at {line.frequency:.3g} Hz of {line.amplitude:.3g} {unit}, there without load too"
             return f"Unexplained: {said}, is {line.share:.0%} of what trembles at rest.{part}"
-        return f"Unexplained: what is left ({after:.2%} of the range) varies most with {strongest}.{part}"
+        return f"Unexplained: what is left ({after:.2%} of the range) varies most with {strongest}.{part}{_own(result, before)}"
     shrink = f"the error shrinks from {before:.2%} to {after:.2%} of the range"
     if result.ambiguous:
         choices = "; ".join(" or ".join(names) for names in result.ambiguous)
@@ -136,6 +137,14 @@ def headline(result: Diagnosis) -> str:
         return f"Not told apart by these recordings: {choices} ({shrink}).{rest}"
     missing = _names([n.name for n in result.named])
     return f"{'Missing' if sure else 'Perhaps missing'}: {missing}; {shrink}."
+
+
+def _own(result: Diagnosis, before: float) -> str:
+    """What of an error the base model's own friction closes, as a sentence; nothing where that is no great part."""
+    bare = (without_friction(result) or {}).get("fit") or 0.0
+    if bare < 1.5 * before:
+        return ""
+    return f" Friction is not missing: the base model has it, and without it the error would be {bare:.2%}."
 
 
 def evidence(result: Diagnosis) -> list[str]:

@@ -1,0 +1,54 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A surface that slides to and fro under a constant load: friction is the base model's own, backlash is in no library."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from palpate.core.gap import report
+from palpate.core.gap.compare import nrmse, without_friction
+from palpate.core.gap.diagnose import diagnose
+from palpate.core.gap.model import Model, Predictor
+from palpate.core.gap.phases import WAYS, features
+from palpate.core.gap.rig import Rig, Trial, grid_texels
+from palpate.core.scenario import SensorParameters
+
+PARAMETERS = SensorParameters(k=1e4, cn=0.0, sigma0=5e3, sigma1=1.0, mus=0.6, mud=0.5, x0=0.02, ct=0.0)
+
+
+def brake(backlash):
+    """Two recordings of 8 s; what hides in them pulls against the slide for the first tenth of the way after each turn."""
+    time = np.linspace(0.0, 8.0, 801)
+    texels, trials = grid_texels(1, 1, 0.01, 0.01), []
+    rng = np.random.default_rng(0)
+    for i, beat in enumerate((0.5, 0.8)):
+        slide = np.column_stack([0.02 * np.sin(2 * np.pi * beat * time), np.zeros(len(time))])
+        empty = Trial(f"t{i}", "check" if i else "fit", time, "depth", None, None, np.full(len(time), 1e-3), slide, None, None)
+        rig = Rig("brake", texels, PARAMETERS, frozenset(), None, None, None, (empty,))
+        sensed = replace(empty, force=np.zeros((len(time), 3)))
+        force = Predictor(sensed, rig).predict(Model(PARAMETERS)).force.copy()
+        phase = (beat * time + 0.25) % 0.5
+        force[:, 0] -= backlash * np.sign(force[:, 0]) * (phase < 0.1)
+        trials.append(replace(sensed, force=force + 0.01 * rng.normal(size=force.shape)))
+    return Rig("brake", texels, PARAMETERS, frozenset(), None, None, None, tuple(trials))
+
+
+def test_the_report_says_what_friction_does_and_what_is_left():
+    *_, result = diagnose(brake(backlash=2.0))
+    bare, own = without_friction(result), nrmse(result.of("fit"), result.base.model, result.full)
+    assert bare["fit"] > 3.0 * own and bare["check"] > 3.0 * nrmse(result.of("check"), result.base.model, result.full)
+    assert not any(named.confidence >= report.SURE for named in result.named)
+    assert result.structure.strongest == "turning"
+    said = report.headline(result)
+    assert "slid since it last turned" in said and "Friction is not missing" in said
+    assert report.summary(result)["base"]["gap_without_friction"] == bare
+
+
+def test_the_way_since_the_last_turn():
+    predictor = Predictor(brake(0.0).trials[0], brake(0.0))
+    found = features(predictor, np.zeros((801, 1)))
+    assert "depth" not in found  # it is the same all the time
+    bands = found["turning"][:, :, 0]
+    assert ((bands != 0).sum(axis=0) <= 1).all() and len(bands) == len(WAYS) - 1
+    peak = np.flatnonzero(np.isclose(predictor.trial.slide[:, 0], 0.02, atol=1e-9))[0]
+    assert bands[0, peak + 2] == -1.0 and bands[-1, peak - 2] == 1.0  # just turned back; at the end of the way there
