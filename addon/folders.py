@@ -9,6 +9,7 @@ the old one is removed while the user goes on (:func:`settle` waits for it): tha
 
 from __future__ import annotations
 
+import math
 import os
 import re
 import shutil
@@ -21,7 +22,7 @@ from pathlib import Path
 from .. import __version__
 from ..core.errors import FileError
 from ..core.formats.archive import load_recording, save_recording
-from ..core.formats.exr import describe, write_exr
+from ..core.formats.exr import describe, write_exrs
 from ..core.formats.files import (
     MANIFEST_NAME,
     RECORDING_NAME,
@@ -34,12 +35,14 @@ from ..core.formats.files import (
 )
 from ..core.formats.sensors import SENSOR_NAME, save_sensor
 from ..core.recording import Frame, Recording
-from ..core.scenario import Scenario
+from ..core.scenario import Scenario, Sensor
 from .behind import Behind
 from .unfinished import Unfinished
 
 OURS = re.compile(rf"tactile_-?\d+\.exr|{'|'.join(map(re.escape, (RECORDING_NAME, SENSOR_NAME, MANIFEST_NAME)))}")
 """Names of the files in a sensor's folder that a bake writes and replaces."""
+BATCH, BATCH_PIXELS = 16, 16384
+"""Most images of a sensor, and pixels in them, that are written together: small ones cost little more than one then."""
 SYNCS = hasattr(os, "sync")
 """Whether all that was written can be brought onto the disk at once; else it is done file by file."""
 
@@ -95,6 +98,7 @@ class Files:
         self._scenario, self._digest = scenario, scenario.digest()
         self._unfinished = Unfinished(self.folder, self._digest)
         self._writer = Behind()
+        self._waiting: list[Frame] = []
         settle()
         try:
             for place in self.folders.values():
@@ -129,6 +133,7 @@ class Files:
     def keep(self, simulation, frames: list[Frame]) -> None:
         """Put the work so far aside, every few seconds, for the case that the process is killed."""
         if self._unfinished.is_due(frames):
+            self._write_waiting()
             self._writer.finish()  # a state belongs to images that are there
             self._unfinished.keep(simulation, frames)
 
@@ -153,15 +158,26 @@ class Files:
         )
 
     def write_frame(self, frame: Frame) -> None:
-        """Write the tactile image of every sensor, while the solver goes on."""
+        """Write the tactile image of every sensor, some frames at a time, while the solver goes on."""
+        self._waiting.append(frame)
+        pixels = max((math.prod(sensor.texels.layout.shape) for sensor in self._sensors.values()), default=1)
+        if len(self._waiting) >= min(BATCH, BATCH_PIXELS // pixels):
+            self._write_waiting()
+
+    def _write_waiting(self) -> None:
+        frames, self._waiting = self._waiting, []
         for name, place in self.folders.items():
-            sensor = self._sensors[name]
-            about = describe(sensor, frame, self._digest)
-            path = _beside(place, "partial") / frame_file(frame.frame)
-            self._writer.do(partial(write_exr, path, sensor.texels.layout, frame.sensors[name], about, at_once=False))
+            if frames:
+                self._writer.do(partial(self._write_images, self._sensors[name], _beside(place, "partial"), frames))
+
+    def _write_images(self, sensor: Sensor, folder: Path, frames: list[Frame]) -> None:
+        paths = [folder / frame_file(frame.frame) for frame in frames]
+        about = [describe(sensor, frame, self._digest) for frame in frames]
+        write_exrs(paths, sensor.texels.layout, [frame.sensors[sensor.name] for frame in frames], about)
 
     def finish(self, recording: Recording) -> None:
         """Write the recordings, and let the new folders take the place of the old ones: all of them, or none."""
+        self._write_waiting()
         for name, place in self.folders.items():
             growing = _beside(place, "partial")
             own, sensor = replace(recording, sensors={name: recording.sensors[name]}), self._sensors[name]

@@ -9,7 +9,7 @@ that show no texel are 0. Row 0 of the layout is the bottom of the picture.
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -19,7 +19,7 @@ from ..layout import GridLayout, UVLayout
 from ..recording import Frame, SensorFrame
 from ..scenario import Sensor
 from . import openexr
-from .files import written
+from .files import atomic_write, written
 
 CHANNELS = ("R", "G", "B", "reading", "depth", "slip", "contact")
 """Names of the channels, in the order in which :func:`read_exr` returns them."""
@@ -27,6 +27,7 @@ CHANNELS = ("R", "G", "B", "reading", "depth", "slip", "contact")
 UNITS = {"R": "N", "G": "N", "B": "N", "depth": "m", "slip": "m/s", "contact": "1"}
 """Units of the channels; that of ``reading`` is the sensor's."""
 
+_IN_FILE = openexr.in_order(CHANNELS)
 _PREFIX = "palpate."  # OpenEXR has header attributes of its own, some with a type ("name", "owner", "type")
 
 
@@ -38,23 +39,29 @@ def exr_channels(layout: GridLayout | UVLayout, frame: SensorFrame) -> dict[str,
     ValueError
         A value is not finite or too large for 32 bits (a fault of the program, not of the user).
     """
-    values = {
-        "R": frame.normal_force,
-        "G": frame.shear[:, 0],
-        "B": frame.shear[:, 1],
-        "reading": frame.reading,
-        "depth": frame.depth,
-        "slip": frame.slip,
-        "contact": frame.contact,
+    pictures = _pictures(layout, [frame], CHANNELS)[0]
+    return {name: np.ascontiguousarray(pictures[::-1, i]) for i, name in enumerate(CHANNELS)}
+
+
+def _pictures(layout: GridLayout | UVLayout, frames: Sequence[SensorFrame], names: Sequence[str]) -> np.ndarray:
+    """(f, height, channels, width) float32 of frames and channels in order, from the top."""
+    columns = {
+        "R": [frame.normal_force for frame in frames],
+        "G": [frame.shear[:, 0] for frame in frames],
+        "B": [frame.shear[:, 1] for frame in frames],
+        **{name: [getattr(frame, name) for frame in frames] for name in ("reading", "depth", "slip", "contact")},
     }
-    table = np.column_stack([np.asarray(values[name], float) for name in CHANNELS])
+    table = np.array([columns[name] for name in names], dtype=float)  # (channels, frames, texels)
     bad = ~(np.abs(table) <= np.finfo(np.float32).max)  # NaN compares false
     if bad.any():
-        texel, channel = np.argwhere(bad)[0]
-        raise ValueError(f"channel '{CHANNELS[channel]}' of texel {texel} is {table[texel, channel]}: no 32-bit number")
-    image = layout.image(table)
-    image[..., CHANNELS.index("contact")] = image[..., CHANNELS.index("contact")] >= 0.5
-    return {name: image[..., i].astype(np.float32) for i, name in enumerate(CHANNELS)}
+        channel, i, texel = np.argwhere(bad)[0]
+        value = table[channel, i, texel]
+        raise ValueError(f"channel '{names[channel]}' of texel {texel} is {value}: no 32-bit number")
+    image = layout.image(table.reshape(-1, table.shape[2]).T)
+    image = image.reshape(*layout.shape, len(names), len(frames))
+    contact = names.index("contact")
+    image[:, :, contact] = image[:, :, contact] >= 0.5
+    return np.ascontiguousarray(np.moveaxis(image[::-1], (3, 0, 2, 1), (0, 1, 2, 3)), dtype="<f4")
 
 
 def describe(sensor: Sensor, frame: Frame, digest: str) -> dict[str, str]:
@@ -82,9 +89,8 @@ def write_exr(
     layout: GridLayout | UVLayout,
     frame: SensorFrame,
     metadata: Mapping[str, str],
-    at_once: bool = True,
 ) -> None:
-    """Write one frame of one sensor.
+    """Write one frame of one sensor, whole or not at all.
 
     Parameters
     ----------
@@ -94,8 +100,6 @@ def write_exr(
     frame : SensorFrame
     metadata : mapping of str to str
         Becomes header attributes named ``palpate.<key>``, see :func:`describe`.
-    at_once : bool
-        See :func:`.files.written`.
 
     Raises
     ------
@@ -104,11 +108,41 @@ def write_exr(
     ValueError
         See :func:`exr_channels`; nothing is written then.
     """
-    pictures = exr_channels(layout, frame)
-    from_top = {name: picture[::-1] for name, picture in pictures.items()}
-    attributes = {_PREFIX + key: str(value) for key, value in metadata.items()}
-    with written(path, at_once) as place:
-        openexr.write(place, from_top, attributes)
+    with atomic_write(path) as place:
+        _write([place], layout, [frame], [metadata])
+
+
+def write_exrs(
+    paths: Sequence[str | os.PathLike],
+    layout: GridLayout | UVLayout,
+    frames: Sequence[SensorFrame],
+    metadata: Sequence[Mapping[str, str]],
+) -> None:
+    """Write frames of one sensor where they are: what is interrupted leaves a half file, see :func:`.files.written`.
+
+    Parameters
+    ----------
+    paths : (f,) sequence of path
+    layout, frames, metadata
+        As for :func:`write_exr`, one for each path.
+
+    Raises
+    ------
+    FileError, ValueError
+        As :func:`write_exr`.
+    """
+    with written(paths[0], at_once=False):
+        _write(paths, layout, frames, metadata)
+
+
+def _write(
+    paths: Sequence[str | os.PathLike],
+    layout: GridLayout | UVLayout,
+    frames: Sequence[SensorFrame],
+    metadata: Sequence[Mapping[str, str]],
+) -> None:
+    attributes = [{_PREFIX + key: str(value) for key, value in about.items()} for about in metadata]
+    openexr.write_all(paths, _IN_FILE, _pictures(layout, frames, _IN_FILE), attributes)
 
 
 def read_exr(path: str | os.PathLike) -> tuple[dict[str, np.ndarray], dict[str, str]]:

@@ -11,7 +11,8 @@ from __future__ import annotations
 import os
 import struct
 import zlib
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
+from functools import lru_cache
 
 import numpy as np
 
@@ -42,23 +43,58 @@ def write(path: str | os.PathLike, channels: Mapping[str, np.ndarray], attribute
     attributes : mapping of str to str
         Added to the header.
     """
-    names = sorted(channels, key=lambda name: name.encode())
-    height, width = channels[names[0]].shape
-    table = np.stack([np.asarray(channels[name], "<f4") for name in names], axis=1)  # (height, channels, width)
+    names = in_order(channels)
+    table = np.stack([np.asarray(channels[name], "<f4") for name in names], axis=1)
+    write_all([path], names, table[None], [attributes])
+
+
+def in_order(names: Iterable[str]) -> tuple[str, ...]:
+    """Return names of channels in the order of the format."""
+    return tuple(sorted(names, key=lambda name: name.encode()))
+
+
+def write_all(
+    paths: Sequence[str | os.PathLike],
+    names: tuple[str, ...],
+    table: np.ndarray,
+    attributes: Sequence[Mapping[str, str]],
+) -> None:
+    """Write images of one size with the same channels; of small ones many at a time take little more than one.
+
+    Parameters
+    ----------
+    paths : (f,) sequence of path
+    names : tuple of str
+        Of the channels, :func:`in_order`.
+    table : (f, height, channels, width) float32
+        The first row is the top of the picture.
+    attributes : (f,) sequence of mapping of str to str
+        Added to the headers.
+    """
+    _, height, _, width = table.shape
     step = _LINES[_ZIP]
-    blocks = [_pack(table[top : top + step].tobytes()) for top in range(0, height, step)]
-    header = _header(names, width, height, attributes)
-    at = len(header) + 8 * len(blocks)
-    with open(path, "wb") as file:
-        file.write(header)
-        for block in blocks:
-            file.write(struct.pack("<Q", at))
-            at += 8 + len(block)
-        for i, block in enumerate(blocks):
-            file.write(struct.pack("<ii", i * step, len(block)) + block)
+    blocks = [_pack(table[:, top : top + step]) for top in range(0, height, step)]
+    for path, own, packed in zip(paths, attributes, zip(*blocks, strict=True), strict=True):
+        header = _header(names, width, height, own)
+        sizes = np.array([8 + len(block) for block in packed])
+        places = len(header) + 8 * len(packed) + np.cumsum(sizes) - sizes
+        parts = [header, places.astype("<u8").tobytes()]
+        for i, block in enumerate(packed):
+            parts += [struct.pack("<ii", i * step, len(block)), block]
+        with open(path, "wb") as file:
+            file.write(b"".join(parts))
 
 
-def _header(names: list[str], width: int, height: int, attributes: Mapping[str, str]) -> bytes:
+def _header(names: tuple[str, ...], width: int, height: int, attributes: Mapping[str, str]) -> bytes:
+    beginning = _beginning(names, tuple(attributes), width, height)
+    return b"".join([beginning, *(_string(name, value) for name, value in attributes.items()), b"\0"])
+
+
+@lru_cache(maxsize=64)
+def _beginning(names: tuple[str, ...], own: tuple[str, ...], width: int, height: int) -> bytes:
+    """The part of a header that all images of a sequence share; `own` are the names of the other attributes."""
+    longest = max(len(name.encode()) for name in (*names, *own, ""))
+    flags = _LONG_NAMES if longest > 31 else 0
     window = struct.pack("<4i", 0, 0, width - 1, height - 1)
     channels = b"".join(_text(name) + struct.pack("<iB3xii", _FLOAT, 0, 1, 1) for name in names) + b"\0"
     entries = [
@@ -70,26 +106,37 @@ def _header(names: list[str], width: int, height: int, attributes: Mapping[str, 
         ("pixelAspectRatio", "float", struct.pack("<f", 1.0)),
         ("screenWindowCenter", "v2f", struct.pack("<2f", 0.0, 0.0)),
         ("screenWindowWidth", "float", struct.pack("<f", 1.0)),
-        *((name, "string", value.encode("utf-8", "surrogatepass")) for name, value in attributes.items()),
     ]
-    longest = max(len(name.encode()) for name in (*names, *attributes, ""))
-    flags = _LONG_NAMES if longest > 31 else 0
-    body = b"".join(_text(name) + _text(kind) + struct.pack("<i", len(value)) + value for name, kind, value in entries)
-    return struct.pack("<ii", MAGIC, VERSION | flags) + body + b"\0"
+    return struct.pack("<ii", MAGIC, VERSION | flags) + b"".join(_entry(*entry) for entry in entries)
+
+
+@lru_cache(maxsize=256)
+def _string(name: str, value: str) -> bytes:
+    return _entry(name, "string", value.encode("utf-8", "surrogatepass"))
+
+
+def _entry(name: str, kind: str, value: bytes) -> bytes:
+    return _text(name) + _text(kind) + struct.pack("<i", len(value)) + value
 
 
 def _text(text: str) -> bytes:
     return text.encode("utf-8", "surrogatepass") + b"\0"
 
 
-def _pack(raw: bytes) -> bytes:
-    """Compress a block: even bytes before odd ones, differences of neighbours, zlib; as it is when that makes it longer."""
-    data = np.frombuffer(raw, np.uint8)
-    sorted_bytes = np.concatenate([data[::2], data[1::2]])
+def _pack(lines: np.ndarray) -> list[bytes]:
+    """Compress a block of each image: even bytes before odd, differences of neighbours, zlib; as it is when that is longer.
+
+    Parameters
+    ----------
+    lines : (f, lines, channels, width) float32
+    """
+    data = lines.reshape(len(lines), -1).view(np.uint8)
+    sorted_bytes = np.concatenate([data[:, ::2], data[:, 1::2]], axis=1)
     different = sorted_bytes.copy()
-    different[1:] = sorted_bytes[1:] - sorted_bytes[:-1] + np.uint8(128)  # modulo 256
-    packed = zlib.compress(different.tobytes(), _LEVEL)
-    return packed if len(packed) < len(raw) else raw
+    different[:, 1:] -= sorted_bytes[:, :-1]  # modulo 256
+    different[:, 1:] += 128
+    found = [zlib.compress(row, _LEVEL) for row in different]
+    return [packed if len(packed) < data.shape[1] else raw.tobytes() for packed, raw in zip(found, data, strict=True)]
 
 
 def _unpack(packed: bytes, size: int) -> bytes:

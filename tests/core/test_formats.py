@@ -6,6 +6,7 @@ from __future__ import annotations
 import copy
 import errno
 import json
+import math
 import os
 import signal
 import stat
@@ -23,7 +24,7 @@ from palpate.core.effects.base import Effect
 from palpate.core.errors import FileError, PalpateError
 from palpate.core.formats import files, openexr
 from palpate.core.formats.archive import load_recording, save_recording
-from palpate.core.formats.exr import CHANNELS, describe, exr_channels, read_exr, write_exr
+from palpate.core.formats.exr import CHANNELS, describe, exr_channels, read_exr, write_exr, write_exrs
 from palpate.core.formats.files import (
     Manifest,
     atomic_write,
@@ -577,12 +578,25 @@ def test_exr_in_wrong_places(tmp_path):
     assert os.listdir(tmp_path) == ["file"]
 
 
+@pytest.mark.parametrize("shape", [(1, 1), (4, 5), (16, 3), (50, 33)])
+def test_images_written_together_are_those_written_one_by_one(tmp_path, shape):
+    layout, rng = grid_of(*shape), np.random.default_rng(7)
+    frames = [replace(tactile_frame(math.prod(shape)), depth=rng.random(math.prod(shape))) for _ in range(5)]
+    about = [METADATA | {"frame": str(i)} for i in range(5)]
+    together = [tmp_path / f"{i}.exr" for i in range(5)]
+    write_exrs(together, layout, frames, about)
+    for path, frame, own in zip(together, frames, about):
+        write_exr(tmp_path / "alone.exr", layout, frame, own)
+        assert path.read_bytes() == (tmp_path / "alone.exr").read_bytes()
+        assert read_exr(path)[1]["frame"] == own["frame"]
+
+
 def test_failing_writer_leaves_nothing(tmp_path, monkeypatch):
-    def half(path, *_):
-        Path(path).write_bytes(b"half")
+    def half(paths, *_):
+        Path(paths[0]).write_bytes(b"half")
         raise OSError(errno.ENOSPC, "No space left on device")
 
-    monkeypatch.setattr(openexr, "write", half)
+    monkeypatch.setattr(openexr, "write_all", half)
     with pytest.raises(FileError) as error:
         write_exr(tmp_path / "a.exr", grid_of(2, 2), tactile_frame(4), METADATA)
     one_sentence(error, tmp_path / "a.exr", "no space left")
