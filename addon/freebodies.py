@@ -117,12 +117,22 @@ class Placement:
         previous : (14,) float, optional
             Properties at the frame before, which the rotation should not jump away from.
         """
+        location, turn = self._moved(pose[None], parent[None])
+        return np.concatenate([location[0], self._rotations(obj, turn[0], self.channels if previous is None else previous)])
+
+    def path(self, obj, poses: np.ndarray, parents: np.ndarray) -> np.ndarray:
+        """Return the (f, 14) properties of a whole motion, that begins at the start."""
+        rows = [self.channels]
+        for location, turn in zip(*self._moved(poses[1:], parents[1:]), strict=True):
+            rows.append(np.concatenate([location, self._rotations(obj, turn, rows[-1])]))
+        return np.array(rows)
+
+    def _moved(self, poses: np.ndarray, parents: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """(f, 3) locations, and (f, 3, 3) turns from the start's rotation, of poses under what parents do."""
         stretch, basis_before, unturned = self._start
-        moved = transforms.rigid(pose[:3] / self.scale, pose[3:]) @ stretch
-        basis = np.linalg.inv(parent) @ moved
-        turn = basis[:3, :3] @ unturned
-        location = self.channels[:3] + basis[:3, 3] - basis_before[:3, 3]
-        return np.concatenate([location, self._rotations(obj, turn, self.channels if previous is None else previous)])
+        moved = np.array([transforms.rigid(pose[:3] / self.scale, pose[3:]) for pose in poses]).reshape(-1, 4, 4) @ stretch
+        basis = np.linalg.inv(parents) @ moved
+        return self.channels[:3] + basis[:, :3, 3] - basis_before[:3, 3], basis[:, :3, :3] @ unturned
 
     @cached_property
     def _start(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -167,10 +177,7 @@ def bake(obj, placement: Placement, frames: np.ndarray, poses: np.ndarray, paren
     poses : (f, 7) float
     parents : (f, 4, 4) float
     """
-    rows = [placement.channels]
-    for pose, parent in zip(poses[1:], parents[1:], strict=True):
-        rows.append(placement.pose(obj, pose, parent, rows[-1]))
-    table = np.array(rows)
+    table = placement.path(obj, poses, parents)
     remember(obj, placement.world)
     found, made = curves.ensure(obj, f"{obj.name} Palpate")
     curves.remove(found, PATHS)

@@ -397,12 +397,15 @@ class Shapes:
             for index, part in enumerate(group)
             if part.deformation is not None
         }
+        self._seen: dict[tuple[str, int], np.ndarray] = {}
 
     def append(self, moment: Moment) -> None:
         """Add what one more sample says."""
         for place, found in moment.shapes.items():
-            before = self._known[place][-1]
-            self._known[place].append(before if found is before or np.array_equal(found, before) else found)
+            known, seen = self._known[place], self._seen.get(place)
+            same = found is seen or np.array_equal(found, known[-1])
+            known.append(known[-1] if same else found)
+            self._seen[place] = found
 
     def finished(self, scenario: Scenario, times: np.ndarray) -> tuple[tuple[Sensor, ...], tuple[Target, ...]]:
         """Return sensors and targets with their deformations; without where nothing has changed."""

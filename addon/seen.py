@@ -46,14 +46,13 @@ class Seen:
         self._read.clear()
 
     def of(self, obj, depsgraph) -> Surface:
-        """Return an object's surface: the same one, not only an equal one, as long as it looks the same."""
+        """Return an object's surface: the same one, not only an equal one, as long as vertices and number of corners stay."""
         key = obj.session_uid
         if key not in self._read:
             with meshes.evaluated(obj, depsgraph) as mesh:
-                found = Surface(meshes.places(mesh), meshes.corners(mesh))
-            before = self._surfaces.get(key)
-            if before is None or not (_same(found.places, before.places) and _same(found.corners, before.corners)):
-                self._surfaces[key] = found
+                places, before = meshes.places(mesh), self._surfaces.get(key)
+                if before is None or len(mesh.loops) != len(before.corners) or not _same(places, before.places):
+                    self._surfaces[key] = Surface(places, meshes.corners(mesh))
             self._read.add(key)
         return self._surfaces[key]
 

@@ -3,6 +3,8 @@
 
 A cached frame is what scrubbing costs on top of Blender's own work: the same `frame_set` with playback on, less the time with
 it off. The bake is compared with solving the same scenario alone, in turn: it also samples, writes images, keyframes and files.
+It ends when the scene shows it: the folder of the bake before is removed while the user goes on, so that is waited for between the
+measurements and not in them.
 """
 
 from __future__ import annotations
@@ -84,45 +86,38 @@ def cached_frame(texels: int) -> float:
 
 def bake_and_solve(texels: int, frames: int) -> tuple[float, float]:
     """Seconds of a bake, and of solving the same scenario."""
-    from palpate.addon.bake import bake
-    from palpate.core.drive import drive
-    from palpate.core.solve import run
-
     with tempfile.TemporaryDirectory() as folder:
-        scene = scene_of(texels, frames, Path(folder))
-        scenario = drive(bake(scene)).scenario  # compiles and warms up
-        rounds = []
-        for _ in range(ROUNDS):
-            start = time.perf_counter()
-            drive(bake(scene))
-            middle = time.perf_counter()
-            run(scenario)
-            rounds.append((middle - start, time.perf_counter() - middle))
-        return tuple(statistics.median(column) for column in zip(*rounds, strict=True))
+        return _in_turn(scene_of(texels, frames, Path(folder)), ROUNDS)
 
 
 def sample_bake_and_solve(name: str) -> tuple[float, float]:
     """Seconds of baking a sample, and of solving the same scenario: work of the size that a bake is for."""
     import bpy
 
-    from palpate.addon.bake import bake
-    from palpate.core.drive import drive
-    from palpate.core.solve import run
-
     _enable()
     with tempfile.TemporaryDirectory() as folder:
         copy = Path(shutil.copy(SAMPLES / f"{name}.blend", folder))
         bpy.ops.wm.open_mainfile(filepath=str(copy))
-        scene = bpy.context.scene
-        run(drive(bake(scene)).scenario)  # compiles and warms up
-        rounds = []
-        for _ in range(SAMPLE_ROUNDS):
-            start = time.perf_counter()
-            scenario = drive(bake(scene)).scenario
-            middle = time.perf_counter()
-            run(scenario)
-            rounds.append((middle - start, time.perf_counter() - middle))
-        return tuple(statistics.median(column) for column in zip(*rounds, strict=True))
+        return _in_turn(bpy.context.scene, SAMPLE_ROUNDS)
+
+
+def _in_turn(scene, rounds: int) -> tuple[float, float]:
+    from palpate.addon import folders
+    from palpate.addon.bake import bake
+    from palpate.core.drive import drive
+    from palpate.core.solve import run
+
+    run(drive(bake(scene)).scenario)  # compiles and warms up
+    times = []
+    for _ in range(rounds):
+        start = time.perf_counter()
+        scenario = drive(bake(scene)).scenario
+        middle = time.perf_counter()
+        folders.settle()
+        begun = time.perf_counter()
+        run(scenario)
+        times.append((middle - start, time.perf_counter() - begun))
+    return tuple(statistics.median(column) for column in zip(*times, strict=True))
 
 
 def _over_solve(name: str, whole: float, alone: float) -> dict:

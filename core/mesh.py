@@ -97,10 +97,13 @@ def edge_defects(triangles: np.ndarray) -> tuple[int, int, int]:
     open_edges, branching, flipped : int
     """
     edges = triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2).astype(np.int64)
-    forward = edges[:, 0] < edges[:, 1]
-    key = edges.min(axis=1) << 32 | edges.max(axis=1)  # one number per edge sorts ten times as fast as a pair
-    _, inverse, count = np.unique(key, return_inverse=True, return_counts=True)
-    along = np.bincount(inverse, weights=forward)
+    start, end = edges[:, 0], edges[:, 1]
+    forward = start < end
+    # One number per edge, its direction the last bit, sorts ten times as fast as a pair.
+    key = np.sort(np.minimum(start, end) << 32 | np.maximum(start, end) << 1 | forward)
+    first = np.flatnonzero(np.diff(key >> 1, prepend=-1))
+    count = np.diff(first, append=len(key))
+    along = np.add.reduceat(key & 1, first) if len(key) else count
     pair = count == 2
     return int((count == 1).sum()), int((count > 2).sum()), int((pair & (along != 1)).sum())
 
