@@ -3,8 +3,8 @@
 
 A cached frame is what scrubbing costs on top of Blender's own work: the same `frame_set` with playback on, less the time with
 it off. The bake is compared with solving the same scenario alone, in turn: it also samples, writes images, keyframes and files.
-It ends when the scene shows it: the folder of the bake before is removed while the user goes on, so that is waited for between the
-measurements and not in them.
+It ends when the scene shows it. The folder of the bake before is removed while the user goes on, so that this is waited for
+between the measurements and not in them.
 """
 
 from __future__ import annotations
