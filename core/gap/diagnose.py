@@ -11,6 +11,7 @@ from functools import partial
 
 import numpy as np
 
+from ..effects.base import Effect
 from ..effects.library import library
 from .candidates import NEVER, Scales, candidates, scales_of
 from .explain import FORCES, LEAST, READINGS, STRUCTURE, Account, Explainer, Ground, Step, means_of
@@ -28,8 +29,12 @@ EXPLAINED = 0.6
 """Share of the gap that must be closed for the verdict "explained"."""
 RIVAL = 1.35
 """A rival is one that leaves at most so many times as much of the gap as the best does."""
-SMALL = 0.1
-"""One of several that closes a smaller share of the whole gap may be what the others' formulas lack: it is no sure name."""
+SMALL, NEARLY_ALL = 0.1, 0.7
+"""One of several that closes a smaller share of the whole gap may be what the others' formulas lack: it is no sure name, unless
+it closes so much of what they leave, as what a formula lacks seldom looks like another effect."""
+TOGETHER = 0.8
+"""Correlation over the texels from which on two effects with a number for each are one: an offset that fades under load takes
+off everywhere what it has put on."""
 
 
 @dataclass(frozen=True)
@@ -263,7 +268,7 @@ def _conclude(result: Diagnosis, account: Account, ground: Ground) -> None:
         weight = 1.0 / (1.0 + sum(ratio**-3.0 for ratio in others.values()))
         share = closed[ground.side(effect.name)] if fitted else 1.0
         confidence = weight * (0.5 + 0.5 * share) if share >= EXPLAINED else 0.5 * weight * share
-        if rivals or (account.gains.get(effect.name, 1.0) < SMALL and len(fitted) > 1):
+        if rivals or (len(fitted) > 1 and _is_doubtful(effect, account, fitted)):
             confidence = min(confidence, 0.45)
         if rivals:
             result.ambiguous.append((effect.name, *rivals))
@@ -271,6 +276,19 @@ def _conclude(result: Diagnosis, account: Account, ground: Ground) -> None:
         result.named.append(
             Named(index, effect.name, effect.form, round(confidence, 3), rivals, nearest, others.get(nearest, np.inf))
         )
+
+
+def _is_doubtful(effect: Effect, account: Account, fitted: Sequence[Effect]) -> bool:
+    """Whether one of several effects may only be what the formula of another lacks."""
+    gain = account.gains.get(effect.name)
+    if gain is None or gain.of_all >= SMALL:
+        return False
+    if gain.of_left < NEARLY_ALL:
+        return True
+    own = [np.asarray(value) for value in effect.values.values() if isinstance(value, tuple)]
+    others = [np.asarray(v) for other in fitted if other is not effect for v in other.values.values() if isinstance(v, tuple)]
+    pairs = [np.corrcoef(a, b)[0, 1] for a in own for b in others if np.ptp(a) > 0 and np.ptp(b) > 0]
+    return any(abs(r) > TOGETHER for r in pairs)
 
 
 def _rule_out(result: Diagnosis, alone: Step, ground: Ground) -> None:

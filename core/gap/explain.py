@@ -83,6 +83,11 @@ class Ground:
         """Share of a side's gap that is closed at these mean squares."""
         return float(np.clip((self.start[side] - means[side]) / self.gap(side), 0.0, 1.0))
 
+    def gain(self, before: np.ndarray, after: np.ndarray, side: int) -> Gain:
+        """What is closed on the way from some mean squares to others."""
+        closed = float(before[side] - after[side])
+        return Gain(closed / self.gap(side), closed / float(max(before[side] - self.floor[side], 1e-12)))
+
     def matters(self, side: int) -> bool:
         """Whether a side has a gap that is worth speaking of."""
         return bool(self.count[side] > 0) and self.gap(side) > (LEAST if side == self.main else 1.0)
@@ -114,6 +119,14 @@ class Step:
         return min(own, default=np.inf)
 
 
+@dataclass(frozen=True)
+class Gain:
+    """What an effect closed: as a share of the whole gap, and of what the others had left."""
+
+    of_all: float
+    of_left: float
+
+
 @dataclass
 class Account:
     """How a model was found: the effects in its order.
@@ -126,8 +139,8 @@ class Account:
     unseen : (trials, 2) float
     steps : dict of str to Step
         In which each effect was chosen.
-    gains : dict of str to float
-        Share of the whole gap that each closed when it joined.
+    gains : dict of str to Gain
+        What each closed when it joined.
     first : Step
         What was judged on top of the base model.
     """
@@ -135,7 +148,7 @@ class Account:
     fit: Fit
     unseen: np.ndarray
     steps: dict[str, Step] = field(default_factory=dict)
-    gains: dict[str, float] = field(default_factory=dict)
+    gains: dict[str, Gain] = field(default_factory=dict)
     first: Step = field(default_factory=lambda: Step([], []))
 
     @property
@@ -246,8 +259,8 @@ class Explainer:
         best = choice or self.simplest(step)
         if not self._earns(best, account, first):
             return account
-        side, name = self.ground.side(best.candidate.name), best.candidate.name
-        gain = float(account.means[side] - means_of(best.unseen, best.fit)[side]) / self.ground.gap(side)
+        name = best.candidate.name
+        gain = self.ground.gain(account.means, means_of(best.unseen, best.fit), self.ground.side(name))
         return Account(best.fit, best.unseen, {**account.steps, name: step}, {**account.gains, name: gain})
 
     def _earns(self, one: Found, account: Account, first: bool) -> bool:
@@ -316,11 +329,10 @@ class Explainer:
         best = self.simplest(step)
         before, after = self._left([account.means, means_of(best.unseen, best.fit)], side)
         if after < (1.0 if best.candidate.name == first else 0.98) * before - 1e-6:
-            gain = float(without.means[side] - means_of(best.unseen, best.fit)[side]) / self.ground.gap(side)
-            name = best.candidate.name
+            name, gain = best.candidate.name, self.ground.gain(without.means, means_of(best.unseen, best.fit), side)
             return Account(last_first(best.fit), best.unseen, {name: step, **steps}, {name: gain, **gains})
         told = step if np.isfinite(step.of(first)) else account.steps[first]  # its rivals are those beside the others
-        gains = {**account.gains, first: lost / self.ground.gap(side)}
+        gains = {**account.gains, first: self.ground.gain(without.means, account.means, side)}
         return replace(account, steps={**account.steps, first: told}, gains=gains)
 
     def _friction(self, account: Account) -> Generator[tuple[str, float], None, Account]:
