@@ -1,14 +1,18 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """``palpate gap`` on recordings with something hidden in them (``_hidden``): what it says, held against the sealed answers.
 
+The confusion matrix goes to build/gap/confusion.txt, the table of docs/gap.md to build/gap/table.md.
+
 The whole matrix is 240 cases, an hour of one core; a fifth of it is run by default. Results are kept in build/gap/, one line a
 case, and a run goes on where the last one stopped, as long as neither the workflow nor the generator has changed.
 Environment:
 
 ``PALPATE_GAP_CASES``      how many cases (48), shared out over the kinds as in :data:`MIX`
 ``PALPATE_GAP_PROCESSES``  how many at a time (2)
-``PALPATE_GAP_FIRST``      number of the first case of each kind; from 1000 on are those that nobody looks at (1000)
+``PALPATE_GAP_FIRST``      number of the first case of each kind; below 1000 are those to develop on, from 5000 on those that
+                           nobody looks at before the figures are drawn (5000)
 ``PALPATE_GAP_BASELINES``  on how many of them the baselines run as well (a quarter)
+``PALPATE_GAP_RESULTS``    a file of results: nothing is run, its figures are printed
 """
 
 from __future__ import annotations
@@ -42,13 +46,15 @@ QUIET = ("noise",)
 def run() -> Iterator[dict]:
     """Yield one figure for every bar; the confusion matrix goes to stderr and to build/gap/confusion.txt."""
     total = int(os.environ.get("PALPATE_GAP_CASES", "48"))
-    first = int(os.environ.get("PALPATE_GAP_FIRST", "1000"))
+    first = int(os.environ.get("PALPATE_GAP_FIRST", "5000"))
     plan = plan_of(total, first)
     baselines = int(os.environ.get("PALPATE_GAP_BASELINES", str(total // 4)))
-    results = _results(plan, set(_spread(plan, baselines)))
-    matrix = confusion(results)
-    print(matrix, file=sys.stderr)
+    kept = os.environ.get("PALPATE_GAP_RESULTS")
+    results = _kept(Path(kept)) if kept else _results(plan, set(_spread(plan, baselines)))
+    matrix, rows = confusion(results), table(results)
+    print(matrix, rows, sep="\n\n", file=sys.stderr)
     (_folder() / "confusion.txt").write_text(matrix + "\n", encoding="utf-8")
+    (_folder() / "table.md").write_text(rows + "\n", encoding="utf-8")
     yield from figures(results)
 
 
@@ -79,9 +85,15 @@ def _fingerprint() -> str:
     seen = hashlib.sha256()
     for part in ("core/gap", "core/effects", "benchmarks/_hidden"):
         for path in sorted((HOUSE / part).glob("*.py")):
-            if path.stem not in ("report", "plots", "tables"):
+            if path.stem not in ("report", "page", "plots", "tables"):
                 seen.update(path.read_bytes())
     return seen.hexdigest()[:12]
+
+
+def _kept(path: Path) -> list[dict]:
+    """The results in a file, the last of each case."""
+    lines = map(json.loads, path.read_text(encoding="utf-8").splitlines())
+    return list({(r["kind"], r["number"]): r for r in lines}.values())
 
 
 def _results(plan: list[tuple[str, int]], compared: set[tuple[str, int]]) -> list[dict]:
@@ -218,6 +230,41 @@ def confusion(results: list[dict]) -> str:
         said = Counter(" + ".join(r["sure"]) if r["sure"] and kind != "two" else r["outcome"] for r in here)
         words = ", ".join(f"{name} {count}" for name, count in said.most_common())
         text.append(f"{kind:8} {hidden or 'nothing':18} {len(here):5d}  {words}")
+    return "\n".join(text)
+
+
+def table(results: list[dict]) -> str:
+    """Return what docs/gap.md says of a whole run, in Markdown."""
+    aims = {
+        "own": ("one effect, the library's own form", "95 %"),
+        "other": ("one effect, another formula", "85 %, ≤ 5 % wrong"),
+        "none": ("nothing, wrong base and coloured noise", "≤ 2 % false alarms"),
+        "two": ("two effects", "75 % both, 90 % one and none wrong"),
+        "outside": ("outside the library", "90 % `unexplained`"),
+        "poor": ("too poor to tell", "none wrong"),
+    }
+    words = {"right": "right", "part": "one of the two", "wrong": "wrong", "ambiguous": "`ambiguous`"}
+    text = ["| hidden | cases | outcome | aim |", "| --- | ---: | --- | --- |"]
+    for kind, (what, aim) in aims.items():
+        here = [r for r in results if r["kind"] == kind]
+        counts = Counter(r["outcome"] for r in here)
+        said = ", ".join(f"{count} {words.get(name, f'`{name}`')}" for name, count in counts.most_common())
+        if kind in ("own", "other", "two"):
+            missed = Counter(" + ".join(r["answer"]) for r in here if r["outcome"] != "right")
+            if kind != "two" and missed:
+                said += "; missed: " + ", ".join(
+                    f"{name} {count}" if count > 1 else name for name, count in missed.most_common()
+                )
+        text.append(f"| {what} | {len(here)} | {said} | {aim} |")
+    closed = {k: [r["closed"] for r in results if r["kind"] == k and r["closed"] is not None] for k in ("own", "other", "two")}
+    inside = [hit for r in results if r["kind"] == "own" for _, hit in r["inside"]]
+    medians = ", ".join(f"{k} {np.median(v):.1%}" for k, v in closed.items() if v)
+    cpu = [r["cpu_seconds"] for r in results]
+    text += [
+        "",
+        f"Gap closed on `check` trials, medians: {medians}. 95 % intervals held {sum(inside)} of {len(inside)} numbers.",
+    ]
+    text += [f"CPU seconds a case: median {np.median(cpu):.0f}, nine of ten below {np.quantile(cpu, 0.9):.0f}."]
     return "\n".join(text)
 
 

@@ -61,7 +61,7 @@ def hysteresis(rng, strength) -> Hidden:
             state = (state & (depth > off)) | (depth > on)
             s.force[t] = (1 - share) * s.force[t] + share * pad.k * deep * state.mean(axis=1)
 
-    return Hidden("hysteresis", "preisach", strength, elastic=act)
+    return Hidden("hysteresis", "crowd of relays", strength, elastic=act)
 
 
 def creep(rng, strength) -> Hidden:
@@ -89,7 +89,7 @@ def adhesion(rng, strength) -> Hidden:
         pull = strength * pad.k * 1.2e-3 * np.exp(-((s.depth / width) ** 2)) * (1 - np.exp(-s.depth / (0.1 * width)))
         s.force = s.force - np.where(leaving, pull, 0.0)
 
-    return Hidden("adhesion", "cohesive", strength, force=act)
+    return Hidden("adhesion", "rounded Dugdale", strength, force=act)
 
 
 def wear(rng, strength) -> Hidden:

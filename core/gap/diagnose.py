@@ -25,8 +25,10 @@ from .structure import Structure, structure_of
 from .telling import alike, untold
 from .tremble import trembling
 
-EXPLAINED = 0.6
+EXPLAINED = 0.5
 """Share of the gap that must be closed for the verdict "explained"."""
+PART, APART = 0.35, 1.5
+"""Share from which on an effect is a sure name although much is left, where all others leave so many times as much."""
 RIVAL = 1.35
 """A rival is one that leaves at most so many times as much of the gap as the best does."""
 SMALL, NEARLY_ALL = 0.1, 0.7
@@ -265,9 +267,10 @@ def _conclude(result: Diagnosis, account: Account, ground: Ground) -> None:
                 others[name] = min(left / own, others.get(name, np.inf))
         same = [name for name in alike(result.coverage, effect.name) if name not in {e.name for e in effects}]
         rivals = tuple(dict.fromkeys([*(name for name, ratio in others.items() if ratio < RIVAL), *same]))
-        weight = 1.0 / (1.0 + sum(ratio**-3.0 for ratio in others.values()))
+        weight = 1.0 / (1.0 + sum(ratio**-4.0 for ratio in others.values()))
         share = closed[ground.side(effect.name)] if fitted else 1.0
-        confidence = weight * (0.5 + 0.5 * share) if share >= EXPLAINED else 0.5 * weight * share
+        apart = min(others.values(), default=np.inf) > APART
+        confidence = weight * (0.5 + 0.5 * share if share >= (PART if apart else EXPLAINED) else 0.5 * share)
         if rivals or (len(fitted) > 1 and _is_doubtful(effect, account, fitted)):
             confidence = min(confidence, 0.45)
         if rivals:

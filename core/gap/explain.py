@@ -25,7 +25,7 @@ from .search import Found, Views, search
 from .structure import Structure
 from .telling import confounded
 
-FIRST, NEXT, NEXT_OF_ALL = 0.25, 0.3, 0.03
+FIRST, NEXT, NEXT_OF_ALL = 0.25, 0.2, 0.03
 """Least share of the gap that the first effect closes; of what is left that a further one closes; and of the whole gap."""
 LEAST = 0.02
 """Least decrease of the mean square on unseen trials, in units of the noise's variance."""
@@ -284,6 +284,8 @@ class Explainer:
     def _open(self, account: Account, structure) -> bool:  # type: ignore[no-untyped-def]
         """Whether enough is left that a further effect could earn its place."""
         g, mean = self.ground, float(account.means[self.ground.main])
+        if any(effect.name == "quantization" for effect in account.fit.model.effects):
+            return False  # what is left lies within a step
         if mean - g.floor[g.main] < max(LEAST, NEXT_OF_ALL * g.gap(g.main)):
             return False
         found: Structure = structure(account.fit)

@@ -26,6 +26,8 @@ STEP = 1e-3
 """Of the finite differences: in the logarithm of a number, or as a share of the size of one that is not on a log scale."""
 
 
+COARSE = 0.03
+"""The same for models whose readings come in steps: a staircase has no slope but across its edges."""
 PRIOR = 10.0
 """Inverse variance of a number per texel about its resting value, in its coordinate: a gain is within ± 0.3 unseen."""
 FRICTION = ("mus", "mud", "sigma0", "x0", "ct")
@@ -342,11 +344,12 @@ def derivatives(
     known: int,
 ) -> None:
     """Write what a step along each free number takes off the residual into `table` (p, T, c + 3), but the first `known`."""
+    step = COARSE if any(effect.name == "quantization" for effect in model.effects) else STEP
     for i, item in list(enumerate(free))[known:]:
-        ahead = item.to(item.back(at[i] + STEP))
+        ahead = item.to(item.back(at[i] + step))
         moved = list(at)
         # At a bound the difference is taken inwards.
-        moved[i] = np.where(ahead - at[i] > 0.5 * STEP, ahead, item.to(item.back(at[i] - STEP)))
+        moved[i] = np.where(ahead - at[i] > 0.5 * step, ahead, item.to(item.back(at[i] - step)))
         change = moved[i] - at[i]
         values = [f.back(x) for f, x in zip(free, moved, strict=True)]
         np.subtract(residual, share.residual(changed(model, free, values)), out=table[i])

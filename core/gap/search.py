@@ -27,6 +27,8 @@ BEHIND = 3.0
 LITTLE = 20_000
 """Measured values up to which a recording is so quick to fit that candidates are begun from several places and more of them are
 judged, in more of their forms: a quick look from one place loses those whose numbers bend most."""
+FEW_LEVELS = 48
+"""Values of all readings together up to which they are steps: noise alone makes thousands."""
 THIN = 4
 """Of so many samples one is looked at where texels feel their neighbours."""
 
@@ -189,7 +191,11 @@ def promising(
         effect = dead(whole, model, candidate, n)
         return [] if effect is None else [(direction.score(model.with_effect(effect))[0], effect)]
     if candidate.name == "quantization":
-        return [(_fall(direction, model.with_effect(effect)), effect) for effect in stepped(whole, model, candidate)]
+        least = (
+            0.5 * direction.total if few_levels(moving_readings(whole, model)) is not None else 0.0
+        )  # they are seen to be there
+        steps = [(_fall(direction, model.with_effect(effect)), effect) for effect in stepped(whole, model, candidate)]
+        return [(max(fall, least), effect) for fall, effect in sorted(steps, key=lambda entry: -entry[0])]
     if candidate.local:
         parameter = next(q.scaled(gain) for q in form.parameters if q.per_texel)
         moved = candidate.effect({parameter.name: float(parameter.default) + 0.01 * _local_size(parameter, scales)}, n, gain)
@@ -313,23 +319,20 @@ def _fall(direction: Direction, model: Model) -> float:
 
 
 def stepped(shares: Sequence[Share], model: Model, candidate: Candidate) -> list[Effect]:
-    """Return the effect with the step in which the readings come, if they do.
+    """Return the effect with each step in which the readings may come, if they do.
 
-    Readings in steps of q have a characteristic function that is large at the frequency 1/q, however they are spread otherwise
-    (Widrow and Kollár, Quantization Noise, 2008). Held values would look alike: only samples that change are taken.
+    A handful of values that all samples share is seen at once; uneven steps stand for several even ones. Readings in finer
+    steps of q have a characteristic function that is large at the frequency 1/q, however they are spread otherwise (Widrow and
+    Kollár, Quantization Noise, 2008). Held values would look alike: only samples that change are taken.
     """
-    moving = []
-    for share in shares:
-        reading = share.predictor.trial.reading
-        if reading is None:
-            return []
-        change = np.abs(np.gradient(share.predictor.predict(model).reading, axis=0))
-        values = reading[(change > 0.5 * share.noise[0]) & np.isfinite(reading)]
-        moving.append(values)
-    values = np.concatenate(moving) - model.parameters.zero
+    values = moving_readings(shares, model)
     if len(values) < 400:
         return []
-    values = values[:: max(1, len(values) // 6000)]
+    levels = few_levels(values)
+    if levels is not None:
+        apart = np.diff(levels)
+        tried = np.unique([np.median(apart), apart.mean(), apart.max(), float(np.average(apart, weights=apart))])
+        return [Effect(candidate.name, candidate.form.name, {"step": float(step)}) for step in tried]
     noise, full = shares[0].noise[0], float(np.ptp(values))
     frequency = np.arange(5.0 / full, 1.0 / (2.5 * noise), 0.12 / full)  # coarser steps than a fifth are seen by eye
     if not 2 < len(frequency) < 20000:
@@ -341,6 +344,24 @@ def stepped(shares: Sequence[Share], model: Model, candidate: Candidate) -> list
     fine = best + np.linspace(-0.12, 0.12, 49) / full
     top = fine[int(np.argmax([abs(np.exp(2j * np.pi * f * values).mean()) for f in fine]))]
     return [Effect(candidate.name, candidate.form.name, {"step": float(1.0 / top)})]
+
+
+def moving_readings(shares: Sequence[Share], model: Model) -> np.ndarray:
+    """Return some thousand readings, less the zero, of samples at which the model changes by more than the noise."""
+    moving = [np.zeros(0)]
+    for share in shares:
+        reading = share.predictor.trial.reading
+        if reading is not None:
+            change = np.abs(np.gradient(share.predictor.predict(model).reading, axis=0))
+            moving.append(reading[(change > 0.5 * share.noise[0]) & np.isfinite(reading)])
+    values = np.concatenate(moving) - model.parameters.zero
+    return values[:: max(1, len(values) // 6000)]
+
+
+def few_levels(values: np.ndarray) -> np.ndarray | None:
+    """Return the values between which readings jump, in order, if they have so few that noise did not make them; else None."""
+    levels = np.unique(np.round(values, 12))
+    return levels if 3 <= len(levels) <= FEW_LEVELS and len(values) >= 20 * len(levels) else None
 
 
 def free_of(free: Sequence[Free], model: Model, candidate: Candidate, scales: Scales) -> tuple[Free, ...]:
