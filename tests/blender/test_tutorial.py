@@ -1,12 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The tutorial of the README, step by step: its numbers and its words are true."""
 
+import os
 import re
+import subprocess
+import sys
 
 import bpy
 import numpy as np
 import pytest
 
+from palpate.commands import main
 from palpate.core.formats.archive import load_recording
 
 
@@ -79,3 +83,24 @@ def test_numbers_of_the_sphere(repository):
     readme = (repository / "README.md").read_text(encoding="utf-8")
     promised = float(re.search(r"about ([\d.]+) N at frame 60", readme).group(1))
     assert k / area * volume == pytest.approx(promised, rel=0.15)
+
+
+def test_a_sensor_made_without_a_window(tmp_path, repository):
+    """The script in docs/authoring.md runs in a Python of its own, and its scene is baked with another sensor's file."""
+    page = (repository / "docs" / "authoring.md").read_text(encoding="utf-8")
+    script = re.search(r"## Without a window.*?```python\n(.*?)```", page, re.DOTALL).group(1)
+    head = 'format = "palpate-sensor-toml/1"\n[sensor]\ncn = 1.0\n'
+    (tmp_path / "soft.toml").write_text(f"{head}k = 100.0\n", encoding="utf-8")
+    (tmp_path / "stiff.toml").write_text(f"{head}k = 400.0\n", encoding="utf-8")
+    here = {**os.environ, "PWD": str(tmp_path)}  # Blender goes by it, as a shell sets it
+    subprocess.run([sys.executable, "-c", script], cwd=tmp_path, env=here, check=True, timeout=120)
+    felt = {}
+    for name in ("soft", "stiff"):
+        words = ["--model", str(tmp_path / f"{name}.toml"), "--out", str(tmp_path / name)]
+        assert main(["bake", str(tmp_path / "scene.blend"), *words]) == 0
+        (sensor,) = (tmp_path / name).iterdir()
+        felt[name] = load_recording(sensor / "recording.npz").sensors[sensor.name]
+    assert felt["soft"].normal_force.max() > 0
+    hold = felt["soft"].normal_force.sum(axis=1).argmax()
+    assert felt["stiff"].depth[hold].max() == pytest.approx(felt["soft"].depth[hold].max())  # the same motion
+    assert felt["stiff"].normal_force.max() > 3 * felt["soft"].normal_force.max()
