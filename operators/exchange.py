@@ -5,14 +5,14 @@ from pathlib import Path
 
 import bpy
 from bpy.props import StringProperty
-from bpy_extras.io_utils import ExportHelper, ImportHelper
+from bpy_extras.io_utils import ExportHelper
 
 from ..addon import exchange
 from ..core.errors import SceneError
 from . import support
 
 
-class PALPATE_OT_openrave_import(support.Reporting, ImportHelper, bpy.types.Operator):
+class PALPATE_OT_openrave_import(support.Reporting, support.Choosing, bpy.types.Operator):
     """Read the parameters of the active sensor from OpenRAVE's XML (a SimTactileSensor, paper's Table 2)"""
 
     bl_idname = "palpate.openrave_import"
@@ -73,7 +73,7 @@ class PALPATE_OT_openrave_export(support.Reporting, ExportHelper, bpy.types.Oper
         self.report({"INFO"}, f"Wrote {len(sensors)} sensors to '{self.filepath}'")
 
 
-class PALPATE_OT_sensor_toml_import(support.Reporting, ImportHelper, bpy.types.Operator):
+class PALPATE_OT_sensor_toml_import(support.Reporting, support.Choosing, bpy.types.Operator):
     """Read a sensor.toml: parameters and effects for the active sensor, or a new pad when none is active and it has a grid"""
 
     bl_idname = "palpate.sensor_toml_import"

@@ -5,7 +5,6 @@ from pathlib import Path
 
 import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
-from bpy_extras.io_utils import ImportHelper
 
 from ..addon import exchange, preview
 from ..core.errors import SensorError
@@ -15,7 +14,7 @@ DAMPING = 0.01
 """Damping suggested for a stiffness, as a share of it in number (paper, section 3.4.1)."""
 
 
-class Fit(support.Reporting, ImportHelper):
+class Fit(support.Reporting, support.Choosing):
     """What both fits share: a CSV is chosen, values are put on the active sensor, and a picture is shown."""
 
     filename_ext = ".csv"
@@ -24,9 +23,20 @@ class Fit(support.Reporting, ImportHelper):
         name="Plot", description="Also write the plot here: .png, .pdf or .svg", subtype="FILE_PATH", options={"SKIP_SAVE"}
     )
 
+    fields: tuple[str, ...] = ()
+    """Names of the fit's own settings."""
+
     @classmethod
     def poll(cls, context):
         return support.sensor_object(cls, context)
+
+    def draw(self, _context):
+        layout = self.layout
+        layout.use_property_split = False  # beside their fields names would be cut off in the file browser
+        for name in self.fields:
+            layout.prop(self, name)
+        layout.label(text="Also write the plot to:")
+        layout.prop(self, "plot", text="")
 
     def picture(self, context, draw, fit, title: str) -> None:
         """Draw a fit, keep it in the .blend as an image, and show it."""
@@ -78,6 +88,8 @@ class PALPATE_OT_stiffness_fit(Fit, bpy.types.Operator):
     )
     with_damping: BoolProperty(name="Damping 1 % of k", description="Also set cn, to 1 % of k in number", default=True)
 
+    fields = ("line", "weight_area", "with_damping")
+
     def run(self, context):
         from ..core.calibrate.plots import plot_stiffness
         from ..core.calibrate.stiffness import fit_stiffness, read_foam
@@ -110,6 +122,8 @@ class PALPATE_OT_friction_fit(Fit, bpy.types.Operator):
         name="Normal Force (N)", description="On one texel while it was measured, N", default=0.08, min=1e-9, precision=5
     )
     texels: IntProperty(name="Texels", description="How many texels shared the measured force", default=1, min=1)
+
+    fields = ("normal_force", "texels")
 
     def run(self, context):
         from ..core.calibrate.friction import fit_friction, read_friction

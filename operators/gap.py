@@ -3,7 +3,6 @@
 
 import bpy
 from bpy.props import BoolProperty, StringProperty
-from bpy_extras.io_utils import ImportHelper
 
 from ..addon import jobs, measured
 from ..core.drive import drive
@@ -11,7 +10,7 @@ from . import support
 from .fits import show_image
 
 
-class PALPATE_OT_measured_open(support.Reporting, ImportHelper, bpy.types.Operator):
+class PALPATE_OT_measured_open(support.Reporting, support.Choosing, bpy.types.Operator):
     """Choose measurements of the real sensor: a rig.toml with its CSV files beside it. They are read to see that they fit"""
 
     bl_idname = "palpate.measured_open"

@@ -3,6 +3,12 @@
 
 from __future__ import annotations
 
+import os
+from pathlib import Path
+
+import bpy
+from bpy_extras.io_utils import ImportHelper
+
 from ..addon import live, measured, meshes, state
 from ..core.errors import PalpateError
 
@@ -28,6 +34,15 @@ def idle(cls) -> bool:
         cls.poll_message_set("Frames are being computed")
         return False
     return True
+
+
+class Choosing(ImportHelper):
+    """Mixin: a file is chosen beside the .blend; Blender by itself would fill in the name of the .blend."""
+
+    def invoke(self, context, event):
+        if not self.filepath and bpy.data.filepath:
+            self.filepath = str(Path(bpy.data.filepath).parent) + os.sep
+        return super().invoke(context, event)
 
 
 def object_with_surface(cls, context) -> bool:
@@ -81,8 +96,6 @@ def leave_edit_mode(context) -> None:
 
     In Edit Mode Blender's undo remembers the mesh being edited and no properties, so that undo could not take back a role.
     """
-    import bpy
-
     if context.object is not None and context.object.mode != "OBJECT":
         bpy.ops.object.mode_set(mode="OBJECT")
 

@@ -55,9 +55,19 @@ def test_paint(play_road):
 
 
 def test_authoring(play_road):
-    """Pads, laid texels, a problem put right, the sidebar, F3, effects and a fit."""
+    """Pads, laid texels, a problem put right, the sidebar, F3 and effects."""
     values = play_road("authoring", timeout=1200)["values"]
     assert values["texels"] > 50
+
+
+def test_fits(play_road):
+    """A preset, and parameters from measured files, by clicks; Table 2's friction comes out again."""
+    values = play_road("fits", timeout=1200)["values"]
+    assert values["preset"]["k"] not in (58.5, 1000.0)
+    area, texels, thickness = 14 * 6 * 0.0034**2, 84, 0.00025 / 980.0  # of a texel each; metres per pascal
+    assert values["k"] == pytest.approx(area / texels / thickness, rel=0.15)  # cells at the rim are halved
+    expected = {"mus": 0.435, "mud": 0.23, "x0": 0.3, "ct": 0.01}
+    assert values["friction"] == pytest.approx(expected, rel=0.05)
 
 
 def test_gap(play_road, real_blender, repository):

@@ -1,7 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Ways of making a sensor in the window: a pad from the Add menu, texels laid on a surface, a problem and its button, a fit."""
-
-import math
+"""Ways of making a sensor in the window: a pad from the Add menu, texels laid on a surface, a problem and its button."""
 
 import bpy
 from tutorial import add, adjust
@@ -76,17 +74,6 @@ def road(ui):
     yield from ui.filter("Creep")
     yield from ui.screenshot("effects")
     yield from ui.filter("")
-
-    # A fit with its plot
-    foam = ui.out / "foam.csv"
-    rows = "\n".join(f"{0.25 * i},{0.98 * i + 0.05 * math.sin(9 * i)}" for i in range(1, 12))
-    foam.write_text(f"compression (mm),pressure (kPa)\n{rows}\n", encoding="utf-8")
-    with ui.context(view):
-        bpy.ops.palpate.stiffness_fit(filepath=str(foam))
-    yield 2.0
-    ui.check("Palpate Stiffness Fit" in bpy.data.images, "the fit's plot is kept in the file")
-    ui.value("windows", len(bpy.context.window_manager.windows))
-    yield from ui.screenshot("fit")
 
 
 def kinds(obj):
