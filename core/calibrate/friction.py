@@ -123,7 +123,9 @@ def read_friction(path: str | os.PathLike, texels: int = 1) -> FrictionData:
     columns = read_columns(path, {"velocity": "m/s", "force": "N", "time": "s"})
     for name in ("velocity", "force"):
         if name not in columns:
-            raise FileError(f"'{path}' has no column '{name}': name the one with the {name} so.")
+            raise FileError(
+                f"'{path}' has no column '{name}': write that word above its numbers, the unit in brackets if it is not SI."
+            )
     if len(columns["force"]) < len(STEADY) + 1:
         raise FileError(f"'{path}' has {len(columns['force'])} lines: friction needs {len(STEADY) + 1} or more.")
     time = columns.get("time")

@@ -101,7 +101,9 @@ def read_foam(path: str | os.PathLike, weight_area: float | None = None) -> Foam
     """
     columns = read_columns(path, {"compression": "m", "pressure": "Pa", "force": "N", "mass": "kg"})
     if "compression" not in columns:
-        raise FileError(f"'{path}' has no column 'compression': name the one with the compression in metres so.")
+        raise FileError(
+            f"'{path}' has no column 'compression': write that word above its numbers, the unit in brackets if it is not m."
+        )
     loads = [name for name in ("pressure", "force", "mass") if name in columns]
     if len(loads) != 1:
         raise FileError(f"'{path}' needs exactly one of the columns 'pressure', 'force' and 'mass'; it has {len(loads)}.")
