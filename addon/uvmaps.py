@@ -58,7 +58,7 @@ def uv_layer(obj):
     if not layers:
         raise ImageError(
             f"Sensor '{obj.name}' has no UV map for its tactile image: unwrap it (Edit Mode, UV › Smart UV Project), "
-            "or set Readout › Tactile Image to Automatic."
+            "or set Readout › Image to Automatic."
         )
     if wanted and all(layer.name != wanted for layer in layers):
         there = ", ".join(f"'{layer.name}'" for layer in layers)

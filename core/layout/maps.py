@@ -148,7 +148,7 @@ def mapped_layout(
         The map has no area, reaches beyond its square, or lays parts of the region over one another.
     """
     known = f"The UV map '{map_name}' of sensor '{sensor}'"
-    remedy = "unwrap it (Edit Mode, UV › Smart UV Project), or set Readout › Tactile Image to Automatic"
+    remedy = "unwrap it (Edit Mode, UV › Smart UV Project), or set Readout › Image to Automatic"
     if not np.isfinite(corner_uv).all() or corner_uv.min() < -_SLACK or corner_uv.max() > 1 + _SLACK:
         raise ImageError(f"{known} reaches beyond its square: use UV › Pack Islands, or {remedy}.")
     a, b = corner_uv[:, 1] - corner_uv[:, 0], corner_uv[:, 2] - corner_uv[:, 0]
