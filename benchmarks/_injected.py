@@ -19,8 +19,8 @@ from ._recordings import Columns, Recording
 
 SIZES = (1.0, 2.0, 4.0)
 """How many times as large as what was left unexplained."""
-LARGEST = 0.3
-"""Share of the range: what is larger is no effect on a sensor but another sensor."""
+LARGEST, STRONGEST = 0.3, 6.0
+"""Share of the range, and strength: beyond them it is no effect on a sensor but another sensor."""
 Change = Callable[[np.ndarray, np.ndarray, float], np.ndarray]
 """From times (T,) and readings (T, n) in shares of the largest, with a strength, to what a sensor with the effect reads."""
 
@@ -142,8 +142,7 @@ def with_effect(ground: Ground, name: str, size: float) -> Recording | None:
     if name in BETWEEN_TEXELS and len(texels) == 1:
         return None
     readings = [np.stack([columns[key] for key in texels], axis=1) for _, _, columns in trials]
-    zero = np.nanmedian([np.nanmedian(r[:5], axis=0) for r in readings], axis=0)
-    zero = np.where(np.isfinite(zero), zero, np.nanmedian(zero))
+    zero = np.array([_first(channel) for channel in np.concatenate(readings).T])
     full = max(float(np.nanmax(np.abs(r - zero))) for r in readings)
     plain = [np.nan_to_num((r - zero) / full) for r in readings]  # a channel that is not read out is at rest
 
@@ -155,23 +154,23 @@ def with_effect(ground: Ground, name: str, size: float) -> Recording | None:
     def size_of(made: list[np.ndarray]) -> float:
         return _beyond_refitting(made, readings, [columns["time"] for _, _, columns in trials])
 
-    strengths = np.geomspace(1e-3, 30.0, 40)
-    sizes = [size_of(changes(float(s))) for s in strengths[::3]]
-    enough = np.flatnonzero(np.array(sizes) >= size * ground.rest)
-    if not len(enough):
+    strengths = np.geomspace(1e-3, STRONGEST, 14)
+    enough = [float(s) for s in strengths if size_of(changes(float(s))) >= size * ground.rest]
+    if not enough or size * ground.share > LARGEST:
         return None
-    high = float(strengths[::3][enough[0]])
-    low = high / float(strengths[3] / strengths[0])
-    for _ in range(20):
+    low, high = enough[0] * float(strengths[0] / strengths[1]), enough[0]
+    for _ in range(12):
         middle = float(np.sqrt(low * high))
         low, high = (middle, high) if size_of(changes(middle)) < size * ground.rest else (low, middle)
-    made = changes(high)
-    if np.sqrt(np.nanmean(np.concatenate([m.ravel() for m in made]) ** 2)) > LARGEST * ground.rest / ground.share:
-        return None
     changed = []
-    for (trial, use, columns), reading, change in zip(trials, readings, made, strict=True):
+    for (trial, use, columns), reading, change in zip(trials, readings, changes(high), strict=True):
         changed.append((trial, use, columns | {key: (reading + change)[:, i] for i, key in enumerate(texels)}))
     return replace(ground.recording, name=f"{ground.recording.name} with {name}", trials=changed)
+
+
+def _first(channel: np.ndarray) -> float:
+    """Median of the first five values that were measured."""
+    return float(np.median(channel[np.isfinite(channel)][:5]))
 
 
 def _beyond_refitting(changes: list[np.ndarray], readings: list[np.ndarray], times: list[np.ndarray]) -> float:

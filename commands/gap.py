@@ -19,6 +19,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
+    from ..addon import dependencies
+
+    dependencies.prepare_numba()
+    from ..core import warm
     from ..core.gap import report
     from ..core.gap.amend import amended
     from ..core.gap.diagnose import Diagnosis, diagnose
@@ -29,6 +33,7 @@ def run(arguments: argparse.Namespace) -> int:
         raise SceneError("--sensor names a sensor of a scene: give the scene with --blend.")
     rig = read_rig(arguments.rig)
     folder = writable_folder(arguments.out, create=True)
+    warm.warm_aloud()
     result = None
     with console.progress_bar("gap", 1000, unit="step") as bar:
 
