@@ -21,7 +21,7 @@ PLACES = 9
 LAST = {
     "tube": ("30mm",),
     "tube-by-place": ("30mm",),
-    "insole": ("experiment_Inf_15September_dynamic_1", "experiment_Inf_17September_dynamic_2"),
+    "insole": ("experiment_Inf_15September_dynamic_1",),
 }
 """Held-out recordings of some sets that were opened only when rigs and workflow were as they are."""
 

@@ -11,6 +11,7 @@ from blender_scenes import grid
 
 from palpate.addon import jobs, measured
 from palpate.commands import main
+from palpate.core import warm
 from palpate.core.errors import SceneError
 
 
@@ -95,3 +96,13 @@ def test_the_command_puts_the_amended_sensor_into_a_scene(scene, rig_file, tmp_p
 def test_the_command_says_what_is_wrong(tmp_path, capsys):
     assert main(["gap", str(tmp_path / "none.toml"), "--out", str(tmp_path / "out")]) == 1
     assert "There is no rig" in capsys.readouterr().err
+
+
+def test_the_command_says_that_it_compiles(rig_file, tmp_path, monkeypatch, capsys):
+    def stop():
+        raise SceneError("far enough.")
+
+    monkeypatch.setattr(warm, "is_needed", lambda: True)
+    monkeypatch.setattr(warm, "warm", stop)
+    assert main(["gap", str(rig_file), "--out", str(tmp_path)]) == 1
+    assert capsys.readouterr().err.splitlines()[0].startswith("Palpate is preparing its solver (first use only)")
