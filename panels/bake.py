@@ -92,7 +92,7 @@ class Figures(Part):
             column.prop(own, "transparent")
         layout.use_property_split = False
         layout.label(text="Data:")
-        layout.row(align=True).prop(own, "exports")
+        layout.column(align=True).prop(own, "exports")
         layout.operator("palpate.figures_make", icon="RENDER_STILL")
 
 

@@ -326,6 +326,6 @@ def colour_bar(figure: Figure, image: Any, axes: Axes, look: Look, ink: str = IN
     bar.update_ticks()
     bar.ax.tick_params(labelsize=FONT, colors=ink, length=2.5, width=0.6)
     long = (place.width * width if lies else place.height * height) > 1.9  # inches; else the words need two lines
-    bar.set_label((" " if long or lies else "\n").join(look.words), fontsize=FONT, color=ink, labelpad=2.0)
+    bar.set_label((" " if long or lies else "\n").join(look.words), fontsize=FONT, color=ink, labelpad=2.0 if lies else 4.0)
     bar.outline.set_edgecolor(ink)
     bar.outline.set_linewidth(0.5)
