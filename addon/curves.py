@@ -11,7 +11,11 @@ LINEAR = bpy.types.Keyframe.bl_rna.properties["interpolation"].enum_items["LINEA
 
 def of(obj):
     """Return the collection of an object's F-curves; None when it has none."""
-    data = obj.animation_data
+    return of_action(obj.animation_data)
+
+
+def of_action(data):
+    """Return the collection of F-curves that an object's animation data, or a strip of it, plays; None when there is none."""
     if data is None or data.action is None:
         return None
     if not hasattr(data.action, "slots"):

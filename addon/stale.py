@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Does a bake still show what the scene would give now? Looked at, cheaply, whenever a frame of it is shown.
 
-What is compared: settings, who takes part, scales and animation curves; the poses of keyframed bodies, and what deforming
-objects and curves look like, with what was recorded of the frame that is shown; and the objects' own meshes and regions when
-Blender has reported a change of geometry.
+What is compared: settings, who takes part, scales, and the animation of all that they hang on (:mod:`.influences`); the poses
+of keyframed bodies, and what deforming objects and curves look like, with what was recorded of the frame that is shown; and the
+objects' own meshes and regions when Blender has reported a change of geometry.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import numpy as np
 
 from ..core.errors import PalpateError
 from ..core.recording import Recording
-from . import cache, clock, curves, deform, freebodies, meshes, sample, state
+from . import cache, clock, deform, freebodies, influences, meshes, sample, state
 
 SAME_POSE = 1e-6
 """Metres, and components of a quaternion, by which a recorded pose may differ: an evaluated matrix has 32 bits."""
@@ -38,32 +38,17 @@ def fingerprint(scene) -> str:
     if key not in _geometry or changed:
         _geometry[key] = _digest(*(meshes.own_fingerprint(obj) for obj in objects))
         state.session.changed_geometry -= changed
-    return _digest(repr(cache.settings_of(scene, objects)), _geometry[key], *(_animation(obj) for obj in objects))
+    scales = map(_scales, objects)
+    return _digest(repr(cache.settings_of(scene, objects)), _geometry[key], *scales, influences.motion(objects))
 
 
-def _animation(obj) -> str:
-    """Return what keyframes say about an object and what carries it, between frames too, and its scale where that is constant.
-
-    Of a body that forces move only what carries it: its own keyframes are the bake's.
-    """
-    digest, own = hashlib.blake2b(digest_size=16), obj.palpate.body in freebodies.MOVED
-    scaled = deform.has_animated_scale(obj)
-    while obj is not None:
-        if not scaled:
-            digest.update(np.array([obj.scale, obj.delta_scale], dtype=np.float32).tobytes())
-        for curve in () if own else curves.of(obj) or ():
-            digest.update(f"{curve.data_path}[{curve.array_index}]{curve.mute}{curve.extrapolation}".encode())
-            for key, size, kind in _KEYFRAME:
-                values = np.empty(size * len(curve.keyframe_points), dtype=kind)
-                curve.keyframe_points.foreach_get(key, values)
-                digest.update(values.tobytes())
-        obj, own = obj.parent, False
-    return digest.hexdigest()
-
-
-_KEYFRAME = (
-    ("co", 2, np.float32), ("handle_left", 2, np.float32), ("handle_right", 2, np.float32), ("interpolation", 1, np.int32),
-)  # fmt: skip
+def _scales(obj) -> str:
+    """Return the scales of an object and of what carries it, where they are constant."""
+    scaled, found = deform.has_animated_scale(obj), []
+    while obj is not None and not scaled:
+        found.append((tuple(obj.scale), tuple(obj.delta_scale)))
+        obj = obj.parent
+    return repr(found)
 
 
 def pack(looks: dict[str, list[str]]) -> str:

@@ -92,6 +92,88 @@ def test_a_change_is_noticed_at_whatever_frame_is_shown_next(baked, change):
     assert live.status(baked).frame is not None  # it is still shown
 
 
+def keyed(owner, path, index=-1):
+    """Keep a property as it is, by keyframes that say so."""
+    for frame in (1, 3, 4, 5):
+        owner.keyframe_insert(path, index=index, frame=frame)
+
+
+@pytest.fixture
+def hung(tmp_path):
+    """A baked scene whose ball hangs on others, all of which have keyframes and stay where they are."""
+    scene, pad, target, *_ = press_and_drop(frames=8)
+    others = {name: bpy.data.objects.new(name, None) for name in ("Leader", "Source", "Far", "Strips", "Nodes")}
+    others["Cage"] = bpy.data.objects.new("Cage", bpy.data.lattices.new("Cage"))
+    for other in others.values():
+        scene.collection.objects.link(other)
+        keyed(other, "location")
+    constraint = target.constraints.new("COPY_LOCATION")
+    constraint.target, constraint.use_offset = others["Leader"], True
+    others["Leader"].parent = others["Far"]
+    target.modifiers.new("Cage", "LATTICE").object = others["Cage"]
+    target.shape_key_add(name="Basis")
+    key = target.shape_key_add(name="Bump")
+    key.data[0].co.z += 0.001
+    keyed(key, "value")
+    driver = target.driver_add("delta_location", 0).driver
+    driver.type = "SUM"
+    driver.variables.new().targets[0].id = others["Source"]
+    driver.variables[0].targets[0].data_path = "location.x"
+    target.driver_add("delta_location", 1).driver.expression = "0.0 * frame"
+    data = others["Strips"].animation_data
+    action, data.action = data.action, None
+    data.nla_tracks.new().strips.new("Strip", 1, action)
+    target.parent = others["Strips"]
+    group = bpy.data.node_groups.new("Group", "GeometryNodeTree")
+    group.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
+    for name in ("Geometry", "Object"):
+        group.interface.new_socket(name, in_out="INPUT", socket_type=f"NodeSocket{name}")
+    group.links.new(group.nodes.new("NodeGroupInput").outputs[0], group.nodes.new("NodeGroupOutput").inputs[0])
+    modifier = target.modifiers.new("Nodes", "NODES")
+    modifier.node_group = group
+    modifier[group.interface.items_tree["Object"].identifier] = others["Nodes"]
+    scene.frame_set(1)
+    save(tmp_path)
+    drive(bake(scene))
+    return reopen(save(tmp_path))
+
+
+def moved_at_4(owner):
+    """Change what keyframes say at frame 4, and nowhere else but around it."""
+    curve = curves_of(owner)[0]
+    point = next(point for point in curve.keyframe_points if round(point.co.x) == 4)
+    point.co.y += 0.001
+    curve.update()
+
+
+def shaken():
+    modifier = curves_of(bpy.data.objects["Ball"])[0].modifiers.new("NOISE")
+    modifier.use_restricted_range, modifier.frame_start, modifier.frame_end = True, 3.0, 5.0
+
+
+ELSEWHERE = {
+    "target of a constraint": lambda ball: moved_at_4(bpy.data.objects["Leader"]),
+    "parent of that": lambda ball: moved_at_4(bpy.data.objects["Far"]),
+    "object of a modifier": lambda ball: moved_at_4(bpy.data.objects["Cage"]),
+    "object of Geometry Nodes": lambda ball: moved_at_4(bpy.data.objects["Nodes"]),
+    "what a driver reads": lambda ball: moved_at_4(bpy.data.objects["Source"]),
+    "shape key": lambda ball: moved_at_4(ball.data.shape_keys),
+    "driver": lambda ball: setattr(ball.animation_data.drivers[1].driver, "expression", "0.001 * (frame == 4)"),
+    "F-curve modifier": lambda ball: shaken(),
+    "strip": lambda ball: setattr(ball.parent.animation_data.nla_tracks[0].strips[0], "scale", 1.5),
+}
+
+
+@pytest.mark.parametrize("change", [None, *ELSEWHERE])
+def test_a_change_at_other_frames_is_noticed_too(hung, change):
+    hung.frame_set(7)
+    if change is not None:
+        ELSEWHERE[change](bpy.data.objects["Ball"])
+        bpy.context.view_layer.update()
+    expected = [FRESH.format(6), FRESH.format(8)] if change is None else [STALE, STALE]
+    assert texts(hung, [6, 8]) == expected
+
+
 def test_a_target_that_is_a_curve_is_watched(tmp_path):
     scene, pad, target = press(frames=3)
     bpy.ops.curve.primitive_bezier_circle_add(radius=0.005, location=(0.01, 0.0, 0.002))
