@@ -68,6 +68,14 @@ class PALPATE_OT_preset_add(AddPresetBase, bpy.types.Operator):
     def poll(cls, context):
         return support.sensor_object(cls, context)
 
+    def execute(self, context):
+        if self.remove_name or self.remove_active:
+            found = bpy.utils.preset_find(self.name, self.preset_subdir, display_name=True)
+            if found and sensors.PRESETS in Path(found).parents:  # Blender takes an extension's files for the user's own
+                self.report({"WARNING"}, f"'{self.name}' comes with Palpate and stays")
+                return {"CANCELLED"}
+        return super().execute(context)
+
 
 class PALPATE_OT_parameters_copy(support.Reporting, bpy.types.Operator):
     """Give the other selected sensors and pads the parameters and effects of the active one; regions stay"""

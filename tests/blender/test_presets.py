@@ -62,6 +62,15 @@ def test_own_presets_are_kept_and_removed():
     assert not mine[0].exists()
 
 
+def test_presets_that_come_with_palpate_stay():
+    """Blender's list has a minus beside each."""
+    grid()
+    bpy.ops.palpate.sensor_add()
+    for path in PRESETS:
+        assert bpy.ops.palpate.preset_add(name=bpy.path.display_name(path.name), remove_name=True) == {"CANCELLED"}
+        assert path.exists()
+
+
 def test_a_preset_needs_a_sensor_and_a_file():
     grid()
     assert not bpy.ops.palpate.preset_load.poll()

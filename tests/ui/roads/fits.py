@@ -56,7 +56,7 @@ def road(ui):
     yield from ui.click(x, y)
     yield 0.5
     yield from ui.screenshot("presets")
-    yield from ui.click(x - 60, y - 55 - 20 * PRESETS.index("Soft_Fingertip"))
+    yield from ui.click(x - 90, y + 80 + 21 * (len(PRESETS) - 1 - PRESETS.index("Soft_Fingertip")))  # the list opens upwards
     yield 0.5
     ui.value("preset", {"k": pad().palpate.k, "mus": pad().palpate.mus})
     yield from ui.screenshot("preset-chosen")
