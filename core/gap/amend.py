@@ -90,6 +90,20 @@ EXPERIMENTS = {
 """What brings out each effect most clearly."""
 
 
+def _sliding_more(result: Diagnosis) -> str:
+    """The same where only net forces were measured while a surface slid."""
+    if result.verdict != "unexplained":
+        return ""
+    hint = {
+        "turning": (
+            "turn back after slides of several lengths, some very slowly, to see whether what is left goes with the way or with "
+            "the time since the turn"
+        ),
+        "sliding": "slide both ways at several constant speeds",
+    }.get(result.structure.strongest, "repeat one trial exactly, to see what of the difference comes again")
+    return f"To find out what it is: {hint}; slide under two other loads, and record the normal force."
+
+
 def next_experiment(result: Diagnosis) -> str:
     """Return what to record next, in one sentence; empty when nothing is open."""
     if result.ambiguous:
@@ -98,6 +112,8 @@ def next_experiment(result: Diagnosis) -> str:
         parts = [EXPERIMENTS[name] for name in involved if name in EXPERIMENTS]
         return f"To tell {', and '.join(pairs)}: {'; and '.join(dict.fromkeys(parts))}."
     c = result.coverage
+    if c.slides and all(p.trial.reading is None for p in result.predictors):
+        return _sliding_more(result)
     lacking = []
     if result.noise[0].deviation > LOUD * result.full[0]:
         lacking.append("press harder, or repeat a trial exactly and average, until the noise is below a hundredth of the range")

@@ -43,9 +43,12 @@ def without_friction(result: Diagnosis) -> dict[str, float | None] | None:
     """
     if not any(p.trial.force is not None and p.stimulus.slide.any() for p in result.predictors):
         return None
-    base = result.base.model
-    smooth = replace(base, parameters=replace(base.parameters, mus=0.0, mud=0.0, ct=0.0))
-    return {use: nrmse(result.of(use), smooth, result.full) for use in ("fit", "check")}
+    return {use: nrmse(result.of(use), smooth(result.base.model), result.full) for use in ("fit", "check")}
+
+
+def smooth(model: Model) -> Model:
+    """Return a model without the base model's friction."""
+    return replace(model, parameters=replace(model.parameters, mus=0.0, mud=0.0, ct=0.0))
 
 
 def noise_floor(result: Diagnosis) -> float:

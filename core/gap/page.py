@@ -13,6 +13,8 @@ from .diagnose import Diagnosis
 from .phases import FEATURES
 from .plots import PICTURES
 
+WIDE = 20.0
+"""An interval that reaches so many times below and above the value tells nothing of it."""
 STYLE = """
 body { font: 15px/1.5 system-ui, sans-serif; color: #1c2430; max-width: 56rem; margin: 2rem auto; padding: 0 1rem }
 h1 { font-size: 1.5rem; margin-bottom: 0 } h2 { font-size: 1.1rem; margin-top: 2rem }
@@ -20,7 +22,7 @@ h1 { font-size: 1.5rem; margin-bottom: 0 } h2 { font-size: 1.1rem; margin-top: 2
 table { border-collapse: collapse } td, th { padding: .2rem .8rem .2rem 0; text-align: left; vertical-align: top }
 th { font-weight: 600; border-bottom: 1px solid #9aa3ad } td.number { text-align: right; font-variant-numeric: tabular-nums }
 figure { margin: 1.2rem 0 } figcaption { color: #68727f; font-size: .9rem } img { max-width: 100% }
-.pair { display: flex; flex-wrap: wrap; gap: 1rem } .pair figure { flex: 1 1 20rem; margin: 0 }
+.pair { display: flex; flex-wrap: wrap; gap: 1rem } .pair figure { flex: 1 1 20rem; margin: 0; max-width: 30rem }
 """
 
 
@@ -39,10 +41,10 @@ def page(result: Diagnosis, found: dict[str, Any], headline: str, pictures: list
     shown = {name: _picture(folder / f"{name}.png", PICTURES[name][1]) for name in pictures}
     rig = result.rig
     seconds = sum(float(t.time[-1] - t.time[0]) for t in rig.trials)
-    uses = f"{len(result.of('fit'))} trials fitted, {len(result.of('check'))} for checking only"
+    uses = f"{_count(len(result.of('fit')), 'trial')} fitted, {len(result.of('check'))} for checking only"
     parts = [
         f"<h1>{escape(rig.name)}</h1>",
-        f"<p>{len(rig.texels)} texels, {uses}, {seconds:.0f} s in all.</p>",
+        f"<p>{_count(len(rig.texels), 'texel')}, {uses}, {seconds:.0f} s in all.</p>",
         f'<p class="verdict">{escape(headline)}</p>',
         '<div class="pair">' + shown.get("gap", "") + shown.get("loops", "") + "</div>",
         _gap_table(found),
@@ -66,6 +68,10 @@ def page(result: Diagnosis, found: dict[str, Any], headline: str, pictures: list
     )
 
 
+def _count(number: int, what: str) -> str:
+    return f"{number} {what}" + ("" if number == 1 else "s")
+
+
 def _picture(path: Path, caption: str) -> str:
     data = base64.b64encode(path.read_bytes()).decode()
     text = escape(caption)
@@ -81,7 +87,7 @@ def _table(head: list[str], rows: list[list[str]], numeric: set[int] = frozenset
 
 
 def _gap_table(found: dict[str, Any]) -> str:
-    gap = found["gap"]
+    gap, bare = found["gap"], found["base"]["gap_without_friction"]
     rows = []
     for use, words in (("fit", "fitted trials"), ("check", "check trials, never fitted")):
         before, after = gap["before"][use], gap["after"][use]
@@ -90,9 +96,14 @@ def _gap_table(found: dict[str, Any]) -> str:
         floor = gap["noise_floor"]
         left = [max(value**2 - floor**2, 0.0) ** 0.5 for value in (before, after)]
         closed = f"{1.0 - left[1] / left[0]:.0%}" if left[0] > 0.2 * floor else "–"
-        rows.append([words, f"{before:.3%}", f"{after:.3%}", f"{floor:.3%}", closed])
+        row = [words, f"{before:.3%}", f"{after:.3%}" if found["found"] else "–", f"{floor:.3%}"]
+        rows.append([*row, closed if found["found"] else "–"])
+        if bare is not None:
+            rows[-1].insert(1, f"{bare[use]:.3%}")
     head = ["NRMSE, share of the range", "base", "amended", "noise floor", "gap closed, noise removed"]
-    return "<h2>The gap</h2>" + _table(head, rows, {1, 2, 3, 4})
+    if bare is not None:
+        head.insert(1, "base without its friction")
+    return "<h2>The gap</h2>" + _table(head, rows, set(range(1, len(head))))
 
 
 def _found(found: dict[str, Any]) -> str:
@@ -129,7 +140,7 @@ def _numbers(result: Diagnosis, found: dict[str, Any]) -> str:
     rows = []
     for name, value in found["base"]["parameters"].items():
         low, high = found["base"]["intervals"][name]
-        rows.append(["base model", name, f"{value:.4g}", f"{low:.4g} … {high:.4g}", units.get(name, "1")])
+        rows.append(["base model", name, f"{value:.4g}", _interval(value, low, high), units.get(name, "1")])
     for one in found["found"]:
         for parameter in form_of(one["effect"], one["form"]).parameters:
             value = one["parameters"].get(parameter.name)
@@ -140,9 +151,17 @@ def _numbers(result: Diagnosis, found: dict[str, Any]) -> str:
                 )
             elif value is not None:
                 low, high = one["intervals"].get(parameter.name, (value, value))
-                rows.append([one["effect"], parameter.name, f"{value:.4g}", f"{low:.4g} … {high:.4g}", own])
+                rows.append([one["effect"], parameter.name, f"{value:.4g}", _interval(value, low, high), own])
     head = ["", "parameter", "value", "95 % interval", "unit"]
-    return "<h2>Parameters of the amended sensor</h2>" + _table(head, rows, {2, 3})
+    what = "amended sensor" if found["found"] else "base model, refitted"
+    return f"<h2>Parameters of the {what}</h2>" + _table(head, rows, {2, 3})
+
+
+def _interval(value: float, low: float, high: float) -> str:
+    """An interval in words; one of a positive number that leaves its size open is none."""
+    if low >= 0.0 and high > WIDE * value and low * WIDE <= value:
+        return "not told by these recordings"
+    return f"{low:.4g} … {high:.4g}"
 
 
 def _open_questions(found: dict[str, Any]) -> str:
@@ -178,9 +197,10 @@ def _ruled_out(found: dict[str, Any]) -> str:
 
 
 def _recording(result: Diagnosis) -> str:
-    noise, c = result.noise[0], result.coverage
+    read, c = any(p.trial.reading is not None for p in result.predictors), result.coverage
+    noise, unit = result.noise[0 if read else 1], result.rig.parameters.unit if read else "N"
     rows = [
-        ["noise of a reading", f"{noise.deviation:.3g} {result.rig.parameters.unit}, from {noise.source}"],
+        [f"noise of a {'reading' if read else 'net force'}", f"{noise.deviation:.3g} {unit}, from {noise.source}"],
         ["memory of the noise", "none" if noise.memory < 1.5 else f"{noise.memory:.3g} samples"],
         ["texels touched", f"{c.texels:.0%}"],
         ["fast to slow loading", f"{c.rates:.3g} to 1"],

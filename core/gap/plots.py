@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..canvas import INK, NORMAL_COLOUR, SHEAR_COLOUR, WIDTHS, new_figure, save_figure, tidy_axes
+from ..canvas import GREY, INK, NORMAL_COLOUR, SHEAR_COLOUR, WIDTHS, new_figure, save_figure, tidy_axes
 from ..layout import GridLayout
-from .compare import noise_floor, nrmse, rms_by_texel, where
+from .compare import noise_floor, nrmse, rms_by_texel, smooth, where, without_friction
 from .diagnose import Diagnosis
 from .model import Model, Predictor
 from .phases import PHASES
@@ -28,12 +28,14 @@ def gap_bars(result: Diagnosis) -> Figure:
     figure = new_figure(WIDTHS["single"], 2.5)
     axes = figure.add_axes((0.15, 0.18, 0.82, 0.58))
     uses = [use for use in ("fit", "check") if result.of(use)]
-    for offset, (label, model, colour) in enumerate(_models(result)):
+    shown = [*_rough(result), *_models(result)]
+    wide = 0.72 / max(len(shown), 2)
+    for offset, (label, model, colour) in enumerate(shown):
         heights = [100.0 * (nrmse(result.of(use), model, result.full) or 0.0) for use in uses]
-        places = np.arange(len(uses)) + 0.36 * (offset - 0.5)
-        bars = axes.bar(places, heights, 0.34, color=colour, label=label)
+        places = np.arange(len(uses)) + wide * (offset - 0.5 * (len(shown) - 1))
+        bars = axes.bar(places, heights, 0.95 * wide, color=colour, label=label)
         for bar, height in zip(bars, heights, strict=True):
-            axes.text(bar.get_x() + 0.17, height, f"{height:.2f}", ha="center", va="bottom", fontsize=8, color=INK)
+            axes.text(bar.get_x() + 0.475 * wide, height, f"{height:.2f}", ha="center", va="bottom", fontsize=8, color=INK)
     floor = 100.0 * noise_floor(result)
     axes.axhline(floor, color=INK, lw=0.9, ls=(0, (4, 3)), label=f"noise floor {floor:.2f} %")
     names = {"fit": "fitted trials", "check": "check trials,\nnever fitted"}
@@ -46,7 +48,14 @@ def gap_bars(result: Diagnosis) -> Figure:
 
 
 def _models(result: Diagnosis) -> list[tuple[str, Model, str]]:
-    return [("base model", result.base.model, BEFORE), ("amended", result.best.model, AFTER)]
+    """The models to be compared: the base alone where nothing was added to it."""
+    base = ("base model", result.base.model, BEFORE)
+    return [base, ("amended", result.best.model, AFTER)] if result.best.model.effects else [base]
+
+
+def _rough(result: Diagnosis) -> list[tuple[str, Model, str]]:
+    """The base model without its friction, where a surface slides."""
+    return [] if without_friction(result) is None else [("without friction", smooth(result.base.model), GREY)]
 
 
 def curves(result: Diagnosis) -> Figure:
@@ -105,7 +114,7 @@ def error_map(result: Diagnosis) -> Figure:
     figure = new_figure(WIDTHS["single"], 2.9)
     image: Any = None
     for i, (label, values) in enumerate(maps):
-        axes = figure.add_axes((0.02 + 0.4 * i, 0.04, 0.36, 0.84))
+        axes = figure.add_axes((0.02 + 0.4 * (i + 0.5 * (2 - len(maps))), 0.04, 0.36, 0.84))
         if isinstance(layout, GridLayout):
             picture: Any = np.ma.masked_array(layout.image(values), ~layout.mask())
             image = axes.imshow(picture, origin="lower", cmap="inferno", vmin=0.0, vmax=top, interpolation="nearest")
@@ -130,7 +139,13 @@ def phase_bars(result: Diagnosis) -> Figure:
         left = ((nrmse(result.of("fit"), model, result.full) or 0.0) / base) ** 2
         shares = {entry["phase"]: entry["share"] for entry in where(result, model) if "phase" in entry}
         heights = [100.0 * left * shares[phase] for phase in PHASES]
-        axes.bar(np.arange(len(PHASES)) + 0.36 * (offset - 0.5), heights, 0.34, color=colour, label=label)
+        axes.bar(
+            np.arange(len(PHASES)) + 0.36 * (offset - 0.5 * (len(_models(result)) - 1)),
+            heights,
+            0.34,
+            color=colour,
+            label=label,
+        )
     axes.set_xticks(np.arange(len(PHASES)), PHASES, rotation=25, ha="right", rotation_mode="anchor")
     axes.set_ylabel("squared error\n(% of that of the base)")
     tidy_axes(axes)
@@ -153,15 +168,15 @@ def loops(result: Diagnosis) -> Figure:
     else:
         x, label = 1e3 * s.depth.max(axis=1), "depth (mm)"
     figure = new_figure(WIDTHS["single"], 2.5)
-    axes = figure.add_axes((0.19, 0.18, 0.78, 0.68))
+    axes = figure.add_axes((0.21, 0.18, 0.76, 0.62))
     axes.plot(x, measured, ".", ms=4.0, mew=0, color=MEASURED, alpha=0.55, zorder=3, label="measured")
     for text, model, colour in _models(result):
         axes.plot(x, pick(model), lw=0.8, color=colour, ls="--" if text == "base model" else "-", label=text)
     axes.set_xlabel(label)
     axes.set_ylabel(_quantity(result, name))
-    axes.set_title(f"{trial.name}: {name}", loc="left", fontsize=8.5, color=INK)
+    axes.set_title(f"{trial.name}: {name}", loc="left", fontsize=8.5, color=INK, pad=18)
     tidy_axes(axes)
-    axes.legend(frameon=False, fontsize=8, loc="best")
+    axes.legend(frameon=False, fontsize=8, ncols=3, loc="lower left", bbox_to_anchor=(-0.04, 0.98), columnspacing=1.0)
     return figure
 
 

@@ -33,7 +33,7 @@ def brake(backlash):
     return Rig("brake", texels, PARAMETERS, frozenset(), None, None, None, tuple(trials))
 
 
-def test_the_report_says_what_friction_does_and_what_is_left():
+def test_the_report_says_what_friction_does_and_what_is_left(tmp_path):
     *_, result = diagnose(brake(backlash=2.0))
     bare, own = without_friction(result), nrmse(result.of("fit"), result.base.model, result.full)
     assert bare["fit"] > 3.0 * own and bare["check"] > 3.0 * nrmse(result.of("check"), result.base.model, result.full)
@@ -42,6 +42,10 @@ def test_the_report_says_what_friction_does_and_what_is_left():
     said = report.headline(result)
     assert "slid since it last turned" in said and "Friction is not missing" in said
     assert report.summary(result)["base"]["gap_without_friction"] == bare
+    *_, _ = report.write(result, tmp_path)
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "1 texel, 1 trial fitted" in page and "base without its friction" in page and "base model, refitted" in page
+    assert "not told by these recordings" in page  # friction and stiffness are known as a product alone
 
 
 def test_the_way_since_the_last_turn():
