@@ -96,8 +96,8 @@ def _sliding_more(result: Diagnosis) -> str:
         return ""
     hint = {
         "turning": (
-            "turn back after slides of several lengths, some very slowly, to see whether what is left goes with the way or with "
-            "the time since the turn"
+            "turn back after slides of several lengths, some very slowly, to see whether what is left goes with the way "
+            "or with the time since the turn"
         ),
         "sliding": "slide both ways at several constant speeds",
     }.get(result.structure.strongest, "repeat one trial exactly, to see what of the difference comes again")
