@@ -149,3 +149,34 @@ def declared(scenario: Scenario, skins) -> tuple[tuple[Sensor, ...], tuple[Targe
         first = part.mesh.vertices if skin.follower is None else skin.follower.frames(skin.follower.start, skin.name)
         group[skin.index] = replace(part, deformation=Deformation(np.zeros(1), first[None]))
     return tuple(sensors), tuple(targets)
+
+
+class Shapes:
+    """Shapes of what may deform, frame after frame; those that never change take the room of one."""
+
+    def __init__(self, scenario: Scenario):
+        groups = (("target", scenario.targets), ("sensor", scenario.sensors))
+        self._known = {
+            (kind, index): [part.deformation.values[0]]
+            for kind, group in groups
+            for index, part in enumerate(group)
+            if part.deformation is not None
+        }
+        self._seen: dict[tuple[str, int], np.ndarray] = {}
+
+    def append(self, shapes: dict[tuple[str, int], np.ndarray]) -> None:
+        """Add what one more sample says."""
+        for place, found in shapes.items():
+            known, seen = self._known[place], self._seen.get(place)
+            same = found is seen or np.array_equal(found, known[-1])
+            known.append(known[-1] if same else found)
+            self._seen[place] = found
+
+    def finished(self, scenario: Scenario, times: np.ndarray) -> tuple[tuple[Sensor, ...], tuple[Target, ...]]:
+        """Return sensors and targets with their deformations; without where nothing has changed."""
+        groups = {"sensor": list(scenario.sensors), "target": list(scenario.targets)}
+        for (kind, index), samples in self._known.items():
+            still = all(found is samples[0] for found in samples)
+            deformation = None if still else Deformation(times, np.array(samples))
+            groups[kind][index] = replace(groups[kind][index], deformation=deformation)
+        return tuple(groups["sensor"]), tuple(groups["target"])

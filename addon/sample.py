@@ -19,7 +19,7 @@ import numpy as np
 
 from ..core.errors import SceneError
 from ..core.mesh import TriangleMesh, checked_mesh, mass_properties
-from ..core.scenario import Body, Deformation, Motion, Painted, Scenario, Sensor, SensorParameters, Signal, Target
+from ..core.scenario import Body, Motion, Painted, Scenario, Sensor, SensorParameters, Signal, Target
 from ..core.texels import texels_from_region
 from . import clock, deform, drives, effects, freebodies, identity, meshes, parts, properties, transforms, units, uvmaps
 from .jobs import Progress
@@ -92,6 +92,8 @@ class Binding:
         Fingerprints, frame by frame, of what those and other objects that become meshes look like; by name.
     seen : Seen
         Their surfaces as they were read last.
+    placed : dict of int to (bytes, pose)
+        Matrices as they were read last, and the poses that they are, by body index: most bodies rest most of the time.
     """
 
     keys: tuple[str, ...]
@@ -107,6 +109,7 @@ class Binding:
     skins: tuple[deform.Skin, ...]
     looks: dict[str, list[str]] = field(default_factory=dict)
     seen: Seen = field(default_factory=Seen)
+    placed: dict[int, tuple] = field(default_factory=dict)
 
     def sensor_objects(self, scene) -> list:
         """Return the objects that hold the sensors and pads, by sensor index; None for one that was deleted."""
@@ -281,17 +284,25 @@ def sample_moment(scene, depsgraph, binding: Binding) -> Moment:
             matrix = _world(obj, depsgraph)
         if index not in binding.starts:
             matrices[index] = matrix
-        position, quaternion, stretch = _split(obj, matrix)
-        rigid = index not in may_change or not deform.has_animated_scale(obj)
-        if rigid and np.abs(stretch - binding.stretch[index]).max() > SAME_STRETCH * np.abs(binding.stretch[index]).max():
-            raise SceneError(
-                f"The scale of '{obj.name}' changes (frame {scene.frame_current}) without keyframes or drivers of its own or a "
-                "parent: give it some, or keep the scale constant."
-            )
-        poses[index] = position * binding.scale, quaternion
+        before, poses[index] = binding.placed.get(index, (b"", None))
+        if matrix.tobytes() != before:
+            rigid = index not in may_change or not deform.has_animated_scale(obj)
+            poses[index] = _pose(scene, obj, matrix, binding.scale, binding.stretch[index] if rigid else None)
+            binding.placed[index] = matrix.tobytes(), poses[index]
     if binding.parts:
         parts.check_places(scene, depsgraph, binding.parts)
     return Moment(poses, parents, targets, *_shapes(scene, depsgraph, binding, matrices))
+
+
+def _pose(scene, obj, matrix: np.ndarray, scale: float, stretch: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
+    """Return the pose of an object's body, whose stretch has to be as it was where it is given."""
+    position, quaternion, found = _split(obj, matrix)
+    if stretch is not None and np.abs(found - stretch).max() > SAME_STRETCH * np.abs(stretch).max():
+        raise SceneError(
+            f"The scale of '{obj.name}' changes (frame {scene.frame_current}) without keyframes or drivers of its own or a "
+            "parent: give it some, or keep the scale constant."
+        )
+    return position * scale, quaternion
 
 
 def _shapes(scene, depsgraph, binding: Binding, matrices: dict[int, np.ndarray]) -> tuple[dict, dict]:
@@ -335,7 +346,7 @@ def _sample_scenario(scene) -> Generator[Progress, None, tuple[Scenario, Binding
     motions = {index: body.motion for index, body in enumerate(scenario.bodies) if not body.free}
     samples = {index: [(motion.positions[0], motion.quaternions[0])] for index, motion in motions.items()}
     targets = {index: list(scenario.bodies[index].drive.target.values) for index in binding.driven}
-    shapes = Shapes(scenario)
+    shapes = deform.Shapes(scenario)
     yield Progress("Reading", frames[0], 1, len(frames))
     for frame in frames[1:]:
         for part in range(1, parts_of_frame + 1):
@@ -346,7 +357,7 @@ def _sample_scenario(scene) -> Generator[Progress, None, tuple[Scenario, Binding
                 samples[index].append(pose)
             for index, value in moment.targets.items():
                 targets[index].append(value)
-            shapes.append(moment)
+            shapes.append(moment.shapes)
         for index, matrix in moment.parents.items():
             binding.parents[index].append(matrix)
         _look(scene, watched, binding)
@@ -384,37 +395,6 @@ def _unchanged_masses(scenario: Scenario) -> tuple[str, ...]:
         if target.deformation is not None and scenario.bodies[target.body].name == target.name
         if scenario.bodies[target.body].moved_by_forces
     )
-
-
-class Shapes:
-    """Shapes of what may deform, frame after frame; those that never change take the room of one."""
-
-    def __init__(self, scenario: Scenario):
-        groups = (("target", scenario.targets), ("sensor", scenario.sensors))
-        self._known = {
-            (kind, index): [part.deformation.values[0]]
-            for kind, group in groups
-            for index, part in enumerate(group)
-            if part.deformation is not None
-        }
-        self._seen: dict[tuple[str, int], np.ndarray] = {}
-
-    def append(self, moment: Moment) -> None:
-        """Add what one more sample says."""
-        for place, found in moment.shapes.items():
-            known, seen = self._known[place], self._seen.get(place)
-            same = found is seen or np.array_equal(found, known[-1])
-            known.append(known[-1] if same else found)
-            self._seen[place] = found
-
-    def finished(self, scenario: Scenario, times: np.ndarray) -> tuple[tuple[Sensor, ...], tuple[Target, ...]]:
-        """Return sensors and targets with their deformations; without where nothing has changed."""
-        groups = {"sensor": list(scenario.sensors), "target": list(scenario.targets)}
-        for (kind, index), samples in self._known.items():
-            still = all(found is samples[0] for found in samples)
-            deformation = None if still else Deformation(times, np.array(samples))
-            groups[kind][index] = replace(groups[kind][index], deformation=deformation)
-        return tuple(groups["sensor"]), tuple(groups["target"])
 
 
 def _whole_and_part(frame: int, part: int, parts_of_frame: int) -> tuple[int, float]:
