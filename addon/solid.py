@@ -22,7 +22,7 @@ NAME = "Palpate Colour"
 PLAIN = (0.8, 0.8, 0.8, 1.0)
 """Linear colour of what has no material."""
 CLEAR_NODES = {"BSDF_TRANSPARENT", "BSDF_GLASS", "BSDF_REFRACTION"}
-CLEAR = 0.25
+CLEAR = 0.12
 """How solid Workbench draws glass."""
 
 

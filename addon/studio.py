@@ -116,9 +116,11 @@ def photographed(
                 made.append(world)
         if scene.render.engine == "BLENDER_WORKBENCH":
             shading = scene.display.shading
-            change(shading, "light", "STUDIO")
+            change(shading, "light", "FLAT")  # in a lamp's shade a heat map would not have the colours of its bar
             change(shading, "color_type", "VERTEX")
             change(shading, "show_cavity", True)
+            change(shading, "cavity_type", "BOTH")
+            change(shading, "show_object_outline", True)
             change(scene.display, "render_aa", "16")
         if scene.view_settings.view_transform != "Standard":  # a heat map must have the colours of its colour bar
             change(scene.view_settings, "view_transform", "Standard")
