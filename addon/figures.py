@@ -44,15 +44,20 @@ class PALPATE_PG_figures(bpy.types.PropertyGroup):
     )
     kinds: EnumProperty(
         name="Figures",
-        description="What is made",
+        description="What is made; Shift-click adds one to those chosen",
         items=KINDS,
         default={"SCENE", "STRIP", "CURVES", "NUMBERS"},
         options={"ENUM_FLAG"},
     )
-    exports: EnumProperty(name="Data", description="What is written beside them", items=EXPORTS, options={"ENUM_FLAG"})
+    exports: EnumProperty(
+        name="Data",
+        description="What is written beside them; Shift-click adds one to those chosen",
+        items=EXPORTS,
+        options={"ENUM_FLAG"},
+    )
     formats: EnumProperty(
         name="Files",
-        description="Of figures that are no renders",
+        description="Of figures that are no renders; Shift-click adds one to those chosen",
         items=FORMATS,
         default={"PNG", "PDF"},
         options={"ENUM_FLAG"},

@@ -525,7 +525,7 @@ class PALPATE_PG_scene(bpy.types.PropertyGroup):
     )
     overlays: EnumProperty(
         name="On Baked Sensors",
-        description="What a bake puts on its sensors, besides the heat map",
+        description="What a bake puts on its sensors, besides the heat map; Shift-click adds one to those chosen",
         items=OVERLAYS,
         default={"FORCE"},
         options={"ENUM_FLAG"},

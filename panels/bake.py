@@ -74,7 +74,7 @@ class Figures(Part):
     def draw_part(self, layout, _settings, context):
         own = context.scene.palpate.figures
         layout.prop(own, "folder", text="")
-        layout.grid_flow(columns=3, even_columns=True, align=True).prop(own, "kinds")
+        layout.grid_flow(columns=1, even_columns=True, align=True).prop(own, "kinds")
         if own.kinds & {"STRIP", "CURVES", "NUMBERS"}:
             layout.row(align=True).prop(own, "formats")
             layout.prop(own, "width")
@@ -92,7 +92,7 @@ class Figures(Part):
             column.prop(own, "transparent")
         layout.use_property_split = False
         layout.label(text="Data:")
-        layout.column(align=True).prop(own, "exports")
+        layout.grid_flow(columns=1, even_columns=True, align=True).prop(own, "exports")
         layout.operator("palpate.figures_make", icon="RENDER_STILL")
 
 
