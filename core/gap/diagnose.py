@@ -283,7 +283,9 @@ def _conclude(result: Diagnosis, account: Account, ground: Ground) -> None:
 
 def _is_doubtful(effect: Effect, account: Account, fitted: Sequence[Effect]) -> bool:
     """Whether one of several effects may only be what the formula of another lacks."""
-    gain = account.gains.get(effect.name)
+    gain, step = account.gains.get(effect.name), account.steps.get(effect.name)
+    if step is not None and step.again < RIVAL * step.of(effect.name):
+        return True
     if gain is None or gain.of_all >= SMALL:
         return False
     if gain.of_left < NEARLY_ALL:

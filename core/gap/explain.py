@@ -17,7 +17,7 @@ import numpy as np
 
 from ..effects.library import library
 from .admissible import admissible
-from .candidates import Candidate, Scales, candidates
+from .candidates import READ_OFF, Candidate, Scales, candidates
 from .fit import Fit, Free, fit, held_out
 from .model import Model
 from .noise import Coverage
@@ -108,10 +108,13 @@ class Step:
         Those that were judged and that the recordings do not refute, best first.
     left : list of float
         What each leaves of the gap, with a little for what no fit can tell.
+    again : float
+        What the best second effect of a kind that is in the model already leaves: more freedom for its formula.
     """
 
     ranked: list[Found]
     left: list[float]
+    again: float = np.inf
 
     def of(self, name: str) -> float:
         """What the best form of a kind leaves; infinite if it was not judged."""
@@ -208,7 +211,8 @@ class Explainer:
     def _look(self, account: Account, start: float, share: float, first: bool = False, friction: bool = False) -> Work:
         """Judge every effect that the model has not yet on top of it."""
         taken = {effect.name for effect in account.fit.model.effects}
-        forms = [c for c in candidates([s.predictor for s in self.views.whole], account.fit.model) if c.name not in taken]
+        forms = candidates([s.predictor for s in self.views.whole], account.fit.model)
+        forms = [c for c in forms if c.name not in taken or may_repeat(c)]
         forms = [c for c in forms if not is_free_already(c, account.fit.free) and (first or c.name not in self.mixed)]
         if self.ground.both:
             forms = [c for c in forms if (c.form.friction is not None) == friction]
@@ -216,17 +220,18 @@ class Explainer:
         for what, done, found in search(self.views, account.fit, forms, self.scales):
             yield what, start + share * done
             ranked = found or ranked
-        return self._ranked([one for one in ranked if admissible(one, self.views)])
+        return self._ranked([one for one in ranked if admissible(one, self.views)], taken)
 
-    def _ranked(self, judged: list[Found]) -> Step:
+    def _ranked(self, judged: list[Found], taken: set[str]) -> Step:
         """Put what was judged in order of what it leaves."""
         if not judged:
             return Step([], [])
         means = [means_of(one.unseen, one.fit) for one in judged]
         side = self.ground.side(judged[0].candidate.name)
         left = [x + 0.004 * self.ground.gap(side) + 0.01 for x in self._left(means, side)]
-        order = np.argsort(left, kind="stable")
-        return Step([judged[i] for i in order], [left[i] for i in order])
+        again = [i for i, one in enumerate(judged) if one.candidate.name in taken]
+        order = [int(i) for i in np.argsort(left, kind="stable") if i not in again]
+        return Step([judged[i] for i in order], [left[i] for i in order], min((left[i] for i in again), default=np.inf))
 
     def _left(self, means: Sequence[np.ndarray], side: int) -> list[float]:
         """What each of some models leaves of the gap.
@@ -348,6 +353,11 @@ class Explainer:
                 break
             account = replace(longer, first=account.first)
         return account
+
+
+def may_repeat(candidate: Candidate) -> bool:
+    """Whether a second effect of the kind would be more than the first with other numbers."""
+    return not candidate.local and candidate.name not in READ_OFF and candidate.form.place is None
 
 
 def is_free_already(candidate: Candidate, free: Sequence[Free]) -> bool:

@@ -1,0 +1,58 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What earns a place and what is a sure name: gaps of readings and of forces, steps that are seen, and what a formula lacks."""
+
+import numpy as np
+import pytest
+
+from palpate.core.effects.library import effect
+from palpate.core.gap.diagnose import _is_doubtful
+from palpate.core.gap.explain import FORCES, READINGS, Account, Gain, Ground, Step, friction_kinds
+from palpate.core.gap.search import few_levels
+
+
+def test_readings_and_forces_have_a_gap_each():
+    ground = Ground(np.array([11.0, 101.0]), np.array([1.0, 1.0]), np.array([8400.0, 300.0]))
+    assert friction_kinds() == ["stribeck", "viscous-friction"]
+    assert ground.side("stribeck") == FORCES and ground.side("creep") == READINGS
+    after = np.array([2.0, 51.0])
+    assert ground.closed(after, READINGS) == pytest.approx(0.9) and ground.closed(after, FORCES) == pytest.approx(0.5)
+    gain = ground.gain(np.array([6.0, 0.0]), after, READINGS)
+    assert (gain.of_all, gain.of_left) == pytest.approx((0.4, 0.8))
+    alone = Ground(np.array([0.0, 101.0]), np.array([1.0, 1.0]), np.array([0.0, 300.0]))
+    assert alone.side("creep") == alone.side("stribeck") == FORCES  # nothing was read
+
+
+def test_a_handful_of_values_is_seen():
+    rng = np.random.default_rng(1)
+    smooth = rng.uniform(0, 1, 4000)
+    np.testing.assert_allclose(few_levels(0.25 * np.round(smooth / 0.25)), [0, 0.25, 0.5, 0.75, 1])
+    uneven = np.floor(4 * np.sqrt(smooth)) ** 2
+    assert list(few_levels(uneven)) == [0, 1, 4, 9]
+    assert few_levels(smooth) is None
+    assert few_levels(np.round(smooth, 2)) is None  # a hundred values: no step is seen by eye
+    assert few_levels(np.ones(4000)) is None
+
+
+def doubtful(second, gain, again=np.inf, **values):
+    first = effect("offset", "listed", offset=(0.1, 0.2, 0.4, 0.3))
+    other = effect(*second, **values)
+
+    class Alone(Step):
+        def of(self, name):
+            return 1.0
+
+    account = Account(None, None, {other.name: Alone([], [], again)}, {other.name: gain})
+    return _is_doubtful(other, account, [first, other])
+
+
+def test_a_small_effect_is_sure_where_it_closes_nearly_all_that_is_left():
+    creep = ("creep", "exponential")
+    assert not doubtful(creep, Gain(0.2, 0.3)) and not doubtful(creep, Gain(0.05, 0.9))
+    assert doubtful(creep, Gain(0.05, 0.5))
+    assert doubtful(creep, Gain(0.2, 0.9), again=1.1)  # more of what is there already would do as well
+
+
+def test_an_offset_that_fades_is_no_gain():
+    gains = ("gain-mismatch", "listed")
+    assert doubtful(gains, Gain(0.05, 0.9), factor=(0.95, 0.9, 0.8, 0.86))
+    assert not doubtful(gains, Gain(0.05, 0.9), factor=(0.95, 1.1, 0.9, 1.0))
