@@ -30,7 +30,7 @@ EXPLAINED = 0.5
 PART, APART = 0.35, 1.5
 """Share from which on an effect is a sure name although much is left, where all others leave so many times as much."""
 RIVAL = 1.35
-"""A rival is one that leaves at most so many times as much of the gap as the best does."""
+"""A rival is one that leaves at most so many times as much of the gap as the best does, and closes nearly as much."""
 SMALL, NEARLY_ALL = 0.1, 0.7
 """One of several that closes a smaller share of the whole gap may be what the others' formulas lack: it is no sure name, unless
 it closes so much of what they leave, as what a formula lacks seldom looks like another effect."""
@@ -260,16 +260,18 @@ def _conclude(result: Diagnosis, account: Account, ground: Ground) -> None:
     for index, effect in enumerate(effects):
         step = account.steps.get(effect.name, Step([], []))
         others: dict[str, float] = {}
+        leaves: dict[str, float] = {}
         own = step.of(effect.name)
         for one, left in zip(step.ranked, step.left, strict=True):
             name = one.candidate.name
             if name not in {e.name for e in effects} and not (effect.name == "dead-texels" and one.candidate.local):
-                others[name] = min(left / own, others.get(name, np.inf))
+                others[name] = min(step.worse(left, effect.name), others.get(name, np.inf))
+                leaves[name] = min(left / own, leaves.get(name, np.inf))
         same = [name for name in alike(result.coverage, effect.name) if name not in {e.name for e in effects}]
         rivals = tuple(dict.fromkeys([*(name for name, ratio in others.items() if ratio < RIVAL), *same]))
         weight = 1.0 / (1.0 + sum(ratio**-4.0 for ratio in others.values()))
         share = closed[ground.side(effect.name)] if fitted else 1.0
-        apart = min(others.values(), default=np.inf) > APART
+        apart = min(leaves.values(), default=np.inf) > APART
         confidence = weight * (0.5 + 0.5 * share if share >= (PART if apart else EXPLAINED) else 0.5 * share)
         if rivals or (len(fitted) > 1 and _is_doubtful(effect, account, fitted)):
             confidence = min(confidence, 0.45)
@@ -277,7 +279,7 @@ def _conclude(result: Diagnosis, account: Account, ground: Ground) -> None:
             result.ambiguous.append((effect.name, *rivals))
         nearest = min(others, key=lambda name: others[name], default="")
         result.named.append(
-            Named(index, effect.name, effect.form, round(confidence, 3), rivals, nearest, others.get(nearest, np.inf))
+            Named(index, effect.name, effect.form, round(confidence, 3), rivals, nearest, leaves.get(nearest, np.inf))
         )
 
 

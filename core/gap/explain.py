@@ -25,7 +25,7 @@ from .search import Found, Views, search
 from .structure import Structure
 from .telling import confounded
 
-FIRST, NEXT, NEXT_OF_ALL = 0.25, 0.2, 0.03
+FIRST, NEXT, NEXT_OF_ALL = 0.25, 0.2, 0.02
 """Least share of the gap that the first effect closes; of what is left that a further one closes; and of the whole gap."""
 LEAST = 0.02
 """Least decrease of the mean square on unseen trials, in units of the noise's variance."""
@@ -108,18 +108,29 @@ class Step:
         Those that were judged and that the recordings do not refute, best first.
     left : list of float
         What each leaves of the gap, with a little for what no fit can tell.
+    before : float
+        What was left without any of them.
     again : float
         What the best second effect of a kind that is in the model already leaves: more freedom for its formula.
     """
 
     ranked: list[Found]
     left: list[float]
+    before: float = np.inf
     again: float = np.inf
 
     def of(self, name: str) -> float:
         """What the best form of a kind leaves; infinite if it was not judged."""
         own = [left for one, left in zip(self.ranked, self.left, strict=True) if one.candidate.name == name]
         return min(own, default=np.inf)
+
+    def worse(self, left: float, name: str) -> float:
+        """How many times as bad one is that leaves so much as the kind of this name: by what it leaves or by what it closes.
+
+        The two are one where hardly anything is left. Where much is left whatever is taken, what they close tells more.
+        """
+        own = self.of(name)
+        return max(left / own, (self.before - own) / max(self.before - left, 1e-12)) if self.before < np.inf else left / own
 
 
 @dataclass(frozen=True)
@@ -220,18 +231,20 @@ class Explainer:
         for what, done, found in search(self.views, account.fit, forms, self.scales):
             yield what, start + share * done
             ranked = found or ranked
-        return self._ranked([one for one in ranked if admissible(one, self.views)], taken)
+        return self._ranked([one for one in ranked if admissible(one, self.views)], account)
 
-    def _ranked(self, judged: list[Found], taken: set[str]) -> Step:
+    def _ranked(self, judged: list[Found], account: Account) -> Step:
         """Put what was judged in order of what it leaves."""
         if not judged:
             return Step([], [])
-        means = [means_of(one.unseen, one.fit) for one in judged]
+        means = [*(means_of(one.unseen, one.fit) for one in judged), account.means]
         side = self.ground.side(judged[0].candidate.name)
-        left = [x + 0.004 * self.ground.gap(side) + 0.01 for x in self._left(means, side)]
+        *left, before = (x + 0.004 * self.ground.gap(side) + 0.01 for x in self._left(means, side))
+        taken = {effect.name for effect in account.fit.model.effects}
         again = [i for i, one in enumerate(judged) if one.candidate.name in taken]
         order = [int(i) for i in np.argsort(left, kind="stable") if i not in again]
-        return Step([judged[i] for i in order], [left[i] for i in order], min((left[i] for i in again), default=np.inf))
+        repeated = min((left[i] for i in again), default=np.inf)
+        return Step([judged[i] for i in order], [left[i] for i in order], before, repeated)
 
     def _left(self, means: Sequence[np.ndarray], side: int) -> list[float]:
         """What each of some models leaves of the gap.

@@ -41,7 +41,7 @@ def doubtful(second, gain, again=np.inf, **values):
         def of(self, name):
             return 1.0
 
-    account = Account(None, None, {other.name: Alone([], [], again)}, {other.name: gain})
+    account = Account(None, None, {other.name: Alone([], [], again=again)}, {other.name: gain})
     return _is_doubtful(other, account, [first, other])
 
 
@@ -56,3 +56,16 @@ def test_an_offset_that_fades_is_no_gain():
     gains = ("gain-mismatch", "listed")
     assert doubtful(gains, Gain(0.05, 0.9), factor=(0.95, 0.9, 0.8, 0.86))
     assert not doubtful(gains, Gain(0.05, 0.9), factor=(0.95, 1.1, 0.9, 1.0))
+
+
+def test_a_rival_closes_nearly_as_much():
+    """Of a gap of which most is left whatever is taken, what two leave is much alike and what they close is not."""
+
+    class Two(Step):
+        def of(self, name):
+            return {"gain-mismatch": 8.0}[name]
+
+    step = Two([], [], before=12.0)
+    assert step.worse(10.4, "gain-mismatch") == pytest.approx(4.0 / 1.6)
+    assert step.worse(16.0, "gain-mismatch") == pytest.approx(4.0 / 1e-12)  # closes nothing
+    assert Two([], [], before=1000.0).worse(10.4, "gain-mismatch") == pytest.approx(1.3)
