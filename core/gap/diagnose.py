@@ -31,6 +31,8 @@ PART, APART = 0.35, 1.5
 """Share from which on an effect is a sure name although much is left, where all others leave so many times as much."""
 RIVAL = 1.35
 """A rival is one that leaves at most so many times as much of the gap as the best does, and closes nearly as much."""
+AGAIN = 1.75
+"""So many times as bad more freedom for the formulas that are there must be, for a further effect to be more than that."""
 SMALL, NEARLY_ALL = 0.1, 0.7
 """One of several that closes a smaller share of the whole gap may be what the others' formulas lack: it is no sure name, unless
 it closes so much of what they leave, as what a formula lacks seldom looks like another effect."""
@@ -286,7 +288,7 @@ def _conclude(result: Diagnosis, account: Account, ground: Ground) -> None:
 def _is_doubtful(effect: Effect, account: Account, fitted: Sequence[Effect]) -> bool:
     """Whether one of several effects may only be what the formula of another lacks."""
     gain, step = account.gains.get(effect.name), account.steps.get(effect.name)
-    if step is not None and step.again < RIVAL * step.of(effect.name):
+    if step is not None and step.worse(step.again, effect.name) < AGAIN:
         return True
     if gain is None or gain.of_all >= SMALL:
         return False
