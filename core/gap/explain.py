@@ -31,6 +31,8 @@ LEAST = 0.02
 """Least decrease of the mean square on unseen trials, in units of the noise's variance."""
 LEAST_OF_FORCES = 0.25
 """The same for friction: sliding between two samples is integrated, and not quite as the world does it."""
+BY_FAR = 0.8
+"""Least share that what is better in some trials has in all that changes: one trial may alone have what tells."""
 STRUCTURE = 0.03
 """Share of a residual that can be predicted, below which it is noise."""
 MOST = 3
@@ -282,15 +284,16 @@ class Explainer:
         return Account(best.fit, best.unseen, {**account.steps, name: step}, {**account.gains, name: gain})
 
     def _earns(self, one: Found, account: Account, first: bool) -> bool:
-        """Whether a candidate closes enough of the gap, in most stretches of the recordings."""
+        """Whether a candidate closes enough of the gap, and hardly anywhere does worse."""
         g, side = self.ground, self.ground.side(one.candidate.name)
         before, after = account.means[side], means_of(one.unseen, one.fit)[side]
         gained, left = float(before - after), max(float(before - g.floor[side]), 1e-12)
         change = account.unseen[:, side] - one.unseen[:, side]
+        if float(change[change > 0].sum()) < BY_FAR * float(np.abs(change).sum()):
+            return False
         if g.both and side == FORCES:
-            weighty = float(change[change > 0].sum()) >= 0.8 * float(np.abs(change).sum())
-            return weighty and gained >= max(LEAST_OF_FORCES, FIRST * left)
-        if gained < LEAST or float(np.mean(change > 0)) < 0.6:
+            return gained >= max(LEAST_OF_FORCES, FIRST * left)
+        if gained < LEAST:
             return False
         return gained >= (FIRST if first else NEXT) * left and gained >= NEXT_OF_ALL * g.gap(side)
 
