@@ -25,7 +25,7 @@ from .search import Found, Views, search
 from .structure import Structure
 from .telling import confounded
 
-FIRST, NEXT, NEXT_OF_ALL = 0.25, 0.2, 0.02
+FIRST, NEXT, NEXT_OF_ALL = 0.25, 0.2, 0.01
 """Least share of the gap that the first effect closes; of what is left that a further one closes; and of the whole gap."""
 LEAST = 0.02
 """Least decrease of the mean square on unseen trials, in units of the noise's variance."""
