@@ -33,7 +33,7 @@ RIVAL = 1.35
 """A rival is one that leaves at most so many times as much of the gap as the best does, and closes nearly as much."""
 AGAIN = 1.75
 """So many times as bad more freedom for the formulas that are there must be, for a further effect to be more than that."""
-SMALL, NEARLY_ALL = 0.1, 0.7
+SMALL, NEARLY_ALL = 0.1, 0.65
 """One of several that closes a smaller share of the whole gap may be what the others' formulas lack: it is no sure name, unless
 it closes so much of what they leave, as what a formula lacks seldom looks like another effect."""
 TOGETHER = 0.8
