@@ -31,7 +31,7 @@ def stuck(x: np.ndarray, time: np.ndarray, values: Values, site: Site, seed: int
 def held(x: np.ndarray, time: np.ndarray, values: Values, site: Site, seed: int) -> np.ndarray:
     """A reading of its own for ever where a texel is listed as dead."""
     gone = np.asarray(values["dead"])
-    return (1.0 - gone) * x + gone * (site.zero + np.asarray(values["level"]))
+    return (1.0 - gone) * x + gone * np.asarray(values["level"])
 
 
 _DEAD = Parameter("dead", "1", 0.0, 0.0, 1.0, "1 for each dead texel, 0 for the others.", per_texel=True)
@@ -63,13 +63,11 @@ KIND = Kind(
         ),
         Form(
             "held",
-            "rᵢ = (1 − deadᵢ) · r₀ᵢ + deadᵢ · (r₀ + Lᵢ),  r₀ without load",
+            "rᵢ = (1 − deadᵢ) · r₀ᵢ + deadᵢ · Lᵢ",
             "Ni et al., ACM Trans. Sens. Netw. 5 (2009): stuck-at fault",
             (
                 _DEAD,
-                Parameter(
-                    "level", "unit", 0.1, -1e5, 1e5, "Reading L of a dead texel, above the one without load.", per_texel=True
-                ),
+                Parameter("level", "unit", 0.1, -1e5, 1e5, "Reading L at which a dead texel stays.", per_texel=True),
             ),
             off={"dead": 0.0},
             shape=held,

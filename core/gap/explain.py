@@ -327,7 +327,8 @@ class Explainer:
         ends = []
         for number, account in enumerate(firsts):
             step = yield from self._look(account, 0.25 + 0.35 * number / len(firsts), 0.35 / len(firsts))
-            ends.append(self._joined(account, step))
+            longer = self._joined(account, step)
+            ends += [longer] if longer is not account or account is single else []  # alone, the first one was the better choice
         remaining = self._left([end.means for end in ends], self.ground.main)
         best = int(np.argmin(remaining))
         return ends[best] if best == 0 or remaining[best] < BETTER * remaining[0] else ends[0]

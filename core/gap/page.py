@@ -158,8 +158,8 @@ def _numbers(result: Diagnosis, found: dict[str, Any]) -> str:
 
 
 def _interval(value: float, low: float, high: float) -> str:
-    """An interval in words; one of a positive number that leaves its size open is none."""
-    if low >= 0.0 and high > WIDE * value and low * WIDE <= value:
+    """An interval in words; one that leaves the number's size open is none."""
+    if (low >= 0.0 and high > WIDE * value and low * WIDE <= value) or high - low > WIDE**2 * abs(value) > 0.0:
         return "not told by these recordings"
     return f"{low:.4g} … {high:.4g}"
 

@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 
 BEFORE, AFTER = SHEAR_COLOUR, NORMAL_COLOUR
 MEASURED = INK
+LONG = 12
+"""How many times as long as wide a grid is no picture any more."""
 
 
 def gap_bars(result: Diagnosis) -> Figure:
@@ -68,7 +70,14 @@ def curves(result: Diagnosis) -> Figure:
         time = predictor.trial.time
         axes.plot(time, measured, color=MEASURED, lw=1.5, label="measured")
         for label, model, colour in _models(result):
-            axes.plot(time, pick(model), color=colour, lw=1.0, ls="--" if label == "base model" else "-", label=label)
+            axes.plot(
+                time,
+                np.where(np.isfinite(measured), pick(model), np.nan),
+                color=colour,
+                lw=1.0,
+                ls="--" if label == "base model" else "-",
+                label=label,
+            )
         axes.set_title(f"{predictor.trial.name} ({predictor.trial.use}): {name}", loc="left", fontsize=8.5, color=INK)
         axes.set_ylabel(_quantity(result, name))
         axes.margins(x=0)
@@ -111,6 +120,8 @@ def error_map(result: Diagnosis) -> Figure:
     top = max(float(values.max()) for _, values in maps)
     position = result.rig.texels.position
     layout = result.rig.texels.layout
+    if isinstance(layout, GridLayout) and LONG * min(layout.mask().shape) < max(layout.mask().shape):
+        return _error_line(maps)
     figure = new_figure(WIDTHS["single"], 2.9)
     image: Any = None
     for i, (label, values) in enumerate(maps):
@@ -127,6 +138,20 @@ def error_map(result: Diagnosis) -> Figure:
     bar = figure.colorbar(image, cax=figure.add_axes((0.82, 0.12, 0.035, 0.68)))
     bar.ax.tick_params(labelsize=8, colors=INK)
     bar.set_label("error (% of range)", fontsize=8.5, color=INK)
+    return figure
+
+
+def _error_line(maps: list[tuple[str, np.ndarray]]) -> Figure:
+    """The same for texels in a long row."""
+    figure = new_figure(WIDTHS["single"], 2.5)
+    axes = figure.add_axes((0.15, 0.2, 0.82, 0.62))
+    for (label, values), colour in zip(maps, (BEFORE, AFTER), strict=False):
+        axes.step(np.arange(len(values)), values, where="mid", color=colour, lw=0.9, label=label)
+    axes.set_xlabel("texel")
+    axes.set_ylabel("error (% of range)")
+    axes.margins(x=0)
+    tidy_axes(axes)
+    axes.legend(frameon=False, fontsize=8, loc="lower right", bbox_to_anchor=(1.0, 0.98), ncols=2)
     return figure
 
 

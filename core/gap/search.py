@@ -306,7 +306,7 @@ def dead(shares: Sequence[Share], model: Model, candidate: Candidate, texels: in
     silent = railed | (loaded & (slope < 0.15 * np.nanmedian(slope[~railed])))
     if not silent.any() or silent.sum() > 0.4 * loaded.sum():
         return None
-    values = {"dead": silent.astype(float), "level": np.where(silent, level * noise, 0.0)}
+    values = {"dead": silent.astype(float), "level": np.where(silent, level * noise + model.parameters.zero, 0.0)}
     own = [q.name for q in candidate.form.parameters]
     return Effect(candidate.name, candidate.form.name, {name: tuple(values[name].tolist()) for name in own})
 
