@@ -4,7 +4,6 @@
 import math
 
 import bpy
-import solver
 from tutorial import add
 
 PRESETS = ("Firm_Fingertip", "Foam", "Soft_Fingertip", "Stiff_Skin", "Weiss")
@@ -46,13 +45,10 @@ def road(ui):
     bpy.ops.wm.save_as_mainfile(filepath=str(ui.out / "fits.blend"))
     bpy.context.preferences.view.filebrowser_display_type = "SCREEN"
     yield from ui.tab("PHYSICS")
-    yield from solver.wait(ui)  # its progress would stand between the header and the role
-    yield 0.5
 
-    # A preset
-    _, y = yield from ui.find("palpate.role")
+    # A preset, from the header of the first panel below Blender's own eight buttons
     panel = ui.region(ui.area("PROPERTIES"))
-    x, y = panel.x + panel.width - 47, y + 26
+    x, y = panel.x + panel.width - 47, panel.y + panel.height - 250
     yield from ui.click(x, y)
     yield 0.5
     yield from ui.screenshot("presets")
