@@ -9,6 +9,7 @@ import pytest
 from blender_scenes import changes, dump, press, press_and_drop, reopen, save
 
 from palpate.addon import cache, live, materials, state
+from palpate.addon import handlers as handlers_of_palpate
 from palpate.addon.bake import bake
 from palpate.core.drive import drive
 from palpate.core.recording import SensorFrame
@@ -138,6 +139,54 @@ def test_sub_frames_loops_steps_and_handlers_off_give_the_same_pictures(tmp_path
     for name, functions in handlers.items():
         getattr(bpy.app.handlers, name).extend(functions)
     assert alone.tolist() == baked.tolist()
+
+
+def test_steps_loops_and_handlers_off_render_the_same_pixels(tmp_path):
+    scene, pad, _, _, free = press_and_drop(frames=16)
+    save(tmp_path)
+    drive(bake(scene))
+    bpy.ops.object.light_add(type="SUN")
+    bpy.context.object.data.energy = 10.0
+    camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
+    scene.collection.objects.link(camera)
+    camera.location, camera.data.type, camera.data.ortho_scale, scene.camera = (0.0, 0.0, 0.5), "ORTHO", 0.08, camera
+    for obj in scene.objects:
+        obj.hide_render = obj not in (pad, free) and obj.type == "MESH"  # the heat map is seen from above
+    render, scene.cycles.samples, scene.cycles.use_denoising = scene.render, 1, False
+    render.engine, render.image_settings.file_format, render.image_settings.color_depth = "CYCLES", "PNG", "16"
+    render.resolution_x = render.resolution_y = 24
+
+    def pixels(path):
+        picture = bpy.data.images.load(str(path))
+        values = np.empty(len(picture.pixels), dtype=np.float32)
+        picture.pixels.foreach_get(values)
+        bpy.data.images.remove(picture)
+        return values
+
+    def still(number, part=0.0):
+        scene.frame_set(number, subframe=part)
+        render.filepath = str(tmp_path / "still.png")
+        bpy.ops.render.render(write_still=True)
+        return pixels(render.filepath)
+
+    stills = {number: still(number) for number in (12, 14, 16)}
+    between = still(14, 0.5)
+    assert (still(12) == stills[12]).all()  # around the loop
+    handlers = {name: getattr(bpy.app.handlers, name).copy() for name in handlers_of_palpate.LISTS}
+    for name in handlers:
+        getattr(bpy.app.handlers, name).clear()
+    try:
+        scene.frame_start, scene.frame_step, render.filepath = 12, 2, str(tmp_path / "step_")
+        bpy.ops.render.render(animation=True)
+        alone = still(14, 0.5)
+    finally:
+        for name, functions in handlers.items():
+            getattr(bpy.app.handlers, name).extend(functions)
+    assert sorted(path.name for path in tmp_path.glob("step_*")) == [f"step_00{number}.png" for number in stills]
+    for number, expected in stills.items():
+        assert (pixels(tmp_path / f"step_00{number}.png") == expected).all()
+    assert (alone == between).all()
+    assert all(np.abs(stills[a] - stills[b]).max() > 0.1 for a, b in ((12, 14), (14, 16)))
 
 
 def test_time_stretching_shows_the_same_bake_slower(tmp_path):
