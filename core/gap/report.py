@@ -135,8 +135,11 @@ def headline(result: Diagnosis) -> str:
         choices = "; ".join(" or ".join(names) for names in result.ambiguous)
         rest = f" {_names([n.name for n in sure])} is missing for sure." if sure else ""
         return f"Not told apart by these recordings: {choices} ({shrink}).{rest}"
-    missing = _names([n.name for n in result.named])
-    return f"{'Missing' if sure else 'Perhaps missing'}: {missing}; {shrink}."
+    doubtful = _names([n.name for n in result.named if n not in sure])
+    if not sure:
+        return f"Perhaps missing: {doubtful}; {shrink}."
+    besides = f", and perhaps {doubtful}" if len(sure) < len(result.named) else ""
+    return f"Missing: {_names([n.name for n in sure])}{besides}; {shrink}."
 
 
 def _own(result: Diagnosis, before: float) -> str:

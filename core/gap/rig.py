@@ -478,6 +478,12 @@ def _readings(columns: Mapping[str, np.ndarray], texels: int, file: Path) -> np.
     if not names:
         return None
     wanted = [f"texel_{i}" for i in range(texels)]
+    lost = [name for name in wanted if name not in columns]
+    if 0 < len(lost) < texels and wanted[-1] in columns:
+        raise FileError(
+            f"'{file.name}' has no column {lost[0]}{' and others' if len(lost) > 1 else ''} of the sensor's {texels} texels: "
+            "export every texel; one that is not connected has empty cells."
+        )
     if len(names) != texels:
         raise FileError(f"'{file.name}' has {len(names)} texel columns and the sensor has {texels} texels: make them agree.")
     for name in wanted:
