@@ -53,9 +53,14 @@ class PALPATE_OT_catch_up(working.Working, bpy.types.Operator):
         return support.idle(cls)
 
     def job(self, context):
-        if context.screen is not None and context.screen.is_animation_playing:
+        self._was_playing = context.screen is not None and context.screen.is_animation_playing
+        if self._was_playing:
             bpy.ops.screen.animation_cancel(restore_frame=False)  # it would move the frame under the work
         return live.catch_up(context.scene)
+
+    def done(self, result):
+        if self._was_playing:  # frames were dropped, or time is stretched so that whole ones are passed by
+            bpy.ops.screen.animation_play()
 
 
 class PALPATE_OT_bake_clear(support.Reporting, bpy.types.Operator):
