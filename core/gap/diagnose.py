@@ -229,6 +229,9 @@ def _explain(result: Diagnosis, views: Views) -> Iterator[tuple[str, float]]:
             result.best = replace(account.fit, model=account.fit.model.with_effect(tremble))
             ground.floor[main] = max(ground.floor[main], mean)
     _conclude(result, account, ground)
+    if result.ambiguous:  # what is named beside what is unclear may be a part of that
+        small = {name for name, gain in account.gains.items() if gain.of_all < SMALL}
+        result.named = [replace(n, confidence=min(n.confidence, 0.45)) if n.name in small else n for n in result.named]
     _rule_out(result, account.first, ground)
 
 
