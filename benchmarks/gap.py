@@ -39,6 +39,9 @@ MIX = {"own": 60, "other": 60, "none": 30, "two": 40, "outside": 30, "poor": 20}
 """Cases of each kind in a whole run."""
 SURE = 0.5
 """Confidence from which a name is meant as one; see docs/gap.md."""
+FAILED: dict[str, Any] = {"outcome": "failed", "sure": [], "said": [], "verdict": "failed", "ambiguous": [], "experiment": ""}
+FAILED |= {"closed": None, "inside": []}
+"""The score of a case that raised."""
 QUIET = ("noise",)
 """Effects that leave no gap which a model could close."""
 
@@ -125,16 +128,19 @@ def examine(kind: str, number: int, compare: bool = False) -> dict[str, Any]:
     with tempfile.TemporaryDirectory() as folder:
         rig_path = cases.write(case, Path(folder))
         began, used = time.perf_counter(), time.process_time()
-        result = None
-        for step in diagnose(read_rig(rig_path)):
-            if isinstance(step, Diagnosis):
-                result = step
-        assert result is not None
+        result, failed = None, ""
+        try:
+            for step in diagnose(read_rig(rig_path)):
+                if isinstance(step, Diagnosis):
+                    result = step
+        except Exception as error:  # counts as anything but right; the other cases go on
+            failed = repr(error)
         seconds, cpu = time.perf_counter() - began, time.process_time() - used
     entry = {"kind": kind, "number": number, "answer": case.answer, "forms": [h.form for h in case.hidden]}
-    entry |= {"shape": "ball" if case.probe.radius else "flat", "share": list(case.share), **score(case, result)}
+    scored = score(case, result) if result is not None else {**FAILED, "failed": failed}
+    entry |= {"shape": "ball" if case.probe.radius else "flat", "share": list(case.share), **scored}
     entry |= {"seconds": round(seconds, 2), "cpu_seconds": round(cpu, 2)}
-    if compare:
+    if compare and result is not None:
         from . import _gap_baselines
 
         entry["baselines"] = _gap_baselines.all_of(case, result, closed)
