@@ -120,7 +120,8 @@ def _corners(mesh: TriangleMesh) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 def _longest_edges(mesh: TriangleMesh) -> np.ndarray:
     a, b, c = _corners(mesh)
-    return np.linalg.norm(np.stack([b - a, c - b, a - c]), axis=2).max(axis=0)
+    squares = [np.einsum("ij,ij->i", edge, edge) for edge in (b - a, c - b, a - c)]
+    return np.sqrt(np.maximum(np.maximum(*squares[:2]), squares[2]))
 
 
 def triangle_areas(mesh: TriangleMesh) -> np.ndarray:
@@ -134,9 +135,13 @@ def have_area(mesh: TriangleMesh) -> np.ndarray:
 
     A sliver whose height is lost in the rounding of its coordinates has none, whatever its corners' cross product says.
     """
+    return _are_sure(mesh, triangle_areas(mesh))
+
+
+def _are_sure(mesh: TriangleMesh, area: np.ndarray) -> np.ndarray:
     longest = _longest_edges(mesh)
     scale = np.abs(mesh.vertices).max(initial=0.0) + longest.max(initial=0.0)
-    return triangle_areas(mesh) > 1e-13 * scale * longest
+    return area > 1e-13 * scale * longest
 
 
 def face_normals(mesh: TriangleMesh) -> np.ndarray:
@@ -144,7 +149,7 @@ def face_normals(mesh: TriangleMesh) -> np.ndarray:
     a, b, c = _corners(mesh)
     normal = np.cross(b - a, c - a)
     length = np.linalg.norm(normal, axis=1, keepdims=True)
-    return np.divide(normal, length, out=np.zeros_like(normal), where=have_area(mesh)[:, None])
+    return np.divide(normal, length, out=np.zeros_like(normal), where=_are_sure(mesh, 0.5 * length[:, 0])[:, None])
 
 
 def vertex_normals(mesh: TriangleMesh) -> np.ndarray:
