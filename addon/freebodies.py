@@ -130,8 +130,9 @@ class Placement:
     def _moved(self, poses: np.ndarray, parents: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """(f, 3) locations, and (f, 3, 3) turns from the start's rotation, of poses under what parents do."""
         stretch, basis_before, unturned = self._start
-        moved = np.array([transforms.rigid(pose[:3] / self.scale, pose[3:]) for pose in poses]).reshape(-1, 4, 4) @ stretch
-        basis = np.linalg.inv(parents) @ moved
+        moved = np.tile(np.eye(4), (len(poses), 1, 1))
+        moved[:, :3, :3], moved[:, :3, 3] = transforms.rotation(poses[:, 3:]), poses[:, :3] / self.scale
+        basis = np.linalg.inv(parents) @ moved @ stretch
         return self.channels[:3] + basis[:, :3, 3] - basis_before[:3, 3], basis[:, :3, :3] @ unturned
 
     @cached_property

@@ -77,9 +77,12 @@ class Worn:
 
     def in_world(self) -> tuple[np.ndarray, np.ndarray]:
         """(F, 3) float: where the net force acts, Blender units, and with what the sensor pushes back there, N."""
-        rotation = np.array([transforms.rotation(pose[3:]) for pose in self.poses])
-        foot = self.poses[:, :3] + np.einsum("fij,fj->fi", rotation, self.felt.centre_of_pressure)
-        return foot / self.scale, -np.einsum("fij,fj->fi", rotation, self.felt.net_force)
+        foot = self.poses[:, :3] + self.turned(self.felt.centre_of_pressure)
+        return foot / self.scale, -self.turned(self.felt.net_force)
+
+    def turned(self, vectors: np.ndarray) -> np.ndarray:
+        """(F, 3) float: vectors in the body's frame, as they are in the world at each frame."""
+        return np.einsum("fij,fj->fi", transforms.rotation(self.poses[:, 3:]), vectors)
 
 
 def find(objects, uid: str, kind: str):
@@ -115,17 +118,15 @@ def channels(worn: Worn, kind: str, length: float = 1.0) -> np.ndarray:
     """(F, 10) float: location, quaternion and scale of a marker at each recorded frame; `length` is that of one unit."""
     direction, size = _SHOWN[kind](worn)
     size = np.where(worn.felt.contact.any(axis=1), size * length, 0.0)
-    rows, last = [], Quaternion()
-    for i, pose in enumerate(worn.poses):
-        rotation = transforms.rotation(pose[3:])
-        foot = (pose[:3] + rotation @ worn.felt.centre_of_pressure[i]) / worn.scale
+    foot, way = worn.in_world()[0], worn.turned(direction)
+    turns, last = [], Quaternion()
+    for i in range(len(size)):
         if size[i] > 0.0:
-            way = rotation @ direction[i]
-            turn = Vector(way / np.linalg.norm(way)).to_track_quat("Z", "Y")  # which takes short vectors for none
+            turn = Vector(way[i] / np.linalg.norm(way[i])).to_track_quat("Z", "Y")  # which takes short vectors for none
             turn.make_compatible(last)
             last = turn
-        rows.append([*foot, *last, *(3 * [size[i]])])
-    return np.array(rows)
+        turns.append(tuple(last))
+    return np.hstack([foot, turns, np.repeat(size[:, None], 3, axis=1)])
 
 
 def _force(worn: Worn) -> tuple[np.ndarray, np.ndarray]:

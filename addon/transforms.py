@@ -87,15 +87,16 @@ def _quaternion(rotation) -> list[float]:
 
 
 def rotation(quaternion: np.ndarray) -> np.ndarray:
-    """(3, 3) rotation matrix of a unit quaternion."""
-    w, x, y, z = quaternion.tolist()  # numbers, not arrays of one: ten times as fast
-    return np.array(
+    """(3, 3) rotation matrix of a unit quaternion, or (n, 3, 3) of (n, 4)."""
+    w, x, y, z = quaternion.tolist() if quaternion.ndim == 1 else quaternion.T  # numbers, not arrays of one: ten times as fast
+    rows = np.array(
         [
             [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
             [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
             [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
         ]
     )
+    return rows if rows.ndim == 2 else np.moveaxis(rows, 2, 0)
 
 
 def rigid(location: np.ndarray, quaternion: np.ndarray) -> np.ndarray:
