@@ -124,7 +124,10 @@ def _evidence(found: dict[str, Any]) -> str:
     rows = []
     for one in found["found"]:
         rival = one["next_best"]
-        near = f"{rival['effect']}, which leaves {rival['leaves']:.2g} times as much" if rival else "none came near"
+        near = "none came near"
+        if rival:
+            much = "as much" if rival["leaves"] < 1.05 else f"{rival['leaves']:.2g} times as much"
+            near = f"{rival['effect']}, which leaves {much}"
         rows.append([one["effect"], f"{one['gap_before']:.3%}", f"{one['gap_after']:.3%}", f"{one['confidence']:.0%}", near])
     text = (
         "<p>Error on the fitted trials without and with each effect, one after the other. The next best was fitted in its "

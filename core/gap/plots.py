@@ -196,12 +196,20 @@ def loops(result: Diagnosis) -> Figure:
     axes = figure.add_axes((0.21, 0.18, 0.76, 0.62))
     axes.plot(x, measured, ".", ms=4.0, mew=0, color=MEASURED, alpha=0.55, zorder=3, label="measured")
     for text, model, colour in _models(result):
-        axes.plot(x, pick(model), lw=0.8, color=colour, ls="--" if text == "base model" else "-", label=text)
+        axes.plot(
+            x,
+            np.where(np.isfinite(measured), pick(model), np.nan),
+            lw=0.8,
+            color=colour,
+            ls="--" if text == "base model" else "-",
+            label=text,
+        )
     axes.set_xlabel(label)
     axes.set_ylabel(_quantity(result, name))
     axes.set_title(f"{trial.name}: {name}", loc="left", fontsize=8.5, color=INK, pad=18)
     tidy_axes(axes)
-    axes.legend(frameon=False, fontsize=8, ncols=3, loc="lower left", bbox_to_anchor=(-0.04, 0.98), columnspacing=1.0)
+    place = {"loc": "lower right", "bbox_to_anchor": (1.02, 0.98), "borderaxespad": 0.2}
+    axes.legend(frameon=False, fontsize=8, ncols=3, columnspacing=0.9, handlelength=1.4, handletextpad=0.5, **place)
     return figure
 
 

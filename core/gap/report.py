@@ -131,14 +131,14 @@ def headline(result: Diagnosis) -> str:
             return f"Unexplained: {said}, is {line.share:.0%} of what trembles at rest.{part}"
         return f"Unexplained: what is left ({after:.2%} of the range) varies most with {strongest}.{part}{_own(result, before)}"
     shrink = f"the error shrinks from {before:.2%} to {after:.2%} of the range"
-    if result.ambiguous:
+    if result.ambiguous and not sure:
         choices = "; ".join(" or ".join(names) for names in result.ambiguous)
-        rest = f" {_names([n.name for n in sure])} is missing for sure." if sure else ""
-        return f"Not told apart by these recordings: {choices} ({shrink}).{rest}"
-    doubtful = _names([n.name for n in result.named if n not in sure])
+        return f"Not told apart by these recordings: {choices} ({shrink})."
+    alike = {names[0]: " or ".join(names) for names in result.ambiguous}
+    doubtful = _names([alike.get(n.name, n.name) for n in result.named if n not in sure])
     if not sure:
         return f"Perhaps missing: {doubtful}; {shrink}."
-    besides = f", and perhaps {doubtful}" if len(sure) < len(result.named) else ""
+    besides = f", and perhaps {doubtful}{' (not told apart)' if alike else ''}" if len(sure) < len(result.named) else ""
     return f"Missing: {_names([n.name for n in sure])}{besides}; {shrink}."
 
 
