@@ -24,14 +24,17 @@ def write_measurements(folder):
     (folder / "slide.csv").write_text(f"velocity (m/s),force (N)\n{rows}\n", encoding="utf-8")
 
 
-def choose_file(ui, row, name):
+def choose_file(ui, name):
     """Click a file in the file browser, then its button at the lower right."""
     yield 1.0
     browser = ui.area("FILE_BROWSER")
     files, buttons = ui.region(browser), ui.region(browser, "EXECUTE")
-    yield from ui.click(files.x + 80, files.y + files.height - 35 - 20 * row)
-    yield 0.3
-    yield from ui.screenshot(f"choose-{name}")
+    for row in range(2):  # however the list is sorted
+        yield from ui.click(files.x + 80, files.y + files.height - 35 - 20 * row)
+        yield 0.3
+        if browser.spaces.active.params.filename == name:
+            break
+    yield from ui.screenshot(f"choose-{name.partition('.')[0]}")
     yield from ui.click(buttons.x + buttons.width - 70, buttons.y + buttons.height // 2)
     yield 1.5
 
@@ -66,13 +69,13 @@ def road(ui):
     # Stiffness and friction
     yield from ui.filter("Foam")
     yield from ui.press("palpate.stiffness_fit")
-    yield from choose_file(ui, 0, "foam")
+    yield from choose_file(ui, "foam.csv")
     ui.value("k", pad().palpate.k)
     ui.check("Palpate Stiffness Fit" in bpy.data.images, "the plot of the stiffness is kept in the file")
     yield from ui.screenshot("stiffness-fit")
     yield from ui.filter("Curve")
     yield from ui.press("palpate.friction_fit")
-    yield from choose_file(ui, 1, "slide")
+    yield from choose_file(ui, "slide.csv")
     ui.value("friction", {name: getattr(pad().palpate, name) for name in ("mus", "mud", "x0", "ct")})
     ui.check("Palpate Friction Fit" in bpy.data.images, "the plot of the friction is kept in the file")
     yield from ui.screenshot("friction-fit")
