@@ -64,8 +64,8 @@ def test_fits(play_road):
     """A preset, and parameters from measured files, by clicks; Table 2's friction comes out again."""
     values = play_road("fits", timeout=1200)["values"]
     assert values["preset"]["k"] not in (58.5, 1000.0)
-    area, texels, thickness = 14 * 6 * 0.0034**2, 84, 0.00025 / 980.0  # of a texel each; metres per pascal
-    assert values["k"] == pytest.approx(area / texels / thickness, rel=0.15)  # cells at the rim are halved
+    area, texels = 13 * 5 * 0.0034**2, 84  # 14 × 6 vertices span 13 × 5 faces
+    assert values["k"] == pytest.approx(980.0 / 0.00025 * area / texels, rel=0.01)  # Eq. 18
     expected = {"mus": 0.435, "mud": 0.23, "x0": 0.3, "ct": 0.01}
     assert values["friction"] == pytest.approx(expected, rel=0.05)
 
