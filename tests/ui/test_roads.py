@@ -70,6 +70,15 @@ def test_fits(play_road):
     assert values["friction"] == pytest.approx(expected, rel=0.05)
 
 
+def test_figures(play_road):
+    """All figures by the panel's button, stopped once by ESC."""
+    files = play_road("figures", timeout=900)["values"]["files"]
+    expected = {f"{kind}.{ending}" for kind in ("strip", "curves") for ending in ("png", "pdf")} | {"video.mp4", "data csv"}
+    assert expected <= set(files)
+    for start in ("scene 00", "scene and touch 00", "numbers Left finger 00", "numbers Right finger 00"):
+        assert any(name.startswith(start) for name in files), start
+
+
 def test_gap(play_road, real_blender, repository):
     """docs/gap.md on its sample rig: what was hidden in it is named, and ends up on the sensor."""
     shutil.copytree(repository / "docs" / "sample-rig", real_blender.work / "sample-rig")
