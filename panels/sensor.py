@@ -96,10 +96,10 @@ class Region(Part):
         obj = context.object
         layout.prop(settings, "region")
         if settings.region == "GROUP":
-            layout.prop_search(settings, "vertex_group", obj, "vertex_groups")
+            layout.prop_search(settings, "vertex_group", obj, "vertex_groups", text="")
             layout.prop(settings, "threshold")
         elif settings.region == "MATERIAL":
-            layout.prop_search(settings, "material", obj, "material_slots")
+            layout.prop_search(settings, "material", obj, "material_slots", text="")
         elif settings.region == "FACE_SET":
             row = layout.row(align=True)
             row.prop(settings, "face_set")
