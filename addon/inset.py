@@ -234,12 +234,14 @@ class _Canvas:
 
     @staticmethod
     def _batch(shader, kind: str, uniforms=None, **content) -> None:
+        import gpu
         from gpu_extras.batch import batch_for_shader
 
         batch = batch_for_shader(shader, kind, content)
         shader.bind()
         for name, value in (uniforms or {}).items():
             shader.uniform_float(name, value)
+        gpu.state.blend_set("ALPHA")  # words that were drawn before have switched it off
         batch.draw(shader)
 
 

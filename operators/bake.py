@@ -58,6 +58,11 @@ class PALPATE_OT_catch_up(working.Working, bpy.types.Operator):
             bpy.ops.screen.animation_cancel(restore_frame=False)  # it would move the frame under the work
         return live.catch_up(context.scene)
 
+    def modal(self, context, event):
+        if event.type == "SPACE" and event.value == "PRESS":  # whoever wants to stop what seems to be playing
+            self._was_playing = False
+        return super().modal(context, event)
+
     def done(self, result):
         if self._was_playing:  # frames were dropped, or time is stretched so that whole ones are passed by
             bpy.ops.screen.animation_play()
