@@ -37,6 +37,7 @@ from ..core.formats.sensors import SENSOR_NAME, save_sensor
 from ..core.recording import Frame, Recording
 from ..core.scenario import Scenario, Sensor
 from .behind import Behind
+from .claim import Claim
 from .unfinished import Unfinished
 
 OURS = re.compile(rf"tactile_-?\d+\.exr|{'|'.join(map(re.escape, (RECORDING_NAME, SENSOR_NAME, MANIFEST_NAME)))}")
@@ -86,7 +87,8 @@ class Files:
     Raises
     ------
     FileError
-        The folder cannot be made or written to, or a sensor's folder holds something that must not be replaced.
+        The folder cannot be made or written to, another bake is writing to it, or a sensor's folder holds something that must
+        not be replaced.
     """
 
     def __init__(self, folder: Path, scenario: Scenario, blend: str = ""):
@@ -96,6 +98,7 @@ class Files:
         names = folder_names(self._sensors)
         self.folders = {name: self.folder / names[name] for name in self._sensors}
         self._scenario, self._digest = scenario, scenario.digest()
+        self._claim = Claim(self.folder)
         self._unfinished = Unfinished(self.folder, self._digest)
         self._writer = Behind()
         self._waiting: list[Frame] = []
@@ -195,11 +198,13 @@ class Files:
             self._unfinished.drop()
         except OSError as error:
             raise _problem(self.folder, error) from error
+        self._claim.give_back()
 
     def discard(self) -> None:
         """Remove what is unfinished."""
         self._writer.stop()
         self._clean()
+        self._claim.give_back()
 
     def _clean(self) -> None:
         self._unfinished.drop()

@@ -12,9 +12,10 @@ from pathlib import Path
 import pytest
 from blender_scenes import press_and_drop, save
 
-from palpate.addon import folders, jobs, unfinished
+from palpate.addon import claim, folders, jobs, unfinished
 from palpate.addon.bake import bake
 from palpate.core.drive import drive
+from palpate.core.errors import FileError
 from palpate.core.formats.archive import load_recording
 
 SCRIPT = Path(__file__).with_name("killed_bake.py")
@@ -68,7 +69,7 @@ def abandon(scene, steps):
     """Stop a bake as a kill would: it cannot clean up."""
     work = jobs.Slice(bake(scene))
     discard = folders.Files.discard
-    folders.Files.discard = lambda self: None
+    folders.Files.discard = lambda self: self._claim.give_back()  # as the operating system does
     try:
         for _ in range(steps):
             work.work(0.0)
@@ -118,6 +119,25 @@ def test_what_does_not_fit_is_begun_anew(killed, tmp_path, what):
         (tmp_path / "palpate" / "Pad.partial").rmdir()
     assert computed(scene)[0] == 1
     assert sorted(path.name for path in (tmp_path / "palpate").iterdir()) == ["Pad", "Pad 2"]
+
+
+def test_one_bake_at_a_time(tmp_path):
+    """Two at once would mix their images; the second is refused and touches nothing, and later it may."""
+    scene, *_ = press_and_drop(frames=12)
+    save(tmp_path)
+    expected = contents_of_a_whole_bake(scene, tmp_path)
+    scene.palpate.folder = "//palpate"
+    first = bake(scene)
+    while not (tmp_path / "palpate" / claim.NAME).exists():
+        next(first)
+    with pytest.raises(FileError, match="Another bake is writing to"):
+        drive(bake(scene))
+    drive(first)
+    folders.settle()
+    assert contents(tmp_path / "palpate") == expected
+    drive(bake(scene))
+    folders.settle()
+    assert contents(tmp_path / "palpate") == expected
 
 
 def test_escape_leaves_nothing(tmp_path, monkeypatch):
