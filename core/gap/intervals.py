@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..calibrate.regression import student
-from .fit import PRIOR, Fit, flattened, total_of, value_of
+from .fit import PRIOR, Fit, Sums, flattened, total_of, value_of
 
 if TYPE_CHECKING:
     from .diagnose import Diagnosis
@@ -72,11 +72,8 @@ def _covariances(found: Fit) -> tuple[np.ndarray, ...]:
     t = total_of(flattened(found.sums))
     m = t.h.shape[1]
     a = t.a + 1e-12 * (1.0 + np.trace(t.a)) * np.eye(len(t.a))
-    shift = np.zeros((t.b.shape[0], m, len(t.a)))
-    if m:
-        c = t.c + PRIOR * np.eye(m)
-        shift = np.linalg.solve(c, t.b)
-        a = a - np.einsum("nmp,nmq->pq", t.b, shift)
+    shift = _followed(t) if m else np.zeros((t.b.shape[0], m, len(t.a)))
+    a = a - np.einsum("nmp,nmq->pq", t.b, shift)
     bread = np.linalg.pinv(a, hermitian=True)
     blocks, texels, trials = [], [], []
     for trial in found.sums:
@@ -88,6 +85,22 @@ def _covariances(found: Fit) -> tuple[np.ndarray, ...]:
         texels.append(gradient.sum(axis=0))
         trials.append(gradient.sum(axis=(0, 1))[None])
     return bread, *(_sandwich(bread, np.concatenate(groups)) for groups in (blocks, texels, trials))
+
+
+def _followed(t: Sums) -> np.ndarray:
+    """How numbers per texel give way to the common ones, (n, m, p), while their mean over the texels that were touched stays.
+
+    What all texels have in common is a common number's: each texel's gain times two is the sensor's.
+    """
+    m = t.h.shape[1]
+    inverse = np.linalg.inv(t.c + PRIOR * np.eye(m))
+    told = np.einsum("nmm->nm", t.c)
+    told = (told > 1e-9 * told.max(initial=1e-300)).astype(float)
+    follow = inverse @ t.b
+    pulled = np.einsum("nmk,nk->nmk", inverse, told)
+    stiffness, drift = np.einsum("nm,nmk->mk", told, pulled), np.einsum("nm,nmp->mp", told, follow)
+    kept: np.ndarray = follow - pulled @ np.linalg.lstsq(stiffness, drift, rcond=None)[0]
+    return kept
 
 
 def _sandwich(bread: np.ndarray, gradients: np.ndarray) -> np.ndarray:
