@@ -131,7 +131,11 @@ def hung(tmp_path):
     group.links.new(group.nodes.new("NodeGroupInput").outputs[0], group.nodes.new("NodeGroupOutput").inputs[0])
     modifier = target.modifiers.new("Nodes", "NODES")
     modifier.node_group = group
-    modifier[group.interface.items_tree["Object"].identifier] = others["Nodes"]
+    socket = group.interface.items_tree["Object"].identifier
+    if hasattr(modifier, "properties"):  # Blender 5.2
+        getattr(modifier.properties.inputs, socket).value = others["Nodes"]
+    else:
+        modifier[socket] = others["Nodes"]
     scene.frame_set(1)
     save(tmp_path)
     drive(bake(scene))
