@@ -78,7 +78,8 @@ def _named_by(block) -> Iterator:
     elif isinstance(block, bpy.types.NodeTree):
         for node in block.nodes:
             yield getattr(node, "node_tree", None)
-            yield from (value for socket in node.inputs if isinstance(value := _default(socket), bpy.types.ID))
+            defaults = (getattr(socket, "default_value", None) for socket in node.inputs)
+            yield from (value for value in defaults if isinstance(value, bpy.types.ID))
     elif isinstance(block, bpy.types.Curve):
         yield from (block.bevel_object, block.taper_object)
     yield getattr(block, "shape_keys", None)
@@ -102,10 +103,6 @@ def _inputs(modifier) -> Iterator:
             value = modifier.get(item.identifier)
         if isinstance(value, bpy.types.ID):
             yield value
-
-
-def _default(socket):
-    return getattr(socket, "default_value", None)
 
 
 def _pointers(item) -> Iterator:

@@ -10,7 +10,7 @@ other formulas than the library's.
 
 from __future__ import annotations
 
-from collections.abc import Generator, Sequence
+from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -45,6 +45,8 @@ BETTER = 0.8
 
 READINGS, FORCES = 0, 1
 Work = Generator[tuple[str, float], None, "Step"]
+Left = Callable[[Fit], Structure]
+"""Says what structure is in the residual of a fit."""
 
 
 @dataclass
@@ -191,14 +193,14 @@ class Explainer:
     def __post_init__(self) -> None:
         self.mixed = confounded(self.coverage)
 
-    def run(self, base: Account, structure) -> Generator[tuple[str, float], None, Account]:  # type: ignore[no-untyped-def]
+    def run(self, base: Account, structure: Left) -> Generator[tuple[str, float], None, Account]:
         """Explain what a base model lacks.
 
         Parameters
         ----------
         base : Account
         structure : callable
-            Fit → :class:`Structure` of its residual.
+            Of a fit's residual.
         """
         account = base
         lone = yield from self._look(base, 0.0, 0.25, first=True)
@@ -302,17 +304,18 @@ class Explainer:
     def _main_effects(self, account: Account) -> int:
         return len(account.fit.model.effects)
 
-    def _open(self, account: Account, structure) -> bool:  # type: ignore[no-untyped-def]
+    def _open(self, account: Account, structure: Left) -> bool:
         """Whether enough is left that a further effect could earn its place."""
         g, mean = self.ground, float(account.means[self.ground.main])
         if any(effect.name == "quantization" for effect in account.fit.model.effects):
             return False  # what is left lies within a step
         if mean - g.floor[g.main] < max(LEAST, NEXT_OF_ALL * g.gap(g.main)):
             return False
-        found: Structure = structure(account.fit)
-        return found.total >= STRUCTURE or mean >= 1.5
+        return structure(account.fit).total >= STRUCTURE or mean >= 1.5
 
-    def _second(self, base: Account, lone: Step, single: Account, structure) -> Generator[tuple[str, float], None, Account]:  # type: ignore[no-untyped-def]
+    def _second(
+        self, base: Account, lone: Step, single: Account, structure: Left
+    ) -> Generator[tuple[str, float], None, Account]:
         """The best of those pairs of effects that begin with one of the best first ones; or the first alone."""
         if not self._open(single, structure):
             return single
