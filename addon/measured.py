@@ -17,6 +17,7 @@ import numpy as np
 from ..core import colormaps
 from ..core.errors import SceneError
 from . import effects, exchange, identity, preparing, sample
+from .jobs import Progress
 
 if TYPE_CHECKING:
     from ..core.gap.diagnose import Diagnosis
@@ -59,36 +60,39 @@ def find(obj):
     Yields
     ------
     Progress
-        ``stage``, ``done`` and ``total``; closing the generator stops it and keeps what was known before.
+        Closing the generator stops it and keeps what was known before.
+
+    Returns
+    -------
+    Result
     """
     from ..core.gap import report
     from ..core.gap.amend import next_experiment
-    from ..core.gap.diagnose import Diagnosis, Progress, diagnose
+    from ..core.gap.diagnose import Diagnosis, diagnose
     from ..core.gap.plots import PICTURES
     from ..core.gap.rig import read_rig
 
     yield from preparing.wait()
-    yield Progress("reading the recordings", 0, 1000)
+    yield Progress("Reading the recordings", None, 0, 1000)
     rig = read_rig(rig_path(obj))
     diagnosis = None
     for step in diagnose(rig):
         if isinstance(step, Diagnosis):
             diagnosis = step
         else:
-            yield step
+            yield Progress(f"Finding the gap: {step.stage}", None, step.done, step.total)
     assert diagnosis is not None
     folder, pictures = Path(tempfile.mkdtemp(prefix="gap-", dir=bpy.app.tempdir)), {}
     from ..core.canvas import save_figure
 
     for name in ("curves", "gap", "loops"):
-        yield Progress("drawing", 990, 1000)
+        yield Progress("Drawing", None, 990, 1000)
         pictures[name] = folder / f"{name}.png"
         save_figure(PICTURES[name][0](diagnosis), pictures[name], 150)
     identity.ensure(obj)
-    _results[identity.key(obj)] = Result(
-        diagnosis, report.headline(diagnosis), report.evidence(diagnosis), next_experiment(diagnosis), pictures
-    )
-    return diagnosis
+    result = Result(diagnosis, report.headline(diagnosis), report.evidence(diagnosis), next_experiment(diagnosis), pictures)
+    _results[identity.key(obj)] = result
+    return result
 
 
 def add_found(obj) -> int:

@@ -4,9 +4,8 @@
 import bpy
 from bpy.props import BoolProperty, StringProperty
 
-from ..addon import jobs, measured
-from ..core.drive import drive
-from . import support
+from ..addon import measured
+from . import support, working
 from .fits import show_image
 
 
@@ -35,12 +34,13 @@ class PALPATE_OT_measured_open(support.Reporting, support.Choosing, bpy.types.Op
         self.report({"INFO"}, f"'{rig.name}': {len(rig.trials)} trials on {len(rig.texels)} texels")
 
 
-class PALPATE_OT_gap_find(support.Reporting, bpy.types.Operator):
+class PALPATE_OT_gap_find(working.Working, bpy.types.Operator):
     """Compare the model with the measurements, name what it misses and judge it on trials it has not seen. ESC stops it"""
 
     bl_idname = "palpate.gap_find"
     bl_label = "Find Gap"
     bl_options = {"REGISTER"}
+    stopped = "Stopped; what was found before is unchanged"
 
     @classmethod
     def poll(cls, context):
@@ -51,66 +51,11 @@ class PALPATE_OT_gap_find(support.Reporting, bpy.types.Operator):
             return False
         return True
 
-    def invoke(self, context, _event):
-        if bpy.app.background:
-            return self.execute(context)
-        return self.reporting(lambda: self._start(context))
+    def job(self, context):
+        return measured.find(context.object)
 
-    def run(self, context):
-        drive(measured.find(context.object))
-        self._say(context.object)
-
-    def _start(self, context):
-        self._name = context.object.name
-        self._slice = jobs.Slice(measured.find(context.object))
-        self._slice.work(0.0)
-        manager = context.window_manager
-        self._timer = manager.event_timer_add(0.01, window=context.window)
-        manager.progress_begin(0.0, 1.0)
-        manager.modal_handler_add(self)
-        return {"RUNNING_MODAL"}
-
-    def modal(self, context, event):
-        if event.type == "ESC" and event.value == "PRESS":
-            self._end(context)
-            self.report({"WARNING"}, "Stopped; what was found before is unchanged")
-            return {"CANCELLED"}
-        if event.type != "TIMER":
-            return {"RUNNING_MODAL"}
-        result = None
-        try:
-            result = self.reporting(lambda: self._work(context))
-        finally:
-            if result != {"RUNNING_MODAL"}:
-                self._end(context)
-        return result
-
-    def _work(self, context):
-        self._slice.work()
-        if self._slice.is_done:
-            self._say(bpy.data.objects.get(self._name))
-            return {"FINISHED"}
-        progress = self._slice.progress
-        context.window_manager.progress_update(progress.done / progress.total)
-        context.workspace.status_text_set(f"{progress.stage}: {progress.done / progress.total:.0%}    ESC: stop")
-        return {"RUNNING_MODAL"}
-
-    def cancel(self, context):
-        """Blender closes, or loads another file."""
-        self._end(context)
-
-    def _end(self, context):
-        self._slice.cancel()
-        context.window_manager.event_timer_remove(self._timer)
-        context.window_manager.progress_end()
-        context.workspace.status_text_set(None)
-        for area in context.screen.areas:
-            area.tag_redraw()
-
-    def _say(self, obj):
-        result = measured.of(obj) if obj is not None else None
-        if result is not None:
-            self.report({"INFO"}, result.headline)
+    def done(self, result):
+        self.report({"INFO"}, result.headline)
 
 
 class PALPATE_OT_gap_add(support.Reporting, bpy.types.Operator):

@@ -57,8 +57,9 @@ class Working(support.Reporting):
             self.done(self._slice.result)
             return {"FINISHED"}
         progress = self._slice.progress
-        context.window_manager.progress_update(progress.done / progress.total)
-        context.workspace.status_text_set(f"{progress.text}    ESC: stop")
+        share = progress.done / progress.total
+        context.window_manager.progress_update(share)
+        context.workspace.status_text_set(f"{progress.text}, {share:.0%}    ESC: stop")
         redraw_panels(context)
         return {"RUNNING_MODAL"}
 

@@ -210,6 +210,24 @@ class UI:
         self.say(f"{what}")
         return seen
 
+    def becomes(self, holds: Callable[[], object], what: str, timeout: float = 30.0) -> Steps:
+        """Check that something comes to hold, however slow the machine is."""
+        end = time.monotonic() + timeout
+        while not holds() and time.monotonic() < end:
+            yield 0.1
+        self.check(holds(), what)
+
+    def works(self, operator: str) -> bool:
+        """Whether an operator, as in "palpate.bake", is at work behind the window."""
+        group, _, name = operator.partition(".")
+        return any(modal.bl_idname == f"{group.upper()}_OT_{name}" for modal in self.window.modal_operators)
+
+    def stop(self, operator: str) -> Steps:
+        """Press ESC while an operator is at work. Give it work that no machine can finish before."""
+        yield from self.wait_until(lambda: self.works(operator), f"{operator} is at work")
+        yield from self.key("ESC")
+        yield from self.becomes(lambda: not self.works(operator), f"ESC stops {operator}")
+
     # --- words for what users do
 
     def search(self, words: str, area: bpy.types.Area | None = None) -> Steps:

@@ -58,19 +58,18 @@ def road(ui):
     yield from ui.screenshot("chosen")
 
     yield from ui.press("palpate.figures_make()")
-    yield from ui.wait_until(lambda: list(place.glob("scene and touch*.png")), "the first figure is there", timeout=180)
-    yield from ui.screenshot("at-work")
-    yield from ui.key("ESC")
-    yield 1.0
-    ui.check(not (place / "video.mp4").exists(), "ESC stops it before the video")
+    yield from ui.wait_until(lambda: list(place.glob("scene*.png")), "the first figure is there", timeout=180)
+    yield from ui.stop("palpate.figures_make")  # many figures and a video are still to come
+    ui.check(not (place / "video.mp4").exists(), "before the video")
     ui.check(scene.camera.name == camera and "Palpate Camera" not in bpy.data.objects, "and the camera is the scene's own")
     ui.check(scene.frame_current == 12, "and the frame as before")
     ui.check(not list(place.glob("*.part*")), "and nothing half-made stays")
     yield from ui.screenshot("stopped")
 
     yield from ui.press("palpate.figures_make()")
+    yield from ui.screenshot("at-work")
     yield from ui.wait_until(lambda: (place / "video.mp4").exists(), "the video is there", timeout=300)
-    yield 1.0
+    yield from ui.wait_until(lambda: not ui.works("palpate.figures_make"), "all is made")
     ui.value("files", sorted(path.name for path in place.iterdir()))
     ui.check(scene.frame_current == 12 and scene.camera.name == camera, "the scene is as before")
     yield from ui.screenshot("made")
