@@ -22,7 +22,8 @@ SIZES = (1.0, 2.0, 4.0)
 LARGEST, STRONGEST = 0.3, 6.0
 """Share of the range, and strength: beyond them it is no effect on a sensor but another sensor."""
 Change = Callable[[np.ndarray, np.ndarray, float], np.ndarray]
-"""From times (T,) and readings (T, n) in shares of the largest, with a strength, to what a sensor with the effect reads."""
+"""From times (T,) since a recording began, in shares of the longest one's length, and readings (T, n) in shares of the largest,
+with a strength, to what a sensor with the effect reads: with the same times and rates in every recording, long or short."""
 
 
 def _low_pass(time: np.ndarray, x: np.ndarray, tau: float) -> np.ndarray:
@@ -35,7 +36,7 @@ def _low_pass(time: np.ndarray, x: np.ndarray, tau: float) -> np.ndarray:
 def lag(time, x, strength):
     """Three equal low passes in turn."""
     for _ in range(3):
-        x = _low_pass(time, x, 0.03 * strength * (time[-1] - time[0]) + 1e-9)
+        x = _low_pass(time, x, 0.03 * strength)
     return x
 
 
@@ -52,13 +53,12 @@ def dead_zone(time, x, strength):
 
 def drift(time, x, strength):
     """A power of the time."""
-    return x + 0.3 * strength * ((time - time[0]) / (time[-1] - time[0]))[:, None] ** 1.3
+    return x + 0.3 * strength * time[:, None] ** 1.3
 
 
 def creep(time, x, strength):
     """The reading goes on rising, with two times."""
-    long = time[-1] - time[0]
-    return x + strength * (0.3 * _low_pass(time, x, 0.03 * long) + 0.3 * _low_pass(time, x, 0.15 * long))
+    return x + strength * (0.3 * _low_pass(time, x, 0.03) + 0.3 * _low_pass(time, x, 0.15))
 
 
 def hysteresis(time, x, strength):
@@ -146,13 +146,15 @@ def with_effect(ground: Ground, name: str, size: float) -> Recording | None:
     full = max(float(np.nanmax(np.abs(r - zero))) for r in readings)
     plain = [np.nan_to_num((r - zero) / full) for r in readings]  # a channel that is not read out is at rest
 
+    times = [columns["time"] - columns["time"][0] for _, _, columns in trials]
+    longest = max(float(time[-1]) for time in times)
+
     def changes(strength: float) -> list[np.ndarray]:
-        times = [columns["time"] for _, _, columns in trials]
         pairs = zip(times, plain, readings, strict=True)
-        return [np.where(np.isnan(r), np.nan, full * (CHANGES[name](t, x, strength) - x)) for t, x, r in pairs]
+        return [np.where(np.isnan(r), np.nan, full * (CHANGES[name](t / longest, x, strength) - x)) for t, x, r in pairs]
 
     def size_of(made: list[np.ndarray]) -> float:
-        return _beyond_refitting(made, readings, [columns["time"] for _, _, columns in trials])
+        return _beyond_refitting(made, readings, times)
 
     strengths = np.geomspace(1e-3, STRONGEST, 14)
     enough = [float(s) for s in strengths if size_of(changes(float(s))) >= size * ground.rest]

@@ -89,8 +89,7 @@ def _idle(predictor: Predictor) -> list[tuple[int, int]]:
     stimulus = predictor.stimulus
     load = stimulus.depth if stimulus.load is None else stimulus.load
     free = ~(load > 0).any(axis=1)
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], free, [False]]).astype(int)))
-    found = [(int(a), int(b)) for a, b in edges.reshape(-1, 2) if b - a >= SHORTEST]
+    found = [(a, b) for a, b in _stretches(free) if b - a >= SHORTEST]
     return [*found, (0, len(load))]
 
 
@@ -161,6 +160,8 @@ class Coverage:
         Longest trial.
     roams : bool
         Whether what presses part of the texels did so at more than one place.
+    levels : float
+        Largest of the loads that were held for a while, by the smallest.
     """
 
     texels: float
@@ -173,6 +174,7 @@ class Coverage:
     rest: float
     seconds: float
     roams: bool = True
+    levels: float = 1.0
 
 
 def coverage(predictors: Sequence[Predictor]) -> Coverage:
@@ -180,6 +182,7 @@ def coverage(predictors: Sequence[Predictor]) -> Coverage:
     texels = predictors[0].rig.texels
     touched, middles = np.zeros(len(texels), bool), []
     speeds: list[np.ndarray] = []
+    levels: list[float] = []
     hold, unloading, cycles, peaks, slides, rest = 0.0, False, 0, [], False, 0.0
     for predictor in predictors:
         s = predictor.stimulus
@@ -195,7 +198,9 @@ def coverage(predictors: Sequence[Predictor]) -> Coverage:
         speeds.append(rate[rate > pace])
         unloading |= bool((np.maximum.accumulate(total) - total).max() > 0.1 * full)
         still = (np.abs(rate) < pace) & (total > 0.05 * full)
-        hold = max(hold, _longest(still, s.time))
+        holds = _stretches(still)
+        hold = max([hold, *(float(s.time[min(b, len(total) - 1)] - s.time[a]) for a, b in holds)])
+        levels += [float(total[a:b].mean()) for a, b in holds if b - a >= SHORTEST]
         idle = s.time[(load <= AT_REST * max(float(load.max(initial=0.0)), 1e-300)).any(axis=1)]
         rest = max(rest, float(np.ptp(idle)) / float(np.ptp(s.time)) if len(idle) else 0.0)
         starts = np.flatnonzero((total > 0) & (np.concatenate([[0.0], total[:-1]]) <= 0))
@@ -216,6 +221,7 @@ def coverage(predictors: Sequence[Predictor]) -> Coverage:
         rest=rest,
         seconds=max(float(p.trial.time[-1] - p.trial.time[0]) for p in predictors),
         roams=_roams(np.concatenate(middles), texels.area, touched),
+        levels=max(levels) / min(levels) if levels else 1.0,
     )
 
 
@@ -226,6 +232,7 @@ def _roams(middle: np.ndarray, area: np.ndarray, touched: np.ndarray) -> bool:
     return float(np.ptp(middle, axis=0).max()) > float(np.sqrt(np.median(area)))
 
 
-def _longest(flag: np.ndarray, time: np.ndarray) -> float:
+def _stretches(flag: np.ndarray) -> list[tuple[int, int]]:
+    """First sample of each stretch for which a flag is set, and the one behind it."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], flag, [False]]).astype(int))).reshape(-1, 2)
-    return max((float(time[min(b, len(time) - 1)] - time[a]) for a, b in edges), default=0.0)
+    return [(int(a), int(b)) for a, b in edges]

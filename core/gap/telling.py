@@ -17,9 +17,13 @@ ONE_SPEED = 1.5
 """Ratio of fast to slow loading below which all of it was done at one speed."""
 
 
-NEVER_AT_REST = "nothing was left without load for long, so that moving by itself and settling under load are one"
+NEVER_AT_REST = (
+    "nothing was left without load for long, nor held at unlike loads, so that moving by itself and settling under load are one"
+)
 RESTS = 0.1
 """Share of a trial from the first to the last time that a texel carries nothing, from which on a drift would show there."""
+LEVELS = 1.5
+"""Largest by smallest of the loads that were held, from which on settling, which goes with the load, is told from a drift."""
 
 
 BY_PLACE = ("load-spreading", "crosstalk", "gain-mismatch", "misalignment")
@@ -33,7 +37,7 @@ SHORT = 0.5
 def untold(coverage: Coverage) -> dict[str, str]:
     """Return the kinds of effects that recordings cannot tell, each with the reason."""
     said = {} if coverage.unloading else dict.fromkeys(LEAVES_BEHIND, NEVER_UNLOADED)
-    if coverage.rest < RESTS:
+    if coverage.rest < RESTS and coverage.levels < LEVELS:
         said["drift"] = NEVER_AT_REST
     return said
 
