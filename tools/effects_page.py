@@ -193,7 +193,7 @@ def _peaks(axes, kind):
     depth = _cycles(40)(time)
     texel = _pressed(time, depth, np.full(len(time), 1e-3))
     top = lambda *items: texel(*items)[1:].reshape(40, 100).max(axis=1)  # noqa: E731
-    _curves(axes, kind, np.arange(1, 41), top(), top, "pressing", "peak (N)", archard={"rate": 2e-4})
+    _curves(axes, kind, np.arange(1, 41), top(), top, "pressing", "peak (N)", archard={"rate": 2e-4}, work={"life": 5.0})
 
 
 def _across(axes, kind):

@@ -56,6 +56,15 @@ def archard(force, slope, depth, slide, numbers, row, memory, point, at, commit)
     return force * left, slope * left + force * gone / (depth * depth)
 
 
+def work(force, slope, depth, slide, numbers, row, memory, point, at, commit):
+    """``f exp(−W/L)`` with W the load summed over the way its surface goes, in and along. Memory: W and the last depth."""
+    factor = math.exp(-memory[point, at] / numbers[row, 0])
+    if commit:
+        memory[point, at] += max(force, 0.0) * math.hypot(slide, max(depth, 0.0) - memory[point, at + 1])
+        memory[point, at + 1] = max(depth, 0.0)
+    return force * factor, slope * factor
+
+
 KIND = Kind(
     name="wear",
     title="Wear",
@@ -102,6 +111,16 @@ KIND = Kind(
             law=archard,
             constants=same_for_all_steps("rate"),
             memory=1,
+        ),
+        Form(
+            "work",
+            "f = fₑ · exp(−W/L),  Ẇ = fₑ √(v² + ḋ²)",
+            "Fouvry, Kapsa and Vincent, Wear 200 (1996): what is lost goes with the energy that was dissipated",
+            (Parameter("life", "J", 0.1, 1e-6, 1e9, "Load times way L that leaves 37 % of the force.", log=True),),
+            off={"life": math.inf},
+            law=work,
+            constants=same_for_all_steps("life"),
+            memory=2,
         ),
     ),
 )

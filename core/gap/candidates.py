@@ -90,6 +90,7 @@ def search_range(parameter: Parameter, scales: Scales) -> tuple[float, float]:
         "s": (0.5 * scales.step, 2.0 * scales.seconds),
         "m/s": (0.02 * scales.speed, 2.0 * scales.speed),
         "N·s": (0.1 * scales.force * scales.seconds, 50.0 * scales.force * scales.seconds),
+        "J": (0.1 * scales.force * scales.depth, 50.0 * scales.force * scales.speed * scales.seconds),
         "1/N": (0.02 / scales.force, 2.0 / scales.force),
         "s/m": (0.02 / scales.speed, 2.0 / scales.speed),
         "unit/s": (-0.5 * scales.reading / scales.seconds, 0.5 * scales.reading / scales.seconds),
@@ -169,6 +170,13 @@ class Candidate:
         """The parameter that is zero when the effect is not there, if there is one."""
         for name, value in self.form.off.items():
             if value == 0.0:
+                return name
+        return None
+
+    def reach(self) -> str | None:
+        """The parameter that is infinite when the effect is not there, if there is one: its inverse is the strength."""
+        for name, value in self.form.off.items():
+            if np.isinf(value):
                 return name
         return None
 

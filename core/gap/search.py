@@ -205,7 +205,7 @@ def promising(
             [_placed_score(candidate, direction, model, scales, gain), *_placed_far(candidate, direction, model, scales, gain)],
             key=lambda entry: -entry[0],
         )
-    strength, tried = candidate.strength(), []
+    strength, reach, tried = candidate.strength(), candidate.reach(), []
     for values in candidate.starts(scales, gain):
         effect = candidate.effect(values, n, gain)
         promise, length = direction.score(model.with_effect(effect))
@@ -217,8 +217,17 @@ def promising(
             effect = candidate.effect({**values, strength: scaled}, n, gain)
         elif length <= 0.0:
             continue
+        elif reach is not None:
+            parameter = next(q.scaled(gain) for q in form.parameters if q.name == reach)
+            far = float(np.clip(values[reach] / np.clip(length, 0.01, 20.0), parameter.low, parameter.high))
+            effect = _better(direction, effect, candidate.effect({**values, reach: far}, n, gain))
         tried.append((promise, effect))
     return sorted(tried, key=lambda entry: -entry[0])
+
+
+def _better(direction: Direction, one: Effect, other: Effect) -> Effect:
+    """The one of two that fits better as it is: far from the best length along it, an effect is a bad place to begin."""
+    return max((one, other), key=lambda effect: _fall(direction, direction.model.with_effect(effect)))
 
 
 def _local_size(parameter, scales: Scales) -> float:  # type: ignore[no-untyped-def]

@@ -222,6 +222,20 @@ def test_wear_by_rubbing():
     np.testing.assert_allclose(found, K * np.maximum(0.002 - gone, 0.0), rtol=1e-9)
 
 
+def test_wear_by_work():
+    """Held, each step of rubbing takes the same share; pressed without rubbing, the load's work on the spring, ``k d²/2``."""
+    way, life = 1e-3, 0.05
+    found = force(effect("wear", "work", life=life), np.full(len(TIME), 0.002), np.full(len(TIME), way))
+    # The first step goes in as well: what it wears off acts from the next one on, like all that comes later.
+    first = K * 0.002 * np.hypot(way, 0.002)
+    expected = np.exp(-(first + K * 0.002 * way * np.arange(len(TIME) - 1)) / life)
+    np.testing.assert_allclose(found[1:], K * 0.002 * expected, rtol=1e-9)
+    depth = np.linspace(0.0, 0.003, 20001)
+    depth = np.append(depth, depth[-1])
+    done = force(effect("wear", "work", life=life), depth, time=np.arange(len(depth)) * 1e-3)[-1]
+    assert done == pytest.approx(K * 0.003 * np.exp(-K * 0.003**2 / 2 / life), rel=1e-4)
+
+
 # --- adhesion
 
 
