@@ -17,6 +17,8 @@ PULLED = -0.5
 """Standard deviations of the noise below which a reading pulls."""
 ENOUGH = 20
 """Samples without load from which on a texel's rest says something."""
+BEGINS = 0.1
+"""Share of a trial that is its beginning: what is an offset is there from the first samples on."""
 PRESENT = 0.4
 """Least share of what is claimed that must be seen there."""
 
@@ -25,7 +27,7 @@ def admissible(found: Found, views: Views) -> bool:
     """Tell whether the recordings bear out a fitted effect where it is its own; True where they do not say."""
     if found.candidate.name == "adhesion":
         return _pulls(found, views)
-    if found.candidate.name == "offset" and found.candidate.local:
+    if found.candidate.name == "offset":
         return _is_there_at_rest(found, views)
     return True
 
@@ -46,22 +48,34 @@ def _pulls(found: Found, views: Views) -> bool:
 
 
 def _is_there_at_rest(found: Found, views: Views) -> bool:
-    """An offset is what a texel reads without load: one that is only there under load is something else."""
+    """An offset is what a texel reads without load, from the first moment on: what is only there under load, or comes with time
+    (as the part of a drift does that its formula lacks), is something else.
+    """
     model = found.fit.model
     index = len(model.effects) - 1
-    claimed = np.asarray(model.effects[index].values["offset"], float)
-    total, count = np.zeros(len(claimed)), np.zeros(len(claimed))
+    texels = len(views.whole[0].predictor.rig.texels)
+    claimed = np.broadcast_to(np.asarray(model.effects[index].values["offset"], float), texels)
+    always, first = np.zeros((2, texels)), np.zeros((2, texels))
     for share in views.whole:
-        reading = share.predictor.trial.reading
-        if reading is None:
+        trial = share.predictor.trial
+        if trial.reading is None:
             continue
-        rest = (load_of(share.predictor.stimulus) < AT_REST) & np.isfinite(reading)
-        miss = reading - share.predictor.predict(model.without(index)).reading
-        total += np.where(rest, miss, 0.0).sum(axis=0)
-        count += rest.sum(axis=0)
+        rest = (load_of(share.predictor.stimulus) < AT_REST) & np.isfinite(trial.reading)
+        miss = np.where(rest, trial.reading - share.predictor.predict(model.without(index)).reading, 0.0)
+        begins = trial.time <= trial.time[0] + BEGINS * np.ptp(trial.time)
+        early = rest & (np.cumsum(rest, axis=0) <= ENOUGH) & begins[:, None]
+        always += [miss.sum(axis=0), rest.sum(axis=0)]
+        first += [np.where(early, miss, 0.0).sum(axis=0), early.sum(axis=0)]
+    alike = not found.candidate.local
+    return all(_is_seen(claimed, total, count, alike) for total, count in (always, first))
+
+
+def _is_seen(claimed: np.ndarray, total: np.ndarray, count: np.ndarray, alike: bool) -> bool:
+    """Whether the means of some samples of each texel bear out what is claimed; True where there are too few."""
     resting = count >= ENOUGH
     if resting.sum() < 2:
         return True
     seen, claimed = total[resting] / count[resting], claimed[resting]
-    seen, claimed = seen - seen.mean(), claimed - claimed.mean()  # what all share is the sensor's zero
+    if not alike:  # what all share is the sensor's zero
+        seen, claimed = seen - seen.mean(), claimed - claimed.mean()
     return float(claimed @ seen) >= PRESENT * float(claimed @ claimed)

@@ -13,14 +13,14 @@ import numpy as np
 
 from ..effects.base import Effect
 from ..effects.library import library
-from .candidates import NEVER, Scales, candidates, scales_of
-from .explain import FORCES, LEAST, READINGS, STRUCTURE, Account, Explainer, Ground, Step, means_of
-from .fit import FRICTION, Fit, base_numbers, fit, held_out
+from .candidates import NEVER, READ_OFF, Scales, candidates, scales_of
+from .explain import FORCES, LEAST, READINGS, STRUCTURE, Account, Explainer, Ground, Step, friction_kinds, means_of
+from .fit import FRICTION, LEVEL, Fit, base_numbers, fit, held_out
 from .lines import Line, line_of
 from .model import Model, Predictor
 from .noise import SHORTEST, Coverage, Noise, coverage, force_noise, reading_noise
 from .rig import Rig
-from .search import Views, views_of
+from .search import Views, coarsest, views_of
 from .structure import Structure, structure_of
 from .telling import alike, untold
 from .tremble import trembling
@@ -36,6 +36,8 @@ AGAIN = 1.75
 SMALL, NEARLY_ALL = 0.1, 0.65
 """One of several that closes a smaller share of the whole gap may be what the others' formulas lack: it is no sure name, unless
 it closes so much of what they leave, as what a formula lacks seldom looks like another effect."""
+UNSURE = 0.45
+"""Highest confidence of a name that is not meant as sure."""
 TOGETHER = 0.8
 """Correlation over the texels from which on two effects with a number for each are one: an offset that fades under load takes
 off everywhere what it has put on."""
@@ -103,10 +105,16 @@ class Progress:
 
 
 def free_base(rig: Rig, predictors: Sequence[Predictor]) -> list[str]:
-    """Return which of the base model's own numbers these recordings tell.
+    """Return which of the base model's own numbers are free while effects are looked for.
 
     Of depth and pose the readings tell only gain times stiffness: in newtons, or where the rig gives the gain, that is `k`.
     """
+    names = numbers_told(rig, predictors)
+    return [name for name in names if name not in FRICTION] + (free_friction(rig) if set(FRICTION) & set(names) else [])
+
+
+def numbers_told(rig: Rig, predictors: Sequence[Predictor]) -> list[str]:
+    """Return which of the base model's own numbers these recordings tell."""
     read = any(p.trial.reading is not None for p in predictors)
     pressed = any(p.trial.stimulus != "force" for p in predictors)
     loaded = any(p.trial.stimulus == "force" for p in predictors)
@@ -127,6 +135,22 @@ def free_base(rig: Rig, predictors: Sequence[Predictor]) -> list[str]:
         names.append("zero")
     if dragged:
         names += FRICTION
+    return names
+
+
+def free_friction(rig: Rig) -> list[str]:
+    """Return which of the base model's numbers of friction are free while effects are looked for.
+
+    By how much friction falls from rest to sliding, and over which speeds, is itself a law of Stribeck's, and `ct` a viscous
+    friction: were they free, there would be nothing left of these two effects to find. Where a rig states them, another fall
+    or another drag is such an effect, and the level of friction alone is a better number.
+    """
+    p = rig.parameters
+    names = list(FRICTION)
+    if {"mus", "mud", "x0"} <= rig.given and p.mus > 0:
+        names = [LEVEL, *(name for name in names if name not in ("mus", "mud", "x0"))]
+    if "ct" in rig.given:
+        names.remove("ct")
     return names
 
 
@@ -218,6 +242,7 @@ def _explain(result: Diagnosis, views: Views) -> Iterator[tuple[str, float]]:
     ground = Ground(start, floor, result.base.count.sum(axis=0).astype(float))
     explainer = Explainer(views, result.scales, result.coverage, ground)
     account = yield from explainer.run(base, partial(_structure, views))
+    account = replace(account, fit=_loosened(result, views, account.fit))
     result.best, result.structure = account.fit, _structure(views, account.fit)
     result.line = line_of(views.whole, account.fit.model)
     main, mean = ground.main, float(account.means[ground.main])
@@ -229,10 +254,53 @@ def _explain(result: Diagnosis, views: Views) -> Iterator[tuple[str, float]]:
             result.best = replace(account.fit, model=account.fit.model.with_effect(tremble))
             ground.floor[main] = max(ground.floor[main], mean)
     _conclude(result, account, ground)
-    if result.ambiguous:  # what is named beside what is unclear may be a part of that
-        small = {name for name, gain in account.gains.items() if gain.of_all < SMALL}
-        result.named = [replace(n, confidence=min(n.confidence, 0.45)) if n.name in small else n for n in result.named]
+    doubted = _doubted(result, views, account, ground)
+    result.named = [replace(n, confidence=min(n.confidence, UNSURE)) if n.name in doubted else n for n in result.named]
     _rule_out(result, account.first, ground)
+
+
+def _doubted(result: Diagnosis, views: Views, account: Account, ground: Ground) -> set[str]:
+    """Names that are not sure for what else there is, or is not, in the model.
+
+    What is named beside what is unclear may be a part of that: all of it where the recordings cannot tell, since any curve
+    that they bring out could be either's; else what is small. What closes less than a step of the readings may lie within it.
+    Friction goes with the load: where the normal force is off by more than what a law of friction closes, that may be why.
+    """
+    small = {name for name, gain in account.gains.items() if gain.of_all < SMALL}
+    doubted = small if result.ambiguous else set()
+    names = {one.name for one in result.named}
+    if any(alike(result.coverage, name) for name in names):
+        doubted |= names - set(READ_OFF)
+    step = coarsest(views.whole, result.base.model)
+    size = {name: abs(gain.of_all) * ground.gap(ground.main) for name, gain in account.gains.items()}
+    if "quantization" not in names and ground.main == READINGS:
+        doubted |= {name for name, square in size.items() if square < (step / result.noise[READINGS].deviation) ** 2}
+    for name in names & set(friction_kinds()) if ground.both else ():
+        if account.gains[name].of_all * ground.gap(FORCES) * ground.count[FORCES] < _normal_squares(views, account.fit):
+            doubted.add(name)
+    return doubted
+
+
+def _normal_squares(views: Views, found: Fit) -> float:
+    """Squares of the residual of the net normal force, beyond those of its noise."""
+    normal = views.whole[0].predictor.rig.texels.normal.mean(axis=0)
+    residual = np.concatenate([share.residual(found.model)[:, -3:] @ normal for share in views.whole])
+    return max(float(residual @ residual) - len(residual), 0.0)
+
+
+def _loosened(result: Diagnosis, views: Views, found: Fit) -> Fit:
+    """The fit with all the base model's numbers free, as those that a rig states are rounded.
+
+    Where an effect on friction was found they would take its part. There they stay, and only make the intervals as wide as
+    what the recordings tell.
+    """
+    names = numbers_told(result.rig, [share.predictor for share in views.whole])
+    if set(names) == {item.name for item in found.free if item.effect < 0}:
+        return found
+    rubbed = any(effect.name in friction_kinds() for effect in found.model.effects)
+    free = base_numbers(found.model.parameters, names, result.full[READINGS])
+    free += [item for item in found.free if item.effect >= 0]
+    return fit(views.whole, found.model, free, turns=0 if rubbed else 10, tolerance=1e-5)
 
 
 def _trembling_at_rest(views: Views, found: Fit) -> float:
@@ -279,7 +347,7 @@ def _conclude(result: Diagnosis, account: Account, ground: Ground) -> None:
         apart = min(leaves.values(), default=np.inf) > APART
         confidence = weight * (0.5 + 0.5 * share if share >= (PART if apart else EXPLAINED) else 0.5 * share)
         if rivals or (len(fitted) > 1 and _is_doubtful(effect, account, fitted)):
-            confidence = min(confidence, 0.45)
+            confidence = min(confidence, UNSURE)
         if rivals:
             result.ambiguous.append((effect.name, *rivals))
         nearest = min(others, key=lambda name: others[name], default="")
@@ -291,6 +359,8 @@ def _conclude(result: Diagnosis, account: Account, ground: Ground) -> None:
 def _is_doubtful(effect: Effect, account: Account, fitted: Sequence[Effect]) -> bool:
     """Whether one of several effects may only be what the formula of another lacks."""
     gain, step = account.gains.get(effect.name), account.steps.get(effect.name)
+    if _is_of_the_dead(effect, fitted):
+        return True
     if step is not None and step.worse(step.again, effect.name) < AGAIN:
         return True
     if gain is None or gain.of_all >= SMALL:
@@ -301,6 +371,18 @@ def _is_doubtful(effect: Effect, account: Account, fitted: Sequence[Effect]) -> 
     others = [np.asarray(v) for other in fitted if other is not effect for v in other.values.values() if isinstance(v, tuple)]
     pairs = [np.corrcoef(a, b)[0, 1] for a in own for b in others if np.ptp(a) > 0 and np.ptp(b) > 0]
     return any(abs(r) > TOGETHER for r in pairs)
+
+
+def _is_of_the_dead(effect: Effect, fitted: Sequence[Effect]) -> bool:
+    """Whether what an effect says of each texel is mostly said of dead ones: a little that they still answer."""
+    for other in fitted:
+        dead = np.asarray(other.values.get("dead", 0.0))
+        for value in effect.values.values():
+            if other is not effect and isinstance(value, tuple) and dead.shape:
+                moved = (np.asarray(value) - np.median(value)) ** 2
+                if float(moved[dead > 0.5].sum()) > 0.5 * float(moved.sum()):
+                    return True
+    return False
 
 
 def _rule_out(result: Diagnosis, alone: Step, ground: Ground) -> None:

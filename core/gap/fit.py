@@ -32,6 +32,8 @@ PRIOR = 10.0
 """Inverse variance of a number per texel about its resting value, in its coordinate: a gain is within ± 0.3 unseen."""
 FRICTION = ("mus", "mud", "sigma0", "x0", "ct")
 """Parameters of the base model that show in net forces alone."""
+LEVEL = "mus and mud"
+"""Both friction coefficients as one number, by which they grow alike."""
 BLOCKS = 12
 """Blocks of time of each stretch in which gradients are summed, each long against the memory of the noise."""
 TOLD = 0.1
@@ -54,6 +56,8 @@ class Free:
     per_texel : bool
     rest : float
         Value from which a number per texel departs only as far as the recording says so (see :data:`PRIOR`).
+    along : tuple of str
+        Other parameters of the base model that keep their ratio to it.
     """
 
     effect: int
@@ -64,6 +68,7 @@ class Free:
     size: float = 1.0
     per_texel: bool = False
     rest: float = 0.0
+    along: tuple[str, ...] = ()
 
     def to(self, value: np.ndarray | float) -> np.ndarray:
         """Value → coordinate of the fit."""
@@ -90,6 +95,8 @@ def changed(model: Model, free: Sequence[Free], values: Sequence[np.ndarray | fl
     for item, value in zip(free, values, strict=True):
         if item.effect < 0:
             base[item.name] = float(value)
+            grows = float(value) / max(float(getattr(model.parameters, item.name)), 1e-12) if item.along else 1.0
+            base |= {name: grows * float(getattr(model.parameters, name)) for name in item.along}
         else:
             plain = tuple(np.asarray(value).tolist()) if item.per_texel else float(value)
             stacks.setdefault(item.effect, {})[item.name] = plain
@@ -499,7 +506,7 @@ def base_numbers(parameters: SensorParameters, wanted: Sequence[str], full: floa
     """
     p, made = parameters, []
     for name in wanted:
-        value = float(getattr(p, name))
+        value = float(getattr(p, "mus" if name == LEVEL else name))
         if name in ("k", "sigma0", "x0"):
             made.append(Free(-1, name, value * 1e-5, value * 1e5, log=True))
         elif name == "cn":
@@ -509,6 +516,8 @@ def base_numbers(parameters: SensorParameters, wanted: Sequence[str], full: floa
             made.append(Free(-1, name, -1e6 * size, 1e6 * size, size=size))
         elif name == "zero":
             made.append(Free(-1, name, -100 * full - abs(value), 100 * full + abs(value), size=full))
+        elif name == LEVEL:
+            made.append(Free(-1, "mus", 1e-3, 20.0, size=0.1, along=("mud",)))
         elif name in ("mus", "mud"):
             made.append(Free(-1, name, 0.0, 20.0, size=0.1))
         else:

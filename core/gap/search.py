@@ -373,6 +373,12 @@ def few_levels(values: np.ndarray) -> np.ndarray | None:
     return levels if 3 <= len(levels) <= FEW_LEVELS and len(values) >= 20 * len(levels) else None
 
 
+def coarsest(shares: Sequence[Share], model: Model) -> float:
+    """Return the largest step in which readings come, in the sensor's unit; 0 where there are none that can be seen."""
+    levels = few_levels(moving_readings(shares, model))
+    return 0.0 if levels is None else float(np.diff(levels).max())
+
+
 def free_of(free: Sequence[Free], model: Model, candidate: Candidate, scales: Scales) -> tuple[Free, ...]:
     """Return some free numbers of a model and those of one effect more on top of it."""
     if candidate.name in READ_OFF:

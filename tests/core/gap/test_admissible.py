@@ -38,8 +38,12 @@ def only_under_load(reading, _time):
     return reading + SPREAD * (reading > 0.01)
 
 
-@pytest.mark.parametrize(("change", "is_one"), [(always, True), (only_under_load, False)])
-def test_an_offset_is_there_without_load(change, is_one):
+def later(reading, time):
+    return reading + SPREAD * (time[:, None] / time[-1]) ** 0.7
+
+
+@pytest.mark.parametrize(("change", "is_one"), [(always, True), (only_under_load, False), (later, False)])
+def test_an_offset_is_there_without_load_from_the_beginning(change, is_one):
     found, views = offset_each(cases.rig(change=change, seed=4, trials=6))
     touched = np.any([(s.predictor.stimulus.depth > 0).any(axis=0) for s in views.whole], axis=0)
     values = np.array(found.fit.model.effects[0].values["offset"])[touched]
