@@ -25,6 +25,16 @@ def converter(x: np.ndarray, time: np.ndarray, values: Values, site: Site, seed:
     return _stepped(x, number(values, "range") / 2.0 ** number(values, "bits"), np.round)
 
 
+def companded(x: np.ndarray, time: np.ndarray, values: Values, site: Site, seed: int) -> np.ndarray:
+    """To the step below, of steps that grow with the reading's change."""
+    scale, growth = number(values, "scale"), number(values, "growth")
+    if growth <= 0.0:
+        return x
+    change = x - site.zero
+    steps = np.floor(np.log1p(np.abs(change) / scale) / growth)
+    return site.zero + np.sign(change) * scale * np.expm1(growth * steps)
+
+
 def _stepped(x: np.ndarray, step: float, way: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
     return step * way(x / step) if step > 0.0 else x
 
@@ -66,6 +76,18 @@ KIND = Kind(
             ),
             off={"range": 0.0},
             shape=converter,
+            after_conversion=True,
+        ),
+        Form(
+            "companding",
+            "r = A · (exp(b · floor(ln(1 + r₀/A) / b)) − 1)",
+            "ITU-T Recommendation G.711 (1988): companding by a logarithm",
+            (
+                Parameter("scale", "unit", 0.1, 1e-6, 1e5, "Reading A from which on steps grow with it.", log=True),
+                Parameter("growth", "1", 0.05, 0.0, 3.0, "Width b of a step as a share of A and the reading together."),
+            ),
+            off={"growth": 0.0},
+            shape=companded,
             after_conversion=True,
         ),
     ),

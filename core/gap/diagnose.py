@@ -19,10 +19,11 @@ from .fit import FRICTION, LEVEL, Fit, base_numbers, fit, held_out
 from .lines import Line, line_of
 from .model import Model, Predictor
 from .noise import SHORTEST, Coverage, Noise, coverage, force_noise, reading_noise
+from .readoff import coarsest
 from .rig import Rig
-from .search import Views, coarsest, views_of
+from .search import Views, views_of
 from .structure import Structure, structure_of
-from .telling import alike, untold
+from .telling import alike, bend_of, untold
 from .tremble import trembling
 
 EXPLAINED = 0.5
@@ -269,7 +270,7 @@ def _doubted(result: Diagnosis, views: Views, account: Account, ground: Ground) 
     small = {name for name, gain in account.gains.items() if gain.of_all < SMALL}
     doubted = small if result.ambiguous else set()
     names = {one.name for one in result.named}
-    if any(alike(result.coverage, name) for name in names):
+    if any(alike(result.coverage, name, bend_of(result.of("fit"), result.best.model)) for name in names):
         doubted |= names - set(READ_OFF)
     step = coarsest(views.whole, result.base.model)
     size = {name: abs(gain.of_all) * ground.gap(ground.main) for name, gain in account.gains.items()}
@@ -330,6 +331,7 @@ def _conclude(result: Diagnosis, account: Account, ground: Ground) -> None:
     else:
         open_sides = [side for side in (READINGS, FORCES) if ground.matters(side) and closed[side] < EXPLAINED]
         result.verdict = "unexplained" if open_sides else "explained"
+    bend = bend_of(result.of("fit"), result.best.model)
     for index, effect in enumerate(effects):
         step = account.steps.get(effect.name, Step([], []))
         others: dict[str, float] = {}
@@ -340,7 +342,7 @@ def _conclude(result: Diagnosis, account: Account, ground: Ground) -> None:
             if name not in {e.name for e in effects} and not (effect.name == "dead-texels" and one.candidate.local):
                 others[name] = min(step.worse(left, effect.name), others.get(name, np.inf))
                 leaves[name] = min(left / own, leaves.get(name, np.inf))
-        same = [name for name in alike(result.coverage, effect.name) if name not in {e.name for e in effects}]
+        same = [name for name in alike(result.coverage, effect.name, bend) if name not in {e.name for e in effects}]
         rivals = tuple(dict.fromkeys([*(name for name, ratio in others.items() if ratio < RIVAL), *same]))
         weight = 1.0 / (1.0 + sum(ratio**-4.0 for ratio in others.values()))
         share = closed[ground.side(effect.name)] if fitted else 1.0

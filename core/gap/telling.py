@@ -3,6 +3,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
+import numpy as np
+
+from .model import Model, Predictor
 from .noise import Coverage
 
 NEVER_UNLOADED = "nothing was ever unloaded, so that what it leaves behind cannot show"
@@ -30,6 +35,11 @@ BY_PLACE = ("load-spreading", "crosstalk", "gain-mismatch", "misalignment")
 """Known by how neighbours differ as the load moves on: at one place each is some pattern of texels that grows with the load."""
 BY_CYCLE = ("hysteresis", "softening", "wear")
 """Known by how a second cycle differs from the first: in one alone, each makes the way back lie below the way in."""
+BENDS = ("stiffening", "saturation", "dead-zone")
+"""A curve that is not straight: so is the way in of whatever has a loop."""
+LOOP = 3.0
+"""Ratio of a curve's steepest to its flattest quarter up to which it may be the way in of a loop that takes two thirds of the
+force."""
 SHORT = 0.5
 """Seconds of a hold below which it tells nothing of settling."""
 
@@ -52,15 +62,40 @@ def confounded(coverage: Coverage) -> tuple[str, ...]:
     return BY_TIME if one else ()
 
 
-def alike(coverage: Coverage, name: str) -> tuple[str, ...]:
+def alike(coverage: Coverage, name: str, bend: float = np.inf) -> tuple[str, ...]:
     """Return the kinds that recordings cannot tell from one of this name, however much better one of them fits.
 
     The sensor need follow none of the formulas: a better fit is no evidence where the mark of the effect was not brought out.
+
+    Parameters
+    ----------
+    coverage : Coverage
+    name : str
+    bend : float
+        How many times as steep as its flattest quarter the steepest of the fitted curve is (see :func:`bend_of`).
     """
     groups: list[tuple[str, ...]] = []
+    if not coverage.unloading and name in BENDS and bend < LOOP:
+        groups.append((name, "hysteresis"))
     if not coverage.roams:
         groups.append(BY_PLACE)
     if coverage.unloading and coverage.cycles < 2:
         still = coverage.rates < ONE_SPEED and coverage.longest_hold < SHORT
         groups.append((*BY_CYCLE, "creep", "lag") if still else BY_CYCLE)
     return tuple(dict.fromkeys(other for group in groups if name in group for other in group if other != name))
+
+
+def bend_of(predictors: Sequence[Predictor], model: Model) -> float:
+    """Return how many times as steep as its flattest quarter the steepest of a model's curve is, of the texel pressed most."""
+    deepest = max(predictors, key=lambda one: float(_load(one).max(initial=0.0)))
+    texel = int(np.argmax(_load(deepest).max(axis=0)))
+    load, reading = _load(deepest)[:, texel], deepest.predict(model).reading[:, texel]
+    order = np.argsort(load)
+    slopes = np.diff(np.interp(np.linspace(0.0, load.max(), 5), load[order], reading[order]))
+    steep = np.abs(slopes)
+    return float(steep.max() / max(float(steep.min()), 1e-9 * float(steep.max()), 1e-300))
+
+
+def _load(predictor: Predictor) -> np.ndarray:
+    s = predictor.stimulus
+    return s.depth if s.load is None else s.load

@@ -46,6 +46,12 @@ def image(texel, value=1.0):
         ("offset", "common", {"offset": -0.2}, lambda f: f - 0.2),
         ("quantization", "round", {"step": 0.25}, lambda f: 0.25 * np.round(f / 0.25)),
         ("quantization", "floor", {"step": 0.25}, lambda f: 0.25 * np.floor(f / 0.25)),
+        (
+            "quantization",
+            "companding",
+            {"scale": 0.5, "growth": np.log(2.0)},
+            lambda f: np.sign(f) * np.choose(np.searchsorted([0.5, 1.5], np.abs(f), "right"), [0, 0.5, 1.5]),
+        ),
         ("quantization", "bits", {"bits": 4, "range": 2.0}, lambda f: np.round(f * 8) / 8),
         ("drift", "linear", {"rate": 0.03}, lambda f: f + 0.03 * TIME[:, None]),
         ("drift", "warm-up", {"amount": 0.3, "time": 4.0}, lambda f: f + 0.3 * (1 - np.exp(-TIME[:, None] / 4))),

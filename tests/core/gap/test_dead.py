@@ -9,7 +9,8 @@ from palpate.core.effects.library import form_of, kind_of
 from palpate.core.gap.candidates import Candidate
 from palpate.core.gap.diagnose import begin
 from palpate.core.gap.model import Model
-from palpate.core.gap.search import dead, views_of
+from palpate.core.gap.readoff import dead
+from palpate.core.gap.search import views_of
 
 GONE, TOUCH = [5, 9, 14], 0.004
 

@@ -4,10 +4,15 @@
 import numpy as np
 import pytest
 
-from palpate.core.effects.library import effect
-from palpate.core.gap.diagnose import _is_doubtful
+from palpate.core.effects.library import effect, form_of, kind_of
+from palpate.core.gap.candidates import Candidate
+from palpate.core.gap.diagnose import _is_doubtful, free_friction
 from palpate.core.gap.explain import FORCES, READINGS, Account, Gain, Ground, Step, friction_kinds
-from palpate.core.gap.search import few_levels
+from palpate.core.gap.fit import LEVEL, base_numbers, changed
+from palpate.core.gap.model import Model
+from palpate.core.gap.readoff import few_levels, growing
+from palpate.core.gap.rig import Rig, grid_texels
+from palpate.core.scenario import SensorParameters
 
 
 def test_readings_and_forces_have_a_gap_each():
@@ -31,6 +36,37 @@ def test_a_handful_of_values_is_seen():
     assert few_levels(smooth) is None
     assert few_levels(np.round(smooth, 2)) is None  # a hundred values: no step is seen by eye
     assert few_levels(np.ones(4000)) is None
+
+
+def test_steps_that_grow_are_read_off():
+    scale, growth = 0.02, 0.3
+    levels = 7.0 + scale * np.expm1(growth * np.arange(-1, 12))
+    (found,) = growing(levels, 7.0, Candidate(kind_of("quantization"), form_of("quantization", "companding")))
+    assert found.values["growth"] == pytest.approx(growth, rel=0.02) and found.values["scale"] == pytest.approx(scale, rel=0.05)
+    assert not growing(levels[:3], 7.0, Candidate(kind_of("quantization"), form_of("quantization", "companding")))
+
+
+def test_a_stated_fall_of_friction_is_held_and_its_level_free():
+    parameters = SensorParameters(k=50.0, mus=0.6, mud=0.45, x0=0.02, ct=0.01)
+    texels = grid_texels(1, 2, 3e-3, 3e-3)
+
+    def stating(*names):
+        return Rig("two", texels, parameters, frozenset(names), None, (1, 2, (3e-3, 3e-3)), None, ())
+
+    assert free_friction(stating("k", "mus", "mud", "x0", "ct")) == [LEVEL, "sigma0"]
+    assert set(free_friction(stating("k", "mus", "mud", "ct"))) == {"mus", "mud", "sigma0", "x0"}
+    assert "ct" in free_friction(stating("mus", "mud", "x0"))
+    level = base_numbers(parameters, [LEVEL], 1.0)
+    moved = changed(Model(parameters), level, [0.9]).parameters
+    assert (moved.mus, moved.mud) == pytest.approx((0.9, 0.675))
+
+
+def test_what_dead_texels_still_answer_is_no_further_effect():
+    dead = effect("dead-texels", "listed", dead=(0.0, 1.0, 0.0, 0.0))
+    for offset, doubt in (((0.0, 0.3, 0.01, 0.0), True), ((0.1, 0.3, -0.3, 0.2), False)):
+        other = effect("offset", "listed", offset=offset)
+        account = Account(None, None, {}, {"offset": Gain(0.3, 0.9)})
+        assert _is_doubtful(other, account, [dead, other]) == doubt
 
 
 def doubtful(second, gain, again=np.inf, **values):

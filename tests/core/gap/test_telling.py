@@ -6,12 +6,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from palpate.core.effects.library import effect
 from palpate.core.gap.candidates import candidates
 from palpate.core.gap.model import Model, Predictor
 from palpate.core.gap.noise import coverage
 from palpate.core.gap.phases import PHASES, phases
 from palpate.core.gap.rig import Rig, Trial, grid_texels
-from palpate.core.gap.telling import BY_CYCLE, BY_PLACE, BY_TIME, LEAVES_BEHIND, alike, confounded, untold
+from palpate.core.gap.telling import BY_CYCLE, BY_PLACE, BY_TIME, LEAVES_BEHIND, LOOP, alike, bend_of, confounded, untold
 from palpate.core.scenario import SensorParameters
 
 PROGRAMMES = {
@@ -73,6 +74,19 @@ def test_one_cycle_does_not_tell_what_a_second_would():
     assert set(alike(once, "softening")) == {*BY_CYCLE, "creep", "lag"} - {"softening"}
     assert set(alike(coverage([predictor("held", 20.0)]), "softening")) == set(BY_CYCLE) - {"softening"}
     assert alike(replace(once, cycles=3), "softening") == () == alike(once, "stiffening")
+
+
+@pytest.mark.parametrize("depth", [1e-1, 4e-3, 2e-4])
+def test_the_way_in_alone_may_be_that_of_a_loop(depth):
+    """What bends little may be half a loop; a curve several times as steep at its end is not."""
+    up, back = (predictor(programme, 20.0) for programme in ("ramp", "press"))
+    model = Model(up.rig.parameters, (effect("stiffening", "polynomial", depth=depth, exponent=1.0),))
+    at = 1e-3 / depth * np.linspace(0, 1, 5)
+    slopes = np.diff(at * (1 + at))
+    found = bend_of([up], model)
+    assert found == pytest.approx(slopes[-1] / slopes[0], rel=0.02)
+    assert alike(coverage([up]), "stiffening", found) == (("hysteresis",) if found < LOOP else ())
+    assert alike(coverage([back]), "stiffening", found) == ()
 
 
 @pytest.mark.parametrize(("stays", "told"), [(True, False), (False, True)])
