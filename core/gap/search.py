@@ -57,9 +57,10 @@ class Views:
         if candidate.name in READ_OFF:
             return self.whole
         forms = [candidate.form, *(form_of(e.name, e.form) for e in model.effects)]
+        rubs = candidate.form.friction is not None
         if any(is_spatial(form) or form.place is not None for form in forms):
-            return self.thin
-        return self.rubbed if candidate.form.friction is not None else self.narrow
+            return self.whole if rubs else self.thin  # bristles need every sample, and friction shows in net forces alone
+        return self.rubbed if rubs else self.narrow
 
 
 def views_of(predictors: Sequence[Predictor], noise: tuple[float, float]) -> Views:

@@ -12,6 +12,7 @@ from palpate.core.gap.fit import LEVEL, base_numbers, changed
 from palpate.core.gap.model import Model
 from palpate.core.gap.readoff import few_levels, growing
 from palpate.core.gap.rig import Rig, grid_texels
+from palpate.core.gap.search import Views
 from palpate.core.scenario import SensorParameters
 
 
@@ -105,3 +106,17 @@ def test_a_rival_closes_nearly_as_much():
     assert step.worse(10.4, "gain-mismatch") == pytest.approx(4.0 / 1.6)
     assert step.worse(16.0, "gain-mismatch") == pytest.approx(4.0 / 1e-12)  # closes nothing
     assert Two([], [], before=1000.0).worse(10.4, "gain-mismatch") == pytest.approx(1.3)
+
+
+@pytest.mark.parametrize(
+    "beside", [("load-spreading", "gaussian"), ("crosstalk", "neighbours"), ("misalignment", "shift"), None]
+)
+def test_friction_is_looked_for_where_forces_are(beside):
+    """What texels feel of each other is looked at without net forces, in which alone friction shows."""
+    views = Views(["whole"], ["narrow"], ["rubbed"], ["thin"])
+    model = Model(SensorParameters(), (effect(*beside),) if beside else ())
+    for name in friction_kinds():
+        kind = kind_of(name)
+        assert views.quick(Candidate(kind, kind.forms[0]), model) == (["whole"] if beside else ["rubbed"])
+    creep = kind_of("creep")
+    assert views.quick(Candidate(creep, creep.forms[0]), model) == (["thin"] if beside else ["narrow"])
