@@ -227,7 +227,7 @@ def offset(rng, strength) -> Hidden:
 
 
 def quantization(rng, strength) -> Hidden:
-    """A converter with companding: steps that grow with the reading, and cut off instead of rounding."""
+    """A converter behind a square root: steps that grow with the reading, and cut off instead of rounding."""
 
     def act(reading, pad):
         step, full = 0.15 * strength, pad.gain * pad.k * 3e-3
@@ -235,7 +235,7 @@ def quantization(rng, strength) -> Hidden:
         root = np.sign(x) * np.sqrt(np.abs(x))
         return pad.zero + full * np.sign(root) * (step * np.floor(np.abs(root) / step)) ** 2
 
-    return Hidden("quantization", "companding", strength, convert=act)
+    return Hidden("quantization", "square root", strength, convert=act)
 
 
 def noise(rng, strength) -> Hidden:
