@@ -38,7 +38,7 @@ BY_CYCLE = ("hysteresis", "softening", "wear")
 BENDS = ("stiffening", "saturation", "dead-zone")
 """A curve that is not straight: so is the way in of whatever has a loop."""
 LOOP = 3.0
-"""Ratio of a curve's steepest to its flattest quarter up to which it may be the way in of a loop that takes two thirds of the
+"""Ratio of a curve's steepest to its flattest eighth up to which it may be the way in of a loop that takes two thirds of the
 force."""
 SHORT = 0.5
 """Seconds of a hold below which it tells nothing of settling."""
@@ -72,7 +72,7 @@ def alike(coverage: Coverage, name: str, bend: float = np.inf) -> tuple[str, ...
     coverage : Coverage
     name : str
     bend : float
-        How many times as steep as its flattest quarter the steepest of the fitted curve is (see :func:`bend_of`).
+        How many times as steep as its flattest eighth the steepest of the fitted curve is (see :func:`bend_of`).
     """
     groups: list[tuple[str, ...]] = []
     if not coverage.unloading and name in BENDS and bend < LOOP:
@@ -86,12 +86,12 @@ def alike(coverage: Coverage, name: str, bend: float = np.inf) -> tuple[str, ...
 
 
 def bend_of(predictors: Sequence[Predictor], model: Model) -> float:
-    """Return how many times as steep as its flattest quarter the steepest of a model's curve is, of the texel pressed most."""
+    """Return how many times as steep as its flattest eighth the steepest of a model's curve is, of the texel pressed most."""
     deepest = max(predictors, key=lambda one: float(_load(one).max(initial=0.0)))
     texel = int(np.argmax(_load(deepest).max(axis=0)))
     load, reading = _load(deepest)[:, texel], deepest.predict(model).reading[:, texel]
     order = np.argsort(load)
-    slopes = np.diff(np.interp(np.linspace(0.0, load.max(), 5), load[order], reading[order]))
+    slopes = np.diff(np.interp(np.linspace(0.0, load.max(), 9), load[order], reading[order]))
     steep = np.abs(slopes)
     return float(steep.max() / max(float(steep.min()), 1e-9 * float(steep.max()), 1e-300))
 

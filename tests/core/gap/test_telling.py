@@ -81,7 +81,7 @@ def test_the_way_in_alone_may_be_that_of_a_loop(depth):
     """What bends little may be half a loop; a curve several times as steep at its end is not."""
     up, back = (predictor(programme, 20.0) for programme in ("ramp", "press"))
     model = Model(up.rig.parameters, (effect("stiffening", "polynomial", depth=depth, exponent=1.0),))
-    at = 1e-3 / depth * np.linspace(0, 1, 5)
+    at = 1e-3 / depth * np.linspace(0, 1, 9)
     slopes = np.diff(at * (1 + at))
     found = bend_of([up], model)
     assert found == pytest.approx(slopes[-1] / slopes[0], rel=0.02)
