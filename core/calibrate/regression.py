@@ -25,7 +25,7 @@ class Estimate:
         return f"{self.value:.4g}{f' {unit}' if unit else ''} (95 %: {self.low:.4g} to {self.high:.4g})"
 
 
-def student(freedom: int) -> float:
+def student(freedom: float) -> float:
     """97.5 % quantile of Student's t; infinite without a degree of freedom, since nothing tells the scatter then."""
     from scipy.stats import t
 

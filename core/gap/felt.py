@@ -184,8 +184,9 @@ def sum_forces(touches, force, factor, viscous, parameters, work, total):  # typ
     keeps, gains, owns, fades = work[0], work[1], work[2], work[3]
     for i in range(force.shape[0]):
         held[i] = force[i] if plain else force[i] * factor[i]
-    for i in range(force.shape[0]):
-        keeps[i], gains[i] = bristle_step(before[i], held[i], length[i], parameters)
+    for i in range(force.shape[0]):  # over a step the load is the mean of its ends, as the velocity is
+        load = 0.5 * (held[i] + held[i - 1]) if touches.follows[i] and held[i - 1] > 0.0 else held[i]
+        keeps[i], gains[i] = bristle_step(before[i], load, length[i], parameters)
     for i in range(force.shape[0]):
         owns[i] = bristle_rate(0.0, 1.0, now[i], held[i], parameters)
         fades[i] = bristle_rate(-1.0, 0.0, now[i], held[i], parameters)
