@@ -21,9 +21,9 @@ SIZES = (1.0, 2.0, 4.0)
 """How many times as large as what was left unexplained."""
 LARGEST, STRONGEST = 0.3, 6.0
 """Share of the range, and strength: beyond them it is no effect on a sensor but another sensor."""
-Change = Callable[[np.ndarray, np.ndarray, float], np.ndarray]
-"""From times (T,) since a recording began, in shares of the longest one's length, and readings (T, n) in shares of the largest,
-with a strength, to what a sensor with the effect reads: with the same times and rates in every recording, long or short."""
+Change = Callable[[np.ndarray, np.ndarray, np.ndarray, float], np.ndarray]
+"""From times (T,) since a recording began, in shares of the longest one's length, loads (T, 1) and readings (T, n), both in
+shares of the largest, with a strength, to what a sensor with the effect reads: one sensor, in long recordings and short."""
 
 
 def _low_pass(time: np.ndarray, x: np.ndarray, tau: float) -> np.ndarray:
@@ -33,50 +33,49 @@ def _low_pass(time: np.ndarray, x: np.ndarray, tau: float) -> np.ndarray:
     return out
 
 
-def lag(time, x, strength):
+def lag(time, load, x, strength):
     """Three equal low passes in turn."""
     for _ in range(3):
         x = _low_pass(time, x, 0.03 * strength)
     return x
 
 
-def saturation(time, x, strength):
+def saturation(time, load, x, strength):
     """An arctangent."""
     return np.arctan(x * strength) / strength
 
 
-def dead_zone(time, x, strength):
+def dead_zone(time, load, x, strength):
     """A quadratic onset that runs into the line."""
     size, start = np.abs(x), 0.3 * strength
     return np.sign(x) * np.where(size < 2 * start, size**2 / (4 * start), size - start)
 
 
-def drift(time, x, strength):
+def drift(time, load, x, strength):
     """A power of the time."""
     return x + 0.3 * strength * time[:, None] ** 1.3
 
 
-def creep(time, x, strength):
+def creep(time, load, x, strength):
     """The reading goes on rising, with two times."""
     return x + strength * (0.3 * _low_pass(time, x, 0.03) + 0.3 * _low_pass(time, x, 0.15))
 
 
-def hysteresis(time, x, strength):
-    """Each way back bulges out over the way in, by a parabola between nothing and the largest load before it."""
-    size, out = np.abs(x), x.copy()
-    top = np.zeros(x.shape[1])
+def hysteresis(time, load, x, strength):
+    """Where load was taken back, readings bulge out over the way in: by a parabola up to the largest load before."""
+    out, top = x.copy(), np.zeros(1)
     for t in range(len(x)):
-        top = np.where(size[t] < 0.02, size[t], np.maximum(top, size[t]))
-        out[t] = x[t] + strength * x[t] * (1.0 - size[t] / np.maximum(top, 1e-9))
+        top = np.where(load[t] < 0.02, load[t], np.maximum(top, load[t]))
+        out[t] = x[t] + strength * x[t] * (1.0 - load[t] / np.maximum(top, 1e-9))
     return out
 
 
-def gain_mismatch(time, x, strength):
+def gain_mismatch(time, load, x, strength):
     """Gains spread by the logarithm."""
     return x * np.exp(0.3 * strength * np.random.default_rng(1).normal(size=x.shape[1]))
 
 
-def offset(time, x, strength):
+def offset(time, load, x, strength):
     """Zeros spread evenly."""
     return x + 0.3 * strength * np.random.default_rng(2).uniform(-1.0, 1.0, x.shape[1])
 
@@ -148,10 +147,15 @@ def with_effect(ground: Ground, name: str, size: float) -> Recording | None:
 
     times = [columns["time"] - columns["time"][0] for _, _, columns in trials]
     longest = max(float(time[-1]) for time in times)
+    loads = [next(columns[key] for key in ("force", "depth") if key in columns)[:, None] for _, _, columns in trials]
+    most = max(float(load.max()) for load in loads)
 
     def changes(strength: float) -> list[np.ndarray]:
-        pairs = zip(times, plain, readings, strict=True)
-        return [np.where(np.isnan(r), np.nan, full * (CHANGES[name](t / longest, x, strength) - x)) for t, x, r in pairs]
+        made = []
+        for time, load, x, reading in zip(times, loads, plain, readings, strict=True):
+            change = CHANGES[name](time / longest, load / most, x, strength) - x
+            made.append(np.where(np.isnan(reading), np.nan, full * change))
+        return made
 
     def size_of(made: list[np.ndarray]) -> float:
         return _beyond_refitting(made, readings, times)
