@@ -100,7 +100,8 @@ def _followed(t: Sums) -> np.ndarray:
 
 def _inverse(a: np.ndarray) -> np.ndarray:
     """Inverse of normal equations (p, p), next to infinite along what they do not tell."""
-    size = np.sqrt(np.maximum(np.diag(a), 1e-300))
+    squares = np.diag(a)
+    size = np.sqrt(np.where(squares > 1e-30 * squares.max(initial=0.0), squares, 1.0))  # one without any effect stays so
     told, along = np.linalg.eigh(a / np.outer(size, size))
     inverse: np.ndarray = (along / np.where(told > UNTOLD, told, 1e-4 * UNTOLD)) @ along.T / np.outer(size, size)
     return inverse

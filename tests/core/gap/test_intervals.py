@@ -22,6 +22,8 @@ def test_what_only_acts_as_a_sum_is_told_by_nothing():
     assert found[0, 0] > 1e6 * alone[0, 0] and found[1, 1] > 1e6 * alone[0, 0]
     assert sums @ found @ sums == pytest.approx(alone[0, 0], rel=1e-2)
     assert found[2, 2] == pytest.approx(alone[1, 1], rel=1e-3)
+    nothing = _inverse(np.diag([4.0, 0.0]))
+    assert nothing[0, 0] == 0.25 and 1e6 < nothing[1, 1] < np.inf
 
 
 @pytest.mark.parametrize("groups", [6, 40])
