@@ -23,7 +23,7 @@ from .readoff import coarsest
 from .rig import Rig
 from .search import Views, views_of
 from .structure import Structure, structure_of
-from .telling import alike, bend_of, untold
+from .telling import PASSED_ON, alike, bend_of, untold
 from .tremble import trembling
 
 EXPLAINED = 0.5
@@ -32,6 +32,8 @@ PART, APART = 0.35, 1.5
 """Share from which on an effect is a sure name although much is left, where all others leave so many times as much."""
 RIVAL = 1.35
 """A rival is one that leaves at most so many times as much of the gap as the best does, and closes nearly as much."""
+OF_A_KIND = 3.0
+"""The same for load spreading and crosstalk, which are much alike (see :data:`.telling.PASSED_ON`)."""
 AGAIN = 1.75
 """So many times as bad more freedom for the formulas that are there must be, for a further effect to be more than that."""
 SMALL, NEARLY_ALL = 0.1, 0.65
@@ -343,7 +345,8 @@ def _conclude(result: Diagnosis, account: Account, ground: Ground) -> None:
                 others[name] = min(step.worse(left, effect.name), others.get(name, np.inf))
                 leaves[name] = min(left / own, leaves.get(name, np.inf))
         same = [name for name in alike(result.coverage, effect.name, bend) if name not in {e.name for e in effects}]
-        rivals = tuple(dict.fromkeys([*(name for name, ratio in others.items() if ratio < RIVAL), *same]))
+        near = [name for name, ratio in others.items() if ratio < (OF_A_KIND if {name, effect.name} <= {*PASSED_ON} else RIVAL)]
+        rivals = tuple(dict.fromkeys([*near, *same]))
         weight = 1.0 / (1.0 + sum(ratio**-4.0 for ratio in others.values()))
         share = closed[ground.side(effect.name)] if fitted else 1.0
         apart = min(leaves.values(), default=np.inf) > APART
@@ -361,7 +364,7 @@ def _conclude(result: Diagnosis, account: Account, ground: Ground) -> None:
 def _is_doubtful(effect: Effect, account: Account, fitted: Sequence[Effect]) -> bool:
     """Whether one of several effects may only be what the formula of another lacks."""
     gain, step = account.gains.get(effect.name), account.steps.get(effect.name)
-    if _is_of_the_dead(effect, fitted):
+    if _is_of_the_dead(effect, fitted) or _is_passed_on_as_well(effect, account, fitted):
         return True
     if step is not None and step.worse(step.again, effect.name) < AGAIN:
         return True
@@ -373,6 +376,16 @@ def _is_doubtful(effect: Effect, account: Account, fitted: Sequence[Effect]) -> 
     others = [np.asarray(v) for other in fitted if other is not effect for v in other.values.values() if isinstance(v, tuple)]
     pairs = [np.corrcoef(a, b)[0, 1] for a in own for b in others if np.ptp(a) > 0 and np.ptp(b) > 0]
     return any(abs(r) > TOGETHER for r in pairs)
+
+
+def _is_passed_on_as_well(effect: Effect, account: Account, fitted: Sequence[Effect]) -> bool:
+    """Whether one of the other kind passes more on to the neighbours already: this may be what its pattern lacks."""
+
+    def share(name: str) -> float:
+        return account.gains[name].of_all if name in account.gains else 0.0
+
+    others = [other.name for other in fitted if {effect.name, other.name} == {*PASSED_ON}]
+    return any(share(name) > share(effect.name) for name in others)
 
 
 def _is_of_the_dead(effect: Effect, fitted: Sequence[Effect]) -> bool:

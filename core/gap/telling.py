@@ -35,6 +35,9 @@ BY_PLACE = ("load-spreading", "crosstalk", "gain-mismatch", "misalignment")
 """Known by how neighbours differ as the load moves on: at one place each is some pattern of texels that grows with the load."""
 BY_CYCLE = ("hysteresis", "softening", "wear")
 """Known by how a second cycle differs from the first: in one alone, each makes the way back lie below the way in."""
+PASSED_ON = ("load-spreading", "crosstalk")
+"""Both pass a part of what a texel carries on to those around it. A sensor does so in its own pattern, and which formula comes
+nearer to that says little about which it is."""
 BENDS = ("stiffening", "saturation", "dead-zone")
 """A curve that is not straight: so is the way in of whatever has a loop."""
 LOOP = 3.0

@@ -70,6 +70,12 @@ def test_what_dead_texels_still_answer_is_no_further_effect():
         assert _is_doubtful(other, account, [dead, other]) == doubt
 
 
+def test_of_two_that_pass_loads_on_one_may_be_what_the_other_lacks():
+    both = [effect("crosstalk", "neighbours"), effect("load-spreading", "gaussian")]
+    account = Account(None, None, {}, {"crosstalk": Gain(0.7, 0.7), "load-spreading": Gain(0.2, 0.7)})
+    assert [_is_doubtful(one, account, both) for one in both] == [False, True]
+
+
 def doubtful(second, gain, again=np.inf, **values):
     first = effect("offset", "listed", offset=(0.1, 0.2, 0.4, 0.3))
     other = effect(*second, **values)
