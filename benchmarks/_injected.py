@@ -134,16 +134,10 @@ def every(recording: Recording, step: int) -> Recording:
     return replace(recording, sensor=re.sub(r"columns = \d+", f"columns = {len(kept)}", recording.sensor), trials=trials)
 
 
-def one_channel(ground: Ground) -> Ground:
-    """Return the same with those channels as one that are never read together: what one channel went through in turn."""
-    trials: list[tuple[str, str, Columns]] = []
-    for name, use, columns in ground.recording.trials:
-        texels = np.stack([value for key, value in columns.items() if key.startswith("texel_")], axis=1)
-        assert (np.isfinite(texels).sum(axis=1) == 1).all()
-        rest = {"time": columns["time"], "force": columns["force"] / texels.shape[1]}
-        trials.append((name, use, rest | {"texel_0": np.nansum(texels, axis=1)}))
-    sensor = re.sub(r"columns = \d+", "columns = 1", ground.recording.sensor)
-    return replace(ground, recording=replace(ground.recording, sensor=sensor, trials=trials))
+def read_in_turn(recording: Recording) -> bool:
+    """Whether channels are read one after the other: a number for each does then all that a drift does, and not the reverse."""
+    tables = [np.stack([v for k, v in columns.items() if k.startswith("texel_")], axis=1) for _, _, columns in recording.trials]
+    return all(table.shape[1] > 1 and (np.isfinite(table).sum(axis=1) <= 1).all() for table in tables)
 
 
 def with_effect(ground: Ground, name: str, size: float) -> Recording | None:
