@@ -21,7 +21,21 @@ from ..core.errors import SceneError
 from ..core.mesh import TriangleMesh, checked_mesh, mass_properties
 from ..core.scenario import Body, Motion, Painted, Scenario, Sensor, SensorParameters, Signal, Target
 from ..core.texels import texels_from_region
-from . import clock, deform, drives, effects, freebodies, identity, meshes, parts, properties, transforms, units, uvmaps
+from . import (
+    clock,
+    deform,
+    drives,
+    effects,
+    freebodies,
+    identity,
+    meshes,
+    parts,
+    properties,
+    texelarrows,
+    transforms,
+    units,
+    uvmaps,
+)
 from .jobs import Progress
 from .seen import Seen
 
@@ -327,7 +341,7 @@ def sample_scenario(scene) -> Generator[Progress, None, tuple[Scenario, Binding]
     """Read a scene over its whole frame range, frame by frame, and leave it at the frame where it stood."""
     before = scene.frame_current, scene.frame_subframe
     try:
-        with clock.unstretched(scene):
+        with clock.unstretched(scene), texelarrows.resting(scene):
             return (yield from _sample_scenario(scene))
     finally:
         with suppress(ReferenceError):  # the scene went while its frames were read

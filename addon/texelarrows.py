@@ -7,6 +7,9 @@ sensor pushes back with. Each kind is an object of points, one per texel, that i
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+
 import bpy
 import numpy as np
 from mathutils import Matrix
@@ -55,6 +58,29 @@ def bake(scene, worn: markers.Worn, image, kinds, lengths: dict, longest: dict) 
         modifier.node_group = _nodes(
             f"{uid}:{kind}", made.name, image, frames, kind, lengths[kind], longest[kind], shapes.material(look)
         )
+
+
+@contextmanager
+def resting(scene) -> Iterator[None]:
+    """Let no arrows be made for a while: in each frame that is read, their nodes would read an image of the bake before."""
+    names = [obj.name for obj in scene.objects if obj.library is None and (own := _own(obj)) is not None and own.show_viewport]
+    try:
+        _show(scene, names, False)
+        yield
+    finally:
+        with suppress(ReferenceError):  # the scene went meanwhile
+            _show(scene, names, True)
+
+
+def _own(obj):
+    return obj.modifiers.get(MODIFIER)
+
+
+def _show(scene, names, shown: bool) -> None:
+    for name in names:
+        obj = scene.objects.get(name)  # it may have been deleted meanwhile
+        if obj is not None and (own := _own(obj)) is not None:
+            own.show_viewport = shown
 
 
 def _points(worn: markers.Worn, name: str):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from blender_scenes import changes, cube, dump, press_and_drop, save
 
-from palpate.addon import dress, markers, materials, texelarrows, transforms, write
+from palpate.addon import dress, markers, materials, sample, texelarrows, transforms, write
 from palpate.addon.bake import bake
 from palpate.core import measures
 from palpate.core.drive import drive
@@ -185,3 +185,19 @@ def test_arrows_of_a_lost_image_do_not_show(baked, tmp_path):
     scene.frame_set(7)
     scene.frame_set(8)
     assert instances(markers.find(scene.objects, pad.palpate.uid, "NORMALS")) == []
+
+
+@pytest.mark.parametrize("end", ["whole", "stopped"])
+def test_arrows_rest_while_the_scene_is_read(baked, end):
+    scene, pad, _ = baked
+    own = [markers.find(scene.objects, pad.palpate.uid, kind).modifiers[texelarrows.MODIFIER] for kind in texelarrows.KINDS]
+    own[1].show_viewport = False  # as the user left it
+    work = sample.sample_scenario(scene)
+    for _ in range(3):
+        next(work)
+        assert not any(modifier.show_viewport for modifier in own)
+    if end == "whole":
+        drive(work)
+    else:
+        work.close()
+    assert [modifier.show_viewport for modifier in own] == [True, False]
