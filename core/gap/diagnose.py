@@ -279,16 +279,17 @@ def _doubted(result: Diagnosis, views: Views, account: Account, ground: Ground) 
     if "quantization" not in names and ground.main == READINGS:
         doubted |= {name for name, square in size.items() if square < (step / result.noise[READINGS].deviation) ** 2}
     for name in names & set(friction_kinds()) if ground.both else ():
-        if account.gains[name].of_all * ground.gap(FORCES) * ground.count[FORCES] < _normal_squares(views, account.fit):
+        closed = account.gains[name].of_all * ground.gap(FORCES) * ground.count[FORCES]
+        if closed < _normal_squares(views, account.fit, float(ground.floor[FORCES])):
             doubted.add(name)
     return doubted
 
 
-def _normal_squares(views: Views, found: Fit) -> float:
-    """Squares of the residual of the net normal force, beyond those of its noise."""
+def _normal_squares(views: Views, found: Fit, floor: float) -> float:
+    """Squares of the residual of the net normal force, beyond those of noise (`floor` of each value)."""
     normal = views.whole[0].predictor.rig.texels.normal.mean(axis=0)
     residual = np.concatenate([share.residual(found.model)[:, -3:] @ normal for share in views.whole])
-    return max(float(residual @ residual) - len(residual), 0.0)
+    return max(float(residual @ residual) - floor * len(residual), 0.0)
 
 
 def _loosened(result: Diagnosis, views: Views, found: Fit) -> Fit:
@@ -349,8 +350,7 @@ def _conclude(result: Diagnosis, account: Account, ground: Ground) -> None:
         rivals = tuple(dict.fromkeys([*near, *same]))
         weight = 1.0 / (1.0 + sum(ratio**-4.0 for ratio in others.values()))
         share = closed[ground.side(effect.name)] if fitted else 1.0
-        apart = min(leaves.values(), default=np.inf) > APART
-        confidence = weight * (0.5 + 0.5 * share if share >= (PART if apart else EXPLAINED) else 0.5 * share)
+        confidence = weight * (0.5 + 0.5 * share if share >= _least(effect.name, leaves) else 0.5 * share)
         if rivals or (len(fitted) > 1 and _is_doubtful(effect, account, fitted)):
             confidence = min(confidence, UNSURE)
         if rivals:
@@ -359,6 +359,17 @@ def _conclude(result: Diagnosis, account: Account, ground: Ground) -> None:
         result.named.append(
             Named(index, effect.name, effect.form, round(confidence, 3), rivals, nearest, leaves.get(nearest, np.inf))
         )
+
+
+def _least(name: str, leaves: dict[str, float]) -> float:
+    """Least share of the gap to be closed for a sure name, by how many times as much the other kinds leave.
+
+    Steps are seen in the readings themselves. Friction has but one other kind, and to be ahead of that says little.
+    """
+    if name == "quantization":
+        return 0.0
+    apart = min(leaves.values(), default=np.inf) > APART and name not in friction_kinds()
+    return PART if apart else EXPLAINED
 
 
 def _is_doubtful(effect: Effect, account: Account, fitted: Sequence[Effect]) -> bool:

@@ -6,7 +6,7 @@ import pytest
 
 from palpate.core.effects.library import effect, form_of, kind_of
 from palpate.core.gap.candidates import Candidate
-from palpate.core.gap.diagnose import _is_doubtful, free_friction
+from palpate.core.gap.diagnose import _is_doubtful, _least, free_friction
 from palpate.core.gap.explain import FORCES, READINGS, Account, Gain, Ground, Step, friction_kinds
 from palpate.core.gap.fit import LEVEL, base_numbers, changed
 from palpate.core.gap.model import Model
@@ -126,3 +126,10 @@ def test_friction_is_looked_for_where_forces_are(beside):
         assert views.quick(Candidate(kind, kind.forms[0]), model) == (["whole"] if beside else ["rubbed"])
     creep = kind_of("creep")
     assert views.quick(Candidate(creep, creep.forms[0]), model) == (["thin"] if beside else ["narrow"])
+
+
+def test_what_makes_a_sure_name():
+    """Steps are seen, however little of the gap they are; friction has but one other kind, and a lead over that says little."""
+    far, near = {"creep": 3.0}, {"creep": 1.2}
+    assert _least("quantization", near) == 0.0
+    assert _least("hysteresis", far) < _least("hysteresis", near) == _least("stribeck", {"viscous-friction": 3.0}) == 0.5
