@@ -30,7 +30,8 @@ FIRST, NEXT, NEXT_OF_ALL = 0.25, 0.2, 0.01
 LEAST = 0.02
 """Least decrease of the mean square on unseen trials, in units of the noise's variance."""
 LEAST_OF_FORCES = 0.25
-"""The same for friction: sliding between two samples is integrated, and not quite as the world does it."""
+"""The same for friction, in units of what forces tremble at rest, which coloured noise does by more than it changes from sample
+to sample. Sliding between two samples is integrated, and not quite as the world does it."""
 BY_FAR = 0.8
 """Least share that what is better in some trials has in all that changes: one trial may alone have what tells."""
 STRUCTURE = 0.03
@@ -94,7 +95,7 @@ class Ground:
 
     def matters(self, side: int) -> bool:
         """Whether a side has a gap that is worth speaking of."""
-        return bool(self.count[side] > 0) and self.gap(side) > (LEAST if side == self.main else 1.0)
+        return bool(self.count[side] > 0) and self.gap(side) > (LEAST if side == self.main else float(self.floor[side]))
 
 
 def friction_kinds() -> list[str]:
@@ -294,7 +295,7 @@ class Explainer:
         if float(change[change > 0].sum()) < BY_FAR * float(np.abs(change).sum()):
             return False
         if g.both and side == FORCES:
-            return gained >= max(LEAST_OF_FORCES, FIRST * left)
+            return gained >= max(LEAST_OF_FORCES * float(g.floor[side]), FIRST * left)
         if gained < LEAST:
             return False
         if one.candidate.name == "quantization":
@@ -367,7 +368,7 @@ class Explainer:
     def _friction(self, account: Account) -> Generator[tuple[str, float], None, Account]:
         """Effects on friction, judged by forces alone, on top of all else."""
         for _ in friction_kinds():
-            if account.means[FORCES] - self.ground.floor[FORCES] < LEAST_OF_FORCES:
+            if account.means[FORCES] < (1.0 + LEAST_OF_FORCES) * self.ground.floor[FORCES]:
                 break
             step = yield from self._look(account, 0.9, 0.05, first=True, friction=True)
             longer = self._joined(account, step)

@@ -26,6 +26,8 @@ def test_readings_and_forces_have_a_gap_each():
     assert (gain.of_all, gain.of_left) == pytest.approx((0.4, 0.8))
     alone = Ground(np.array([0.0, 101.0]), np.array([1.0, 1.0]), np.array([0.0, 300.0]))
     assert alone.side("creep") == alone.side("stribeck") == FORCES  # nothing was read
+    trembling = Ground(np.array([1.0, 14.3]), np.array([1.0, 13.0]), ground.count)
+    assert ground.matters(FORCES) and not trembling.matters(FORCES)  # coloured noise is not known to a tenth
 
 
 def test_a_handful_of_values_is_seen():
