@@ -43,17 +43,20 @@ def unloading(force, slope, depth, slide, numbers, row, memory, point, at, commi
 
 
 def cohesive(force, slope, depth, slide, numbers, row, memory, point, at, commit):
-    """``f − F u x exp(1 − x)``, x = d/D: on the way back the last of the depth is a layer that parts; u as :func:`unloading`.
+    """``f − F u x exp(1 − x)``, x = d/D: on the way back the last of the depth is a layer that parts.
 
-    Memory: u and the last depth. Constants: F, D.
+    ``du/dt = (aim − u) |ḋ|/D − u/τ``, exact over a step: u goes to 1 on the way back, to 0 on the way in, and fades in time.
+    Memory: u and the last depth. Constants: F, D, the length of the step by τ.
     """
     if depth <= 0.0:
         if commit:
             memory[point, at], memory[point, at + 1] = 0.0, 0.0
         return force, slope
     change, x = depth - memory[point, at + 1], depth / numbers[row, 1]
-    aim = 0.0 if change >= 0.0 else 1.0
-    u = aim + (memory[point, at] - aim) * math.exp(-abs(change) / numbers[row, 1])
+    aim, way = 0.0 if change >= 0.0 else 1.0, abs(change) / numbers[row, 1]
+    rate = way + numbers[row, 2]
+    end = aim * way / rate if rate > 0.0 else 0.0
+    u = end + (memory[point, at] - end) * math.exp(-rate)
     if commit:
         memory[point, at], memory[point, at + 1] = u, depth
     traction = x * math.exp(1.0 - x)
@@ -71,7 +74,17 @@ def _with_time(values: Values, dt: np.ndarray) -> np.ndarray:
     return np.column_stack([same, left, np.zeros(len(dt))])
 
 
+def _held(values: Values, dt: np.ndarray) -> np.ndarray:
+    return np.tile([number(values, "pull"), number(values, "depth"), 0.0], (len(dt), 1))
+
+
+def _relaxing(values: Values, dt: np.ndarray) -> np.ndarray:
+    same = np.tile([number(values, "pull"), number(values, "depth")], (len(dt), 1))
+    return np.column_stack([same, np.asarray(dt) / number(values, "time")])
+
+
 _PULL = Parameter("pull", "N", 0.02, 0.0, 100.0, "Largest pull F of one texel.")
+_ZONE = Parameter("depth", "m", 2e-4, 1e-6, 0.02, "Depth D, before contact ends, at which it pulls most.", log=True)
 _WAY = Parameter("depth", "m", 2e-4, 1e-6, 0.02, "Way back D after which the pull has come to 63 %.", log=True)
 
 KIND = Kind(
@@ -122,13 +135,25 @@ KIND = Kind(
             "f = f₀ − F u x exp(1 − x),  x = d/D;  u → 1 on the way back, → 0 on the way in, within D",
             "Rose, Ferrante and Smith, Phys. Rev. Lett. 47 (1981); Xu and Needleman, Model. Simul. Mater. Sci. Eng. 1 (1993): "
             "traction over separation",
+            (_PULL, _ZONE),
+            off={"pull": 0.0},
+            law=cohesive,
+            constants=_held,
+            memory=2,
+            after_clip=True,
+        ),
+        Form(
+            "relaxing",
+            "f = f₀ − F u x exp(1 − x) as cohesive, but u fades within the time τ when it rests",
+            "Maugis and Barquins, J. Phys. D 11 (1978): the faster surfaces part, the more adhesion takes",
             (
                 _PULL,
-                Parameter("depth", "m", 2e-4, 1e-6, 0.02, "Depth D, before contact ends, at which it pulls most.", log=True),
+                _ZONE,
+                Parameter("time", "s", 0.1, 1e-3, 1000.0, "Time τ after which 37 % of the pull are left at rest.", log=True),
             ),
             off={"pull": 0.0},
             law=cohesive,
-            constants=same_for_all_steps("pull", "depth"),
+            constants=_relaxing,
             memory=2,
             after_clip=True,
         ),

@@ -12,8 +12,8 @@ from functools import partial
 import numpy as np
 
 from ..effects.base import Effect
-from ..effects.library import library
-from .candidates import NEVER, READ_OFF, Scales, candidates, scales_of
+from ..effects.library import form_of, library
+from .candidates import NEVER, READ_OFF, Scales, candidates, is_spatial, scales_of
 from .explain import FORCES, LEAST, READINGS, STRUCTURE, Account, Explainer, Ground, Step, friction_kinds, means_of
 from .fit import FRICTION, LEVEL, Fit, base_numbers, fit, held_out
 from .lines import Line, line_of
@@ -384,6 +384,8 @@ def _is_doubtful(effect: Effect, account: Account, fitted: Sequence[Effect]) -> 
     if gain.of_left < NEARLY_ALL:
         return True
     own = [np.asarray(value) for value in effect.values.values() if isinstance(value, tuple)]
+    if own and any(is_spatial(form_of(other.name, other.form)) for other in fitted if other is not effect):
+        return True  # at the rim a texel has fewer neighbours: a formula that is off there looks like numbers per texel
     others = [np.asarray(v) for other in fitted if other is not effect for v in other.values.values() if isinstance(v, tuple)]
     pairs = [np.corrcoef(a, b)[0, 1] for a in own for b in others if np.ptp(a) > 0 and np.ptp(b) > 0]
     return any(abs(r) > TOGETHER for r in pairs)

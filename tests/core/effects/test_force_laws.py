@@ -266,6 +266,19 @@ def test_a_cohesive_zone_takes_the_work_of_adhesion():
     assert abs(lost[-2]) < 0.06 * pull
 
 
+def test_a_pull_that_relaxes():
+    """Drawn out evenly it comes to v/(v + D/τ) of the cohesive zone's traction; at rest it fades within τ."""
+    pull, zone, time, step = 0.1, 1e-4, 0.05, 1e-3
+    depth = np.concatenate([np.linspace(0.0, 3e-3, 101), np.linspace(3e-3, 3e-4, 2001)[1:], np.full(200, 3e-4)])
+    item = effect("adhesion", "relaxing", pull=pull, depth=zone, time=time)
+    lost = K * depth - force(item, depth, time=step * np.arange(len(depth)))
+    x, parting = depth / zone, 2.7e-3 / 2000 / step
+    share = parting / (parting + zone / time)
+    np.testing.assert_allclose(lost[1500:2101], (pull * share * x * np.exp(1 - x))[1500:2101], rtol=1e-6, atol=1e-12)
+    assert np.abs(lost[:101]).max() == 0.0
+    np.testing.assert_allclose(lost[2101:], lost[2100] * np.exp(-step * np.arange(1, 201) / time), rtol=1e-9)
+
+
 def test_adhesion_ends_with_the_contact():
     depth = np.where(TIME < 10, cycle(), 0.0)
     assert (force(effect("adhesion"), depth)[TIME >= 10] == 0.0).all()

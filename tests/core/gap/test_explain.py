@@ -78,8 +78,8 @@ def test_of_two_that_pass_loads_on_one_may_be_what_the_other_lacks():
     assert [_is_doubtful(one, account, both) for one in both] == [False, True]
 
 
-def doubtful(second, gain, again=np.inf, **values):
-    first = effect("offset", "listed", offset=(0.1, 0.2, 0.4, 0.3))
+def doubtful(second, gain, again=np.inf, first=None, **values):
+    first = first or effect("offset", "listed", offset=(0.1, 0.2, 0.4, 0.3))
     other = effect(*second, **values)
 
     class Alone(Step):
@@ -101,6 +101,14 @@ def test_an_offset_that_fades_is_no_gain():
     gains = ("gain-mismatch", "listed")
     assert doubtful(gains, Gain(0.05, 0.9), factor=(0.95, 0.9, 0.8, 0.86))
     assert not doubtful(gains, Gain(0.05, 0.9), factor=(0.95, 1.1, 0.9, 1.0))
+
+
+def test_what_a_kernel_lacks_at_the_rim_is_no_gain():
+    gains, several = ("gain-mismatch", "listed"), (0.95, 1.1, 0.9, 1.0)
+    for first in (effect("load-spreading"), effect("crosstalk")):
+        assert doubtful(gains, Gain(0.02, 0.95), first=first, factor=several)
+        assert not doubtful(gains, Gain(0.2, 0.95), first=first, factor=several)
+    assert not doubtful(gains, Gain(0.02, 0.95), first=effect("lag"), factor=several)
 
 
 def test_a_rival_closes_nearly_as_much():
