@@ -170,7 +170,7 @@ def brake(data: Path) -> Recording:
         table = thinned(table[:, :3], 8)
         columns = {"time": table[:, 0], "depth": np.full(len(table), 1e-3), "slide_x": table[:, 1] * 0.0254}
         trials.append((name.replace(".", "_"), use, columns | {"force_x": table[:, 2] * 4448.22}))
-    words = "k = 3e7\nsigma0 = 5e6\nsigma1 = 1e4\nct = 0.0\nmus = 0.5\nmud = 0.4\nx0 = 0.05\nmax_penetration = 0.1"
+    words = "k = 3e7\nsigma0 = 5e6\nsigma1 = 1e4\nmax_penetration = 0.1"  # of its friction nothing is known
     return Recording("band brake", f"grid = {{ rows = 1, columns = 1, pitch = 0.05 }}\n{words}", trials)
 
 

@@ -137,11 +137,12 @@ def _outcome(effect: str, result: Any) -> str:
 
 def _is_told(effect: str, recording: Recording, result: Any) -> bool:
     """Whether recordings could tell an effect by what was done to the sensor in them, whatever came out."""
-    from palpate.core.gap.telling import alike, untold
+    from palpate.core.gap.telling import alike, bend_of, untold
 
     if effect == "drift" and read_in_turn(recording):
         return False
-    return effect not in untold(result.coverage) and not alike(result.coverage, effect)
+    bend = bend_of(result.of("fit"), result.best.model)
+    return effect not in untold(result.coverage) and not alike(result.coverage, effect, bend)
 
 
 def _diagnosed(recording: Recording, folder: Path) -> Any:

@@ -23,7 +23,7 @@ from .readoff import coarsest
 from .rig import Rig
 from .search import Views, views_of
 from .structure import Structure, structure_of
-from .telling import PASSED_ON, alike, bend_of, untold
+from .telling import BENDS, PASSED_ON, RESTS, SETTLES, alike, bend_of, nearly_alike, untold
 from .tremble import trembling
 
 EXPLAINED = 0.5
@@ -33,7 +33,7 @@ PART, APART = 0.35, 1.5
 RIVAL = 1.35
 """A rival is one that leaves at most so many times as much of the gap as the best does, and closes nearly as much."""
 OF_A_KIND = 3.0
-"""The same for load spreading and crosstalk, which are much alike (see :data:`.telling.PASSED_ON`)."""
+"""The same for those that are much alike (see :func:`.telling.nearly_alike`)."""
 AGAIN = 1.75
 """So many times as bad more freedom for the formulas that are there must be, for a further effect to be more than that."""
 SMALL, NEARLY_ALL = 0.1, 0.65
@@ -268,12 +268,15 @@ def _doubted(result: Diagnosis, views: Views, account: Account, ground: Ground) 
     What is named beside what is unclear may be a part of that: all of it where the recordings cannot tell, since any curve
     that they bring out could be either's; else what is small. What closes less than a step of the readings may lie within it.
     Friction goes with the load: where the normal force is off by more than what a law of friction closes, that may be why.
+    Without rest, what moves by itself may be a part of what settles, where that is unclear.
     """
     small = {name for name, gain in account.gains.items() if gain.of_all < SMALL}
     doubted = small if result.ambiguous else set()
     names = {one.name for one in result.named}
     if any(alike(result.coverage, name, bend_of(result.of("fit"), result.best.model)) for name in names):
         doubted |= names - set(READ_OFF)
+    if result.coverage.rest < RESTS and {name for pair in result.ambiguous for name in pair} & set(SETTLES):
+        doubted |= set(SETTLES)
     step = coarsest(views.whole, result.base.model)
     size = {name: abs(gain.of_all) * ground.gap(ground.main) for name, gain in account.gains.items()}
     if "quantization" not in names and ground.main == READINGS:
@@ -346,12 +349,13 @@ def _conclude(result: Diagnosis, account: Account, ground: Ground) -> None:
                 others[name] = min(step.worse(left, effect.name), others.get(name, np.inf))
                 leaves[name] = min(left / own, leaves.get(name, np.inf))
         same = [name for name in alike(result.coverage, effect.name, bend) if name not in {e.name for e in effects}]
-        near = [name for name, ratio in others.items() if ratio < (OF_A_KIND if {name, effect.name} <= {*PASSED_ON} else RIVAL)]
+        akin = nearly_alike(result.coverage, effect.name)
+        near = [name for name, ratio in others.items() if ratio < (OF_A_KIND if name in akin else RIVAL)]
         rivals = tuple(dict.fromkeys([*near, *same]))
         weight = 1.0 / (1.0 + sum(ratio**-4.0 for ratio in others.values()))
         share = closed[ground.side(effect.name)] if fitted else 1.0
         confidence = weight * (0.5 + 0.5 * share if share >= _least(effect.name, leaves) else 0.5 * share)
-        if rivals or (len(fitted) > 1 and _is_doubtful(effect, account, fitted)):
+        if rivals or (len(fitted) > 1 and _is_doubtful(effect, account, fitted, ground)):
             confidence = min(confidence, UNSURE)
         if rivals:
             result.ambiguous.append((effect.name, *rivals))
@@ -372,10 +376,10 @@ def _least(name: str, leaves: dict[str, float]) -> float:
     return PART if apart else EXPLAINED
 
 
-def _is_doubtful(effect: Effect, account: Account, fitted: Sequence[Effect]) -> bool:
+def _is_doubtful(effect: Effect, account: Account, fitted: Sequence[Effect], ground: Ground) -> bool:
     """Whether one of several effects may only be what the formula of another lacks."""
     gain, step = account.gains.get(effect.name), account.steps.get(effect.name)
-    if _is_of_the_dead(effect, fitted) or _is_passed_on_as_well(effect, account, fitted):
+    if _is_of_the_dead(effect, fitted) or _another_does_more(effect, account, fitted, ground):
         return True
     if step is not None and step.worse(step.again, effect.name) < AGAIN:
         return True
@@ -391,14 +395,18 @@ def _is_doubtful(effect: Effect, account: Account, fitted: Sequence[Effect]) -> 
     return any(abs(r) > TOGETHER for r in pairs)
 
 
-def _is_passed_on_as_well(effect: Effect, account: Account, fitted: Sequence[Effect]) -> bool:
-    """Whether one of the other kind passes more on to the neighbours already: this may be what its pattern lacks."""
+def _another_does_more(effect: Effect, account: Account, fitted: Sequence[Effect], ground: Ground) -> bool:
+    """Whether one that does the same closes more already, so that this may be what its formula lacks.
+
+    Load spreading and crosstalk both pass something on to the neighbours. A law of contact and a readout that bend, in turn,
+    bend the reading like one; the law alone bends the net force.
+    """
 
     def share(name: str) -> float:
         return account.gains[name].of_all if name in account.gains else 0.0
 
-    others = [other.name for other in fitted if {effect.name, other.name} == {*PASSED_ON}]
-    return any(share(name) > share(effect.name) for name in others)
+    same = PASSED_ON if effect.name in PASSED_ON else () if ground.both or effect.name not in BENDS else BENDS
+    return any(share(other.name) > share(effect.name) for other in fitted if other.name in same and other.name != effect.name)
 
 
 def _is_of_the_dead(effect: Effect, fitted: Sequence[Effect]) -> bool:

@@ -27,6 +27,8 @@ NEVER_AT_REST = (
 )
 RESTS = 0.1
 """Share of a trial from the first to the last time that a texel carries nothing, from which on a drift would show there."""
+SETTLES = ("creep", "drift")
+"""Both make a reading move while nothing else does."""
 LEVELS = 1.5
 """Largest by smallest of the loads that were held, from which on settling, which goes with the load, is told from a drift."""
 
@@ -86,6 +88,16 @@ def alike(coverage: Coverage, name: str, bend: float = np.inf) -> tuple[str, ...
         still = coverage.rates < ONE_SPEED and coverage.longest_hold < SHORT
         groups.append((*BY_CYCLE, "creep", "lag") if still else BY_CYCLE)
     return tuple(dict.fromkeys(other for group in groups if name in group for other in group if other != name))
+
+
+def nearly_alike(coverage: Coverage, name: str) -> tuple[str, ...]:
+    """Return the kinds that must fit far worse than one of this name to be told from it.
+
+    Load spreading and crosstalk both pass something on to the neighbours. Without rest, settling and moving by itself differ
+    only in how they go with the load.
+    """
+    groups = [PASSED_ON, *([SETTLES] if coverage.rest < RESTS else [])]
+    return tuple(other for group in groups if name in group for other in group if other != name)
 
 
 def bend_of(predictors: Sequence[Predictor], model: Model) -> float:

@@ -15,6 +15,8 @@ from palpate.core.gap.rig import Rig, grid_texels
 from palpate.core.gap.search import Views
 from palpate.core.scenario import SensorParameters
 
+WITH_FORCES, READ_ALONE = (Ground(np.full(2, 9.0), np.ones(2), np.array([900.0, count])) for count in (300.0, 0.0))
+
 
 def test_readings_and_forces_have_a_gap_each():
     ground = Ground(np.array([11.0, 101.0]), np.array([1.0, 1.0]), np.array([8400.0, 300.0]))
@@ -69,13 +71,20 @@ def test_what_dead_texels_still_answer_is_no_further_effect():
     for offset, doubt in (((0.0, 0.3, 0.01, 0.0), True), ((0.1, 0.3, -0.3, 0.2), False)):
         other = effect("offset", "listed", offset=offset)
         account = Account(None, None, {}, {"offset": Gain(0.3, 0.9)})
-        assert _is_doubtful(other, account, [dead, other]) == doubt
+        assert _is_doubtful(other, account, [dead, other], WITH_FORCES) == doubt
 
 
 def test_of_two_that_pass_loads_on_one_may_be_what_the_other_lacks():
     both = [effect("crosstalk", "neighbours"), effect("load-spreading", "gaussian")]
     account = Account(None, None, {}, {"crosstalk": Gain(0.7, 0.7), "load-spreading": Gain(0.2, 0.7)})
-    assert [_is_doubtful(one, account, both) for one in both] == [False, True]
+    assert [_is_doubtful(one, account, both, WITH_FORCES) for one in both] == [False, True]
+
+
+def test_without_net_forces_a_law_of_contact_and_a_readout_bend_one_curve():
+    both = [effect("stiffening", "foam"), effect("saturation", "rational")]
+    account = Account(None, None, {}, {"stiffening": Gain(0.7, 0.7), "saturation": Gain(0.2, 0.7)})
+    assert not any(_is_doubtful(one, account, both, WITH_FORCES) for one in both)
+    assert [_is_doubtful(one, account, both, READ_ALONE) for one in both] == [False, True]
 
 
 def doubtful(second, gain, again=np.inf, first=None, **values):
@@ -87,7 +96,7 @@ def doubtful(second, gain, again=np.inf, first=None, **values):
             return 1.0
 
     account = Account(None, None, {other.name: Alone([], [], again=again)}, {other.name: gain})
-    return _is_doubtful(other, account, [first, other])
+    return _is_doubtful(other, account, [first, other], WITH_FORCES)
 
 
 def test_a_small_effect_is_sure_where_it_closes_nearly_all_that_is_left():

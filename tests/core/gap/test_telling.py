@@ -12,7 +12,18 @@ from palpate.core.gap.model import Model, Predictor
 from palpate.core.gap.noise import coverage
 from palpate.core.gap.phases import PHASES, phases
 from palpate.core.gap.rig import Rig, Trial, grid_texels
-from palpate.core.gap.telling import BY_CYCLE, BY_PLACE, BY_TIME, LEAVES_BEHIND, LOOP, alike, bend_of, confounded, untold
+from palpate.core.gap.telling import (
+    BY_CYCLE,
+    BY_PLACE,
+    BY_TIME,
+    LEAVES_BEHIND,
+    LOOP,
+    alike,
+    bend_of,
+    confounded,
+    nearly_alike,
+    untold,
+)
 from palpate.core.scenario import SensorParameters
 
 PROGRAMMES = {
@@ -45,6 +56,13 @@ def test_unloading_is_seen_at_any_pace(programme, unloads, seconds):
     # Those that unload end without load; what settles at two loads does not go with the clock alone.
     assert ("drift" in untold(seen)) == (programme == "ramp")
     assert seen.levels == pytest.approx(2.0 if programme == "stairs" else 1.0, rel=0.05)
+
+
+def test_without_rest_settling_and_drift_are_told_by_the_load_alone():
+    stairs, press = (coverage([predictor(programme, 20.0)]) for programme in ("stairs", "press"))
+    assert nearly_alike(stairs, "creep") == ("drift",) and nearly_alike(stairs, "drift") == ("creep",)
+    assert nearly_alike(press, "drift") == () == nearly_alike(stairs, "lag")
+    assert nearly_alike(press, "crosstalk") == ("load-spreading",)
 
 
 def test_time_and_depth_are_one_in_a_single_ramp():
