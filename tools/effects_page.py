@@ -268,7 +268,7 @@ DRAWN = {
         constant={"depth": 3e-5},
         dwell={"depth": 3e-5, "time": 30.0},
         cohesive={"pull": 0.06, "depth": 4e-5},
-        relaxing={"pull": 0.06, "depth": 4e-5, "time": 0.2},
+        relaxing={"pull": 0.06, "depth": 4e-5, "time": 2.0},
     ),
     "load-spreading": _across,
     "dead-zone": _reading_over_force(hard={"threshold": 0.4}, soft={"threshold": 0.4}, step={"threshold": 0.4}),
