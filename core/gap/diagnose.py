@@ -327,6 +327,7 @@ def _conclude(result: Diagnosis, account: Account, ground: Ground) -> None:
     effects = result.best.model.effects
     fitted = [effect for effect in effects if effect.name != "noise"]
     closed = [ground.closed(account.means, side) for side in (READINGS, FORCES)]
+    open_sides = [side for side in (READINGS, FORCES) if ground.matters(side) and closed[side] < EXPLAINED]
     if effects and not fitted:
         result.verdict = "explained"
     elif not effects:
@@ -335,7 +336,6 @@ def _conclude(result: Diagnosis, account: Account, ground: Ground) -> None:
         quiet = quiet and not (ground.both and ground.matters(FORCES))
         result.verdict = "no gap" if quiet else "unexplained"
     else:
-        open_sides = [side for side in (READINGS, FORCES) if ground.matters(side) and closed[side] < EXPLAINED]
         result.verdict = "unexplained" if open_sides else "explained"
     bend = bend_of(result.of("fit"), result.best.model)
     for index, effect in enumerate(effects):
@@ -349,13 +349,16 @@ def _conclude(result: Diagnosis, account: Account, ground: Ground) -> None:
                 others[name] = min(step.worse(left, effect.name), others.get(name, np.inf))
                 leaves[name] = min(left / own, leaves.get(name, np.inf))
         same = [name for name in alike(result.coverage, effect.name, bend) if name not in {e.name for e in effects}]
-        akin = nearly_alike(result.coverage, effect.name)
+        # A kernel that leaves nothing is the sensor's own.
+        hit = effect.name in PASSED_ON and own < 2.0 * ground.untold(ground.side(effect.name))
+        akin = () if hit else nearly_alike(result.coverage, effect.name)
         near = [name for name, ratio in others.items() if ratio < (OF_A_KIND if name in akin else RIVAL)]
         rivals = tuple(dict.fromkeys([*near, *same]))
         weight = 1.0 / (1.0 + sum(ratio**-4.0 for ratio in others.values()))
         share = closed[ground.side(effect.name)] if fitted else 1.0
         confidence = weight * (0.5 + 0.5 * share if share >= _least(effect.name, leaves) else 0.5 * share)
-        if rivals or (len(fitted) > 1 and _is_doubtful(effect, account, fitted, ground)):
+        bent = bool(open_sides) and _may_be_bent(effect, account)
+        if rivals or (len(fitted) > 1 and (bent or _is_doubtful(effect, account, fitted, ground))):
             confidence = min(confidence, UNSURE)
         if rivals:
             result.ambiguous.append((effect.name, *rivals))
@@ -393,6 +396,16 @@ def _is_doubtful(effect: Effect, account: Account, fitted: Sequence[Effect], gro
     others = [np.asarray(v) for other in fitted if other is not effect for v in other.values.values() if isinstance(v, tuple)]
     pairs = [np.corrcoef(a, b)[0, 1] for a in own for b in others if np.ptp(a) > 0 and np.ptp(b) > 0]
     return any(abs(r) > TOGETHER for r in pairs)
+
+
+def _may_be_bent(effect: Effect, account: Account) -> bool:
+    """Whether something larger was found beside an effect with a number for each texel.
+
+    Where much is left that nothing explains, such numbers bend to that.
+    """
+    mine = account.gains[effect.name].of_all if effect.name in account.gains else 0.0
+    larger = any(gain.of_all > mine for name, gain in account.gains.items() if name != effect.name)
+    return larger and effect.name not in READ_OFF and any(isinstance(value, tuple) for value in effect.values.values())
 
 
 def _another_does_more(effect: Effect, account: Account, fitted: Sequence[Effect], ground: Ground) -> bool:

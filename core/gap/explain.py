@@ -93,6 +93,10 @@ class Ground:
         closed = float(before[side] - after[side])
         return Gain(closed / self.gap(side), closed / float(max(before[side] - self.floor[side], 1e-12)))
 
+    def untold(self, side: int) -> float:
+        """What no fit can tell of what is left of a side's gap."""
+        return 0.004 * self.gap(side) + 0.01
+
     def matters(self, side: int) -> bool:
         """Whether a side has a gap that is worth speaking of."""
         return bool(self.count[side] > 0) and self.gap(side) > (LEAST if side == self.main else float(self.floor[side]))
@@ -244,7 +248,7 @@ class Explainer:
             return Step([], [])
         means = [*(means_of(one.unseen, one.fit) for one in judged), account.means]
         side = self.ground.side(judged[0].candidate.name)
-        *left, before = (x + 0.004 * self.ground.gap(side) + 0.01 for x in self._left(means, side))
+        *left, before = (x + self.ground.untold(side) for x in self._left(means, side))
         taken = {effect.name for effect in account.fit.model.effects}
         again = [i for i, one in enumerate(judged) if one.candidate.name in taken]
         order = [int(i) for i in np.argsort(left, kind="stable") if i not in again]

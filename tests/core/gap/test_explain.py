@@ -6,7 +6,7 @@ import pytest
 
 from palpate.core.effects.library import effect, form_of, kind_of
 from palpate.core.gap.candidates import Candidate
-from palpate.core.gap.diagnose import _is_doubtful, _least, free_friction
+from palpate.core.gap.diagnose import _is_doubtful, _least, _may_be_bent, free_friction
 from palpate.core.gap.explain import FORCES, READINGS, Account, Gain, Ground, Step, friction_kinds
 from palpate.core.gap.fit import LEVEL, base_numbers, changed
 from palpate.core.gap.model import Model
@@ -152,3 +152,11 @@ def test_what_makes_a_sure_name():
     far, near = {"creep": 3.0}, {"creep": 1.2}
     assert _least("quantization", near) == 0.0
     assert _least("hysteresis", far) < _least("hysteresis", near) == _least("stribeck", {"viscous-friction": 3.0}) == 0.5
+
+
+def test_numbers_per_texel_bend_to_what_is_not_explained():
+    gains = {"hysteresis": Gain(0.6, 0.6), "gain-mismatch": Gain(0.3, 0.7)}
+    account = Account(None, None, {}, gains)
+    mismatch = effect("gain-mismatch", "listed", factor=(0.9, 1.1))
+    assert _may_be_bent(mismatch, account) and not _may_be_bent(effect("hysteresis", "preisach"), account)
+    assert not _may_be_bent(mismatch, Account(None, None, {}, {**gains, "hysteresis": Gain(0.2, 0.2)}))
