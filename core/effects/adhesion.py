@@ -55,12 +55,13 @@ def cohesive(force, slope, depth, slide, numbers, row, memory, point, at, commit
     change, x = depth - memory[point, at + 1], depth / numbers[row, 1]
     aim, way = 0.0 if change >= 0.0 else 1.0, abs(change) / numbers[row, 1]
     rate = way + numbers[row, 2]
-    end = aim * way / rate if rate > 0.0 else 0.0
+    end, lags = (aim * way / rate, aim * numbers[row, 2] / (rate * rate)) if rate > 0.0 else (0.0, 0.0)
     u = end + (memory[point, at] - end) * math.exp(-rate)
     if commit:
         memory[point, at], memory[point, at + 1] = u, depth
     traction = x * math.exp(1.0 - x)
-    bend = u * (1.0 - x) * math.exp(1.0 - x) - abs(aim - u) * traction
+    further = end - u - lags * math.expm1(-rate)  # du by the way over D; back is against the depth
+    bend = u * (1.0 - x) * math.exp(1.0 - x) + (1.0 - 2.0 * aim) * further * traction
     return force - numbers[row, 0] * u * traction, slope - numbers[row, 0] * bend / numbers[row, 1]
 
 
