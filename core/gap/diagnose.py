@@ -12,38 +12,24 @@ from functools import partial
 import numpy as np
 
 from ..effects.base import Effect
-from ..effects.library import form_of, library
-from .candidates import NEVER, READ_OFF, Scales, candidates, is_spatial, scales_of
+from ..effects.library import library
+from .candidates import NEVER, Scales, candidates, scales_of
+from .doubt import EXPLAINED, UNSURE, doubted, is_doubtful, least_share, may_be_bent
 from .explain import FORCES, LEAST, READINGS, STRUCTURE, Account, Explainer, Ground, Step, friction_kinds, means_of
 from .fit import FRICTION, LEVEL, Fit, base_numbers, fit, held_out
 from .lines import Line, line_of
 from .model import Model, Predictor
 from .noise import SHORTEST, Coverage, Noise, coverage, force_noise, reading_noise
-from .readoff import coarsest
 from .rig import Rig
 from .search import Views, views_of
 from .structure import Structure, structure_of
-from .telling import BENDS, PASSED_ON, RESTS, SETTLES, alike, bend_of, nearly_alike, untold
+from .telling import PASSED_ON, alike, bend_of, nearly_alike, untold
 from .tremble import trembling
 
-EXPLAINED = 0.5
-"""Share of the gap that must be closed for the verdict "explained"."""
-PART, APART = 0.35, 1.5
-"""Share from which on an effect is a sure name although much is left, where all others leave so many times as much."""
 RIVAL = 1.35
 """A rival is one that leaves at most so many times as much of the gap as the best does, and closes nearly as much."""
 OF_A_KIND = 3.0
 """The same for those that are much alike (see :func:`.telling.nearly_alike`)."""
-AGAIN = 1.75
-"""So many times as bad more freedom for the formulas that are there must be, for a further effect to be more than that."""
-SMALL, NEARLY_ALL = 0.1, 0.65
-"""One of several that closes a smaller share of the whole gap may be what the others' formulas lack: it is no sure name, unless
-it closes so much of what they leave, as what a formula lacks seldom looks like another effect."""
-UNSURE = 0.45
-"""Highest confidence of a name that is not meant as sure."""
-TOGETHER = 0.8
-"""Correlation over the texels from which on two effects with a number for each are one: an offset that fades under load takes
-off everywhere what it has put on."""
 
 
 @dataclass(frozen=True)
@@ -257,42 +243,9 @@ def _explain(result: Diagnosis, views: Views) -> Iterator[tuple[str, float]]:
             result.best = replace(account.fit, model=account.fit.model.with_effect(tremble))
             ground.floor[main] = max(ground.floor[main], mean)
     _conclude(result, account, ground)
-    doubted = _doubted(result, views, account, ground)
-    result.named = [replace(n, confidence=min(n.confidence, UNSURE)) if n.name in doubted else n for n in result.named]
+    unsure = doubted(result, views, account, ground)
+    result.named = [replace(n, confidence=min(n.confidence, UNSURE)) if n.name in unsure else n for n in result.named]
     _rule_out(result, account.first, ground)
-
-
-def _doubted(result: Diagnosis, views: Views, account: Account, ground: Ground) -> set[str]:
-    """Names that are not sure for what else there is, or is not, in the model.
-
-    What is named beside what is unclear may be a part of that: all of it where the recordings cannot tell, since any curve
-    that they bring out could be either's; else what is small. What closes less than a step of the readings may lie within it.
-    Friction goes with the load: where the normal force is off by more than what a law of friction closes, that may be why.
-    Without rest, what moves by itself may be a part of what settles, where that is unclear.
-    """
-    small = {name for name, gain in account.gains.items() if gain.of_all < SMALL}
-    doubted = small if result.ambiguous else set()
-    names = {one.name for one in result.named}
-    if any(alike(result.coverage, name, bend_of(result.of("fit"), result.best.model)) for name in names):
-        doubted |= names - set(READ_OFF)
-    if result.coverage.rest < RESTS and {name for pair in result.ambiguous for name in pair} & set(SETTLES):
-        doubted |= set(SETTLES)
-    step = coarsest(views.whole, result.base.model)
-    size = {name: abs(gain.of_all) * ground.gap(ground.main) for name, gain in account.gains.items()}
-    if "quantization" not in names and ground.main == READINGS:
-        doubted |= {name for name, square in size.items() if square < (step / result.noise[READINGS].deviation) ** 2}
-    for name in names & set(friction_kinds()) if ground.both else ():
-        closed = account.gains[name].of_all * ground.gap(FORCES) * ground.count[FORCES]
-        if closed < _normal_squares(views, account.fit, float(ground.floor[FORCES])):
-            doubted.add(name)
-    return doubted
-
-
-def _normal_squares(views: Views, found: Fit, floor: float) -> float:
-    """Squares of the residual of the net normal force, beyond those of noise (`floor` of each value)."""
-    normal = views.whole[0].predictor.rig.texels.normal.mean(axis=0)
-    residual = np.concatenate([share.residual(found.model)[:, -3:] @ normal for share in views.whole])
-    return max(float(residual @ residual) - floor * len(residual), 0.0)
 
 
 def _loosened(result: Diagnosis, views: Views, found: Fit) -> Fit:
@@ -323,42 +276,21 @@ def _trembling_at_rest(views: Views, found: Fit) -> float:
 
 
 def _conclude(result: Diagnosis, account: Account, ground: Ground) -> None:
-    """Write verdict, names and rivals; those that close little beside others are no sure names."""
+    """Write verdict, names and rivals."""
     effects = result.best.model.effects
     fitted = [effect for effect in effects if effect.name != "noise"]
     closed = [ground.closed(account.means, side) for side in (READINGS, FORCES)]
-    open_sides = [side for side in (READINGS, FORCES) if ground.matters(side) and closed[side] < EXPLAINED]
-    if effects and not fitted:
-        result.verdict = "explained"
-    elif not effects:
-        mean, gap = float(ground.start[ground.main]), ground.gap(ground.main)
-        quiet = result.base_structure.total < STRUCTURE and (mean < 2.0 or gap < LEAST) and result.line is None
-        quiet = quiet and not (ground.both and ground.matters(FORCES))
-        result.verdict = "no gap" if quiet else "unexplained"
-    else:
-        result.verdict = "unexplained" if open_sides else "explained"
+    is_open = any(ground.matters(side) and closed[side] < EXPLAINED for side in (READINGS, FORCES))
+    result.verdict = _verdict(result, ground, is_open)
     bend = bend_of(result.of("fit"), result.best.model)
     for index, effect in enumerate(effects):
-        step = account.steps.get(effect.name, Step([], []))
-        others: dict[str, float] = {}
-        leaves: dict[str, float] = {}
-        own = step.of(effect.name)
-        for one, left in zip(step.ranked, step.left, strict=True):
-            name = one.candidate.name
-            if name not in {e.name for e in effects} and not (effect.name == "dead-texels" and one.candidate.local):
-                others[name] = min(step.worse(left, effect.name), others.get(name, np.inf))
-                leaves[name] = min(left / own, leaves.get(name, np.inf))
-        same = [name for name in alike(result.coverage, effect.name, bend) if name not in {e.name for e in effects}]
-        # A kernel that leaves nothing is the sensor's own.
-        hit = effect.name in PASSED_ON and own < 2.0 * ground.untold(ground.side(effect.name))
-        akin = () if hit else nearly_alike(result.coverage, effect.name)
-        near = [name for name, ratio in others.items() if ratio < (OF_A_KIND if name in akin else RIVAL)]
-        rivals = tuple(dict.fromkeys([*near, *same]))
+        others, leaves = _beside(effect, account, {e.name for e in effects})
+        rivals = _rivals(effect, account, result.coverage, bend, others, ground)
         weight = 1.0 / (1.0 + sum(ratio**-4.0 for ratio in others.values()))
         share = closed[ground.side(effect.name)] if fitted else 1.0
-        confidence = weight * (0.5 + 0.5 * share if share >= _least(effect.name, leaves) else 0.5 * share)
-        bent = bool(open_sides) and _may_be_bent(effect, account)
-        if rivals or (len(fitted) > 1 and (bent or _is_doubtful(effect, account, fitted, ground))):
+        confidence = weight * (0.5 + 0.5 * share if share >= least_share(effect.name, leaves) else 0.5 * share)
+        bent = is_open and may_be_bent(effect, account)
+        if rivals or (len(fitted) > 1 and (bent or is_doubtful(effect, account, fitted, ground))):
             confidence = min(confidence, UNSURE)
         if rivals:
             result.ambiguous.append((effect.name, *rivals))
@@ -368,70 +300,42 @@ def _conclude(result: Diagnosis, account: Account, ground: Ground) -> None:
         )
 
 
-def _least(name: str, leaves: dict[str, float]) -> float:
-    """Least share of the gap to be closed for a sure name, by how many times as much the other kinds leave.
-
-    Steps are seen in the readings themselves. Friction has but one other kind, and to be ahead of that says little.
-    """
-    if name == "quantization":
-        return 0.0
-    apart = min(leaves.values(), default=np.inf) > APART and name not in friction_kinds()
-    return PART if apart else EXPLAINED
-
-
-def _is_doubtful(effect: Effect, account: Account, fitted: Sequence[Effect], ground: Ground) -> bool:
-    """Whether one of several effects may only be what the formula of another lacks."""
-    gain, step = account.gains.get(effect.name), account.steps.get(effect.name)
-    if _is_of_the_dead(effect, fitted) or _another_does_more(effect, account, fitted, ground):
-        return True
-    if step is not None and step.worse(step.again, effect.name) < AGAIN:
-        return True
-    if gain is None or gain.of_all >= SMALL:
-        return False
-    if gain.of_left < NEARLY_ALL:
-        return True
-    own = [np.asarray(value) for value in effect.values.values() if isinstance(value, tuple)]
-    if own and any(is_spatial(form_of(other.name, other.form)) for other in fitted if other is not effect):
-        return True  # at the rim a texel has fewer neighbours: a formula that is off there looks like numbers per texel
-    others = [np.asarray(v) for other in fitted if other is not effect for v in other.values.values() if isinstance(v, tuple)]
-    pairs = [np.corrcoef(a, b)[0, 1] for a in own for b in others if np.ptp(a) > 0 and np.ptp(b) > 0]
-    return any(abs(r) > TOGETHER for r in pairs)
+def _verdict(result: Diagnosis, ground: Ground, is_open: bool) -> str:
+    """One word on the whole; `is_open` where much of what the base model lacks is left."""
+    effects = result.best.model.effects
+    if all(effect.name == "noise" for effect in effects) and effects:
+        return "explained"
+    if effects:
+        return "unexplained" if is_open else "explained"
+    mean, gap = float(ground.start[ground.main]), ground.gap(ground.main)
+    quiet = result.base_structure.total < STRUCTURE and (mean < 2.0 or gap < LEAST) and result.line is None
+    return "no gap" if quiet and not (ground.both and ground.matters(FORCES)) else "unexplained"
 
 
-def _may_be_bent(effect: Effect, account: Account) -> bool:
-    """Whether something larger was found beside an effect with a number for each texel.
-
-    Where much is left that nothing explains, such numbers bend to that.
-    """
-    mine = account.gains[effect.name].of_all if effect.name in account.gains else 0.0
-    larger = any(gain.of_all > mine for name, gain in account.gains.items() if name != effect.name)
-    return larger and effect.name not in READ_OFF and any(isinstance(value, tuple) for value in effect.values.values())
-
-
-def _another_does_more(effect: Effect, account: Account, fitted: Sequence[Effect], ground: Ground) -> bool:
-    """Whether one that does the same closes more already, so that this may be what its formula lacks.
-
-    Load spreading and crosstalk both pass something on to the neighbours. A law of contact and a readout that bend, in turn,
-    bend the reading like one; the law alone bends the net force.
-    """
-
-    def share(name: str) -> float:
-        return account.gains[name].of_all if name in account.gains else 0.0
-
-    same = PASSED_ON if effect.name in PASSED_ON else () if ground.both or effect.name not in BENDS else BENDS
-    return any(share(other.name) > share(effect.name) for other in fitted if other.name in same and other.name != effect.name)
+def _beside(effect: Effect, account: Account, taken: set[str]) -> tuple[dict[str, float], dict[str, float]]:
+    """How many times as bad as an effect each other kind is in its place, and how many times as much it leaves, by name."""
+    step = account.steps.get(effect.name, Step([], []))
+    own = step.of(effect.name)
+    others: dict[str, float] = {}
+    leaves: dict[str, float] = {}
+    for one, left in zip(step.ranked, step.left, strict=True):
+        name = one.candidate.name
+        if name not in taken and not (effect.name == "dead-texels" and one.candidate.local):
+            others[name] = min(step.worse(left, effect.name), others.get(name, np.inf))
+            leaves[name] = min(left / own, leaves.get(name, np.inf))
+    return others, leaves
 
 
-def _is_of_the_dead(effect: Effect, fitted: Sequence[Effect]) -> bool:
-    """Whether what an effect says of each texel is mostly said of dead ones: a little that they still answer."""
-    for other in fitted:
-        dead = np.asarray(other.values.get("dead", 0.0))
-        for value in effect.values.values():
-            if other is not effect and isinstance(value, tuple) and dead.shape:
-                moved = (np.asarray(value) - np.median(value)) ** 2
-                if float(moved[dead > 0.5].sum()) > 0.5 * float(moved.sum()):
-                    return True
-    return False
+def _rivals(
+    effect: Effect, account: Account, covered: Coverage, bend: float, others: dict[str, float], ground: Ground
+) -> tuple[str, ...]:
+    """Kinds that would do as well, or that these recordings cannot tell from it; `others` are those of :func:`_beside`."""
+    taken = {e.name for e in account.fit.model.effects}
+    own = account.steps.get(effect.name, Step([], [])).of(effect.name)
+    hit = effect.name in PASSED_ON and own < 2.0 * ground.untold(ground.side(effect.name))  # leaves nothing: the sensor's own
+    akin = () if hit else nearly_alike(covered, effect.name)
+    near = [name for name, ratio in others.items() if ratio < (OF_A_KIND if name in akin else RIVAL)]
+    return tuple(dict.fromkeys([*near, *(name for name in alike(covered, effect.name, bend) if name not in taken)]))
 
 
 def _rule_out(result: Diagnosis, alone: Step, ground: Ground) -> None:

@@ -6,7 +6,8 @@ import pytest
 
 from palpate.core.effects.library import effect, form_of, kind_of
 from palpate.core.gap.candidates import Candidate
-from palpate.core.gap.diagnose import _is_doubtful, _least, _may_be_bent, free_friction
+from palpate.core.gap.diagnose import free_friction
+from palpate.core.gap.doubt import is_doubtful, least_share, may_be_bent
 from palpate.core.gap.explain import FORCES, READINGS, Account, Gain, Ground, Step, friction_kinds
 from palpate.core.gap.fit import LEVEL, base_numbers, changed
 from palpate.core.gap.model import Model
@@ -71,20 +72,20 @@ def test_what_dead_texels_still_answer_is_no_further_effect():
     for offset, doubt in (((0.0, 0.3, 0.01, 0.0), True), ((0.1, 0.3, -0.3, 0.2), False)):
         other = effect("offset", "listed", offset=offset)
         account = Account(None, None, {}, {"offset": Gain(0.3, 0.9)})
-        assert _is_doubtful(other, account, [dead, other], WITH_FORCES) == doubt
+        assert is_doubtful(other, account, [dead, other], WITH_FORCES) == doubt
 
 
 def test_of_two_that_pass_loads_on_one_may_be_what_the_other_lacks():
     both = [effect("crosstalk", "neighbours"), effect("load-spreading", "gaussian")]
     account = Account(None, None, {}, {"crosstalk": Gain(0.7, 0.7), "load-spreading": Gain(0.2, 0.7)})
-    assert [_is_doubtful(one, account, both, WITH_FORCES) for one in both] == [False, True]
+    assert [is_doubtful(one, account, both, WITH_FORCES) for one in both] == [False, True]
 
 
 def test_without_net_forces_a_law_of_contact_and_a_readout_bend_one_curve():
     both = [effect("stiffening", "foam"), effect("saturation", "rational")]
     account = Account(None, None, {}, {"stiffening": Gain(0.7, 0.7), "saturation": Gain(0.2, 0.7)})
-    assert not any(_is_doubtful(one, account, both, WITH_FORCES) for one in both)
-    assert [_is_doubtful(one, account, both, READ_ALONE) for one in both] == [False, True]
+    assert not any(is_doubtful(one, account, both, WITH_FORCES) for one in both)
+    assert [is_doubtful(one, account, both, READ_ALONE) for one in both] == [False, True]
 
 
 def doubtful(second, gain, again=np.inf, first=None, **values):
@@ -96,7 +97,7 @@ def doubtful(second, gain, again=np.inf, first=None, **values):
             return 1.0
 
     account = Account(None, None, {other.name: Alone([], [], again=again)}, {other.name: gain})
-    return _is_doubtful(other, account, [first, other], WITH_FORCES)
+    return is_doubtful(other, account, [first, other], WITH_FORCES)
 
 
 def test_a_small_effect_is_sure_where_it_closes_nearly_all_that_is_left():
@@ -150,13 +151,14 @@ def test_friction_is_looked_for_where_forces_are(beside):
 def test_what_makes_a_sure_name():
     """Steps are seen, however little of the gap they are; friction has but one other kind, and a lead over that says little."""
     far, near = {"creep": 3.0}, {"creep": 1.2}
-    assert _least("quantization", near) == 0.0
-    assert _least("hysteresis", far) < _least("hysteresis", near) == _least("stribeck", {"viscous-friction": 3.0}) == 0.5
+    assert least_share("quantization", near) == 0.0
+    friction = least_share("stribeck", {"viscous-friction": 3.0})
+    assert least_share("hysteresis", far) < least_share("hysteresis", near) == friction == 0.5
 
 
 def test_numbers_per_texel_bend_to_what_is_not_explained():
     gains = {"hysteresis": Gain(0.6, 0.6), "gain-mismatch": Gain(0.3, 0.7)}
     account = Account(None, None, {}, gains)
     mismatch = effect("gain-mismatch", "listed", factor=(0.9, 1.1))
-    assert _may_be_bent(mismatch, account) and not _may_be_bent(effect("hysteresis", "preisach"), account)
-    assert not _may_be_bent(mismatch, Account(None, None, {}, {**gains, "hysteresis": Gain(0.2, 0.2)}))
+    assert may_be_bent(mismatch, account) and not may_be_bent(effect("hysteresis", "preisach"), account)
+    assert not may_be_bent(mismatch, Account(None, None, {}, {**gains, "hysteresis": Gain(0.2, 0.2)}))
