@@ -20,7 +20,7 @@ def normalised(result: Diagnosis) -> Model:
     touched = np.zeros(len(result.rig.texels), bool)
     for predictor in result.of("fit"):
         s = predictor.stimulus
-        touched |= ((s.depth if s.load is None else s.load) > 0).any(axis=0)
+        touched |= (s.pressed_by > 0).any(axis=0)
     for index, effect in enumerate(model.effects):
         if effect.name != "gain-mismatch" or "factor" not in effect.values or not touched.any():
             continue

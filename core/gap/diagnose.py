@@ -268,7 +268,7 @@ def _trembling_at_rest(views: Views, found: Fit) -> float:
     squares = []
     for share in views.whole:
         stimulus = share.predictor.stimulus
-        load = stimulus.depth if stimulus.load is None else stimulus.load
+        load = stimulus.pressed_by
         rest = ~(load > 0).any(axis=1)
         if share.forces and share.predictor.trial.force is not None and rest.sum() >= SHORTEST:
             squares.append(share.residual(found.model)[rest, -3:] ** 2)

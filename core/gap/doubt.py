@@ -115,7 +115,8 @@ def doubted(result: Diagnosis, views: Views, account: Account, ground: Ground) -
     small = {name for name, gain in account.gains.items() if gain.of_all < SMALL}
     unsure = small if result.ambiguous else set()
     names = {one.name for one in result.named}
-    if any(alike(result.coverage, name, bend_of(result.of("fit"), result.best.model)) for name in names):
+    bend = bend_of(result.of("fit"), result.best.model)
+    if any(alike(result.coverage, name, bend) for name in names):
         unsure |= names - set(READ_OFF)
     if result.coverage.rest < RESTS and {name for pair in result.ambiguous for name in pair} & set(SETTLES):
         unsure |= set(SETTLES)

@@ -87,7 +87,7 @@ class Felt:
     @classmethod
     def of(cls, stimulus: Stimulus, columns: np.ndarray | None, rig: Rig) -> Felt:
         """Lay out what some texels of a rig meet (all of them: None)."""
-        load = stimulus.depth if stimulus.load is None else stimulus.load
+        load = stimulus.pressed_by
         chosen = np.arange(load.shape[1]) if columns is None else columns
         (place,) = np.nonzero(load[:, chosen].any(axis=0))
         touched = chosen[place]

@@ -87,7 +87,7 @@ def force_noise(predictors: Sequence[Predictor], full: float) -> Noise:
 def _idle(predictor: Predictor) -> list[tuple[int, int]]:
     """Stretches of samples in which nothing touches at all, and the whole trial for texels that are never touched."""
     stimulus = predictor.stimulus
-    load = stimulus.depth if stimulus.load is None else stimulus.load
+    load = stimulus.pressed_by
     free = ~(load > 0).any(axis=1)
     found = [(a, b) for a, b in _stretches(free) if b - a >= SHORTEST]
     return [*found, (0, len(load))]
@@ -96,7 +96,7 @@ def _idle(predictor: Predictor) -> list[tuple[int, int]]:
 def _alike(predictor: Predictor, start: int, stop: int) -> list[np.ndarray]:
     """Texels that carry nothing in a stretch."""
     stimulus = predictor.stimulus
-    load = stimulus.depth if stimulus.load is None else stimulus.load
+    load = stimulus.pressed_by
     (texels,) = np.nonzero(~(load[start:stop] > 0).any(axis=0))
     return [texels] if len(texels) else []
 
@@ -186,7 +186,7 @@ def coverage(predictors: Sequence[Predictor]) -> Coverage:
     hold, unloading, cycles, peaks, slides, rest = 0.0, False, 0, [], False, 0.0
     for predictor in predictors:
         s = predictor.stimulus
-        load = s.depth if s.load is None else s.load
+        load = s.pressed_by
         touched |= (load > 0).any(axis=0)
         pressed = load.sum(axis=1)
         at = pressed > 0.05 * max(float(pressed.max(initial=0.0)), 1e-300)

@@ -19,7 +19,7 @@ FAST_SLIDE = 2e-4
 
 def load_of(stimulus: Stimulus) -> np.ndarray:
     """Depth of a texel, or its share of a known force, as a share of the largest in the trial, (T, n) float."""
-    load = stimulus.depth if stimulus.load is None else stimulus.load
+    load = stimulus.pressed_by
     shares: np.ndarray = load / max(float(load.max(initial=0.0)), 1e-300)
     return shares
 

@@ -87,7 +87,7 @@ def _few(predictor: Predictor) -> np.ndarray | None:
     if n <= FEW_TEXELS:
         return None
     s = predictor.stimulus
-    load = (s.depth if s.load is None else s.load).sum(axis=0)
+    load = s.pressed_by.sum(axis=0)
     order = np.argsort(load)[::-1]
     loaded = order[load[order] > 0]
     idle = order[load[order] <= 0]

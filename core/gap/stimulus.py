@@ -54,6 +54,11 @@ class Stimulus:
     sunk: int = 0
 
     @property
+    def pressed_by(self) -> np.ndarray:
+        """What presses each texel, (T, n) float: the depth, or its share of a known force."""
+        return self.depth if self.load is None else self.load
+
+    @property
     def time(self) -> np.ndarray:
         """(T,) seconds."""
         return self.trial.time

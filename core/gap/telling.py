@@ -102,15 +102,10 @@ def nearly_alike(coverage: Coverage, name: str) -> tuple[str, ...]:
 
 def bend_of(predictors: Sequence[Predictor], model: Model) -> float:
     """Return how many times as steep as its flattest eighth the steepest of a model's curve is, of the texel pressed most."""
-    deepest = max(predictors, key=lambda one: float(_load(one).max(initial=0.0)))
-    texel = int(np.argmax(_load(deepest).max(axis=0)))
-    load, reading = _load(deepest)[:, texel], deepest.predict(model).reading[:, texel]
+    deepest = max(predictors, key=lambda one: float(one.stimulus.pressed_by.max(initial=0.0)))
+    texel = int(np.argmax(deepest.stimulus.pressed_by.max(axis=0)))
+    load, reading = deepest.stimulus.pressed_by[:, texel], deepest.predict(model).reading[:, texel]
     order = np.argsort(load)
     slopes = np.diff(np.interp(np.linspace(0.0, load.max(), 9), load[order], reading[order]))
     steep = np.abs(slopes)
     return float(steep.max() / max(float(steep.min()), 1e-9 * float(steep.max()), 1e-300))
-
-
-def _load(predictor: Predictor) -> np.ndarray:
-    s = predictor.stimulus
-    return s.depth if s.load is None else s.load
