@@ -11,14 +11,15 @@ __version__ = "0.1.0"
 
 def _rooms():
     """What registers, in order; each has register() and unregister()."""
-    from .addon import dependencies
+    from .addon.session import dependencies
 
     if dependencies.missing():
         from .panels import missing
 
         return [missing]
     from . import operators, panels
-    from .addon import handlers, properties
+    from .addon.events import handlers
+    from .addon.properties import properties
 
     return [properties, operators, panels, handlers, _CommandLine]
 

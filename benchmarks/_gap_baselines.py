@@ -31,9 +31,9 @@ def _told(answer: list[str], names: list[str]) -> dict[str, bool]:
 
 def stepwise(result: Any, most: int = 3) -> tuple[list[str], Any]:
     """Add the form that lowers the BIC on the fitted trials most, until none does."""
-    from palpate.core.gap.candidates import candidates
-    from palpate.core.gap.fit import fit
-    from palpate.core.gap.search import Direction, free_of, promising, views_of
+    from palpate.core.gap.fitting.least_squares import fit
+    from palpate.core.gap.selection.candidates import candidates
+    from palpate.core.gap.selection.screening import Direction, free_of, promising, views_of
 
     views = views_of(result.of("fit"), (result.noise[0].deviation, result.noise[1].deviation))
     current = result.base

@@ -58,13 +58,14 @@ def _enable() -> None:
 
 def cached_frame(texels: int) -> float:
     """Milliseconds that showing a remembered frame adds to Blender's own frame change, with a live picture as in a window."""
-    from palpate.addon import cache, live, overlays
+    from palpate.addon.display import overlays
+    from palpate.addon.timeline import live_cache, playback
 
     with tempfile.TemporaryDirectory() as folder:
         scene = scene_of(texels, 6, Path(folder))
         for frame in range(1, 7):
             scene.frame_set(frame)
-        run = cache.get(scene)
+        run = live_cache.get(scene)
         times = []
         for frame in (2, 5, 3, 6, 4) * ROUNDS:
             scene.palpate.use_live = False
@@ -79,7 +80,7 @@ def cached_frame(texels: int) -> float:
             pictures = overlays.pictures_of(scene, run, run.frames[frame])  # in the background nothing is drawn
             overlays.board_of(scene, run, run.frames[frame])
             times.append(time.perf_counter() - start - plain)
-            if cache.get(scene) is not run or not pictures or live.status(scene).frame is None:
+            if live_cache.get(scene) is not run or not pictures or playback.status(scene).frame is None:
                 raise RuntimeError("the frame was computed anew or not shown: this would not be the same work")
         return statistics.median(times) * 1e3
 
@@ -102,10 +103,10 @@ def sample_bake_and_solve(name: str) -> tuple[float, float]:
 
 
 def _in_turn(scene, rounds: int) -> tuple[float, float]:
-    from palpate.addon import folders
-    from palpate.addon.bake import bake
-    from palpate.core.drive import drive
-    from palpate.core.solve import run
+    from palpate.addon.bake.bake import bake_files
+    from palpate.addon.bake.bake.bake import bake
+    from palpate.core.jobs.job_runner import drive
+    from palpate.core.solver.simulation import run
 
     run(drive(bake(scene)).scenario)  # compiles and warms up
     times = []
@@ -113,7 +114,7 @@ def _in_turn(scene, rounds: int) -> tuple[float, float]:
         start = time.perf_counter()
         scenario = drive(bake(scene)).scenario
         middle = time.perf_counter()
-        folders.settle()
+        bake_files.settle()
         begun = time.perf_counter()
         run(scenario)
         times.append((middle - start, time.perf_counter() - begun))

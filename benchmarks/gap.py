@@ -121,8 +121,8 @@ def _results(plan: list[tuple[str, int]], compared: set[tuple[str, int]]) -> lis
 
 def examine(kind: str, number: int, compare: bool = False) -> dict[str, Any]:
     """Draw a case, have it diagnosed from its files, and hold the outcome against the answer."""
-    from palpate.core.gap.diagnose import Diagnosis, diagnose
-    from palpate.core.gap.rig import read_rig
+    from palpate.core.gap.dataset.rig import read_rig
+    from palpate.core.gap.selection.diagnosis import Diagnosis, diagnose
 
     case = cases.draw(kind, number)
     with tempfile.TemporaryDirectory() as folder:
@@ -152,8 +152,8 @@ def examine(kind: str, number: int, compare: bool = False) -> dict[str, Any]:
 
 def score(case: cases.Case, result: Any) -> dict[str, Any]:
     """Return what was said of a case and how right it is."""
-    from palpate.core.gap.amend import next_experiment, normalised
-    from palpate.core.gap.intervals import numbers
+    from palpate.core.gap.fitting.intervals import numbers
+    from palpate.core.gap.report.summary.amended_sensor import next_experiment, normalised
 
     model = normalised(result)
     sure = [named.name for named in result.named if named.confidence >= SURE]

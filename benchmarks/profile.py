@@ -17,13 +17,15 @@ from collections.abc import Callable, Iterator
 import numba
 import numpy as np
 
-from palpate.core import bristles, gather, pairs, phases, sums
-from palpate.core.solve import Simulation
+from palpate.core.solver import parallel_loops
+from palpate.core.solver.detection import narrow_phase
+from palpate.core.solver.dynamics import contact_assembly, friction_state, relative_kinematics
+from palpate.core.solver.simulation import Simulation
 
 from .solver import GRIDS, cube, weighing
 
 ROUNDS = 5
-PHASES = {"find contacts": phases.GATHER, "linearise and sum": phases.SUM, "bend bristles": phases.BEND}
+PHASES = {"find contacts": parallel_loops.GATHER, "linearise and sum": parallel_loops.SUM, "bend bristles": parallel_loops.BEND}
 BYTES = {
     # contact point 12, bristle 4 (both ways), triangle 12, hint and lists 3; columns of the row: 10 written, 6 and 3 laid flat
     "find contacts": 8 * (12 + 8 + 12 + 3 + 10 + 9),
@@ -35,7 +37,7 @@ BYTES = {
 @numba.njit(nogil=True)
 def _repeat(times, phase, world, tree, neighbours, shapes, state, scratch):
     for _ in range(times):
-        phases.share_out(phase, world, tree, neighbours, shapes, state, scratch)
+        parallel_loops.share_out(phase, world, tree, neighbours, shapes, state, scratch)
 
 
 @numba.njit(nogil=True)
@@ -101,10 +103,19 @@ def run() -> Iterator[dict]:
         scratch.step[0] = simulation.dt
         flops = {
             "linearise and sum": operations(
-                sums._sum_contacts, 0, 0, simulation.dt, pairs.law_of(world.parameters, 0), world, arrays[-2].memory, scratch
+                contact_assembly._sum_contacts,
+                0,
+                0,
+                simulation.dt,
+                relative_kinematics.law_of(world.parameters, 0),
+                world,
+                arrays[-2].memory,
+                scratch,
             ),
-            "bend bristles": operations(bristles._bend_bristles, 0, pairs.values(scratch.part[0]), arrays[-2], scratch),
-            "find contacts": 90 + operations(gather._lay_flat, 0, int(scratch.contacts[0]), scratch.rows),  # 90 by hand
+            "bend bristles": operations(
+                friction_state._bend_bristles, 0, relative_kinematics.values(scratch.part[0]), arrays[-2], scratch
+            ),
+            "find contacts": 90 + operations(narrow_phase._lay_flat, 0, int(scratch.contacts[0]), scratch.rows),  # 90 by hand
         }
         for name, phase in PHASES.items():
             _repeat(1, phase, *arrays)

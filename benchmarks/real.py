@@ -55,14 +55,14 @@ def run() -> Iterator[dict]:
 
 
 def _found_in(name: str, recording: Recording) -> Iterator[dict]:
-    from palpate.core.gap import report
-    from palpate.core.gap.compare import nrmse
+    from palpate.core.gap.report.summary import summary
+    from palpate.core.gap.report.summary.comparison import nrmse
 
     folder = HOUSE / "build" / "real" / name
     result = _diagnosed(recording, folder)
-    for _ in report.write(result, folder):
+    for _ in summary.write(result, folder):
         pass
-    print(f"{name}: {report.headline(result)}", file=sys.stderr, flush=True)
+    print(f"{name}: {summary.headline(result)}", file=sys.stderr, flush=True)
     found = "+".join(one.name for one in result.named) or result.verdict.replace(" ", "_")
     last = LAST.get(name, ())
     parts = {
@@ -81,7 +81,7 @@ def _found_in(name: str, recording: Recording) -> Iterator[dict]:
 
 def _friction(name: str, result: Any) -> Iterator[dict]:
     """What the base model's own friction closes, of the error of a sensor without any: it is in every base, and no effect."""
-    from palpate.core.gap.compare import nrmse, without_friction
+    from palpate.core.gap.report.summary.comparison import nrmse, without_friction
 
     for use, without in (without_friction(result) or {}).items():
         own = nrmse(result.of(use), result.base.model, result.full)
@@ -122,7 +122,7 @@ def _recall(data: Path) -> Iterator[dict]:
 
 
 def _sure(result: Any) -> list[str]:
-    from palpate.core.gap.report import SURE
+    from palpate.core.gap.report.summary.summary import SURE
 
     return [one.name for one in result.named if one.confidence >= SURE]
 
@@ -137,7 +137,7 @@ def _outcome(effect: str, result: Any) -> str:
 
 def _is_told(effect: str, recording: Recording, result: Any) -> bool:
     """Whether recordings could tell an effect by what was done to the sensor in them, whatever came out."""
-    from palpate.core.gap.telling import alike, bend_of, untold
+    from palpate.core.gap.selection.identifiability import alike, bend_of, untold
 
     if effect == "drift" and read_in_turn(recording):
         return False
@@ -146,8 +146,8 @@ def _is_told(effect: str, recording: Recording, result: Any) -> bool:
 
 
 def _diagnosed(recording: Recording, folder: Path) -> Any:
-    from palpate.core.gap.diagnose import Diagnosis, diagnose
-    from palpate.core.gap.rig import read_rig
+    from palpate.core.gap.dataset.rig import read_rig
+    from palpate.core.gap.selection.diagnosis import Diagnosis, diagnose
 
     *_, result = diagnose(read_rig(recording.write(folder / "rig")))
     assert isinstance(result, Diagnosis)

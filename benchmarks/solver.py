@@ -18,10 +18,10 @@ from pathlib import Path
 import numpy as np
 import trimesh
 
-from palpate.core.mesh import TriangleMesh, checked_mesh, mass_properties
-from palpate.core.scenario import Body, Motion, Scenario, Sensor, SensorParameters, Target
-from palpate.core.solve import Simulation
-from palpate.core.texels import texels_from_region
+from palpate.core.geometry.mesh import TriangleMesh, checked_mesh, mass_properties
+from palpate.core.geometry.texels import texels_from_region
+from palpate.core.model.scenario import Body, Motion, Scenario, Sensor, SensorParameters, Target
+from palpate.core.solver.simulation import Simulation
 
 SIDE = 0.047
 """Longer side of the pad, metres."""

@@ -9,10 +9,10 @@ from pathlib import Path
 
 import numpy as np
 
-from ..core.drive import drive
 from ..core.errors import SceneError
-from ..core.formats.files import writable_folder
-from ..core.measures import net_shear
+from ..core.io.files import writable_folder
+from ..core.jobs.job_runner import drive
+from ..core.response.metrics import net_shear
 from . import blender, console
 
 
@@ -79,7 +79,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 def bake_with_bar(scene, into_scene: bool = True):
     """Bake a scene with a progress bar on stderr; Ctrl-C leaves an earlier bake as it was."""
-    from ..addon import bake
+    from ..addon.bake import bake
 
     with console.progress_bar("bake", 1, unit="step") as bar:
 
@@ -128,9 +128,9 @@ def save(arguments: argparse.Namespace) -> Path | None:
 
 def _leave_saved_bake(bpy, scene, blend: str) -> None:
     """Raise SceneError when the bake that the saved file plays would be replaced, and the file not told."""
-    from ..addon import folders
+    from ..addon.bake import bake_files
 
-    target = folders.bake_folder(scene).resolve()
+    target = bake_files.bake_folder(scene).resolve()
     for obj in scene.objects:
         played = obj.palpate.bake_folder
         if played and Path(bpy.path.abspath(played)).resolve().parent == target:
@@ -142,14 +142,14 @@ def _leave_saved_bake(bpy, scene, blend: str) -> None:
 
 def _put_model(scene, words: str) -> None:
     """Put what ``[NAME=]SENSOR.toml`` says on a sensor."""
-    from ..addon import measured
-    from ..core.formats.sensor_toml import read_sensor
+    from ..addon.measured import gap_results
+    from ..core.io.sensor_toml import read_sensor
 
     name, _, file = ("", "", words) if Path(words).is_file() else words.partition("=")
     if not file:
         name, file = "", name
     model = read_sensor(file)
-    measured.put(measured.sensor_called(scene, name or None, f"write --model NAME={file}"), model)
+    gap_results.put(gap_results.sensor_called(scene, name or None, f"write --model NAME={file}"), model)
 
 
 def _frames(scene, first: int, last: int) -> tuple[int, int]:

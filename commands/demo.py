@@ -9,8 +9,12 @@ from pathlib import Path
 
 import numpy as np
 
-from ..core import figures, measures
-from ..core.formats.files import remove_leftovers, writable_folder
+from ..core.figures.picture_labels import Label, label_picture
+from ..core.figures.recording_style import Look
+from ..core.figures.tactile_strip import tactile_strip
+from ..core.figures.time_curves import force_curves
+from ..core.io.files import remove_leftovers, writable_folder
+from ..core.response import metrics
 from . import blender, console
 from .bake import bake_with_bar, report
 
@@ -54,13 +58,13 @@ def run(arguments: argparse.Namespace) -> int:
     recording = baked.recording
     sensors = {sensor.name: sensor for sensor in baked.scenario.sensors if sensor.readout}
     texels = {name: sensor.texels for name, sensor in sensors.items()}
-    look = figures.Look(scene.palpate.color_map, limit=demo.RANGE, dpi=200)
+    look = Look(scene.palpate.color_map, limit=demo.RANGE, dpi=200)
     required = demo.CUBE_MASS * float(np.linalg.norm(baked.scenario.gravity))
 
     strip, curves, picture = folder / "tactile-strip.png", folder / "forces.png", folder / "scene.png"
-    figures.tactile_strip(strip, recording, texels, demo.STRIP_FRAMES, look)
+    tactile_strip(strip, recording, texels, demo.STRIP_FRAMES, look)
     parameters = {name: sensor.parameters for name, sensor in sensors.items()}
-    figures.force_curves(curves, recording, texels, parameters, {demo.PAD_B: required}, look)
+    force_curves(curves, recording, texels, parameters, {demo.PAD_B: required}, look)
     if not arguments.no_render:
         _picture(scene, picture, recording, sensors, texels, arguments, look)
 
@@ -86,7 +90,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _picture(scene, path: Path, recording, sensors, texels, arguments, look) -> None:
     """Render the scene and put the colour bar, tactile images and labels on it."""
-    from ..addon import render
+    from ..addon.render import render
     from ..sample_blends import demo
 
     stopped = "palpate demo: stopped while rendering; the bake and the scene are finished."
@@ -99,26 +103,26 @@ def _picture(scene, path: Path, recording, sensors, texels, arguments, look) -> 
         scene.frame_set(demo.PICTURE_FRAME)
         labels = _labels(scene, recording, sensors, demo)
         bar.update()
-    figures.label_picture(path, path, recording, texels, demo.PICTURE_FRAME, labels=labels, look=look)
+    label_picture(path, path, recording, texels, demo.PICTURE_FRAME, labels=labels, look=look)
 
 
-def _labels(scene, recording, sensors, demo) -> list[figures.Label]:
+def _labels(scene, recording, sensors, demo) -> list[Label]:
     """Words for the ball and the cube, from what their pads feel."""
-    from ..addon import render
+    from ..addon.render import render
 
     i = int(np.searchsorted(recording.frames, demo.PICTURE_FRAME))
     pressed, at_rest = recording.sensors[demo.PAD_A], recording.sensors[demo.PAD_B]
     normal = pressed.normal_force[i].sum()
-    shear = np.linalg.norm(measures.net_shear(pressed, sensors[demo.PAD_A].texels)[i])
+    shear = np.linalg.norm(metrics.net_shear(pressed, sensors[demo.PAD_A].texels)[i])
     weight, carriers = at_rest.normal_force[i].sum(), np.count_nonzero(at_rest.contact[i])
     words = {
         demo.BALL: f"Steel ball, slipping\n{normal:.2f} N normal, {shear:.2f} N shear",
         demo.CUBE: f"Steel cube, 1 kg, at rest\n{weight:.4f} N on {carriers} texels",
     }
-    labels = [figures.Label("\nArrows: the force with\nwhich a pad pushes back", (0.315, 0.14))]
+    labels = [Label("\nArrows: the force with\nwhich a pad pushes back", (0.315, 0.14))]
     for name, text in words.items():
         box = np.array([render.picture_position(scene, point) for point in render.corners([scene.objects[name]])])
-        labels.append(figures.Label(text, (float(box[:, 0].min()), float(box[:, 1].max()) + 0.035)))
+        labels.append(Label(text, (float(box[:, 0].min()), float(box[:, 1].max()) + 0.035)))
     return labels
 
 
@@ -126,9 +130,9 @@ def _slide(recording, sensor) -> str:
     """Return how friction builds up under the ball until it slips, as a table."""
     felt, mu = recording.sensors[sensor.name], sensor.parameters
     normal = felt.normal_force.sum(axis=1)
-    shear = np.linalg.norm(measures.net_shear(felt, sensor.texels), axis=1)
-    share = measures.mobilised(felt, sensor.texels, mu.mus)
-    slipping = measures.slipping(felt, mu)
+    shear = np.linalg.norm(metrics.net_shear(felt, sensor.texels), axis=1)
+    share = metrics.mobilised(felt, sensor.texels, mu.mus)
+    slipping = metrics.slipping(felt, mu)
     rows = [("frame", "time", "normal", "shear", "shear / µs·normal", "texels slipping")]
     touching = np.flatnonzero(normal > 0)
     for i in touching[:: max(1, len(touching) // 10)]:

@@ -5,10 +5,10 @@ from __future__ import annotations
 
 import argparse
 
-from ..core.bakes import Bake, read_bake
-from ..core.drive import drive
-from ..core.figures import Look
-from ..core.formats.export import KINDS, export
+from ..core.figures.recording_style import Look
+from ..core.io.bake_reader import Bake, read_bake
+from ..core.io.export import KINDS, export
+from ..core.jobs.job_runner import drive
 from . import console, looks
 
 
@@ -55,6 +55,6 @@ def find_bake(where: str) -> Bake:
     with console.quiet():
         bpy = blender.start()
         blender.open_blend(where)
-        from ..addon import pictures
+        from ..addon.render import figure_export
 
-        return pictures.bake_of(bpy.context.scene)
+        return figure_export.bake_of(bpy.context.scene)

@@ -6,7 +6,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from ..core.scenario import SensorParameters
+from ..core.model.scenario import SensorParameters
 from . import console
 
 
@@ -47,7 +47,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _stiffness(arguments: argparse.Namespace) -> None:
-    from ..core.calibrate.stiffness import fit_stiffness, read_foam
+    from ..core.gap.calibration.stiffness import fit_stiffness, read_foam
 
     data = read_foam(arguments.file, arguments.weight_area)
     fit = fit_stiffness(data, arguments.area, arguments.texels)
@@ -63,7 +63,7 @@ def _stiffness(arguments: argparse.Namespace) -> None:
         print("through zero does not have; add the effect dead-zone to the sensor for it.")
     print(f"\nSuggested: k = {fit.k.value:.4g} N/m, cn = {0.01 * fit.k.value:.3g} N·s/m (1 % of k)")
     if arguments.plot:
-        from ..core.calibrate.plots import plot_stiffness
+        from ..core.gap.calibration.plots import plot_stiffness
 
         plot_stiffness(arguments.plot, fit)
 
@@ -73,7 +73,7 @@ def _pascals(fit) -> str:
 
 
 def _friction(arguments: argparse.Namespace) -> None:
-    from ..core.calibrate.friction import UNITS, fit_friction, read_friction
+    from ..core.gap.calibration.friction import UNITS, fit_friction, read_friction
 
     data = read_friction(arguments.file, arguments.texels)
     fit = fit_friction(data, arguments.normal_force, SensorParameters())
@@ -87,6 +87,6 @@ def _friction(arguments: argparse.Namespace) -> None:
     if fit.untold:
         print(f"These measurements do not tell {', '.join(fit.untold)}: add some at other velocities.")
     if arguments.plot:
-        from ..core.calibrate.plots import plot_friction
+        from ..core.gap.calibration.plots import plot_friction
 
         plot_friction(arguments.plot, fit)

@@ -7,7 +7,7 @@ import argparse
 from pathlib import Path
 
 from ..core.errors import SceneError
-from ..core.formats.files import writable_folder
+from ..core.io.files import writable_folder
 from . import console
 
 
@@ -19,21 +19,21 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    from ..addon import dependencies
+    from ..addon.session import dependencies
 
     dependencies.prepare_numba()
-    from ..core import warm
-    from ..core.gap import report
-    from ..core.gap.amend import amended
-    from ..core.gap.diagnose import Diagnosis, diagnose
-    from ..core.gap.intervals import numbers
-    from ..core.gap.rig import read_rig
+    from ..core.gap.dataset.rig import read_rig
+    from ..core.gap.fitting.intervals import numbers
+    from ..core.gap.report import summary
+    from ..core.gap.report.amended_sensor import amended
+    from ..core.gap.selection.diagnosis import Diagnosis, diagnose
+    from ..core.solver import precompile
 
     if arguments.sensor and not arguments.blend:
         raise SceneError("--sensor names a sensor of a scene: give the scene with --blend.")
     rig = read_rig(arguments.rig)
     folder = writable_folder(arguments.out, create=True)
-    warm.warm_aloud()
+    precompile.warm_aloud()
     result = None
     with console.progress_bar("gap", 1000, unit="step") as bar:
 
@@ -48,17 +48,17 @@ def run(arguments: argparse.Namespace) -> int:
             else:
                 show(step.stage, int(0.95 * step.done))
         assert result is not None
-        for stage, share in report.write(result, folder):
+        for stage, share in summary.write(result, folder):
             show(stage, 950 + int(50 * share))
-    print(report.headline(result))
+    print(summary.headline(result))
     rows = [("", "parameter", "value (95 % interval)")]
     for one in numbers(result):
         owner = "base model" if one.effect < 0 else result.best.model.effects[one.effect].name
-        rows.append((owner, one.name, report.interval_text(one)))
+        rows.append((owner, one.name, summary.interval_text(one)))
     print()
     print(console.table(rows, "<<<"))
     print()
-    for text in report.summary(result)["warnings"]:
+    for text in summary.summary(result)["warnings"]:
         print(f"note: {text}")
     print(f"report: {folder / 'report.html'}")
     print(f"sensor: {folder / 'sensor.toml'}")
@@ -74,9 +74,9 @@ def _into_scene(blend: str, name: str | None, sensor) -> Path:
     with console.quiet():
         bpy = blender.start()
         blender.open_blend(blend)
-        from ..addon import measured
+        from ..addon.measured import gap_results
 
-        measured.put(measured.sensor_called(bpy.context.scene, name), sensor)
+        gap_results.put(gap_results.sensor_called(bpy.context.scene, name), sensor)
         path = Path(blend)
         blender.save_blend(path)
     return path

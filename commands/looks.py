@@ -5,15 +5,15 @@ from __future__ import annotations
 
 import argparse
 
-from ..core import colormaps
-from ..core.canvas import WIDTHS
-from ..core.figures import Look
+from ..core.figures import color_maps
+from ..core.figures.figure_style import WIDTHS
+from ..core.figures.recording_style import Look
 
 OPTIONS = ("colour_map", "quantity", "limit", "width", "dpi")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    names = [name.lower() for name in colormaps.STOPS]
+    names = [name.lower() for name in color_maps.STOPS]
     parser.add_argument("--colour-map", metavar="NAME", choices=names, help=f"{', '.join(names)} (default: the scene's)")
     parser.add_argument(
         "--quantity", choices=("force", "pressure"), help="what colours show: N per texel, or kPa (default: the scene's)"

@@ -7,7 +7,7 @@ import argparse
 from pathlib import Path
 
 from ..core.errors import SceneError
-from ..core.formats.openrave import NUMBERS, OpenRaveSensor, openrave_xml, read_openrave, write_openrave
+from ..core.io.openrave import NUMBERS, OpenRaveSensor, openrave_xml, read_openrave, write_openrave
 from . import blender, console
 
 
@@ -57,7 +57,7 @@ def _import(arguments: argparse.Namespace) -> None:
     with console.quiet():
         bpy = blender.start()
         blender.open_blend(arguments.scene)
-        from ..addon import exchange
+        from ..addon.authoring import exchange
 
         name = arguments.sensor or sensor.link
         obj = bpy.context.scene.objects.get(name)
@@ -85,7 +85,7 @@ def _export(arguments: argparse.Namespace) -> None:
     with console.quiet():
         bpy = blender.start()
         blender.open_blend(arguments.scene)
-        from ..addon import exchange
+        from ..addon.authoring import exchange
 
         found = {obj.name: obj for obj in bpy.context.scene.objects if obj.palpate.role in {"SENSOR", "PAD"}}
         wanted = arguments.sensor or [name for name, obj in found.items() if obj.palpate.role == "SENSOR"]

@@ -7,7 +7,7 @@ import argparse
 import time
 
 from ..core.errors import ParameterError
-from ..core.formats.files import writable_folder
+from ..core.io.files import writable_folder
 from . import blender, console
 
 MARKS = {True: "ok", False: "OFF", None: ""}

@@ -5,9 +5,9 @@ from __future__ import annotations
 
 import argparse
 
-from ..core.canvas import KINDS as FORMATS
-from ..core.drive import drive
-from ..core.formats.files import remove_leftovers, writable_folder
+from ..core.figures.figure_style import KINDS as FORMATS
+from ..core.io.files import remove_leftovers, writable_folder
+from ..core.jobs.job_runner import drive
 from . import blender, console, looks
 
 FIGURES = ("scene", "strip", "curves", "numbers", "video")
@@ -48,12 +48,12 @@ def run(arguments: argparse.Namespace) -> int:
     folder = writable_folder(arguments.out, create=True)
     with console.quiet():
         bpy = blender.start()
-        from ..addon import pictures
+        from ..addon.render import figure_export
 
         blender.open_blend(arguments.scene)
         scene = bpy.context.scene
-        wish = pictures.Wish(
-            look=looks.of(arguments, **vars(pictures.look_of(scene))),
+        wish = figure_export.Wish(
+            look=looks.of(arguments, **vars(figure_export.look_of(scene))),
             frames=tuple(arguments.frame or ()),
             sensors=tuple(arguments.sensor or ()),
             engine=arguments.engine,
@@ -77,7 +77,7 @@ def run(arguments: argparse.Namespace) -> int:
                 bar.set_description(f"{progress.stage}, frame {progress.frame}", refresh=False)
                 bar.update(progress.done - bar.n)
 
-            written = drive(pictures.make(scene, folder, wish), show)
+            written = drive(figure_export.make(scene, folder, wish), show)
     for path in written:
         print(path)
     return 0

@@ -2,5 +2,5 @@
 """Numbers in, numbers out: the part of Palpate that never heard of Blender.
 
 Importing this package is cheap; numba is loaded only by the modules that hold kernels (:mod:`.bvh`, :mod:`.contact`,
-:mod:`.solve`). SI units, float64, right-handed frames and quaternions ``(w, x, y, z)`` throughout.
+:mod:`.simulation`). SI units, float64, right-handed frames and quaternions ``(w, x, y, z)`` throughout.
 """

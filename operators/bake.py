@@ -3,8 +3,10 @@
 
 import bpy
 
-from ..addon import dress, live, write
-from ..addon.bake import bake
+from ..addon.bake import scene_writer
+from ..addon.bake.bake import bake
+from ..addon.display import bake_display
+from ..addon.timeline import playback
 from . import support, working
 
 
@@ -18,7 +20,7 @@ class PALPATE_OT_bake(working.Working, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        if context.scene is None or not live.has_roles(context.scene):
+        if context.scene is None or not playback.has_roles(context.scene):
             cls.poll_message_set("No object has a role: make a sensor and a target first")
             return False
         return support.idle(cls)
@@ -47,7 +49,7 @@ class PALPATE_OT_catch_up(working.Working, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        if context.scene is None or not live.missing(context.scene):
+        if context.scene is None or not playback.missing(context.scene):
             cls.poll_message_set("Nothing is missing up to the present frame")
             return False
         return support.idle(cls)
@@ -56,7 +58,7 @@ class PALPATE_OT_catch_up(working.Working, bpy.types.Operator):
         self._was_playing = context.screen is not None and context.screen.is_animation_playing
         if self._was_playing:
             bpy.ops.screen.animation_cancel(restore_frame=False)  # it would move the frame under the work
-        return live.catch_up(context.scene)
+        return playback.catch_up(context.scene)
 
     def modal(self, context, event):
         if event.type == "SPACE" and event.value == "PRESS":  # whoever wants to stop what seems to be playing
@@ -77,15 +79,15 @@ class PALPATE_OT_bake_clear(support.Reporting, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        if context.scene is None or not write.has_bake(context.scene):
+        if context.scene is None or not scene_writer.has_bake(context.scene):
             cls.poll_message_set("Nothing is baked in this scene")
             return False
         return True
 
     def run(self, context):
         support.leave_edit_mode(context)
-        write.clear(context.scene)
-        live.reset(context.scene)
+        scene_writer.clear(context.scene)
+        playback.reset(context.scene)
 
 
 class PALPATE_OT_reset(support.Reporting, bpy.types.Operator):
@@ -97,16 +99,16 @@ class PALPATE_OT_reset(support.Reporting, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        if context.scene is None or not live.has_roles(context.scene):
+        if context.scene is None or not playback.has_roles(context.scene):
             cls.poll_message_set("No object has a role")
             return False
-        if write.baked_objects(context.scene):
+        if scene_writer.baked_objects(context.scene):
             cls.poll_message_set("The scene is baked: use Clear Bake")
             return False
         return True
 
     def run(self, context):
-        live.reset(context.scene)
+        playback.reset(context.scene)
 
 
 class PALPATE_OT_dress(support.Reporting, bpy.types.Operator):
@@ -118,14 +120,14 @@ class PALPATE_OT_dress(support.Reporting, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        if context.scene is None or not write.baked_objects(context.scene):
+        if context.scene is None or not scene_writer.baked_objects(context.scene):
             cls.poll_message_set("Nothing is baked in this scene")
             return False
         return True
 
     def run(self, context):
         support.leave_edit_mode(context)
-        dress.again(context.scene, write.bake_folders(context.scene))
+        bake_display.again(context.scene, scene_writer.bake_folders(context.scene))
 
 
 CLASSES = (PALPATE_OT_bake, PALPATE_OT_catch_up, PALPATE_OT_bake_clear, PALPATE_OT_reset, PALPATE_OT_dress)

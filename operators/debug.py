@@ -3,7 +3,7 @@
 
 import bpy
 
-from ..addon import dependencies
+from ..addon.session import dependencies
 
 
 class PALPATE_OT_debug_info_copy(bpy.types.Operator):

@@ -4,8 +4,9 @@
 import bpy
 from bpy.props import EnumProperty, IntProperty
 
-from ..addon import effects, units
-from ..core.effects import library
+from ..addon.properties import effect_stack
+from ..addon.session import units
+from ..core.effects.engine import registry
 from . import support
 
 
@@ -16,7 +17,7 @@ class PALPATE_OT_effect_add(support.Reporting, bpy.types.Operator):
     bl_label = "Add Effect"
     bl_options = {"REGISTER", "UNDO"}
 
-    effect: EnumProperty(name="Effect", description="What to add", items=effects.kind_items(), options={"SKIP_SAVE"})
+    effect: EnumProperty(name="Effect", description="What to add", items=effect_stack.kind_items(), options={"SKIP_SAVE"})
 
     @classmethod
     def poll(cls, context):
@@ -24,13 +25,13 @@ class PALPATE_OT_effect_add(support.Reporting, bpy.types.Operator):
 
     @classmethod
     def description(cls, _context, properties):
-        return library.kind_of(properties.effect).text.removesuffix(".")
+        return registry.kind_of(properties.effect).text.removesuffix(".")
 
     def run(self, context):
         obj = context.object
         gain = units.as_typed(obj.palpate.gain)
-        effects.add(obj, library.effect(self.effect, gain=gain))
-        self.report({"INFO"}, f"'{obj.name}' has {library.kind_of(self.effect).title.lower()}")
+        effect_stack.add(obj, registry.effect(self.effect, gain=gain))
+        self.report({"INFO"}, f"'{obj.name}' has {registry.kind_of(self.effect).title.lower()}")
 
 
 class _OnEntry(support.Reporting):

@@ -7,7 +7,7 @@ import bpy
 from bpy.props import StringProperty
 from bpy_extras.io_utils import ExportHelper
 
-from ..addon import exchange
+from ..addon.authoring import exchange
 from ..core.errors import SceneError
 from . import support
 
@@ -32,7 +32,7 @@ class PALPATE_OT_openrave_import(support.Reporting, support.Choosing, bpy.types.
         return support.sensor_object(cls, context)
 
     def run(self, context):
-        from ..core.formats.openrave import read_openrave
+        from ..core.io.openrave import read_openrave
 
         obj = context.object
         found = read_openrave(self.filepath)
@@ -65,7 +65,7 @@ class PALPATE_OT_openrave_export(support.Reporting, ExportHelper, bpy.types.Oper
         return True
 
     def run(self, context):
-        from ..core.formats.openrave import OpenRaveSensor, write_openrave
+        from ..core.io.openrave import OpenRaveSensor, write_openrave
 
         sensors = [obj for obj in context.selected_objects if obj.palpate.role == "SENSOR"]
         sensors = sensors or [obj for obj in context.scene.objects if obj.palpate.role == "SENSOR"]

@@ -3,7 +3,8 @@
 
 import bpy
 
-from ..addon import figures, write
+from ..addon.bake import scene_writer
+from ..addon.properties import figure_properties
 from . import support, working
 
 
@@ -17,16 +18,16 @@ class PALPATE_OT_figures_make(working.Working, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        if context.scene is None or not write.bake_folders(context.scene):
+        if context.scene is None or not scene_writer.bake_folders(context.scene):
             cls.poll_message_set("Nothing is baked in this scene: bake first")
             return False
         return support.idle(cls)
 
     def job(self, context):
-        from ..addon import pictures
+        from ..addon.render import figure_export
 
         scene = context.scene
-        return pictures.make(scene, figures.folder(scene), figures.wish(scene, context.object))
+        return figure_export.make(scene, figure_properties.folder(scene), figure_properties.wish(scene, context.object))
 
     def done(self, result):
         names = ", ".join(f"'{path.name}'" for path in result[:4])

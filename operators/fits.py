@@ -6,7 +6,7 @@ from pathlib import Path
 import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
 
-from ..addon import exchange, preview
+from ..addon.authoring import exchange, sensor_report
 from ..core.errors import SensorError
 from . import support
 
@@ -91,11 +91,11 @@ class PALPATE_OT_stiffness_fit(Fit, bpy.types.Operator):
     fields = ("line", "weight_area", "with_damping")
 
     def run(self, context):
-        from ..core.calibrate.plots import plot_stiffness
-        from ..core.calibrate.stiffness import fit_stiffness, read_foam
+        from ..core.gap.calibration.plots import plot_stiffness
+        from ..core.gap.calibration.stiffness import fit_stiffness, read_foam
 
         obj = context.object
-        report = preview.now(obj, context.scene)
+        report = sensor_report.now(obj, context.scene)
         if report.texels is None:
             raise SensorError(report.problems[0].text)
         fit = fit_stiffness(read_foam(self.filepath, self.weight_area or None), report.area, len(report.texels))
@@ -126,8 +126,8 @@ class PALPATE_OT_friction_fit(Fit, bpy.types.Operator):
     fields = ("normal_force", "texels")
 
     def run(self, context):
-        from ..core.calibrate.friction import fit_friction, read_friction
-        from ..core.calibrate.plots import plot_friction
+        from ..core.gap.calibration.friction import fit_friction, read_friction
+        from ..core.gap.calibration.plots import plot_friction
 
         obj = context.object
         fit = fit_friction(read_friction(self.filepath, self.texels), self.normal_force, exchange.parameters(obj))

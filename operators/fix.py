@@ -4,7 +4,7 @@
 import bpy
 from bpy.props import EnumProperty
 
-from ..addon import preview, problems
+from ..addon.authoring import problems, sensor_report
 from . import support
 
 
@@ -29,8 +29,8 @@ class PALPATE_OT_fix(support.Reporting, bpy.types.Operator):
     def run(self, context):
         support.leave_edit_mode(context)
         obj = context.object
-        problems.fix(obj, self.kind, preview.now(obj, context.scene))
-        left = preview.now(obj, context.scene).problems
+        problems.fix(obj, self.kind, sensor_report.now(obj, context.scene))
+        left = sensor_report.now(obj, context.scene).problems
         if left:
             self.report({"WARNING"}, left[0].text)
         else:

@@ -4,7 +4,7 @@
 import bpy
 from bpy.props import BoolProperty, StringProperty
 
-from ..addon import measured
+from ..addon.measured import gap_results
 from . import support, working
 from .fits import show_image
 
@@ -24,7 +24,7 @@ class PALPATE_OT_measured_open(support.Reporting, support.Choosing, bpy.types.Op
         return support.sensor_object(cls, context)
 
     def run(self, context):
-        from ..core.gap.rig import read_rig
+        from ..core.gap.dataset.rig import read_rig
 
         rig = read_rig(self.filepath)
         blend = bpy.data.filepath
@@ -52,7 +52,7 @@ class PALPATE_OT_gap_find(working.Working, bpy.types.Operator):
         return True
 
     def job(self, context):
-        return measured.find(context.object)
+        return gap_results.find(context.object)
 
     def done(self, result):
         self.report({"INFO"}, result.headline)
@@ -70,7 +70,7 @@ class PALPATE_OT_gap_add(support.Reporting, bpy.types.Operator):
         return support.gap_found(cls, context)
 
     def run(self, context):
-        count = measured.add_found(context.object)
+        count = gap_results.add_found(context.object)
         self.report({"INFO"}, f"'{context.object.name}' has the fitted parameters and {count} effects")
 
 
@@ -86,7 +86,7 @@ class PALPATE_OT_gap_curves(support.Reporting, bpy.types.Operator):
         return support.gap_found(cls, context)
 
     def run(self, context):
-        show_image(context, measured.of(context.object).pictures["curves"], "Palpate Gap Curves")
+        show_image(context, gap_results.of(context.object).pictures["curves"], "Palpate Gap Curves")
 
 
 class PALPATE_OT_gap_show(support.Reporting, bpy.types.Operator):
@@ -104,8 +104,8 @@ class PALPATE_OT_gap_show(support.Reporting, bpy.types.Operator):
 
     def run(self, context):
         support.leave_edit_mode(context)
-        top = measured.show_on_sensor(context, context.object, self.amended)
-        measured.mark_phases(context.scene, context.object)
+        top = gap_results.show_on_sensor(context, context.object, self.amended)
+        gap_results.mark_phases(context.scene, context.object)
         self.report({"INFO"}, f"The brightest texel errs by {top:.2%} of the range")
 
 
@@ -127,11 +127,11 @@ class PALPATE_OT_gap_report(support.Reporting, bpy.types.Operator):
         return {"RUNNING_MODAL"}
 
     def run(self, context):
-        from ..core.formats.files import writable_folder
-        from ..core.gap import report
+        from ..core.gap.report import summary
+        from ..core.io.files import writable_folder
 
         folder = writable_folder(bpy.path.abspath(self.directory), create=True)
-        for _ in report.write(measured.of(context.object).diagnosis, folder):
+        for _ in summary.write(gap_results.of(context.object).diagnosis, folder):
             pass
         self.report({"INFO"}, f"Wrote {folder / 'report.html'}")
 

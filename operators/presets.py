@@ -8,7 +8,7 @@ from bl_operators.presets import AddPresetBase
 from bl_ui.utils import PresetPanel
 from bpy.props import StringProperty
 
-from ..addon import sensors
+from ..addon.authoring import sensors
 from ..core.errors import FileError
 from . import support
 

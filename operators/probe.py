@@ -4,7 +4,7 @@
 import bpy
 from bpy.props import EnumProperty, FloatProperty
 
-from ..addon import probes
+from ..addon.authoring import probes
 from . import support
 
 

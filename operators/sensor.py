@@ -5,7 +5,8 @@ import bpy
 import numpy as np
 from bpy.props import EnumProperty
 
-from ..addon import meshes, sensors
+from ..addon.authoring import sensors
+from ..addon.scene import meshes
 from . import support
 
 

@@ -5,7 +5,8 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty
 from bpy_extras.object_utils import AddObjectHelper, object_data_add
 
-from ..addon import properties, sensors, skins
+from ..addon.authoring import laid_sensors, sensors
+from ..addon.properties import properties
 from . import support
 
 
@@ -40,7 +41,7 @@ class PALPATE_OT_pad_mesh_add(support.Reporting, AddObjectHelper, bpy.types.Oper
         return True
 
     def run(self, context):
-        mesh = skins.new_pad(context, self.rows, self.columns, (self.pitch_x, self.pitch_y), self.radius)
+        mesh = laid_sensors.new_pad(context, self.rows, self.columns, (self.pitch_x, self.pitch_y), self.radius)
         obj = object_data_add(context, mesh, operator=self)
         if self.make_sensor:
             sensors.make_sensor(obj, "MESH")
@@ -117,17 +118,17 @@ class PALPATE_OT_skin_add(support.Reporting, bpy.types.Operator):
 
     def invoke(self, context, _event):
         if not self.spacing:
-            self.spacing = skins.usual_spacing(context.object, context.scene)
+            self.spacing = laid_sensors.usual_spacing(context.object, context.scene)
         return self.execute(context)
 
     def run(self, context):
         carrier = context.object
         source = self._source(carrier)
         support.leave_edit_mode(context)
-        recipe = {key: getattr(self, key) for key in skins.RECIPE}
-        recipe["spacing"] = recipe["spacing"] or skins.usual_spacing(carrier, context.scene)
+        recipe = {key: getattr(self, key) for key in laid_sensors.RECIPE}
+        recipe["spacing"] = recipe["spacing"] or laid_sensors.usual_spacing(carrier, context.scene)
         was_sensor = carrier.palpate.role == "SENSOR"
-        obj = skins.lay(context, carrier, source, recipe)
+        obj = laid_sensors.lay(context, carrier, source, recipe)
         text = f"'{obj.name}' has {len(obj.data.vertices)} texels"
         if was_sensor and source == "OWN":  # its own texels would feel the same load a second time
             carrier.palpate.role = "TARGET" if carrier.palpate.body == "FREE" else "NONE"
@@ -167,14 +168,14 @@ class PALPATE_OT_skin_update(support.Reporting, bpy.types.Operator):
     def poll(cls, context):
         if not support.mesh_object(cls, context):
             return False
-        if not skins.is_skin(context.object):
+        if not laid_sensors.is_skin(context.object):
             cls.poll_message_set(f"'{context.object.name}' was not laid onto a surface: use Lay Texels first")
             return False
         return True
 
     def run(self, context):
         support.leave_edit_mode(context)
-        count = skins.lay_anew(context, context.object)
+        count = laid_sensors.lay_anew(context, context.object)
         self.report({"INFO"}, f"'{context.object.name}' has {count} texels")
 
 

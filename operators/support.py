@@ -9,7 +9,10 @@ from pathlib import Path
 import bpy
 from bpy_extras.io_utils import ImportHelper
 
-from ..addon import live, measured, meshes, state
+from ..addon.measured import gap_results
+from ..addon.scene import meshes
+from ..addon.session import session_state
+from ..addon.timeline import playback
 from ..core.errors import PalpateError
 
 
@@ -30,7 +33,7 @@ class Reporting:
 
 def idle(cls) -> bool:
     """Poll: no frames are being computed, by a bake or after a jump on the timeline."""
-    if live.is_baking() or state.session.catching_up:
+    if playback.is_baking() or session_state.session.catching_up:
         cls.poll_message_set("Frames are being computed")
         return False
     return True
@@ -104,7 +107,7 @@ def gap_found(cls, context) -> bool:
     """Poll: something was found for the active sensor."""
     if not sensor_object(cls, context):
         return False
-    if measured.of(context.object) is None:
+    if gap_results.of(context.object) is None:
         cls.poll_message_set("Nothing was found yet: use Find Gap first")
         return False
     return True

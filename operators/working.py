@@ -5,8 +5,8 @@ from __future__ import annotations
 
 import bpy
 
-from ..addon import jobs
-from ..core.drive import drive
+from ..addon.session import jobs
+from ..core.jobs.job_runner import drive
 from . import support
 
 

@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Panels of what the scene does: bake, and how results look."""
 
-from ..addon import live, state, write
+from ..addon.bake import scene_writer
+from ..addon.session import session_state
+from ..addon.timeline import playback
 from .places import Part, named, sentences
 
 
@@ -22,20 +24,20 @@ class Bake(Part):
         if not own.use_auto_dt:
             column.prop(own, "dt")
         layout.prop(own, "use_live")
-        progress = state.session.bake
+        progress = session_state.session.bake
         if progress is not None:
             text = "Preparing the solver" if progress.frame is None else progress.text
             layout.progress(text=f"{text} (ESC: stop)", factor=progress.done / progress.total)
             return
         row = layout.row(align=True)
         row.operator("palpate.bake", text=f"Bake {scene.frame_start}–{scene.frame_end}", icon="RENDER_ANIMATION")
-        if write.has_bake(scene):
+        if scene_writer.has_bake(scene):
             row.operator("palpate.bake_clear", text="", icon="TRASH")
         else:
             row = layout.row(align=True)
             row.operator("palpate.catch_up")
             row.operator("palpate.reset", text="Reset")
-        status = live.status(scene)
+        status = playback.status(scene)
         sentences(layout, status.text, "INFO", context)
         if status.step:
             sentences(layout, status.step, "PREVIEW_RANGE", context)
@@ -63,7 +65,7 @@ class Display(Part):
         if not own.use_auto_arrow:
             column.prop(own, "arrow_scale")
             column.prop(own, "texel_arrow_scale")
-        if write.baked_objects(context.scene):
+        if scene_writer.baked_objects(context.scene):
             layout.operator("palpate.dress")
 
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Panel of what moves an object."""
 
-from ..addon import drives, freebodies
+from ..addon.scene import drives, moved_bodies
 from .places import Part, named, sentences
 
 
@@ -12,7 +12,7 @@ class Body(Part):
 
     def draw_part(self, layout, settings, context):
         layout.prop(settings, "body", text="")
-        if settings.body in freebodies.MOVED:
+        if settings.body in moved_bodies.MOVED:
             layout.prop(settings, "mass")
         if settings.role in {"SENSOR", "PAD"}:
             layout.prop(settings, "presses")

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Panel of a sensor's texels: how many, how dense, how long a step may be, what is wrong and the button against it."""
 
-from ..addon import preview, problems
-from ..core.layout import GridLayout
+from ..addon.authoring import problems, sensor_report
+from ..core.geometry.layout import GridLayout
 from .places import Part, sentences
 
 
@@ -18,7 +18,7 @@ class Texels(Part):
         grid = layout.grid_flow(columns=2, even_columns=True, align=True)
         for name in ("show_texels", "show_normals", "show_numbers", "show_reach"):
             grid.prop(own, name)
-        report = preview.of(context.object, context.scene)
+        report = sensor_report.of(context.object, context.scene)
         if report is None:
             layout.label(text="Looking at it…", icon="SORTTIME")
             return

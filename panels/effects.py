@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The stack of a sensor's effects, drawn like modifiers."""
 
-from ..addon import effects
+from ..addon.properties import effect_stack
 from .places import Part
 
 
@@ -20,10 +20,10 @@ class Effects(Part):
             self._draw_entry(layout.box(), item, index)
 
     def _draw_entry(self, box, item, index: int) -> None:
-        kind, form = effects.kind_of(item), effects.form_of(item)
+        kind, form = effect_stack.kind_of(item), effect_stack.form_of(item)
         row = box.row(align=True)
         row.prop(item, "show", text="", icon="DOWNARROW_HLT" if item.show else "RIGHTARROW", emboss=False)
-        row.label(text=kind.title, icon=effects.STAGE_ICONS[kind.stage_of(form)])
+        row.label(text=kind.title, icon=effect_stack.STAGE_ICONS[kind.stage_of(form)])
         row.prop(item, "use", text="", icon="HIDE_OFF" if item.use else "HIDE_ON", emboss=False)
         for way, icon in (("UP", "TRIA_UP"), ("DOWN", "TRIA_DOWN")):
             move = row.operator("palpate.effect_move", text="", icon=icon, emboss=False)
@@ -33,8 +33,8 @@ class Effects(Part):
             return
         column = box.column()
         column.active = item.use
-        column.prop(item, effects.form_key(kind), text="")
-        for _parameter, key in effects.parameters(item):
+        column.prop(item, effect_stack.form_key(kind), text="")
+        for _parameter, key in effect_stack.parameters(item):
             column.prop(item, key)
         if form.random:
             column.prop(item, "seed")

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Measured data of the real sensor: what the model misses against them."""
 
-from ..addon import measured
+from ..addon.measured import gap_results
 from .places import Part, sentences
 
 
@@ -17,7 +17,7 @@ class Measured(Part):
         row.prop(settings, "measured", text="")
         row.operator("palpate.measured_open", text="", icon="FILE_FOLDER")
         layout.operator("palpate.gap_find", icon="VIEWZOOM")
-        result = measured.of(context.object)
+        result = gap_results.of(context.object)
         if result is None:
             return
         box = layout.box()

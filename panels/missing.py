@@ -3,7 +3,7 @@
 
 import bpy
 
-from ..addon import dependencies
+from ..addon.session import dependencies
 from ..operators import debug
 
 

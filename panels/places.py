@@ -7,7 +7,7 @@ import textwrap
 
 import bpy
 
-from ..addon import meshes
+from ..addon.scene import meshes
 
 PLACES = {
     "": {"bl_space_type": "PROPERTIES", "bl_region_type": "WINDOW", "bl_context": "physics"},

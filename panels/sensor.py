@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Panels of one object: its role, and of a sensor or pad its region, its contact, its friction and what it reads."""
 
-from ..addon import live, preparing, skins, state
+from ..addon.authoring import laid_sensors
+from ..addon.session import first_use, session_state
+from ..addon.timeline import playback
 from ..operators import presets
 from .places import ROOT, Part, named, sentences
 
@@ -20,9 +22,9 @@ class Root(Part):
     def draw_part(self, layout, settings, context):
         obj = context.object
         for name in (obj.name, context.scene.name):
-            if name in state.session.notes:
-                sentences(layout, state.session.notes[name], "ERROR", context)
-        coming = preparing.progress()
+            if name in session_state.session.notes:
+                sentences(layout, session_state.session.notes[name], "ERROR", context)
+        coming = first_use.progress()
         if coming is not None:
             layout.progress(text="Preparing the solver", factor=coming.done / coming.total)
             sentences(layout, f"{coming.text}. Only the first use of this version has to wait.", "SORTTIME", context)
@@ -55,11 +57,11 @@ class Skins(Part):
     @classmethod
     def poll(cls, context):
         obj = context.object
-        return super().poll(context) and obj.type == "MESH" and (obj.palpate.role != "NONE" or bool(skins.skins_of(obj)))
+        return super().poll(context) and obj.type == "MESH" and (obj.palpate.role != "NONE" or bool(laid_sensors.skins_of(obj)))
 
     def draw_part(self, layout, settings, context):
         obj = context.object
-        if skins.is_skin(obj):
+        if laid_sensors.is_skin(obj):
             own = settings.skin
             box = layout.box().column()
             row = box.row(align=True)
@@ -70,7 +72,7 @@ class Skins(Part):
                 box.prop(own, name)
             layout.operator("palpate.skin_update", icon="FILE_REFRESH")
             return
-        for skin in skins.skins_of(obj):
+        for skin in laid_sensors.skins_of(obj):
             row = layout.row(align=True)
             row.prop(skin, "name", text="", icon="MOD_SHRINKWRAP")
             row.operator("palpate.object_activate", text="", icon="RESTRICT_SELECT_OFF").name = skin.name
@@ -178,7 +180,7 @@ class Readout(Part):
             column.prop_search(settings, "image_map", context.object.data, "uv_layers", text="", icon="UV")
             column.prop(settings, "image_size")
             column.prop(settings, "image_filter", text="")
-        status = live.status(context.scene)
+        status = playback.status(context.scene)
         felt = status.frame.sensors.get(context.object.name) if status.frame is not None else None
         box = layout.box().column()
         if felt is None:

@@ -10,11 +10,12 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from ..addon import bake as baking
-from ..addon import render, sample
-from ..core.drive import drive
-from ..core.recording import Recording
-from ..core.scenario import Scenario
+from ..addon.bake import bake as baking
+from ..addon.render import render
+from ..addon.scene import scene_reader
+from ..core.jobs.job_runner import drive
+from ..core.model.recording import Recording
+from ..core.model.scenario import Scenario
 
 SAMPLES = 12
 """Samples per pixel of the renders: soft light needs few, and the denoiser does the rest."""
@@ -29,7 +30,7 @@ def fresh(build: Callable) -> bpy.types.Scene:
 
 def scenario_of(scene) -> Scenario:
     """Return what the solver is given for a scene."""
-    scenario, _ = drive(sample.sample_scenario(scene))
+    scenario, _ = drive(scene_reader.sample_scenario(scene))
     return scenario
 
 

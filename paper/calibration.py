@@ -9,11 +9,11 @@ from pathlib import Path
 
 import numpy as np
 
-from ..core.calibrate.friction import FrictionData, fit_friction, friction_over_time, steady_friction
-from ..core.calibrate.plots import plot_friction, plot_stiffness
-from ..core.calibrate.stiffness import STANDARD_GRAVITY, FoamData, fit_stiffness, texel_stiffness
-from ..core.formats.openrave import OpenRaveSensor, openrave_xml, read_openrave
-from ..core.scenario import SensorParameters
+from ..core.gap.calibration.friction import FrictionData, fit_friction, friction_over_time, steady_friction
+from ..core.gap.calibration.plots import plot_friction, plot_stiffness
+from ..core.gap.calibration.stiffness import STANDARD_GRAVITY, FoamData, fit_stiffness, texel_stiffness
+from ..core.io.openrave import OpenRaveSensor, openrave_xml, read_openrave
+from ..core.model.scenario import SensorParameters
 from .chapter import Chapter, Picture, Row, compare
 
 AREA, TEXELS = 0.00125, 84  # m², and how many texels share it (section 3.4.1)

@@ -10,15 +10,18 @@ from pathlib import Path
 
 import numpy as np
 
-from ..core import figures
-from ..core.recording import Recording
-from ..core.scenario import Scenario
-from ..core.solve import run
+from ..core.figures.recording_style import Look
+from ..core.figures.tactile_strip import tactile_strip
+from ..core.figures.texel_numbers import texel_numbers
+from ..core.figures.time_curves import time_curves
+from ..core.model.recording import Recording
+from ..core.model.scenario import Scenario
+from ..core.solver.simulation import run
 from ..sample_blends import grasps, gripper, hand, pick_and_place
 from . import bench
 from .chapter import Chapter, Picture, Row, below, compare
 
-LOOK = figures.Look(colour_map="PAPER", width="single")
+LOOK = Look(colour_map="PAPER", width="single")
 """White is no force, black the largest, as in the paper."""
 HOLD, LAST = 60.0, 10.0
 """Seconds that an object is held, and how many of them at the end it must not move in."""
@@ -50,7 +53,7 @@ def _one_object(chapter: Chapter, kind: str, folder: Path, progress: Callable) -
     recording = bench.bake(scene, folder / f"bake-grasp-{kind}")
     last = int(recording.frames[-1])
     numbers = folder / f"fig10-{kind}-numbers"
-    _twice(numbers, lambda path: figures.texel_numbers(path, recording, texels, gripper.RIGHT, last, LOOK))
+    _twice(numbers, lambda path: texel_numbers(path, recording, texels, gripper.RIGHT, last, LOOK))
     chapter.pictures += [
         Picture(bench.picture(scene, folder / f"fig10-{kind}.png", last), f"{name}: the grasp."),
         _strip(folder / f"fig10-{kind}-images", recording, texels, [last], f"{name}: both pads."),
@@ -148,7 +151,7 @@ def work_cycle(folder: Path, progress: Callable) -> Chapter:
     frames = list(pick_and_place.STAGES.values())
     chapter.pictures.append(_strip(folder / "fig12-images", recording, texels, frames, "Both pads at each stage."))
     parameters = {sensor.name: sensor.parameters for sensor in scenario.sensors if sensor.readout}
-    _twice(folder / "fig12-forces", lambda path: figures.time_curves(path, recording, texels, parameters, ("force",), LOOK))
+    _twice(folder / "fig12-forces", lambda path: time_curves(path, recording, texels, parameters, ("force",), LOOK))
     chapter.pictures.append(Picture(folder / "fig12-forces.png", "Forces over the work cycle."))
     chapter.rows += cycle_rows(recording)
     progress()
@@ -198,7 +201,7 @@ def finger_and_thumb(folder: Path, progress: Callable) -> Chapter:
 
 
 def _strip(stem: Path, recording: Recording, texels, frames, caption: str) -> Picture:
-    _twice(stem, lambda path: figures.tactile_strip(path, recording, texels, frames, LOOK))
+    _twice(stem, lambda path: tactile_strip(path, recording, texels, frames, LOOK))
     return Picture(stem.with_suffix(".png"), caption)
 
 

@@ -10,9 +10,9 @@ from pathlib import Path
 
 import numpy as np
 
-from ..core.canvas import GREY, INK, NORMAL_COLOUR, new_figure, save_figure
-from ..core.scenario import Scenario
-from ..core.solve import run
+from ..core.figures.figure_style import GREY, INK, NORMAL_COLOUR, new_figure, save_figure
+from ..core.model.scenario import Scenario
+from ..core.solver.simulation import run
 from ..sample_blends import tilt, weighing
 from . import bench
 from .chapter import Chapter, Picture, Row, below, compare

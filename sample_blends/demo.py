@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 
-from ..addon import render
+from ..addon.render import render
 from . import studio
 
 FPS = 24

@@ -305,7 +305,7 @@ def explain(text: str) -> None:
 
 def frame_objects(scene, objects, region=(0.06, 0.06, 0.94, 0.94), size=(960, 720)) -> None:
     """Set the size of the picture (pixels) and let the camera frame the objects where they are now."""
-    from ..addon import render
+    from ..addon.render import render
 
     scene.render.resolution_x, scene.render.resolution_y = size
     bpy.context.view_layer.update()
@@ -316,9 +316,9 @@ def frame_objects(scene, objects, region=(0.06, 0.06, 0.94, 0.94), size=(960, 72
 
 def needles(scene, sensor, length: float, look, radius: float = 0.26):
     """Return thin needles on all texels of a sensor, along their normals and `length` long; they follow the sensor."""
-    from ..addon import meshes
-    from ..core.mesh import checked_mesh
-    from ..core.texels import texels_from_region
+    from ..addon.scene import meshes
+    from ..core.geometry.mesh import checked_mesh
+    from ..core.geometry.texels import texels_from_region
 
     data = sensor.data
     data.calc_loop_triangles()
@@ -342,8 +342,8 @@ def needles(scene, sensor, length: float, look, radius: float = 0.26):
 
 def step_keys(obj) -> None:
     """Let the animated numbers of an object jump at their keyframes, since a command changes at once."""
-    from ..addon import curves
+    from ..addon.session import fcurves
 
-    for curve in curves.of(obj) or ():
+    for curve in fcurves.of(obj) or ():
         for key in curve.keyframe_points:
             key.interpolation = "CONSTANT"

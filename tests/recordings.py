@@ -5,9 +5,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from palpate.core.mesh import TriangleMesh
-from palpate.core.recording import Recording, SensorRecording
-from palpate.core.texels import texels_from_region
+from palpate.core.geometry.mesh import TriangleMesh
+from palpate.core.geometry.texels import texels_from_region
+from palpate.core.model.recording import Recording, SensorRecording
 
 ROWS, COLUMNS, PITCH = 5, 3, 0.004
 

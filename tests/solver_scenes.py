@@ -6,10 +6,10 @@ from dataclasses import replace
 import numpy as np
 import trimesh
 
-from palpate.core.bodies import rotation_matrices
-from palpate.core.mesh import TriangleMesh, checked_mesh, mass_properties
-from palpate.core.scenario import Body, Drive, Motion, Scenario, Sensor, SensorParameters, Signal, Target
-from palpate.core.texels import Texels, texels_from_region
+from palpate.core.geometry.mesh import TriangleMesh, checked_mesh, mass_properties
+from palpate.core.geometry.rotations import rotation_matrices
+from palpate.core.geometry.texels import Texels, texels_from_region
+from palpate.core.model.scenario import Body, Drive, Motion, Scenario, Sensor, SensorParameters, Signal, Target
 
 GRAVITY = 9.81
 LEVEL = (1.0, 0.0, 0.0, 0.0)

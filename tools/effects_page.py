@@ -22,7 +22,7 @@ Each of these is an *effect* that a sensor can be given, in one of several formu
 Blender: Physics › Palpate › Effects › *Add Effect*. In a script or a file, an effect is its name, its form and its values:
 
 ```python
-from palpate.core.effects.library import effect
+from palpate.core.effects.engine.registry import effect
 
 sensor = dataclasses.replace(sensor, effects=(effect("creep", amount=0.3), effect("noise", "white", spread=2e-3, seed=1)))
 ```
@@ -63,7 +63,7 @@ take the force as linear between two frames.
 
 def page() -> str:
     """Return the text of docs/effects.md."""
-    from palpate.core.effects.library import library
+    from palpate.core.effects.engine.registry import library
 
     parts = [INTRODUCTION]
     for kind in library().values():
@@ -93,8 +93,8 @@ ROOM = {"creep": 2.3, "lag": 1.6, "wear": 1.4}
 
 def picture(path: Path) -> None:
     """Draw each effect in the experiment that shows it best."""
-    from palpate.core.canvas import new_figure, save_figure
-    from palpate.core.effects.library import library
+    from palpate.core.effects.engine.registry import library
+    from palpate.core.figures.figure_style import new_figure, save_figure
 
     figure = new_figure(10.0, 11.6)
     grid = figure.subplots(5, 4)
@@ -106,8 +106,8 @@ def picture(path: Path) -> None:
 
 
 def _setting():
-    from palpate.core.effects.base import Site
-    from palpate.core.scenario import SensorParameters
+    from palpate.core.effects.engine.specification import Site
+    from palpate.core.model.scenario import SensorParameters
 
     row, column = (index.ravel() for index in np.mgrid[0:ROWS, 0:COLUMNS])
     position = np.stack([column * PITCH, row * PITCH, np.zeros(ROWS * COLUMNS)], axis=1)
@@ -116,8 +116,8 @@ def _setting():
 
 def _curves(axes, kind, x, base, of_form, xlabel, ylabel, **values):
     """Grey the base, in colour what each form makes of it; `values` by form name go beyond the defaults."""
-    from palpate.core.canvas import GREY, SERIES, tidy_axes
-    from palpate.core.effects.library import effect
+    from palpate.core.effects.engine.registry import effect
+    from palpate.core.figures.figure_style import GREY, SERIES, tidy_axes
 
     if base is not None:
         axes.plot(x, base, color=GREY, lw=1.0, label="_")
@@ -136,7 +136,7 @@ def _curves(axes, kind, x, base, of_form, xlabel, ylabel, **values):
 
 def _pressed(time, depth, slide=None):
     """Return what one texel reads over a history of depths, with an effect of whatever stage."""
-    from palpate.core.effects.bound import forces, readings
+    from palpate.core.effects.engine.binding import forces, readings
 
     site, parameters = _setting()
     one = type(site)(np.zeros((1, 3)), np.ones(1))
@@ -163,7 +163,7 @@ def _over_time(time, depth, ylabel="reading (N)", **values):
 
 def _reading_over_force(**values):
     def draw(axes, kind):
-        from palpate.core.effects.bound import readings
+        from palpate.core.effects.engine.binding import readings
 
         site, force = _setting()[0], np.linspace(0, 2, 801)
         one = type(site)(np.zeros((1, 3)), np.ones(1))
@@ -174,8 +174,8 @@ def _reading_over_force(**values):
 
 
 def _over_speed(axes, kind):
-    from palpate.core.effects.bound import friction
-    from palpate.core.scenario import SensorParameters
+    from palpate.core.effects.engine.binding import friction
+    from palpate.core.model.scenario import SensorParameters
 
     v, p = np.linspace(0, 0.06, 400), SensorParameters()
 
@@ -198,7 +198,7 @@ def _peaks(axes, kind):
 
 def _across(axes, kind):
     """A column of the pad under a load on one texel."""
-    from palpate.core.effects.bound import readings
+    from palpate.core.effects.engine.binding import readings
 
     site = _setting()[0]
     force = np.zeros((1, ROWS * COLUMNS))
@@ -210,7 +210,7 @@ def _across(axes, kind):
 
 def _texels(**values):
     def draw(axes, kind):
-        from palpate.core.effects.bound import readings
+        from palpate.core.effects.engine.binding import readings
 
         site = _setting()[0]
         force = np.ones((1, ROWS * COLUMNS))
@@ -223,7 +223,7 @@ def _texels(**values):
 
 def _ball(axes, kind):
     """What a ball on the middle of the pad reads along one column."""
-    from palpate.core.effects.library import placed
+    from palpate.core.effects.engine.registry import placed
 
     site = _setting()[0]
     middle = site.position.mean(axis=0)

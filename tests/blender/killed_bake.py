@@ -13,11 +13,11 @@ import bpy
 import palpate
 
 palpate.register()
-from palpate.addon import unfinished  # noqa: E402
-from palpate.addon.bake import bake  # noqa: E402
-from palpate.core.drive import drive  # noqa: E402
+from palpate.addon.bake.bake import bake_checkpoint  # noqa: E402
+from palpate.addon.bake.bake.bake import bake  # noqa: E402
+from palpate.core.jobs.job_runner import drive  # noqa: E402
 
-unfinished.PATIENCE = 0.0
+bake_checkpoint.PATIENCE = 0.0
 bpy.ops.wm.open_mainfile(filepath=sys.argv[1])
 computed = []
 

@@ -5,7 +5,8 @@ import bpy
 import pytest
 from blender_scenes import ball, changes, dump, grid, select
 
-from palpate.addon import identity, sensors
+from palpate.addon.authoring import sensors
+from palpate.addon.session import identity
 
 
 def members(obj, name):

@@ -12,10 +12,11 @@ import numpy as np
 import pytest
 from blender_scenes import ball, changes, cube, dump, press, press_and_drop, save
 
-from palpate.addon import jobs, sample
-from palpate.addon.bake import bake
-from palpate.core.drive import drive
+from palpate.addon.bake.bake.bake import bake
+from palpate.addon.scene import scene_reader
+from palpate.addon.session import jobs
 from palpate.core.errors import PalpateError, SceneError
+from palpate.core.jobs.job_runner import drive
 
 
 @pytest.fixture
@@ -200,7 +201,7 @@ def test_a_time_step_of_zero(pressed):
 def test_a_frame_range_that_runs_backwards():
     """Blender's own buttons keep it straight; a file or a command line need not."""
     with pytest.raises(SceneError, match=r"frame range of 'Shot' runs backwards \(9 to 3\): set the end frame after"):
-        sample._check_range(SimpleNamespace(name="Shot", frame_start=9, frame_end=3))
+        scene_reader._check_range(SimpleNamespace(name="Shot", frame_start=9, frame_end=3))
     scene = bpy.context.scene
     scene.frame_start, scene.frame_end = 9, 3
     assert scene.frame_start <= scene.frame_end

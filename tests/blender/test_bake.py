@@ -8,18 +8,22 @@ import numpy as np
 import pytest
 from blender_scenes import changes, cube, dump, grid, press, press_and_drop, reopen, save
 
-from palpate.addon import curves, folders, heatmap, jobs, live, materials, sample, shapes, transforms
-from palpate.addon.bake import bake
-from palpate.core.drive import drive
+from palpate.addon.bake.bake import bake_files
+from palpate.addon.bake.bake.bake import bake
+from palpate.addon.display import heat_map, marker_meshes, materials
+from palpate.addon.scene import scene_reader
+from palpate.addon.session import fcurves, jobs, transforms
+from palpate.addon.timeline import playback
 from palpate.core.errors import FileError
-from palpate.core.formats.archive import load_recording
-from palpate.core.formats.exr import read_exr
-from palpate.core.formats.files import read_manifest
+from palpate.core.io.files import read_manifest
+from palpate.core.io.npz import load_recording
+from palpate.core.io.tactile_exr import read_exr
+from palpate.core.jobs.job_runner import drive
 
 
 def baked(scene):
     result = drive(bake(scene))
-    folders.settle()
+    bake_files.settle()
     return result
 
 
@@ -47,7 +51,7 @@ def test_progress_reaches_its_end(tmp_path):
     seen = []
     drive(bake(scene), seen.append)
     assert [step.done for step in seen] == list(range(1, 9)) and {step.total for step in seen} == {8}
-    assert not live.is_baking()
+    assert not playback.is_baking()
 
 
 @pytest.mark.parametrize("mode", ["XYZ", "ZXY", "QUATERNION", "AXIS_ANGLE"])
@@ -74,10 +78,10 @@ def test_keyframes_put_free_bodies_where_the_solver_had_them(tmp_path, mode, par
         assert location == pytest.approx(result.recording.poses[i, index, :3], abs=2e-7)
         turned = transforms.rotation(result.recording.poses[i, index, 3:])
         assert transforms.rotation(quaternion) == pytest.approx(turned, abs=2e-6)
-    paths = curves.animated_paths(free)
+    paths = fcurves.animated_paths(free)
     rotation = {"QUATERNION": "rotation_quaternion", "AXIS_ANGLE": "rotation_axis_angle"}.get(mode, "rotation_euler")
     assert paths == {"location", rotation}
-    assert {point.interpolation for curve in curves.of(free) for point in curve.keyframe_points} == {"LINEAR"}
+    assert {point.interpolation for curve in fcurves.of(free) for point in curve.keyframe_points} == {"LINEAR"}
 
 
 def test_the_arrow_is_the_reaction_at_the_centre_of_pressure(tmp_path):
@@ -132,7 +136,7 @@ def test_clearing_brings_everything_back(tmp_path):
     assert bpy.ops.palpate.bake_clear() == {"FINISHED"}
     scene.frame_set(1)
     assert [line for line in changes(before, dump()) if "baked_" not in line and "start_" not in line] == []
-    assert curves.animated_paths(free) == {"hide_render"}
+    assert fcurves.animated_paths(free) == {"hide_render"}
 
 
 def test_baking_keeps_the_frame_and_moves_nothing_by_hand(tmp_path):
@@ -194,7 +198,7 @@ def test_a_stopped_bake_leaves_the_old_one(tmp_path):
         work.cancel()
         assert {path: path.read_bytes() for path in (tmp_path / "palpate").rglob("*") if path.is_file()} == files
         assert [line for line in changes(before, dump()) if not line.startswith("Pad: settings")] == []
-        assert not live.is_baking()
+        assert not playback.is_baking()
 
 
 def test_a_kill_between_two_renames_is_put_right(tmp_path):
@@ -309,7 +313,7 @@ def test_who_left_the_bake_is_cleaned(tmp_path):
     baked(scene)
     assert not second.palpate.is_baked and not free.palpate.is_baked
     assert [obj.name for obj in scene.objects if obj.name.startswith("Net Force")] == ["Net Force Pad"]
-    assert curves.animated_paths(free) == set()
+    assert fcurves.animated_paths(free) == set()
 
 
 def test_two_pads_with_one_mesh_have_a_heat_map_each(tmp_path):
@@ -324,7 +328,7 @@ def test_two_pads_with_one_mesh_have_a_heat_map_each(tmp_path):
     assert pad.material_slots[1].material.name == "Palpate Pad"
     assert twin.material_slots[1].material.name == "Palpate Twin"
     assert len(pad.data.materials) == 2
-    heatmap.clear(pad)
+    heat_map.clear(pad)
     assert twin.material_slots[1].material.name == "Palpate Twin"
     bpy.ops.palpate.bake_clear()
     after = dump(uids=False)
@@ -346,7 +350,7 @@ def test_a_sensor_all_around_has_a_heat_map_on_its_vertices(tmp_path):
         values = np.zeros(8, dtype=np.float32)
         mesh.attributes[materials.FORCE].data.foreach_get("value", values)
         assert values == pytest.approx(felt.normal_force[i], abs=1e-7)
-    scenario = drive(sample.sample_scenario(scene))[0]  # its own nodes do not change what is sampled
+    scenario = drive(scene_reader.sample_scenario(scene))[0]  # its own nodes do not change what is sampled
     assert scenario.digest() == drive(bake(scene)).recording.digest
 
 
@@ -357,7 +361,7 @@ def test_an_arrow_without_contact_has_no_size(tmp_path):
     save(tmp_path)
     baked(scene)
     assert list(materials.find(scene.objects, pad.palpate.uid).scale) == [0.0, 0.0, 0.0]
-    assert shapes.MARK in materials.find(scene.objects, pad.palpate.uid).data
+    assert marker_meshes.MARK in materials.find(scene.objects, pad.palpate.uid).data
 
 
 def test_frame_zero_can_be_baked(tmp_path):
@@ -386,7 +390,7 @@ def test_materials_given_after_a_bake_outlive_the_next(tmp_path):
     pad.data.materials[0] = rubber
     pad.data.materials.append(tape)
     pad.data.polygons[0].material_index = 2
-    heatmap.clear(pad)
+    heat_map.clear(pad)
     assert list(pad.data.materials) == [rubber, tape]
     assert [face.material_index for face in pad.data.polygons] == [1] + [0] * 64
     baked(scene)
@@ -405,8 +409,8 @@ def test_a_heat_map_that_was_taken_apart_can_be_cleared_and_baked_again(tmp_path
     else:
         pad.active_material_index = 1
         bpy.ops.object.material_slot_remove()
-    heatmap.clear(pad)
-    assert heatmap.OLD_MATERIAL not in pad.data.attributes and len(pad.data.materials) == 0
+    heat_map.clear(pad)
+    assert heat_map.OLD_MATERIAL not in pad.data.attributes and len(pad.data.materials) == 0
     if change == "faces":
         pad.data = region
     baked(scene)

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from blender_scenes import ball, grid, reopen, save
 
-from palpate.addon import clinging, meshes, preview, sample, skins
-from palpate.core.drive import drive
+from palpate.addon.authoring import laid_sensors, sensor_report, surface_binding
+from palpate.addon.scene import meshes, scene_reader
+from palpate.core.jobs.job_runner import drive
 
 
 def finger():
@@ -31,7 +32,7 @@ def shapes(obj):
     """(frames, n, 9) where the texels of a sensor are, as the solver gets it."""
     target = ball("Target", (0.0, 0.0, 1.0))
     target.palpate.role = "TARGET"
-    scenario, _ = drive(sample.sample_scenario(bpy.context.scene))
+    scenario, _ = drive(scene_reader.sample_scenario(bpy.context.scene))
     bpy.data.objects.remove(target)
     return next(s for s in scenario.sensors if s.name == obj.name).deformation.values
 
@@ -47,7 +48,7 @@ def test_laid_texels_move_as_the_vertices_under_them(laid_at):
     carrier = finger()
     bpy.context.scene.frame_set(laid_at)
     skin = lay(carrier, method="VERTICES")
-    assert clinging.clings(skin)
+    assert surface_binding.clings(skin)
     bpy.context.scene.frame_set(1)
     laid = shapes(skin)
     skin.palpate.role = "NONE"
@@ -105,13 +106,13 @@ def test_a_rigid_surface_binds_nothing_and_one_that_bends_later_says_so(tmp_path
     assert not skin.modifiers
     carrier.modifiers.new("Wave", "WAVE")
     bpy.context.view_layer.objects.active = skin
-    report = preview.now(skin, bpy.context.scene)
+    report = sensor_report.now(skin, bpy.context.scene)
     assert [problem.kind for problem in report.problems] == ["STILL"]
     assert bpy.ops.palpate.fix(kind="STILL") == {"FINISHED"}
-    assert clinging.clings(skin)
-    assert [problem.kind for problem in preview.now(skin, bpy.context.scene).problems] == []
+    assert surface_binding.clings(skin)
+    assert [problem.kind for problem in sensor_report.now(skin, bpy.context.scene).problems] == []
     reopen(save(tmp_path))
-    assert clinging.clings(bpy.data.objects["Sheet Skin"])
+    assert surface_binding.clings(bpy.data.objects["Sheet Skin"])
 
 
 def test_what_is_painted_on_a_skin_stays_when_it_is_laid_anew():
@@ -144,6 +145,6 @@ def test_a_part_that_was_left_out_stays_out():
     skin.palpate.region, skin.palpate.vertex_group = "GROUP", "Half"
     bpy.ops.palpate.skin_update()
     ball("Target", (0.0, 0.0, 1.0)).palpate.role = "TARGET"
-    scenario, _ = sample.sample_start(bpy.context.scene, sample.depsgraph_of(bpy.context.scene))
+    scenario, _ = scene_reader.sample_start(bpy.context.scene, scene_reader.depsgraph_of(bpy.context.scene))
     assert -0.003 < scenario.sensors[0].texels.position[:, 0].min() < 0.003
-    assert skins.is_skin(skin)
+    assert laid_sensors.is_skin(skin)

@@ -13,12 +13,12 @@ import numpy as np
 import pytest
 from blender_scenes import press, reopen, save
 
-from palpate.addon.bake import bake
+from palpate.addon.bake.bake.bake import bake
 from palpate.commands import COMMANDS, READY, blender, console, main
 from palpate.commands.bake import report
-from palpate.core.drive import drive
 from palpate.core.errors import FileError
-from palpate.core.formats.archive import load_recording
+from palpate.core.io.npz import load_recording
+from palpate.core.jobs.job_runner import drive
 
 
 @pytest.fixture

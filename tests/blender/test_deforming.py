@@ -8,14 +8,16 @@ import numpy as np
 import pytest
 from blender_scenes import press, press_and_drop
 
-from palpate.addon import live, meshes, sample, transforms
-from palpate.addon.bake import bake
-from palpate.core.drive import drive
+from palpate.addon.bake.bake.bake import bake
+from palpate.addon.scene import meshes, scene_reader
+from palpate.addon.session import transforms
+from palpate.addon.timeline import playback
 from palpate.core.errors import SceneError
+from palpate.core.jobs.job_runner import drive
 
 
 def sampled(scene):
-    return drive(sample.sample_scenario(scene))
+    return drive(scene_reader.sample_scenario(scene))
 
 
 def world_of(scenario, values, body, frame):
@@ -98,7 +100,7 @@ def test_looks_are_the_fingerprints_of_every_frame(how):
     for frame in range(1, 7):
         scene.frame_set(frame)
         for name, found in expected.items():
-            found.append(meshes.fingerprint(scene.objects[name], sample.depsgraph_of(scene)))
+            found.append(meshes.fingerprint(scene.objects[name], scene_reader.depsgraph_of(scene)))
     assert binding.looks == expected
     assert len(set(expected["Ball"][:4])) > 2 and len(set(expected["Pad"])) == 1
 
@@ -150,8 +152,8 @@ def test_played_and_baked_alike(tmp_path):
     played = []
     for frame in range(1, 7):
         scene.frame_set(frame)
-        played.append(live.status(scene).frame.sensors["Pad"].normal_force)
-    live.reset(scene)
+        played.append(playback.status(scene).frame.sensors["Pad"].normal_force)
+    playback.reset(scene)
     recording = drive(bake(scene)).recording
     assert recording.sensors["Pad"].contact[-1].any()
     np.testing.assert_array_equal(np.array(played), recording.sensors["Pad"].normal_force)
@@ -188,7 +190,7 @@ def test_sensors_that_are_felt_by_others_share_the_overlap():
     scene.frame_set(1)
     scenario, _ = sampled(scene)
     assert [part.sensor for part in scenario.targets] == [0, 1]
-    from palpate.core.solve import run
+    from palpate.core.solver.simulation import run
 
     for found in run(scenario).sensors.values():
         inner = found.normal_force[0].reshape(14, 6)[1:-1, 1:-1]
@@ -199,9 +201,9 @@ def test_only_a_free_body_that_does_deform_is_warned_of():
     """A modifier that rounds the edges changes nothing over time, and is nothing to warn of."""
     cube = press_and_drop(frames=4)[-1]
     cube.modifiers.new("Bevel", "BEVEL").width = 1e-3
-    _, binding = drive(sample.sample_scenario(bpy.context.scene))
+    _, binding = drive(scene_reader.sample_scenario(bpy.context.scene))
     assert not any("deforms" in warning for warning in binding.warnings)
     wave = cube.modifiers.new("Wave", "WAVE")
     wave.height, wave.speed = 1e-3, 1e-3
-    _, binding = drive(sample.sample_scenario(bpy.context.scene))
+    _, binding = drive(scene_reader.sample_scenario(bpy.context.scene))
     assert any("deforms while forces move it" in warning for warning in binding.warnings)

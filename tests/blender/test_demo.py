@@ -7,13 +7,13 @@ import bpy
 import numpy as np
 import pytest
 
-from palpate.addon import render
-from palpate.addon.bake import bake
+from palpate.addon.bake.bake.bake import bake
+from palpate.addon.render.render import render
 from palpate.commands import main
-from palpate.core import measures
-from palpate.core.drive import drive
 from palpate.core.errors import SceneError
-from palpate.core.formats.archive import load_recording
+from palpate.core.io.npz import load_recording
+from palpate.core.jobs.job_runner import drive
+from palpate.core.response import metrics
 from palpate.sample_blends import build_samples, demo, studio
 
 
@@ -230,7 +230,7 @@ def test_samples_open_and_bake(name, repository, tmp_path):
     scene.palpate.folder = str(tmp_path / "bake")
     baked = drive(bake(scene))
     assert baked.recording.warnings == ()
-    assert measures.peak_force(baked.recording) > 0.01
+    assert metrics.peak_force(baked.recording) > 0.01
     for sensor in baked.recording.sensors.values():
         assert sensor.contact.any()
         assert np.isfinite(sensor.normal_force).all()

@@ -6,10 +6,13 @@ import numpy as np
 import pytest
 from blender_scenes import grid, press, reopen, save
 
-from palpate.addon import bake, cache, effects, live, sample, stale
-from palpate.core.drive import drive
-from palpate.core.effects.library import effect, library
+from palpate.addon.bake.bake import bake
+from palpate.addon.properties.properties import effect_stack
+from palpate.addon.scene import scene_reader
+from palpate.addon.timeline import live_cache, playback, staleness
+from palpate.core.effects.engine.registry import effect, library
 from palpate.core.errors import EffectError
+from palpate.core.jobs.job_runner import drive
 
 FORMS = [(kind.name, form.name) for kind in library().values() for form in kind.forms]
 
@@ -28,51 +31,51 @@ def baked(scene):
 def test_every_effect_can_be_added_moved_and_removed(pad):
     for name in library():
         assert bpy.ops.palpate.effect_add(effect=name) == {"FINISHED"}
-    assert [item.name for item in effects.stack(pad)] == list(library())
-    assert effects.stack(pad) == tuple(effect(name) for name in library())
+    assert [item.name for item in effect_stack.stack(pad)] == list(library())
+    assert effect_stack.stack(pad) == tuple(effect(name) for name in library())
     bpy.ops.palpate.effect_move(index=1, way="UP")
     assert [item.kind for item in pad.palpate.effects][:2] == list(library())[1::-1]
     bpy.ops.palpate.effect_move(index=0, way="UP")  # stays where it is
     bpy.ops.palpate.effect_remove(index=0)
     assert len(pad.palpate.effects) == len(library()) - 1
     pad.palpate.effects[0].use = False
-    assert len(effects.stack(pad)) == len(library()) - 2
+    assert len(effect_stack.stack(pad)) == len(library()) - 2
 
 
 @pytest.mark.parametrize(("name", "form"), FORMS, ids=["-".join(names) for names in FORMS])
 def test_what_is_put_on_is_what_is_sampled(pad, name, form):
     pad.palpate.gain = 250.0
     one = effect(name, form, seed=3, gain=250.0)
-    effects.put_stack(pad, (one,))
-    (found,) = effects.stack(pad)
+    effect_stack.put_stack(pad, (one,))
+    (found,) = effect_stack.stack(pad)
     assert (found.name, found.form) == (name, form)
     assert found.values == pytest.approx(one.values, rel=1e-6)
-    sample_of = sample._sensor(pad, 0, _mesh(pad))
+    sample_of = scene_reader._sensor(pad, 0, _mesh(pad))
     assert sample_of.effects == (found,)
 
 
 def _mesh(obj):
-    return sample.sensor_alone(bpy.context.scene, obj, bpy.context.evaluated_depsgraph_get())[1]
+    return scene_reader.sensor_alone(bpy.context.scene, obj, bpy.context.evaluated_depsgraph_get())[1]
 
 
 def test_numbers_for_each_texel(pad):
     factors = tuple(np.linspace(0.5, 1.5, 84))
-    effects.put_stack(pad, (effect("gain-mismatch", "listed", factor=factors),))
-    assert effects.stack(pad)[0].values["factor"] == factors
+    effect_stack.put_stack(pad, (effect("gain-mismatch", "listed", factor=factors),))
+    assert effect_stack.stack(pad)[0].values["factor"] == factors
     pad.palpate.effects[0].gain_mismatch_listed_factor = "1, 2, three"
     with pytest.raises(EffectError, match="factor of effect 'gain-mismatch' of sensor 'Pad' cannot be read"):
-        effects.stack(pad)
+        effect_stack.stack(pad)
 
 
 def test_a_stack_that_means_nothing_leaves_the_old_one(pad):
-    effects.put_stack(pad, (effect("creep"),))
+    effect_stack.put_stack(pad, (effect("creep"),))
     with pytest.raises(EffectError, match="no effect 'rust'"):
-        effects.put_stack(pad, (effects.Effect("rust", ""),))
+        effect_stack.put_stack(pad, (effect_stack.Effect("rust", ""),))
     assert len(pad.palpate.effects) == 1
 
 
 def test_the_tooltips_and_bounds_are_those_of_the_library():
-    properties = effects.PALPATE_PG_effect.bl_rna.properties
+    properties = effect_stack.PALPATE_PG_effect.bl_rna.properties
     amount = properties["creep_exponential_amount"]
     assert (amount.soft_min, amount.soft_max) == pytest.approx((0.0, 0.95))
     assert amount.description.startswith("Share of the force")
@@ -88,32 +91,32 @@ def test_a_bake_holds_the_readings_and_notices_a_change(tmp_path):
     bpy.ops.palpate.effect_add(effect="saturation")
     level = 0.4 * float(plain.reading.max())
     pad.palpate.effects[0].saturation_clip_level = level
-    assert stale.is_stale(scene, bpy.context.evaluated_depsgraph_get(), None)
+    assert staleness.is_stale(scene, bpy.context.evaluated_depsgraph_get(), None)
     limited = baked(scene)
     np.testing.assert_array_equal(limited.normal_force, plain.normal_force)
     np.testing.assert_allclose(limited.reading, np.minimum(plain.reading, level), rtol=1e-6)
-    assert not stale.is_stale(scene, bpy.context.evaluated_depsgraph_get(), None)
+    assert not staleness.is_stale(scene, bpy.context.evaluated_depsgraph_get(), None)
     pad.palpate.effects[0].use = False
-    assert stale.is_stale(scene, bpy.context.evaluated_depsgraph_get(), None)
+    assert staleness.is_stale(scene, bpy.context.evaluated_depsgraph_get(), None)
 
 
 def test_playing_gives_the_bakes_readings(tmp_path):
     """Noise of a seed and a lag, frame by frame on the timeline."""
     scene, pad, _ = press(6)
-    effects.put_stack(pad, (effect("noise", spread=1e-3, seed=4), effect("lag", time=0.1)))
+    effect_stack.put_stack(pad, (effect("noise", spread=1e-3, seed=4), effect("lag", time=0.1)))
     played = []
     for frame in range(1, 7):
         scene.frame_set(frame)
-        played.append(live.status(scene).frame.sensors["Pad"].reading)
+        played.append(playback.status(scene).frame.sensors["Pad"].reading)
     save(tmp_path)
     np.testing.assert_array_equal(np.array(played), baked(scene).reading)
 
 
 def test_the_stack_is_in_the_file(tmp_path, pad):
     stack = (effect("hysteresis", "bouc-wen", share=0.25), effect("noise", seed=9))
-    effects.put_stack(pad, stack)
+    effect_stack.put_stack(pad, stack)
     scene = reopen(save(tmp_path))
-    assert effects.stack(scene.objects["Pad"]) == stack
+    assert effect_stack.stack(scene.objects["Pad"]) == stack
 
 
 def test_a_sensor_with_an_effect_out_of_bounds_says_where():
@@ -122,13 +125,13 @@ def test_a_sensor_with_an_effect_out_of_bounds_says_where():
     bpy.ops.palpate.effect_add(effect="offset")
     pad.palpate.effects[0].offset_common_offset = 1e9
     with pytest.raises(EffectError, match="offset of effect 'offset' \\(common\\) of sensor 'Pad' is 1e\\+09 unit"):
-        drive(sample.sample_scenario(scene))[0].check()
+        drive(scene_reader.sample_scenario(scene))[0].check()
 
 
 def test_settings_tell_stacks_apart(pad):
-    before = cache.settings_of(bpy.context.scene, [pad])
+    before = live_cache.settings_of(bpy.context.scene, [pad])
     bpy.ops.palpate.effect_add(effect="noise")
-    assert cache.settings_of(bpy.context.scene, [pad]) != before
+    assert live_cache.settings_of(bpy.context.scene, [pad]) != before
 
 
 def test_without_a_sensor_the_button_says_why():

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from blender_scenes import grid
 
-from palpate.addon import exchange
-from palpate.core.calibrate.stiffness import texel_stiffness
-from palpate.core.effects import library
-from palpate.core.scenario import SensorParameters
+from palpate.addon.authoring import exchange
+from palpate.core.effects.engine import registry
+from palpate.core.gap.calibration.stiffness import texel_stiffness
+from palpate.core.model.scenario import SensorParameters
 
 
 def sensor(**values):
@@ -109,9 +109,9 @@ def test_effects_are_copied_with_the_parameters():
 
 def test_every_effect_can_be_added():
     pad = sensor()
-    for name in library.library():
+    for name in registry.library():
         assert bpy.ops.palpate.effect_add(effect=name) == {"FINISHED"}
-    assert len(pad.palpate.effects) == len(library.library())
+    assert len(pad.palpate.effects) == len(registry.library())
 
 
 # --- fits

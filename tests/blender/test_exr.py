@@ -10,10 +10,10 @@ import bpy
 import numpy as np
 import pytest
 
-from palpate.core.formats.exr import CHANNELS, exr_channels, read_exr, write_exr
-from palpate.core.formats.files import frame_file
-from palpate.core.layout import GridLayout, uv_layout
-from palpate.core.recording import SensorFrame
+from palpate.core.geometry.layout import GridLayout, uv_layout
+from palpate.core.io.files import frame_file
+from palpate.core.io.tactile_exr import CHANNELS, exr_channels, read_exr, write_exr
+from palpate.core.model.recording import SensorFrame
 
 ROWS, COLUMNS = 5, 7
 

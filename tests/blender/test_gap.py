@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 from blender_scenes import grid
 
-from palpate.addon import jobs, measured
+from palpate.addon.measured.gap_results import gap_results
+from palpate.addon.session import jobs
 from palpate.commands import main
-from palpate.core import warm
 from palpate.core.errors import SceneError
+from palpate.core.solver import precompile
 
 
 @pytest.fixture(scope="module")
@@ -33,7 +34,7 @@ def test_from_a_rig_to_an_amended_sensor(scene, rig_file, tmp_path):
     assert bpy.ops.palpate.measured_open(filepath=str(rig_file)) == {"FINISHED"}
     assert obj.palpate.measured == str(rig_file)
     assert bpy.ops.palpate.gap_find() == {"FINISHED"}
-    result = measured.of(obj)
+    result = gap_results.of(obj)
     assert "creep" in result.headline
 
     assert bpy.ops.palpate.gap_add() == {"FINISHED"}
@@ -41,14 +42,14 @@ def test_from_a_rig_to_an_amended_sensor(scene, rig_file, tmp_path):
     assert obj.palpate.k == pytest.approx(80.0, rel=0.1)
 
     assert bpy.ops.palpate.gap_show(amended=False) == {"FINISHED"}
-    layer = obj.data.color_attributes[measured.ATTRIBUTE]
+    layer = obj.data.color_attributes[gap_results.ATTRIBUTE]
     colours = np.zeros(4 * len(obj.data.vertices))
     layer.data.foreach_get("color", colours)
     before = colours.reshape(-1, 4)[:, 0].max()
     names = {marker.name for marker in scene.timeline_markers}
     assert {"gap: approach", "gap: loading", "gap: unloading"} <= names
     bpy.ops.palpate.gap_show(amended=True)
-    obj.data.color_attributes[measured.ATTRIBUTE].data.foreach_get("color", colours)
+    obj.data.color_attributes[gap_results.ATTRIBUTE].data.foreach_get("color", colours)
     assert colours.reshape(-1, 4)[:, 0].max() < before  # on one scale the amended sensor is darker
 
     assert bpy.ops.palpate.gap_curves() == {"FINISHED"}
@@ -60,11 +61,11 @@ def test_from_a_rig_to_an_amended_sensor(scene, rig_file, tmp_path):
 def test_stopping_keeps_what_was_known(scene, rig_file):
     obj = pad()
     obj.palpate.measured = str(rig_file)
-    work = jobs.Slice(measured.find(obj))
+    work = jobs.Slice(gap_results.find(obj))
     for _ in range(3):
         work.work(0.0)
     work.cancel()
-    assert measured.of(obj) is None
+    assert gap_results.of(obj) is None
 
 
 def test_a_bad_rig_is_said_in_a_sentence(scene, tmp_path):
@@ -80,7 +81,7 @@ def test_another_grid_shows_no_residual(scene, rig_file):
     obj.palpate.measured = str(rig_file)
     bpy.ops.palpate.gap_find()
     with pytest.raises(SceneError, match="24 texels and 'Pad' has 18"):
-        measured.show_on_sensor(bpy.context, obj, False)
+        gap_results.show_on_sensor(bpy.context, obj, False)
 
 
 def test_the_command_puts_the_amended_sensor_into_a_scene(scene, rig_file, tmp_path, capsys):
@@ -102,7 +103,7 @@ def test_the_command_says_that_it_compiles(rig_file, tmp_path, monkeypatch, caps
     def stop():
         raise SceneError("far enough.")
 
-    monkeypatch.setattr(warm, "is_needed", lambda: True)
-    monkeypatch.setattr(warm, "warm", stop)
+    monkeypatch.setattr(precompile, "is_needed", lambda: True)
+    monkeypatch.setattr(precompile, "warm", stop)
     assert main(["gap", str(rig_file), "--out", str(tmp_path)]) == 1
     assert capsys.readouterr().err.splitlines()[0].startswith("Palpate is preparing its solver (first use only)")

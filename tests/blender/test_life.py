@@ -7,18 +7,21 @@ import numpy as np
 import pytest
 from blender_scenes import ball, grid, press, reopen, save, select
 
-from palpate.addon import bake, identity, preview, sample, transforms
+from palpate.addon.authoring import sensor_report
+from palpate.addon.bake.bake import bake
+from palpate.addon.scene import scene_reader
+from palpate.addon.session import identity, transforms
 from palpate.commands import main
-from palpate.core.drive import drive
 from palpate.core.errors import PalpateError
-from palpate.core.formats.archive import load_recording
-from palpate.core.solve import run
+from palpate.core.io.npz import load_recording
+from palpate.core.jobs.job_runner import drive
+from palpate.core.solver.simulation import run
 
 
 def forces(scene=None):
     """Sum of the normal forces of every sensor at the last frame."""
     scene = scene or bpy.context.scene
-    recording = run(drive(sample.sample_scenario(scene))[0])
+    recording = run(drive(scene_reader.sample_scenario(scene))[0])
     return {name: float(felt.normal_force[-1].sum()) for name, felt in recording.sensors.items()}
 
 
@@ -30,7 +33,7 @@ def choose(*objects):
 
 def kinds(obj):
     bpy.context.view_layer.update()
-    return [problem.kind for problem in preview.now(obj, bpy.context.scene).problems]
+    return [problem.kind for problem in sensor_report.now(obj, bpy.context.scene).problems]
 
 
 @pytest.mark.parametrize("linked", [False, True])
@@ -87,7 +90,7 @@ def test_mirrored_upside_down_it_faces_down():
     scene, pad, _ = press(4)
     pad.scale.z = -1.0
     bpy.context.view_layer.update()
-    texels = preview.now(pad, scene).texels
+    texels = sensor_report.now(pad, scene).texels
     frame = transforms.rotation(transforms.split(np.array(pad.matrix_world, float))[1])
     assert texels.normal @ frame.T == pytest.approx(np.tile([0, 0, -1.0], (84, 1)), abs=1e-6)
 
@@ -96,7 +99,7 @@ def test_a_mirror_modifier_says_what_to_do():
     scene, pad, _ = press(2)
     pad.modifiers.new("Mirror", "MIRROR")
     assert kinds(pad) == ["MODIFIER"]
-    text = preview.now(pad, scene).problems[0].text
+    text = sensor_report.now(pad, scene).problems[0].text
     assert "apply it" in text
     bpy.context.view_layer.objects.active = pad
     assert bpy.ops.palpate.fix(kind="MODIFIER") == {"FINISHED"}
@@ -113,7 +116,7 @@ def test_joined_by_region():
         bpy.ops.palpate.sensor_add(source="SELECTION")
     choose(other, pad)
     bpy.ops.object.join()
-    assert len(preview.now(pad, scene).texels) == 24
+    assert len(sensor_report.now(pad, scene).texels) == 24
     assert kinds(pad) == []
 
 
@@ -150,7 +153,7 @@ def test_separated_without_any_of_its_region_says_so():
     select(pad, range(12))
     bpy.ops.palpate.sensor_add(source="SELECTION")
     pad.vertex_groups.clear()
-    report = preview.now(pad, bpy.context.scene)
+    report = sensor_report.now(pad, bpy.context.scene)
     assert "no vertex group 'Palpate Sensor'" in report.problems[0].text
 
 
@@ -249,11 +252,11 @@ def test_edited_while_it_is_a_sensor():
     pad = grid()
     select(pad, range(84))
     bpy.ops.palpate.sensor_add(source="SELECTION")
-    before = len(preview.now(pad, bpy.context.scene).texels)
+    before = len(sensor_report.now(pad, bpy.context.scene).texels)
     bpy.ops.object.mode_set(mode="EDIT")
     bpy.ops.mesh.select_all(action="SELECT")
     bpy.ops.mesh.subdivide()
     bpy.ops.object.mode_set(mode="OBJECT")
     assert before == 84
-    assert len(preview.now(pad, bpy.context.scene).texels) == 11 * 27
-    assert np.isfinite(preview.now(pad, bpy.context.scene).density)
+    assert len(sensor_report.now(pad, bpy.context.scene).texels) == 11 * 27
+    assert np.isfinite(sensor_report.now(pad, bpy.context.scene).density)

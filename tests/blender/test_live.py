@@ -8,11 +8,13 @@ import numpy as np
 import pytest
 from blender_scenes import changes, dump, press, press_and_drop, reopen, save
 
-from palpate.addon import cache, live, materials, state
-from palpate.addon import handlers as handlers_of_palpate
-from palpate.addon.bake import bake
-from palpate.core.drive import drive
-from palpate.core.recording import SensorFrame
+from palpate.addon.bake.bake.bake import bake
+from palpate.addon.display import materials
+from palpate.addon.events import handlers as handlers_of_palpate
+from palpate.addon.session import session_state
+from palpate.addon.timeline import live_cache, playback
+from palpate.core.jobs.job_runner import drive
+from palpate.core.model.recording import SensorFrame
 
 
 def play(scene, *frames):
@@ -32,7 +34,7 @@ def shown_force(obj):
 def test_playing_gives_the_numbers_of_a_bake(tmp_path):
     scene, *_ = press_and_drop(frames=8)
     play(scene, *range(1, 9))
-    frames = dict(cache.get(scene).frames)
+    frames = dict(live_cache.get(scene).frames)
     assert sorted(frames) == list(range(1, 9))
     save(tmp_path)
     recording = drive(bake(scene)).recording
@@ -50,12 +52,12 @@ def test_it_shows_forces_and_moves_free_bodies():
     scene, pad, _, _, free = press_and_drop(frames=8)
     start = free.location.z
     play(scene, *range(1, 9))
-    frame = cache.get(scene).frames[8]
+    frame = live_cache.get(scene).frames[8]
     assert shown_force(pad) == pytest.approx(frame.sensors["Pad"].normal_force, abs=1e-7)
-    index = cache.get(scene).binding.names.index("Cube")
+    index = live_cache.get(scene).binding.names.index("Cube")
     assert list(free.location) == pytest.approx(frame.poses[index, :3], abs=1e-7)
     assert free.location.z < start
-    assert live.status(scene).frame is frame
+    assert playback.status(scene).frame is frame
 
 
 def test_scrubbing_reads_what_was_computed():
@@ -65,8 +67,8 @@ def test_scrubbing_reads_what_was_computed():
     for frame in (3, 6, 2, 5):
         scene.frame_set(frame)
         heights[frame] = free.location.z
-        assert shown_force(pad) == pytest.approx(cache.get(scene).frames[frame].sensors["Pad"].normal_force, abs=1e-7)
-    assert heights[2] > heights[3] and cache.get(scene).simulation.frame == 6
+        assert shown_force(pad) == pytest.approx(live_cache.get(scene).frames[frame].sensors["Pad"].normal_force, abs=1e-7)
+    assert heights[2] > heights[3] and live_cache.get(scene).simulation.frame == 6
     scene.frame_set(1)
     assert not free.palpate.has_start
 
@@ -74,40 +76,40 @@ def test_scrubbing_reads_what_was_computed():
 def test_a_jump_shows_nothing_and_says_so():
     scene, *_ = press(frames=20)
     play(scene, 1, 2, 15)
-    assert sorted(cache.get(scene).frames) == [1, 2]
-    status = live.status(scene)
+    assert sorted(live_cache.get(scene).frames) == [1, 2]
+    status = playback.status(scene)
     assert status.frame is None and status.text == "Frame 15 is not computed: play from frame 2, or use Compute to Here."
     play(scene, 3)
-    assert live.status(scene).step == cache.get(scene).simulation.step_reason != ""
-    assert live.status(scene).frame.frame == 3
+    assert playback.status(scene).step == live_cache.get(scene).simulation.step_reason != ""
+    assert playback.status(scene).frame.frame == 3
 
 
 def test_a_jump_ahead_is_computed_with_progress(tmp_path):
     scene, *_ = press_and_drop(frames=12)
     play(scene, 1, 2, 9)
     steps = []
-    drive(live.catch_up(scene), lambda step: steps.append((step.frame, step.done, step.total)))
+    drive(playback.catch_up(scene), lambda step: steps.append((step.frame, step.done, step.total)))
     assert steps == [(frame, frame - 2, 7) for frame in range(3, 10)] and scene.frame_current == 9
-    jumped = cache.get(scene).frames[9]
-    assert live.status(scene).frame is jumped
+    jumped = live_cache.get(scene).frames[9]
+    assert playback.status(scene).frame is jumped
     bpy.ops.palpate.reset()
     play(scene, 1, 11)
     assert bpy.ops.palpate.catch_up() == {"FINISHED"}
-    assert cache.get(scene).frames[9].poses.tobytes() == jumped.poses.tobytes()
+    assert live_cache.get(scene).frames[9].poses.tobytes() == jumped.poses.tobytes()
     assert not bpy.ops.palpate.catch_up.poll()
     bpy.ops.palpate.reset()
     play(scene, 7)  # from nothing
-    assert bpy.ops.palpate.catch_up() == {"FINISHED"} and sorted(cache.get(scene).frames) == list(range(1, 8))
+    assert bpy.ops.palpate.catch_up() == {"FINISHED"} and sorted(live_cache.get(scene).frames) == list(range(1, 8))
 
 
 def test_a_stopped_jump_keeps_what_was_computed():
     scene, *_ = press(frames=12)
     play(scene, 1, 10)
-    job = live.catch_up(scene)
+    job = playback.catch_up(scene)
     next(job), next(job)
     job.close()
-    assert sorted(cache.get(scene).frames) == [1, 2, 3] and scene.frame_current == 10
-    assert not state.session.catching_up
+    assert sorted(live_cache.get(scene).frames) == [1, 2, 3] and scene.frame_current == 10
+    assert not session_state.session.catching_up
 
 
 def watched(scene, obj, moments):
@@ -131,7 +133,7 @@ def test_sub_frames_loops_steps_and_handlers_off_give_the_same_pictures(tmp_path
     drive(bake(scene))
     baked = watched(scene, free, moments)
     assert played == pytest.approx(baked, abs=1e-6)
-    live.forget()
+    playback.forget()
     handlers = {name: getattr(bpy.app.handlers, name).copy() for name in ("frame_change_pre", "frame_change_post")}
     for name in handlers:
         getattr(bpy.app.handlers, name).clear()
@@ -203,8 +205,8 @@ def test_time_stretching_shows_the_same_bake_slower(tmp_path):
     assert (scene.render.frame_map_old, scene.render.frame_map_new) == (100, 200)
     assert watched(scene, free, [(2 * number, 0.0) for number in range(1, 9)]) == pytest.approx(at_speed, abs=1e-6)
     scene.frame_set(16)
-    assert live.status(scene).text == "Frame 8 of the bake."
-    assert live.status(scene).step == plain.step_reason != ""
+    assert playback.status(scene).text == "Frame 8 of the bake."
+    assert playback.status(scene).step == plain.step_reason != ""
     arrows = {}
     for number in (2, 16):  # of the timeline; nothing touches at the animation's frame 1
         scene.frame_set(number)
@@ -220,17 +222,17 @@ def test_play_from_the_first_frame_starts_with_the_second():
     scene.palpate.use_live = False
     scene.frame_set(1)
     scene.palpate.use_live = True
-    cache.clear()
+    live_cache.clear()
     play(scene, 2, 3)
-    assert sorted(cache.get(scene).frames) == [1, 2, 3]
+    assert sorted(live_cache.get(scene).frames) == [1, 2, 3]
 
 
 def test_a_start_in_the_middle_computes_nothing():
     scene, *_ = press(frames=8)
-    cache.clear()
+    live_cache.clear()
     play(scene, 5, 6)
-    assert cache.get(scene) is None
-    assert "go to the first frame" in live.status(scene).text
+    assert live_cache.get(scene) is None
+    assert "go to the first frame" in playback.status(scene).text
 
 
 @pytest.mark.parametrize(
@@ -254,8 +256,8 @@ def test_a_change_makes_it_stale(change):
     pad.data.update()
     bpy.context.view_layer.update()
     play(scene, 4)
-    assert cache.get(scene) is None
-    assert live.status(scene).frame is None
+    assert live_cache.get(scene) is None
+    assert playback.status(scene).frame is None
 
 
 def test_its_own_writing_does_not_make_it_stale():
@@ -263,7 +265,7 @@ def test_its_own_writing_does_not_make_it_stale():
     for frame in range(1, 9):
         scene.frame_set(frame)
         bpy.context.view_layer.update()  # as the window does between frames
-    assert sorted(cache.get(scene).frames) == list(range(1, 9))
+    assert sorted(live_cache.get(scene).frames) == list(range(1, 9))
 
 
 def test_edited_keyframes_make_it_stale():
@@ -273,7 +275,7 @@ def test_edited_keyframes_make_it_stale():
     target.keyframe_insert("location", frame=3)
     bpy.context.view_layer.update()
     play(scene, 2)
-    assert cache.get(scene) is None
+    assert live_cache.get(scene) is None
 
 
 def test_a_free_body_moved_at_the_first_frame_starts_there():
@@ -282,15 +284,15 @@ def test_a_free_body_moved_at_the_first_frame_starts_there():
     free.location.z = 0.05
     bpy.context.view_layer.update()
     play(scene, 2)
-    index = cache.get(scene).binding.names.index("Cube")
-    assert cache.get(scene).frames[1].poses[index, 2] == pytest.approx(0.05)
+    index = live_cache.get(scene).binding.names.index("Cube")
+    assert live_cache.get(scene).frames[1].poses[index, 2] == pytest.approx(0.05)
 
 
 def test_an_error_is_said_in_the_panel_and_not_at_every_frame(capfd):
     scene, pad, _ = press(frames=4)
     pad.palpate.mud = 0.9  # above mus
     play(scene, 1, 2, 3)
-    assert "mud of sensor 'Pad'" in live.status(scene).text
+    assert "mud of sensor 'Pad'" in playback.status(scene).text
     assert "Traceback" not in capfd.readouterr().err
 
 
@@ -337,7 +339,7 @@ def test_a_file_saved_when_what_was_played_is_stale_holds_none_of_it(tmp_path):
     play(scene, 1, 2, 3)
     pad.palpate.k *= 2.0
     play(scene, 4)
-    assert cache.get(scene) is None
+    assert live_cache.get(scene) is None
     assert materials.FORCE not in stored_mesh(save(tmp_path), pad).attributes
 
 
@@ -367,7 +369,7 @@ def test_undo_forgets_what_was_computed():
     bpy.ops.ed.undo_push(message="played")
     bpy.ops.ed.undo()
     scene, free = bpy.context.scene, bpy.data.objects["Cube"]
-    assert cache.get(scene) is None
+    assert live_cache.get(scene) is None
     assert tuple(free.location) == start
     bpy.ops.ed.redo()
     scene, free = bpy.context.scene, bpy.data.objects["Cube"]
@@ -375,7 +377,7 @@ def test_undo_forgets_what_was_computed():
     play(scene, 1)
     assert tuple(free.location) == start
     play(scene, 2, 3)
-    assert sorted(cache.get(scene).frames) == [1, 2, 3]
+    assert sorted(live_cache.get(scene).frames) == [1, 2, 3]
 
 
 def test_reset_puts_bodies_back():
@@ -384,7 +386,7 @@ def test_reset_puts_bodies_back():
     play(scene, *range(1, 6))
     assert bpy.ops.palpate.reset() == {"FINISHED"}
     assert (tuple(free.location), tuple(free.rotation_euler)) == start
-    assert shown_force(pad) is None and cache.get(scene) is None
+    assert shown_force(pad) is None and live_cache.get(scene) is None
 
 
 @pytest.mark.parametrize("setting, value", [("body", "KEYFRAMED"), ("role", "NONE")])
@@ -421,7 +423,7 @@ def test_another_file_opened_while_a_bake_is_half_done_can_be_played(tmp_path):
     scene = reopen(path)
     job.close()
     play(scene, 1, 2)
-    assert sorted(cache.get(scene).frames) == [1, 2]
+    assert sorted(live_cache.get(scene).frames) == [1, 2]
 
 
 def test_the_numbers_of_a_bake_follow_a_file_saved_elsewhere(tmp_path):
@@ -433,7 +435,7 @@ def test_the_numbers_of_a_bake_follow_a_file_saved_elsewhere(tmp_path):
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "there" / "scene.blend"), relative_remap=True)
     scene = reopen(tmp_path / "there" / "scene.blend")
     play(scene, 3)
-    assert live.status(scene).frame.sensors["Pad"].normal_force.tolist() == felt.normal_force[2].tolist()
+    assert playback.status(scene).frame.sensors["Pad"].normal_force.tolist() == felt.normal_force[2].tolist()
 
 
 def test_rendering_never_simulates(tmp_path):
@@ -449,12 +451,12 @@ def test_rendering_never_simulates(tmp_path):
     bpy.app.handlers.render_post.append(lambda scene, *_: seen.append((scene.frame_current, free.location.z)))
     bpy.ops.render.render(animation=True)
     bpy.app.handlers.render_post.pop()
-    run = cache.get(scene)
+    run = live_cache.get(scene)
     assert sorted(run.frames) == [1, 2]
     assert [frame for frame, _ in seen] == [1, 2, 3, 4]
     index = run.binding.names.index("Cube")
     assert seen[1][1] == pytest.approx(run.frames[2].poses[index, 2])  # remembered frames are shown
-    assert not state.session.rendering
+    assert not session_state.session.rendering
 
 
 def test_a_baked_scene_is_not_simulated_again(tmp_path):
@@ -463,19 +465,23 @@ def test_a_baked_scene_is_not_simulated_again(tmp_path):
     recording = drive(bake(scene)).recording
     path = save(tmp_path)
     play(scene, 1, 2, 3)
-    assert cache.get(scene) is None
-    assert live.status(scene).frame.sensors["Pad"].normal_force.tolist() == recording.sensors["Pad"].normal_force[2].tolist()
+    assert live_cache.get(scene) is None
+    assert (
+        playback.status(scene).frame.sensors["Pad"].normal_force.tolist() == recording.sensors["Pad"].normal_force[2].tolist()
+    )
     scene = reopen(path)
     play(scene, 4)
-    assert live.status(scene).frame.sensors["Pad"].normal_force.tolist() == recording.sensors["Pad"].normal_force[3].tolist()
+    assert (
+        playback.status(scene).frame.sensors["Pad"].normal_force.tolist() == recording.sensors["Pad"].normal_force[3].tolist()
+    )
     play(scene, 9)
-    assert live.status(scene).frame is None
+    assert playback.status(scene).frame is None
 
 
 def test_a_scene_without_roles_costs_nothing(monkeypatch):
     scene = bpy.context.scene
     scene.frame_set(1)
-    monkeypatch.setattr(live.write, "baked_objects", lambda scene: pytest.fail("looked at objects"))
+    monkeypatch.setattr(playback.write, "baked_objects", lambda scene: pytest.fail("looked at objects"))
     play(scene, 2, 3)
 
 
@@ -500,11 +506,11 @@ def test_a_bake_that_is_out_of_date_says_so(tmp_path, change):
     scene = reopen(path)
     for frame in (1, 2, 4, 3):
         scene.frame_set(frame)
-        assert live.status(scene).text == f"Frame {frame} of the bake."
+        assert playback.status(scene).text == f"Frame {frame} of the bake."
     pad = bpy.data.objects["Pad"]
     change(scene, pad, bpy.data.objects["Ball"])
     pad.data.update()
     bpy.context.view_layer.update()
     play(scene, 2)
-    assert live.status(scene).text.startswith("The bake is out of date")
-    assert live.status(scene).frame is not None  # it is still shown
+    assert playback.status(scene).text.startswith("The bake is out of date")
+    assert playback.status(scene).frame is not None  # it is still shown

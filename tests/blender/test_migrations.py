@@ -4,8 +4,9 @@
 import bpy
 from blender_scenes import press, reopen, save
 
-from palpate.addon import migrations, state
-from palpate.core.migrate import VERSION
+from palpate.addon.properties.properties import migrations
+from palpate.addon.session import session_state
+from palpate.core.io.settings_migration import VERSION
 
 
 def write_raw(block, values):
@@ -42,9 +43,9 @@ def test_a_newer_file_is_left_alone_and_it_is_said(tmp_path):
     reopen(path)
     assert bpy.data.objects["Pad"].palpate.k == 77.0
     assert bpy.data.objects["Pad"].palpate.schema_version == VERSION + 5
-    assert state.session.notes["Pad"].startswith("The settings of 'Pad' were saved by a newer Palpate")
+    assert session_state.session.notes["Pad"].startswith("The settings of 'Pad' were saved by a newer Palpate")
     bpy.ops.wm.read_homefile(use_empty=True)
-    assert state.session.notes == {}
+    assert session_state.session.notes == {}
 
 
 def test_a_file_that_is_open_when_the_add_on_is_enabled_is_looked_through_as_well(tmp_path):
@@ -55,10 +56,10 @@ def test_a_file_that_is_open_when_the_add_on_is_enabled_is_looked_through_as_wel
     bpy.ops.preferences.addon_disable(module="palpate")
     reopen(path)
     bpy.ops.preferences.addon_enable(module="palpate")
-    assert state.session.notes == {}
+    assert session_state.session.notes == {}
     bpy.data.objects["Pad"].location.x += 0.001
     bpy.context.view_layer.update()
-    assert "newer Palpate" in state.session.notes["Pad"]
+    assert "newer Palpate" in session_state.session.notes["Pad"]
 
 
 def test_todays_settings_are_not_touched(tmp_path):

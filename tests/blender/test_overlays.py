@@ -6,11 +6,14 @@ import numpy as np
 import pytest
 from blender_scenes import changes, cube, dump, press_and_drop, save
 
-from palpate.addon import dress, markers, materials, sample, texelarrows, transforms, write
-from palpate.addon.bake import bake
-from palpate.core import measures
-from palpate.core.drive import drive
+from palpate.addon.bake.bake import scene_writer
+from palpate.addon.bake.bake.bake import bake
+from palpate.addon.display import bake_display, markers, materials, texel_arrows
+from palpate.addon.scene import scene_reader
+from palpate.addon.session import transforms
 from palpate.core.errors import PalpateError
+from palpate.core.jobs.job_runner import drive
+from palpate.core.response import metrics
 from palpate.sample_blends import grasp
 
 ALL = {"FORCE", "TORQUE", "CENTRE", "SLIP", "NORMALS", "SHEARS"}
@@ -50,7 +53,7 @@ def test_texel_arrows_are_the_forces_of_their_texels(baked, kind):
         force = -felt.shear[:, :1] * texels.tangent - felt.shear[:, 1:] * texels.bitangent
     found = instances(markers.find(scene.objects, pad.palpate.uid, kind))
     size = np.linalg.norm(force, axis=1)
-    assert len(found) == (size > texelarrows.SMALLEST * size.max()).sum() >= 3
+    assert len(found) == (size > texel_arrows.SMALLEST * size.max()).sum() >= 3
     place = result.recording.poses[-1, body, :3] + texels.position @ rotation.T
     ratios = []
     for matrix in found:
@@ -65,8 +68,8 @@ def test_texel_arrows_are_the_forces_of_their_texels(baked, kind):
 def test_markers_stand_at_the_centre_of_pressure_and_show_moment_and_slip(baked):
     scene, pad, result = baked
     felt = result.recording.sensors["Pad"]
-    share = measures.slip_share(felt, result.scenario.sensors[0].parameters)
-    moment = measures.free_moment(felt)
+    share = metrics.slip_share(felt, result.scenario.sensors[0].parameters)
+    moment = metrics.free_moment(felt)
     radius = float(np.ptp(result.scenario.sensors[0].texels.position, axis=0).max()) * markers.RING_SHARE
     for frame in (1, 6, 8):
         scene.frame_set(frame)
@@ -98,7 +101,7 @@ def test_all_sensors_share_one_scale(baked):
         for slot in obj.material_slots
         if slot.material is not None and materials.MARK in slot.material
     }
-    assert list(ends) == [pytest.approx(measures.scale_limit(measures.peak_force(result.recording)))]
+    assert list(ends) == [pytest.approx(metrics.scale_limit(metrics.peak_force(result.recording)))]
 
 
 def test_arrows_of_fingers_that_face_each_other_do_not_cross(tmp_path):
@@ -116,7 +119,7 @@ def test_arrows_of_fingers_that_face_each_other_do_not_cross(tmp_path):
 
 def test_display_settings_are_applied_to_a_bake_without_computing(baked, monkeypatch):
     scene, pad, result = baked
-    monkeypatch.setattr("palpate.core.solve.Simulation", lambda *_: pytest.fail("computed"))
+    monkeypatch.setattr("palpate.core.solver.simulation.Simulation", lambda *_: pytest.fail("computed"))
     scene.palpate.overlays = {"CENTRE"}
     scene.palpate.color_map = "CIVIDIS"
     scene.palpate.use_auto_range, scene.palpate.range_max = False, 0.25
@@ -133,7 +136,7 @@ def test_applying_without_the_files_says_so(baked, tmp_path):
     scene, *_ = baked
     (tmp_path / "palpate").rename(tmp_path / "lost")
     with pytest.raises(PalpateError, match="bake"):
-        dress.again(scene, write.bake_folders(scene))
+        bake_display.again(scene, scene_writer.bake_folders(scene))
 
 
 def test_clearing_takes_all_overlays_away(tmp_path):
@@ -163,9 +166,9 @@ def test_a_heat_map_of_pressure_divides_by_the_texels_area(tmp_path, around):
     result = drive(bake(scene))
     sensor = next(s for s in result.scenario.sensors if s.name == pad.name)
     nodes = pad.material_slots[-1].material.node_tree.nodes
-    peak = measures.peak_pressure(result.recording, {s.name: s.texels for s in result.scenario.sensors if s.readout})
+    peak = metrics.peak_pressure(result.recording, {s.name: s.texels for s in result.scenario.sensors if s.readout})
     end = next(node.inputs[1].default_value for node in nodes if "Pressure / maximum" in node.label)
-    assert end == pytest.approx(1e3 * measures.scale_limit(peak / 1e3), rel=1e-5)
+    assert end == pytest.approx(1e3 * metrics.scale_limit(peak / 1e3), rel=1e-5)
     if around:
         values = np.zeros(8, dtype=np.float32)
         pad.data.attributes[materials.AREA].data.foreach_get("value", values)
@@ -179,7 +182,7 @@ def test_a_heat_map_of_pressure_divides_by_the_texels_area(tmp_path, around):
 
 def test_arrows_of_a_lost_image_do_not_show(baked, tmp_path):
     scene, pad, _ = baked
-    assert texelarrows.KINDS.keys() <= ALL
+    assert texel_arrows.KINDS.keys() <= ALL
     (tmp_path / "palpate").rename(tmp_path / "lost")
     materials.find(bpy.data.images, pad.palpate.uid).reload()
     scene.frame_set(7)
@@ -190,9 +193,9 @@ def test_arrows_of_a_lost_image_do_not_show(baked, tmp_path):
 @pytest.mark.parametrize("end", ["whole", "stopped"])
 def test_arrows_rest_while_the_scene_is_read(baked, end):
     scene, pad, _ = baked
-    own = [markers.find(scene.objects, pad.palpate.uid, kind).modifiers[texelarrows.MODIFIER] for kind in texelarrows.KINDS]
+    own = [markers.find(scene.objects, pad.palpate.uid, kind).modifiers[texel_arrows.MODIFIER] for kind in texel_arrows.KINDS]
     own[1].show_viewport = False  # as the user left it
-    work = sample.sample_scenario(scene)
+    work = scene_reader.sample_scenario(scene)
     for _ in range(3):
         next(work)
         assert not any(modifier.show_viewport for modifier in own)

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from palpate.commands import main
-from palpate.core.solve import run
+from palpate.core.solver.simulation import run
 from palpate.paper import bench, grasping, page, weighing
 from palpate.paper.chapter import Chapter, Picture, Row, below, compare
 from palpate.sample_blends import grasps, gripper, hand, pick_and_place, tilt

@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 from blender_scenes import ball, cube, grid
 
-from palpate.addon import bake, sample
-from palpate.core.drive import drive
+from palpate.addon.bake.bake import bake
+from palpate.addon.scene import scene_reader
 from palpate.core.errors import SceneError
-from palpate.core.solve import run
+from palpate.core.jobs.job_runner import drive
+from palpate.core.solver.simulation import run
 
 
 def on(parent, part):
@@ -42,7 +43,7 @@ def box_on_soles(frames=24):
 
 def test_two_soles_carry_a_free_box():
     scene, box, soles, _ = box_on_soles()
-    scenario, binding = drive(sample.sample_scenario(scene))
+    scenario, binding = drive(scene_reader.sample_scenario(scene))
     assert [body.name for body in scenario.bodies] == ["Box", "Table"]
     assert [sensor.body for sensor in scenario.sensors] == [0, 0]
     assert binding.sensor_objects(scene) == soles
@@ -57,9 +58,9 @@ def test_texels_of_a_part_are_where_blender_shows_them():
     box.location = (0.1, -0.2, 0.3)
     box.rotation_euler = (0.3, 0.5, -0.4)
     bpy.context.view_layer.update()
-    scenario, _ = sample.sample_start(scene, sample.depsgraph_of(scene))
+    scenario, _ = scene_reader.sample_start(scene, scene_reader.depsgraph_of(scene))
     body = scenario.bodies[0].motion
-    from palpate.addon import transforms
+    from palpate.addon.session import transforms
 
     rotation = transforms.rotation(body.quaternions[0])
     for sensor, sole in zip(scenario.sensors, soles, strict=True):
@@ -87,7 +88,7 @@ def test_a_part_of_something_that_takes_no_part_follows_it():
     stick.keyframe_insert("location", frame=10)
     scene = bpy.context.scene
     scene.frame_start, scene.frame_end = 1, 10
-    scenario, _ = drive(sample.sample_scenario(scene))
+    scenario, _ = drive(scene_reader.sample_scenario(scene))
     assert [body.name for body in scenario.bodies] == ["Pad", "Ball"]
     assert scenario.bodies[0].motion.positions[-1][2] - scenario.bodies[0].motion.positions[0][2] == pytest.approx(0.01)
 
@@ -96,7 +97,7 @@ def test_a_part_never_touches_its_own_body():
     scene, _, soles, table = box_on_soles(2)
     soles[0].location.z += 0.003  # into the box, facing outwards
     table.location.z = -1.0
-    recording = run(drive(sample.sample_scenario(scene))[0])
+    recording = run(drive(scene_reader.sample_scenario(scene))[0])
     assert all(not recording.sensors[sole.name].contact.any() for sole in soles)
 
 
@@ -106,26 +107,26 @@ def test_a_part_that_moves_on_its_parent_is_refused():
     soles[0].location.z -= 0.01
     soles[0].keyframe_insert("location", frame=4)
     with pytest.raises(SceneError, match="'Sole 0' moves on its parent"):
-        drive(sample.sample_scenario(scene))
+        drive(scene_reader.sample_scenario(scene))
 
 
 def test_a_child_of_a_free_body_says_what_to_do():
     scene, _, soles, _ = box_on_soles(4)
     soles[0].palpate.body = "KEYFRAMED"
     with pytest.raises(SceneError, match="Part of Parent"):
-        drive(sample.sample_scenario(scene))
+        drive(scene_reader.sample_scenario(scene))
 
 
 def test_playing_a_free_body_moves_its_parts_and_does_not_start_anew(monkeypatch):
-    from palpate.addon import cache
+    from palpate.addon.timeline import live_cache
 
     scene, box, soles, _ = box_on_soles(6)
     box.location.z = 0.005
     scene.frame_set(1)
     for frame in range(1, 7):
         scene.frame_set(frame)
-    found = cache.get(scene)
+    found = live_cache.get(scene)
     assert sorted(found.frames) == [1, 2, 3, 4, 5, 6]
     scene.frame_set(3)
-    assert sorted(cache.get(scene).frames) == [1, 2, 3, 4, 5, 6]
+    assert sorted(live_cache.get(scene).frames) == [1, 2, 3, 4, 5, 6]
     assert box.location.z < 0.005

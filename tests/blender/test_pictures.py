@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 from blender_scenes import changes, dump, press_and_drop, save
 
-from palpate.addon import pictures, render, studio, video
-from palpate.addon.bake import bake
+from palpate.addon.bake.bake.bake import bake
+from palpate.addon.render.render import figure_export, render, render_setup, video
 from palpate.commands import main
-from palpate.core.drive import drive
 from palpate.core.errors import FileError, ParameterError, SceneError
-from palpate.core.figures import Look
+from palpate.core.figures.recording_style import Look
+from palpate.core.jobs.job_runner import drive
 
 
 @pytest.fixture
@@ -39,9 +39,11 @@ def test_everything_at_once_and_nothing_left_behind(baked, tmp_path):
     scene, _ = baked
     before = dump()
     worlds, lights, cameras = len(bpy.data.worlds), len(bpy.data.lights), len(bpy.data.cameras)
-    wish = pictures.Wish(pictures.KINDS, Look(dpi=50), frames=(3, 4), size=(96, 64), samples=1, formats=("png", "pdf"))
+    wish = figure_export.Wish(
+        figure_export.KINDS, Look(dpi=50), frames=(3, 4), size=(96, 64), samples=1, formats=("png", "pdf")
+    )
     stages = []
-    written = drive(pictures.make(scene, tmp_path / "out", wish), lambda step: stages.append((step.done, step.total)))
+    written = drive(figure_export.make(scene, tmp_path / "out", wish), lambda step: stages.append((step.done, step.total)))
     assert {path.name for path in written} == {path.name for path in (tmp_path / "out").iterdir()}
     assert {path.suffix for path in written} == {".png", ".pdf", ".mp4"}
     assert image(tmp_path / "out" / "scene 0003.png").shape[:2] == (64, 96)
@@ -66,8 +68,8 @@ def test_the_video_has_a_picture_per_frame(baked, tmp_path):
 
 def test_all_that_matters_is_in_the_picture_and_lit(baked, tmp_path):
     scene, _ = baked
-    with studio.photographed(scene, [1, 4], view=(-60.0, 35.0), transparent=True):
-        points = render.corners(studio.seen_objects(scene))
+    with render_setup.photographed(scene, [1, 4], view=(-60.0, 35.0), transparent=True):
+        points = render.corners(render_setup.seen_objects(scene))
         places = np.array([render.picture_position(scene, point) for point in points])
         render.render_frame(scene, tmp_path / "a.png", 4, samples=4, size=(96, 64))
     assert (places > 0.0).all() and (places < 1.0).all()
@@ -80,28 +82,28 @@ def test_all_that_matters_is_in_the_picture_and_lit(baked, tmp_path):
 def test_the_scene_shows_the_colours_of_the_colour_bar(baked):
     """The heat map ends where the figures' colour bar does."""
     scene, _ = baked
-    made = pictures.bake_of(scene)
+    made = figure_export.bake_of(scene)
     pad = scene.objects["Pad"]
     nodes = pad.material_slots[-1].material.node_tree.nodes
     end = next(node.inputs[1].default_value for node in nodes if "maximum" in node.label)
-    assert end == pytest.approx(pictures.look_of(scene).top(made.recording, made.texels))
+    assert end == pytest.approx(figure_export.look_of(scene).top(made.recording, made.texels))
 
 
 def test_a_scene_that_is_not_baked_and_a_frame_that_is_not_are_one_sentence(baked, tmp_path):
     scene, _ = baked
     with pytest.raises(FileError, match="from 1 to 4"):
-        drive(pictures.make(scene, tmp_path / "out", pictures.Wish(frames=(9,))))
+        drive(figure_export.make(scene, tmp_path / "out", figure_export.Wish(frames=(9,))))
     bpy.ops.palpate.bake_clear()
     with pytest.raises(SceneError, match="is not baked"):
-        drive(pictures.make(scene, tmp_path / "out", pictures.Wish()))
+        drive(figure_export.make(scene, tmp_path / "out", figure_export.Wish()))
     with pytest.raises(ParameterError, match="choose from"):
-        pictures.Wish(kinds=("hologram",))
+        figure_export.Wish(kinds=("hologram",))
 
 
 def test_an_error_in_the_middle_puts_the_scene_back(baked):
     scene, _ = baked
     before = dump()
-    with pytest.raises(RuntimeError), studio.photographed(scene, [1], engine="workbench", transparent=True):
+    with pytest.raises(RuntimeError), render_setup.photographed(scene, [1], engine="workbench", transparent=True):
         raise RuntimeError
     assert changes(before, dump()) == [] and scene.camera is None and scene.render.engine == "CYCLES"
 
@@ -124,10 +126,10 @@ def test_workbench_shows_the_heat_map_and_leaves_meshes_alone(baked, tmp_path):
     glass.node_tree.nodes["Principled BSDF"].inputs["Transmission Weight"].default_value = 1.0
     ball.data.materials.append(glass)
     before, meshes = dump(), len(bpy.data.meshes)
-    wish = pictures.Wish(
+    wish = figure_export.Wish(
         ("scene",), Look(colour_map="MAGMA"), frames=(4,), sensors=("Pad",), size=(200, 160), engine="workbench", view=(-90, 89)
     )
-    drive(pictures.make(scene, tmp_path / "out", wish))
+    drive(figure_export.make(scene, tmp_path / "out", wish))
     picture = image(tmp_path / "out" / "scene 0004.png")[..., :3]
     assert np.ptp(picture, axis=2).max() > 0.4  # the purples and oranges of magma, on grey
     assert [line for line in changes(before, dump()) if "Render Result" not in line] == []
@@ -143,7 +145,7 @@ def test_a_transparent_picture_leaves_the_backdrop_out_but_not_what_carries_a_se
     robot = bpy.context.object
     scene.objects["Pad"].parent = robot
     for transparent, hidden in ((False, set()), (True, {floor})):
-        with studio.photographed(scene, [1], transparent=transparent):
+        with render_setup.photographed(scene, [1], transparent=transparent):
             assert {obj for obj in scene.objects if obj.hide_render} == hidden
     assert not floor.hide_render
 
@@ -151,8 +153,8 @@ def test_a_transparent_picture_leaves_the_backdrop_out_but_not_what_carries_a_se
 @pytest.mark.parametrize("size", [(160, 90), (90, 160)])
 def test_the_picture_is_filled_whatever_its_shape(baked, size):
     scene, _ = baked
-    with studio.photographed(scene, [1, 4], view=(-60.0, 35.0), size=size):
-        points = render.corners(studio.seen_objects(scene))
+    with render_setup.photographed(scene, [1, 4], view=(-60.0, 35.0), size=size):
+        points = render.corners(render_setup.seen_objects(scene))
         places = np.array([render.picture_position(scene, point) for point in points])
         assert (scene.render.resolution_x, scene.render.resolution_y) == size
     assert (places > 0.0).all() and (places < 1.0).all() and np.ptp(places, axis=0).max() > 0.7
@@ -180,7 +182,7 @@ def test_what_moves_away_in_between_stays_in_the_picture(baked):
     for frame, height in ((1, 0.01), (2, 0.4), (4, 0.01)):
         ball.location.z = height
         ball.keyframe_insert("location", frame=frame)
-    with studio.photographed(scene, [1, 2, 3, 4], view=(-60.0, 35.0)):
+    with render_setup.photographed(scene, [1, 2, 3, 4], view=(-60.0, 35.0)):
         scene.frame_set(2)
         places = np.array([render.picture_position(scene, point) for point in render.corners([ball])])
     assert (places > 0.0).all() and (places < 1.0).all()

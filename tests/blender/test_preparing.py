@@ -13,27 +13,28 @@ import time
 import bpy
 import pytest
 
-from palpate.addon import bake as baking
-from palpate.addon import dependencies, live, preparing
-from palpate.core import compile_beside, warm
-from palpate.core.drive import drive
+from palpate.addon.bake.bake import bake as baking
+from palpate.addon.session import dependencies, first_use
+from palpate.addon.timeline import playback
+from palpate.core.jobs.job_runner import drive
+from palpate.core.solver import precompile, precompile_process
 
 
 @pytest.fixture
 def window(monkeypatch, tmp_path):
     """As if there were a window, and nothing compiled; the compiler is replaced by a script that the test chooses."""
-    monkeypatch.setattr(preparing, "has_window", lambda: True)
-    monkeypatch.setattr(warm, "_done", False)
-    monkeypatch.setattr(warm, "folder", lambda: tmp_path)  # of the note that it is done; numba's own cache stays
+    monkeypatch.setattr(first_use, "has_window", lambda: True)
+    monkeypatch.setattr(precompile, "_done", False)
+    monkeypatch.setattr(precompile, "folder", lambda: tmp_path)  # of the note that it is done; numba's own cache stays
 
     def compiler(source):
         script = tmp_path / "compiler.py"
         script.write_text(source)
-        monkeypatch.setattr(compile_beside, "__file__", str(script))
+        monkeypatch.setattr(precompile_process, "__file__", str(script))
 
     compiler("import sys; sys.stdin.read()")  # until its end
     yield compiler
-    preparing.stop()
+    first_use.stop()
 
 
 def make_sensor():
@@ -55,35 +56,35 @@ def is_gone(process):
 
 
 def test_the_first_sensor_starts_it_and_disabling_ends_it(window):
-    assert preparing.progress() is None
+    assert first_use.progress() is None
     make_sensor()
-    process = preparing._work.process
-    log = preparing._work.log
-    assert process.poll() is None and not preparing.is_ready()
-    assert "first use" in preparing.progress().text
+    process = first_use._work.process
+    log = first_use._work.log
+    assert process.poll() is None and not first_use.is_ready()
+    assert "first use" in first_use.progress().text
     bpy.ops.preferences.addon_disable(module="palpate")
     assert is_gone(process) and not log.exists()
-    assert not bpy.app.timers.is_registered(preparing._watch)
+    assert not bpy.app.timers.is_registered(first_use._watch)
     bpy.ops.preferences.addon_enable(module="palpate")
 
 
 def test_it_is_started_once(window):
     make_sensor()
-    process = preparing._work.process
-    preparing.begin()
-    assert preparing._work.process is process
+    process = first_use._work.process
+    first_use.begin()
+    assert first_use._work.process is process
 
 
 def test_playing_waits_and_goes_on_when_it_is_ready(window):
     make_sensor()
     scene = bpy.context.scene
     scene.frame_set(2)
-    assert "solver is ready" in live.status(scene).text
-    assert not live._refused
-    warm.stamp().touch()
-    assert preparing.is_ready() and preparing.progress() is None
+    assert "solver is ready" in playback.status(scene).text
+    assert not playback._refused
+    precompile.stamp().touch()
+    assert first_use.is_ready() and first_use.progress() is None
     scene.frame_set(1)
-    assert live.status(scene).frame is not None
+    assert playback.status(scene).frame is not None
 
 
 def test_a_bake_waits_with_progress_and_can_be_stopped(window, tmp_path):
@@ -94,42 +95,42 @@ def test_a_bake_waits_with_progress_and_can_be_stopped(window, tmp_path):
     job = baking.bake(scene)
     steps = [next(job) for _ in range(8)]
     assert [step.text for step in steps[:3]] == [f"Reading the scene: frame {i}" for i in (1, 2, 3)]
-    assert all(step.text.startswith(preparing.STAGE) for step in steps[3:])
+    assert all(step.text.startswith(first_use.STAGE) for step in steps[3:])
     job.close()
     assert not (tmp_path / "bake").exists()
     job = baking.bake(scene)
     for step in job:
-        if step.stage.startswith(preparing.STAGE):
-            warm.stamp().touch()
+        if step.stage.startswith(first_use.STAGE):
+            precompile.stamp().touch()
     assert len(list((tmp_path / "bake").glob("*/tactile_*.exr"))) == 3
 
 
 def test_how_far_it_is_comes_from_the_process(window):
     window(f"import sys; print({json.dumps(json.dumps({'done': 7, 'total': 9}))}, flush=True); sys.stdin.read()")
-    preparing.begin()
+    first_use.begin()
     for _ in range(100):
-        if preparing.progress().done == 7:
+        if first_use.progress().done == 7:
             break
         time.sleep(0.05)
-    assert (preparing.progress().done, preparing.progress().total) == (7, 9)
+    assert (first_use.progress().done, first_use.progress().total) == (7, 9)
 
 
 def test_when_it_fails_the_solver_is_compiled_at_its_first_use(window, capfd):
     window("raise SystemExit('no compiler here')")
-    preparing.begin()
-    drive(preparing.wait())
-    assert preparing.is_ready()
+    first_use.begin()
+    drive(first_use.wait())
+    assert first_use.is_ready()
     assert "no compiler here" in capfd.readouterr().err
 
 
 def test_without_a_window_it_is_compiled_in_place_with_a_line_on_stderr(monkeypatch, tmp_path, capfd):
-    monkeypatch.setattr(warm, "_done", False)
-    monkeypatch.setattr(warm, "stamp", lambda: tmp_path / "stamp")
+    monkeypatch.setattr(precompile, "_done", False)
+    monkeypatch.setattr(precompile, "stamp", lambda: tmp_path / "stamp")
     make_sensor()
-    assert preparing._work is None and preparing.is_ready()
+    assert first_use._work is None and first_use.is_ready()
     dependencies.solver()
     assert "first use only" in capfd.readouterr().err
-    assert (tmp_path / "stamp").exists() and not warm.is_needed()
+    assert (tmp_path / "stamp").exists() and not precompile.is_needed()
     dependencies.solver()
     assert capfd.readouterr().err == ""
 
@@ -137,13 +138,13 @@ def test_without_a_window_it_is_compiled_in_place_with_a_line_on_stderr(monkeypa
 def test_the_process_loads_the_package_by_its_name_in_blender_and_ends_with_blender(tmp_path):
     """Kernels that were kept under another name could not be read."""
     code = (
-        f"import sys; sys.path[:0] = [{os.path.dirname(compile_beside.__file__)!r}]; import compile_beside as c; "
-        "c.load('bl_ext.user_default.palpate'); import bl_ext.user_default.palpate.core.warm as w; "
+        f"import sys; sys.path[:0] = [{os.path.dirname(precompile_process.__file__)!r}]; import compile_beside as c; "
+        "c.load('bl_ext.user_default.palpate'); import bl_ext.user_default.palpate.core.solver.precompile as w; "
         "print(w.__name__, 'numba' in sys.modules, flush=True); import threading; "
         "threading.Thread(target=w._end_with_parent).start()"
     )
     process = subprocess.Popen([sys.executable, "-c", code], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
-    assert process.stdout.readline().split() == ["bl_ext.user_default.palpate.core.warm", "False"]
+    assert process.stdout.readline().split() == ["bl_ext.user_default.palpate.core.solver.precompile", "False"]
     assert process.poll() is None
     process.stdin.close()  # as when Blender is killed
     assert is_gone(process)

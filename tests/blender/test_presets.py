@@ -9,9 +9,11 @@ import numpy as np
 import pytest
 from blender_scenes import ball, grid, press
 
-from palpate.addon import cache, meshes, sample, sensors
+from palpate.addon.authoring import sensors
+from palpate.addon.scene import meshes, scene_reader
+from palpate.addon.timeline import live_cache
 from palpate.core.errors import SensorError
-from palpate.core.scenario import SensorParameters
+from palpate.core.model.scenario import SensorParameters
 
 PRESETS = sorted((sensors.PRESETS / "palpate" / "sensor").glob("*.py"))
 
@@ -25,10 +27,10 @@ def test_blender_finds_the_presets():
 def test_a_preset_makes_a_sensor_that_works_and_names_its_source(path):
     pad = grid()
     bpy.ops.palpate.sensor_add()
-    before = sample.parameters(pad.palpate)
+    before = scene_reader.parameters(pad.palpate)
     pad.palpate.normal_law = "hunt-crossley"  # a preset's k is that of the linear law
     assert bpy.ops.palpate.preset_load(filepath=str(path)) == {"FINISHED"}
-    after = sample.parameters(pad.palpate)
+    after = scene_reader.parameters(pad.palpate)
     after.check(pad.name)
     text = path.read_text(encoding="utf-8")
     assert after.k == float(re.search(r"settings\.k = ([\d.]+)", text).group(1))
@@ -133,8 +135,8 @@ def test_a_material_or_face_set_becomes_the_region(source):
 
 
 def test_a_region_by_material_survives_its_own_heat_map(tmp_path):
-    from palpate.addon.bake import bake
-    from palpate.core.drive import drive
+    from palpate.addon.bake.bake.bake import bake
+    from palpate.core.jobs.job_runner import drive
 
     scene, pad, _ = press(3)
     right = two_halves(pad)
@@ -149,9 +151,9 @@ def test_a_changed_region_or_painted_map_is_noticed():
     scene, pad, _ = press(4)
     two_halves(pad)
     pad.palpate.region, pad.palpate.material = "MATERIAL", "Rubber"
-    depsgraph = sample.depsgraph_of(scene)
-    run = cache.begin(scene, depsgraph)
-    assert not cache.is_stale(scene, depsgraph, run)
+    depsgraph = scene_reader.depsgraph_of(scene)
+    run = live_cache.begin(scene, depsgraph)
+    assert not live_cache.is_stale(scene, depsgraph, run)
     first = meshes.fingerprint(pad, depsgraph)
     pad.data.polygons.foreach_set("material_index", np.ones(len(pad.data.polygons), dtype=np.int32))
     assert meshes.fingerprint(pad, depsgraph) != first
@@ -160,7 +162,7 @@ def test_a_changed_region_or_painted_map_is_noticed():
     pad.palpate.k_map = "Soft"
     group.add([0], 1.0, "REPLACE")
     assert meshes.fingerprint(pad, depsgraph) != second
-    assert cache.is_stale(scene, depsgraph, run)
+    assert live_cache.is_stale(scene, depsgraph, run)
 
 
 # --- painted multipliers
@@ -175,7 +177,7 @@ def test_painted_maps_reach_the_solver():
     rough = pad.data.attributes.new("Rough", "FLOAT", "POINT")
     rough.data.foreach_set("value", np.linspace(0.5, 2.0, 84).astype(np.float32))
     pad.palpate.friction_map = "Rough"
-    scenario, _ = sample.sample_start(scene, sample.depsgraph_of(scene))
+    scenario, _ = scene_reader.sample_start(scene, scene_reader.depsgraph_of(scene))
     painted = scenario.sensors[0].painted
     assert painted.k[:5] == pytest.approx([0.2, 0.2, 0.2, 0.6, 1.0])
     assert painted.friction == pytest.approx(np.linspace(0.5, 2.0, 84), rel=1e-6)
@@ -191,7 +193,7 @@ def test_a_painted_map_that_cannot_be_used_says_so(name, value, text):
     bad.data.foreach_set("value", np.full(84, value, dtype=np.float32))
     pad.palpate.gain_map = name
     with pytest.raises(SensorError, match=text):
-        sample.sample_start(scene, sample.depsgraph_of(scene))
+        scene_reader.sample_start(scene, scene_reader.depsgraph_of(scene))
 
 
 def test_a_soft_tip_feels_less_under_the_same_ball():
@@ -201,8 +203,8 @@ def test_a_soft_tip_feels_less_under_the_same_ball():
         group = pad.vertex_groups.get("Soft") or pad.vertex_groups.new(name="Soft")
         group.add(range(84), 1.0, "REPLACE")
         pad.palpate.k_map, pad.palpate.k_factor = "Soft", factor
-        from palpate.core.drive import drive
-        from palpate.core.solve import run
+        from palpate.core.jobs.job_runner import drive
+        from palpate.core.solver.simulation import run
 
-        forces.append(run(drive(sample.sample_scenario(scene))[0]).sensors["Pad"].normal_force[-1].sum())
+        forces.append(run(drive(scene_reader.sample_scenario(scene))[0]).sensors["Pad"].normal_force[-1].sum())
     assert forces[1] == pytest.approx(0.5 * forces[0], rel=1e-6)

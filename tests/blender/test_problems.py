@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 from blender_scenes import ball, cube, grid, press_and_drop
 
-from palpate.addon import preview, problems, texelview
+from palpate.addon.authoring import problems, sensor_report
+from palpate.addon.display import texel_overlay
 
 
 def look(obj):
     bpy.context.view_layer.update()
-    return preview.now(obj, bpy.context.scene)
+    return sensor_report.now(obj, bpy.context.scene)
 
 
 def kinds(obj):
@@ -40,12 +41,12 @@ def test_counts_area_and_density():
 
 
 def test_stability_limit_and_step_are_those_of_the_scene():
-    from palpate.addon import sample
-    from palpate.core.timestep import advise
+    from palpate.addon.scene import scene_reader
+    from palpate.core.solver.time_step_adviser import advise
 
     scene, pad, *_ = press_and_drop()
     report = look(pad)
-    expected = advise(sample.sample_start(scene, sample.depsgraph_of(scene))[0])
+    expected = advise(scene_reader.sample_start(scene, scene_reader.depsgraph_of(scene))[0])
     assert report.advice == expected
     assert 0 < report.advice.dt < report.advice.limit < 1.0
 
@@ -233,7 +234,7 @@ def test_every_problem_has_a_button_with_a_name():
 def test_what_is_drawn_is_where_the_texels_are():
     pad = sensor(grid(size=0.05))
     report = look(pad)
-    drawing = texelview.drawing_of(report)
+    drawing = texel_overlay.drawing_of(report)
     assert drawing.labels[0][0] == "0,0"
     assert drawing.labels[83][0] == "13,5"
     assert [place[:2] for _, place in drawing.labels] == pytest.approx(report.texels.position[:, :2], abs=1e-9)
@@ -242,4 +243,4 @@ def test_what_is_drawn_is_where_the_texels_are():
     up = drawing.lines["normals"].reshape(-1, 2, 3)
     assert (up[:, 1, 2] > up[:, 0, 2]).all()
     assert len(drawing.spots["faulty"]) == 0
-    assert len(drawing.spots["fine"]) == 84 * texelview.SIDES * 3
+    assert len(drawing.spots["fine"]) == 84 * texel_overlay.SIDES * 3

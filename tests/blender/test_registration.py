@@ -10,7 +10,7 @@ import bpy
 import pytest
 
 import palpate
-from palpate.addon import properties
+from palpate.addon.properties.properties import properties
 
 
 def kinds_of(base):
@@ -102,7 +102,7 @@ def test_a_missing_module_leaves_a_panel_that_says_so(commands, monkeypatch):
     from palpate.panels.missing import PALPATE_PT_missing
 
     assert PALPATE_PT_missing.lost == ("trimesh",)
-    from palpate.addon import dependencies
+    from palpate.addon.session import dependencies
 
     assert "missing: trimesh" in dependencies.debug_info()
     assert bpy.ops.palpate.debug_info_copy() == {"FINISHED"}
@@ -113,7 +113,7 @@ def test_a_missing_module_leaves_a_panel_that_says_so(commands, monkeypatch):
 
 def test_a_failure_while_registering_is_seen_and_leaves_nothing(commands, monkeypatch):
     without = traces()
-    from palpate.addon import handlers
+    from palpate.addon.events import handlers
 
     def fail():
         raise RuntimeError("broken")

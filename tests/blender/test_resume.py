@@ -12,11 +12,12 @@ from pathlib import Path
 import pytest
 from blender_scenes import press_and_drop, save
 
-from palpate.addon import claim, folders, jobs, unfinished
-from palpate.addon.bake import bake
-from palpate.core.drive import drive
+from palpate.addon.bake.bake import bake_checkpoint, bake_files, folder_lock
+from palpate.addon.bake.bake.bake import bake
+from palpate.addon.session import jobs
 from palpate.core.errors import FileError
-from palpate.core.formats.archive import load_recording
+from palpate.core.io.npz import load_recording
+from palpate.core.jobs.job_runner import drive
 
 SCRIPT = Path(__file__).with_name("killed_bake.py")
 FRAMES = 60
@@ -68,31 +69,31 @@ def contents_of_a_whole_bake(scene, tmp_path):
 def abandon(scene, steps):
     """Stop a bake as a kill would: it cannot clean up."""
     work = jobs.Slice(bake(scene))
-    discard = folders.Files.discard
-    folders.Files.discard = lambda self: self._claim.give_back()  # as the operating system does
+    discard = bake_files.Files.discard
+    bake_files.Files.discard = lambda self: self._claim.give_back()  # as the operating system does
     try:
         for _ in range(steps):
             work.work(0.0)
         work.cancel()
     finally:
-        folders.Files.discard = discard
+        bake_files.Files.discard = discard
 
 
 @pytest.fixture
 def killed(tmp_path, monkeypatch):
     """A scene whose bake was killed at its sixth frame."""
-    monkeypatch.setattr(unfinished, "PATIENCE", 0.0)
+    monkeypatch.setattr(bake_checkpoint, "PATIENCE", 0.0)
     scene, pad, *_ = press_and_drop(frames=8)
     save(tmp_path)
     abandon(scene, 8 + 6)
-    assert (tmp_path / "palpate" / unfinished.FOLDER / unfinished.STATE).is_file()
+    assert (tmp_path / "palpate" / bake_checkpoint.FOLDER / bake_checkpoint.STATE).is_file()
     return scene, pad
 
 
 def computed(scene):
     frames = []
     drive(bake(scene), lambda step: frames.append(step.frame) if step.stage == "Computing forces" else None)
-    folders.settle()
+    bake_files.settle()
     return frames
 
 
@@ -106,11 +107,11 @@ def test_the_next_bake_goes_on(killed, tmp_path):
 @pytest.mark.parametrize("what", ["parameter", "damaged state", "lost frames", "lost images"])
 def test_what_does_not_fit_is_begun_anew(killed, tmp_path, what):
     scene, pad = killed
-    place = tmp_path / "palpate" / unfinished.FOLDER
+    place = tmp_path / "palpate" / bake_checkpoint.FOLDER
     if what == "parameter":
         pad.palpate.k = 77.0
     elif what == "damaged state":
-        (place / unfinished.STATE).write_bytes((place / unfinished.STATE).read_bytes()[:1000])
+        (place / bake_checkpoint.STATE).write_bytes((place / bake_checkpoint.STATE).read_bytes()[:1000])
     elif what == "lost frames":
         next(place.glob("frames_*")).unlink()
     else:
@@ -128,20 +129,20 @@ def test_one_bake_at_a_time(tmp_path):
     expected = contents_of_a_whole_bake(scene, tmp_path)
     scene.palpate.folder = "//palpate"
     first = bake(scene)
-    while not (tmp_path / "palpate" / claim.NAME).exists():
+    while not (tmp_path / "palpate" / folder_lock.NAME).exists():
         next(first)
     with pytest.raises(FileError, match="Another bake is writing to"):
         drive(bake(scene))
     drive(first)
-    folders.settle()
+    bake_files.settle()
     assert contents(tmp_path / "palpate") == expected
     drive(bake(scene))
-    folders.settle()
+    bake_files.settle()
     assert contents(tmp_path / "palpate") == expected
 
 
 def test_escape_leaves_nothing(tmp_path, monkeypatch):
-    monkeypatch.setattr(unfinished, "PATIENCE", 0.0)
+    monkeypatch.setattr(bake_checkpoint, "PATIENCE", 0.0)
     scene, *_ = press_and_drop(frames=8)
     save(tmp_path)
     work = jobs.Slice(bake(scene))

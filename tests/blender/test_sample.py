@@ -9,14 +9,15 @@ import pytest
 from blender_scenes import ball, cube, grid, press
 from mathutils import Matrix, Quaternion
 
-from palpate.addon import sample, transforms, units
-from palpate.core.drive import drive
+from palpate.addon.scene import scene_reader
+from palpate.addon.session import transforms, units
 from palpate.core.errors import SceneError
-from palpate.core.mesh import face_normals
+from palpate.core.geometry.mesh import face_normals
+from palpate.core.jobs.job_runner import drive
 
 
 def sampled(scene):
-    return drive(sample.sample_scenario(scene))
+    return drive(scene_reader.sample_scenario(scene))
 
 
 def of(scenario, name):
@@ -78,9 +79,9 @@ def test_unit_scale_makes_metres():
 
 
 def _curves(obj):
-    from palpate.addon import curves
+    from palpate.addon.session import fcurves
 
-    return curves.of(obj)
+    return fcurves.of(obj)
 
 
 @pytest.mark.parametrize("scale", [(2.0, 2.0, 2.0), (1.0, 2.0, 0.5), (-1.0, 1.0, 1.0), (1.0, -2.0, 3.0), (-1.0, -1.0, -1.0)])
@@ -263,7 +264,7 @@ def test_a_pad_is_not_read_out():
 
 
 def test_contact_points_and_normal_law_go_there_and_back():
-    from palpate.addon import exchange
+    from palpate.addon.authoring import exchange
 
     scene, pad, _ = press()
     pad.palpate.points_per_texel, pad.palpate.normal_law, pad.palpate.exponent = "9", "hunt-crossley", 2.0

@@ -6,13 +6,15 @@ import numpy as np
 import pytest
 from blender_scenes import ball, changes, cube, dump, grid, select
 
-from palpate.addon import sample, skins, transforms
-from palpate.core.drive import drive
-from palpate.core.solve import run
+from palpate.addon.authoring import laid_sensors
+from palpate.addon.scene import scene_reader
+from palpate.addon.session import transforms
+from palpate.core.jobs.job_runner import drive
+from palpate.core.solver.simulation import run
 
 
 def texels_of(obj):
-    scenario, binding = sample.sample_start(bpy.context.scene, sample.depsgraph_of(bpy.context.scene))
+    scenario, binding = scene_reader.sample_start(bpy.context.scene, scene_reader.depsgraph_of(bpy.context.scene))
     return scenario.sensors[binding.sensor_objects(bpy.context.scene).index(obj)].texels
 
 
@@ -104,14 +106,14 @@ def test_one_object_carries_several_sensors_that_feel_on_their_own():
         bpy.ops.palpate.skin_add(source="SELECTION", method="NOISE", spacing=0.002)
         names.append(bpy.context.object.name)
     assert names == ["Finger Skin", "Finger Skin.001"]
-    assert skins.skins_of(obj) == [bpy.data.objects[name] for name in names]
+    assert laid_sensors.skins_of(obj) == [bpy.data.objects[name] for name in names]
     bpy.data.objects[names[1]].palpate.k = 117.0  # twice as stiff below
     scene = bpy.context.scene
     scene.frame_start, scene.frame_end = 1, 2
     for z in (0.0195, -0.0195):
         plate = cube("Plate", (0.0, 0.0, z), 0.02)
         plate.palpate.role = "TARGET"
-    recording = run(drive(sample.sample_scenario(scene))[0])
+    recording = run(drive(scene_reader.sample_scenario(scene))[0])
     above, below = (recording.sensors[name].normal_force[-1].sum() for name in names)
     assert above > 0
     assert below == pytest.approx(2 * above, rel=0.15)  # other patterns of the same density
@@ -147,14 +149,14 @@ def test_a_skin_is_laid_anew_when_the_surface_has_changed():
     select(obj, upper(obj))
     bpy.ops.palpate.skin_add(source="SELECTION", method="NOISE", spacing=0.002)
     skin = bpy.context.object
-    assert not skins.is_outdated(skin)
+    assert not laid_sensors.is_outdated(skin)
     for vertex in obj.data.vertices:
         vertex.co *= 1.5
-    assert skins.is_outdated(skin)
+    assert laid_sensors.is_outdated(skin)
     before = len(skin.data.vertices)
     skin.palpate.k = 99.0
     assert bpy.ops.palpate.skin_update() == {"FINISHED"}
-    assert not skins.is_outdated(skin)
+    assert not laid_sensors.is_outdated(skin)
     points = np.array([v.co for v in skin.data.vertices])
     assert np.linalg.norm(points, axis=1) == pytest.approx(0.015, rel=0.01)
     assert len(points) == pytest.approx(1.5**2 * before, rel=0.2)
@@ -194,4 +196,4 @@ def test_a_skin_that_lost_its_surface_says_so():
 
 
 def test_a_good_spacing_is_guessed():
-    assert skins.usual_spacing(grid(size=0.05), bpy.context.scene) == pytest.approx(0.0035, rel=0.3)
+    assert laid_sensors.usual_spacing(grid(size=0.05), bpy.context.scene) == pytest.approx(0.0035, rel=0.3)

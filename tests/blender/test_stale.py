@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from blender_scenes import ball, press, press_and_drop, reopen, save
 
-from palpate.addon import cache, live
-from palpate.addon.bake import bake
-from palpate.core.drive import drive
+from palpate.addon.bake.bake.bake import bake
+from palpate.addon.timeline import live_cache, playback
+from palpate.core.jobs.job_runner import drive
 
 FRESH, STALE = "Frame {} of the bake.", "The bake is out of date, something has changed since: bake again."
 
@@ -44,7 +44,7 @@ def texts(scene, frames):
     found = []
     for frame in frames:
         scene.frame_set(frame)
-        found.append(live.status(scene).text)
+        found.append(playback.status(scene).text)
     return found
 
 
@@ -52,13 +52,13 @@ def test_nothing_changed_is_fresh_at_every_frame(baked):
     frames = (1, 2, 3, 4, 5, 6, 4, 2, 1)
     assert texts(baked, frames) == [FRESH.format(frame) for frame in frames]
     baked.frame_set(3, subframe=0.5)
-    assert live.status(baked).text == FRESH.format(3)
+    assert playback.status(baked).text == FRESH.format(3)
 
 
 def curves_of(obj):
-    from palpate.addon import curves
+    from palpate.addon.session import fcurves
 
-    return curves.of(obj)
+    return fcurves.of(obj)
 
 
 def bow(curve):
@@ -89,7 +89,7 @@ def test_a_change_is_noticed_at_whatever_frame_is_shown_next(baked, change):
     CHANGES[change](pad, target)
     bpy.context.view_layer.update()
     assert texts(baked, [5, 2]) == [STALE, STALE]
-    assert live.status(baked).frame is not None  # it is still shown
+    assert playback.status(baked).frame is not None  # it is still shown
 
 
 def keyed(owner, path, index=-1):
@@ -212,7 +212,7 @@ def test_playing_reads_between_frames_as_a_bake_does(tmp_path, stretched, bends)
     for frame in range(1, 13 if stretched else 7):
         scene.frame_set(frame)
     assert scene.frame_current == frame and scene.frame_subframe == 0.0
-    played = dict(cache.get(scene).frames)
+    played = dict(live_cache.get(scene).frames)
     bpy.ops.palpate.reset()
     save(tmp_path)
     recording = drive(bake(scene)).recording

@@ -11,9 +11,10 @@ import numpy as np
 import pytest
 from blender_scenes import cube, press_and_drop, save
 
-from palpate.addon.bake import bake
-from palpate.core import colormaps, measures
-from palpate.core.drive import drive
+from palpate.addon.bake.bake.bake import bake
+from palpate.core.figures import color_maps
+from palpate.core.jobs.job_runner import drive
+from palpate.core.response import metrics
 
 FRAMES = (1, 7, 8)
 SCRIPT = Path(__file__).with_name("without_addon.py")
@@ -108,7 +109,7 @@ def test_every_texel_has_the_colour_of_its_force(scene_file, tmp_path):
     path, recording = scene_file
     seen = watch(path, tmp_path, "seen", False)
     force = recording.sensors["Pad"].normal_force
-    end = measures.scale_limit(measures.peak_force(recording))  # one scale for all
+    end = metrics.scale_limit(metrics.peak_force(recording))  # one scale for all
     for frame in FRAMES:
         shot = seen["frames"][str(frame)]
         width, height = shot["size"]
@@ -117,8 +118,8 @@ def test_every_texel_has_the_colour_of_its_force(scene_file, tmp_path):
         column = np.clip(np.round((np.arange(6) / 5) * width - 0.5), 1, width - 2).astype(int)
         row = np.clip(np.round((np.arange(14) / 13) * height - 0.5), 1, height - 2).astype(int)
         found = pixels[np.ix_(row, column)][..., :3].reshape(-1, 3)
-        colors = colormaps.colors("VIRIDIS", force[frame - 1] / end)
-        glow = 0.4 * colormaps.linear(colors)
+        colors = color_maps.colors("VIRIDIS", force[frame - 1] / end)
+        glow = 0.4 * color_maps.linear(colors)
         expected = np.where(glow <= 0.0031308, 12.92 * glow, 1.055 * glow ** (1 / 2.4) - 0.055)
         assert np.abs(found - expected).max() < 0.03, frame
     assert len({tuple(shot["pixels"]) for shot in seen["frames"].values()}) == 3

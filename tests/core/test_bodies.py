@@ -4,7 +4,7 @@
 import numpy as np
 import pytest
 
-from palpate.core.bodies import look_back, quaternions_from_vectors, rotation_matrices, write_twist
+from palpate.core.geometry.rotations import look_back, quaternions_from_vectors, rotation_matrices, write_twist
 
 
 @pytest.mark.parametrize("angle", [0.0, 1e-9, 1e-4, 0.3, 2.0, 5.0])

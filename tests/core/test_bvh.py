@@ -6,8 +6,8 @@ import pytest
 import trimesh
 from solver_scenes import grid_mesh, shape
 
-from palpate.core import bvh
-from palpate.core.mesh import face_normals
+from palpate.core.geometry import bvh
+from palpate.core.geometry.mesh import face_normals
 
 NONE = 2.0
 

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from solver_scenes import box, cube_on_pad, gripper
 
-from palpate.core import checkpoint
-from palpate.core.drive import drive
-from palpate.core.effects.library import effect
-from palpate.core.recording import SensorFrame
-from palpate.core.solve import Simulation, solve
+from palpate.core.effects.engine.registry import effect
+from palpate.core.jobs.job_runner import drive
+from palpate.core.model.recording import SensorFrame
+from palpate.core.solver import checkpoint
+from palpate.core.solver.simulation import Simulation, solve
 
 
 def slipping_cube():

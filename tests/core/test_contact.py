@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from palpate.core import contact
-from palpate.core.scenario import SensorParameters
+from palpate.core.laws import contact
+from palpate.core.model.scenario import SensorParameters
 
 PAPER = SensorParameters()  # Table 2; Fig. 7 was drawn with these and fn = 0.08 N
 ROW = contact.parameter_row(PAPER)

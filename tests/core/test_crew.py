@@ -6,10 +6,10 @@ import pytest
 import trimesh
 from solver_scenes import about, cube_on_pad, pad, pressed, shape
 
-from palpate.core import crew, jit
-from palpate.core.solve import PART, Simulation
+from palpate.core.compiled import kernels, thread_team
+from palpate.core.solver.simulation import PART, Simulation
 
-compiled = pytest.mark.skipif(not jit.COMPILED, reason="plain Python computes in one thread")
+compiled = pytest.mark.skipif(not kernels.COMPILED, reason="plain Python computes in one thread")
 
 
 def rolling(threads):
@@ -42,26 +42,26 @@ def test_threads_change_no_bit(scene):
 @compiled
 def test_helpers_are_called_where_they_are_worth_while(monkeypatch):
     monkeypatch.delenv("PALPATE_THREADS", raising=False)
-    monkeypatch.setattr(crew, "_processors", lambda: 4)
-    assert crew.board_for(crew.ENOUGH - 1)[1] == 0
-    assert crew.board_for(crew.ENOUGH)[1] == 1
-    assert crew.board_for(10**6)[1] == 3
+    monkeypatch.setattr(thread_team, "_processors", lambda: 4)
+    assert thread_team.board_for(thread_team.ENOUGH - 1)[1] == 0
+    assert thread_team.board_for(thread_team.ENOUGH)[1] == 1
+    assert thread_team.board_for(10**6)[1] == 3
     monkeypatch.setenv("PALPATE_THREADS", "1")
-    assert crew.board_for(10**6)[1] == 0
+    assert thread_team.board_for(10**6)[1] == 0
 
 
 @compiled
 def test_a_late_helper_is_not_called_for_a_while():
-    board, number = crew.board_for(10**4, 2)
+    board, number = thread_team.board_for(10**4, 2)
     called = []
-    with crew.helpers(board, number, called.append, 1):
-        board[crew.PHASES], board[crew.LATE] = 100, 50
+    with thread_team.helpers(board, number, called.append, 1):
+        board[thread_team.PHASES], board[thread_team.LATE] = 100, 50
     assert called == [1]
-    for _ in range(crew.SOLITUDE):
-        with crew.helpers(board, number, called.append, 2):
+    for _ in range(thread_team.SOLITUDE):
+        with thread_team.helpers(board, number, called.append, 2):
             pass
     assert called == [1]
-    with crew.helpers(board, number, called.append, 3):
+    with thread_team.helpers(board, number, called.append, 3):
         pass
     assert called == [1, 3]
 

@@ -8,10 +8,10 @@ import pytest
 import trimesh
 from solver_scenes import about, box, cube_on_pad, grid_mesh, pad, pressed, shape
 
-from palpate.core.bodies import rotation_matrices
 from palpate.core.errors import PalpateError
-from palpate.core.scenario import Body, Deformation, Motion
-from palpate.core.solve import Simulation, run
+from palpate.core.geometry.rotations import rotation_matrices
+from palpate.core.model.scenario import Body, Deformation, Motion
+from palpate.core.solver.simulation import Simulation, run
 
 STIFF_FRICTION = {"k": 200.0, "cn": 2.0, "sigma0": 400.0, "sigma1": 0.5, "ct": 0.05, "x0": 0.02}
 FRAMES, FPS, STEPS = 10, 100.0, 5

@@ -8,10 +8,10 @@ import pytest
 from scipy.integrate import solve_ivp
 from solver_scenes import GRAVITY, about, box, gripper, pad, smooth_path
 
-from palpate.core.control import GripControl, TactileData
 from palpate.core.errors import PalpateError
-from palpate.core.scenario import Body, Drive, Motion, Scenario, Sensor, SensorParameters, Signal, Target
-from palpate.core.solve import Simulation, run
+from palpate.core.model.scenario import Body, Drive, Motion, Scenario, Sensor, SensorParameters, Signal, Target
+from palpate.core.solver.dynamics.grip_controller import GripControl, TactileData
+from palpate.core.solver.simulation import Simulation, run
 
 
 def slider(drive, frames=25, fps=100.0, dt=1e-4, motion=None, mass=0.5, gravity=0.0, height=10.0, **parameters) -> Scenario:

@@ -6,7 +6,7 @@ import pytest
 from oracles.loads import GRIDS, tilted, weight_error
 from solver_scenes import GRAVITY, cube_on_pad
 
-from palpate.core.solve import run
+from palpate.core.solver.simulation import run
 
 
 @pytest.mark.parametrize("mass", [0.1, 1.0, 4.0, 10.0])

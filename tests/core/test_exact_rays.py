@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from oracles.rays import NONE, compare, entries, leaks, solids
 
-from palpate.core.mesh import TriangleMesh
+from palpate.core.geometry.mesh import TriangleMesh
 
 SOLIDS = solids()
 

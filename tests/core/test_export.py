@@ -9,16 +9,16 @@ import numpy as np
 import pytest
 from recordings import grid_texels, recording_of, round_texels
 
-from palpate.core import colormaps
-from palpate.core.bakes import frame_index, read_bake
-from palpate.core.drive import drive
 from palpate.core.errors import FileError, PalpateError
-from palpate.core.figures import Look
-from palpate.core.formats.archive import save_recording
-from palpate.core.formats.export import export
-from palpate.core.formats.files import Manifest, write_manifest
-from palpate.core.formats.sensors import load_sensor, save_sensor
-from palpate.core.scenario import Painted, SensorParameters
+from palpate.core.figures import color_maps
+from palpate.core.figures.recording_style import Look
+from palpate.core.io.bake_reader import frame_index, read_bake
+from palpate.core.io.export import export
+from palpate.core.io.files import Manifest, write_manifest
+from palpate.core.io.npz import save_recording
+from palpate.core.io.sensor_npz import load_sensor, save_sensor
+from palpate.core.jobs.job_runner import drive
+from palpate.core.model.scenario import Painted, SensorParameters
 
 
 def put(folder, name, texels, painted=None, digest="d"):
@@ -151,7 +151,7 @@ def test_png_has_one_scale_for_all_sensors(bake, tmp_path):
     tip = imread(next((tmp_path / "out").glob("tip_1*")) / "tactile_0005.png")
     assert (tip[..., 3] == 0.0).any()  # nothing there
     assert np.isclose(tip[..., 0][tip[..., 3] > 0].min(), 0.5, atol=0.1)
-    assert (colormaps.colors("PAPER", np.array([0.5])) == 0.5).all()
+    assert (color_maps.colors("PAPER", np.array([0.5])) == 0.5).all()
 
 
 def test_an_unknown_format_is_refused(bake, tmp_path):

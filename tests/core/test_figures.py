@@ -8,11 +8,18 @@ import numpy as np
 import pytest
 from recordings import COLUMNS, PITCH, ROWS, grid_texels, recording_of, round_texels
 
-from palpate.core import canvas, figures, measures
 from palpate.core.errors import FileError, ParameterError, SensorError
-from palpate.core.mesh import TriangleMesh
-from palpate.core.scenario import SensorParameters
-from palpate.core.texels import texels_from_region
+from palpate.core.figures import figure_style
+from palpate.core.figures.picture_labels import Label, label_picture
+from palpate.core.figures.recording_style import Look
+from palpate.core.figures.side_by_side import side_by_side
+from palpate.core.figures.tactile_strip import tactile_strip
+from palpate.core.figures.texel_numbers import texel_numbers
+from palpate.core.figures.time_curves import force_curves, time_curves
+from palpate.core.geometry.mesh import TriangleMesh
+from palpate.core.geometry.texels import texels_from_region
+from palpate.core.model.scenario import SensorParameters
+from palpate.core.response import metrics
 
 
 def test_net_shear_of_a_flat_pad_is_the_plain_sum():
@@ -20,13 +27,13 @@ def test_net_shear_of_a_flat_pad_is_the_plain_sum():
     sensor = recording_of(texels).sensors["pad"]
     expected = np.zeros((10, 3))
     expected[:, 1] = sensor.shear[:, :, 1].sum(axis=1)  # rows run along +y
-    np.testing.assert_allclose(measures.net_shear(sensor, texels), expected, atol=1e-15)
+    np.testing.assert_allclose(metrics.net_shear(sensor, texels), expected, atol=1e-15)
 
 
 def test_mobilised_friction_is_shear_over_limit_and_zero_without_contact():
     texels = grid_texels()
     sensor = recording_of(texels).sensors["pad"]
-    ratio = measures.mobilised(sensor, texels, mus=0.4)
+    ratio = metrics.mobilised(sensor, texels, mus=0.4)
     touching = sensor.normal_force.any(axis=1)
     np.testing.assert_allclose(ratio[touching], 0.5)
     assert (ratio[~touching] == 0).all()
@@ -34,23 +41,23 @@ def test_mobilised_friction_is_shear_over_limit_and_zero_without_contact():
 
 @pytest.mark.parametrize(("value", "limit"), [(0.11, 0.15), (1.0, 1.0), (0.026, 0.03), (9.9, 10.0), (3e-7, 3e-7)])
 def test_scales_end_at_round_numbers(value, limit):
-    assert measures.tidy_limit(value) == pytest.approx(limit)
+    assert metrics.tidy_limit(value) == pytest.approx(limit)
 
 
 def test_frames_are_spread_over_what_happens():
     recording = recording_of(grid_texels())
-    chosen = measures.choose_frames(recording, 4)
+    chosen = metrics.choose_frames(recording, 4)
     assert len(chosen) == 4
     assert (np.diff(chosen) > 0).all()
     assert chosen.max() <= 8  # the last three frames are alike
-    assert set(measures.choose_frames(recording, 100)) <= set(recording.frames)
+    assert set(metrics.choose_frames(recording, 100)) <= set(recording.frames)
 
 
 def test_frames_of_a_still_recording_are_spread_over_all_of_it():
     recording = recording_of(grid_texels())
     recording.sensors["pad"].normal_force[:] = 0.3
     recording.sensors["pad"].shear[:] = 0
-    assert list(measures.choose_frames(recording, 2)) == [3, 8]
+    assert list(metrics.choose_frames(recording, 2)) == [3, 8]
 
 
 @pytest.mark.parametrize("texels", [grid_texels(), round_texels()], ids=["grid", "uv"])
@@ -59,7 +66,7 @@ def test_strip_is_written_and_the_same_every_time(tmp_path, texels, suffix):
     recording = recording_of(texels)
     first, second = tmp_path / f"a.{suffix}", tmp_path / f"b.{suffix}"
     for path in (first, second):
-        figures.tactile_strip(path, recording, {"pad": texels})
+        tactile_strip(path, recording, {"pad": texels})
     assert first.stat().st_size > 2000
     assert first.read_bytes() == second.read_bytes()
 
@@ -74,7 +81,7 @@ def test_colours_of_the_strip_are_the_forces(tmp_path):
     recording.sensors["pad"].shear[:] = 0
     recording.sensors["pad"].normal_force[:] = 0.0
     recording.sensors["pad"].normal_force[5, :] = 0.12
-    figures.tactile_strip(tmp_path / "a.png", recording, {"pad": texels}, [6], figures.Look("VIRIDIS", limit=0.2))
+    tactile_strip(tmp_path / "a.png", recording, {"pad": texels}, [6], Look("VIRIDIS", limit=0.2))
     picture = imread(tmp_path / "a.png")[:, :, :3]
     pixels = picture[:, : picture.shape[1] * 3 // 4].reshape(-1, 3)  # without the colour bar
     expected = np.array(colormaps["viridis"](0.6)[:3])
@@ -104,25 +111,25 @@ def test_no_text_is_smaller_than_eight_points_or_leaves_the_figure(tmp_path, mon
                 inside = box.x0 >= 0 and box.x1 <= width and box.y0 >= 0 and box.y1 <= height
                 seen.append((text.get_text(), text.get_fontsize(), inside))
 
-    monkeypatch.setattr(canvas, "_write", look)
+    monkeypatch.setattr(figure_style, "_write", look)
     texels = grid_texels()
     recording = recording_of(texels)
     long_name = "Index finger of the left hand"
     recording.sensors[long_name] = recording.sensors["pad"]
     both = {"pad": texels, long_name: texels}
     parameters = dict.fromkeys(both, SensorParameters())
-    for width in canvas.WIDTHS:
+    for width in figure_style.WIDTHS:
         for quantity in ("force", "pressure"):
-            look = figures.Look(width=width, quantity=quantity)
-            figures.tactile_strip(tmp_path / "a.png", recording, both, look=look)
-            figures.time_curves(tmp_path / "c.png", recording, both, parameters, look=look)
-            figures.texel_numbers(tmp_path / "d.png", recording, both, "pad", 5, look)
-    figures.force_curves(tmp_path / "b.png", recording, both, parameters, {"pad": 9.81})
+            look = Look(width=width, quantity=quantity)
+            tactile_strip(tmp_path / "a.png", recording, both, look=look)
+            time_curves(tmp_path / "c.png", recording, both, parameters, look=look)
+            texel_numbers(tmp_path / "d.png", recording, both, "pad", 5, look)
+    force_curves(tmp_path / "b.png", recording, both, parameters, {"pad": 9.81})
     source = tmp_path / "scene.png"
     imsave(source, np.full((480, 640, 3), 0.4))
     for shown in ({"pad": texels}, both, dict.fromkeys((*both, "c", "d"), texels)):
         recording.sensors.update(dict.fromkeys(shown, recording.sensors["pad"]))
-        figures.side_by_side(source, tmp_path / "e.png", recording, shown, 5)
+        side_by_side(source, tmp_path / "e.png", recording, shown, 5)
     assert len(seen) > 20
     assert [entry for entry in seen if entry[1] < 8 or not entry[2]] == []
 
@@ -130,7 +137,7 @@ def test_no_text_is_smaller_than_eight_points_or_leaves_the_figure(tmp_path, mon
 def drawn(tmp_path, monkeypatch, draw):
     """Return the figure that `draw(path)` would have written."""
     kept = []
-    monkeypatch.setattr(canvas, "_write", lambda figure, *_: kept.append(figure))
+    monkeypatch.setattr(figure_style, "_write", lambda figure, *_: kept.append(figure))
     draw(tmp_path / "a.png")
     return kept[0]
 
@@ -138,7 +145,7 @@ def drawn(tmp_path, monkeypatch, draw):
 def test_numbers_are_those_of_the_texels_in_their_places(tmp_path, monkeypatch):
     texels = grid_texels()
     recording = recording_of(texels)
-    figure = drawn(tmp_path, monkeypatch, lambda path: figures.texel_numbers(path, recording, {"pad": texels}, "pad", 5))
+    figure = drawn(tmp_path, monkeypatch, lambda path: texel_numbers(path, recording, {"pad": texels}, "pad", 5))
     words = {tuple(np.round(np.divide(text.get_position(), 4.0) - 0.5).astype(int)): text for text in figure.axes[0].texts}
     force = recording.sensors["pad"].normal_force[4].reshape(ROWS, COLUMNS)
     assert len(words) == ROWS * COLUMNS
@@ -151,8 +158,8 @@ def test_a_colour_bar_in_kilopascals_is_force_over_area(tmp_path, monkeypatch):
     texels = grid_texels()
     recording = recording_of(texels)
     recording.sensors["pad"].normal_force[:] = 0.02
-    look = figures.Look(quantity="pressure", limit=10.0)
-    figure = drawn(tmp_path, monkeypatch, lambda path: figures.tactile_strip(path, recording, {"pad": texels}, [1], look))
+    look = Look(quantity="pressure", limit=10.0)
+    figure = drawn(tmp_path, monkeypatch, lambda path: tactile_strip(path, recording, {"pad": texels}, [1], look))
     image = figure.axes[0].images[0]
     assert image.get_array().data.sum() == pytest.approx((0.02 / texels.area / 1e3).sum())
     assert image.get_array().data[2, 1] == pytest.approx(0.02 / PITCH**2 / 1e3)
@@ -173,7 +180,7 @@ def test_a_closed_sensor_is_shown_from_the_side_that_bears(tmp_path, monkeypatch
     force = np.tile([0.0, 0.0, 0.03], (len(texels), 1)) * loaded[:, None]
     felt.shear[:, :, 0] = np.einsum("ij,ij->i", force, texels.tangent)
     felt.shear[:, :, 1] = np.einsum("ij,ij->i", force, texels.bitangent)
-    figure = drawn(tmp_path, monkeypatch, lambda path: figures.tactile_strip(path, recording, {"pad": texels}, [3]))
+    figure = drawn(tmp_path, monkeypatch, lambda path: tactile_strip(path, recording, {"pad": texels}, [3]))
     axes = figure.axes[0]
     mesh, arrows = axes.collections
     seen = np.unique(mesh._triangulation.triangles)
@@ -188,12 +195,12 @@ def test_slip_is_the_share_of_the_load_on_texels_at_their_limit():
     texels = grid_texels()
     felt = recording_of(texels).sensors["pad"]
     parameters = SensorParameters(mus=0.2, mud=0.2)  # shear is 0.2 of the normal force
-    assert (measures.slip_share(felt, parameters) == 0.0).all()  # nothing moves
+    assert (metrics.slip_share(felt, parameters) == 0.0).all()  # nothing moves
     felt.slip[:, :5] = 0.01
-    share = measures.slip_share(felt, parameters)
+    share = metrics.slip_share(felt, parameters)
     expected = felt.normal_force[:, :5].sum(axis=1)[3] / felt.normal_force.sum(axis=1)[3]
     assert share[3] == pytest.approx(expected) and share[-1] == 0.0
-    assert (measures.slip_share(felt, SensorParameters(mus=0.5, mud=0.5)) == 0.0).all()
+    assert (metrics.slip_share(felt, SensorParameters(mus=0.5, mud=0.5)) == 0.0).all()
 
 
 def test_the_free_moment_does_not_depend_on_the_origin():
@@ -202,19 +209,19 @@ def test_the_free_moment_does_not_depend_on_the_origin():
     place, force, couple = np.array([0.1, -0.2, 0.03]), np.array([1.0, 2.0, -5.0]), np.array([0.0, 0.0, 0.4])
     felt.centre_of_pressure, felt.net_force = np.tile(place, (10, 1)), np.tile(force, (10, 1))
     felt.net_torque = np.tile(np.cross(place, force) + couple, (10, 1))
-    np.testing.assert_allclose(measures.free_moment(felt), np.tile(couple, (10, 1)), atol=1e-15)
+    np.testing.assert_allclose(metrics.free_moment(felt), np.tile(couple, (10, 1)), atol=1e-15)
 
 
 @pytest.mark.parametrize("wrong", [{"colour_map": "JET"}, {"quantity": "torque"}, {"width": "huge"}])
 def test_an_unknown_look_is_refused_with_what_there_is(wrong):
     with pytest.raises(ParameterError, match="choose from"):
-        figures.Look(**wrong)
+        Look(**wrong)
 
 
 def test_a_figure_of_an_unknown_kind_is_refused(tmp_path):
     texels = grid_texels()
     with pytest.raises(ParameterError, match=".png, .pdf or .svg"):
-        figures.tactile_strip(tmp_path / "a.docx", recording_of(texels), {"pad": texels})
+        tactile_strip(tmp_path / "a.docx", recording_of(texels), {"pad": texels})
 
 
 def test_numbers_of_too_many_texels_are_refused(tmp_path):
@@ -223,7 +230,7 @@ def test_numbers_of_too_many_texels_are_refused(tmp_path):
     ball = trimesh.creation.icosphere(4, 0.01)
     texels = texels_from_region(TriangleMesh(ball.vertices, ball.faces), np.ones(len(ball.vertices), bool), "ball")
     with pytest.raises(SensorError, match="export them as CSV"):
-        figures.texel_numbers(tmp_path / "a.png", recording_of(texels), {"pad": texels}, "pad", 1)
+        texel_numbers(tmp_path / "a.png", recording_of(texels), {"pad": texels}, "pad", 1)
 
 
 def test_labels_keep_the_size_of_the_picture(tmp_path):
@@ -232,25 +239,25 @@ def test_labels_keep_the_size_of_the_picture(tmp_path):
     source = tmp_path / "render.png"
     imsave(source, np.full((360, 640, 3), 0.4))
     texels = grid_texels()
-    figures.label_picture(
+    label_picture(
         source,
         tmp_path / "out.png",
         recording_of(texels),
         {"pad": texels},
         6,
-        labels=[figures.Label("Pad\n1 N", (0.1, 0.8), (0.3, 0.5))],
+        labels=[Label("Pad\n1 N", (0.1, 0.8), (0.3, 0.5))],
     )
     out = imread(tmp_path / "out.png")
     assert out.shape[:2] == (360, 640)
     assert (out[:, :, :3] > 0.9).any()  # there are white words on the grey
     with pytest.raises(KeyError):
-        figures.label_picture(source, tmp_path / "out.png", recording_of(texels), {"pad": texels}, 99)
+        label_picture(source, tmp_path / "out.png", recording_of(texels), {"pad": texels}, 99)
 
 
 def test_a_missing_folder_is_one_sentence(tmp_path):
     texels = grid_texels()
     with pytest.raises(FileError, match="nowhere"):
-        figures.tactile_strip(tmp_path / "nowhere" / "a.png", recording_of(texels), {"pad": texels})
+        tactile_strip(tmp_path / "nowhere" / "a.png", recording_of(texels), {"pad": texels})
 
 
 def test_importing_figures_does_not_import_matplotlib():

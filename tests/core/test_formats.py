@@ -20,12 +20,13 @@ import numpy as np
 import OpenEXR
 import pytest
 
-from palpate.core.effects.base import Effect
+from palpate.core.effects.engine.specification import Effect
 from palpate.core.errors import FileError, PalpateError
-from palpate.core.formats import files, openexr
-from palpate.core.formats.archive import load_recording, save_recording
-from palpate.core.formats.exr import CHANNELS, describe, exr_channels, read_exr, write_exr, write_exrs
-from palpate.core.formats.files import (
+from palpate.core.geometry.layout import GridLayout, uv_layout
+from palpate.core.geometry.mesh import TriangleMesh
+from palpate.core.geometry.texels import texels_from_region
+from palpate.core.io import exr_codec, files
+from palpate.core.io.files import (
     Manifest,
     atomic_write,
     folder_names,
@@ -35,11 +36,10 @@ from palpate.core.formats.files import (
     writable_folder,
     write_manifest,
 )
-from palpate.core.layout import GridLayout, uv_layout
-from palpate.core.mesh import TriangleMesh
-from palpate.core.recording import Frame, Recording, SensorFrame, SensorRecording
-from palpate.core.scenario import Painted, Sensor, SensorParameters
-from palpate.core.texels import texels_from_region
+from palpate.core.io.npz import load_recording, save_recording
+from palpate.core.io.tactile_exr import CHANNELS, describe, exr_channels, read_exr, write_exr, write_exrs
+from palpate.core.model.recording import Frame, Recording, SensorFrame, SensorRecording
+from palpate.core.model.scenario import Painted, Sensor, SensorParameters
 
 on_linux = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="looks at Linux's /proc and /dev")
 
@@ -181,7 +181,7 @@ def test_kill_in_the_middle_leaves_the_old_file(tmp_path):
     target.write_text("old")
     program = (
         "import os, signal, sys\n"
-        "from palpate.core.formats.files import atomic_write\n"
+        "from palpate.core.io.files import atomic_write\n"
         "with atomic_write(sys.argv[1]) as temporary:\n"
         "    temporary.write_text('half')\n"
         "    os.kill(os.getpid(), signal.SIGKILL)\n"
@@ -596,7 +596,7 @@ def test_failing_writer_leaves_nothing(tmp_path, monkeypatch):
         Path(paths[0]).write_bytes(b"half")
         raise OSError(errno.ENOSPC, "No space left on device")
 
-    monkeypatch.setattr(openexr, "write_all", half)
+    monkeypatch.setattr(exr_codec, "write_all", half)
     with pytest.raises(FileError) as error:
         write_exr(tmp_path / "a.exr", grid_of(2, 2), tactile_frame(4), METADATA)
     one_sentence(error, tmp_path / "a.exr", "no space left")
@@ -624,7 +624,7 @@ def test_exr_agrees_with_the_library(tmp_path, shape):
     rng = np.random.default_rng(1)
     noise = rng.normal(size=shape).astype(np.float32)
     channels = {"R": noise, "G": np.zeros(shape, np.float32), "depth": np.cumsum(noise, axis=1, dtype=np.float32)}
-    openexr.write(tmp_path / "ours.exr", channels, {"a": "ü", "palpate.x": ""})
+    exr_codec.write(tmp_path / "ours.exr", channels, {"a": "ü", "palpate.x": ""})
     with OpenEXR.File(str(tmp_path / "ours.exr"), separate_channels=True) as file:
         for name, picture in channels.items():
             np.testing.assert_array_equal(file.channels()[name].pixels, picture)
@@ -635,7 +635,7 @@ def test_exr_agrees_with_the_library(tmp_path, shape):
         copies = {name: picture.copy() for name, picture in channels.items()}
         with OpenEXR.File({"compression": compression, "type": OpenEXR.scanlineimage, "b": "text"}, copies) as file:
             file.write(str(tmp_path / "theirs.exr"))
-        found, attributes = openexr.read(tmp_path / "theirs.exr")
+        found, attributes = exr_codec.read(tmp_path / "theirs.exr")
         assert attributes["b"] == "text"
         for name, picture in channels.items():
             assert found[name].dtype == picture.dtype

@@ -9,11 +9,11 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 from solver_scenes import GRAVITY, cube_on_pad, pad
 
-from palpate.core import contact
 from palpate.core.errors import ParameterError
-from palpate.core.scenario import SensorParameters
-from palpate.core.solve import run
-from palpate.core.timestep import advise
+from palpate.core.laws import contact
+from palpate.core.model.scenario import SensorParameters
+from palpate.core.solver.simulation import run
+from palpate.core.solver.time_step_adviser import advise
 
 LAW = {"normal_law": "hunt-crossley", "exponent": 1.5, "dissipation": 0.4, "k": 2e4, "mus": 0.0, "mud": 0.0}
 TEXELS = 16

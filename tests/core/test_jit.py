@@ -13,9 +13,10 @@ import numpy as np
 import pytest
 from solver_scenes import cube_on_pad
 
-from palpate.core import bristles, edition, jit, pairs, sums
-from palpate.core.reference import by_reference
-from palpate.core.solve import Simulation
+from palpate.core.compiled import kernel_fingerprint, kernels
+from palpate.core.compiled.struct_reference import by_reference
+from palpate.core.solver.dynamics import contact_assembly, friction_state, relative_kinematics
+from palpate.core.solver.simulation import Simulation
 
 numba = pytest.importorskip("numba")
 
@@ -32,7 +33,7 @@ class Outer(NamedTuple):
     number: int
 
 
-@jit.kernel
+@kernels.kernel
 def total(outer):
     return outer.kind[0, 1] + outer.inner.values[2] + outer.number
 
@@ -57,13 +58,13 @@ def value():
 """
 
 
-@pytest.mark.skipif(not jit.COMPILED, reason="without numba nothing is kept")
+@pytest.mark.skipif(not kernels.COMPILED, reason="without numba nothing is kept")
 def test_a_kernel_is_compiled_anew_when_one_that_it_calls_has_changed(tmp_path):
     """In another file, which numba's own check does not see. What has not changed comes from the cache."""
     package = tmp_path / "kernels"
     package.mkdir()
     (package / "__init__.py").touch()
-    for module in (jit, edition):
+    for module in (kernels, kernel_fingerprint):
         shutil.copy(module.__file__, package)
     (package / "caller.py").write_text(CALLER)
     answers = []
@@ -81,17 +82,19 @@ def test_a_kernel_is_compiled_anew_when_one_that_it_calls_has_changed(tmp_path):
     assert answers == [["2.0", "0"], ["2.0", "1"], ["6.0", "0"]]
 
 
-@pytest.mark.skipif(not jit.COMPILED or platform.machine() not in ("x86_64", "AMD64"), reason="reads x86 machine code")
+@pytest.mark.skipif(not kernels.COMPILED or platform.machine() not in ("x86_64", "AMD64"), reason="reads x86 machine code")
 @pytest.mark.parametrize("name", ["_sum_contacts", "_bend_bristles"])
 def test_loops_over_contacts_run_in_vector_registers(name):
     """A call or a branch in such a loop changes no number and only makes it five times slower. Its root shows it."""
     simulation = Simulation(cube_on_pad(1.0, frames=1, dt=1e-3))
-    scratch, law = simulation._scratch, pairs.law_of(simulation._world.parameters, 0)
-    compiled = numba.njit(error_model="numpy")(getattr(sums if name == "_sum_contacts" else bristles, name).py_func)
+    scratch, law = simulation._scratch, relative_kinematics.law_of(simulation._world.parameters, 0)
+    compiled = numba.njit(error_model="numpy")(
+        getattr(contact_assembly if name == "_sum_contacts" else friction_state, name).py_func
+    )
     if name == "_sum_contacts":
         compiled(0, 0, 1e-3, law, simulation._world, simulation._state.memory, scratch)
     else:
-        compiled(0, pairs.values(scratch.part[0]), simulation._state, scratch)
+        compiled(0, relative_kinematics.values(scratch.part[0]), simulation._state, scratch)
     (code,) = compiled.inspect_asm().values()
     assert re.search(r"^\s+v?sqrtpd\s", code, re.MULTILINE), "the square root is taken of one number at a time"
 
@@ -106,7 +109,7 @@ def test_tuples_that_kernels_take_by_reference_stay_tuples():
     assert total(outer._replace(number=7, inner=Inner(np.array([0.0, 0.0, 0.5])))) == 27.5
 
 
-@pytest.mark.skipif(not jit.COMPILED, reason="only compiled code takes addresses")
+@pytest.mark.skipif(not kernels.COMPILED, reason="only compiled code takes addresses")
 def test_a_field_may_not_hide_what_a_reference_keeps():
     class Wrong(NamedTuple):
         address: int

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 import trimesh
 
-from palpate.core.layout import GridLayout, UVLayout, grid_layout, maps, raster, uv_layout
-from palpate.core.mesh import checked_mesh
-from palpate.core.texels import texels_from_region
+from palpate.core.geometry.layout import GridLayout, UVLayout, grid_layout, rasterization, texture_maps, uv_layout
+from palpate.core.geometry.mesh import checked_mesh
+from palpate.core.geometry.texels import texels_from_region
 
 DIAGONALS = ("same", "other", "alternating", "diamond", "random")
 
@@ -490,7 +490,7 @@ def test_cells_of_an_atlas_are_filled_as_if_each_were_searched(subdivisions):
     pixel, triangle, weights, inside = layout._pixels
     assert len(np.unique(pixel)) == len(pixel)
     order = np.argsort(pixel)
-    searched = raster.rasterise(corner_pixels(layout), *layout.shape)
+    searched = rasterization.rasterise(corner_pixels(layout), *layout.shape)
     np.testing.assert_array_equal(searched[0], pixel[order])
     np.testing.assert_array_equal(searched[3], inside[order])
     np.testing.assert_array_equal(searched[1][searched[3]], triangle[order][searched[3]])
@@ -502,7 +502,7 @@ def test_many_texels_stay_within_the_largest_picture():
     for repeats in (1, 4):
         position = np.vstack([mesh.vertices + [3 * i, 0, 0] for i in range(repeats)])
         triangles = np.vstack([mesh.faces + i * len(mesh.vertices) for i in range(repeats)])
-        layout = maps._atlas(position, triangles)
+        layout = texture_maps._atlas(position, triangles)
         corners = corner_pixels(layout)
         edges = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
         if len(triangles) <= 69192:

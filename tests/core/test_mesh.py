@@ -7,7 +7,7 @@ import trimesh
 from solver_scenes import box, grid_mesh, shape
 
 from palpate.core.errors import MeshError, ParameterError
-from palpate.core.mesh import (
+from palpate.core.geometry.mesh import (
     checked_mesh,
     edge_defects,
     face_normals,

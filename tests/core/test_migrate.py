@@ -4,7 +4,7 @@
 import pytest
 
 from palpate.core.errors import FileError
-from palpate.core.migrate import STEPS, VERSION, migrate
+from palpate.core.io.settings_migration import STEPS, VERSION, migrate
 
 
 def renamed(settings):

@@ -10,8 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from palpate.core.errors import FileError
-from palpate.core.formats.openrave import OpenRaveSensor, openrave_xml, read_openrave, write_openrave
-from palpate.core.scenario import SensorParameters
+from palpate.core.io.openrave import OpenRaveSensor, openrave_xml, read_openrave, write_openrave
+from palpate.core.model.scenario import SensorParameters
 
 TABLE_2 = """\
 <AttachedSensor>

@@ -8,9 +8,9 @@ import pytest
 from solver_scenes import box, cube_on_pad, pad, pressed
 
 from palpate.core.errors import ParameterError
-from palpate.core.scenario import Painted
-from palpate.core.solve import run
-from palpate.core.timestep import advise
+from palpate.core.model.scenario import Painted
+from palpate.core.solver.simulation import run
+from palpate.core.solver.time_step_adviser import advise
 
 N = len(pad())
 PLATE, DEPTH = box(0.4, 0.4, 0.05), 0.003

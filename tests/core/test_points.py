@@ -9,11 +9,11 @@ import trimesh
 from solver_scenes import GRAVITY, about, box, cube_on_pad, grid_mesh, pad, pressed, shape
 
 from palpate.core.errors import ParameterError
-from palpate.core.layout import GridLayout
-from palpate.core.points import contact_points
-from palpate.core.scenario import SensorParameters
-from palpate.core.solve import run
-from palpate.core.texels import texels_from_region
+from palpate.core.geometry.contact_points import contact_points
+from palpate.core.geometry.layout import GridLayout
+from palpate.core.geometry.texels import texels_from_region
+from palpate.core.model.scenario import SensorParameters
+from palpate.core.solver.simulation import run
 
 
 def test_one_point_is_the_vertex():

@@ -8,12 +8,12 @@ import pytest
 from scipy.linalg import eigvals
 from solver_scenes import cube_on_pad, pressed
 
-from palpate.core.bodies import quaternions_from_vectors, rotation_matrices, rotation_vectors
 from palpate.core.errors import ParameterError
-from palpate.core.motions import poses_at
-from palpate.core.scenario import Motion, SensorParameters
-from palpate.core.solve import run
-from palpate.core.timestep import LONGEST, advise, plan, stability_limit
+from palpate.core.geometry.rotations import quaternions_from_vectors, rotation_matrices, rotation_vectors
+from palpate.core.model.pose_interpolation import poses_at
+from palpate.core.model.scenario import Motion, SensorParameters
+from palpate.core.solver.simulation import run
+from palpate.core.solver.time_step_adviser import LONGEST, advise, plan, stability_limit
 
 NUMBERS = [item.name for item in fields(SensorParameters) if item.type == "float"]
 

@@ -8,9 +8,9 @@ import pytest
 import trimesh
 from solver_scenes import GRAVITY, about, box, cube_on_pad, grid_mesh, pad, pressed, shape
 
-from palpate.core.scenario import Body, Motion, Scenario, Sensor, SensorParameters, Target
-from palpate.core.solve import Simulation, run
-from palpate.core.texels import texels_from_region
+from palpate.core.geometry.texels import texels_from_region
+from palpate.core.model.scenario import Body, Motion, Scenario, Sensor, SensorParameters, Target
+from palpate.core.solver.simulation import Simulation, run
 
 DEPTH = 1e-3
 

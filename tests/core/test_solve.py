@@ -9,10 +9,10 @@ import trimesh
 from scipy.integrate import solve_ivp
 from solver_scenes import GRAVITY, LEVEL, about, box, cube_on_pad, free_body, pad, pressed, shape
 
-from palpate.core.bodies import quaternion_product, rotation_matrices
 from palpate.core.errors import PalpateError
-from palpate.core.scenario import Body, Motion, Sensor, SensorParameters, Target
-from palpate.core.solve import Simulation, run, solve
+from palpate.core.geometry.rotations import quaternion_product, rotation_matrices
+from palpate.core.model.scenario import Body, Motion, Sensor, SensorParameters, Target
+from palpate.core.solver.simulation import Simulation, run, solve
 
 STIFF_FRICTION = {"sigma0": 1e3, "sigma1": 10.0, "x0": 0.01}
 

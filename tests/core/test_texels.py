@@ -7,9 +7,9 @@ import trimesh
 from solver_scenes import grid_mesh, pad, shape
 
 from palpate.core.errors import SensorError
-from palpate.core.layout import GridLayout, UVLayout
-from palpate.core.mesh import TriangleMesh
-from palpate.core.texels import texels_from_region
+from palpate.core.geometry.layout import GridLayout, UVLayout
+from palpate.core.geometry.mesh import TriangleMesh
+from palpate.core.geometry.texels import texels_from_region
 
 
 def test_the_paper_s_example_of_eight_rows_and_six_columns():

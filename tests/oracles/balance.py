@@ -11,9 +11,9 @@ from scipy.integrate import solve_ivp
 from solver_scenes import about, box, cube_on_pad, free_body, pad, shape
 
 from oracles.sweep import moving, stored
-from palpate.core.bodies import quaternion_product, rotation_matrices
-from palpate.core.scenario import Motion, Scenario, Sensor, SensorParameters, Target
-from palpate.core.solve import Simulation, run
+from palpate.core.geometry.rotations import quaternion_product, rotation_matrices
+from palpate.core.model.scenario import Motion, Scenario, Sensor, SensorParameters, Target
+from palpate.core.solver.simulation import Simulation, run
 
 STIFF = {"sigma0": 1e3, "sigma1": 10.0, "x0": 0.01}
 

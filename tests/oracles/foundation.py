@@ -24,9 +24,9 @@ import numpy as np
 import trimesh
 from solver_scenes import about, box, pad, pressed, shape
 
-from palpate.core.mesh import TriangleMesh, checked_mesh
-from palpate.core.scenario import Sensor, SensorParameters
-from palpate.core.solve import run
+from palpate.core.geometry.mesh import TriangleMesh, checked_mesh
+from palpate.core.model.scenario import Sensor, SensorParameters
+from palpate.core.solver.simulation import run
 
 RADIUS, DEPTH, LENGTH = 0.02, 5e-4, 0.012
 """Of the bodies; how deep they are pressed; side of the pad. Metres."""

@@ -8,8 +8,8 @@ from scipy.integrate import dblquad, solve_ivp
 from solver_scenes import GRAVITY, about, box, pad, pressed
 
 from oracles.foundation import punch
-from palpate.core.scenario import Body, Motion, Scenario, Sensor, SensorParameters, Target
-from palpate.core.solve import run
+from palpate.core.model.scenario import Body, Motion, Scenario, Sensor, SensorParameters, Target
+from palpate.core.solver.simulation import run
 
 LUGRE = SensorParameters(k=100.0, cn=0.0, sigma0=400.0, sigma1=0.5, ct=0.05, x0=0.02)
 """A texel whose bristles bend by a tenth of a millimetre before it slides."""

@@ -6,9 +6,9 @@ from __future__ import annotations
 import numpy as np
 from solver_scenes import GRAVITY, cube_on_pad, pad
 
-from palpate.core.bodies import rotation_matrices
-from palpate.core.scenario import Scenario
-from palpate.core.solve import run
+from palpate.core.geometry.rotations import rotation_matrices
+from palpate.core.model.scenario import Scenario
+from palpate.core.solver.simulation import run
 
 GRIDS = {"14x6": (14, 6), "32x32": (32, 32), "100x100": (100, 100)}
 SIDE = 0.0442

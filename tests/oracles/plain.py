@@ -16,8 +16,8 @@ import trimesh
 from solver_scenes import about, cube_on_pad, pad, pressed, shape
 
 from oracles.balance import STIFF, collision, tumbling
-from palpate.core.scenario import Scenario
-from palpate.core.solve import Simulation, run
+from palpate.core.model.scenario import Scenario
+from palpate.core.solver.simulation import Simulation, run
 
 KEYS = ("normal_force", "shear", "depth", "slip", "net_force", "net_torque", "centre_of_pressure")
 
@@ -70,9 +70,9 @@ def without_numba() -> tuple[dict[str, np.ndarray], float]:
 
 def write(path: str) -> None:
     """What the other process does."""
-    from palpate.core import jit
+    from palpate.core.compiled import kernels
 
-    if jit.COMPILED:
+    if kernels.COMPILED:
         raise RuntimeError("this was to run without numba")
     np.savez(path, step_time=step_time(), **{name: numbers(scene) for name, scene in scenes().items()})
 

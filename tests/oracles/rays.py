@@ -13,9 +13,9 @@ import numpy as np
 import trimesh
 from solver_scenes import shape
 
-from palpate.core import bvh
-from palpate.core.jit import kernel
-from palpate.core.mesh import TriangleMesh, face_normals
+from palpate.core.compiled.kernels import kernel
+from palpate.core.geometry import bvh
+from palpate.core.geometry.mesh import TriangleMesh, face_normals
 
 NONE = 2.0
 

@@ -9,9 +9,9 @@ import numpy as np
 import trimesh
 from solver_scenes import GRAVITY, box, free_body, pad, shape
 
-from palpate.core.bodies import rotation_matrices
-from palpate.core.scenario import Body, Motion, Scenario, Sensor, SensorParameters, Target
-from palpate.core.solve import Simulation
+from palpate.core.geometry.rotations import rotation_matrices
+from palpate.core.model.scenario import Body, Motion, Scenario, Sensor, SensorParameters, Target
+from palpate.core.solver.simulation import Simulation
 
 
 def logarithmic(rng, low, high):

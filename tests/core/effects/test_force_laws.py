@@ -6,9 +6,9 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.special import erf
 
-from palpate.core.effects.bound import forces, friction
-from palpate.core.effects.library import effect, placed
-from palpate.core.scenario import SensorParameters
+from palpate.core.effects.engine.binding import forces, friction
+from palpate.core.effects.engine.registry import effect, placed
+from palpate.core.model.scenario import SensorParameters
 
 K = 1000.0
 SPRING = SensorParameters(k=K, cn=0.0)

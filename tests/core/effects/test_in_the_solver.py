@@ -8,11 +8,11 @@ import pytest
 from solver_scenes import box, cube_on_pad, pressed, shape
 from trimesh.creation import icosphere
 
-from palpate.core.effects.bound import forces
-from palpate.core.effects.library import effect, library
-from palpate.core.respond import respond
-from palpate.core.scenario import Painted, SensorParameters
-from palpate.core.solve import Simulation, run
+from palpate.core.effects.engine.binding import forces
+from palpate.core.effects.engine.registry import effect, library
+from palpate.core.model.scenario import Painted, SensorParameters
+from palpate.core.response.readings import respond
+from palpate.core.solver.simulation import Simulation, run
 
 
 def with_effects(scenario, *effects):

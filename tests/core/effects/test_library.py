@@ -6,12 +6,12 @@ import dataclasses
 import numpy as np
 import pytest
 
-from palpate.core.effects import base
-from palpate.core.effects.base import Effect, Site
-from palpate.core.effects.bound import Pad, Reader, forces, friction, readings
-from palpate.core.effects.library import check, effect, form_of, from_dict, kind_of, library, placed, to_dict
+from palpate.core.effects.engine import specification
+from palpate.core.effects.engine.binding import Pad, Reader, forces, friction, readings
+from palpate.core.effects.engine.registry import check, effect, form_of, from_dict, kind_of, library, placed, to_dict
+from palpate.core.effects.engine.specification import Effect, Site
 from palpate.core.errors import EffectError
-from palpate.core.scenario import SensorParameters
+from palpate.core.model.scenario import SensorParameters
 
 FORMS = [(kind.name, form.name) for kind in library().values() for form in kind.forms]
 every_form = pytest.mark.parametrize(("name", "form"), FORMS, ids=["-".join(names) for names in FORMS])
@@ -53,7 +53,7 @@ def noticeable(form) -> dict[str, float]:
 @every_form
 def test_a_form_says_what_it_is(name, form):
     kind, found = kind_of(name), form_of(name, form)
-    assert kind.stage_of(found) in base.STAGES
+    assert kind.stage_of(found) in specification.STAGES
     assert kind.text.endswith(".") and found.formula and found.reference
     ways = [found.law, found.shape, found.mix, found.delay, found.friction, found.place]
     assert getattr(found, found.way) is not None

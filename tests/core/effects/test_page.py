@@ -3,7 +3,7 @@
 
 import effects_page
 
-from palpate.core.effects.library import library
+from palpate.core.effects.engine.registry import library
 
 
 def test_the_page_is_that_of_this_library():

@@ -5,11 +5,11 @@ import numpy as np
 import pytest
 from scipy.signal import TransferFunction, lsim
 
-from palpate.core.effects import chance
-from palpate.core.effects.base import Site
-from palpate.core.effects.bound import Reader, readings
-from palpate.core.effects.library import effect
-from palpate.core.effects.mixing import mixing, nearest_distance, pairs_within
+from palpate.core.effects.engine import random_numbers
+from palpate.core.effects.engine.binding import Reader, readings
+from palpate.core.effects.engine.mixing import mixing, nearest_distance, pairs_within
+from palpate.core.effects.engine.registry import effect
+from palpate.core.effects.engine.specification import Site
 from palpate.core.errors import EffectError
 
 ROWS, COLUMNS, PITCH = 14, 6, 0.0034
@@ -213,7 +213,7 @@ def test_the_near_part_of_a_matrix_does_what_the_whole_does(monkeypatch):
     position, area, signal = random.uniform(0, 0.05, (N, 3)), random.uniform(1, 2, N), random.random((4, N))
     for areas in (area, None):
         whole = mixing(position, weight, reach, areas)
-        monkeypatch.setattr("palpate.core.effects.mixing.WHOLE", 0)
+        monkeypatch.setattr("palpate.core.effects.engine.mixing.WHOLE", 0)
         near = mixing(position, weight, reach, areas)
         monkeypatch.undo()
         assert near.matrix is None
@@ -305,7 +305,7 @@ def test_any_moment_can_be_asked_for_by_itself(name, form):
 
 
 def test_uniform_numbers_fill_their_interval():
-    numbers = chance.uniform("test", 1, np.arange(100_000))
+    numbers = random_numbers.uniform("test", 1, np.arange(100_000))
     counts, _ = np.histogram(numbers, 100, (0, 1))
     assert ((counts - 1000) ** 2 / 1000).sum() < 150  # chi-squared with 99 degrees of freedom: 1 in 1,000 is above 149
     assert numbers.min() > 0 and numbers.max() < 1

@@ -5,13 +5,13 @@ import gap_cases as cases
 import numpy as np
 import pytest
 
-from palpate.core.effects.library import effect
-from palpate.core.gap.admissible import admissible
-from palpate.core.gap.candidates import Candidate, scales_of
-from palpate.core.gap.diagnose import begin
-from palpate.core.gap.fit import base_numbers, fit
-from palpate.core.gap.model import Model
-from palpate.core.gap.search import Found, views_of
+from palpate.core.effects.engine.registry import effect
+from palpate.core.gap.fitting.least_squares import base_numbers, fit
+from palpate.core.gap.forward.predictor import Model
+from palpate.core.gap.selection.candidates import Candidate, scales_of
+from palpate.core.gap.selection.diagnosis import begin
+from palpate.core.gap.selection.plausibility import admissible
+from palpate.core.gap.selection.screening import Found, views_of
 
 SPREAD = 0.02 * np.random.default_rng(1).normal(size=cases.ROWS * cases.COLUMNS)
 """N, of each texel."""
@@ -21,7 +21,7 @@ def offset_each(rig):
     """An offset for each texel, fitted on top of the base model."""
     predictors, noise, full = begin(rig)
     views, none = views_of(predictors, (noise[0].deviation, 1.0)), tuple([0.0] * len(SPREAD))
-    from palpate.core.effects.library import form_of, kind_of
+    from palpate.core.effects.engine.registry import form_of, kind_of
 
     candidate = Candidate(kind_of("offset"), form_of("offset", "listed"))
     free = base_numbers(rig.parameters, ("k", "cn"), full[0])

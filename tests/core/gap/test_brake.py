@@ -5,13 +5,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from palpate.core.gap import report
-from palpate.core.gap.compare import nrmse, without_friction
-from palpate.core.gap.diagnose import diagnose
-from palpate.core.gap.model import Model, Predictor
-from palpate.core.gap.phases import WAYS, features
-from palpate.core.gap.rig import Rig, Trial, grid_texels
-from palpate.core.scenario import SensorParameters
+from palpate.core.gap.dataset.rig import Rig, Trial, grid_texels
+from palpate.core.gap.forward.contact_phases import WAYS, features
+from palpate.core.gap.forward.predictor import Model, Predictor
+from palpate.core.gap.report.summary import summary
+from palpate.core.gap.report.summary.comparison import nrmse, without_friction
+from palpate.core.gap.selection.diagnosis import diagnose
+from palpate.core.model.scenario import SensorParameters
 
 PARAMETERS = SensorParameters(k=1e4, cn=0.0, sigma0=5e3, sigma1=1.0, mus=0.6, mud=0.5, x0=0.02, ct=0.0)
 
@@ -37,12 +37,12 @@ def test_the_report_says_what_friction_does_and_what_is_left(tmp_path):
     *_, result = diagnose(brake(backlash=2.0))
     bare, own = without_friction(result), nrmse(result.of("fit"), result.base.model, result.full)
     assert bare["fit"] > 3.0 * own and bare["check"] > 3.0 * nrmse(result.of("check"), result.base.model, result.full)
-    assert not any(named.confidence >= report.SURE for named in result.named)
+    assert not any(named.confidence >= summary.SURE for named in result.named)
     assert result.structure.strongest == "turning"
-    said = report.headline(result)
+    said = summary.headline(result)
     assert "slid since it last turned" in said and "Friction is not missing" in said
-    assert report.summary(result)["base"]["gap_without_friction"] == bare
-    *_, _ = report.write(result, tmp_path)
+    assert summary.summary(result)["base"]["gap_without_friction"] == bare
+    *_, _ = summary.write(result, tmp_path)
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert "1 texel, 1 trial fitted" in page and "base without its friction" in page and "base model, refitted" in page
     assert "not told by these recordings" in page  # friction and stiffness are known as a product alone

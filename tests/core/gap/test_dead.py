@@ -5,12 +5,12 @@ import gap_cases as cases
 import numpy as np
 import pytest
 
-from palpate.core.effects.library import form_of, kind_of
-from palpate.core.gap.candidates import Candidate
-from palpate.core.gap.diagnose import begin
-from palpate.core.gap.model import Model
-from palpate.core.gap.readoff import dead
-from palpate.core.gap.search import views_of
+from palpate.core.effects.engine.registry import form_of, kind_of
+from palpate.core.gap.forward.predictor import Model
+from palpate.core.gap.selection.candidates import Candidate
+from palpate.core.gap.selection.diagnosis import begin
+from palpate.core.gap.selection.direct_estimates import dead
+from palpate.core.gap.selection.screening import views_of
 
 GONE, TOUCH = [5, 9, 14], 0.004
 

@@ -4,17 +4,17 @@
 import numpy as np
 import pytest
 
-from palpate.core.effects.library import effect, form_of, kind_of
-from palpate.core.gap.candidates import Candidate
-from palpate.core.gap.diagnose import free_friction
-from palpate.core.gap.doubt import is_doubtful, least_share, may_be_bent
-from palpate.core.gap.explain import FORCES, READINGS, Account, Gain, Ground, Step, friction_kinds
-from palpate.core.gap.fit import LEVEL, base_numbers, changed
-from palpate.core.gap.model import Model
-from palpate.core.gap.readoff import few_levels, growing
-from palpate.core.gap.rig import Rig, grid_texels
-from palpate.core.gap.search import Views
-from palpate.core.scenario import SensorParameters
+from palpate.core.effects.engine.registry import effect, form_of, kind_of
+from palpate.core.gap.dataset.rig import Rig, grid_texels
+from palpate.core.gap.fitting.least_squares import LEVEL, base_numbers, changed
+from palpate.core.gap.forward.predictor import Model
+from palpate.core.gap.selection.candidates import Candidate
+from palpate.core.gap.selection.confidence import is_doubtful, least_share, may_be_bent
+from palpate.core.gap.selection.diagnosis import free_friction
+from palpate.core.gap.selection.direct_estimates import few_levels, growing
+from palpate.core.gap.selection.forward_selection import FORCES, READINGS, Account, Gain, Ground, Step, friction_kinds
+from palpate.core.gap.selection.screening import Views
+from palpate.core.model.scenario import SensorParameters
 
 WITH_FORCES, READ_ALONE = (Ground(np.full(2, 9.0), np.ones(2), np.array([900.0, count])) for count in (300.0, 0.0))
 

@@ -10,9 +10,9 @@ import pytest
 
 from palpate.benchmarks import gap
 from palpate.benchmarks._hidden import cases, other, own, world
-from palpate.core.effects.library import library
-from palpate.core.gap.model import Model, Predictor
-from palpate.core.gap.rig import read_rig
+from palpate.core.effects.engine.registry import library
+from palpate.core.gap.dataset.rig import read_rig
+from palpate.core.gap.forward.predictor import Model, Predictor
 
 HIDDEN = Path(cases.__file__).parent
 

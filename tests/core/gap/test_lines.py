@@ -5,10 +5,10 @@ import gap_cases as cases
 import numpy as np
 import pytest
 
-from palpate.core.gap.diagnose import diagnose
-from palpate.core.gap.fit import Share
-from palpate.core.gap.lines import line_of
-from palpate.core.gap.model import Model, Predictor
+from palpate.core.gap.fitting.least_squares import Share
+from palpate.core.gap.fitting.spectral_lines import line_of
+from palpate.core.gap.forward.predictor import Model, Predictor
+from palpate.core.gap.selection.diagnosis import diagnose
 
 
 def line_in(rig, deviation):

@@ -7,8 +7,8 @@ import trimesh
 
 from palpate.benchmarks._recordings import Recording
 from palpate.core.errors import PalpateError
-from palpate.core.gap import tables
-from palpate.core.gap.rig import read_rig
+from palpate.core.gap.dataset import csv_columns
+from palpate.core.gap.dataset.rig import read_rig
 
 TEXELS = 6
 RIG = """
@@ -211,7 +211,7 @@ def test_a_missing_rig_and_missing_stimulus_values(tmp_path):
 def test_columns_without_meaning_are_said(tmp_path):
     rig = read_rig(write(tmp_path, press=table(names=("x", "y", "z", "temperature"))))
     assert any("temperature" in warning for warning in rig.warnings)
-    assert tables.LARGEST < 10**9
+    assert csv_columns.LARGEST < 10**9
 
 
 def test_recordings_become_rigs_with_empty_cells_where_nothing_was_measured(tmp_path):

@@ -4,10 +4,10 @@
 import numpy as np
 import sample_rig
 
-from palpate.core.gap.diagnose import diagnose
-from palpate.core.gap.intervals import numbers
-from palpate.core.gap.report import summary
-from palpate.core.gap.rig import read_rig
+from palpate.core.gap.dataset.rig import read_rig
+from palpate.core.gap.fitting.intervals import numbers
+from palpate.core.gap.report.summary.summary import summary
+from palpate.core.gap.selection.diagnosis import diagnose
 
 
 def test_the_sample_rig_is_what_its_script_writes(tmp_path):

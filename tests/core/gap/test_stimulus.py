@@ -8,12 +8,12 @@ import pytest
 import trimesh
 
 from palpate.core.errors import PalpateError
-from palpate.core.gap.model import Predictor
-from palpate.core.gap.noise import coverage
-from palpate.core.gap.rig import Indenter, Rig, Trial, grid_texels
-from palpate.core.gap.stimulus import stimulus_of
-from palpate.core.mesh import checked_mesh
-from palpate.core.scenario import SensorParameters
+from palpate.core.gap.dataset.rig import Indenter, Rig, Trial, grid_texels
+from palpate.core.gap.fitting.noise_floor import coverage
+from palpate.core.gap.forward.predictor import Predictor
+from palpate.core.gap.forward.stimulus import stimulus_of
+from palpate.core.geometry.mesh import checked_mesh
+from palpate.core.model.scenario import SensorParameters
 
 RADIUS = 0.008
 

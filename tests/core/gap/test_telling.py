@@ -6,13 +6,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from palpate.core.effects.library import effect
-from palpate.core.gap.candidates import candidates
-from palpate.core.gap.model import Model, Predictor
-from palpate.core.gap.noise import coverage
-from palpate.core.gap.phases import PHASES, phases
-from palpate.core.gap.rig import Rig, Trial, grid_texels
-from palpate.core.gap.telling import (
+from palpate.core.effects.engine.registry import effect
+from palpate.core.gap.dataset.rig import Rig, Trial, grid_texels
+from palpate.core.gap.fitting.noise_floor import coverage
+from palpate.core.gap.forward.contact_phases import PHASES, phases
+from palpate.core.gap.forward.predictor import Model, Predictor
+from palpate.core.gap.selection.candidates import candidates
+from palpate.core.gap.selection.identifiability import (
     BY_CYCLE,
     BY_PLACE,
     BY_TIME,
@@ -24,7 +24,7 @@ from palpate.core.gap.telling import (
     nearly_alike,
     untold,
 )
-from palpate.core.scenario import SensorParameters
+from palpate.core.model.scenario import SensorParameters
 
 PROGRAMMES = {
     "ramp": ([0, 1], [0, 1]),

@@ -12,17 +12,17 @@ import pytest
 from scipy.optimize import least_squares
 from scipy.signal import lfilter
 
-from palpate.core.effects.library import effect
-from palpate.core.formats.sensor_toml import read_sensor
-from palpate.core.gap import report
-from palpate.core.gap.amend import next_experiment
-from palpate.core.gap.compare import nrmse
-from palpate.core.gap.diagnose import Diagnosis, diagnose
-from palpate.core.gap.fit import Free, Share, base_numbers, fit, held_out
-from palpate.core.gap.intervals import numbers
-from palpate.core.gap.model import Model, Predictor
-from palpate.core.gap.noise import reading_noise
-from palpate.core.gap.structure import structure_of
+from palpate.core.effects.engine.registry import effect
+from palpate.core.gap.fitting.intervals import numbers
+from palpate.core.gap.fitting.least_squares import Free, Share, base_numbers, fit, held_out
+from palpate.core.gap.fitting.noise_floor import reading_noise
+from palpate.core.gap.fitting.residual_tests import structure_of
+from palpate.core.gap.forward.predictor import Model, Predictor
+from palpate.core.gap.report.summary import summary
+from palpate.core.gap.report.summary.amended_sensor import next_experiment
+from palpate.core.gap.report.summary.comparison import nrmse
+from palpate.core.gap.selection.diagnosis import Diagnosis, diagnose
+from palpate.core.io.sensor_toml import read_sensor
 
 
 def diagnosed(rig):
@@ -113,7 +113,7 @@ def test_creep_is_named_and_the_gap_closes(tmp_path):
     result = diagnosed(cases.rig(contact=cases.relaxing(), seed=7))
     assert [named.name for named in result.named] == ["creep"]
     assert result.verdict == "explained" and result.named[0].confidence > 0.6
-    for _ in report.write(result, tmp_path):
+    for _ in summary.write(result, tmp_path):
         pass
     found = json.loads((tmp_path / "gap.json").read_text())
     assert found["format"] == "palpate-gap/1" and found["found"][0]["effect"] == "creep"

@@ -8,11 +8,11 @@ import pytest
 import trimesh
 
 from palpate.core.errors import SensorError
-from palpate.core.mesh import TriangleMesh, checked_mesh, edge_defects, triangle_areas
-from palpate.core.surface.array import fill, middle_of, pad, wrap
-from palpate.core.surface.noise import refined, scatter
-from palpate.core.surface.walk import Surface, nearest_point
-from palpate.core.texels import texels_from_region
+from palpate.core.geometry.mesh import TriangleMesh, checked_mesh, edge_defects, triangle_areas
+from palpate.core.geometry.sampling.poisson_disk import refined, scatter
+from palpate.core.geometry.sampling.surface_walk import Surface, nearest_point
+from palpate.core.geometry.sampling.texel_arrays import fill, middle_of, pad, wrap
+from palpate.core.geometry.texels import texels_from_region
 
 PITCH = (0.0034, 0.0034)
 

@@ -12,7 +12,7 @@ import press
 
 
 def preparing():
-    return importlib.import_module("bl_ext.user_default.palpate.addon.preparing")
+    return importlib.import_module("bl_ext.user_default.palpate.addon.session.first_use")
 
 
 def hold(what):

@@ -5,7 +5,7 @@ import importlib
 
 
 def is_ready():
-    return importlib.import_module("bl_ext.user_default.palpate.addon.preparing").is_ready()
+    return importlib.import_module("bl_ext.user_default.palpate.addon.session.first_use").is_ready()
 
 
 def wait(ui):

@@ -1,0 +1,107 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A sensor's parameters between an object and the files of other programs; which formats there are is told in core/formats."""
+
+from __future__ import annotations
+
+import numpy as np
+from bpy_extras.object_utils import object_data_add
+
+from ...core.errors import SceneError
+from ...core.geometry.layout import GridLayout
+from ...core.model.scenario import SensorParameters
+from ..properties import effect_stack, properties
+from ..scene import scene_reader
+from . import laid_sensors, sensors
+
+
+def parameters(obj) -> SensorParameters:
+    """Return the parameters of an object's panel."""
+    return scene_reader.parameters(obj.palpate)
+
+
+def put_parameters(obj, values: SensorParameters) -> None:
+    """Write parameters into an object's panel.
+
+    Raises
+    ------
+    SceneError
+        The object is linked from another file, or is no sensor and no pad.
+    ParameterError
+        A value means nothing. Nothing was changed then.
+    """
+    if obj.library is not None:
+        raise SceneError(f"'{obj.name}' is linked from '{obj.library.filepath}': change it there, or make it local first.")
+    if obj.palpate.role not in {"SENSOR", "PAD"}:
+        raise SceneError(f"'{obj.name}' is no sensor: make it one with Physics › Palpate › Make Sensor first.")
+    values.check(obj.name)
+    for key in properties.PARAMETERS:
+        value = getattr(values, key)
+        setattr(obj.palpate, key, str(value) if key == "points_per_texel" else value)
+
+
+def save_toml(context, obj, path) -> None:
+    """Write a sensor as TOML: parameters, effects and, where its texels are a flat grid, that.
+
+    Raises
+    ------
+    PalpateError
+        The file cannot be written, or a value means nothing.
+    """
+    from ...core.io.sensor_toml import SensorModel, write_sensor
+
+    values = parameters(obj)
+    values.check(obj.name)
+    write_sensor(path, SensorModel(obj.name, values, effect_stack.stack(obj), _grid_words(context, obj)))
+
+
+def load_toml(context, path) -> tuple:
+    """Put a sensor's file on the active sensor; with none active, on a new pad of its grid.
+
+    Returns
+    -------
+    obj : Object
+    effects : int
+        How many it has now.
+
+    Raises
+    ------
+    PalpateError
+        The file is something else, or there is neither an active sensor nor a grid. Nothing was changed then.
+    """
+    from ...core.io.sensor_toml import read_sensor
+
+    model = read_sensor(path)
+    obj = context.object
+    if obj is None or obj.palpate.role not in {"SENSOR", "PAD"}:
+        obj = _new_pad(context, model)
+    put_parameters(obj, model.parameters)
+    effect_stack.put_stack(obj, model.effects)
+    return obj, len(model.effects)
+
+
+def _new_pad(context, model):
+    grid = model.shape.get("grid")
+    if grid is None:
+        raise SceneError(f"'{model.name}' has no grid to make a pad of: make the sensor that gets it active first.")
+    mesh = laid_sensors.new_pad(context, grid["rows"], grid["columns"], tuple(grid["pitch"]), 0.0)
+    obj = object_data_add(context, mesh, name=model.name)
+    sensors.make_sensor(obj, "MESH")
+    return obj
+
+
+def _grid_words(context, obj) -> dict:
+    """Return ``{"grid": …}`` for texels in rows and columns of one pitch on a plane, else nothing."""
+    texels = scene_reader.sensor_alone(context.scene, obj, scene_reader.depsgraph_of(context.scene))[0].texels
+    layout = texels.layout
+    if not isinstance(layout, GridLayout):
+        return {}
+    table = np.empty((layout.rows, layout.columns, 3))
+    table[layout.row, layout.column] = texels.position
+    across = (table[0, -1] - table[0, 0]) / (layout.columns - 1)
+    along = (table[-1, 0] - table[0, 0]) / (layout.rows - 1)
+    steps = np.arange(layout.columns)[None, :, None] * across + np.arange(layout.rows)[:, None, None] * along
+    pitch = [float(np.linalg.norm(across)), float(np.linalg.norm(along))]
+    same = np.abs(table - table[0, 0] - steps).max() < 1e-3 * min(pitch)
+    if not same or abs(across @ along) > 1e-3 * pitch[0] * pitch[1]:
+        return {}
+    return {"grid": {"rows": layout.rows, "columns": layout.columns, "pitch": [float(f"{p:.6g}") for p in pitch]}}

@@ -1,0 +1,117 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Something to press a new sensor with: a ball, a box or a rod that comes, presses, holds and goes, keyframed."""
+
+from __future__ import annotations
+
+import math
+
+import bmesh
+import bpy
+import numpy as np
+from mathutils import Matrix, Vector
+from mathutils.bvhtree import BVHTree
+
+from ...core.errors import SensorError
+from ..session import transforms
+from . import sensor_report
+
+APPROACH, PRESS, HOLD = 0.04, 0.2, 0.75
+"""Shares of the frame range at which it arrives, is deepest, and leaves again."""
+SIDES = 64
+
+
+def add(context, obj, shape: str, size: float, depth: float):
+    """Add a target that presses on the middle of a sensor along its normal.
+
+    Parameters
+    ----------
+    shape : {"BALL", "BOX", "ROD"}
+    size : float, metres
+        Radius; half the side of a box. 0: a third of the sensor's extent.
+    depth : float, metres
+        Of the deepest point, from where it first touches. 0: a quarter of the maximum penetration.
+
+    Returns
+    -------
+    Object
+
+    Raises
+    ------
+    SensorError
+        The sensor has no texels.
+    """
+    report = sensor_report.now(obj, context.scene)
+    if report.texels is None:
+        raise SensorError(report.problems[0].text)
+    texels, unit = report.texels, report.metres
+    extent = float(np.ptp(texels.position, axis=0).max())
+    size, depth = size or extent / 3, depth or report.reach / 4
+    weights = texels.area / texels.area.sum()
+    mean = weights @ texels.normal
+    mean = mean / np.linalg.norm(mean) if np.linalg.norm(mean) > 0.1 else texels.normal[0]
+    flat = np.eye(3) - np.outer(mean, mean)
+    across = np.linalg.norm((texels.position - weights @ texels.position) @ flat, axis=1)
+    facing = texels.normal @ mean > 0.5 * (texels.normal @ mean).max()  # not those on the back of a closed sensor
+    foot = texels.position[np.argmin(np.where(facing, across, np.inf))]
+    location, quaternion, _ = transforms.split(transforms.array(obj.matrix_world))
+    rotation = transforms.rotation(quaternion)
+    normal, ground = rotation @ mean, location + rotation @ foot / unit
+    probe = bpy.data.objects.new("Probe", _mesh(shape, size / unit))
+    _home(context.scene, obj).objects.link(probe)
+    turn = Vector(normal).to_track_quat("Z", "Y")
+    probe.rotation_euler = turn.to_euler()
+    around = (texels.position - foot) / unit @ rotation.T @ transforms.array(turn.to_matrix())
+    ground = ground + _meeting(probe.data, around, size / unit) * normal
+    _animate(context.scene, probe, ground, normal, size / unit, depth / unit)
+    probe.display_type = "WIRE"  # the texels under it are what one wants to see
+    probe.palpate.role = "TARGET"
+    return probe
+
+
+def _home(scene, obj):
+    """The collection that the sensor is in: the probe is shown, and bakes, where the sensor does."""
+    return next((found for found in obj.users_collection if found.is_editable), scene.collection)
+
+
+def _meeting(mesh, points: np.ndarray, size: float) -> float:
+    """How much higher than `size` above the foot the probe's middle is when it first touches one of the texels.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        Of the probe, which comes down along its own z.
+    points : (n, 3) float
+        Texels relative to the foot, along the probe's axes.
+    """
+    tree = BVHTree.FromPolygons([vertex.co for vertex in mesh.vertices], [face.vertices for face in mesh.polygons])
+    under = Vector((0.0, 0.0, -10.0 * size))
+    heights = [0.0]  # above the foot itself
+    for x, y, z in points:
+        place = tree.ray_cast(under + Vector((x, y, 0.0)), Vector((0.0, 0.0, 1.0)))[0]
+        if place is not None:
+            heights.append(z - place.z - size)
+    return max(heights)
+
+
+def _animate(scene, probe, ground: np.ndarray, normal: np.ndarray, size: float, depth: float) -> None:
+    first, length = scene.frame_start, scene.frame_end - scene.frame_start
+    clear = max(2.0 * depth, 0.2 * size)
+    for share, height in ((0.0, clear), (APPROACH, 0.1 * depth), (PRESS, -depth), (HOLD, -depth), (1.0, clear)):
+        probe.location = ground + (size + height) * normal
+        probe.keyframe_insert("location", frame=round(first + share * length))
+
+
+def _mesh(shape: str, size: float):
+    mesh, data = bmesh.new(), bpy.data.meshes.new("Probe")
+    if shape == "BOX":
+        bmesh.ops.create_cube(mesh, size=2 * size)
+    elif shape == "ROD":
+        bmesh.ops.create_cone(mesh, cap_ends=True, segments=SIDES, radius1=size, radius2=size, depth=4 * size)
+        bmesh.ops.rotate(mesh, verts=mesh.verts, matrix=Matrix.Rotation(math.pi / 2, 3, "X"))
+    else:
+        bmesh.ops.create_uvsphere(mesh, u_segments=SIDES, v_segments=SIDES // 2, radius=size)
+        for face in mesh.faces:
+            face.smooth = True
+    mesh.to_mesh(data)
+    mesh.free()
+    return data

@@ -1,0 +1,313 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What is wrong with a sensor as it stands, texel by texel, and how each fault is put right."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import bmesh
+import bpy
+import numpy as np
+from mathutils import Vector
+from mathutils.bvhtree import BVHTree
+
+from ...core.errors import ImageError, PaintedError, PalpateError, RegionError, SensorError
+from ...core.geometry.mesh import TriangleMesh, edge_defects, is_closed
+from ...core.geometry.texels import Texels
+from ..scene import meshes
+from . import laid_sensors, surface_binding
+
+TOO_NEAR = 0.1
+"""Texels nearer than this share of the usual distance count as one upon another."""
+AHEAD = 0.02
+"""Share of the usual distance from texel to texel by which a point in front of a texel is looked at."""
+MARGIN = 0.9
+"""Share of the thickness that the maximum penetration is shortened to."""
+
+
+@dataclass(frozen=True)
+class Problem:
+    """One kind of fault.
+
+    Attributes
+    ----------
+    kind : str
+        A key of :data:`FIXES`, where there is a button for it.
+    text : str
+        One sentence: what and where.
+    texels : (k,) int
+        Which texels it concerns; empty when it is the whole sensor.
+    """
+
+    kind: str
+    text: str
+    texels: np.ndarray = field(default_factory=lambda: np.zeros(0, int))
+
+
+def of_texels(obj, mesh: TriangleMesh, texels: Texels, reach: float, around: TriangleMesh | None = None) -> list[Problem]:
+    """Return what is wrong with the texels of a sensor.
+
+    Parameters
+    ----------
+    mesh : TriangleMesh
+        The sensor's mesh in the frame of the texels.
+    reach : float, metres
+        Maximum penetration.
+    around : TriangleMesh, optional
+        What a skin lies on, in the same frame.
+    """
+    found = []
+    mixed = edge_defects(mesh.triangles)[2]
+    if mixed:
+        found.append(Problem("NORMALS", f"{mixed} edges of '{obj.name}' join faces that point to opposite sides."))
+    spacing = _spacing(texels)
+    body = around if around is not None and is_closed(around.triangles) else mesh
+    # A skin stands on or above the surface; texels of the object's own mesh are corners of it.
+    inside = _inside(body, texels, AHEAD * spacing) if is_closed(body.triangles) and not mixed else np.zeros(len(texels), bool)
+    if inside.sum() > 0.5 * len(texels):
+        text = f"The texels of '{obj.name}' face inwards: its normals are flipped, nothing from outside is felt."
+        found.append(Problem("FLIPPED", text, np.flatnonzero(inside)))
+    elif inside.any():
+        text = f"{inside.sum()} texels of '{obj.name}' lie inside the object and never touch anything."
+        found.append(Problem("INSIDE", text, np.flatnonzero(inside)))
+    near = _too_near(texels, spacing)
+    if len(near):
+        found.append(Problem("OVERLAP", f"{len(near)} texels of '{obj.name}' lie upon another and feel the same twice.", near))
+    if not inside.any() and not mixed:
+        thickness = _thickness(body, texels, AHEAD * spacing)
+        thin = np.flatnonzero(thickness < reach)
+        if len(thin):
+            text = (
+                f"{len(thin)} texels of '{obj.name}' reach through it: the maximum penetration ({reach * 1e3:.3g} mm) is more "
+                f"than its thickness there ({thickness.min() * 1e3:.3g} mm), what touches its back would be felt in front."
+            )
+            found.append(Problem("THROUGH", text, thin))
+    return found
+
+
+def of_object(obj, notes: list[str]) -> list[Problem]:
+    """Return what is wrong with a sensor as an object; `notes` come from :func:`.meshes.sensor_arrays`."""
+    found = [Problem("MODIFIER", note) for note in notes]
+    if laid_sensors.is_skin(obj):
+        if obj.parent is None:
+            found.append(Problem("ORPHAN", f"'{obj.name}' has lost its parent: it stays where it is and moves with nothing."))
+        elif laid_sensors.is_outdated(obj):
+            found.append(
+                Problem("OUTDATED", f"The surface of '{obj.parent.name}' has changed since '{obj.name}' was laid on it.")
+            )
+        elif surface_binding.is_needed(obj.parent) and not surface_binding.clings(obj):
+            found.append(Problem("STILL", f"'{obj.parent.name}' may change its shape, and the texels of '{obj.name}' stay."))
+    made = obj.palpate.made_vertices
+    if obj.palpate.region == "MESH" and made and made != len(obj.data.vertices):
+        found.append(
+            Problem(
+                "GROWN",
+                f"'{obj.name}' had {made} vertices when its whole mesh became a sensor and has {len(obj.data.vertices)} now: "
+                "all of them are texels.",
+            )
+        )
+    return found
+
+
+def _spacing(texels: Texels) -> float:
+    """Usual distance of neighbouring texels, metres."""
+    a, b, c = (texels.position[texels.layout.triangles[:, i]] for i in range(3))
+    return float(np.median(np.linalg.norm(np.concatenate([b - a, c - b, a - c]), axis=1)))
+
+
+def _tree(mesh: TriangleMesh) -> BVHTree:
+    return BVHTree.FromPolygons(mesh.vertices.tolist(), mesh.triangles.tolist(), all_triangles=True)
+
+
+def _inside(mesh: TriangleMesh, texels: Texels, ahead: float) -> np.ndarray:
+    """(n,) bool: points just in front of the texels that are inside of a closed mesh; best of three rays."""
+    tree, size = _tree(mesh), float(np.linalg.norm(np.ptp(mesh.vertices, axis=0)))
+    votes = np.zeros(len(texels), int)
+    for tilt in ((0.0, 0.0), (0.11, 0.07), (-0.05, 0.13)):
+        rays = texels.normal + tilt[0] * texels.tangent + tilt[1] * texels.bitangent
+        starts = texels.position + ahead * texels.normal
+        votes += [_crossings(tree, start, ray, 1e-6 * size) % 2 for start, ray in zip(starts, rays, strict=True)]
+    return votes >= 2
+
+
+def _crossings(tree: BVHTree, start: np.ndarray, ray: np.ndarray, step: float) -> int:
+    here, direction, count = Vector(start), Vector(ray).normalized(), 0
+    while count < 64:
+        place, *_ = tree.ray_cast(here, direction)
+        if place is None:
+            break
+        count += 1
+        here = place + step * direction
+    return count
+
+
+def _thickness(mesh: TriangleMesh, texels: Texels, behind: float) -> np.ndarray:
+    """(n,) float: how far it is behind each texel to where the mesh ends, metres; infinite where it does not."""
+    tree = _tree(mesh)
+    result = np.full(len(texels), np.inf)
+    for i, (point, normal) in enumerate(zip(texels.position, texels.normal, strict=True)):
+        start = Vector(point - behind * normal)
+        place, out, _, distance = tree.ray_cast(start, Vector(-normal))
+        if place is not None and out.dot(Vector(normal)) < 0:
+            result[i] = distance + behind
+    return result
+
+
+def _too_near(texels: Texels, spacing: float) -> np.ndarray:
+    """(k,) int: texels that have another one with a smaller number almost at the same place."""
+    cell = np.floor(texels.position / (TOO_NEAR * spacing)).astype(np.int64)
+    homes: dict[tuple[int, ...], list[int]] = {}
+    near = []
+    around = [(x, y, z) for x in (-1, 0, 1) for y in (-1, 0, 1) for z in (-1, 0, 1)]
+    for number, (x, y, z) in enumerate(cell.tolist()):
+        others = np.array([other for dx, dy, dz in around for other in homes.get((x + dx, y + dy, z + dz), ())], int)
+        apart = np.linalg.norm(texels.position[others] - texels.position[number], axis=1)
+        alike = texels.normal[others] @ texels.normal[number] > 0.5  # not the two sides of a thin plate
+        if (alike & (apart < TOO_NEAR * spacing)).any():
+            near.append(number)
+        homes.setdefault((x, y, z), []).append(number)
+    return np.array(near, int)
+
+
+# --- putting it right
+
+
+def _edit(obj, work: Callable) -> None:
+    """Change an object's own mesh."""
+    mesh = bmesh.new()
+    mesh.from_mesh(obj.data)
+    work(mesh)
+    mesh.to_mesh(obj.data)
+    mesh.free()
+    obj.data.update()
+
+
+def _turn_alike(obj, _problem, _report) -> None:
+    _edit(obj, lambda mesh: bmesh.ops.recalc_face_normals(mesh, faces=mesh.faces))
+
+
+def _flip(obj, _problem, _report) -> None:
+    _edit(obj, lambda mesh: bmesh.ops.reverse_faces(mesh, faces=mesh.faces))
+
+
+def _merge(obj, _problem, report) -> None:
+    scale = report.metres
+    distance = TOO_NEAR * _spacing(report.texels) / scale
+    _edit(obj, lambda mesh: bmesh.ops.remove_doubles(mesh, verts=mesh.verts, dist=distance))
+    if obj.palpate.made_vertices:
+        obj.palpate.made_vertices = len(obj.data.vertices)
+
+
+def _leave_out(obj, problem, report) -> None:
+    """Make the region a vertex group without some texels."""
+    from .sensors import GROUP_NAME
+
+    settings = obj.palpate
+    keep = np.setdiff1d(report.texels.vertex, report.texels.vertex[problem.texels])
+    group = obj.vertex_groups.get(settings.vertex_group) if settings.region == "GROUP" else None
+    group = group or obj.vertex_groups.new(name=GROUP_NAME)
+    group.remove(range(len(obj.data.vertices)))
+    group.add(keep.tolist(), 1.0, "REPLACE")
+    settings.region, settings.vertex_group = "GROUP", group.name
+
+
+def _shorten(obj, _problem, report) -> None:
+    thickness = _thickness(report.body, report.texels, AHEAD * _spacing(report.texels))
+    obj.palpate.max_penetration = MARGIN * float(thickness.min())
+
+
+def _apply_modifiers(obj, _problem, _report) -> None:
+    if obj.data.users > 1:
+        obj.data = obj.data.copy()
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    mesh = bpy.data.meshes.new_from_object(obj.evaluated_get(depsgraph), preserve_all_data_layers=True, depsgraph=depsgraph)
+    old, name = obj.data, obj.data.name
+    obj.modifiers.clear()
+    obj.data = mesh
+    if old.users == 0:
+        bpy.data.meshes.remove(old)
+    mesh.name = name
+    obj.palpate.made_vertices = len(mesh.vertices)
+
+
+def _accept(obj, _problem, _report) -> None:
+    obj.palpate.made_vertices = len(obj.data.vertices)
+
+
+def _lay_anew(obj, _problem, _report) -> None:
+    laid_sensors.lay_anew(bpy.context, obj)
+
+
+def _cling(obj, _problem, _report) -> None:
+    surface_binding.cling(bpy.context, obj, obj.parent)
+
+
+def _whole_mesh(obj, _problem, _report) -> None:
+    obj.palpate.region = "MESH"
+    obj.palpate.made_vertices = len(obj.data.vertices)
+
+
+def _active_group(obj, _problem, _report) -> None:
+    obj.palpate.vertex_group = obj.vertex_groups.active.name
+
+
+def _automatic_image(obj, _problem, _report) -> None:
+    obj.palpate.image_layout = "AUTO"
+
+
+def _nothing_painted(obj, _problem, _report) -> None:
+    """Empty the fields for painted multipliers that cannot be read."""
+    for key in ("k", "friction", "gain"):
+        try:
+            meshes.multipliers(obj, key)
+        except PaintedError:
+            setattr(obj.palpate, f"{key}_map", "")
+
+
+def _on_its_own(obj, _problem, _report) -> None:
+    obj.palpate.body = "KEYFRAMED"
+
+
+FIXES: dict[str, tuple[str, Callable]] = {
+    "NORMALS": ("Turn Faces Alike", _turn_alike),
+    "FLIPPED": ("Flip Normals", _flip),
+    "INSIDE": ("Leave Them Out", _leave_out),
+    "OVERLAP": ("Merge Them", _merge),
+    "THROUGH": ("Shorten Max Penetration", _shorten),
+    "MODIFIER": ("Apply Modifiers", _apply_modifiers),
+    "OUTDATED": ("Lay Anew", _lay_anew),
+    "STILL": ("Bind to Surface", _cling),
+    "ORPHAN": ("Keyframed Body", _on_its_own),
+    "GROWN": ("That Is Meant", _accept),
+    "REGION": ("Use Whole Mesh", _whole_mesh),
+    "GROUP": ("Use Active Group", _active_group),
+    "IMAGE": ("Automatic Image", _automatic_image),
+    "PAINTED": ("Empty the Field", _nothing_painted),
+}
+"""By kind: the name of the button, and what it does to (object, problem, report)."""
+
+
+def fix(obj, kind: str, report) -> None:
+    """Put one kind of problem right.
+
+    Raises
+    ------
+    SensorError
+        The sensor has no such problem any more.
+    """
+    problem = next((found for found in report.problems if found.kind == kind), None)
+    if problem is None:
+        raise SensorError(f"'{obj.name}' has no such problem any more.")
+    FIXES[kind][1](obj, problem, report)
+
+
+def of_error(obj, error: PalpateError) -> Problem:
+    """Return the problem of a sensor that has no texels because of an error; some kinds have no button."""
+    own = obj.palpate
+    if isinstance(error, RegionError):
+        lost = own.region == "GROUP" and own.vertex_group not in obj.vertex_groups and len(obj.vertex_groups) > 0
+        return Problem("GROUP" if lost else "REGION", str(error))
+    if isinstance(error, ImageError):
+        return Problem("IMAGE", str(error))
+    return Problem("PAINTED" if isinstance(error, PaintedError) else "OTHER", str(error))

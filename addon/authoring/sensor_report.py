@@ -1,0 +1,164 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What panels and the 3D view show of a sensor while it is being made: its texels, their numbers, and what is wrong.
+
+Drawing only asks (:func:`of`); what has to be computed is computed a moment later, by a timer.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, field
+
+import bpy
+import numpy as np
+
+from ...core.errors import PalpateError, SceneError
+from ...core.geometry.mesh import TriangleMesh
+from ...core.geometry.texels import Texels
+from ...core.solver.time_step_adviser import Advice, advise
+from ..scene import attached_objects, meshes, scene_reader
+from ..session import session_state, transforms, units
+from ..timeline import live_cache
+from . import laid_sensors, problems
+
+DELAY = 0.2
+"""Seconds after a change before it is looked at, and three times the time that this took last."""
+
+
+@dataclass(frozen=True)
+class Report:
+    """A sensor as it stands.
+
+    Attributes
+    ----------
+    texels : Texels or None
+        In the frame of the object: its location and rotation, metres.
+    reach : float, metres
+    metres : float
+        Per Blender unit.
+    body : TriangleMesh or None
+        What the texels stand on, in the same frame.
+    problems : list of Problem
+    advice : Advice or None
+        On the time step of the scene; None when the scene makes no run.
+    missing : str
+        Why the scene makes no run, in one sentence.
+    """
+
+    texels: Texels | None = None
+    reach: float = 0.0
+    metres: float = 1.0
+    body: TriangleMesh | None = None
+    problems: list = field(default_factory=list)
+    advice: Advice | None = None
+    missing: str = ""
+
+    @property
+    def area(self) -> float:
+        """Square metres of the region."""
+        return float(self.texels.area.sum())
+
+    @property
+    def density(self) -> float:
+        """Texels per square centimetre."""
+        return len(self.texels) / (self.area * 1e4) if self.area > 0 else 0.0
+
+
+_reports: dict[int, tuple[tuple, Report]] = {}
+_wanted: set[int] = set()
+_last = 0.0
+
+
+def of(obj, scene) -> Report | None:
+    """Return what is known of a sensor; looks at it anew soon if it may have changed. Cheap enough for drawing."""
+    key = _key(obj, scene)
+    known = _reports.get(obj.session_uid)
+    if known is None or known[0] != key:
+        _ask(obj)
+    return known[1] if known else None
+
+
+def now(obj, scene) -> Report:
+    """Look at a sensor at once."""
+    key = _key(obj, scene)
+    report = _look(obj, scene)
+    _reports[obj.session_uid] = key, report
+    return report
+
+
+def forget() -> None:
+    """Forget everything, because another file is open or undo has changed it."""
+    _reports.clear()
+    _wanted.clear()
+
+
+def _key(obj, scene) -> tuple:
+    """Changes with everything that may change a report; that it changed need not mean that the report does."""
+    stretch = tuple(round(length, 6) for length in obj.matrix_world.to_scale())
+    lies_on = obj.parent.name if obj.parent else ""
+    return (*live_cache.settings_of(scene, [obj]), session_state.session.geometry_version, stretch, lies_on, obj.mode)
+
+
+def _ask(obj) -> None:
+    if bpy.app.background:
+        return
+    _wanted.add(obj.session_uid)
+    if not bpy.app.timers.is_registered(_work):
+        bpy.app.timers.register(_work, first_interval=DELAY + 3.0 * _last)
+
+
+def _work() -> float | None:
+    """Compute what was asked for, when nothing plays or bakes."""
+    global _last
+    window = bpy.context.window_manager.windows[0] if bpy.context.window_manager.windows else None
+    if session_state.session.bake is not None or (window and window.screen.is_animation_playing):
+        return DELAY
+    scene, began = bpy.context.scene, time.perf_counter()
+    for obj in scene.objects:
+        if obj.session_uid in _wanted and obj.palpate.role in {"SENSOR", "PAD"}:
+            now(obj, scene)
+    _wanted.clear()
+    _last = time.perf_counter() - began
+    for window in bpy.context.window_manager.windows:
+        for area in window.screen.areas:
+            if area.type in {"VIEW_3D", "PROPERTIES"}:
+                area.tag_redraw()
+    return None
+
+
+def _look(obj, scene) -> Report:
+    depsgraph = scene_reader.depsgraph_of(scene)
+    advice, missing = _advice(scene, depsgraph)
+    metres = units.metres_per_unit(scene)
+    reach = units.as_typed(obj.palpate.max_penetration)
+    try:
+        sensor, mesh = scene_reader.sensor_alone(scene, obj, depsgraph)
+        notes = meshes.sensor_arrays(obj, depsgraph)[1]
+        around = _around(obj, depsgraph, metres) if laid_sensors.is_skin(obj) and obj.parent else None
+        found = problems.of_object(obj, notes) + problems.of_texels(obj, mesh, sensor.texels, reach, around)
+    except PalpateError as error:
+        return Report(None, reach, metres, None, [problems.of_error(obj, error)], advice, missing)
+    return Report(sensor.texels, reach, metres, mesh if around is None else around, found, advice, missing)
+
+
+def _around(obj, depsgraph, metres: float) -> TriangleMesh | None:
+    """What a skin lies on, in the frame of the skin's own object, metres."""
+    carrier = obj.parent
+    if carrier.type not in meshes.KINDS:
+        return None
+    arrays = meshes.target_arrays(carrier, depsgraph)
+    matrix = transforms.array(obj.evaluated_get(depsgraph).matrix_world)
+    linear, offset = attached_objects.into_body(matrix, np.linalg.inv(matrix) @ transforms.array(carrier.matrix_world))
+    triangles = arrays.triangles[:, ::-1] if np.linalg.det(linear) < 0 else arrays.triangles
+    return TriangleMesh((arrays.vertices @ linear.T + offset) * metres, triangles)
+
+
+def _advice(scene, depsgraph) -> tuple[Advice | None, str]:
+    """The advised time step of the scene, or why there is none."""
+    try:
+        scenario, _ = scene_reader.sample_start(scene, depsgraph)
+    except SceneError as error:
+        return None, str(error)
+    except PalpateError:  # of some sensor: its own report says it
+        return None, ""
+    return advise(scenario), ""

@@ -1,0 +1,189 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Making and unmaking sensors, targets and pads."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from ...core.errors import SensorError
+from ..bake import scene_writer
+from ..properties import effect_stack, properties
+from ..scene import meshes
+
+GROUP_NAME = "Palpate Sensor"
+PRESETS = Path(__file__).parents[1] / "presets"
+COPIED = (*properties.PARAMETERS, "k_factor", "friction_factor", "gain_factor")
+"""What is copied from sensor to sensor and kept in presets: everything that does not hang on one mesh."""
+
+
+def source_of(obj, mode: str) -> str:
+    """Return what AUTO means in a mode: the selection in Edit Mode, the painted group in Weight Paint, else the whole mesh."""
+    if mode == "EDIT":
+        obj.update_from_editmode()
+        if selected_vertices(obj).any():
+            return "SELECTION"
+    if mode == "WEIGHT_PAINT" and obj.vertex_groups.active is not None:
+        return "GROUP"
+    return "MESH"
+
+
+def selected_vertices(obj) -> np.ndarray:
+    """(nv,) bool: vertices selected in Edit Mode, as far as the object knows of them."""
+    chosen = np.zeros(len(obj.data.vertices), dtype=bool)
+    obj.data.vertices.foreach_get("select", chosen)
+    return chosen
+
+
+def make_sensor(obj, source: str, role: str = "SENSOR") -> int:
+    """Give a mesh object the role of a sensor, or of a pad, on a region.
+
+    Parameters
+    ----------
+    source : {"SELECTION", "GROUP", "MATERIAL", "FACE_SET", "MESH"}
+        SELECTION writes a vertex group; GROUP and MATERIAL take the active one, FACE_SET that of the active face.
+
+    Returns
+    -------
+    int
+        Number of vertices in the region.
+
+    Raises
+    ------
+    SensorError
+        The region has no vertices or no face. Nothing was changed then.
+    """
+    if obj.type != "MESH":
+        raise SensorError(f"'{obj.name}' is no mesh: convert it with Object › Convert › Mesh before it becomes a sensor.")
+    settings = obj.palpate
+    if source == "SELECTION":
+        chosen = selected_vertices(obj)
+    elif source == "GROUP":
+        group = obj.vertex_groups.active
+        if group is None:
+            raise SensorError(f"'{obj.name}' has no vertex group: paint one, or make the whole mesh a sensor.")
+        chosen = meshes.weights(obj.data, group.index) >= max(settings.threshold, 1e-6)
+    elif source == "MATERIAL":
+        chosen, material = _active_material(obj)
+    elif source == "FACE_SET":
+        chosen, face_set = _active_face_set(obj)
+    else:
+        chosen = np.ones(len(obj.data.vertices), dtype=bool)
+    _check(obj, chosen, source)
+    if source == "SELECTION":
+        group = obj.vertex_groups.get(GROUP_NAME) or obj.vertex_groups.new(name=GROUP_NAME)
+        group.remove(range(len(chosen)))
+        group.add(np.flatnonzero(chosen).tolist(), 1.0, "REPLACE")
+        obj.vertex_groups.active_index = group.index
+    if source == "MATERIAL":
+        settings.region, settings.material = source, material
+    elif source == "FACE_SET":
+        settings.region, settings.face_set = source, face_set
+    elif source == "MESH":
+        settings.region, settings.made_vertices = source, len(chosen)
+    else:
+        settings.region, settings.vertex_group = "GROUP", group.name
+    settings.role = role
+    return int(chosen.sum())
+
+
+def describe_region(obj, source: str) -> dict:
+    """Return what :func:`.meshes.region_by` needs for a region of an object that stays what it is; a selection becomes a group.
+
+    Parameters
+    ----------
+    source : {"OWN", "SELECTION", "GROUP", "MATERIAL", "FACE_SET", "MESH"}
+        OWN is the region that the object has as a sensor.
+    """
+    own = obj.palpate
+    if source == "OWN":
+        return {"region": own.region, "vertex_group": own.vertex_group, "material": own.material, "face_set": own.face_set}
+    if source == "SELECTION":
+        chosen = selected_vertices(obj)
+        _check(obj, chosen, source)
+        group = obj.vertex_groups.new(name=GROUP_NAME)  # of its own: another skin may lie on another selection
+        group.add(np.flatnonzero(chosen).tolist(), 1.0, "REPLACE")
+        return {"region": "GROUP", "vertex_group": group.name}
+    if source == "GROUP":
+        if obj.vertex_groups.active is None:
+            raise SensorError(f"'{obj.name}' has no vertex group: paint one, or use the whole mesh.")
+        return {"region": "GROUP", "vertex_group": obj.vertex_groups.active.name}
+    if source == "MATERIAL":
+        return {"region": "MATERIAL", "material": _active_material(obj)[1]}
+    if source == "FACE_SET":
+        return {"region": "FACE_SET", "face_set": _active_face_set(obj)[1]}
+    return {"region": "MESH"}
+
+
+def _active_material(obj) -> tuple[np.ndarray, str]:
+    """Vertices of the faces that wear the active material, and its name."""
+    material = obj.active_material
+    if material is None:
+        raise SensorError(f"'{obj.name}' has no active material: give the sensor's faces one in the Material tab.")
+    index = np.empty(len(obj.data.polygons), dtype=np.int32)
+    obj.data.polygons.foreach_get("material_index", index)
+    return meshes.corners_of(obj.data, index == obj.active_material_index), material.name
+
+
+def _active_face_set(obj) -> tuple[np.ndarray, int]:
+    """Vertices of the face set that the active face is in, and its number."""
+    sets, active = meshes.face_sets(obj.data), obj.data.polygons.active
+    number = int(sets[active]) if 0 <= active < len(sets) else obj.palpate.face_set
+    return meshes.corners_of(obj.data, sets == number), number
+
+
+def set_brush(tools) -> None:
+    """Let the weight brush paint all of a region at once: weight and strength 1, no normalising against other groups."""
+    tools.use_auto_normalize = False
+    paint = tools.weight_paint
+    brush = paint.brush if paint is not None else None
+    shared = getattr(paint, "unified_paint_settings", None) or getattr(tools, "unified_paint_settings", None)
+    for part in ("weight", "strength"):  # shared by all brushes where the user has it so
+        if shared is not None and getattr(shared, f"use_unified_{part}"):
+            setattr(shared, part, 1.0)
+        elif brush is not None:
+            setattr(brush, part, 1.0)
+
+
+def copy_parameters(source, target) -> None:
+    """Give a sensor what another one is made of; its region and its name stay; effects that are switched off are left out."""
+    for name in COPIED:
+        setattr(target.palpate, name, getattr(source.palpate, name))
+    effect_stack.put_stack(target, effect_stack.stack(source))
+
+
+def _check(obj, chosen: np.ndarray, source: str) -> None:
+    what = {
+        "SELECTION": "Nothing is selected",
+        "GROUP": f"No vertex has a weight of {obj.palpate.threshold:g} or more in the active vertex group",
+        "MATERIAL": "No face wears the active material",
+        "FACE_SET": "No face is in that face set",
+        "MESH": "There are no vertices",
+    }[source]
+    if not chosen.any():
+        raise SensorError(f"{what} on '{obj.name}': a sensor needs at least one face.")
+    if not any(all(chosen[vertex] for vertex in face.vertices) for face in obj.data.polygons):
+        raise SensorError(
+            f"The {int(chosen.sum())} chosen vertices of '{obj.name}' span no face: choose all corners of at least one face."
+        )
+
+
+def remove_role(scene, obj) -> None:
+    """Take an object out: its role, and its part of a bake. Parameters and vertex groups stay."""
+    if obj.palpate.is_baked:
+        scene_writer.clear_object(scene, obj)
+    obj.palpate.role = "NONE"
+
+
+def paint_group(obj):
+    """Return the vertex group to paint a sensor's region in: the one it has, else a new, empty one."""
+    settings = obj.palpate
+    group = obj.vertex_groups.get(settings.vertex_group) if settings.vertex_group else None
+    if group is None:
+        group = obj.vertex_groups.get(GROUP_NAME) or obj.vertex_groups.new(name=GROUP_NAME)
+    obj.vertex_groups.active_index = group.index
+    settings.region, settings.vertex_group = "GROUP", group.name
+    if settings.role == "NONE":
+        settings.role = "SENSOR"
+    return group

@@ -1,0 +1,159 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A finished recording goes back into the scene: motion of free bodies, force arrows, heat maps. And out of it again."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+from ...core.errors import SceneError
+from ...core.model.recording import Recording
+from ...core.model.scenario import Scenario
+from ..display import bake_display, heat_map, markers, materials
+from ..scene import moved_bodies
+from ..scene.scene_reader import Binding
+from ..session import identity
+from ..timeline import staleness
+
+
+def check(scene, scenario: Scenario, binding: Binding) -> None:
+    """Raise SceneError when :func:`commit` could not write on an object."""
+    objects = binding.objects(scene)
+    read_out = [obj for sensor, obj in zip(scenario.sensors, sensor_objects(scene, binding)) if sensor.readout]
+    for obj in {*(objects[index] for index in binding.starts), *read_out}:
+        if not obj.is_editable:
+            raise SceneError(
+                f"'{obj.name}' is linked from another file, so that a bake cannot be put on it: "
+                "use Object › Relations › Make Local first, or `palpate bake` without --save, which writes files alone."
+            )
+    for obj in read_out:
+        mesh = obj.data
+        if not mesh.is_editable or mesh.override_library is not None:  # Blender saves no changes of those
+            raise SceneError(
+                f"The mesh of sensor '{obj.name}' is linked from another file, so that its heat map would be "
+                "lost: use Object › Relations › Make Local › Selected Objects and Data first, "
+                "or `palpate bake` without --save, which writes files alone."
+            )
+
+
+def sensor_objects(scene, binding: Binding) -> list:
+    """Return the objects that hold the sensors and pads, by sensor index.
+
+    Raises
+    ------
+    SceneError
+        One of them was deleted.
+    """
+    found = binding.sensor_objects(scene)
+    if any(obj is None for obj in found):
+        raise SceneError("A sensor was deleted while its forces were computed: undo that, or start again without it.")
+    return found
+
+
+def commit(scene, scenario: Scenario, binding: Binding, recording: Recording, folders: dict[str, Path]) -> None:
+    """Put a recording into its scene, replacing an earlier bake's.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        That was solved.
+    binding : Binding
+    recording : Recording
+    folders : dict of str to Path
+        Of the sensors, complete.
+    """
+    objects, sensors = binding.objects(scene), sensor_objects(scene, binding)
+    taking_part = {*objects, *sensors}
+    for obj in scene.objects:  # who took part in an earlier bake and no longer does
+        if obj.palpate.is_baked and obj not in taking_part:
+            clear_object(scene, obj)
+    for index in binding.starts:
+        _free_body(objects[index], index, binding, recording)
+    moved = {objects[index] for index in binding.starts}
+    worn = []
+    for sensor, obj in zip(scenario.sensors, sensors):
+        if sensor.readout:
+            worn.append(_worn(obj, objects[sensor.body], sensor, binding, recording, folders[sensor.name]))
+            obj.palpate.is_baked = True
+        elif obj.palpate.is_baked and obj not in moved:
+            clear_object(scene, obj)
+    bake_display.dress(scene, worn)
+    sweep()
+    settings = scene.palpate
+    settings.baked_digest = recording.digest
+    settings.baked_shapes = staleness.pack(binding.looks)
+    settings.baked_start, settings.baked_end = scenario.frame_start, scenario.frame_end
+
+
+def _free_body(obj, index: int, binding: Binding, recording: Recording) -> None:
+    placement = moved_bodies.Placement.of(obj, binding.starts[index], binding.parents[index][0], binding.scale)
+    moved_bodies.bake(obj, placement, recording.frames, recording.poses[:, index], np.array(binding.parents[index]))
+
+
+def _worn(obj, body, sensor, binding: Binding, recording: Recording, folder: Path) -> markers.Worn:
+    return markers.Worn(
+        obj=obj,
+        body=body,
+        texels=sensor.texels,
+        painted=sensor.painted,
+        parameters=sensor.parameters,
+        felt=recording.sensors[sensor.name],
+        frames=recording.frames,
+        poses=recording.poses[:, sensor.body],
+        scale=binding.scale,
+        folder=folder,
+    )
+
+
+def baked_objects(scene) -> list:
+    """Return the objects that hold a part of the scene's bake."""
+    return [obj for obj in scene.objects if obj.palpate.is_baked]
+
+
+def bake_folder(obj) -> Path | None:
+    """Return the folder of a sensor's bake; None when it shows none.
+
+    It is where the images are: their path follows when the .blend is saved somewhere else, the text in our settings does not.
+    """
+    image = materials.find(bpy.data.images, obj.palpate.uid) if obj.palpate.bake_folder else None
+    return None if image is None else Path(os.path.abspath(bpy.path.abspath(image.filepath))).parent
+
+
+def bake_folders(scene) -> dict:
+    """Return the folders of the scene's bake by the sensors' objects."""
+    return {obj: place for obj in baked_objects(scene) if (place := bake_folder(obj)) is not None}
+
+
+def clear(scene) -> None:
+    """Take a bake out of its scene; its files stay."""
+    for obj in baked_objects(scene):
+        clear_object(scene, obj)
+    sweep()
+    scene.palpate.baked_digest = ""
+
+
+def sweep() -> None:
+    """Remove markers, materials, nodes and images of sensors that were deleted."""
+    uids = {obj.palpate.uid for obj in bpy.data.objects}
+    markers.sweep(uids)
+    materials.sweep(uids)
+
+
+def has_bake(scene) -> bool:
+    """Whether there is anything for :func:`clear`: an object's part of a bake, or the arrow of a deleted sensor."""
+    if baked_objects(scene):
+        return True
+    return bool(scene.palpate.baked_digest) and bool(markers.of_deleted(scene.objects))
+
+
+def clear_object(scene, obj) -> None:
+    """Take one object's part of a bake away: keyframes, heat map, arrow; a free body is put back to its start."""
+    identity.ensure(obj)
+    moved_bodies.clear(obj)
+    if obj.palpate.bake_folder:
+        heat_map.clear(obj)
+        markers.clear(scene, obj.palpate.uid)
+        obj.palpate.bake_folder = ""

@@ -1,0 +1,181 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the scene shows of a bake: heat maps, markers and arrows, all sensors on one scale.
+
+Made when a scene is baked, and made anew from the bake's files when only the display's settings have changed.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import combinations
+
+import bpy
+import numpy as np
+
+from ...core.errors import SceneError
+from ...core.figures.recording_style import Look
+from ...core.io.bake_reader import Bake, read_sensors
+from ...core.io.files import frame_file
+from ...core.response import metrics
+from ..session import units
+from . import heat_map, markers, materials, texel_arrows
+
+LEAST_RANGE = 1e-6
+"""Newtons, or pascals, at the end of the heat maps of sensors that nothing touched."""
+TEXEL_ARROW = 0.2
+"""Longest arrow of a texel, in sizes of the largest sensor, where its length is chosen automatically."""
+FACING = 0.7
+"""Cosine of the angle within which the force of one sensor points at another."""
+ARROW_GAP = 0.94
+"""Of the way between two such sensors that their arrows take up together."""
+
+
+@dataclass(frozen=True)
+class Scales:
+    """What all sensors of a scene share.
+
+    Attributes
+    ----------
+    maximum : float, N or Pa
+        End of the colours.
+    force, moment : float
+        Blender units per newton and per newton metre, of the large arrows.
+    texel : dict of str to float
+        Blender units per newton of the arrows at the texels, by kind: shear is much smaller than what presses.
+    longest : dict of str to float
+        Longest of these, Blender units.
+    """
+
+    maximum: float
+    force: float
+    moment: float
+    texel: dict[str, float]
+    longest: dict[str, float]
+
+    @classmethod
+    def of(cls, settings, worn: list[markers.Worn]) -> Scales:
+        """Choose the scales for all sensors of a scene, or take those that are set."""
+        size = max((item.size for item in worn), default=1.0)
+        unit = worn[0].scale if worn else 1.0
+        net = _largest(np.linalg.norm(item.felt.net_force, axis=1) for item in worn)
+        turn = _largest(np.linalg.norm(metrics.free_moment(item.felt), axis=1) for item in worn)
+        force = units.as_typed(settings.arrow_scale) / unit
+        if settings.use_auto_arrow:
+            force = min(size / net, _room_between(worn)) if net > 0 else 0.0
+        peaks = {
+            "NORMALS": _largest(item.felt.normal_force for item in worn),
+            "SHEARS": _largest(np.linalg.norm(item.felt.shear, axis=2) for item in worn),
+        }
+        texel = dict.fromkeys(peaks, units.as_typed(settings.texel_arrow_scale) / unit)
+        if settings.use_auto_arrow:
+            texel = {kind: TEXEL_ARROW * size / peak if peak > 0 else 0.0 for kind, peak in peaks.items()}
+        longest = {kind: texel[kind] * peak for kind, peak in peaks.items()}
+        moment = 0.6 * size / turn if turn > 0 else 0.0
+        return cls(heat_range(settings, worn), force, moment, texel, longest)
+
+
+def _room_between(worn: list[markers.Worn]) -> float:
+    """Return the Blender units per newton up to which arrows of sensors that face each other, as in a grasp, do not cross."""
+    room = np.inf
+    ways = [item.in_world() for item in worn]
+    touching = [item.felt.contact.any(axis=1) for item in worn]
+    for a, b in combinations(range(len(worn)), 2):
+        frames = touching[a] & touching[b]
+        (from_a, push_a), (from_b, push_b) = ((foot[frames], push[frames]) for foot, push in (ways[a], ways[b]))
+        distance = np.linalg.norm(from_b - from_a, axis=1)
+        way = (from_b - from_a) / np.maximum(distance, 1e-12)[:, None]
+        strengths = [np.maximum(np.linalg.norm(push, axis=1), 1e-12) for push in (push_a, push_b)]
+        towards = (push_a * way).sum(axis=1) / strengths[0], -(push_b * way).sum(axis=1) / strengths[1]
+        facing = (np.minimum(*towards) > FACING) & (distance > 0)
+        room = min(room, (0.5 * ARROW_GAP * distance / np.maximum(*strengths))[facing].min(initial=np.inf))
+    return room
+
+
+def _largest(tables) -> float:
+    return max((float(table.max(initial=0.0)) for table in tables), default=0.0)
+
+
+def heat_range(settings, worn: list[markers.Worn]) -> float:
+    """Return the end of the colours, N or Pa: what is set, or where the colour bars of figures end (:meth:`.Look.top`)."""
+    unit = 1e3 if settings.quantity == "PRESSURE" else 1.0
+    if not settings.use_auto_range:
+        return fixed_range(settings)
+    largest = _largest(shown(settings, item.felt.normal_force, item.texels) for item in worn)
+    return unit * metrics.scale_limit(largest / unit) if largest > 0 else LEAST_RANGE
+
+
+def fixed_range(settings) -> float:
+    """Return the end of the colours that is set, N or Pa."""
+    return 1e3 * settings.range_max_pressure if settings.quantity == "PRESSURE" else settings.range_max
+
+
+def shown(settings, normal_force: np.ndarray, texels) -> np.ndarray:
+    """Return what the colours show, N or Pa."""
+    return metrics.pressure(normal_force, texels) if settings.quantity == "PRESSURE" else normal_force
+
+
+def look_of(scene, **others) -> Look:
+    """Return the look of figures that agree with what the scene shows."""
+    own = scene.palpate
+    limit = None
+    if not own.use_auto_range:
+        limit = own.range_max_pressure if own.quantity == "PRESSURE" else own.range_max
+    return Look(**{"colour_map": own.color_map, "quantity": own.quantity.lower(), "limit": limit, **others})
+
+
+def dress(scene, worn: list[markers.Worn]) -> None:
+    """Put heat maps, markers and arrows on the sensors of a finished bake, replacing earlier ones."""
+    settings = scene.palpate
+    scales = Scales.of(settings, worn)
+    relative = settings.folder.startswith("//")
+    for item in worn:
+        obj, frames = item.obj, (int(item.frames[0]), int(item.frames[-1]))
+        image = materials.load_sequence(obj.palpate.uid, item.folder / frame_file(frames[0]), relative)
+        heat_map.apply(obj, item.texels, image, frames, scales.maximum, settings.color_map, settings.quantity == "PRESSURE")
+        markers.bake(scene, item, settings.overlays, {"FORCE": scales.force, "TORQUE": scales.moment})
+        texel_arrows.bake(scene, item, image, settings.overlays, scales.texel, scales.longest)
+        obj.palpate.bake_folder = bpy.path.relpath(str(item.folder)) if relative else str(item.folder)
+
+
+def again(scene, places: dict) -> None:
+    """Dress a scene anew from the files of its bake.
+
+    Parameters
+    ----------
+    places : dict of Object to Path
+        Folder of each sensor.
+
+    Raises
+    ------
+    PalpateError
+        The files are gone, or do not fit the scene any more.
+    """
+    if not places:
+        raise SceneError(f"Nothing is baked in '{scene.name}': bake first.")
+    bake: Bake = read_sensors(list(places.values()))
+    names = {place: name for name, place in bake.folders.items()}
+    recording = bake.recording
+    worn = []
+    for obj, place in places.items():
+        name = names[place]
+        body_name = bake.manifests[name].body or obj.name
+        body = scene.objects.get(body_name)
+        if body is None or body_name not in recording.body_names:
+            raise SceneError(f"'{body_name}', which moves sensor '{obj.name}', is not in the bake any more: bake again.")
+        if len(obj.data.vertices) <= bake.texels[name].vertex.max():
+            raise SceneError(f"The mesh of sensor '{obj.name}' has changed since it was baked: bake again.")
+        worn.append(
+            markers.Worn(
+                obj=obj,
+                body=body,
+                texels=bake.texels[name],
+                painted=bake.painted[name],
+                parameters=bake.parameters[name],
+                felt=recording.sensors[name],
+                frames=recording.frames,
+                poses=recording.poses[:, recording.body_names.index(body_name)],
+                scale=units.metres_per_unit(scene),
+                folder=place,
+            )
+        )
+    dress(scene, worn)

@@ -1,0 +1,189 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A heat map on the region's faces of a sensor: texture coordinates, material slot, and the way back."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+
+from ...core.geometry.layout import UVLayout
+from ...core.geometry.texels import Texels
+from ..scene import meshes
+from ..scene.meshes import OLD_MATERIAL
+from . import materials
+
+EMPTY_SLOT = "palpate_empty_slot"
+"""Custom property of a mesh that had no material slot."""
+MODIFIER = "Palpate Heat Map"
+
+
+def apply(obj, texels: Texels, image, frames: tuple[int, int], maximum: float, color_map: str, pressure: bool = False) -> None:
+    """Show a baked sequence on a sensor; an earlier bake's heat map is replaced.
+
+    Parameters
+    ----------
+    obj : Object
+    texels : Texels
+    image : Image
+        From :func:`.materials.load_sequence`.
+    frames : (int, int)
+    maximum : float, N or Pa
+    color_map : str
+    pressure : bool
+        Colours show force over area.
+    """
+    clear(obj, keep_image=True)
+    uid, mesh, layout = obj.palpate.uid, obj.data, texels.layout
+    own_map = isinstance(layout, UVLayout) and layout.map_name
+    uv = None if own_map else _one_uv_per_texel(texels)
+    on_vertices = uv is None and not own_map
+    if on_vertices:
+        _store_texel_uv(mesh, texels)
+        _store_area(mesh, texels)
+        modifier = obj.modifiers.new(MODIFIER, "NODES")
+        modifier.node_group = materials.force_nodes(uid, obj.name, image, frames)
+        obj.modifiers.move(len(obj.modifiers) - 1, 0)  # where the vertices are still the texels'
+    elif uv is not None:
+        _write_uv(mesh, texels, uv)
+    area = None
+    if pressure:
+        area = materials.AREA if on_vertices else materials.area_image(uid, obj.name, layout.image(texels.area))
+    coordinates = materials.Coordinates(own_map, not layout.nearest) if own_map else materials.Coordinates()
+    material = materials.heat_map(uid, obj.name, None if on_vertices else image, frames, maximum, color_map, area, coordinates)
+    _assign(obj, texels, material)
+
+
+def clear(obj, keep_image: bool = False) -> None:
+    """Take the heat map off a sensor: its faces have their materials again, and nothing of ours is left."""
+    if obj.type != "MESH":
+        return
+    mesh, uid = obj.data, obj.palpate.uid
+    _unassign(obj)
+    modifier = obj.modifiers.get(MODIFIER)
+    if modifier is not None:
+        obj.modifiers.remove(modifier)
+    if _slot_of(mesh) is None:
+        layer = mesh.uv_layers.get(materials.UV_NAME)
+        if layer is not None:
+            mesh.uv_layers.remove(layer)
+        for name in (materials.TEXEL_UV, materials.FORCE, materials.AREA):
+            attribute = mesh.attributes.get(name)
+            if attribute is not None:
+                mesh.attributes.remove(attribute)
+    materials.remove(uid, keep_image)
+
+
+def _one_uv_per_texel(texels: Texels) -> np.ndarray | None:
+    """(n, 2) texture coordinates; None when a texel has others in each of its triangles."""
+    layout = texels.layout
+    uv = layout.uv()
+    return uv if np.allclose(layout.corner_uv, uv[layout.triangles], atol=1e-9) else None
+
+
+def _write_uv(mesh, texels: Texels, uv: np.ndarray) -> None:
+    layer = mesh.uv_layers.get(materials.UV_NAME)
+    if layer is None:
+        active = mesh.uv_layers.active_index
+        layer = mesh.uv_layers.new(name=materials.UV_NAME, do_init=False)
+        if active >= 0:
+            mesh.uv_layers.active_index = active
+    table = np.zeros((len(mesh.vertices), 2))
+    table[texels.vertex] = uv
+    corner = meshes.corners(mesh)
+    layer.data.foreach_set("uv", table[corner].astype(np.float32).ravel())
+
+
+def _store_texel_uv(mesh, texels: Texels) -> None:
+    attribute = mesh.attributes.get(materials.TEXEL_UV) or mesh.attributes.new(materials.TEXEL_UV, "FLOAT_VECTOR", "POINT")
+    table = np.zeros((len(mesh.vertices), 3), dtype=np.float32)
+    table[texels.vertex, :2] = texels.layout.uv()
+    attribute.data.foreach_set("vector", table.ravel())
+
+
+def _store_area(mesh, texels: Texels) -> None:
+    attribute = mesh.attributes.get(materials.AREA) or mesh.attributes.new(materials.AREA, "FLOAT", "POINT")
+    table = np.zeros(len(mesh.vertices), dtype=np.float32)
+    table[texels.vertex] = texels.area
+    attribute.data.foreach_set("value", table)
+
+
+def region_faces(mesh, texels: Texels) -> np.ndarray:
+    """(nf,) bool: faces whose corners are all texels."""
+    inside = np.zeros(len(mesh.vertices), dtype=bool)
+    inside[texels.vertex] = True
+    corner = np.empty(len(mesh.loops), dtype=np.int32)
+    start = np.empty(len(mesh.polygons), dtype=np.int32)
+    mesh.loops.foreach_get("vertex_index", corner)
+    mesh.polygons.foreach_get("loop_start", start)
+    return np.logical_and.reduceat(inside[corner], start)
+
+
+def _assign(obj, texels: Texels, material) -> None:
+    """Put the material on the region's faces, in a slot of the object, since its mesh may have other users."""
+    mesh = obj.data
+    count = len(mesh.polygons)
+    index = np.empty(count, dtype=np.int32)
+    mesh.polygons.foreach_get("material_index", index)
+    faces = region_faces(mesh, texels)
+    old = mesh.attributes.get(OLD_MATERIAL)
+    if old is None:
+        if not len(mesh.materials):
+            mesh.materials.append(None)  # the faces outside keep the look of an object without material
+            mesh[EMPTY_SLOT] = 1
+        mesh.materials.append(None)
+        slot = len(mesh.materials) - 1
+        old = mesh.attributes.new(OLD_MATERIAL, "INT", "FACE")
+        old.data.foreach_set("value", np.where(faces, index, -1).astype(np.int32))
+        mesh.polygons.foreach_set("material_index", np.where(faces, slot, index).astype(np.int32))
+        mesh.update()
+    else:  # another object with this mesh shows its heat map there
+        slot = _slot_of(mesh)
+    obj.material_slots[slot].link = "OBJECT"
+    obj.material_slots[slot].material = material
+
+
+def _shown_slot(obj) -> int | None:
+    """Return the slot in which an object shows its heat map.
+
+    Found by our mark and not by the faces: these, the slots and what is in them may have been changed since.
+    """
+    for number, slot in enumerate(obj.material_slots):
+        if slot.link == "OBJECT" and slot.material is not None and materials.MARK in slot.material:
+            return number
+    return None
+
+
+def _slot_of(mesh) -> int | None:
+    """Return the slot of the heat maps on a mesh; None when nobody shows one."""
+    shown = (_shown_slot(obj) for obj in bpy.data.objects if obj.data == mesh)
+    return next((slot for slot in shown if slot is not None), None)
+
+
+def _unassign(obj) -> None:
+    """Give the faces their materials back, except those to which the user has given another since."""
+    mesh = obj.data
+    attribute, slot = mesh.attributes.get(OLD_MATERIAL), _slot_of(mesh)
+    if attribute is None and slot is None:
+        return
+    if _shown_slot(obj) is not None:
+        obj.material_slots[slot].material = None
+        obj.material_slots[slot].link = "DATA"
+    if _slot_of(mesh) is not None:
+        return
+    count = len(mesh.polygons)
+    index, old = np.empty(count, dtype=np.int32), np.zeros(count, dtype=np.int32)
+    mesh.polygons.foreach_get("material_index", index)
+    if attribute is not None:  # a mesh that was made anew, as by Remesh, has lost it
+        attribute.data.foreach_get("value", old)
+        mesh.attributes.remove(attribute)
+    if slot is not None:
+        index = np.where((old >= 0) & (index == slot), old, index).astype(np.int32)
+        mesh.polygons.foreach_set("material_index", index)
+        mesh.materials.pop(index=slot)  # also counts the slots after it down, on the faces
+    if EMPTY_SLOT in mesh:
+        del mesh[EMPTY_SLOT]
+        if not any(mesh.materials):
+            mesh.materials.clear()
+    if not index.any() and "material_index" in mesh.attributes:  # no attribute says the same as zeros everywhere
+        mesh.attributes.remove(mesh.attributes["material_index"])
+    mesh.update()

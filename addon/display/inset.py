@@ -1,0 +1,274 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The live view: tactile images, colour bar and force curves in a corner of the 3D view while the timeline moves."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+
+from ...core.figures import color_maps
+from ...core.geometry.layout import GridLayout
+from ..session import redraw
+from . import bake_display
+
+MOST = 4
+"""Sensors that are shown."""
+IMAGE, GAP, CURVE, BAR = 120.0, 12.0, 56.0, 10.0
+"""Sides of the images, distances, height of the curve and width of the colour bar; pixels at a resolution scale of one."""
+LARGEST = 256
+"""Pixels along a side of an image: larger ones are thinned out, the screen has no more for them, and few texels get many."""
+COLORS = ((0.34, 0.7, 0.91), (1.0, 0.62, 0.25), (0.4, 0.85, 0.6), (0.9, 0.6, 0.8))
+BACK, FRAME = (0.05, 0.05, 0.06, 0.72), (1.0, 1.0, 1.0, 0.35)
+
+
+@dataclass
+class Inset:
+    """What is shown of one sensor.
+
+    Attributes
+    ----------
+    name : str
+    pixels : (h, w, 4) float32
+        sRGB, row 0 at the bottom.
+    frames, force : (f,) float
+        The sum of the normal forces so far, N.
+    now : float, N
+    """
+
+    name: str
+    pixels: np.ndarray
+    frames: np.ndarray
+    force: np.ndarray
+    now: float
+    texture: object = None
+
+
+@dataclass
+class Board:
+    """All insets of a scene, on one scale.
+
+    Attributes
+    ----------
+    insets : list of Inset
+    color_map : str
+    end : str
+        Words at the end of the colour bar.
+    span : (2,) float
+        First and last frame of the scene.
+    frame : float
+        The present one.
+    """
+
+    insets: list[Inset]
+    color_map: str
+    end: str
+    span: tuple[float, float]
+    frame: float
+    bar: object = None
+
+
+_boards: dict[int, Board] = {}
+_handle = None
+
+
+def picture(layout, values: np.ndarray, maximum: float, color_map: str) -> np.ndarray:
+    """(h, w, 4) float32: a tactile image in colours, clear where no texel is."""
+    image, mask = layout.image(values), layout.mask()
+    step = -(-max(image.shape) // LARGEST)
+    image, mask = image[::step, ::step], mask[::step, ::step]
+    rgb = color_maps.colors(color_map, image.ravel() / maximum).reshape(*image.shape, 3)
+    pixels = np.dstack([rgb, mask]).astype(np.float32)
+    if isinstance(layout, GridLayout):  # the screen blends pixels, and texels are to stay apart
+        times = -(-LARGEST // max(image.shape))
+        pixels = pixels.repeat(times, axis=0).repeat(times, axis=1)
+    return pixels
+
+
+def board(scene, frame, texels: dict, frames: np.ndarray, loads: dict, maximum: float) -> Board:
+    """Return what is shown of one frame.
+
+    Parameters
+    ----------
+    frame : Frame
+    texels : dict of str to Texels
+        The sensors, of which the first few are shown.
+    frames : (f,) float
+        For which there are sums of normal forces:
+    loads : dict of str to (f,) float, N
+    maximum : float, N or Pa
+        End of the colours.
+    """
+    settings, insets = scene.palpate, []
+    for name, own in list(texels.items())[:MOST]:
+        felt = frame.sensors[name]
+        pixels = picture(own.layout, bake_display.shown(settings, felt.normal_force, own), maximum, settings.color_map)
+        insets.append(Inset(name, pixels, frames, loads[name], float(felt.normal_force.sum())))
+    span = float(scene.frame_start), float(scene.frame_end)
+    return Board(insets, settings.color_map, words(settings, maximum), span, float(frame.frame))
+
+
+def words(settings, maximum: float) -> str:
+    """Say what the end of the colours stands for."""
+    return f"{maximum / 1e3:.3g} kPa" if settings.quantity == "PRESSURE" else f"{maximum:.3g} N"
+
+
+def show(scene, board: Board) -> None:
+    """Show the present frame."""
+    _boards[scene.session_uid] = board
+    redraw.views()
+
+
+def clear(scene=None) -> None:
+    """Stop showing a scene, or all."""
+    if scene is None:
+        _boards.clear()
+    else:
+        _boards.pop(scene.session_uid, None)
+    redraw.views()
+
+
+def _draw() -> None:
+    """Called by each 3D view, in pixels of its region."""
+    board = _boards.get(bpy.context.scene.session_uid)
+    if board is None or not bpy.context.space_data.overlay.show_overlays:
+        return
+    import gpu
+
+    gpu.state.blend_set("ALPHA")
+    scale = bpy.context.preferences.system.ui_scale
+    canvas = _Canvas(scale)
+    x, top = 20.0 * scale, 20.0 * scale + _height(board, scale)
+    _draw_board(board, canvas, x, top)
+    gpu.state.blend_set("NONE")
+
+
+def _sizes(inset: Inset, scale: float) -> tuple[float, float]:
+    height, width = inset.pixels.shape[:2]
+    longest = IMAGE * scale / max(height, width)
+    return width * longest, height * longest
+
+
+def _height(board: Board, scale: float) -> float:
+    return max(_sizes(inset, scale)[1] for inset in board.insets) + (CURVE + 4 * GAP + 22.0) * scale
+
+
+def _draw_board(board: Board, canvas, x: float, top: float) -> None:
+    scale, gap = canvas.scale, GAP * canvas.scale
+    tall = max(_sizes(inset, scale)[1] for inset in board.insets)
+    widths = [max(_sizes(inset, scale)[0], 70.0 * scale) for inset in board.insets]
+    whole = sum(widths) + gap * (len(widths) + 1) + (BAR + 58.0) * scale
+    height = _height(board, scale)
+    canvas.rectangle(x, top - height, whole, height, BACK)
+    at, upper = x + gap, top - gap - 12.0 * scale
+    for inset, width, color in zip(board.insets, widths, COLORS):
+        canvas.text(at, upper + 3.0 * scale, inset.name, (*color, 1.0), width)
+        if inset.texture is None:
+            inset.texture = _texture(inset.pixels)
+        size = _sizes(inset, scale)
+        canvas.image(inset.texture, at, upper - 3.0 * scale - size[1], *size)
+        at += width + gap
+    if board.bar is None:
+        colors = color_maps.colors(board.color_map, np.linspace(0.0, 1.0, 64))
+        board.bar = _texture(np.column_stack([colors, np.ones(64)])[:, None].astype(np.float32))
+    low = upper - 3.0 * scale - tall
+    canvas.image(board.bar, at, low, BAR * scale, tall)
+    canvas.text(at + (BAR + 4.0) * scale, low + tall - 9.0 * scale, board.end, (1.0, 1.0, 1.0, 1.0))
+    canvas.text(at + (BAR + 4.0) * scale, low, "0", (1.0, 1.0, 1.0, 1.0))
+    _draw_curves(board, canvas, x + gap, top - height + gap, whole - 2 * gap)
+
+
+def _draw_curves(board: Board, canvas, x: float, y: float, width: float) -> None:
+    scale = canvas.scale
+    height = CURVE * scale
+    largest = max((float(inset.force.max(initial=0.0)) for inset in board.insets), default=0.0)
+    first, last = board.span
+    span = max(last - first, 1.0)
+    canvas.line([(x, y + height), (x, y), (x + width, y)], FRAME, 1.0)
+    if largest > 0.0:
+        for below, (inset, color) in zip(range(len(board.insets) - 1, -1, -1), zip(board.insets, COLORS)):
+            points = np.column_stack([x + (inset.frames - first) / span * width, y + inset.force / largest * height])
+            canvas.line(points, (*color, 1.0), 1.5 + 2.0 * below)  # the first are wider: equal curves do not hide each other
+    now = x + (board.frame - first) / span * width
+    canvas.line([(now, y), (now, y + height)], FRAME, 1.0)
+    text = ",  ".join(f"{inset.now:.3g} N" for inset in board.insets)
+    canvas.text(x + 4.0 * scale, y + height + 3.0 * scale, f"normal force  {text}", (1.0, 1.0, 1.0, 1.0))
+
+
+class _Canvas:
+    """Rectangles, images, lines and words in pixels."""
+
+    def __init__(self, scale: float):
+        import gpu
+
+        self.scale = scale
+        self._flat = gpu.shader.from_builtin("UNIFORM_COLOR")
+        self._lines = gpu.shader.from_builtin("POLYLINE_UNIFORM_COLOR")
+        self._image = gpu.shader.from_builtin("IMAGE")
+        self._viewport = gpu.state.viewport_get()[2:]
+
+    def rectangle(self, x, y, width, height, color) -> None:
+        self._batch(self._flat, "TRI_FAN", pos=_corners(x, y, width, height), uniforms={"color": color})
+
+    def image(self, texture, x, y, width, height) -> None:
+        self._image.bind()
+        self._image.uniform_sampler("image", texture)
+        places = {"pos": _corners(x, y, width, height), "texCoord": [(0, 0), (1, 0), (1, 1), (0, 1)]}
+        self._batch(self._image, "TRI_FAN", **places)
+
+    def line(self, points, color, width: float) -> None:
+        if len(points) > 1:
+            points = [(float(x), float(y), 0.0) for x, y in points]
+            uniforms = {"color": color, "lineWidth": width * self.scale, "viewportSize": self._viewport}
+            self._batch(self._lines, "LINE_STRIP", pos=points, uniforms=uniforms)
+
+    def text(self, x, y, words: str, color, room: float | None = None) -> None:
+        import blf
+
+        blf.size(0, 11.0 * self.scale)
+        while room is not None and len(words) > 2 and blf.dimensions(0, words)[0] > room:
+            words = words[:-2] + "…"
+        blf.color(0, *color)
+        blf.position(0, x, y, 0.0)
+        blf.draw(0, words)
+
+    @staticmethod
+    def _batch(shader, kind: str, uniforms=None, **content) -> None:
+        import gpu
+        from gpu_extras.batch import batch_for_shader
+
+        batch = batch_for_shader(shader, kind, content)
+        shader.bind()
+        for name, value in (uniforms or {}).items():
+            shader.uniform_float(name, value)
+        gpu.state.blend_set("ALPHA")  # words that were drawn before have switched it off
+        batch.draw(shader)
+
+
+def _corners(x, y, width, height):
+    return [(x, y), (x + width, y), (x + width, y + height), (x, y + height)]
+
+
+def _texture(pixels: np.ndarray):
+    import gpu
+
+    height, width = pixels.shape[:2]
+    pixels = pixels.copy()
+    pixels[..., :3] = color_maps.linear(pixels[..., :3])  # the shader takes images as scene-linear
+    buffer = gpu.types.Buffer("FLOAT", height * width * 4, np.ascontiguousarray(pixels, np.float32).ravel())
+    return gpu.types.GPUTexture((width, height), format="RGBA32F", data=buffer)
+
+
+def register() -> None:
+    global _handle
+    if not bpy.app.background:
+        _handle = bpy.types.SpaceView3D.draw_handler_add(_draw, (), "WINDOW", "POST_PIXEL")
+
+
+def unregister() -> None:
+    global _handle
+    clear()
+    if _handle is not None:
+        bpy.types.SpaceView3D.draw_handler_remove(_handle, "WINDOW")
+        _handle = None

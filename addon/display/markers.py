@@ -1,0 +1,214 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What stands on a baked sensor: objects of their own with keyframes, which play in any Blender.
+
+* ``FORCE``: an arrow at the centre of pressure. It shows the force that the sensor pushes *back* with, as biomechanics draws
+  ground reaction forces: out of the sensor, where it can be seen. The force on the sensor is its negative.
+* ``TORQUE``: a double arrow along the axis of the free moment there (the net torque about the centre of pressure), likewise.
+* ``CENTRE``: a ball at the centre of pressure.
+* ``SLIP``: a ring around it, as wide as the share of the load that rests on slipping texels.
+
+Without contact their scale is zero.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import bpy
+import numpy as np
+from mathutils import Quaternion, Vector
+
+from ...core.geometry.texels import Texels
+from ...core.model.recording import SensorRecording
+from ...core.model.scenario import Painted, SensorParameters
+from ...core.response import metrics
+from ..session import fcurves, transforms
+from . import marker_meshes, materials
+
+KIND = "palpate_marker"
+"""Custom property of a marker: which it is. One without is a FORCE of an earlier version."""
+KINDS = {
+    "FORCE": ("Net Force", "Arrow"),
+    "TORQUE": ("Free Moment", "Torque Arrow"),
+    "CENTRE": ("Centre of Pressure", "Ball"),
+    "SLIP": ("Slip", "Ring"),
+}
+"""Name of the object, without its sensor's, and shape."""
+BALL_SHARE, RING_SHARE = 0.03, 0.25
+"""Radii of the ball and of the ring when everything slips, in sizes of the sensor."""
+
+
+@dataclass(frozen=True)
+class Worn:
+    """A sensor with its part of a bake, as markers need it.
+
+    Attributes
+    ----------
+    obj : Object
+    body : Object
+        That moves it: itself, unless it is part of another.
+    texels, painted, parameters
+        Of the sensor.
+    felt : SensorRecording
+    frames : (F,) int
+    poses : (F, 7) float
+        Of its body.
+    scale : float
+        Metres per Blender unit.
+    folder : Path
+        Of its bake.
+    """
+
+    obj: object
+    body: object
+    texels: Texels
+    painted: Painted
+    parameters: SensorParameters
+    felt: SensorRecording
+    frames: np.ndarray
+    poses: np.ndarray
+    scale: float
+    folder: Path
+
+    @property
+    def size(self) -> float:
+        """Longest side of the sensor, Blender units."""
+        return float(np.ptp(self.texels.position, axis=0).max()) / self.scale
+
+    def in_world(self) -> tuple[np.ndarray, np.ndarray]:
+        """(F, 3) float: where the net force acts, Blender units, and with what the sensor pushes back there, N."""
+        foot = self.poses[:, :3] + self.turned(self.felt.centre_of_pressure)
+        return foot / self.scale, -self.turned(self.felt.net_force)
+
+    def turned(self, vectors: np.ndarray) -> np.ndarray:
+        """(F, 3) float: vectors in the body's frame, as they are in the world at each frame."""
+        return np.einsum("fij,fj->fi", transforms.rotation(self.poses[:, 3:]), vectors)
+
+
+def find(objects, uid: str, kind: str):
+    """Return a sensor's marker among some objects; None when there is none."""
+    return next((obj for obj in objects if obj.get(materials.MARK) == uid and obj.get(KIND, "FORCE") == kind), None)
+
+
+def bake(scene, worn: Worn, kinds, lengths: dict[str, float]) -> None:
+    """Keyframe the markers of one sensor, and remove those that are not wanted.
+
+    Parameters
+    ----------
+    kinds : collection of str
+        Keys of :data:`KINDS`.
+    lengths : dict
+        Of arrows: Blender units per newton for FORCE, per newton metre for TORQUE.
+    """
+    for kind in KINDS:
+        marker = find(scene.objects, worn.obj.palpate.uid, kind)
+        if kind not in kinds:
+            if marker is not None:
+                remove(marker)
+            continue
+        marker = marker or _make(scene, worn.obj, kind)
+        marker.rotation_mode = "QUATERNION"
+        table = channels(worn, kind, lengths.get(kind, 1.0))
+        found, _ = fcurves.ensure(marker, f"{marker.name} Palpate")
+        for path, columns in (("location", slice(0, 3)), ("rotation_quaternion", slice(3, 7)), ("scale", slice(7, 10))):
+            fcurves.write(found, path, worn.frames, table[:, columns])
+
+
+def channels(worn: Worn, kind: str, length: float = 1.0) -> np.ndarray:
+    """(F, 10) float: location, quaternion and scale of a marker at each recorded frame; `length` is that of one unit."""
+    direction, size = _SHOWN[kind](worn)
+    size = np.where(worn.felt.contact.any(axis=1), size * length, 0.0)
+    foot, way = worn.in_world()[0], worn.turned(direction)
+    turns, last = [], Quaternion()
+    for i in range(len(size)):
+        if size[i] > 0.0:
+            turn = Vector(way[i] / np.linalg.norm(way[i])).to_track_quat("Z", "Y")  # which takes short vectors for none
+            turn.make_compatible(last)
+            last = turn
+        turns.append(tuple(last))
+    return np.hstack([foot, turns, np.repeat(size[:, None], 3, axis=1)])
+
+
+def _force(worn: Worn) -> tuple[np.ndarray, np.ndarray]:
+    return -worn.felt.net_force, np.linalg.norm(worn.felt.net_force, axis=1)
+
+
+def _torque(worn: Worn) -> tuple[np.ndarray, np.ndarray]:
+    moment = metrics.free_moment(worn.felt)
+    return -moment, np.linalg.norm(moment, axis=1)
+
+
+def _centre(worn: Worn) -> tuple[np.ndarray, np.ndarray]:
+    return _outwards(worn), np.full(len(worn.frames), BALL_SHARE * worn.size)
+
+
+def _slip(worn: Worn) -> tuple[np.ndarray, np.ndarray]:
+    share = metrics.slip_share(worn.felt, worn.parameters, worn.painted)
+    return _outwards(worn), share * RING_SHARE * worn.size
+
+
+def _outwards(worn: Worn) -> np.ndarray:
+    """(F, 3) float: the mean normal of the texels that bear, in the body's frame."""
+    mean = worn.felt.normal_force @ worn.texels.normal
+    flat = np.linalg.norm(mean, axis=1) == 0.0
+    mean[flat] = worn.texels.normal[0]
+    return mean
+
+
+_SHOWN = {"FORCE": _force, "TORQUE": _torque, "CENTRE": _centre, "SLIP": _slip}
+
+
+def clear(scene, uid: str) -> None:
+    """Remove the markers of a sensor."""
+    for marker in [obj for obj in scene.objects if obj.get(materials.MARK) == uid]:
+        remove(marker)
+
+
+def sweep(uids) -> None:
+    """Remove the markers of sensors that were deleted; `uids` are those of all objects."""
+    for marker in of_deleted(bpy.data.objects, uids):
+        remove(marker)
+
+
+def of_deleted(objects, uids=None) -> list:
+    """Return the markers among some objects whose sensor was deleted."""
+    found = [obj for obj in objects if materials.MARK in obj and obj.library is None]
+    if found and uids is None:
+        uids = {obj.palpate.uid for obj in bpy.data.objects}
+    return [marker for marker in found if marker[materials.MARK] not in uids]
+
+
+def remove(marker) -> None:
+    """Remove a marker and what only it used."""
+    action = marker.animation_data.action if marker.animation_data else None
+    groups = [modifier.node_group for modifier in marker.modifiers if modifier.type == "NODES"]
+    mesh = marker.data
+    bpy.data.objects.remove(marker)
+    if action is not None and action.users == 0:
+        bpy.data.actions.remove(action)
+    looks = [material for material in mesh.materials if material is not None] if mesh is not None else []
+    if mesh is not None and mesh.users == 0:
+        bpy.data.meshes.remove(mesh)
+    for group in groups:
+        if group is not None and group.users == 0:
+            looks += [node.inputs["Material"].default_value for node in group.nodes if node.type == "SET_MATERIAL"]
+            bpy.data.node_groups.remove(group)
+    for material in looks:
+        if material is not None and material.users == 0:
+            bpy.data.materials.remove(material)
+
+
+def _make(scene, obj, kind: str):
+    name, shape = KINDS[kind]
+    marker = bpy.data.objects.new(f"{name} {obj.name}", marker_meshes.shared_mesh(shape))
+    link(scene, obj, marker, kind)
+    return marker
+
+
+def link(scene, obj, marker, kind: str) -> None:
+    """Put a new marker where its sensor is: in a collection of this scene, since the sensor may be in other scenes, too."""
+    marker[materials.MARK], marker[KIND] = obj.palpate.uid, kind
+    own = {scene.collection, *scene.collection.children_recursive}
+    place = next((found for found in obj.users_collection if found in own and found.is_editable), scene.collection)
+    place.objects.link(marker)

@@ -1,0 +1,173 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Live heat maps in the 3D view: drawn over the sensors while playing, and part of no file."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+
+from ...core.figures import color_maps
+from ..session import redraw, transforms
+from . import bake_display, inset
+
+LIFT = 0.004
+"""Share of the sensor's size by which the picture hovers above its surface, so that the two do not flicker."""
+ARROW_SHARE = 1.0
+"""Length of the longest arrow, in sizes of the sensor."""
+
+
+@dataclass
+class Picture:
+    """Triangles and lines of one sensor in the world; GPU batches are made when it is first drawn.
+
+    Attributes
+    ----------
+    corners : (t, 3) float32
+    colors : (t, 4) float32
+    line : (2, 3) float32 or None
+        The net-force arrow's ends.
+    """
+
+    corners: np.ndarray
+    colors: np.ndarray
+    line: np.ndarray | None
+    batches: list | None = None
+
+
+_pictures: dict[int, list[Picture]] = {}
+_largest: dict[int, tuple[float, float]] = {}
+"""Largest value and net force of any sensor so far, by scene."""
+_handle = None
+
+
+def show(scene, run, frame) -> None:
+    """Show one frame of a run."""
+    if bpy.app.background:
+        return
+    settings = scene.palpate
+    if not (settings.show_overlay or settings.show_inset):
+        clear(scene)
+        return
+    if settings.show_overlay:
+        _pictures[scene.session_uid] = pictures_of(scene, run, frame)
+    if settings.show_inset:
+        inset.show(scene, board_of(scene, run, frame))
+    redraw.views()
+
+
+def pictures_of(scene, run, frame) -> list[Picture]:
+    """Return the heat maps and arrows of one frame of a run, all sensors on one scale."""
+    maximum, strongest = _scale(scene, run, frame)
+    return [
+        _picture(scene, sensor, frame.sensors[sensor.name], frame.poses[sensor.body], maximum, strongest, run.binding.scale)
+        for sensor in _read_out(run)
+    ]
+
+
+def board_of(scene, run, frame) -> inset.Board:
+    """Return the tactile images and curves of one frame of a run."""
+    maximum, _ = _scale(scene, run, frame)
+    known = sorted(run.frames)
+    texels = {sensor.name: sensor.texels for sensor in _read_out(run)}
+    loads = {name: np.array([run.load(number)[name] for number in known]) for name in texels}
+    return inset.board(scene, frame, texels, np.array(known, float), loads, maximum)
+
+
+def _read_out(run) -> list:
+    return [sensor for sensor in run.scenario.sensors if sensor.readout]
+
+
+def _scale(scene, run, frame) -> tuple[float, float]:
+    """Return the end of the colours, N or Pa, and the net force of the longest arrow."""
+    settings = scene.palpate
+    key = hash((scene.session_uid, settings.quantity))
+    value, net = _largest.get(key, (1e-9, 1e-9))
+    for sensor in _read_out(run):
+        felt = frame.sensors[sensor.name]
+        value = max(value, float(bake_display.shown(settings, felt.normal_force, sensor.texels).max(initial=0.0)))
+        net = max(net, float(np.linalg.norm(felt.net_force)))
+    _largest[key] = value, net
+    return (value if settings.use_auto_range else bake_display.fixed_range(settings)), net
+
+
+def _picture(scene, sensor, felt, pose, maximum: float, strongest: float, scale: float) -> Picture:
+    texels = sensor.texels
+    rotation = transforms.rotation(pose[3:])
+    size = float(np.ptp(texels.position, axis=0).max())
+    points = texels.position + LIFT * size * texels.normal
+    world = (pose[:3] + points @ rotation.T) / scale
+    rgb = color_maps.colors(scene.palpate.color_map, bake_display.shown(scene.palpate, felt.normal_force, texels) / maximum)
+    corner = texels.layout.triangles.ravel()
+    colors = np.column_stack([rgb, np.ones(len(rgb))])[corner]
+    line = None
+    if felt.contact.any():
+        foot = felt.centre_of_pressure
+        tip = foot - felt.net_force * (ARROW_SHARE * size / strongest)
+        line = (pose[:3] + np.array([foot, tip]) @ rotation.T) / scale
+    return Picture(world[corner].astype(np.float32), colors.astype(np.float32), line)
+
+
+def clear(scene=None) -> None:
+    """Stop showing a scene, or all."""
+    if scene is None:
+        _pictures.clear()
+        _largest.clear()
+        inset.clear()
+    else:
+        _pictures.pop(scene.session_uid, None)
+        inset.clear(scene)
+    redraw.views()
+
+
+def _draw() -> None:
+    """Called by each 3D view after the scene's own geometry."""
+    pictures = _pictures.get(bpy.context.scene.session_uid)
+    space = bpy.context.space_data
+    if not pictures or not space.overlay.show_overlays:
+        return
+    import gpu
+
+    gpu.state.depth_test_set("LESS_EQUAL")
+    gpu.state.depth_mask_set(True)
+    for picture in pictures:
+        if picture.batches is None:
+            picture.batches = _batches(picture)
+        for shader, batch, uniforms in picture.batches:
+            shader.bind()
+            for name, value in uniforms.items():
+                shader.uniform_float(name, value)
+            batch.draw(shader)
+    gpu.state.depth_mask_set(False)
+    gpu.state.depth_test_set("NONE")
+
+
+def _batches(picture: Picture) -> list:
+    import gpu
+    from gpu_extras.batch import batch_for_shader
+
+    smooth = gpu.shader.from_builtin("SMOOTH_COLOR")
+    result = [(smooth, batch_for_shader(smooth, "TRIS", {"pos": picture.corners, "color": picture.colors}), {})]
+    if picture.line is not None:
+        lines = gpu.shader.from_builtin("POLYLINE_UNIFORM_COLOR")
+        viewport = gpu.state.viewport_get()[2:]
+        uniforms = {"color": (1.0, 0.35, 0.05, 1.0), "lineWidth": 4.0, "viewportSize": viewport}
+        result.append((lines, batch_for_shader(lines, "LINES", {"pos": picture.line.astype(np.float32)}), uniforms))
+    return result
+
+
+def register() -> None:
+    global _handle
+    inset.register()
+    if not bpy.app.background:
+        _handle = bpy.types.SpaceView3D.draw_handler_add(_draw, (), "WINDOW", "POST_VIEW")
+
+
+def unregister() -> None:
+    global _handle
+    clear()
+    inset.unregister()
+    if _handle is not None:
+        bpy.types.SpaceView3D.draw_handler_remove(_handle, "WINDOW")
+        _handle = None

@@ -1,0 +1,176 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""An arrow at every texel, made by geometry nodes from the baked images, so that they play in any Blender.
+
+``NORMALS`` stand on the surface, as long as the normal force; ``SHEARS`` lie on it. Like the large arrows they show what the
+sensor pushes back with. Each kind is an object of points, one per texel, that is a child of the sensor's body.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+
+import bpy
+import numpy as np
+from mathutils import Matrix
+
+from ..session import transforms
+from . import marker_meshes, markers, materials
+
+KINDS = {"NORMALS": ("Normal Forces", "Normal Arrow"), "SHEARS": ("Shear Forces", "Shear Arrow")}
+"""Name of the object, without its sensor's, and material."""
+NORMAL, X_AXIS, Y_AXIS = "palpate_normal", "palpate_x", "palpate_y"
+"""Vector attributes of the points."""
+SMALLEST = 0.02
+"""Newtons times length below which no arrow is drawn, as a share of the longest arrow."""
+MODIFIER = "Palpate Arrows"
+
+
+def bake(scene, worn: markers.Worn, image, kinds, lengths: dict, longest: dict) -> None:
+    """Put up the arrows of one sensor, and remove those that are not wanted.
+
+    Parameters
+    ----------
+    worn : Worn
+    image : Image
+        The baked sequence.
+    kinds : collection of str
+        Keys of :data:`KINDS`.
+    lengths, longest : dict of str to float
+        By kind: Blender units per newton, and the longest arrow of all sensors.
+    """
+    frames = int(worn.frames[0]), int(worn.frames[-1])
+    for kind, (name, look) in KINDS.items():
+        uid = worn.obj.palpate.uid
+        found = markers.find(scene.objects, uid, kind)
+        if found is not None:
+            markers.remove(found)
+        if kind not in kinds:
+            continue
+        mesh = _points(worn, f"{name} {worn.obj.name}")
+        made = bpy.data.objects.new(mesh.name, mesh)
+        markers.link(scene, worn.obj, made, kind)
+        made.parent = worn.body
+        _, _, stretch = transforms.split(transforms.array(worn.body.matrix_world))
+        made.matrix_parent_inverse = Matrix(np.vstack([np.column_stack([np.linalg.inv(stretch), np.zeros(3)]), [0, 0, 0, 1]]))
+        made.hide_select = True
+        made.color = (*marker_meshes.COLORS[look], 1.0)  # Workbench shows these of what nodes make
+        modifier = made.modifiers.new(MODIFIER, "NODES")
+        modifier.node_group = _nodes(
+            f"{uid}:{kind}", made.name, image, frames, kind, lengths[kind], longest[kind], marker_meshes.material(look)
+        )
+
+
+@contextmanager
+def resting(scene) -> Iterator[None]:
+    """Let no arrows be made for a while: in each frame that is read, their nodes would read an image of the bake before."""
+    names = [obj.name for obj in scene.objects if obj.library is None and (own := _own(obj)) is not None and own.show_viewport]
+    try:
+        _show(scene, names, False)
+        yield
+    finally:
+        with suppress(ReferenceError):  # the scene went meanwhile
+            _show(scene, names, True)
+
+
+def _own(obj):
+    return obj.modifiers.get(MODIFIER)
+
+
+def _show(scene, names, shown: bool) -> None:
+    for name in names:
+        obj = scene.objects.get(name)  # it may have been deleted meanwhile
+        if obj is not None and (own := _own(obj)) is not None:
+            own.show_viewport = shown
+
+
+def _points(worn: markers.Worn, name: str):
+    """Return a mesh of loose vertices, the texels, with what the nodes need to know of them."""
+    texels = worn.texels
+    mesh = bpy.data.meshes.new(name)
+    mesh.vertices.add(len(texels))
+    mesh.vertices.foreach_set("co", (texels.position / worn.scale).astype(np.float32).ravel())
+    uv = np.column_stack([texels.layout.uv(), np.zeros(len(texels))])
+    for key, table in (
+        (materials.TEXEL_UV, uv), (NORMAL, texels.normal), (X_AXIS, texels.tangent), (Y_AXIS, texels.bitangent)
+    ):  # fmt: skip
+        attribute = mesh.attributes.new(key, "FLOAT_VECTOR", "POINT")
+        attribute.data.foreach_set("vector", table.astype(np.float32).ravel())
+    mesh.update()
+    return mesh
+
+
+def _nodes(mark: str, name: str, image, frames, kind: str, length: float, longest: float, material):
+    """Return the nodes of one kind: a vector per texel, an arrow along it where it is long enough."""
+    group = materials.new_nodes(mark, name)
+    add, link = materials.Adder(group), group.links.new
+
+    def vector(operation: str, *inputs, **values):
+        node = add("ShaderNodeVectorMath", operation=operation)
+        for socket, source in zip(node.inputs, inputs):
+            link(source, socket)
+        for key, value in values.items():
+            node.inputs[key].default_value = value
+        return node
+
+    def attribute(key: str):
+        node = add("GeometryNodeInputNamedAttribute", data_type="FLOAT_VECTOR")
+        node.inputs["Name"].default_value = key
+        return node.outputs["Attribute"]
+
+    start = add("NodeGroupInput")
+    color = materials.look_up(add, image, frames)
+    parts = add("FunctionNodeSeparateColor")
+    link(color, parts.inputs["Color"])
+
+    def times(key: str, channel: str):
+        node = vector("SCALE", attribute(key))
+        link(parts.outputs[channel], node.inputs["Scale"])
+        return node.outputs["Vector"]
+
+    if kind == "NORMALS":
+        force = times(NORMAL, "Red")
+    else:  # the shear on the sensor, turned round
+        along = vector("ADD", times(X_AXIS, "Green"), times(Y_AXIS, "Blue")).outputs["Vector"]
+        force = vector("SCALE", along, Scale=-1.0).outputs["Vector"]
+    arrow = vector("SCALE", force, Scale=length).outputs["Vector"]
+    size = vector("LENGTH", arrow).outputs["Value"]
+    long_enough = add("ShaderNodeMath", operation="GREATER_THAN")
+    link(size, long_enough.inputs[0])
+    long_enough.inputs[1].default_value = SMALLEST * longest
+    there = add("ShaderNodeMath", operation="SUBTRACT")
+    link(long_enough.outputs[0], there.inputs[0])
+    link(materials.is_missing(add, color), there.inputs[1])
+    turn = add("FunctionNodeAlignRotationToVector", axis="Z")
+    link(arrow, turn.inputs["Vector"])
+
+    lift = vector("SCALE", attribute(NORMAL), Scale=0.04 * longest if kind == "SHEARS" else 0.0)
+    place = add("GeometryNodeSetPosition")
+    link(start.outputs[0], place.inputs["Geometry"])
+    link(lift.outputs["Vector"], place.inputs["Offset"])
+    on_points = add("GeometryNodeInstanceOnPoints")
+    link(place.outputs["Geometry"], on_points.inputs["Points"])
+    link(_arrow(add, material), on_points.inputs["Instance"])
+    link(there.outputs[0], on_points.inputs["Selection"])
+    link(turn.outputs["Rotation"], on_points.inputs["Rotation"])
+    link(size, on_points.inputs["Scale"])
+    link(on_points.outputs["Instances"], add("NodeGroupOutput").inputs[0])
+    return group
+
+
+def _arrow(add, material):
+    """Return the socket of an arrow one unit long along z: the nodes bring it along, so that no other object is needed."""
+    link = add.tree.links.new
+    join = add("GeometryNodeJoinGeometry")
+    for bottom, top, begin, end in ((0.035, 0.035, 0.0, 0.66), (0.1, 0.0, 0.66, 1.0)):
+        cone = add("GeometryNodeMeshCone")
+        for key, value in (("Vertices", 12), ("Radius Top", top), ("Radius Bottom", bottom), ("Depth", end - begin)):
+            cone.inputs[key].default_value = value
+        move = add("GeometryNodeTransform")
+        move.inputs["Translation"].default_value = (0.0, 0.0, begin)
+        link(cone.outputs["Mesh"], move.inputs["Geometry"])
+        link(move.outputs["Geometry"], join.inputs["Geometry"])
+    paint = add("GeometryNodeSetMaterial")
+    paint.inputs["Material"].default_value = material
+    link(join.outputs["Geometry"], paint.inputs["Geometry"])
+    return paint.outputs["Geometry"]

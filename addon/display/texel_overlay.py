@@ -1,0 +1,191 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Texels of the active sensor in the 3D view: where they are, which way they feel, how deep they reach, and their numbers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import bpy
+import numpy as np
+
+from ...core.geometry.layout import GridLayout
+from ..authoring import sensor_report
+from ..session import transforms
+from ..timeline import playback
+
+FINE, FAULTY, NORMAL, REACH = (0.1, 0.75, 0.95, 0.9), (1.0, 0.15, 0.1, 1.0), (0.2, 0.5, 1.0, 1.0), (1.0, 0.65, 0.1, 0.9)
+SIDES = 8
+MOST_NUMBERS = 600
+_handles: list = []
+
+
+@dataclass
+class Drawing:
+    """What is drawn of one report, in the frame of its object and Blender units."""
+
+    report: object
+    spots: dict[str, np.ndarray]
+    lines: dict[str, np.ndarray]
+    labels: list[tuple[str, np.ndarray]]
+    batches: dict = field(default_factory=dict)
+
+
+_drawing: Drawing | None = None
+
+
+def drawing_of(report) -> Drawing:
+    """Return triangles, lines and labels of a report."""
+    texels, unit = report.texels, report.metres
+    a, b, _ = texels.layout.triangles.T
+    spacing = float(np.median(np.linalg.norm(texels.position[a] - texels.position[b], axis=1)))
+    faulty = np.zeros(len(texels), bool)
+    for problem in report.problems:
+        faulty[problem.texels] = True
+    lifted = texels.position + 0.04 * spacing * texels.normal
+    turn = np.arange(SIDES) * 2 * np.pi / SIDES
+    rim = lifted[:, None] + 0.16 * spacing * (
+        np.cos(turn)[:, None] * texels.tangent[:, None] + np.sin(turn)[:, None] * texels.bitangent[:, None]
+    )
+    discs = np.stack([np.broadcast_to(lifted[:, None], rim.shape), rim, np.roll(rim, -1, axis=1)], axis=2)
+    normals = np.stack([lifted, texels.position + 0.8 * spacing * texels.normal], axis=1)
+    deep = np.stack([texels.position, texels.position - report.reach * texels.normal], axis=1)
+    return Drawing(
+        report=report,
+        spots={"fine": discs[~faulty].reshape(-1, 3) / unit, "faulty": discs[faulty].reshape(-1, 3) / unit},
+        lines={"normals": normals.reshape(-1, 3) / unit, "reach": deep.reshape(-1, 3) / unit},
+        labels=_labels(texels, lifted / unit),
+    )
+
+
+def _labels(texels, places: np.ndarray) -> list[tuple[str, np.ndarray]]:
+    """Row and column where texels form a grid, else their number; along the rim only where there are many."""
+    layout = texels.layout
+    if not isinstance(layout, GridLayout):
+        return [(str(i), places[i]) for i in range(len(places))] if len(places) <= MOST_NUMBERS else []
+    rim = (layout.row == 0) | (layout.column == 0)
+    shown = np.flatnonzero(rim if len(places) > MOST_NUMBERS else np.ones(len(places), bool))
+    return [(f"{layout.row[i]},{layout.column[i]}", places[i]) for i in shown]
+
+
+def _present():
+    """The active sensor, its report and what is shown of it; None when there is nothing to draw."""
+    context = bpy.context
+    obj, own = context.object, context.scene.palpate
+    wanted = own.show_texels or own.show_normals or own.show_numbers or own.show_reach
+    if obj is None or not wanted or obj.type != "MESH" or obj.palpate.role not in {"SENSOR", "PAD"}:
+        return None
+    if not context.space_data.overlay.show_overlays or not obj.visible_get() or obj.palpate.is_baked:
+        return None
+    report = sensor_report.of(obj, context.scene)
+    return (obj, own, report) if report is not None and report.texels is not None else None
+
+
+def _frame(obj):
+    from mathutils import Matrix
+
+    location, quaternion, _ = transforms.split(transforms.array(obj.matrix_world))
+    return Matrix(transforms.rigid(location, quaternion))
+
+
+def _current(report) -> Drawing:
+    global _drawing
+    if _drawing is None or _drawing.report is not report:
+        _drawing = drawing_of(report)
+    return _drawing
+
+
+def _draw() -> None:
+    """Called by each 3D view after the scene's own geometry."""
+    found = _present()
+    if found is None:
+        return
+    import gpu
+
+    obj, own, report = found
+    drawing = _current(report)
+    gpu.state.blend_set("ALPHA")
+    with gpu.matrix.push_pop():
+        gpu.matrix.multiply_matrix(_frame(obj))
+        gpu.state.depth_test_set("NONE" if bpy.context.space_data.shading.show_xray else "LESS_EQUAL")
+        felt = playback.status(bpy.context.scene).frame
+        shown = obj.mode == "OBJECT" and felt is not None and obj.name in felt.sensors  # the heat map is where they are
+        if own.show_texels and not shown:
+            _triangles(drawing, "fine", FINE)
+        if own.show_normals and not shown:
+            _lines(drawing, "normals", NORMAL)
+        gpu.state.depth_test_set("NONE")  # what follows may be inside the object
+        if own.show_texels and not shown:
+            _triangles(drawing, "faulty", FAULTY)
+        if own.show_reach:
+            _lines(drawing, "reach", REACH)
+    gpu.state.blend_set("NONE")
+
+
+def _triangles(drawing: Drawing, name: str, color) -> None:
+    import gpu
+    from gpu_extras.batch import batch_for_shader
+
+    if not len(drawing.spots[name]):
+        return
+    shader = gpu.shader.from_builtin("UNIFORM_COLOR")
+    if name not in drawing.batches:
+        drawing.batches[name] = batch_for_shader(shader, "TRIS", {"pos": drawing.spots[name].astype(np.float32)})
+    shader.bind()
+    shader.uniform_float("color", color)
+    drawing.batches[name].draw(shader)
+
+
+def _lines(drawing: Drawing, name: str, color) -> None:
+    import gpu
+    from gpu_extras.batch import batch_for_shader
+
+    shader = gpu.shader.from_builtin("POLYLINE_UNIFORM_COLOR")
+    if name not in drawing.batches:
+        drawing.batches[name] = batch_for_shader(shader, "LINES", {"pos": drawing.lines[name].astype(np.float32)})
+    shader.bind()
+    shader.uniform_float("color", color)
+    shader.uniform_float("lineWidth", 1.5)
+    shader.uniform_float("viewportSize", gpu.state.viewport_get()[2:])
+    drawing.batches[name].draw(shader)
+
+
+def _draw_numbers() -> None:
+    """Called by each 3D view last, in pixels."""
+    found = _present()
+    if found is None or not found[1].show_numbers:
+        return
+    import blf
+    from bpy_extras.view3d_utils import location_3d_to_region_2d
+    from mathutils import Vector
+
+    obj, _, report = found
+    context, frame = bpy.context, _frame(obj)
+    normals = report.texels.normal @ np.array(frame.to_3x3()).T
+    eye = np.array(context.region_data.view_matrix.to_3x3().transposed().col[2])
+    blf.size(0, 11 * context.preferences.system.ui_scale)
+    blf.color(0, 1.0, 1.0, 1.0, 1.0)
+    blf.enable(0, blf.SHADOW)
+    blf.shadow(0, 3, 0.0, 0.0, 0.0, 1.0)
+    facing = normals @ eye > 0.1 if len(_current(report).labels) == len(normals) else None
+    for i, (text, place) in enumerate(_current(report).labels):
+        if facing is not None and not facing[i]:
+            continue
+        spot = location_3d_to_region_2d(context.region, context.region_data, frame @ Vector(place))
+        if spot is not None:
+            width, height = blf.dimensions(0, text)
+            blf.position(0, spot.x - width / 2, spot.y - height / 2, 0)
+            blf.draw(0, text)
+    blf.disable(0, blf.SHADOW)
+
+
+def register() -> None:
+    if not bpy.app.background:
+        for function, when in ((_draw, "POST_VIEW"), (_draw_numbers, "POST_PIXEL")):
+            _handles.append(bpy.types.SpaceView3D.draw_handler_add(function, (), "WINDOW", when))
+
+
+def unregister() -> None:
+    global _drawing
+    _drawing = None
+    while _handles:
+        bpy.types.SpaceView3D.draw_handler_remove(_handles.pop(), "WINDOW")

@@ -1,0 +1,199 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Measurements of a real sensor beside the sensor in the scene: what was found out about them, and where it is shown.
+
+Results live in this session only; what is kept in the file is the path of the rig, and effects once they are on the sensor.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import bpy
+import numpy as np
+
+from ...core.errors import SceneError
+from ...core.figures import color_maps
+from ..authoring import exchange
+from ..properties import effect_stack
+from ..scene import scene_reader
+from ..session import first_use, identity
+from ..session.jobs import Progress
+
+if TYPE_CHECKING:
+    from ...core.gap.selection.diagnosis import Diagnosis
+
+ATTRIBUTE = "Palpate Gap"
+"""Colours of the residual on the sensor's vertices."""
+MARK = "gap: "
+"""How the timeline markers of phases begin."""
+
+
+@dataclass
+class Result:
+    """What was found out for one sensor."""
+
+    diagnosis: Diagnosis
+    headline: str
+    lines: list[str]
+    experiment: str
+    pictures: dict[str, Path]
+
+
+_results: dict[str, Result] = {}
+
+
+def of(obj) -> Result | None:
+    """Return what is known about a sensor's measurements."""
+    return _results.get(identity.key(obj))
+
+
+def rig_path(obj) -> Path:
+    """Return the path of a sensor's rig; raises SceneError when none was chosen."""
+    if not obj.palpate.measured:
+        raise SceneError(f"'{obj.name}' has no measurements: choose its rig.toml first.")
+    return Path(bpy.path.abspath(obj.palpate.measured))
+
+
+def find(obj):
+    """Find out what the model misses in a sensor's measurements.
+
+    Yields
+    ------
+    Progress
+        Closing the generator stops it and keeps what was known before.
+
+    Returns
+    -------
+    Result
+    """
+    from ...core.gap.dataset.rig import read_rig
+    from ...core.gap.report import summary
+    from ...core.gap.report.amended_sensor import next_experiment
+    from ...core.gap.report.plots import PICTURES
+    from ...core.gap.selection.diagnosis import Diagnosis, diagnose
+
+    yield from first_use.wait()
+    yield Progress("Reading the recordings", None, 0, 1000)
+    rig = read_rig(rig_path(obj))
+    diagnosis = None
+    for step in diagnose(rig):
+        if isinstance(step, Diagnosis):
+            diagnosis = step
+        else:
+            yield Progress(f"Finding the gap: {step.stage}", None, step.done, step.total)
+    assert diagnosis is not None
+    folder, pictures = Path(tempfile.mkdtemp(prefix="gap-", dir=bpy.app.tempdir)), {}
+    from ...core.figures.figure_style import save_figure
+
+    for name in ("curves", "gap", "loops"):
+        yield Progress("Drawing", None, 990, 1000)
+        pictures[name] = folder / f"{name}.png"
+        save_figure(PICTURES[name][0](diagnosis), pictures[name], 150)
+    identity.ensure(obj)
+    result = Result(diagnosis, summary.headline(diagnosis), summary.evidence(diagnosis), next_experiment(diagnosis), pictures)
+    _results[identity.key(obj)] = result
+    return result
+
+
+def add_found(obj) -> int:
+    """Put the fitted parameters and what was found on the sensor; return how many effects it has now."""
+    from ...core.gap.report.amended_sensor import amended
+
+    result = of(obj)
+    if result is None:
+        raise SceneError(f"Nothing was found for '{obj.name}' yet: use Find Gap first.")
+    model = amended(result.diagnosis)
+    per_texel = [e.name for e in model.effects if any(isinstance(value, tuple) for value in e.values.values())]
+    own = len(_texels(bpy.context, obj)) if per_texel else 0
+    if per_texel and own != len(result.diagnosis.rig.texels):
+        raise SceneError(
+            f"The rig's sensor has {len(result.diagnosis.rig.texels)} texels and '{obj.name}' has {own}: "
+            f"{per_texel[0]} has a number for each, so give both the same grid."
+        )
+    put(obj, model)
+    return len(obj.palpate.effects)
+
+
+def put(obj, model) -> None:
+    """Put a sensor's parameters and effects on an object."""
+    exchange.put_parameters(obj, model.parameters)
+    effect_stack.put_stack(obj, model.effects)
+
+
+def sensor_called(scene, name: str | None, how: str = "name one with --sensor"):
+    """Return a sensor of a scene by its name, or the only one; raises SceneError, which says `how` to name one of several."""
+    sensors = {obj.name: obj for obj in scene.objects if obj.palpate.role == "SENSOR"}
+    known = ", ".join(f"'{known}'" for known in sensors) or "none"
+    if name is None:
+        if len(sensors) != 1:
+            raise SceneError(f"'{scene.name}' has {len(sensors)} sensors ({known}): {how}.")
+        return next(iter(sensors.values()))
+    if name not in sensors:
+        raise SceneError(f"There is no sensor '{name}' in '{scene.name}': choose from {known}.")
+    return sensors[name]
+
+
+def show_on_sensor(context, obj, amended: bool) -> float:
+    """Colour the sensor's vertices by the error of their texels; return the largest, as a share of the range."""
+    from ...core.gap.report.comparison import rms_by_texel
+
+    result = of(obj)
+    if result is None:
+        raise SceneError(f"Nothing was found for '{obj.name}' yet: use Find Gap first.")
+    d = result.diagnosis
+    top = float(rms_by_texel(d, d.base.model).max())
+    values = rms_by_texel(d, d.best.model if amended else d.base.model)
+    texels = _texels(context, obj)
+    if len(texels) != len(values):
+        raise SceneError(
+            f"The rig's sensor has {len(values)} texels and '{obj.name}' has {len(texels)}: give both the same grid to see it."
+        )
+    mesh = obj.data
+    old = mesh.color_attributes.get(ATTRIBUTE)
+    if old is not None:
+        mesh.color_attributes.remove(old)
+    layer = mesh.color_attributes.new(ATTRIBUTE, "FLOAT_COLOR", "POINT")
+    colours = np.full((len(mesh.vertices), 4), (0.2, 0.2, 0.2, 1.0))
+    colours[texels.vertex, :3] = color_maps.linear(color_maps.colors("INFERNO", values / max(top, 1e-300)))
+    layer.data.foreach_set("color", colours.ravel())
+    mesh.color_attributes.active_color = layer
+    for area in context.screen.areas if context.screen else ():
+        if area.type == "VIEW_3D":  # the colours of the scale, not those of a lit surface
+            area.spaces.active.shading.color_type = "VERTEX"
+            area.spaces.active.shading.light = "FLAT"
+    return top
+
+
+def _texels(context, obj):
+    return scene_reader.sensor_alone(context.scene, obj, scene_reader.depsgraph_of(context.scene))[0].texels
+
+
+def mark_phases(scene, obj) -> int:
+    """Put timeline markers where the most loaded texel of the first fitted trial enters a phase; return how many."""
+    from ...core.gap.forward.contact_phases import PHASES, load_of, phases
+
+    result = of(obj)
+    if result is None:
+        raise SceneError(f"Nothing was found for '{obj.name}' yet: use Find Gap first.")
+    predictor = result.diagnosis.of("fit")[0]
+    texel = int(load_of(predictor.stimulus).sum(axis=0).argmax())
+    at, time = phases(predictor.stimulus)[:, texel], predictor.trial.time
+    clear_marks(scene)
+    fps = scene.render.fps / scene.render.fps_base
+    changes = [0, *(int(i) for i in np.flatnonzero(np.diff(at)) + 1)]
+    last, count = -1, 0
+    for i in changes:
+        frame = scene.frame_start + round(float(time[i] - time[0]) * fps)
+        if frame > last:
+            scene.timeline_markers.new(f"{MARK}{PHASES[at[i]]}", frame=frame)
+            last, count = frame, count + 1
+    return count
+
+
+def clear_marks(scene) -> None:
+    """Take the markers of phases off the timeline."""
+    for marker in [m for m in scene.timeline_markers if m.name.startswith(MARK)]:
+        scene.timeline_markers.remove(marker)

@@ -1,0 +1,189 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The stack of effects of a sensor, `Object.palpate.effects`: properties made from the library, to and from plain data.
+
+A file that joins :mod:`..core.effects` shows up here by itself. Enums carry numbers of their own, made from the names, so that
+a saved file does not depend on what else the library has.
+"""
+
+from __future__ import annotations
+
+import json
+import zlib
+
+import bpy
+from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
+
+from ...core.effects.engine import registry
+from ...core.effects.engine.specification import Effect, Form, Kind, Parameter
+from ...core.errors import EffectError
+from ..session import units
+
+STAGE_ICONS = {"contact": "MOD_PHYSICS", "pad": "MOD_CLOTH", "readout": "DRIVER"}
+
+_fixed = {"options": set(), "override": {"LIBRARY_OVERRIDABLE"}}
+
+
+def form_key(kind: Kind) -> str:
+    """Name of the property that holds the form of this kind."""
+    return f"{kind.name}_form".replace("-", "_")
+
+
+def value_key(kind: Kind, form: Form, parameter: Parameter) -> str:
+    """Name of the property that holds a parameter."""
+    return f"{kind.name}_{form.name}_{parameter.name}".replace("-", "_")
+
+
+def _items(entries) -> list[tuple]:
+    return [(name, title, text, icon, zlib.crc32(name.encode()) & 0x7FFFFFFF) for name, title, text, icon in entries]
+
+
+def kind_items() -> list[tuple]:
+    """Enum items of all kinds, in the order in which they act."""
+    return _items((kind.name, kind.title, kind.text, STAGE_ICONS[kind.stage]) for kind in registry.library().values())
+
+
+def title(name: str) -> str:
+    """A form's name as people read it."""
+    return name.replace("-", " ").title()
+
+
+def _label(parameter: Parameter) -> str:
+    name = title(parameter.name.replace("_", "-"))
+    return name if parameter.unit == "1" else f"{name} ({parameter.unit})"
+
+
+def _tooltip(form: Form, parameter: Parameter) -> str:
+    """What a parameter does, its unit and bounds, and where the formula comes from."""
+    unit = "no unit" if parameter.unit == "1" else parameter.unit
+    bounds = "" if parameter.unit.startswith("unit") else f"; {parameter.low:g} to {parameter.high:g}"
+    return f"{parameter.text.removesuffix('.')} ({unit}{bounds}). Source: {form.reference.removesuffix('.')}"
+
+
+def _property(form: Form, parameter: Parameter):
+    text = _tooltip(form, parameter)
+    if parameter.per_texel:
+        text = f"Numbers separated by commas, one per texel or one for all. {text}"
+        return StringProperty(name=_label(parameter), description=text, **_fixed)
+    limits = {} if parameter.unit.startswith("unit") else {"min": parameter.low, "max": parameter.high}
+    return FloatProperty(
+        name=_label(parameter),
+        description=text,
+        default=parameter.default,
+        precision=5,
+        step=0.1 if parameter.unit == "m" else 1,
+        **limits,
+        **_fixed,
+    )
+
+
+def _annotations() -> dict:
+    made = {
+        "use": BoolProperty(name="Use", description="Take part", default=True, **_fixed),
+        "show": BoolProperty(name="Show", description="Show its parameters", default=True, options=set()),
+        "kind": EnumProperty(name="Effect", description="What real sensors do", items=kind_items(), **_fixed),
+        "seed": IntProperty(name="Seed", description="Other random numbers for each", min=0, **_fixed),
+    }
+    for kind in registry.library().values():
+        forms = _items((form.name, title(form.name), form.formula, "NONE") for form in kind.forms)
+        made[form_key(kind)] = EnumProperty(
+            name="Form", description="Which formula", items=forms, default=kind.forms[0].name, **_fixed
+        )
+        for form in kind.forms:
+            for parameter in form.parameters:
+                made[value_key(kind, form, parameter)] = _property(form, parameter)
+    return made
+
+
+PALPATE_PG_effect = type(
+    "PALPATE_PG_effect",
+    (bpy.types.PropertyGroup,),
+    {"__doc__": "One effect of a sensor", "__annotations__": _annotations()},
+)
+
+
+def kind_of(item) -> Kind:
+    """Kind of an entry of the stack."""
+    return registry.kind_of(item.kind)
+
+
+def form_of(item) -> Form:
+    """Form of an entry of the stack."""
+    return registry.form_of(item.kind, getattr(item, form_key(kind_of(item))))
+
+
+def parameters(item) -> list[tuple[Parameter, str]]:
+    """Parameters of an entry of the stack, with the names of their properties."""
+    kind, form = kind_of(item), form_of(item)
+    return [(parameter, value_key(kind, form, parameter)) for parameter in form.parameters]
+
+
+def stack(obj) -> tuple[Effect, ...]:
+    """Return the effects of a sensor that are in use, as plain data.
+
+    Raises
+    ------
+    EffectError
+        A list of numbers cannot be read.
+    """
+    return tuple(_plain(obj, item) for item in obj.palpate.effects if item.use)
+
+
+def settings(obj) -> list[tuple]:
+    """Return everything that is set in a sensor's stack, in a form that can be compared."""
+    return [
+        (item.kind, form_of(item).name, item.seed, *(getattr(item, key) for _, key in parameters(item)))
+        for item in obj.palpate.effects
+        if item.use
+    ]
+
+
+def put_stack(obj, effects) -> None:
+    """Give a sensor these effects and no others.
+
+    Raises
+    ------
+    EffectError
+        One of them means nothing; the sensor keeps what it has.
+    """
+    gain = units.as_typed(obj.palpate.gain)
+    registry.check(effects, obj.name, gain=gain)
+    obj.palpate.effects.clear()
+    for effect in effects:
+        add(obj, effect)
+
+
+def add(obj, effect: Effect):
+    """Put an effect at the end of a sensor's stack and return its entry."""
+    kind, form = registry.kind_of(effect.name), registry.form_of(effect.name, effect.form)
+    item = obj.palpate.effects.add()
+    item.name, item.kind, item.seed = kind.title, kind.name, effect.seed
+    setattr(item, form_key(kind), form.name)
+    values = registry.complete_values(effect, units.as_typed(obj.palpate.gain))
+    for parameter in form.parameters:
+        value = values[parameter.name]
+        if parameter.per_texel:
+            value = ", ".join(repr(number) for number in (value if isinstance(value, tuple) else (value,)))
+        setattr(item, value_key(kind, form, parameter), value)
+    return item
+
+
+def _plain(obj, item) -> Effect:
+    form = form_of(item)
+    values = {}
+    for parameter, key in parameters(item):
+        value = getattr(item, key)
+        if not parameter.per_texel:
+            values[parameter.name] = units.as_typed(value)
+        elif value.strip():
+            values[parameter.name] = _numbers(value, f"{parameter.name} of effect '{item.kind}' of sensor '{obj.name}'")
+        else:
+            values[parameter.name] = parameter.scaled(units.as_typed(obj.palpate.gain)).default
+    return Effect(item.kind, form.name, values, item.seed if form.random else 0)
+
+
+def _numbers(text: str, where: str):
+    try:
+        numbers = tuple(float(number) for number in json.loads(f"[{text}]"))
+    except (ValueError, TypeError):
+        raise EffectError(f"{where} cannot be read: write numbers separated by commas, one per texel or one for all.") from None
+    return numbers[0] if len(numbers) == 1 else numbers

@@ -1,0 +1,46 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Settings in files of an older Palpate are brought forward when the file is opened; see :mod:`.settings_migration`."""
+
+from __future__ import annotations
+
+import bpy
+
+from ...core.errors import FileError
+from ...core.io.settings_migration import VERSION, migrate
+from ..session import session_state
+
+
+def apply(version: int = VERSION, steps=None) -> None:
+    """Bring the settings of all objects and scenes of the file forward; other versions and steps are for tests."""
+    for kind, blocks in (("object", bpy.data.objects), ("scene", bpy.data.scenes)):
+        for block in blocks:
+            if block.palpate.schema_version not in (0, version):
+                _bring_forward(block, kind, version, steps)
+
+
+def _bring_forward(block, kind: str, version: int, steps) -> None:
+    before = stored(block)
+    try:
+        after = migrate(before, kind, block.name, steps, version)
+    except FileError as error:
+        session_state.session.notes[block.name] = str(error)
+        return
+    for key, value in after.items():
+        if before.get(key) != value and hasattr(block.palpate, key):
+            setattr(block.palpate, key, value)
+
+
+def stored(block) -> dict:
+    """Return what is saved of a block's settings, also under names that this version no longer knows."""
+    if hasattr(block, "bl_system_properties_get"):  # Blender 5.0 keeps it apart from custom properties
+        system = block.bl_system_properties_get()
+        group = system.get("palpate") if system is not None else None
+    else:
+        group = block.get("palpate")
+    return {key: _plain(value) for key, value in group.items()} if group is not None else {}
+
+
+def _plain(value):
+    if hasattr(value, "to_dict"):  # settings within settings, and pointers to objects that point nowhere
+        return {key: _plain(item) for key, item in value.items()}
+    return list(value) if hasattr(value, "to_list") else value

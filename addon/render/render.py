@@ -1,0 +1,208 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A frame of the scene as a PNG, and a camera that frames what matters by itself."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import lru_cache
+from pathlib import Path
+
+import bpy
+import numpy as np
+from mathutils import Vector
+
+from ...core.errors import FileError, SceneError
+from ...core.io.files import atomic_write
+
+NEED_GL = {"BLENDER_EEVEE_NEXT", "BLENDER_EEVEE", "BLENDER_WORKBENCH"}
+"""Engines that draw with the graphics card, or with Mesa's software in its place."""
+_SURFACELESS = 0x31DD
+"""EGL_PLATFORM_SURFACELESS_MESA"""
+
+
+def corners(objects) -> np.ndarray:
+    """Return the corners of the objects' bounding boxes, with their modifiers, in the world.
+
+    Returns
+    -------
+    (8 m, 3) float, Blender units
+    """
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    found = []
+    for obj in objects:
+        evaluated = obj.evaluated_get(depsgraph)
+        box = np.array(evaluated.bound_box)
+        matrix = np.array(evaluated.matrix_world)
+        found.append(box @ matrix[:3, :3].T + matrix[:3, 3])
+    return np.concatenate(found)
+
+
+def frame_camera(scene, points: np.ndarray, region=(0.05, 0.05, 0.95, 0.95)) -> None:
+    """Move the scene's camera, without turning it, so that all points just fit into a part of the picture.
+
+    Parameters
+    ----------
+    scene : bpy.types.Scene
+        With a perspective camera; the size of its render counts.
+    points : (n, 3) float, Blender units, world
+    region : (4,) float
+        Left, bottom, right and top of that part, as shares of the picture's width and height.
+
+    Raises
+    ------
+    SceneError
+        There is no perspective camera.
+    """
+    camera = _camera(scene)
+    width, height = _half_angles(scene, camera)
+    turn = np.array(camera.matrix_world)[:3, :3]
+    turn = turn / np.linalg.norm(turn, axis=0)
+    local = np.asarray(points, float) @ turn  # x to the right, y up, z towards the viewer
+    left, bottom, right, top = ((2 * r - 1) * half for r, half in zip(region, (width, height, width, height), strict=True))
+    # A point is seen at slope (x - cx) / (cz - z). For slopes within [low, high] the camera's cx lies between two lines in cz,
+    # and the nearest camera is where the tighter pair of lines crosses.
+    spans = []
+    for axis, low, high in ((0, left, right), (1, bottom, top)):
+        at_least = (local[:, axis] + high * local[:, 2]).max()
+        at_most = (local[:, axis] + low * local[:, 2]).min()
+        spans.append((at_least, high, at_most, low))
+    distance = max((at_least - at_most) / (high - low) for at_least, high, at_most, low in spans)
+    centre = [0.5 * (at_least - high * distance + at_most - low * distance) for at_least, high, at_most, low in spans]
+    matrix = camera.matrix_world.copy()
+    matrix.translation = tuple(turn @ np.array([*centre, distance]))
+    camera.matrix_world = matrix
+    bpy.context.view_layer.update()
+
+
+def picture_position(scene, point) -> tuple[float, float]:
+    """Return where a point of the world lies on the picture, as shares of its width and height from the lower left corner."""
+    camera = _camera(scene)
+    width, height = _half_angles(scene, camera)
+    x, y, z = camera.matrix_world.normalized().inverted() @ Vector(point)
+    return 0.5 + 0.5 * x / (-z * width), 0.5 + 0.5 * y / (-z * height)
+
+
+def render_frame(scene, path: str | os.PathLike, frame: int, *, samples: int | None = None, size=None) -> Path:
+    """Render one frame of `scene` with its own engine and camera to a PNG; the scene's settings stay as they were.
+
+    Parameters
+    ----------
+    path : path
+        Replaced whole or not at all.
+    frame : int
+    samples : int, optional
+        Samples per pixel for Cycles and EEVEE. Default: the scene's. Cycles takes twice as many where the scene wants
+        its picture denoised and this Blender cannot.
+    size : (2,) int, optional
+        Width and height, pixels. Default: the scene's.
+
+    Raises
+    ------
+    SceneError
+        The scene has no perspective camera, or Blender cannot render it with the scene's engine.
+    FileError
+        The picture cannot be written.
+    """
+    _camera(scene)
+    if scene.render.engine in NEED_GL and not can_draw():
+        raise SceneError(
+            f"EEVEE and Workbench need OpenGL, which this machine has not without a window, so '{scene.name}' cannot be "
+            "rendered: choose Cycles."
+        )
+    path = Path(path)
+    if path.suffix.lower() != ".png":
+        path = path.with_name(path.name + ".png")
+    with atomic_write(path) as temporary, _settings(scene, temporary, frame, samples, size):
+        temporary.unlink()  # so that a render which writes nothing is noticed
+        try:
+            bpy.ops.render.render(write_still=True, scene=scene.name)
+        except RuntimeError as error:
+            reason = " ".join(str(error).removeprefix("Error:").split()).rstrip(".")
+            raise SceneError(f"Frame {frame} of '{scene.name}' could not be rendered: {reason}.") from error
+        if not temporary.exists():
+            raise FileError(f"The render of frame {frame} was not written to '{path}': check the space left on the disk.")
+    return path
+
+
+@lru_cache
+def can_draw() -> bool:
+    """Whether Blender can draw: without a window, and without EGL to draw beside one, EEVEE and Workbench end the process."""
+    if not bpy.app.background or not sys.platform.startswith("linux"):
+        return True
+    try:
+        egl = ctypes.CDLL("libEGL.so.1")
+    except OSError:
+        return False
+    egl.eglGetDisplay.argtypes, egl.eglGetDisplay.restype = [ctypes.c_void_p], ctypes.c_void_p
+    egl.eglGetPlatformDisplay.argtypes = [ctypes.c_uint, ctypes.c_void_p, ctypes.c_void_p]
+    egl.eglGetPlatformDisplay.restype = ctypes.c_void_p
+    egl.eglInitialize.argtypes = [ctypes.c_void_p] * 3
+    displays = egl.eglGetDisplay(None), egl.eglGetPlatformDisplay(_SURFACELESS, None, None)
+    return any(display and egl.eglInitialize(display, None, None) for display in displays)
+
+
+def can_denoise() -> bool:
+    """Whether Cycles was built with its denoiser; some distributions' is not, and would refuse to render."""
+    try:
+        import _cycles
+    except ImportError:
+        return False
+    return bool(getattr(_cycles, "with_openimagedenoise", False))
+
+
+def _camera(scene):
+    camera = scene.camera
+    if camera is None or camera.type != "CAMERA" or camera.data.type != "PERSP":
+        raise SceneError(f"'{scene.name}' has no perspective camera: add one and make it the scene's camera.")
+    return camera
+
+
+def _half_angles(scene, camera) -> tuple[float, float]:
+    """Tangents of half the horizontal and half the vertical field of view."""
+    render = scene.render
+    frame = camera.data.view_frame(scene=scene)
+    depth = -frame[0].z
+    if render.resolution_x <= 0 or depth <= 0:
+        raise SceneError(f"The camera of '{scene.name}' has no field of view: check its lens and the render size.")
+    return max(abs(c.x) for c in frame) / depth, max(abs(c.y) for c in frame) / depth
+
+
+@contextmanager
+def _settings(scene, path: Path, frame: int, samples: int | None, size) -> Iterator[None]:
+    """Change the scene for one render and put everything back."""
+    render, image = scene.render, scene.render.image_settings
+    changes: list[tuple[object, str, object]] = []
+    if hasattr(image, "media_type"):  # Blender 5.0: decides which file formats there are to choose from
+        changes.append((image, "media_type", "IMAGE"))
+    changes += [
+        (image, "file_format", "PNG"),
+        (image, "color_mode", "RGBA" if render.film_transparent else "RGB"),
+        (image, "color_depth", "8"),
+    ]
+    changes += [(render, "filepath", str(path)), (render, "use_file_extension", False), (render, "use_overwrite", True)]
+    if size is not None:
+        changes += [(render, "resolution_x", int(size[0])), (render, "resolution_y", int(size[1]))]
+        changes.append((render, "resolution_percentage", 100))
+    denoise = render.engine != "CYCLES" or not scene.cycles.use_denoising or can_denoise()
+    if not denoise:
+        changes.append((scene.cycles, "use_denoising", False))
+    if samples is not None:
+        if render.engine == "CYCLES":
+            changes.append((scene.cycles, "samples", int(samples) if denoise else 2 * int(samples)))
+        elif hasattr(scene, "eevee"):
+            changes.append((scene.eevee, "taa_render_samples", int(samples)))
+    before = [(owner, name, getattr(owner, name)) for owner, name, _ in changes]
+    frame_before = scene.frame_current
+    try:
+        for owner, name, value in changes:
+            setattr(owner, name, value)
+        scene.frame_set(frame)
+        yield
+    finally:
+        for owner, name, value in before:
+            setattr(owner, name, value)
+        scene.frame_set(frame_before)

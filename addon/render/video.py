@@ -1,0 +1,84 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Pictures become a video: Blender's own sequencer and encoder, in a scene that is gone afterwards."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+
+import bpy
+
+from ...core.errors import FileError, SceneError
+from ...core.io.files import atomic_write
+
+
+def encode(pictures: Sequence[str | os.PathLike], path: str | os.PathLike, fps: float) -> Path:
+    """Write an MP4 (H.264) of pictures of one size, one per frame.
+
+    Parameters
+    ----------
+    pictures : sequence of path
+        PNG, of even width and height, all in one folder.
+    path : path
+        Replaced whole or not at all; gets the ending .mp4.
+    fps : float
+
+    Raises
+    ------
+    SceneError
+        This Blender cannot encode videos.
+    FileError
+        The video cannot be written.
+    """
+    if not bpy.app.build_options.codec_ffmpeg:
+        raise SceneError("This Blender was built without FFmpeg and cannot write videos: take another, or use the pictures.")
+    path = Path(path).with_suffix(".mp4")
+    scene = bpy.data.scenes.new("Palpate Video")
+    try:
+        _strip(scene, [Path(picture) for picture in pictures])
+        _settings(scene, len(pictures), fps)
+        with atomic_write(path) as temporary:
+            temporary.unlink()
+            scene.render.filepath = str(temporary)
+            try:
+                bpy.ops.render.render(animation=True, scene=scene.name)
+            except RuntimeError as error:
+                reason = " ".join(str(error).removeprefix("Error:").split()).rstrip(".")
+                raise SceneError(f"The video could not be made: {reason}.") from error
+            if not temporary.exists():
+                raise FileError(f"The video was not written to '{path}': check the space left on the disk.")
+    finally:
+        bpy.data.scenes.remove(scene)
+    return path
+
+
+def _strip(scene, pictures: list[Path]) -> None:
+    editor = scene.sequence_editor_create()
+    strips = editor.strips if hasattr(editor, "strips") else editor.sequences  # 4.4 renamed them
+    strip = strips.new_image("Pictures", str(pictures[0]), channel=1, frame_start=1)
+    for picture in pictures[1:]:
+        strip.elements.append(picture.name)
+    strip.colorspace_settings.name = "sRGB"
+    image = bpy.data.images.load(str(pictures[0]))
+    scene.render.resolution_x, scene.render.resolution_y = image.size
+    bpy.data.images.remove(image)
+
+
+def _settings(scene, count: int, fps: float) -> None:
+    render = scene.render
+    scene.frame_start, scene.frame_end = 1, count
+    render.fps = max(1, round(fps))
+    render.fps_base = render.fps / fps
+    render.resolution_percentage = 100
+    render.use_sequencer, render.use_compositing = True, False
+    render.use_file_extension = False
+    scene.view_settings.view_transform = "Standard"
+    image = render.image_settings
+    if hasattr(image, "media_type"):  # Blender 5.0
+        image.media_type = "VIDEO"
+    image.file_format = "FFMPEG"
+    image.color_mode = "RGB"
+    render.ffmpeg.format, render.ffmpeg.codec = "MPEG4", "H264"
+    render.ffmpeg.constant_rate_factor = "HIGH"
+    render.ffmpeg.gopsize = 12

@@ -1,0 +1,168 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What moves and bends objects, through however many others: parents, constraints, modifiers, drivers, and their animation.
+
+Poses and shapes are compared at the frame that is shown. A change that shows at other frames only is seen here.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterator
+from functools import cache
+
+import bpy
+import numpy as np
+
+from ..display import heat_map
+from ..session import fcurves
+from . import moved_bodies
+
+_PLACES = ("co", "handle_left", "handle_right")
+_EASES = ("easing", "back", "amplitude", "period")
+"""What else keyframes say where they are followed by an easing curve."""
+_EASED = 2
+"""Above this, the number of an interpolation is that of an easing curve."""
+_NO_VALUE = {"name", "show_expanded", "select", "active", "strip_time"}
+"""Properties that say nothing about motion, or something else at every frame."""
+
+
+def motion(objects) -> str:
+    """Return a hash of the animation of objects and of all that they hang on, between frames too.
+
+    Of a body that forces move only its drivers: its keyframes are the bake's.
+    """
+    digest = hashlib.blake2b(digest_size=16)
+    for block in blocks(objects):
+        data = getattr(block, "animation_data", None)
+        if data is None:
+            continue
+        digest.update(b"next")  # their names may change
+        for driver in data.drivers:
+            _feed_curve(digest, driver)
+            digest.update(repr(_driver(driver.driver)).encode("utf-8", "surrogatepass"))
+        if isinstance(block, bpy.types.Object) and block.palpate.body in moved_bodies.MOVED:
+            continue
+        for curve in fcurves.of_action(data) or ():
+            _feed_curve(digest, curve)
+        for track in data.nla_tracks:
+            for strip in track.strips:
+                digest.update(repr((track.mute, track.is_solo, _values(strip))).encode("utf-8", "surrogatepass"))
+                for curve in (*strip.fcurves, *(fcurves.of_action(strip) or ())):
+                    _feed_curve(digest, curve)
+    return digest.hexdigest()
+
+
+def blocks(objects) -> list:
+    """Return objects and every data-block that their place and shape hang on, in an order that stays."""
+    found, waiting = {}, list(objects)[::-1]
+    while waiting:
+        block = waiting.pop()
+        if block is not None and block.session_uid not in found:
+            found[block.session_uid] = block
+            waiting += _named_by(block)
+    return list(found.values())
+
+
+def _named_by(block) -> Iterator:
+    data = getattr(block, "animation_data", None)
+    for driver in () if data is None else data.drivers:
+        for variable in driver.driver.variables:
+            yield from (target.id for target in variable.targets)
+    if isinstance(block, bpy.types.Object):
+        yield from (block.parent, block.data)
+        yield from _of_constraints(block.constraints)
+        for modifier in block.modifiers:
+            if modifier.name != heat_map.MODIFIER:
+                yield from _pointers(modifier)
+                yield from _inputs(modifier)
+        for bone in () if block.pose is None else block.pose.bones:
+            yield from _of_constraints(bone.constraints)
+    elif isinstance(block, bpy.types.NodeTree):
+        for node in block.nodes:
+            yield getattr(node, "node_tree", None)
+            defaults = (getattr(socket, "default_value", None) for socket in node.inputs)
+            yield from (value for value in defaults if isinstance(value, bpy.types.ID))
+    elif isinstance(block, bpy.types.Curve):
+        yield from (block.bevel_object, block.taper_object)
+    yield getattr(block, "shape_keys", None)
+
+
+def _of_constraints(constraints) -> Iterator:
+    for constraint in constraints:
+        yield from _pointers(constraint)
+        yield from (item.target for item in getattr(constraint, "targets", ()))
+
+
+def _inputs(modifier) -> Iterator:
+    """Return the data-blocks that Geometry Nodes are given. Newer Blenders (5.2) have properties for inputs."""
+    nodes = modifier.node_group if modifier.type == "NODES" else None
+    for item in () if nodes is None else nodes.interface.items_tree:
+        if getattr(item, "in_out", "") != "INPUT":
+            continue
+        if hasattr(modifier, "properties"):
+            value = getattr(getattr(modifier.properties.inputs, item.identifier, None), "value", None)
+        else:
+            value = modifier.get(item.identifier)
+        if isinstance(value, bpy.types.ID):
+            yield value
+
+
+def _pointers(item) -> Iterator:
+    """Return the data-blocks that a modifier or constraint names."""
+    yield from (getattr(item, name) for name in _pointer_names(type(item)))
+
+
+@cache
+def _pointer_names(kind) -> tuple[str, ...]:
+    pointers = [prop for prop in kind.bl_rna.properties if prop.type == "POINTER"]
+    return tuple(prop.identifier for prop in pointers if _is_block(prop.fixed_type))
+
+
+def _is_block(kind) -> bool:
+    while kind is not None and kind.identifier != "ID":
+        kind = kind.base
+    return kind is not None
+
+
+def _feed_curve(digest, curve) -> None:
+    digest.update(f"{curve.data_path}[{curve.array_index}]{curve.mute}{curve.extrapolation}".encode("utf-8", "surrogatepass"))
+    points = curve.keyframe_points
+    places, kinds = np.empty(2 * len(points), dtype=np.float32), np.empty(len(points), dtype=np.int32)
+    for key in _PLACES:
+        points.foreach_get(key, places)
+        digest.update(places.tobytes())
+    points.foreach_get("interpolation", kinds)
+    digest.update(kinds.tobytes())
+    if (kinds > _EASED).any():
+        digest.update(repr([[getattr(point, key) for key in _EASES] for point in points]).encode())
+    for modifier in curve.modifiers:
+        digest.update(repr(_values(modifier)).encode("utf-8", "surrogatepass"))
+
+
+def _driver(driver) -> tuple:
+    variables = [(_values(item), [(_block_name(t.id), _values(t)) for t in item.targets]) for item in driver.variables]
+    return driver.type, driver.expression, driver.use_self, variables
+
+
+def _block_name(block) -> str:
+    return "" if block is None else block.name_full
+
+
+def _values(item) -> list[tuple]:
+    """Return the numbers and words of a part of an animation, by name."""
+    found = []
+    for name in _value_names(type(item)):
+        value = getattr(item, name)
+        if name == "influence" and getattr(item, "use_animated_influence", False):
+            continue  # its curve counts
+        if isinstance(value, set):
+            value = sorted(value)  # which comes first is chance
+        found.append((name, value if isinstance(value, int | float | str | list) else tuple(value)))
+    return found
+
+
+@cache
+def _value_names(kind) -> tuple[str, ...]:
+    plain = [prop for prop in kind.bl_rna.properties if prop.type in {"BOOLEAN", "INT", "FLOAT", "STRING", "ENUM"}]
+    given = [prop.identifier for prop in plain if not prop.is_readonly or prop.identifier == "type"]
+    return tuple(name for name in given if name not in _NO_VALUE)

@@ -1,0 +1,108 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A sensor's tactile image laid out by a UV map of its own mesh, where the user wants it so."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ...core.errors import ImageError
+from ...core.geometry.layout import UVLayout, mapped_layout
+from ...core.geometry.texels import Texels
+from ..display import materials
+from . import meshes
+
+SETTINGS = ("image_layout", "image_map", "image_size", "image_filter")
+"""Names in :class:`.properties.PALPATE_PG_object`."""
+_kept: list[tuple[tuple, UVLayout]] = []
+"""The last few layouts: panels ask for them again and again, and each takes a while."""
+_MOST_KEPT = 8
+
+
+def laid_out(obj, texels: Texels) -> Texels:
+    """Return texels with the layout that their object asks for.
+
+    Raises
+    ------
+    ImageError
+        The UV map is missing, or no picture can be made of it.
+    """
+    own = obj.palpate
+    if own.image_layout != "UV":
+        return texels
+    layer = uv_layer(obj)
+    number = np.full(len(obj.data.vertices), -1)
+    number[texels.vertex] = np.arange(len(texels))
+    loops, corner = _triangles(obj.data)
+    triangles = number[corner[loops]]
+    inside = (triangles >= 0).all(axis=1)
+    uv = np.empty(2 * len(corner), dtype=np.float32)
+    layer.uv.foreach_get("vector", uv)
+    triangles, corner_uv = triangles[inside], uv.reshape(-1, 2).astype(float)[loops[inside]]
+    if obj.matrix_world.is_negative:  # anticlockwise from outside, as the sensor's own triangles are then turned
+        triangles, corner_uv = triangles[:, ::-1], corner_uv[:, ::-1]
+    key = (triangles.tobytes(), corner_uv.tobytes(), own.image_size, own.image_filter, layer.name, obj.name)
+    return replace(texels, layout=_known(key) or _remember(key, _made(obj, triangles, corner_uv, layer.name)))
+
+
+def uv_layer(obj):
+    """Return the UV map of a sensor's tactile image: the one that is named, else the one that renders use.
+
+    Raises
+    ------
+    ImageError
+        There is none, or the mesh is being edited.
+    """
+    layers = [layer for layer in obj.data.uv_layers if layer.name != materials.UV_NAME]
+    wanted = obj.palpate.image_map
+    if not layers:
+        raise ImageError(
+            f"Sensor '{obj.name}' has no UV map for its tactile image: unwrap it (Edit Mode, UV › Smart UV Project), "
+            "or set Readout › Image to Automatic."
+        )
+    if wanted and all(layer.name != wanted for layer in layers):
+        there = ", ".join(f"'{layer.name}'" for layer in layers)
+        raise ImageError(f"Sensor '{obj.name}' has no UV map '{wanted}': choose one of {there} in its Readout panel.")
+    found = next((layer for layer in layers if layer.name == wanted), None)
+    found = found or next((layer for layer in layers if layer.active_render), layers[0])
+    if len(found.uv) != len(obj.data.loops):
+        raise ImageError(f"The UV map of sensor '{obj.name}' cannot be read in Edit Mode: leave it (Tab) first.")
+    return found
+
+
+def notes(obj, texels: Texels) -> list[str]:
+    """Return what a user should know about the layout of a sensor's texels."""
+    layout = texels.layout
+    small = layout.too_small() if isinstance(layout, UVLayout) and layout.map_name else 0
+    if not small:
+        return []
+    return [
+        f"{small} of {len(texels)} texels of '{obj.name}' are smaller than a pixel of its tactile image: "
+        "choose a larger Readout › Resolution."
+    ]
+
+
+def _made(obj, triangles: np.ndarray, corner_uv: np.ndarray, name: str) -> UVLayout:
+    own = obj.palpate
+    nearest = own.image_filter == "NEAREST"
+    return mapped_layout(triangles, corner_uv, own.image_size, map_name=name, nearest=nearest, sensor=obj.name)
+
+
+def _known(key: tuple) -> UVLayout | None:
+    return next((layout for known, layout in _kept if known == key), None)
+
+
+def _remember(key: tuple, layout: UVLayout) -> UVLayout:
+    _kept.append((key, layout))
+    del _kept[:-_MOST_KEPT]
+    return layout
+
+
+def _triangles(mesh) -> tuple[np.ndarray, np.ndarray]:
+    """Return the (m, 3) corners of the mesh's triangles, and the vertex of each corner."""
+    mesh.calc_loop_triangles()
+    loops = np.empty(3 * len(mesh.loop_triangles), dtype=np.int32)
+    mesh.loop_triangles.foreach_get("loops", loops)
+    corner = meshes.corners(mesh)
+    return loops.reshape(-1, 3), corner

@@ -1,0 +1,29 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Which kernels these are. Found without numba, so that the panel can ask whether they were compiled before."""
+
+from __future__ import annotations
+
+import hashlib
+from functools import cache
+from pathlib import Path
+
+MARKS = (b"@kernel", b"@inlined", b"@allocating", b"KIND = Kind(", b"from numba")
+"""What files hold that have a say in what is compiled; the laws of effects are compiled as well."""
+
+
+CORE = Path(__file__).resolve().parents[1]
+
+
+@cache
+def edition() -> str:
+    """Return a hash of all files with kernels in core.
+
+    A compiled kernel holds the machine code of those it calls, but numba looks only at a kernel's own file to see whether what
+    it kept is still good: after a change in another file, or an upgrade, the old code would go on running.
+    """
+    digest = hashlib.sha256()
+    for path in sorted(CORE.rglob("*.py")):
+        source = path.read_bytes()
+        if any(mark in source for mark in MARKS):
+            digest.update(source)
+    return digest.hexdigest()[:12]

@@ -1,0 +1,165 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""All effects there are: every module of the library defines a ``KIND``."""
+
+from __future__ import annotations
+
+import difflib
+import importlib
+import pkgutil
+from collections.abc import Iterable, Mapping
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from ...errors import EffectError
+from .specification import STAGES, Effect, Form, Kind, Value, Values
+
+LIBRARY = f"{__package__.rpartition('.')[0]}.library"
+"""The package of the effects."""
+
+
+@cache
+def library() -> dict[str, Kind]:
+    """Return every kind by its standard name, in the order in which they act."""
+    package = importlib.import_module(LIBRARY)
+    found = [importlib.import_module(f"{LIBRARY}.{module.name}").KIND for module in pkgutil.iter_modules(package.__path__)]
+    found.sort(key=lambda kind: (STAGES.index(kind.stage), kind.order, kind.name))
+    return {kind.name: kind for kind in found}
+
+
+def kind_of(name: str) -> Kind:
+    """Return the kind of a standard name; raises :class:`EffectError` when there is none."""
+    kinds = library()
+    if name not in kinds:
+        raise EffectError(f"There is no effect '{name}'{_perhaps(name, kinds)}; the library has {', '.join(kinds)}.")
+    return kinds[name]
+
+
+def form_of(name: str, form: str = "") -> Form:
+    """Return a form of an effect by its name, the usual one when none is given; raises :class:`EffectError`."""
+    forms = {item.name: item for item in kind_of(name).forms}
+    if not form:
+        return next(iter(forms.values()))
+    if form not in forms:
+        raise EffectError(f"Effect '{name}' has no form '{form}'{_perhaps(form, forms)}; it has {', '.join(forms)}.")
+    return forms[form]
+
+
+def stage_of(effect: Effect) -> str:
+    """Return the stage at which an effect acts."""
+    return kind_of(effect.name).stage_of(form_of(effect.name, effect.form))
+
+
+def effect(name: str, form: str = "", seed: int = 0, gain: float = 1.0, **values: Any) -> Effect:
+    """Return a complete effect: the usual form unless one is named, defaults for what is not given.
+
+    Parameters
+    ----------
+    name, form : str
+    seed : int
+    gain : float
+        Of the sensor it is meant for, since some defaults are in its unit.
+    **values
+        Parameters by name; a number, or one number per texel.
+
+    Raises
+    ------
+    EffectError
+        An unknown name, form or parameter, or a value outside its bounds.
+    """
+    found = form_of(name, form)
+    complete: dict[str, Value] = found.defaults(gain)
+    complete.update({key: _plain(value) for key, value in values.items()})
+    made = Effect(name, found.name, complete, seed)
+    check((made,), "the sensor", gain=gain)
+    return made
+
+
+def complete_values(item: Effect, gain: float = 1.0) -> dict[str, Value]:
+    """Return an effect's value of every parameter, defaults included."""
+    return {**form_of(item.name, item.form).defaults(gain), **item.values}
+
+
+def check(effects: Iterable[Effect], sensor: str, texels: int | None = None, gain: float = 1.0) -> None:
+    """Raise :class:`EffectError` for the first effect of a sensor that means nothing."""
+    for item in effects:
+        form = form_of(item.name, item.form)
+        where = f"effect '{item.name}' ({form.name}) of sensor '{sensor}'"
+        known = {parameter.name: parameter for parameter in form.parameters}
+        for key, value in item.values.items():
+            if key not in known:
+                raise EffectError(f"{key} is no parameter of {where}{_perhaps(key, known)}; it has {', '.join(known)}.")
+            parameter = known[key].scaled(gain)
+            numbers = np.asarray(value, dtype=float)
+            if numbers.ndim and not parameter.per_texel:
+                raise EffectError(f"{key} of {where} is a list of {numbers.size}: give it one number.")
+            if numbers.ndim and texels is not None and len(numbers) != texels:
+                raise EffectError(f"{key} of {where} has {len(numbers)} numbers for {texels} texels: give one per texel.")
+            low, high = parameter.low - 1e-9 * abs(parameter.low), parameter.high + 1e-9 * abs(parameter.high)  # rounding
+            outside = ~((numbers >= low) & (numbers <= high))
+            if outside.any():
+                worst = float(np.atleast_1d(numbers)[np.atleast_1d(outside)][0])
+                unit = "" if parameter.unit == "1" else f" {parameter.unit}"
+                raise EffectError(
+                    f"{key} of {where} is {worst:g}{unit}: give it a value from {parameter.low:g} to {parameter.high:g}{unit}."
+                )
+
+
+def in_order(effects: Iterable[Effect], readout: bool) -> list[tuple[Effect, Form]]:
+    """Return a sensor's effects on forces, or those on readings, in the order in which they act."""
+    chosen = []
+    for item in effects:
+        kind, form = kind_of(item.name), form_of(item.name, item.form)
+        stage = kind.stage_of(form)
+        if (stage == "readout") == readout:
+            rank = (form.after_conversion, form.after_clip, stage == "pad", kind.order)
+            chosen.append((rank, item, form))
+    chosen.sort(key=lambda entry: entry[0])  # stable: of two alike the first in the stack acts first
+    return [(item, form) for _, item, form in chosen]
+
+
+def placed(effects: Iterable[Effect], position: np.ndarray, normal: np.ndarray, tangent: np.ndarray) -> tuple[np.ndarray, ...]:
+    """Where the texels really are, with the effects that move them: position (m), normal and tangent, each (n, 3)."""
+    for item, form in in_order(effects, readout=False):
+        if form.place is not None:
+            position, normal, tangent = form.place(position, normal, tangent, complete_values(item))
+    return position, normal, tangent
+
+
+def to_dict(item: Effect) -> dict[str, Any]:
+    """Return an effect as a TOML table: ``name``, ``form``, ``seed`` where chance plays a part, and its values."""
+    seed = {"seed": item.seed} if form_of(item.name, item.form).random else {}
+    values = {key: list(value) if isinstance(value, tuple) else value for key, value in item.values.items()}
+    return {"name": item.name, "form": item.form, **seed, **values}
+
+
+def from_dict(table: Mapping[str, Any], gain: float = 1.0) -> Effect:
+    """Return the effect that a TOML table describes; raises :class:`EffectError`."""
+    rest = dict(table)
+    name, form, seed = rest.pop("name", None), rest.pop("form", ""), rest.pop("seed", 0)
+    if not isinstance(name, str) or not isinstance(form, str):
+        raise EffectError('An effect needs name = "…", one of the library\'s, and may have form = "…".')
+    if not isinstance(seed, int) or isinstance(seed, bool) or not 0 <= seed < 2**31:
+        raise EffectError(f"seed of effect '{name}' is {seed!r}: give it a whole number from 0 to 2147483647.")
+    for key, value in rest.items():
+        numbers = value if isinstance(value, list | tuple) else [value]
+        if not all(isinstance(number, int | float) and not isinstance(number, bool) for number in numbers):
+            raise EffectError(f"{key} of effect '{name}' is {value!r}: give it a number.")
+    return effect(name, form, seed, gain, **rest)
+
+
+def scalars(values: Values) -> dict[str, float]:
+    """Return the values that are single numbers."""
+    return {key: value for key, value in values.items() if not isinstance(value, tuple)}
+
+
+def _plain(value: Any) -> Value:
+    """A number, or numbers as a tuple, whatever kind of array they came in."""
+    numbers = np.asarray(value, dtype=float)
+    return float(numbers) if numbers.ndim == 0 else tuple(float(number) for number in numbers.ravel())
+
+
+def _perhaps(name: str, known: Iterable[str]) -> str:
+    near = difflib.get_close_matches(name, list(known), n=1)
+    return f" (did you mean '{near[0]}'?)" if near else ""

@@ -1,0 +1,180 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Slow settling: under constant depth the force relaxes, or under constant load the reading rises.
+
+All forms are sums of exponentials ``G(t) = 1 ∓ Σ a_i (1 − exp(−t/τ_i))``; the logarithmic and the power law are spread over the
+logarithm of time, so that their states stay few and the cost does not grow with the past.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from ..engine.specification import Form, Kind, Parameter, Values, number
+
+LOG_RATES = np.arange(-13.75, 2.76, 1.25)
+"""Logarithm of the rates that stand for a spectrum; a step of 1.25 keeps the sum within 0.1 % of the closed formula."""
+TERMS = len(LOG_RATES)
+
+
+def settling(force, slope, depth, slide, numbers, row, memory, point, at, commit):
+    """Add ``Σ a_i q_i`` with ``τ_i q̇_i = f − q_i``; `f` is taken as linear over the step, for which this is exact.
+
+    Memory: the force at the last step's end, then the q_i. Constants: how many, then for each the old q's share, the old and
+    the new force's share in q, and a_i.
+    """
+    count = int(numbers[row, 0])
+    total, rise = force, 1.0
+    before = memory[point, at]
+    for i in range(count):
+        j = 1 + 4 * i
+        q = numbers[row, j] * memory[point, at + 1 + i] + numbers[row, j + 1] * before + numbers[row, j + 2] * force
+        total += numbers[row, j + 3] * q
+        rise += numbers[row, j + 3] * numbers[row, j + 2]
+        if commit:
+            memory[point, at + 1 + i] = q
+    if commit:
+        memory[point, at] = force
+    return total, slope * rise
+
+
+def filter_constants(amplitudes: np.ndarray, times: np.ndarray, dt: np.ndarray) -> np.ndarray:
+    """Return the constants of :func:`settling`, (m, 1 + 4 c), for steps `dt` (m,) and c exponentials."""
+    x = np.asarray(dt, float)[:, None] / times
+    table = np.stack([*shares_of_a_step(x), np.broadcast_to(amplitudes, x.shape)], axis=-1)
+    return np.hstack([np.full((len(x), 1), float(len(times))), table.reshape(len(x), -1)])
+
+
+def shares_of_a_step(x: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Shares of the old q, the old f and the new f in q after a step `x` = dt/τ of ``τ q̇ = f − q`` over which f is linear."""
+    risen = -np.expm1(-x)
+    new = np.where(
+        x > 1e-4, 1.0 - risen / np.maximum(x, 1e-300), 0.5 * x - x * x / 6.0
+    )  # the series where digits would be lost
+    return np.exp(-x), risen - new, new
+
+
+def _constants(
+    spectrum: Callable[[Values], tuple[np.ndarray, np.ndarray]], sign: float
+) -> Callable[[Values, np.ndarray], np.ndarray]:
+    def constants(values: Values, dt: np.ndarray) -> np.ndarray:
+        amplitudes, times = spectrum(values)
+        return filter_constants(sign * amplitudes, times, dt)
+
+    return constants
+
+
+def prony(values: Values) -> tuple[np.ndarray, np.ndarray]:
+    """Amplitudes and times of one or two exponentials."""
+    pairs = [("amount", "time"), ("amount_2", "time_2")]
+    found = [(values[a], values[t]) for a, t in pairs if a in values]
+    amplitudes, times = np.array(found, dtype=float).T
+    if len(amplitudes) > 1:  # together they never take more than the whole force
+        amplitudes = amplitudes / max(1.0, float(amplitudes.sum()) / 0.95)
+    return amplitudes, times
+
+
+def logarithmic(values: Values) -> tuple[np.ndarray, np.ndarray]:
+    """``a · log10(1 + t/τ)`` until a hundred thousand times τ: exponentials at even steps of log time."""
+    # 1 - exp(-x s) weighted with exp(-x) dx / x integrates to ln(1 + s).
+    rates = np.exp(LOG_RATES)
+    weights = (LOG_RATES[1] - LOG_RATES[0]) * np.exp(-rates) / math.log(10.0)
+    return number(values, "amount") * weights, number(values, "time") / rates
+
+
+def power(values: Values) -> tuple[np.ndarray, np.ndarray]:
+    """``a · (1 − (1 + t/τ)^−p)``: the power law's own spectrum x^(p−1) exp(−x) / Γ(p), at even steps of ln x."""
+    exponent, rates = number(values, "exponent"), np.exp(LOG_RATES)
+    weights = (LOG_RATES[1] - LOG_RATES[0]) * rates**exponent * np.exp(-rates) / math.gamma(exponent)
+    return number(values, "amount") * weights, number(values, "time") / rates
+
+
+_TIME = Parameter("time", "s", 2.0, 0.02, 1000.0, "Time in which the settling has come 63 % of its way.", log=True)
+_ONSET = Parameter("time", "s", 0.5, 0.01, 100.0, "Time after which the settling follows the logarithm of time.", log=True)
+_AMOUNT = Parameter("amount", "1", 0.2, 0.0, 0.95, "Share of the force that is gone in the end.")
+_RISE = Parameter("amount", "1", 0.2, 0.0, 5.0, "Share by which the reading has risen in the end.")
+_SECOND = (
+    Parameter("amount_2", "1", 0.1, 0.0, 0.95, "The same of a second, slower settling."),
+    Parameter("time_2", "s", 20.0, 0.02, 1000.0, "Time of the second settling.", log=True),
+)
+_DECADE = Parameter("amount", "1", 0.05, 0.0, 0.15, "Share of the force that goes per decade of time.")
+_RISE_DECADE = Parameter("amount", "1", 0.05, 0.0, 1.0, "Share by which the reading rises per decade of time.")
+_EXPONENT = Parameter("exponent", "1", 0.3, 0.05, 1.5, "Exponent p of the power law.")
+
+_VISCOELASTIC = "Fung, Biomechanics (1993), section 7.6: quasi-linear viscoelasticity"
+_LOG = "Findley, Lai and Onaran, Creep and Relaxation of Nonlinear Viscoelastic Materials (1976)"
+_POWER = "Nutting (1921); Schapery and Park, Int. J. Solids Struct. 36 (1999): power law by exponentials"
+
+KIND = Kind(
+    name="creep",
+    title="Creep",
+    text="Settles slowly: held at one depth the force relaxes, or under one load the reading goes on rising.",
+    stage="pad",
+    order=30,
+    forms=(
+        Form(
+            "exponential",
+            "f(t) = fₑ − a · q,  τ q̇ = fₑ − q",
+            _VISCOELASTIC,
+            (_AMOUNT, _TIME),
+            off={"amount": 0.0},
+            law=settling,
+            constants=_constants(prony, -1.0),
+            memory=2,
+        ),
+        Form(
+            "two-exponentials",
+            "f(t) = fₑ − a₁ q₁ − a₂ q₂,  τᵢ q̇ᵢ = fₑ − qᵢ",
+            _VISCOELASTIC,
+            (_AMOUNT, _TIME, *_SECOND),
+            off={"amount": 0.0, "amount_2": 0.0},
+            law=settling,
+            constants=_constants(prony, -1.0),
+            memory=3,
+        ),
+        Form(
+            "logarithmic",
+            "step response 1 − a · log₁₀(1 + t/τ)",
+            _LOG,
+            (_DECADE, _ONSET),
+            off={"amount": 0.0},
+            law=settling,
+            constants=_constants(logarithmic, -1.0),
+            memory=1 + TERMS,
+        ),
+        Form(
+            "power",
+            "step response 1 − a · (1 − (1 + t/τ)⁻ᵖ)",
+            _POWER,
+            (_AMOUNT, _ONSET, _EXPONENT),
+            off={"amount": 0.0},
+            law=settling,
+            constants=_constants(power, -1.0),
+            memory=1 + TERMS,
+        ),
+        Form(
+            "rising-exponential",
+            "r(t) = f + a · q,  τ q̇ = f − q",
+            _VISCOELASTIC,
+            (_RISE, _TIME),
+            off={"amount": 0.0},
+            law=settling,
+            constants=_constants(prony, 1.0),
+            memory=2,
+            stage="readout",
+        ),
+        Form(
+            "rising-logarithmic",
+            "step response 1 + a · log₁₀(1 + t/τ)",
+            _LOG,
+            (_RISE_DECADE, _ONSET),
+            off={"amount": 0.0},
+            law=settling,
+            constants=_constants(logarithmic, 1.0),
+            memory=1 + TERMS,
+            stage="readout",
+        ),
+    ),
+)

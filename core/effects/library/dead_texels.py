@@ -1,0 +1,87 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Some texels report nothing, or always the same."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..engine.random_numbers import uniform
+from ..engine.specification import Form, Kind, Parameter, Site, Values, number
+
+
+def _dead(values: Values, seed: int, texels: int) -> np.ndarray:
+    return uniform("dead-texels", seed, np.arange(texels)) < number(values, "share")
+
+
+def random(x: np.ndarray, time: np.ndarray, values: Values, site: Site, seed: int) -> np.ndarray:
+    """Nothing where a texel is dead."""
+    return np.where(_dead(values, seed, x.shape[1]), 0.0, x)
+
+
+def listed(x: np.ndarray, time: np.ndarray, values: Values, site: Site, seed: int) -> np.ndarray:
+    """Nothing where a texel is listed as dead; half dead ones report half."""
+    return x * (1.0 - np.asarray(values["dead"]))
+
+
+def stuck(x: np.ndarray, time: np.ndarray, values: Values, site: Site, seed: int) -> np.ndarray:
+    """One reading for ever where a texel is dead."""
+    return np.where(_dead(values, seed, x.shape[1]), site.zero + number(values, "level"), x)
+
+
+def held(x: np.ndarray, time: np.ndarray, values: Values, site: Site, seed: int) -> np.ndarray:
+    """A reading of its own for ever where a texel is listed as dead."""
+    gone = np.asarray(values["dead"])
+    return (1.0 - gone) * x + gone * np.asarray(values["level"])
+
+
+_DEAD = Parameter("dead", "1", 0.0, 0.0, 1.0, "1 for each dead texel, 0 for the others.", per_texel=True)
+_SHARE = Parameter("share", "1", 0.1, 0.0, 1.0, "Share of the texels that are dead.")
+
+KIND = Kind(
+    name="dead-texels",
+    title="Dead Texels",
+    text="Some texels report nothing, whatever presses on them.",
+    stage="readout",
+    order=45,
+    forms=(
+        Form(
+            "random",
+            "rᵢ = 0 for a share of the texels",
+            "Ni et al., ACM Trans. Sens. Netw. 5 (2009): fault types",
+            (_SHARE,),
+            off={"share": 0.0},
+            shape=random,
+            random=True,
+        ),
+        Form(
+            "listed",
+            "rᵢ = (1 − deadᵢ) · fᵢ",
+            "Ni et al., ACM Trans. Sens. Netw. 5 (2009): fault types",
+            (_DEAD,),
+            off={"dead": 0.0},
+            shape=listed,
+        ),
+        Form(
+            "held",
+            "rᵢ = (1 − deadᵢ) · r₀ᵢ + deadᵢ · Lᵢ",
+            "Ni et al., ACM Trans. Sens. Netw. 5 (2009): stuck-at fault",
+            (
+                _DEAD,
+                Parameter("level", "unit", 0.1, -1e5, 1e5, "Reading L at which a dead texel stays.", per_texel=True),
+            ),
+            off={"dead": 0.0},
+            shape=held,
+            after_conversion=True,
+        ),
+        Form(
+            "stuck",
+            "rᵢ = r₀ + L for a share of the texels",
+            "Ni et al., ACM Trans. Sens. Netw. 5 (2009): stuck-at fault",
+            (_SHARE, Parameter("level", "unit", 0.1, -1e5, 1e5, "Reading L above the one without load at which they stay.")),
+            off={"share": 0.0},
+            shape=stuck,
+            after_conversion=True,
+            random=True,
+        ),
+    ),
+)

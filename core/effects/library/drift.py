@@ -1,0 +1,67 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The reading moves with the clock, whatever the load; time counts from the start of the recording or the first frame."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..engine.random_numbers import random_walk
+from ..engine.specification import Form, Kind, Parameter, Site, Values, number
+
+
+def linear(x: np.ndarray, time: np.ndarray, values: Values, site: Site, seed: int) -> np.ndarray:
+    """By so much each second."""
+    return x + number(values, "rate") * time[:, None]
+
+
+def warm_up(x: np.ndarray, time: np.ndarray, values: Values, site: Site, seed: int) -> np.ndarray:
+    """Fast at first, then to a halt."""
+    return x - number(values, "amount") * np.expm1(-time[:, None] / number(values, "time"))
+
+
+def walk(x: np.ndarray, time: np.ndarray, values: Values, site: Site, seed: int) -> np.ndarray:
+    """At random, each texel by itself."""
+    spread = number(values, "spread")
+    return x + spread * random_walk("drift", seed, time, x.shape[1]) if spread else x
+
+
+KIND = Kind(
+    name="drift",
+    title="Drift",
+    text="The reading moves slowly by itself, with or without load.",
+    stage="readout",
+    order=64,
+    forms=(
+        Form(
+            "linear",
+            "r = r₀ + b t",
+            "ISO/IEC Guide 99 (2007), 4.21: instrumental drift",
+            (Parameter("rate", "unit/s", 1e-3, -1e3, 1e3, "Change b of the reading per second."),),
+            off={"rate": 0.0},
+            shape=linear,
+            after_conversion=True,
+        ),
+        Form(
+            "warm-up",
+            "r = r₀ + a · (1 − exp(−t/τ))",
+            "Doebelin, Measurement Systems (2003): warm-up of an instrument",
+            (
+                Parameter("amount", "unit", 0.05, -1e4, 1e4, "Change a of the reading when warm."),
+                Parameter("time", "s", 30.0, 0.1, 1e5, "Time τ in which 63 % of it have come.", log=True),
+            ),
+            off={"amount": 0.0},
+            shape=warm_up,
+            after_conversion=True,
+        ),
+        Form(
+            "random-walk",
+            "r = r₀ + s · W(t),  W Brownian motion",
+            "IEEE Std 952 (1997), annex C: random walk; constructed after Lévy (1948)",
+            (Parameter("spread", "unit/√s", 0.005, 0.0, 1e3, "Standard deviation s after one second."),),
+            off={"spread": 0.0},
+            shape=walk,
+            after_conversion=True,
+            random=True,
+        ),
+    ),
+)

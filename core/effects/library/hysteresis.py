@@ -1,0 +1,229 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Loading and unloading go different ways, however slowly.
+
+Laws on the force take energy: the way back lies below the way in. They forget when the contact is released. Laws on the reading
+are transducers that trail behind: the reading lies lower on the way up and higher on the way down.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ..engine.specification import Form, Kind, Parameter, Values, number, same_for_all_steps
+
+ELEMENTS = 4
+"""Elements of the operators; their thresholds are spread evenly around the given one."""
+
+
+def duhem(force, slope, depth, slide, numbers, row, memory, point, at, commit):
+    """``f (1 + h z)`` with ``dz/dd = (±1 − z) / D``, plus on the way in. Memory: z and the last depth."""
+    z, change = memory[point, at], depth - memory[point, at + 1]
+    aim = 1.0 if change >= 0.0 else -1.0
+    left = math.exp(-abs(change) / numbers[row, 1])
+    z = aim + (z - aim) * left
+    if commit:
+        memory[point, at] = z if depth > 0.0 else 0.0
+        memory[point, at + 1] = depth
+    factor = 1.0 + numbers[row, 0] * z
+    return force * factor, slope * factor + force * numbers[row, 0] * (1.0 - aim * z) / numbers[row, 1]
+
+
+def bouc_wen(force, slope, depth, slide, numbers, row, memory, point, at, commit):
+    """``(1 − a) f + a z`` with ``dz = df − (β |df| z + γ df |z|) / Y``, β + γ = 1; piecewise exponential and so exact.
+
+    Memory: z and the last force. Along the way of the force, u = ±z grows by 1 − u/Y above zero, by 1 − (β − γ) u/Y below.
+    """
+    share, yield_force, below = numbers[row, 0], numbers[row, 1], 2.0 * numbers[row, 2] - 1.0
+    change = force - memory[point, at + 1]
+    way = 1.0 if change >= 0.0 else -1.0
+    u, path = way * memory[point, at], abs(change)
+    if u < 0.0:
+        to_zero = -u
+        if below * -u > 1e-9 * yield_force:
+            to_zero = yield_force / below * math.log1p(-below * u / yield_force)
+        if path < to_zero:
+            if below * -u > 1e-9 * yield_force:
+                top = yield_force / below
+                u = top + (u - top) * math.exp(-path / top)
+            else:
+                u += path
+            path = 0.0
+        else:
+            u, path = 0.0, path - to_zero
+    if u >= 0.0:
+        u = yield_force + (u - yield_force) * math.exp(-path / yield_force)
+        steep = 1.0 - u / yield_force
+    else:
+        steep = 1.0 - below * u / yield_force
+    if commit:
+        memory[point, at] = way * u if depth > 0.0 else 0.0
+        memory[point, at + 1] = force
+    return (1.0 - share) * force + share * way * u, slope * (1.0 - share + share * steep)
+
+
+def maxwell_slip(force, slope, depth, slide, numbers, row, memory, point, at, commit):
+    """``(1 − a) f + a · mean of s_j``, where s_j follows f until it slips at ±r_j. Memory: the last force, then the s_j."""
+    share, count = numbers[row, 0], int(numbers[row, 1])
+    change = force - memory[point, at]
+    total, sticking = 0.0, 0.0
+    for j in range(count):
+        threshold = numbers[row, 2 + j]
+        s = memory[point, at + 1 + j] + change
+        if abs(s) <= threshold:
+            sticking += 1.0
+        s = min(max(s, -threshold), threshold)
+        total += s
+        if commit:
+            memory[point, at + 1 + j] = s if depth > 0.0 else 0.0
+    if commit:
+        memory[point, at] = force
+    return (1.0 - share) * force + share * total / count, slope * (1.0 - share + share * sticking / count)
+
+
+def play(force, slope, depth, slide, numbers, row, memory, point, at, commit):
+    """``(1 − a) x + a · mean of p_j``, where p_j is dragged along once x is r_j ahead of it. Memory: the p_j."""
+    share, count = numbers[row, 0], int(numbers[row, 1])
+    total, moving = 0.0, 0.0
+    for j in range(count):
+        threshold, before = numbers[row, 2 + j], memory[point, at + j]
+        p = min(max(before, force - threshold), force + threshold)
+        if p != before:
+            moving += 1.0
+        total += p
+        if commit:
+            memory[point, at + j] = p
+    return (1.0 - share) * force + share * total / count, slope * (1.0 - share + share * moving / count)
+
+
+def preisach(force, slope, depth, slide, numbers, row, memory, point, at, commit):
+    """``(1 − a) x + a · mean of p_j``, where p_j stays between x − w_j and x, and above zero. Memory: the p_j.
+
+    Relays that switch on at b + w and off at b, b spread evenly from zero on, add up to p: max(x − w, 0) on a first way up.
+    """
+    share, count = numbers[row, 0], int(numbers[row, 1])
+    total, moving = 0.0, 0.0
+    for j in range(count):
+        before = memory[point, at + j]
+        p = min(max(before, force - numbers[row, 2 + j], 0.0), max(force, 0.0))
+        if p != before:
+            moving += 1.0
+        total += p
+        if commit:
+            memory[point, at + j] = p
+    return (1.0 - share) * force + share * total / count, slope * (1.0 - share + share * moving / count)
+
+
+def trailing(force, slope, depth, slide, numbers, row, memory, point, at, commit):
+    """``x (1 − h z)`` with ``dz/dx = (±1 − z) / F``, plus on the way up. Memory: z and the last x."""
+    change = force - memory[point, at + 1]
+    aim = 1.0 if change >= 0.0 else -1.0
+    z = aim + (memory[point, at] - aim) * math.exp(-abs(change) / numbers[row, 1])
+    if commit:
+        memory[point, at] = z
+        memory[point, at + 1] = force
+    factor = 1.0 - numbers[row, 0] * z
+    return force * factor, slope * (factor - force * numbers[row, 0] * (1.0 - aim * z) / numbers[row, 1])
+
+
+def _operators(values: Values, dt: np.ndarray) -> np.ndarray:
+    """Share, how many elements, and their thresholds, whose mean is the given one."""
+    spread = 2.0 * np.arange(1, ELEMENTS + 1) / (ELEMENTS + 1)
+    row = np.concatenate([[number(values, "share"), ELEMENTS], number(values, "force") * spread])
+    return np.tile(row, (len(dt), 1))
+
+
+def _relays(values: Values, dt: np.ndarray) -> np.ndarray:
+    """Share, how many elements, and their widths: middles of equal parts of an exponential distribution of given mean."""
+    widths = -np.log1p(-(np.arange(ELEMENTS) + 0.5) / ELEMENTS)
+    row = np.concatenate([[number(values, "share"), ELEMENTS], number(values, "force") * widths / widths.mean()])
+    return np.tile(row, (len(dt), 1))
+
+
+_SHARE = Parameter("share", "1", 0.4, 0.0, 0.95, "Share a of the force that goes through the elements that slip.")
+_FORCE = Parameter("force", "N", 0.05, 1e-6, 1e3, "Force Y at which they slip.", log=True)
+_WIDTH = Parameter("width", "1", 0.15, 0.0, 0.9, "Half the width h of the loop, as a share of the force.")
+
+KIND = Kind(
+    name="hysteresis",
+    title="Hysteresis",
+    text="Reads differently at the same depth on the way in and on the way back, however slowly it is done.",
+    stage="pad",
+    order=20,
+    forms=(
+        Form(
+            "duhem",
+            "f = fₑ · (1 + h z),  dz/dd = (sgn ḋ − z) / D",
+            "Visintin, Differential Models of Hysteresis (1994): Duhem; Coleman and Hodgdon, Int. J. Eng. Sci. 24 (1986)",
+            (_WIDTH, Parameter("depth", "m", 3e-4, 1e-6, 0.05, "Way D after which the other branch is reached.", log=True)),
+            off={"width": 0.0},
+            law=duhem,
+            constants=same_for_all_steps("width", "depth"),
+            memory=2,
+        ),
+        Form(
+            "bouc-wen",
+            "f = (1 − a) fₑ + a z,  ż = ḟₑ − (β |ḟₑ| z + (1 − β) ḟₑ |z|) / Y",
+            "Bouc (1967); Wen, J. Eng. Mech. Div. 102 (1976), with n = 1",
+            (
+                _SHARE,
+                _FORCE,
+                Parameter("beta", "1", 0.75, 0.5, 1.0, "Shape β of the loop: how much of the yielding is on the way back."),
+            ),
+            off={"share": 0.0},
+            law=bouc_wen,
+            constants=same_for_all_steps("share", "force", "beta"),
+            memory=2,
+        ),
+        Form(
+            "maxwell-slip",
+            "f = (1 − a) fₑ + a · mean of sⱼ,  sⱼ follows fₑ within ±rⱼ",
+            "Iwan, J. Appl. Mech. 33 (1966); Al-Bender et al., IEEE Trans. Autom. Control 50 (2005)",
+            (_SHARE, _FORCE),
+            off={"share": 0.0},
+            law=maxwell_slip,
+            constants=_operators,
+            memory=1 + ELEMENTS,
+        ),
+        Form(
+            "play",
+            "r = (1 − a) f + a · mean of pⱼ,  pⱼ is dragged along rⱼ behind f",
+            "Krasnosel'skii and Pokrovskii, Systems with Hysteresis (1989); Kuhnen, Eur. J. Control 9 (2003): play operators",
+            (
+                Parameter("share", "1", 0.4, 0.0, 1.0, "Share a of the reading that goes through the elements with play."),
+                Parameter("force", "N", 0.05, 1e-6, 1e3, "Force Y by which they trail behind.", log=True),
+            ),
+            off={"share": 0.0},
+            law=play,
+            constants=_operators,
+            memory=ELEMENTS,
+            stage="readout",
+        ),
+        Form(
+            "preisach",
+            "r = (1 − a) f + a · mean of pⱼ,  pⱼ between f − wⱼ and f, and never below zero",
+            "Preisach, Z. Phys. 94 (1935); Mayergoyz, Mathematical Models of Hysteresis (1991): relays of exponential widths",
+            (
+                Parameter("share", "1", 0.4, 0.0, 1.0, "Share a of the reading that goes through the relays."),
+                Parameter("force", "N", 0.1, 1e-6, 1e3, "Mean width w between switching on and off.", log=True),
+            ),
+            off={"share": 0.0},
+            law=preisach,
+            constants=_relays,
+            memory=ELEMENTS,
+            stage="readout",
+        ),
+        Form(
+            "trailing",
+            "r = f · (1 − h z),  dz/df = (sgn ḟ − z) / F",
+            "Visintin, Differential Models of Hysteresis (1994): Duhem's model",
+            (_WIDTH, Parameter("force", "N", 0.02, 1e-6, 1e3, "Force F after which the other branch is reached.", log=True)),
+            off={"width": 0.0},
+            law=trailing,
+            constants=same_for_all_steps("width", "force"),
+            memory=2,
+            stage="readout",
+        ),
+    ),
+)

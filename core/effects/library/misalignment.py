@@ -1,0 +1,83 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The texels are not where the model has them: a sensor glued on askew, an array that has slipped.
+
+x runs along the texels' mean x axis, z along their mean normal, through their middle.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..engine.specification import Form, Kind, Parameter, Values, number
+
+
+def moved(
+    position: np.ndarray, normal: np.ndarray, tangent: np.ndarray, values: Values
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Turn about z, then about y, then about x, and shift."""
+    up = _unit(normal.sum(axis=0), np.array([0.0, 0.0, 1.0]))
+    across = tangent.sum(axis=0)
+    across = across - (across @ up) * up
+    across = _unit(across, np.cross(up, np.eye(3)[np.abs(up).argmin()]))
+    frame = np.stack([across, np.cross(up, across), up], axis=1)
+    given = {key: number(values, key) for key in values}
+    turn = frame @ _turn(given.get("about_x", 0.0), given.get("about_y", 0.0), given.get("about_z", 0.0)) @ frame.T
+    shift = frame @ np.array([given.get("x", 0.0), given.get("y", 0.0), given.get("z", 0.0)])
+    middle = position.mean(axis=0)
+    return middle + (position - middle) @ turn.T + shift, normal @ turn.T, tangent @ turn.T
+
+
+def _unit(vector: np.ndarray, otherwise: np.ndarray) -> np.ndarray:
+    length = float(np.linalg.norm(vector))
+    return vector / length if length > 1e-9 else otherwise / np.linalg.norm(otherwise)
+
+
+def _turn(x: float, y: float, z: float) -> np.ndarray:
+    (a, b), (c, d), (e, f) = ((np.cos(angle), np.sin(angle)) for angle in (x, y, z))
+    about_x = np.array([[1, 0, 0], [0, a, -b], [0, b, a]])
+    about_y = np.array([[c, 0, d], [0, 1, 0], [-d, 0, c]])
+    about_z = np.array([[e, -f, 0], [f, e, 0], [0, 0, 1]])
+    return about_x @ about_y @ about_z
+
+
+_X = Parameter("x", "m", 0.001, -0.05, 0.05, "Shift along the columns.")
+_Y = Parameter("y", "m", 0.0, -0.05, 0.05, "Shift along the rows.")
+_Z = Parameter("about_z", "rad", 0.05, -0.8, 0.8, "Turn about the normal.")
+
+KIND = Kind(
+    name="misalignment",
+    title="Misalignment",
+    text="The texels sit beside or askew of where the model has them.",
+    stage="contact",
+    order=0,
+    forms=(
+        Form(
+            "shift",
+            "p = p₀ + s",
+            "Craig, Introduction to Robotics (2005), section 2.8: a frame's error as a rigid motion",
+            (_X, _Y),
+            off={"x": 0.0, "y": 0.0},
+            place=moved,
+        ),
+        Form(
+            "turn",
+            "p = R_z (p₀ − m) + m + s",
+            "Craig, Introduction to Robotics (2005), section 2.8",
+            (_X, _Y, _Z),
+            off={"x": 0.0, "y": 0.0, "about_z": 0.0},
+            place=moved,
+        ),
+        Form(
+            "tilt",
+            "p = R_x R_y (p₀ − m) + m + z",
+            "Craig, Introduction to Robotics (2005), section 2.8",
+            (
+                Parameter("about_x", "rad", 0.03, -0.5, 0.5, "Turn about the texels' x axis."),
+                Parameter("about_y", "rad", 0.0, -0.5, 0.5, "Turn about the texels' y axis."),
+                Parameter("z", "m", 0.0, -0.02, 0.02, "Shift outwards, along the normal."),
+            ),
+            off={"about_x": 0.0, "about_y": 0.0, "z": 0.0},
+            place=moved,
+        ),
+    ),
+)

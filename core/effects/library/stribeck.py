@@ -1,0 +1,69 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Friction is larger when it starts to slide: a rise of the friction coefficient at low speed, on top of the base model's."""
+
+from __future__ import annotations
+
+import math
+
+from ..engine.specification import Form, Kind, Parameter, same_for_all_steps
+
+
+def gaussian(speed, force, numbers, row):
+    """``1 + a · exp(−(v/V)²)``."""
+    x = speed / numbers[row, 1]
+    return 1.0 + numbers[row, 0] * math.exp(-x * x), 0.0
+
+
+def exponential(speed, force, numbers, row):
+    """``1 + a · exp(−v/V)``."""
+    return 1.0 + numbers[row, 0] * math.exp(-speed / numbers[row, 1]), 0.0
+
+
+def rational(speed, force, numbers, row):
+    """``1 + a / (1 + (v/V)²)``."""
+    x = speed / numbers[row, 1]
+    return 1.0 + numbers[row, 0] / (1.0 + x * x), 0.0
+
+
+_PARAMETERS = (
+    Parameter("rise", "1", 0.5, 0.0, 4.0, "By what share a friction is larger at rest than when sliding fast."),
+    Parameter("speed", "m/s", 0.01, 1e-5, 2.0, "Sliding speed V at which the rise is mostly gone.", log=True),
+)
+_CONSTANTS = same_for_all_steps("rise", "speed")
+
+KIND = Kind(
+    name="stribeck",
+    title="Stribeck Friction",
+    text="Grips harder when it slides slowly than when it slides fast.",
+    stage="contact",
+    order=20,
+    forms=(
+        Form(
+            "gaussian",
+            "μ = μ₀ · (1 + a exp(−(v/V)²))",
+            "Bo and Pavelescu, Wear 82 (1982); Canudas de Wit et al., IEEE Trans. Autom. Control 40 (1995)",
+            _PARAMETERS,
+            off={"rise": 0.0},
+            friction=gaussian,
+            constants=_CONSTANTS,
+        ),
+        Form(
+            "exponential",
+            "μ = μ₀ · (1 + a exp(−v/V))",
+            "Tustin, J. IEE 94 (1947); Armstrong-Hélouvry, Dupont and Canudas de Wit, Automatica 30 (1994)",
+            _PARAMETERS,
+            off={"rise": 0.0},
+            friction=exponential,
+            constants=_CONSTANTS,
+        ),
+        Form(
+            "rational",
+            "μ = μ₀ · (1 + a / (1 + (v/V)²))",
+            "Hess and Soom, J. Tribol. 112 (1990)",
+            _PARAMETERS,
+            off={"rise": 0.0},
+            friction=rational,
+            constants=_CONSTANTS,
+        ),
+    ),
+)

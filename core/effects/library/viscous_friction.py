@@ -1,0 +1,62 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Friction that grows with the sliding speed, on top of the base model's ``ct v``."""
+
+from __future__ import annotations
+
+from ..engine.specification import Form, Kind, Parameter, same_for_all_steps
+
+
+def linear(speed, force, numbers, row):
+    """``c v``."""
+    return 1.0, numbers[row, 0]
+
+
+def power(speed, force, numbers, row):
+    """``C · v^p``, below a hundredth of a millimetre per second linear."""
+    return 1.0, numbers[row, 0] * max(speed, 1e-5) ** (numbers[row, 1] - 1.0)
+
+
+def load(speed, force, numbers, row):
+    """``c f v``."""
+    return 1.0, numbers[row, 0] * max(force, 0.0)
+
+
+KIND = Kind(
+    name="viscous-friction",
+    title="Viscous Friction",
+    text="Drags the harder the faster it slides.",
+    stage="contact",
+    order=30,
+    forms=(
+        Form(
+            "linear",
+            "fₜ = fₜ₀ + c v",
+            "Armstrong-Hélouvry, Dupont and Canudas de Wit, Automatica 30 (1994)",
+            (Parameter("viscosity", "N·s/m", 0.05, 0.0, 1e3, "Drag c of one texel per metre per second."),),
+            off={"viscosity": 0.0},
+            friction=linear,
+            constants=same_for_all_steps("viscosity"),
+        ),
+        Form(
+            "load",
+            "fₜ = fₜ₀ + c f v",
+            "Bowden and Tabor, The Friction and Lubrication of Solids (1950): the area that is sheared grows with the load",
+            (Parameter("viscosity", "s/m", 0.5, 0.0, 1e3, "Drag c per newton of load and metre per second."),),
+            off={"viscosity": 0.0},
+            friction=load,
+            constants=same_for_all_steps("viscosity"),
+        ),
+        Form(
+            "power",
+            "fₜ = fₜ₀ + C vᵖ",
+            "Olsson et al., Eur. J. Control 4 (1998)",
+            (
+                Parameter("drag", "N·(s/m)^p", 0.05, 0.0, 1e3, "Drag C of one texel at one metre per second."),
+                Parameter("exponent", "1", 0.5, 0.2, 2.0, "Exponent p of the speed."),
+            ),
+            off={"drag": 0.0},
+            friction=power,
+            constants=same_for_all_steps("drag", "exponent"),
+        ),
+    ),
+)

@@ -1,0 +1,112 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What is put on or beside a rendered picture of the scene: colour bar, tactile images, labels."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ..geometry.texels import Texels
+from ..model.recording import Recording
+from ..response import metrics
+from .figure_style import FONT, new_figure, save_figure
+from .recording_style import Look
+from .tactile_image import View, colour_bar
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+DPI = 160
+"""Of a picture 1280 pixels wide: text then has its 8 pt when the picture is shown at eight inches."""
+
+
+@dataclass(frozen=True)
+class Label:
+    """Words on a picture with a thin line to what they are about.
+
+    Attributes
+    ----------
+    text : str
+        Its first line is set bold.
+    at : (2,) float
+        Where the words stand, as shares of the picture's width and height from its lower left corner.
+    to : (2,) float or None
+        Where the line ends, likewise.
+    """
+
+    text: str
+    at: tuple[float, float]
+    to: tuple[float, float] | None = None
+
+
+def label_picture(
+    source: str | Path,
+    path: str | Path,
+    recording: Recording,
+    texels: Mapping[str, Texels],
+    frame: int,
+    *,
+    look: Look | None = None,
+    labels: Sequence[Label] = (),
+) -> None:
+    """Put a colour bar, the tactile images of `frame`, and labels on a rendered picture.
+
+    Parameters
+    ----------
+    source, path : str or Path
+        The rendered PNG and the PNG to write; they may be the same file. The size in pixels stays as it is.
+    """
+    from matplotlib.image import imread
+
+    look = look or Look()
+    picture = imread(source)
+    pixels_y, pixels_x = picture.shape[:2]
+    dpi = round(DPI * pixels_x / 1280)
+    width, height = pixels_x / dpi, pixels_y / dpi
+    figure = new_figure(width, height)
+    background = figure.add_axes((0, 0, 1, 1))
+    background.imshow(picture, aspect="auto", interpolation="none")
+    background.set_axis_off()
+
+    felt = recording.at(frame).sensors
+    top, strongest = look.top(recording, texels), metrics.peak_shear(recording)
+    views = [View.of(texels[name], recording.sensors[name].normal_force.sum(axis=0)) for name in texels]
+    image = None
+    # A column at the right edge: one tactile image per sensor over each other, the colour bar beside them.
+    column, bar_room, title = 0.74, 0.72, 0.24
+    x = width - column - bar_room - 0.12
+    room = height - 0.3
+    each = min(1.75, room / max(len(views), 1) - title)
+    y = height - 0.5 * (height - len(views) * (each + title))
+    y_top = y - title
+    for name, view in zip(texels, views, strict=True):
+        y -= title
+        figure.text(
+            (x + column / 2) / width, (y + 0.05) / height, name, fontsize=FONT, color="white", weight="bold", ha="center"
+        )
+        y -= each
+        axes = figure.add_axes((x / width, y / height, column / width, each / height))
+        values = look.values(felt[name], texels[name])
+        view = view.at_size(min(column / view.width, each / view.height))
+        image = view.draw(axes, values, felt[name].shear, strongest, top, look, edge="#ffffff80")
+    if image is not None:
+        bar = figure.add_axes(((width - bar_room) / width, y / height, 0.12 / width, (y_top - y) / height))
+        colour_bar(figure, image, bar, look, ink="white")
+    for label in labels:
+        _draw_label(figure, label, width, height)
+    save_figure(figure, path, dpi)
+
+
+def _draw_label(figure: Figure, label: Label, width: float, height: float) -> None:
+    first, _, rest = label.text.partition("\n")
+    x, y = label.at
+    figure.text(x, y, first, fontsize=FONT + 1.5, color="white", weight="bold", va="bottom", ha="left")
+    figure.text(x, y - 0.03 / height, rest, fontsize=FONT, color="#e3e8ee", va="top", ha="left", linespacing=1.35)
+    if label.to is not None:
+        from matplotlib.lines import Line2D
+
+        figure.add_artist(
+            Line2D([x, label.to[0]], [label.at[1] + 0.22 / height, label.to[1]], color="white", lw=0.8, alpha=0.8)
+        )

@@ -1,0 +1,166 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A rendered picture with what the sensors feel beside it: tactile images, colour bar, and the force so far."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..geometry.texels import Texels
+from ..io.bake_reader import frame_index
+from ..model.recording import Recording, SensorRecording
+from ..response import metrics
+from .figure_style import FONT, INK, SERIES, SMALL, new_figure, save_figure, tidy_axes
+from .recording_style import Look
+from .tactile_image import KEYS_LINE, SMALLEST_ARROW, View, colour_bar, keys, keys_width, widest_key
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+_MOST = 4
+"""Sensors whose images fit over one another."""
+_TALL, _SIDE, _MARGIN = 4.5, 2.5, 0.14
+"""Inches: height of the whole, width of what is beside the picture, and around and between that."""
+_NAME, _BAR, _CURVE = 0.22, 0.72, 1.05
+"""Inches that a sensor's name and the colour bar take up, and the curves at least."""
+_MOST_CURVE = 1.7
+"""Inches of the curves where images leave so much."""
+_LETTER = 0.085
+"""Inches that a letter of a name takes."""
+
+
+def side_by_side(
+    source: str | Path,
+    path: str | Path,
+    recording: Recording,
+    texels: Mapping[str, Texels],
+    frame: int,
+    look: Look | None = None,
+    height: int = 720,
+) -> None:
+    """Put a rendered picture and the tactile images of the same frame side by side, with the force over time below them.
+
+    Parameters
+    ----------
+    source, path : str or Path
+        The rendered PNG, and the PNG to write.
+    texels : mapping of str to Texels
+        The first four are shown.
+    frame : int
+    height : int, pixels
+        Of the result. Width and height are even numbers, as videos ask for.
+    """
+    from matplotlib.image import imread
+
+    look = look or Look()
+    picture = imread(source)
+    i = frame_index(recording, frame)
+    shown = dict(list(texels.items())[:_MOST])
+    dpi = height / _TALL  # text of 8 pt can then be read at the height of a page's figure
+    wide = _TALL * picture.shape[1] / picture.shape[0]
+    pixels = 2 * round(0.5 * (wide + _SIDE) * dpi), 2 * round(0.5 * height)
+    width = pixels[0] / dpi
+    figure = new_figure(width, _TALL)
+
+    def axes_at(x: float, y: float, across: float, up: float) -> Axes:
+        return figure.add_axes((x / width, y / _TALL, across / width, up / _TALL))
+
+    axes = axes_at(0.0, 0.0, wide, _TALL)
+    axes.imshow(picture, aspect="auto", interpolation="antialiased")
+    axes.set_axis_off()
+
+    top, strongest = look.top(recording, texels), metrics.peak_shear(recording)
+    left, room = wide + _MARGIN, _SIDE - 2 * _MARGIN
+    parts = [_Part.of(own, recording.sensors[name], strongest) for name, own in shown.items()]
+    places = _placed(parts, room, _TALL - _CURVE - _BAR - _MARGIN)
+    image, low = None, _TALL
+    for number, ((name, own), part, (x, y, inches)) in enumerate(zip(shown.items(), parts, places, strict=True)):
+        felt, view = recording.sensors[name], part.view.at_size(inches)
+        x, y, across, up = left + x, _TALL - _MARGIN - y, inches * view.width, inches * view.height
+        colour = SERIES[number] if len(shown) > 1 else INK
+        words = name if len(name) * _LETTER < part.room else name[: int(part.room / _LETTER) - 1] + "…"
+        figure.text(x / width, y / _TALL, words, fontsize=FONT, color=colour, weight="bold", va="top")
+        place = axes_at(x, y - _NAME - up, across, up)
+        image = view.draw(place, look.values(felt, own)[i], felt.shear[i], strongest, top, look)
+        keys(figure, (x, y - _NAME - up - 0.1), view, part.strongest, inches, room=part.room)
+        low = min(low, y - _NAME - up - part.below(inches))
+    if image is not None:
+        colour_bar(figure, image, axes_at(left + 0.1, low - 0.24, room - 0.2, 0.1), look)
+    curve = min(low - _BAR, _MOST_CURVE)
+    _force_so_far(axes_at(left + 0.3, 0.3, room - 0.38, curve - 0.5), recording, i, shown)
+    save_figure(figure, path, dpi)
+
+
+@dataclass
+class _Part:
+    """A sensor's image, with the shear that its arrow stands for (N, zero without any) and the inches it has across."""
+
+    view: View
+    strongest: float
+    room: float = 0.0
+
+    @classmethod
+    def of(cls, texels: Texels, felt: SensorRecording, strongest: float) -> _Part:
+        own = float(np.linalg.norm(felt.shear, axis=2).max(initial=0.0))
+        view = View.of(texels, felt.normal_force.sum(axis=0))
+        return cls(view, strongest if own > SMALLEST_ARROW * strongest else 0.0)
+
+    def inches(self, across: float, up: float) -> float:
+        """Return the inches per millimetre that fit into a cell with name, scale bar and arrow."""
+        self.room = across
+        for lines in (1, 2):
+            size = min(across / self.view.width, (up - _NAME - 0.03 - lines * KEYS_LINE) / self.view.height)
+            if self.below(size) < 0.03 + 1.5 * KEYS_LINE:
+                break
+        return size
+
+    def wider_line(self, inches: float) -> float:
+        """Return the inches across of scale bar or arrow, whichever is wider."""
+        return widest_key(self.view.at_size(inches), self.strongest, inches)
+
+    def below(self, inches: float) -> float:
+        """Return the inches that scale bar and arrow take up."""
+        both = keys_width(self.view.at_size(inches), self.strongest, inches) > self.room
+        return 0.03 + (1 + both) * KEYS_LINE
+
+
+def _placed(parts: list[_Part], across: float, up: float) -> list[tuple[float, float, float]]:
+    """Return x, y downwards and inches per millimetre of each image, in as many columns as make them largest."""
+    best: list[tuple[float, float, float]] = []
+    most, room = -1.0, across
+    for columns in range(1, len(parts) + 1):
+        rows = -(-len(parts) // columns)
+        cell = (across - (columns - 1) * _MARGIN) / columns, (up - (rows - 1) * 0.06) / rows
+        sizes = [part.inches(*cell) for part in parts]
+        area = sum(size**2 * part.view.width * part.view.height for size, part in zip(sizes, parts, strict=True))
+        legible = columns == 1 or all(part.wider_line(size) <= cell[0] for size, part in zip(sizes, parts, strict=True))
+        if legible and min(sizes) > 0 and area > most:
+            most = area
+            best = [
+                (number % columns * (cell[0] + _MARGIN), number // columns * (cell[1] + 0.06), size)
+                for number, size in enumerate(sizes)
+            ]
+            room = cell[0]
+    for part in parts:
+        part.room = room
+    return best
+
+
+def _force_so_far(axes: Axes, recording: Recording, i: int, texels: Mapping[str, Texels]) -> None:
+    for number, name in enumerate(texels):
+        force = recording.sensors[name].normal_force.sum(axis=1)
+        below = len(texels) - 1 - number  # the first are wider, so that equal curves do not hide each other
+        axes.plot(recording.times, force, color=SERIES[number], lw=0.8 + below, alpha=0.35)
+        axes.plot(recording.times[: i + 1], force[: i + 1], color=SERIES[number], lw=1.4 + 1.2 * below)
+        axes.plot(recording.times[i], force[i], "o", color=SERIES[number], ms=3.5 + 2.0 * below)
+    axes.set_ylim(bottom=0)
+    axes.margins(x=0.02)
+    axes.set_xlabel("time (s)", labelpad=-7)
+    axes.set_title("normal force (N)", fontsize=SMALL, color=INK, loc="left", pad=3)
+    tidy_axes(axes)
+    last = float(np.max(recording.times))
+    axes.set_xticks([0.0, round(last, 1)] if last > 0.1 else [0.0])

@@ -1,0 +1,331 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""One tactile image on an axes: colours, arrows of shear, scale bar; and the colour bar that belongs to it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..geometry.layout import GridLayout
+from ..geometry.texels import Texels
+from .figure_style import FONT, INK, SMALL
+from .recording_style import Look, newtons
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+SMALLEST_ARROW = 0.08
+"""Share of the strongest shear below which no arrow is drawn."""
+MOST_ARROWS = 18
+"""Along the longer side: where texels are denser, an arrow is the mean of several."""
+LEAST_ARROWS, ARROW_ROOM = 5, 0.09
+"""The fewest of them, and the inches that one needs to be seen."""
+ARROW = "simple,head_length=5,head_width=5,tail_width=1.5"
+_BARS = (0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100, 200, 500)
+
+
+@dataclass(frozen=True)
+class View:
+    """How one sensor's texels are drawn: an image and where the texels lie on it.
+
+    Attributes
+    ----------
+    extent : (4,) float
+        Left, right, bottom and top of the whole image, in millimetres.
+    window : (4,) float
+        The part of it that shows texels.
+    points : (n, 2) float
+        Where the texels lie.
+    seen : (n,) bool
+        Which of them are not on the far side.
+    triangles : (m, 3) int or None
+        What is drawn instead of an image, where the image is an atlas of single triangles that nobody could read or a map
+        without true lengths: the side of the surface that bears most, as one sees it from outside.
+    axes : (2, 3) float or None
+        Of that view, in the frame of the sensor's body; elsewhere the texels' own axes are the image's.
+    most : int
+        Arrows along the longer side.
+    """
+
+    texels: Texels
+    extent: tuple[float, float, float, float]
+    window: tuple[float, float, float, float]
+    points: np.ndarray
+    seen: np.ndarray
+    triangles: np.ndarray | None = None
+    axes: np.ndarray | None = None
+    most: int = MOST_ARROWS
+
+    @classmethod
+    def of(cls, texels: Texels, load: np.ndarray | None = None) -> View:
+        """Return the view of a sensor; a flattened surface has true lengths where it lies across the view.
+
+        `load`, (n,) float, tells which side of a surface that cannot be flattened is worth seeing.
+        """
+        layout = texels.layout
+        rows, columns = layout.shape
+        if isinstance(layout, GridLayout):
+            pitch_x, pitch_y = _pitch(texels, layout.row, layout.column), _pitch(texels, layout.column, layout.row)
+            points = np.stack([(layout.column + 0.5) * pitch_x, (layout.row + 0.5) * pitch_y], axis=1)
+            whole = (0.0, columns * pitch_x, 0.0, rows * pitch_y)
+            return cls(texels, whole, whole, points, np.ones(len(texels), bool))
+        if layout.cell or layout.map_name:
+            return cls._from_outside(texels, load)
+        size = _millimetres_per_pixel(texels)
+        points = np.asarray(layout.uv()) * [columns, rows] * size
+        row, column = np.nonzero(layout.mask())
+        left, right, bottom, top = (float(size * x) for x in (column.min() - 1, column.max() + 2, row.min() - 1, row.max() + 2))
+        return cls(
+            texels, (0.0, columns * size, 0.0, rows * size), (left, right, bottom, top), points, np.ones(len(texels), bool)
+        )
+
+    @classmethod
+    def _from_outside(cls, texels: Texels, load: np.ndarray | None) -> View:
+        layout = texels.layout
+        weight = texels.area if load is None or not load.any() else load
+        out = weight @ texels.normal
+        length = float(np.linalg.norm(out))
+        out = out / length if length > 1e-3 * weight.sum() else np.array([0.0, 0.0, 1.0])
+        up = np.eye(3)[1 if abs(out[1]) < 0.9 else 2]
+        right = np.cross(up, out)
+        right /= np.linalg.norm(right)
+        axes = np.stack([right, np.cross(out, right)])
+        points = 1e3 * texels.position @ axes.T
+        a, b, c = np.moveaxis(points[layout.triangles], 1, 0)
+        turn = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]
+        triangles = layout.triangles[turn > 0]
+        seen = np.zeros(len(texels), bool)
+        seen[triangles] = True
+        low, high = points[seen].min(axis=0), points[seen].max(axis=0)
+        points = points - low
+        reach = tuple(float(x) for x in high - low)
+        window = (0.0, reach[0], 0.0, reach[1])
+        return cls(texels, window, window, points, seen, triangles, axes)
+
+    @property
+    def width(self) -> float:
+        """Millimetres."""
+        return self.window[1] - self.window[0]
+
+    @property
+    def height(self) -> float:
+        """Millimetres."""
+        return self.window[3] - self.window[2]
+
+    @property
+    def bar(self) -> float:
+        """Length of the scale bar, mm; zero where the sensor is too small for any."""
+        return max((step for step in _BARS if step <= 0.7 * self.width), default=0.0)
+
+    @property
+    def caption(self) -> str:
+        """What kind of sensor this is."""
+        layout = self.texels.layout
+        if isinstance(layout, GridLayout):
+            return f"{layout.rows} × {layout.columns} texels\n{self.width / layout.columns:.3g} mm pitch"
+        how = "flattened" if self.triangles is None else f"{self.seen.sum()} in view"
+        return f"{len(self.texels)} texels,\n{how}"
+
+    def at_size(self, inches: float) -> View:
+        """Return the view with as many arrows as can be told apart where a millimetre is so many `inches`."""
+        longer = inches * max(self.width, self.height)
+        return replace(self, most=int(np.clip(longer / ARROW_ROOM, LEAST_ARROWS, MOST_ARROWS)))
+
+    @property
+    def arrow(self) -> float:
+        """Length of the longest arrow, mm."""
+        layout = self.texels.layout
+        if isinstance(layout, GridLayout) and max(layout.shape) <= self.most:
+            return 1.2 * self.width / layout.columns
+        return 1.4 * max(self.width, self.height) / self.most
+
+    def draw(
+        self, axes: Axes, values: np.ndarray, shear: np.ndarray, strongest: float, top: float, look: Look, edge: str = "#9aa3ad"
+    ) -> Any:
+        """Draw one tactile image; the arrow of the `strongest` shear is a little longer than a texel."""
+        layout = self.texels.layout
+        colours: dict[str, Any] = {"cmap": look.colours(), "vmin": 0.0, "vmax": top}
+        image: Any
+        if self.triangles is not None:
+            image = axes.tripcolor(*self.points.T, self.triangles, values, shading="gouraud", rasterized=True, **colours)
+            axes.set_aspect("equal")
+        else:
+            picture: Any = np.ma.masked_array(layout.image(values), ~layout.mask())
+            image = axes.imshow(picture, origin="lower", extent=self.extent, interpolation="nearest", **colours)
+        self._arrows(axes, shear, strongest)
+        if isinstance(layout, GridLayout) and max(layout.shape) <= 64:
+            rows, columns = layout.shape
+            lines: dict[str, Any] = {"color": "white", "lw": 0.4, "alpha": 0.22, "zorder": 2}
+            axes.vlines(np.arange(1, columns) * self.width / columns, 0.0, self.height, **lines)
+            axes.hlines(np.arange(1, rows) * self.height / rows, 0.0, self.width, **lines)
+        axes.set_xlim(self.window[:2])
+        axes.set_ylim(self.window[2:])
+        axes.set_xticks([])
+        axes.set_yticks([])
+        for spine in axes.spines.values():
+            spine.set_color(edge)
+            spine.set_linewidth(0.6)
+        return image
+
+    def _arrows(self, axes: Axes, shear: np.ndarray, strongest: float) -> None:
+        if self.axes is not None:
+            force = shear[:, :1] * self.texels.tangent + shear[:, 1:] * self.texels.bitangent
+            shear = force @ self.axes.T
+        middle, mean = self._thinned(shear)
+        size = np.linalg.norm(mean, axis=1)
+        shown = size > SMALLEST_ARROW * strongest if strongest > 0 else np.zeros(len(size), dtype=bool)
+        if not shown.any():
+            return
+        length = mean[shown] * (self.arrow / strongest)
+        axes.quiver(
+            middle[shown, 0],
+            middle[shown, 1],
+            length[:, 0],
+            length[:, 1],
+            angles="xy",
+            scale_units="xy",
+            scale=1.0,
+            pivot="middle",
+            color="white",
+            edgecolor="black",
+            linewidth=0.35,
+            width=self.arrow * 0.1,
+            units="xy",
+            headwidth=3.6,
+            headlength=3.8,
+            headaxislength=3.4,
+            minlength=0.1,
+            zorder=3,
+            clip_on=False,
+        )
+
+    def _thinned(self, shear: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return where arrows stand and the mean shear of the texels around them; every texel where there are few."""
+        cell = max(self.width, self.height) / self.most
+        places = np.floor((self.points - [self.window[0], self.window[2]]) / cell).astype(int)
+        layout = self.texels.layout
+        if isinstance(layout, GridLayout) and max(layout.shape) <= self.most:
+            return self.points, shear
+        places, points, shear = places[self.seen], self.points[self.seen], shear[self.seen]
+        _, which, count = np.unique(places, axis=0, return_inverse=True, return_counts=True)
+        which = which.ravel()
+        middle, mean = (np.column_stack([np.bincount(which, table[:, i]) / count for i in (0, 1)]) for table in (points, shear))
+        return middle, mean
+
+
+def _pitch(texels: Texels, across: np.ndarray, along: np.ndarray) -> float:
+    """Median distance, in mm, of texels that are neighbours in `along` and equal in `across`; 1 where there are none."""
+    order = np.lexsort((along, across))
+    a, b = order[:-1], order[1:]
+    neighbours = (across[a] == across[b]) & (along[b] - along[a] == 1)
+    if not neighbours.any():
+        return 1.0
+    gaps = np.linalg.norm(texels.position[b[neighbours]] - texels.position[a[neighbours]], axis=1)
+    return float(np.median(gaps)) * 1e3
+
+
+def _millimetres_per_pixel(texels: Texels) -> float:
+    """Scale of a flattened surface where it is least foreshortened: the edges that are longest on the map for their length."""
+    layout = texels.layout
+    assert not isinstance(layout, GridLayout)
+    rows, columns = layout.shape
+    corner = layout.corner_uv * [columns, rows]
+    true = texels.position[layout.triangles]
+    pixels = np.linalg.norm(corner - np.roll(corner, -1, axis=1), axis=2).ravel()
+    metres = np.linalg.norm(true - np.roll(true, -1, axis=1), axis=2).ravel()
+    whole = (pixels > 1e-9) & (metres > 0)
+    if not whole.any():
+        return 1.0
+    return float(np.quantile(metres[whole] / pixels[whole], 0.05)) * 1e3
+
+
+KEYS_LINE = 0.17
+"""Inches from the scale bar to the arrow where that stands below."""
+_LETTER = 0.066
+"""Inches that a letter of the small text takes, on average."""
+
+
+def _arrow_key(view: View, strongest: float, inches: float) -> tuple[str, float]:
+    """Words for the arrow below the images, and its length in inches."""
+    value = float(f"{strongest:.1g}")
+    return f"{newtons(value)} shear", value / strongest * view.arrow * inches
+
+
+def widest_key(view: View, strongest: float, inches: float) -> float:
+    """Return the room, in inches, that :func:`keys` needs on two lines."""
+    alone = keys_width(view, 0.0, inches)
+    return max(alone, keys_width(view, strongest, inches) - alone - 0.2)
+
+
+def keys_width(view: View, strongest: float, inches: float) -> float:
+    """Return the room, in inches, that :func:`keys` needs."""
+    width = view.bar * inches + 0.07 + _LETTER * len(f"{view.bar:g} mm") if view.bar > 0 else 0.0
+    if strongest > 0:
+        words, length = _arrow_key(view, strongest, inches)
+        width += 0.2 + length + 0.07 + _LETTER * len(words)
+    return width
+
+
+def keys(
+    figure: Figure,
+    at: tuple[float, float],
+    view: View,
+    strongest: float,
+    inches: float,
+    ink: str = INK,
+    room: float | None = None,
+) -> None:
+    """Below a row of images, at (x, y) inches: how long some millimetres and some newtons of shear are drawn.
+
+    `inches` is the size of a millimetre; without a `strongest` shear there is no arrow. Where both need more than `room`
+    inches, the arrow stands below the bar.
+    """
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import FancyArrowPatch
+
+    width, height = figure.get_size_inches()
+    x, y = at
+    words: dict[str, Any] = {"fontsize": SMALL, "color": ink, "va": "center_baseline"}
+    if view.bar > 0:
+        stop = x + view.bar * inches
+        figure.add_artist(Line2D([x / width, stop / width], [y / height] * 2, color=ink, lw=2.0, solid_capstyle="butt"))
+        figure.text((stop + 0.07) / width, y / height, f"{view.bar:g} mm", **words)
+        x = stop + 0.07 + _LETTER * len(f"{view.bar:g} mm") + 0.2
+    if room is not None and view.bar > 0 and keys_width(view, strongest, inches) > room:
+        x, y = at[0], y - KEYS_LINE
+    if strongest > 0:
+        label, length = _arrow_key(view, strongest, inches)
+        stop = x + length
+        figure.add_artist(
+            FancyArrowPatch(
+                (x / width, y / height),
+                (stop / width, y / height),
+                arrowstyle=ARROW,
+                mutation_scale=1,
+                color=ink,
+                lw=0,
+                shrinkA=0,
+                shrinkB=0,
+                transform=figure.transFigure,
+            )
+        )
+        figure.text((stop + 0.07) / width, y / height, label, **words)
+
+
+def colour_bar(figure: Figure, image: Any, axes: Axes, look: Look, ink: str = INK) -> None:
+    """Fill `axes` with the colour bar of an image; it lies where the axes are wider than high."""
+    from matplotlib.ticker import MaxNLocator
+
+    place, (width, height) = axes.get_position(), figure.get_size_inches()
+    lies = place.width * width > place.height * height
+    bar = figure.colorbar(image, cax=axes, orientation="horizontal" if lies else "vertical")
+    bar.locator = MaxNLocator(5, steps=[1, 2, 2.5, 5, 10])
+    bar.update_ticks()
+    bar.ax.tick_params(labelsize=FONT, colors=ink, length=2.5, width=0.6)
+    long = (place.width * width if lies else place.height * height) > 1.9  # inches; else the words need two lines
+    bar.set_label((" " if long or lies else "\n").join(look.words), fontsize=FONT, color=ink, labelpad=2.0 if lies else 4.0)
+    bar.outline.set_edgecolor(ink)
+    bar.outline.set_linewidth(0.5)

@@ -1,0 +1,123 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The number of every texel at one frame, over its colour."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import SensorError
+from ..geometry.layout import GridLayout
+from ..geometry.texels import Texels
+from ..model.recording import Recording
+from .figure_style import FONT, INK, SMALL, new_figure, save_figure
+from .recording_style import Look
+from .tactile_image import View, colour_bar
+
+MOST = 1024
+"""Texels whose numbers can still be told apart on a page."""
+_LETTER = 0.62
+"""Width of a digit over the size of its font."""
+
+
+def texel_numbers(
+    path: str | Path, recording: Recording, texels: Mapping[str, Texels], name: str, frame: int, look: Look | None = None
+) -> None:
+    """Write what every texel of one sensor feels at one frame, as numbers on the tactile image.
+
+    Small forces are in millinewtons, small pressures in pascals, so that three digits say what there is to say. The colours
+    are those of the sensor's other figures. The figure is as wide as its numbers need where a column is too narrow.
+
+    Parameters
+    ----------
+    name : str
+        Of the sensor.
+    frame : int
+
+    Raises
+    ------
+    SensorError
+        The sensor has so many texels that their numbers could not be read.
+    KeyError
+        The frame was not recorded.
+    """
+    from matplotlib.patheffects import withStroke
+
+    look = look or Look()
+    own = texels[name]
+    if len(own) > MOST:
+        raise SensorError(
+            f"Sensor '{name}' has {len(own)} texels, whose numbers could not be read (at most {MOST}): "
+            "export them as CSV instead."
+        )
+    felt = recording.at(frame).sensors[name]
+    values, view = look.values(felt, own), View.of(own, recording.sensors[name].normal_force.sum(axis=0))
+    top = look.top(recording, texels)
+    peak = float(values.max(initial=0.0))
+    unit, factor = _unit(peak, look.quantity)
+    words = [_digits(value * factor, peak * factor) for value in values]
+    longest = max(len(word) for word in words)
+
+    # The closest pair of texels must leave room for a number of 8 pt between their middles.
+    letters = longest * _LETTER * SMALL / 72 + 0.05
+    inches = max(letters / _room(view), (1.5 * SMALL / 72) / _room(view, 1))
+    right, above, side = 0.95, 0.32, 0.12
+    inches = max(inches, min((look.inches - right - 2 * side) / view.width, 6.0 / view.height))
+    width, height = inches * view.width + 2 * side + right, inches * view.height + above + side
+    height = max(height, 1.9)
+    figure = new_figure(width, height)
+    axes = figure.add_axes(
+        (side / width, side / height, inches * view.width / width, inches * view.height / height), anchor="NW"
+    )
+    image = view.draw(axes, values, np.zeros((len(own), 2)), 0.0, top, look)
+    on_grid = isinstance(own.layout, GridLayout)
+    if not on_grid:  # texels lie on the very rim there: room for their numbers
+        room = 0.5 * letters / inches
+        axes.set_xlim(view.window[0] - room, view.window[1] + room)
+        axes.set_ylim(view.window[2] - room, view.window[3] + room)
+    colours = image.cmap(image.norm(values))
+    for (x, y), word, colour in zip(view.points[view.seen], np.array(words)[view.seen], colours[view.seen], strict=True):
+        light = float(np.dot(colour[:3], (0.299, 0.587, 0.114))) > 0.5
+        ink, around = (INK, "white") if light else ("white", INK)
+        rim = (
+            [] if on_grid else [withStroke(linewidth=1.2, foreground=around, alpha=0.55)]
+        )  # on the edge they lie half on white
+        axes.text(x, y, word, fontsize=SMALL, color=ink, ha="center", va="center_baseline", path_effects=rim)
+    time = recording.times[int(np.searchsorted(recording.frames, frame))]
+    figure.text(
+        side / width,
+        1 - 0.05 / height,
+        f"{name}, {time:.2f} s, numbers in {unit}",
+        fontsize=FONT,
+        color=INK,
+        weight="bold",
+        va="top",
+    )
+    tall = max(inches * view.height, 1.2)
+    bar = figure.add_axes(((width - right + 0.08) / width, side / height, 0.11 / width, tall / height))
+    colour_bar(figure, image, bar, look)
+    save_figure(figure, path, look.dpi)
+
+
+def _unit(peak: float, quantity: str) -> tuple[str, float]:
+    if quantity == "pressure":
+        return ("Pa", 1e3) if peak < 1.0 else ("kPa", 1.0)
+    return ("mN", 1e3) if peak < 1.0 else ("N", 1.0)
+
+
+def _digits(value: float, peak: float) -> str:
+    """Return a number with as many decimals as give the largest one three digits."""
+    decimals = 0 if peak <= 0 else int(np.clip(2 - np.floor(np.log10(peak)), 0, 3))
+    text = f"{value:.{decimals}f}"
+    return "0" if float(text) == 0.0 else text
+
+
+def _room(view: View, axis: int = 0) -> float:
+    """Millimetres between the middles of neighbouring texels along the image's x (0) or y (1) axis."""
+    layout = view.texels.layout
+    if isinstance(layout, GridLayout):
+        return (view.width / layout.columns, view.height / layout.rows)[axis]
+    # without rows and columns: what a square of the mean area per texel has as its side, a little less
+    return 0.8 * float(np.sqrt(view.width * view.height / len(view.texels)))

@@ -1,0 +1,237 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Curves over time: forces with their friction limits, slip, centre of pressure."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..errors import ParameterError
+from ..geometry.texels import Texels
+from ..model.recording import Recording
+from ..model.scenario import SensorParameters
+from ..response import metrics
+from .figure_style import FONT, INK, NORMAL_COLOUR, SERIES, SHEAR_COLOUR, SMALL, new_figure, save_figure, tidy_axes
+from .recording_style import Look
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+KINDS = ("force", "slip", "pressure centre")
+_LOADED = 1e-3
+"""Share of the largest net force below which a centre of pressure is not drawn: it would jump about."""
+
+
+def time_curves(
+    path: str | Path,
+    recording: Recording,
+    texels: Mapping[str, Texels],
+    parameters: Mapping[str, SensorParameters],
+    kinds: Sequence[str] = KINDS,
+    look: Look | None = None,
+    marks: Sequence[float] = (),
+) -> None:
+    """Draw forces, slip and centre of pressure of all sensors over time, one panel of each kind, one colour per sensor.
+
+    Parameters
+    ----------
+    path : str or Path
+        PNG, PDF or SVG, by its ending.
+    kinds : sequence of {"force", "slip", "pressure centre"}
+        "slip" is the share of the normal force that rests on slipping texels (:func:`.metrics.slip_share`); the centre of
+        pressure is along the sensor's x and y axes, from the origin of its body.
+    marks : sequence of float, seconds
+        Times at which a thin line stands, as those of a strip's images.
+    """
+    look = look or Look()
+    for kind in kinds:
+        if kind not in KINDS:
+            raise ParameterError(f"There are no curves of '{kind}': choose from {', '.join(KINDS)}.")
+    names = list(texels)
+    legend = 0.2 * (1 + (len(names) - 1) // max(1, int(look.inches / 1.3)))
+    each, above, below, gap = 1.25, 0.12 + legend, 0.45, 0.12
+    height = above + below + len(kinds) * each + (len(kinds) - 1) * gap
+    figure = new_figure(look.inches, height)
+    grid = figure.subplots(len(kinds), 1, sharex=True, squeeze=False)[:, 0]
+    for axes, kind in zip(grid, kinds, strict=True):
+        for i, name in enumerate(names):
+            # the first lie below and are wider, so that equal curves do not hide each other
+            pen = _Pen(SERIES[i % len(SERIES)], 1.3 + min(0.9 * (len(names) - 1 - i), 2.7))
+            _DRAW[kind](axes, recording, name, texels[name], parameters[name], pen)
+        tidy_axes(axes)
+        axes.margins(x=0)
+        _LIMITS[kind](axes)
+        for mark in marks:
+            axes.axvline(mark, color=INK, lw=0.6, ls=(0, (1, 2)))
+        _style_legend(axes)
+    grid[-1].set_xlabel("time (s)")
+    left = 0.8
+    figure.subplots_adjust(
+        left=left / look.inches,
+        right=1 - 0.15 / look.inches,
+        top=1 - above / height,
+        bottom=below / height,
+        hspace=gap / each,
+    )
+    figure.align_ylabels(list(grid))
+    from matplotlib.lines import Line2D
+
+    handles = [Line2D([], [], color=SERIES[i % len(SERIES)], lw=1.6, label=name) for i, name in enumerate(names)]
+    figure.legend(
+        handles=handles,
+        loc="upper left",
+        bbox_to_anchor=(left / look.inches, 1 - 0.02 / height),
+        ncols=max(1, int(look.inches / 1.3)),
+        frameon=False,
+        fontsize=SMALL,
+        handlelength=1.4,
+        borderaxespad=0,
+        columnspacing=1.2,
+    )
+    save_figure(figure, path, look.dpi)
+
+
+@dataclass(frozen=True)
+class _Pen:
+    colour: str
+    width: float
+
+    @property
+    def solid(self) -> dict[str, Any]:
+        return {"color": self.colour, "lw": self.width}
+
+    @property
+    def dashed(self) -> dict[str, Any]:
+        return {"color": self.colour, "lw": 0.8 * self.width, "ls": (0, (4, 2))}
+
+
+def _force(axes: Axes, recording: Recording, name: str, texels: Texels, _: SensorParameters, pen: _Pen) -> None:
+    felt = recording.sensors[name]
+    axes.plot(recording.times, felt.normal_force.sum(axis=1), **pen.solid)
+    axes.plot(recording.times, np.linalg.norm(metrics.net_shear(felt, texels), axis=1), **pen.dashed)
+    axes.set_ylabel("force (N)")
+
+
+def _slip(axes: Axes, recording: Recording, name: str, _: Texels, parameters: SensorParameters, pen: _Pen) -> None:
+    share = metrics.slip_share(recording.sensors[name], parameters)
+    axes.plot(recording.times, 100 * share, **pen.solid)
+    axes.set_ylabel("slipping\n(% of load)")
+
+
+def _centre(axes: Axes, recording: Recording, name: str, texels: Texels, _: SensorParameters, pen: _Pen) -> None:
+    felt = recording.sensors[name]
+    load = felt.normal_force.sum(axis=1)
+    touching = (load > _LOADED * load.max(initial=0.0))[:, None]
+    place = np.where(touching, 1e3 * felt.centre_of_pressure, np.nan) @ _plane(texels).T
+    axes.plot(recording.times, place[:, 0], **pen.solid)
+    axes.plot(recording.times, place[:, 1], **pen.dashed)
+    axes.set_ylabel("centre of\npressure (mm)")
+
+
+def _plane(texels: Texels) -> np.ndarray:
+    """(2, 3) float: the sensor's mean x axis, and the y axis across it."""
+    x = texels.tangent.mean(axis=0)
+    y = texels.bitangent.mean(axis=0)
+    if min(np.linalg.norm(x), np.linalg.norm(y)) < 0.1:  # all around a body: its own axes
+        return np.eye(3)[:2]
+    x /= np.linalg.norm(x)
+    y -= (y @ x) * x
+    return np.stack([x, y / np.linalg.norm(y)])
+
+
+def _at_least_a_millimetre(axes: Axes) -> None:
+    low, high = axes.get_ylim()
+    middle, half = 0.5 * (low + high), max(0.5 * (high - low), 0.5)
+    axes.set_ylim(middle - half, middle + half)
+
+
+_LIMITS = {
+    "force": lambda axes: axes.set_ylim(bottom=0),
+    "slip": lambda axes: axes.set_ylim(-3, 103),
+    "pressure centre": _at_least_a_millimetre,
+}
+_DRAW = {"force": _force, "slip": _slip, "pressure centre": _centre}
+_STYLES = {"force (N)": ("normal", "shear"), "centre of\npressure (mm)": ("x", "y")}
+
+
+def _style_legend(axes: Axes) -> None:
+    """Say what solid and dashed lines are; the colours are the sensors'."""
+    from matplotlib.lines import Line2D
+
+    words = _STYLES.get(axes.get_ylabel())
+    if words is None:
+        return
+    handles = [
+        Line2D([], [], color=INK, lw=lw, ls=ls, label=word)
+        for word, lw, ls in zip(words, (1.5, 1.2), ("-", (0, (4, 2))), strict=True)
+    ]
+    legend = axes.legend(
+        handles=handles, loc="best", fontsize=SMALL, handlelength=1.8, borderaxespad=0.3, frameon=True, framealpha=0.75
+    )
+    legend.get_frame().set_linewidth(0)
+
+
+def force_curves(
+    path: str | Path,
+    recording: Recording,
+    texels: Mapping[str, Texels],
+    parameters: Mapping[str, SensorParameters],
+    required: Mapping[str, float] | None = None,
+    look: Look | None = None,
+) -> None:
+    """Draw each sensor's summed normal force and shear over time, with the friction limits ``mus · N`` and ``mud · N``.
+
+    Parameters
+    ----------
+    required : mapping of str to float, N, optional
+        The normal force that a sensor ought to show at the end (a weight at rest), drawn as a dashed line.
+    """
+    look = look or Look()
+    names = list(texels)
+    figure = new_figure(look.inches, 0.75 + 1.75 * len(names))
+    grid = figure.subplots(len(names), 1, sharex=True, squeeze=False)[:, 0]
+    for axes, name in zip(grid, names, strict=True):
+        sensor, mu = recording.sensors[name], parameters[name]
+        normal = sensor.normal_force.sum(axis=1)
+        axes.plot(recording.times, normal, color=NORMAL_COLOUR, lw=1.8, label="normal, sum of texels")
+        if required and name in required:
+            axes.axhline(required[name], color=INK, lw=0.9, ls=(0, (4, 3)), label=f"required: {required[name]:.4f} N")
+            axes.annotate(
+                f"{normal[-1]:.4f} N",
+                (recording.times[-1], normal[-1]),
+                (-4, -6),
+                textcoords="offset points",
+                ha="right",
+                va="top",
+                fontsize=SMALL,
+                color=NORMAL_COLOUR,
+            )
+        else:
+            shear = np.linalg.norm(metrics.net_shear(sensor, texels[name]), axis=1)
+            axes.fill_between(
+                recording.times,
+                mu.mud * normal,
+                mu.mus * normal,
+                color=SHEAR_COLOUR,
+                alpha=0.18,
+                lw=0,
+                label="friction limit,\nµd N to µs N",
+            )
+            axes.plot(recording.times, shear, color=SHEAR_COLOUR, lw=1.8, label="shear, net")
+        axes.set_title(name, loc="left", fontsize=FONT, color=INK, weight="bold")
+        axes.set_ylabel("force (N)")
+        axes.set_ylim(bottom=0)
+        axes.margins(x=0)
+        axes.legend(
+            loc="upper left", bbox_to_anchor=(1.01, 1.0), frameon=False, handlelength=1.6, borderaxespad=0, fontsize=SMALL
+        )
+        tidy_axes(axes)
+    grid[-1].set_xlabel("time (s)")
+    width, height = figure.get_size_inches()
+    figure.subplots_adjust(left=0.58 / width, right=1 - 1.75 / width, top=1 - 0.3 / height, bottom=0.5 / height, hspace=0.45)
+    figure.align_ylabels(list(grid))
+    save_figure(figure, path, look.dpi)

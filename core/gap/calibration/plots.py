@@ -1,0 +1,69 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Pictures of the fits: foam compression (paper, Fig. 6) and friction curve (Fig. 7), at the width of a journal column."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ...figures.figure_style import GREY, INK, NORMAL_COLOUR, SHEAR_COLOUR, new_figure, save_figure
+from .friction import FrictionFit, friction_over_time, steady_friction
+from .stiffness import StiffnessFit
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+COLUMN = 3.5
+"""Width of a journal's column, inches."""
+
+
+def plot_stiffness(path: str | Path, fit: StiffnessFit, dpi: int = 200) -> None:
+    """Write the measurements with both lines (PNG, PDF or SVG by the file's ending)."""
+    figure = new_figure(COLUMN, 2.7)
+    axes = figure.add_axes((0.165, 0.165, 0.8, 0.8))
+    x = np.array([0.0, fit.data.compression.max() * 1.06])
+    axes.plot(fit.data.compression * 1e3, fit.data.pressure / 1e3, "o", color=INK, ms=3.5, label="measured")
+    axes.plot(x * 1e3, fit.slope * x / 1e3, color=NORMAL_COLOUR, lw=1.3, label=f"through zero: k = {fit.k.value:.4g} N/m")
+    offset = fit.offset.value + fit.slope_offset * x
+    axes.plot(x * 1e3, offset / 1e3, "--", color=SHEAR_COLOUR, lw=1.1, label=f"with offset: k = {fit.k_offset.value:.4g} N/m")
+    axes.axhline(0.0, color=GREY, lw=0.5)
+    axes.set_xlim(0.0, x[1] * 1e3)
+    axes.set_xlabel("compression (mm)")
+    axes.set_ylabel("pressure (kPa)")
+    _finish(axes)
+    save_figure(figure, path, dpi)
+
+
+def plot_friction(path: str | Path, fit: FrictionFit, dpi: int = 200) -> None:
+    """Write the measured friction with the fitted law (PNG, PDF or SVG by the file's ending)."""
+    figure = new_figure(COLUMN, 2.7)
+    axes = figure.add_axes((0.165, 0.165, 0.8, 0.8))
+    data, law = fit.data, fit.parameters
+    axes.plot(data.velocity, data.force * 1e3, "o", color=INK, ms=2.5, alpha=0.7, mew=0, label="measured")
+    if data.time is not None:
+        force = friction_over_time(data.time, data.velocity, fit.normal_force, law)
+        axes.plot(data.velocity, force * 1e3, color=NORMAL_COLOUR, lw=1.3, label="fitted, from rest (Eq. 9, 13)")
+    # Steady sliding turns its direction with a jump: two branches, each drawn on its own side of zero.
+    low, high = min(data.velocity.min(), 0.0), max(data.velocity.max(), 0.0)
+    label = "steady sliding (Eq. 10, 13)"
+    for start, stop in ((low, -1e-12), (0.0, high)):
+        if stop > start:
+            v = np.linspace(start, stop, 300)
+            axes.plot(v, steady_friction(v, fit.normal_force, law) * 1e3, "--", color=SHEAR_COLOUR, lw=1.1, label=label)
+            label = "_"
+    axes.set_xlabel("sliding velocity (m/s)")
+    axes.set_ylabel("friction of one texel (mN)")
+    if low == 0.0:
+        axes.set_xlim(0.0, None)
+    if data.force.min() >= 0.0:
+        axes.set_ylim(0.0, None)
+    _finish(axes)
+    save_figure(figure, path, dpi)
+
+
+def _finish(axes: Axes) -> None:
+    axes.tick_params(labelsize=8, length=2.5, width=0.6, colors=INK)
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.legend(frameon=False, handlelength=1.6, loc="best")

@@ -1,0 +1,575 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Rigs: a TOML file that says what was measured, beside CSV files with the measurements (docs/gap.md describes both).
+
+Everything a rig can get wrong is said here, in one sentence, before anything is computed.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ...errors import FileError, ParameterError, SensorError
+from ...geometry.mesh import TriangleMesh, checked_mesh
+from ...geometry.texels import Texels, texels_from_region
+from ...model.scenario import SensorParameters
+from .csv_columns import read_table
+
+FORMAT = "palpate-rig/1"
+POSE, TURN, SLIDE = ("x", "y", "z"), ("qw", "qx", "qy", "qz"), ("slide_x", "slide_y")
+FORCE = ("force_x", "force_y", "force_z")
+STIMULI = ("pose", "depth", "force")
+MOST_TEXELS = 65536
+LONGEST_STEP = 5.0
+"""Seconds between samples above which the clock is taken for one in milliseconds."""
+
+
+@dataclass(frozen=True)
+class Indenter:
+    """What presses on the sensor.
+
+    Attributes
+    ----------
+    mesh : TriangleMesh
+        In the indenter's own frame, whose origin is the pose's point, metres.
+    radius : float or None, metres
+        Of a ball; then contact is computed from the true sphere.
+    name : str
+    edges : (3,) float or None, metres
+        Full sizes of a box about the pose's point; then contact is computed from them.
+    """
+
+    mesh: TriangleMesh
+    radius: float | None = None
+    name: str = "indenter"
+    edges: tuple[float, ...] | None = None
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One recording.
+
+    Attributes
+    ----------
+    name : str
+        Of its file, without the suffix.
+    use : "fit" or "check"
+    time : (T,) float, seconds, increasing
+        Since the first sample of the rig's first recording.
+    stimulus : "pose", "depth" or "force"
+    position, quaternion : (T, 3), (T, 4) float, or None
+        Of the indenter in the sensor's frame.
+    level : (T,) float or None
+        Depth (m, every texel alike) or force (N, shared by all texels).
+    slide : (T, 2) float, metres
+        Travel of the surface along the sensor's x and y; zero where none was recorded.
+    reading : (T, n) float or None, the sensor's unit
+        NaN where a value is missing.
+    force : (T, 3) float or None, newtons
+        On the sensor; NaN where missing or not recorded.
+    """
+
+    name: str
+    use: str
+    time: np.ndarray
+    stimulus: str
+    position: np.ndarray | None
+    quaternion: np.ndarray | None
+    level: np.ndarray | None
+    slide: np.ndarray
+    reading: np.ndarray | None
+    force: np.ndarray | None
+
+    @property
+    def step(self) -> float:
+        """Median time between samples, seconds."""
+        return float(np.median(np.diff(self.time)))
+
+
+@dataclass(frozen=True)
+class Rig:
+    """A sensor, what pressed on it, and what was recorded.
+
+    Attributes
+    ----------
+    name : str
+    texels : Texels
+    parameters : SensorParameters
+        The sensor's own words, defaults for what it leaves out.
+    given : frozenset of str
+        Parameters that the rig states.
+    thickness : float or None, metres
+    grid : (int, int, (float, float)) or None
+        Rows, columns and pitch, when the sensor was given as a grid.
+    indenter : Indenter or None
+    trials : tuple of Trial
+    words : mapping
+        The `[sensor]` table as it was written.
+    warnings : tuple of str
+    """
+
+    name: str
+    texels: Texels
+    parameters: SensorParameters
+    given: frozenset[str]
+    thickness: float | None
+    grid: tuple[int, int, tuple[float, float]] | None
+    indenter: Indenter | None
+    trials: tuple[Trial, ...]
+    words: Mapping[str, Any] = field(default_factory=dict)
+    warnings: tuple[str, ...] = ()
+
+    def of(self, use: str) -> tuple[Trial, ...]:
+        """Return the trials for one use."""
+        return tuple(trial for trial in self.trials if trial.use == use)
+
+
+def read_rig(path: str | Path) -> Rig:
+    """Read a rig and all its recordings.
+
+    Parameters
+    ----------
+    path : path of the TOML file
+
+    Raises
+    ------
+    PalpateError
+        Something in it cannot be used; the message says what, where, and what to do.
+    """
+    path = Path(path)
+    words = _toml(path)
+    if words.get("format") != FORMAT:
+        raise FileError(f"'{path.name}' is not a rig: its first line must be format = \"{FORMAT}\".")
+    _known(words, {"format", "name", "sensor", "indenter", "trial"}, f"'{path.name}'")
+    folder, warnings = path.resolve().parent, []
+    sensor = _table(words, "sensor", path)
+    texels, grid = _texels(sensor, folder, path)
+    parameters, thickness = _parameters(sensor, path)
+    indenter = _indenter(_table(words, "indenter", path), folder, path) if "indenter" in words else None
+    entries = words.get("trial")
+    if not isinstance(entries, list) or not entries:
+        raise FileError(f"'{path.name}' has no [[trial]]: name at least one CSV file.")
+    trials = []
+    for number, entry in enumerate(entries, start=1):
+        trial, said = _trial(entry, number, folder, path, len(texels), indenter is not None)
+        trials.append(trial)
+        warnings += said
+    began = min(float(trial.time[0]) for trial in trials)  # recordings of one clock keep their order on it
+    trials = [replace(trial, time=trial.time - began) for trial in trials]
+    names = [trial.name for trial in trials]
+    for name in names:
+        if names.count(name) > 1:
+            raise FileError(
+                f"Two trials of '{path.name}' read '{name}.csv': give each recording once, so that none judges itself."
+            )
+    if not any(trial.use == "fit" for trial in trials):
+        raise FileError(f"No trial of '{path.name}' has use = \"fit\": give at least one to fit.")
+    if not any(_responds(trial) for trial in trials):
+        raise FileError(
+            f"All responses in '{path.name}' are zero: check that the sensor was connected and the right columns exported."
+        )
+    _check_units(trials, indenter, texels, parameters, thickness, path)
+    return Rig(
+        name=str(words.get("name", path.stem)),
+        texels=texels,
+        parameters=parameters,
+        given=frozenset(set(sensor) & {item.name for item in fields(SensorParameters)}),
+        thickness=thickness,
+        grid=grid,
+        indenter=indenter,
+        trials=tuple(trials),
+        words=sensor,
+        warnings=tuple(warnings),
+    )
+
+
+def _toml(path: Path) -> dict[str, Any]:
+    try:
+        with path.open("rb") as file:
+            return tomllib.load(file)
+    except FileNotFoundError as error:
+        raise FileError(f"There is no rig '{path}': check the path.") from error
+    except OSError as error:
+        raise FileError(f"The rig '{path}' could not be read ({error.strerror}): give a .toml file.") from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise FileError(f"'{path.name}' is not TOML ({error}): mend that line.") from error
+
+
+def _known(table: Mapping[str, Any], keys: set[str], where: str) -> None:
+    for key in table:
+        if key not in keys:
+            raise FileError(f"{where} has '{key}', which means nothing there: use one of {', '.join(sorted(keys))}.")
+
+
+def _table(words: Mapping[str, Any], key: str, path: Path) -> dict[str, Any]:
+    table = words.get(key)
+    if not isinstance(table, dict):
+        raise FileError(f"'{path.name}' has no [{key}]: describe it there.")
+    return table
+
+
+def _inside(name: Any, folder: Path, what: str, path: Path) -> Path:
+    """Return the path of a file beside the rig; anything that leads out of its folder is refused."""
+    if not isinstance(name, str) or not name.strip():
+        raise FileError(f"{what} of '{path.name}' names no file: write the name of one beside the rig.")
+    found = (folder / name).resolve()
+    if not found.is_relative_to(folder):
+        raise FileError(f"{what} of '{path.name}' is '{name}', outside the rig's folder: move the file beside the rig.")
+    if not found.is_file():
+        raise FileError(
+            f"{what} of '{path.name}' is '{name}', which is not there: check the name, it counts from the rig's folder."
+        )
+    return found
+
+
+def _numbers(value: Any, count: int, what: str, path: Path) -> tuple[float, ...]:
+    items = value if isinstance(value, list) else [value]
+    good = len(items) == count and all(isinstance(v, int | float) and not isinstance(v, bool) for v in items)
+    if not good or not all(np.isfinite(v) and v > 0 for v in items):
+        many = "a number above zero" if count == 1 else f"{count} numbers above zero"
+        raise FileError(f"{what} of '{path.name}' is {value!r}: give {many}, in metres.")
+    return tuple(float(v) for v in items)
+
+
+# --- the sensor
+
+
+def _texels(sensor: dict[str, Any], folder: Path, path: Path) -> tuple[Texels, tuple | None]:
+    if ("grid" in sensor) == ("mesh" in sensor):
+        raise FileError(f"[sensor] of '{path.name}' needs either grid = {{ rows, columns, pitch }} or mesh = \"….ply\".")
+    if "mesh" in sensor:
+        mesh, _ = _mesh(_inside(sensor["mesh"], folder, "The sensor's mesh", path), "the sensor's mesh")
+        texels = texels_from_region(mesh, np.ones(len(mesh.vertices), bool), "sensor")
+        if len(texels) != len(mesh.vertices):
+            raise SensorError(
+                f"{len(mesh.vertices) - len(texels)} vertices of the mesh in '{path.name}' are on no face: "
+                "remove them, so that texel numbers and vertices agree."
+            )
+        return texels, None
+    grid = sensor["grid"]
+    if not isinstance(grid, dict):
+        raise FileError(f"grid of '{path.name}' is {grid!r}: write {{ rows = 14, columns = 6, pitch = [0.0034, 0.0034] }}.")
+    _known(grid, {"rows", "columns", "pitch"}, f"grid of '{path.name}'")
+    counts = []
+    for key in ("rows", "columns"):
+        count = grid.get(key)
+        if not isinstance(count, int) or isinstance(count, bool) or count < 1:
+            raise FileError(f"{key} of '{path.name}' is {count!r}: give a whole number above zero.")
+        counts.append(count)
+    rows, columns = counts
+    if rows * columns > MOST_TEXELS:
+        raise FileError(f"The grid of '{path.name}' has {rows * columns} texels: at most {MOST_TEXELS} are read.")
+    pitch = grid.get("pitch")
+    pitch_x, pitch_y = _numbers(pitch if isinstance(pitch, list) else [pitch, pitch], 2, "pitch", path)
+    return grid_texels(rows, columns, pitch_x, pitch_y), (rows, columns, (pitch_x, pitch_y))
+
+
+def grid_texels(rows: int, columns: int, pitch_x: float, pitch_y: float) -> Texels:
+    """Return texels in z = 0, centred on the origin, rows along +y, columns along +x, normals +z; texel 0 is row 0, column 0.
+
+    Parameters
+    ----------
+    rows, columns : int
+    pitch_x, pitch_y : float, metres
+    """
+    from ...geometry.layout import GridLayout
+
+    row, column = np.divmod(np.arange(rows * columns), columns)
+    x, y = (column - 0.5 * (columns - 1)) * pitch_x, (row - 0.5 * (rows - 1)) * pitch_y
+    n = rows * columns
+    corner = (np.arange(rows - 1)[:, None] * columns + np.arange(columns - 1)).ravel()
+    quads = np.stack([corner, corner + 1, corner + columns + 1, corner + columns], axis=1)
+    return Texels(
+        vertex=np.arange(n),
+        position=np.stack([x, y, np.zeros(n)], axis=1),
+        normal=np.tile([0.0, 0.0, 1.0], (n, 1)),
+        tangent=np.tile([1.0, 0.0, 0.0], (n, 1)),
+        area=np.full(n, pitch_x * pitch_y),
+        layout=GridLayout(rows, columns, row, column, np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])),
+    )
+
+
+def _mesh(path: Path, name: str) -> tuple[TriangleMesh, list[str]]:
+    import trimesh
+
+    try:
+        loaded = trimesh.load(path, process=False, force="mesh")
+    except Exception as error:  # whatever a reader of meshes raises for a broken file
+        raise FileError(f"'{path.name}' is not a mesh that can be read ({error}): give a PLY, STL or OBJ file.") from error
+    if not hasattr(loaded, "faces"):
+        raise FileError(f"'{path.name}' holds no faces: give a PLY, STL or OBJ file with triangles.")
+    return checked_mesh(loaded.vertices, loaded.faces, name)
+
+
+def _parameters(sensor: dict[str, Any], path: Path) -> tuple[SensorParameters, float | None]:
+    known = {item.name for item in fields(SensorParameters)}
+    _known(sensor, known | {"grid", "mesh", "thickness", "name"}, f"[sensor] of '{path.name}'")
+    thickness = None
+    if "thickness" in sensor:
+        (thickness,) = _numbers(sensor["thickness"], 1, "thickness", path)
+        if thickness > 1.0:
+            raise ParameterError(f"thickness of '{path.name}' is {thickness:g} m: give it in metres.")
+    values: dict[str, Any] = {}
+    for key in known & set(sensor):
+        value = sensor[key]
+        if key == "unit":
+            if not isinstance(value, str) or not value.strip():
+                raise ParameterError(f"unit of '{path.name}' is {value!r}: write the unit's name, \"N\" for newtons.")
+        elif not isinstance(value, int | float) or isinstance(value, bool):
+            raise ParameterError(f"{key} of '{path.name}' is {value!r}: give a number.")
+        values[key] = value if key == "unit" else float(value)
+    if "k" in values and "cn" not in values:
+        values["cn"] = 0.01 * values["k"]
+    if thickness is not None and "max_penetration" not in values:
+        values["max_penetration"] = 2.0 * thickness  # section 3.3.3
+    if "mus" in values and "mud" not in values:
+        values["mud"] = min(SensorParameters.mud, values["mus"])
+    if "mud" in values and "mus" not in values:
+        values["mus"] = max(SensorParameters.mus, values["mud"])
+    parameters = SensorParameters(**values)
+    parameters.check(f"sensor of {path.name}")
+    return parameters, thickness
+
+
+# --- the indenter
+
+
+def _indenter(words: dict[str, Any], folder: Path, path: Path) -> Indenter:
+    _known(words, {"shape", "mesh", "name"}, f"[indenter] of '{path.name}'")
+    if ("shape" in words) == ("mesh" in words):
+        raise FileError(f"[indenter] of '{path.name}' needs either a shape or a mesh, and not both.")
+    if "mesh" in words:
+        mesh, _ = _mesh(_inside(words["mesh"], folder, "The indenter's mesh", path), "the indenter")
+        return Indenter(mesh, None, str(words["mesh"]))
+    shape = words["shape"]
+    if not isinstance(shape, dict) or len(shape) != 1 or next(iter(shape)) not in ("sphere", "box", "cylinder"):
+        raise FileError(
+            f"The indenter's shape of '{path.name}' is {shape!r}: write {{ sphere = radius }}, {{ box = [x, y, z] }} or "
+            "{ cylinder = [radius, height] }, in metres."
+        )
+    import trimesh
+
+    ((kind, size),) = shape.items()
+    edges = None
+    if kind == "sphere":
+        (radius,) = _numbers(size, 1, "The sphere's radius", path)
+        solid = trimesh.creation.icosphere(subdivisions=4, radius=radius)
+        name = f"{2e3 * radius:g} mm ball"
+    elif kind == "box":
+        size, radius = _numbers(size, 3, "The box's size", path), None
+        solid, edges = trimesh.creation.box(size), tuple(map(float, size))
+        name = " × ".join(f"{1e3 * edge:g}" for edge in size) + " mm box"
+    else:
+        (across, height), radius = _numbers(size, 2, "The cylinder's size", path), None
+        solid = trimesh.creation.cylinder(radius=across, height=height, sections=256)
+        name = f"cylinder of {2e3 * across:g} mm"
+    mesh = checked_mesh(solid.vertices, solid.faces, "the indenter")[0]
+    return Indenter(mesh, radius if kind == "sphere" else None, name, edges)
+
+
+# --- trials
+
+
+def _trial(entry: Any, number: int, folder: Path, path: Path, texels: int, has_indenter: bool) -> tuple[Trial, list[str]]:
+    where = f"Trial {number}"
+    if not isinstance(entry, dict):
+        raise FileError(f"{where} of '{path.name}' is not a table: write [[trial]] above its file.")
+    _known(entry, {"file", "use", "name"}, f"{where} of '{path.name}'")
+    use = entry.get("use", "fit")
+    if use not in ("fit", "check"):
+        raise FileError(f'{where} of \'{path.name}\' has use = {use!r}: write "fit" or "check".')
+    file = _inside(entry.get("file"), folder, f"{where}'s file", path)
+    names, values = read_table(file)
+    columns = {name: values[:, i] for i, name in enumerate(names)}
+    time = _clock(columns, file)
+    kind = _stimulus_kind(columns, file, has_indenter)
+    reading = _readings(columns, texels, file)
+    force = _vector(columns, FORCE, partial=True)
+    if kind == "force" and force is not None:
+        force = None if np.isnan(force).all() else force
+    if reading is None and force is None:
+        raise FileError(f"'{file.name}' has no response: it needs texel_0 … texel_{texels - 1}, or force_x force_y force_z.")
+    slide = _vector(columns, SLIDE, partial=False)
+    position = quaternion = level = None
+    if kind == "pose":
+        position, quaternion = _vector(columns, POSE, partial=False), _turns(columns, file)
+    else:
+        level = columns[kind].copy()
+    said = _gaps_filled([position, quaternion, level, slide], time, file)
+    if quaternion is not None:
+        quaternion = quaternion / np.linalg.norm(quaternion, axis=1, keepdims=True)
+    strangers = [name for name in names if not _meaning(name)]
+    if strangers:
+        said.append(f"'{file.name}': {', '.join(repr(name) for name in strangers)} mean nothing here and were left out.")
+    stimulus = position if kind == "pose" else level
+    assert stimulus is not None
+    return (
+        Trial(
+            name=file.stem,
+            use=use,
+            time=time,
+            stimulus=kind,
+            position=position,
+            quaternion=quaternion,
+            level=level,
+            slide=np.zeros((len(time), 2)) if slide is None else slide,
+            reading=reading,
+            force=force,
+        ),
+        said,
+    )
+
+
+def _meaning(name: str) -> bool:
+    return name in ("time", "depth", "force", *POSE, *TURN, *SLIDE, *FORCE) or name.startswith("texel_")
+
+
+def _clock(columns: Mapping[str, np.ndarray], file: Path) -> np.ndarray:
+    if "time" not in columns:
+        raise FileError(f"'{file.name}' has no column `time`: add one, in seconds.")
+    time = columns["time"]
+    (missing,) = np.nonzero(np.isnan(time))
+    if len(missing):
+        raise FileError(f"Line {missing[0] + 2} of '{file.name}' has no time: each sample needs one, in seconds.")
+    if len(time) < 8:
+        many = "one sample" if len(time) == 1 else f"{len(time)} samples"
+        raise FileError(f"'{file.name}' has {many}: a trial needs at least 8 to say how the sensor answers.")
+    (back,) = np.nonzero(np.diff(time) <= 0)
+    if len(back):
+        line = back[0] + 3
+        how = "stands still" if time[back[0] + 1] == time[back[0]] else "goes backwards"
+        raise FileError(
+            f"Time {how} at line {line} of '{file.name}' ({time[back[0] + 1]:g} s after {time[back[0]]:g} s): "
+            "sort the samples, or cut the file where the clock was reset."
+        )
+    step = float(np.median(np.diff(time)))
+    if step > LONGEST_STEP:
+        raise FileError(
+            f"The samples of '{file.name}' are {step:g} s apart: `time` must be in seconds, it looks like milliseconds."
+        )
+    return time
+
+
+def _stimulus_kind(columns: Mapping[str, np.ndarray], file: Path, has_indenter: bool) -> str:
+    some_pose = [name for name in POSE if name in columns]
+    kinds = [kind for kind in ("depth", "force") if kind in columns]
+    if some_pose and len(some_pose) < 3:
+        lacking = ", ".join(name for name in POSE if name not in columns)
+        raise FileError(f"'{file.name}' has no column {lacking}: a pose needs x, y and z.")
+    kinds += ["pose"] if some_pose else []
+    if not kinds:
+        raise FileError(f"'{file.name}' has no stimulus: it needs the columns x y z, or depth, or force.")
+    if len(kinds) > 1:
+        raise FileError(
+            f"'{file.name}' has more than one stimulus ({' and '.join(sorted(kinds))}): keep the one that drove the rig."
+        )
+    if kinds[0] == "pose" and not has_indenter:
+        raise FileError(f"'{file.name}' gives the indenter's pose and the rig has no [indenter]: describe its shape.")
+    return kinds[0]
+
+
+def _readings(columns: Mapping[str, np.ndarray], texels: int, file: Path) -> np.ndarray | None:
+    names = [name for name in columns if name.startswith("texel_")]
+    if not names:
+        return None
+    wanted = [f"texel_{i}" for i in range(texels)]
+    lost = [name for name in wanted if name not in columns]
+    if 0 < len(lost) < texels and wanted[-1] in columns:
+        raise FileError(
+            f"'{file.name}' has no column {lost[0]}{' and others' if len(lost) > 1 else ''} of the sensor's {texels} texels: "
+            "export every texel; one that is not connected has empty cells."
+        )
+    if len(names) != texels:
+        raise FileError(f"'{file.name}' has {len(names)} texel columns and the sensor has {texels} texels: make them agree.")
+    for name in wanted:
+        if name not in columns:
+            raise FileError(f"'{file.name}' has no column {name}: texels are numbered texel_0 to texel_{texels - 1}.")
+    return np.stack([columns[name] for name in wanted], axis=1)
+
+
+def _vector(columns: Mapping[str, np.ndarray], names: tuple[str, ...], partial: bool) -> np.ndarray | None:
+    found = [name for name in names if name in columns]
+    if not found or (len(found) < len(names) and not partial and names is not SLIDE):
+        return None
+    length = len(columns[found[0]])
+    missing = np.zeros(length) if names is SLIDE else np.full(length, np.nan)
+    return np.stack([columns.get(name, missing) for name in names], axis=1)
+
+
+def _turns(columns: Mapping[str, np.ndarray], file: Path) -> np.ndarray:
+    found = [name for name in TURN if name in columns]
+    if not found:
+        return np.tile([1.0, 0.0, 0.0, 0.0], (len(columns["x"]), 1))
+    if len(found) < 4:
+        lacking = ", ".join(name for name in TURN if name not in columns)
+        raise FileError(f"'{file.name}' has no column {lacking}: an orientation needs qw, qx, qy and qz.")
+    turns = np.stack([columns[name] for name in TURN], axis=1)
+    length = np.linalg.norm(turns, axis=1)
+    (bad,) = np.nonzero(np.abs(length - 1.0) > 0.05)
+    if len(bad):
+        raise FileError(
+            f"Line {bad[0] + 2} of '{file.name}': qw qx qy qz have length {length[bad[0]]:.3g}, a rotation has length 1."
+        )
+    for i in range(1, len(turns)):  # the same rotation has two quaternions: take the one near the last
+        if turns[i] @ turns[i - 1] < 0:
+            turns[i] *= -1.0
+    return turns
+
+
+def _gaps_filled(stimuli: list[np.ndarray | None], time: np.ndarray, file: Path) -> list[str]:
+    """Interpolate missing stimulus values in place."""
+    said, total = [], 0
+    for values in stimuli:
+        if values is None:
+            continue
+        for column in values.reshape(len(time), -1).T:
+            missing = np.isnan(column)
+            if missing.mean() > 0.1:
+                raise FileError(
+                    f"{missing.mean():.0%} of the stimulus in '{file.name}' is missing: record the trial again or cut it."
+                )
+            if missing.any():
+                total += int(missing.sum())
+                column[missing] = np.interp(time[missing], time[~missing], column[~missing])
+    if total:
+        said.append(f"'{file.name}': {total} missing values of the stimulus were interpolated.")
+    return said
+
+
+def _responds(trial: Trial) -> bool:
+    parts = [part for part in (trial.reading, trial.force) if part is not None]
+    return any(np.nanmax(np.abs(part), initial=0.0) > 0 for part in parts if not np.isnan(part).all())
+
+
+def _check_units(
+    trials: list[Trial],
+    indenter: Indenter | None,
+    texels: Texels,
+    parameters: SensorParameters,
+    thickness: float | None,
+    path: Path,
+) -> None:
+    """Refuse lengths that can only be millimetres: a stimulus past the sensor's back, or one that never comes near it."""
+    deepest = parameters.max_penetration
+    for trial in trials:
+        if trial.stimulus == "depth":
+            assert trial.level is not None
+            if trial.level.max() > 20 * deepest:
+                raise FileError(
+                    f"`depth` of '{trial.name}.csv' reaches {trial.level.max():g} m, "
+                    f"and the sensor can be pressed in by {deepest:g} m: "
+                    "give it in metres."
+                )
+        elif trial.stimulus == "pose":
+            assert trial.position is not None and indenter is not None
+            spans = [float(np.linalg.norm(np.ptp(points, axis=0))) for points in (texels.position, indenter.mesh.vertices)]
+            if np.abs(trial.position).max() > 20 * max(sum(spans), deepest):
+                raise FileError(
+                    f"The pose in '{trial.name}.csv' reaches {np.abs(trial.position).max():g} m from a sensor of "
+                    f"{spans[0]:.3g} m: give x, y and z in metres."
+                )

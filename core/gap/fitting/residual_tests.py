@@ -1,0 +1,109 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Whether a residual is more than noise, and what it varies with: regressions that are judged on trials they have not seen.
+
+Noise cannot be predicted from trials it was not in, however coloured it is, as long as each texel has its own; so a share that
+can be predicted is structure.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..forward.contact_phases import features, load_of
+from ..forward.predictor import Predictor
+
+
+@dataclass(frozen=True)
+class Structure:
+    """How much of a residual's mean square can be predicted.
+
+    Attributes
+    ----------
+    total : float
+        Share, by all that is looked at together.
+    shares : dict of str to float
+        By each group of :data:`~.contact_phases.FEATURES` alone.
+    """
+
+    total: float
+    shares: dict[str, float]
+
+    @property
+    def strongest(self) -> str:
+        """The group that predicts most."""
+        return max(self.shares, key=lambda name: self.shares[name]) if self.shares else ""
+
+
+def structure_of(predictors: Sequence[Predictor], residuals: Sequence[np.ndarray]) -> Structure:
+    """Find out what residuals vary with.
+
+    Parameters
+    ----------
+    predictors : sequence of Predictor
+        Of the trials.
+    residuals : sequence of (T, n) float
+        In units of the noise; zero where a value is missing.
+    """
+    if len(predictors) == 1:  # halves of the only trial stand in for trials
+        predictors, residuals, halves = [predictors[0]] * 2, [residuals[0]] * 2, True
+    else:
+        halves = False
+    folds, names, sizes = [], [], []
+    for number, (predictor, residual) in enumerate(zip(predictors, residuals, strict=True)):
+        found = features(predictor, residual)
+        names, sizes = list(found), [len(columns) for columns in found.values()]
+        table = np.concatenate(list(found.values())).reshape(sum(sizes), *residual.shape)
+        part = slice(None)
+        if halves:
+            middle = len(residual) // 2
+            part = slice(None, middle) if number == 0 else slice(middle, None)
+        folds.append((table[:, part].reshape(sum(sizes), -1), residual[part]))
+    total = sum(float(np.vdot(r, r)) for _, r in folds)
+    if total <= 0:
+        return Structure(0.0, dict.fromkeys(names, 0.0))
+    sums = [(x @ x.T, x @ r.ravel()) for x, r in folds]
+    shares, start = {}, 0
+    for name, size in zip(names, sizes, strict=True):
+        shares[name] = _explained(folds, sums, np.arange(start, start + size), total)
+        start += size
+    everything = _explained(folds, sums, np.arange(start), total)
+    if residuals[0].shape[1] > 1 and not halves:
+        shares["texel"] = _by_texel(predictors, [r for _, r in folds], total)
+        everything = 1.0 - (1.0 - max(everything, 0.0)) * (1.0 - max(shares["texel"], 0.0))
+    return Structure(max(everything, *shares.values(), 0.0), {name: max(share, 0.0) for name, share in shares.items()})
+
+
+def _explained(
+    folds: list[tuple[np.ndarray, np.ndarray]], sums: list[tuple[np.ndarray, np.ndarray]], use: np.ndarray, total: float
+) -> float:
+    """Share of the squares that a regression on some features predicts on the folds it has not seen."""
+    left = 0.0
+    for i, (x, r) in enumerate(folds):
+        a = sum((s[0] for j, s in enumerate(sums) if j != i), np.zeros(sums[0][0].shape))[np.ix_(use, use)]
+        b = sum((s[1] for j, s in enumerate(sums) if j != i), np.zeros(len(sums[0][1])))[use]
+        weights = np.linalg.solve(a + np.diag(1e-3 * np.diag(a) + 1e-9 * (1.0 + np.trace(a))), b)
+        miss = r.ravel() - weights @ x[use]
+        left += float(np.vdot(miss, miss))
+    return 1.0 - left / total
+
+
+def _by_texel(predictors: Sequence[Predictor], residuals: Sequence[np.ndarray], total: float) -> float:
+    """The same for a constant and a gain of each texel."""
+    parts = []
+    for predictor, r in zip(predictors, residuals, strict=True):
+        d = load_of(predictor.stimulus)
+        moments = [np.full(d.shape[1], float(len(d))), d.sum(axis=0), (d * d).sum(axis=0), r.sum(axis=0), (d * r).sum(axis=0)]
+        parts.append(np.stack(moments))
+    left = 0.0
+    for i, (predictor, r) in enumerate(zip(predictors, residuals, strict=True)):
+        one, d1, d2, r1, rd = sum(p for j, p in enumerate(parts) if j != i)
+        # A little of a second trial without residual: texels that were hardly loaded say nothing.
+        one, d2 = one * 1.01 + 1.0, d2 * 1.01 + 1.0
+        det = one * d2 - d1 * d1
+        offset, gain = (d2 * r1 - d1 * rd) / det, (one * rd - d1 * r1) / det
+        miss = r - offset - gain * load_of(predictor.stimulus)
+        left += float(np.vdot(miss, miss))
+    return 1.0 - left / total

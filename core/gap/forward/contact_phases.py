@@ -1,0 +1,175 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a texel goes through: phases of contact, and the quantities that a residual may depend on."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .predictor import Predictor
+from .stimulus import Stimulus
+
+PHASES = ("approach", "loading", "hold", "unloading", "released", "sliding")
+STILL, STILL_OF_PACE = 0.02, 0.2
+"""Share of the largest load per second below which a texel counts as held; in a slow trial so much of the trial's own pace."""
+CONSTANT = 1e-6
+"""Share of the largest load per second below which nothing but rounding moves."""
+FAST_SLIDE = 2e-4
+"""Metres per second above which a held surface counts as sliding."""
+
+
+def load_of(stimulus: Stimulus) -> np.ndarray:
+    """Depth of a texel, or its share of a known force, as a share of the largest in the trial, (T, n) float."""
+    load = stimulus.pressed_by
+    shares: np.ndarray = load / max(float(load.max(initial=0.0)), 1e-300)
+    return shares
+
+
+def pace_of(rate: np.ndarray) -> float:
+    """Rate below which a load is held: a fixed one, or where all of a trial is slow, one that its fastest parts exceed by far.
+
+    Parameters
+    ----------
+    rate : float, 1/s
+        Of the load, as a share of the largest.
+    """
+    return float(np.clip(STILL_OF_PACE * np.quantile(np.abs(rate), 0.99), CONSTANT, STILL)) if rate.size else STILL
+
+
+def phases(stimulus: Stimulus) -> np.ndarray:
+    """Return which of :data:`PHASES` each texel is in at each sample, (T, n) int."""
+    load = load_of(stimulus)
+    rate = np.gradient(load, stimulus.time, axis=0)
+    still = pace_of(rate[load > 0]) * np.maximum(load.max(axis=0, keepdims=True), 1e-12)
+    touching = load > 0
+    before = ~np.maximum.accumulate(touching, axis=0)
+    found = np.full(load.shape, PHASES.index("released"))
+    found[before] = PHASES.index("approach")
+    found[touching] = PHASES.index("hold")
+    found[touching & (rate > still)] = PHASES.index("loading")
+    found[touching & (rate < -still)] = PHASES.index("unloading")
+    found[touching & (np.abs(rate) <= 5 * still) & (stimulus.slide > FAST_SLIDE)] = PHASES.index("sliding")
+    return found
+
+
+ALWAYS = 1e-9
+"""Share of the largest load within which a load never changes, and nothing can vary with it."""
+WAYS = (0.0, 0.02, 0.04, 0.06, 0.09, 0.12, 0.16, 0.2, 0.25, 0.32, 0.4, 1.01)
+"""Bands of the way since the surface turned back, as shares of the longest."""
+
+
+FEATURES: dict[str, str] = {
+    "depth": "how deep the texel is pressed",
+    "rate and direction": "how fast it is pressed, and whether it is loaded or unloaded",
+    "time since contact": "how long it has been touched",
+    "history": "how far and how often it was loaded before",
+    "neighbours": "what its neighbours carry",
+    "texel": "which texel it is",
+    "sliding": "which way and how fast the surface slides",
+    "turning": "how far the surface has slid since it last turned back",
+    "clock": "clock time, whatever is done",
+    "common mode": "what all texels do at the same moment, loaded or not",
+    "shared by loaded texels": "something that all loaded texels share at the same moment",
+}
+
+
+def features(predictor: Predictor, residual: np.ndarray) -> dict[str, np.ndarray]:
+    """What the residual of each texel at each sample may vary with: arrays (f, T, n) by group of :data:`FEATURES`.
+
+    Parameters
+    ----------
+    residual : (T, n) float
+        Only the last two groups look at it, and then at the other texels'.
+    """
+    s = predictor.stimulus
+    d = load_of(s)
+    time = s.time
+    rate = np.gradient(d, time, axis=0)
+    rate /= max(float(np.abs(rate).max(initial=0.0)), 1e-300)
+    touching = d > 0
+    since = _since(touching, time)
+    top = np.maximum.accumulate(d, axis=0)
+    step = np.diff(time, prepend=time[0])[:, None]
+    done = np.cumsum(d * step, axis=0)
+    done /= max(float(done.max(initial=0.0)), 1e-300)
+    falling = rate < -0.005
+    clock = np.broadcast_to(((time - time[0]) / max(time[-1] - time[0], 1e-300))[:, None], d.shape)
+    groups = {
+        "depth": [d, d**2, d**3, touching.astype(float)],
+        "rate and direction": [rate, np.abs(rate), d * falling, d**2 * falling, np.abs(rate) ** 0.3 * np.sign(rate)],
+        "time since contact": [
+            d * np.exp(-since / 0.1),
+            d * np.exp(-since),
+            d * np.exp(-since / 8.0),
+            np.exp(-since) * touching,
+        ],
+        "history": [top - d, (top - d) * touching, top**2 - d**2, done * d, done],
+        "clock": [clock, clock**2, clock * d],
+    }
+    if np.ptp(d) < ALWAYS:
+        del groups["depth"]
+    if predictor.trial.reading is None and s.slip is not None:
+        groups |= _sliding(s.slip, time, d.shape)
+    n = d.shape[1]
+    if n > 1:
+        around = _neighbours(predictor, d)
+        groups["neighbours"] = [around - d, around * (d > 0), np.broadcast_to(d.mean(axis=1, keepdims=True), d.shape)]
+        others = (residual.sum(axis=1, keepdims=True) - residual) / (n - 1)
+        groups["common mode"] = [others]
+        shared = [_share_of_others(residual, d), _share_of_others(residual, rate)]
+        groups["shared by loaded texels"] = shared
+    return {name: np.stack(columns) for name, columns in groups.items()}
+
+
+def _sliding(slip: np.ndarray, time: np.ndarray, shape: tuple[int, ...]) -> dict[str, list[np.ndarray]]:
+    """Speed along the direction in which the surface slides most, and the way since that speed last changed its sign.
+
+    Parameters
+    ----------
+    slip : (T, n, 3) float, m/s
+    shape : (int, int)
+        Of what is returned.
+    """
+    mean = slip.mean(axis=1)
+    _, _, axes = np.linalg.svd(mean, full_matrices=False)
+    along = axes[0] * np.sign(axes[0][np.argmax(np.abs(axes[0]))])  # the same in every trial
+    speed = mean @ along
+    sign, fast = np.where(speed < 0, -1.0, 1.0), max(float(np.abs(speed).max()), 1e-300)
+    step = np.abs(speed) * np.diff(time, prepend=time[0])
+    way = np.cumsum(step)
+    turned = np.concatenate([[False], sign[1:] * sign[:-1] < 0])
+    since = way - np.maximum.accumulate(np.where(turned, way, 0.0))
+    since /= max(float(since.max()), 1e-300)
+    wide = lambda x: np.broadcast_to(x[:, None], shape)  # noqa: E731
+    bands = [wide(sign * ((since >= a) & (since < b))) for a, b in zip(WAYS[:-1], WAYS[1:], strict=True)]
+    return {"sliding": [wide(x) for x in (np.ones(len(sign)), sign, speed / fast, (speed / fast) ** 2)], "turning": bands}
+
+
+def _since(touching: np.ndarray, time: np.ndarray) -> np.ndarray:
+    """Seconds since each texel was last touched anew, (T, n); zero where nothing touches."""
+    began = touching.copy()
+    began[1:] &= ~touching[:-1]
+    start = np.maximum.accumulate(np.where(began, time[:, None], -np.inf), axis=0)
+    return np.where(touching, time[:, None] - start, 0.0)
+
+
+def _neighbours(predictor: Predictor, d: np.ndarray) -> np.ndarray:
+    """Mean load of the four nearest texels."""
+    p = predictor.rig.texels.position
+    count = min(4, len(p) - 1)
+    if len(p) > 2000:  # the distances of all pairs would fill the memory
+        return np.broadcast_to(d.mean(axis=1, keepdims=True), d.shape)
+    distance = np.linalg.norm(p[:, None] - p[None], axis=2)
+    nearest = np.argsort(distance, axis=1)[:, 1 : count + 1]
+    mean = np.zeros_like(d)
+    for k in range(count):
+        mean += d[:, nearest[:, k]]
+    return mean / count
+
+
+def _share_of_others(residual: np.ndarray, shape: np.ndarray) -> np.ndarray:
+    """The residual that a texel would have if all followed `shape` with one amplitude per sample, found from the others."""
+    top = (residual * shape).sum(axis=1, keepdims=True) - residual * shape
+    square = (shape * shape).sum(axis=1, keepdims=True) - shape * shape
+    # A texel that is nearly alone says nothing about the others.
+    amplitude = np.where(square > 0.05, top / np.maximum(square, 0.05), 0.0)
+    return amplitude * shape

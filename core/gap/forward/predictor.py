@@ -1,0 +1,171 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a sensor with given parameters and effects would have recorded in a trial."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ...effects.engine import binding
+from ...effects.engine.registry import form_of, stage_of
+from ...effects.engine.registry import placed as placed_texels
+from ...effects.engine.specification import Effect
+from ...model.scenario import Sensor, SensorParameters
+from ..dataset.rig import Rig, Trial
+from .force_model import Felt
+from .stimulus import Stimulus, stimulus_of
+
+KEPT = 4
+"""Placements, forces and readings that are remembered per trial: a derivative by one number asks for the others again."""
+
+
+@dataclass(frozen=True)
+class Model:
+    """A sensor in words: the base model's parameters and the effects on top of it."""
+
+    parameters: SensorParameters
+    effects: tuple[Effect, ...] = ()
+
+    def with_effect(self, effect: Effect) -> Model:
+        """Return the model with one more effect."""
+        return replace(self, effects=(*self.effects, effect))
+
+    def without(self, index: int) -> Model:
+        """Return the model without its effect of this index."""
+        return replace(self, effects=self.effects[:index] + self.effects[index + 1 :])
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """What a model says a trial recorded: `reading` (T, n) in the sensor's unit, `force` (T, 3) N where it was measured."""
+
+    reading: np.ndarray
+    force: np.ndarray | None
+
+
+class Predictor:
+    """Predicts one trial for any model; what only some of its numbers change is computed once.
+
+    Parameters
+    ----------
+    trial : Trial
+    rig : Rig
+    """
+
+    def __init__(self, trial: Trial, rig: Rig):
+        self.trial, self.rig = trial, rig
+        self.stimulus = stimulus_of(trial, rig)
+        self._placed: dict[object, Stimulus] = {}
+        self._felt: dict[object, Felt] = {}
+        self._forces: dict[object, np.ndarray] = {}
+        self._totals: dict[object, np.ndarray] = {}
+        self._readings: dict[object, np.ndarray] = {}
+
+    def predict(self, model: Model, columns: np.ndarray | None = None, forces: bool = True) -> Prediction:
+        """Return the prediction of a model; its arrays are kept and not to be written to.
+
+        Parameters
+        ----------
+        model : Model
+        columns : (c,) int, optional
+            Only these texels; right as long as no effect lets texels feel their neighbours.
+        forces : bool
+            Whether the net force is wanted, where it was measured.
+        """
+        wanted = forces and self.trial.force is not None
+        return Prediction(self._reading(model, columns), self._total(model) if wanted else None)
+
+    def _reading(self, model: Model, columns: np.ndarray | None) -> np.ndarray:
+        p = model.parameters
+        # Noise is left out: what is predicted is what is to be expected.
+        reading = tuple(e for e in model.effects if stage_of(e) == "readout" and e.name != "noise")
+        key = (self._force_key(model, columns), p.gain, p.zero, _key(reading))
+        if key not in self._readings:
+            site = binding.site_of(Sensor("sensor", 0, self.rig.texels, p))
+            if columns is not None:
+                site = replace(
+                    site,
+                    position=site.position[columns],
+                    area=site.area[columns],
+                    row=None if site.row is None else site.row[columns],
+                    column=None if site.column is None else site.column[columns],
+                )
+                reading = tuple(_restricted(effect, columns) for effect in reading)
+            force = self.normal_force(model, columns)
+            _keep(self._readings, key, binding.readings(reading, site, self.trial.time, force), KEPT)
+        return self._readings[key]
+
+    def _total(self, model: Model) -> np.ndarray:
+        """Sum of normal and friction forces on the sensor, (T, 3) N."""
+        p, rubbing = model.parameters, tuple(effect for effect in model.effects if _has(effect, "friction"))
+        slides = (p.sigma0, p.sigma1, p.mus, p.mud, p.x0, p.ct, _key(rubbing))
+        key = (self._force_key(model, None), slides)
+        if key not in self._totals:
+            _keep(self._totals, key, self._felt_by(model, None).total(p, rubbing, self.normal_force(model)), KEPT)
+        return self._totals[key]
+
+    def placed(self, model: Model) -> Stimulus:
+        """Return what the texels meet with the effects that move them."""
+        moving = tuple(effect for effect in model.effects if _has(effect, "place"))
+        if not moving or self.trial.stimulus != "pose":
+            return self.stimulus
+        key = _key(moving)
+        if key not in self._placed:
+            t = self.rig.texels
+            position, normal, tangent = placed_texels(moving, t.position, t.normal, t.tangent)
+            moved = replace(t, position=position, normal=normal, tangent=tangent)
+            _keep(self._placed, key, stimulus_of(self.trial, self.rig, moved), KEPT)
+        return self._placed[key]
+
+    def normal_force(self, model: Model, columns: np.ndarray | None = None) -> np.ndarray:
+        """Normal force of each texel (or of some), (T, n) N: from the law of contact with its effects, or known."""
+        stimulus = self.placed(model)
+        if stimulus.load is not None:
+            return stimulus.load if columns is None else stimulus.load[:, columns]
+        whole = self._forces.get(self._force_key(model, None))
+        if columns is not None and whole is not None:
+            return whole[:, columns]
+        key = self._force_key(model, columns)
+        if key not in self._forces:
+            _keep(self._forces, key, self._felt_by(model, columns).force(model.parameters, _acting(model)), KEPT)
+        return self._forces[key]
+
+    def _force_key(self, model: Model, columns: np.ndarray | None) -> object:
+        p, which = model.parameters, None if columns is None else columns.tobytes()
+        return which, p.k, p.cn, p.exponent, p.dissipation, _key(_acting(model))
+
+    def _felt_by(self, model: Model, columns: np.ndarray | None) -> Felt:
+        which = None if columns is None else columns.tobytes()
+        key = which, _key(tuple(effect for effect in model.effects if _has(effect, "place")))
+        if key not in self._felt:
+            _keep(self._felt, key, Felt.of(self.placed(model), columns, self.rig), 2 * KEPT)
+        return self._felt[key]
+
+
+def _acting(model: Model) -> tuple[Effect, ...]:
+    """The effects on normal forces, and those that move the texels."""
+    return tuple(e for e in model.effects if stage_of(e) != "readout" and not _has(e, "friction"))
+
+
+def _has(effect: Effect, way: str) -> bool:
+    return form_of(effect.name, effect.form).way == way
+
+
+def _keep(memory: dict, key: object, value: object, most: int) -> None:
+    """Remember something, and forget the oldest where there is too much."""
+    while len(memory) >= most:
+        del memory[next(iter(memory))]
+    memory[key] = value
+
+
+def _key(effects: tuple[Effect, ...]) -> object:
+    return tuple((effect.name, effect.form, effect.seed, *effect.values.items()) for effect in effects)
+
+
+def _restricted(effect: Effect, columns: np.ndarray) -> Effect:
+    """The effect on some of the texels."""
+    if not any(isinstance(value, tuple) for value in effect.values.values()):
+        return effect
+    values = {k: tuple(np.asarray(v)[columns]) if isinstance(v, tuple) else v for k, v in effect.values.items()}
+    return replace(effect, values=values)

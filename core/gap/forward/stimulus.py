@@ -1,0 +1,225 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What each texel meets during a trial: depth, its rate, the direction of the push, and sliding.
+
+None of it depends on the parameters that are fitted, so it is computed once per trial. A ball is computed in closed form, so
+that facets are not taken for an effect, and a box, whose flat end is common, so that texels can be tried at many places; every
+other indenter goes through the solver's own contact search.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ...errors import SceneError
+from ...geometry.rotations import quaternion_product, rotation_matrices, rotation_vectors
+from ...geometry.texels import Texels
+from ...model.scenario import Body, Motion, Scenario, Sensor, Target
+from ...solver.simulation import Simulation
+from ..dataset.rig import Rig, Trial
+
+
+@dataclass(frozen=True)
+class Stimulus:
+    """A trial as the texels see it.
+
+    Attributes
+    ----------
+    trial : Trial
+    depth : (T, n) float, metres
+        Perpendicular penetration; zero where nothing touches. Of a force trial: zeros.
+    rate : (T, n) float, m/s
+        Speed at which the surface comes closer along its normal; zero where nothing touches.
+    load : (T, n) float or None, newtons
+        Each texel's share of the force in a force trial.
+    normal : (T, n, 3) float or None
+        Outward normal of what presses, in the sensor's frame: the direction of the normal force on the sensor. None: straight
+        into each texel.
+    slide : (T, n) float, m/s
+        Speed at which the surface slides over the sensor, where they touch.
+    slip : (T, n, 3) float, m/s, or None
+        The same as a vector in the sensor's frame; None where no friction force was measured.
+    sunk : int
+        Most texels at once that were pressed past their maximum penetration.
+    """
+
+    trial: Trial
+    depth: np.ndarray
+    rate: np.ndarray
+    load: np.ndarray | None
+    normal: np.ndarray | None
+    slide: np.ndarray
+    slip: np.ndarray | None
+    sunk: int = 0
+
+    @property
+    def pressed_by(self) -> np.ndarray:
+        """What presses each texel, (T, n) float: the depth, or its share of a known force."""
+        return self.depth if self.load is None else self.load
+
+    @property
+    def time(self) -> np.ndarray:
+        """(T,) seconds."""
+        return self.trial.time
+
+
+def stimulus_of(trial: Trial, rig: Rig, texels: Texels | None = None) -> Stimulus:
+    """Compute what the texels meet in a trial of a rig.
+
+    Parameters
+    ----------
+    trial : Trial
+    rig : Rig
+    texels : Texels, optional
+        Where the texels really are, if not where the rig has them.
+    """
+    texels = rig.texels if texels is None else texels
+    n = len(texels)
+    along = None
+    if np.ptp(trial.slide, axis=0).any():
+        travel = np.gradient(trial.slide, trial.time, axis=0)
+        along = travel[:, None, :1] * texels.tangent + travel[:, None, 1:] * texels.bitangent
+    if trial.stimulus == "pose":
+        return _posed(trial, rig, texels, along)
+    assert trial.level is not None
+    level = np.repeat(np.maximum(trial.level, 0.0)[:, None], n, axis=1)
+    slip = None if along is None else along * (level > 0)[:, :, None]
+    nothing = np.zeros_like(level)
+    slide = nothing if slip is None else np.sqrt(_dot(slip, slip))
+    if trial.stimulus == "force":
+        return Stimulus(trial, nothing, nothing, level / n, None, slide, slip)
+    rate = np.where(level > 0, np.gradient(trial.level, trial.time)[:, None], 0.0)
+    return Stimulus(trial, level, rate, None, None, slide, slip)
+
+
+def _posed(trial: Trial, rig: Rig, texels: Texels, along: np.ndarray | None) -> Stimulus:
+    assert trial.position is not None and trial.quaternion is not None and rig.indenter is not None
+    reach, radius = rig.parameters.max_penetration, rig.indenter.radius
+    limit, deep = reach, 0
+    for _ in range(6):
+        if radius is not None:
+            depth, normal, point, deep = ball_contact(trial.position, radius, texels.position, texels.normal, reach)
+        elif rig.indenter.edges is not None:
+            pose, edges = (trial.position, trial.quaternion), np.array(rig.indenter.edges)
+            depth, normal, point, deep = box_contact(*pose, edges, texels.position, texels.normal, reach)
+        else:
+            depth, normal, point, deep = _mesh_contact(trial, rig, texels, reach)
+        if not deep:
+            break
+        reach *= 2.0  # a real sensor does not go limp where the model's reach ends: look from further behind
+    else:
+        raise SceneError(
+            f"The indenter of '{trial.name}.csv' goes right through the sensor (by more than {0.5e3 * reach:.3g} mm): "
+            "check the pose's unit, its origin (the shape's centre) and the sign of z."
+        )
+    velocity = np.gradient(trial.position, trial.time, axis=0)[:, None, :]
+    spin = _spin(trial.quaternion, trial.time)
+    if spin.any():
+        velocity = velocity + np.cross(spin[:, None, :], point - trial.position[:, None, :])
+    if along is not None:
+        velocity = velocity + along
+    touching = depth > 0
+    rate = np.where(touching, _dot(velocity, normal), 0.0)
+    slide = np.sqrt(np.maximum(np.where(touching, _dot(velocity, velocity), 0.0) - rate * rate, 0.0))
+    slip = None
+    if trial.force is not None:
+        slip = np.where(touching[:, :, None], velocity - rate[:, :, None] * normal, 0.0)
+    sunk = int((depth > limit).sum(axis=1).max(initial=0))
+    return Stimulus(trial, depth, rate, None, normal, slide, slip, sunk)
+
+
+def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Scalar product along the last axis; three products are several times as fast as einsum over so short an axis."""
+    return a[..., 0] * b[..., 0] + a[..., 1] * b[..., 1] + a[..., 2] * b[..., 2]
+
+
+def _spin(quaternion: np.ndarray, time: np.ndarray) -> np.ndarray:
+    """Angular velocity (T, 3) rad/s in the sensor's frame, by central differences."""
+    turned = np.diff(quaternion, axis=0)
+    if not turned.any():
+        return np.zeros((len(time), 3))
+    conjugate = quaternion * np.array([1.0, -1.0, -1.0, -1.0])
+    before, after = np.maximum(np.arange(len(time)) - 1, 0), np.minimum(np.arange(len(time)) + 1, len(time) - 1)
+    turn = rotation_vectors(quaternion_product(quaternion[after], conjugate[before]))
+    return turn / (time[after] - time[before])[:, None]
+
+
+def ball_contact(
+    center: np.ndarray, radius: float, position: np.ndarray, outward: np.ndarray, reach: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, int]:
+    """Contact of texels with a true sphere, in closed form (paper, Eq. 4: the segment against the surface).
+
+    Parameters
+    ----------
+    center : (T, 3) float, metres
+    radius, reach : float, metres
+    position, outward : (n, 3) float
+        Texels and their unit normals.
+
+    Returns
+    -------
+    depth : (T, n) float, metres
+    normal : (T, n, 3) float
+        The sphere's outward normal where the segment enters it; minus the texel's normal where it does not.
+    point : (T, n, 3) float, metres
+    sunk : int
+        Most texels at once whose segment begins inside the sphere.
+    """
+    # From the segment's base, along the texel's normal: |base + s·n - c| = radius, the smaller root.
+    offset = position - reach * outward - center[:, None, :]
+    along = _dot(offset, outward)
+    inside = _dot(offset, offset) - radius * radius
+    root = along * along - inside
+    hit = root > 0
+    s = -along - np.sqrt(np.where(hit, root, 0.0))
+    touching = hit & (s >= 0) & (s < reach)
+    normal = np.where(touching[:, :, None], (offset + s[:, :, None] * outward) / radius, -outward)
+    depth = np.where(touching, (reach - s) * np.abs(_dot(normal, outward)), 0.0)
+    point = position - np.where(touching, reach - s, 0.0)[:, :, None] * outward
+    sunk = (inside < 0).sum(axis=1).max(initial=0)
+    return depth, normal, point, int(sunk)
+
+
+def box_contact(
+    center: np.ndarray, quaternion: np.ndarray, edges: np.ndarray, position: np.ndarray, outward: np.ndarray, reach: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, int]:
+    """The same for a box of full sizes `edges` (3,), turned by `quaternion` (T, 4): the segment against three pairs of planes.
+
+    Its returns are those of :func:`ball_contact`.
+    """
+    frame = rotation_matrices(quaternion)  # box → sensor
+    base = position - reach * outward - center[:, None, :]
+    base, way = base @ frame, np.broadcast_to(outward, base.shape) @ frame  # rows by the matrix: into the box's frame
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ends = [(np.sign(way) * side * 0.5 * edges - base) / way for side in (-1.0, 1.0)]
+    beside = way == 0.0  # along a pair of planes: always between them, or never
+    between = np.abs(base) < 0.5 * edges
+    enter = np.where(beside, np.where(between, -np.inf, np.inf), ends[0])
+    leave = np.where(beside, np.where(between, np.inf, -np.inf), ends[1])
+    s, face = enter.max(axis=2), enter.argmax(axis=2)
+    touching = (s <= leave.min(axis=2)) & (s >= 0) & (s < reach)
+    hit = np.arange(3) == face[:, :, None]
+    own = np.where(hit, -np.sign(way), 0.0) @ frame.transpose(0, 2, 1)
+    normal = np.where(touching[:, :, None], own, -outward)
+    left = np.where(touching, reach - s, 0.0)
+    depth = left * np.abs(_dot(normal, outward))
+    sunk = between.all(axis=2).sum(axis=1).max(initial=0)
+    return depth, normal, position - left[:, :, None] * outward, int(sunk)
+
+
+def _mesh_contact(trial: Trial, rig: Rig, texels: Texels, reach: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, int]:
+    """The same as :func:`ball_contact` for any mesh, through the solver's contact search."""
+    assert trial.position is not None and trial.quaternion is not None and rig.indenter is not None
+    parameters = replace(rig.parameters, max_penetration=reach)
+    scenario = Scenario(
+        bodies=(
+            Body("sensor", Motion.at_rest()),
+            Body("indenter", Motion.at_rest(trial.position[0], trial.quaternion[0])),
+        ),
+        sensors=(Sensor("sensor", 0, texels, parameters),),
+        targets=(Target("indenter", 1, rig.indenter.mesh),),
+        frame_end=1,
+        name=rig.name,
+    )
+    return Simulation(scenario).contacts_along(1, trial.position, trial.quaternion)

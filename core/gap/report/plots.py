@@ -1,0 +1,244 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The report's pictures: the gap before and after, curves of what was measured and simulated, where the error sits."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ...figures.figure_style import GREY, INK, NORMAL_COLOUR, SHEAR_COLOUR, WIDTHS, new_figure, save_figure, tidy_axes
+from ...geometry.layout import GridLayout
+from ..forward.contact_phases import PHASES
+from ..forward.predictor import Model, Predictor
+from ..selection.diagnosis import Diagnosis
+from .comparison import noise_floor, nrmse, rms_by_texel, smooth, where, without_friction
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+BEFORE, AFTER = SHEAR_COLOUR, NORMAL_COLOUR
+MEASURED = INK
+LONG = 12
+"""How many times as long as wide a grid is no picture any more."""
+
+
+def gap_bars(result: Diagnosis) -> Figure:
+    """NRMSE of base and amended model on fitted and held-out trials, with the noise floor."""
+    figure = new_figure(WIDTHS["single"], 2.5)
+    axes = figure.add_axes((0.15, 0.18, 0.82, 0.58))
+    uses = [use for use in ("fit", "check") if result.of(use)]
+    shown = [*_rough(result), *_models(result)]
+    wide = 0.72 / max(len(shown), 2)
+    for offset, (label, model, colour) in enumerate(shown):
+        heights = [100.0 * (nrmse(result.of(use), model, result.full) or 0.0) for use in uses]
+        places = np.arange(len(uses)) + wide * (offset - 0.5 * (len(shown) - 1))
+        bars = axes.bar(places, heights, 0.95 * wide, color=colour, label=label)
+        for bar, height in zip(bars, heights, strict=True):
+            axes.text(bar.get_x() + 0.475 * wide, height, f"{height:.2f}", ha="center", va="bottom", fontsize=8, color=INK)
+    floor = 100.0 * noise_floor(result)
+    axes.axhline(floor, color=INK, lw=0.9, ls=(0, (4, 3)), label=f"noise floor {floor:.2f} %")
+    names = {"fit": "fitted trials", "check": "check trials,\nnever fitted"}
+    axes.set_xticks(np.arange(len(uses)), [names[use] for use in uses])
+    axes.set_ylabel("error (% of range)")
+    axes.margins(y=0.18)
+    tidy_axes(axes)
+    axes.legend(frameon=False, fontsize=8, loc="lower left", bbox_to_anchor=(-0.03, 1.0), ncols=2, columnspacing=1.2)
+    return figure
+
+
+def _models(result: Diagnosis) -> list[tuple[str, Model, str]]:
+    """The models to be compared: the base alone where nothing was added to it."""
+    base = ("base model", result.base.model, BEFORE)
+    return [base, ("amended", result.best.model, AFTER)] if result.best.model.effects else [base]
+
+
+def _rough(result: Diagnosis) -> list[tuple[str, Model, str]]:
+    """The base model without its friction, where a surface slides."""
+    return [] if without_friction(result) is None else [("without friction", smooth(result.base.model), GREY)]
+
+
+def curves(result: Diagnosis) -> Figure:
+    """Measured, base and amended over time, for the two texels (or force components) where the base model errs most."""
+    trials = [*result.of("fit")[:2], *result.of("check")[:1]]
+    figure = new_figure(WIDTHS["double"], 1.75 * len(trials) + 0.5)
+    grid = figure.subplots(len(trials), 1, squeeze=False)[:, 0]
+    for axes, predictor in zip(grid, trials, strict=True):
+        name, measured, pick = _worst_channel(result, predictor)
+        time = predictor.trial.time
+        axes.plot(time, measured, color=MEASURED, lw=1.5, label="measured")
+        for label, model, colour in _models(result):
+            axes.plot(
+                time,
+                np.where(np.isfinite(measured), pick(model), np.nan),
+                color=colour,
+                lw=1.0,
+                ls="--" if label == "base model" else "-",
+                label=label,
+            )
+        axes.set_title(f"{predictor.trial.name} ({predictor.trial.use}): {name}", loc="left", fontsize=8.5, color=INK)
+        axes.set_ylabel(_quantity(result, name))
+        axes.margins(x=0)
+        tidy_axes(axes)
+    grid[0].legend(frameon=False, fontsize=8, ncols=3, loc="lower right", bbox_to_anchor=(1.0, 1.0), borderaxespad=0)
+    grid[-1].set_xlabel("time (s)")
+    height = figure.get_figheight()
+    figure.subplots_adjust(left=0.105, right=0.985, top=1 - 0.3 / height, bottom=0.45 / height, hspace=0.42)
+    return figure
+
+
+def _quantity(result: Diagnosis, channel: str) -> str:
+    """What a channel measures, with its unit."""
+    if not channel.startswith("texel"):
+        return f"{channel} (N)"
+    unit = result.rig.parameters.unit
+    return "normal force (N)" if unit == "N" else f"reading ({unit})"
+
+
+def _worst_channel(result: Diagnosis, predictor: Predictor) -> tuple[str, np.ndarray, Callable[[Model], np.ndarray]]:
+    trial, base = predictor.trial, predictor.predict(result.base.model)
+    if trial.reading is not None:
+        miss = np.nansum((trial.reading - base.reading) ** 2, axis=0)
+        texel = int(np.argmax(miss))
+        return f"texel {texel}", trial.reading[:, texel], lambda model: predictor.predict(model).reading[:, texel]
+    assert trial.force is not None and base.force is not None
+    axis = int(np.argmax(np.nansum((trial.force - base.force) ** 2, axis=0)))
+
+    def force_along(model: Model) -> np.ndarray:
+        force = predictor.predict(model).force
+        assert force is not None
+        return force[:, axis]
+
+    return f"force {'xyz'[axis]}", trial.force[:, axis], force_along
+
+
+def error_map(result: Diagnosis) -> Figure:
+    """Root mean square error of each texel, base and amended, on one scale."""
+    maps = [(label, 100.0 * rms_by_texel(result, model)) for label, model, _ in _models(result)]
+    top = max(float(values.max()) for _, values in maps)
+    position = result.rig.texels.position
+    layout = result.rig.texels.layout
+    if isinstance(layout, GridLayout) and LONG * min(layout.mask().shape) < max(layout.mask().shape):
+        return _error_line(maps)
+    figure = new_figure(WIDTHS["single"], 2.9)
+    image: Any = None
+    for i, (label, values) in enumerate(maps):
+        axes = figure.add_axes((0.02 + 0.4 * (i + 0.5 * (2 - len(maps))), 0.04, 0.36, 0.84))
+        if isinstance(layout, GridLayout):
+            picture: Any = np.ma.masked_array(layout.image(values), ~layout.mask())
+            image = axes.imshow(picture, origin="lower", cmap="inferno", vmin=0.0, vmax=top, interpolation="nearest")
+        else:
+            image = axes.scatter(position[:, 0], position[:, 1], c=values, s=14, cmap="inferno", vmin=0.0, vmax=top)
+            axes.set_aspect("equal")
+        axes.set_title(label, fontsize=8.5, color=INK)
+        axes.set_xticks([])
+        axes.set_yticks([])
+    bar = figure.colorbar(image, cax=figure.add_axes((0.82, 0.12, 0.035, 0.68)))
+    bar.ax.tick_params(labelsize=8, colors=INK)
+    bar.set_label("error (% of range)", fontsize=8.5, color=INK)
+    return figure
+
+
+def _error_line(maps: list[tuple[str, np.ndarray]]) -> Figure:
+    """The same for texels in a long row."""
+    figure = new_figure(WIDTHS["single"], 2.5)
+    axes = figure.add_axes((0.15, 0.2, 0.82, 0.62))
+    for (label, values), colour in zip(maps, (BEFORE, AFTER), strict=False):
+        axes.step(np.arange(len(values)), values, where="mid", color=colour, lw=0.9, label=label)
+    axes.set_xlabel("texel")
+    axes.set_ylabel("error (% of range)")
+    axes.margins(x=0)
+    tidy_axes(axes)
+    axes.legend(frameon=False, fontsize=8, loc="lower right", bbox_to_anchor=(1.0, 0.98), ncols=2)
+    return figure
+
+
+def phase_bars(result: Diagnosis) -> Figure:
+    """Squared error by phase, before and after, as shares of that before."""
+    figure = new_figure(WIDTHS["single"], 2.3)
+    axes = figure.add_axes((0.17, 0.27, 0.8, 0.6))
+    base = nrmse(result.of("fit"), result.base.model, result.full) or 1.0
+    for offset, (label, model, colour) in enumerate(_models(result)):
+        left = ((nrmse(result.of("fit"), model, result.full) or 0.0) / base) ** 2
+        shares = {entry["phase"]: entry["share"] for entry in where(result, model) if "phase" in entry}
+        heights = [100.0 * left * shares[phase] for phase in PHASES]
+        axes.bar(
+            np.arange(len(PHASES)) + 0.36 * (offset - 0.5 * (len(_models(result)) - 1)),
+            heights,
+            0.34,
+            color=colour,
+            label=label,
+        )
+    axes.set_xticks(np.arange(len(PHASES)), PHASES, rotation=25, ha="right", rotation_mode="anchor")
+    axes.set_ylabel("squared error\n(% of that of the base)")
+    tidy_axes(axes)
+    axes.legend(frameon=False, fontsize=8, loc="lower right", bbox_to_anchor=(1.0, 0.98), ncols=2)
+    return figure
+
+
+def loops(result: Diagnosis) -> Figure:
+    """Reading over depth (or load, or travel) of the texel with the largest error: what an effect's signature looks like."""
+    predictor = max(result.of("fit"), key=lambda p: float(np.nansum(_base_miss(p, result))))
+    name, measured, pick = _worst_channel(result, predictor)
+    s, trial = predictor.stimulus, predictor.trial
+    if "texel" in name:
+        texel = int(name.split()[1])
+        x = s.load[:, texel] if s.load is not None else 1e3 * s.depth[:, texel]
+        label = "load (N)" if s.load is not None else "depth (mm)"
+    elif s.slide.any():
+        travel = trial.slide if trial.slide.any() else trial.position[:, :2] if trial.position is not None else trial.slide
+        x, label = 1e3 * travel[:, int(np.argmax(np.ptp(travel, axis=0)))], "travel (mm)"
+    else:
+        x, label = 1e3 * s.depth.max(axis=1), "depth (mm)"
+    figure = new_figure(WIDTHS["single"], 2.5)
+    axes = figure.add_axes((0.21, 0.18, 0.76, 0.62))
+    axes.plot(x, measured, ".", ms=4.0, mew=0, color=MEASURED, alpha=0.55, zorder=3, label="measured")
+    for text, model, colour in _models(result):
+        axes.plot(
+            x,
+            np.where(np.isfinite(measured), pick(model), np.nan),
+            lw=0.8,
+            color=colour,
+            ls="--" if text == "base model" else "-",
+            label=text,
+        )
+    axes.set_xlabel(label)
+    axes.set_ylabel(_quantity(result, name))
+    axes.set_title(f"{trial.name}: {name}", loc="left", fontsize=8.5, color=INK, pad=18)
+    tidy_axes(axes)
+    place = {"loc": "lower right", "bbox_to_anchor": (1.02, 0.98), "borderaxespad": 0.2}
+    axes.legend(frameon=False, fontsize=8, ncols=3, columnspacing=0.9, handlelength=1.4, handletextpad=0.5, **place)
+    return figure
+
+
+def _base_miss(predictor: Predictor, result: Diagnosis) -> np.ndarray:
+    predicted = predictor.predict(result.base.model)
+    if predictor.trial.reading is not None:
+        return ((predictor.trial.reading - predicted.reading) / result.full[0]) ** 2
+    assert predictor.trial.force is not None and predicted.force is not None
+    return ((predictor.trial.force - predicted.force) / result.full[1]) ** 2
+
+
+PICTURES: dict[str, tuple[Callable[[Diagnosis], Figure], str]] = {
+    "gap": (gap_bars, "The gap before and after. Check trials were never fitted, and took no part in choosing."),
+    "curves": (curves, "What was measured and what the models say, where the base model errs most in each trial."),
+    "loops": (loops, "The same over what was done to the sensor: the shape by which an effect is known."),
+    "map": (error_map, "Root mean square error of each texel on the fitted trials."),
+    "phases": (phase_bars, "Squared error by phase of contact, as a share of that of the base model."),
+}
+"""The pictures by file name, with their captions."""
+
+
+def draw(result: Diagnosis, folder: Path) -> list[str]:
+    """Write every picture that makes sense for a rig as PNG and PDF; return their names."""
+    names = []
+    for name, (make, _) in PICTURES.items():
+        if name == "map" and len(result.rig.texels) == 1:
+            continue
+        figure = make(result)
+        for kind in ("png", "pdf"):
+            save_figure(figure, folder / f"{name}.{kind}", 200)
+        names.append(name)
+    return names

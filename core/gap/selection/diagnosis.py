@@ -1,0 +1,363 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What is missing in a sensor's model: recordings are checked, the base model is refitted, effects are looked for, and what was
+found is put into words: names with a confidence, rivals that would do as well, what is ruled out and why.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
+
+import numpy as np
+
+from ...effects.engine.registry import library
+from ...effects.engine.specification import Effect
+from ..dataset.rig import Rig
+from ..fitting.heteroscedastic_noise import trembling
+from ..fitting.least_squares import FRICTION, LEVEL, Fit, base_numbers, fit, held_out
+from ..fitting.noise_floor import SHORTEST, Coverage, Noise, coverage, force_noise, reading_noise
+from ..fitting.residual_tests import Structure, structure_of
+from ..fitting.spectral_lines import Line, line_of
+from ..forward.predictor import Model, Predictor
+from .candidates import NEVER, Scales, candidates, scales_of
+from .confidence import EXPLAINED, UNSURE, doubted, is_doubtful, least_share, may_be_bent
+from .forward_selection import FORCES, LEAST, READINGS, STRUCTURE, Account, Explainer, Ground, Step, friction_kinds, means_of
+from .identifiability import PASSED_ON, alike, bend_of, nearly_alike, untold
+from .screening import Views, views_of
+
+RIVAL = 1.35
+"""A rival is one that leaves at most so many times as much of the gap as the best does, and closes nearly as much."""
+OF_A_KIND = 3.0
+"""The same for those that are much alike (see :func:`.identifiability.nearly_alike`)."""
+
+
+@dataclass(frozen=True)
+class Named:
+    """An effect that was found.
+
+    Attributes
+    ----------
+    effect : int
+        Index in the model's stack.
+    name, form : str
+    confidence : float
+    rivals : tuple of str
+        Kinds that explain as much.
+    next_best : str
+        The kind that came nearest to it, "" where none did, and
+    leaves : float
+        how many times as much of the gap that one leaves.
+    """
+
+    effect: int
+    name: str
+    form: str
+    confidence: float
+    rivals: tuple[str, ...]
+    next_best: str = ""
+    leaves: float = np.inf
+
+
+@dataclass
+class Diagnosis:
+    """All that was found out about a rig."""
+
+    rig: Rig
+    predictors: list[Predictor]
+    noise: tuple[Noise, Noise]
+    full: tuple[float, float]
+    coverage: Coverage
+    scales: Scales
+    base: Fit
+    best: Fit
+    base_structure: Structure
+    structure: Structure
+    verdict: str = "no gap"
+    named: list[Named] = field(default_factory=list)
+    ambiguous: list[tuple[str, ...]] = field(default_factory=list)
+    ruled_out: list[tuple[str, str]] = field(default_factory=list)
+    line: Line | None = None
+
+    def of(self, use: str) -> list[Predictor]:
+        """Return the predictors of the trials of one use."""
+        return [p for p in self.predictors if p.trial.use == use]
+
+
+@dataclass(frozen=True)
+class Progress:
+    """How far a diagnosis has come: `done` of `total`, and what it does."""
+
+    stage: str
+    done: int
+    total: int
+
+
+def free_base(rig: Rig, predictors: Sequence[Predictor]) -> list[str]:
+    """Return which of the base model's own numbers are free while effects are looked for.
+
+    Of depth and pose the readings tell only gain times stiffness: in newtons, or where the rig gives the gain, that is `k`.
+    """
+    names = numbers_told(rig, predictors)
+    return [name for name in names if name not in FRICTION] + (free_friction(rig) if set(FRICTION) & set(names) else [])
+
+
+def numbers_told(rig: Rig, predictors: Sequence[Predictor]) -> list[str]:
+    """Return which of the base model's own numbers these recordings tell."""
+    read = any(p.trial.reading is not None for p in predictors)
+    pressed = any(p.trial.stimulus != "force" for p in predictors)
+    loaded = any(p.trial.stimulus == "force" for p in predictors)
+    dragged = any(p.trial.force is not None and p.stimulus.slide.any() for p in predictors)
+    felt = any(p.trial.force is not None for p in predictors)
+    own_unit = rig.parameters.unit != "N"
+    names: list[str] = []
+    if pressed:
+        names += ["k", "cn"] if rig.parameters.normal_law == "linear" else ["k"]
+        if own_unit and read and "gain" not in rig.given and not felt:
+            names.remove("k")
+            names.append("gain")
+        elif own_unit and read and (felt or loaded):
+            names.append("gain")
+    if loaded and read and "gain" not in names:
+        names.append("gain")
+    if own_unit and read:
+        names.append("zero")
+    if dragged:
+        names += FRICTION
+    return names
+
+
+def free_friction(rig: Rig) -> list[str]:
+    """Return which of the base model's numbers of friction are free while effects are looked for.
+
+    By how much friction falls from rest to sliding, and over which speeds, is itself a law of Stribeck's, and `ct` a viscous
+    friction: were they free, there would be nothing left of these two effects to find. Where a rig states them, another fall
+    or another drag is such an effect, and the level of friction alone is a better number.
+    """
+    p = rig.parameters
+    names = list(FRICTION)
+    if {"mus", "mud", "x0"} <= rig.given and p.mus > 0:
+        names = [LEVEL, *(name for name in names if name not in ("mus", "mud", "x0"))]
+    if "ct" in rig.given:
+        names.remove("ct")
+    return names
+
+
+def begin(rig: Rig) -> tuple[list[Predictor], tuple[Noise, Noise], tuple[float, float]]:
+    """Compute what the texels meet in each trial, and measure noise and range."""
+    predictors = [Predictor(trial, rig) for trial in rig.trials]
+    readings = [p.trial.reading for p in predictors if p.trial.reading is not None]
+    forces = [p.trial.force for p in predictors if p.trial.force is not None]
+    full = _range(readings), _range(forces)
+    noise = reading_noise(predictors, full[0]), force_noise(predictors, full[1])
+    return predictors, noise, full
+
+
+def _range(arrays: Sequence[np.ndarray]) -> float:
+    """Range of what was measured, all trials and channels together; 1 where nothing was."""
+    if not arrays:
+        return 1.0
+    high, low = max(float(np.nanmax(a)) for a in arrays), min(float(np.nanmin(a)) for a in arrays)
+    return max(high - low, 1e-12)
+
+
+def start_model(rig: Rig, predictors: Sequence[Predictor]) -> Model:
+    """Return the rig's own parameters; gain and zero that it leaves open are guessed from the readings."""
+    p = rig.parameters
+    if p.unit == "N" or "gain" in rig.given:
+        return Model(p)
+    base = Model(replace(p, gain=1.0, zero=0.0))
+    x, y = [], []
+    for predictor in predictors:
+        if predictor.trial.reading is not None:
+            good = np.isfinite(predictor.trial.reading)
+            x.append(predictor.predict(base).reading[good])
+            y.append(predictor.trial.reading[good])
+    if not x:
+        return Model(p)
+    gain, zero = np.polyfit(np.concatenate(x), np.concatenate(y), 1)
+    if not np.isfinite(gain) or gain == 0:
+        gain = 1.0
+    return Model(replace(p, gain=float(gain), zero=p.zero if "zero" in rig.given else float(zero)))
+
+
+def diagnose(rig: Rig) -> Iterator[Progress | Diagnosis]:
+    """Find out what the base model misses in a rig.
+
+    Yields
+    ------
+    Progress
+        While it works; closing the generator stops it.
+    Diagnosis
+        At last.
+    """
+    total = 1000
+    yield Progress("contacts of every trial", 0, total)
+    predictors, noise, full = begin(rig)
+    fitted = [p for p in predictors if p.trial.use == "fit"]
+    views = views_of(fitted, (noise[0].deviation, noise[1].deviation))
+    yield Progress("base model", 40, total)
+    start = start_model(rig, fitted)
+    base = fit(views.whole, start, base_numbers(start.parameters, free_base(rig, fitted), full[0]), turns=40, tolerance=1e-7)
+    before = _structure(views, base)
+    scales = scales_of(fitted, base.model)
+    result = Diagnosis(rig, predictors, noise, full, coverage(fitted), scales, base, base, before, before)
+    for progress in _explain(result, views):
+        yield Progress(progress[0], 60 + int(940 * progress[1]), total)
+    yield result
+
+
+def _structure(views: Views, found: Fit) -> Structure:
+    width = len(views.whole[0].predictor.rig.texels)
+    residuals = [share.residual(found.model) for share in views.whole]
+    if not any(share.predictor.trial.reading is not None for share in views.whole):  # forces alone: three channels for texels
+        return _force_structure(views, residuals)
+    return structure_of([share.predictor for share in views.whole], [r[:, :width] for r in residuals])
+
+
+def _force_structure(views: Views, residuals: list[np.ndarray]) -> Structure:
+    """The same where only the net force was measured: its largest component stands for all texels."""
+    width = len(views.whole[0].predictor.rig.texels)
+    total = np.sum([(r[:, width:] ** 2).sum(axis=0) for r in residuals], axis=0)
+    axis = width + int(np.argmax(total))
+    return structure_of([s.predictor for s in views.whole], [np.tile(r[:, axis : axis + 1], (1, width)) for r in residuals])
+
+
+def _explain(result: Diagnosis, views: Views) -> Iterator[tuple[str, float]]:
+    """Add effects to the base model while they earn their place; write everything into `result`."""
+    base = Account(result.base, held_out(views.whole, result.base))
+    start = base.means
+    floor = np.array([min(1.0, start[READINGS]), min(_trembling_at_rest(views, result.base), start[FORCES])])
+    ground = Ground(start, floor, result.base.count.sum(axis=0).astype(float))
+    explainer = Explainer(views, result.scales, result.coverage, ground)
+    account = yield from explainer.run(base, partial(_structure, views))
+    account = replace(account, fit=_loosened(result, views, account.fit))
+    result.best, result.structure = account.fit, _structure(views, account.fit)
+    result.line = line_of(views.whole, account.fit.model)
+    main, mean = ground.main, float(account.means[ground.main])
+    noise = min(start[main] * (1.0 - result.base_structure.total), mean * (1.0 - result.structure.total))
+    ground.floor[main] = float(np.clip(noise, 0.8, 1.0))
+    if result.structure.total < STRUCTURE and result.line is None:
+        tremble = trembling(views.whole, account.fit.model)
+        if tremble is not None:  # then all that is left is noise
+            result.best = replace(account.fit, model=account.fit.model.with_effect(tremble))
+            ground.floor[main] = max(ground.floor[main], mean)
+    _conclude(result, account, ground)
+    unsure = doubted(result, views, account, ground)
+    result.named = [replace(n, confidence=min(n.confidence, UNSURE)) if n.name in unsure else n for n in result.named]
+    _rule_out(result, account.first, ground)
+
+
+def _loosened(result: Diagnosis, views: Views, found: Fit) -> Fit:
+    """The fit with all the base model's numbers free, as those that a rig states are rounded.
+
+    Where an effect on friction was found they would take its part. There they stay, and only make the intervals as wide as
+    what the recordings tell.
+    """
+    names = numbers_told(result.rig, [share.predictor for share in views.whole])
+    if set(names) == {item.name for item in found.free if item.effect < 0}:
+        return found
+    rubbed = any(effect.name in friction_kinds() for effect in found.model.effects)
+    free = base_numbers(found.model.parameters, names, result.full[READINGS])
+    free += [item for item in found.free if item.effect >= 0]
+    return fit(views.whole, found.model, free, turns=0 if rubbed else 10, tolerance=1e-5)
+
+
+def _trembling_at_rest(views: Views, found: Fit) -> float:
+    """Mean square of the forces' residual while nothing touches; at least 1, which is what white noise has."""
+    squares = []
+    for share in views.whole:
+        stimulus = share.predictor.stimulus
+        load = stimulus.pressed_by
+        rest = ~(load > 0).any(axis=1)
+        if share.forces and share.predictor.trial.force is not None and rest.sum() >= SHORTEST:
+            squares.append(share.residual(found.model)[rest, -3:] ** 2)
+    return max(float(np.concatenate(squares).mean()), 1.0) if squares else 1.0
+
+
+def _conclude(result: Diagnosis, account: Account, ground: Ground) -> None:
+    """Write verdict, names and rivals."""
+    effects = result.best.model.effects
+    fitted = [effect for effect in effects if effect.name != "noise"]
+    closed = [ground.closed(account.means, side) for side in (READINGS, FORCES)]
+    is_open = any(ground.matters(side) and closed[side] < EXPLAINED for side in (READINGS, FORCES))
+    result.verdict = _verdict(result, ground, is_open)
+    bend = bend_of(result.of("fit"), result.best.model)
+    for index, effect in enumerate(effects):
+        others, leaves = _beside(effect, account, {e.name for e in effects})
+        rivals = _rivals(effect, account, result.coverage, bend, others, ground)
+        weight = 1.0 / (1.0 + sum(ratio**-4.0 for ratio in others.values()))
+        share = closed[ground.side(effect.name)] if fitted else 1.0
+        confidence = weight * (0.5 + 0.5 * share if share >= least_share(effect.name, leaves) else 0.5 * share)
+        bent = is_open and may_be_bent(effect, account)
+        if rivals or (len(fitted) > 1 and (bent or is_doubtful(effect, account, fitted, ground))):
+            confidence = min(confidence, UNSURE)
+        if rivals:
+            result.ambiguous.append((effect.name, *rivals))
+        nearest = min(others, key=lambda name: others[name], default="")
+        result.named.append(
+            Named(index, effect.name, effect.form, round(confidence, 3), rivals, nearest, leaves.get(nearest, np.inf))
+        )
+
+
+def _verdict(result: Diagnosis, ground: Ground, is_open: bool) -> str:
+    """One word on the whole; `is_open` where much of what the base model lacks is left."""
+    effects = result.best.model.effects
+    if all(effect.name == "noise" for effect in effects) and effects:
+        return "explained"
+    if effects:
+        return "unexplained" if is_open else "explained"
+    mean, gap = float(ground.start[ground.main]), ground.gap(ground.main)
+    quiet = result.base_structure.total < STRUCTURE and (mean < 2.0 or gap < LEAST) and result.line is None
+    return "no gap" if quiet and not (ground.both and ground.matters(FORCES)) else "unexplained"
+
+
+def _beside(effect: Effect, account: Account, taken: set[str]) -> tuple[dict[str, float], dict[str, float]]:
+    """How many times as bad as an effect each other kind is in its place, and how many times as much it leaves, by name."""
+    step = account.steps.get(effect.name, Step([], []))
+    own = step.of(effect.name)
+    others: dict[str, float] = {}
+    leaves: dict[str, float] = {}
+    for one, left in zip(step.ranked, step.left, strict=True):
+        name = one.candidate.name
+        if name not in taken and not (effect.name == "dead-texels" and one.candidate.local):
+            others[name] = min(step.worse(left, effect.name), others.get(name, np.inf))
+            leaves[name] = min(left / own, leaves.get(name, np.inf))
+    return others, leaves
+
+
+def _rivals(
+    effect: Effect, account: Account, covered: Coverage, bend: float, others: dict[str, float], ground: Ground
+) -> tuple[str, ...]:
+    """Kinds that would do as well, or that these recordings cannot tell from it; `others` are those of :func:`_beside`."""
+    taken = {e.name for e in account.fit.model.effects}
+    own = account.steps.get(effect.name, Step([], [])).of(effect.name)
+    hit = effect.name in PASSED_ON and own < 2.0 * ground.untold(ground.side(effect.name))  # leaves nothing: the sensor's own
+    akin = () if hit else nearly_alike(covered, effect.name)
+    near = [name for name, ratio in others.items() if ratio < (OF_A_KIND if name in akin else RIVAL)]
+    return tuple(dict.fromkeys([*near, *(name for name in alike(covered, effect.name, bend) if name not in taken)]))
+
+
+def _rule_out(result: Diagnosis, alone: Step, ground: Ground) -> None:
+    """Say of each kind why it was not named; `alone` are those that were fitted on top of the base model."""
+    tried: dict[str, float] = {}
+    for one in alone.ranked:
+        name = one.candidate.name
+        closed = ground.closed(means_of(one.unseen, one.fit), ground.side(name))
+        tried[name] = max(tried.get(name, 0.0), closed)
+    named = {name for pair in result.ambiguous for name in pair} | {n.name for n in result.named}
+    looked = {c.name for c in candidates(result.of("fit"), result.base.model)}
+    for kind in library().values():
+        if kind.name in named:
+            continue
+        if kind.name in NEVER:
+            why = "what is left does not tremble the more, the larger the reading"
+        elif kind.name not in looked:
+            why = untold(result.coverage).get(kind.name, "these recordings cannot show it")
+        elif kind.name in tried and result.verdict != "no gap":
+            why = f"alone it closes {tried[kind.name]:.0%} of the squared gap on unseen trials"
+        elif result.verdict == "no gap":
+            why = "nothing is left for it to explain"
+        else:
+            why = "a first look promised far less than what was fitted"
+        result.ruled_out.append((kind.name, why))

@@ -1,0 +1,340 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Bounding-volume tree over triangles, and the one question it answers: where does a texel's segment enter an object?
+
+The tree is a list in depth-first order: child follows parent, and `skip` says where to go on when a box is missed, so that a
+query needs no stack and allocates nothing. Boxes are tested against the box of what is left of the segment, which is
+conservative whatever the rounding; triangles are tested with edge functions that two neighbours evaluate to the same number
+with opposite sign, so that a segment through a shared edge or vertex always meets one of them (watertight, as in Woop, Benthin
+and Wald, JCGT 2013).
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..compiled.kernels import allocating, kernel
+from ..compiled.struct_reference import by_reference
+from .mesh import TriangleMesh, face_normals
+
+LEAF_SIZE = 4
+"""Triangles per leaf; two to eight measured alike."""
+
+
+@by_reference
+class Tree(NamedTuple):
+    """One or several meshes' trees behind one another, ready for the kernels.
+
+    Attributes
+    ----------
+    bounds : (nn, 6) float, metres
+        Low and high corner of each node's box.
+    skip : (nn,) int
+        Node to visit when a box is missed.
+    first, number : (nn,) int
+        Triangles of a leaf; `number` is zero in inner nodes.
+    faces : (nt, 12) float
+        Triangles in leaf order: three corners (m) and the outward unit normal.
+    source : (nt,) int
+        Each triangle's index in the mesh it came from.
+    roots : (m + 1,) int
+        Node at which each mesh's tree starts; the last entry is the number of nodes.
+    across : (nt, 3) int
+        Triangle on the other side of the edges from first to second, second to third and third to first corner, in leaf order;
+        -1 unless that edge joins exactly two triangles of one orientation.
+    facing : (nn, 6) float
+        Low and high end of the normals of each node's triangles, by axis; ``±2`` where one of them has no neighbour. They are
+        those of the meshes as they were given.
+    """
+
+    bounds: np.ndarray
+    skip: np.ndarray
+    first: np.ndarray
+    number: np.ndarray
+    faces: np.ndarray
+    source: np.ndarray
+    roots: np.ndarray
+    across: np.ndarray
+    facing: np.ndarray
+
+
+def build_tree(meshes: list[TriangleMesh]) -> Tree:
+    """Build one tree per mesh.
+
+    Parameters
+    ----------
+    meshes : list of TriangleMesh
+        Without degenerate triangles (see :func:`.mesh.checked_mesh`).
+    """
+    parts, node_offset, triangle_offset, roots = [], 0, 0, [0]
+    for mesh in meshes:
+        corners = np.ascontiguousarray(mesh.vertices[mesh.triangles])
+        n = len(corners)
+        order = np.arange(n)
+        size = 2 * n + 1
+        bounds, skip = np.empty((size, 6)), np.empty(size, np.int64)
+        first, number = np.zeros(size, np.int64), np.zeros(size, np.int64)
+        nodes = _build(corners, corners.mean(axis=1), order, LEAF_SIZE, bounds, skip, first, number)
+        leaf, normals = number[:nodes] > 0, np.ascontiguousarray(face_normals(mesh)[order])
+        across, facing = _across(mesh.triangles[order]), np.empty((nodes, 6), np.float32)
+        _fit_normals(normals, across, skip, first, number, facing)
+        parts.append(
+            (
+                bounds[:nodes],
+                skip[:nodes] + node_offset,
+                np.where(leaf, first[:nodes] + triangle_offset, 0),
+                number[:nodes],
+                np.hstack([corners[order].reshape(-1, 9), normals]),
+                order,
+                np.where(across < 0, -1, across + triangle_offset).astype(np.int32),
+                facing,
+            )
+        )
+        node_offset += nodes
+        triangle_offset += n
+        roots.append(node_offset)
+    bounds, skip, first, number, faces, source, across, facing = (
+        np.ascontiguousarray(np.concatenate(part)) for part in zip(*parts, strict=True)
+    )
+    return Tree(bounds, skip, first, number, faces, source, np.array(roots), across, facing)
+
+
+def _across(triangles: np.ndarray) -> np.ndarray:
+    """(n, 3) int: the triangle across each edge, -1 unless the edge joins exactly two of one orientation."""
+    start, end = triangles.ravel().astype(np.int64), np.roll(triangles, -1, axis=1).ravel().astype(np.int64)
+    low, high = np.minimum(start, end), np.maximum(start, end)
+    key = low * (int(triangles.max()) + 1) + high
+    order = np.argsort(key, kind="stable")
+    _, first, count = np.unique(key[order], return_index=True, return_counts=True)
+    one, other = order[first[count == 2]], order[first[count == 2] + 1]
+    turned = start[one] == end[other]  # each goes along the edge its own way
+    one, other = one[turned], other[turned]
+    across = np.full(len(key), -1)
+    across[one], across[other] = other // 3, one // 3
+    return across.reshape(-1, 3)
+
+
+@kernel
+def is_inner(i, normals, first, across):
+    """Whether a triangle has a normal, whose column is `first`, and a neighbour on each side."""
+    square = normals[i, first] ** 2 + normals[i, first + 1] ** 2 + normals[i, first + 2] ** 2
+    return square > 0.5 and across[i, 0] >= 0 and across[i, 1] >= 0 and across[i, 2] >= 0
+
+
+@kernel
+def _fit_normals(normals, across, skip, first, number, facing):
+    """Fill in :attr:`Tree.facing`; rounded away from what is inside, since it is kept in single precision."""
+    for node in range(len(facing) - 1, -1, -1):
+        for axis in range(3):
+            low, high = 2.0, -2.0
+            if number[node] > 0:
+                for i in range(first[node], first[node] + number[node]):
+                    whole = is_inner(i, normals, 0, across)
+                    low = min(low, normals[i, axis] - 1e-6 if whole else -2.0)
+                    high = max(high, normals[i, axis] + 1e-6 if whole else 2.0)
+            else:  # its children come behind it
+                left, right = node + 1, skip[node + 1]
+                low = min(facing[left, axis], facing[right, axis])
+                high = max(facing[left, 3 + axis], facing[right, 3 + axis])
+            facing[node, axis], facing[node, 3 + axis] = low, high
+
+
+@kernel
+def _select(order, centroid, axis, lo, hi, middle):
+    """Hoare's selection: afterwards order[lo:middle] lie below order[middle:hi] along `axis`."""
+    hi -= 1
+    while lo < hi:
+        pivot = centroid[order[(lo + hi) // 2], axis]
+        i, j = lo, hi
+        while i <= j:
+            while centroid[order[i], axis] < pivot:
+                i += 1
+            while centroid[order[j], axis] > pivot:
+                j -= 1
+            if i <= j:
+                order[i], order[j] = order[j], order[i]
+                i += 1
+                j -= 1
+        if middle <= j:
+            hi = j
+        elif middle >= i:
+            lo = i
+        else:
+            return
+
+
+@allocating
+def _build(corners, centroid, order, leaf_size, bounds, skip, first, number):
+    """Split at the median of the longest axis until leaves are small; returns the number of nodes."""
+    stack = np.empty((128, 3), np.int64)  # range of triangles, and the node whose skip the range's end decides
+    stack[0, 0], stack[0, 1] = 0, len(order)
+    depth, node = 1, 0
+    while depth > 0:
+        depth -= 1
+        lo, hi = stack[depth, 0], stack[depth, 1]
+        for axis in range(3):
+            bounds[node, axis] = np.inf
+            bounds[node, 3 + axis] = -np.inf
+        low, high = np.full(3, np.inf), np.full(3, -np.inf)
+        for i in range(lo, hi):
+            for axis in range(3):
+                c = centroid[order[i], axis]
+                low[axis] = min(low[axis], c)
+                high[axis] = max(high[axis], c)
+                for corner in range(3):
+                    x = corners[order[i], corner, axis]
+                    bounds[node, axis] = min(bounds[node, axis], x)
+                    bounds[node, 3 + axis] = max(bounds[node, 3 + axis], x)
+        skip[node] = node + _node_count(hi - lo, leaf_size)
+        if hi - lo <= leaf_size:
+            first[node], number[node] = lo, hi - lo
+        else:
+            axis = 0
+            for other in range(1, 3):
+                if high[other] - low[other] > high[axis] - low[axis]:
+                    axis = other
+            middle = (lo + hi) // 2
+            _select(order, centroid, axis, lo, hi, middle)
+            stack[depth, 0], stack[depth, 1] = middle, hi
+            stack[depth + 1, 0], stack[depth + 1, 1] = lo, middle
+            depth += 2
+        node += 1
+    return node
+
+
+@kernel
+def _node_count(n, leaf_size):
+    """Nodes of a subtree over `n` triangles. Halving gives at most two sizes per level, so two counters walk down."""
+    total = 0
+    small, small_many, large_many = n, 1, 0  # ranges of length `small` and of length `small + 1` on this level
+    while small_many + large_many > 0:
+        total += small_many + large_many
+        split_small = small_many if small > leaf_size else 0
+        split_large = large_many if small + 1 > leaf_size else 0
+        half = small // 2
+        if small % 2 == 0:  # small → half, half; large → half, half + 1
+            small_many, large_many = 2 * split_small + split_large, split_large
+        else:  # small → half, half + 1; large → half + 1, half + 1
+            small_many, large_many = split_small, split_small + 2 * split_large
+        small = half
+    return total
+
+
+@kernel
+def line_of_sight(dx, dy, dz):
+    """Axis along which a vector is longest, and the shear of the other two (in cyclic order) that lays it onto that axis."""
+    if abs(dx) >= abs(dy) and abs(dx) >= abs(dz):
+        return 0, dy / dx, dz / dx
+    if abs(dy) >= abs(dz):
+        return 1, dz / dy, dx / dy
+    return 2, dx / dz, dy / dz
+
+
+@kernel
+def seen_along(x, y, z, axis, shear_x, shear_y):
+    """Project a point along the line of sight."""
+    if axis == 0:
+        return y - shear_x * x, z - shear_y * x
+    if axis == 1:
+        return z - shear_x * y, x - shear_y * y
+    return x - shear_x * z, y - shear_y * z
+
+
+@kernel
+def apart(bounds, node, x0, x1, y0, y1, z0, z1):
+    """Whether a node's box and the box from (x0, y0, z0) to (x1, y1, z1) have no point in common."""
+    return (
+        bounds[node, 0] > x1 or bounds[node, 3] < x0
+        or bounds[node, 1] > y1 or bounds[node, 4] < y0
+        or bounds[node, 2] > z1 or bounds[node, 5] < z0
+    )  # fmt: skip
+
+
+@kernel
+def segment_entry(ox, oy, oz, dx, dy, dz, mesh, hint, tree):
+    """Find where the segment from O to O + D first enters a surface from outside.
+
+    Parameters
+    ----------
+    ox … dz : float
+        Base of the segment and the vector to its tip (not zero), in the mesh's frame.
+    mesh : int
+        Which of the tree's meshes.
+    hint : int
+        Triangle to try first, -1 for none; it changes the speed and never the answer.
+
+    Returns
+    -------
+    t : float
+        Position on the segment, 0 at the base and 1 at the tip; 2 when there is none.
+    triangle : int
+        In leaf order, -1 when there is none.
+    exit : float
+        Position of the nearest intersection that leaves a surface, as far as it lies before `t`: then the base is inside the
+        object. Beyond `t` it may be any such intersection; 2 when none was met.
+    """
+    t, triangle, leaving = 2.0, -1, 2.0
+    axis, shear_x, shear_y = line_of_sight(dx, dy, dz)
+    if hint >= 0:
+        u = cross_triangle(ox, oy, oz, dx, dy, dz, axis, shear_x, shear_y, tree.faces, hint)
+        if 0.0 <= u <= 1.0:
+            t, triangle = u, hint
+    reach = min(t, 1.0)
+    x0, x1 = min(ox, ox + reach * dx), max(ox, ox + reach * dx)
+    y0, y1 = min(oy, oy + reach * dy), max(oy, oy + reach * dy)
+    z0, z1 = min(oz, oz + reach * dz), max(oz, oz + reach * dz)
+    bounds, node, stop = tree.bounds, tree.roots[mesh], tree.roots[mesh + 1]
+    while node < stop:
+        if apart(bounds, node, x0, x1, y0, y1, z0, z1):
+            node = tree.skip[node]
+            continue
+        for i in range(tree.first[node], tree.first[node] + tree.number[node]):
+            u = cross_triangle(ox, oy, oz, dx, dy, dz, axis, shear_x, shear_y, tree.faces, i)
+            if 0.0 <= u <= 1.0:
+                # Of two triangles met at the very same point (a shared edge) the first in the list answers, hint or not.
+                if u < t or (u == t and i < triangle):
+                    t, triangle = u, i
+                    x0, x1 = min(ox, ox + u * dx), max(ox, ox + u * dx)
+                    y0, y1 = min(oy, oy + u * dy), max(oy, oy + u * dy)
+                    z0, z1 = min(oz, oz + u * dz), max(oz, oz + u * dz)
+            elif u < 0.0:
+                leaving = min(leaving, -3.0 - u)
+        node += 1
+    return t, triangle, leaving
+
+
+@kernel
+def cross_triangle(ox, oy, oz, dx, dy, dz, axis, shear_x, shear_y, faces, i):
+    """Position on the segment where it crosses a triangle: t in 0…1 entering, -3 - t leaving, 9 when it misses.
+
+    The corners are seen along the segment as points of a plane, each computed from the corner alone, and the origin must lie on
+    one side of all three edges. Rounding may turn the sign of an edge into zero, which counts as inside on both sides, but
+    never into its opposite: nothing leaks between neighbours.
+    """
+    ax, ay, az = faces[i, 0] - ox, faces[i, 1] - oy, faces[i, 2] - oz
+    bx, by, bz = faces[i, 3] - ox, faces[i, 4] - oy, faces[i, 5] - oz
+    cx, cy, cz = faces[i, 6] - ox, faces[i, 7] - oy, faces[i, 8] - oz
+    height = faces[i, 9] * ax + faces[i, 10] * ay + faces[i, 11] * az
+    ax, ay = seen_along(ax, ay, az, axis, shear_x, shear_y)
+    bx, by = seen_along(bx, by, bz, axis, shear_x, shear_y)
+    cx, cy = seen_along(cx, cy, cz, axis, shear_x, shear_y)
+    u, v, w = ax * by - ay * bx, bx * cy - by * cx, cx * ay - cy * ax
+    low, high = min(u, v, w), max(u, v, w)
+    if (low < 0.0 and high > 0.0) or (low == 0.0 and high == 0.0):
+        return 9.0
+    slope = faces[i, 9] * dx + faces[i, 10] * dy + faces[i, 11] * dz
+    if slope == 0.0:
+        return 9.0
+    t = height / slope
+    if not 0.0 <= t <= 1.0:
+        return 9.0
+    return t if slope < 0.0 else -3.0 - t
+
+
+@kernel
+def cross_plane(ox, oy, oz, dx, dy, dz, faces, i):
+    """Position on the segment where it crosses a triangle's plane, the same bits as :func:`cross_triangle` has for it."""
+    ax, ay, az = faces[i, 0] - ox, faces[i, 1] - oy, faces[i, 2] - oz
+    height = faces[i, 9] * ax + faces[i, 10] * ay + faces[i, 11] * az
+    return height / (faces[i, 9] * dx + faces[i, 10] * dy + faces[i, 11] * dz)

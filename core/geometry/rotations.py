@@ -1,0 +1,203 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Rigid bodies: poses over time, rotations, twists, and the linear algebra that moves the free ones."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ..compiled.kernels import kernel
+
+KEYFRAMED, FREE, DRIVEN = 0, 1, 2
+"""What moves a body: its motion, forces, or its motion and a drive."""
+
+
+def rotation_matrices(quaternions: np.ndarray) -> np.ndarray:
+    """(…, 4) unit quaternions (w, x, y, z) to (…, 3, 3) rotation matrices."""
+    w, x, y, z = np.moveaxis(np.asarray(quaternions, float), -1, 0)
+    rows = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+    ]
+    return np.moveaxis(np.array(rows), (0, 1), (-2, -1))
+
+
+def quaternion_product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Hamilton product of (…, 4) quaternions: first rotate by `b`, then by `a`."""
+    aw, ax, ay, az = np.moveaxis(np.asarray(a, float), -1, 0)
+    bw, bx, by, bz = np.moveaxis(np.asarray(b, float), -1, 0)
+    return np.stack(
+        [
+            aw * bw - ax * bx - ay * by - az * bz,
+            aw * bx + ax * bw + ay * bz - az * by,
+            aw * by - ax * bz + ay * bw + az * bx,
+            aw * bz + ax * by - ay * bx + az * bw,
+        ],
+        axis=-1,
+    )
+
+
+def rotation_vectors(quaternions: np.ndarray) -> np.ndarray:
+    """Logarithm of (…, 4) unit quaternions: the shorter way round, (…, 3) radians."""
+    q = np.asarray(quaternions, float)
+    q = np.where(q[..., :1] < 0, -q, q)
+    sine = np.linalg.norm(q[..., 1:], axis=-1, keepdims=True)
+    angle = 2 * np.arctan2(sine, q[..., :1])
+    factor = np.divide(angle, sine, out=np.full_like(sine, 2.0), where=sine > 1e-12)
+    return q[..., 1:] * factor
+
+
+def quaternions_from_vectors(vectors: np.ndarray) -> np.ndarray:
+    """Exponential of (…, 3) rotation vectors (radians), (…, 4)."""
+    vectors = np.asarray(vectors, float)
+    angle = np.linalg.norm(vectors, axis=-1, keepdims=True)
+    return np.concatenate([np.cos(angle / 2), 0.5 * np.sinc(angle / (2 * np.pi)) * vectors], axis=-1)
+
+
+@kernel
+def rotate(quaternion, vx, vy, vz):
+    """Turn a vector by a unit quaternion."""
+    w, x, y, z = quaternion[0], quaternion[1], quaternion[2], quaternion[3]
+    tx, ty, tz = 2.0 * (y * vz - z * vy), 2.0 * (z * vx - x * vz), 2.0 * (x * vy - y * vx)
+    return vx + w * tx + y * tz - z * ty, vy + w * ty + z * tx - x * tz, vz + w * tz + x * ty - y * tx
+
+
+@kernel
+def write_rotation(quaternion, rotation):
+    """Write the rotation matrix of a unit quaternion into `rotation` (3, 3)."""
+    w, x, y, z = quaternion[0], quaternion[1], quaternion[2], quaternion[3]
+    rotation[0, 0], rotation[0, 1], rotation[0, 2] = 1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)
+    rotation[1, 0], rotation[1, 1], rotation[1, 2] = 2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)
+    rotation[2, 0], rotation[2, 1], rotation[2, 2] = 2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)
+
+
+@kernel
+def turn_quaternion(quaternion, wx, wy, wz):
+    """Turn `quaternion` in place by the rotation vector `w` (radians, world axes) and keep it of unit length."""
+    angle = math.sqrt(wx * wx + wy * wy + wz * wz)
+    c = math.cos(0.5 * angle)
+    s = 0.5 if angle < 1e-8 else math.sin(0.5 * angle) / angle
+    x, y, z = s * wx, s * wy, s * wz
+    qw, qx, qy, qz = quaternion[0], quaternion[1], quaternion[2], quaternion[3]
+    rw, rx = c * qw - x * qx - y * qy - z * qz, c * qx + x * qw + y * qz - z * qy
+    ry, rz = c * qy - x * qz + y * qw + z * qx, c * qz + x * qy - y * qx + z * qw
+    scale = 1.0 / math.sqrt(rw * rw + rx * rx + ry * ry + rz * rz)
+    quaternion[0], quaternion[1], quaternion[2], quaternion[3] = rw * scale, rx * scale, ry * scale, rz * scale
+
+
+@kernel
+def write_twist(velocity, dt, twist):
+    """How the points of a body move over a step that turns it by the angle ``|ω| dt``.
+
+    The point at arm r, seen from the step's beginning, moves by ``dt (V + W r)`` with ``W = (exp([ω dt]×) - 1) / dt``: the
+    chord of its arc, to rounding. With ``ω × r`` in its place two bodies turning as one would drift apart by the square of the
+    angle, and their bristles with them.
+
+    Parameters
+    ----------
+    velocity : (6,) float
+        Velocity of the reference point and angular velocity.
+    dt : float, seconds
+    twist : (12,) float
+        Written: V, then W row by row.
+    """
+    wx, wy, wz = velocity[3], velocity[4], velocity[5]
+    square = wx * wx + wy * wy + wz * wz
+    half = 0.5 * math.sqrt(square) * dt
+    sine = 1.0 if abs(half) < 1e-6 else math.sin(half) / half
+    s, c = sine * math.cos(half), 0.5 * dt * sine * sine
+    twist[0], twist[1], twist[2] = velocity[0], velocity[1], velocity[2]
+    twist[3], twist[4], twist[5] = c * (wx * wx - square), c * wx * wy - s * wz, c * wx * wz + s * wy
+    twist[6], twist[7], twist[8] = c * wx * wy + s * wz, c * (wy * wy - square), c * wy * wz - s * wx
+    twist[9], twist[10], twist[11] = c * wx * wz - s * wy, c * wy * wz + s * wx, c * (wz * wz - square)
+
+
+@kernel
+def look_back(velocity, dt, twist):
+    """Write the twist of the step that has just ended, as seen from its end: ``W = (1 - exp(-[ω dt]×)) / dt``."""
+    write_twist(velocity, -dt, twist)
+
+
+@kernel
+def write_world_inertia(rotation, inertia, out):
+    """R I Rᵀ into `out` (3, 3)."""
+    for i in range(3):
+        for j in range(3):
+            total = 0.0
+            for a in range(3):
+                for b in range(3):
+                    total += rotation[i, a] * inertia[a, b] * rotation[j, b]
+            out[i, j] = total
+
+
+@kernel
+def write_twist_map(rotation, gx, gy, gz, sign, out):
+    """Matrix (6, 6) from a body's twist in world axes to velocities near a sensor, in the axes of the sensor's body.
+
+    Parameters
+    ----------
+    rotation : (3, 3) float
+        Of the sensor's body.
+    gx, gy, gz : float, metres
+        From the body's reference point to that of the sensor's body, world axes.
+    sign : float
+        -1 for the sensor's own body, whose motion counts against the target's.
+    out : (6, 6) float
+        Written.
+    """
+    for i in range(3):
+        rx, ry, rz = sign * rotation[0, i], sign * rotation[1, i], sign * rotation[2, i]
+        out[i, 0], out[i, 1], out[i, 2] = rx, ry, rz
+        out[i, 3], out[i, 4], out[i, 5] = gy * rz - gz * ry, gz * rx - gx * rz, gx * ry - gy * rx  # R (ω × g)
+        out[3 + i, 0], out[3 + i, 1], out[3 + i, 2] = 0.0, 0.0, 0.0
+        out[3 + i, 3], out[3 + i, 4], out[3 + i, 5] = rx, ry, rz
+
+
+@kernel
+def keep_axis(axis, out):
+    """Leave in the first column of a twist map what a body's speed along `axis` (3,) does."""
+    for i in range(6):
+        out[i, 0] = axis[0] * out[i, 0] + axis[1] * out[i, 1] + axis[2] * out[i, 2]
+
+
+@kernel
+def add_product(matrix, row, column, left, left_width, middle, right, right_width, scale):
+    """Add ``scale · leftᵀ middle right`` into `matrix`.
+
+    `middle` is symmetric, 6 × 6, and its lower triangle is read; of `left` and `right` the first columns are used.
+    """
+    for j in range(right_width):
+        for i in range(6):
+            total = 0.0
+            for k in range(6):
+                total += (middle[i, k] if k <= i else middle[k, i]) * right[k, j]
+            for m in range(left_width):
+                matrix[row + m, column + j] += scale * left[i, m] * total
+
+
+@kernel
+def solve_positive(matrix, vector, n):
+    """Solve the symmetric positive definite system in place (Cholesky; the lower triangle is read and overwritten)."""
+    for j in range(n):
+        total = matrix[j, j]
+        for k in range(j):
+            total -= matrix[j, k] * matrix[j, k]
+        pivot = math.sqrt(total)
+        matrix[j, j] = pivot
+        for i in range(j + 1, n):
+            total = matrix[i, j]
+            for k in range(j):
+                total -= matrix[i, k] * matrix[j, k]
+            matrix[i, j] = total / pivot
+    for i in range(n):
+        total = vector[i]
+        for k in range(i):
+            total -= matrix[i, k] * vector[k]
+        vector[i] = total / matrix[i, i]
+    for i in range(n - 1, -1, -1):
+        total = vector[i]
+        for k in range(i + 1, n):
+            total -= matrix[k, i] * vector[k]
+        vector[i] = total / matrix[i, i]

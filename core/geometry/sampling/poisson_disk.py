@@ -1,0 +1,214 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Texels spread evenly over a region without rows: a relaxed Poisson-disk pattern ("blue noise").
+
+The region is cut into small triangles; their corners, in random order, become texels where no other is near; each texel then
+moves to the middle of the part of the region that is nearest to it, a few times (Lloyd 1982); parts that meet in a point are
+joined by a face. "Near" follows the surface, so that the two sides of a thin finger do not disturb one another.
+"""
+
+from __future__ import annotations
+
+import heapq
+import math
+
+import numpy as np
+
+from ...errors import SensorError
+from ..mesh import TriangleMesh, triangle_areas
+from .surface_walk import nearest_point
+from .texel_arrays import Skin
+
+FINENESS = 5.0
+"""Small triangles per spacing."""
+RADIUS = 0.84
+"""Of the discs, as a share of the spacing: what they leave room for relaxes to about this distance between neighbours."""
+ROUNDS = 6
+MOST = 60_000
+"""Texels at the most; more would take minutes."""
+
+
+def scatter(mesh: TriangleMesh, spacing: float, seed: int = 0) -> Skin:
+    """Spread texels over a region.
+
+    Parameters
+    ----------
+    mesh : TriangleMesh
+        The region, metres.
+    spacing : float, metres
+        Usual distance between neighbours.
+    seed : int
+        Another pattern for each.
+
+    Raises
+    ------
+    SensorError
+        The spacing is too large for three texels that make a face, or too small to be computed.
+    """
+    if not spacing > 0:
+        raise SensorError(f"The spacing of texels is {spacing * 1e3:g} mm: give a length above zero.")
+    expected = float(triangle_areas(mesh).sum()) / (0.87 * spacing**2)
+    if expected > MOST:
+        raise SensorError(
+            f"A spacing of {spacing * 1e3:g} mm makes about {expected:.0f} texels: give a larger one, {MOST} are the most."
+        )
+    fine = refined(mesh, spacing / FINENESS)
+    links = _links(fine)
+    weight = _weights(fine)
+    sites = _discs(fine.vertices, links, RADIUS * spacing, np.random.default_rng(seed))
+    points = fine.vertices[sites]
+    owner = np.zeros(0, dtype=int)
+    for _ in range(ROUNDS):
+        owner = _nearest(fine.vertices, links, points, sites)
+        middle, sites = _centres(fine.vertices, weight, owner, len(sites))
+        points = fine.vertices[sites]
+    points = _on_surface(fine, middle, sites)
+    owner = _nearest(fine.vertices, links, points, sites)
+    faces = _duals(fine.triangles, owner)
+    if not len(faces):
+        raise SensorError(f"No three texels {spacing * 1e3:g} mm apart fit into the region: use a smaller spacing.")
+    used = np.unique(faces)
+    number = np.full(len(points), -1)
+    number[used] = np.arange(len(used))
+    return Skin(points[used], [tuple(face) for face in number[faces].tolist()])
+
+
+def refined(mesh: TriangleMesh, longest: float) -> TriangleMesh:
+    """Cut the triangles of a mesh until no edge is longer than `longest`; neighbours are cut alike.
+
+    Parameters
+    ----------
+    mesh : TriangleMesh
+    longest : float, metres
+    """
+    used, triangles = np.unique(mesh.triangles, return_inverse=True)
+    vertices, triangles = mesh.vertices[used], triangles.reshape(-1, 3)
+    while True:
+        edges, which = np.unique(np.sort(triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0, return_inverse=True)
+        which = which.reshape(-1, 3)
+        long = np.linalg.norm(vertices[edges[:, 1]] - vertices[edges[:, 0]], axis=1) > longest
+        if not long.any():
+            return TriangleMesh(vertices, triangles)
+        middle = np.where(long, len(vertices) + np.cumsum(long) - 1, -1)
+        vertices = np.vstack([vertices, vertices[edges[long]].mean(axis=1)])
+        triangles = _split(triangles, middle[which])
+
+
+def _split(triangles: np.ndarray, middle: np.ndarray) -> np.ndarray:
+    """Cut triangles at the middles of their edges; −1 in `middle` (m, 3) is an edge that stays whole."""
+    count = (middle >= 0).sum(axis=1)
+    parts = [triangles[count == 0]]
+    for turn in range(3):  # bring the edge that decides to the front
+        a, b, c = np.roll(triangles, -turn, axis=1).T
+        ab, bc, ca = np.roll(middle, -turn, axis=1).T
+        one = (count == 1) & (ab >= 0)
+        parts += [np.stack([a, ab, c], axis=1)[one], np.stack([ab, b, c], axis=1)[one]]
+        two = (count == 2) & (ca < 0)
+        parts += [
+            np.stack([ab, b, bc], axis=1)[two],
+            np.stack([a, ab, bc], axis=1)[two],
+            np.stack([a, bc, c], axis=1)[two],
+        ]
+        if turn == 0:
+            three = count == 3
+            for corners in ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)):
+                parts.append(np.stack(corners, axis=1)[three])
+    return np.concatenate(parts)
+
+
+def _links(mesh: TriangleMesh) -> list[list[int]]:
+    """Neighbours of each vertex."""
+    edges = np.unique(np.sort(mesh.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0)
+    both = np.vstack([edges, edges[:, ::-1]])
+    both = both[np.argsort(both[:, 0], kind="stable")]
+    starts = np.searchsorted(both[:, 0], np.arange(len(mesh.vertices) + 1)).tolist()
+    ends = both[:, 1].tolist()
+    return [ends[starts[i] : starts[i + 1]] for i in range(len(mesh.vertices))]
+
+
+def _weights(mesh: TriangleMesh) -> np.ndarray:
+    """(nv,) area that belongs to each vertex."""
+    weight = np.zeros(len(mesh.vertices))
+    np.add.at(weight, mesh.triangles, triangle_areas(mesh)[:, None] / 3.0)
+    return weight
+
+
+def _discs(vertices: np.ndarray, links: list[list[int]], radius: float, rng: np.random.Generator) -> np.ndarray:
+    """Choose vertices in random order, none within `radius` of another as far as the surface in between goes."""
+    free, places = [True] * len(vertices), vertices.tolist()
+    chosen = []
+    for start in rng.permutation(len(vertices)).tolist():
+        if not free[start]:
+            continue
+        chosen.append(start)
+        free[start] = False
+        reached, front = {start}, [start]
+        while front:
+            here = front.pop()
+            for other in links[here]:
+                if other not in reached and math.dist(places[other], places[start]) < radius:
+                    reached.add(other)
+                    free[other] = False
+                    front.append(other)
+    return np.array(chosen)
+
+
+def _nearest(vertices: np.ndarray, links: list[list[int]], points: np.ndarray, sites: np.ndarray) -> np.ndarray:
+    """(nv,) int: which point each vertex is nearest to; every part is connected and holds its site."""
+    owner = [-1] * len(vertices)
+    places, targets = vertices.tolist(), points.tolist()
+    heap = [(0.0, int(site), number) for number, site in enumerate(sites)]
+    heapq.heapify(heap)
+    while heap:
+        _, here, number = heapq.heappop(heap)
+        if owner[here] >= 0:
+            continue
+        owner[here] = number
+        for other in links[here]:
+            if owner[other] < 0:
+                heapq.heappush(heap, (math.dist(places[other], targets[number]), other, number))
+    return np.array(owner)
+
+
+def _centres(vertices: np.ndarray, weight: np.ndarray, owner: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Centres of area of the parts, (count, 3), and the vertex of each part that is nearest to it, (count,)."""
+    there = owner >= 0
+    total = np.bincount(owner[there], weights=weight[there], minlength=count)
+    middle = np.stack(
+        [np.bincount(owner[there], weights=(weight * vertices[:, i])[there], minlength=count) / total for i in range(3)], axis=1
+    )
+    distance = np.where(there, np.linalg.norm(vertices - middle[owner], axis=1), np.inf)
+    order = np.lexsort((distance, owner))
+    first = np.searchsorted(owner[order], np.arange(count))
+    sites = order[first]
+    return middle, sites
+
+
+def _on_surface(mesh: TriangleMesh, points: np.ndarray, sites: np.ndarray) -> np.ndarray:
+    """(n, 3) float: points moved onto the triangles around the vertices that they are nearest to."""
+    order = np.argsort(mesh.triangles.ravel(), kind="stable")
+    starts = np.searchsorted(mesh.triangles.ravel()[order], np.arange(len(mesh.vertices) + 1))
+    around = [order[starts[site] : starts[site + 1]] // 3 for site in sites]
+    moved = (nearest_point(TriangleMesh(mesh.vertices, mesh.triangles[i]), point)[0] for i, point in zip(around, points))
+    return np.array(list(moved))
+
+
+def _duals(triangles: np.ndarray, owner: np.ndarray) -> np.ndarray:
+    """(m, 3) int: faces between parts of which three meet in a small triangle, each once, wound like it."""
+    labels = owner[triangles]
+    meet = (labels[:, 0] != labels[:, 1]) & (labels[:, 1] != labels[:, 2]) & (labels[:, 2] != labels[:, 0])
+    labels = labels[meet & (labels >= 0).all(axis=1)]
+    if not len(labels):
+        return labels
+    first = np.argmin(labels, axis=1)
+    labels = np.take_along_axis(labels, (first[:, None] + np.arange(3)) % 3, axis=1)
+    faces, count = np.unique(labels, axis=0, return_counts=True)
+    # Two windings of one face, or a third face on an edge, come from parts that touch twice: the rarer one goes.
+    order = np.argsort(-count, kind="stable")
+    kept: list[tuple[int, int, int]] = []
+    taken: set[tuple[int, int]] = set()
+    for a, b, c in faces[order].tolist():
+        directed = {(a, b), (b, c), (c, a)}
+        if not directed & taken:
+            taken |= directed
+            kept.append((a, b, c))
+    return np.array(kept)

@@ -1,0 +1,260 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Arrays of texels in rows and columns: flat, bent to a radius, or wrapped onto any surface."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...errors import SensorError
+from ..mesh import TriangleMesh, face_normals, triangle_areas
+from .surface_walk import Place, Surface
+
+CROWDED = 0.5
+"""Texels nearer to one another than this share of the pitch are left out where the surface draws the ribs together."""
+
+
+@dataclass(frozen=True)
+class Skin:
+    """Texels laid onto a surface, with the faces between them.
+
+    Attributes
+    ----------
+    vertices : (n, 3) float, metres
+    faces : list of tuples of int
+        Anticlockwise seen from outside; four-sided where the texels form a grid.
+    """
+
+    vertices: np.ndarray
+    faces: list[tuple[int, ...]]
+
+
+def pad(rows: int, columns: int, pitch: tuple[float, float], radius: float = 0.0) -> Skin:
+    """Return a flat pad in z = 0, or one bent about an axis along its rows' direction +y.
+
+    Parameters
+    ----------
+    rows, columns : int
+        Rows run along +y, columns along +x.
+    pitch : (float, float), metres
+        Between columns (x) and between rows (y), along the surface.
+    radius : float, metres
+        Of the bend: above zero the middle is the highest line, as on a finger; below zero it is the lowest; zero is flat.
+
+    Raises
+    ------
+    SensorError
+        The pad would be no grid, or would meet itself around its bend.
+    """
+    if rows < 2 or columns < 2 or min(pitch) <= 0:
+        raise SensorError(
+            f"A pad of {rows} × {columns} texels has no face: use two rows and columns or more, and a pitch above 0."
+        )
+    width = (columns - 1) * pitch[0]
+    if radius and width >= 2 * math.pi * abs(radius):
+        raise SensorError(
+            f"A pad {width * 1e3:g} mm wide goes more than once around a radius of {abs(radius) * 1e3:g} mm: "
+            "use a larger radius."
+        )
+    y, along = np.mgrid[0:rows, 0:columns].astype(float)
+    along, y = (along - (columns - 1) / 2) * pitch[0], (y - (rows - 1) / 2) * pitch[1]
+    x, z = (along, np.zeros_like(along)) if not radius else _bent(along, radius)
+    return Skin(np.stack([x, y, z], axis=-1).reshape(-1, 3), _quads(np.arange(rows * columns).reshape(rows, columns)))
+
+
+def _check_size(rows: int, columns: int, pitch: tuple[float, float]) -> None:
+    if rows < 2 or columns < 2 or not min(pitch) > 0:
+        raise SensorError(
+            f"An array of {rows} × {columns} texels has no face: use two rows and columns or more, and a pitch above zero."
+        )
+
+
+def _bent(along: np.ndarray, radius: float) -> tuple[np.ndarray, np.ndarray]:
+    angle = along / radius
+    return radius * np.sin(angle), radius * (np.cos(angle) - 1.0)
+
+
+def wrap(
+    mesh: TriangleMesh, rows: int, columns: int, pitch: tuple[float, float], middle: Place | None = None, angle: float = 0.0
+) -> Skin:
+    """Lay a whole array onto a surface, its middle at a place: a spine of rows, and a rib of columns from each.
+
+    Distances along spine and ribs are the pitch, measured on the surface; on what can be unrolled the array keeps its shape.
+
+    Parameters
+    ----------
+    mesh : TriangleMesh
+        The region, metres.
+    rows, columns : int
+    pitch : (float, float), metres
+        Along a row, and from row to row.
+    middle : Place, optional
+        Where the middle is, heading along the rows' direction (from one row to the next); by default :func:`middle_of`.
+    angle : float, radians
+        The array is turned by this, anticlockwise seen from outside.
+
+    Raises
+    ------
+    SensorError
+        The array reaches beyond the region.
+    """
+    _check_size(rows, columns, pitch)
+    surface = Surface(mesh)
+    centre = _turned(surface, middle or middle_of(mesh), angle)
+    index = np.full((rows, columns), -1)
+    points: list[np.ndarray] = []
+    offsets_y = (np.arange(rows) - (rows - 1) / 2) * pitch[1]
+    offsets_x = (np.arange(columns) - (columns - 1) / 2) * pitch[0]
+    for row, y in enumerate(offsets_y):
+        spine = _along(surface, centre, y)
+        for column, x in enumerate(offsets_x):
+            found = None if spine is None else _along(surface, _turned(surface, spine, -math.pi / 2), x)
+            if found is None:
+                raise SensorError(
+                    f"Texel ({row}, {column}) of the {rows} × {columns} array lies beyond the region: "
+                    "use fewer texels, a smaller pitch or a larger region, or turn the array."
+                )
+            index[row, column] = len(points)
+            points.append(found.point)
+    return Skin(np.array(points), _quads(index))
+
+
+def fill(mesh: TriangleMesh, spacing: float, angle: float = 0.0) -> Skin:
+    """Cover a region with rows and columns as far as it goes; the rim follows the region in steps.
+
+    Parameters
+    ----------
+    mesh : TriangleMesh
+        The region, metres.
+    spacing : float, metres
+        Between rows and between columns, on the surface.
+    angle : float, radians
+        The rows are turned by this, anticlockwise seen from outside.
+
+    Raises
+    ------
+    SensorError
+        Less than a face fits.
+    """
+    surface, most = Surface(mesh), _most_steps(mesh, spacing)
+    spine = _both_ways(surface, _turned(surface, middle_of(mesh), angle), spacing, most)
+    ribs = [_both_ways(surface, _turned(surface, place, -math.pi / 2), spacing, most) for _, place in spine]
+    low = min(number for rib in ribs for number, _ in rib)
+    high = max(number for rib in ribs for number, _ in rib)
+    index = np.full((len(ribs), high - low + 1), -1)
+    points: list[np.ndarray] = []
+    for row, rib in enumerate(ribs):
+        for column, place in rib:
+            below = index[row - 1] if row else []
+            near = [points[i] for i in below if i >= 0]
+            if near and np.linalg.norm(np.array(near) - place.point, axis=1).min() < CROWDED * spacing:
+                continue
+            index[row, column - low] = len(points)
+            points.append(place.point)
+    faces = _quads(index)
+    if not faces:
+        raise SensorError(f"No face of {spacing * 1e3:g} × {spacing * 1e3:g} mm fits into the region: use a smaller spacing.")
+    return _used(np.array(points), faces)
+
+
+def middle_of(mesh: TriangleMesh) -> Place:
+    """Return the point of a region nearest to its centre of area, heading along its longest extent.
+
+    Of the two ways along, the one nearer to +y (then +x, then +z) is taken.
+    """
+    corners, area = mesh.vertices[mesh.triangles], triangle_areas(mesh)
+    middles = corners.mean(axis=1)
+    centre = (area[:, None] * middles).sum(axis=0) / area.sum()
+    normal = (area[:, None] * face_normals(mesh)).sum(axis=0)
+    arms = corners - centre
+    spread = np.einsum("i,ivj,ivk->jk", area / 12, arms, arms) + np.einsum(
+        "i,ij,ik->jk", area / 12, arms.sum(axis=1), arms.sum(axis=1)
+    )  # the integral of x xᵀ over each triangle
+    if np.linalg.norm(normal) > 1e-3 * area.sum():  # within the mean plane: the height of a dome is no direction on it
+        flat = np.eye(3) - np.outer(normal, normal) / (normal @ normal)
+        spread = flat @ spread @ flat
+        height = np.linalg.norm(np.ptp(mesh.vertices, axis=0))
+        centre = centre + height * normal / np.linalg.norm(normal)
+    values, vectors = np.linalg.eigh(spread)
+    heading = vectors[:, 2]
+    if values[2] - values[1] < 1e-3 * values[2]:  # round: as far along +y as it goes
+        heading = vectors[:, 1:] @ (vectors[:, 1:].T @ np.array([1e-6, 1.0, 1e-9]))
+        heading /= np.linalg.norm(heading)
+    if heading @ np.array([1e-3, 1.0, 1e-6]) < 0:
+        heading = -heading
+    return Surface(mesh).place(centre, heading)
+
+
+def shifted(mesh: TriangleMesh, place: Place, shift: tuple[float, float]) -> Place:
+    """Return the place that lies (across, along) its heading from another, measured on the surface, metres.
+
+    Raises
+    ------
+    SensorError
+        That is beyond the region.
+    """
+    surface = Surface(mesh)
+    found = _along(surface, place, shift[1])
+    if found is not None and shift[0]:
+        side = _along(surface, _turned(surface, found, -math.pi / 2), shift[0])
+        found = None if side is None else _turned(surface, side, math.pi / 2)
+    if found is None:
+        raise SensorError(
+            f"Shifted by {shift[0] * 1e3:g} and {shift[1] * 1e3:g} mm the array's middle lies beyond the region: shift it less."
+        )
+    return found
+
+
+def _turned(surface: Surface, place: Place, angle: float) -> Place:
+    return place.turned(surface.normals[place.triangle], angle)
+
+
+def _along(surface: Surface, place: Place, length: float) -> Place | None:
+    """Go straight on, backwards for a negative length; the heading at the end points forwards in either case."""
+    if length >= 0:
+        return surface.walk(place, length)
+    end = surface.walk(_turned(surface, place, math.pi), -length)
+    return None if end is None else _turned(surface, end, math.pi)
+
+
+def _both_ways(surface: Surface, middle: Place, spacing: float, most: int) -> list[tuple[int, Place]]:
+    """Places at every multiple of the spacing before and behind the middle, as far as the surface goes, numbered."""
+    found = [(0, middle)]
+    for sign in (-1, 1):
+        here: Place | None = middle
+        for number in range(1, most):
+            here = _along(surface, here, sign * spacing) if here is not None else None
+            if here is None or np.linalg.norm(here.point - middle.point) < CROWDED * spacing:  # off it, or once around it
+                break
+            found.append((sign * number, here))
+            if sign > 0 and _meets(found, here.point, CROWDED * spacing):
+                found.pop()
+                break
+    return sorted(found, key=lambda item: item[0])
+
+
+def _meets(found: list[tuple[int, Place]], point: np.ndarray, distance: float) -> bool:
+    """Whether a line has come around a closed surface to where it was behind the middle."""
+    return any(number < 0 and np.linalg.norm(place.point - point) < distance for number, place in found)
+
+
+def _most_steps(mesh: TriangleMesh, spacing: float) -> int:
+    if not spacing > 0:
+        raise SensorError(f"The spacing of texels is {spacing * 1e3:g} mm: give a length above zero.")
+    return 2 + math.ceil(4.0 * float(np.linalg.norm(np.ptp(mesh.vertices[mesh.triangles].reshape(-1, 3), axis=0))) / spacing)
+
+
+def _quads(index: np.ndarray) -> list[tuple[int, ...]]:
+    """Faces between neighbours in a table of vertex numbers; −1 is an empty place."""
+    corners = np.stack([index[:-1, :-1], index[:-1, 1:], index[1:, 1:], index[1:, :-1]], axis=-1).reshape(-1, 4)
+    return [tuple(corner) for corner in corners[(corners >= 0).all(axis=1)].tolist()]
+
+
+def _used(points: np.ndarray, faces: list[tuple[int, ...]]) -> Skin:
+    """Leave out the points without a face."""
+    used = np.unique([corner for face in faces for corner in face])
+    number = np.full(len(points), -1)
+    number[used] = np.arange(len(used))
+    return Skin(points[used], [tuple(number[list(face)].tolist()) for face in faces])

@@ -1,0 +1,189 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Vertices of a mesh region become texels (paper, section 3.1 and Fig. 3)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..errors import RegionError, SensorError
+from .layout import GridLayout, UVLayout, grid_layout, uv_layout
+from .mesh import TriangleMesh, vertex_areas, vertex_normals
+
+
+@dataclass(frozen=True)
+class Texels:
+    """The tactile elements of one sensor, in the frame of the sensor's body.
+
+    Attributes
+    ----------
+    vertex : (n,) int
+        Vertex of the sensor's mesh that each texel stands on.
+    position : (n, 3) float, metres
+    normal : (n, 3) float
+        Unit vectors, out of the sensor: normalised sum of the unit normals of the adjoining triangles.
+    tangent : (n, 3) float
+        Unit vectors of the texel's x axis; its y axis is ``normal × tangent``. Along the columns where the texels form a grid.
+    area : (n,) float, square metres
+        A third of the area of the adjoining triangles of the region.
+    layout : GridLayout or UVLayout
+        How the texels become a tactile image.
+    """
+
+    vertex: np.ndarray
+    position: np.ndarray
+    normal: np.ndarray
+    tangent: np.ndarray
+    area: np.ndarray
+    layout: GridLayout | UVLayout
+
+    def __len__(self) -> int:
+        return len(self.position)
+
+    @property
+    def frames(self) -> np.ndarray:
+        """(n, 9) position (m), normal and tangent of each texel."""
+        return np.hstack([self.position, self.normal, self.tangent])
+
+    def with_frames(self, frames: np.ndarray) -> Texels:
+        """Return the same texels elsewhere; `frames` as in :attr:`frames`, made orthonormal."""
+        normal = frames[:, 3:6] / np.linalg.norm(frames[:, 3:6], axis=1, keepdims=True)
+        tangent = frames[:, 6:9] - np.einsum("ij,ij->i", frames[:, 6:9], normal)[:, None] * normal
+        tangent /= np.linalg.norm(tangent, axis=1, keepdims=True)
+        return replace(self, position=frames[:, :3], normal=normal, tangent=tangent)
+
+    @property
+    def bitangent(self) -> np.ndarray:
+        """(n, 3) unit vectors of the texels' y axes."""
+        return np.cross(self.normal, self.tangent)
+
+
+def texels_from_region(mesh: TriangleMesh, region: np.ndarray, name: str = "sensor") -> Texels:
+    """Build the texels of the vertices that `region` selects.
+
+    Parameters
+    ----------
+    mesh : TriangleMesh
+        The sensor's mesh, in its body's frame, metres.
+    region : (nv,) bool
+        True for each vertex that becomes a texel. A triangle belongs to the region when its three vertices do; normals are
+        taken from *all* adjoining triangles, as the paper does, areas from those of the region only.
+    name : str
+        Used in error messages.
+
+    Raises
+    ------
+    SensorError
+        The region is empty, has no triangle, or a texel has no normal.
+    """
+    region = np.asarray(region, dtype=bool)
+    vertex = np.flatnonzero(region)
+    if len(vertex) == 0:
+        raise RegionError(
+            f"The region of sensor '{name}' is empty: select or paint all corners of at least one face, or take its role away."
+        )
+    inside = region[mesh.triangles].all(axis=1)
+    if not inside.any():
+        raise RegionError(
+            f"The {len(vertex)} vertices of sensor '{name}' span no face: select or paint all corners of at least one face."
+        )
+    triangles = mesh.triangles[inside]
+    on_face = np.zeros(len(mesh.vertices), dtype=bool)
+    on_face[triangles] = True
+    vertex = np.flatnonzero(on_face)
+
+    normals = vertex_normals(mesh)[vertex]
+    flat = np.linalg.norm(normals, axis=1) < 0.5
+    if flat.any():
+        raise SensorError(
+            f"Vertex {vertex[flat][0]} of sensor '{name}' has no normal, its faces cancel out: "
+            "recalculate the normals or leave the vertex out."
+        )
+    index = np.full(len(mesh.vertices), -1)
+    index[vertex] = np.arange(len(vertex))
+    position = mesh.vertices[vertex]
+    local_triangles = index[triangles]
+    local_polygons = index[mesh.quads[region[mesh.quads].all(axis=1)]] if mesh.quads is not None else None
+    grid, along = grid_layout(position, normals, local_triangles, local_polygons)
+    layout: GridLayout | UVLayout
+    if grid is not None and along is not None:
+        layout = grid
+    else:
+        layout, along = uv_layout(position, normals, local_triangles)
+    tangent = along - np.einsum("ij,ij->i", along, normals)[:, None] * normals
+    length = np.linalg.norm(tangent, axis=1)
+    bad = length < 1e-9
+    if bad.any():  # the axis stands on the normal there: any direction across will do, as long as it is always the same
+        tangent[bad] = np.cross(normals[bad], np.eye(3)[np.abs(normals[bad]).argmin(axis=1)])
+        length = np.linalg.norm(tangent, axis=1)
+    tangent /= length[:, None]
+    return Texels(
+        vertex=vertex,
+        position=position,
+        normal=normals,
+        tangent=tangent,
+        area=vertex_areas(mesh, inside)[vertex],
+        layout=layout,
+    )
+
+
+class Follower:
+    """Texels that go with a mesh whose vertices move.
+
+    Normals are computed anew; each texel's x axis keeps its angle to one edge of the mesh, the one nearest to its direction.
+
+    Parameters
+    ----------
+    texels : Texels
+    mesh : TriangleMesh
+        In the shape in which the texels were made.
+    """
+
+    def __init__(self, texels: Texels, mesh: TriangleMesh):
+        self._mesh, self._vertex, self.start = mesh, texels.vertex, mesh.vertices
+        edges = mesh.triangles[:, [0, 1, 1, 2, 2, 0, 1, 0, 2, 1, 0, 2]].reshape(-1, 2)
+        number = np.full(len(mesh.vertices), -1)
+        number[texels.vertex] = np.arange(len(texels))
+        edges = edges[number[edges[:, 0]] >= 0]
+        texel = number[edges[:, 0]]
+        across = _across(mesh.vertices[edges[:, 1]] - mesh.vertices[edges[:, 0]], texels.normal[texel])
+        along = np.einsum("ij,ij->i", across, texels.tangent[texel])
+        best = np.lexsort([-along, texel])
+        first = np.searchsorted(texel[best], np.arange(len(texels)))
+        chosen = best[first]
+        self._other = edges[chosen, 1]
+        self._cosine = along[chosen]
+        self._sine = np.einsum("ij,ij->i", np.cross(texels.normal, across[chosen]), texels.tangent)
+
+    def frames(self, vertices: np.ndarray, name: str) -> np.ndarray:
+        """Return :attr:`Texels.frames` on the mesh in another shape.
+
+        Parameters
+        ----------
+        vertices : (nv, 3) float, metres
+        name : str
+            Of the sensor, for the message.
+
+        Raises
+        ------
+        SensorError
+            A texel has no normal there.
+        """
+        normal = vertex_normals(TriangleMesh(vertices, self._mesh.triangles))[self._vertex]
+        edge = _across(vertices[self._other] - vertices[self._vertex], normal)
+        tangent = self._cosine[:, None] * edge + self._sine[:, None] * np.cross(normal, edge)
+        bad = (np.linalg.norm(normal, axis=1) < 0.5) | (np.linalg.norm(edge, axis=1) < 0.5)
+        if bad.any():
+            raise SensorError(
+                f"Vertex {self._vertex[bad][0]} of sensor '{name}' loses its normal as it deforms: "
+                "keep its faces from collapsing."
+            )
+        return np.hstack([vertices[self._vertex], normal, tangent])
+
+
+def _across(vectors: np.ndarray, normal: np.ndarray) -> np.ndarray:
+    """Unit vectors of what of (n, 3) vectors lies across the normals; zero where nothing does."""
+    flat = vectors - np.einsum("ij,ij->i", vectors, normal)[:, None] * normal
+    length = np.linalg.norm(flat, axis=1, keepdims=True)
+    return np.divide(flat, length, out=np.zeros_like(flat), where=length > 0)

@@ -1,0 +1,115 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A finished bake, read back from its folder: what figures and exports are made of, without Blender."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import FileError
+from ..geometry.texels import Texels
+from ..model.recording import Recording
+from ..model.scenario import Painted, SensorParameters
+from .files import MANIFEST_NAME, RECORDING_NAME, Manifest, read_manifest
+from .npz import load_recording
+from .sensor_npz import SENSOR_NAME, load_sensor
+
+
+@dataclass(frozen=True)
+class Bake:
+    """What some sensors felt, and what they are.
+
+    Attributes
+    ----------
+    recording : Recording
+    texels, painted, parameters, folders, manifests : dict
+        By sensor name.
+    """
+
+    recording: Recording
+    texels: dict[str, Texels]
+    painted: dict[str, Painted]
+    parameters: dict[str, SensorParameters]
+    folders: dict[str, Path]
+    manifests: dict[str, Manifest]
+
+    def only(self, names: Sequence[str]) -> Bake:
+        """Return the part of some sensors, in the order of `names`.
+
+        Raises
+        ------
+        FileError
+            There is no such sensor.
+        """
+        for name in names:
+            if name not in self.texels:
+                raise FileError(f"There is no sensor '{name}' in this bake: choose from {', '.join(self.texels)}.")
+        sensors = {name: self.recording.sensors[name] for name in names}
+        parts = {item.name: {name: getattr(self, item.name)[name] for name in names} for item in fields(self)[1:]}
+        return Bake(recording=replace(self.recording, sensors=sensors), **parts)
+
+
+def read_bake(folder: str | os.PathLike) -> Bake:
+    """Read a bake folder, or the folder of one sensor in it.
+
+    Raises
+    ------
+    FileError
+        There is no bake, a file of it is damaged, or its sensors do not belong to the same run.
+    """
+    folder = Path(folder)
+    if not folder.is_dir():
+        raise FileError(f"The folder '{folder}' does not exist: bake first, or choose another.")
+    places = [folder] if (folder / MANIFEST_NAME).is_file() else sorted(path for path in folder.iterdir() if _is_bake(path))
+    if not places:
+        raise FileError(f"'{folder}' holds no bake: bake first, or choose the folder that Physics › Palpate › Bake names.")
+    return read_sensors(places)
+
+
+def read_sensors(places: Sequence[Path]) -> Bake:
+    """Read the folders of some sensors of one bake; raises FileError as :func:`read_bake` does."""
+    manifests = {place: read_manifest(place) for place in places}
+    first = manifests[places[0]]
+    for place, manifest in manifests.items():
+        if manifest.digest != first.digest:
+            raise FileError(
+                f"The sensors '{first.sensor}' and '{manifest.sensor}' in '{place.parent}' were baked from different scenes: "
+                "bake again, or choose the folder of one sensor."
+            )
+    recordings = [load_recording(place / RECORDING_NAME) for place in places]
+    sensors = {name: felt for recording in recordings for name, felt in recording.sensors.items()}
+    read = {manifest.sensor: load_sensor(place / SENSOR_NAME) for place, manifest in manifests.items()}
+    known = {item.name for item in fields(SensorParameters)}
+    return Bake(
+        recording=replace(recordings[0], sensors=sensors),
+        texels={name: texels for name, (texels, _) in read.items()},
+        painted={name: painted for name, (_, painted) in read.items()},
+        parameters={
+            manifest.sensor: SensorParameters(**{key: value for key, value in manifest.parameters.items() if key in known})
+            for manifest in manifests.values()
+        },
+        folders={manifest.sensor: place for place, manifest in manifests.items()},
+        manifests={manifest.sensor: manifest for manifest in manifests.values()},
+    )
+
+
+def _is_bake(place: Path) -> bool:
+    return not place.name.endswith((".partial", ".old")) and (place / MANIFEST_NAME).is_file()
+
+
+def frame_index(recording: Recording, frame: int) -> int:
+    """Return where a frame is in a recording.
+
+    Raises
+    ------
+    FileError
+        It was not baked.
+    """
+    (found,) = np.nonzero(recording.frames == frame)
+    if len(found) == 0:
+        raise FileError(f"Frame {frame} is not in the bake: choose from {recording.frames[0]} to {recording.frames[-1]}.")
+    return int(found[0])

@@ -1,0 +1,143 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""OpenRAVE's XML definition of a tactile sensor (paper, Table 2): ``<AttachedSensor>`` with a ``SimTactileSensor``.
+
+The print of Table 2 has spaces inside its tags and is no XML; this reads and writes what it means. The XML holds the foam's
+thickness where the model holds the maximum penetration, which is twice that (paper, section 3.3.3).
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+from ..errors import FileError, PalpateError
+from ..model.scenario import SensorParameters
+from .files import atomic_write
+
+SENSOR_TYPE = "SimTactileSensor"
+NUMBERS = ("k", "cn", "sigma0", "sigma1", "x0", "ct", "mus", "mud")
+"""Elements of Table 2 behind the thickness, in its order."""
+THICKNESS = "thickness"
+DEPTH_PER_THICKNESS = 2.0
+
+
+@dataclass(frozen=True)
+class OpenRaveSensor:
+    """One definition.
+
+    Attributes
+    ----------
+    name : str
+    link : str
+        The link, that is the object, that the sensor is attached to.
+    parameters : SensorParameters
+        What the XML does not hold (gain, unit, …) has its default.
+    missing : tuple of str
+        Elements that the definition left out; they have their defaults too.
+    """
+
+    name: str
+    link: str
+    parameters: SensorParameters
+    missing: tuple[str, ...] = ()
+
+
+def read_openrave(path: str | os.PathLike) -> list[OpenRaveSensor]:
+    """Read every tactile sensor of an OpenRAVE file, whatever surrounds it.
+
+    Raises
+    ------
+    FileError
+        There is no such file, it is no XML, it holds no tactile sensor, or a value is no number or out of range.
+    """
+    try:
+        text = Path(path).read_bytes()
+    except FileNotFoundError as error:
+        raise FileError(f"There is no file '{path}': check its name and folder.") from error
+    except OSError as error:
+        raise FileError(f"'{path}' cannot be read ({error.strerror}): check its name and permissions.") from error
+    if b"<!ENTITY" in text:  # entities can multiply without end, and a sensor needs none
+        raise FileError(f"'{path}' declares XML entities: write them out, a sensor definition needs none.")
+    try:
+        # A fragment with several definitions side by side, as in a robot file's middle, has no root of its own.
+        body = text[text.index(b"?>") + 2 :] if text.lstrip().startswith(b"<?xml") else text
+        root = ElementTree.fromstring(b"<palpate>" + body + b"</palpate>")
+    except (ElementTree.ParseError, ValueError) as error:
+        line = getattr(error, "position", (1, 0))[0]
+        raise FileError(
+            f"Line {line} of '{path}' is no XML ({error}): a tag may have no space behind its '<' and must be closed."
+        ) from error
+    found = [_sensor(path, attached) for attached in root.iter("AttachedSensor") if _tactile(attached) is not None]
+    if not found:
+        raise FileError(f"'{path}' has no <AttachedSensor> with a <sensor type=\"{SENSOR_TYPE}\">: give a file that has one.")
+    return found
+
+
+def _tactile(attached: ElementTree.Element) -> ElementTree.Element | None:
+    sensors = (child for child in attached if child.tag.lower() == "sensor")
+    return next((s for s in sensors if s.get("type", "").lower() == SENSOR_TYPE.lower()), None)
+
+
+def _sensor(path: str | os.PathLike, attached: ElementTree.Element) -> OpenRaveSensor:
+    element = _tactile(attached)
+    assert element is not None
+    name = element.get("name") or attached.get("name") or "sensor"
+    values: dict[str, Any] = {}
+    for child in element:
+        key = child.tag.lower()
+        if key not in (THICKNESS, *NUMBERS):
+            continue
+        if key in values:
+            raise FileError(f"Sensor '{name}' in '{path}' has two <{key}>: leave only one.")
+        try:
+            values[key] = float((child.text or "").strip())
+        except ValueError as error:
+            raise FileError(
+                f"<{key}> of sensor '{name}' in '{path}' is '{child.text}', which is no number: correct it."
+            ) from error
+    missing = tuple(key for key in (THICKNESS, *NUMBERS) if key not in values)
+    if THICKNESS in values:
+        values["max_penetration"] = DEPTH_PER_THICKNESS * values.pop(THICKNESS)
+    parameters = replace(SensorParameters(), **values)
+    try:
+        parameters.check(name)
+    except PalpateError as error:
+        raise FileError(f"In '{path}': {error}") from error
+    return OpenRaveSensor(name, (attached.findtext("link") or "").strip(), parameters, missing)
+
+
+def openrave_xml(sensors: Iterable[OpenRaveSensor], robot: str | None = None) -> str:
+    """Return definitions as XML; numbers are written so that reading them gives the same bits.
+
+    Parameters
+    ----------
+    sensors : iterable of OpenRaveSensor
+    robot : str, optional
+        Name of a ``<Robot>`` around them. Without it they stand side by side, to be pasted into a robot's file.
+    """
+    from xml.sax.saxutils import escape, quoteattr
+
+    lines = [f"<Robot name={quoteattr(robot)}>"] if robot is not None else []
+    indent = "  " if robot is not None else ""
+    for sensor in sensors:
+        values = [(THICKNESS, sensor.parameters.max_penetration / DEPTH_PER_THICKNESS)]
+        values += [(key, getattr(sensor.parameters, key)) for key in NUMBERS]
+        block = ["<AttachedSensor>", f"  <link>{escape(sensor.link)}</link>"]
+        block += [f"  <sensor name={quoteattr(sensor.name)} type={quoteattr(SENSOR_TYPE)}>"]
+        block += [f"    <{key}>{float(value)!r}</{key}>" for key, value in values]
+        block += ["  </sensor>", "</AttachedSensor>"]
+        lines += [indent + line for line in block]
+    if robot is not None:
+        lines.append("</Robot>")
+    return "\n".join(lines) + "\n"
+
+
+def write_openrave(path: str | os.PathLike, sensors: Iterable[OpenRaveSensor], robot: str | None = None) -> None:
+    """Write :func:`openrave_xml` to a file, whole or not at all."""
+    text = openrave_xml(sensors, robot)
+    with atomic_write(path) as temporary:
+        temporary.write_text(text, encoding="utf-8")

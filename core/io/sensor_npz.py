@@ -1,0 +1,73 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a sensor is made of, beside its recording: with this file a bake can be drawn and exported where no Blender is."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..errors import FileError
+from ..geometry.layout import GridLayout, UVLayout
+from ..geometry.texels import Texels
+from ..model.scenario import Painted
+from .npz import DAMAGED, write_arrays
+
+SENSOR_FORMAT = "palpate-sensor/1"
+SENSOR_NAME = "sensor.npz"
+
+_ARRAYS = tuple(item.name for item in fields(Texels) if item.name != "layout")
+_LAYOUTS: dict[str, type[GridLayout] | type[UVLayout]] = {"grid": GridLayout, "uv": UVLayout}
+
+
+def save_sensor(path: str | os.PathLike, texels: Texels, painted: Painted | None = None, at_once: bool = True) -> None:
+    """Write texels, their layout and what is painted on them as .npz, as :func:`.files.written` does.
+
+    Raises
+    ------
+    FileError
+        The file cannot be written.
+    """
+    kind = next(name for name, cls in _LAYOUTS.items() if isinstance(texels.layout, cls))
+    arrays = {"format": np.array(SENSOR_FORMAT), "layout": np.array(kind)}
+    arrays |= {name: np.asarray(getattr(texels, name)) for name in _ARRAYS}
+    arrays |= {f"layout/{item.name}": np.asarray(getattr(texels.layout, item.name)) for item in fields(texels.layout)}
+    for item in fields(painted or Painted()):
+        values = getattr(painted, item.name, None)
+        if values is not None:
+            arrays[f"painted/{item.name}"] = np.asarray(values)
+    write_arrays(path, arrays, at_once)
+
+
+def load_sensor(path: str | os.PathLike) -> tuple[Texels, Painted]:
+    """Read what :func:`save_sensor` wrote.
+
+    Raises
+    ------
+    FileError
+        There is no such file, or it is damaged or something else.
+    """
+    if not Path(path).exists():
+        raise FileError(f"'{path}' does not exist: bake again with this version.")
+    try:
+        with np.load(path, allow_pickle=False) as members:
+            if str(members["format"]) != SENSOR_FORMAT:
+                raise FileError(f"'{path}' is not a '{SENSOR_FORMAT}' file: bake again with this version.")
+            cls = _LAYOUTS[str(members["layout"])]
+            stored = {item.name: f"layout/{item.name}" for item in fields(cls)}
+            layout: Any = cls(**{name: _plain(members[key]) for name, key in stored.items() if key in members.files})
+            texels = Texels(**{name: members[name] for name in _ARRAYS}, layout=layout)
+            found = {item.name: f"painted/{item.name}" for item in fields(Painted)}
+            return texels, Painted(**{name: members[key] for name, key in found.items() if key in members.files})
+    except OSError as error:
+        reason = (error.strerror or str(error)).lower()
+        raise FileError(f"'{path}' could not be read ({reason}): choose another file.") from error
+    except DAMAGED as error:
+        raise FileError(f"'{path}' is damaged or no sensor ({error}): bake again.") from error
+
+
+def _plain(value: np.ndarray) -> Any:
+    return value if value.ndim else value.item()

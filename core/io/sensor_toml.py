@@ -1,0 +1,148 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A sensor as a text file: its parameters, its effects and, where it has them, the rig's words for its shape.
+
+::
+
+    format = "palpate-sensor-toml/1"
+    name = "pad"
+
+    [sensor]                       # the words of a rig's [sensor]; what is left out has its default
+    k = 58.4
+    unit = "N"
+    grid = { rows = 14, columns = 6, pitch = [0.0034, 0.0034] }
+
+    [[effect]]                     # as many as there are; their parameters are in docs/effects.md
+    name = "creep"
+    form = "exponential"
+    amount = 0.21
+    time = 1.7
+
+What was written is read back exactly, to the last bit.
+"""
+
+from __future__ import annotations
+
+import os
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+from pathlib import Path
+from typing import Any
+
+from ..effects.engine.registry import check, from_dict, to_dict
+from ..effects.engine.specification import Effect
+from ..errors import FileError, PalpateError
+from ..model.scenario import SensorParameters
+from .files import atomic_write
+
+FORMAT = "palpate-sensor-toml/1"
+SHAPE_WORDS = ("grid", "mesh", "thickness")
+"""Words of a rig's [sensor] that say where its texels are; they are kept as they are and mean nothing here."""
+
+
+@dataclass(frozen=True)
+class SensorModel:
+    """What one sensor is made of, apart from its texels.
+
+    Attributes
+    ----------
+    name : str
+    parameters : SensorParameters
+    effects : tuple of Effect
+    shape : mapping
+        Words of a rig's [sensor] for its shape (:data:`SHAPE_WORDS`), empty where the sensor is a mesh of a scene.
+    """
+
+    name: str
+    parameters: SensorParameters = field(default_factory=SensorParameters)
+    effects: tuple[Effect, ...] = ()
+    shape: Mapping[str, Any] = field(default_factory=dict)
+
+
+def write_sensor(path: str | os.PathLike, model: SensorModel) -> None:
+    """Write a sensor as TOML, whole or not at all; raises :class:`FileError` when that is not possible."""
+    text = sensor_text(model)
+    with atomic_write(path) as fresh:
+        fresh.write_text(text, encoding="utf-8", newline="\n")
+
+
+def sensor_text(model: SensorModel) -> str:
+    """Return the text of a sensor's file."""
+    import tomli_w
+
+    words = {item.name: getattr(model.parameters, item.name) for item in fields(SensorParameters)}
+    table: dict[str, Any] = {"format": FORMAT, "name": model.name, "sensor": {**words, **_plain(model.shape)}}
+    if model.effects:
+        table["effect"] = [to_dict(item) for item in model.effects]
+    return tomli_w.dumps(table)
+
+
+def read_sensor(path: str | os.PathLike) -> SensorModel:
+    """Read what :func:`write_sensor` wrote, or a person did.
+
+    Raises
+    ------
+    FileError
+        There is no such file, or it is something else.
+    EffectError, ParameterError
+        It says what means nothing.
+    """
+    try:
+        text = Path(path).read_text(encoding="utf-8")
+    except UnicodeDecodeError as error:
+        raise FileError(f"'{path}' is not a text file: choose a sensor's .toml.") from error
+    except OSError as error:
+        raise FileError(f"'{path}' could not be read ({error.strerror}): check the name.") from error
+    try:
+        table = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise FileError(f"'{path}' is not valid TOML ({error}): mend that line.") from error
+    try:
+        return sensor_of(table)
+    except PalpateError as error:
+        raise type(error)(f"'{Path(path).name}': {error}") from error
+
+
+def sensor_of(table: Mapping[str, Any]) -> SensorModel:
+    """Return the sensor that the tables of a file describe; the errors are those of :func:`read_sensor`."""
+    if table.get("format") != FORMAT:
+        raise FileError(f'Its format is {table.get("format")!r}: a sensor\'s file begins with format = "{FORMAT}".')
+    _known(table, {"format", "name", "sensor", "effect"}, "the file")
+    name, words, entries = table.get("name", "sensor"), table.get("sensor", {}), table.get("effect", [])
+    if not isinstance(name, str) or not isinstance(words, Mapping):
+        raise FileError('It needs name = "…" and [sensor] with the sensor\'s words.')
+    if not isinstance(entries, list) or not all(isinstance(entry, Mapping) for entry in entries):
+        raise FileError("Its effects have to be written as [[effect]], one for each.")
+    parameters = parameters_of(words)
+    parameters.check(name)
+    effects = tuple(from_dict(entry, parameters.gain) for entry in entries)
+    check(effects, name, gain=parameters.gain)
+    return SensorModel(name, parameters, effects, {key: words[key] for key in SHAPE_WORDS if key in words})
+
+
+def parameters_of(words: Mapping[str, Any]) -> SensorParameters:
+    """Return the parameters among the words of a [sensor], defaults for what is left out; raises :class:`FileError`."""
+    known = {item.name: getattr(SensorParameters, item.name) for item in fields(SensorParameters)}
+    _known(words, {*known, *SHAPE_WORDS}, "[sensor]")
+    values: dict[str, Any] = {}
+    for key, default in known.items():
+        if key not in words:
+            continue
+        value, kind = words[key], type(default)
+        if kind is float and isinstance(value, int) and not isinstance(value, bool):
+            value = float(value)
+        if type(value) is not kind:
+            wanted = {float: "a number", int: "a whole number", str: "a text"}[kind]
+            raise FileError(f"{key} of [sensor] is {value!r}: give {wanted}.")
+        values[key] = value
+    return SensorParameters(**values)
+
+
+def _known(table: Mapping[str, Any], words: set[str], where: str) -> None:
+    for key in table:
+        if key not in words:
+            raise FileError(f"'{key}' in {where} is not a word of this format: it knows {', '.join(sorted(words))}.")
+
+
+def _plain(words: Mapping[str, Any]) -> dict[str, Any]:
+    return {key: list(value) if isinstance(value, tuple) else value for key, value in words.items()}

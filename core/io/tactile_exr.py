@@ -1,0 +1,175 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Tactile images as OpenEXR: what Blender's image nodes read directly, and every other channel beside it.
+
+``R`` is the normal force and ``G``, ``B`` the shear along the texel's x and y axes, all in newtons; ``reading`` is in
+the sensor's unit, ``depth`` in metres, ``slip`` in metres per second, ``contact`` 0 or 1. All are 32-bit floats; pixels
+that show no texel are 0. Row 0 of the layout is the bottom of the picture.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import FileError
+from ..geometry.layout import GridLayout, UVLayout
+from ..model.recording import Frame, SensorFrame
+from ..model.scenario import Sensor
+from . import exr_codec
+from .files import atomic_write, written
+
+CHANNELS = ("R", "G", "B", "reading", "depth", "slip", "contact")
+"""Names of the channels, in the order in which :func:`read_exr` returns them."""
+
+UNITS = {"R": "N", "G": "N", "B": "N", "depth": "m", "slip": "m/s", "contact": "1"}
+"""Units of the channels; that of ``reading`` is the sensor's."""
+
+_IN_FILE = exr_codec.in_order(CHANNELS)
+_PREFIX = "palpate."  # OpenEXR has header attributes of its own, some with a type ("name", "owner", "type")
+
+
+def exr_channels(layout: GridLayout | UVLayout, frame: SensorFrame) -> dict[str, np.ndarray]:
+    """Return the pictures of a frame by channel name, each (height, width) float32 with row 0 at the bottom.
+
+    Raises
+    ------
+    ValueError
+        A value is not finite or too large for 32 bits (a fault of the program, not of the user).
+    """
+    pictures = _pictures(layout, [frame], CHANNELS)[0]
+    return {name: np.ascontiguousarray(pictures[::-1, i]) for i, name in enumerate(CHANNELS)}
+
+
+def _pictures(layout: GridLayout | UVLayout, frames: Sequence[SensorFrame], names: Sequence[str]) -> np.ndarray:
+    """(f, height, channels, width) float32 of frames and channels in order, from the top."""
+    columns = {
+        "R": [frame.normal_force for frame in frames],
+        "G": [frame.shear[:, 0] for frame in frames],
+        "B": [frame.shear[:, 1] for frame in frames],
+        **{name: [getattr(frame, name) for frame in frames] for name in ("reading", "depth", "slip", "contact")},
+    }
+    table = np.array([columns[name] for name in names], dtype=float)  # (channels, frames, texels)
+    bad = ~(np.abs(table) <= np.finfo(np.float32).max)  # NaN compares false
+    if bad.any():
+        channel, i, texel = np.argwhere(bad)[0]
+        value = table[channel, i, texel]
+        raise ValueError(f"channel '{names[channel]}' of texel {texel} is {value}: no 32-bit number")
+    image = layout.image(table.reshape(-1, table.shape[2]).T)
+    image = image.reshape(*layout.shape, len(names), len(frames))
+    contact = names.index("contact")
+    image[:, :, contact] = image[:, :, contact] >= 0.5
+    return np.ascontiguousarray(np.moveaxis(image[::-1], (3, 0, 2, 1), (0, 1, 2, 3)), dtype="<f4")
+
+
+def describe(sensor: Sensor, frame: Frame, digest: str) -> dict[str, str]:
+    """Return the metadata of a tactile image: whose it is, when, in which units, and what it was made from.
+
+    ``unit.R``, ``unit.depth``, … are the units of the channels; ``parameters`` is a hash of the sensor's parameters, of what is
+    painted on it and of its effects, ``digest`` one of everything that the forces depend on.
+    """
+    about = {
+        "sensor": sensor.name,
+        "frame": str(frame.frame),
+        "time": repr(float(frame.time)),
+        "unit": sensor.parameters.unit,
+        "digest": digest,
+        "parameters": sensor.settings_digest,
+    }
+    about |= {f"unit.{channel}": UNITS.get(channel, sensor.parameters.unit) for channel in CHANNELS}
+    if isinstance(sensor.texels.layout, UVLayout) and sensor.texels.layout.map_name:
+        about["map"] = sensor.texels.layout.map_name
+    return about
+
+
+def write_exr(
+    path: str | os.PathLike,
+    layout: GridLayout | UVLayout,
+    frame: SensorFrame,
+    metadata: Mapping[str, str],
+) -> None:
+    """Write one frame of one sensor, whole or not at all.
+
+    Parameters
+    ----------
+    path : path
+    layout : GridLayout or UVLayout
+        Of the sensor's texels.
+    frame : SensorFrame
+    metadata : mapping of str to str
+        Becomes header attributes named ``palpate.<key>``, see :func:`describe`.
+
+    Raises
+    ------
+    FileError
+        The file cannot be written.
+    ValueError
+        See :func:`exr_channels`; nothing is written then.
+    """
+    with atomic_write(path) as place:
+        _write([place], layout, [frame], [metadata])
+
+
+def write_exrs(
+    paths: Sequence[str | os.PathLike],
+    layout: GridLayout | UVLayout,
+    frames: Sequence[SensorFrame],
+    metadata: Sequence[Mapping[str, str]],
+) -> None:
+    """Write frames of one sensor where they are: what is interrupted leaves a half file, see :func:`.files.written`.
+
+    Parameters
+    ----------
+    paths : (f,) sequence of path
+    layout, frames, metadata
+        As for :func:`write_exr`, one for each path.
+
+    Raises
+    ------
+    FileError, ValueError
+        As :func:`write_exr`.
+    """
+    with written(paths[0], at_once=False):
+        _write(paths, layout, frames, metadata)
+
+
+def _write(
+    paths: Sequence[str | os.PathLike],
+    layout: GridLayout | UVLayout,
+    frames: Sequence[SensorFrame],
+    metadata: Sequence[Mapping[str, str]],
+) -> None:
+    attributes = [{_PREFIX + key: str(value) for key, value in about.items()} for about in metadata]
+    exr_codec.write_all(paths, _IN_FILE, _pictures(layout, frames, _IN_FILE), attributes)
+
+
+def read_exr(path: str | os.PathLike) -> tuple[dict[str, np.ndarray], dict[str, str]]:
+    """Read the channels and the metadata of a tactile image.
+
+    Returns
+    -------
+    channels : dict of str to (height, width) float32
+        Row 0 at the bottom; those of :data:`CHANNELS` first, others after them.
+    metadata : dict of str to str
+        As given to :func:`write_exr`.
+
+    Raises
+    ------
+    FileError
+        There is no such file, or it is damaged or not an OpenEXR image.
+    """
+    if not Path(path).is_file():
+        raise FileError(f"'{path}' does not exist: bake first, or choose another file.")
+    try:
+        pictures, attributes = exr_codec.read(path)
+    except OSError as error:
+        reason = (error.strerror or str(error)).lower()
+        raise FileError(f"'{path}' could not be read ({reason}): check its permissions.") from error
+    except exr_codec.FormatError as error:
+        raise FileError(f"'{path}' is damaged or not an OpenEXR image ({error}): bake again.") from error
+    found = {name: picture[::-1].astype(np.float32) for name, picture in pictures.items()}
+    order = [name for name in CHANNELS if name in found] + [name for name in found if name not in CHANNELS]
+    metadata = {key.removeprefix(_PREFIX): value for key, value in attributes.items() if key.startswith(_PREFIX)}
+    return {name: found[name] for name in order}, metadata

@@ -1,0 +1,151 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Numbers that are read off a recording: sums of forces, what slips, the free moment, ranges for a common scale."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+
+import numpy as np
+
+from ..geometry.texels import Texels
+from ..model.recording import Recording, SensorFrame, SensorRecording
+from ..model.scenario import Painted, SensorParameters
+
+AT_LIMIT = 0.9
+"""Share of what friction can hold from which on a texel counts as slipping."""
+CREEPING = 1e-6
+"""Speed, m/s, up to which a texel at its limit still counts as sticking."""
+
+
+def net_shear(sensor: SensorRecording, texels: Texels) -> np.ndarray:
+    """Return the sum of all texels' shear forces, in the frame of the sensor's body.
+
+    Parameters
+    ----------
+    sensor : SensorRecording
+        F frames of n texels.
+    texels : Texels
+        The n texels.
+
+    Returns
+    -------
+    (F, 3) float, N
+    """
+    return sensor.shear[:, :, 0] @ texels.tangent + sensor.shear[:, :, 1] @ texels.bitangent
+
+
+def mobilised(sensor: SensorRecording, texels: Texels, mus: float) -> np.ndarray:
+    """Return how much of the static friction is used: ``|Σ shear| / (mus · Σ normal)``, zero while nothing touches.
+
+    Returns
+    -------
+    (F,) float
+    """
+    limit = mus * sensor.normal_force.sum(axis=1)
+    shear = np.linalg.norm(net_shear(sensor, texels), axis=1)
+    return np.divide(shear, limit, out=np.zeros_like(shear), where=limit > 0)
+
+
+def slipping(sensor: SensorRecording | SensorFrame, parameters: SensorParameters, painted: Painted | None = None) -> np.ndarray:
+    """Return which texels slip: they touch, move, and carry (almost) what friction can hold at their speed (Eq. 10).
+
+    Parameters
+    ----------
+    sensor : SensorRecording or SensorFrame
+    parameters : SensorParameters
+    painted : Painted, optional
+        Its friction multiplies what each texel can hold.
+
+    Returns
+    -------
+    (F, n) or (n,) bool
+    """
+    from ..laws.contact import friction_limit
+
+    found = np.asarray(sensor.contact, bool) & (sensor.slip > CREEPING)
+    limit = friction_limit(sensor.normal_force[found], sensor.slip[found], parameters)
+    if painted is not None and painted.friction is not None:
+        limit = limit * np.broadcast_to(painted.friction, found.shape)[found]
+    found[found] = sensor.friction[found] >= AT_LIMIT * limit
+    return found
+
+
+def slip_share(sensor: SensorRecording, parameters: SensorParameters, painted: Painted | None = None) -> np.ndarray:
+    """Return how much of the normal force rests on texels that slip, 0 to 1; zero while nothing touches.
+
+    Returns
+    -------
+    (F,) float
+    """
+    total = sensor.normal_force.sum(axis=1)
+    loose = np.where(slipping(sensor, parameters, painted), sensor.normal_force, 0.0).sum(axis=1)
+    return np.divide(loose, total, out=np.zeros_like(total), where=total > 0)
+
+
+def free_moment(sensor: SensorRecording | SensorFrame) -> np.ndarray:
+    """Return the net torque about the centre of pressure instead of the body's origin, in the body's frame.
+
+    Returns
+    -------
+    (F, 3) or (3,) float, N·m
+    """
+    return sensor.net_torque - np.cross(sensor.centre_of_pressure, sensor.net_force)
+
+
+def pressure(normal_force: np.ndarray, texels: Texels) -> np.ndarray:
+    """Return normal forces (..., n) in N over the texels' areas, Pa."""
+    return normal_force / texels.area
+
+
+def peak_force(recording: Recording) -> float:
+    """Return the largest normal force of any texel at any frame, N; one newton when nothing ever touched."""
+    return _peak(sensor.normal_force for sensor in recording.sensors.values())
+
+
+def peak_pressure(recording: Recording, texels: Mapping[str, Texels]) -> float:
+    """Return the largest pressure on any texel at any frame, Pa; one pascal when nothing ever touched."""
+    return _peak(pressure(recording.sensors[name].normal_force, texels[name]) for name in texels)
+
+
+def _peak(values: Iterable[np.ndarray]) -> float:
+    peak = max((float(value.max(initial=0.0)) for value in values), default=0.0)
+    return peak if peak > 0 else 1.0
+
+
+def peak_shear(recording: Recording) -> float:
+    """Return the largest shear force of any texel at any frame, N; zero when nothing ever slid."""
+    return max((float(np.linalg.norm(s.shear, axis=2).max(initial=0.0)) for s in recording.sensors.values()), default=0.0)
+
+
+def tidy_limit(value: float) -> float:
+    """Return the next number of the form 1, 1.5, 2, 2.5, 3, 4, 5, 6 or 8 × 10ⁿ at or above `value`, for the end of a scale."""
+    power = 10.0 ** np.floor(np.log10(value))
+    for step in (1, 1.5, 2, 2.5, 3, 4, 5, 6, 8, 10):
+        if value <= step * power * (1 + 1e-9):
+            return float(step * power)
+    raise AssertionError("every decade ends at ten")
+
+
+def scale_limit(peak: float) -> float:
+    """Return the end of a scale: a round number with some room above the largest value."""
+    return tidy_limit(1.05 * peak)
+
+
+def choose_frames(recording: Recording, count: int) -> np.ndarray:
+    """Return up to `count` frame numbers, evenly spread over the time in which the forces change (or over all of it).
+
+    Returns
+    -------
+    (c,) int, increasing
+    """
+    peak = peak_force(recording)
+    changes = np.zeros(len(recording.frames), dtype=bool)
+    for sensor in recording.sensors.values():
+        forces = np.concatenate([sensor.normal_force[:, :, None], sensor.shear], axis=2)
+        step = np.abs(np.diff(forces, axis=0)).max(axis=(1, 2), initial=0.0) > 1e-3 * peak
+        changes[1:] |= step
+        changes[:-1] |= step
+    indices = np.flatnonzero(changes) if changes.any() else np.arange(len(recording.frames))
+    first, span = indices[0], indices[-1] - indices[0] + 1
+    count = min(count, span)
+    return recording.frames[first + ((np.arange(count) + 0.5) * span / count).astype(int)]

@@ -1,0 +1,23 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Forces → readings: what the sensor would report, a linear conversion (paper, section 4) and its effects on readings."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..effects.engine.binding import Reader, readings, site_of
+from ..model.scenario import Sensor
+
+__all__ = ["Reader", "respond"]
+
+
+def respond(sensor: Sensor, time: np.ndarray, normal_force: np.ndarray) -> np.ndarray:
+    """Return the texels' readings over a whole signal, (t, n) float in the sensor's unit.
+
+    Parameters
+    ----------
+    sensor : Sensor
+    time : (t,) float, s, increasing
+    normal_force : (t, n) float, N
+    """
+    return readings(sensor.effects, site_of(sensor), time, normal_force)

@@ -1,0 +1,155 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What deforms in a scenario, frame by frame, for the kernels of :mod:`.deformation`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from ...geometry.bvh import Tree
+from ...geometry.contact_points import ContactPoints
+from ...geometry.mesh import TriangleMesh, vertex_normals
+from ...geometry.texels import Texels
+from ...laws.contact import World
+from ...model.scenario import Deformation, Scenario
+from .deformation import Shapes, Window, corners_of, pace_of, point_pace_of, track, window
+
+
+def point_rows(texels: Texels, points: ContactPoints, reference: np.ndarray) -> np.ndarray:
+    """Rows of :attr:`.World.points`.
+
+    Parameters
+    ----------
+    texels : Texels
+    points : ContactPoints
+    reference : (3,) float, metres
+        Reference point of the body, in its frame.
+    """
+    position, normal = points.positions(texels.position) - reference, points.normals(texels.normal)
+    return np.hstack([position, normal, texels.tangent[points.texel], texels.bitangent[points.texel]])
+
+
+class Surfaces:
+    """The shapes of a scenario's targets and sensors, as far as they are known.
+
+    Parameters
+    ----------
+    scenario : Scenario
+    center : (b, 3) float, metres
+        Reference point of each body in its frame.
+    points : list of ContactPoints
+        Of each sensor.
+    tree : Tree
+    world : World
+        The extents of sensors that bend are kept up to date in it.
+    """
+
+    def __init__(self, scenario: Scenario, center: np.ndarray, points: list[ContactPoints], tree: Tree, world: World):
+        self._targets, self._sensors = scenario.targets, scenario.sensors
+        self._vertices = [target.deformation for target in scenario.targets]
+        self._texels = [sensor.deformation for sensor in scenario.sensors]
+        self._target_center = [center[target.body] for target in scenario.targets]
+        self._sensor_center = [center[sensor.body] for sensor in scenario.sensors]
+        self._points, self._world = points, world
+        meshes = [target.mesh for target in scenario.targets]
+        count = len(tree.faces)
+        wanted = any(target.smooth or target.deformation is not None for target in scenario.targets)
+        corner, self._triangle_start = corners_of(meshes, tree)
+        self._corner = corner if wanted else np.zeros((0, 3), np.int64)
+        self._stamp = np.full(count if wanted else 0, -1)
+        self._clock = np.zeros(3, np.int64)
+        self._travelled = np.zeros(len(scenario.targets)), np.zeros(len(scenario.sensors))
+
+    @property
+    def moves(self) -> bool:
+        """Whether anything deforms."""
+        return any(found is not None for found in (*self._vertices, *self._texels))
+
+    def extend(self, time: float, vertices: Mapping[int, np.ndarray], texels: Mapping[int, np.ndarray]) -> None:
+        """Append the next shapes.
+
+        Parameters
+        ----------
+        time : float, seconds
+        vertices : mapping of target index to (nv, 3) float, metres, in the body's frame
+        texels : mapping of sensor index to (n, 9) float
+            Position (m), normal and tangent of the texels, in the body's frame.
+        """
+        for known, found in ((self._vertices, vertices), (self._texels, texels)):
+            for index, values in found.items():
+                before = known[index]
+                if before is None:
+                    raise ValueError(f"Shape {index} was not declared as deforming.")
+                if before.times[-1] < time - 1e-9:
+                    known[index] = before.extended(time, values)
+
+    def at(self, moments: np.ndarray) -> Shapes:
+        """Lay out the shapes between the first and the last of some moments.
+
+        Parameters
+        ----------
+        moments : (steps + 1,) float, seconds
+        """
+        vertices = [self._target_window(i, moments) for i in range(len(self._targets))]
+        rows = [self._sensor_window(i, moments) for i in range(len(self._sensors))]
+        reach = self._world.reach
+        self._fit_extents(rows)
+        return Shapes(
+            moves=np.array([self.moves]),
+            deforms=np.array([found is not None for found in self._vertices], dtype=np.bool_),
+            smooth=np.array([target.smooth for target in self._targets], dtype=np.bool_),
+            bends=np.array([found is not None for found in self._texels], dtype=np.bool_),
+            targets=track(vertices, 6, len(moments)),
+            sensors=track(rows, 12, len(moments)),
+            corner=self._corner,
+            triangle_start=self._triangle_start,
+            pace=np.array([pace_of(found) for found in vertices]),
+            point_pace=np.array([point_pace_of(found, reach[i]) for i, found in enumerate(rows)]),
+            travelled=self._travelled[0],
+            point_travelled=self._travelled[1],
+            stamp=self._stamp,
+            clock=self._clock,
+        )
+
+    def _target_window(self, index: int, moments: np.ndarray) -> Window | None:
+        """Vertices and, where they are asked for, their normals; None for what neither deforms nor is smooth."""
+        target, known = self._targets[index], self._vertices[index]
+        if known is None:
+            if not target.smooth:
+                return None
+            known = Deformation(np.zeros(1), target.mesh.vertices[None])
+        found = window(known.times, known.values, moments)
+        normals = np.zeros_like(found.samples)
+        if target.smooth:
+            for sample, shape in enumerate(found.samples):
+                normals[sample] = vertex_normals(TriangleMesh(shape, target.mesh.triangles))
+        return found._replace(samples=np.concatenate([found.samples - self._target_center[index], normals], axis=2))
+
+    def _sensor_window(self, index: int, moments: np.ndarray) -> Window | None:
+        known = self._texels[index]
+        if known is None:
+            return None
+        found = window(known.times, known.values, moments)
+        sensor, center = self._sensors[index], self._sensor_center[index]
+        bent = [replace(sensor, texels=sensor.texels.with_frames(frames)).mounted for frames in found.samples]
+        rows = [point_rows(texels, self._points[index], center) for texels in bent]
+        return found._replace(samples=np.stack(rows))
+
+    def _fit_extents(self, rows: list[Window | None]) -> None:
+        """Where the segments of bending sensors are during the frame; between samples a turning segment's end bulges out."""
+        for index, found in enumerate(rows):
+            if found is not None:
+                reach = self._world.reach[index]
+                turn = np.linalg.norm(np.diff(found.samples[:, :, 3:6], axis=0), axis=2).max(initial=0.0)
+                bulge = reach * (1.0 - np.sqrt(max(1.0 - 0.25 * turn**2, 0.0)))
+                middle, radius = extent(found.samples.reshape(-1, 12), reach)
+                self._world.center[index], self._world.radius[index] = middle, radius + bulge
+
+
+def extent(points: np.ndarray, reach: float) -> tuple[np.ndarray, float]:
+    """Middle and radius of contact points (rows of :attr:`.World.points`) and the segments behind them."""
+    ends = np.vstack([points[:, :3], points[:, :3] - reach * points[:, 3:6]])
+    middle = 0.5 * (ends.min(axis=0) + ends.max(axis=0))
+    return middle, float(np.linalg.norm(ends - middle, axis=1).max())

@@ -1,0 +1,112 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How a body turns that nothing touches: its angular momentum and its energy both stay what they are (kernels).
+
+A body with three different moments of inertia tumbles: its angular velocity changes although nothing acts. To turn it by the
+angular velocity of a step's beginning adds energy in every step, until it spins about its thinnest axis with twice of it. The
+midpoint rule of Simo and Wong (1991, ALGO_C1) keeps both: the mean of the angular velocities at a step's ends is what a Cayley
+map turns the body by.
+"""
+
+from __future__ import annotations
+
+import math
+
+from ...compiled.kernels import kernel
+
+LARGEST_TURN = 0.25
+"""Radians by which the midpoint rule turns a body at once: its rounds end after a few."""
+
+
+@kernel
+def product(matrix, x, y, z):
+    """Return a (3, 3) matrix times a vector."""
+    return (
+        matrix[0, 0] * x + matrix[0, 1] * y + matrix[0, 2] * z,
+        matrix[1, 0] * x + matrix[1, 1] * y + matrix[1, 2] * z,
+        matrix[2, 0] * x + matrix[2, 1] * y + matrix[2, 2] * z,
+    )
+
+
+@kernel
+def into_body(rotation, x, y, z):
+    """A vector of the world in the axes of a body with the given rotation."""
+    return (
+        rotation[0, 0] * x + rotation[1, 0] * y + rotation[2, 0] * z,
+        rotation[0, 1] * x + rotation[1, 1] * y + rotation[2, 1] * z,
+        rotation[0, 2] * x + rotation[1, 2] * y + rotation[2, 2] * z,
+    )
+
+
+@kernel
+def _turned_back(vx, vy, vz, jx, jy, jz):
+    """Turn `v` back by the Cayley map of 2 `j`: the length of `j` is the tangent of half the angle."""
+    cx, cy, cz = vy * jz - vz * jy, vz * jx - vx * jz, vx * jy - vy * jx
+    scale = 2.0 / (1.0 + jx * jx + jy * jy + jz * jz)
+    return (
+        vx + scale * (cx + cy * jz - cz * jy),
+        vy + scale * (cy + cz * jx - cx * jz),
+        vz + scale * (cz + cx * jy - cy * jx),
+    )
+
+
+@kernel
+def _half_turn(lx, ly, lz, dt, inverse):
+    """Turn over a short step, as the tangent of half the angle along its axis; `l` is the angular momentum. Body axes."""
+    wx, wy, wz = product(inverse, lx, ly, lz)
+    jx, jy, jz = 0.5 * dt * wx, 0.5 * dt * wy, 0.5 * dt * wz
+    for _ in range(40):
+        ex, ey, ez = _turned_back(lx, ly, lz, jx, jy, jz)
+        wx, wy, wz = product(inverse, lx + ex, ly + ey, lz + ez)
+        x, y, z = 0.25 * dt * wx, 0.25 * dt * wy, 0.25 * dt * wz
+        change = abs(x - jx) + abs(y - jy) + abs(z - jz)
+        jx, jy, jz = x, y, z
+        if change <= 1e-15 * (abs(x) + abs(y) + abs(z)):  # rounding alone may keep it from less
+            break
+    return jx, jy, jz
+
+
+@kernel
+def mean_spin(rotation, inverse, lx, ly, lz, dt):
+    """Angular velocity that turns a body over a step as it tumbles when nothing acts.
+
+    Parameters
+    ----------
+    rotation : (3, 3) float
+        At the step's beginning.
+    inverse : (3, 3) float, 1/(kg·m²)
+        Inverse of its inertia, body axes.
+    lx, ly, lz : float, kg·m²/s
+        Angular momentum, world axes.
+    dt : float, seconds
+
+    Returns
+    -------
+    x, y, z : float, rad/s
+        World axes; the shorter way round.
+    """
+    lx, ly, lz = into_body(rotation, lx, ly, lz)
+    wx, wy, wz = product(inverse, lx, ly, lz)
+    parts = int(min(dt * math.sqrt(wx * wx + wy * wy + wz * wz) / LARGEST_TURN, 1000.0)) + 1
+    qw, qx, qy, qz = 1.0, 0.0, 0.0, 0.0  # the turn so far
+    for _ in range(parts):
+        jx, jy, jz = _half_turn(lx, ly, lz, dt / parts, inverse)
+        lx, ly, lz = _turned_back(lx, ly, lz, jx, jy, jz)
+        qw, qx, qy, qz = (
+            qw - qx * jx - qy * jy - qz * jz,
+            qx + qw * jx + qy * jz - qz * jy,
+            qy + qw * jy + qz * jx - qx * jz,
+            qz + qw * jz + qx * jy - qy * jx,
+        )
+    if qw < 0.0:
+        qw, qx, qy, qz = -qw, -qx, -qy, -qz
+    sine = math.sqrt(qx * qx + qy * qy + qz * qz)
+    pace = 2.0 / (qw * dt) if sine < 1e-8 * qw else 2.0 * math.atan2(sine, qw) / (sine * dt)
+    return product(rotation, pace * qx, pace * qy, pace * qz)
+
+
+@kernel
+def spin_of(rotation, inverse, lx, ly, lz):
+    """Angular velocity (rad/s) of a body whose angular momentum is `l` (kg·m²/s), both in world axes."""
+    bx, by, bz = into_body(rotation, lx, ly, lz)
+    wx, wy, wz = product(inverse, bx, by, bz)
+    return product(rotation, wx, wy, wz)

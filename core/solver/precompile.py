@@ -1,0 +1,167 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Compile the solver before it is needed: a tiny scene is solved once, and numba keeps what it compiled.
+
+That takes a minute, once for each version. Beside Blender's window a process of its own does it (:func:`main`), since a thread
+would share the interpreter with the window, and could not be stopped when Blender closes.
+"""
+
+from __future__ import annotations
+
+import importlib.metadata
+import json
+import os
+import platform
+import sys
+import threading
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ..compiled.kernel_fingerprint import edition
+
+if TYPE_CHECKING:
+    from ..model.scenario import Scenario
+
+Report = Callable[[int, int], None]
+
+_lock = threading.Lock()
+_done = False
+
+
+def folder() -> Path:
+    """Return where numba keeps what it compiles: what ``NUMBA_CACHE_DIR`` says, otherwise beside the source."""
+    chosen = os.environ.get("NUMBA_CACHE_DIR")
+    return Path(chosen) if chosen else Path(__file__).parent / "__pycache__"
+
+
+def stamp() -> Path:
+    """Return the file that says that these kernels were compiled, by this numba for this Python and processor."""
+    python = f"{sys.implementation.cache_tag}-{platform.machine()}"
+    return folder() / f"palpate-{edition()}-numba-{_numba()}-{python}.compiled"
+
+
+@cache
+def _numba() -> str:
+    return importlib.metadata.version("numba")
+
+
+def is_needed() -> bool:
+    """Whether the solver's first run would have to wait for the compiler. Imports nothing heavy."""
+    if _done or os.environ.get("PALPATE_NUMBA", "1") == "0":
+        return False
+    try:
+        return not stamp().is_file()
+    except importlib.metadata.PackageNotFoundError:  # in plain Python nothing is compiled
+        return False
+
+
+def warm(report: Report = lambda done, total: None) -> None:
+    """Compile everything that the solver needs, and note that it is done.
+
+    Parameters
+    ----------
+    report : callable(done, total)
+        Called now and then, from another thread, with how many functions are compiled.
+    """
+    global _done
+    with _lock:
+        if _done:
+            return
+        from ..compiled.kernels import KERNELS
+
+        with _Watch(lambda: report(sum(bool(kernel.signatures) for kernel in list(KERNELS)), max(1, len(KERNELS)))):
+            _solve()
+        _done = True
+        with suppress(OSError):  # in a folder that must not be written to numba chooses another, and we ask anew next time
+            folder().mkdir(parents=True, exist_ok=True)
+            stamp().touch()
+
+
+def warm_aloud() -> None:
+    """Do as :func:`warm` where that is needed, with a line on stderr, for work without a window."""
+    if is_needed():
+        print("Palpate is preparing its solver (first use only), which takes about a minute …", file=sys.stderr, flush=True)
+        warm()
+
+
+class _Watch:
+    """Does something twice a second meanwhile."""
+
+    def __init__(self, look: Callable[[], None]):
+        self._look, self._over = look, threading.Event()
+        self._thread = threading.Thread(target=self._watch, name="palpate compiling", daemon=True)
+
+    def __enter__(self) -> None:
+        self._thread.start()
+
+    def __exit__(self, *_: object) -> None:
+        self._over.set()
+        self._thread.join()
+
+    def _watch(self) -> None:
+        while not self._over.wait(0.5):
+            self._look()
+
+
+def _solve() -> None:
+    """Solve a frame of a scene that goes through every kernel, alone and with a helper."""
+    from .simulation import Simulation
+
+    for threads in (1, 2):
+        Simulation(scenario(), threads).advance()
+
+
+def warm_laws() -> None:
+    """Compile the law of every form of every effect."""
+    from ..effects.engine.registry import effect, library
+    from .simulation import Simulation
+
+    plain = scenario()
+    for name, kind in library().items():
+        for form in kind.forms:
+            sensor = replace(plain.sensors[0], effects=(effect(name, form.name),))
+            Simulation(replace(plain, sensors=(sensor,)), 1).observe()
+
+
+def scenario() -> Scenario:
+    """Return a small box that falls on a pad of four texels, for one frame of 10 ms."""
+    import numpy as np
+
+    from ..geometry.mesh import TriangleMesh
+    from ..geometry.texels import texels_from_region
+    from ..model.scenario import Body, Motion, Scenario, Sensor, Target
+
+    corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], dtype=float)
+    quads = np.array([[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]])
+    box = TriangleMesh(0.01 * (corners - 0.5), np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]]))
+    sheet = 0.002 * (corners[[0, 4, 2, 6]] - 0.5) * [1.0, 1.0, 0.0]
+    pad = TriangleMesh(sheet, np.array([[0, 1, 3], [0, 3, 2]]), np.array([[0, 1, 3, 2]]))
+    return Scenario(
+        bodies=(
+            Body("pad", Motion.at_rest()),
+            Body("box", Motion.at_rest([0.0, 0.0, 0.0049]), True, 0.001, np.zeros(3), 1e-8 * np.eye(3)),
+        ),
+        sensors=(Sensor("pad", 0, texels_from_region(pad, np.ones(4, bool), "pad")),),
+        targets=(Target("box", 1, box),),
+        frame_end=2,
+        fps=100.0,
+    )
+
+
+def _end_with_parent() -> None:
+    """Leave when whoever started us is gone: then the pipe on stdin is closed, however it went."""
+    sys.stdin.buffer.read()
+    os._exit(1)
+
+
+def main() -> None:
+    """Compile in a process of its own; a line of JSON on stdout twice a second says how far it is.
+
+    When that is noted as done, the laws of effects follow, which take a second each when they are first used.
+    """
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+    warm(lambda done, total: print(json.dumps({"done": done, "total": total}), flush=True))
+    warm_laws()

@@ -1,0 +1,122 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How long a substep may be, and why."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..model.scenario import HUNT_CROSSLEY, Scenario, Sensor
+
+SHARE_OF_LIMIT = 0.2
+"""Share of the explicit stability limit that is used: about thirty steps per period of the stiffest contact."""
+LONGEST = 1e-3
+"""Longest step that is advised (s), so that fast motions are followed where nothing is stiff."""
+SHORTEST = 1e-6
+"""Shortest step that is advised (s); the solver stays bounded at any step, shorter ones only cost time."""
+
+
+@dataclass(frozen=True)
+class Advice:
+    """A step size with its reason.
+
+    Attributes
+    ----------
+    dt : float, seconds
+    limit : float, seconds
+        Above this an explicit penalty method would be unstable; infinite when no body is free.
+    reason : str
+        One sentence for the user.
+    """
+
+    dt: float
+    limit: float
+    reason: str
+
+
+def stability_limit(stiffness: float, damping: float, mass: float) -> float:
+    """Longest stable step of symplectic Euler on ``m ẍ + c ẋ + k x = 0``, seconds.
+
+    The recursion ``v += dt (-k x - c v) / m; x += dt v`` has its eigenvalues on the unit circle's inside while
+    ``k dt² + 2 c dt < 4 m``.
+    """
+    return 4.0 * mass / (damping + math.sqrt(damping * damping + 4.0 * stiffness * mass))
+
+
+def advise(scenario: Scenario) -> Advice:
+    """Choose a substep for a scenario.
+
+    The limit is that of each free or driven body against every texel that could touch it at once.
+    """
+    limit, culprit = math.inf, ""
+    for i, body in enumerate(scenario.bodies):
+        if not body.moved_by_forces:
+            continue
+        stiffness = damping = 0.0
+        for sensor in scenario.sensors:
+            pressed_by = any(target.body == i for target in scenario.targets) and sensor.body != i
+            if sensor.body == i or pressed_by:
+                k, c = _tangent_or_normal(sensor)
+                stiffness += k
+                damping += c
+        if stiffness > 0:
+            found = stability_limit(stiffness, damping, body.mass)
+            if found < limit:
+                limit, culprit = found, body.name
+    if math.isinf(limit):
+        return Advice(
+            LONGEST,
+            limit,
+            f"{LONGEST * 1e3:g} ms: nothing that forces move touches a sensor, only the motion has to be followed.",
+        )
+    dt = float(np.clip(SHARE_OF_LIMIT * limit, SHORTEST, LONGEST))
+    return Advice(
+        dt,
+        limit,
+        f"{dt * 1e3:.3g} ms: {SHARE_OF_LIMIT:.0%} of the explicit stability limit of '{culprit}' ({limit * 1e3:.3g} ms)"
+        + (", the longest that is advised." if dt == LONGEST else "."),
+    )
+
+
+@dataclass(frozen=True)
+class Plan:
+    """The step that a run takes: a whole number of them makes a frame.
+
+    Attributes
+    ----------
+    dt : float, seconds
+    substeps : int
+        In each frame.
+    reason : str
+        One or two sentences for the user: what was chosen or set, and what was advised and why.
+    """
+
+    dt: float
+    substeps: int
+    reason: str
+
+
+def plan(scenario: Scenario) -> Plan:
+    """Return the step of a run: the advised one, or the longest that the scenario allows where that is set."""
+    advice = advise(scenario)
+    longest = advice.dt if scenario.dt is None else scenario.dt
+    substeps = max(1, math.ceil(1.0 / (scenario.fps * longest) - 1e-9))
+    dt = 1.0 / (scenario.fps * substeps)
+    number = f"{substeps} to a frame" if substeps > 1 else "one to a frame"
+    if scenario.dt is None:
+        return Plan(dt, substeps, f"Steps of {dt * 1e3:.3g} ms, {number}. Advised are {advice.reason}")
+    beyond = " Longer ones stay bounded, but follow the motion less exactly." if dt > 1.001 * advice.dt else ""
+    return Plan(dt, substeps, f"Steps of {dt * 1e3:.3g} ms, {number}, as set. Advised are {advice.reason}{beyond}")
+
+
+def _tangent_or_normal(sensor: Sensor) -> tuple[float, float]:
+    """Stiffness and damping of all texels together, in the direction in which they are stiffer."""
+    p, factor = sensor.parameters, np.ones(len(sensor.texels)) if sensor.painted.k is None else sensor.painted.k
+    k, cn = p.k, p.cn
+    if p.normal_law == HUNT_CROSSLEY:  # where it is stiffest: pressed in as far as it acts
+        k = p.k * p.exponent * p.max_penetration ** (p.exponent - 1.0)
+        cn = 1.5 * p.dissipation * p.k * p.max_penetration**p.exponent
+    stiffness, damping = np.maximum(factor * k, p.sigma0), np.maximum(factor * cn, p.sigma1 + p.ct)
+    return float(stiffness.sum()), float(damping.sum())
