@@ -103,8 +103,7 @@ def sample_bake_and_solve(name: str) -> tuple[float, float]:
 
 
 def _in_turn(scene, rounds: int) -> tuple[float, float]:
-    from palpate.addon.bake.bake import bake_files
-    from palpate.addon.bake.bake.bake import bake
+    from palpate.addon.bake.bake import bake, bake_files
     from palpate.core.jobs.job_runner import drive
     from palpate.core.solver.simulation import run
 

@@ -153,7 +153,7 @@ def examine(kind: str, number: int, compare: bool = False) -> dict[str, Any]:
 def score(case: cases.Case, result: Any) -> dict[str, Any]:
     """Return what was said of a case and how right it is."""
     from palpate.core.gap.fitting.intervals import numbers
-    from palpate.core.gap.report.summary.amended_sensor import next_experiment, normalised
+    from palpate.core.gap.report.amended_sensor import next_experiment, normalised
 
     model = normalised(result)
     sure = [named.name for named in result.named if named.confidence >= SURE]

@@ -55,8 +55,8 @@ def run() -> Iterator[dict]:
 
 
 def _found_in(name: str, recording: Recording) -> Iterator[dict]:
-    from palpate.core.gap.report.summary import summary
-    from palpate.core.gap.report.summary.comparison import nrmse
+    from palpate.core.gap.report import summary
+    from palpate.core.gap.report.comparison import nrmse
 
     folder = HOUSE / "build" / "real" / name
     result = _diagnosed(recording, folder)
@@ -81,7 +81,7 @@ def _found_in(name: str, recording: Recording) -> Iterator[dict]:
 
 def _friction(name: str, result: Any) -> Iterator[dict]:
     """What the base model's own friction closes, of the error of a sensor without any: it is in every base, and no effect."""
-    from palpate.core.gap.report.summary.comparison import nrmse, without_friction
+    from palpate.core.gap.report.comparison import nrmse, without_friction
 
     for use, without in (without_friction(result) or {}).items():
         own = nrmse(result.of(use), result.base.model, result.full)
@@ -122,7 +122,7 @@ def _recall(data: Path) -> Iterator[dict]:
 
 
 def _sure(result: Any) -> list[str]:
-    from palpate.core.gap.report.summary.summary import SURE
+    from palpate.core.gap.report.summary import SURE
 
     return [one.name for one in result.named if one.confidence >= SURE]
 

@@ -5,8 +5,8 @@ Who takes part: every object of the scene with a role that the view layer shows.
 with a warning; instances of collections never take part.
 
 Each object is a body of its own, unless it is part of its parent's (:mod:`.attached_objects`). A body's frame has the
-location and rotation of its object; scale and shear go into the vertices. Keyframed bodies, and surfaces that deform, are sampled at every
-frame.
+location and rotation of its object; scale and shear go into the vertices. Keyframed bodies, and surfaces that deform, are
+sampled at every frame.
 """
 
 from __future__ import annotations

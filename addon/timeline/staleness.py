@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Does a bake still show what the scene would give now? Looked at, cheaply, whenever a frame of it is shown.
 
-What is compared: settings, who takes part, scales, and the animation of all that they hang on
-(:mod:`.animation_fingerprint`); the poses of keyframed bodies, and what deforming objects and curves look like, with what was recorded of the frame that is shown; and the
-objects' own meshes and regions when Blender has reported a change of geometry.
+Compared are: settings, participants, scales and the animation of everything they depend on (:mod:`.animation_fingerprint`); the
+poses of keyframed bodies and the shapes of deforming objects and curves against the recording of the frame that is shown; and,
+when Blender has reported a change of geometry, the objects' own meshes and regions.
 """
 
 from __future__ import annotations

@@ -13,8 +13,8 @@ import bpy
 import palpate
 
 palpate.register()
-from palpate.addon.bake.bake import bake_checkpoint  # noqa: E402
-from palpate.addon.bake.bake.bake import bake  # noqa: E402
+from palpate.addon.bake import bake_checkpoint  # noqa: E402
+from palpate.addon.bake.bake import bake  # noqa: E402
 from palpate.core.jobs.job_runner import drive  # noqa: E402
 
 bake_checkpoint.PATIENCE = 0.0

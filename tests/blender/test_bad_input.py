@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from blender_scenes import ball, changes, cube, dump, press, press_and_drop, save
 
-from palpate.addon.bake.bake.bake import bake
+from palpate.addon.bake.bake import bake
 from palpate.addon.scene import scene_reader
 from palpate.addon.session import jobs
 from palpate.core.errors import PalpateError, SceneError

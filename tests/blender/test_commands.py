@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from blender_scenes import press, reopen, save
 
-from palpate.addon.bake.bake.bake import bake
+from palpate.addon.bake.bake import bake
 from palpate.commands import COMMANDS, READY, blender, console, main
 from palpate.commands.bake import report
 from palpate.core.errors import FileError

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from blender_scenes import press, press_and_drop
 
-from palpate.addon.bake.bake.bake import bake
+from palpate.addon.bake.bake import bake
 from palpate.addon.scene import meshes, scene_reader
 from palpate.addon.session import transforms
 from palpate.addon.timeline import playback

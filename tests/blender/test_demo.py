@@ -7,7 +7,7 @@ import bpy
 import numpy as np
 import pytest
 
-from palpate.addon.bake.bake.bake import bake
+from palpate.addon.bake.bake import bake
 from palpate.addon.render.render import render
 from palpate.commands import main
 from palpate.core.errors import SceneError

@@ -7,7 +7,7 @@ import bpy
 import pytest
 from blender_scenes import press, save
 
-from palpate.addon.bake.bake.bake import bake
+from palpate.addon.bake.bake import bake
 from palpate.addon.properties.properties import figure_properties
 from palpate.commands import render
 from palpate.core.errors import ParameterError

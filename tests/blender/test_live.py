@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from blender_scenes import changes, dump, press, press_and_drop, reopen, save
 
-from palpate.addon.bake.bake.bake import bake
+from palpate.addon.bake.bake import bake
 from palpate.addon.display import materials
 from palpate.addon.events import handlers as handlers_of_palpate
 from palpate.addon.session import session_state

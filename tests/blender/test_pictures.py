@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from blender_scenes import changes, dump, press_and_drop, save
 
-from palpate.addon.bake.bake.bake import bake
+from palpate.addon.bake.bake import bake
 from palpate.addon.render.render import figure_export, render, render_setup, video
 from palpate.commands import main
 from palpate.core.errors import FileError, ParameterError, SceneError

@@ -135,7 +135,7 @@ def test_a_material_or_face_set_becomes_the_region(source):
 
 
 def test_a_region_by_material_survives_its_own_heat_map(tmp_path):
-    from palpate.addon.bake.bake.bake import bake
+    from palpate.addon.bake.bake import bake
     from palpate.core.jobs.job_runner import drive
 
     scene, pad, _ = press(3)

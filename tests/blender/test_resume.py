@@ -12,8 +12,7 @@ from pathlib import Path
 import pytest
 from blender_scenes import press_and_drop, save
 
-from palpate.addon.bake.bake import bake_checkpoint, bake_files, folder_lock
-from palpate.addon.bake.bake.bake import bake
+from palpate.addon.bake.bake import bake, bake_checkpoint, bake_files, folder_lock
 from palpate.addon.session import jobs
 from palpate.core.errors import FileError
 from palpate.core.io.npz import load_recording

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from blender_scenes import ball, press, press_and_drop, reopen, save
 
-from palpate.addon.bake.bake.bake import bake
+from palpate.addon.bake.bake import bake
 from palpate.addon.timeline import live_cache, playback
 from palpate.core.jobs.job_runner import drive
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from blender_scenes import ball, save
 
-from palpate.addon.bake.bake.bake import bake
+from palpate.addon.bake.bake import bake
 from palpate.addon.display import materials
 from palpate.addon.scene import scene_reader, uv_layouts
 from palpate.addon.timeline import playback

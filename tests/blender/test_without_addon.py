@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from blender_scenes import cube, press_and_drop, save
 
-from palpate.addon.bake.bake.bake import bake
+from palpate.addon.bake.bake import bake
 from palpate.core.figures import color_maps
 from palpate.core.jobs.job_runner import drive
 from palpate.core.response import metrics

@@ -9,7 +9,7 @@ import pytest
 from recordings import COLUMNS, PITCH, ROWS, grid_texels, recording_of, round_texels
 
 from palpate.core.errors import FileError, ParameterError, SensorError
-from palpate.core.figures import figure_style
+from palpate.core.figures import figure_style, tactile_image
 from palpate.core.figures.picture_labels import Label, label_picture
 from palpate.core.figures.recording_style import Look
 from palpate.core.figures.side_by_side import side_by_side
@@ -185,7 +185,7 @@ def test_a_closed_sensor_is_shown_from_the_side_that_bears(tmp_path, monkeypatch
     mesh, arrows = axes.collections
     seen = np.unique(mesh._triangulation.triangles)
     assert (texels.normal[seen] @ [1.0, 0.0, 0.0] > -0.35).all() and loaded[seen].sum() == loaded.sum()
-    view = figures.images.View.of(texels, felt.normal_force.sum(axis=0))
+    view = tactile_image.View.of(texels, felt.normal_force.sum(axis=0))
     expected = np.array([0.0, 0.0, 1.0]) @ view.axes.T
     mean = np.array([arrows.U.mean(), arrows.V.mean()])
     np.testing.assert_allclose(mean / np.linalg.norm(mean), expected, atol=0.05)
@@ -267,7 +267,7 @@ def test_importing_figures_does_not_import_matplotlib():
 
 def test_figures_leave_pyplot_alone(tmp_path):
     code = (
-        "import sys; from palpate.core import canvas; canvas.save_figure(canvas.new_figure(1, 1), sys.argv[1], 50);"
+        "import sys; from palpate.core.figures import figure_style as f; f.save_figure(f.new_figure(1, 1), sys.argv[1], 50);"
         "sys.exit('matplotlib.pyplot' in sys.modules)"
     )
     assert subprocess.run([sys.executable, "-c", code, str(tmp_path / "a.png")]).returncode == 0

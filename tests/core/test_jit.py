@@ -40,7 +40,7 @@ def total(outer):
 
 CALLER = """
 from .callee import value
-from .jit import kernel
+from .kernels import kernel
 
 @kernel
 def twice():
@@ -50,7 +50,7 @@ if __name__ == "__main__":
     print(twice(), sum(twice.stats.cache_hits.values()))
 """
 CALLEE = """
-from .jit import kernel
+from .kernels import kernel
 
 @kernel
 def value():

@@ -8,8 +8,8 @@ import numpy as np
 from palpate.core.gap.dataset.rig import Rig, Trial, grid_texels
 from palpate.core.gap.forward.contact_phases import WAYS, features
 from palpate.core.gap.forward.predictor import Model, Predictor
-from palpate.core.gap.report.summary import summary
-from palpate.core.gap.report.summary.comparison import nrmse, without_friction
+from palpate.core.gap.report import summary
+from palpate.core.gap.report.comparison import nrmse, without_friction
 from palpate.core.gap.selection.diagnosis import diagnose
 from palpate.core.model.scenario import SensorParameters
 

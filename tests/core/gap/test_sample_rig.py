@@ -6,7 +6,7 @@ import sample_rig
 
 from palpate.core.gap.dataset.rig import read_rig
 from palpate.core.gap.fitting.intervals import numbers
-from palpate.core.gap.report.summary.summary import summary
+from palpate.core.gap.report.summary import summary
 from palpate.core.gap.selection.diagnosis import diagnose
 
 

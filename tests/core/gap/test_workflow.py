@@ -18,9 +18,9 @@ from palpate.core.gap.fitting.least_squares import Free, Share, base_numbers, fi
 from palpate.core.gap.fitting.noise_floor import reading_noise
 from palpate.core.gap.fitting.residual_tests import structure_of
 from palpate.core.gap.forward.predictor import Model, Predictor
-from palpate.core.gap.report.summary import summary
-from palpate.core.gap.report.summary.amended_sensor import next_experiment
-from palpate.core.gap.report.summary.comparison import nrmse
+from palpate.core.gap.report import summary
+from palpate.core.gap.report.amended_sensor import next_experiment
+from palpate.core.gap.report.comparison import nrmse
 from palpate.core.gap.selection.diagnosis import Diagnosis, diagnose
 from palpate.core.io.sensor_toml import read_sensor
 
