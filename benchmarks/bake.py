@@ -103,7 +103,8 @@ def sample_bake_and_solve(name: str) -> tuple[float, float]:
 
 
 def _in_turn(scene, rounds: int) -> tuple[float, float]:
-    from palpate.addon.bake.bake import bake, bake_files
+    from palpate.addon.bake import bake_files
+    from palpate.addon.bake.bake import bake
     from palpate.core.jobs.job_runner import drive
     from palpate.core.solver.simulation import run
 

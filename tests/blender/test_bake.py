@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from blender_scenes import changes, cube, dump, grid, press, press_and_drop, reopen, save
 
-from palpate.addon.bake.bake import bake, bake_files
+from palpate.addon.bake import bake_files
+from palpate.addon.bake.bake import bake
 from palpate.addon.display import heat_map, marker_meshes, materials
 from palpate.addon.scene import scene_reader
 from palpate.addon.session import fcurves, jobs, transforms

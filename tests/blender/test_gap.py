@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from blender_scenes import grid
 
-from palpate.addon.measured.gap_results import gap_results
+from palpate.addon.measured import gap_results
 from palpate.addon.session import jobs
 from palpate.commands import main
 from palpate.core.errors import SceneError

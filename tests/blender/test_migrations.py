@@ -4,7 +4,7 @@
 import bpy
 from blender_scenes import press, reopen, save
 
-from palpate.addon.properties.properties import migrations
+from palpate.addon.properties import migrations
 from palpate.addon.session import session_state
 from palpate.core.io.settings_migration import VERSION
 

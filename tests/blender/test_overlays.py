@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from blender_scenes import changes, cube, dump, press_and_drop, save
 
-from palpate.addon.bake.bake import bake, scene_writer
+from palpate.addon.bake import scene_writer
+from palpate.addon.bake.bake import bake
 from palpate.addon.display import bake_display, markers, materials, texel_arrows
 from palpate.addon.scene import scene_reader
 from palpate.addon.session import transforms

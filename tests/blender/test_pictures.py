@@ -11,7 +11,7 @@ import pytest
 from blender_scenes import changes, dump, press_and_drop, save
 
 from palpate.addon.bake.bake import bake
-from palpate.addon.render.render import figure_export, render, render_setup, video
+from palpate.addon.render import figure_export, render, render_setup, video
 from palpate.commands import main
 from palpate.core.errors import FileError, ParameterError, SceneError
 from palpate.core.figures.recording_style import Look

@@ -13,7 +13,7 @@ import time
 import bpy
 import pytest
 
-from palpate.addon.bake.bake import bake as baking
+from palpate.addon.bake import bake as baking
 from palpate.addon.session import dependencies, first_use
 from palpate.addon.timeline import playback
 from palpate.core.jobs.job_runner import drive

@@ -10,7 +10,7 @@ import bpy
 import pytest
 
 import palpate
-from palpate.addon.properties.properties import properties
+from palpate.addon.properties import properties
 
 
 def kinds_of(base):

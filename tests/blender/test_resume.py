@@ -12,7 +12,8 @@ from pathlib import Path
 import pytest
 from blender_scenes import press_and_drop, save
 
-from palpate.addon.bake.bake import bake, bake_checkpoint, bake_files, folder_lock
+from palpate.addon.bake import bake_checkpoint, bake_files, folder_lock
+from palpate.addon.bake.bake import bake
 from palpate.addon.session import jobs
 from palpate.core.errors import FileError
 from palpate.core.io.npz import load_recording
