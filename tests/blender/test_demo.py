@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from palpate.addon.bake.bake import bake
-from palpate.addon.render.render import render
+from palpate.addon.render import render
 from palpate.commands import main
 from palpate.core.errors import SceneError
 from palpate.core.io.npz import load_recording

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from blender_scenes import cube, grid, save
 
-from palpate.addon.bake.bake import bake
+from palpate.addon.bake import bake
 from palpate.addon.scene import scene_reader
 from palpate.addon.timeline import playback
 from palpate.core.errors import SceneError

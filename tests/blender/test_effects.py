@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from blender_scenes import grid, press, reopen, save
 
-from palpate.addon.bake.bake import bake
+from palpate.addon.bake import bake
 from palpate.addon.properties.properties import effect_stack
 from palpate.addon.scene import scene_reader
 from palpate.addon.timeline import live_cache, playback, staleness

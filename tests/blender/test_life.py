@@ -8,7 +8,7 @@ import pytest
 from blender_scenes import ball, grid, press, reopen, save, select
 
 from palpate.addon.authoring import sensor_report
-from palpate.addon.bake.bake import bake
+from palpate.addon.bake import bake
 from palpate.addon.scene import scene_reader
 from palpate.addon.session import identity, transforms
 from palpate.commands import main

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from blender_scenes import ball, cube, grid
 
-from palpate.addon.bake.bake import bake
+from palpate.addon.bake import bake
 from palpate.addon.scene import scene_reader
 from palpate.core.errors import SceneError
 from palpate.core.jobs.job_runner import drive

@@ -138,7 +138,7 @@ def test_without_a_window_it_is_compiled_in_place_with_a_line_on_stderr(monkeypa
 def test_the_process_loads_the_package_by_its_name_in_blender_and_ends_with_blender(tmp_path):
     """Kernels that were kept under another name could not be read."""
     code = (
-        f"import sys; sys.path[:0] = [{os.path.dirname(precompile_process.__file__)!r}]; import compile_beside as c; "
+        f"import sys; sys.path[:0] = [{os.path.dirname(precompile_process.__file__)!r}]; import precompile_process as c; "
         "c.load('bl_ext.user_default.palpate'); import bl_ext.user_default.palpate.core.solver.precompile as w; "
         "print(w.__name__, 'numba' in sys.modules, flush=True); import threading; "
         "threading.Thread(target=w._end_with_parent).start()"

@@ -16,7 +16,7 @@ def addon(name):
 
 
 def texels():
-    report = addon("preview").now(pad(), bpy.context.scene)
+    report = addon("authoring.sensor_report").now(pad(), bpy.context.scene)
     return len(report.texels) if report.texels is not None else 0
 
 
@@ -51,7 +51,7 @@ def felt(ui, frame):
     """Go to the start and to a frame; return what the sensor feels there."""
     yield from timeline(ui, "frame_current", 1)
     yield from timeline(ui, "frame_current", frame)
-    live = addon("live")
+    live = addon("timeline.playback")
 
     def known():
         status = live.status(bpy.context.scene)
@@ -115,14 +115,14 @@ def road(ui):
         bpy.ops.palpate.probe_add()
         bpy.context.view_layer.objects.active = pad()
         pad().select_set(True)
-    preparing = addon("preparing")
+    preparing = addon("session.first_use")
     yield from ui.wait_until(preparing.is_ready, "the solver is ready", timeout=900)
     stiff = yield from felt(ui, 20)
     ui.value("before", float(stiff.normal_force.sum()))
     with ui.context(view):
         pad().vertex_groups.new(name="Soft")
         bpy.ops.object.mode_set(mode="WEIGHT_PAINT")
-        addon("sensors").set_brush(bpy.context.scene.tool_settings)
+        addon("authoring.sensors").set_brush(bpy.context.scene.tool_settings)
     yield 1.0
     x, y = ui.at((0.0, 0.0, 0.0))
     for dy in (20, -10):
