@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from ..core.errors import SceneError
-from ..core.io.files import writable_folder
+from ..core.io.file_writing import writable_folder
 from ..core.jobs.job_runner import drive
 from ..core.response.metrics import net_shear
 from . import blender, console

@@ -87,7 +87,7 @@ def save_blend(path: str | os.PathLike, backup: bool = True) -> None:
     """
     import bpy
 
-    from ..core.io.files import writable_folder
+    from ..core.io.file_writing import writable_folder
 
     path = Path(path).absolute()
     writable_folder(path.parent)

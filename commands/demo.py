@@ -9,11 +9,11 @@ from pathlib import Path
 
 import numpy as np
 
+from ..core.figures.figure_style import FigureStyle
 from ..core.figures.picture_labels import Label, label_picture
-from ..core.figures.recording_style import Look
 from ..core.figures.tactile_strip import tactile_strip
 from ..core.figures.time_curves import force_curves
-from ..core.io.files import remove_leftovers, writable_folder
+from ..core.io.file_writing import remove_leftovers, writable_folder
 from ..core.response import metrics
 from . import blender, console
 from .bake import bake_with_bar, report
@@ -58,7 +58,7 @@ def run(arguments: argparse.Namespace) -> int:
     recording = baked.recording
     sensors = {sensor.name: sensor for sensor in baked.scenario.sensors if sensor.readout}
     texels = {name: sensor.texels for name, sensor in sensors.items()}
-    look = Look(scene.palpate.color_map, limit=demo.RANGE, dpi=200)
+    look = FigureStyle(scene.palpate.color_map, limit=demo.RANGE, dpi=200)
     required = demo.CUBE_MASS * float(np.linalg.norm(baked.scenario.gravity))
 
     strip, curves, picture = folder / "tactile-strip.png", folder / "forces.png", folder / "scene.png"
@@ -103,7 +103,7 @@ def _picture(scene, path: Path, recording, sensors, texels, arguments, look) -> 
         scene.frame_set(demo.PICTURE_FRAME)
         labels = _labels(scene, recording, sensors, demo)
         bar.update()
-    label_picture(path, path, recording, texels, demo.PICTURE_FRAME, labels=labels, look=look)
+    label_picture(path, path, recording, texels, demo.PICTURE_FRAME, labels=labels, style=look)
 
 
 def _labels(scene, recording, sensors, demo) -> list[Label]:
@@ -131,7 +131,7 @@ def _slide(recording, sensor) -> str:
     felt, mu = recording.sensors[sensor.name], sensor.parameters
     normal = felt.normal_force.sum(axis=1)
     shear = np.linalg.norm(metrics.net_shear(felt, sensor.texels), axis=1)
-    share = metrics.mobilised(felt, sensor.texels, mu.mus)
+    share = metrics.mobilised_friction(felt, sensor.texels, mu.mus)
     slipping = metrics.slipping(felt, mu)
     rows = [("frame", "time", "normal", "shear", "shear / µs·normal", "texels slipping")]
     touching = np.flatnonzero(normal > 0)

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import argparse
 
-from ..core.figures.recording_style import Look
+from ..core.figures.figure_style import FigureStyle
 from ..core.io.bake_reader import Bake, read_bake
 from ..core.io.export import KINDS, export
 from ..core.jobs.job_runner import drive
@@ -25,8 +25,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     bake = find_bake(arguments.bake)
     if arguments.sensor:
-        bake = bake.only(arguments.sensor)
-    look: Look = looks.of(arguments)
+        bake = bake.select(arguments.sensor)
+    look: FigureStyle = looks.of(arguments)
     with console.progress_bar("export", len(bake.texels), unit="sensor") as bar:
 
         def show(name: str) -> None:

@@ -7,7 +7,7 @@ import argparse
 from pathlib import Path
 
 from ..core.errors import SceneError
-from ..core.io.files import writable_folder
+from ..core.io.file_writing import writable_folder
 from . import console
 
 

@@ -6,8 +6,7 @@ from __future__ import annotations
 import argparse
 
 from ..core.figures import color_maps
-from ..core.figures.figure_style import WIDTHS
-from ..core.figures.recording_style import Look
+from ..core.figures.figure_style import WIDTHS, FigureStyle
 
 OPTIONS = ("colour_map", "quantity", "limit", "width", "dpi")
 
@@ -23,9 +22,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--dpi", metavar="N", type=int, help="of PNG figures (default: 300)")
 
 
-def of(arguments: argparse.Namespace, **others) -> Look:
+def of(arguments: argparse.Namespace, **others) -> FigureStyle:
     """Return the look that the words ask for; `others` are what else than the usual is meant where they say nothing."""
     given = {key: value for key in OPTIONS if (value := getattr(arguments, key)) is not None}
     if "colour_map" in given:
         given["colour_map"] = given["colour_map"].upper()
-    return Look(**{**others, **given})
+    return FigureStyle(**{**others, **given})

@@ -7,7 +7,7 @@ import argparse
 import time
 
 from ..core.errors import ParameterError
-from ..core.io.files import writable_folder
+from ..core.io.file_writing import writable_folder
 from . import blender, console
 
 MARKS = {True: "ok", False: "OFF", None: ""}

@@ -5,8 +5,8 @@ from __future__ import annotations
 
 import argparse
 
-from ..core.figures.figure_style import KINDS as FORMATS
-from ..core.io.files import remove_leftovers, writable_folder
+from ..core.figures.figure_canvas import FILE_TYPES as FORMATS
+from ..core.io.file_writing import remove_leftovers, writable_folder
 from ..core.jobs.job_runner import drive
 from . import blender, console, looks
 

@@ -128,7 +128,7 @@ class PALPATE_OT_gap_report(support.Reporting, bpy.types.Operator):
 
     def run(self, context):
         from ..core.gap.report import summary
-        from ..core.io.files import writable_folder
+        from ..core.io.file_writing import writable_folder
 
         folder = writable_folder(bpy.path.abspath(self.directory), create=True)
         for _ in summary.write(gap_results.of(context.object).diagnosis, folder):

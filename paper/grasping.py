@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..core.figures.recording_style import Look
+from ..core.figures.figure_style import FigureStyle
 from ..core.figures.tactile_strip import tactile_strip
 from ..core.figures.texel_numbers import texel_numbers
 from ..core.figures.time_curves import time_curves
@@ -21,7 +21,7 @@ from ..sample_blends import grasps, gripper, hand, pick_and_place
 from . import bench
 from .chapter import Chapter, Picture, Row, below, compare
 
-LOOK = Look(colour_map="PAPER", width="single")
+LOOK = FigureStyle(colour_map="PAPER", width="single")
 """White is no force, black the largest, as in the paper."""
 HOLD, LAST = 60.0, 10.0
 """Seconds that an object is held, and how many of them at the end it must not move in."""

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from html import escape
 from pathlib import Path
 
-from ..core.io.files import atomic_write
+from ..core.io.file_writing import atomic_write
 from .chapter import Chapter, Picture, Row
 
 STYLE = """

@@ -10,7 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ..core.figures.figure_style import GREY, INK, NORMAL_COLOUR, new_figure, save_figure
+from ..core.figures.figure_canvas import new_figure, save_figure
+from ..core.figures.figure_style import GREY, INK, NORMAL_COLOUR
 from ..core.model.scenario import Scenario
 from ..core.solver.simulation import run
 from ..sample_blends import tilt, weighing

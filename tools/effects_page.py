@@ -94,7 +94,7 @@ ROOM = {"creep": 2.3, "lag": 1.6, "wear": 1.4}
 def picture(path: Path) -> None:
     """Draw each effect in the experiment that shows it best."""
     from palpate.core.effects.engine.registry import library
-    from palpate.core.figures.figure_style import new_figure, save_figure
+    from palpate.core.figures.figure_canvas import new_figure, save_figure
 
     figure = new_figure(10.0, 11.6)
     grid = figure.subplots(5, 4)
@@ -117,7 +117,8 @@ def _setting():
 def _curves(axes, kind, x, base, of_form, xlabel, ylabel, **values):
     """Grey the base, in colour what each form makes of it; `values` by form name go beyond the defaults."""
     from palpate.core.effects.engine.registry import effect
-    from palpate.core.figures.figure_style import GREY, SERIES, tidy_axes
+    from palpate.core.figures.figure_canvas import tidy_axes
+    from palpate.core.figures.figure_style import GREY, SERIES
 
     if base is not None:
         axes.plot(x, base, color=GREY, lw=1.0, label="_")

@@ -34,7 +34,8 @@ def curves(path: Path) -> None:
 def rest(data: Path, path: Path) -> None:
     """What each texel of the insole reads without pressure and under the largest, in the first recording."""
     from palpate.benchmarks._recordings import insole
-    from palpate.core.figures.figure_style import GREY, INK, NORMAL_COLOUR, SHEAR_COLOUR, new_figure, save_figure, tidy_axes
+    from palpate.core.figures.figure_canvas import new_figure, save_figure, tidy_axes
+    from palpate.core.figures.figure_style import GREY, INK, NORMAL_COLOUR, SHEAR_COLOUR
 
     _, _, columns = insole(data, cleaned=False).trials[0]
     counts = np.stack([value for key, value in columns.items() if key.startswith("texel_")])

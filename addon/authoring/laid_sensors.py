@@ -17,7 +17,14 @@ import numpy as np
 from ...core.errors import SensorError
 from ...core.geometry.mesh import TriangleMesh, checked_mesh, vertex_normals
 from ...core.geometry.sampling.poisson_disk import scatter
-from ...core.geometry.sampling.texel_arrays import Skin, fill, middle_of, pad, shifted, wrap
+from ...core.geometry.sampling.texel_arrays import (
+    TexelMesh,
+    filled_region,
+    pad_array,
+    region_middle,
+    shifted_pose,
+    wrapped_array,
+)
 from ..scene import meshes, scene_reader
 from ..session import identity, transforms, units
 from . import sensors, surface_binding
@@ -28,7 +35,7 @@ RECIPE = ("method", "rows", "columns", "pitch_x", "pitch_y", "shift_x", "shift_y
 
 def new_pad(context, rows: int, columns: int, pitch: tuple[float, float], radius: float):
     """Return the mesh of a tactile pad; lengths in metres."""
-    return _mesh_of(pad(rows, columns, pitch, radius), "Tactile Pad", 1.0 / units.metres_per_unit(context.scene))
+    return _mesh_of(pad_array(rows, columns, pitch, radius), "Tactile Pad", 1.0 / units.metres_per_unit(context.scene))
 
 
 def lay(context, carrier, source: str, recipe: dict):
@@ -167,7 +174,7 @@ def _chosen(carrier, where: dict) -> np.ndarray:
     return meshes.region_by(carrier, len(carrier.data.vertices), **where)
 
 
-def _compute(context, carrier, chosen: np.ndarray, recipe: dict) -> Skin:
+def _compute(context, carrier, chosen: np.ndarray, recipe: dict) -> TexelMesh:
     """Return the texels in the coordinates of the carrier."""
     depsgraph = scene_reader.depsgraph_of(context.scene)
     arrays, _ = meshes.sensor_arrays(carrier, depsgraph)
@@ -183,29 +190,29 @@ def _compute(context, carrier, chosen: np.ndarray, recipe: dict) -> Skin:
     skin = make(mesh, recipe)
     lifted = skin.vertices + recipe["lift"] * vertex_normals(_triangulated(skin))
     faces = [face[::-1] for face in skin.faces] if mirrored else skin.faces
-    return Skin(lifted @ np.linalg.inv(stretch).T, faces)
+    return TexelMesh(lifted @ np.linalg.inv(stretch).T, faces)
 
 
-def make(mesh: TriangleMesh, recipe: dict) -> Skin:
+def make(mesh: TriangleMesh, recipe: dict) -> TexelMesh:
     """Lay texels onto a region as the recipe says."""
     if recipe["method"] == "NOISE":
         return scatter(mesh, recipe["spacing"], recipe["seed"])
     if recipe["method"] == "GRID":
-        return fill(mesh, recipe["spacing"], recipe["angle"])
+        return filled_region(mesh, recipe["spacing"], recipe["angle"])
     if recipe["method"] == "VERTICES":
         used, corners = np.unique(mesh.triangles, return_inverse=True)
-        return Skin(mesh.vertices[used], [tuple(face) for face in corners.reshape(-1, 3).tolist()])
-    middle = shifted(mesh, middle_of(mesh), (recipe["shift_x"], recipe["shift_y"]))
+        return TexelMesh(mesh.vertices[used], [tuple(face) for face in corners.reshape(-1, 3).tolist()])
+    middle = shifted_pose(mesh, region_middle(mesh), (recipe["shift_x"], recipe["shift_y"]))
     pitch = recipe["pitch_x"], recipe["pitch_y"]
-    return wrap(mesh, recipe["rows"], recipe["columns"], pitch, middle, recipe["angle"])
+    return wrapped_array(mesh, recipe["rows"], recipe["columns"], pitch, middle, recipe["angle"])
 
 
-def _triangulated(skin: Skin) -> TriangleMesh:
+def _triangulated(skin: TexelMesh) -> TriangleMesh:
     triangles = [(face[0], face[i], face[i + 1]) for face in skin.faces for i in range(1, len(face) - 1)]
     return TriangleMesh(skin.vertices, np.array(triangles))
 
 
-def _mesh_of(skin: Skin, name: str, scale: float = 1.0):
+def _mesh_of(skin: TexelMesh, name: str, scale: float = 1.0):
     mesh = bpy.data.meshes.new(name)
     mesh.from_pydata((skin.vertices * scale).tolist(), [], skin.faces)
     mesh.update()

@@ -16,8 +16,9 @@ import numpy as np
 
 from ... import __version__
 from ...core.errors import FileError
-from ...core.io.files import atomic_write
-from ...core.io.npz import DAMAGED, load_recording, save_recording
+from ...core.io.file_writing import atomic_write
+from ...core.io.npz import DAMAGED
+from ...core.io.recording_npz import load_recording, save_recording
 from ...core.model.recording import Frame, Recording
 from ...core.solver import checkpoint
 

@@ -21,17 +21,17 @@ from pathlib import Path
 
 from ... import __version__
 from ...core.errors import FileError
-from ...core.io.files import (
+from ...core.io.bake_folder import (
     MANIFEST_NAME,
     RECORDING_NAME,
     Manifest,
     folder_names,
     frame_file,
     read_manifest,
-    writable_folder,
     write_manifest,
 )
-from ...core.io.npz import load_recording, save_recording
+from ...core.io.file_writing import writable_folder
+from ...core.io.recording_npz import load_recording, save_recording
 from ...core.io.sensor_npz import SENSOR_NAME, save_sensor
 from ...core.io.tactile_exr import describe, write_exrs
 from ...core.model.recording import Frame, Recording
@@ -184,9 +184,9 @@ class Files:
         for name, place in self.folders.items():
             growing = _beside(place, "partial")
             own, sensor = replace(recording, sensors={name: recording.sensors[name]}), self._sensors[name]
-            save_recording(growing / RECORDING_NAME, own, at_once=not SYNCS)
-            save_sensor(growing / SENSOR_NAME, sensor.texels, sensor.painted, at_once=not SYNCS)
-            write_manifest(growing, self._manifest(name, recording), at_once=not SYNCS)
+            save_recording(growing / RECORDING_NAME, own, atomic=not SYNCS)
+            save_sensor(growing / SENSOR_NAME, sensor.texels, sensor.painted, atomic=not SYNCS)
+            write_manifest(growing, self._manifest(name, recording), atomic=not SYNCS)
         self._writer.finish()
         self._writer.stop()
         for place in self.folders.values():

@@ -13,9 +13,9 @@ import bpy
 import numpy as np
 
 from ...core.errors import SceneError
-from ...core.figures.recording_style import Look
+from ...core.figures.figure_style import FigureStyle
+from ...core.io.bake_folder import frame_file
 from ...core.io.bake_reader import Bake, read_sensors
-from ...core.io.files import frame_file
 from ...core.response import metrics
 from ..session import units
 from . import heat_map, markers, materials, texel_arrows
@@ -96,7 +96,7 @@ def _largest(tables) -> float:
 
 
 def heat_range(settings, worn: list[markers.Worn]) -> float:
-    """Return the end of the colours, N or Pa: what is set, or where the colour bars of figures end (:meth:`.Look.top`)."""
+    """Return the end of the colour scale, N or Pa: as set, or as in figures (:meth:`.FigureStyle.scale_limit`)."""
     unit = 1e3 if settings.quantity == "PRESSURE" else 1.0
     if not settings.use_auto_range:
         return fixed_range(settings)
@@ -114,13 +114,13 @@ def shown(settings, normal_force: np.ndarray, texels) -> np.ndarray:
     return metrics.pressure(normal_force, texels) if settings.quantity == "PRESSURE" else normal_force
 
 
-def look_of(scene, **others) -> Look:
+def look_of(scene, **others) -> FigureStyle:
     """Return the look of figures that agree with what the scene shows."""
     own = scene.palpate
     limit = None
     if not own.use_auto_range:
         limit = own.range_max_pressure if own.quantity == "PRESSURE" else own.range_max
-    return Look(**{"colour_map": own.color_map, "quantity": own.quantity.lower(), "limit": limit, **others})
+    return FigureStyle(**{"colour_map": own.color_map, "quantity": own.quantity.lower(), "limit": limit, **others})
 
 
 def dress(scene, worn: list[markers.Worn]) -> None:

@@ -86,7 +86,7 @@ def find(obj):
             yield Progress(f"Finding the gap: {step.stage}", None, step.done, step.total)
     assert diagnosis is not None
     folder, pictures = Path(tempfile.mkdtemp(prefix="gap-", dir=bpy.app.tempdir)), {}
-    from ...core.figures.figure_style import save_figure
+    from ...core.figures.figure_canvas import save_figure
 
     for name in ("curves", "gap", "loops"):
         yield Progress("Drawing", None, 990, 1000)

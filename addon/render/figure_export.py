@@ -13,14 +13,15 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from ...core.errors import ParameterError, SceneError
-from ...core.figures.recording_style import Look
+from ...core.figures.figure_style import FigureStyle
 from ...core.figures.side_by_side import side_by_side
 from ...core.figures.tactile_strip import tactile_strip
 from ...core.figures.texel_numbers import MOST, texel_numbers
 from ...core.figures.time_curves import time_curves
+from ...core.io.bake_folder import folder_names
 from ...core.io.bake_reader import Bake, frame_index, read_sensors
 from ...core.io.export import export
-from ...core.io.files import folder_names, writable_folder
+from ...core.io.file_writing import writable_folder
 from ...core.jobs.job_runner import drive
 from ..bake import scene_writer
 from ..display import bake_display
@@ -40,7 +41,7 @@ class Wish:
     ----------
     kinds : tuple of str
         Of :data:`KINDS`.
-    look : Look
+    look : FigureStyle
     frames : tuple of int
         For scene and numbers; none: the one with the largest force. Two or more are also the strip's columns.
     sensors : tuple of str
@@ -60,7 +61,7 @@ class Wish:
     """
 
     kinds: tuple[str, ...] = ("scene", "strip", "curves", "numbers")
-    look: Look = field(default_factory=Look)
+    look: FigureStyle = field(default_factory=FigureStyle)
     frames: tuple[int, ...] = ()
     sensors: tuple[str, ...] = ()
     formats: tuple[str, ...] = ("png", "pdf")
@@ -114,7 +115,7 @@ def make(scene, folder, wish: Wish) -> Generator[Progress, None, list[Path]]:
     """
     bake = bake_of(scene)
     if wish.sensors:
-        bake = bake.only(wish.sensors)
+        bake = bake.select(wish.sensors)
     place = writable_folder(folder, create=True)
     frames = wish.frames or (_busiest(bake),)
     for number in frames:
@@ -144,7 +145,7 @@ def draw(bake: Bake, place: Path, wish: Wish, frames: Sequence[int]) -> list[Pat
             tactile_strip(place / f"strip.{ending}", *parts, columns, wish.look)
             written.append(place / f"strip.{ending}")
         if "curves" in wish.kinds:
-            time_curves(place / f"curves.{ending}", *parts, bake.parameters, look=wish.look)
+            time_curves(place / f"curves.{ending}", *parts, bake.parameters, style=wish.look)
             written.append(place / f"curves.{ending}")
         if "numbers" in wish.kinds:
             for name, stem in folder_names(bake.texels).items():
@@ -229,6 +230,6 @@ class _Steps:
         return Progress(stage, frame, self.done, self.total)
 
 
-def look_of(scene, **others) -> Look:
+def look_of(scene, **others) -> FigureStyle:
     """Return the look that agrees with what the scene shows."""
     return bake_display.look_of(scene, **others)

@@ -16,7 +16,7 @@ import numpy as np
 from mathutils import Vector
 
 from ...core.errors import FileError, SceneError
-from ...core.io.files import atomic_write
+from ...core.io.file_writing import atomic_write
 
 NEED_GL = {"BLENDER_EEVEE_NEXT", "BLENDER_EEVEE", "BLENDER_WORKBENCH"}
 """Engines that draw with the graphics card, or with Mesa's software in its place."""

@@ -10,7 +10,7 @@ from pathlib import Path
 import bpy
 
 from ...core.errors import FileError, SceneError
-from ...core.io.files import atomic_write
+from ...core.io.file_writing import atomic_write
 
 
 def encode(pictures: Sequence[str | os.PathLike], path: str | os.PathLike, fps: float) -> Path:

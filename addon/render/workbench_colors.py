@@ -13,7 +13,7 @@ import bpy
 import numpy as np
 
 from ...core.figures import color_maps
-from ...core.figures.recording_style import Look
+from ...core.figures.figure_style import FigureStyle
 from ...core.geometry.texels import Texels
 from ...core.io.bake_reader import Bake, frame_index
 from ..display import heat_map, materials
@@ -28,7 +28,7 @@ CLEAR = 0.12
 
 
 @contextmanager
-def painted(places: dict, bake: Bake, look: Look) -> Iterator[Callable[[int], None]]:
+def painted(places: dict, bake: Bake, look: FigureStyle) -> Iterator[Callable[[int], None]]:
     """Put sensors in colours and everything else in its materials' viewport colours, and take them off again.
 
     Parameters
@@ -36,7 +36,7 @@ def painted(places: dict, bake: Bake, look: Look) -> Iterator[Callable[[int], No
     places : dict of Object to Path
         Folder of each sensor's bake.
     bake : Bake
-    look : Look
+    look : FigureStyle
 
     Yields
     ------
@@ -47,7 +47,7 @@ def painted(places: dict, bake: Bake, look: Look) -> Iterator[Callable[[int], No
     worn = {obj: names[place] for obj, place in places.items() if place in names}
     solid = [obj for obj in bpy.context.scene.objects if obj.type == "MESH" and len(obj.data.polygons)]
     before = {obj: (obj.data, tuple(obj.color)) for obj in solid}
-    top = look.top(bake.recording, bake.texels)
+    top = look.scale_limit(bake.recording, bake.texels)
     try:
         plain = {obj: _in_material_colours(obj) for obj in solid}
         looks = {obj: _corners_of_region(obj.data, bake.texels[name]) for obj, name in worn.items()}

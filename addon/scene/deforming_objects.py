@@ -13,7 +13,7 @@ import numpy as np
 
 from ...core.errors import SceneError
 from ...core.geometry.mesh import TriangleMesh
-from ...core.geometry.texels import Follower
+from ...core.geometry.texels import DeformedTexels
 from ...core.model.scenario import Deformation, Scenario, Sensor, Target
 from ..display import heat_map
 from ..session import fcurves, identity
@@ -60,7 +60,7 @@ class Skin:
         From the object's vertices to the body's frame in metres, at the first frame.
     scaled : bool
         Whether those change.
-    follower : Follower or None
+    follower : DeformedTexels or None
         How texels go with the mesh; None for a target.
     """
 
@@ -72,7 +72,7 @@ class Skin:
     linear: np.ndarray
     offset: np.ndarray
     scaled: bool
-    follower: Follower | None
+    follower: DeformedTexels | None
     _last: tuple | None = None
     """What :meth:`at` was asked last, and what it said: most surfaces stay as they are."""
 
@@ -137,7 +137,7 @@ def skin_of(
         with meshes.evaluated(obj, depsgraph) as final:
             if len(final.vertices) != len(mesh.vertices):
                 return None  # texels stand on the mesh without modifiers
-        follower = Follower(part.texels, mesh)
+        follower = DeformedTexels(part.texels, mesh)
     scaled = has_animated_scale(obj)
     return Skin(identity.key(obj), obj.name, part.body, index, len(mesh.vertices), linear, offset, scaled, follower)
 

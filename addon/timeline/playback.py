@@ -302,7 +302,7 @@ def _show_board(scene, frame: Frame) -> None:
     if last is None:
         return
     look = bake_display.look_of(scene)
-    top = look.top(replace(last, sensors=sensors), texels) * (1e3 if look.quantity == "pressure" else 1.0)
+    top = look.scale_limit(replace(last, sensors=sensors), texels) * (1e3 if look.quantity == "pressure" else 1.0)
     loads = {name: felt.normal_force.sum(axis=1) for name, felt in sensors.items()}
     inset.show(scene, inset.board(scene, frame, texels, last.frames.astype(float), loads, top))
 

@@ -1,20 +1,19 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What every figure is drawn on: its colours, text of 8 pt and more at the written size, files that are whole or not there.
-
-matplotlib is imported on use, and only its Agg canvas, so that nothing here needs a window or touches another figure.
-"""
+"""The style that all figures of a recording share: text sizes, colours and their scale, width of the page."""
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
 
 from ..errors import ParameterError
-from ..io.files import atomic_write
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+from ..geometry.texels import Texels
+from ..model.recording import Recording, SensorFrame, SensorRecording
+from ..response import metrics
+from . import color_maps
 
 FONT, SMALL = 8.5, 8.0
 """Sizes of the text, points: nothing is smaller than 8 pt at the size of the written figure."""
@@ -24,66 +23,72 @@ INK, GREY, RULE = "#1c2430", "#68727f", "#e4e7eb"
 NORMAL_COLOUR, SHEAR_COLOUR = "#1f5fa8", "#c8501e"
 SERIES = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#4d4d4d")
 """Colours of curves that the colour-blind can tell apart (Okabe and Ito 2008, without the yellow)."""
-KINDS = ("png", "pdf", "svg")
-"""Endings of the files that a figure can become."""
 
 
-def new_figure(width: float, height: float) -> Figure:
-    """Return a figure of its own, in inches, that no window and no other figure knows of."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
+@dataclass(frozen=True)
+class FigureStyle:
+    """How the figures of one recording style, so that all of them agree.
 
-    figure = Figure(figsize=(width, height), facecolor="white")
-    FigureCanvasAgg(figure)
-    return figure
-
-
-def tidy_axes(axes: Axes) -> None:
-    """Leave of an axes what helps reading: two spines, a faint grid, small ticks."""
-    axes.grid(True, color=RULE, lw=0.7)
-    axes.set_axisbelow(True)
-    axes.tick_params(labelsize=SMALL, colors=INK, length=2.5, width=0.6)
-    for label in (axes.xaxis.label, axes.yaxis.label):
-        label.set_fontsize(FONT)
-        label.set_color(INK)
-    for side in ("top", "right"):
-        axes.spines[side].set_visible(False)
-    for side in ("left", "bottom"):
-        axes.spines[side].set_color(INK)
-        axes.spines[side].set_linewidth(0.6)
-
-
-def save_figure(figure: Figure, path: str | Path, dpi: float) -> None:
-    """Write the figure, whole or not at all, as PNG, PDF or SVG by its ending.
-
-    The same figure gives the same bytes: PDF without a date. Fonts go into it as such, so that a journal can edit the text.
-
-    Raises
-    ------
-    ParameterError
-        The ending is of another kind.
-    FileError
-        It cannot be written.
+    Attributes
+    ----------
+    colour_map : str
+        Key of :data:`.color_maps.STOPS`.
+    quantity : {"force", "pressure"}
+        What the colours show: normal force per texel (N) or normal force over the texel's area (kPa).
+    limit : float or None, N or kPa
+        Upper end of the colour scale, common to all sensors. None: a round number above the largest value.
+    width : {"single", "middle", "double"}
+        Column width, see :data:`WIDTHS`.
+    dpi : int
+        Of a PNG.
     """
-    path = Path(path)
-    kind = path.suffix.lstrip(".").lower()
-    if kind not in KINDS:
-        raise ParameterError(f"'{path.name}' is no figure that can be written: end its name with .png, .pdf or .svg.")
-    metadata = {"CreationDate": None} if kind == "pdf" else {"Date": None} if kind == "svg" else {"Software": "Palpate"}
-    for axes in figure.axes:
-        for label in (axes.xaxis.label, axes.yaxis.label, *axes.get_xticklabels(), *axes.get_yticklabels()):
-            if float(label.get_fontsize()) > FONT:
-                label.set_fontsize(FONT)
-    for axes in figure.axes:
-        legend = axes.get_legend()
-        for text in legend.get_texts() if legend else ():
-            text.set_fontsize(8)
-    _write(figure, path, dpi, kind, metadata)
+
+    colour_map: str = "VIRIDIS"
+    quantity: str = "force"
+    limit: float | None = None
+    width: str = "double"
+    dpi: int = 300
+
+    def __post_init__(self) -> None:
+        for what, value, known in (
+            ("colour map", self.colour_map, color_maps.STOPS),
+            ("quantity", self.quantity, ("force", "pressure")),
+            ("width", self.width, WIDTHS),
+        ):
+            if value not in known:
+                raise ParameterError(f"There is no {what} '{value}': choose from {', '.join(known)}.")
+
+    @property
+    def width_inches(self) -> float:
+        """Width of the figure."""
+        return WIDTHS[self.width]
+
+    @property
+    def quantity_label(self) -> tuple[str, str]:
+        """Label of the colour bar, in two parts that may stand on lines of their own."""
+        return ("normal force", "per texel (N)") if self.quantity == "force" else ("pressure", "on each texel (kPa)")
+
+    def values(self, sensor: SensorRecording | SensorFrame, texels: Texels) -> np.ndarray:
+        """Return what the colours show, (F, n) or (n,) float, N or kPa."""
+        force = sensor.normal_force
+        return force if self.quantity == "force" else metrics.pressure(force, texels) / 1e3
+
+    def scale_limit(self, recording: Recording, texels: Mapping[str, Texels]) -> float:
+        """Return the end of the colour scale for a recording."""
+        if self.limit is not None:
+            return self.limit
+        if self.quantity == "force":
+            return metrics.scale_limit(metrics.peak_force(recording))
+        return metrics.scale_limit(metrics.peak_pressure(recording, texels) / 1e3)
+
+    def matplotlib_colormap(self) -> Any:
+        """Return the colour map as matplotlib has them."""
+        from matplotlib.colors import LinearSegmentedColormap
+
+        stops = [tuple(color) for color in color_maps.STOPS[self.colour_map]]
+        return LinearSegmentedColormap.from_list(self.colour_map, stops, N=1024)
 
 
-def _write(figure: Figure, path: Path, dpi: float, kind: str, metadata: dict[str, Any]) -> None:
-    import matplotlib
-
-    plain = {"pdf.fonttype": 42, "svg.fonttype": "none", "svg.hashsalt": "palpate"}
-    with atomic_write(path) as temporary, matplotlib.rc_context(plain):
-        figure.savefig(temporary, dpi=dpi, format=kind, metadata=metadata)
+def force_label(value: float) -> str:
+    """Return a force in words, small ones in millinewtons."""
+    return f"{value * 1e3:g} mN" if value < 0.1 else f"{value:g} N"

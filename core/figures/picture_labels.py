@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING
 from ..geometry.texels import Texels
 from ..model.recording import Recording
 from ..response import metrics
-from .figure_style import FONT, new_figure, save_figure
-from .recording_style import Look
-from .tactile_image import View, colour_bar
+from .figure_canvas import new_figure, save_figure
+from .figure_style import FONT, FigureStyle
+from .tactile_image import SensorView, draw_colour_bar
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -48,7 +48,7 @@ def label_picture(
     texels: Mapping[str, Texels],
     frame: int,
     *,
-    look: Look | None = None,
+    style: FigureStyle | None = None,
     labels: Sequence[Label] = (),
 ) -> None:
     """Put a colour bar, the tactile images of `frame`, and labels on a rendered picture.
@@ -60,7 +60,7 @@ def label_picture(
     """
     from matplotlib.image import imread
 
-    look = look or Look()
+    style = style or FigureStyle()
     picture = imread(source)
     pixels_y, pixels_x = picture.shape[:2]
     dpi = round(DPI * pixels_x / 1280)
@@ -71,8 +71,8 @@ def label_picture(
     background.set_axis_off()
 
     felt = recording.at(frame).sensors
-    top, strongest = look.top(recording, texels), metrics.peak_shear(recording)
-    views = [View.of(texels[name], recording.sensors[name].normal_force.sum(axis=0)) for name in texels]
+    top, strongest = style.scale_limit(recording, texels), metrics.peak_shear(recording)
+    views = [SensorView.of(texels[name], recording.sensors[name].normal_force.sum(axis=0)) for name in texels]
     image = None
     # A column at the right edge: one tactile image per sensor over each other, the colour bar beside them.
     column, bar_room, title = 0.74, 0.72, 0.24
@@ -88,12 +88,12 @@ def label_picture(
         )
         y -= each
         axes = figure.add_axes((x / width, y / height, column / width, each / height))
-        values = look.values(felt[name], texels[name])
+        values = style.values(felt[name], texels[name])
         view = view.at_size(min(column / view.width, each / view.height))
-        image = view.draw(axes, values, felt[name].shear, strongest, top, look, edge="#ffffff80")
+        image = view.draw(axes, values, felt[name].shear, strongest, top, style, edge="#ffffff80")
     if image is not None:
         bar = figure.add_axes(((width - bar_room) / width, y / height, 0.12 / width, (y_top - y) / height))
-        colour_bar(figure, image, bar, look, ink="white")
+        draw_colour_bar(figure, image, bar, style, ink="white")
     for label in labels:
         _draw_label(figure, label, width, height)
     save_figure(figure, path, dpi)

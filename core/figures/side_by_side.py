@@ -14,9 +14,17 @@ from ..geometry.texels import Texels
 from ..io.bake_reader import frame_index
 from ..model.recording import Recording, SensorRecording
 from ..response import metrics
-from .figure_style import FONT, INK, SERIES, SMALL, new_figure, save_figure, tidy_axes
-from .recording_style import Look
-from .tactile_image import KEYS_LINE, SMALLEST_ARROW, View, colour_bar, keys, keys_width, widest_key
+from .figure_canvas import new_figure, save_figure, tidy_axes
+from .figure_style import FONT, INK, SERIES, SMALL, FigureStyle
+from .tactile_image import (
+    SCALE_KEY_LINE,
+    SMALLEST_ARROW,
+    SensorView,
+    draw_colour_bar,
+    draw_scale_key,
+    scale_key_width,
+    widest_scale_key,
+)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -39,7 +47,7 @@ def side_by_side(
     recording: Recording,
     texels: Mapping[str, Texels],
     frame: int,
-    look: Look | None = None,
+    style: FigureStyle | None = None,
     height: int = 720,
 ) -> None:
     """Put a rendered picture and the tactile images of the same frame side by side, with the force over time below them.
@@ -56,7 +64,7 @@ def side_by_side(
     """
     from matplotlib.image import imread
 
-    look = look or Look()
+    style = style or FigureStyle()
     picture = imread(source)
     i = frame_index(recording, frame)
     shown = dict(list(texels.items())[:_MOST])
@@ -73,7 +81,7 @@ def side_by_side(
     axes.imshow(picture, aspect="auto", interpolation="antialiased")
     axes.set_axis_off()
 
-    top, strongest = look.top(recording, texels), metrics.peak_shear(recording)
+    top, strongest = style.scale_limit(recording, texels), metrics.peak_shear(recording)
     left, room = wide + _MARGIN, _SIDE - 2 * _MARGIN
     parts = [_Part.of(own, recording.sensors[name], strongest) for name, own in shown.items()]
     places = _placed(parts, room, _TALL - _CURVE - _BAR - _MARGIN)
@@ -85,11 +93,11 @@ def side_by_side(
         words = name if len(name) * _LETTER < part.room else name[: int(part.room / _LETTER) - 1] + "…"
         figure.text(x / width, y / _TALL, words, fontsize=FONT, color=colour, weight="bold", va="top")
         place = axes_at(x, y - _NAME - up, across, up)
-        image = view.draw(place, look.values(felt, own)[i], felt.shear[i], strongest, top, look)
-        keys(figure, (x, y - _NAME - up - 0.1), view, part.strongest, inches, room=part.room)
+        image = view.draw(place, style.values(felt, own)[i], felt.shear[i], strongest, top, style)
+        draw_scale_key(figure, (x, y - _NAME - up - 0.1), view, part.strongest, inches, room=part.room)
         low = min(low, y - _NAME - up - part.below(inches))
     if image is not None:
-        colour_bar(figure, image, axes_at(left + 0.1, low - 0.24, room - 0.2, 0.1), look)
+        draw_colour_bar(figure, image, axes_at(left + 0.1, low - 0.24, room - 0.2, 0.1), style)
     curve = min(low - _BAR, _MOST_CURVE)
     _force_so_far(axes_at(left + 0.3, 0.3, room - 0.38, curve - 0.5), recording, i, shown)
     save_figure(figure, path, dpi)
@@ -99,33 +107,33 @@ def side_by_side(
 class _Part:
     """A sensor's image, with the shear that its arrow stands for (N, zero without any) and the inches it has across."""
 
-    view: View
+    view: SensorView
     strongest: float
     room: float = 0.0
 
     @classmethod
     def of(cls, texels: Texels, felt: SensorRecording, strongest: float) -> _Part:
         own = float(np.linalg.norm(felt.shear, axis=2).max(initial=0.0))
-        view = View.of(texels, felt.normal_force.sum(axis=0))
+        view = SensorView.of(texels, felt.normal_force.sum(axis=0))
         return cls(view, strongest if own > SMALLEST_ARROW * strongest else 0.0)
 
     def inches(self, across: float, up: float) -> float:
         """Return the inches per millimetre that fit into a cell with name, scale bar and arrow."""
         self.room = across
         for lines in (1, 2):
-            size = min(across / self.view.width, (up - _NAME - 0.03 - lines * KEYS_LINE) / self.view.height)
-            if self.below(size) < 0.03 + 1.5 * KEYS_LINE:
+            size = min(across / self.view.width, (up - _NAME - 0.03 - lines * SCALE_KEY_LINE) / self.view.height)
+            if self.below(size) < 0.03 + 1.5 * SCALE_KEY_LINE:
                 break
         return size
 
     def wider_line(self, inches: float) -> float:
         """Return the inches across of scale bar or arrow, whichever is wider."""
-        return widest_key(self.view.at_size(inches), self.strongest, inches)
+        return widest_scale_key(self.view.at_size(inches), self.strongest, inches)
 
     def below(self, inches: float) -> float:
         """Return the inches that scale bar and arrow take up."""
-        both = keys_width(self.view.at_size(inches), self.strongest, inches) > self.room
-        return 0.03 + (1 + both) * KEYS_LINE
+        both = scale_key_width(self.view.at_size(inches), self.strongest, inches) > self.room
+        return 0.03 + (1 + both) * SCALE_KEY_LINE
 
 
 def _placed(parts: list[_Part], across: float, up: float) -> list[tuple[float, float, float]]:

@@ -10,8 +10,7 @@ import numpy as np
 
 from ..geometry.layout import GridLayout
 from ..geometry.texels import Texels
-from .figure_style import FONT, INK, SMALL
-from .recording_style import Look, newtons
+from .figure_style import FONT, INK, SMALL, FigureStyle, force_label
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -28,7 +27,7 @@ _BARS = (0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100, 200, 500)
 
 
 @dataclass(frozen=True)
-class View:
+class SensorView:
     """How one sensor's texels are drawn: an image and where the texels lie on it.
 
     Attributes
@@ -60,7 +59,7 @@ class View:
     most: int = MOST_ARROWS
 
     @classmethod
-    def of(cls, texels: Texels, load: np.ndarray | None = None) -> View:
+    def of(cls, texels: Texels, load: np.ndarray | None = None) -> SensorView:
         """Return the view of a sensor; a flattened surface has true lengths where it lies across the view.
 
         `load`, (n,) float, tells which side of a surface that cannot be flattened is worth seeing.
@@ -83,7 +82,7 @@ class View:
         )
 
     @classmethod
-    def _from_outside(cls, texels: Texels, load: np.ndarray | None) -> View:
+    def _from_outside(cls, texels: Texels, load: np.ndarray | None) -> SensorView:
         layout = texels.layout
         weight = texels.area if load is None or not load.any() else load
         out = weight @ texels.normal
@@ -129,7 +128,7 @@ class View:
         how = "flattened" if self.triangles is None else f"{self.seen.sum()} in view"
         return f"{len(self.texels)} texels,\n{how}"
 
-    def at_size(self, inches: float) -> View:
+    def at_size(self, inches: float) -> SensorView:
         """Return the view with as many arrows as can be told apart where a millimetre is so many `inches`."""
         longer = inches * max(self.width, self.height)
         return replace(self, most=int(np.clip(longer / ARROW_ROOM, LEAST_ARROWS, MOST_ARROWS)))
@@ -143,11 +142,18 @@ class View:
         return 1.4 * max(self.width, self.height) / self.most
 
     def draw(
-        self, axes: Axes, values: np.ndarray, shear: np.ndarray, strongest: float, top: float, look: Look, edge: str = "#9aa3ad"
+        self,
+        axes: Axes,
+        values: np.ndarray,
+        shear: np.ndarray,
+        strongest: float,
+        top: float,
+        style: FigureStyle,
+        edge: str = "#9aa3ad",
     ) -> Any:
         """Draw one tactile image; the arrow of the `strongest` shear is a little longer than a texel."""
         layout = self.texels.layout
-        colours: dict[str, Any] = {"cmap": look.colours(), "vmin": 0.0, "vmax": top}
+        colours: dict[str, Any] = {"cmap": style.matplotlib_colormap(), "vmin": 0.0, "vmax": top}
         image: Any
         if self.triangles is not None:
             image = axes.tripcolor(*self.points.T, self.triangles, values, shading="gouraud", rasterized=True, **colours)
@@ -242,37 +248,37 @@ def _millimetres_per_pixel(texels: Texels) -> float:
     return float(np.quantile(metres[whole] / pixels[whole], 0.05)) * 1e3
 
 
-KEYS_LINE = 0.17
+SCALE_KEY_LINE = 0.17
 """Inches from the scale bar to the arrow where that stands below."""
 _LETTER = 0.066
 """Inches that a letter of the small text takes, on average."""
 
 
-def _arrow_key(view: View, strongest: float, inches: float) -> tuple[str, float]:
+def _arrow_scale(view: SensorView, strongest: float, inches: float) -> tuple[str, float]:
     """Words for the arrow below the images, and its length in inches."""
     value = float(f"{strongest:.1g}")
-    return f"{newtons(value)} shear", value / strongest * view.arrow * inches
+    return f"{force_label(value)} shear", value / strongest * view.arrow * inches
 
 
-def widest_key(view: View, strongest: float, inches: float) -> float:
+def widest_scale_key(view: SensorView, strongest: float, inches: float) -> float:
     """Return the room, in inches, that :func:`keys` needs on two lines."""
-    alone = keys_width(view, 0.0, inches)
-    return max(alone, keys_width(view, strongest, inches) - alone - 0.2)
+    alone = scale_key_width(view, 0.0, inches)
+    return max(alone, scale_key_width(view, strongest, inches) - alone - 0.2)
 
 
-def keys_width(view: View, strongest: float, inches: float) -> float:
+def scale_key_width(view: SensorView, strongest: float, inches: float) -> float:
     """Return the room, in inches, that :func:`keys` needs."""
     width = view.bar * inches + 0.07 + _LETTER * len(f"{view.bar:g} mm") if view.bar > 0 else 0.0
     if strongest > 0:
-        words, length = _arrow_key(view, strongest, inches)
+        words, length = _arrow_scale(view, strongest, inches)
         width += 0.2 + length + 0.07 + _LETTER * len(words)
     return width
 
 
-def keys(
+def draw_scale_key(
     figure: Figure,
     at: tuple[float, float],
-    view: View,
+    view: SensorView,
     strongest: float,
     inches: float,
     ink: str = INK,
@@ -294,10 +300,10 @@ def keys(
         figure.add_artist(Line2D([x / width, stop / width], [y / height] * 2, color=ink, lw=2.0, solid_capstyle="butt"))
         figure.text((stop + 0.07) / width, y / height, f"{view.bar:g} mm", **words)
         x = stop + 0.07 + _LETTER * len(f"{view.bar:g} mm") + 0.2
-    if room is not None and view.bar > 0 and keys_width(view, strongest, inches) > room:
-        x, y = at[0], y - KEYS_LINE
+    if room is not None and view.bar > 0 and scale_key_width(view, strongest, inches) > room:
+        x, y = at[0], y - SCALE_KEY_LINE
     if strongest > 0:
-        label, length = _arrow_key(view, strongest, inches)
+        label, length = _arrow_scale(view, strongest, inches)
         stop = x + length
         figure.add_artist(
             FancyArrowPatch(
@@ -315,7 +321,7 @@ def keys(
         figure.text((stop + 0.07) / width, y / height, label, **words)
 
 
-def colour_bar(figure: Figure, image: Any, axes: Axes, look: Look, ink: str = INK) -> None:
+def draw_colour_bar(figure: Figure, image: Any, axes: Axes, style: FigureStyle, ink: str = INK) -> None:
     """Fill `axes` with the colour bar of an image; it lies where the axes are wider than high."""
     from matplotlib.ticker import MaxNLocator
 
@@ -326,6 +332,7 @@ def colour_bar(figure: Figure, image: Any, axes: Axes, look: Look, ink: str = IN
     bar.update_ticks()
     bar.ax.tick_params(labelsize=FONT, colors=ink, length=2.5, width=0.6)
     long = (place.width * width if lies else place.height * height) > 1.9  # inches; else the words need two lines
-    bar.set_label((" " if long or lies else "\n").join(look.words), fontsize=FONT, color=ink, labelpad=2.0 if lies else 4.0)
+    label = (" " if long or lies else "\n").join(style.quantity_label)
+    bar.set_label(label, fontsize=FONT, color=ink, labelpad=2.0 if lies else 4.0)
     bar.outline.set_edgecolor(ink)
     bar.outline.set_linewidth(0.5)

@@ -12,9 +12,9 @@ from ..errors import SensorError
 from ..geometry.layout import GridLayout
 from ..geometry.texels import Texels
 from ..model.recording import Recording
-from .figure_style import FONT, INK, SMALL, new_figure, save_figure
-from .recording_style import Look
-from .tactile_image import View, colour_bar
+from .figure_canvas import new_figure, save_figure
+from .figure_style import FONT, INK, SMALL, FigureStyle
+from .tactile_image import SensorView, draw_colour_bar
 
 MOST = 1024
 """Texels whose numbers can still be told apart on a page."""
@@ -23,7 +23,12 @@ _LETTER = 0.62
 
 
 def texel_numbers(
-    path: str | Path, recording: Recording, texels: Mapping[str, Texels], name: str, frame: int, look: Look | None = None
+    path: str | Path,
+    recording: Recording,
+    texels: Mapping[str, Texels],
+    name: str,
+    frame: int,
+    style: FigureStyle | None = None,
 ) -> None:
     """Write what every texel of one sensor feels at one frame, as numbers on the tactile image.
 
@@ -45,7 +50,7 @@ def texel_numbers(
     """
     from matplotlib.patheffects import withStroke
 
-    look = look or Look()
+    style = style or FigureStyle()
     own = texels[name]
     if len(own) > MOST:
         raise SensorError(
@@ -53,10 +58,10 @@ def texel_numbers(
             "export them as CSV instead."
         )
     felt = recording.at(frame).sensors[name]
-    values, view = look.values(felt, own), View.of(own, recording.sensors[name].normal_force.sum(axis=0))
-    top = look.top(recording, texels)
+    values, view = style.values(felt, own), SensorView.of(own, recording.sensors[name].normal_force.sum(axis=0))
+    top = style.scale_limit(recording, texels)
     peak = float(values.max(initial=0.0))
-    unit, factor = _unit(peak, look.quantity)
+    unit, factor = _unit(peak, style.quantity)
     words = [_digits(value * factor, peak * factor) for value in values]
     longest = max(len(word) for word in words)
 
@@ -64,14 +69,14 @@ def texel_numbers(
     letters = longest * _LETTER * SMALL / 72 + 0.05
     inches = max(letters / _room(view), (1.5 * SMALL / 72) / _room(view, 1))
     right, above, side = 0.95, 0.32, 0.12
-    inches = max(inches, min((look.inches - right - 2 * side) / view.width, 6.0 / view.height))
+    inches = max(inches, min((style.width_inches - right - 2 * side) / view.width, 6.0 / view.height))
     width, height = inches * view.width + 2 * side + right, inches * view.height + above + side
     height = max(height, 1.9)
     figure = new_figure(width, height)
     axes = figure.add_axes(
         (side / width, side / height, inches * view.width / width, inches * view.height / height), anchor="NW"
     )
-    image = view.draw(axes, values, np.zeros((len(own), 2)), 0.0, top, look)
+    image = view.draw(axes, values, np.zeros((len(own), 2)), 0.0, top, style)
     on_grid = isinstance(own.layout, GridLayout)
     if not on_grid:  # texels lie on the very rim there: room for their numbers
         room = 0.5 * letters / inches
@@ -97,8 +102,8 @@ def texel_numbers(
     )
     tall = max(inches * view.height, 1.2)
     bar = figure.add_axes(((width - right + 0.08) / width, side / height, 0.11 / width, tall / height))
-    colour_bar(figure, image, bar, look)
-    save_figure(figure, path, look.dpi)
+    draw_colour_bar(figure, image, bar, style)
+    save_figure(figure, path, style.dpi)
 
 
 def _unit(peak: float, quantity: str) -> tuple[str, float]:
@@ -114,7 +119,7 @@ def _digits(value: float, peak: float) -> str:
     return "0" if float(text) == 0.0 else text
 
 
-def _room(view: View, axis: int = 0) -> float:
+def _room(view: SensorView, axis: int = 0) -> float:
     """Millimetres between the middles of neighbouring texels along the image's x (0) or y (1) axis."""
     layout = view.texels.layout
     if isinstance(layout, GridLayout):

@@ -15,8 +15,8 @@ from ..geometry.texels import Texels
 from ..model.recording import Recording
 from ..model.scenario import SensorParameters
 from ..response import metrics
-from .figure_style import FONT, INK, NORMAL_COLOUR, SERIES, SHEAR_COLOUR, SMALL, new_figure, save_figure, tidy_axes
-from .recording_style import Look
+from .figure_canvas import new_figure, save_figure, tidy_axes
+from .figure_style import FONT, INK, NORMAL_COLOUR, SERIES, SHEAR_COLOUR, SMALL, FigureStyle
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -32,7 +32,7 @@ def time_curves(
     texels: Mapping[str, Texels],
     parameters: Mapping[str, SensorParameters],
     kinds: Sequence[str] = KINDS,
-    look: Look | None = None,
+    style: FigureStyle | None = None,
     marks: Sequence[float] = (),
 ) -> None:
     """Draw forces, slip and centre of pressure of all sensors over time, one panel of each kind, one colour per sensor.
@@ -47,15 +47,15 @@ def time_curves(
     marks : sequence of float, seconds
         Times at which a thin line stands, as those of a strip's images.
     """
-    look = look or Look()
+    style = style or FigureStyle()
     for kind in kinds:
         if kind not in KINDS:
             raise ParameterError(f"There are no curves of '{kind}': choose from {', '.join(KINDS)}.")
     names = list(texels)
-    legend = 0.2 * (1 + (len(names) - 1) // max(1, int(look.inches / 1.3)))
+    legend = 0.2 * (1 + (len(names) - 1) // max(1, int(style.width_inches / 1.3)))
     each, above, below, gap = 1.25, 0.12 + legend, 0.45, 0.12
     height = above + below + len(kinds) * each + (len(kinds) - 1) * gap
-    figure = new_figure(look.inches, height)
+    figure = new_figure(style.width_inches, height)
     grid = figure.subplots(len(kinds), 1, sharex=True, squeeze=False)[:, 0]
     for axes, kind in zip(grid, kinds, strict=True):
         for i, name in enumerate(names):
@@ -71,8 +71,8 @@ def time_curves(
     grid[-1].set_xlabel("time (s)")
     left = 0.8
     figure.subplots_adjust(
-        left=left / look.inches,
-        right=1 - 0.15 / look.inches,
+        left=left / style.width_inches,
+        right=1 - 0.15 / style.width_inches,
         top=1 - above / height,
         bottom=below / height,
         hspace=gap / each,
@@ -84,15 +84,15 @@ def time_curves(
     figure.legend(
         handles=handles,
         loc="upper left",
-        bbox_to_anchor=(left / look.inches, 1 - 0.02 / height),
-        ncols=max(1, int(look.inches / 1.3)),
+        bbox_to_anchor=(left / style.width_inches, 1 - 0.02 / height),
+        ncols=max(1, int(style.width_inches / 1.3)),
         frameon=False,
         fontsize=SMALL,
         handlelength=1.4,
         borderaxespad=0,
         columnspacing=1.2,
     )
-    save_figure(figure, path, look.dpi)
+    save_figure(figure, path, style.dpi)
 
 
 @dataclass(frozen=True)
@@ -181,7 +181,7 @@ def force_curves(
     texels: Mapping[str, Texels],
     parameters: Mapping[str, SensorParameters],
     required: Mapping[str, float] | None = None,
-    look: Look | None = None,
+    style: FigureStyle | None = None,
 ) -> None:
     """Draw each sensor's summed normal force and shear over time, with the friction limits ``mus · N`` and ``mud · N``.
 
@@ -190,9 +190,9 @@ def force_curves(
     required : mapping of str to float, N, optional
         The normal force that a sensor ought to show at the end (a weight at rest), drawn as a dashed line.
     """
-    look = look or Look()
+    style = style or FigureStyle()
     names = list(texels)
-    figure = new_figure(look.inches, 0.75 + 1.75 * len(names))
+    figure = new_figure(style.width_inches, 0.75 + 1.75 * len(names))
     grid = figure.subplots(len(names), 1, sharex=True, squeeze=False)[:, 0]
     for axes, name in zip(grid, names, strict=True):
         sensor, mu = recording.sensors[name], parameters[name]
@@ -234,4 +234,4 @@ def force_curves(
     width, height = figure.get_size_inches()
     figure.subplots_adjust(left=0.58 / width, right=1 - 1.75 / width, top=1 - 0.3 / height, bottom=0.5 / height, hspace=0.45)
     figure.align_ylabels(list(grid))
-    save_figure(figure, path, look.dpi)
+    save_figure(figure, path, style.dpi)

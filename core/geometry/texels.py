@@ -128,7 +128,7 @@ def texels_from_region(mesh: TriangleMesh, region: np.ndarray, name: str = "sens
     )
 
 
-class Follower:
+class DeformedTexels:
     """Texels that go with a mesh whose vertices move.
 
     Normals are computed anew; each texel's x axis keeps its angle to one edge of the mesh, the one nearest to its direction.

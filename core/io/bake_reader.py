@@ -14,8 +14,8 @@ from ..errors import FileError
 from ..geometry.texels import Texels
 from ..model.recording import Recording
 from ..model.scenario import Painted, SensorParameters
-from .files import MANIFEST_NAME, RECORDING_NAME, Manifest, read_manifest
-from .npz import load_recording
+from .bake_folder import MANIFEST_NAME, RECORDING_NAME, Manifest, read_manifest
+from .recording_npz import load_recording
 from .sensor_npz import SENSOR_NAME, load_sensor
 
 
@@ -37,7 +37,7 @@ class Bake:
     folders: dict[str, Path]
     manifests: dict[str, Manifest]
 
-    def only(self, names: Sequence[str]) -> Bake:
+    def select(self, names: Sequence[str]) -> Bake:
         """Return the part of some sensors, in the order of `names`.
 
         Raises

@@ -19,12 +19,13 @@ import numpy as np
 
 from ..errors import PalpateError
 from ..figures import color_maps
-from ..figures.recording_style import Look
+from ..figures.figure_style import FigureStyle
 from ..geometry.layout import GridLayout
 from ..model.recording import SensorRecording
 from ..response import metrics
+from .bake_folder import folder_names
 from .bake_reader import Bake
-from .files import atomic_write, folder_names, writable_folder
+from .file_writing import atomic_write, writable_folder
 from .npz import write_arrays
 
 UNITS = {
@@ -45,7 +46,9 @@ _LEAST_PIXELS = 256
 """Along the longer side of a PNG: smaller images are magnified by a whole number, pixel by pixel."""
 
 
-def export(bake: Bake, kind: str, folder: str | os.PathLike, look: Look | None = None) -> Generator[str, None, list[Path]]:
+def export(
+    bake: Bake, kind: str, folder: str | os.PathLike, style: FigureStyle | None = None
+) -> Generator[str, None, list[Path]]:
     """Write a bake in another format.
 
     Parameters
@@ -54,7 +57,7 @@ def export(bake: Bake, kind: str, folder: str | os.PathLike, look: Look | None =
     kind : {"csv", "npz", "hdf5", "png"}
     folder : path
         Made when only it is missing.
-    look : Look, optional
+    style : FigureStyle, optional
         Colours and their scale, for PNG.
 
     Yields
@@ -75,7 +78,7 @@ def export(bake: Bake, kind: str, folder: str | os.PathLike, look: Look | None =
     if kind not in KINDS:
         raise PalpateError(f"There is no export to '{kind}': choose from {', '.join(KINDS)}.")
     place = writable_folder(folder, create=True)
-    return (yield from KINDS[kind](bake, place, look or Look()))
+    return (yield from KINDS[kind](bake, place, style or FigureStyle()))
 
 
 def arrays_of(bake: Bake, name: str) -> dict[str, np.ndarray]:
@@ -92,7 +95,7 @@ def arrays_of(bake: Bake, name: str) -> dict[str, np.ndarray]:
 # --- NPZ
 
 
-def _npz(bake: Bake, place: Path, _: Look) -> Generator[str, None, list[Path]]:
+def _npz(bake: Bake, place: Path, _: FigureStyle) -> Generator[str, None, list[Path]]:
     written = []
     for name, stem in folder_names(bake.texels).items():
         yield name
@@ -105,7 +108,7 @@ def _npz(bake: Bake, place: Path, _: Look) -> Generator[str, None, list[Path]]:
 # --- HDF5
 
 
-def _hdf5(bake: Bake, place: Path, _: Look) -> Generator[str, None, list[Path]]:
+def _hdf5(bake: Bake, place: Path, _: FigureStyle) -> Generator[str, None, list[Path]]:
     try:
         import h5py
     except ImportError as error:
@@ -154,7 +157,7 @@ def _unit(bake: Bake, name: str, key: str) -> str:
 # --- CSV
 
 
-def _csv(bake: Bake, place: Path, _: Look) -> Generator[str, None, list[Path]]:
+def _csv(bake: Bake, place: Path, _: FigureStyle) -> Generator[str, None, list[Path]]:
     recording = bake.recording
     header = ["frame", "time"] + [
         f"{body} {key}" for body in recording.body_names for key in ("x", "y", "z", "qw", "qx", "qy", "qz")
@@ -215,32 +218,37 @@ def _table(path: Path, header: Sequence[str], rows: Iterable[Sequence[float]]) -
 # --- PNG
 
 
-def _png(bake: Bake, place: Path, look: Look) -> Generator[str, None, list[Path]]:
+def _png(bake: Bake, place: Path, style: FigureStyle) -> Generator[str, None, list[Path]]:
     from matplotlib.image import imsave
 
     recording, written = bake.recording, []
-    top = look.top(recording, bake.texels)
+    top = style.scale_limit(recording, bake.texels)
     for name, stem in folder_names(bake.texels).items():
         yield name
         folder = writable_folder(place / stem, create=True)
         texels = bake.texels[name]
-        layout, values = texels.layout, look.values(recording.sensors[name], texels)
+        layout, values = texels.layout, style.values(recording.sensors[name], texels)
         mask = layout.mask()
         times = max(1, -(-_LEAST_PIXELS // max(layout.shape)))
         for frame, own in zip(recording.frames, values, strict=True):
-            color = color_maps.colors(look.colour_map, layout.image(own).ravel() / top).reshape(*layout.shape, 3)
+            color = color_maps.colors(style.colour_map, layout.image(own).ravel() / top).reshape(*layout.shape, 3)
             pixels = np.dstack([color, mask])[::-1]
             pixels = np.repeat(np.repeat(pixels, times, axis=0), times, axis=1)
             with atomic_write(folder / f"tactile_{frame:04d}.png") as temporary:
                 imsave(temporary, (pixels * 255 + 0.5).astype(np.uint8), metadata={"Software": "Palpate"})
-        scale = {"quantity": " ".join(look.words), "first_colour": 0.0, "last_colour": top, "colour_map": look.colour_map}
+        scale = {
+            "quantity": " ".join(style.quantity_label),
+            "first_colour": 0.0,
+            "last_colour": top,
+            "colour_map": style.colour_map,
+        }
         with atomic_write(folder / "scale.json") as temporary:
             temporary.write_text(json.dumps(scale, indent=2) + "\n", encoding="utf-8")
         written.append(folder)
     return written
 
 
-KINDS: dict[str, Callable[[Bake, Path, Look], Generator[str, None, list[Path]]]] = {
+KINDS: dict[str, Callable[[Bake, Path, FigureStyle], Generator[str, None, list[Path]]]] = {
     "csv": _csv,
     "npz": _npz,
     "hdf5": _hdf5,

@@ -1,28 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Recordings as .npz: numpy reads them without Palpate, bit for bit, and equal recordings are equal files.
-
-Members: ``header.npy`` (JSON text), ``frames``, ``times``, ``poses``, ``velocities`` and, for sensor number i of the
-header's list, ``sensor_<i>/normal_force`` and so on with the names of :class:`.recording.SensorRecording`.
-"""
+"""Deterministic .npz files: equal arrays give equal bytes, and numpy reads them without Palpate."""
 
 from __future__ import annotations
 
-import json
 import os
 import zipfile
 import zlib
 from collections.abc import Mapping
-from dataclasses import fields
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from ..errors import FileError
-from ..model.recording import Recording, SensorRecording
-from .files import written
-
-RECORDING_FORMAT = "palpate-recording/2"
+from .file_writing import write_file
 
 DAMAGED = (
     ValueError,
@@ -38,114 +26,25 @@ DAMAGED = (
     zipfile.BadZipFile,
     zlib.error,
 )
-"""What reading a damaged archive may raise."""
+"""Exceptions that reading a damaged archive may raise."""
 
-_LONG_AGO = (1980, 1, 1, 0, 0, 0)  # the earliest time a zip can hold: the clock must not get into the bytes
-_SENSOR_FIELDS = tuple(item.name for item in fields(SensorRecording))
-
-
-def save_recording(path: str | os.PathLike, recording: Recording, at_once: bool = True) -> None:
-    """Write a recording as .npz, as :func:`.files.written` does; the same recording gives the same bytes.
-
-    Raises
-    ------
-    FileError
-        The file cannot be written.
-    ValueError
-        A number is not finite or an array has another number of frames (a fault of the program, not of the user).
-    """
-    arrays = {"header": np.array(json.dumps(_header(recording), allow_nan=False))}
-    for name in ("frames", "times", "poses", "velocities"):
-        arrays[name] = np.asarray(getattr(recording, name))
-    for i, sensor in enumerate(recording.sensors.values()):
-        for name in _SENSOR_FIELDS:
-            arrays[f"sensor_{i}/{name}"] = np.asarray(getattr(sensor, name))
-    for name, array in arrays.items():
-        if name != "header" and len(array) != len(recording.frames):
-            raise ValueError(f"'{name}' has {len(array)} frames, the recording {len(recording.frames)}")
-        if array.dtype.kind == "f" and not np.isfinite(array).all():
-            raise ValueError(f"'{name}' of the recording has values that are not finite")
-        if array.dtype.kind not in "fiubU":
-            raise ValueError(f"'{name}' of the recording has type {array.dtype}")
-
-    write_arrays(path, arrays, at_once)
+_LONG_AGO = (1980, 1, 1, 0, 0, 0)  # the earliest date of a zip archive; the current time would change the bytes
 
 
-def write_arrays(path: str | os.PathLike, arrays: Mapping[str, np.ndarray], at_once: bool = True) -> None:
-    """Write arrays as .npz, as :func:`.files.written` does; equal arrays give equal bytes.
+def write_arrays(path: str | os.PathLike, arrays: Mapping[str, np.ndarray], atomic: bool = True) -> None:
+    """Write arrays as .npz, as :func:`.write_file` does; equal arrays give equal bytes.
 
     Raises
     ------
     FileError
         The file cannot be written.
     """
-    with written(path, at_once) as temporary, zipfile.ZipFile(temporary, "w") as archive:
+    with write_file(path, atomic) as temporary, zipfile.ZipFile(temporary, "w") as archive:
         for name, array in arrays.items():
             info = zipfile.ZipInfo(f"{name}.npy", _LONG_AGO)
             info.compress_type = zipfile.ZIP_DEFLATED
             info._compresslevel = 3  # type: ignore[attr-defined]
-            info.create_system = 3  # the same on every system
+            info.create_system = 3  # the same bytes on every system
             info.external_attr = 0o644 << 16
             with archive.open(info, "w", force_zip64=array.nbytes > 1 << 30) as member:
                 np.lib.format.write_array(member, np.asarray(array, order="C"), allow_pickle=False)
-
-
-def load_recording(path: str | os.PathLike) -> Recording:
-    """Read a recording that :func:`save_recording` wrote.
-
-    Raises
-    ------
-    FileError
-        There is no such file, or it is damaged or something else.
-    """
-    file = Path(path)
-    if not file.exists():
-        raise FileError(f"'{path}' does not exist: bake first, or choose another file.")
-    try:
-        with np.load(file, allow_pickle=False) as members:
-            if not isinstance(members, np.lib.npyio.NpzFile) or "header" not in members.files:
-                raise FileError(f"'{path}' is not a recording of Palpate: choose a recording.npz of a bake.")
-            return _recording(path, members)
-    except OSError as error:
-        reason = (error.strerror or str(error)).lower()
-        raise FileError(f"'{path}' could not be read ({reason}): choose another file.") from error
-    except DAMAGED as error:
-        raise FileError(f"'{path}' is damaged or no recording ({error}): bake again.") from error
-
-
-def _header(recording: Recording) -> dict[str, Any]:
-    return {
-        "format": RECORDING_FORMAT,
-        "sensors": list(recording.sensors),
-        "bodies": list(recording.body_names),
-        "dt": float(recording.dt),
-        "digest": recording.digest,
-        "warnings": list(recording.warnings),
-        "step_reason": recording.step_reason,
-    }
-
-
-def _recording(path: str | os.PathLike, members: Any) -> Recording:
-    header = json.loads(str(members["header"]))
-    if header["format"] != RECORDING_FORMAT:
-        raise FileError(
-            f"'{path}' has the format {header['format']!r}, not '{RECORDING_FORMAT}': bake again with this version."
-        )
-    arrays = {name: members[name] for name in ("frames", "times", "poses", "velocities")}
-    sensors = {
-        str(name): SensorRecording(**{key: members[f"sensor_{i}/{key}"] for key in _SENSOR_FIELDS})
-        for i, name in enumerate(header["sensors"])
-    }
-    count = len(arrays["frames"])
-    parts = [*arrays.values(), *(getattr(sensor, key) for sensor in sensors.values() for key in _SENSOR_FIELDS)]
-    if any(len(part) != count for part in parts):
-        raise ValueError("its arrays have different numbers of frames")
-    return Recording(
-        **arrays,
-        sensors=sensors,
-        body_names=tuple(str(name) for name in header["bodies"]),
-        dt=float(header["dt"]),
-        digest=str(header["digest"]),
-        warnings=tuple(str(warning) for warning in header["warnings"]),
-        step_reason=str(header.get("step_reason", "")),
-    )

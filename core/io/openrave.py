@@ -16,7 +16,7 @@ from xml.etree import ElementTree
 
 from ..errors import FileError, PalpateError
 from ..model.scenario import SensorParameters
-from .files import atomic_write
+from .file_writing import atomic_write
 
 SENSOR_TYPE = "SimTactileSensor"
 NUMBERS = ("k", "cn", "sigma0", "sigma1", "x0", "ct", "mus", "mud")

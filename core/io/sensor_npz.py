@@ -14,6 +14,7 @@ from ..errors import FileError
 from ..geometry.layout import GridLayout, UVLayout
 from ..geometry.texels import Texels
 from ..model.scenario import Painted
+from .file_writing import os_error_reason
 from .npz import DAMAGED, write_arrays
 
 SENSOR_FORMAT = "palpate-sensor/1"
@@ -23,8 +24,8 @@ _ARRAYS = tuple(item.name for item in fields(Texels) if item.name != "layout")
 _LAYOUTS: dict[str, type[GridLayout] | type[UVLayout]] = {"grid": GridLayout, "uv": UVLayout}
 
 
-def save_sensor(path: str | os.PathLike, texels: Texels, painted: Painted | None = None, at_once: bool = True) -> None:
-    """Write texels, their layout and what is painted on them as .npz, as :func:`.files.written` does.
+def save_sensor(path: str | os.PathLike, texels: Texels, painted: Painted | None = None, atomic: bool = True) -> None:
+    """Write texels, their layout and what is painted on them as .npz, as :func:`.write_file` does.
 
     Raises
     ------
@@ -39,7 +40,7 @@ def save_sensor(path: str | os.PathLike, texels: Texels, painted: Painted | None
         values = getattr(painted, item.name, None)
         if values is not None:
             arrays[f"painted/{item.name}"] = np.asarray(values)
-    write_arrays(path, arrays, at_once)
+    write_arrays(path, arrays, atomic)
 
 
 def load_sensor(path: str | os.PathLike) -> tuple[Texels, Painted]:
@@ -63,8 +64,7 @@ def load_sensor(path: str | os.PathLike) -> tuple[Texels, Painted]:
             found = {item.name: f"painted/{item.name}" for item in fields(Painted)}
             return texels, Painted(**{name: members[key] for name, key in found.items() if key in members.files})
     except OSError as error:
-        reason = (error.strerror or str(error)).lower()
-        raise FileError(f"'{path}' could not be read ({reason}): choose another file.") from error
+        raise FileError(f"'{path}' could not be read ({os_error_reason(error)}): choose another file.") from error
     except DAMAGED as error:
         raise FileError(f"'{path}' is damaged or no sensor ({error}): bake again.") from error
 

@@ -33,7 +33,7 @@ from ..effects.engine.registry import check, from_dict, to_dict
 from ..effects.engine.specification import Effect
 from ..errors import FileError, PalpateError
 from ..model.scenario import SensorParameters
-from .files import atomic_write
+from .file_writing import atomic_write
 
 FORMAT = "palpate-sensor-toml/1"
 SHAPE_WORDS = ("grid", "mesh", "thickness")

@@ -19,7 +19,7 @@ from ..geometry.layout import GridLayout, UVLayout
 from ..model.recording import Frame, SensorFrame
 from ..model.scenario import Sensor
 from . import exr_codec
-from .files import atomic_write, written
+from .file_writing import atomic_write, os_error_reason, write_file
 
 CHANNELS = ("R", "G", "B", "reading", "depth", "slip", "contact")
 """Names of the channels, in the order in which :func:`read_exr` returns them."""
@@ -118,7 +118,7 @@ def write_exrs(
     frames: Sequence[SensorFrame],
     metadata: Sequence[Mapping[str, str]],
 ) -> None:
-    """Write frames of one sensor where they are: what is interrupted leaves a half file, see :func:`.files.written`.
+    """Write frames of one sensor where they are: what is interrupted leaves a half file, see :func:`.write_file`.
 
     Parameters
     ----------
@@ -131,7 +131,7 @@ def write_exrs(
     FileError, ValueError
         As :func:`write_exr`.
     """
-    with written(paths[0], at_once=False):
+    with write_file(paths[0], atomic=False):
         _write(paths, layout, frames, metadata)
 
 
@@ -165,8 +165,7 @@ def read_exr(path: str | os.PathLike) -> tuple[dict[str, np.ndarray], dict[str, 
     try:
         pictures, attributes = exr_codec.read(path)
     except OSError as error:
-        reason = (error.strerror or str(error)).lower()
-        raise FileError(f"'{path}' could not be read ({reason}): check its permissions.") from error
+        raise FileError(f"'{path}' could not be read ({os_error_reason(error)}): check its permissions.") from error
     except exr_codec.FormatError as error:
         raise FileError(f"'{path}' is damaged or not an OpenEXR image ({error}): bake again.") from error
     found = {name: picture[::-1].astype(np.float32) for name, picture in pictures.items()}

@@ -34,7 +34,7 @@ def net_shear(sensor: SensorRecording, texels: Texels) -> np.ndarray:
     return sensor.shear[:, :, 0] @ texels.tangent + sensor.shear[:, :, 1] @ texels.bitangent
 
 
-def mobilised(sensor: SensorRecording, texels: Texels, mus: float) -> np.ndarray:
+def mobilised_friction(sensor: SensorRecording, texels: Texels, mus: float) -> np.ndarray:
     """Return how much of the static friction is used: ``|Σ shear| / (mus · Σ normal)``, zero while nothing touches.
 
     Returns
@@ -117,7 +117,7 @@ def peak_shear(recording: Recording) -> float:
     return max((float(np.linalg.norm(s.shear, axis=2).max(initial=0.0)) for s in recording.sensors.values()), default=0.0)
 
 
-def tidy_limit(value: float) -> float:
+def rounded_limit(value: float) -> float:
     """Return the next number of the form 1, 1.5, 2, 2.5, 3, 4, 5, 6 or 8 × 10ⁿ at or above `value`, for the end of a scale."""
     power = 10.0 ** np.floor(np.log10(value))
     for step in (1, 1.5, 2, 2.5, 3, 4, 5, 6, 8, 10):
@@ -128,7 +128,7 @@ def tidy_limit(value: float) -> float:
 
 def scale_limit(peak: float) -> float:
     """Return the end of a scale: a round number with some room above the largest value."""
-    return tidy_limit(1.05 * peak)
+    return rounded_limit(1.05 * peak)
 
 
 def choose_frames(recording: Recording, count: int) -> np.ndarray:

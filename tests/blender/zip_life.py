@@ -116,7 +116,7 @@ def road():
     played = sum(value.value for value in pad.data.attributes["palpate_force"].data)
     bpy.ops.palpate.bake()
     files = sorted(path.name for path in (folder / "palpate" / pad.name).iterdir())
-    archive = sys.modules[f"{MODULE}.core.io.npz"]
+    archive = sys.modules[f"{MODULE}.core.io.recording_npz"]
     recording = archive.load_recording(folder / "palpate" / pad.name / "recording.npz")
     compiled = Path(bpy.utils.extension_path_user(MODULE, path="numba")).rglob("*.nbi")
     return {

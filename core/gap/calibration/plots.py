@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...figures.figure_style import GREY, INK, NORMAL_COLOUR, SHEAR_COLOUR, new_figure, save_figure
+from ...figures.figure_canvas import new_figure, save_figure
+from ...figures.figure_style import GREY, INK, NORMAL_COLOUR, SHEAR_COLOUR
 from .friction import FrictionFit, friction_over_time, steady_friction
 from .stiffness import StiffnessFit
 

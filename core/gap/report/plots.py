@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...figures.figure_style import GREY, INK, NORMAL_COLOUR, SHEAR_COLOUR, WIDTHS, new_figure, save_figure, tidy_axes
+from ...figures.figure_canvas import new_figure, save_figure, tidy_axes
+from ...figures.figure_style import GREY, INK, NORMAL_COLOUR, SHEAR_COLOUR, WIDTHS
 from ...geometry.layout import GridLayout
 from ..forward.contact_phases import PHASES
 from ..forward.predictor import Model, Predictor

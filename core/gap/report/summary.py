@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from ...io.files import atomic_write
+from ...io.file_writing import atomic_write
 from ...io.sensor_toml import write_sensor
 from ..fitting.intervals import Number, numbers
 from ..forward.contact_phases import FEATURES

@@ -15,8 +15,8 @@ import numpy as np
 
 from ...errors import SensorError
 from ..mesh import TriangleMesh, triangle_areas
-from .surface_walk import nearest_point
-from .texel_arrays import Skin
+from .straightest_geodesics import nearest_point
+from .texel_arrays import TexelMesh
 
 FINENESS = 5.0
 """Small triangles per spacing."""
@@ -27,7 +27,7 @@ MOST = 60_000
 """Texels at the most; more would take minutes."""
 
 
-def scatter(mesh: TriangleMesh, spacing: float, seed: int = 0) -> Skin:
+def scatter(mesh: TriangleMesh, spacing: float, seed: int = 0) -> TexelMesh:
     """Spread texels over a region.
 
     Parameters
@@ -69,7 +69,7 @@ def scatter(mesh: TriangleMesh, spacing: float, seed: int = 0) -> Skin:
     used = np.unique(faces)
     number = np.full(len(points), -1)
     number[used] = np.arange(len(used))
-    return Skin(points[used], [tuple(face) for face in number[faces].tolist()])
+    return TexelMesh(points[used], [tuple(face) for face in number[faces].tolist()])
 
 
 def refined(mesh: TriangleMesh, longest: float) -> TriangleMesh:

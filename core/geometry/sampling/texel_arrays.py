@@ -10,14 +10,14 @@ import numpy as np
 
 from ...errors import SensorError
 from ..mesh import TriangleMesh, face_normals, triangle_areas
-from .surface_walk import Place, Surface
+from .straightest_geodesics import GeodesicTracer, SurfacePose
 
 CROWDED = 0.5
 """Texels nearer to one another than this share of the pitch are left out where the surface draws the ribs together."""
 
 
 @dataclass(frozen=True)
-class Skin:
+class TexelMesh:
     """Texels laid onto a surface, with the faces between them.
 
     Attributes
@@ -31,7 +31,7 @@ class Skin:
     faces: list[tuple[int, ...]]
 
 
-def pad(rows: int, columns: int, pitch: tuple[float, float], radius: float = 0.0) -> Skin:
+def pad_array(rows: int, columns: int, pitch: tuple[float, float], radius: float = 0.0) -> TexelMesh:
     """Return a flat pad in z = 0, or one bent about an axis along its rows' direction +y.
 
     Parameters
@@ -61,7 +61,7 @@ def pad(rows: int, columns: int, pitch: tuple[float, float], radius: float = 0.0
     y, along = np.mgrid[0:rows, 0:columns].astype(float)
     along, y = (along - (columns - 1) / 2) * pitch[0], (y - (rows - 1) / 2) * pitch[1]
     x, z = (along, np.zeros_like(along)) if not radius else _bent(along, radius)
-    return Skin(np.stack([x, y, z], axis=-1).reshape(-1, 3), _quads(np.arange(rows * columns).reshape(rows, columns)))
+    return TexelMesh(np.stack([x, y, z], axis=-1).reshape(-1, 3), _quads(np.arange(rows * columns).reshape(rows, columns)))
 
 
 def _check_size(rows: int, columns: int, pitch: tuple[float, float]) -> None:
@@ -76,9 +76,14 @@ def _bent(along: np.ndarray, radius: float) -> tuple[np.ndarray, np.ndarray]:
     return radius * np.sin(angle), radius * (np.cos(angle) - 1.0)
 
 
-def wrap(
-    mesh: TriangleMesh, rows: int, columns: int, pitch: tuple[float, float], middle: Place | None = None, angle: float = 0.0
-) -> Skin:
+def wrapped_array(
+    mesh: TriangleMesh,
+    rows: int,
+    columns: int,
+    pitch: tuple[float, float],
+    middle: SurfacePose | None = None,
+    angle: float = 0.0,
+) -> TexelMesh:
     """Lay a whole array onto a surface, its middle at a place: a spine of rows, and a rib of columns from each.
 
     Distances along spine and ribs are the pitch, measured on the surface; on what can be unrolled the array keeps its shape.
@@ -90,8 +95,8 @@ def wrap(
     rows, columns : int
     pitch : (float, float), metres
         Along a row, and from row to row.
-    middle : Place, optional
-        Where the middle is, heading along the rows' direction (from one row to the next); by default :func:`middle_of`.
+    middle : SurfacePose, optional
+        Where the middle is, heading along the rows' direction (from one row to the next); by default :func:`region_middle`.
     angle : float, radians
         The array is turned by this, anticlockwise seen from outside.
 
@@ -101,8 +106,8 @@ def wrap(
         The array reaches beyond the region.
     """
     _check_size(rows, columns, pitch)
-    surface = Surface(mesh)
-    centre = _turned(surface, middle or middle_of(mesh), angle)
+    surface = GeodesicTracer(mesh)
+    centre = _turned(surface, middle or region_middle(mesh), angle)
     index = np.full((rows, columns), -1)
     points: list[np.ndarray] = []
     offsets_y = (np.arange(rows) - (rows - 1) / 2) * pitch[1]
@@ -118,10 +123,10 @@ def wrap(
                 )
             index[row, column] = len(points)
             points.append(found.point)
-    return Skin(np.array(points), _quads(index))
+    return TexelMesh(np.array(points), _quads(index))
 
 
-def fill(mesh: TriangleMesh, spacing: float, angle: float = 0.0) -> Skin:
+def filled_region(mesh: TriangleMesh, spacing: float, angle: float = 0.0) -> TexelMesh:
     """Cover a region with rows and columns as far as it goes; the rim follows the region in steps.
 
     Parameters
@@ -138,8 +143,8 @@ def fill(mesh: TriangleMesh, spacing: float, angle: float = 0.0) -> Skin:
     SensorError
         Less than a face fits.
     """
-    surface, most = Surface(mesh), _most_steps(mesh, spacing)
-    spine = _both_ways(surface, _turned(surface, middle_of(mesh), angle), spacing, most)
+    surface, most = GeodesicTracer(mesh), _most_steps(mesh, spacing)
+    spine = _both_ways(surface, _turned(surface, region_middle(mesh), angle), spacing, most)
     ribs = [_both_ways(surface, _turned(surface, place, -math.pi / 2), spacing, most) for _, place in spine]
     low = min(number for rib in ribs for number, _ in rib)
     high = max(number for rib in ribs for number, _ in rib)
@@ -159,7 +164,7 @@ def fill(mesh: TriangleMesh, spacing: float, angle: float = 0.0) -> Skin:
     return _used(np.array(points), faces)
 
 
-def middle_of(mesh: TriangleMesh) -> Place:
+def region_middle(mesh: TriangleMesh) -> SurfacePose:
     """Return the point of a region nearest to its centre of area, heading along its longest extent.
 
     Of the two ways along, the one nearer to +y (then +x, then +z) is taken.
@@ -184,10 +189,10 @@ def middle_of(mesh: TriangleMesh) -> Place:
         heading /= np.linalg.norm(heading)
     if heading @ np.array([1e-3, 1.0, 1e-6]) < 0:
         heading = -heading
-    return Surface(mesh).place(centre, heading)
+    return GeodesicTracer(mesh).place(centre, heading)
 
 
-def shifted(mesh: TriangleMesh, place: Place, shift: tuple[float, float]) -> Place:
+def shifted_pose(mesh: TriangleMesh, place: SurfacePose, shift: tuple[float, float]) -> SurfacePose:
     """Return the place that lies (across, along) its heading from another, measured on the surface, metres.
 
     Raises
@@ -195,7 +200,7 @@ def shifted(mesh: TriangleMesh, place: Place, shift: tuple[float, float]) -> Pla
     SensorError
         That is beyond the region.
     """
-    surface = Surface(mesh)
+    surface = GeodesicTracer(mesh)
     found = _along(surface, place, shift[1])
     if found is not None and shift[0]:
         side = _along(surface, _turned(surface, found, -math.pi / 2), shift[0])
@@ -207,11 +212,11 @@ def shifted(mesh: TriangleMesh, place: Place, shift: tuple[float, float]) -> Pla
     return found
 
 
-def _turned(surface: Surface, place: Place, angle: float) -> Place:
+def _turned(surface: GeodesicTracer, place: SurfacePose, angle: float) -> SurfacePose:
     return place.turned(surface.normals[place.triangle], angle)
 
 
-def _along(surface: Surface, place: Place, length: float) -> Place | None:
+def _along(surface: GeodesicTracer, place: SurfacePose, length: float) -> SurfacePose | None:
     """Go straight on, backwards for a negative length; the heading at the end points forwards in either case."""
     if length >= 0:
         return surface.walk(place, length)
@@ -219,11 +224,11 @@ def _along(surface: Surface, place: Place, length: float) -> Place | None:
     return None if end is None else _turned(surface, end, math.pi)
 
 
-def _both_ways(surface: Surface, middle: Place, spacing: float, most: int) -> list[tuple[int, Place]]:
+def _both_ways(surface: GeodesicTracer, middle: SurfacePose, spacing: float, most: int) -> list[tuple[int, SurfacePose]]:
     """Places at every multiple of the spacing before and behind the middle, as far as the surface goes, numbered."""
     found = [(0, middle)]
     for sign in (-1, 1):
-        here: Place | None = middle
+        here: SurfacePose | None = middle
         for number in range(1, most):
             here = _along(surface, here, sign * spacing) if here is not None else None
             if here is None or np.linalg.norm(here.point - middle.point) < CROWDED * spacing:  # off it, or once around it
@@ -235,7 +240,7 @@ def _both_ways(surface: Surface, middle: Place, spacing: float, most: int) -> li
     return sorted(found, key=lambda item: item[0])
 
 
-def _meets(found: list[tuple[int, Place]], point: np.ndarray, distance: float) -> bool:
+def _meets(found: list[tuple[int, SurfacePose]], point: np.ndarray, distance: float) -> bool:
     """Whether a line has come around a closed surface to where it was behind the middle."""
     return any(number < 0 and np.linalg.norm(place.point - point) < distance for number, place in found)
 
@@ -252,9 +257,9 @@ def _quads(index: np.ndarray) -> list[tuple[int, ...]]:
     return [tuple(corner) for corner in corners[(corners >= 0).all(axis=1)].tolist()]
 
 
-def _used(points: np.ndarray, faces: list[tuple[int, ...]]) -> Skin:
+def _used(points: np.ndarray, faces: list[tuple[int, ...]]) -> TexelMesh:
     """Leave out the points without a face."""
     used = np.unique([corner for face in faces for corner in face])
     number = np.full(len(points), -1)
     number[used] = np.arange(len(used))
-    return Skin(points[used], [tuple(number[list(face)].tolist()) for face in faces])
+    return TexelMesh(points[used], [tuple(number[list(face)].tolist()) for face in faces])

@@ -15,8 +15,8 @@ from palpate.addon.scene import scene_reader
 from palpate.addon.session import fcurves, jobs, transforms
 from palpate.addon.timeline import playback
 from palpate.core.errors import FileError
-from palpate.core.io.files import read_manifest
-from palpate.core.io.npz import load_recording
+from palpate.core.io.bake_folder import read_manifest
+from palpate.core.io.recording_npz import load_recording
 from palpate.core.io.tactile_exr import read_exr
 from palpate.core.jobs.job_runner import drive
 

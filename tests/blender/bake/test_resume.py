@@ -16,7 +16,7 @@ from palpate.addon.bake import bake_checkpoint, bake_files, folder_lock
 from palpate.addon.bake.bake import bake
 from palpate.addon.session import jobs
 from palpate.core.errors import FileError
-from palpate.core.io.npz import load_recording
+from palpate.core.io.recording_npz import load_recording
 from palpate.core.jobs.job_runner import drive
 
 SCRIPT = Path(__file__).with_name("killed_bake.py")

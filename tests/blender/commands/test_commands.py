@@ -17,7 +17,7 @@ from palpate.addon.bake.bake import bake
 from palpate.commands import COMMANDS, READY, blender, console, main
 from palpate.commands.bake import report
 from palpate.core.errors import FileError
-from palpate.core.io.npz import load_recording
+from palpate.core.io.recording_npz import load_recording
 from palpate.core.jobs.job_runner import drive
 
 

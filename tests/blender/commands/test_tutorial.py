@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from palpate.commands import main
-from palpate.core.io.npz import load_recording
+from palpate.core.io.recording_npz import load_recording
 
 
 def test_the_tutorial_does_what_it_says(scene, tmp_path, repository):

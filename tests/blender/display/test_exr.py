@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from palpate.core.geometry.layout import GridLayout, uv_layout
-from palpate.core.io.files import frame_file
+from palpate.core.io.bake_folder import frame_file
 from palpate.core.io.tactile_exr import CHANNELS, exr_channels, read_exr, write_exr
 from palpate.core.model.recording import SensorFrame
 

@@ -11,7 +11,7 @@ from palpate.addon.display import materials
 from palpate.addon.scene import scene_reader, uv_layouts
 from palpate.addon.timeline import playback
 from palpate.core.errors import SensorError
-from palpate.core.io.files import frame_file
+from palpate.core.io.bake_folder import frame_file
 from palpate.core.io.tactile_exr import read_exr
 from palpate.core.jobs.job_runner import drive
 

@@ -14,7 +14,7 @@ from palpate.addon.bake.bake import bake
 from palpate.addon.render import figure_export, render, render_setup, video
 from palpate.commands import main
 from palpate.core.errors import FileError, ParameterError, SceneError
-from palpate.core.figures.recording_style import Look
+from palpate.core.figures.figure_style import FigureStyle
 from palpate.core.jobs.job_runner import drive
 
 
@@ -40,7 +40,7 @@ def test_everything_at_once_and_nothing_left_behind(baked, tmp_path):
     before = dump()
     worlds, lights, cameras = len(bpy.data.worlds), len(bpy.data.lights), len(bpy.data.cameras)
     wish = figure_export.Wish(
-        figure_export.KINDS, Look(dpi=50), frames=(3, 4), size=(96, 64), samples=1, formats=("png", "pdf")
+        figure_export.KINDS, FigureStyle(dpi=50), frames=(3, 4), size=(96, 64), samples=1, formats=("png", "pdf")
     )
     stages = []
     written = drive(figure_export.make(scene, tmp_path / "out", wish), lambda step: stages.append((step.done, step.total)))
@@ -86,7 +86,7 @@ def test_the_scene_shows_the_colours_of_the_colour_bar(baked):
     pad = scene.objects["Pad"]
     nodes = pad.material_slots[-1].material.node_tree.nodes
     end = next(node.inputs[1].default_value for node in nodes if "maximum" in node.label)
-    assert end == pytest.approx(figure_export.look_of(scene).top(made.recording, made.texels))
+    assert end == pytest.approx(figure_export.look_of(scene).scale_limit(made.recording, made.texels))
 
 
 def test_a_scene_that_is_not_baked_and_a_frame_that_is_not_are_one_sentence(baked, tmp_path):
@@ -127,7 +127,13 @@ def test_workbench_shows_the_heat_map_and_leaves_meshes_alone(baked, tmp_path):
     ball.data.materials.append(glass)
     before, meshes = dump(), len(bpy.data.meshes)
     wish = figure_export.Wish(
-        ("scene",), Look(colour_map="MAGMA"), frames=(4,), sensors=("Pad",), size=(200, 160), engine="workbench", view=(-90, 89)
+        ("scene",),
+        FigureStyle(colour_map="MAGMA"),
+        frames=(4,),
+        sensors=("Pad",),
+        size=(200, 160),
+        engine="workbench",
+        view=(-90, 89),
     )
     drive(figure_export.make(scene, tmp_path / "out", wish))
     picture = image(tmp_path / "out" / "scene 0004.png")[..., :3]

@@ -11,7 +11,7 @@ from palpate.addon.bake.bake import bake
 from palpate.addon.render import render
 from palpate.commands import main
 from palpate.core.errors import SceneError
-from palpate.core.io.npz import load_recording
+from palpate.core.io.recording_npz import load_recording
 from palpate.core.jobs.job_runner import drive
 from palpate.core.response import metrics
 from palpate.sample_blends import build_samples, demo, studio

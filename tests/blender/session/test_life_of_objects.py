@@ -13,7 +13,7 @@ from palpate.addon.scene import scene_reader
 from palpate.addon.session import identity, transforms
 from palpate.commands import main
 from palpate.core.errors import PalpateError
-from palpate.core.io.npz import load_recording
+from palpate.core.io.recording_npz import load_recording
 from palpate.core.jobs.job_runner import drive
 from palpate.core.solver.simulation import run
 

@@ -9,9 +9,9 @@ import pytest
 from recordings import COLUMNS, PITCH, ROWS, grid_texels, recording_of, round_texels
 
 from palpate.core.errors import FileError, ParameterError, SensorError
-from palpate.core.figures import figure_style, tactile_image
+from palpate.core.figures import figure_canvas, figure_style, tactile_image
+from palpate.core.figures.figure_style import FigureStyle
 from palpate.core.figures.picture_labels import Label, label_picture
-from palpate.core.figures.recording_style import Look
 from palpate.core.figures.side_by_side import side_by_side
 from palpate.core.figures.tactile_strip import tactile_strip
 from palpate.core.figures.texel_numbers import texel_numbers
@@ -33,7 +33,7 @@ def test_net_shear_of_a_flat_pad_is_the_plain_sum():
 def test_mobilised_friction_is_shear_over_limit_and_zero_without_contact():
     texels = grid_texels()
     sensor = recording_of(texels).sensors["pad"]
-    ratio = metrics.mobilised(sensor, texels, mus=0.4)
+    ratio = metrics.mobilised_friction(sensor, texels, mus=0.4)
     touching = sensor.normal_force.any(axis=1)
     np.testing.assert_allclose(ratio[touching], 0.5)
     assert (ratio[~touching] == 0).all()
@@ -41,7 +41,7 @@ def test_mobilised_friction_is_shear_over_limit_and_zero_without_contact():
 
 @pytest.mark.parametrize(("value", "limit"), [(0.11, 0.15), (1.0, 1.0), (0.026, 0.03), (9.9, 10.0), (3e-7, 3e-7)])
 def test_scales_end_at_round_numbers(value, limit):
-    assert metrics.tidy_limit(value) == pytest.approx(limit)
+    assert metrics.rounded_limit(value) == pytest.approx(limit)
 
 
 def test_frames_are_spread_over_what_happens():
@@ -81,7 +81,7 @@ def test_colours_of_the_strip_are_the_forces(tmp_path):
     recording.sensors["pad"].shear[:] = 0
     recording.sensors["pad"].normal_force[:] = 0.0
     recording.sensors["pad"].normal_force[5, :] = 0.12
-    tactile_strip(tmp_path / "a.png", recording, {"pad": texels}, [6], Look("VIRIDIS", limit=0.2))
+    tactile_strip(tmp_path / "a.png", recording, {"pad": texels}, [6], FigureStyle("VIRIDIS", limit=0.2))
     picture = imread(tmp_path / "a.png")[:, :, :3]
     pixels = picture[:, : picture.shape[1] * 3 // 4].reshape(-1, 3)  # without the colour bar
     expected = np.array(colormaps["viridis"](0.6)[:3])
@@ -111,7 +111,7 @@ def test_no_text_is_smaller_than_eight_points_or_leaves_the_figure(tmp_path, mon
                 inside = box.x0 >= 0 and box.x1 <= width and box.y0 >= 0 and box.y1 <= height
                 seen.append((text.get_text(), text.get_fontsize(), inside))
 
-    monkeypatch.setattr(figure_style, "_write", look)
+    monkeypatch.setattr(figure_canvas, "_write", look)
     texels = grid_texels()
     recording = recording_of(texels)
     long_name = "Index finger of the left hand"
@@ -120,9 +120,9 @@ def test_no_text_is_smaller_than_eight_points_or_leaves_the_figure(tmp_path, mon
     parameters = dict.fromkeys(both, SensorParameters())
     for width in figure_style.WIDTHS:
         for quantity in ("force", "pressure"):
-            look = Look(width=width, quantity=quantity)
-            tactile_strip(tmp_path / "a.png", recording, both, look=look)
-            time_curves(tmp_path / "c.png", recording, both, parameters, look=look)
+            look = FigureStyle(width=width, quantity=quantity)
+            tactile_strip(tmp_path / "a.png", recording, both, style=look)
+            time_curves(tmp_path / "c.png", recording, both, parameters, style=look)
             texel_numbers(tmp_path / "d.png", recording, both, "pad", 5, look)
     force_curves(tmp_path / "b.png", recording, both, parameters, {"pad": 9.81})
     source = tmp_path / "scene.png"
@@ -137,7 +137,7 @@ def test_no_text_is_smaller_than_eight_points_or_leaves_the_figure(tmp_path, mon
 def drawn(tmp_path, monkeypatch, draw):
     """Return the figure that `draw(path)` would have written."""
     kept = []
-    monkeypatch.setattr(figure_style, "_write", lambda figure, *_: kept.append(figure))
+    monkeypatch.setattr(figure_canvas, "_write", lambda figure, *_: kept.append(figure))
     draw(tmp_path / "a.png")
     return kept[0]
 
@@ -158,7 +158,7 @@ def test_a_colour_bar_in_kilopascals_is_force_over_area(tmp_path, monkeypatch):
     texels = grid_texels()
     recording = recording_of(texels)
     recording.sensors["pad"].normal_force[:] = 0.02
-    look = Look(quantity="pressure", limit=10.0)
+    look = FigureStyle(quantity="pressure", limit=10.0)
     figure = drawn(tmp_path, monkeypatch, lambda path: tactile_strip(path, recording, {"pad": texels}, [1], look))
     image = figure.axes[0].images[0]
     assert image.get_array().data.sum() == pytest.approx((0.02 / texels.area / 1e3).sum())
@@ -185,7 +185,7 @@ def test_a_closed_sensor_is_shown_from_the_side_that_bears(tmp_path, monkeypatch
     mesh, arrows = axes.collections
     seen = np.unique(mesh._triangulation.triangles)
     assert (texels.normal[seen] @ [1.0, 0.0, 0.0] > -0.35).all() and loaded[seen].sum() == loaded.sum()
-    view = tactile_image.View.of(texels, felt.normal_force.sum(axis=0))
+    view = tactile_image.SensorView.of(texels, felt.normal_force.sum(axis=0))
     expected = np.array([0.0, 0.0, 1.0]) @ view.axes.T
     mean = np.array([arrows.U.mean(), arrows.V.mean()])
     np.testing.assert_allclose(mean / np.linalg.norm(mean), expected, atol=0.05)
@@ -215,7 +215,7 @@ def test_the_free_moment_does_not_depend_on_the_origin():
 @pytest.mark.parametrize("wrong", [{"colour_map": "JET"}, {"quantity": "torque"}, {"width": "huge"}])
 def test_an_unknown_look_is_refused_with_what_there_is(wrong):
     with pytest.raises(ParameterError, match="choose from"):
-        Look(**wrong)
+        FigureStyle(**wrong)
 
 
 def test_a_figure_of_an_unknown_kind_is_refused(tmp_path):
@@ -267,7 +267,7 @@ def test_importing_figures_does_not_import_matplotlib():
 
 def test_figures_leave_pyplot_alone(tmp_path):
     code = (
-        "import sys; from palpate.core.figures import figure_style as f; f.save_figure(f.new_figure(1, 1), sys.argv[1], 50);"
+        "import sys; from palpate.core.figures import figure_canvas as f; f.save_figure(f.new_figure(1, 1), sys.argv[1], 50);"
         "sys.exit('matplotlib.pyplot' in sys.modules)"
     )
     assert subprocess.run([sys.executable, "-c", code, str(tmp_path / "a.png")]).returncode == 0

@@ -11,11 +11,11 @@ from recordings import grid_texels, recording_of, round_texels
 
 from palpate.core.errors import FileError, PalpateError
 from palpate.core.figures import color_maps
-from palpate.core.figures.recording_style import Look
+from palpate.core.figures.figure_style import FigureStyle
+from palpate.core.io.bake_folder import Manifest, write_manifest
 from palpate.core.io.bake_reader import frame_index, read_bake
 from palpate.core.io.export import export
-from palpate.core.io.files import Manifest, write_manifest
-from palpate.core.io.npz import save_recording
+from palpate.core.io.recording_npz import save_recording
 from palpate.core.io.sensor_npz import load_sensor, save_sensor
 from palpate.core.jobs.job_runner import drive
 from palpate.core.model.scenario import Painted, SensorParameters
@@ -67,10 +67,10 @@ def test_a_damaged_sensor_file_is_one_sentence(tmp_path, content):
 def test_a_folder_gives_all_its_sensors(bake, tmp_path):
     assert list(bake.texels) == ["pad", "tip/1"] == list(bake.recording.sensors)
     assert bake.parameters["pad"].unit == "V"
-    assert list(bake.only(["tip/1"]).recording.sensors) == ["tip/1"]
+    assert list(bake.select(["tip/1"]).recording.sensors) == ["tip/1"]
     assert list(read_bake(tmp_path / "bake" / "pad").texels) == ["pad"]
     with pytest.raises(FileError, match="choose from pad, tip/1"):
-        bake.only(["thumb"])
+        bake.select(["thumb"])
     with pytest.raises(FileError, match="from 1 to 10"):
         frame_index(bake.recording, 11)
 
@@ -139,7 +139,7 @@ def test_png_has_one_scale_for_all_sensors(bake, tmp_path):
     from matplotlib.image import imread
 
     bake.recording.sensors["tip/1"].normal_force[4, 0] = 0.2
-    drive(export(bake, "png", tmp_path / "out", Look("PAPER", limit=0.4)))
+    drive(export(bake, "png", tmp_path / "out", FigureStyle("PAPER", limit=0.4)))
     scale = json.loads((tmp_path / "out" / "pad" / "scale.json").read_text())
     assert scale["last_colour"] == 0.4 and scale["quantity"].endswith("(N)")
     picture = imread(tmp_path / "out" / "pad" / "tactile_0005.png")

@@ -25,18 +25,10 @@ from palpate.core.errors import FileError, PalpateError
 from palpate.core.geometry.layout import GridLayout, uv_layout
 from palpate.core.geometry.mesh import TriangleMesh
 from palpate.core.geometry.texels import texels_from_region
-from palpate.core.io import exr_codec, files
-from palpate.core.io.files import (
-    Manifest,
-    atomic_write,
-    folder_names,
-    frame_file,
-    read_manifest,
-    remove_leftovers,
-    writable_folder,
-    write_manifest,
-)
-from palpate.core.io.npz import load_recording, save_recording
+from palpate.core.io import exr_codec, file_writing
+from palpate.core.io.bake_folder import Manifest, folder_names, frame_file, read_manifest, write_manifest
+from palpate.core.io.file_writing import atomic_write, remove_leftovers, writable_folder
+from palpate.core.io.recording_npz import load_recording, save_recording
 from palpate.core.io.tactile_exr import CHANNELS, describe, exr_channels, read_exr, write_exr, write_exrs
 from palpate.core.model.recording import Frame, Recording, SensorFrame, SensorRecording
 from palpate.core.model.scenario import Painted, Sensor, SensorParameters
@@ -85,7 +77,7 @@ def test_full_disk(tmp_path, monkeypatch, step):
     def full(*_):
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
-    monkeypatch.setattr(files.os, step, full)
+    monkeypatch.setattr(file_writing.os, step, full)
     with pytest.raises(FileError) as error, atomic_write(target) as temporary:
         temporary.write_text("new")
     assert "free some space" in one_sentence(error, target)
@@ -142,7 +134,7 @@ def test_read_only_folder(tmp_path, monkeypatch):
     def forbidden(*_):
         raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
 
-    monkeypatch.setattr(files.os, "open", forbidden)
+    monkeypatch.setattr(file_writing.os, "open", forbidden)
     assert "read-only" in cannot_write(tmp_path / "a.exr", tmp_path)
     with pytest.raises(FileError) as error:
         writable_folder(tmp_path)
@@ -153,7 +145,7 @@ def test_read_only_file(tmp_path, monkeypatch):
     target = tmp_path / "a.exr"
     target.write_text("old")
     target.chmod(0o444)
-    monkeypatch.setattr(files.os, "access", lambda path, mode: path != target)  # root may write anything
+    monkeypatch.setattr(file_writing.os, "access", lambda path, mode: path != target)  # root may write anything
     assert "read-only" in cannot_write(target, target)
     assert target.read_text() == "old"
 
@@ -181,7 +173,7 @@ def test_kill_in_the_middle_leaves_the_old_file(tmp_path):
     target.write_text("old")
     program = (
         "import os, signal, sys\n"
-        "from palpate.core.io.files import atomic_write\n"
+        "from palpate.core.io.file_writing import atomic_write\n"
         "with atomic_write(sys.argv[1]) as temporary:\n"
         "    temporary.write_text('half')\n"
         "    os.kill(os.getpid(), signal.SIGKILL)\n"

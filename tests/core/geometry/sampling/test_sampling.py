@@ -10,8 +10,8 @@ import trimesh
 from palpate.core.errors import SensorError
 from palpate.core.geometry.mesh import TriangleMesh, checked_mesh, edge_defects, triangle_areas
 from palpate.core.geometry.sampling.poisson_disk import refined, scatter
-from palpate.core.geometry.sampling.surface_walk import Surface, nearest_point
-from palpate.core.geometry.sampling.texel_arrays import fill, middle_of, pad, wrap
+from palpate.core.geometry.sampling.straightest_geodesics import GeodesicTracer, nearest_point
+from palpate.core.geometry.sampling.texel_arrays import filled_region, pad_array, region_middle, wrapped_array
 from palpate.core.geometry.texels import texels_from_region
 
 PITCH = (0.0034, 0.0034)
@@ -61,7 +61,7 @@ def texels(skin):
 
 
 def test_a_walk_on_a_plane_is_straight_whatever_its_triangles():
-    surface = Surface(sheet())
+    surface = GeodesicTracer(sheet())
     for degrees in range(0, 360, 15):
         heading = np.array([math.cos(math.radians(degrees)), math.sin(math.radians(degrees)), 0.0])
         end = surface.walk(surface.place(np.array([0.001, 0.002, 0.0]), heading), 0.02)
@@ -71,7 +71,7 @@ def test_a_walk_on_a_plane_is_straight_whatever_its_triangles():
 
 def test_a_walk_on_a_cylinder_is_a_helix():
     radius = 0.01
-    surface = Surface(tube(radius))
+    surface = GeodesicTracer(tube(radius))
     start = surface.place(np.array([0.0, -0.02, radius]), np.array([1.0, 0.5, 0.0]))
     length = 0.08
     end = surface.walk(start, length)
@@ -84,7 +84,7 @@ def test_a_walk_on_a_cylinder_is_a_helix():
 def test_a_walk_through_corners_does_not_get_lost():
     ball = trimesh.creation.icosphere(subdivisions=3, radius=1.0)
     mesh = checked_mesh(np.asarray(ball.vertices), np.asarray(ball.faces), "ball")[0]
-    surface = Surface(mesh)
+    surface = GeodesicTracer(mesh)
     for vertex in range(0, 60, 7):  # a great circle leads back to where it began, from a corner and through corners
         point = mesh.vertices[vertex]
         end = surface.walk(surface.place(point, np.cross(point, [0.3, 0.2, 1.0])), 2 * math.pi)
@@ -92,7 +92,7 @@ def test_a_walk_through_corners_does_not_get_lost():
 
 
 def test_a_walk_ends_at_the_rim():
-    surface = Surface(sheet())
+    surface = GeodesicTracer(sheet())
     assert surface.walk(surface.place(np.zeros(3), np.array([1.0, 0, 0])), 0.0251) is None
 
 
@@ -112,7 +112,7 @@ def test_nearest_point_is_trimesh_s():
 
 @pytest.mark.parametrize("radius", [0.0, 0.008, -0.02])
 def test_a_pad_is_a_grid_whose_texels_are_a_pitch_apart(radius):
-    skin = pad(14, 6, PITCH, radius)
+    skin = pad_array(14, 6, PITCH, radius)
     found = texels(skin)
     assert (found.layout.rows, found.layout.columns) == (14, 6)
     table = np.empty((14, 6, 3))
@@ -136,7 +136,7 @@ def test_a_pad_is_a_grid_whose_texels_are_a_pitch_apart(radius):
 @pytest.mark.parametrize(("arguments", "text"), [((1, 6, PITCH), "no face"), ((14, 6, PITCH, 0.002), "more than once around")])
 def test_a_pad_that_is_none_says_why(arguments, text):
     with pytest.raises(SensorError, match=text):
-        pad(*arguments)
+        pad_array(*arguments)
 
 
 # --- arrays wrapped onto surfaces
@@ -145,11 +145,11 @@ def test_a_pad_that_is_none_says_why(arguments, text):
 @pytest.mark.parametrize("degrees", [0, 30, -45])
 def test_wrapped_onto_a_plane_it_is_the_flat_pad(degrees):
     angle = math.radians(degrees)
-    skin = wrap(sheet(), 8, 6, (0.003, 0.004), angle=angle)
-    flat = pad(8, 6, (0.003, 0.004)).vertices
+    skin = wrapped_array(sheet(), 8, 6, (0.003, 0.004), angle=angle)
+    flat = pad_array(8, 6, (0.003, 0.004)).vertices
     turn = np.array([[math.cos(angle), -math.sin(angle), 0], [math.sin(angle), math.cos(angle), 0], [0, 0, 1]])
     middle = skin.vertices.mean(axis=0)
-    heading = middle_of(sheet()).heading
+    heading = region_middle(sheet()).heading
     own = math.atan2(-heading[0], heading[1])  # the sheet's own direction is not quite +y
     turn = turn @ np.array([[math.cos(own), -math.sin(own), 0], [math.sin(own), math.cos(own), 0], [0, 0, 1]])
     assert skin.vertices - middle == pytest.approx(flat @ turn.T, abs=1e-9)
@@ -159,8 +159,8 @@ def test_wrapped_onto_a_cylinder_it_is_the_bent_pad():
     radius = 0.01
     mesh = tube(radius)
     upper = mesh.vertices[mesh.triangles].mean(axis=1)[:, 2] > 0
-    skin = wrap(TriangleMesh(mesh.vertices, mesh.triangles[upper]), 14, 6, PITCH)
-    expected = pad(14, 6, PITCH, radius).vertices + [0, 0, radius]
+    skin = wrapped_array(TriangleMesh(mesh.vertices, mesh.triangles[upper]), 14, 6, PITCH)
+    expected = pad_array(14, 6, PITCH, radius).vertices + [0, 0, radius]
     assert skin.vertices == pytest.approx(expected, abs=3e-7)  # 720 sides: the sagitta is 1e-7 m
     found = texels(skin)
     assert (found.layout.rows, found.layout.columns) == (14, 6)
@@ -168,7 +168,7 @@ def test_wrapped_onto_a_cylinder_it_is_the_bent_pad():
 
 
 def test_wrapped_onto_a_dome_every_texel_is_on_it_and_none_overlap():
-    skin = wrap(dome(), 6, 6, (0.002, 0.002))
+    skin = wrapped_array(dome(), 6, 6, (0.002, 0.002))
     assert np.linalg.norm(skin.vertices, axis=1) == pytest.approx(0.01, rel=2e-3)
     found = texels(skin)
     assert (found.layout.rows, found.layout.columns) == (6, 6)
@@ -179,7 +179,7 @@ def test_wrapped_onto_a_dome_every_texel_is_on_it_and_none_overlap():
 
 def test_an_array_beyond_its_region_says_what_to_do():
     with pytest.raises(SensorError, match="beyond the region: use fewer texels"):
-        wrap(sheet(), 20, 6, PITCH)
+        wrapped_array(sheet(), 20, 6, PITCH)
 
 
 # --- even spacing
@@ -188,7 +188,7 @@ def test_an_array_beyond_its_region_says_what_to_do():
 @pytest.mark.parametrize("surface", ["sheet", "dome", "tube"])
 def test_rows_at_a_spacing_cover_the_region(surface):
     mesh, spacing = {"sheet": sheet, "dome": dome, "tube": tube}[surface](), 0.0015
-    skin = fill(mesh, spacing)
+    skin = filled_region(mesh, spacing)
     patch = as_mesh(skin)
     assert edge_defects(patch.triangles)[1:] == (0, 0)
     covered = triangle_areas(patch).sum() / triangle_areas(mesh).sum()
@@ -245,10 +245,10 @@ def test_refining_keeps_the_surface():
     ("call", "text"),
     [
         (lambda: scatter(sheet(), 0.2), "use a smaller spacing"),
-        (lambda: fill(sheet(), 0.2), "use a smaller spacing"),
+        (lambda: filled_region(sheet(), 0.2), "use a smaller spacing"),
         (lambda: scatter(sheet(), 0.00001), "give a larger one"),
         (lambda: scatter(sheet(), 0.0), "above zero"),
-        (lambda: fill(sheet(), -1.0), "above zero"),
+        (lambda: filled_region(sheet(), -1.0), "above zero"),
     ],
 )
 def test_spacings_that_cannot_be_say_what_to_do(call, text):

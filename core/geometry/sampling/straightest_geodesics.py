@@ -14,7 +14,7 @@ NUDGE = 1e-9
 
 
 @dataclass(frozen=True)
-class Place:
+class SurfacePose:
     """A point on a surface and a direction along it.
 
     Attributes
@@ -29,13 +29,13 @@ class Place:
     point: np.ndarray
     heading: np.ndarray
 
-    def turned(self, normal: np.ndarray, angle: float) -> Place:
+    def turned(self, normal: np.ndarray, angle: float) -> SurfacePose:
         """Return the same point with the heading turned anticlockwise, seen from outside."""
         across = np.cross(normal, self.heading)
-        return Place(self.triangle, self.point, np.cos(angle) * self.heading + np.sin(angle) * across)
+        return SurfacePose(self.triangle, self.point, np.cos(angle) * self.heading + np.sin(angle) * across)
 
 
-class Surface:
+class GeodesicTracer:
     """A surface to walk on.
 
     Parameters
@@ -58,7 +58,7 @@ class Surface:
             for edge in ((a, b), (b, c), (c, a)):
                 self._across.setdefault((min(edge), max(edge)), []).append(number)
 
-    def place(self, point: np.ndarray, heading: np.ndarray) -> Place:
+    def place(self, point: np.ndarray, heading: np.ndarray) -> SurfacePose:
         """Return the point of the surface that is nearest to `point`, with the nearest direction along it.
 
         Parameters
@@ -70,22 +70,22 @@ class Surface:
         along = heading - (heading @ normal) * normal
         if np.linalg.norm(along) < 1e-6 * np.linalg.norm(heading):  # it stands on the surface: any direction will do
             along = np.cross(normal, np.eye(3)[np.abs(normal).argmin()])
-        return Place(triangle, nearest, along / np.linalg.norm(along))
+        return SurfacePose(triangle, nearest, along / np.linalg.norm(along))
 
-    def walk(self, start: Place, length: float) -> Place | None:
+    def walk(self, start: SurfacePose, length: float) -> SurfacePose | None:
         """Go straight on; None when the surface ends before."""
         here, left = start, length
         for _ in range(4 * len(self.mesh.triangles) + 16):
             step, edge = self._exit(here)
             if left <= step:
-                return Place(here.triangle, here.point + left * here.heading, here.heading)
+                return SurfacePose(here.triangle, here.point + left * here.heading, here.heading)
             after = self._cross(here, here.point + step * here.heading, edge)
             if after is None:
                 return None
             here, left = after, left - step
         return None
 
-    def _exit(self, here: Place) -> tuple[float, int]:
+    def _exit(self, here: SurfacePose) -> tuple[float, int]:
         """How far it is to the rim of the triangle, and which edge is met there."""
         outward = self._outward[here.triangle]
         speed = outward @ here.heading
@@ -94,7 +94,7 @@ class Surface:
         edge = int(np.argmin(distance))
         return float(distance[edge]), edge
 
-    def _cross(self, here: Place, point: np.ndarray, edge: int) -> Place | None:
+    def _cross(self, here: SurfacePose, point: np.ndarray, edge: int) -> SurfacePose | None:
         """Step over an edge; the heading keeps its angle to it."""
         corners = self.mesh.triangles[here.triangle]
         a, b = int(corners[edge]), int(corners[(edge + 1) % 3])
@@ -108,7 +108,7 @@ class Surface:
         back = next(i for i in range(3) if self.mesh.triangles[other, (i + 2) % 3] not in (a, b))
         inward = -self._outward[other, back]
         heading = (here.heading @ along) * along + abs(here.heading @ self._outward[here.triangle, edge]) * inward
-        return Place(other, start + share * length * along, heading / np.linalg.norm(heading))
+        return SurfacePose(other, start + share * length * along, heading / np.linalg.norm(heading))
 
 
 def nearest_point(mesh: TriangleMesh, point: np.ndarray) -> tuple[np.ndarray, int]:

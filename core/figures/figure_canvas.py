@@ -1,0 +1,82 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The canvas of every figure: a new figure, the style of its axes, and writing it to a file atomically.
+
+matplotlib is imported on use, and only its Agg canvas, so that nothing here needs a window or changes another figure.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ..errors import ParameterError
+from ..io.file_writing import atomic_write
+from .figure_style import FONT, INK, RULE, SMALL
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+FILE_TYPES = ("png", "pdf", "svg")
+"""Endings of the files that a figure can become."""
+
+
+def new_figure(width: float, height: float) -> Figure:
+    """Return a figure of its own, in inches, that no window and no other figure knows of."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(width, height), facecolor="white")
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def tidy_axes(axes: Axes) -> None:
+    """Leave of an axes what helps reading: two spines, a faint grid, small ticks."""
+    axes.grid(True, color=RULE, lw=0.7)
+    axes.set_axisbelow(True)
+    axes.tick_params(labelsize=SMALL, colors=INK, length=2.5, width=0.6)
+    for label in (axes.xaxis.label, axes.yaxis.label):
+        label.set_fontsize(FONT)
+        label.set_color(INK)
+    for side in ("top", "right"):
+        axes.spines[side].set_visible(False)
+    for side in ("left", "bottom"):
+        axes.spines[side].set_color(INK)
+        axes.spines[side].set_linewidth(0.6)
+
+
+def save_figure(figure: Figure, path: str | Path, dpi: float) -> None:
+    """Write the figure, whole or not at all, as PNG, PDF or SVG by its ending.
+
+    The same figure gives the same bytes: PDF without a date. Fonts go into it as such, so that a journal can edit the text.
+
+    Raises
+    ------
+    ParameterError
+        The ending is of another kind.
+    FileError
+        It cannot be written.
+    """
+    path = Path(path)
+    kind = path.suffix.lstrip(".").lower()
+    if kind not in FILE_TYPES:
+        raise ParameterError(f"'{path.name}' is no figure that can be written: end its name with .png, .pdf or .svg.")
+    metadata = {"CreationDate": None} if kind == "pdf" else {"Date": None} if kind == "svg" else {"Software": "Palpate"}
+    for axes in figure.axes:
+        for label in (axes.xaxis.label, axes.yaxis.label, *axes.get_xticklabels(), *axes.get_yticklabels()):
+            if float(label.get_fontsize()) > FONT:
+                label.set_fontsize(FONT)
+    for axes in figure.axes:
+        legend = axes.get_legend()
+        for text in legend.get_texts() if legend else ():
+            text.set_fontsize(8)
+    _write(figure, path, dpi, kind, metadata)
+
+
+def _write(figure: Figure, path: Path, dpi: float, kind: str, metadata: dict[str, Any]) -> None:
+    import matplotlib
+
+    plain = {"pdf.fonttype": 42, "svg.fonttype": "none", "svg.hashsalt": "palpate"}
+    with atomic_write(path) as temporary, matplotlib.rc_context(plain):
+        figure.savefig(temporary, dpi=dpi, format=kind, metadata=metadata)

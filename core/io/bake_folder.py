@@ -1,0 +1,180 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A bake folder: names of its folders and files, and the manifest that describes each sensor's bake.
+
+A bake folder holds one folder per sensor. Each of these holds one EXR image per frame, ``recording.npz``, ``sensor.npz`` and
+``manifest.json``.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import zlib
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+from ..errors import FileError
+from .file_writing import os_error_reason, write_file
+
+MANIFEST_FORMAT = "palpate-bake/1"
+MANIFEST_NAME = "manifest.json"
+RECORDING_NAME = "recording.npz"
+
+_RESERVED = {"con", "prn", "aux", "nul", *(f"{port}{i}" for port in ("com", "lpt") for i in range(1, 10))}
+"""Names that Windows reserves for devices."""
+
+
+def folder_names(names: Iterable[str]) -> dict[str, str]:
+    """Return a unique folder name for each sensor that every operating system accepts.
+
+    A name of letters, digits, blanks, dots, hyphens and underscores is kept. In any other name the remaining characters
+    become ``_`` and a checksum of the name is appended. The same is done for names that differ only in case.
+    """
+    chosen: dict[str, str] = {}
+    taken: set[str] = set()
+    for name in dict.fromkeys(names):
+        clean = "".join(c if c.isalnum() or c in " ._-" else "_" for c in name).strip(" .")[:60]
+        if not clean or clean != name or clean.split(".")[0].lower() in _RESERVED or clean.casefold() in taken:
+            base = f"{clean or 'sensor'}-{zlib.crc32(name.encode('utf-8', 'surrogatepass')):08x}"
+            clean = base if clean.split(".")[0].lower() not in _RESERVED else f"_{base}"
+        while clean.casefold() in taken:
+            clean += "_"
+        taken.add(clean.casefold())
+        chosen[name] = clean
+    return chosen
+
+
+def frame_file(frame: int) -> str:
+    """Return the name of a frame's tactile image; Blender plays files named like this as a sequence."""
+    return f"tactile_{frame:04d}.exr"
+
+
+@dataclass(frozen=True)
+class Manifest:
+    """Description of one sensor's bake: where it comes from and how to read it.
+
+    Attributes
+    ----------
+    sensor : str
+    palpate : str
+        Version of Palpate that wrote it.
+    frame_start, frame_end : int
+        Frames of the whole bake, both included.
+    fps : float, frames per second
+    dt : float, seconds
+        Substep.
+    step_reason : str
+        Why that one; empty when the manifest is older.
+    digest : str
+        :meth:`.scenario.Scenario.digest` of what is solved; another digest makes the bake stale.
+    unit : str
+        Of the channel ``reading``.
+    shape : (int, int)
+        Height and width of the images, pixels.
+    parameters : dict
+        Of the sensor, JSON values.
+    warnings : tuple of str
+    complete : bool
+        True once all images and the recording are written.
+    scene_file : str
+        Name, without its folder, of the .blend that was baked; empty when it had none, or when the manifest is older.
+    body : str
+        Name of the body that carries the sensor, among those of the recording; empty when the manifest is older.
+    """
+
+    sensor: str
+    palpate: str
+    frame_start: int
+    frame_end: int
+    fps: float
+    dt: float
+    digest: str
+    unit: str
+    shape: tuple[int, int]
+    parameters: dict[str, Any] = field(default_factory=dict)
+    warnings: tuple[str, ...] = ()
+    complete: bool = False
+    scene_file: str = ""
+    body: str = ""
+    step_reason: str = ""
+
+
+def write_manifest(folder: str | os.PathLike, manifest: Manifest, atomic: bool = True) -> Path:
+    """Write ``manifest.json`` into `folder`, as :func:`.write_file` does, and return its path.
+
+    Raises
+    ------
+    FileError
+        It cannot be written.
+    ValueError
+        A number is not finite or a parameter is no JSON value (a fault of the program, not of the user).
+    """
+    content = {"format": MANIFEST_FORMAT, **asdict(manifest)}
+    try:
+        text = json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False)
+    except TypeError as error:
+        raise ValueError(f"the manifest of '{manifest.sensor}' holds something that is not JSON: {error}") from error
+    path = Path(folder) / MANIFEST_NAME
+    with write_file(path, atomic) as temporary:
+        temporary.write_bytes((text + "\n").encode("utf-8", "surrogatepass"))
+    return path
+
+
+def read_manifest(folder: str | os.PathLike) -> Manifest:
+    """Read ``manifest.json`` of a sensor's bake folder.
+
+    Raises
+    ------
+    FileError
+        There is none, or it is not one that this version reads.
+    """
+    path = Path(folder) / MANIFEST_NAME
+    try:
+        content = json.loads(path.read_bytes().decode("utf-8", "surrogatepass"))
+    except FileNotFoundError:
+        raise FileError(f"'{path}' does not exist: bake first, or choose a sensor's folder inside the bake folder.") from None
+    except OSError as error:
+        raise FileError(f"'{path}' could not be read ({os_error_reason(error)}): check its permissions.") from error
+    except (ValueError, RecursionError) as error:
+        raise FileError(f"'{path}' is damaged (not JSON): delete the folder and bake again.") from error
+    if not isinstance(content, dict) or content.get("format") != MANIFEST_FORMAT:
+        found = content.get("format") if isinstance(content, dict) else None
+        raise FileError(f"'{path}' is not a '{MANIFEST_FORMAT}' file but {found!r}: bake again with this version.")
+    try:
+        return _manifest(content)
+    except (KeyError, TypeError, ValueError, OverflowError) as error:
+        raise FileError(f"'{path}' is damaged ({type(error).__name__}: {error}): delete the folder and bake again.") from error
+
+
+def _manifest(content: dict[str, Any]) -> Manifest:
+    height, width = content["shape"]
+    manifest = Manifest(
+        sensor=_typed(content, "sensor", str),
+        palpate=_typed(content, "palpate", str),
+        frame_start=_typed(content, "frame_start", int),
+        frame_end=_typed(content, "frame_end", int),
+        fps=float(_typed(content, "fps", (int, float))),
+        dt=float(_typed(content, "dt", (int, float))),
+        digest=_typed(content, "digest", str),
+        unit=_typed(content, "unit", str),
+        shape=(int(height), int(width)),
+        parameters=_typed(content, "parameters", dict),
+        warnings=tuple(str(warning) for warning in _typed(content, "warnings", list)),
+        complete=_typed(content, "complete", bool),
+        scene_file=_typed({"scene_file": "", **content}, "scene_file", str),
+        body=_typed({"body": "", **content}, "body", str),
+        step_reason=_typed({"step_reason": "", **content}, "step_reason", str),
+    )
+    if not (math.isfinite(manifest.fps) and math.isfinite(manifest.dt)):
+        raise ValueError("fps and dt must be finite")
+    return manifest
+
+
+def _typed(content: dict[str, Any], key: str, kind: Any) -> Any:
+    value = content[key]
+    if not isinstance(value, kind) or (isinstance(value, bool) and kind is not bool):
+        raise TypeError(f"{key} is {value!r}")
+    return value

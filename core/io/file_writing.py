@@ -1,0 +1,193 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Atomic writing: a file keeps its old content until the new content is complete and on the disk.
+
+The new content is written to a temporary file beside the target, which then replaces the target. A process that is killed
+leaves either the old or the new file. It may also leave a temporary file, whose name contains ``.partial``;
+:func:`remove_leftovers` deletes these.
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+import re
+import secrets
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+from ..errors import FileError
+
+
+@contextmanager
+def atomic_write(path: str | os.PathLike) -> Iterator[Path]:
+    """Write a file so that `path` always has either its old content or all of the new content.
+
+    Parameters
+    ----------
+    path : path
+        The file to make or to replace. Where it is a symbolic link, the file it points to is replaced.
+
+    Yields
+    ------
+    Path
+        A new, empty file beside `path`, with the same suffix. The body of the ``with`` statement writes and closes it. It
+        replaces `path` when the body ends, and is removed when the body raises.
+
+    Raises
+    ------
+    FileError
+        The folder is missing, cannot be written to, is full, or `path` is a folder, a device or read-only.
+    """
+    target = Path(os.path.realpath(path))
+    if target.is_dir():
+        raise FileError(f"'{path}' is a folder: give the name of a file in it.")
+    if target.exists() and not target.is_file():  # a rename would put a plain file in the place of /dev/null
+        raise FileError(f"'{path}' is a device, not a file: give the name of a file.")
+    if target.exists() and not os.access(target, os.W_OK):
+        raise FileError(f"'{path}' is read-only: change its permissions or choose another name.")
+    _require_folder(target.parent)
+    temporary = _new_file_in(target.parent, target.stem, target.suffix)
+    try:
+        yield temporary
+        with open(temporary, "rb+") as file:
+            os.fsync(file.fileno())
+        os.replace(temporary, target)
+    except BaseException as error:
+        with suppress(OSError):
+            temporary.unlink()
+        if isinstance(error, OSError):
+            raise FileError(f"'{path}' could not be written ({os_error_reason(error)}): {_remedy(error)}.") from error
+        raise
+    _sync_folder(target.parent)
+
+
+@contextmanager
+def write_file(path: str | os.PathLike, atomic: bool = True) -> Iterator[Path]:
+    """Write a file, either atomically (:func:`atomic_write`) or directly.
+
+    Parameters
+    ----------
+    path : path
+    atomic : bool
+        False writes to `path` itself and does not wait until the data is on the disk. This is many times faster, but an
+        interruption leaves an incomplete file: only for a folder that nobody reads before it is complete.
+
+    Yields
+    ------
+    Path
+        The file to write and close.
+
+    Raises
+    ------
+    FileError
+        As :func:`atomic_write`.
+    """
+    if atomic:
+        with atomic_write(path) as temporary:
+            yield temporary
+        return
+    try:
+        yield Path(path)
+    except OSError as error:
+        raise FileError(f"'{path}' could not be written ({os_error_reason(error)}): {_remedy(error)}.") from error
+
+
+def writable_folder(path: str | os.PathLike, create: bool = False) -> Path:
+    """Check that files can be written into a folder, by creating one and deleting it.
+
+    Parameters
+    ----------
+    path : path
+    create : bool
+        Create the folder if it is missing and its parent folder exists.
+
+    Returns
+    -------
+    Path
+        Absolute.
+
+    Raises
+    ------
+    FileError
+        There is no such folder, something else has its name, or it cannot be written to.
+    """
+    folder = Path(os.path.abspath(path))
+    if create and not folder.exists():
+        _require_folder(folder.parent)
+        try:
+            folder.mkdir(exist_ok=True)
+        except OSError as error:
+            raise FileError(f"The folder '{folder}' could not be made ({os_error_reason(error)}): {_remedy(error)}.") from error
+    _require_folder(folder)
+    with suppress(FileNotFoundError):
+        _new_file_in(folder, "check", "").unlink()
+    return folder
+
+
+def remove_leftovers(folder: str | os.PathLike) -> list[Path]:
+    """Delete the temporary files that interrupted calls of :func:`atomic_write` left in `folder`.
+
+    No other process may be writing to the folder meanwhile.
+
+    Returns
+    -------
+    list of Path
+        The deleted files, sorted by name.
+    """
+    removed = []
+    for path in sorted(Path(folder).glob(".*.partial*")):
+        if re.fullmatch(r"\..*\.[0-9a-f]{8}\.partial(\.[^.]*)?", path.name) and path.is_file():
+            with suppress(OSError):
+                path.unlink()
+                removed.append(path)
+    return removed
+
+
+def _require_folder(folder: Path) -> None:
+    if folder.is_dir():
+        return
+    if folder.exists():
+        raise FileError(f"'{folder}' is a file where a folder is needed: choose another folder.")
+    for above in folder.parents:
+        if above.exists() and not above.is_dir():
+            raise FileError(f"'{folder}' cannot be a folder because '{above}' is a file: choose another folder.")
+    raise FileError(f"The folder '{folder}' does not exist: create it or choose another.")
+
+
+def _new_file_in(folder: Path, stem: str, suffix: str) -> Path:
+    """Create an empty file with a unique name; the user's umask decides who may read it."""
+    path = folder / f".{stem}.{secrets.token_hex(4)}.partial{suffix}"
+    try:
+        os.close(os.open(path, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))
+    except OSError as error:
+        # Permissions alone do not decide: root may write despite them, and cannot write to a read-only file system.
+        if error.errno in (errno.EACCES, errno.EPERM, errno.EROFS) or not os.access(folder, os.W_OK):
+            raise FileError(f"The folder '{folder}' is read-only: change its permissions or choose another.") from error
+        raise FileError(
+            f"No file can be made in the folder '{folder}' ({os_error_reason(error)}): {_remedy(error)}."
+        ) from error
+    return path
+
+
+def _sync_folder(folder: Path) -> None:
+    """Flush a folder's list of names to the disk, on systems that allow it, so that a rename survives a power cut."""
+    with suppress(OSError):
+        handle = os.open(folder, os.O_RDONLY)
+        try:
+            os.fsync(handle)
+        finally:
+            os.close(handle)
+
+
+def os_error_reason(error: OSError) -> str:
+    """Return the operating system's words for an error, in lower case, as they stand inside our sentences."""
+    return (error.strerror or str(error) or type(error).__name__).lower()
+
+
+def _remedy(error: OSError) -> str:
+    if error.errno in (errno.ENOSPC, errno.EDQUOT):
+        return "free some space or choose another folder"
+    if error.errno == errno.ENAMETOOLONG:
+        return "choose a shorter name"
+    return "close programs that use it, check its permissions, or choose another folder"

@@ -1,0 +1,112 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Recordings as .npz: numpy reads them without Palpate, bit for bit, and equal recordings are equal files.
+
+Members: ``header.npy`` (JSON text), ``frames``, ``times``, ``poses``, ``velocities`` and, for sensor number i of the
+header's list, ``sensor_<i>/normal_force`` and so on with the names of :class:`.recording.SensorRecording`.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..errors import FileError
+from ..model.recording import Recording, SensorRecording
+from .file_writing import os_error_reason
+from .npz import DAMAGED, write_arrays
+
+RECORDING_FORMAT = "palpate-recording/2"
+
+_SENSOR_FIELDS = tuple(item.name for item in fields(SensorRecording))
+
+
+def save_recording(path: str | os.PathLike, recording: Recording, atomic: bool = True) -> None:
+    """Write a recording as .npz, as :func:`.write_file` does; the same recording gives the same bytes.
+
+    Raises
+    ------
+    FileError
+        The file cannot be written.
+    ValueError
+        A number is not finite or an array has another number of frames (a fault of the program, not of the user).
+    """
+    arrays = {"header": np.array(json.dumps(_header(recording), allow_nan=False))}
+    for name in ("frames", "times", "poses", "velocities"):
+        arrays[name] = np.asarray(getattr(recording, name))
+    for i, sensor in enumerate(recording.sensors.values()):
+        for name in _SENSOR_FIELDS:
+            arrays[f"sensor_{i}/{name}"] = np.asarray(getattr(sensor, name))
+    for name, array in arrays.items():
+        if name != "header" and len(array) != len(recording.frames):
+            raise ValueError(f"'{name}' has {len(array)} frames, the recording {len(recording.frames)}")
+        if array.dtype.kind == "f" and not np.isfinite(array).all():
+            raise ValueError(f"'{name}' of the recording has values that are not finite")
+        if array.dtype.kind not in "fiubU":
+            raise ValueError(f"'{name}' of the recording has type {array.dtype}")
+
+    write_arrays(path, arrays, atomic)
+
+
+def load_recording(path: str | os.PathLike) -> Recording:
+    """Read a recording that :func:`save_recording` wrote.
+
+    Raises
+    ------
+    FileError
+        There is no such file, or it is damaged or something else.
+    """
+    file = Path(path)
+    if not file.exists():
+        raise FileError(f"'{path}' does not exist: bake first, or choose another file.")
+    try:
+        with np.load(file, allow_pickle=False) as members:
+            if not isinstance(members, np.lib.npyio.NpzFile) or "header" not in members.files:
+                raise FileError(f"'{path}' is not a recording of Palpate: choose a recording.npz of a bake.")
+            return _recording(path, members)
+    except OSError as error:
+        raise FileError(f"'{path}' could not be read ({os_error_reason(error)}): choose another file.") from error
+    except DAMAGED as error:
+        raise FileError(f"'{path}' is damaged or no recording ({error}): bake again.") from error
+
+
+def _header(recording: Recording) -> dict[str, Any]:
+    return {
+        "format": RECORDING_FORMAT,
+        "sensors": list(recording.sensors),
+        "bodies": list(recording.body_names),
+        "dt": float(recording.dt),
+        "digest": recording.digest,
+        "warnings": list(recording.warnings),
+        "step_reason": recording.step_reason,
+    }
+
+
+def _recording(path: str | os.PathLike, members: Any) -> Recording:
+    header = json.loads(str(members["header"]))
+    if header["format"] != RECORDING_FORMAT:
+        raise FileError(
+            f"'{path}' has the format {header['format']!r}, not '{RECORDING_FORMAT}': bake again with this version."
+        )
+    arrays = {name: members[name] for name in ("frames", "times", "poses", "velocities")}
+    sensors = {
+        str(name): SensorRecording(**{key: members[f"sensor_{i}/{key}"] for key in _SENSOR_FIELDS})
+        for i, name in enumerate(header["sensors"])
+    }
+    count = len(arrays["frames"])
+    parts = [*arrays.values(), *(getattr(sensor, key) for sensor in sensors.values() for key in _SENSOR_FIELDS)]
+    if any(len(part) != count for part in parts):
+        raise ValueError("its arrays have different numbers of frames")
+    return Recording(
+        **arrays,
+        sensors=sensors,
+        body_names=tuple(str(name) for name in header["bodies"]),
+        dt=float(header["dt"]),
+        digest=str(header["digest"]),
+        warnings=tuple(str(warning) for warning in header["warnings"]),
+        step_reason=str(header.get("step_reason", "")),
+    )
