@@ -25,7 +25,7 @@ from ..laws.series_compliance import coupling
 from ..model.pose_interpolation import poses_at
 from ..model.recording import Frame, Recording, SensorFrame
 from ..model.scenario import Scenario, Sensor, Target
-from ..response.readings import Reader
+from ..response.readings import ReadoutChain
 from .detection.deformation import Shapes
 from .detection.deforming_surfaces import Surfaces, extent, point_rows
 from .detection.narrow_phase import count_sunk
@@ -101,7 +101,7 @@ class Simulation:
         self._neighbours = neighbours_for(len(self._state.hint), len(self._world.pairs))
         board, self._helpers = board_for(len(self._state.hint), threads)
         self._scratch = scratch_for(self._world, self._state, self._shapes, board)
-        self._readers = [Reader.of(sensor) for sensor in scenario.sensors]
+        self._readers = [ReadoutChain.of(sensor) for sensor in scenario.sensors]
         self._pilot = Pilot(scenario)
         self._texel_start = _texel_start(scenario)
 
