@@ -25,7 +25,11 @@ from palpate.core.solver.simulation import Simulation
 from .solver import GRIDS, cube, weighing
 
 ROUNDS = 5
-PHASES = {"find contacts": parallel_loops.GATHER, "linearise and sum": parallel_loops.SUM, "bend bristles": parallel_loops.BEND}
+LOOPS = {
+    "find contacts": parallel_loops.FIND_CONTACTS,
+    "linearise and sum": parallel_loops.SUM_CONTACTS,
+    "bend bristles": parallel_loops.UPDATE_FRICTION,
+}
 BYTES = {
     # contact point 12, bristle 4 (both ways), triangle 12, hint and lists 3; columns of the row: 10 written, 6 and 3 laid flat
     "find contacts": 8 * (12 + 8 + 12 + 3 + 10 + 9),
@@ -35,9 +39,9 @@ BYTES = {
 
 
 @numba.njit(nogil=True)
-def _repeat(times, phase, world, tree, neighbours, shapes, state, scratch):
+def _repeat(times, phase, model, tree, neighbour_lists, surfaces, state, workspace):
     for _ in range(times):
-        parallel_loops.share_out(phase, world, tree, neighbours, shapes, state, scratch)
+        parallel_loops.run_parallel_loop(phase, model, tree, neighbour_lists, surfaces, state, workspace)
 
 
 @numba.njit(nogil=True)
@@ -99,25 +103,26 @@ def run() -> Iterator[dict]:
         simulation = Simulation(weighing(texels, solid), threads=1)
         simulation.advance()
         arrays, times, total = simulation.arrays, max(10, 100_000 // texels), 0.0
-        world, scratch = arrays[0], arrays[-1]
-        scratch.step[0] = simulation.dt
+        model, workspace = arrays[0], arrays[-1]
+        workspace.step[0] = simulation.dt
         flops = {
             "linearise and sum": operations(
                 contact_assembly._sum_contacts,
                 0,
                 0,
                 simulation.dt,
-                relative_kinematics.law_of(world.parameters, 0),
-                world,
+                relative_kinematics.pair_law(model.parameters, 0),
+                model,
                 arrays[-2].memory,
-                scratch,
+                workspace,
             ),
             "bend bristles": operations(
-                friction_state._bend_bristles, 0, relative_kinematics.values(scratch.part[0]), arrays[-2], scratch
+                friction_state._update_bristles, 0, relative_kinematics.motion_values(workspace.part[0]), arrays[-2], workspace
             ),
-            "find contacts": 90 + operations(narrow_phase._lay_flat, 0, int(scratch.contacts[0]), scratch.rows),  # 90 by hand
+            "find contacts": 90  # counted by hand
+            + operations(narrow_phase._rotate_bristles_into_plane, 0, int(workspace.contacts[0]), workspace.rows),
         }
-        for name, phase in PHASES.items():
+        for name, phase in LOOPS.items():
             _repeat(1, phase, *arrays)
             taken = best(functools.partial(_repeat, times, phase, *arrays)) / times / texels
             total += taken

@@ -107,8 +107,9 @@ def palpate_step(
 def memory(texels: int, solid: trimesh.Trimesh) -> int:
     """Return the bytes of all arrays that the inner loop works on, but for the object's own triangles."""
     simulation = Simulation(weighing(texels, solid))
-    world, _, neighbours, _, state, scratch = simulation.arrays
-    return sum(array.nbytes for part in (world, neighbours, state, scratch) for array in part if isinstance(array, np.ndarray))
+    model, _, neighbour_lists, _, state, workspace = simulation.arrays
+    parts = (model, neighbour_lists, state, workspace)
+    return sum(array.nbytes for part in parts for array in part if isinstance(array, np.ndarray))
 
 
 def mujoco_model(texels: int, solid: trimesh.Trimesh, slope: float = 0.0, gap: float = 0.0):

@@ -33,7 +33,7 @@ def run(arguments: argparse.Namespace) -> int:
         raise SceneError("--sensor names a sensor of a scene: give the scene with --blend.")
     rig = read_rig(arguments.rig)
     folder = writable_folder(arguments.out, create=True)
-    precompile.warm_aloud()
+    precompile.compile_solver_with_notice()
     result = None
     with console.progress_bar("gap", 1000, unit="step") as bar:
 

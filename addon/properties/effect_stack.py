@@ -18,7 +18,7 @@ from ...core.effects.engine.specification import Effect, Form, Kind, Parameter
 from ...core.errors import EffectError
 from ..session import units
 
-SITE_ICONS = {"contact": "MOD_PHYSICS", "pad": "MOD_CLOTH", "readout": "DRIVER"}
+STAGE_ICONS = {"contact": "MOD_PHYSICS", "pad": "MOD_CLOTH", "readout": "DRIVER"}
 
 _fixed = {"options": set(), "override": {"LIBRARY_OVERRIDABLE"}}
 
@@ -39,7 +39,7 @@ def _items(entries) -> list[tuple]:
 
 def kind_items() -> list[tuple]:
     """Enum items of all kinds, in the order in which they act."""
-    return _items((kind.name, kind.title, kind.text, SITE_ICONS[kind.site]) for kind in registry.library().values())
+    return _items((kind.name, kind.title, kind.text, STAGE_ICONS[kind.stage]) for kind in registry.library().values())
 
 
 def title(name: str) -> str:

@@ -68,5 +68,5 @@ def solver():
     prepare_numba()
     from ...core.solver import precompile, simulation
 
-    precompile.warm_aloud()
+    precompile.compile_solver_with_notice()
     return simulation

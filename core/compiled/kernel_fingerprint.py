@@ -7,7 +7,7 @@ import hashlib
 from functools import cache
 from pathlib import Path
 
-MARKS = (b"@kernel", b"@inlined", b"@allocating", b"KIND = Kind(", b"from numba")
+KERNEL_MARKS = (b"@kernel", b"@inlined", b"@allocating", b"KIND = Kind(", b"from numba")
 """What files hold that have a say in what is compiled; the laws of effects are compiled as well."""
 
 
@@ -15,7 +15,7 @@ CORE = Path(__file__).resolve().parents[1]
 
 
 @cache
-def edition() -> str:
+def fingerprint() -> str:
     """Return a hash of all files with kernels in core.
 
     A compiled kernel holds the machine code of those it calls, but numba looks only at a kernel's own file to see whether what
@@ -24,6 +24,6 @@ def edition() -> str:
     digest = hashlib.sha256()
     for path in sorted(CORE.rglob("*.py")):
         source = path.read_bytes()
-        if any(mark in source for mark in MARKS):
+        if any(mark in source for mark in KERNEL_MARKS):
             digest.update(source)
     return digest.hexdigest()[:12]

@@ -11,7 +11,7 @@ import os
 from collections.abc import Callable
 from typing import Any
 
-from .kernel_fingerprint import edition
+from .kernel_fingerprint import fingerprint
 
 COMPILED = False
 
@@ -24,7 +24,7 @@ if os.environ.get("PALPATE_NUMBA", "1") != "0":
         COMPILED = False
 
 
-EDITION = edition() if COMPILED else ""
+FINGERPRINT = fingerprint() if COMPILED else ""
 
 KERNELS: list[Any] = []
 """All that numba compiles when it is first called; for saying how far that is."""
@@ -41,7 +41,7 @@ def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
     return _compiled(function, _nrt=False)
 
 
-def allocating(function: Callable[..., Any]) -> Callable[..., Any]:
+def allocating_kernel(function: Callable[..., Any]) -> Callable[..., Any]:
     """Do as :func:`kernel` for a function that makes arrays. None of these is called in the inner loop."""
     if not COMPILED:
         return function
@@ -60,7 +60,7 @@ def inlined(function: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def _compiled(function: Callable[..., Any], **options: bool) -> Callable[..., Any]:
-    function.__qualname__ += f"_{EDITION}"  # part of the name under which numba keeps the result
+    function.__qualname__ += f"_{FINGERPRINT}"  # part of the name under which numba keeps the result
     compiled: Callable[..., Any] = numba.njit(
         cache=True, no_cfunc_wrapper=True, fastmath=False, error_model="numpy", nogil=True, **options
     )(function)
@@ -80,7 +80,7 @@ if COMPILED:
 
     def compiled_callback(function: Callable[..., Any]) -> Any:
         """Compile `function` for calls by its `address`: twenty whole numbers, of which some are pointers to arrays."""
-        function.__qualname__ += f"_{EDITION}"
+        function.__qualname__ += f"_{FINGERPRINT}"
         kinds = {0: types.float64, 2: types.int64, 4: types.float64, 7: types.float64}
         arguments = [types.CPointer(kinds[i]) if i in kinds else types.int64 for i in range(_NUMBERS)]
         return numba.cfunc(types.void(*arguments), cache=True, error_model="numpy")(function)

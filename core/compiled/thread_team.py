@@ -26,20 +26,20 @@ import numpy as np
 
 from .kernels import COMPILED, inlined, kernel
 
-ENOUGH = 2000
+POINTS_PER_THREAD = 2000
 """Contact points from which on a second thread is worth while; each further one asks for as many again."""
 
 # Places on the board, each in a cache line of its own.
-TICKET, DONE = 0, 8  # phase · PIECES + the next piece; how many pieces of the phase are done
-YIELD = 16  # address of the system's function that lets other threads run
-PHASES, LATE = 17, 18  # how many phases there were in a frame, and in how many a helper kept the others waiting
-ALONE = 19  # for how many frames to come no helper is called
-BOARD = 24
-PIECES = 1 << 32
-REST, STOP = 0, 1  # phases in which there is nothing to do for helpers; other numbers are the caller's
+NEXT_ITEM, ITEMS_DONE = 0, 8  # phase · LOOP_FACTOR + the next piece; how many pieces of the phase are done
+YIELD_ADDRESS = 16  # address of the system's function that lets other threads run
+LOOPS, LATE_LOOPS = 17, 18  # how many phases there were in a frame, and in how many a helper kept the others waiting
+FRAMES_ALONE = 19  # for how many frames to come no helper is called
+QUEUE_SIZE = 24
+LOOP_FACTOR = 1 << 32
+IDLE, STOP = 0, 1  # phases in which there is nothing to do for helpers; other numbers are the caller's
 SPINS = 2000
 """Looks at the board before a waiting thread lets others run: a few pieces' time."""
-PATIENCE, SOLITUDE = 0.05, 20
+MAX_LATE_SHARE, SINGLE_THREAD_FRAMES = 0.05, 20
 """Share of late phases above which the processors are taken to be busy with other work, and for how many frames."""
 
 if COMPILED:
@@ -48,41 +48,43 @@ if COMPILED:
     from numba.core.cgutils import get_or_insert_function
     from numba.extending import intrinsic
 
-    def _place(context: Any, builder: Any, array_type: Any, array: Any, index: Any) -> Any:
+    def _element_pointer(context: Any, builder: Any, array_type: Any, array: Any, index: Any) -> Any:
         """Pointer to an element of a one-dimensional array."""
         return builder.gep(context.make_array(array_type)(context, builder, array).data, [index])
 
     @intrinsic
-    def add(typingctx, board, place, value):
+    def atomic_add(typingctx, queue, place, value):
         """Add to a place on the board and return what was there before, in one go for all threads."""
 
         def codegen(context, builder, signature, arguments):
-            pointer = _place(context, builder, signature.args[0], *arguments[:2])
+            pointer = _element_pointer(context, builder, signature.args[0], *arguments[:2])
             return builder.atomic_rmw("add", pointer, arguments[2], "seq_cst")
 
-        return types.int64(board, types.int64, types.int64), codegen
+        return types.int64(queue, types.int64, types.int64), codegen
 
     @intrinsic
-    def look(typingctx, board, place):
+    def atomic_load(typingctx, queue, place):
         """Read a place on the board, and all that was written before its value was."""
 
         def codegen(context, builder, signature, arguments):
-            return builder.load_atomic(_place(context, builder, signature.args[0], *arguments), "seq_cst", 8)
+            return builder.load_atomic(_element_pointer(context, builder, signature.args[0], *arguments), "seq_cst", 8)
 
-        return types.int64(board, types.int64), codegen
+        return types.int64(queue, types.int64), codegen
 
     @intrinsic
-    def put(typingctx, board, place, value):
+    def atomic_store(typingctx, queue, place, value):
         """Write a place on the board, after all that was written before."""
 
         def codegen(context, builder, signature, arguments):
-            builder.store_atomic(arguments[2], _place(context, builder, signature.args[0], *arguments[:2]), "seq_cst", 8)
+            builder.store_atomic(
+                arguments[2], _element_pointer(context, builder, signature.args[0], *arguments[:2]), "seq_cst", 8
+            )
             return context.get_dummy_value()
 
-        return types.void(board, types.int64, types.int64), codegen
+        return types.void(queue, types.int64, types.int64), codegen
 
     @intrinsic
-    def _call(typingctx, address):
+    def _call_address(typingctx, address):
         """Call the function without arguments that is at an address."""
 
         def codegen(context, builder, signature, arguments):
@@ -93,7 +95,7 @@ if COMPILED:
         return types.void(types.int64), codegen
 
     @intrinsic
-    def _pause(typingctx):
+    def _cpu_pause(typingctx):
         """Tell the processor that this thread only waits."""
         machine = platform.machine().lower()
 
@@ -110,51 +112,51 @@ if COMPILED:
 
 
 @inlined
-def announce(board, phase):
+def begin_loop(queue, phase):
     """Begin a phase: its pieces may be taken from now on."""
-    board[PHASES] += 1
-    put(board, DONE, 0)
-    put(board, TICKET, phase * PIECES)
+    queue[LOOPS] += 1
+    atomic_store(queue, ITEMS_DONE, 0)
+    atomic_store(queue, NEXT_ITEM, phase * LOOP_FACTOR)
 
 
 @inlined
-def take(board, pieces):
+def claim_item(queue, pieces):
     """Take a piece; returns the phase and the piece, REST and `pieces` when there is none."""
-    ticket = look(board, TICKET)
-    if ticket % PIECES < pieces and ticket // PIECES > STOP:
-        ticket = add(board, TICKET, 1)  # by now of a later phase, maybe
-        if ticket % PIECES < pieces and ticket // PIECES > STOP:
-            return ticket // PIECES, ticket % PIECES
-    return REST, pieces
+    ticket = atomic_load(queue, NEXT_ITEM)
+    if ticket % LOOP_FACTOR < pieces and ticket // LOOP_FACTOR > STOP:
+        ticket = atomic_add(queue, NEXT_ITEM, 1)  # by now of a later phase, maybe
+        if ticket % LOOP_FACTOR < pieces and ticket // LOOP_FACTOR > STOP:
+            return ticket // LOOP_FACTOR, ticket % LOOP_FACTOR
+    return IDLE, pieces
 
 
 @inlined
-def hand_in(board):
+def finish_item(queue):
     """One piece is done."""
-    add(board, DONE, 1)
+    atomic_add(queue, ITEMS_DONE, 1)
 
 
 @inlined
-def is_over(board, pieces):
+def all_items_done(queue, pieces):
     """Whether all pieces of the phase are done."""
-    return look(board, DONE) >= pieces
+    return atomic_load(queue, ITEMS_DONE) >= pieces
 
 
 @inlined
-def is_stopped(board):
+def is_stopped(queue):
     """Whether helpers may go home."""
-    return look(board, TICKET) // PIECES == STOP
+    return atomic_load(queue, NEXT_ITEM) // LOOP_FACTOR == STOP
 
 
 @kernel
-def linger(board, turn):
+def wait_briefly(queue, turn):
     """Wait a moment, for the `turn`-th time in a row."""
-    _pause()
+    _cpu_pause()
     if turn % SPINS == SPINS - 1:
-        _call(board[YIELD])
+        _call_address(queue[YIELD_ADDRESS])
 
 
-def board_for(points: int, threads: int | None = None) -> tuple[np.ndarray, int]:
+def make_queue(points: int, threads: int | None = None) -> tuple[np.ndarray, int]:
     """Return a board and how many helpers shall look at it.
 
     Parameters
@@ -166,15 +168,15 @@ def board_for(points: int, threads: int | None = None) -> tuple[np.ndarray, int]
 
     Returns
     -------
-    board : (BOARD,) int, or (0,) without helpers
+    board : (QUEUE_SIZE,) int, or (0,) without helpers
     helpers : int
     """
-    threads = threads or int(os.environ.get("PALPATE_THREADS", "0")) or min(_processors(), 1 + points // ENOUGH)
+    threads = threads or int(os.environ.get("PALPATE_THREADS", "0")) or min(_processors(), 1 + points // POINTS_PER_THREAD)
     if not COMPILED or threads < 2:
         return np.zeros(0, np.int64), 0
-    board = np.zeros(BOARD, np.int64)
-    board[YIELD] = _address_of_yield()
-    return board, threads - 1
+    queue = np.zeros(QUEUE_SIZE, np.int64)
+    queue[YIELD_ADDRESS] = _address_of_yield()
+    return queue, threads - 1
 
 
 def _processors() -> int:
@@ -193,27 +195,27 @@ def _address_of_yield() -> int:
 
 
 @contextmanager
-def helpers(board: np.ndarray, number: int, work: Callable[..., Any], *arguments: Any) -> Iterator[None]:
+def helper_threads(queue: np.ndarray, number: int, work: Callable[..., Any], *arguments: Any) -> Iterator[None]:
     """Have `number` threads run ``work(*arguments)`` meanwhile, which is to return when the board says STOP.
 
     Where the processors are busy with other work a helper is sent away in the middle of a piece, and all wait for it: after a
     frame in which that was often so, none is called for a while.
     """
-    if number == 0 or board[ALONE] > 0:
+    if number == 0 or queue[FRAMES_ALONE] > 0:
         if number > 0:
-            board[ALONE] -= 1
+            queue[FRAMES_ALONE] -= 1
         yield
         return
-    board[PHASES] = board[LATE] = 0
-    board[TICKET] = REST * PIECES
+    queue[LOOPS] = queue[LATE_LOOPS] = 0
+    queue[NEXT_ITEM] = IDLE * LOOP_FACTOR
     threads = [threading.Thread(target=work, args=arguments, name="palpate helper", daemon=True) for _ in range(number)]
     for thread in threads:
         thread.start()
     try:
         yield
     finally:
-        board[TICKET] = STOP * PIECES
+        queue[NEXT_ITEM] = STOP * LOOP_FACTOR
         for thread in threads:
             thread.join()
-        if board[LATE] > PATIENCE * board[PHASES]:
-            board[ALONE] = SOLITUDE
+        if queue[LATE_LOOPS] > MAX_LATE_SHARE * queue[LOOPS]:
+            queue[FRAMES_ALONE] = SINGLE_THREAD_FRAMES

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..compiled.kernels import allocating, kernel
+from ..compiled.kernels import allocating_kernel, kernel
 from ..compiled.struct_reference import by_reference
 from .mesh import TriangleMesh, face_normals
 
@@ -55,8 +55,8 @@ class Tree(NamedTuple):
     faces: np.ndarray
     source: np.ndarray
     roots: np.ndarray
-    across: np.ndarray
-    facing: np.ndarray
+    adjacent: np.ndarray
+    normal_bounds: np.ndarray
 
 
 def build_tree(meshes: list[TriangleMesh]) -> Tree:
@@ -77,8 +77,8 @@ def build_tree(meshes: list[TriangleMesh]) -> Tree:
         first, number = np.zeros(size, np.int64), np.zeros(size, np.int64)
         nodes = _build(corners, corners.mean(axis=1), order, LEAF_SIZE, bounds, skip, first, number)
         leaf, normals = number[:nodes] > 0, np.ascontiguousarray(face_normals(mesh)[order])
-        across, facing = _across(mesh.triangles[order]), np.empty((nodes, 6), np.float32)
-        _fit_normals(normals, across, skip, first, number, facing)
+        adjacent, normal_bounds = _adjacent_triangles(mesh.triangles[order]), np.empty((nodes, 6), np.float32)
+        _fit_normal_bounds(normals, adjacent, skip, first, number, normal_bounds)
         parts.append(
             (
                 bounds[:nodes],
@@ -87,20 +87,20 @@ def build_tree(meshes: list[TriangleMesh]) -> Tree:
                 number[:nodes],
                 np.hstack([corners[order].reshape(-1, 9), normals]),
                 order,
-                np.where(across < 0, -1, across + triangle_offset).astype(np.int32),
-                facing,
+                np.where(adjacent < 0, -1, adjacent + triangle_offset).astype(np.int32),
+                normal_bounds,
             )
         )
         node_offset += nodes
         triangle_offset += n
         roots.append(node_offset)
-    bounds, skip, first, number, faces, source, across, facing = (
+    bounds, skip, first, number, faces, source, adjacent, normal_bounds = (
         np.ascontiguousarray(np.concatenate(part)) for part in zip(*parts, strict=True)
     )
-    return Tree(bounds, skip, first, number, faces, source, np.array(roots), across, facing)
+    return Tree(bounds, skip, first, number, faces, source, np.array(roots), adjacent, normal_bounds)
 
 
-def _across(triangles: np.ndarray) -> np.ndarray:
+def _adjacent_triangles(triangles: np.ndarray) -> np.ndarray:
     """(n, 3) int: the triangle across each edge, -1 unless the edge joins exactly two of one orientation."""
     start, end = triangles.ravel().astype(np.int64), np.roll(triangles, -1, axis=1).ravel().astype(np.int64)
     low, high = np.minimum(start, end), np.maximum(start, end)
@@ -110,34 +110,34 @@ def _across(triangles: np.ndarray) -> np.ndarray:
     one, other = order[first[count == 2]], order[first[count == 2] + 1]
     turned = start[one] == end[other]  # each goes along the edge its own way
     one, other = one[turned], other[turned]
-    across = np.full(len(key), -1)
-    across[one], across[other] = other // 3, one // 3
-    return across.reshape(-1, 3)
+    adjacent = np.full(len(key), -1)
+    adjacent[one], adjacent[other] = other // 3, one // 3
+    return adjacent.reshape(-1, 3)
 
 
 @kernel
-def is_inner(i, normals, first, across):
+def is_interior(i, normals, first, adjacent):
     """Whether a triangle has a normal, whose column is `first`, and a neighbour on each side."""
     square = normals[i, first] ** 2 + normals[i, first + 1] ** 2 + normals[i, first + 2] ** 2
-    return square > 0.5 and across[i, 0] >= 0 and across[i, 1] >= 0 and across[i, 2] >= 0
+    return square > 0.5 and adjacent[i, 0] >= 0 and adjacent[i, 1] >= 0 and adjacent[i, 2] >= 0
 
 
 @kernel
-def _fit_normals(normals, across, skip, first, number, facing):
+def _fit_normal_bounds(normals, adjacent, skip, first, number, normal_bounds):
     """Fill in :attr:`Tree.facing`; rounded away from what is inside, since it is kept in single precision."""
-    for node in range(len(facing) - 1, -1, -1):
+    for node in range(len(normal_bounds) - 1, -1, -1):
         for axis in range(3):
             low, high = 2.0, -2.0
             if number[node] > 0:
                 for i in range(first[node], first[node] + number[node]):
-                    whole = is_inner(i, normals, 0, across)
+                    whole = is_interior(i, normals, 0, adjacent)
                     low = min(low, normals[i, axis] - 1e-6 if whole else -2.0)
                     high = max(high, normals[i, axis] + 1e-6 if whole else 2.0)
             else:  # its children come behind it
                 left, right = node + 1, skip[node + 1]
-                low = min(facing[left, axis], facing[right, axis])
-                high = max(facing[left, 3 + axis], facing[right, 3 + axis])
-            facing[node, axis], facing[node, 3 + axis] = low, high
+                low = min(normal_bounds[left, axis], normal_bounds[right, axis])
+                high = max(normal_bounds[left, 3 + axis], normal_bounds[right, 3 + axis])
+            normal_bounds[node, axis], normal_bounds[node, 3 + axis] = low, high
 
 
 @kernel
@@ -164,7 +164,7 @@ def _select(order, centroid, axis, lo, hi, middle):
             return
 
 
-@allocating
+@allocating_kernel
 def _build(corners, centroid, order, leaf_size, bounds, skip, first, number):
     """Split at the median of the longest axis until leaves are small; returns the number of nodes."""
     stack = np.empty((128, 3), np.int64)  # range of triangles, and the node whose skip the range's end decides
@@ -222,7 +222,7 @@ def _node_count(n, leaf_size):
 
 
 @kernel
-def line_of_sight(dx, dy, dz):
+def shear_to_axis(dx, dy, dz):
     """Axis along which a vector is longest, and the shear of the other two (in cyclic order) that lays it onto that axis."""
     if abs(dx) >= abs(dy) and abs(dx) >= abs(dz):
         return 0, dy / dx, dz / dx
@@ -232,7 +232,7 @@ def line_of_sight(dx, dy, dz):
 
 
 @kernel
-def seen_along(x, y, z, axis, shear_x, shear_y):
+def project_sheared(x, y, z, axis, shear_x, shear_y):
     """Project a point along the line of sight."""
     if axis == 0:
         return y - shear_x * x, z - shear_y * x
@@ -242,7 +242,7 @@ def seen_along(x, y, z, axis, shear_x, shear_y):
 
 
 @kernel
-def apart(bounds, node, x0, x1, y0, y1, z0, z1):
+def boxes_disjoint(bounds, node, x0, x1, y0, y1, z0, z1):
     """Whether a node's box and the box from (x0, y0, z0) to (x1, y1, z1) have no point in common."""
     return (
         bounds[node, 0] > x1 or bounds[node, 3] < x0
@@ -275,9 +275,9 @@ def segment_entry(ox, oy, oz, dx, dy, dz, mesh, hint, tree):
         object. Beyond `t` it may be any such intersection; 2 when none was met.
     """
     t, triangle, leaving = 2.0, -1, 2.0
-    axis, shear_x, shear_y = line_of_sight(dx, dy, dz)
+    axis, shear_x, shear_y = shear_to_axis(dx, dy, dz)
     if hint >= 0:
-        u = cross_triangle(ox, oy, oz, dx, dy, dz, axis, shear_x, shear_y, tree.faces, hint)
+        u = intersect_triangle(ox, oy, oz, dx, dy, dz, axis, shear_x, shear_y, tree.faces, hint)
         if 0.0 <= u <= 1.0:
             t, triangle = u, hint
     reach = min(t, 1.0)
@@ -286,11 +286,11 @@ def segment_entry(ox, oy, oz, dx, dy, dz, mesh, hint, tree):
     z0, z1 = min(oz, oz + reach * dz), max(oz, oz + reach * dz)
     bounds, node, stop = tree.bounds, tree.roots[mesh], tree.roots[mesh + 1]
     while node < stop:
-        if apart(bounds, node, x0, x1, y0, y1, z0, z1):
+        if boxes_disjoint(bounds, node, x0, x1, y0, y1, z0, z1):
             node = tree.skip[node]
             continue
         for i in range(tree.first[node], tree.first[node] + tree.number[node]):
-            u = cross_triangle(ox, oy, oz, dx, dy, dz, axis, shear_x, shear_y, tree.faces, i)
+            u = intersect_triangle(ox, oy, oz, dx, dy, dz, axis, shear_x, shear_y, tree.faces, i)
             if 0.0 <= u <= 1.0:
                 # Of two triangles met at the very same point (a shared edge) the first in the list answers, hint or not.
                 if u < t or (u == t and i < triangle):
@@ -305,7 +305,7 @@ def segment_entry(ox, oy, oz, dx, dy, dz, mesh, hint, tree):
 
 
 @kernel
-def cross_triangle(ox, oy, oz, dx, dy, dz, axis, shear_x, shear_y, faces, i):
+def intersect_triangle(ox, oy, oz, dx, dy, dz, axis, shear_x, shear_y, faces, i):
     """Position on the segment where it crosses a triangle: t in 0…1 entering, -3 - t leaving, 9 when it misses.
 
     The corners are seen along the segment as points of a plane, each computed from the corner alone, and the origin must lie on
@@ -316,9 +316,9 @@ def cross_triangle(ox, oy, oz, dx, dy, dz, axis, shear_x, shear_y, faces, i):
     bx, by, bz = faces[i, 3] - ox, faces[i, 4] - oy, faces[i, 5] - oz
     cx, cy, cz = faces[i, 6] - ox, faces[i, 7] - oy, faces[i, 8] - oz
     height = faces[i, 9] * ax + faces[i, 10] * ay + faces[i, 11] * az
-    ax, ay = seen_along(ax, ay, az, axis, shear_x, shear_y)
-    bx, by = seen_along(bx, by, bz, axis, shear_x, shear_y)
-    cx, cy = seen_along(cx, cy, cz, axis, shear_x, shear_y)
+    ax, ay = project_sheared(ax, ay, az, axis, shear_x, shear_y)
+    bx, by = project_sheared(bx, by, bz, axis, shear_x, shear_y)
+    cx, cy = project_sheared(cx, cy, cz, axis, shear_x, shear_y)
     u, v, w = ax * by - ay * bx, bx * cy - by * cx, cx * ay - cy * ax
     low, high = min(u, v, w), max(u, v, w)
     if (low < 0.0 and high > 0.0) or (low == 0.0 and high == 0.0):
@@ -333,8 +333,8 @@ def cross_triangle(ox, oy, oz, dx, dy, dz, axis, shear_x, shear_y, faces, i):
 
 
 @kernel
-def cross_plane(ox, oy, oz, dx, dy, dz, faces, i):
-    """Position on the segment where it crosses a triangle's plane, the same bits as :func:`cross_triangle` has for it."""
+def intersect_plane(ox, oy, oz, dx, dy, dz, faces, i):
+    """Position on the segment where it crosses a triangle's plane, the same bits as :func:`intersect_triangle` has for it."""
     ax, ay, az = faces[i, 0] - ox, faces[i, 1] - oy, faces[i, 2] - oz
     height = faces[i, 9] * ax + faces[i, 10] * ay + faces[i, 11] * az
     return height / (faces[i, 9] * dx + faces[i, 10] * dy + faces[i, 11] * dz)

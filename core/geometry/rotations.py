@@ -74,7 +74,7 @@ def write_rotation(quaternion, rotation):
 
 
 @kernel
-def turn_quaternion(quaternion, wx, wy, wz):
+def rotate_quaternion(quaternion, wx, wy, wz):
     """Turn `quaternion` in place by the rotation vector `w` (radians, world axes) and keep it of unit length."""
     angle = math.sqrt(wx * wx + wy * wy + wz * wz)
     c = math.cos(0.5 * angle)
@@ -115,7 +115,7 @@ def write_twist(velocity, dt, twist):
 
 
 @kernel
-def look_back(velocity, dt, twist):
+def write_backward_twist(velocity, dt, twist):
     """Write the twist of the step that has just ended, as seen from its end: ``W = (1 - exp(-[ω dt]×)) / dt``."""
     write_twist(velocity, -dt, twist)
 
@@ -156,14 +156,14 @@ def write_twist_map(rotation, gx, gy, gz, sign, out):
 
 
 @kernel
-def keep_axis(axis, out):
+def project_on_axis(axis, out):
     """Leave in the first column of a twist map what a body's speed along `axis` (3,) does."""
     for i in range(6):
         out[i, 0] = axis[0] * out[i, 0] + axis[1] * out[i, 1] + axis[2] * out[i, 2]
 
 
 @kernel
-def add_product(matrix, row, column, left, left_width, middle, right, right_width, scale):
+def add_triple_product(matrix, row, column, left, left_width, middle, right, right_width, scale):
     """Add ``scale · leftᵀ middle right`` into `matrix`.
 
     `middle` is symmetric, 6 × 6, and its lower triangle is read; of `left` and `right` the first columns are used.
@@ -178,7 +178,7 @@ def add_product(matrix, row, column, left, left_width, middle, right, right_widt
 
 
 @kernel
-def solve_positive(matrix, vector, n):
+def solve_positive_definite(matrix, vector, n):
     """Solve the symmetric positive definite system in place (Cholesky; the lower triangle is read and overwritten)."""
     for j in range(n):
         total = matrix[j, j]

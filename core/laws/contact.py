@@ -23,7 +23,7 @@ import numpy as np
 
 from ..compiled.kernels import inlined, kernel
 from ..compiled.struct_reference import by_reference
-from ..effects.engine.compiled_program import EffectProgram
+from ..effects.engine.compiled_program import Program
 from ..model.scenario import HUNT_CROSSLEY, SensorParameters
 
 # Contact rows: one per touching texel and target, in the frame of the sensor's body; they are all that the solver's inner loop
@@ -37,8 +37,10 @@ ZX, ZY, ZZ = (LANES * i for i in range(6, 9))  # bristle deflection, m
 DEPTH = LANES * 9  # m
 KEEP, GAIN = LANES * 10, LANES * 11  # z(t + dt) = KEEP z + GAIN v
 LIMIT = LANES * 12  # largest |z|, m
-PUSH, SLOPE = LANES * 13, LANES * 14  # tangent of the normal law where it is not the same for all contacts: N, N·s/m
-GRIP, DRAG = LANES * 15, LANES * 16  # multiplier of friction, and what is added to ct (N·s/m), written like these
+# Written only where they are not the same for all contacts of a pair: the tangent of the normal law (N, N·s/m), the
+# multiplier of the friction coefficients, and what is added to ct (N·s/m).
+NORMAL_BIAS, NORMAL_SLOPE = LANES * 13, LANES * 14
+FRICTION_SCALE, EXTRA_VISCOSITY = LANES * 15, LANES * 16
 ROW = LANES * 17
 
 # Columns of a parameter row, one per sensor or pad.
@@ -70,7 +72,7 @@ def parameter_row(parameters: SensorParameters, share: float = 1.0, part: float 
     return row
 
 
-def friction_limit(normal_force: np.ndarray, speed: np.ndarray, parameters: SensorParameters) -> np.ndarray:
+def stribeck_force(normal_force: np.ndarray, speed: np.ndarray, parameters: SensorParameters) -> np.ndarray:
     """Return what friction can hold at a sliding speed, ``g`` of Eq. 10.
 
     Parameters
@@ -80,11 +82,11 @@ def friction_limit(normal_force: np.ndarray, speed: np.ndarray, parameters: Sens
     parameters : SensorParameters
     """
     row = parameter_row(parameters)
-    return normal_force * np.array([stribeck(v * v, row) for v in np.ravel(speed)]).reshape(np.shape(speed))
+    return normal_force * np.array([stribeck_coefficient(v * v, row) for v in np.ravel(speed)]).reshape(np.shape(speed))
 
 
 @by_reference
-class World(NamedTuple):
+class SolverModel(NamedTuple):
     """What does not change during a run: b bodies, m sensors with N contact points, q pairs of sensor and target.
 
     A large sensor has several pairs with each target, one after the other, each with some of its points, for threads to share.
@@ -142,7 +144,7 @@ class World(NamedTuple):
         The unknown of each drive.
     drives : (d, 4) float
         See :mod:`.actuators`.
-    program : EffectProgram
+    program : Program
         The sensors' effects on forces.
     share, part : (q,) float
         Of a texel's force that one of its contact points moves the bodies with; of the depth that is the sensor's own.
@@ -178,7 +180,7 @@ class World(NamedTuple):
     drive_of: np.ndarray
     drive_at: np.ndarray
     drives: np.ndarray
-    program: EffectProgram
+    program: Program
     share: np.ndarray
     part: np.ndarray
 
@@ -216,14 +218,14 @@ class State(NamedTuple):
     tank: np.ndarray
 
 
-SERIES = tuple(1.0 / math.factorial(n + 1) for n in range(13, -1, -1))
+TAYLOR_COEFFICIENTS = tuple(1.0 / math.factorial(n + 1) for n in range(13, -1, -1))
 """Taylor coefficients of (1 - exp(-y)) / y without their signs, from y¹³ down to y⁰."""
-SMALLEST = 1.0 / math.factorial(15)
+LEADING_COEFFICIENT = 1.0 / math.factorial(15)
 """The one before them, of y¹⁴."""
 
 
 @inlined
-def relaxation(x):
+def decay_and_mean(x):
     """Return exp(-x) and (1 - exp(-x)) / x for x ≥ 0, both to 1e-15 of one, zero included.
 
     Written out so that it runs in vector registers, which a call of the library's exp forbids, and gives the same bits
@@ -233,8 +235,8 @@ def relaxation(x):
     within = min(x, 40.0)  # exp(-40) is nothing beside one
     half = within * 0.0078125
     y = 2.0 * half
-    mean = SMALLEST
-    for coefficient in SERIES:
+    mean = LEADING_COEFFICIENT
+    for coefficient in TAYLOR_COEFFICIENTS:
         mean = coefficient - y * mean
     for _ in range(6):
         mean *= 1.0 - half * mean
@@ -243,9 +245,9 @@ def relaxation(x):
 
 
 @inlined
-def stribeck(speed_squared, parameters):
+def stribeck_coefficient(speed_squared, parameters):
     """Friction coefficient of steady sliding, mud + (mus - mud) exp(-|v|²/x0²) (Eq. 10–12 divided by fn)."""
-    share, _ = relaxation(speed_squared / (parameters[X0] * parameters[X0]))
+    share, _ = decay_and_mean(speed_squared / (parameters[X0] * parameters[X0]))
     return parameters[MUD] + (parameters[MUS] - parameters[MUD]) * share
 
 
@@ -258,14 +260,14 @@ def bristle_step(speed_squared, normal_force, dt, parameters):
     keep : float
     gain : float, seconds
     """
-    g = normal_force * stribeck(speed_squared, parameters)
+    g = normal_force * stribeck_coefficient(speed_squared, parameters)
     held = g > 0.0  # without friction nothing holds the bristles
-    keep, mean = relaxation(parameters[SIGMA0] * dt * math.sqrt(speed_squared) / g if held else 0.0)
+    keep, mean = decay_and_mean(parameters[SIGMA0] * dt * math.sqrt(speed_squared) / g if held else 0.0)
     return (keep if held else 0.0), (mean * dt if held else 0.0)
 
 
 @inlined
-def bristle_limit(normal_force, parameters):
+def max_bristle_deflection(normal_force, parameters):
     """Largest bristle deflection that static friction holds, metres."""
     return max(normal_force, 0.0) * (parameters[MUS] / parameters[SIGMA0])
 
@@ -279,7 +281,7 @@ def friction_force(z, bristle_rate, velocity, parameters):
 @kernel
 def bristle_rate(z, velocity, speed_squared, normal_force, parameters):
     """One component of Eq. 9."""
-    g = normal_force * stribeck(speed_squared, parameters)
+    g = normal_force * stribeck_coefficient(speed_squared, parameters)
     if g <= 0.0:
         return 0.0
     return velocity - parameters[SIGMA0] * math.sqrt(speed_squared) / g * z
@@ -324,7 +326,7 @@ def normal_tangent(depth, rate, dt, parameters):
 
 
 @kernel
-def friction_trace(time, velocity, normal_force, parameters, force):
+def friction_along_path(time, velocity, normal_force, parameters, force):
     """Friction of one contact point along a straight path, from rest, under a constant normal force (Eq. 9, 13).
 
     Parameters
@@ -348,7 +350,7 @@ def friction_trace(time, velocity, normal_force, parameters, force):
 
 
 @inlined
-def linearise(nx, ny, nz, zx, zy, zz, push, stiff_n, grip, drag, sticks, vx, vy, vz, dt, parameters):
+def linearise_contact(nx, ny, nz, zx, zy, zz, push, stiff_n, grip, drag, sticks, vx, vy, vz, dt, parameters):
     """How a contact's force depends on the relative velocity at the step's end, near velocity `v`.
 
     The force on the target is ``-(push + stiff_n ḋ) n - (bias z + stiff_t v_t)``; `v` is the target's velocity relative to the
@@ -381,7 +383,7 @@ def linearise(nx, ny, nz, zx, zy, zz, push, stiff_n, grip, drag, sticks, vx, vy,
     tx, ty, tz = vx - rate * nx, vy - rate * ny, vz - rate * nz
     force = max(push + stiff_n * rate, 0.0)
     load = grip * force
-    limit = bristle_limit(load, parameters)
+    limit = max_bristle_deflection(load, parameters)
     square = zx * zx + zy * zy + zz * zz
     held = limit / math.sqrt(square) if square > limit * limit else 1.0  # the load fell: the rest has slipped already
     keep, gain = bristle_step(tx * tx + ty * ty + tz * tz, load, dt, parameters)

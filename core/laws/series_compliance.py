@@ -11,15 +11,15 @@ from __future__ import annotations
 from ..model.scenario import HUNT_CROSSLEY, Scenario, Sensor
 
 
-def modulus(sensor: Sensor) -> float:
+def stiffness_per_area(sensor: Sensor) -> float:
     """Stiffness of a sensor's skin per area, N/m³ (for Hunt and Crossley's law N/m²⁺ᵖ)."""
     return sensor.parameters.k * len(sensor.texels) / float(sensor.texels.area.sum())
 
 
-def own_part(sensor: Sensor, other: Sensor) -> float:
+def overlap_share(sensor: Sensor, other: Sensor) -> float:
     """Part of the overlap with another sensor that is taken by the sensor's own skin."""
     power = 1.0 / sensor.parameters.exponent if sensor.parameters.normal_law == HUNT_CROSSLEY else 1.0
-    mine, theirs = modulus(sensor) ** power, modulus(other) ** power
+    mine, theirs = stiffness_per_area(sensor) ** power, stiffness_per_area(other) ** power
     return theirs / (mine + theirs)
 
 
@@ -37,4 +37,4 @@ def coupling(scenario: Scenario, sensor: int, target: int) -> tuple[float, float
     if other is None:
         return 1.0, 1.0
     felt = any(candidate.sensor == sensor and candidate.body != scenario.sensors[other].body for candidate in scenario.targets)
-    return own_part(scenario.sensors[sensor], scenario.sensors[other]), 0.5 if felt else 1.0
+    return overlap_share(scenario.sensors[sensor], scenario.sensors[other]), 0.5 if felt else 1.0

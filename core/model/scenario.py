@@ -11,8 +11,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..effects.engine.registry import actual_placement
 from ..effects.engine.registry import check as check_effects
+from ..effects.engine.registry import placed
 from ..effects.engine.specification import Effect
 from ..errors import ParameterError, SceneError
 from ..geometry.mesh import TriangleMesh
@@ -357,7 +357,7 @@ class Sensor:
     def mounted(self) -> Texels:
         """The texels where they really are, with the effects that move them."""
         texels = self.texels
-        position, normal, tangent = actual_placement(self.effects, texels.position, texels.normal, texels.tangent)
+        position, normal, tangent = placed(self.effects, texels.position, texels.normal, texels.tangent)
         return texels if position is texels.position else replace(texels, position=position, normal=normal, tangent=tangent)
 
     @cached_property

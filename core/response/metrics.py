@@ -60,10 +60,10 @@ def slipping(sensor: SensorRecording | SensorFrame, parameters: SensorParameters
     -------
     (F, n) or (n,) bool
     """
-    from ..laws.contact import friction_limit
+    from ..laws.contact import stribeck_force
 
     found = np.asarray(sensor.contact, bool) & (sensor.slip > CREEPING)
-    limit = friction_limit(sensor.normal_force[found], sensor.slip[found], parameters)
+    limit = stribeck_force(sensor.normal_force[found], sensor.slip[found], parameters)
     if painted is not None and painted.friction is not None:
         limit = limit * np.broadcast_to(painted.friction, found.shape)[found]
     found[found] = sensor.friction[found] >= AT_LIMIT * limit

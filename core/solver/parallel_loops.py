@@ -4,72 +4,81 @@
 from __future__ import annotations
 
 from ..compiled.kernels import inlined, kernel
-from ..compiled.thread_team import LATE, SPINS, announce, hand_in, is_over, is_stopped, linger, take
+from ..compiled.thread_team import (
+    LATE_LOOPS,
+    SPINS,
+    all_items_done,
+    begin_loop,
+    claim_item,
+    finish_item,
+    is_stopped,
+    wait_briefly,
+)
 from ..geometry.rotations import write_rotation
-from .detection.narrow_phase import gather
-from .dynamics.contact_assembly import sum_pair
-from .dynamics.friction_state import bend_pair
+from .detection.narrow_phase import find_contacts
+from .dynamics.contact_assembly import sum_pair_contacts
+from .dynamics.friction_state import update_pair_friction
 
-GATHER, SUM, BEND = 2, 3, 4
+FIND_CONTACTS, SUM_CONTACTS, UPDATE_FRICTION = 2, 3, 4
 """Phases of a step whose pairs are shared out: find the contacts, sum them up, bend the bristles."""
 
 
 @inlined
-def gather_all(dt, world, tree, neighbours, shapes, state, scratch):
+def find_all_contacts(dt, model, tree, neighbour_lists, surfaces, state, workspace):
     """Contacts of all pairs of sensor and target where the bodies are now. Returns how many points are sunk too deep to act."""
     for body in range(len(state.position)):
-        write_rotation(state.quaternion[body], scratch.rotation[body])
-    scratch.step[0] = dt
-    share_out(GATHER, world, tree, neighbours, shapes, state, scratch)
-    return scratch.sunk.sum()
+        write_rotation(state.quaternion[body], workspace.rotation[body])
+    workspace.step[0] = dt
+    run_parallel_loop(FIND_CONTACTS, model, tree, neighbour_lists, surfaces, state, workspace)
+    return workspace.too_deep.sum()
 
 
 @inlined
-def share_out(phase, world, tree, neighbours, shapes, state, scratch):
+def run_parallel_loop(phase, model, tree, neighbour_lists, surfaces, state, workspace):
     """Do a phase for all pairs, alone or with helpers; surfaces that deform are moved on when first asked for, so alone."""
-    board, pairs = scratch.board, len(world.pairs)
-    if len(board) == 0 or pairs == 1 or shapes.moves[0]:
+    queue, pairs = workspace.queue, len(model.pairs)
+    if len(queue) == 0 or pairs == 1 or surfaces.moves[0]:
         for pair in range(pairs):
-            _do(phase, pair, world, tree, neighbours, shapes, state, scratch)
+            _run_item(phase, pair, model, tree, neighbour_lists, surfaces, state, workspace)
         return
-    announce(board, phase)
+    begin_loop(queue, phase)
     pair = 0
     while pair < pairs:
-        _, pair = take(board, pairs)
+        _, pair = claim_item(queue, pairs)
         if pair < pairs:
-            _do(phase, pair, world, tree, neighbours, shapes, state, scratch)
-            hand_in(board)
+            _run_item(phase, pair, model, tree, neighbour_lists, surfaces, state, workspace)
+            finish_item(queue)
     turn = 0
-    while not is_over(board, pairs):
-        linger(board, turn)
+    while not all_items_done(queue, pairs):
+        wait_briefly(queue, turn)
         turn += 1
     if turn >= SPINS:
-        board[LATE] += 1
+        queue[LATE_LOOPS] += 1
 
 
 @kernel
-def help_out(world, tree, neighbours, shapes, state, scratch):
-    """Do what :func:`share_out` puts on the board, until it says that the helpers may go home."""
-    board, pairs, turn = scratch.board, len(world.pairs), 0
-    while not is_stopped(board):
-        phase, pair = take(board, pairs)
+def help_with_loops(model, tree, neighbour_lists, surfaces, state, workspace):
+    """Do what :func:`run_parallel_loop` puts on the board, until it says that the helpers may go home."""
+    queue, pairs, turn = workspace.queue, len(model.pairs), 0
+    while not is_stopped(queue):
+        phase, pair = claim_item(queue, pairs)
         if pair < pairs:
-            _do(phase, pair, world, tree, neighbours, shapes, state, scratch)
-            hand_in(board)
+            _run_item(phase, pair, model, tree, neighbour_lists, surfaces, state, workspace)
+            finish_item(queue)
             turn = 0
         else:
-            linger(board, turn)
+            wait_briefly(queue, turn)
             turn += 1
 
 
 @inlined
-def _do(phase, pair, world, tree, neighbours, shapes, state, scratch):
+def _run_item(phase, pair, model, tree, neighbour_lists, surfaces, state, workspace):
     """One phase of one pair. What it writes belongs to this pair alone."""
-    dt = scratch.step[0]
-    if phase == GATHER:
-        gather(pair, dt, world, tree, neighbours, shapes, state, scratch)
-    elif scratch.contacts[pair] > 0:
-        if phase == SUM:
-            sum_pair(pair, dt, world, state, scratch)
+    dt = workspace.step[0]
+    if phase == FIND_CONTACTS:
+        find_contacts(pair, dt, model, tree, neighbour_lists, surfaces, state, workspace)
+    elif workspace.contacts[pair] > 0:
+        if phase == SUM_CONTACTS:
+            sum_pair_contacts(pair, dt, model, state, workspace)
         else:
-            bend_pair(pair, dt, world, shapes, state, scratch)
+            update_pair_friction(pair, dt, model, surfaces, state, workspace)

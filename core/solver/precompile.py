@@ -20,7 +20,7 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..compiled.kernel_fingerprint import edition
+from ..compiled.kernel_fingerprint import fingerprint
 
 if TYPE_CHECKING:
     from ..model.scenario import Scenario
@@ -31,16 +31,16 @@ _lock = threading.Lock()
 _done = False
 
 
-def folder() -> Path:
+def cache_folder() -> Path:
     """Return where numba keeps what it compiles: what ``NUMBA_CACHE_DIR`` says, otherwise beside the source."""
     chosen = os.environ.get("NUMBA_CACHE_DIR")
     return Path(chosen) if chosen else Path(__file__).parent / "__pycache__"
 
 
-def stamp() -> Path:
+def completion_file() -> Path:
     """Return the file that says that these kernels were compiled, by this numba for this Python and processor."""
     python = f"{sys.implementation.cache_tag}-{platform.machine()}"
-    return folder() / f"palpate-{edition()}-numba-{_numba()}-{python}.compiled"
+    return cache_folder() / f"palpate-{fingerprint()}-numba-{_numba()}-{python}.compiled"
 
 
 @cache
@@ -53,12 +53,12 @@ def is_needed() -> bool:
     if _done or os.environ.get("PALPATE_NUMBA", "1") == "0":
         return False
     try:
-        return not stamp().is_file()
+        return not completion_file().is_file()
     except importlib.metadata.PackageNotFoundError:  # in plain Python nothing is compiled
         return False
 
 
-def warm(report: Report = lambda done, total: None) -> None:
+def compile_solver(report: Report = lambda done, total: None) -> None:
     """Compile everything that the solver needs, and note that it is done.
 
     Parameters
@@ -72,22 +72,22 @@ def warm(report: Report = lambda done, total: None) -> None:
             return
         from ..compiled.kernels import KERNELS
 
-        with _Watch(lambda: report(sum(bool(kernel.signatures) for kernel in list(KERNELS)), max(1, len(KERNELS)))):
+        with _PeriodicReport(lambda: report(sum(bool(kernel.signatures) for kernel in list(KERNELS)), max(1, len(KERNELS)))):
             _solve()
         _done = True
         with suppress(OSError):  # in a folder that must not be written to numba chooses another, and we ask anew next time
-            folder().mkdir(parents=True, exist_ok=True)
-            stamp().touch()
+            cache_folder().mkdir(parents=True, exist_ok=True)
+            completion_file().touch()
 
 
-def warm_aloud() -> None:
+def compile_solver_with_notice() -> None:
     """Do as :func:`warm` where that is needed, with a line on stderr, for work without a window."""
     if is_needed():
         print("Palpate is preparing its solver (first use only), which takes about a minute …", file=sys.stderr, flush=True)
-        warm()
+        compile_solver()
 
 
-class _Watch:
+class _PeriodicReport:
     """Does something twice a second meanwhile."""
 
     def __init__(self, look: Callable[[], None]):
@@ -114,7 +114,7 @@ def _solve() -> None:
         Simulation(scenario(), threads).advance()
 
 
-def warm_laws() -> None:
+def compile_effect_laws() -> None:
     """Compile the law of every form of every effect."""
     from ..effects.engine.registry import effect, library
     from .simulation import Simulation
@@ -163,5 +163,5 @@ def main() -> None:
     When that is noted as done, the laws of effects follow, which take a second each when they are first used.
     """
     threading.Thread(target=_end_with_parent, daemon=True).start()
-    warm(lambda done, total: print(json.dumps({"done": done, "total": total}), flush=True))
-    warm_laws()
+    compile_solver(lambda done, total: print(json.dumps({"done": done, "total": total}), flush=True))
+    compile_effect_laws()

@@ -13,33 +13,33 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..compiled.thread_team import board_for, helpers
+from ..compiled.thread_team import helper_threads, make_queue
 from ..effects.engine.compiled_program import compile_program
 from ..geometry.bvh import Tree, build_tree
 from ..geometry.contact_points import ContactPoints, contact_points
 from ..geometry.mesh import is_closed
 from ..geometry.rotations import DRIVEN, FREE, KEYFRAMED, quaternion_product, rotation_matrices, rotation_vectors
 from ..jobs.job_runner import drive
-from ..laws.contact import State, World, parameter_row
+from ..laws.contact import SolverModel, State, parameter_row
 from ..laws.series_compliance import coupling
 from ..model.pose_interpolation import poses_at
 from ..model.recording import Frame, Recording, SensorFrame
 from ..model.scenario import Scenario, Sensor, Target
-from ..response.readings import ReadoutChain
-from .detection.deformation import Shapes
-from .detection.deforming_surfaces import Surfaces, extent, point_rows
-from .detection.narrow_phase import count_sunk
-from .detection.neighbour_lists import WIDEST, Neighbours, neighbours_for
+from ..response.readings import Reader
+from .detection.deformation import SurfaceMotion
+from .detection.deforming_surfaces import DeformingSurfaces, bounding_sphere, point_rows
+from .detection.narrow_phase import count_too_deep
+from .detection.neighbour_lists import MAX_RADIUS_SHARE, NeighbourLists, neighbour_lists_for
 from .dynamics.actuators import drive_table
-from .dynamics.drive_commands import Pilot
-from .dynamics.passivity import fill_tanks
-from .parallel_loops import gather_all, help_out
+from .dynamics.drive_commands import DriveCommands
+from .dynamics.passivity import credit_initial_contacts
+from .parallel_loops import find_all_contacts, help_with_loops
 from .substep import advance_steps
-from .texel_readout import feel
+from .texel_readout import read_texels
 from .time_step_adviser import plan
-from .workspace import Scratch, contacts_of, scratch_for
+from .workspace import Workspace, contacts_of, workspace_for
 
-PART = 512
+MAX_PAIR_POINTS = 512
 """Most contact points of a pair: what a thread takes at a time."""
 
 
@@ -60,7 +60,7 @@ class Simulation:
     ----------
     scenario : Scenario
     threads : int, optional
-        How many to compute with (see :func:`.thread_team.board_for`); the numbers are the same, bit by bit.
+        How many to compute with (see :func:`.thread_team.make_queue`); the numbers are the same, bit by bit.
 
     Raises
     ------
@@ -92,23 +92,23 @@ class Simulation:
         meshes = [replace(t.mesh, vertices=t.mesh.vertices - self._center[t.body]) for t in scenario.targets]
         self._tree = build_tree(meshes)
         self._closed = [is_closed(mesh.triangles) for mesh in meshes]
-        self._sunk = 0  # most texels at once that the substeps of the last frame found past their reach
+        self._most_too_deep = 0  # most texels at once that the substeps of the last frame found past their reach
         points = [contact_points(s.texels, s.parameters.points_per_texel) for s in scenario.sensors]
-        self._world = _world(scenario, self._center, points, self.dt)
-        self._surfaces = Surfaces(scenario, self._center, points, self._tree, self._world)
-        self._shapes = self._surfaces.at(np.zeros(1))
-        self._state = _start(scenario, self._world, self._center)
-        self._neighbours = neighbours_for(len(self._state.hint), len(self._world.pairs))
-        board, self._helpers = board_for(len(self._state.hint), threads)
-        self._scratch = scratch_for(self._world, self._state, self._shapes, board)
-        self._readers = [ReadoutChain.of(sensor) for sensor in scenario.sensors]
-        self._pilot = Pilot(scenario)
+        self._model = _model(scenario, self._center, points, self.dt)
+        self._deforming_surfaces = DeformingSurfaces(scenario, self._center, points, self._tree, self._model)
+        self._surface_motion = self._deforming_surfaces.at(np.zeros(1))
+        self._state = _initial_state(scenario, self._model, self._center)
+        self._neighbour_lists = neighbour_lists_for(len(self._state.hint), len(self._model.pairs))
+        queue, self._helpers = make_queue(len(self._state.hint), threads)
+        self._workspace = workspace_for(self._model, self._state, self._surface_motion, queue)
+        self._readers = [Reader.of(sensor) for sensor in scenario.sensors]
+        self._drive_commands = DriveCommands(scenario)
         self._texel_start = _texel_start(scenario)
 
     @property
-    def arrays(self) -> tuple[World, Tree, Neighbours, Shapes, State, Scratch]:
+    def arrays(self) -> tuple[SolverModel, Tree, NeighbourLists, SurfaceMotion, State, Workspace]:
         """What the kernels work on."""
-        return self._world, self._tree, self._neighbours, self._shapes, self._state, self._scratch
+        return self._model, self._tree, self._neighbour_lists, self._surface_motion, self._state, self._workspace
 
     @property
     def time(self) -> float:
@@ -137,12 +137,12 @@ class Simulation:
             Of the way to the next frame, for what is known in between: these come first, in order.
         """
         time = self._time_of(self.frame + share)
-        self._surfaces.extend(time, vertices or {}, texels or {})
+        self._deforming_surfaces.extend(time, vertices or {}, texels or {})
         for body, (position, quaternion) in poses.items():
             motion = self._motions[body]
             if motion.times[-1] < time - 1e-9:
                 self._motions[body] = motion.extended(time, position, quaternion)
-        self._pilot.extend(time, targets or {})
+        self._drive_commands.extend(time, targets or {})
 
     def advance(self) -> Frame:
         """Bring the state one frame on and return what the sensors feel there."""
@@ -151,21 +151,21 @@ class Simulation:
         path = [poses_at(motion, times, self.scenario.interpolation) for motion in self._motions]
         quaternions = np.ascontiguousarray(np.stack([quaternion for _, quaternion in path], axis=1))
         positions = np.ascontiguousarray(np.stack([position for position, _ in path], axis=1))
-        for body in np.flatnonzero(self._world.kind == DRIVEN):
+        for body in np.flatnonzero(self._model.kind == DRIVEN):
             positions[:, body] += rotation_matrices(quaternions[:, body]) @ self._center[body]
         conjugate = quaternions[:-1] * np.array([1.0, -1.0, -1.0, -1.0])
         turns = rotation_vectors(quaternion_product(quaternions[1:], conjugate))
         velocities = np.concatenate([np.diff(positions, axis=0), turns], axis=2) / self.dt
-        if self._surfaces.moves:
-            self._shapes = self._surfaces.at(times)
+        if self._deforming_surfaces.moves:
+            self._surface_motion = self._deforming_surfaces.at(times)
         if self.frame == self.scenario.frame_start:
-            gather_all(-self.dt, *self.arrays)
-            fill_tanks(self._world, self._state, self._scratch)
-        self._sunk = 0
-        for first, last, commands in self._pilot.stretches(times, self.dt, self._tactile):
-            with helpers(self._scratch.board, self._helpers, help_out, *self.arrays):
-                sunk = advance_steps(self.dt, first, last, positions, quaternions, velocities, commands, *self.arrays)
-            self._sunk = max(self._sunk, sunk)
+            find_all_contacts(-self.dt, *self.arrays)
+            credit_initial_contacts(self._model, self._state, self._workspace)
+        self._most_too_deep = 0
+        for first, last, commands in self._drive_commands.control_intervals(times, self.dt, self._tactile):
+            with helper_threads(self._workspace.queue, self._helpers, help_with_loops, *self.arrays):
+                too_deep = advance_steps(self.dt, first, last, positions, quaternions, velocities, commands, *self.arrays)
+            self._most_too_deep = max(self._most_too_deep, too_deep)
         self.frame += 1
         return self.observe()
 
@@ -195,15 +195,15 @@ class Simulation:
         shape, texels = (len(positions), len(sensor.texels)), sensor.mounted
         depth, normal = np.zeros(shape), np.tile(-texels.normal, (shape[0], 1, 1))
         point, most = np.tile(texels.position, (shape[0], 1, 1)), 0
-        own = [pair for pair, (index, _) in enumerate(self._world.pairs) if index == 0]
+        own = [pair for pair, (index, _) in enumerate(self._model.pairs) if index == 0]
         for t in range(shape[0]):
             self._state.position[body], self._state.quaternion[body] = positions[t], quaternions[t]
-            sunk = gather_all(-self.dt, *self.arrays)
-            most = max(most, int(sunk))
+            too_deep = find_all_contacts(-self.dt, *self.arrays)
+            most = max(most, int(too_deep))
             for pair in own:
-                most = max(most, self._count_sunk(pair))
-                slots, normals, points, depths = contacts_of(pair, self._scratch)
-                texel = self._world.texel[self._world.point_first[pair] + slots - self._world.slot_start[pair]]
+                most = max(most, self._count_too_deep(pair))
+                slots, normals, points, depths = contacts_of(pair, self._workspace)
+                texel = self._model.texel[self._model.point_first[pair] + slots - self._model.slot_start[pair]]
                 deeper = np.argsort(depths, kind="stable")  # of several points of a texel the deepest comes last
                 deeper = deeper[depths[deeper] > depth[t, texel[deeper]]]
                 texel = texel[deeper]
@@ -215,19 +215,19 @@ class Simulation:
     def _time_of(self, frame: float) -> float:
         return (frame - self.scenario.frame_start) / self.scenario.fps
 
-    def _warn_of_sunk(self) -> None:
+    def _warn_of_too_deep(self) -> None:
         """Say once, at the first frame where it happens, that texels are pressed too deep to act."""
         if any("maximum penetration" in warning for warning in self.warnings):
             return
         sensors, targets, total, names = self.scenario.sensors, self.scenario.targets, 0, []
-        for pair, (sensor, target) in enumerate(self._world.pairs):
-            sunk = self._count_sunk(pair)
-            if sunk:
+        for pair, (sensor, target) in enumerate(self._model.pairs):
+            too_deep = self._count_too_deep(pair)
+            if too_deep:
                 name = f"'{targets[target].name}' into '{sensors[sensor].name}'"
                 if name not in names:  # a large sensor has several pairs with one target
                     names.append(name)
-                total += sunk
-        total = max(total, self._sunk)
+                total += too_deep
+        total = max(total, self._most_too_deep)
         if total:
             what = "texels" if all(sensor.parameters.points_per_texel == 1 for sensor in sensors) else "contact points"
             self.warnings.append(
@@ -235,30 +235,30 @@ class Simulation:
                 f"{', '.join(names) or 'an object'} and do not act; press less deep, or raise k or the maximum penetration."
             )
 
-    def _count_sunk(self, pair: int) -> int:
+    def _count_too_deep(self, pair: int) -> int:
         """Contact points of a pair that are sunk or buried in its target."""
-        closed = self._closed[self._world.pairs[pair, 1]]
-        return int(count_sunk(pair, closed, self._world, self._tree, self._shapes, self._state, self._scratch))
+        closed = self._closed[self._model.pairs[pair, 1]]
+        return int(count_too_deep(pair, closed, self._model, self._tree, self._surface_motion, self._state, self._workspace))
 
     def _tactile(self, sensor: int) -> np.ndarray:
         """(n,) normal forces of a sensor in the present state, for its controllers."""
-        gather_all(-self.dt, *self.arrays)
-        force = self._feel()[0]
+        find_all_contacts(-self.dt, *self.arrays)
+        force = self._read_texels()[0]
         return force[self._texel_start[sensor] : self._texel_start[sensor + 1]]
 
-    def _feel(self) -> tuple[np.ndarray, ...]:
-        """What :func:`feel` writes, from rows gathered: per texel up to the contact, then per sensor."""
+    def _read_texels(self) -> tuple[np.ndarray, ...]:
+        """What :func:`read_texels` writes, from rows gathered: per texel up to the contact, then per sensor."""
         n, m = self._texel_start[-1], len(self.scenario.sensors)
         force, friction, depth, slip, contact = *np.zeros((4, n)), np.zeros(n, dtype=np.bool_)
         shear, net, moment = np.zeros((n, 2)), np.zeros((m, 6)), np.zeros((m, 4))
-        feel(self._world, self._state, self._scratch, force, shear, friction, depth, slip, contact, net, moment)
+        read_texels(self._model, self._state, self._workspace, force, shear, friction, depth, slip, contact, net, moment)
         return force, shear, friction, depth, slip, contact, net, moment
 
     def observe(self) -> Frame:
         """What the sensors feel in the present state."""
-        gather_all(-self.dt, *self.arrays)
-        self._warn_of_sunk()
-        force, shear, friction, depth, slip, contact, net, moment = self._feel()
+        find_all_contacts(-self.dt, *self.arrays)
+        self._warn_of_too_deep()
+        force, shear, friction, depth, slip, contact, net, moment = self._read_texels()
         sensors = {}
         for i, sensor in enumerate(self.scenario.sensors):
             if not sensor.readout:
@@ -278,7 +278,7 @@ class Simulation:
                 net_torque=net[i, 3:] + np.cross(center, net[i, :3]),
                 centre_of_pressure=moment[i, :3] / moment[i, 3] + center if pressed else np.zeros(3),
             )
-        origin = self._state.position - np.einsum("bij,bj->bi", self._scratch.rotation, self._center)
+        origin = self._state.position - np.einsum("bij,bj->bi", self._workspace.rotation, self._center)
         return Frame(
             frame=self.frame,
             time=self.time,
@@ -288,7 +288,7 @@ class Simulation:
         )
 
 
-def _world(scenario: Scenario, center: np.ndarray, points: list[ContactPoints], dt: float) -> World:
+def _model(scenario: Scenario, center: np.ndarray, points: list[ContactPoints], dt: float) -> SolverModel:
     """Flatten a scenario into the kernels' arrays; `center` (b, 3) is the reference point of each body in its frame."""
     bodies, sensors, targets = scenario.bodies, scenario.sensors, scenario.targets
     blocks = [point_rows(s.mounted, p, center[s.body]) for s, p in zip(sensors, points, strict=True)]
@@ -298,17 +298,17 @@ def _world(scenario: Scenario, center: np.ndarray, points: list[ContactPoints], 
     at, drive_at, unknowns = _unknowns(kind, drive_of)
     point_start = np.cumsum([0] + [len(block) for block in blocks])
     parts = [  # sensor, target, first point, and the one after the last
-        (i, j, first, min(first + PART, point_start[i + 1]))
+        (i, j, first, min(first + MAX_PAIR_POINTS, point_start[i + 1]))
         for i, s in enumerate(sensors)
         for j, t in enumerate(targets)
         if s.body != t.body
-        for first in range(point_start[i], point_start[i + 1], PART)
+        for first in range(point_start[i], point_start[i + 1], MAX_PAIR_POINTS)
     ]
     pairs = [(i, j) for i, j, _, _ in parts]
     couplings = [coupling(scenario, i, j) for i, j in pairs]
     sizes = [stop - first for _, _, first, stop in parts]
-    extents = [extent(block, sensor.parameters.max_penetration) for block, sensor in zip(blocks, sensors, strict=True)]
-    return World(
+    extents = [bounding_sphere(block, sensor.parameters.max_penetration) for block, sensor in zip(blocks, sensors, strict=True)]
+    return SolverModel(
         points=np.ascontiguousarray(np.vstack(blocks)),
         point_start=point_start,
         texel=np.concatenate([p.texel + start for p, start in zip(points, texel_start, strict=False)]),
@@ -319,7 +319,7 @@ def _world(scenario: Scenario, center: np.ndarray, points: list[ContactPoints], 
             ]
         ),
         weight=np.array([weight for _, weight in couplings]),
-        painted=_painted(sensors, points),
+        painted=_painted_multipliers(sensors, points),
         reach=np.array([s.parameters.max_penetration for s in sensors], dtype=float),
         pairs=np.array(pairs),
         point_first=np.array([first for _, _, first, _ in parts]),
@@ -329,8 +329,8 @@ def _world(scenario: Scenario, center: np.ndarray, points: list[ContactPoints], 
         slot_start=np.cumsum([0, *sizes])[:-1],
         center=np.array([middle for middle, _ in extents]),
         radius=np.array([radius for _, radius in extents]),
-        skin=np.array([WIDEST * sensors[i].parameters.max_penetration for i, _ in pairs]),
-        listed=np.array([_listed(sensors[i], targets[j]) for i, j in pairs]),
+        skin=np.array([MAX_RADIUS_SHARE * sensors[i].parameters.max_penetration for i, _ in pairs]),
+        listed=np.array([_list_radius(sensors[i], targets[j]) for i, j in pairs]),
         kind=kind,
         at=at,
         unknowns=unknowns,
@@ -352,7 +352,7 @@ def _world(scenario: Scenario, center: np.ndarray, points: list[ContactPoints], 
     )
 
 
-def _painted(sensors: tuple[Sensor, ...], points: list[ContactPoints]) -> np.ndarray:
+def _painted_multipliers(sensors: tuple[Sensor, ...], points: list[ContactPoints]) -> np.ndarray:
     """(N, 2) multipliers of stiffness and friction of all contact points; no rows when no sensor is painted."""
     if all(s.painted.k is None and s.painted.friction is None for s in sensors):
         return np.zeros((0, 2))
@@ -388,30 +388,30 @@ def _unknowns(kind: np.ndarray, drive_of: np.ndarray) -> tuple[np.ndarray, np.nd
     return at, drive_at, int(6 * np.count_nonzero(free) + drives)
 
 
-def _listed(sensor: Sensor, target: Target) -> float:
+def _list_radius(sensor: Sensor, target: Target) -> float:
     """How far around a texel triangles are listed at the most: a tenth of the target's usual edge, so that they are few."""
     a, b, _ = target.mesh.triangles.T
     edge = np.median(np.linalg.norm(target.mesh.vertices[b] - target.mesh.vertices[a], axis=1))
     return float(min(0.1 * edge, 0.1 * sensor.parameters.max_penetration))
 
 
-def _start(scenario: Scenario, world: World, center: np.ndarray) -> State:
+def _initial_state(scenario: Scenario, model: SolverModel, center: np.ndarray) -> State:
     """Everything where it is at the first frame; keyframed bodies count as at rest until they move."""
     quaternion = np.array([body.motion.quaternions[0] for body in scenario.bodies], dtype=float)
     origin = np.array([body.motion.positions[0] for body in scenario.bodies], dtype=float)
     velocity = [
         np.concatenate([body.velocity, body.angular_velocity]) if body.free else np.zeros(6) for body in scenario.bodies
     ]
-    slots = int((world.point_stop - world.point_first).sum())
+    slots = int((model.point_stop - model.point_first).sum())
     return State(
         position=origin + np.einsum("bij,bj->bi", rotation_matrices(quaternion), center),
         quaternion=quaternion,
         velocity=np.array(velocity, dtype=float),
         hint=np.full(slots, -1),
         bristles=np.zeros((slots, 4)),
-        drives=np.zeros((len(world.drives), 3)),
-        memory=world.program.memory(len(world.points)),
-        tank=np.zeros(len(world.pairs)),
+        drives=np.zeros((len(model.drives), 3)),
+        memory=model.program.memory(len(model.points)),
+        tank=np.zeros(len(model.pairs)),
     )
 
 

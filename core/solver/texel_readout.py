@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 
-from ..compiled.kernels import allocating
+from ..compiled.kernels import allocating_kernel
 from ..laws.contact import (
     DEPTH,
     LANES,
@@ -20,53 +20,57 @@ from ..laws.contact import (
     ZX,
     ZY,
     ZZ,
-    bristle_limit,
     bristle_rate,
     friction_force,
+    max_bristle_deflection,
     normal_force,
 )
-from .detection.surface_kinematics import OX, OY, OZ
-from .dynamics.effect_kernels import NOW, force_and_law, has_effects, let_effects_act, press_texel
-from .dynamics.relative_kinematics import law_of, painted_law, relative_motion, values, velocity_at
+from .detection.surface_kinematics import SURFACE_VX, SURFACE_VY, SURFACE_VZ
+from .dynamics.effect_kernels import NOW, apply_effects, force_and_friction_law, has_effects, press_texel
+from .dynamics.relative_kinematics import motion_values, pair_law, point_law, relative_motion, velocity_at
 
 
-@allocating
-def feel(world, state, scratch, force, shear, friction, depth, slip, contact, net, moment):
+@allocating_kernel
+def read_texels(model, state, workspace, force, shear, friction, depth, slip, contact, net, moment):
     """What every texel feels right now, from rows freshly gathered (Eq. 8, 9, 13); forces on the sensor, in its body's frame.
 
     `net` gets force and torque about the body's reference point, `moment` the sum of fn · point and of fn.
     """
-    rows, points = scratch.rows, world.points
+    rows, points = workspace.rows, model.points
     strongest = np.full(len(force), -1.0)
-    for pair in range(len(world.pairs)):
-        sensor = world.pairs[pair, 0]
-        a, b = world.sensor_body[sensor], world.target_body[world.pairs[pair, 1]]
-        effects = has_effects(sensor, world.program)
-        law, whole = law_of(world.parameters, pair), 1.0 / world.weight[pair]
-        relative_motion(a, b, scratch.twist, state.position, scratch.rotation, scratch.motion[pair])
-        motion = values(scratch.motion[pair])
-        for r in range(scratch.contacts[pair]):
-            block, lane = scratch.first_block[pair] + r // LANES, r % LANES
-            point = world.point_first[pair] + scratch.slots[block, lane] - world.slot_start[pair]
-            texel = world.texel[point]
-            p = painted_law(law, world.painted, point)
+    for pair in range(len(model.pairs)):
+        sensor = model.pairs[pair, 0]
+        a, b = model.sensor_body[sensor], model.target_body[model.pairs[pair, 1]]
+        effects = has_effects(sensor, model.program)
+        law, whole = pair_law(model.parameters, pair), 1.0 / model.weight[pair]
+        relative_motion(a, b, workspace.twist, state.position, workspace.rotation, workspace.motion[pair])
+        motion = motion_values(workspace.motion[pair])
+        for r in range(workspace.contacts[pair]):
+            block, lane = workspace.first_block[pair] + r // LANES, r % LANES
+            point = model.point_first[pair] + workspace.slots[block, lane] - model.slot_start[pair]
+            texel = model.texel[point]
+            p = point_law(law, model.painted, point)
             nx, ny, nz = rows[block, NX + lane], rows[block, NY + lane], rows[block, NZ + lane]
             px, py, pz = rows[block, PX + lane], rows[block, PY + lane], rows[block, PZ + lane]
             vx, vy, vz = velocity_at(px, py, pz, motion)
-            if scratch.moving[pair]:
-                own = scratch.own
-                vx, vy, vz = vx + own[block, OX + lane], vy + own[block, OY + lane], vz + own[block, OZ + lane]
+            if workspace.moving[pair]:
+                own = workspace.own
+                vx, vy, vz = (
+                    vx + own[block, SURFACE_VX + lane],
+                    vy + own[block, SURFACE_VY + lane],
+                    vz + own[block, SURFACE_VZ + lane],
+                )
             rate = vx * nx + vy * ny + vz * nz
             tx, ty, tz = vx - rate * nx, vy - rate * ny, vz - rate * nz
             square = tx * tx + ty * ty + tz * tz
             fn = normal_force(rows[block, DEPTH + lane], rate, p)
             if effects:
-                felt, offset = scratch.felt, world.point_first[pair] - world.slot_start[pair]
-                press_texel(felt, block, LANES, lane, pair, rows[block, DEPTH + lane], rate, 0.0, math.sqrt(square), p, world)
-                let_effects_act(sensor, NOW, block, lane, 1, offset, p, world, state.memory, scratch.slots, felt)
-                fn, p = force_and_law(pair, block, lane, p, world, felt)
+                felt, offset = workspace.felt, model.point_first[pair] - model.slot_start[pair]
+                press_texel(felt, block, LANES, lane, pair, rows[block, DEPTH + lane], rate, 0.0, math.sqrt(square), p, model)
+                apply_effects(sensor, NOW, block, lane, 1, offset, p, model, state.memory, workspace.slots, felt)
+                fn, p = force_and_friction_law(pair, block, lane, p, model, felt)
             zx, zy, zz = rows[block, ZX + lane], rows[block, ZY + lane], rows[block, ZZ + lane]
-            length, limit = math.sqrt(zx * zx + zy * zy + zz * zz), bristle_limit(fn, p)
+            length, limit = math.sqrt(zx * zx + zy * zy + zz * zz), max_bristle_deflection(fn, p)
             held = limit / length if length > limit else 1.0
             zx, zy, zz = held * zx, held * zy, held * zz
             # Friction drags the sensor along with the target; the target's surface normal points into the sensor.

@@ -9,9 +9,9 @@ import numpy as np
 
 from ..compiled.struct_reference import by_reference
 from ..effects.engine.compiled_program import COLUMNS
-from ..geometry.rotations import DRIVEN, FREE, look_back
-from ..laws.contact import DEPTH, LANES, NX, PX, ROW, State, World
-from .detection.deformation import Shapes
+from ..geometry.rotations import DRIVEN, FREE, write_backward_twist
+from ..laws.contact import DEPTH, LANES, NX, PX, ROW, SolverModel, State
+from .detection.deformation import SurfaceMotion
 from .dynamics.effect_kernels import may_pull
 
 SUMS = 27
@@ -19,7 +19,7 @@ SUMS = 27
 
 
 @by_reference
-class Scratch(NamedTuple):
+class Workspace(NamedTuple):
     """Working memory of the kernels, so that nothing is allocated inside the loop.
 
     Attributes
@@ -83,7 +83,7 @@ class Scratch(NamedTuple):
         Work that each pair does in the step and could do (J); the share of its forces that acts, and what it lies between.
     step : (1,) float, seconds
         The time step that helpers are to reckon with.
-    board : (BOARD,) or (0,) int
+    board : (QUEUE_SIZE,) or (0,) int
         Where helpers look for work (see :mod:`.thread_team`).
     """
 
@@ -97,7 +97,7 @@ class Scratch(NamedTuple):
     moving: np.ndarray
     first_block: np.ndarray
     contacts: np.ndarray
-    sunk: np.ndarray
+    too_deep: np.ndarray
     sums: np.ndarray
     pose: np.ndarray
     turn: np.ndarray
@@ -132,20 +132,20 @@ class Scratch(NamedTuple):
     enough: np.ndarray
     too_much: np.ndarray
     step: np.ndarray
-    board: np.ndarray
+    queue: np.ndarray
 
 
-def scratch_for(world: World, state: State, shapes: Shapes, board: np.ndarray) -> Scratch:
+def workspace_for(model: SolverModel, state: State, surfaces: SurfaceMotion, queue: np.ndarray) -> Workspace:
     """Allocate the working memory of a run."""
     b = len(state.position)
-    slots = np.diff(world.slot_start, append=len(state.hint))
+    slots = np.diff(model.slot_start, append=len(state.hint))
     blocks = np.cumsum([0, *(-(-slots // LANES))])
     twist = np.zeros((b, 12))
     for body in range(b):
-        look_back(state.velocity[body], 1e-9, twist[body])
-    n = max(6, world.unknowns)
-    moving = shapes.bends[world.pairs[:, 0]] | shapes.deforms[world.pairs[:, 1]]
-    return Scratch(
+        write_backward_twist(state.velocity[body], 1e-9, twist[body])
+    n = max(6, model.unknowns)
+    moving = surfaces.bends[model.pairs[:, 0]] | surfaces.deforms[model.pairs[:, 1]]
+    return Workspace(
         rotation=np.zeros((b, 3, 3)),
         inertia=np.zeros((b, 3, 3)),
         twist=twist,
@@ -155,13 +155,13 @@ def scratch_for(world: World, state: State, shapes: Shapes, board: np.ndarray) -
         own=np.zeros((blocks[-1] if moving.any() else 0, 3 * LANES)),
         moving=moving,
         first_block=blocks[:-1],
-        contacts=np.zeros(len(world.pairs), np.int64),
-        sunk=np.zeros(len(world.pairs), np.int64),
-        sums=np.zeros((len(world.pairs), SUMS * LANES)),
-        pose=np.zeros((len(world.pairs), 12)),
-        turn=np.zeros((len(world.pairs), 3, 3, 3)),
-        motion=np.zeros((len(world.pairs), 12)),
-        part=np.zeros((len(world.pairs), 12)),
+        contacts=np.zeros(len(model.pairs), np.int64),
+        too_deep=np.zeros(len(model.pairs), np.int64),
+        sums=np.zeros((len(model.pairs), SUMS * LANES)),
+        pose=np.zeros((len(model.pairs), 12)),
+        turn=np.zeros((len(model.pairs), 3, 3, 3)),
+        motion=np.zeros((len(model.pairs), 12)),
+        part=np.zeros((len(model.pairs), 12)),
         block=np.zeros((6, 6)),
         wrench=np.zeros(6),
         map_a=np.zeros((6, 6)),
@@ -175,35 +175,35 @@ def scratch_for(world: World, state: State, shapes: Shapes, board: np.ndarray) -
         tumbling=np.zeros((b, 3)),
         axis=np.zeros((b, 3)),
         carried=np.zeros((b, 6)),
-        felt=np.zeros((0 if world.program.is_empty else blocks[-1], COLUMNS * LANES)),
-        pressed=np.zeros((1, 0 if world.program.is_empty else COLUMNS * len(world.points))),
-        every=np.arange(len(world.points)),
-        drive_mass=np.zeros(len(world.drives)),
-        drive_load=np.zeros(len(world.drives)),
+        felt=np.zeros((0 if model.program.is_empty else blocks[-1], COLUMNS * LANES)),
+        pressed=np.zeros((1, 0 if model.program.is_empty else COLUMNS * len(model.points))),
+        every=np.arange(len(model.points)),
+        drive_mass=np.zeros(len(model.drives)),
+        drive_load=np.zeros(len(model.drives)),
         before=np.zeros((b, 6)),
-        counted=_counted(world, moving),
-        force=np.zeros((len(world.pairs), 6)),
-        found=np.zeros((len(world.pairs), 6)),
-        found_before=np.zeros((len(world.pairs), 6)),
-        work=np.zeros(len(world.pairs)),
-        left=np.zeros(len(world.pairs)),
-        hold=np.ones(len(world.pairs)),
-        enough=np.zeros(len(world.pairs)),
-        too_much=np.ones(len(world.pairs)),
+        counted=_counted(model, moving),
+        force=np.zeros((len(model.pairs), 6)),
+        found=np.zeros((len(model.pairs), 6)),
+        found_before=np.zeros((len(model.pairs), 6)),
+        work=np.zeros(len(model.pairs)),
+        left=np.zeros(len(model.pairs)),
+        hold=np.ones(len(model.pairs)),
+        enough=np.zeros(len(model.pairs)),
+        too_much=np.ones(len(model.pairs)),
         step=np.zeros(1),
-        board=board,
+        queue=queue,
     )
 
 
-def _counted(world: World, moving: np.ndarray) -> np.ndarray:
-    sensor, target = world.pairs.T
-    kinds = world.kind[np.stack([world.sensor_body[sensor], world.target_body[target]])]
+def _counted(model: SolverModel, moving: np.ndarray) -> np.ndarray:
+    sensor, target = model.pairs.T
+    kinds = model.kind[np.stack([model.sensor_body[sensor], model.target_body[target]])]
     moved = (kinds == FREE).any(axis=0) & (kinds != DRIVEN).all(axis=0)
-    pulls = np.array([may_pull(i, world.program) for i in sensor], dtype=bool)
+    pulls = np.array([may_pull(i, model.program) for i in sensor], dtype=bool)
     return moved & ~moving & ~pulls
 
 
-def contacts_of(pair: int, scratch: Scratch) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+def contacts_of(pair: int, workspace: Workspace) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Return the contacts of one pair, freshly gathered.
 
     Returns
@@ -216,8 +216,8 @@ def contacts_of(pair: int, scratch: Scratch) -> tuple[np.ndarray, np.ndarray, np
         From the body's reference point.
     depth : (n,) float, metres
     """
-    count, first = scratch.contacts[pair], scratch.first_block[pair]
+    count, first = workspace.contacts[pair], workspace.first_block[pair]
     blocks = slice(first, first - (-count // LANES))
-    columns = scratch.rows[blocks].reshape(-1, ROW // LANES, LANES).swapaxes(1, 2).reshape(-1, ROW // LANES)[:count]
+    columns = workspace.rows[blocks].reshape(-1, ROW // LANES, LANES).swapaxes(1, 2).reshape(-1, ROW // LANES)[:count]
     n, p = NX // LANES, PX // LANES
-    return scratch.slots[blocks].ravel()[:count], columns[:, n : n + 3], columns[:, p : p + 3], columns[:, DEPTH // LANES]
+    return workspace.slots[blocks].ravel()[:count], columns[:, n : n + 3], columns[:, p : p + 3], columns[:, DEPTH // LANES]

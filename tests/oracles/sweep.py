@@ -117,7 +117,7 @@ class Energies:
 
 def stored(simulation: Simulation, frame) -> float:
     """Energy in the springs and bristles of all contacts, joules."""
-    total, state, world = 0.0, simulation._state, simulation._world
+    total, state, world = 0.0, simulation._state, simulation._model
     for index, sensor in enumerate(simulation.scenario.sensors):
         p = sensor.parameters
         if sensor.readout:

@@ -1,17 +1,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What an effect is: plain data on a sensor, a kind in the library, and the mechanisms in which a form of it can act.
+"""What an effect is: plain data on a sensor, a kind in the library, and the ways in which a form of it can act.
 
 Each file of this folder but its machinery defines a ``KIND``; nothing else has to know of it. Its forms are different formulas
 for the same thing, since no two papers agree on one. A form acts in exactly one way:
 
-================  ===========================================================================================================
-``law``           scalar law with memory, the same for the solver, for whole signals and for streams (see :data:`Law`)
-``memoryless``    formula on readings without a past: ``memoryless(x (t, n), time (t,), values, transducers, seed) → (t, n)``
-``coupling``      linear coupling of texels, made once for all samples: ``coupling(values, transducers) → CouplingMatrix``
-``delay``         seconds by which the reading comes late: ``delay(values) → float``
-``friction_law``  law of sliding: ``friction_law(speed, force, numbers, row) → (factor on the friction coefficient, N·s/m)``
-``placement``     where the texels really are: ``placement(position, normal, tangent, values) → the same three``
-================  ===========================================================================================================
+=============  ==============================================================================================================
+``law``        scalar law with memory, the same for the solver, for whole signals and for streams (see :data:`Law`)
+``shape``      formula on readings that needs no past: ``shape(x (t, n), time (t,), values, site, seed) → (t, n)``
+``mix``        weights of a linear mix of texels: ``mix(values, site) → Mixing``, made once and applied to every sample
+``delay``      seconds by which the reading comes late: ``delay(values) → float``
+``friction``   law of sliding: ``friction(speed, force, numbers, row) → (factor on the friction coefficient, N·s/m)``
+``place``      where the texels really are: ``place(position, normal, tangent, values) → the same three``
+=============  ==============================================================================================================
 
 Laws and friction are compiled, so they are plain functions of numbers and arrays that use nothing but :mod:`math`; this file
 and those of the effects import nothing heavy, because Blender's panels list them.
@@ -24,9 +24,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from .coupling_matrix import CouplingMatrix
+from .mixing import Mixing
 
-SITES_OF_ACTION = ("contact", "pad", "readout")
+STAGES = ("contact", "pad", "readout")
 """`contact`: the law of contact itself, without memory. `pad`: with memory; both act on the bodies. `readout`: only on what
 the sensor reports."""
 
@@ -115,7 +115,7 @@ class Parameter:
 
 
 @dataclass(frozen=True)
-class TransducerArray:
+class Site:
     """Where an effect sits: the texels and the linear conversion of the sensor it belongs to.
 
     Attributes
@@ -154,16 +154,16 @@ class Form:
         As the documentation prints it.
     reference : str
     parameters : tuple of Parameter
-    neutral : dict of str to float
+    off : dict of str to float
         Values, possibly outside the bounds, at which the effect is not there: ``strength`` zero, a level of infinity.
-    law, memoryless, coupling, delay, friction_law, placement
+    law, shape, mix, delay, friction, place
         How it acts; exactly one is given (see the module's text).
     constants : callable
         ``constants(values, dt (m,)) → (m, c)``: the numbers of a law for steps of these lengths (s), of a friction law for
         none in particular.
     memory : int
         How many numbers a law remembers.
-    site : str
+    stage : str
         Where it differs from that of its kind.
     after_conversion : bool
         A readout form that acts on the reading in the sensor's unit, and not on newtons before gain and zero.
@@ -177,25 +177,25 @@ class Form:
     formula: str
     reference: str
     parameters: tuple[Parameter, ...]
-    neutral: dict[str, float]
+    off: dict[str, float]
     law: Law | None = None
-    memoryless: Callable[..., np.ndarray] | None = None
-    coupling: Callable[[Values, TransducerArray], CouplingMatrix] | None = None
+    shape: Callable[..., np.ndarray] | None = None
+    mix: Callable[[Values, Site], Mixing] | None = None
     delay: Callable[[Values], float] | None = None
-    friction_law: Callable[..., tuple[float, float]] | None = None
-    placement: Callable[..., tuple[np.ndarray, np.ndarray, np.ndarray]] | None = None
+    friction: Callable[..., tuple[float, float]] | None = None
+    place: Callable[..., tuple[np.ndarray, np.ndarray, np.ndarray]] | None = None
     constants: Callable[[Values, np.ndarray], np.ndarray] | None = None
     memory: int = 0
-    site: str = ""
+    stage: str = ""
     after_conversion: bool = False
     after_clip: bool = False
     random: bool = False
 
     @property
-    def mechanism(self) -> str:
+    def way(self) -> str:
         """How it acts: the name of the one attribute that is given."""
-        mechanisms = ("law", "memoryless", "coupling", "delay", "friction_law", "placement")
-        return next(name for name in mechanisms if getattr(self, name) is not None)
+        ways = ("law", "shape", "mix", "delay", "friction", "place")
+        return next(name for name in ways if getattr(self, name) is not None)
 
     def defaults(self, gain: float = 1.0) -> dict[str, Value]:
         """Return the default of every parameter, for a sensor with this gain."""
@@ -214,10 +214,10 @@ class Kind:
         For people.
     text : str
         What it does, in one sentence.
-    site : str
-        One of :data:`SITES_OF_ACTION`.
+    stage : str
+        One of :data:`STAGES`.
     order : float
-        Place in the chain among those of its site.
+        Place in the chain among those of its stage.
     forms : tuple of Form
         The first is the usual one.
     """
@@ -225,26 +225,26 @@ class Kind:
     name: str
     title: str
     text: str
-    site: str
+    stage: str
     order: float
     forms: tuple[Form, ...]
 
-    def site_of(self, form: Form) -> str:
+    def stage_of(self, form: Form) -> str:
         """Return where a form of this kind acts."""
-        return form.site or self.site
+        return form.stage or self.stage
 
 
-def scalar(values: Values, name: str) -> float:
+def number(values: Values, name: str) -> float:
     """Return a value that is one number."""
     value = values[name]
     assert isinstance(value, float | int)
     return float(value)
 
 
-def constants_from(*names: str) -> Callable[[Values, np.ndarray], np.ndarray]:
+def same_for_all_steps(*names: str) -> Callable[[Values, np.ndarray], np.ndarray]:
     """Return the `constants` of a law whose numbers are its parameters of these names, whatever the step."""
 
     def constants(values: Values, dt: np.ndarray) -> np.ndarray:
-        return np.tile([scalar(values, name) for name in names], (len(dt), 1))
+        return np.tile([number(values, name) for name in names], (len(dt), 1))
 
     return constants

@@ -5,30 +5,30 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..engine.random_streams import uniform
-from ..engine.specification import Form, Kind, Parameter, TransducerArray, Values, scalar
+from ..engine.random_numbers import uniform
+from ..engine.specification import Form, Kind, Parameter, Site, Values, number
 
 
 def _dead(values: Values, seed: int, texels: int) -> np.ndarray:
-    return uniform("dead-texels", seed, np.arange(texels)) < scalar(values, "share")
+    return uniform("dead-texels", seed, np.arange(texels)) < number(values, "share")
 
 
-def random(x: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
+def random(x: np.ndarray, time: np.ndarray, values: Values, site: Site, seed: int) -> np.ndarray:
     """Nothing where a texel is dead."""
     return np.where(_dead(values, seed, x.shape[1]), 0.0, x)
 
 
-def listed(x: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
+def listed(x: np.ndarray, time: np.ndarray, values: Values, site: Site, seed: int) -> np.ndarray:
     """Nothing where a texel is listed as dead; half dead ones report half."""
     return x * (1.0 - np.asarray(values["dead"]))
 
 
-def stuck(x: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
+def stuck(x: np.ndarray, time: np.ndarray, values: Values, site: Site, seed: int) -> np.ndarray:
     """One reading for ever where a texel is dead."""
-    return np.where(_dead(values, seed, x.shape[1]), transducers.zero + scalar(values, "level"), x)
+    return np.where(_dead(values, seed, x.shape[1]), site.zero + number(values, "level"), x)
 
 
-def held(x: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
+def held(x: np.ndarray, time: np.ndarray, values: Values, site: Site, seed: int) -> np.ndarray:
     """A reading of its own for ever where a texel is listed as dead."""
     gone = np.asarray(values["dead"])
     return (1.0 - gone) * x + gone * np.asarray(values["level"])
@@ -41,7 +41,7 @@ KIND = Kind(
     name="dead-texels",
     title="Dead Texels",
     text="Some texels report nothing, whatever presses on them.",
-    site="readout",
+    stage="readout",
     order=45,
     forms=(
         Form(
@@ -49,8 +49,8 @@ KIND = Kind(
             "rᵢ = 0 for a share of the texels",
             "Ni et al., ACM Trans. Sens. Netw. 5 (2009): fault types",
             (_SHARE,),
-            neutral={"share": 0.0},
-            memoryless=random,
+            off={"share": 0.0},
+            shape=random,
             random=True,
         ),
         Form(
@@ -58,8 +58,8 @@ KIND = Kind(
             "rᵢ = (1 − deadᵢ) · fᵢ",
             "Ni et al., ACM Trans. Sens. Netw. 5 (2009): fault types",
             (_DEAD,),
-            neutral={"dead": 0.0},
-            memoryless=listed,
+            off={"dead": 0.0},
+            shape=listed,
         ),
         Form(
             "held",
@@ -69,8 +69,8 @@ KIND = Kind(
                 _DEAD,
                 Parameter("level", "unit", 0.1, -1e5, 1e5, "Reading L at which a dead texel stays.", per_texel=True),
             ),
-            neutral={"dead": 0.0},
-            memoryless=held,
+            off={"dead": 0.0},
+            shape=held,
             after_conversion=True,
         ),
         Form(
@@ -78,8 +78,8 @@ KIND = Kind(
             "rᵢ = r₀ + L for a share of the texels",
             "Ni et al., ACM Trans. Sens. Netw. 5 (2009): stuck-at fault",
             (_SHARE, Parameter("level", "unit", 0.1, -1e5, 1e5, "Reading L above the one without load at which they stay.")),
-            neutral={"share": 0.0},
-            memoryless=stuck,
+            off={"share": 0.0},
+            shape=stuck,
             after_conversion=True,
             random=True,
         ),

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..engine.specification import Form, Kind, Parameter, Values, scalar
+from ..engine.specification import Form, Kind, Parameter, Values, number
 
 
 def moved(
@@ -20,7 +20,7 @@ def moved(
     across = across - (across @ up) * up
     across = _unit(across, np.cross(up, np.eye(3)[np.abs(up).argmin()]))
     frame = np.stack([across, np.cross(up, across), up], axis=1)
-    given = {key: scalar(values, key) for key in values}
+    given = {key: number(values, key) for key in values}
     turn = frame @ _turn(given.get("about_x", 0.0), given.get("about_y", 0.0), given.get("about_z", 0.0)) @ frame.T
     shift = frame @ np.array([given.get("x", 0.0), given.get("y", 0.0), given.get("z", 0.0)])
     middle = position.mean(axis=0)
@@ -48,7 +48,7 @@ KIND = Kind(
     name="misalignment",
     title="Misalignment",
     text="The texels sit beside or askew of where the model has them.",
-    site="contact",
+    stage="contact",
     order=0,
     forms=(
         Form(
@@ -56,16 +56,16 @@ KIND = Kind(
             "p = p₀ + s",
             "Craig, Introduction to Robotics (2005), section 2.8: a frame's error as a rigid motion",
             (_X, _Y),
-            neutral={"x": 0.0, "y": 0.0},
-            placement=moved,
+            off={"x": 0.0, "y": 0.0},
+            place=moved,
         ),
         Form(
             "turn",
             "p = R_z (p₀ − m) + m + s",
             "Craig, Introduction to Robotics (2005), section 2.8",
             (_X, _Y, _Z),
-            neutral={"x": 0.0, "y": 0.0, "about_z": 0.0},
-            placement=moved,
+            off={"x": 0.0, "y": 0.0, "about_z": 0.0},
+            place=moved,
         ),
         Form(
             "tilt",
@@ -76,8 +76,8 @@ KIND = Kind(
                 Parameter("about_y", "rad", 0.0, -0.5, 0.5, "Turn about the texels' y axis."),
                 Parameter("z", "m", 0.0, -0.02, 0.02, "Shift outwards, along the normal."),
             ),
-            neutral={"about_x": 0.0, "about_y": 0.0, "z": 0.0},
-            placement=moved,
+            off={"about_x": 0.0, "about_y": 0.0, "z": 0.0},
+            place=moved,
         ),
     ),
 )

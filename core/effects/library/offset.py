@@ -5,21 +5,21 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..engine.random_streams import normal
-from ..engine.specification import Form, Kind, Parameter, TransducerArray, Values, scalar
+from ..engine.random_numbers import normal
+from ..engine.specification import Form, Kind, Parameter, Site, Values, number
 
 
-def common(x: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
+def common(x: np.ndarray, time: np.ndarray, values: Values, site: Site, seed: int) -> np.ndarray:
     """The same for all texels."""
-    return x + scalar(values, "offset")
+    return x + number(values, "offset")
 
 
-def random(x: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
+def random(x: np.ndarray, time: np.ndarray, values: Values, site: Site, seed: int) -> np.ndarray:
     """Another for each texel, normally distributed."""
-    return x + scalar(values, "spread") * normal("offset", seed, np.arange(x.shape[1]))
+    return x + number(values, "spread") * normal("offset", seed, np.arange(x.shape[1]))
 
 
-def listed(x: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
+def listed(x: np.ndarray, time: np.ndarray, values: Values, site: Site, seed: int) -> np.ndarray:
     """A known one for each texel."""
     return x + np.asarray(values["offset"])
 
@@ -28,7 +28,7 @@ KIND = Kind(
     name="offset",
     title="Offset",
     text="Reads something without load.",
-    site="readout",
+    stage="readout",
     order=62,
     forms=(
         Form(
@@ -36,8 +36,8 @@ KIND = Kind(
             "r = r₀ + b",
             "ISO/IEC Guide 99 (2007), 4.28: zero error",
             (Parameter("offset", "unit", 0.05, -1e5, 1e5, "Offset b of all texels."),),
-            neutral={"offset": 0.0},
-            memoryless=common,
+            off={"offset": 0.0},
+            shape=common,
             after_conversion=True,
         ),
         Form(
@@ -45,8 +45,8 @@ KIND = Kind(
             "rᵢ = r₀ᵢ + s εᵢ,  ε normal",
             "ISO/IEC Guide 99 (2007), 4.28: zero error",
             (Parameter("spread", "unit", 0.05, 0.0, 1e5, "Standard deviation s of the texels' offsets."),),
-            neutral={"spread": 0.0},
-            memoryless=random,
+            off={"spread": 0.0},
+            shape=random,
             after_conversion=True,
             random=True,
         ),
@@ -55,8 +55,8 @@ KIND = Kind(
             "rᵢ = r₀ᵢ + bᵢ",
             "ISO/IEC Guide 99 (2007), 4.28: zero error",
             (Parameter("offset", "unit", 0.0, -1e5, 1e5, "Offset b of each texel.", per_texel=True),),
-            neutral={"offset": 0.0},
-            memoryless=listed,
+            off={"offset": 0.0},
+            shape=listed,
             after_conversion=True,
         ),
     ),

@@ -7,32 +7,32 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ..engine.specification import Form, Kind, Parameter, TransducerArray, Values, scalar
+from ..engine.specification import Form, Kind, Parameter, Site, Values, number
 
 
-def rounded(x: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
+def rounded(x: np.ndarray, time: np.ndarray, values: Values, site: Site, seed: int) -> np.ndarray:
     """To the nearest step."""
-    return _stepped(x, scalar(values, "step"), np.round)
+    return _stepped(x, number(values, "step"), np.round)
 
 
-def cut(x: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
+def cut(x: np.ndarray, time: np.ndarray, values: Values, site: Site, seed: int) -> np.ndarray:
     """To the step below."""
-    return _stepped(x, scalar(values, "step"), np.floor)
+    return _stepped(x, number(values, "step"), np.floor)
 
 
-def converter(x: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
+def converter(x: np.ndarray, time: np.ndarray, values: Values, site: Site, seed: int) -> np.ndarray:
     """To the nearest of ``2^bits`` steps over a range."""
-    return _stepped(x, scalar(values, "range") / 2.0 ** scalar(values, "bits"), np.round)
+    return _stepped(x, number(values, "range") / 2.0 ** number(values, "bits"), np.round)
 
 
-def companded(x: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
+def companded(x: np.ndarray, time: np.ndarray, values: Values, site: Site, seed: int) -> np.ndarray:
     """To the step below, of steps that grow with the reading's change."""
-    scale, growth = scalar(values, "scale"), scalar(values, "growth")
+    scale, growth = number(values, "scale"), number(values, "growth")
     if growth <= 0.0:
         return x
-    change = x - transducers.zero
+    change = x - site.zero
     steps = np.floor(np.log1p(np.abs(change) / scale) / growth)
-    return transducers.zero + np.sign(change) * scale * np.expm1(growth * steps)
+    return site.zero + np.sign(change) * scale * np.expm1(growth * steps)
 
 
 def _stepped(x: np.ndarray, step: float, way: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
@@ -45,7 +45,7 @@ KIND = Kind(
     name="quantization",
     title="Quantization",
     text="The reading comes in steps.",
-    site="readout",
+    stage="readout",
     order=90,
     forms=(
         Form(
@@ -53,8 +53,8 @@ KIND = Kind(
             "r = Δ · round(r₀ / Δ)",
             "IEEE Std 1241 (2010): mid-tread quantizer",
             (_STEP,),
-            neutral={"step": 0.0},
-            memoryless=rounded,
+            off={"step": 0.0},
+            shape=rounded,
             after_conversion=True,
         ),
         Form(
@@ -62,8 +62,8 @@ KIND = Kind(
             "r = Δ · floor(r₀ / Δ)",
             "IEEE Std 1241 (2010): truncating quantizer",
             (_STEP,),
-            neutral={"step": 0.0},
-            memoryless=cut,
+            off={"step": 0.0},
+            shape=cut,
             after_conversion=True,
         ),
         Form(
@@ -74,8 +74,8 @@ KIND = Kind(
                 Parameter("bits", "1", 8.0, 1.0, 24.0, "Bits b of the converter."),
                 Parameter("range", "unit", 1.0, 1e-6, 1e6, "Range R that they divide.", log=True),
             ),
-            neutral={"range": 0.0},
-            memoryless=converter,
+            off={"range": 0.0},
+            shape=converter,
             after_conversion=True,
         ),
         Form(
@@ -86,8 +86,8 @@ KIND = Kind(
                 Parameter("scale", "unit", 0.1, 1e-6, 1e5, "Reading A from which on steps grow with it.", log=True),
                 Parameter("growth", "1", 0.05, 0.0, 3.0, "Width b of a step as a share of A and the reading together."),
             ),
-            neutral={"growth": 0.0},
-            memoryless=companded,
+            off={"growth": 0.0},
+            shape=companded,
             after_conversion=True,
         ),
     ),

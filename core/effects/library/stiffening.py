@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 
-from ..engine.specification import Form, Kind, Parameter, constants_from
+from ..engine.specification import Form, Kind, Parameter, same_for_all_steps
 
 
 def polynomial(force, slope, depth, slide, numbers, row, memory, point, at, commit):
@@ -52,7 +52,7 @@ KIND = Kind(
     name="stiffening",
     title="Stiffening",
     text="Gets stiffer the deeper it is pressed.",
-    site="contact",
+    stage="contact",
     order=10,
     forms=(
         Form(
@@ -60,18 +60,18 @@ KIND = Kind(
             "f = k d · (1 + (d/D)ᵖ)",
             "Rusch, J. Appl. Polym. Sci. 13 (1969): load of flexible foams with a power of the compression",
             (_DOUBLE, _POWER),
-            neutral={"depth": math.inf},
+            off={"depth": math.inf},
             law=polynomial,
-            constants=constants_from("depth", "exponent"),
+            constants=same_for_all_steps("depth", "exponent"),
         ),
         Form(
             "exponential",
             "f = k D · (exp(d/D) − 1)",
             "Fung, Biomechanics (1993), section 7.5: exponential stress-strain law of soft tissue",
             (Parameter("depth", "m", 0.004, 1e-4, 0.1, "Depth D by which the stiffness grows e-fold.", log=True),),
-            neutral={"depth": math.inf},
+            off={"depth": math.inf},
             law=exponential,
-            constants=constants_from("depth"),
+            constants=same_for_all_steps("depth"),
         ),
         Form(
             "foam",
@@ -81,9 +81,9 @@ KIND = Kind(
                 Parameter("depth", "m", 0.01, 2e-4, 0.1, "Depth L at which the foam's cells are closed.", log=True),
                 Parameter("exponent", "1", 2.0, 0.5, 8.0, "How suddenly it densifies."),
             ),
-            neutral={"depth": math.inf},
+            off={"depth": math.inf},
             law=foam,
-            constants=constants_from("depth", "exponent"),
+            constants=same_for_all_steps("depth", "exponent"),
         ),
     ),
 )

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 
-from ..engine.specification import Form, Kind, Parameter, constants_from
+from ..engine.specification import Form, Kind, Parameter, same_for_all_steps
 
 
 def gaussian(speed, force, numbers, row):
@@ -29,13 +29,13 @@ _PARAMETERS = (
     Parameter("rise", "1", 0.5, 0.0, 4.0, "By what share a friction is larger at rest than when sliding fast."),
     Parameter("speed", "m/s", 0.01, 1e-5, 2.0, "Sliding speed V at which the rise is mostly gone.", log=True),
 )
-_CONSTANTS = constants_from("rise", "speed")
+_CONSTANTS = same_for_all_steps("rise", "speed")
 
 KIND = Kind(
     name="stribeck",
     title="Stribeck Friction",
     text="Grips harder when it slides slowly than when it slides fast.",
-    site="contact",
+    stage="contact",
     order=20,
     forms=(
         Form(
@@ -43,8 +43,8 @@ KIND = Kind(
             "μ = μ₀ · (1 + a exp(−(v/V)²))",
             "Bo and Pavelescu, Wear 82 (1982); Canudas de Wit et al., IEEE Trans. Autom. Control 40 (1995)",
             _PARAMETERS,
-            neutral={"rise": 0.0},
-            friction_law=gaussian,
+            off={"rise": 0.0},
+            friction=gaussian,
             constants=_CONSTANTS,
         ),
         Form(
@@ -52,8 +52,8 @@ KIND = Kind(
             "μ = μ₀ · (1 + a exp(−v/V))",
             "Tustin, J. IEE 94 (1947); Armstrong-Hélouvry, Dupont and Canudas de Wit, Automatica 30 (1994)",
             _PARAMETERS,
-            neutral={"rise": 0.0},
-            friction_law=exponential,
+            off={"rise": 0.0},
+            friction=exponential,
             constants=_CONSTANTS,
         ),
         Form(
@@ -61,8 +61,8 @@ KIND = Kind(
             "μ = μ₀ · (1 + a / (1 + (v/V)²))",
             "Hess and Soom, J. Tribol. 112 (1990)",
             _PARAMETERS,
-            neutral={"rise": 0.0},
-            friction_law=rational,
+            off={"rise": 0.0},
+            friction=rational,
             constants=_CONSTANTS,
         ),
     ),

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from ..engine.specification import Form, Kind, Parameter, constants_from
+from ..engine.specification import Form, Kind, Parameter, same_for_all_steps
 
 
 def linear(speed, force, numbers, row):
@@ -25,7 +25,7 @@ KIND = Kind(
     name="viscous-friction",
     title="Viscous Friction",
     text="Drags the harder the faster it slides.",
-    site="contact",
+    stage="contact",
     order=30,
     forms=(
         Form(
@@ -33,18 +33,18 @@ KIND = Kind(
             "fₜ = fₜ₀ + c v",
             "Armstrong-Hélouvry, Dupont and Canudas de Wit, Automatica 30 (1994)",
             (Parameter("viscosity", "N·s/m", 0.05, 0.0, 1e3, "Drag c of one texel per metre per second."),),
-            neutral={"viscosity": 0.0},
-            friction_law=linear,
-            constants=constants_from("viscosity"),
+            off={"viscosity": 0.0},
+            friction=linear,
+            constants=same_for_all_steps("viscosity"),
         ),
         Form(
             "load",
             "fₜ = fₜ₀ + c f v",
             "Bowden and Tabor, The Friction and Lubrication of Solids (1950): the area that is sheared grows with the load",
             (Parameter("viscosity", "s/m", 0.5, 0.0, 1e3, "Drag c per newton of load and metre per second."),),
-            neutral={"viscosity": 0.0},
-            friction_law=load,
-            constants=constants_from("viscosity"),
+            off={"viscosity": 0.0},
+            friction=load,
+            constants=same_for_all_steps("viscosity"),
         ),
         Form(
             "power",
@@ -54,9 +54,9 @@ KIND = Kind(
                 Parameter("drag", "N·(s/m)^p", 0.05, 0.0, 1e3, "Drag C of one texel at one metre per second."),
                 Parameter("exponent", "1", 0.5, 0.2, 2.0, "Exponent p of the speed."),
             ),
-            neutral={"drag": 0.0},
-            friction_law=power,
-            constants=constants_from("drag", "exponent"),
+            off={"drag": 0.0},
+            friction=power,
+            constants=same_for_all_steps("drag", "exponent"),
         ),
     ),
 )

@@ -16,7 +16,7 @@ import numpy as np
 
 from ...errors import FileError, ParameterError
 from ...io.csv_table import read_columns
-from ...laws.contact import friction_limit, friction_trace, parameter_row
+from ...laws.contact import friction_along_path, parameter_row, stribeck_force
 from ...model.scenario import SensorParameters
 from ..fitting.regression import Estimate, intervals
 
@@ -83,7 +83,7 @@ def steady_friction(velocity: np.ndarray, normal_force: float, parameters: Senso
     parameters : SensorParameters
     """
     v = np.asarray(velocity, float)
-    return np.where(v < 0, -1.0, 1.0) * friction_limit(np.full(v.shape, normal_force), v, parameters) + parameters.ct * v
+    return np.where(v < 0, -1.0, 1.0) * stribeck_force(np.full(v.shape, normal_force), v, parameters) + parameters.ct * v
 
 
 def friction_over_time(time: np.ndarray, velocity: np.ndarray, normal_force: float, parameters: SensorParameters) -> np.ndarray:
@@ -99,7 +99,7 @@ def friction_over_time(time: np.ndarray, velocity: np.ndarray, normal_force: flo
     parameters : SensorParameters
     """
     force = np.empty(len(time))
-    friction_trace(
+    friction_along_path(
         np.ascontiguousarray(time, float), np.ascontiguousarray(velocity, float), normal_force, parameter_row(parameters), force
     )
     return force

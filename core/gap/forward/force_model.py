@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from ...compiled.kernels import kernel
-from ...effects.engine import contact_forces
+from ...effects.engine import binding
 from ...effects.engine.specification import Effect
-from ...laws.contact import bristle_limit, bristle_rate, bristle_step, friction_force, parameter_row
+from ...laws.contact import bristle_rate, bristle_step, friction_force, max_bristle_deflection, parameter_row
 from ...model.scenario import SensorParameters
 
 if TYPE_CHECKING:
@@ -108,7 +108,7 @@ class Felt:
         None of the effects may have a number for each texel.
         """
         force = np.zeros((len(self.time), self.width))
-        found = contact_forces.normal_forces(acting, p, self.time, self.depth, self.slide, self.rate)
+        found = binding.forces(acting, p, self.time, self.depth, self.slide, self.rate)
         force[:, self.place] = found[:, self.group]
         return force
 
@@ -130,7 +130,7 @@ class Felt:
         total = np.zeros((len(self.time), 3))
         factor, viscous = np.ones(1), np.zeros(1)
         if rubbing:
-            factor, viscous = contact_forces.friction_factors(rubbing, np.sqrt(t.square), pressed)
+            factor, viscous = binding.friction(rubbing, np.sqrt(t.square), pressed)
         work = np.empty((5, len(pressed)))
         sum_forces(t, pressed, factor, viscous, parameter_row(p), work, total)
         return total
@@ -214,7 +214,7 @@ def sum_forces(touches, force, factor, viscous, parameters, work, total):  # typ
             zx = keep * zx + gain * touches.between[i, 0]
             zy = keep * zy + gain * touches.between[i, 1]
             zz = keep * zz + gain * touches.between[i, 2]
-        limit, reach = bristle_limit(fn, parameters), (zx * zx + zy * zy + zz * zz) ** 0.5
+        limit, reach = max_bristle_deflection(fn, parameters), (zx * zx + zy * zy + zz * zz) ** 0.5
         if reach > limit:
             zx, zy, zz = zx * limit / reach, zy * limit / reach, zz * limit / reach
         vx, vy, vz = touches.slip[i, 0], touches.slip[i, 1], touches.slip[i, 2]

@@ -21,7 +21,7 @@ FLAT = 1e-13
 """Twice the area over the square of the longest edge below which a triangle has no normal, and so never answers."""
 
 
-class Window(NamedTuple):
+class SampleWindow(NamedTuple):
     """Samples that a span of time needs, and where its moments lie among them.
 
     Attributes
@@ -40,7 +40,7 @@ class Window(NamedTuple):
     spans: np.ndarray
 
 
-def window(times: np.ndarray, samples: np.ndarray, moments: np.ndarray) -> Window:
+def window(times: np.ndarray, samples: np.ndarray, moments: np.ndarray) -> SampleWindow:
     """Cut out of a series of samples what the given moments lie between; the first and the last sample are held.
 
     Parameters
@@ -50,16 +50,16 @@ def window(times: np.ndarray, samples: np.ndarray, moments: np.ndarray) -> Windo
     moments : (steps + 1,) float, seconds, increasing
     """
     if len(times) == 1:
-        return Window(samples, np.zeros(len(moments), np.int64), np.zeros(len(moments)), np.zeros(0))
+        return SampleWindow(samples, np.zeros(len(moments), np.int64), np.zeros(len(moments)), np.zeros(0))
     moments = np.clip(moments, times[0], times[-1])
     right = np.clip(np.searchsorted(times, moments, side="left"), 1, len(times) - 1)
     share = (moments - times[right - 1]) / (times[right] - times[right - 1])
     first, last = right[0] - 1, right[-1]
-    return Window(samples[first : last + 1], right - 1 - first, share, np.diff(times[first : last + 1]))
+    return SampleWindow(samples[first : last + 1], right - 1 - first, share, np.diff(times[first : last + 1]))
 
 
 @by_reference
-class Track(NamedTuple):
+class SampleTrack(NamedTuple):
     """The windows of several things behind one another, for the kernels. A *moment* is the beginning of a step or the last end.
 
     Attributes
@@ -78,7 +78,7 @@ class Track(NamedTuple):
     share: np.ndarray
 
 
-def track(windows: Sequence[Window | None], columns: int, moments: int) -> Track:
+def stack_windows(windows: Sequence[SampleWindow | None], columns: int, moments: int) -> SampleTrack:
     """Lay windows behind one another; None is for a thing that has no values."""
     values, at = [np.zeros((0, columns))], 0
     stride = np.zeros(len(windows), np.int64)
@@ -91,11 +91,11 @@ def track(windows: Sequence[Window | None], columns: int, moments: int) -> Track
         stride[i] = size if samples > 1 else 0
         row[:, i], share[:, i] = at + found.left * size, found.share
         at += samples * size
-    return Track(np.ascontiguousarray(np.concatenate(values), dtype=float), stride, row, share)
+    return SampleTrack(np.ascontiguousarray(np.concatenate(values), dtype=float), stride, row, share)
 
 
 @by_reference
-class Shapes(NamedTuple):
+class SurfaceMotion(NamedTuple):
     """What surfaces look like at the steps of one frame: T targets, m sensors.
 
     Attributes
@@ -106,10 +106,10 @@ class Shapes(NamedTuple):
         Targets whose vertices move, and those whose contact normals are interpolated between their vertices.
     bends : (m,) bool
         Sensors whose contact points move in their body's frame.
-    targets : Track
+    targets : SampleTrack
         Vertices (m, relative to the body's reference point) and vertex normals of targets that deform or are smooth.
-    sensors : Track
-        Rows of :attr:`.World.points` of sensors that bend.
+    sensors : SampleTrack
+        Rows of :attr:`.SolverModel.points` of sensors that bend.
     corner : (nt, 3) int
         Vertices of each triangle of the tree, counted within its target; without rows when nothing needs them.
     triangle_start : (T + 1,) int
@@ -127,8 +127,8 @@ class Shapes(NamedTuple):
     deforms: np.ndarray
     smooth: np.ndarray
     bends: np.ndarray
-    targets: Track
-    sensors: Track
+    targets: SampleTrack
+    sensors: SampleTrack
     corner: np.ndarray
     triangle_start: np.ndarray
     pace: np.ndarray
@@ -139,7 +139,7 @@ class Shapes(NamedTuple):
     clock: np.ndarray
 
 
-def pace_of(found: Window | None) -> float:
+def vertex_speed_bound(found: SampleWindow | None) -> float:
     """Bound on the speed of the vertices of a window, m/s."""
     if found is None or len(found.spans) == 0:
         return 0.0
@@ -147,7 +147,7 @@ def pace_of(found: Window | None) -> float:
     return float((step.max(axis=1, initial=0.0) / found.spans).max())
 
 
-def point_pace_of(found: Window | None, reach: float) -> float:
+def point_speed_bound(found: SampleWindow | None, reach: float) -> float:
     """Bound on the speed of both ends of the segments of a window's contact points, m/s.
 
     A unit vector that goes straight to another and is stretched to its length turns fastest half-way.
@@ -174,11 +174,11 @@ def at_moment(found, moment, thing, i, column):
 
 
 @kernel
-def refit(shapes, tree):
+def refit_boxes(surfaces, tree):
     """Fit the boxes of deforming targets around all places of their triangles in this frame."""
-    bounds, found = tree.bounds, shapes.targets
-    for target in range(len(shapes.deforms)):
-        if not shapes.deforms[target]:
+    bounds, found = tree.bounds, surfaces.targets
+    for target in range(len(surfaces.deforms)):
+        if not surfaces.deforms[target]:
             continue
         moments = len(found.row)
         begin, step = found.row[0, target], found.stride[target]
@@ -192,7 +192,7 @@ def refit(shapes, tree):
                     for i in range(tree.first[node], tree.first[node] + tree.number[node]):
                         for corner in range(3):
                             for sample in range(samples):
-                                x = found.values[begin + sample * step + shapes.corner[i, corner], axis]
+                                x = found.values[begin + sample * step + surfaces.corner[i, corner], axis]
                                 low, high = min(low, x), max(high, x)
                     bounds[node, axis], bounds[node, 3 + axis] = low, high
             else:  # its children come behind it
@@ -203,15 +203,15 @@ def refit(shapes, tree):
 
 
 @kernel
-def place_triangle(i, target, shapes, tree):
+def place_triangle(i, target, surfaces, tree):
     """Bring a triangle of a deforming target to the present moment: corners and normal."""
-    if shapes.stamp[i] == shapes.clock[0]:
+    if surfaces.stamp[i] == surfaces.clock[0]:
         return
-    shapes.stamp[i] = shapes.clock[0]
-    faces, moment = tree.faces, shapes.clock[1]
+    surfaces.stamp[i] = surfaces.clock[0]
+    faces, moment = tree.faces, surfaces.clock[1]
     for corner in range(3):
         for axis in range(3):
-            faces[i, 3 * corner + axis] = at_moment(shapes.targets, moment, target, shapes.corner[i, corner], axis)
+            faces[i, 3 * corner + axis] = at_moment(surfaces.targets, moment, target, surfaces.corner[i, corner], axis)
     ux, uy, uz = faces[i, 3] - faces[i, 0], faces[i, 4] - faces[i, 1], faces[i, 5] - faces[i, 2]
     vx, vy, vz = faces[i, 6] - faces[i, 0], faces[i, 7] - faces[i, 1], faces[i, 8] - faces[i, 2]
     wx, wy, wz = vx - ux, vy - uy, vz - uz
@@ -225,24 +225,24 @@ def place_triangle(i, target, shapes, tree):
 
 
 @kernel
-def place_all(target, shapes, tree):
+def place_all_triangles(target, surfaces, tree):
     """Bring all triangles of a target to the present moment."""
-    if shapes.deforms[target]:
-        for i in range(shapes.triangle_start[target], shapes.triangle_start[target + 1]):
-            place_triangle(i, target, shapes, tree)
+    if surfaces.deforms[target]:
+        for i in range(surfaces.triangle_start[target], surfaces.triangle_start[target + 1]):
+            place_triangle(i, target, surfaces, tree)
 
 
 @kernel
-def place_near(target, first, stop, near, number, shapes, tree):
+def place_listed_triangles(target, first, stop, near, number, surfaces, tree):
     """Bring the triangles that contact points can meet to the present moment: the lists from slot `first` to `stop`."""
-    if not shapes.deforms[target]:
+    if not surfaces.deforms[target]:
         return
     for slot in range(first, stop):
         if number[slot] < 0:
-            place_all(target, shapes, tree)
+            place_all_triangles(target, surfaces, tree)
             return
         for j in range(number[slot]):
-            place_triangle(near[slot, j], target, shapes, tree)
+            place_triangle(near[slot, j], target, surfaces, tree)
 
 
 def corners_of(meshes: Sequence, tree: Tree) -> tuple[np.ndarray, np.ndarray]:
@@ -253,9 +253,9 @@ def corners_of(meshes: Sequence, tree: Tree) -> tuple[np.ndarray, np.ndarray]:
 
 
 @kernel
-def point_at(shapes, moment, sensor, i):
+def point_at(surfaces, moment, sensor, i):
     """Position and unit normal of a contact point of a bending sensor."""
-    found = shapes.sensors
+    found = surfaces.sensors
     x, y, z = (
         at_moment(found, moment, sensor, i, 0),
         at_moment(found, moment, sensor, i, 1),
@@ -271,10 +271,10 @@ def point_at(shapes, moment, sensor, i):
 
 
 @kernel
-def frame_at(shapes, moment, sensor, i):
+def frame_at(surfaces, moment, sensor, i):
     """Position of a contact point of a bending sensor, and normal, x axis and y axis of its texel there: twelve numbers."""
-    found = shapes.sensors
-    x, y, z, nx, ny, nz = point_at(shapes, moment, sensor, i)
+    found = surfaces.sensors
+    x, y, z, nx, ny, nz = point_at(surfaces, moment, sensor, i)
     tx, ty, tz = (
         at_moment(found, moment, sensor, i, 6),
         at_moment(found, moment, sensor, i, 7),
@@ -288,7 +288,7 @@ def frame_at(shapes, moment, sensor, i):
 
 
 @kernel
-def set_moment(now, other, dt, world, shapes):
+def set_moment(now, other, dt, model, surfaces):
     """Go on to another moment; the contact points of bending sensors move there.
 
     Parameters
@@ -298,15 +298,15 @@ def set_moment(now, other, dt, world, shapes):
     dt : float, seconds
         Since the moment before, at the most.
     """
-    shapes.clock[0] += 1
-    shapes.clock[1], shapes.clock[2] = now, other
-    for target in range(len(shapes.deforms)):
-        shapes.travelled[target] += dt * shapes.pace[target]
-    for sensor in range(len(shapes.bends)):
-        if shapes.bends[sensor]:
-            shapes.point_travelled[sensor] += dt * shapes.point_pace[sensor]
-            start = world.point_start[sensor]
-            for i in range(world.point_start[sensor + 1] - start):
-                frame = frame_at(shapes, now, sensor, i)
+    surfaces.clock[0] += 1
+    surfaces.clock[1], surfaces.clock[2] = now, other
+    for target in range(len(surfaces.deforms)):
+        surfaces.travelled[target] += dt * surfaces.pace[target]
+    for sensor in range(len(surfaces.bends)):
+        if surfaces.bends[sensor]:
+            surfaces.point_travelled[sensor] += dt * surfaces.point_pace[sensor]
+            start = model.point_start[sensor]
+            for i in range(model.point_start[sensor + 1] - start):
+                frame = frame_at(surfaces, now, sensor, i)
                 for column in range(12):
-                    world.points[start + i, column] = frame[column]
+                    model.points[start + i, column] = frame[column]

@@ -12,13 +12,13 @@ from ...geometry.bvh import Tree
 from ...geometry.contact_points import ContactPoints
 from ...geometry.mesh import TriangleMesh, vertex_normals
 from ...geometry.texels import Texels
-from ...laws.contact import World
+from ...laws.contact import SolverModel
 from ...model.scenario import Deformation, Scenario
-from .deformation import Shapes, Window, corners_of, pace_of, point_pace_of, track, window
+from .deformation import SampleWindow, SurfaceMotion, corners_of, point_speed_bound, stack_windows, vertex_speed_bound, window
 
 
 def point_rows(texels: Texels, points: ContactPoints, reference: np.ndarray) -> np.ndarray:
-    """Rows of :attr:`.World.points`.
+    """Rows of :attr:`.SolverModel.points`.
 
     Parameters
     ----------
@@ -31,7 +31,7 @@ def point_rows(texels: Texels, points: ContactPoints, reference: np.ndarray) -> 
     return np.hstack([position, normal, texels.tangent[points.texel], texels.bitangent[points.texel]])
 
 
-class Surfaces:
+class DeformingSurfaces:
     """The shapes of a scenario's targets and sensors, as far as they are known.
 
     Parameters
@@ -42,17 +42,17 @@ class Surfaces:
     points : list of ContactPoints
         Of each sensor.
     tree : Tree
-    world : World
+    world : SolverModel
         The extents of sensors that bend are kept up to date in it.
     """
 
-    def __init__(self, scenario: Scenario, center: np.ndarray, points: list[ContactPoints], tree: Tree, world: World):
+    def __init__(self, scenario: Scenario, center: np.ndarray, points: list[ContactPoints], tree: Tree, model: SolverModel):
         self._targets, self._sensors = scenario.targets, scenario.sensors
         self._vertices = [target.deformation for target in scenario.targets]
         self._texels = [sensor.deformation for sensor in scenario.sensors]
         self._target_center = [center[target.body] for target in scenario.targets]
         self._sensor_center = [center[sensor.body] for sensor in scenario.sensors]
-        self._points, self._world = points, world
+        self._points, self._model = points, model
         meshes = [target.mesh for target in scenario.targets]
         count = len(tree.faces)
         wanted = any(target.smooth or target.deformation is not None for target in scenario.targets)
@@ -85,7 +85,7 @@ class Surfaces:
                 if before.times[-1] < time - 1e-9:
                     known[index] = before.extended(time, values)
 
-    def at(self, moments: np.ndarray) -> Shapes:
+    def at(self, moments: np.ndarray) -> SurfaceMotion:
         """Lay out the shapes between the first and the last of some moments.
 
         Parameters
@@ -94,26 +94,26 @@ class Surfaces:
         """
         vertices = [self._target_window(i, moments) for i in range(len(self._targets))]
         rows = [self._sensor_window(i, moments) for i in range(len(self._sensors))]
-        reach = self._world.reach
+        reach = self._model.reach
         self._fit_extents(rows)
-        return Shapes(
+        return SurfaceMotion(
             moves=np.array([self.moves]),
             deforms=np.array([found is not None for found in self._vertices], dtype=np.bool_),
             smooth=np.array([target.smooth for target in self._targets], dtype=np.bool_),
             bends=np.array([found is not None for found in self._texels], dtype=np.bool_),
-            targets=track(vertices, 6, len(moments)),
-            sensors=track(rows, 12, len(moments)),
+            targets=stack_windows(vertices, 6, len(moments)),
+            sensors=stack_windows(rows, 12, len(moments)),
             corner=self._corner,
             triangle_start=self._triangle_start,
-            pace=np.array([pace_of(found) for found in vertices]),
-            point_pace=np.array([point_pace_of(found, reach[i]) for i, found in enumerate(rows)]),
+            pace=np.array([vertex_speed_bound(found) for found in vertices]),
+            point_pace=np.array([point_speed_bound(found, reach[i]) for i, found in enumerate(rows)]),
             travelled=self._travelled[0],
             point_travelled=self._travelled[1],
             stamp=self._stamp,
             clock=self._clock,
         )
 
-    def _target_window(self, index: int, moments: np.ndarray) -> Window | None:
+    def _target_window(self, index: int, moments: np.ndarray) -> SampleWindow | None:
         """Vertices and, where they are asked for, their normals; None for what neither deforms nor is smooth."""
         target, known = self._targets[index], self._vertices[index]
         if known is None:
@@ -127,7 +127,7 @@ class Surfaces:
                 normals[sample] = vertex_normals(TriangleMesh(shape, target.mesh.triangles))
         return found._replace(samples=np.concatenate([found.samples - self._target_center[index], normals], axis=2))
 
-    def _sensor_window(self, index: int, moments: np.ndarray) -> Window | None:
+    def _sensor_window(self, index: int, moments: np.ndarray) -> SampleWindow | None:
         known = self._texels[index]
         if known is None:
             return None
@@ -137,19 +137,19 @@ class Surfaces:
         rows = [point_rows(texels, self._points[index], center) for texels in bent]
         return found._replace(samples=np.stack(rows))
 
-    def _fit_extents(self, rows: list[Window | None]) -> None:
+    def _fit_extents(self, rows: list[SampleWindow | None]) -> None:
         """Where the segments of bending sensors are during the frame; between samples a turning segment's end bulges out."""
         for index, found in enumerate(rows):
             if found is not None:
-                reach = self._world.reach[index]
+                reach = self._model.reach[index]
                 turn = np.linalg.norm(np.diff(found.samples[:, :, 3:6], axis=0), axis=2).max(initial=0.0)
                 bulge = reach * (1.0 - np.sqrt(max(1.0 - 0.25 * turn**2, 0.0)))
-                middle, radius = extent(found.samples.reshape(-1, 12), reach)
-                self._world.center[index], self._world.radius[index] = middle, radius + bulge
+                middle, radius = bounding_sphere(found.samples.reshape(-1, 12), reach)
+                self._model.center[index], self._model.radius[index] = middle, radius + bulge
 
 
-def extent(points: np.ndarray, reach: float) -> tuple[np.ndarray, float]:
-    """Middle and radius of contact points (rows of :attr:`.World.points`) and the segments behind them."""
+def bounding_sphere(points: np.ndarray, reach: float) -> tuple[np.ndarray, float]:
+    """Middle and radius of contact points (rows of :attr:`.SolverModel.points`) and the segments behind them."""
     ends = np.vstack([points[:, :3], points[:, :3] - reach * points[:, 3:6]])
     middle = 0.5 * (ends.min(axis=0) + ends.max(axis=0))
     return middle, float(np.linalg.norm(ends - middle, axis=1).max())

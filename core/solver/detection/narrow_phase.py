@@ -10,9 +10,9 @@ import numpy as np
 from ...compiled.kernels import inlined, kernel
 from ...geometry.bvh import segment_entry
 from ...laws.contact import DEPTH, LANES, NX, NY, NZ, PX, PY, PZ, ROW, ZX, ZY, ZZ
-from .deformation import place_all, place_near
-from .neighbour_lists import entry, look_around
-from .surface_kinematics import finish_rows
+from .deformation import place_all_triangles, place_listed_triangles
+from .neighbour_lists import find_entry, rebuild_list
+from .surface_kinematics import apply_surface_motion
 
 
 @kernel
@@ -44,7 +44,7 @@ def _distance_to_box(pose, center, sensor, bounds, root):
 
 
 @kernel
-def _travel(pose, old, pair, center, sensor, radius):
+def _travel_bound(pose, old, pair, center, sensor, radius):
     """Bound on how far any point of the sensor has moved between two poses, metres."""
     shift, turn = 0.0, 0.0
     for i in range(3):
@@ -70,7 +70,7 @@ def _segment(point, reach, pose, points):
 
 
 @inlined
-def _own_travel(point, reach, pose, old, points):
+def _segment_travel(point, reach, pose, old, points):
     """How far any point of a segment has moved between two poses at the most, metres: one of its ends."""
     ox, oy, oz, _, _, _, tx, ty, tz = _segment(point, reach, pose, points)
     px, py, pz, _, _, _, qx, qy, qz = _segment(point, reach, old, points)
@@ -79,41 +79,41 @@ def _own_travel(point, reach, pose, old, points):
 
 
 @inlined
-def _keep_up(pair, sensor, target, pose, world, tree, neighbours, shapes, hint):
+def _update_lists(pair, sensor, target, pose, model, tree, neighbour_lists, surfaces, hint):
     """Look around anew for those contact points that have moved by more than what they know holds for."""
-    known = neighbours.pose[pair]
-    deformed = shapes.travelled[target] + shapes.point_travelled[sensor]
-    travel = _travel(pose, neighbours.pose, pair, world.center, sensor, world.radius[sensor]) + deformed - known[14]
+    known = neighbour_lists.pose[pair]
+    deformed = surfaces.travelled[target] + surfaces.point_travelled[sensor]
+    travel = _travel_bound(pose, neighbour_lists.pose, pair, model.center, sensor, model.radius[sensor]) + deformed - known[14]
     known[13] += 1.0
     step = travel / known[13] if known[12] >= 0.0 else 0.0
     # Wide tubes cost more to use, so they are narrowed where all has come to rest.
     narrower = known[13] == 256.0 and 32.0 * step < 0.5 * known[15]
     if travel > known[12] or narrower:
-        _look_around_all(pair, travel, step, narrower, pose, world, tree, neighbours, shapes, hint)
+        _rebuild_lists(pair, travel, step, narrower, pose, model, tree, neighbour_lists, surfaces, hint)
 
 
 @kernel
-def _look_around_all(pair, travel, step, narrower, pose, world, tree, neighbours, shapes, hint):
+def _rebuild_lists(pair, travel, step, narrower, pose, model, tree, neighbour_lists, surfaces, hint):
     """Reckon distances from the present pose, and look around where that is due, or wherever something is near.
 
     The radius of the tubes follows the motion: some thirty steps' travel. Of a target that deforms all is looked at anew, since
     all of its triangles must be brought to the present moment for that.
     """
-    sensor, target = world.pairs[pair, 0], world.pairs[pair, 1]
-    points, reach, known, until = world.points, world.reach[sensor], neighbours.pose[pair], neighbours.until
-    place_all(target, shapes, tree)
-    first, deforms, listed = known[12] < 0.0, shapes.deforms[target], world.listed[pair]
-    radius = world.skin[pair] if first else min(max(32.0 * step, 1e-3 * listed), world.skin[pair])
-    deformed = shapes.travelled[target] + shapes.point_travelled[sensor] - known[14]
-    soonest, slot = np.inf, world.slot_start[pair] - 1
-    for point in range(world.point_first[pair], world.point_stop[pair]):
+    sensor, target = model.pairs[pair, 0], model.pairs[pair, 1]
+    points, reach, known, until = model.points, model.reach[sensor], neighbour_lists.pose[pair], neighbour_lists.until
+    place_all_triangles(target, surfaces, tree)
+    first, deforms, listed = known[12] < 0.0, surfaces.deforms[target], model.listed[pair]
+    radius = model.skin[pair] if first else min(max(32.0 * step, 1e-3 * listed), model.skin[pair])
+    deformed = surfaces.travelled[target] + surfaces.point_travelled[sensor] - known[14]
+    soonest, slot = np.inf, model.slot_start[pair] - 1
+    for point in range(model.point_first[pair], model.point_stop[pair]):
         slot += 1
         near = 0.0 <= until[slot] < 16.0 * travel  # where the bound for all points is soon used up, the point's own way counts
-        until[slot] -= min(_own_travel(point, reach, pose, known, points) + deformed, travel) if near else travel
-        if until[slot] < 0.0 or deforms or first or (narrower and neighbours.number[slot] != 0):
+        until[slot] -= min(_segment_travel(point, reach, pose, known, points) + deformed, travel) if near else travel
+        if until[slot] < 0.0 or deforms or first or (narrower and neighbour_lists.number[slot] != 0):
             ox, oy, oz, dx, dy, dz, _, _, _ = _segment(point, reach, pose, points)
-            empty = neighbours.number[slot] == 0 and hint[slot] < 0
-            look_around(slot, ox, oy, oz, dx, dy, dz, target, radius, listed, step, empty, not deforms, neighbours, tree)
+            empty = neighbour_lists.number[slot] == 0 and hint[slot] < 0
+            rebuild_list(slot, ox, oy, oz, dx, dy, dz, target, radius, listed, step, empty, not deforms, neighbour_lists, tree)
         soonest = min(soonest, until[slot])
     for i in range(12):
         known[i] = pose[i]
@@ -122,10 +122,10 @@ def _look_around_all(pair, travel, step, narrower, pose, world, tree, neighbours
 
 
 @kernel
-def _forget(pair, world, state):
+def _clear_contacts(pair, model, state):
     """Nothing of this pair touches: no triangle met, no bristle bent."""
-    start = world.slot_start[pair]
-    for slot in range(start, start + world.point_stop[pair] - world.point_first[pair]):
+    start = model.slot_start[pair]
+    for slot in range(start, start + model.point_stop[pair] - model.point_first[pair]):
         if state.hint[slot] != -1:
             state.hint[slot] = -1
             for i in range(4):
@@ -133,7 +133,7 @@ def _forget(pair, world, state):
 
 
 @kernel
-def gather(pair, dt, world, tree, neighbours, shapes, state, scratch):
+def find_contacts(pair, dt, model, tree, neighbour_lists, surfaces, state, workspace):
     """Collect the contacts of one pair as rows.
 
     The segment of a contact point runs from `reach` deep in the sensor to it; where it enters the target counts. Memory of
@@ -144,38 +144,38 @@ def gather(pair, dt, world, tree, neighbours, shapes, state, scratch):
     pair : int
     dt : float, seconds
         By which velocities of surfaces are told: the step that begins, or minus the step that has ended.
-    world : World
+    world : SolverModel
     tree : Tree
-    neighbours : Neighbours
-    shapes : Shapes
+    neighbours : NeighbourLists
+    shapes : SurfaceMotion
     state : State
-    scratch : Scratch
+    scratch : Workspace
         `rotation` is read; `rows`, `slots` (which place in the memory each row belongs to), `own`, `contacts` and `sunk` are
         written.
     """
-    sensor, target = world.pairs[pair, 0], world.pairs[pair, 1]
-    a, b = world.sensor_body[sensor], world.target_body[target]
-    points, hint, bristles = world.points, state.hint, state.bristles
-    rows, slots, pose, first = scratch.rows, scratch.slots, scratch.pose[pair], scratch.first_block[pair]
-    reach, root = world.reach[sensor], tree.roots[target]
-    _relative_pose(a, b, state.position, scratch.rotation, pose)
-    if _distance_to_box(pose, world.center, sensor, tree.bounds, root) > world.radius[sensor]:
-        _forget(pair, world, state)
-        scratch.contacts[pair], scratch.sunk[pair] = 0, 0
+    sensor, target = model.pairs[pair, 0], model.pairs[pair, 1]
+    a, b = model.sensor_body[sensor], model.target_body[target]
+    points, hint, bristles = model.points, state.hint, state.bristles
+    rows, slots, pose, first = workspace.rows, workspace.slots, workspace.pose[pair], workspace.first_block[pair]
+    reach, root = model.reach[sensor], tree.roots[target]
+    _relative_pose(a, b, state.position, workspace.rotation, pose)
+    if _distance_to_box(pose, model.center, sensor, tree.bounds, root) > model.radius[sensor]:
+        _clear_contacts(pair, model, state)
+        workspace.contacts[pair], workspace.too_deep[pair] = 0, 0
         return
-    _keep_up(pair, sensor, target, pose, world, tree, neighbours, shapes, hint)
-    sunk, slot = 0, world.slot_start[pair] - 1
-    stop = slot + 1 + world.point_stop[pair] - world.point_first[pair]
-    if shapes.deforms[target]:
-        place_near(target, slot + 1, stop, neighbours.near, neighbours.number, shapes, tree)
+    _update_lists(pair, sensor, target, pose, model, tree, neighbour_lists, surfaces, hint)
+    too_deep, slot = 0, model.slot_start[pair] - 1
+    stop = slot + 1 + model.point_stop[pair] - model.point_first[pair]
+    if surfaces.deforms[target]:
+        place_listed_triangles(target, slot + 1, stop, neighbour_lists.near, neighbour_lists.number, surfaces, tree)
     block, lane = first, 0
-    for point in range(world.point_first[pair], world.point_stop[pair]):
+    for point in range(model.point_first[pair], model.point_stop[pair]):
         slot += 1
         before = hint[slot]
-        if before == -1 and neighbours.number[slot] == 0:
+        if before == -1 and neighbour_lists.number[slot] == 0:
             continue
         ox, oy, oz, dx, dy, dz, tx, ty, tz = _segment(point, reach, pose, points)
-        met, triangle, leaving = entry(ox, oy, oz, dx, dy, dz, slot, target, before, neighbours, tree)
+        met, triangle, leaving = find_entry(ox, oy, oz, dx, dy, dz, slot, target, before, neighbour_lists, tree)
         if triangle < 0:
             # Sunk: the base is inside the object. Either the segment leaves it somewhere, or the object's surface has just run
             # past the base (it was within the last tenth of the reach a step ago, and is not just beside it now).
@@ -186,10 +186,10 @@ def gather(pair, dt, world, tree, neighbours, shapes, state, scratch):
             )  # fmt: skip
             ran_past = in_box and before == -2
             if in_box and before >= 0 and bristles[slot, 3] > 0.9:
-                place_all(target, shapes, tree)
-                ran_past = _behind(ox, oy, oz, dx, dy, dz, target, tree)
+                place_all_triangles(target, surfaces, tree)
+                ran_past = _is_inside(ox, oy, oz, dx, dy, dz, target, tree)
             if leaving <= 1.0 or ran_past:
-                sunk += 1
+                too_deep += 1
                 hint[slot] = -2
             else:
                 hint[slot] = -1
@@ -220,14 +220,14 @@ def gather(pair, dt, world, tree, neighbours, shapes, state, scratch):
         for unused in range(lane, LANES):
             for column in range(0, ROW, LANES):
                 rows[block, column + unused] = 0.0
-    if shapes.smooth[target] or shapes.deforms[target] or shapes.bends[sensor]:
-        finish_rows(pair, first, count, dt, world, tree, shapes, state, scratch)
-    _lay_flat(first, count, rows)
-    scratch.contacts[pair], scratch.sunk[pair] = count, sunk
+    if surfaces.smooth[target] or surfaces.deforms[target] or surfaces.bends[sensor]:
+        apply_surface_motion(pair, first, count, dt, model, tree, surfaces, state, workspace)
+    _rotate_bristles_into_plane(first, count, rows)
+    workspace.contacts[pair], workspace.too_deep[pair] = count, too_deep
 
 
 @kernel
-def _lay_flat(first, count, rows):
+def _rotate_bristles_into_plane(first, count, rows):
     """Lay back into the surface what its turn makes stand out of it of a bristle, which stays as long as it was."""
     for block in range(first, first + (count + LANES - 1) // LANES):
         for lane in range(LANES):
@@ -243,7 +243,7 @@ def _lay_flat(first, count, rows):
 
 
 @kernel
-def _behind(ox, oy, oz, dx, dy, dz, target, tree):
+def _is_inside(ox, oy, oz, dx, dy, dz, target, tree):
     """Whether a long segment from O along D leaves the target's surface before it enters it: then O is inside, or behind it."""
     root, size = tree.roots[target], 1.0
     for i in range(3):
@@ -253,20 +253,20 @@ def _behind(ox, oy, oz, dx, dy, dz, target, tree):
 
 
 @kernel
-def count_sunk(pair, closed, world, tree, shapes, state, scratch):
+def count_too_deep(pair, closed, model, tree, surfaces, state, workspace):
     """Count the contact points of a sensor that are deeper inside a target than they reach, and so feel nothing.
 
     Looked for once a frame by a long segment from each segment's base: among all points when the target is closed, else among
     those that were seen to sink in. Points that have come out again elsewhere, as in a hole of the target, are forgotten.
-    The other arguments are those of :func:`gather`.
+    The other arguments are those of :func:`find_contacts`.
     """
-    sensor, target = world.pairs[pair, 0], world.pairs[pair, 1]
-    pose, hint = scratch.pose[pair], state.hint
-    _relative_pose(world.sensor_body[sensor], world.target_body[target], state.position, scratch.rotation, pose)
-    place_all(target, shapes, tree)
-    points, reach, root = world.points, world.reach[sensor], tree.roots[target]
-    sunk, slot = 0, world.slot_start[pair] - 1
-    for point in range(world.point_first[pair], world.point_stop[pair]):
+    sensor, target = model.pairs[pair, 0], model.pairs[pair, 1]
+    pose, hint = workspace.pose[pair], state.hint
+    _relative_pose(model.sensor_body[sensor], model.target_body[target], state.position, workspace.rotation, pose)
+    place_all_triangles(target, surfaces, tree)
+    points, reach, root = model.points, model.reach[sensor], tree.roots[target]
+    too_deep, slot = 0, model.slot_start[pair] - 1
+    for point in range(model.point_first[pair], model.point_stop[pair]):
         slot += 1
         if hint[slot] >= 0 or (hint[slot] == -1 and not closed):
             continue
@@ -276,8 +276,8 @@ def count_sunk(pair, closed, world, tree, shapes, state, scratch):
             and tree.bounds[root, 1] <= oy <= tree.bounds[root, 4]
             and tree.bounds[root, 2] <= oz <= tree.bounds[root, 5]
         )
-        if (within or not closed) and _behind(ox, oy, oz, dx, dy, dz, target, tree):
-            sunk += 1
+        if (within or not closed) and _is_inside(ox, oy, oz, dx, dy, dz, target, tree):
+            too_deep += 1
         elif hint[slot] == -2:
             hint[slot] = -1
-    return sunk
+    return too_deep

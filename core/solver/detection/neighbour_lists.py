@@ -26,31 +26,39 @@ import numpy as np
 
 from ...compiled.kernels import inlined, kernel
 from ...compiled.struct_reference import by_reference
-from ...geometry.bvh import apart, cross_plane, cross_triangle, is_inner, line_of_sight, seen_along, segment_entry
+from ...geometry.bvh import (
+    boxes_disjoint,
+    intersect_plane,
+    intersect_triangle,
+    is_interior,
+    project_sheared,
+    segment_entry,
+    shear_to_axis,
+)
 
-LISTED = 12
+LIST_LENGTH = 12
 """Most triangles that are remembered as near a segment; where there are more, the tree is asked every time."""
-ASK, SHEET = -1, -2
+ASK_TREE, ONE_SHEET = -1, -2
 """In the place of a list's length: ask the tree; one sheet."""
-FACING = 0.5547
+MIN_FACING = 0.5547
 """Cosine of the angle by which the triangles of a sheet lean at the most: their slope is 1.5 then."""
-DRAWN_OUT = 3.0
+EXTENSION = 3.0
 """By how many radii a tube is longer than its segment at each end: twice that slope."""
-WIDEST = 0.25
+MAX_RADIUS_SHARE = 0.25
 """Largest radius of a tube by the length of its segment; segments in the tube lean by no more than 30° then."""
-STEPS = 16
+MAX_WALK = 16
 """Most triangles that a walk goes through; then the tree is asked."""
 
 
 @by_reference
-class Neighbours(NamedTuple):
+class NeighbourLists(NamedTuple):
     """What each contact point can meet; a cache that changes the speed and never the numbers.
 
     Attributes
     ----------
     near : (s, LISTED) int
     number : (s,) int
-        Length of each list, ASK or SHEET.
+        Length of each list, ASK or ONE_SHEET.
     only : (s,) int
         The triangle that a texel's line goes through for certain and alone; of a sheet, the triangle met last; else -1.
     until : (s,) float, metres
@@ -68,39 +76,39 @@ class Neighbours(NamedTuple):
     pose: np.ndarray
 
 
-def neighbours_for(slots: int, pairs: int) -> Neighbours:
+def neighbour_lists_for(slots: int, pairs: int) -> NeighbourLists:
     """Make room; what is near is looked for when it is first asked for."""
-    near, pose = np.zeros((slots, LISTED), np.int32), np.zeros((pairs, 16))
+    near, pose = np.zeros((slots, LIST_LENGTH), np.int32), np.zeros((pairs, 16))
     pose[:, 12] = -1.0
-    return Neighbours(near, np.zeros(slots, np.int32), np.full(slots, -1, np.int32), np.full(slots, -1.0), pose)
+    return NeighbourLists(near, np.zeros(slots, np.int32), np.full(slots, -1, np.int32), np.full(slots, -1.0), pose)
 
 
 @inlined
-def entry(ox, oy, oz, dx, dy, dz, slot, target, hint, neighbours, tree):
+def find_entry(ox, oy, oz, dx, dy, dz, slot, target, hint, neighbour_lists, tree):
     """Answer like :func:`.segment_entry`, from what is known to be near."""
-    number, only = neighbours.number[slot], neighbours.only[slot]
-    if number == SHEET:
-        triangle, t = _walk(ox, oy, oz, dx, dy, dz, only, tree)
+    number, only = neighbour_lists.number[slot], neighbour_lists.only[slot]
+    if number == ONE_SHEET:
+        triangle, t = _walk_to_triangle(ox, oy, oz, dx, dy, dz, only, tree)
         if triangle >= 0:
-            neighbours.only[slot] = triangle
+            neighbour_lists.only[slot] = triangle
             return t, triangle if 0.0 <= t <= 1.0 else -1, 2.0
         return segment_entry(ox, oy, oz, dx, dy, dz, target, hint, tree)
     if only >= 0:
-        t = cross_plane(ox, oy, oz, dx, dy, dz, tree.faces, only)
+        t = intersect_plane(ox, oy, oz, dx, dy, dz, tree.faces, only)
         return t, only if 0.0 <= t <= 1.0 else -1, 2.0
     if number >= 0:
-        return _list_entry(ox, oy, oz, dx, dy, dz, neighbours.near, slot, number, tree.faces)
+        return _entry_from_list(ox, oy, oz, dx, dy, dz, neighbour_lists.near, slot, number, tree.faces)
     return segment_entry(ox, oy, oz, dx, dy, dz, target, hint, tree)
 
 
 @kernel
-def _list_entry(ox, oy, oz, dx, dy, dz, near, slot, number, faces):
-    """Answer like :func:`.segment_entry`, from a list of all triangles that the segment can meet (see :func:`_find_list`)."""
+def _entry_from_list(ox, oy, oz, dx, dy, dz, near, slot, number, faces):
+    """Answer like :func:`.segment_entry`, from a list of all triangles that the segment can meet."""
     t, triangle, leaving = 2.0, -1, 2.0
-    axis, shear_x, shear_y = line_of_sight(dx, dy, dz)
+    axis, shear_x, shear_y = shear_to_axis(dx, dy, dz)
     for j in range(number):
         i = near[slot, j]
-        u = cross_triangle(ox, oy, oz, dx, dy, dz, axis, shear_x, shear_y, faces, i)
+        u = intersect_triangle(ox, oy, oz, dx, dy, dz, axis, shear_x, shear_y, faces, i)
         if 0.0 <= u <= 1.0:
             if u < t:
                 t, triangle = u, i
@@ -112,14 +120,14 @@ def _list_entry(ox, oy, oz, dx, dy, dz, near, slot, number, faces):
 @inlined
 def _corners_seen(ox, oy, oz, axis, shear_x, shear_y, f, i):
     """A triangle's corners seen along the segment, its base being the origin: ax, ay, bx, by, cx, cy."""
-    ax, ay = seen_along(f[i, 0] - ox, f[i, 1] - oy, f[i, 2] - oz, axis, shear_x, shear_y)
-    bx, by = seen_along(f[i, 3] - ox, f[i, 4] - oy, f[i, 5] - oz, axis, shear_x, shear_y)
-    cx, cy = seen_along(f[i, 6] - ox, f[i, 7] - oy, f[i, 8] - oz, axis, shear_x, shear_y)
+    ax, ay = project_sheared(f[i, 0] - ox, f[i, 1] - oy, f[i, 2] - oz, axis, shear_x, shear_y)
+    bx, by = project_sheared(f[i, 3] - ox, f[i, 4] - oy, f[i, 5] - oz, axis, shear_x, shear_y)
+    cx, cy = project_sheared(f[i, 6] - ox, f[i, 7] - oy, f[i, 8] - oz, axis, shear_x, shear_y)
     return ax, ay, bx, by, cx, cy
 
 
 @inlined
-def _aside(skin, ox, oy, oz, dx, dy, dz, shear_x, shear_y):
+def _lateral_margin(skin, ox, oy, oz, dx, dy, dz, shear_x, shear_y):
     """How far aside of the origin, seen along the segment, something may lie that a motion by `skin` brings onto it.
 
     The last term is the rounding of what is compared with it, which must not leave out a triangle that is only just met.
@@ -129,7 +137,7 @@ def _aside(skin, ox, oy, oz, dx, dy, dz, shear_x, shear_y):
 
 
 @kernel
-def _walk(ox, oy, oz, dx, dy, dz, triangle, tree):
+def _walk_to_triangle(ox, oy, oz, dx, dy, dz, triangle, tree):
     """Go across edges from `triangle` to the one that a segment's line goes through, no edge of it touched.
 
     Returns
@@ -139,25 +147,25 @@ def _walk(ox, oy, oz, dx, dy, dz, triangle, tree):
     t : float
         Position on the segment, the same bits as :func:`.segment_entry` has for it.
     """
-    axis, shear_x, shear_y = line_of_sight(dx, dy, dz)
-    for _ in range(STEPS):
+    axis, shear_x, shear_y = shear_to_axis(dx, dy, dz)
+    for _ in range(MAX_WALK):
         ax, ay, bx, by, cx, cy = _corners_seen(ox, oy, oz, axis, shear_x, shear_y, tree.faces, triangle)
         u, v, w = ax * by - ay * bx, bx * cy - by * cx, cx * ay - cy * ax
         if u + v + w < 0.0:
             u, v, w = -u, -v, -w
         least = min(u, v, w)
         if least > 0.0:
-            return triangle, cross_plane(ox, oy, oz, dx, dy, dz, tree.faces, triangle)
+            return triangle, intersect_plane(ox, oy, oz, dx, dy, dz, tree.faces, triangle)
         if not least < 0.0:
             return -1, 2.0
-        triangle = tree.across[triangle, 0 if u == least else (1 if v == least else 2)]
+        triangle = tree.adjacent[triangle, 0 if u == least else (1 if v == least else 2)]
         if triangle < 0:
             return -1, 2.0
     return -1, 2.0
 
 
 @kernel
-def look_around(slot, ox, oy, oz, dx, dy, dz, target, radius, listed, travel, empty, sheets, neighbours, tree):
+def rebuild_list(slot, ox, oy, oz, dx, dy, dz, target, radius, listed, travel, empty, sheets, neighbour_lists, tree):
     """Find out anew what a segment can meet.
 
     Parameters
@@ -177,35 +185,35 @@ def look_around(slot, ox, oy, oz, dx, dy, dz, target, radius, listed, travel, em
         Whether nothing is expected to be near.
     sheets : bool
         Whether the target's triangles keep their normals.
-    neighbours : Neighbours
+    neighbours : NeighbourLists
     tree : Tree
     """
     length = math.sqrt(dx * dx + dy * dy + dz * dz)
-    radius = min(radius, WIDEST * length)
-    neighbours.only[slot] = -1
+    radius = min(radius, MAX_RADIUS_SHARE * length)
+    neighbour_lists.only[slot] = -1
     if empty and radius > 0.0:
         free = _clearance(ox, oy, oz, dx, dy, dz, target, 2.0 * radius, 0.25 * radius, tree)
         if free > 0.0:
-            neighbours.number[slot], neighbours.until[slot] = 0, free
+            neighbour_lists.number[slot], neighbour_lists.until[slot] = 0, free
             return
     for attempt in range(2):
         tube = radius if attempt == 0 else 0.125 * radius
         if not sheets or tube <= 2.0 * travel:
             break
-        count, triangle, margin, free = _survey(ox, oy, oz, dx, dy, dz, target, tube, tree)
+        count, triangle, margin, free = _count_sheets(ox, oy, oz, dx, dy, dz, target, tube, tree)
         if count == 0 or (count == 1 and free > 0.25 * tube):
-            neighbours.number[slot], neighbours.until[slot] = 0, tube if count == 0 else min(free, tube)
+            neighbour_lists.number[slot], neighbour_lists.until[slot] = 0, tube if count == 0 else min(free, tube)
             return
         if count == 1:
             certain = margin > 0.25 * tube
-            neighbours.number[slot], neighbours.only[slot] = 1 if certain else SHEET, triangle
-            neighbours.until[slot] = min(margin, tube) if certain else tube
+            neighbour_lists.number[slot], neighbour_lists.only[slot] = 1 if certain else ONE_SHEET, triangle
+            neighbour_lists.until[slot] = min(margin, tube) if certain else tube
             return
     listed = min(listed, radius)
-    neighbours.number[slot], neighbours.until[slot] = ASK, max(radius, 8.0 * travel)
+    neighbour_lists.number[slot], neighbour_lists.until[slot] = ASK_TREE, max(radius, 8.0 * travel)
     if listed > 2.0 * travel:
-        number, only = _find_list(ox, oy, oz, dx, dy, dz, target, listed, neighbours.near, slot, tree)
-        neighbours.number[slot], neighbours.only[slot], neighbours.until[slot] = number, only, listed
+        number, only = _list_triangles(ox, oy, oz, dx, dy, dz, target, listed, neighbour_lists.near, slot, tree)
+        neighbour_lists.number[slot], neighbour_lists.only[slot], neighbour_lists.until[slot] = number, only, listed
 
 
 @kernel
@@ -244,17 +252,17 @@ def _clearance(ox, oy, oz, dx, dy, dz, mesh, far, least, tree):
 
 
 @kernel
-def _beside(ox, oy, oz, axis, shear_x, shear_y, aside, bounds, node):
+def _box_beside_line(ox, oy, oz, axis, shear_x, shear_y, aside, bounds, node):
     """Whether a box, seen along the segment, lies further than `aside` from its line, by the rectangle around what is seen."""
     x0, y0, z0 = bounds[node, 0] - ox, bounds[node, 1] - oy, bounds[node, 2] - oz
     x1, y1, z1 = bounds[node, 3] - ox, bounds[node, 4] - oy, bounds[node, 5] - oz
-    x, y = seen_along(0.5 * (x0 + x1), 0.5 * (y0 + y1), 0.5 * (z0 + z1), axis, shear_x, shear_y)
-    wide, high = seen_along(0.5 * (x1 - x0), 0.5 * (y1 - y0), 0.5 * (z1 - z0), axis, -abs(shear_x), -abs(shear_y))
+    x, y = project_sheared(0.5 * (x0 + x1), 0.5 * (y0 + y1), 0.5 * (z0 + z1), axis, shear_x, shear_y)
+    wide, high = project_sheared(0.5 * (x1 - x0), 0.5 * (y1 - y0), 0.5 * (z1 - z0), axis, -abs(shear_x), -abs(shear_y))
     return abs(x) > wide + aside or abs(y) > high + aside
 
 
 @kernel
-def _survey(ox, oy, oz, dx, dy, dz, mesh, skin, tree):
+def _count_sheets(ox, oy, oz, dx, dy, dz, mesh, skin, tree):
     """Count the sheets in the tube around a segment, if it holds nothing else.
 
     Returns
@@ -270,28 +278,30 @@ def _survey(ox, oy, oz, dx, dy, dz, mesh, skin, tree):
         segment a sheet that leans takes up one and a half parts where the tip moves aside, and one where it moves ahead.
     """
     length = math.sqrt(dx * dx + dy * dy + dz * dz)
-    more = DRAWN_OUT * skin / length
-    axis, shear_x, shear_y = line_of_sight(dx, dy, dz)
-    aside = _aside(skin, ox, oy, oz, dx, dy, dz, shear_x, shear_y)
-    rounding = _aside(0.0, ox, oy, oz, dx, dy, dz, shear_x, shear_y)
+    more = EXTENSION * skin / length
+    axis, shear_x, shear_y = shear_to_axis(dx, dy, dz)
+    aside = _lateral_margin(skin, ox, oy, oz, dx, dy, dz, shear_x, shear_y)
+    rounding = _lateral_margin(0.0, ox, oy, oz, dx, dy, dz, shear_x, shear_y)
     fx, fy, fz = ox - more * dx, oy - more * dy, oz - more * dz
     tx, ty, tz = ox + (1.0 + more) * dx, oy + (1.0 + more) * dy, oz + (1.0 + more) * dz
     x0, x1 = min(fx, tx) - skin, max(fx, tx) + skin
     y0, y1 = min(fy, ty) - skin, max(fy, ty) + skin
     z0, z1 = min(fz, tz) - skin, max(fz, tz) + skin
-    leaning = -FACING * length
+    leaning = -MIN_FACING * length
     count, triangle, margin, free = 0, -1, 0.0, 0.0
-    faces, facing = tree.faces, tree.facing
+    faces, normal_bounds = tree.faces, tree.normal_bounds
     node, stop = tree.roots[mesh], tree.roots[mesh + 1]
     while node < stop:
-        if apart(tree.bounds, node, x0, x1, y0, y1, z0, z1):
+        if boxes_disjoint(tree.bounds, node, x0, x1, y0, y1, z0, z1):
             node = tree.skip[node]
             continue
-        slope = max(facing[node, 0] * dx, facing[node, 3] * dx)
-        slope += max(facing[node, 1] * dy, facing[node, 4] * dy) + max(facing[node, 2] * dz, facing[node, 5] * dz)
+        slope = max(normal_bounds[node, 0] * dx, normal_bounds[node, 3] * dx)
+        slope += max(normal_bounds[node, 1] * dy, normal_bounds[node, 4] * dy) + max(
+            normal_bounds[node, 2] * dz, normal_bounds[node, 5] * dz
+        )
         # What faces the base matters only where the line itself may go through it.
         within = rounding if slope < leaning else aside
-        if _beside(ox, oy, oz, axis, shear_x, shear_y, within, tree.bounds, node):
+        if _box_beside_line(ox, oy, oz, axis, shear_x, shear_y, within, tree.bounds, node):
             node = tree.skip[node]
             continue
         for i in range(tree.first[node], tree.first[node] + tree.number[node]):
@@ -299,12 +309,12 @@ def _survey(ox, oy, oz, dx, dy, dz, mesh, skin, tree):
             if min(ax, bx, cx) > aside or max(ax, bx, cx) < -aside or min(ay, by, cy) > aside or max(ay, by, cy) < -aside:
                 continue
             slope = faces[i, 9] * dx + faces[i, 10] * dy + faces[i, 11] * dz
-            if not (slope < leaning and is_inner(i, faces, 9, tree.across)):
+            if not (slope < leaning and is_interior(i, faces, 9, tree.adjacent)):
                 return -1, -1, 0.0, 0.0
             u, v, w = ax * by - ay * bx, bx * cy - by * cx, cx * ay - cy * ax
             if min(u, v, w) < 0.0 and max(u, v, w) > 0.0:
                 continue
-            t = cross_plane(ox, oy, oz, dx, dy, dz, faces, i)
+            t = intersect_plane(ox, oy, oz, dx, dy, dz, faces, i)
             if -more <= t <= 1.0 + more:
                 if count == 1:
                     return -1, -1, 0.0, 0.0
@@ -316,7 +326,7 @@ def _survey(ox, oy, oz, dx, dy, dz, mesh, skin, tree):
 
 
 @kernel
-def _find_list(ox, oy, oz, dx, dy, dz, mesh, skin, near, slot, tree):
+def _list_triangles(ox, oy, oz, dx, dy, dz, mesh, skin, near, slot, tree):
     """Write the triangles that a segment can meet as long as none of its points has moved by more than `skin`.
 
     Parameters
@@ -332,23 +342,23 @@ def _find_list(ox, oy, oz, dx, dy, dz, mesh, skin, near, slot, tree):
     only : int
         The triangle, where there is but one and the segment's line goes through it for certain, from outside; else -1.
     """
-    axis, shear_x, shear_y = line_of_sight(dx, dy, dz)
-    aside = _aside(skin, ox, oy, oz, dx, dy, dz, shear_x, shear_y)
+    axis, shear_x, shear_y = shear_to_axis(dx, dy, dz)
+    aside = _lateral_margin(skin, ox, oy, oz, dx, dy, dz, shear_x, shear_y)
     x0, x1 = min(ox, ox + dx) - skin, max(ox, ox + dx) + skin
     y0, y1 = min(oy, oy + dy) - skin, max(oy, oy + dy) + skin
     z0, z1 = min(oz, oz + dz) - skin, max(oz, oz + dz) + skin
     number, only = 0, -1
     bounds, node, stop = tree.bounds, tree.roots[mesh], tree.roots[mesh + 1]
     while node < stop:
-        if apart(bounds, node, x0, x1, y0, y1, z0, z1):
+        if boxes_disjoint(bounds, node, x0, x1, y0, y1, z0, z1):
             node = tree.skip[node]
             continue
         for i in range(tree.first[node], tree.first[node] + tree.number[node]):
             # Seen along the segment, the triangle must come within the skin of the origin.
             f = tree.faces
-            ax, ay = seen_along(f[i, 0] - ox, f[i, 1] - oy, f[i, 2] - oz, axis, shear_x, shear_y)
-            bx, by = seen_along(f[i, 3] - ox, f[i, 4] - oy, f[i, 5] - oz, axis, shear_x, shear_y)
-            cx, cy = seen_along(f[i, 6] - ox, f[i, 7] - oy, f[i, 8] - oz, axis, shear_x, shear_y)
+            ax, ay = project_sheared(f[i, 0] - ox, f[i, 1] - oy, f[i, 2] - oz, axis, shear_x, shear_y)
+            bx, by = project_sheared(f[i, 3] - ox, f[i, 4] - oy, f[i, 5] - oz, axis, shear_x, shear_y)
+            cx, cy = project_sheared(f[i, 6] - ox, f[i, 7] - oy, f[i, 8] - oz, axis, shear_x, shear_y)
             beside = min(ax, bx, cx) > aside or max(ax, bx, cx) < -aside or min(ay, by, cy) > aside or max(ay, by, cy) < -aside
             u, v, w = ax * by - ay * bx, bx * cy - by * cx, cx * ay - cy * ax
             side = 1.0 if u + v + w > 0.0 else -1.0

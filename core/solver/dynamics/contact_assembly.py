@@ -9,79 +9,83 @@ from ...compiled.kernels import inlined, kernel
 from ...laws.contact import (
     CN,
     DEPTH,
-    DRAG,
     EXPONENT,
+    EXTRA_VISCOSITY,
+    FRICTION_SCALE,
     GAIN,
-    GRIP,
     KEEP,
     LANES,
     LIMIT,
     LINEAR,
+    NORMAL_BIAS,
+    NORMAL_SLOPE,
     NX,
     NY,
     NZ,
-    PUSH,
     PX,
     PY,
     PZ,
-    SLOPE,
     ZX,
     ZY,
     ZZ,
     K,
-    linearise,
+    linearise_contact,
     normal_tangent,
 )
-from ..detection.surface_kinematics import OX, OY, OZ
+from ..detection.surface_kinematics import SURFACE_VX, SURFACE_VY, SURFACE_VZ
 from ..workspace import SUMS
-from .effect_kernels import STEP, has_effects, let_effects_act, may_pull, press_texel, write_tangent
-from .relative_kinematics import law_of, painted_law, relative_motion, values, velocity_at
+from .effect_kernels import STEP, apply_effects, has_effects, may_pull, press_texel, write_tangent
+from .relative_kinematics import motion_values, pair_law, point_law, relative_motion, velocity_at
 
 
 @inlined
-def sum_pair(pair, dt, world, state, scratch):
+def sum_pair_contacts(pair, dt, model, state, workspace):
     """Sum up the contacts of a pair at the velocities that are guessed."""
-    a, b = world.sensor_body[world.pairs[pair, 0]], world.target_body[world.pairs[pair, 1]]
-    relative_motion(a, b, scratch.twist, state.position, scratch.rotation, scratch.motion[pair])
-    relative_motion(a, b, scratch.known, state.position, scratch.rotation, scratch.part[pair])
-    first = world.point_first[pair] - world.slot_start[pair]
-    _sum_contacts(pair, first, dt, law_of(world.parameters, pair), world, state.memory, scratch)
+    a, b = model.sensor_body[model.pairs[pair, 0]], model.target_body[model.pairs[pair, 1]]
+    relative_motion(a, b, workspace.twist, state.position, workspace.rotation, workspace.motion[pair])
+    relative_motion(a, b, workspace.known, state.position, workspace.rotation, workspace.part[pair])
+    first = model.point_first[pair] - model.slot_start[pair]
+    _sum_contacts(pair, first, dt, pair_law(model.parameters, pair), model, state.memory, workspace)
 
 
 @kernel
-def _write_tangents(pair, first_point, dt, motion, law, world, memory, scratch):
+def _write_tangents(pair, first_point, dt, motion, law, model, memory, workspace):
     """Write what is not the same for all contacts of a pair, for the loop that must not call it itself.
 
     The tangents of a curved normal law at the velocities of `motion`, what effects make of them, and what was painted.
     """
-    rows, painted, sensor = scratch.rows, world.painted, world.pairs[pair, 0]
-    effects = has_effects(sensor, world.program)
-    for r in range(scratch.contacts[pair]):
-        b, lane = scratch.first_block[pair] + r // LANES, r % LANES
-        point = first_point + scratch.slots[b, lane]
+    rows, painted, sensor = workspace.rows, model.painted, model.pairs[pair, 0]
+    effects = has_effects(sensor, model.program)
+    for r in range(workspace.contacts[pair]):
+        b, lane = workspace.first_block[pair] + r // LANES, r % LANES
+        point = first_point + workspace.slots[b, lane]
         vx, vy, vz = velocity_at(rows[b, PX + lane], rows[b, PY + lane], rows[b, PZ + lane], motion)
-        if scratch.moving[pair]:
-            vx, vy, vz = vx + scratch.own[b, OX + lane], vy + scratch.own[b, OY + lane], vz + scratch.own[b, OZ + lane]
+        if workspace.moving[pair]:
+            vx, vy, vz = (
+                vx + workspace.own[b, SURFACE_VX + lane],
+                vy + workspace.own[b, SURFACE_VY + lane],
+                vz + workspace.own[b, SURFACE_VZ + lane],
+            )
         rate = vx * rows[b, NX + lane] + vy * rows[b, NY + lane] + vz * rows[b, NZ + lane]
-        p = painted_law(law, painted, point)
-        rows[b, GRIP + lane], rows[b, DRAG + lane] = painted[point, 1] if len(painted) > 0 else 1.0, 0.0
+        p = point_law(law, painted, point)
+        rows[b, FRICTION_SCALE + lane], rows[b, EXTRA_VISCOSITY + lane] = painted[point, 1] if len(painted) > 0 else 1.0, 0.0
         if effects:
             speed = math.sqrt(max(vx * vx + vy * vy + vz * vz - rate * rate, 0.0))
-            press_texel(scratch.felt, b, LANES, lane, pair, rows[b, DEPTH + lane] + dt * rate, rate, 0.0, speed, p, world)
+            press_texel(workspace.felt, b, LANES, lane, pair, rows[b, DEPTH + lane] + dt * rate, rate, 0.0, speed, p, model)
         else:
-            rows[b, PUSH + lane], rows[b, SLOPE + lane] = normal_tangent(rows[b, DEPTH + lane], rate, dt, p)
+            rows[b, NORMAL_BIAS + lane], rows[b, NORMAL_SLOPE + lane] = normal_tangent(rows[b, DEPTH + lane], rate, dt, p)
     if effects:
-        first, left = scratch.first_block[pair], scratch.contacts[pair]
+        first, left = workspace.first_block[pair], workspace.contacts[pair]
         for b in range(first, first + (left + LANES - 1) // LANES):
             count = min(left, LANES)
-            let_effects_act(sensor, STEP, b, 0, count, first_point, law, world, memory, scratch.slots, scratch.felt)
+            apply_effects(sensor, STEP, b, 0, count, first_point, law, model, memory, workspace.slots, workspace.felt)
             for lane in range(count):
-                write_tangent(pair, b, lane, dt, rows[b, GRIP + lane], world, scratch.felt, rows)
+                write_tangent(pair, b, lane, dt, rows[b, FRICTION_SCALE + lane], model, workspace.felt, rows)
             left -= LANES
 
 
 @kernel
-def _sum_contacts(pair, first_point, dt, p, world, memory, scratch):
+def _sum_contacts(pair, first_point, dt, p, model, memory, workspace):
     """Linearise the contacts of a pair, and sum their forces on the target and what they resist.
 
     The contact point of a row is `first_point` plus its slot.
@@ -89,18 +93,18 @@ def _sum_contacts(pair, first_point, dt, p, world, memory, scratch):
     With a contact's damping tensor ``C = ct 1 + (cn - ct) n nᵀ`` and velocities ``v + ω × p`` the block is the sum of
     ``Jᵀ C J``, its lower triangle; the wrench is what the springs and the known part of the motion do.
     """
-    rows, sums = scratch.rows, scratch.sums[pair]
-    motion, part = values(scratch.motion[pair]), values(scratch.part[pair])
+    rows, sums = workspace.rows, workspace.sums[pair]
+    motion, part = motion_values(workspace.motion[pair]), motion_values(workspace.part[pair])
     for i in range(SUMS * LANES):
         sums[i] = 0.0
-    own, moving = scratch.own, scratch.moving[pair]
-    sensor = world.pairs[pair, 0]
-    vary = p[EXPONENT] != LINEAR or len(world.painted) > 0 or has_effects(sensor, world.program)
-    sticks = may_pull(sensor, world.program)
+    own, moving = workspace.own, workspace.moving[pair]
+    sensor = model.pairs[pair, 0]
+    vary = p[EXPONENT] != LINEAR or len(model.painted) > 0 or has_effects(sensor, model.program)
+    sticks = may_pull(sensor, model.program)
     if vary:
-        _write_tangents(pair, first_point, dt, motion, p, world, memory, scratch)
-    first = scratch.first_block[pair]
-    for b in range(first, first + (scratch.contacts[pair] + LANES - 1) // LANES):
+        _write_tangents(pair, first_point, dt, motion, p, model, memory, workspace)
+    first = workspace.first_block[pair]
+    for b in range(first, first + (workspace.contacts[pair] + LANES - 1) // LANES):
         for lane in range(LANES):  # runs in vector registers: no branches, no calls
             nx, ny, nz = rows[b, NX + lane], rows[b, NY + lane], rows[b, NZ + lane]
             px, py, pz = rows[b, PX + lane], rows[b, PY + lane], rows[b, PZ + lane]
@@ -108,13 +112,13 @@ def _sum_contacts(pair, first_point, dt, p, world, memory, scratch):
             vx, vy, vz = velocity_at(px, py, pz, motion)
             ux, uy, uz = velocity_at(px, py, pz, part)
             if moving:
-                vx, vy, vz = vx + own[b, OX + lane], vy + own[b, OY + lane], vz + own[b, OZ + lane]
-                ux, uy, uz = ux + own[b, OX + lane], uy + own[b, OY + lane], uz + own[b, OZ + lane]
+                vx, vy, vz = vx + own[b, SURFACE_VX + lane], vy + own[b, SURFACE_VY + lane], vz + own[b, SURFACE_VZ + lane]
+                ux, uy, uz = ux + own[b, SURFACE_VX + lane], uy + own[b, SURFACE_VY + lane], uz + own[b, SURFACE_VZ + lane]
             push, slope, grip, drag = p[K] * rows[b, DEPTH + lane], p[K] * dt + p[CN], 1.0, 0.0
             if vary:
-                push, slope, grip = rows[b, PUSH + lane], rows[b, SLOPE + lane], rows[b, GRIP + lane]
-                drag = rows[b, DRAG + lane]
-            limit, push, stiff_n, bias, t, keep, gain = linearise(
+                push, slope, grip = rows[b, NORMAL_BIAS + lane], rows[b, NORMAL_SLOPE + lane], rows[b, FRICTION_SCALE + lane]
+                drag = rows[b, EXTRA_VISCOSITY + lane]
+            limit, push, stiff_n, bias, t, keep, gain = linearise_contact(
                 nx, ny, nz, zx, zy, zz, push, slope, grip, drag, sticks, vx, vy, vz, dt, p
             )
             rows[b, LIMIT + lane], rows[b, KEEP + lane], rows[b, GAIN + lane] = limit, keep, gain

@@ -9,11 +9,11 @@ import numpy as np
 
 from ...geometry.layout import GridLayout
 from ...model.scenario import Scenario
-from .actuators import HOLDS_WAY, PUSH, TO_SPEED, TO_WAY
+from .actuators import HOLD_TRAVEL, PUSH, TARGET_SPEED, TARGET_TRAVEL
 from .grip_controller import Command, GripControl, TactileData
 
 
-class Pilot:
+class DriveCommands:
     """The targets and controllers of a scenario's drives on their way through time.
 
     Parameters
@@ -43,7 +43,7 @@ class Pilot:
             if body in self._targets and self._targets[body].times[-1] < time - 1e-9:
                 self._targets[body] = self._targets[body].extended(time, value)
 
-    def stretches(
+    def control_intervals(
         self, times: np.ndarray, dt: float, read: Callable[[int], np.ndarray]
     ) -> Iterator[tuple[int, int, np.ndarray]]:
         """Yield the steps of a frame in stretches during which no controller is asked.
@@ -67,10 +67,10 @@ class Pilot:
         for i, (body, drive) in enumerate(self._drives.items()):
             target = self._targets[body].at(times)
             if drive.control == "position":
-                commands[:, i, TO_WAY], commands[:, i, HOLDS_WAY] = target[1:], 1.0
-                commands[:, i, TO_SPEED] = np.diff(target) / dt
+                commands[:, i, TARGET_TRAVEL], commands[:, i, HOLD_TRAVEL] = target[1:], 1.0
+                commands[:, i, TARGET_SPEED] = np.diff(target) / dt
             elif drive.control == "velocity":
-                commands[:, i, TO_SPEED] = target[1:]
+                commands[:, i, TARGET_SPEED] = target[1:]
         turns = {body: range(0, steps, max(1, round(self._drives[body].period / dt))) for body in self._controllers}
         stops = sorted({0, steps}.union(*turns.values()))
         for first, last in zip(stops, stops[1:], strict=False):
@@ -78,10 +78,10 @@ class Pilot:
                 if first in turns.get(body, ()):
                     seconds = min(turns[body].step, steps - first) * dt
                     wanted = float(self._targets[body].at(times[first + 1 : first + 2])[0])
-                    commands[first:, i] = self._ask(body, wanted, seconds, read)
+                    commands[first:, i] = self._controller_command(body, wanted, seconds, read)
             yield first, last, commands
 
-    def _ask(self, body: int, target: float, seconds: float, read: Callable[[int], np.ndarray]) -> np.ndarray:
+    def _controller_command(self, body: int, target: float, seconds: float, read: Callable[[int], np.ndarray]) -> np.ndarray:
         """Return the (4,) command of a controller for the next `seconds`."""
         sensor = self._drives[body].sensor
         values = read(sensor)
@@ -92,6 +92,6 @@ class Pilot:
             rows, columns = len(values), 1
         told: Command = self._controllers[body].update(TactileData(rows, columns, values), target, seconds)
         command = np.zeros(4)
-        command[TO_SPEED], command[HOLDS_WAY] = told.velocity, told.homing
+        command[TARGET_SPEED], command[HOLD_TRAVEL] = told.velocity, told.homing
         command[PUSH] = told.push * self._coupled[body]
         return command

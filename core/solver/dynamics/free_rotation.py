@@ -18,7 +18,7 @@ LARGEST_TURN = 0.25
 
 
 @kernel
-def product(matrix, x, y, z):
+def matrix_times_vector(matrix, x, y, z):
     """Return a (3, 3) matrix times a vector."""
     return (
         matrix[0, 0] * x + matrix[0, 1] * y + matrix[0, 2] * z,
@@ -28,7 +28,7 @@ def product(matrix, x, y, z):
 
 
 @kernel
-def into_body(rotation, x, y, z):
+def to_body_axes(rotation, x, y, z):
     """A vector of the world in the axes of a body with the given rotation."""
     return (
         rotation[0, 0] * x + rotation[1, 0] * y + rotation[2, 0] * z,
@@ -38,7 +38,7 @@ def into_body(rotation, x, y, z):
 
 
 @kernel
-def _turned_back(vx, vy, vz, jx, jy, jz):
+def _inverse_cayley_rotation(vx, vy, vz, jx, jy, jz):
     """Turn `v` back by the Cayley map of 2 `j`: the length of `j` is the tangent of half the angle."""
     cx, cy, cz = vy * jz - vz * jy, vz * jx - vx * jz, vx * jy - vy * jx
     scale = 2.0 / (1.0 + jx * jx + jy * jy + jz * jz)
@@ -50,13 +50,13 @@ def _turned_back(vx, vy, vz, jx, jy, jz):
 
 
 @kernel
-def _half_turn(lx, ly, lz, dt, inverse):
+def _half_rotation(lx, ly, lz, dt, inverse):
     """Turn over a short step, as the tangent of half the angle along its axis; `l` is the angular momentum. Body axes."""
-    wx, wy, wz = product(inverse, lx, ly, lz)
+    wx, wy, wz = matrix_times_vector(inverse, lx, ly, lz)
     jx, jy, jz = 0.5 * dt * wx, 0.5 * dt * wy, 0.5 * dt * wz
     for _ in range(40):
-        ex, ey, ez = _turned_back(lx, ly, lz, jx, jy, jz)
-        wx, wy, wz = product(inverse, lx + ex, ly + ey, lz + ez)
+        ex, ey, ez = _inverse_cayley_rotation(lx, ly, lz, jx, jy, jz)
+        wx, wy, wz = matrix_times_vector(inverse, lx + ex, ly + ey, lz + ez)
         x, y, z = 0.25 * dt * wx, 0.25 * dt * wy, 0.25 * dt * wz
         change = abs(x - jx) + abs(y - jy) + abs(z - jz)
         jx, jy, jz = x, y, z
@@ -66,7 +66,7 @@ def _half_turn(lx, ly, lz, dt, inverse):
 
 
 @kernel
-def mean_spin(rotation, inverse, lx, ly, lz, dt):
+def mean_angular_velocity(rotation, inverse, lx, ly, lz, dt):
     """Angular velocity that turns a body over a step as it tumbles when nothing acts.
 
     Parameters
@@ -84,13 +84,13 @@ def mean_spin(rotation, inverse, lx, ly, lz, dt):
     x, y, z : float, rad/s
         World axes; the shorter way round.
     """
-    lx, ly, lz = into_body(rotation, lx, ly, lz)
-    wx, wy, wz = product(inverse, lx, ly, lz)
+    lx, ly, lz = to_body_axes(rotation, lx, ly, lz)
+    wx, wy, wz = matrix_times_vector(inverse, lx, ly, lz)
     parts = int(min(dt * math.sqrt(wx * wx + wy * wy + wz * wz) / LARGEST_TURN, 1000.0)) + 1
     qw, qx, qy, qz = 1.0, 0.0, 0.0, 0.0  # the turn so far
     for _ in range(parts):
-        jx, jy, jz = _half_turn(lx, ly, lz, dt / parts, inverse)
-        lx, ly, lz = _turned_back(lx, ly, lz, jx, jy, jz)
+        jx, jy, jz = _half_rotation(lx, ly, lz, dt / parts, inverse)
+        lx, ly, lz = _inverse_cayley_rotation(lx, ly, lz, jx, jy, jz)
         qw, qx, qy, qz = (
             qw - qx * jx - qy * jy - qz * jz,
             qx + qw * jx + qy * jz - qz * jy,
@@ -101,12 +101,12 @@ def mean_spin(rotation, inverse, lx, ly, lz, dt):
         qw, qx, qy, qz = -qw, -qx, -qy, -qz
     sine = math.sqrt(qx * qx + qy * qy + qz * qz)
     pace = 2.0 / (qw * dt) if sine < 1e-8 * qw else 2.0 * math.atan2(sine, qw) / (sine * dt)
-    return product(rotation, pace * qx, pace * qy, pace * qz)
+    return matrix_times_vector(rotation, pace * qx, pace * qy, pace * qz)
 
 
 @kernel
-def spin_of(rotation, inverse, lx, ly, lz):
+def angular_velocity_of(rotation, inverse, lx, ly, lz):
     """Angular velocity (rad/s) of a body whose angular momentum is `l` (kg·m²/s), both in world axes."""
-    bx, by, bz = into_body(rotation, lx, ly, lz)
-    wx, wy, wz = product(inverse, bx, by, bz)
-    return product(rotation, wx, wy, wz)
+    bx, by, bz = to_body_axes(rotation, lx, ly, lz)
+    wx, wy, wz = matrix_times_vector(inverse, bx, by, bz)
+    return matrix_times_vector(rotation, wx, wy, wz)

@@ -7,47 +7,47 @@ import math
 
 from ...compiled.kernels import inlined, kernel
 from ...laws.contact import GAIN, KEEP, LANES, LIMIT, NX, NY, NZ, PX, PY, PZ, ZX, ZY, ZZ
-from ..detection.surface_kinematics import OX, OY, OZ, turn_rows
-from .relative_kinematics import relative_motion, values, velocity_at
+from ..detection.surface_kinematics import SURFACE_VX, SURFACE_VY, SURFACE_VZ, rotate_rows
+from .relative_kinematics import motion_values, relative_motion, velocity_at
 
 
 @inlined
-def bend_pair(pair, dt, world, shapes, state, scratch):
+def update_pair_friction(pair, dt, model, surfaces, state, workspace):
     """Bristle deflections at the step's end, as the sensor sees them then."""
-    a, b = world.sensor_body[world.pairs[pair, 0]], world.target_body[world.pairs[pair, 1]]
-    motion, part = scratch.motion[pair], scratch.part[pair]
-    relative_motion(a, b, scratch.twist, state.position, scratch.rotation, motion)
-    _seen_at_the_end(a, dt, scratch.twist, scratch.rotation, motion, part, scratch.turn[pair])
-    if scratch.moving[pair]:
-        _turn_own(pair, scratch)
-    if shapes.bends[world.pairs[pair, 0]]:
-        turn_rows(pair, world, shapes, scratch)
-    _bend_bristles(pair, values(part), state, scratch)
+    a, b = model.sensor_body[model.pairs[pair, 0]], model.target_body[model.pairs[pair, 1]]
+    motion, part = workspace.motion[pair], workspace.part[pair]
+    relative_motion(a, b, workspace.twist, state.position, workspace.rotation, motion)
+    _motion_at_step_end(a, dt, workspace.twist, workspace.rotation, motion, part, workspace.turn[pair])
+    if workspace.moving[pair]:
+        _rotate_surface_velocities(pair, workspace)
+    if surfaces.bends[model.pairs[pair, 0]]:
+        rotate_rows(pair, model, surfaces, workspace)
+    _update_bristles(pair, motion_values(part), state, workspace)
 
 
 @kernel
-def _turn_own(pair, scratch):
+def _rotate_surface_velocities(pair, workspace):
     """Turn the velocities that deformation adds by what the sensor turns during the step."""
-    own, turn = scratch.own, scratch.turn[pair]
-    for r in range(scratch.contacts[pair]):
-        b, lane = scratch.first_block[pair] + r // LANES, r % LANES
-        u = own[b, OX + lane], own[b, OY + lane], own[b, OZ + lane]
+    own, turn = workspace.own, workspace.turn[pair]
+    for r in range(workspace.contacts[pair]):
+        b, lane = workspace.first_block[pair] + r // LANES, r % LANES
+        u = own[b, SURFACE_VX + lane], own[b, SURFACE_VY + lane], own[b, SURFACE_VZ + lane]
         for k in range(3):
             own[b, k * LANES + lane] = turn[0, k, 0] * u[0] + turn[0, k, 1] * u[1] + turn[0, k, 2] * u[2]
 
 
 @kernel
-def _bend_bristles(pair, motion, state, scratch):
+def _update_bristles(pair, motion, state, workspace):
     """Bring the bristles of a pair's contacts to the step's end, at the velocities of `motion`."""
-    rows, slots, bristles = scratch.rows, scratch.slots, state.bristles
-    own, moving = scratch.own, scratch.moving[pair]
-    first, left = scratch.first_block[pair], scratch.contacts[pair]
+    rows, slots, bristles = workspace.rows, workspace.slots, state.bristles
+    own, moving = workspace.own, workspace.moving[pair]
+    first, left = workspace.first_block[pair], workspace.contacts[pair]
     for b in range(first, first + (left + LANES - 1) // LANES):
         for lane in range(LANES):
             nx, ny, nz = rows[b, NX + lane], rows[b, NY + lane], rows[b, NZ + lane]
             vx, vy, vz = velocity_at(rows[b, PX + lane], rows[b, PY + lane], rows[b, PZ + lane], motion)
             if moving:
-                vx, vy, vz = vx + own[b, OX + lane], vy + own[b, OY + lane], vz + own[b, OZ + lane]
+                vx, vy, vz = vx + own[b, SURFACE_VX + lane], vy + own[b, SURFACE_VY + lane], vz + own[b, SURFACE_VZ + lane]
             keep, gain, limit = rows[b, KEEP + lane], rows[b, GAIN + lane], rows[b, LIMIT + lane]
             out = vx * nx + vy * ny + vz * nz
             zx = keep * rows[b, ZX + lane] + gain * (vx - out * nx)
@@ -64,7 +64,7 @@ def _bend_bristles(pair, motion, state, scratch):
 
 
 @kernel
-def _seen_at_the_end(a, dt, twist, rotation, motion, seen, turned):
+def _motion_at_step_end(a, dt, twist, rotation, motion, seen, turned):
     """Turn a relative motion by what the sensor itself turns during the step, ``(1 + dt W)ᵀ`` in its own axes.
 
     That matrix is left in the first of `turned` (3, 3, 3).

@@ -17,80 +17,80 @@ import numpy as np
 
 from ...compiled.kernels import inlined, kernel
 from ...geometry.rotations import FREE, KEYFRAMED
-from ...laws.contact import EXPONENT, LINEAR, K, State, World
-from ..workspace import Scratch, contacts_of
+from ...laws.contact import EXPONENT, LINEAR, K, SolverModel, State
+from ..workspace import Workspace, contacts_of
 from .linear_system import is_last_part
 
-HALVINGS = 24
+MAX_BISECTIONS = 24
 """How often the share of its forces that a pair can pay for is looked for, by halves."""
 
 
-def fill_tanks(world: World, state: State, scratch: Scratch) -> None:
+def credit_initial_contacts(model: SolverModel, state: State, workspace: Workspace) -> None:
     """Credit contacts that are there at the very start, freshly gathered, with what their springs hold."""
     held = 0.0
-    for pair, p in enumerate(world.parameters):
-        slots, _, _, depth = contacts_of(pair, scratch)
-        points = world.point_first[pair] + slots - world.slot_start[pair]
+    for pair, p in enumerate(model.parameters):
+        slots, _, _, depth = contacts_of(pair, workspace)
+        points = model.point_first[pair] + slots - model.slot_start[pair]
         power = 1.0 if p[EXPONENT] == LINEAR else p[EXPONENT]
-        k = p[K] * (world.painted[points, 0] if len(world.painted) else 1.0)
+        k = p[K] * (model.painted[points, 0] if len(model.painted) else 1.0)
         held += float(np.sum(k * depth ** (power + 1.0))) / (power + 1.0)
-        if is_last_part(pair, world.pairs):
+        if is_last_part(pair, model.pairs):
             state.tank[pair], held = held, 0.0
 
 
 @kernel
-def open_tanks(world, state, scratch):
+def reset_force_scales(model, state, workspace):
     """All forces act in full, to begin with; and what animation has moved may draw from it without end."""
-    for pair in range(len(scratch.hold)):
-        scratch.hold[pair] = scratch.too_much[pair] = 1.0
-        scratch.enough[pair] = 0.0
-        for body in (world.sensor_body[world.pairs[pair, 0]], world.target_body[world.pairs[pair, 1]]):
-            if world.kind[body] == KEYFRAMED:
+    for pair in range(len(workspace.hold)):
+        workspace.hold[pair] = workspace.too_much[pair] = 1.0
+        workspace.enough[pair] = 0.0
+        for body in (model.sensor_body[model.pairs[pair, 0]], model.target_body[model.pairs[pair, 1]]):
+            if model.kind[body] == KEYFRAMED:
                 for i in range(6):
                     if state.velocity[body, i] != 0.0:
                         state.tank[pair] = math.inf
 
 
 @kernel
-def are_paid(halving, dt, world, state, scratch):
+def check_energy(bisection, dt, model, state, workspace):
     """Whether no pair gives more than its tank holds; then the tanks are brought to the step's end.
 
     Else the largest share of their forces that those pairs can pay for is narrowed down; none at all costs nothing.
     """
-    hold, paid = scratch.hold, True
-    for pair in range(len(world.pairs)):
-        scratch.work[pair] = _work(pair, dt, world, state, scratch)
-        scratch.left[pair] = max(state.tank[pair] + _lag(pair, dt, world, state), 0.0)
-        if scratch.work[pair] > scratch.left[pair]:
-            scratch.too_much[pair], paid = hold[pair], False
+    hold, paid = workspace.hold, True
+    for pair in range(len(model.pairs)):
+        workspace.work[pair] = _contact_work(pair, dt, model, state, workspace)
+        workspace.left[pair] = max(state.tank[pair] + _integration_energy(pair, dt, model, state), 0.0)
+        if workspace.work[pair] > workspace.left[pair]:
+            workspace.too_much[pair], paid = hold[pair], False
         elif hold[pair] < 1.0:
-            scratch.enough[pair] = hold[pair]
-    if (paid and halving == 0) or halving == HALVINGS - 1:
-        for pair in range(len(world.pairs)):
-            state.tank[pair] -= scratch.work[pair]
+            workspace.enough[pair] = hold[pair]
+    if (paid and bisection == 0) or bisection == MAX_BISECTIONS - 1:
+        for pair in range(len(model.pairs)):
+            state.tank[pair] -= workspace.work[pair]
         return True
-    for pair in range(len(world.pairs)):
-        if scratch.too_much[pair] < 1.0 or scratch.work[pair] > scratch.left[pair]:
-            middle = 0.5 * (scratch.enough[pair] + scratch.too_much[pair])
-            hold[pair] = middle if halving < HALVINGS - 2 else scratch.enough[pair]
+    for pair in range(len(model.pairs)):
+        if workspace.too_much[pair] < 1.0 or workspace.work[pair] > workspace.left[pair]:
+            middle = 0.5 * (workspace.enough[pair] + workspace.too_much[pair])
+            hold[pair] = middle if bisection < MAX_BISECTIONS - 2 else workspace.enough[pair]
     return False
 
 
 @kernel
-def _work(pair, dt, world, state, scratch):
+def _contact_work(pair, dt, model, state, workspace):
     """Work that a pair's forces do in a step on both bodies together, joules.
 
     What is put in counts by the mean of the velocities at both ends, so that all that a body loses is found; what comes out by
     the velocity at the end if that is more.
     """
-    force, touches = scratch.force[pair], False
+    force, touches = workspace.force[pair], False
     for i in range(6):
         touches = touches or force[i] != 0.0
     if not touches:
         return 0.0
-    a, b = world.sensor_body[world.pairs[pair, 0]], world.target_body[world.pairs[pair, 1]]
-    early = _relative_velocity(a, b, scratch.before, state.position, scratch.rotation)
-    late = _relative_velocity(a, b, state.velocity, state.position, scratch.rotation)
+    a, b = model.sensor_body[model.pairs[pair, 0]], model.target_body[model.pairs[pair, 1]]
+    early = _relative_velocity(a, b, workspace.before, state.position, workspace.rotation)
+    late = _relative_velocity(a, b, state.velocity, state.position, workspace.rotation)
     mean, end = 0.0, 0.0
     for i in range(6):
         mean += 0.5 * dt * force[i] * (early[i] + late[i])
@@ -99,16 +99,16 @@ def _work(pair, dt, world, state, scratch):
 
 
 @kernel
-def _lag(pair, dt, world, state):
+def _integration_energy(pair, dt, model, state):
     """Energy that a pair's free bodies have lost since the start by being moved with the velocity of each step's end, joules.
 
     Gravity speeds a body up by the mean velocity and lowers it by the last: falling it loses in each step what it gains rising.
     """
     lag = 0.0
-    for body in (world.sensor_body[world.pairs[pair, 0]], world.target_body[world.pairs[pair, 1]]):
-        if world.kind[body] == FREE:
+    for body in (model.sensor_body[model.pairs[pair, 0]], model.target_body[model.pairs[pair, 1]]):
+        if model.kind[body] == FREE:
             for i in range(3):
-                lag += 0.5 * dt * world.mass[body] * world.gravity[i] * (state.velocity[body, i] - world.thrown[body, i])
+                lag += 0.5 * dt * model.mass[body] * model.gravity[i] * (state.velocity[body, i] - model.thrown[body, i])
     return lag
 
 

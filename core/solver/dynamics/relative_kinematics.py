@@ -29,7 +29,7 @@ def relative_motion(a, b, twist, position, rotation, motion):
 
 
 @kernel
-def values(motion):
+def motion_values(motion):
     """The twelve numbers of a motion as a tuple: the compiler keeps them in registers, which it may not do with an array's."""
     return (
         motion[0], motion[1], motion[2], motion[3], motion[4], motion[5],
@@ -38,7 +38,7 @@ def values(motion):
 
 
 @kernel
-def law_of(parameters, pair):
+def pair_law(parameters, pair):
     """A pair's parameters as a tuple, for the same reason."""
     return (
         parameters[pair, 0], parameters[pair, 1], parameters[pair, 2], parameters[pair, 3],
@@ -48,7 +48,7 @@ def law_of(parameters, pair):
 
 
 @kernel
-def painted_law(p, painted, point):
+def point_law(p, painted, point):
     """A sensor's parameters with the multipliers of one of its contact points; `p` itself where nothing is painted."""
     if len(painted) == 0:
         return p

@@ -104,6 +104,6 @@ def test_the_command_says_that_it_compiles(rig_file, tmp_path, monkeypatch, caps
         raise SceneError("far enough.")
 
     monkeypatch.setattr(precompile, "is_needed", lambda: True)
-    monkeypatch.setattr(precompile, "warm", stop)
+    monkeypatch.setattr(precompile, "compile_solver", stop)
     assert main(["gap", str(rig_file), "--out", str(tmp_path)]) == 1
     assert capsys.readouterr().err.splitlines()[0].startswith("Palpate is preparing its solver (first use only)")

@@ -81,7 +81,7 @@ def test_playing_waits_and_goes_on_when_it_is_ready(window):
     scene.frame_set(2)
     assert "solver is ready" in playback.status(scene).text
     assert not playback._refused
-    precompile.stamp().touch()
+    precompile.completion_file().touch()
     assert first_use.is_ready() and first_use.progress() is None
     scene.frame_set(1)
     assert playback.status(scene).frame is not None
@@ -101,7 +101,7 @@ def test_a_bake_waits_with_progress_and_can_be_stopped(window, tmp_path):
     job = baking.bake(scene)
     for step in job:
         if step.stage.startswith(first_use.STAGE):
-            precompile.stamp().touch()
+            precompile.completion_file().touch()
     assert len(list((tmp_path / "bake").glob("*/tactile_*.exr"))) == 3
 
 
@@ -125,7 +125,7 @@ def test_when_it_fails_the_solver_is_compiled_at_its_first_use(window, capfd):
 
 def test_without_a_window_it_is_compiled_in_place_with_a_line_on_stderr(monkeypatch, tmp_path, capfd):
     monkeypatch.setattr(precompile, "_done", False)
-    monkeypatch.setattr(precompile, "stamp", lambda: tmp_path / "stamp")
+    monkeypatch.setattr(precompile, "completion_file", lambda: tmp_path / "stamp")
     make_sensor()
     assert first_use._work is None and first_use.is_ready()
     dependencies.solver()

@@ -83,18 +83,18 @@ def test_a_kernel_is_compiled_anew_when_one_that_it_calls_has_changed(tmp_path):
 
 
 @pytest.mark.skipif(not kernels.COMPILED or platform.machine() not in ("x86_64", "AMD64"), reason="reads x86 machine code")
-@pytest.mark.parametrize("name", ["_sum_contacts", "_bend_bristles"])
+@pytest.mark.parametrize("name", ["_sum_contacts", "_update_bristles"])
 def test_loops_over_contacts_run_in_vector_registers(name):
     """A call or a branch in such a loop changes no number and only makes it five times slower. Its root shows it."""
     simulation = Simulation(cube_on_pad(1.0, frames=1, dt=1e-3))
-    scratch, law = simulation._scratch, relative_kinematics.law_of(simulation._world.parameters, 0)
+    workspace, law = simulation._workspace, relative_kinematics.pair_law(simulation._model.parameters, 0)
     compiled = numba.njit(error_model="numpy")(
         getattr(contact_assembly if name == "_sum_contacts" else friction_state, name).py_func
     )
     if name == "_sum_contacts":
-        compiled(0, 0, 1e-3, law, simulation._world, simulation._state.memory, scratch)
+        compiled(0, 0, 1e-3, law, simulation._model, simulation._state.memory, workspace)
     else:
-        compiled(0, relative_kinematics.values(scratch.part[0]), simulation._state, scratch)
+        compiled(0, relative_kinematics.motion_values(workspace.part[0]), simulation._state, workspace)
     (code,) = compiled.inspect_asm().values()
     assert re.search(r"^\s+v?sqrtpd\s", code, re.MULTILINE), "the square root is taken of one number at a time"
 

@@ -4,7 +4,7 @@
 import numpy as np
 import pytest
 
-from palpate.core.geometry.rotations import look_back, quaternions_from_vectors, rotation_matrices, write_twist
+from palpate.core.geometry.rotations import quaternions_from_vectors, rotation_matrices, write_backward_twist, write_twist
 
 
 @pytest.mark.parametrize("angle", [0.0, 1e-9, 1e-4, 0.3, 2.0, 5.0])
@@ -15,7 +15,7 @@ def test_twists_are_the_chords_of_a_turn_seen_from_either_end(angle):
     turn = rotation_matrices(quaternions_from_vectors(angle * axis))
     begin, end = np.zeros(12), np.zeros(12)
     write_twist(velocity, dt, begin)
-    look_back(velocity, dt, end)
+    write_backward_twist(velocity, dt, end)
     for twist, expected in ((begin, turn - np.eye(3)), (end, np.eye(3) - turn.T)):
         assert np.array_equal(twist[:3], velocity[:3])
         np.testing.assert_allclose(dt * twist[3:].reshape(3, 3), expected, rtol=0, atol=4e-16 + 1e-12 * angle)

@@ -27,7 +27,7 @@ def test_normal_force_never_pulls():
 def test_steady_state_is_the_friction_curve_of_fig_7(speed):
     """At steady sliding ż = 0, so ft = g(v) sign(v) + ct v (Eq. 9 and 13); reached by the step itself to 1e-9."""
     fn = 0.08
-    assert contact.stribeck(speed**2, ROW) * fn == pytest.approx(g(speed, fn), rel=1e-14)
+    assert contact.stribeck_coefficient(speed**2, ROW) * fn == pytest.approx(g(speed, fn), rel=1e-14)
     z = 0.0
     for _ in range(400):
         keep, gain = contact.bristle_step(speed**2, fn, 0.1, ROW)
@@ -56,7 +56,7 @@ def test_bristles_hold_nothing_without_normal_force_or_friction():
     slippery = ROW.copy()
     slippery[contact.MUS] = slippery[contact.MUD] = 0.0
     assert contact.bristle_step(1.0, 1.0, 1e-3, slippery) == (0.0, 0.0)
-    assert contact.bristle_limit(1.0, slippery) == 0.0
+    assert contact.max_bristle_deflection(1.0, slippery) == 0.0
 
 
 def test_sticking_is_for_ever():
@@ -69,7 +69,7 @@ def test_sticking_is_for_ever():
 def test_relaxation_is_exp_to_rounding():
     """Against numpy's exp and expm1, from nothing to far beyond what doubles tell from zero."""
     for x in [0.0, 5e-324, 1e-300, *np.logspace(-20, 6, 521)]:
-        left, mean = contact.relaxation(x)
+        left, mean = contact.decay_and_mean(x)
         assert left == pytest.approx(np.exp(-x), rel=0, abs=5e-16)
         assert mean == pytest.approx(-np.expm1(-x) / x if x else 1.0, rel=2e-15)
         assert 0.0 <= left <= 1.0

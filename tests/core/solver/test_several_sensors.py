@@ -115,7 +115,7 @@ def test_texels_that_come_out_in_a_hole_are_no_longer_sunk():
     counts = []
     for _ in range(3):
         simulation.advance()
-        counts.append(simulation._count_sunk(0))
+        counts.append(simulation._count_too_deep(0))
     assert counts[1:] == [9, 0]
     assert not (simulation._state.hint == -2).any()
 

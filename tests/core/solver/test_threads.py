@@ -7,7 +7,7 @@ import trimesh
 from solver_scenes import about, cube_on_pad, pad, pressed, shape
 
 from palpate.core.compiled import kernels, thread_team
-from palpate.core.solver.simulation import PART, Simulation
+from palpate.core.solver.simulation import MAX_PAIR_POINTS, Simulation
 
 compiled = pytest.mark.skipif(not kernels.COMPILED, reason="plain Python computes in one thread")
 
@@ -18,7 +18,7 @@ def rolling(threads):
     path = [[0.0008 * i - 0.006, 0.0004 * i, 0.0192 - 0.00005 * i] for i in range(8)]
     turns = [about((1, 2, 0), 7.0 * i) for i in range(8)]
     texels = pad(44, 40, 0.001)
-    assert len(texels) > 3 * PART
+    assert len(texels) > 3 * MAX_PAIR_POINTS
     return Simulation(pressed(ball, path, texels, turns=turns, dt=1e-3, sigma0=2000.0, sigma1=5.0), threads)
 
 
@@ -43,25 +43,25 @@ def test_threads_change_no_bit(scene):
 def test_helpers_are_called_where_they_are_worth_while(monkeypatch):
     monkeypatch.delenv("PALPATE_THREADS", raising=False)
     monkeypatch.setattr(thread_team, "_processors", lambda: 4)
-    assert thread_team.board_for(thread_team.ENOUGH - 1)[1] == 0
-    assert thread_team.board_for(thread_team.ENOUGH)[1] == 1
-    assert thread_team.board_for(10**6)[1] == 3
+    assert thread_team.make_queue(thread_team.POINTS_PER_THREAD - 1)[1] == 0
+    assert thread_team.make_queue(thread_team.POINTS_PER_THREAD)[1] == 1
+    assert thread_team.make_queue(10**6)[1] == 3
     monkeypatch.setenv("PALPATE_THREADS", "1")
-    assert thread_team.board_for(10**6)[1] == 0
+    assert thread_team.make_queue(10**6)[1] == 0
 
 
 @compiled
 def test_a_late_helper_is_not_called_for_a_while():
-    board, number = thread_team.board_for(10**4, 2)
+    queue, number = thread_team.make_queue(10**4, 2)
     called = []
-    with thread_team.helpers(board, number, called.append, 1):
-        board[thread_team.PHASES], board[thread_team.LATE] = 100, 50
+    with thread_team.helper_threads(queue, number, called.append, 1):
+        queue[thread_team.LOOPS], queue[thread_team.LATE_LOOPS] = 100, 50
     assert called == [1]
-    for _ in range(thread_team.SOLITUDE):
-        with thread_team.helpers(board, number, called.append, 2):
+    for _ in range(thread_team.SINGLE_THREAD_FRAMES):
+        with thread_team.helper_threads(queue, number, called.append, 2):
             pass
     assert called == [1]
-    with thread_team.helpers(board, number, called.append, 3):
+    with thread_team.helper_threads(queue, number, called.append, 3):
         pass
     assert called == [1, 3]
 

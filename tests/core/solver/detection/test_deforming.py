@@ -192,8 +192,9 @@ def test_neighbour_lists_change_nothing():
     scenario = replace(scenario, targets=(target,))
     expected = run(scenario).sensors["pad"]
     simulation = Simulation(scenario)
-    simulation._neighbours = simulation._neighbours._replace(near=np.zeros((len(simulation._neighbours.near), 0), np.int32))
-    simulation._neighbours.pose[:, 12] = -1.0  # what was made already had room
+    lists = simulation._neighbour_lists
+    simulation._neighbour_lists = lists._replace(near=np.zeros((len(lists.near), 0), np.int32))
+    simulation._neighbour_lists.pose[:, 12] = -1.0  # what was made already had room
     for i in range(10):
         frame = simulation.advance() if i else simulation.observe()
         assert np.array_equal(frame.sensors["pad"].normal_force, expected.normal_force[i])

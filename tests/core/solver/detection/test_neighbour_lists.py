@@ -64,14 +64,14 @@ def segments(mesh: TriangleMesh, number: int, seed: int) -> tuple[np.ndarray, np
 def test_what_is_near_answers_like_the_tree(name):
     """Each end of a segment is moved about within what its knowledge is good for, to its rim above all."""
     mesh, number = SURFACES[name], 400
-    tree, known = build_tree([mesh]), neighbour_lists.neighbours_for(number, 1)
+    tree, known = build_tree([mesh]), neighbour_lists.neighbour_lists_for(number, 1)
     bases, tips = segments(mesh, number, 5)
     rng, kinds, hits = np.random.default_rng(6), [], 0
     for slot in range(number):
         base, vector = bases[slot], tips[slot] - bases[slot]
         radius = REACH * rng.choice([0.25, 0.05, 0.01, 1e-4])
         empty = bool(slot % 2)
-        neighbour_lists.look_around(slot, *base, *vector, 0, radius, 0.02, 0.01 * radius, empty, True, known, tree)
+        neighbour_lists.rebuild_list(slot, *base, *vector, 0, radius, 0.02, 0.01 * radius, empty, True, known, tree)
         until = known.until[slot]
         assert until > 0.0
         kinds.append(known.number[slot])
@@ -81,7 +81,7 @@ def test_what_is_near_answers_like_the_tree(name):
             ends *= until * np.minimum(rng.uniform(0, 3, (2, 1)), 1.0) / np.linalg.norm(ends, axis=1)[:, None]
             start = base + ends[0]
             direction = tips[slot] + ends[1] - start
-            t, triangle, leaving = neighbour_lists.entry(*start, *direction, slot, 0, hint, known, tree)
+            t, triangle, leaving = neighbour_lists.find_entry(*start, *direction, slot, 0, hint, known, tree)
             expected = segment_entry(*start, *direction, 0, -1, tree)
             assert triangle == expected[1]
             if triangle >= 0:
@@ -92,15 +92,15 @@ def test_what_is_near_answers_like_the_tree(name):
             hint = triangle
     assert hits > 500
     kinds = np.array(kinds)
-    sheets = (kinds == neighbour_lists.SHEET).mean()
+    sheets = (kinds == neighbour_lists.ONE_SHEET).mean()
     if name in ("ball", "torus"):
         assert sheets > 0.2  # the walk is what is tested
 
 
 def test_a_target_that_deforms_has_no_sheets():
     """Its normals are not those that the tree knows."""
-    tree, known = build_tree([BALL]), neighbour_lists.neighbours_for(1, 1)
-    neighbour_lists.look_around(0, 0.01, 0.02, 1.1, 0.0, 0.0, -0.2, 0, 0.05, 0.02, 0.0, False, False, known, tree)
-    assert known.number[0] >= 0 or known.number[0] == neighbour_lists.ASK
-    neighbour_lists.look_around(0, 0.01, 0.02, 1.1, 0.0, 0.0, -0.2, 0, 0.05, 0.02, 0.0, False, True, known, tree)
-    assert known.number[0] == neighbour_lists.SHEET
+    tree, known = build_tree([BALL]), neighbour_lists.neighbour_lists_for(1, 1)
+    neighbour_lists.rebuild_list(0, 0.01, 0.02, 1.1, 0.0, 0.0, -0.2, 0, 0.05, 0.02, 0.0, False, False, known, tree)
+    assert known.number[0] >= 0 or known.number[0] == neighbour_lists.ASK_TREE
+    neighbour_lists.rebuild_list(0, 0.01, 0.02, 1.1, 0.0, 0.0, -0.2, 0, 0.05, 0.02, 0.0, False, True, known, tree)
+    assert known.number[0] == neighbour_lists.ONE_SHEET
