@@ -20,7 +20,12 @@ import trimesh
 
 from palpate.core.geometry.mesh import TriangleMesh, checked_mesh, mass_properties
 from palpate.core.geometry.texels import texels_from_region
-from palpate.core.model.scenario import Body, Motion, Scenario, Sensor, SensorParameters, Target
+from palpate.core.model.body import Body
+from palpate.core.model.motion import Motion
+from palpate.core.model.scenario import Scenario
+from palpate.core.model.sensor import Sensor
+from palpate.core.model.sensor_parameters import SensorParameters
+from palpate.core.model.target import Target
 from palpate.core.solver.simulation import Simulation
 
 SIDE = 0.047

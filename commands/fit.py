@@ -6,7 +6,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from ..core.model.scenario import SensorParameters
+from ..core.model.sensor_parameters import SensorParameters
 from . import console
 
 

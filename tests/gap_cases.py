@@ -7,7 +7,7 @@ from scipy.signal import lfilter
 
 from palpate.core.gap.dataset.rig import Indenter, Rig, Trial, grid_texels
 from palpate.core.geometry.mesh import checked_mesh
-from palpate.core.model.scenario import SensorParameters
+from palpate.core.model.sensor_parameters import SensorParameters
 
 ROWS, COLUMNS, PITCH, RADIUS, RATE = 6, 4, 0.0034, 0.010, 40.0
 TOP = 0.0015

@@ -107,7 +107,7 @@ def picture(path: Path) -> None:
 
 def _setting():
     from palpate.core.effects.engine.specification import Site
-    from palpate.core.model.scenario import SensorParameters
+    from palpate.core.model.sensor_parameters import SensorParameters
 
     row, column = (index.ravel() for index in np.mgrid[0:ROWS, 0:COLUMNS])
     position = np.stack([column * PITCH, row * PITCH, np.zeros(ROWS * COLUMNS)], axis=1)
@@ -176,7 +176,7 @@ def _reading_over_force(**values):
 
 def _over_speed(axes, kind):
     from palpate.core.effects.engine.binding import friction
-    from palpate.core.model.scenario import SensorParameters
+    from palpate.core.model.sensor_parameters import SensorParameters
 
     v, p = np.linspace(0, 0.06, 400), SensorParameters()
 

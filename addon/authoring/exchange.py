@@ -8,7 +8,7 @@ from bpy_extras.object_utils import object_data_add
 
 from ...core.errors import SceneError
 from ...core.geometry.layout import GridLayout
-from ...core.model.scenario import SensorParameters
+from ...core.model.sensor_parameters import SensorParameters
 from ..properties import effect_stack, properties
 from ..scene import scene_reader
 from . import laid_sensors, sensors

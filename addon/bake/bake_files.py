@@ -35,7 +35,8 @@ from ...core.io.recording_npz import load_recording, save_recording
 from ...core.io.sensor_npz import SENSOR_NAME, save_sensor
 from ...core.io.tactile_exr import describe, write_exrs
 from ...core.model.recording import Frame, Recording
-from ...core.model.scenario import Scenario, Sensor
+from ...core.model.scenario import Scenario
+from ...core.model.sensor import Sensor
 from .background_writer import Behind
 from .bake_checkpoint import Unfinished
 from .folder_lock import Claim

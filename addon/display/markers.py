@@ -21,7 +21,7 @@ from mathutils import Quaternion, Vector
 
 from ...core.geometry.texels import Texels
 from ...core.model.recording import SensorRecording
-from ...core.model.scenario import Painted, SensorParameters
+from ...core.model.sensor_parameters import Painted, SensorParameters
 from ...core.response import metrics
 from ..session import fcurves, transforms
 from . import marker_meshes, materials

@@ -14,8 +14,10 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
 
 from ...core.effects.engine import registry
-from ...core.effects.engine.specification import Effect, Form, Kind, Parameter
+from ...core.effects.engine.specification import Form, Kind
 from ...core.errors import EffectError
+from ...core.model.effect import Effect
+from ...core.model.parameter import Parameter
 from ..session import units
 
 STAGE_ICONS = {"contact": "MOD_PHYSICS", "pad": "MOD_CLOTH", "readout": "DRIVER"}

@@ -18,7 +18,8 @@ from bpy.props import (
 
 from ...core.figures import color_maps
 from ...core.io.settings_migration import VERSION
-from ...core.model.scenario import Drive, SensorParameters
+from ...core.model.drive import Drive
+from ...core.model.sensor_parameters import SensorParameters
 from ..scene import meshes, moved_bodies
 from ..session import first_use, identity, session_state
 from . import effect_stack, figure_properties

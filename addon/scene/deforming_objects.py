@@ -14,7 +14,10 @@ import numpy as np
 from ...core.errors import SceneError
 from ...core.geometry.mesh import TriangleMesh
 from ...core.geometry.texels import DeformedTexels
-from ...core.model.scenario import Deformation, Scenario, Sensor, Target
+from ...core.model.deformation import Deformation
+from ...core.model.scenario import Scenario
+from ...core.model.sensor import Sensor
+from ...core.model.target import Target
 from ..display import heat_map
 from ..session import fcurves, identity
 from . import meshes

@@ -10,7 +10,8 @@ from __future__ import annotations
 import numpy as np
 
 from ...core.errors import SceneError
-from ...core.model.scenario import Drive, Signal
+from ...core.model.drive import Drive
+from ...core.model.motion import Signal
 from ..session import transforms, units
 
 TARGETS = {"POSITION": "drive_position", "VELOCITY": "drive_speed", "FORCE": "drive_force"}

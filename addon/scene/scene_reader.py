@@ -17,10 +17,16 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from ...core.effects.engine.sensor_effects import check_scenario
 from ...core.errors import SceneError
 from ...core.geometry.mesh import TriangleMesh, checked_mesh, mass_properties
 from ...core.geometry.texels import texels_from_region
-from ...core.model.scenario import Body, Motion, Painted, Scenario, Sensor, SensorParameters, Signal, Target
+from ...core.model.body import Body
+from ...core.model.motion import Motion, Signal
+from ...core.model.scenario import Scenario
+from ...core.model.sensor import Sensor
+from ...core.model.sensor_parameters import Painted, SensorParameters
+from ...core.model.target import Target
 from ..display import texel_arrows
 from ..properties import effect_stack, properties
 from ..session import clock, identity, transforms, units
@@ -260,7 +266,7 @@ def sample_start(scene, depsgraph) -> tuple[Scenario, Binding]:
     skins = tuple(skin for skin in skins if skin is not None)
     sensors, targets = deforming_objects.declared(scenario, skins)
     scenario = replace(scenario, sensors=sensors, targets=targets)
-    scenario.check()
+    check_scenario(scenario)
     binding = Binding(
         keys=tuple(identity.key(obj) for obj in owners),
         names=tuple(obj.name for obj in owners),

@@ -13,7 +13,7 @@ import numpy as np
 from ..errors import ParameterError
 from ..geometry.texels import Texels
 from ..model.recording import Recording
-from ..model.scenario import SensorParameters
+from ..model.sensor_parameters import SensorParameters
 from ..response import metrics
 from .figure_canvas import new_figure, save_figure, tidy_axes
 from .figure_style import FONT, INK, NORMAL_COLOUR, SERIES, SHEAR_COLOUR, SMALL, FigureStyle

@@ -13,7 +13,7 @@ import numpy as np
 from ..errors import FileError
 from ..geometry.texels import Texels
 from ..model.recording import Recording
-from ..model.scenario import Painted, SensorParameters
+from ..model.sensor_parameters import Painted, SensorParameters
 from .bake_folder import MANIFEST_NAME, RECORDING_NAME, Manifest, read_manifest
 from .recording_npz import load_recording
 from .sensor_npz import SENSOR_NAME, load_sensor

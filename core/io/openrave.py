@@ -15,7 +15,7 @@ from typing import Any
 from xml.etree import ElementTree
 
 from ..errors import FileError, PalpateError
-from ..model.scenario import SensorParameters
+from ..model.sensor_parameters import SensorParameters
 from .file_writing import atomic_write
 
 SENSOR_TYPE = "SimTactileSensor"

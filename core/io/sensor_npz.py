@@ -13,7 +13,7 @@ import numpy as np
 from ..errors import FileError
 from ..geometry.layout import GridLayout, UVLayout
 from ..geometry.texels import Texels
-from ..model.scenario import Painted
+from ..model.sensor_parameters import Painted
 from .file_writing import os_error_reason
 from .npz import DAMAGED, write_arrays
 

@@ -30,9 +30,9 @@ from pathlib import Path
 from typing import Any
 
 from ..effects.engine.registry import check, from_dict, to_dict
-from ..effects.engine.specification import Effect
 from ..errors import FileError, PalpateError
-from ..model.scenario import SensorParameters
+from ..model.effect import Effect
+from ..model.sensor_parameters import SensorParameters
 from .file_writing import atomic_write
 
 FORMAT = "palpate-sensor-toml/1"

@@ -17,7 +17,7 @@ import numpy as np
 from ..errors import FileError
 from ..geometry.layout import GridLayout, UVLayout
 from ..model.recording import Frame, SensorFrame
-from ..model.scenario import Sensor
+from ..model.sensor import Sensor
 from . import exr_codec
 from .file_writing import atomic_write, os_error_reason, write_file
 

@@ -24,7 +24,7 @@ import numpy as np
 from ..compiled.kernels import inlined, kernel
 from ..compiled.struct_reference import by_reference
 from ..effects.engine.compiled_program import Program
-from ..model.scenario import HUNT_CROSSLEY, SensorParameters
+from ..model.sensor_parameters import HUNT_CROSSLEY, SensorParameters
 
 # Contact rows: one per touching texel and target, in the frame of the sensor's body; they are all that the solver's inner loop
 # reads. LANES of them make a block, in which each column lies in one piece: row r of a pair is `rows[block, COLUMN + lane]`,

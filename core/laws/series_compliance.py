@@ -8,7 +8,9 @@ between them is found twice, once by the texels of either; each finding moves th
 
 from __future__ import annotations
 
-from ..model.scenario import HUNT_CROSSLEY, Scenario, Sensor
+from ..model.scenario import Scenario
+from ..model.sensor import Sensor
+from ..model.sensor_parameters import HUNT_CROSSLEY
 
 
 def stiffness_per_area(sensor: Sensor) -> float:

@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..geometry.rotations import quaternion_product, quaternions_from_vectors, rotation_vectors
-from .scenario import Motion
+from .motion import Motion
 
 
 def poses_at(motion: Motion, times: np.ndarray, interpolation: str = "linear") -> tuple[np.ndarray, np.ndarray]:

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..geometry.texels import Texels
 from ..model.recording import Recording, SensorFrame, SensorRecording
-from ..model.scenario import Painted, SensorParameters
+from ..model.sensor_parameters import Painted, SensorParameters
 
 AT_LIMIT = 0.9
 """Share of what friction can hold from which on a texel counts as slipping."""

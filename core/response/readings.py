@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..effects.engine.binding import Reader, readings, site_of
-from ..model.scenario import Sensor
+from ..model.sensor import Sensor
 
 __all__ = ["Reader", "respond"]
 

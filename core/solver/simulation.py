@@ -15,6 +15,7 @@ import numpy as np
 
 from ..compiled.thread_team import helper_threads, make_queue
 from ..effects.engine.compiled_program import compile_program
+from ..effects.engine.sensor_effects import check_scenario, mounted_texels
 from ..geometry.bvh import Tree, build_tree
 from ..geometry.contact_points import ContactPoints, contact_points
 from ..geometry.mesh import is_closed
@@ -24,7 +25,9 @@ from ..laws.contact import SolverModel, State, parameter_row
 from ..laws.series_compliance import coupling
 from ..model.pose_interpolation import poses_at
 from ..model.recording import Frame, Recording, SensorFrame
-from ..model.scenario import Scenario, Sensor, Target
+from ..model.scenario import Scenario
+from ..model.sensor import Sensor
+from ..model.target import Target
 from ..response.readings import Reader
 from .detection.deformation import SurfaceMotion
 from .detection.deforming_surfaces import DeformingSurfaces, bounding_sphere, point_rows
@@ -65,7 +68,7 @@ class Simulation:
     Raises
     ------
     PalpateError
-        The scenario does not make a run (see :meth:`.Scenario.check`).
+        The scenario does not make a run (see :func:`.check_scenario`).
 
     Attributes
     ----------
@@ -80,7 +83,7 @@ class Simulation:
     """
 
     def __init__(self, scenario: Scenario, threads: int | None = None):
-        scenario.check()
+        check_scenario(scenario)
         self.scenario = scenario
         self.frame = scenario.frame_start
         self.warnings: list[str] = []
@@ -192,7 +195,7 @@ class Simulation:
             Most texels at once that are pressed past their maximum penetration.
         """
         sensor = self.scenario.sensors[0]
-        shape, texels = (len(positions), len(sensor.texels)), sensor.mounted
+        shape, texels = (len(positions), len(sensor.texels)), mounted_texels(sensor)
         depth, normal = np.zeros(shape), np.tile(-texels.normal, (shape[0], 1, 1))
         point, most = np.tile(texels.position, (shape[0], 1, 1)), 0
         own = [pair for pair, (index, _) in enumerate(self._model.pairs) if index == 0]
@@ -291,7 +294,7 @@ class Simulation:
 def _model(scenario: Scenario, center: np.ndarray, points: list[ContactPoints], dt: float) -> SolverModel:
     """Flatten a scenario into the kernels' arrays; `center` (b, 3) is the reference point of each body in its frame."""
     bodies, sensors, targets = scenario.bodies, scenario.sensors, scenario.targets
-    blocks = [point_rows(s.mounted, p, center[s.body]) for s, p in zip(sensors, points, strict=True)]
+    blocks = [point_rows(mounted_texels(s), p, center[s.body]) for s, p in zip(sensors, points, strict=True)]
     texel_start = _texel_start(scenario)
     kind = np.array([FREE if body.free else DRIVEN if body.drive is not None else KEYFRAMED for body in bodies])
     drive_of, drives = drive_table(scenario)

@@ -8,7 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..model.scenario import HUNT_CROSSLEY, Scenario, Sensor
+from ..model.scenario import Scenario
+from ..model.sensor import Sensor
+from ..model.sensor_parameters import HUNT_CROSSLEY
 
 SHARE_OF_LIMIT = 0.2
 """Share of the explicit stability limit that is used: about thirty steps per period of the stiffest contact."""

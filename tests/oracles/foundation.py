@@ -25,7 +25,8 @@ import trimesh
 from solver_scenes import about, box, pad, pressed, shape
 
 from palpate.core.geometry.mesh import TriangleMesh, checked_mesh
-from palpate.core.model.scenario import Sensor, SensorParameters
+from palpate.core.model.sensor import Sensor
+from palpate.core.model.sensor_parameters import SensorParameters
 from palpate.core.solver.simulation import run
 
 RADIUS, DEPTH, LENGTH = 0.02, 5e-4, 0.012

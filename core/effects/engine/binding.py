@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ...model.effect import Effect, Values
 from .compiled_program import (
     COLUMNS,
     DAMPING,
@@ -25,10 +26,11 @@ from .compiled_program import (
 )
 from .mixing import Mixing
 from .registry import complete_values, in_order
-from .specification import Effect, Form, Site, Values
+from .specification import Form, Site
 
 if TYPE_CHECKING:
-    from ...model.scenario import Sensor, SensorParameters
+    from ...model.sensor import Sensor
+    from ...model.sensor_parameters import SensorParameters
 
 
 def site_of(sensor: Sensor) -> Site:

@@ -19,8 +19,9 @@ from numpy.typing import ArrayLike
 
 from ...compiled.kernels import COMPILED, call_address, carray, compiled_callback, kernel
 from ...compiled.struct_reference import by_reference
+from ...model.effect import Effect
 from .registry import complete_values, in_order
-from .specification import Effect, Form
+from .specification import Form
 
 # What this name stands for differs from copy to copy of the functions that use it, see _link.
 ONE: Any = None

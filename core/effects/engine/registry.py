@@ -13,7 +13,8 @@ from typing import Any
 import numpy as np
 
 from ...errors import EffectError
-from .specification import STAGES, Effect, Form, Kind, Value, Values
+from ...model.effect import Effect, Value, Values
+from .specification import STAGES, Form, Kind
 
 LIBRARY = f"{__package__.rpartition('.')[0]}.library"
 """The package of the effects."""

@@ -19,19 +19,18 @@ and those of the effects import nothing heavy, because Blender's panels list the
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 
+from ...model.effect import Value, Values
+from ...model.parameter import Parameter
 from .mixing import Mixing
 
 STAGES = ("contact", "pad", "readout")
 """`contact`: the law of contact itself, without memory. `pad`: with memory; both act on the bodies. `readout`: only on what
 the sensor reports."""
-
-Value = float | tuple[float, ...]
-Values = Mapping[str, Value]
 
 Law = Callable[..., tuple[float, float]]
 """``law(force, slope, depth, slide, numbers, row, memory, point, at, commit) → (force, slope)``
@@ -53,65 +52,6 @@ memory, point, at : (…, m) float, int, int
 commit : bool
     Write the memory. Without it the law is only asked what would be.
 """
-
-
-@dataclass(frozen=True)
-class Effect:
-    """An effect on a sensor: plain data that a file can hold.
-
-    Attributes
-    ----------
-    name, form : str
-        Which effect of the library, and which of its formulas.
-    values : dict of str to float or tuple of float
-        By parameter name; a tuple has one number per texel. What is absent has the form's default.
-    seed : int
-        Of effects with chance in them; equal seeds give equal numbers.
-    """
-
-    name: str
-    form: str
-    values: dict[str, Value] = field(default_factory=dict)
-    seed: int = 0
-
-
-@dataclass(frozen=True)
-class Parameter:
-    """One number of a form.
-
-    Attributes
-    ----------
-    name : str
-    unit : str
-        "1", "N", "m", "s", … and "unit" for the sensor's own unit: default and bounds are then given for a gain of one unit
-        per newton; :meth:`scaled` gives those of a sensor.
-    default, low, high : float
-        Bounds are inclusive: outside them the formula means nothing or nothing real is like that.
-    text : str
-        One sentence for people.
-    log : bool
-        Looked for on a logarithmic scale.
-    per_texel : bool
-        One number per texel; a single number stands for all texels.
-    """
-
-    name: str
-    unit: str
-    default: float
-    low: float
-    high: float
-    text: str
-    log: bool = False
-    per_texel: bool = False
-
-    def scaled(self, gain: float) -> Parameter:
-        """Return the parameter as it is for a sensor with this gain."""
-        if not self.unit.startswith("unit"):
-            return self
-        size = abs(gain)
-        return Parameter(
-            self.name, self.unit, self.default * size, self.low * size, self.high * size, self.text, self.log, self.per_texel
-        )
 
 
 @dataclass(frozen=True)

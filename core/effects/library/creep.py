@@ -12,7 +12,9 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ..engine.specification import Form, Kind, Parameter, Values, number
+from ...model.effect import Values
+from ...model.parameter import Parameter
+from ..engine.specification import Form, Kind, number
 
 LOG_RATES = np.arange(-13.75, 2.76, 1.25)
 """Logarithm of the rates that stand for a spectrum; a step of 1.25 keeps the sum within 0.1 % of the closed formula."""

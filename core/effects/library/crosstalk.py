@@ -6,8 +6,10 @@ from __future__ import annotations
 import numpy as np
 
 from ...errors import EffectError
+from ...model.effect import Values
+from ...model.parameter import Parameter
 from ..engine.mixing import Mixing, mixing, nearest_distance
-from ..engine.specification import Form, Kind, Parameter, Site, Values, number
+from ..engine.specification import Form, Kind, Site, number
 
 
 def neighbours(values: Values, site: Site) -> Mixing:

@@ -5,7 +5,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..engine.specification import Form, Kind, Parameter, Site, Values, number
+from ...model.effect import Values
+from ...model.parameter import Parameter
+from ..engine.specification import Form, Kind, Site, number
 
 
 def hard(x: np.ndarray, time: np.ndarray, values: Values, site: Site, seed: int) -> np.ndarray:

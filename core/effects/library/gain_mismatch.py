@@ -5,8 +5,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...model.effect import Values
+from ...model.parameter import Parameter
 from ..engine.random_numbers import normal
-from ..engine.specification import Form, Kind, Parameter, Site, Values, number
+from ..engine.specification import Form, Kind, Site, number
 
 
 def random(x: np.ndarray, time: np.ndarray, values: Values, site: Site, seed: int) -> np.ndarray:

@@ -11,7 +11,9 @@ import math
 
 import numpy as np
 
-from ..engine.specification import Form, Kind, Parameter, Values, number, same_for_all_steps
+from ...model.effect import Values
+from ...model.parameter import Parameter
+from ..engine.specification import Form, Kind, number, same_for_all_steps
 
 ELEMENTS = 4
 """Elements of the operators; their thresholds are spread evenly around the given one."""

@@ -5,7 +5,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..engine.specification import Form, Kind, Parameter, Values, number
+from ...model.effect import Values
+from ...model.parameter import Parameter
+from ..engine.specification import Form, Kind, number
 from .creep import shares_of_a_step
 
 

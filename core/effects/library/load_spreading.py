@@ -5,8 +5,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...model.effect import Values
+from ...model.parameter import Parameter
 from ..engine.mixing import Mixing, mixing
-from ..engine.specification import Form, Kind, Parameter, Site, Values, number
+from ..engine.specification import Form, Kind, Site, number
 
 
 def gaussian(values: Values, site: Site) -> Mixing:

@@ -8,7 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..engine.specification import Form, Kind, Parameter, Values, number
+from ...model.effect import Values
+from ...model.parameter import Parameter
+from ..engine.specification import Form, Kind, number
 
 
 def moved(

@@ -7,7 +7,9 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ..engine.specification import Form, Kind, Parameter, Site, Values, number
+from ...model.effect import Values
+from ...model.parameter import Parameter
+from ..engine.specification import Form, Kind, Site, number
 
 
 def rounded(x: np.ndarray, time: np.ndarray, values: Values, site: Site, seed: int) -> np.ndarray:

@@ -7,7 +7,9 @@ import math
 
 import numpy as np
 
-from ..engine.specification import Form, Kind, Parameter, Site, Values, number
+from ...model.effect import Values
+from ...model.parameter import Parameter
+from ..engine.specification import Form, Kind, Site, number
 
 _LEVEL = Parameter("level", "unit", 1.0, 1e-4, 1e5, "Largest change of the reading from the one without load.", log=True)
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 
 import math
 
-from ..engine.specification import Form, Kind, Parameter, same_for_all_steps
+from ...model.parameter import Parameter
+from ..engine.specification import Form, Kind, same_for_all_steps
 
 
 def gaussian(speed, force, numbers, row):

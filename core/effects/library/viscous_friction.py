@@ -3,7 +3,8 @@
 
 from __future__ import annotations
 
-from ..engine.specification import Form, Kind, Parameter, same_for_all_steps
+from ...model.parameter import Parameter
+from ..engine.specification import Form, Kind, same_for_all_steps
 
 
 def linear(speed, force, numbers, row):

@@ -17,7 +17,7 @@ import numpy as np
 from ...errors import FileError, ParameterError
 from ...io.csv_table import read_columns
 from ...laws.contact import friction_along_path, parameter_row, stribeck_force
-from ...model.scenario import SensorParameters
+from ...model.sensor_parameters import SensorParameters
 from ..fitting.regression import Estimate, intervals
 
 STEADY = ("mus", "mud", "x0", "ct")

@@ -17,7 +17,7 @@ import numpy as np
 from ...errors import FileError, ParameterError, SensorError
 from ...geometry.mesh import TriangleMesh, checked_mesh
 from ...geometry.texels import Texels, texels_from_region
-from ...model.scenario import SensorParameters
+from ...model.sensor_parameters import SensorParameters
 from .csv_columns import read_table
 
 FORMAT = "palpate-rig/1"

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...effects.engine.specification import Effect
+from ...model.effect import Effect
 from ..forward.predictor import Model
 from .least_squares import Share
 

@@ -18,8 +18,8 @@ from typing import Any
 import numpy as np
 
 from ...effects.engine.registry import form_of
-from ...effects.engine.specification import Effect
-from ...model.scenario import SensorParameters
+from ...model.effect import Effect
+from ...model.sensor_parameters import SensorParameters
 from ..forward.predictor import Model, Predictor
 
 STEP = 1e-3

@@ -15,9 +15,9 @@ import numpy as np
 
 from ...compiled.kernels import kernel
 from ...effects.engine import binding
-from ...effects.engine.specification import Effect
 from ...laws.contact import bristle_rate, bristle_step, friction_force, max_bristle_deflection, parameter_row
-from ...model.scenario import SensorParameters
+from ...model.effect import Effect
+from ...model.sensor_parameters import SensorParameters
 
 if TYPE_CHECKING:
     from ..dataset.rig import Rig

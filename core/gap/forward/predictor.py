@@ -10,8 +10,9 @@ import numpy as np
 from ...effects.engine import binding
 from ...effects.engine.registry import form_of, stage_of
 from ...effects.engine.registry import placed as placed_texels
-from ...effects.engine.specification import Effect
-from ...model.scenario import Sensor, SensorParameters
+from ...model.effect import Effect
+from ...model.sensor import Sensor
+from ...model.sensor_parameters import SensorParameters
 from ..dataset.rig import Rig, Trial
 from .force_model import Felt
 from .stimulus import Stimulus, stimulus_of

@@ -15,7 +15,11 @@ import numpy as np
 from ...errors import SceneError
 from ...geometry.rotations import quaternion_product, rotation_matrices, rotation_vectors
 from ...geometry.texels import Texels
-from ...model.scenario import Body, Motion, Scenario, Sensor, Target
+from ...model.body import Body
+from ...model.motion import Motion
+from ...model.scenario import Scenario
+from ...model.sensor import Sensor
+from ...model.target import Target
 from ...solver.simulation import Simulation
 from ..dataset.rig import Rig, Trial
 

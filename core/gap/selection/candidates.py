@@ -9,7 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...effects.engine.registry import library
-from ...effects.engine.specification import Effect, Form, Kind, Parameter, Site
+from ...effects.engine.specification import Form, Kind, Site
+from ...model.effect import Effect
+from ...model.parameter import Parameter
 from ..fitting.least_squares import Free
 from ..fitting.noise_floor import coverage
 from ..forward.predictor import Model, Predictor

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...effects.engine.registry import form_of
-from ...effects.engine.specification import Effect
+from ...model.effect import Effect
 from ..fitting.least_squares import Fit
 from .candidates import READ_OFF, is_spatial
 from .direct_estimates import coarsest

@@ -12,7 +12,7 @@ from functools import partial
 import numpy as np
 
 from ...effects.engine.registry import library
-from ...effects.engine.specification import Effect
+from ...model.effect import Effect
 from ..dataset.rig import Rig
 from ..fitting.heteroscedastic_noise import trembling
 from ..fitting.least_squares import FRICTION, LEVEL, Fit, base_numbers, fit, held_out

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ...effects.engine.specification import Effect
+from ...model.effect import Effect
 from ..fitting.least_squares import Share
 from ..forward.contact_phases import load_of
 from ..forward.predictor import Model

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from ...effects.engine.registry import form_of
-from ...effects.engine.specification import Effect
+from ...model.effect import Effect
 from ..fitting.least_squares import FRICTION, Fit, Free, Share, derivatives, fit, held_out, value_of
 from ..forward.predictor import Model, Predictor
 from .candidates import READ_OFF, Candidate, Scales, is_spatial

@@ -8,12 +8,14 @@ from dataclasses import replace
 
 import numpy as np
 
+from ...effects.engine.sensor_effects import mounted_texels
 from ...geometry.bvh import Tree
 from ...geometry.contact_points import ContactPoints
 from ...geometry.mesh import TriangleMesh, vertex_normals
 from ...geometry.texels import Texels
 from ...laws.contact import SolverModel
-from ...model.scenario import Deformation, Scenario
+from ...model.deformation import Deformation
+from ...model.scenario import Scenario
 from .deformation import SampleWindow, SurfaceMotion, corners_of, point_speed_bound, stack_windows, vertex_speed_bound, window
 
 
@@ -133,7 +135,7 @@ class DeformingSurfaces:
             return None
         found = window(known.times, known.values, moments)
         sensor, center = self._sensors[index], self._sensor_center[index]
-        bent = [replace(sensor, texels=sensor.texels.with_frames(frames)).mounted for frames in found.samples]
+        bent = [mounted_texels(replace(sensor, texels=sensor.texels.with_frames(frames))) for frames in found.samples]
         rows = [point_rows(texels, self._points[index], center) for texels in bent]
         return found._replace(samples=np.stack(rows))
 

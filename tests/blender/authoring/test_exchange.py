@@ -12,7 +12,7 @@ from blender_scenes import grid
 from palpate.addon.authoring import exchange
 from palpate.core.effects.engine import registry
 from palpate.core.gap.calibration.stiffness import texel_stiffness
-from palpate.core.model.scenario import SensorParameters
+from palpate.core.model.sensor_parameters import SensorParameters
 
 
 def sensor(**values):

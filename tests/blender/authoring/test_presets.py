@@ -13,7 +13,7 @@ from palpate.addon.authoring import sensors
 from palpate.addon.scene import meshes, scene_reader
 from palpate.addon.timeline import live_cache
 from palpate.core.errors import SensorError
-from palpate.core.model.scenario import SensorParameters
+from palpate.core.model.sensor_parameters import SensorParameters
 
 PRESETS = sorted((sensors.PRESETS / "palpate" / "sensor").glob("*.py"))
 

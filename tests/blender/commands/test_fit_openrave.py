@@ -9,7 +9,7 @@ from blender_scenes import press, save
 from palpate.commands import main
 from palpate.core.gap.calibration.friction import steady_friction
 from palpate.core.io.openrave import read_openrave
-from palpate.core.model.scenario import SensorParameters
+from palpate.core.model.sensor_parameters import SensorParameters
 
 
 def test_stiffness_from_foam(tmp_path, capfd):

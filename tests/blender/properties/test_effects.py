@@ -11,6 +11,7 @@ from palpate.addon.properties.properties import effect_stack
 from palpate.addon.scene import scene_reader
 from palpate.addon.timeline import live_cache, playback, staleness
 from palpate.core.effects.engine.registry import effect, library
+from palpate.core.effects.engine.sensor_effects import check_scenario
 from palpate.core.errors import EffectError
 from palpate.core.jobs.job_runner import drive
 
@@ -125,7 +126,7 @@ def test_a_sensor_with_an_effect_out_of_bounds_says_where():
     bpy.ops.palpate.effect_add(effect="offset")
     pad.palpate.effects[0].offset_common_offset = 1e9
     with pytest.raises(EffectError, match="offset of effect 'offset' \\(common\\) of sensor 'Pad' is 1e\\+09 unit"):
-        drive(scene_reader.sample_scenario(scene))[0].check()
+        check_scenario(drive(scene_reader.sample_scenario(scene))[0])
 
 
 def test_settings_tell_stacks_apart(pad):

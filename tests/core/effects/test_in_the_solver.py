@@ -10,7 +10,10 @@ from trimesh.creation import icosphere
 
 from palpate.core.effects.engine.binding import forces
 from palpate.core.effects.engine.registry import effect, library
-from palpate.core.model.scenario import Painted, SensorParameters
+from palpate.core.effects.engine.sensor_effects import check_scenario, mounted_texels
+from palpate.core.errors import EffectError
+from palpate.core.model.effect import Effect
+from palpate.core.model.sensor_parameters import Painted, SensorParameters
 from palpate.core.response.readings import respond
 from palpate.core.solver.simulation import Simulation, run
 
@@ -45,7 +48,7 @@ def test_a_tilted_sensor_is_pressed_harder_at_one_side():
     force = run(tilted).sensors["pad"].normal_force[4]
     expected = 1000.0 * np.maximum(0.002 - sensor.texels.position[:, 0] * np.sin(0.05), 0.0)
     np.testing.assert_allclose(force, expected, rtol=1e-9)
-    np.testing.assert_allclose(sensor.mounted.position[:, 2], -sensor.texels.position[:, 0] * np.sin(0.05), atol=1e-15)
+    np.testing.assert_allclose(mounted_texels(sensor).position[:, 2], -sensor.texels.position[:, 0] * np.sin(0.05), atol=1e-15)
 
 
 def test_readings_of_a_run_are_those_of_the_whole_signal():
@@ -188,3 +191,14 @@ def test_a_sticky_pad_holds_a_light_cube_back():
     felt = run(with_effects(scenario, effect("adhesion", "unloading", pull=0.3, depth=5e-5))).sensors["pad"].normal_force
     assert felt.min() < -0.15
     assert (felt[-1] == 0.0).all()
+
+
+@pytest.mark.parametrize("at", [0, 1, 2])
+def test_the_effects_of_every_sensor_are_checked(at):
+    """Whatever the position of the sensor among the others."""
+    scenario = press(frames=2)
+    sensors = [replace(scenario.sensors[0], name=name) for name in ("first", "second", "third")]
+    check_scenario(replace(scenario, sensors=tuple(sensors)))
+    sensors[at] = replace(sensors[at], effects=(Effect("noise", "white", {"spread": -1.0}),))
+    with pytest.raises(EffectError, match=f"of sensor '{sensors[at].name}'"):
+        check_scenario(replace(scenario, sensors=tuple(sensors)))

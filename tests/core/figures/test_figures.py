@@ -18,7 +18,7 @@ from palpate.core.figures.texel_numbers import texel_numbers
 from palpate.core.figures.time_curves import force_curves, time_curves
 from palpate.core.geometry.mesh import TriangleMesh
 from palpate.core.geometry.texels import texels_from_region
-from palpate.core.model.scenario import SensorParameters
+from palpate.core.model.sensor_parameters import SensorParameters
 from palpate.core.response import metrics
 
 

@@ -11,7 +11,7 @@ from palpate.core.gap.forward.predictor import Model, Predictor
 from palpate.core.gap.report import summary
 from palpate.core.gap.report.comparison import nrmse, without_friction
 from palpate.core.gap.selection.diagnosis import diagnose
-from palpate.core.model.scenario import SensorParameters
+from palpate.core.model.sensor_parameters import SensorParameters
 
 PARAMETERS = SensorParameters(k=1e4, cn=0.0, sigma0=5e3, sigma1=1.0, mus=0.6, mud=0.5, x0=0.02, ct=0.0)
 

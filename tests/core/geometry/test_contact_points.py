@@ -12,7 +12,7 @@ from palpate.core.errors import ParameterError
 from palpate.core.geometry.contact_points import contact_points
 from palpate.core.geometry.layout import GridLayout
 from palpate.core.geometry.texels import texels_from_region
-from palpate.core.model.scenario import SensorParameters
+from palpate.core.model.sensor_parameters import SensorParameters
 from palpate.core.solver.simulation import run
 
 

@@ -18,7 +18,7 @@ from palpate.core.io.export import export
 from palpate.core.io.recording_npz import save_recording
 from palpate.core.io.sensor_npz import load_sensor, save_sensor
 from palpate.core.jobs.job_runner import drive
-from palpate.core.model.scenario import Painted, SensorParameters
+from palpate.core.model.sensor_parameters import Painted, SensorParameters
 
 
 def put(folder, name, texels, painted=None, digest="d"):

@@ -20,7 +20,6 @@ import numpy as np
 import OpenEXR
 import pytest
 
-from palpate.core.effects.engine.specification import Effect
 from palpate.core.errors import FileError, PalpateError
 from palpate.core.geometry.layout import GridLayout, uv_layout
 from palpate.core.geometry.mesh import TriangleMesh
@@ -30,8 +29,10 @@ from palpate.core.io.bake_folder import Manifest, folder_names, frame_file, read
 from palpate.core.io.file_writing import atomic_write, remove_leftovers, writable_folder
 from palpate.core.io.recording_npz import load_recording, save_recording
 from palpate.core.io.tactile_exr import CHANNELS, describe, exr_channels, read_exr, write_exr, write_exrs
+from palpate.core.model.effect import Effect
 from palpate.core.model.recording import Frame, Recording, SensorFrame, SensorRecording
-from palpate.core.model.scenario import Painted, Sensor, SensorParameters
+from palpate.core.model.sensor import Sensor
+from palpate.core.model.sensor_parameters import Painted, SensorParameters
 
 on_linux = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="looks at Linux's /proc and /dev")
 

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from palpate.core.errors import FileError
 from palpate.core.io.openrave import OpenRaveSensor, openrave_xml, read_openrave, write_openrave
-from palpate.core.model.scenario import SensorParameters
+from palpate.core.model.sensor_parameters import SensorParameters
 
 TABLE_2 = """\
 <AttachedSensor>

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from palpate.core.effects.engine.registry import effect, library
 from palpate.core.errors import EffectError, FileError, ParameterError
 from palpate.core.io.sensor_toml import FORMAT, SensorModel, read_sensor, write_sensor
-from palpate.core.model.scenario import SensorParameters
+from palpate.core.model.sensor_parameters import SensorParameters
 
 SHAPE = {"grid": {"rows": 14, "columns": 6, "pitch": [0.0034, 0.0034]}, "thickness": 0.006}
 

@@ -6,7 +6,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from palpate.core.laws import contact
-from palpate.core.model.scenario import SensorParameters
+from palpate.core.model.sensor_parameters import SensorParameters
 
 PAPER = SensorParameters()  # Table 2; Fig. 7 was drawn with these and fn = 0.08 N
 ROW = contact.parameter_row(PAPER)

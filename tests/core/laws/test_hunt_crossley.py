@@ -11,7 +11,7 @@ from solver_scenes import GRAVITY, cube_on_pad, pad
 
 from palpate.core.errors import ParameterError
 from palpate.core.laws import contact
-from palpate.core.model.scenario import SensorParameters
+from palpate.core.model.sensor_parameters import SensorParameters
 from palpate.core.solver.simulation import run
 from palpate.core.solver.time_step_adviser import advise
 

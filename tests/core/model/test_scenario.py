@@ -10,8 +10,9 @@ from solver_scenes import cube_on_pad, pressed
 
 from palpate.core.errors import ParameterError
 from palpate.core.geometry.rotations import quaternions_from_vectors, rotation_matrices, rotation_vectors
+from palpate.core.model.motion import Motion
 from palpate.core.model.pose_interpolation import poses_at
-from palpate.core.model.scenario import Motion, SensorParameters
+from palpate.core.model.sensor_parameters import SensorParameters
 from palpate.core.solver.simulation import run
 from palpate.core.solver.time_step_adviser import LONGEST, advise, plan, stability_limit
 

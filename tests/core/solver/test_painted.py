@@ -8,7 +8,7 @@ import pytest
 from solver_scenes import box, cube_on_pad, pad, pressed
 
 from palpate.core.errors import ParameterError
-from palpate.core.model.scenario import Painted
+from palpate.core.model.sensor_parameters import Painted
 from palpate.core.solver.simulation import run
 from palpate.core.solver.time_step_adviser import advise
 

@@ -11,7 +11,11 @@ from solver_scenes import GRAVITY, LEVEL, about, box, cube_on_pad, free_body, pa
 
 from palpate.core.errors import PalpateError
 from palpate.core.geometry.rotations import quaternion_product, rotation_matrices
-from palpate.core.model.scenario import Body, Motion, Sensor, SensorParameters, Target
+from palpate.core.model.body import Body
+from palpate.core.model.motion import Motion
+from palpate.core.model.sensor import Sensor
+from palpate.core.model.sensor_parameters import SensorParameters
+from palpate.core.model.target import Target
 from palpate.core.solver.simulation import Simulation, run, solve
 
 STIFF_FRICTION = {"sigma0": 1e3, "sigma1": 10.0, "x0": 0.01}

@@ -8,7 +8,7 @@ from scipy.special import erf
 
 from palpate.core.effects.engine.binding import forces, friction
 from palpate.core.effects.engine.registry import effect, placed
-from palpate.core.model.scenario import SensorParameters
+from palpate.core.model.sensor_parameters import SensorParameters
 
 K = 1000.0
 SPRING = SensorParameters(k=K, cn=0.0)

@@ -9,9 +9,10 @@ import pytest
 from palpate.core.effects.engine import specification
 from palpate.core.effects.engine.binding import Pad, Reader, forces, friction, readings
 from palpate.core.effects.engine.registry import check, effect, form_of, from_dict, kind_of, library, placed, to_dict
-from palpate.core.effects.engine.specification import Effect, Site
+from palpate.core.effects.engine.specification import Site
 from palpate.core.errors import EffectError
-from palpate.core.model.scenario import SensorParameters
+from palpate.core.model.effect import Effect
+from palpate.core.model.sensor_parameters import SensorParameters
 
 FORMS = [(kind.name, form.name) for kind in library().values() for form in kind.forms]
 every_form = pytest.mark.parametrize(("name", "form"), FORMS, ids=["-".join(names) for names in FORMS])

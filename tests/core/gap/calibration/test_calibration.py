@@ -11,7 +11,7 @@ from palpate.core.errors import FileError, ParameterError
 from palpate.core.gap.calibration.friction import FrictionData, fit_friction, friction_over_time, read_friction, steady_friction
 from palpate.core.gap.calibration.stiffness import FoamData, fit_stiffness, read_foam, texel_stiffness
 from palpate.core.io.csv_table import read_columns
-from palpate.core.model.scenario import SensorParameters
+from palpate.core.model.sensor_parameters import SensorParameters
 
 PAPER = SensorParameters(sigma0=1.0, sigma1=0.1, x0=0.3, ct=0.01, mus=0.435, mud=0.23)
 LOAD = 0.08

@@ -9,7 +9,7 @@ import pytest
 from palpate.core.gap.dataset.rig import Rig, Trial, grid_texels
 from palpate.core.gap.fitting.intervals import NORMAL_REACH, _inverse, _sandwich
 from palpate.core.gap.forward.predictor import Model, Predictor
-from palpate.core.model.scenario import SensorParameters
+from palpate.core.model.sensor_parameters import SensorParameters
 
 
 def test_what_only_acts_as_a_sum_is_told_by_nothing():

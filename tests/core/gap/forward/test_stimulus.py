@@ -13,7 +13,7 @@ from palpate.core.gap.fitting.noise_floor import coverage
 from palpate.core.gap.forward.predictor import Predictor
 from palpate.core.gap.forward.stimulus import stimulus_of
 from palpate.core.geometry.mesh import checked_mesh
-from palpate.core.model.scenario import SensorParameters
+from palpate.core.model.sensor_parameters import SensorParameters
 
 RADIUS = 0.008
 

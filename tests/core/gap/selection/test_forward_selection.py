@@ -14,7 +14,7 @@ from palpate.core.gap.selection.diagnosis import free_friction
 from palpate.core.gap.selection.direct_estimates import few_levels, growing
 from palpate.core.gap.selection.forward_selection import FORCES, READINGS, Account, Gain, Ground, Step, friction_kinds
 from palpate.core.gap.selection.screening import Views
-from palpate.core.model.scenario import SensorParameters
+from palpate.core.model.sensor_parameters import SensorParameters
 
 WITH_FORCES, READ_ALONE = (Ground(np.full(2, 9.0), np.ones(2), np.array([900.0, count])) for count in (300.0, 0.0))
 

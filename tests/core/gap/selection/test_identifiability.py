@@ -24,7 +24,7 @@ from palpate.core.gap.selection.identifiability import (
     nearly_alike,
     untold,
 )
-from palpate.core.model.scenario import SensorParameters
+from palpate.core.model.sensor_parameters import SensorParameters
 
 PROGRAMMES = {
     "ramp": ([0, 1], [0, 1]),

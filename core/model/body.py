@@ -1,0 +1,47 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A rigid body."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from .drive import Drive
+from .motion import Motion
+
+
+@dataclass(frozen=True)
+class Body:
+    """A rigid body: free when forces move it, driven when it has a drive, else keyframed.
+
+    Attributes
+    ----------
+    name : str
+    motion : Motion
+        Of a keyframed body: its path. Of a driven body: its path without the way of its drive. Of a free body: the first
+        sample is where it starts.
+    free : bool
+        True when forces move it, False when `motion` does.
+    drive : Drive or None
+    mass : float, kg
+    center_of_mass : (3,) float, metres, body frame
+    inertia : (3, 3) float, kg·m², about the centre of mass, body axes
+    velocity, angular_velocity : (3,) float, m/s and rad/s, world frame
+        A free body's start.
+    """
+
+    name: str
+    motion: Motion
+    free: bool = False
+    mass: float = 1.0
+    center_of_mass: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    inertia: np.ndarray = field(default_factory=lambda: np.eye(3))
+    velocity: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    angular_velocity: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    drive: Drive | None = None
+
+    @property
+    def moved_by_forces(self) -> bool:
+        """Whether forces have a say in where it goes: it is free or driven."""
+        return self.free or self.drive is not None

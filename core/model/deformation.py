@@ -1,0 +1,42 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A surface that changes its shape over time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import SceneError
+
+
+@dataclass(frozen=True)
+class Deformation:
+    """A surface that changes its shape in its body's frame; linear between samples, held before the first and after the last.
+
+    Attributes
+    ----------
+    times : (m,) float, seconds, increasing
+    values : (m, n, c) float
+        Of a target: position of each vertex of its mesh, metres. Of a sensor: position (m), normal and tangent of each texel.
+    """
+
+    times: np.ndarray
+    values: np.ndarray
+
+    def extended(self, time: float, values: np.ndarray) -> Deformation:
+        """Return this with one more sample at its end and all but the last two left out (the timeline looks only ahead)."""
+        return Deformation(np.append(self.times[-1:], time), np.concatenate([self.values[-1:], values[None]]))
+
+    def check(self, name: str, shape: tuple[int, ...]) -> None:
+        """Raise :class:`SceneError` when the samples do not fit a surface of `shape`, or one is no number."""
+        if self.values.shape != (len(self.times), *shape):
+            raise SceneError(
+                f"'{name}' deforms with {self.values.shape[1]} vertices and has {shape[0]}: "
+                "use modifiers that keep the number of vertices."
+            )
+        if not np.isfinite(self.values).all():
+            time = self.times[np.flatnonzero(~np.isfinite(self.values).all(axis=(1, 2)))[0]]
+            raise SceneError(
+                f"A vertex of '{name}' is NaN or infinite {time:g} s after the first frame: check what deforms it."
+            )
