@@ -1,2 +1,18 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Between Blender and core: properties, reading a scene, writing results back, the timeline."""
+"""Connects Blender with core: reads scenes, runs and bakes simulations, and shows, renders and exports what they give.
+
+The packages below stand in the order of their imports: each uses only those before it.
+"""
+
+__all__ = [
+    "session",
+    "properties",
+    "scene",
+    "authoring",
+    "timeline",
+    "bake",
+    "display",
+    "render",
+    "measured",
+    "events",
+]

@@ -1,6 +1,22 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Numbers in, numbers out: the part of Palpate that never heard of Blender.
+"""Computes on arrays, without Blender: contact forces of tactile sensors, their files and figures, and fits to measurements.
 
-Importing this package is cheap; numba is loaded only by the modules that hold kernels (:mod:`.bvh`, :mod:`.contact`,
-:mod:`.simulation`). SI units, float64, right-handed frames and quaternions ``(w, x, y, z)`` throughout.
+The packages below stand in the order of their imports: each uses only those before it. Importing `core` is cheap; numba, scipy,
+matplotlib and trimesh are loaded by the modules that use them. All quantities are in SI units and float64; frames are
+right-handed and quaternions are ordered (w, x, y, z).
 """
+
+__all__ = [
+    "errors",
+    "compiled",
+    "jobs",
+    "geometry",
+    "model",
+    "laws",
+    "effects",
+    "response",
+    "solver",
+    "io",
+    "figures",
+    "gap",
+]
