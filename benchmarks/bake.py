@@ -77,8 +77,8 @@ def cached_frame(texels: int) -> float:
             scene.frame_set(frame - 1)
             start = time.perf_counter()
             scene.frame_set(frame)
-            pictures = overlays.pictures_of(scene, run, run.frames[frame])  # in the background nothing is drawn
-            overlays.board_of(scene, run, run.frames[frame])
+            pictures = overlays.sensor_overlays(scene, run, run.frames[frame])  # in the background nothing is drawn
+            overlays.inset_content(scene, run, run.frames[frame])
             times.append(time.perf_counter() - start - plain)
             if live_cache.get(scene) is not run or not pictures or playback.status(scene).frame is None:
                 raise RuntimeError("the frame was computed anew or not shown: this would not be the same work")
@@ -114,7 +114,7 @@ def _in_turn(scene, rounds: int) -> tuple[float, float]:
         start = time.perf_counter()
         scenario = drive(bake(scene)).scenario
         middle = time.perf_counter()
-        bake_files.settle()
+        bake_files.wait_for_removals()
         begun = time.perf_counter()
         run(scenario)
         times.append((middle - start, time.perf_counter() - begun))

@@ -49,8 +49,8 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.sensor and (arguments.save or arguments.save_as):
         print("palpate bake: --sensor bakes a part of the scene, which cannot be saved: leave one of them out", file=sys.stderr)
         return 2
-    with console.quiet():
-        bpy = blender.start()
+    with console.blender_output_hidden():
+        bpy = blender.start_blender()
         blender.open_blend(arguments.scene)
         scene = bpy.context.scene
         own_start = scene.frame_start
@@ -64,8 +64,8 @@ def run(arguments: argparse.Namespace) -> int:
             _leave_saved_bake(bpy, scene, arguments.scene)
         if arguments.sensor:
             _read_out_only(scene, arguments.sensor)
-        baked = bake_with_bar(scene, into_scene=bool(arguments.save or arguments.save_as))
-        saved = save(arguments)
+        baked = bake_with_progress(scene, into_scene=bool(arguments.save or arguments.save_as))
+        saved = save_scene(arguments)
     print(report(baked))
     if scene.frame_start != own_start:
         print(f"note: bodies and bristles started at frame {scene.frame_start}, not at the scene's {own_start}")
@@ -77,7 +77,7 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def bake_with_bar(scene, into_scene: bool = True):
+def bake_with_progress(scene, into_scene: bool = True):
     """Bake a scene with a progress bar on stderr; Ctrl-C leaves an earlier bake as it was."""
     from ..addon.bake import bake
 
@@ -101,12 +101,12 @@ def report(baked) -> str:
     texels = {sensor.name: sensor.texels for sensor in baked.scenario.sensors}
     rows = [("sensor", "texels", "peak texel", "peak normal", "peak shear", "normal at end")]
     for name in baked.folders:
-        felt = recording.sensors[name]
-        normal = felt.normal_force.sum(axis=1)
-        shear = np.linalg.norm(net_shear(felt, texels[name]), axis=1)
-        peaks = (felt.normal_force.max(initial=0.0), normal.max(), shear.max(), normal[-1])
-        rows.append((name, str(felt.normal_force.shape[1]), *(_newtons(value) for value in peaks)))
-    lines += ["", console.table(rows, "<>>>>>")]
+        readings = recording.sensors[name]
+        normal = readings.normal_force.sum(axis=1)
+        shear = np.linalg.norm(net_shear(readings, texels[name]), axis=1)
+        peaks = (readings.normal_force.max(initial=0.0), normal.max(), shear.max(), normal[-1])
+        rows.append((name, str(readings.normal_force.shape[1]), *(_newtons(value) for value in peaks)))
+    lines += ["", console.text_table(rows, "<>>>>>")]
     lines += [f"warning: {warning}" for warning in recording.warnings]
     return "\n".join(lines)
 
@@ -115,7 +115,7 @@ def _newtons(value: float) -> str:
     return f"{value if value > 1e-9 else 0.0:.4f} N"
 
 
-def save(arguments: argparse.Namespace) -> Path | None:
+def save_scene(arguments: argparse.Namespace) -> Path | None:
     """Save the open scene where the user wants it, if anywhere."""
     if not (arguments.save or arguments.save_as):
         return None

@@ -19,7 +19,7 @@ _SEEKABLE_END = b"\xb1\xea\x92\x8f"
 """Last bytes of Zstandard's seekable format, in which Blender compresses."""
 
 
-def start():
+def start_blender():
     """Start Blender where there is none yet; return bpy with the add-on's classes.
 
     Raises
@@ -34,7 +34,7 @@ def start():
             f"This Python has no Blender ({error}): run 'pip install bpy', or 'blender --command palpate …' instead."
         ) from error
     if not bpy.app.binary_path:  # bpy as a module; Blender itself ends in its own way
-        console.hush_at_exit()
+        console.silence_at_exit()
     if not hasattr(bpy.types.Object, "palpate"):
         # The package's root: "palpate" from pip, "bl_ext.<repository>.palpate" as an extension.
         importlib.import_module(__package__.rpartition(".")[0]).register()

@@ -55,7 +55,7 @@ class Interrupt:
 
 
 @contextmanager
-def quiet() -> Iterator[None]:
+def blender_output_hidden() -> Iterator[None]:
     """Keep Blender's own words off the terminal while it works.
 
     Most come from C, so the descriptors themselves are turned away, into a file that nobody sees unless something unexpected
@@ -98,7 +98,7 @@ def quiet() -> Iterator[None]:
 
 
 @functools.cache
-def hush_at_exit() -> None:
+def silence_at_exit() -> None:
     """Keep what Blender says about its own memory after everything is done off the terminal."""
 
     def hush() -> None:
@@ -127,7 +127,7 @@ def _descriptor(stream) -> int | None:
 
 
 @contextmanager
-def stop_at_once(words: str, clean_up: Callable[[], object]) -> Iterator[None]:
+def exit_on_interrupt(words: str, clean_up: Callable[[], object]) -> Iterator[None]:
     """Let Ctrl-C end the process in the middle of a call into Blender, a render above all.
 
     Python tells of an interrupt only once the call has returned, a minute later. Its signal handler writes to a socket at once,
@@ -166,7 +166,7 @@ def progress_bar(label: str, total: int, unit: str = "frame"):
     return tqdm(total=total, desc=label, unit=unit, file=sys.stderr, leave=False, disable=None, dynamic_ncols=True)
 
 
-def table(rows: Sequence[Sequence[str]], align: str) -> str:
+def text_table(rows: Sequence[Sequence[str]], align: str) -> str:
     """Return rows of words as lines with even columns; `align` has "<" or ">" for each column."""
     widths = [max(len(row[i]) for row in rows) for i in range(len(align))]
     lines = []

@@ -16,7 +16,7 @@ from ..core.figures.time_curves import force_curves
 from ..core.io.file_writing import remove_leftovers, writable_folder
 from ..core.response import metrics
 from . import blender, console
-from .bake import bake_with_bar, report
+from .bake import bake_with_progress, report
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -42,8 +42,8 @@ def _positive(text: str) -> int:
 def run(arguments: argparse.Namespace) -> int:
     began = time.monotonic()
     folder = writable_folder(arguments.out, create=True)
-    with console.quiet():
-        bpy = blender.start()
+    with console.blender_output_hidden():
+        bpy = blender.start_blender()
         from ..sample_blends import demo
 
         bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
@@ -52,21 +52,21 @@ def run(arguments: argparse.Namespace) -> int:
         demo.frame_picture(scene, arguments.size)
         blend = folder / "demo.blend"
         blender.save_blend(blend, backup=False)  # the bake folder is relative to it
-        baked = bake_with_bar(scene)
+        baked = bake_with_progress(scene)
         scene.frame_set(demo.PICTURE_FRAME)
         blender.save_blend(blend, backup=False)
     recording = baked.recording
     sensors = {sensor.name: sensor for sensor in baked.scenario.sensors if sensor.readout}
     texels = {name: sensor.texels for name, sensor in sensors.items()}
-    look = FigureStyle(scene.palpate.color_map, limit=demo.RANGE, dpi=200)
+    style = FigureStyle(scene.palpate.color_map, limit=demo.RANGE, dpi=200)
     required = demo.CUBE_MASS * float(np.linalg.norm(baked.scenario.gravity))
 
     strip, curves, picture = folder / "tactile-strip.png", folder / "forces.png", folder / "scene.png"
-    tactile_strip(strip, recording, texels, demo.STRIP_FRAMES, look)
+    tactile_strip(strip, recording, texels, demo.STRIP_FRAMES, style)
     parameters = {name: sensor.parameters for name, sensor in sensors.items()}
-    force_curves(curves, recording, texels, parameters, {demo.PAD_B: required}, look)
+    force_curves(curves, recording, texels, parameters, {demo.PAD_B: required}, style)
     if not arguments.no_render:
-        _picture(scene, picture, recording, sensors, texels, arguments, look)
+        _picture(scene, picture, recording, sensors, texels, arguments, style)
 
     print(report(baked))
     print()
@@ -88,7 +88,7 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _picture(scene, path: Path, recording, sensors, texels, arguments, look) -> None:
+def _picture(scene, path: Path, recording, sensors, texels, arguments, style) -> None:
     """Render the scene and put the colour bar, tactile images and labels on it."""
     from ..addon.render import render
     from ..sample_blends import demo
@@ -96,14 +96,14 @@ def _picture(scene, path: Path, recording, sensors, texels, arguments, look) -> 
     stopped = "palpate demo: stopped while rendering; the bake and the scene are finished."
     with (
         console.progress_bar("Rendering the picture", 1, unit="picture") as bar,
-        console.stop_at_once(stopped, lambda: remove_leftovers(path.parent)),
-        console.quiet(),
+        console.exit_on_interrupt(stopped, lambda: remove_leftovers(path.parent)),
+        console.blender_output_hidden(),
     ):
         render.render_frame(scene, path, demo.PICTURE_FRAME, samples=arguments.samples, size=arguments.size)
         scene.frame_set(demo.PICTURE_FRAME)
         labels = _labels(scene, recording, sensors, demo)
         bar.update()
-    label_picture(path, path, recording, texels, demo.PICTURE_FRAME, labels=labels, style=look)
+    label_picture(path, path, recording, texels, demo.PICTURE_FRAME, labels=labels, style=style)
 
 
 def _labels(scene, recording, sensors, demo) -> list[Label]:
@@ -121,18 +121,18 @@ def _labels(scene, recording, sensors, demo) -> list[Label]:
     }
     labels = [Label("\nArrows: the force with\nwhich a pad pushes back", (0.315, 0.14))]
     for name, text in words.items():
-        box = np.array([render.picture_position(scene, point) for point in render.corners([scene.objects[name]])])
+        box = np.array([render.image_position(scene, point) for point in render.bounding_box_corners([scene.objects[name]])])
         labels.append(Label(text, (float(box[:, 0].min()), float(box[:, 1].max()) + 0.035)))
     return labels
 
 
 def _slide(recording, sensor) -> str:
     """Return how friction builds up under the ball until it slips, as a table."""
-    felt, mu = recording.sensors[sensor.name], sensor.parameters
-    normal = felt.normal_force.sum(axis=1)
-    shear = np.linalg.norm(metrics.net_shear(felt, sensor.texels), axis=1)
-    share = metrics.mobilised_friction(felt, sensor.texels, mu.mus)
-    slipping = metrics.slipping(felt, mu)
+    readings, mu = recording.sensors[sensor.name], sensor.parameters
+    normal = readings.normal_force.sum(axis=1)
+    shear = np.linalg.norm(metrics.net_shear(readings, sensor.texels), axis=1)
+    share = metrics.mobilised_friction(readings, sensor.texels, mu.mus)
+    slipping = metrics.slipping(readings, mu)
     rows = [("frame", "time", "normal", "shear", "shear / µs·normal", "texels slipping")]
     touching = np.flatnonzero(normal > 0)
     for i in touching[:: max(1, len(touching) // 10)]:
@@ -143,7 +143,7 @@ def _slide(recording, sensor) -> str:
                 f"{normal[i]:.4f} N",
                 f"{shear[i]:.4f} N",
                 f"{share[i]:.2f}",
-                f"{np.count_nonzero(slipping[i])} of {np.count_nonzero(felt.contact[i])}",
+                f"{np.count_nonzero(slipping[i])} of {np.count_nonzero(readings.contact[i])}",
             )
         )
-    return f"{sensor.name} under the ball:\n" + console.table(rows, ">>>>>>")
+    return f"{sensor.name} under the ball:\n" + console.text_table(rows, ">>>>>>")

@@ -9,7 +9,7 @@ from ..core.figures.figure_style import FigureStyle
 from ..core.io.bake_reader import Bake, read_bake
 from ..core.io.export import KINDS, export
 from ..core.jobs.job_runner import drive
-from . import console, looks
+from . import console, figure_options
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -19,14 +19,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--out", metavar="DIR", default="palpate-export", help="folder to write to (default: %(default)s)")
     parser.add_argument("--sensor", metavar="NAME", action="append", help="only this sensor; may be given again")
-    looks.add_arguments(parser)
+    figure_options.add_arguments(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
     bake = find_bake(arguments.bake)
     if arguments.sensor:
         bake = bake.select(arguments.sensor)
-    look: FigureStyle = looks.of(arguments)
+    style: FigureStyle = figure_options.figure_style_from(arguments)
     with console.progress_bar("export", len(bake.texels), unit="sensor") as bar:
 
         def show(name: str) -> None:
@@ -34,7 +34,7 @@ def run(arguments: argparse.Namespace) -> int:
             bar.set_description(name, refresh=False)
             bar.update()
 
-        written = drive(export(bake, arguments.format, arguments.out, look), show)
+        written = drive(export(bake, arguments.format, arguments.out, style), show)
     for path in written:
         print(path)
     return 0
@@ -52,9 +52,9 @@ def find_bake(where: str) -> Bake:
         return read_bake(where)
     from . import blender
 
-    with console.quiet():
-        bpy = blender.start()
+    with console.blender_output_hidden():
+        bpy = blender.start_blender()
         blender.open_blend(where)
         from ..addon.render import figure_export
 
-        return figure_export.bake_of(bpy.context.scene)
+        return figure_export.read_scene_bake(bpy.context.scene)

@@ -57,7 +57,7 @@ def _stiffness(arguments: argparse.Namespace) -> None:
         ("with offset", f"{fit.k_offset.value:.4g} N/m", f"{fit.k_offset.low:.4g} to {fit.k_offset.high:.4g}", _pascals(fit)),
     ]
     print(f"{len(data.compression)} measurements from '{arguments.file}', {arguments.texels} texels on {arguments.area:g} m²\n")
-    print(console.table(rows, "<>>>"))
+    print(console.text_table(rows, "<>>>"))
     if fit.offset_is_real and fit.offset.value < 0:
         print(f"\nThe foam gives way by {fit.dead_zone * 1e3:.3g} mm before it carries: a dead zone, which the model's line")
         print("through zero does not have; add the effect dead-zone to the sensor for it.")
@@ -82,7 +82,7 @@ def _friction(arguments: argparse.Namespace) -> None:
     rows = [("parameter", "value", "95 % interval", "unit")]
     for name, estimate in fit.estimates.items():
         rows.append((name, f"{estimate.value:.4g}", f"{estimate.low:.4g} to {estimate.high:.4g}", UNITS[name]))
-    print(console.table(rows, "<>><"))
+    print(console.text_table(rows, "<>><"))
     print(f"\nroot mean square of what is left: {fit.residual:.3g} N")
     if fit.untold:
         print(f"These measurements do not tell {', '.join(fit.untold)}: add some at other velocities.")

@@ -56,23 +56,23 @@ def run(arguments: argparse.Namespace) -> int:
         owner = "base model" if one.effect < 0 else result.best.model.effects[one.effect].name
         rows.append((owner, one.name, summary.interval_text(one)))
     print()
-    print(console.table(rows, "<<<"))
+    print(console.text_table(rows, "<<<"))
     print()
     for text in summary.summary(result)["warnings"]:
         print(f"note: {text}")
     print(f"report: {folder / 'report.html'}")
     print(f"sensor: {folder / 'sensor.toml'}")
     if arguments.blend:
-        print(f"saved:  {_into_scene(arguments.blend, arguments.sensor, amended(result))}")
+        print(f"saved:  {_put_into_scene(arguments.blend, arguments.sensor, amended(result))}")
     return 0
 
 
-def _into_scene(blend: str, name: str | None, sensor) -> Path:
+def _put_into_scene(blend: str, name: str | None, sensor) -> Path:
     """Put the amended sensor on a sensor of a .blend and save it."""
     from . import blender
 
-    with console.quiet():
-        bpy = blender.start()
+    with console.blender_output_hidden():
+        bpy = blender.start_blender()
         blender.open_blend(blend)
         from ..addon.measured import gap_results
 

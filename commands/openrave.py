@@ -42,7 +42,7 @@ def _show(arguments: argparse.Namespace) -> None:
     for sensor in sensors:
         values = [getattr(sensor.parameters, key) for key in NUMBERS]
         rows.append((sensor.name, sensor.link, f"{sensor.parameters.max_penetration / 2:g}", *(f"{v:g}" for v in values)))
-    print(console.table(rows, "<<" + ">" * (1 + len(NUMBERS))))
+    print(console.text_table(rows, "<<" + ">" * (1 + len(NUMBERS))))
     for sensor in sensors:
         _say_missing(sensor)
 
@@ -54,8 +54,8 @@ def _say_missing(sensor: OpenRaveSensor) -> None:
 
 def _import(arguments: argparse.Namespace) -> None:
     sensor = _chosen(read_openrave(arguments.file), arguments.name, arguments.file)
-    with console.quiet():
-        bpy = blender.start()
+    with console.blender_output_hidden():
+        bpy = blender.start_blender()
         blender.open_blend(arguments.scene)
         from ..addon.authoring import exchange
 
@@ -82,8 +82,8 @@ def _chosen(sensors: list[OpenRaveSensor], name: str | None, file: str) -> OpenR
 
 
 def _export(arguments: argparse.Namespace) -> None:
-    with console.quiet():
-        bpy = blender.start()
+    with console.blender_output_hidden():
+        bpy = blender.start_blender()
         blender.open_blend(arguments.scene)
         from ..addon.authoring import exchange
 

@@ -23,8 +23,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     began = time.monotonic()
     folder = writable_folder(arguments.out, create=True)
-    with console.quiet():
-        blender.start()
+    with console.blender_output_hidden():
+        blender.start_blender()
         from ..paper import experiments, page
 
         wanted = arguments.only or list(experiments.EXPERIMENTS)
@@ -55,7 +55,7 @@ def report(chapters) -> str:
         rows = [(row.what, row.printed, row.expected, row.measured, MARKS[row.kept]) for row in chapter.rows]
         lines += [
             f"{chapter.title} ({chapter.where})",
-            console.table([("", "paper", "expected", "here", ""), *rows], "<<<<<"),
+            console.text_table([("", "paper", "expected", "here", ""), *rows], "<<<<<"),
             "",
         ]
     judged = [row.kept for chapter in chapters for row in chapter.rows if row.kept is not None]

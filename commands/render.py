@@ -8,7 +8,7 @@ import argparse
 from ..core.figures.figure_canvas import FILE_TYPES as FORMATS
 from ..core.io.file_writing import remove_leftovers, writable_folder
 from ..core.jobs.job_runner import drive
-from . import blender, console, looks
+from . import blender, console, figure_options
 
 FIGURES = ("scene", "strip", "curves", "numbers", "video")
 
@@ -34,7 +34,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--view", metavar=("AZIMUTH", "ELEVATION"), nargs=2, type=float, help="of the camera, degrees")
     parser.add_argument("--own-camera", action="store_true", help="leave the scene's camera where it is")
     parser.add_argument("--transparent", action="store_true", help="no background")
-    looks.add_arguments(parser)
+    figure_options.add_arguments(parser)
 
 
 def _positive(text: str) -> int:
@@ -46,14 +46,14 @@ def _positive(text: str) -> int:
 
 def run(arguments: argparse.Namespace) -> int:
     folder = writable_folder(arguments.out, create=True)
-    with console.quiet():
-        bpy = blender.start()
+    with console.blender_output_hidden():
+        bpy = blender.start_blender()
         from ..addon.render import figure_export
 
         blender.open_blend(arguments.scene)
         scene = bpy.context.scene
-        wish = figure_export.Wish(
-            look=looks.of(arguments, **vars(figure_export.look_of(scene))),
+        request = figure_export.FigureRequest(
+            style=figure_options.figure_style_from(arguments, **vars(figure_export.scene_style(scene))),
             frames=tuple(arguments.frame or ()),
             sensors=tuple(arguments.sensor or ()),
             engine=arguments.engine,
@@ -68,7 +68,7 @@ def run(arguments: argparse.Namespace) -> int:
         stopped = "palpate render: stopped; figures that were finished are there."
         with (
             console.progress_bar("render", 1, unit="step") as bar,
-            console.stop_at_once(stopped, lambda: remove_leftovers(folder)),
+            console.exit_on_interrupt(stopped, lambda: remove_leftovers(folder)),
         ):
 
             def show(progress) -> None:
@@ -77,7 +77,7 @@ def run(arguments: argparse.Namespace) -> int:
                 bar.set_description(f"{progress.stage}, frame {progress.frame}", refresh=False)
                 bar.update(progress.done - bar.n)
 
-            written = drive(figure_export.make(scene, folder, wish), show)
+            written = drive(figure_export.make_figures(scene, folder, request), show)
     for path in written:
         print(path)
     return 0

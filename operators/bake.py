@@ -7,10 +7,10 @@ from ..addon.bake import scene_writer
 from ..addon.bake.bake import bake
 from ..addon.display import bake_display
 from ..addon.timeline import playback
-from . import support, working
+from . import modal_job, support
 
 
-class PALPATE_OT_bake(working.Working, bpy.types.Operator):
+class PALPATE_OT_bake(modal_job.ModalJob, bpy.types.Operator):
     """Compute all frames of the scene and write tactile images, recordings, force arrows and heat maps. ESC stops it and keeps
     what was there before"""
 
@@ -23,7 +23,7 @@ class PALPATE_OT_bake(working.Working, bpy.types.Operator):
         if context.scene is None or not playback.has_roles(context.scene):
             cls.poll_message_set("No object has a role: make a sensor and a target first")
             return False
-        return support.idle(cls)
+        return support.poll_idle(cls)
 
     stopped = "Bake stopped; what was there before is unchanged"
 
@@ -39,7 +39,7 @@ class PALPATE_OT_bake(working.Working, bpy.types.Operator):
         self.report({"INFO"}, f"Baked frames {frames[0]} to {frames[-1]} of {names}")
 
 
-class PALPATE_OT_catch_up(working.Working, bpy.types.Operator):
+class PALPATE_OT_catch_up(modal_job.ModalJob, bpy.types.Operator):
     """Compute the frames that are missing up to the present one, and show it. ESC stops and keeps what was computed"""
 
     bl_idname = "palpate.catch_up"
@@ -52,7 +52,7 @@ class PALPATE_OT_catch_up(working.Working, bpy.types.Operator):
         if context.scene is None or not playback.missing(context.scene):
             cls.poll_message_set("Nothing is missing up to the present frame")
             return False
-        return support.idle(cls)
+        return support.poll_idle(cls)
 
     def job(self, context):
         self._was_playing = context.screen is not None and context.screen.is_animation_playing
@@ -70,7 +70,7 @@ class PALPATE_OT_catch_up(working.Working, bpy.types.Operator):
             bpy.ops.screen.animation_play()
 
 
-class PALPATE_OT_bake_clear(support.Reporting, bpy.types.Operator):
+class PALPATE_OT_bake_clear(support.ErrorReporting, bpy.types.Operator):
     """Remove baked keyframes, force arrows and heat maps, and put free bodies back to their start. Files on disk stay"""
 
     bl_idname = "palpate.bake_clear"
@@ -90,7 +90,7 @@ class PALPATE_OT_bake_clear(support.Reporting, bpy.types.Operator):
         playback.reset(context.scene)
 
 
-class PALPATE_OT_reset(support.Reporting, bpy.types.Operator):
+class PALPATE_OT_reset(support.ErrorReporting, bpy.types.Operator):
     """Forget what playing has computed and put free bodies back to where they start"""
 
     bl_idname = "palpate.reset"
@@ -111,7 +111,7 @@ class PALPATE_OT_reset(support.Reporting, bpy.types.Operator):
         playback.reset(context.scene)
 
 
-class PALPATE_OT_dress(support.Reporting, bpy.types.Operator):
+class PALPATE_OT_dress(support.ErrorReporting, bpy.types.Operator):
     """Show the bake with the present colours, scales, arrows and markers; nothing is computed"""
 
     bl_idname = "palpate.dress"
@@ -127,7 +127,7 @@ class PALPATE_OT_dress(support.Reporting, bpy.types.Operator):
 
     def run(self, context):
         support.leave_edit_mode(context)
-        bake_display.again(context.scene, scene_writer.bake_folders(context.scene))
+        bake_display.refresh(context.scene, scene_writer.bake_folders(context.scene))
 
 
 CLASSES = (PALPATE_OT_bake, PALPATE_OT_catch_up, PALPATE_OT_bake_clear, PALPATE_OT_reset, PALPATE_OT_dress)

@@ -10,7 +10,7 @@ from ..core.effects.engine import registry
 from . import support
 
 
-class PALPATE_OT_effect_add(support.Reporting, bpy.types.Operator):
+class PALPATE_OT_effect_add(support.ErrorReporting, bpy.types.Operator):
     """Add what real sensors do and the base model does not: creep, hysteresis, noise and more"""
 
     bl_idname = "palpate.effect_add"
@@ -21,7 +21,7 @@ class PALPATE_OT_effect_add(support.Reporting, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        return support.sensor_object(cls, context)
+        return support.poll_editable_sensor(cls, context)
 
     @classmethod
     def description(cls, _context, properties):
@@ -34,10 +34,10 @@ class PALPATE_OT_effect_add(support.Reporting, bpy.types.Operator):
         self.report({"INFO"}, f"'{obj.name}' has {registry.kind_of(self.effect).title.lower()}")
 
 
-class _OnEntry(support.Reporting):
+class _OnEntry(support.ErrorReporting):
     @classmethod
     def poll(cls, context):
-        if not support.sensor_object(cls, context):
+        if not support.poll_editable_sensor(cls, context):
             return False
         if not context.object.palpate.effects:
             cls.poll_message_set(f"'{context.object.name}' has no effects: use Add Effect first")

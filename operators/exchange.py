@@ -12,7 +12,7 @@ from ..core.errors import SceneError
 from . import support
 
 
-class PALPATE_OT_openrave_import(support.Reporting, support.Choosing, bpy.types.Operator):
+class PALPATE_OT_openrave_import(support.ErrorReporting, support.FileChooser, bpy.types.Operator):
     """Read the parameters of the active sensor from OpenRAVE's XML (a SimTactileSensor, paper's Table 2)"""
 
     bl_idname = "palpate.openrave_import"
@@ -29,7 +29,7 @@ class PALPATE_OT_openrave_import(support.Reporting, support.Choosing, bpy.types.
 
     @classmethod
     def poll(cls, context):
-        return support.sensor_object(cls, context)
+        return support.poll_editable_sensor(cls, context)
 
     def run(self, context):
         from ..core.io.openrave import read_openrave
@@ -48,7 +48,7 @@ class PALPATE_OT_openrave_import(support.Reporting, support.Choosing, bpy.types.
             self.report({"WARNING"}, f"It leaves out {', '.join(matching[0].missing)}: the defaults are used")
 
 
-class PALPATE_OT_openrave_export(support.Reporting, ExportHelper, bpy.types.Operator):
+class PALPATE_OT_openrave_export(support.ErrorReporting, ExportHelper, bpy.types.Operator):
     """Write the selected sensors, or all of the scene when none is selected, as OpenRAVE's XML (paper's Table 2)"""
 
     bl_idname = "palpate.openrave_export"
@@ -73,7 +73,7 @@ class PALPATE_OT_openrave_export(support.Reporting, ExportHelper, bpy.types.Oper
         self.report({"INFO"}, f"Wrote {len(sensors)} sensors to '{self.filepath}'")
 
 
-class PALPATE_OT_sensor_toml_import(support.Reporting, support.Choosing, bpy.types.Operator):
+class PALPATE_OT_sensor_toml_import(support.ErrorReporting, support.FileChooser, bpy.types.Operator):
     """Read a sensor.toml: parameters and effects for the active sensor, or a new pad when none is active and it has a grid"""
 
     bl_idname = "palpate.sensor_toml_import"
@@ -88,7 +88,7 @@ class PALPATE_OT_sensor_toml_import(support.Reporting, support.Choosing, bpy.typ
         self.report({"INFO"}, f"'{obj.name}' has the parameters and {effects} effects of '{Path(self.filepath).name}'")
 
 
-class PALPATE_OT_sensor_toml_export(support.Reporting, ExportHelper, bpy.types.Operator):
+class PALPATE_OT_sensor_toml_export(support.ErrorReporting, ExportHelper, bpy.types.Operator):
     """Write the active sensor as TOML: its parameters and effects, and its grid where it is a flat one"""
 
     bl_idname = "palpate.sensor_toml_export"
@@ -99,7 +99,7 @@ class PALPATE_OT_sensor_toml_export(support.Reporting, ExportHelper, bpy.types.O
 
     @classmethod
     def poll(cls, context):
-        return support.any_sensor_object(cls, context)
+        return support.poll_sensor(cls, context)
 
     def run(self, context):
         exchange.save_toml(context, context.object, self.filepath)

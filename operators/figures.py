@@ -5,10 +5,10 @@ import bpy
 
 from ..addon.bake import scene_writer
 from ..addon.properties import figure_properties
-from . import support, working
+from . import modal_job, support
 
 
-class PALPATE_OT_figures_make(working.Working, bpy.types.Operator):
+class PALPATE_OT_figures_make(modal_job.ModalJob, bpy.types.Operator):
     """Make the figures that are chosen above, of what is baked: nothing is computed. ESC stops; what is finished stays"""
 
     bl_idname = "palpate.figures_make"
@@ -21,13 +21,13 @@ class PALPATE_OT_figures_make(working.Working, bpy.types.Operator):
         if context.scene is None or not scene_writer.bake_folders(context.scene):
             cls.poll_message_set("Nothing is baked in this scene: bake first")
             return False
-        return support.idle(cls)
+        return support.poll_idle(cls)
 
     def job(self, context):
         from ..addon.render import figure_export
 
         scene = context.scene
-        return figure_export.make(scene, figure_properties.folder(scene), figure_properties.wish(scene, context.object))
+        return figure_export.make_figures(scene, figure_properties.folder(scene), figure_properties.wish(scene, context.object))
 
     def done(self, result):
         names = ", ".join(f"'{path.name}'" for path in result[:4])

@@ -14,7 +14,7 @@ DAMPING = 0.01
 """Damping suggested for a stiffness, as a share of it in number (paper, section 3.4.1)."""
 
 
-class Fit(support.Reporting, support.Choosing):
+class MeasurementFit(support.ErrorReporting, support.FileChooser):
     """What both fits share: a CSV is chosen, values are put on the active sensor, and a picture is shown."""
 
     filename_ext = ".csv"
@@ -28,7 +28,7 @@ class Fit(support.Reporting, support.Choosing):
 
     @classmethod
     def poll(cls, context):
-        return support.sensor_object(cls, context)
+        return support.poll_editable_sensor(cls, context)
 
     def draw(self, _context):
         layout = self.layout
@@ -67,7 +67,7 @@ def show_image(context, path: Path, title: str) -> None:
     editor.tag_redraw()
 
 
-class PALPATE_OT_stiffness_fit(Fit, bpy.types.Operator):
+class PALPATE_OT_stiffness_fit(MeasurementFit, bpy.types.Operator):
     """Fit the stiffness k of the active sensor's texels to foam measurements (Eq. 18, Fig. 6): a CSV with the columns
     compression (m) and pressure (Pa), force (N) or mass (kg)"""
 
@@ -110,7 +110,7 @@ class PALPATE_OT_stiffness_fit(Fit, bpy.types.Operator):
         self.report({"INFO"}, text)
 
 
-class PALPATE_OT_friction_fit(Fit, bpy.types.Operator):
+class PALPATE_OT_friction_fit(MeasurementFit, bpy.types.Operator):
     """Fit the friction of the active sensor's texels to a force–velocity curve (Eq. 13, Fig. 7): a CSV with the columns
     velocity (m/s) and force (N), in steady sliding, or with a column time (s) as well, recorded from rest"""
 

@@ -8,7 +8,7 @@ from ..addon.authoring import problems, sensor_report
 from . import support
 
 
-class PALPATE_OT_fix(support.Reporting, bpy.types.Operator):
+class PALPATE_OT_fix(support.ErrorReporting, bpy.types.Operator):
     """Put this problem of the active sensor right"""
 
     bl_idname = "palpate.fix"
@@ -24,7 +24,7 @@ class PALPATE_OT_fix(support.Reporting, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        return support.mesh_object(cls, context) and support.sensor_object(cls, context)
+        return support.poll_mesh_object(cls, context) and support.poll_editable_sensor(cls, context)
 
     def run(self, context):
         support.leave_edit_mode(context)

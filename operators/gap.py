@@ -5,11 +5,11 @@ import bpy
 from bpy.props import BoolProperty, StringProperty
 
 from ..addon.measured import gap_results
-from . import support, working
+from . import modal_job, support
 from .fits import show_image
 
 
-class PALPATE_OT_measured_open(support.Reporting, support.Choosing, bpy.types.Operator):
+class PALPATE_OT_measured_open(support.ErrorReporting, support.FileChooser, bpy.types.Operator):
     """Choose measurements of the real sensor: a rig.toml with its CSV files beside it. They are read to see that they fit"""
 
     bl_idname = "palpate.measured_open"
@@ -21,7 +21,7 @@ class PALPATE_OT_measured_open(support.Reporting, support.Choosing, bpy.types.Op
 
     @classmethod
     def poll(cls, context):
-        return support.sensor_object(cls, context)
+        return support.poll_editable_sensor(cls, context)
 
     def run(self, context):
         from ..core.gap.dataset.rig import read_rig
@@ -34,7 +34,7 @@ class PALPATE_OT_measured_open(support.Reporting, support.Choosing, bpy.types.Op
         self.report({"INFO"}, f"'{rig.name}': {len(rig.trials)} trials on {len(rig.texels)} texels")
 
 
-class PALPATE_OT_gap_find(working.Working, bpy.types.Operator):
+class PALPATE_OT_gap_find(modal_job.ModalJob, bpy.types.Operator):
     """Compare the model with the measurements, name what it misses and judge it on trials it has not seen. ESC stops it"""
 
     bl_idname = "palpate.gap_find"
@@ -44,7 +44,7 @@ class PALPATE_OT_gap_find(working.Working, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        if not support.sensor_object(cls, context):
+        if not support.poll_editable_sensor(cls, context):
             return False
         if not context.object.palpate.measured:
             cls.poll_message_set("Choose the sensor's measurements first: Open Rig")
@@ -58,7 +58,7 @@ class PALPATE_OT_gap_find(working.Working, bpy.types.Operator):
         self.report({"INFO"}, result.headline)
 
 
-class PALPATE_OT_gap_add(support.Reporting, bpy.types.Operator):
+class PALPATE_OT_gap_add(support.ErrorReporting, bpy.types.Operator):
     """Put the fitted parameters and the effects that were found on the sensor, instead of those it has"""
 
     bl_idname = "palpate.gap_add"
@@ -67,14 +67,14 @@ class PALPATE_OT_gap_add(support.Reporting, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        return support.gap_found(cls, context)
+        return support.poll_gap_found(cls, context)
 
     def run(self, context):
         count = gap_results.add_found(context.object)
         self.report({"INFO"}, f"'{context.object.name}' has the fitted parameters and {count} effects")
 
 
-class PALPATE_OT_gap_curves(support.Reporting, bpy.types.Operator):
+class PALPATE_OT_gap_curves(support.ErrorReporting, bpy.types.Operator):
     """Show what was measured and what the model says, before and after"""
 
     bl_idname = "palpate.gap_curves"
@@ -83,13 +83,13 @@ class PALPATE_OT_gap_curves(support.Reporting, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        return support.gap_found(cls, context)
+        return support.poll_gap_found(cls, context)
 
     def run(self, context):
         show_image(context, gap_results.of(context.object).pictures["curves"], "Palpate Gap Curves")
 
 
-class PALPATE_OT_gap_show(support.Reporting, bpy.types.Operator):
+class PALPATE_OT_gap_show(support.ErrorReporting, bpy.types.Operator):
     """Colour the sensor by the error of its texels, and mark the phases of the first trial on the timeline"""
 
     bl_idname = "palpate.gap_show"
@@ -100,7 +100,7 @@ class PALPATE_OT_gap_show(support.Reporting, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        return support.mesh_object(cls, context) and support.gap_found(cls, context)
+        return support.poll_mesh_object(cls, context) and support.poll_gap_found(cls, context)
 
     def run(self, context):
         support.leave_edit_mode(context)
@@ -109,7 +109,7 @@ class PALPATE_OT_gap_show(support.Reporting, bpy.types.Operator):
         self.report({"INFO"}, f"The brightest texel errs by {top:.2%} of the range")
 
 
-class PALPATE_OT_gap_report(support.Reporting, bpy.types.Operator):
+class PALPATE_OT_gap_report(support.ErrorReporting, bpy.types.Operator):
     """Write the report, the amended sensor and the plots into a folder"""
 
     bl_idname = "palpate.gap_report"
@@ -120,7 +120,7 @@ class PALPATE_OT_gap_report(support.Reporting, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        return support.gap_found(cls, context)
+        return support.poll_gap_found(cls, context)
 
     def invoke(self, context, _event):
         context.window_manager.fileselect_add(self)

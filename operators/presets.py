@@ -31,7 +31,7 @@ class PALPATE_MT_presets(bpy.types.Menu):
     draw = bpy.types.Menu.draw_preset
 
 
-class PALPATE_OT_preset_load(support.Reporting, bpy.types.Operator):
+class PALPATE_OT_preset_load(support.ErrorReporting, bpy.types.Operator):
     """Give the active sensor the values of this preset"""
 
     # Blender's own script.execute_preset cannot be undone.
@@ -43,7 +43,7 @@ class PALPATE_OT_preset_load(support.Reporting, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        return support.sensor_object(cls, context)
+        return support.poll_editable_sensor(cls, context)
 
     def run(self, context):
         path = Path(self.filepath)
@@ -66,7 +66,7 @@ class PALPATE_OT_preset_add(AddPresetBase, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        return support.sensor_object(cls, context)
+        return support.poll_editable_sensor(cls, context)
 
     def execute(self, context):
         if self.remove_name or self.remove_active:
@@ -77,7 +77,7 @@ class PALPATE_OT_preset_add(AddPresetBase, bpy.types.Operator):
         return super().execute(context)
 
 
-class PALPATE_OT_parameters_copy(support.Reporting, bpy.types.Operator):
+class PALPATE_OT_parameters_copy(support.ErrorReporting, bpy.types.Operator):
     """Give the other selected sensors and pads the parameters and effects of the active one; regions stay"""
 
     bl_idname = "palpate.parameters_copy"
@@ -86,7 +86,7 @@ class PALPATE_OT_parameters_copy(support.Reporting, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        if not support.sensor_object(cls, context):
+        if not support.poll_editable_sensor(cls, context):
             return False
         if not _others(context):
             cls.poll_message_set("No other sensor or pad is selected: select them, and the one to copy from last")

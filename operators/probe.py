@@ -8,7 +8,7 @@ from ..addon.authoring import probes
 from . import support
 
 
-class PALPATE_OT_probe_add(support.Reporting, bpy.types.Operator):
+class PALPATE_OT_probe_add(support.ErrorReporting, bpy.types.Operator):
     """Add something that presses on the middle of the active sensor, holds and goes, over the scene's frame range"""
 
     bl_idname = "palpate.probe_add"
@@ -41,7 +41,7 @@ class PALPATE_OT_probe_add(support.Reporting, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        return support.any_sensor_object(cls, context)
+        return support.poll_sensor(cls, context)
 
     def run(self, context):
         support.leave_edit_mode(context)

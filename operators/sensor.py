@@ -10,7 +10,7 @@ from ..addon.scene import meshes
 from . import support
 
 
-class PALPATE_OT_sensor_add(support.Reporting, bpy.types.Operator):
+class PALPATE_OT_sensor_add(support.ErrorReporting, bpy.types.Operator):
     """Make the active mesh a tactile sensor: each vertex of the region becomes a texel"""
 
     bl_idname = "palpate.sensor_add"
@@ -41,7 +41,7 @@ class PALPATE_OT_sensor_add(support.Reporting, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        return support.mesh_object(cls, context)
+        return support.poll_mesh_object(cls, context)
 
     def run(self, context):
         obj = context.object
@@ -51,7 +51,7 @@ class PALPATE_OT_sensor_add(support.Reporting, bpy.types.Operator):
         self.report({"INFO"}, f"'{obj.name}' is a {self.role.lower()} of {count} texels")
 
 
-class PALPATE_OT_role_set(support.Reporting, bpy.types.Operator):
+class PALPATE_OT_role_set(support.ErrorReporting, bpy.types.Operator):
     """Say what part the selected objects have"""
 
     bl_idname = "palpate.role_set"
@@ -80,7 +80,7 @@ class PALPATE_OT_role_set(support.Reporting, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        return support.object_with_surface(cls, context)
+        return support.poll_surface_object(cls, context)
 
     def run(self, context):
         support.leave_edit_mode(context)
@@ -93,7 +93,7 @@ class PALPATE_OT_role_set(support.Reporting, bpy.types.Operator):
             obj.palpate.role = self.role
 
 
-class PALPATE_OT_sensor_remove(support.Reporting, bpy.types.Operator):
+class PALPATE_OT_sensor_remove(support.ErrorReporting, bpy.types.Operator):
     """Take the active object out of the simulation, with its heat map, arrow and baked keyframes; vertex groups stay"""
 
     bl_idname = "palpate.sensor_remove"
@@ -102,7 +102,7 @@ class PALPATE_OT_sensor_remove(support.Reporting, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        if not support.object_with_surface(cls, context):
+        if not support.poll_surface_object(cls, context):
             return False
         if context.object.palpate.role == "NONE":
             cls.poll_message_set(f"'{context.object.name}' has no role")
@@ -114,7 +114,7 @@ class PALPATE_OT_sensor_remove(support.Reporting, bpy.types.Operator):
         sensors.remove_role(context.scene, context.object)
 
 
-class PALPATE_OT_weight_paint(support.Reporting, bpy.types.Operator):
+class PALPATE_OT_weight_paint(support.ErrorReporting, bpy.types.Operator):
     """Paint the region of a sensor, with a brush of full weight: what is painted to the threshold or above becomes texels"""
 
     bl_idname = "palpate.weight_paint"
@@ -123,7 +123,7 @@ class PALPATE_OT_weight_paint(support.Reporting, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        return support.mesh_object(cls, context)
+        return support.poll_mesh_object(cls, context)
 
     def run(self, context):
         support.leave_edit_mode(context)
@@ -145,7 +145,7 @@ def _face_sets(_operator, context):
 _items: list = []
 
 
-class PALPATE_OT_face_set_choose(support.Reporting, bpy.types.Operator):
+class PALPATE_OT_face_set_choose(support.ErrorReporting, bpy.types.Operator):
     """Choose the face set that is the sensor"""
 
     bl_idname = "palpate.face_set_choose"
@@ -156,7 +156,7 @@ class PALPATE_OT_face_set_choose(support.Reporting, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        return support.mesh_object(cls, context) and support.sensor_object(cls, context)
+        return support.poll_mesh_object(cls, context) and support.poll_editable_sensor(cls, context)
 
     def run(self, context):
         settings = context.object.palpate

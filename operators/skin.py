@@ -10,7 +10,7 @@ from ..addon.properties import properties
 from . import support
 
 
-class PALPATE_OT_pad_mesh_add(support.Reporting, AddObjectHelper, bpy.types.Operator):
+class PALPATE_OT_pad_mesh_add(support.ErrorReporting, AddObjectHelper, bpy.types.Operator):
     """Add a pad of texels in rows and columns, flat or bent to a radius, as a sensor"""
 
     bl_idname = "palpate.pad_mesh_add"
@@ -55,7 +55,7 @@ class PALPATE_OT_pad_mesh_add(support.Reporting, AddObjectHelper, bpy.types.Oper
             column.prop(self, name)
 
 
-class PALPATE_OT_skin_add(support.Reporting, bpy.types.Operator):
+class PALPATE_OT_skin_add(support.ErrorReporting, bpy.types.Operator):
     """Lay texels onto the surface of the active mesh: a sensor of its own that is fixed to it; an object can carry several"""
 
     bl_idname = "palpate.skin_add"
@@ -114,7 +114,7 @@ class PALPATE_OT_skin_add(support.Reporting, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        return support.mesh_object(cls, context)
+        return support.poll_mesh_object(cls, context)
 
     def invoke(self, context, _event):
         if not self.spacing:
@@ -157,7 +157,7 @@ class PALPATE_OT_skin_add(support.Reporting, bpy.types.Operator):
             column.prop(self, name)
 
 
-class PALPATE_OT_skin_update(support.Reporting, bpy.types.Operator):
+class PALPATE_OT_skin_update(support.ErrorReporting, bpy.types.Operator):
     """Lay the texels of this sensor anew onto the surface as it is now; what was painted on it is carried over"""
 
     bl_idname = "palpate.skin_update"
@@ -166,7 +166,7 @@ class PALPATE_OT_skin_update(support.Reporting, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        if not support.mesh_object(cls, context):
+        if not support.poll_mesh_object(cls, context):
             return False
         if not laid_sensors.is_skin(context.object):
             cls.poll_message_set(f"'{context.object.name}' was not laid onto a surface: use Lay Texels first")
@@ -179,7 +179,7 @@ class PALPATE_OT_skin_update(support.Reporting, bpy.types.Operator):
         self.report({"INFO"}, f"'{context.object.name}' has {count} texels")
 
 
-class PALPATE_OT_object_activate(support.Reporting, bpy.types.Operator):
+class PALPATE_OT_object_activate(support.ErrorReporting, bpy.types.Operator):
     """Go to this object: make it the active one"""
 
     bl_idname = "palpate.object_activate"

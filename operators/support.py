@@ -16,7 +16,7 @@ from ..addon.timeline import playback
 from ..core.errors import PalpateError
 
 
-class Reporting:
+class ErrorReporting:
     """Mixin: `run(context)` does the work; a PalpateError becomes a red sentence and nothing else."""
 
     def execute(self, context):
@@ -31,7 +31,7 @@ class Reporting:
             return {"CANCELLED"}
 
 
-def idle(cls) -> bool:
+def poll_idle(cls) -> bool:
     """Poll: no frames are being computed, by a bake or after a jump on the timeline."""
     if playback.is_baking() or session_state.session.catching_up:
         cls.poll_message_set("Frames are being computed")
@@ -39,7 +39,7 @@ def idle(cls) -> bool:
     return True
 
 
-class Choosing(ImportHelper):
+class FileChooser(ImportHelper):
     """Mixin: a file is chosen beside the .blend; Blender by itself would fill in the name of the .blend."""
 
     def invoke(self, context, event):
@@ -48,7 +48,7 @@ class Choosing(ImportHelper):
         return super().invoke(context, event)
 
 
-def object_with_surface(cls, context) -> bool:
+def poll_surface_object(cls, context) -> bool:
     """Poll: there is an active object that could take part."""
     obj = context.object
     if obj is None:
@@ -62,9 +62,9 @@ def object_with_surface(cls, context) -> bool:
     return False
 
 
-def mesh_object(cls, context) -> bool:
+def poll_mesh_object(cls, context) -> bool:
     """Poll: there is an active mesh object whose mesh is of this file."""
-    if not object_with_surface(cls, context):
+    if not poll_surface_object(cls, context):
         return False
     if context.object.type != "MESH":
         cls.poll_message_set(f"'{context.object.name}' is no mesh: use Object › Convert › Mesh first")
@@ -78,12 +78,12 @@ def mesh_object(cls, context) -> bool:
     return True
 
 
-def sensor_object(cls, context) -> bool:
+def poll_editable_sensor(cls, context) -> bool:
     """Poll: the active object is a sensor or a pad that can be changed."""
-    return object_with_surface(cls, context) and any_sensor_object(cls, context)
+    return poll_surface_object(cls, context) and poll_sensor(cls, context)
 
 
-def any_sensor_object(cls, context) -> bool:
+def poll_sensor(cls, context) -> bool:
     """Poll: the active object is a sensor or a pad, perhaps of another file; enough for what does not change it."""
     if context.object is None:
         cls.poll_message_set("Make an object active first")
@@ -103,9 +103,9 @@ def leave_edit_mode(context) -> None:
         bpy.ops.object.mode_set(mode="OBJECT")
 
 
-def gap_found(cls, context) -> bool:
+def poll_gap_found(cls, context) -> bool:
     """Poll: something was found for the active sensor."""
-    if not sensor_object(cls, context):
+    if not poll_editable_sensor(cls, context):
         return False
     if gap_results.of(context.object) is None:
         cls.poll_message_set("Nothing was found yet: use Find Gap first")

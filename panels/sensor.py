@@ -181,18 +181,18 @@ class Readout(Part):
             column.prop(settings, "image_size")
             column.prop(settings, "image_filter", text="")
         status = playback.status(context.scene)
-        felt = status.frame.sensors.get(context.object.name) if status.frame is not None else None
+        readings = status.frame.sensors.get(context.object.name) if status.frame is not None else None
         box = layout.box().column()
-        if felt is None:
+        if readings is None:
             sentences(box, status.text, "INFO", context)
             return
-        net = ", ".join(f"{round(value, 3) + 0.0:.3f}" for value in felt.net_force)  # adding zero turns -0.0 into 0.0
-        box.label(text=f"Frame {status.frame.frame}: {int(felt.contact.sum())} of {len(felt.contact)} texels touch")
-        box.label(text=f"Sum of normals: {felt.normal_force.sum():.4f} N")
-        box.label(text=f"Largest normal: {felt.normal_force.max():.4f} N")
-        box.label(text=f"Largest shear: {(felt.shear**2).sum(axis=1).max() ** 0.5:.4f} N")
+        net = ", ".join(f"{round(value, 3) + 0.0:.3f}" for value in readings.net_force)  # adding zero turns -0.0 into 0.0
+        box.label(text=f"Frame {status.frame.frame}: {int(readings.contact.sum())} of {len(readings.contact)} texels touch")
+        box.label(text=f"Sum of normals: {readings.normal_force.sum():.4f} N")
+        box.label(text=f"Largest normal: {readings.normal_force.max():.4f} N")
+        box.label(text=f"Largest shear: {(readings.shear**2).sum(axis=1).max() ** 0.5:.4f} N")
         box.label(text=f"Net: {net} N")
-        box.label(text=f"Reading: {felt.reading.min():.4g} to {felt.reading.max():.4g} {settings.unit}")
+        box.label(text=f"Reading: {readings.reading.min():.4g} to {readings.reading.max():.4g} {settings.unit}")
 
 
 PARTS = (Region, Skins, Contact, Friction, Readout)

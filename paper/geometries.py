@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from ..sample_blends import geometries
-from . import bench
+from . import experiment_tools
 from .chapter import Chapter, Picture, Row, below
 
 
@@ -21,8 +21,8 @@ def sensors(folder: Path, progress: Callable) -> Chapter:
         "Each vertex of a mesh is a texel; its normal is the normalised sum of the unit normals of the triangles around it. On "
         "the grid and on the sphere the surface itself says what the normal should be.",
     )
-    scene = bench.fresh(geometries.build)
-    scenario = bench.scenario_of(scene)
+    scene = experiment_tools.new_scene(geometries.build)
+    scenario = experiment_tools.scenario_of(scene)
     found = {sensor.name: sensor.texels for sensor in scenario.sensors}
     for name, texels in found.items():
         chapter.rows.append(
@@ -36,8 +36,8 @@ def sensors(folder: Path, progress: Callable) -> Chapter:
     note = "triangles of an icosphere are not all alike, and unit normals count them alike, as in the paper"
     chapter.rows.append(below("sphere: angle of a normal from the radius", "—", float(off), 1.0, "°", note))
     progress()
-    bench.bake(scene, folder / "bake-geometries")
-    picture = bench.picture(scene, folder / "fig1-3-sensors.png", scene.frame_end, (1100, 600))
+    experiment_tools.bake(scene, folder / "bake-geometries")
+    picture = experiment_tools.picture(scene, folder / "fig1-3-sensors.png", scene.frame_end, (1100, 600))
     chapter.pictures.append(
         Picture(picture, "Grid, sphere and fingertip with their texels' normals, a ball pressed on each.", True)
     )

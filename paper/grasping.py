@@ -18,7 +18,7 @@ from ..core.model.recording import Recording
 from ..core.model.scenario import Scenario
 from ..core.solver.simulation import run
 from ..sample_blends import grasps, gripper, hand, pick_and_place
-from . import bench
+from . import experiment_tools
 from .chapter import Chapter, Picture, Row, below, compare
 
 LOOK = FigureStyle(colour_map="PAPER", width="single")
@@ -47,15 +47,15 @@ def four_objects(folder: Path, progress: Callable) -> Chapter:
 
 def _one_object(chapter: Chapter, kind: str, folder: Path, progress: Callable) -> None:
     name = grasps.OBJECTS[kind].name
-    scene = bench.fresh(partial(grasps.build, kind=kind))
-    scenario = bench.scenario_of(scene)
+    scene = experiment_tools.new_scene(partial(grasps.build, kind=kind))
+    scenario = experiment_tools.scenario_of(scene)
     texels = {sensor.name: sensor.texels for sensor in scenario.sensors if sensor.readout}
-    recording = bench.bake(scene, folder / f"bake-grasp-{kind}")
+    recording = experiment_tools.bake(scene, folder / f"bake-grasp-{kind}")
     last = int(recording.frames[-1])
     numbers = folder / f"fig10-{kind}-numbers"
     _twice(numbers, lambda path: texel_numbers(path, recording, texels, gripper.RIGHT, last, LOOK))
     chapter.pictures += [
-        Picture(bench.picture(scene, folder / f"fig10-{kind}.png", last), f"{name}: the grasp."),
+        Picture(experiment_tools.picture(scene, folder / f"fig10-{kind}.png", last), f"{name}: the grasp."),
         _strip(folder / f"fig10-{kind}-images", recording, texels, [last], f"{name}: both pads."),
         Picture(numbers.with_suffix(".png"), f"{name}: each texel of the right finger."),
     ]
@@ -67,7 +67,7 @@ def _one_object(chapter: Chapter, kind: str, folder: Path, progress: Callable) -
 def held_rows(scenario: Scenario, name: str, controlled: str, force: float, seconds: float = HOLD) -> list[Row]:
     """Rows of a long hold: the controlled sum, and how far the object moved in the last ten seconds."""
     held = run(replace(scenario, frame_end=scenario.frame_start + round(seconds * scenario.fps)))
-    path = bench.place_of(held, name)
+    path = experiment_tools.path_of(held, name)
     last = held.times >= held.times[-1] - LAST
     drift = float(np.linalg.norm(path[last] - path[last][0], axis=1).max())
     total = float(held.sensors[controlled].normal_force[-1].sum())
@@ -87,8 +87,8 @@ def too_heavy(folder: Path, progress: Callable) -> Chapter:
         "The box again, in masses between which a bisection looks for the one that just slips out of the fingers. Coulomb: two "
         "pads with 3 N each hold 2 · mus · 3 N.",
     )
-    scene = bench.fresh(partial(grasps.build, kind=HEAVY_KIND))
-    scenario = slowly(bench.scenario_of(scene))
+    scene = experiment_tools.new_scene(partial(grasps.build, kind=HEAVY_KIND))
+    scenario = slowly(experiment_tools.scenario_of(scene))
     name, low, high = grasps.OBJECTS[HEAVY_KIND].name, LIGHT, HEAVY
     expected = coulomb_limit(scenario)
     for mass, too_much in ((low, False), (high, True)):
@@ -125,8 +125,8 @@ def slowly(scenario: Scenario, times: float = 3.0) -> Scenario:
 
 def slips(scenario: Scenario, name: str, mass: float) -> bool:
     """Whether the object of a mass slides out of the fingers."""
-    recording = run(bench.with_mass(scenario, name, mass))
-    path = bench.place_of(recording, name)
+    recording = run(experiment_tools.with_mass(scenario, name, mass))
+    path = experiment_tools.path_of(recording, name)
     return bool(path[0, 2] - path[-1, 2] > FALLEN)
 
 
@@ -139,14 +139,14 @@ def work_cycle(folder: Path, progress: Callable) -> Chapter:
         "(3 N). The controller knows the array's size, its values and their sum, and nothing of the simulation. The cube "
         "covers 30 % of each pad. The paper's simulated pads show equal values; so must ours.",
     )
-    scene = bench.fresh(pick_and_place.build)
-    scenario = bench.scenario_of(scene)
+    scene = experiment_tools.new_scene(pick_and_place.build)
+    scenario = experiment_tools.scenario_of(scene)
     texels = {sensor.name: sensor.texels for sensor in scenario.sensors if sensor.readout}
-    recording = bench.bake(scene, folder / "bake-pick-and-place")
+    recording = experiment_tools.bake(scene, folder / "bake-pick-and-place")
     progress()
     for stage, frame in pick_and_place.STAGES.items():
         path = folder / f"fig12-{stage.replace(' ', '-')}.png"
-        chapter.pictures.append(Picture(bench.picture(scene, path, frame, (480, 480)), stage.capitalize() + "."))
+        chapter.pictures.append(Picture(experiment_tools.picture(scene, path, frame, (480, 480)), stage.capitalize() + "."))
         progress()
     frames = list(pick_and_place.STAGES.values())
     chapter.pictures.append(_strip(folder / "fig12-images", recording, texels, frames, "Both pads at each stage."))
@@ -161,7 +161,7 @@ def work_cycle(folder: Path, progress: Callable) -> Chapter:
 def cycle_rows(recording: Recording) -> list[Row]:
     lifted = int(np.searchsorted(recording.frames, pick_and_place.STAGES["lift"]))
     left, right = (recording.sensors[name].normal_force[lifted] for name in (gripper.LEFT, gripper.RIGHT))
-    path = bench.place_of(recording, pick_and_place.CUBE)
+    path = experiment_tools.path_of(recording, pick_and_place.CUBE)
     loaded = left[left > 0]
     lit, uneven = len(loaded), float(np.ptp(loaded) / loaded.mean())
     raised, beside = float(path[lifted, 2] - path[0, 2]) * 1e3, float(np.linalg.norm(path[-1, :2] - path[0, :2]))
@@ -187,11 +187,11 @@ def finger_and_thumb(folder: Path, progress: Callable) -> Chapter:
         "Fig. 13, section 5.3",
         "The finger tips of a hand modelled by script are sensors as they are; between them they hold a cylinder.",
     )
-    scene = bench.fresh(hand.build)
-    recording = bench.bake(scene, folder / "bake-hand")
-    scenario = bench.scenario_of(scene)
+    scene = experiment_tools.new_scene(hand.build)
+    recording = experiment_tools.bake(scene, folder / "bake-hand")
+    scenario = experiment_tools.scenario_of(scene)
     texels = {sensor.name: sensor.texels for sensor in scenario.sensors if sensor.readout}
-    chapter.pictures.append(Picture(bench.picture(scene, folder / "fig13-hand.png", scene.frame_end), "The grasp."))
+    chapter.pictures.append(Picture(experiment_tools.picture(scene, folder / "fig13-hand.png", scene.frame_end), "The grasp."))
     last = [int(recording.frames[-1])]
     chapter.pictures.append(_strip(folder / "fig13-images", recording, texels, last, "Both finger tips, laid flat."))
     progress()

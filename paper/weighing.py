@@ -15,7 +15,7 @@ from ..core.figures.figure_style import GREY, INK, NORMAL_COLOUR
 from ..core.model.scenario import Scenario
 from ..core.solver.simulation import run
 from ..sample_blends import tilt, weighing
-from . import bench
+from . import experiment_tools
 from .chapter import Chapter, Picture, Row, below, compare
 
 PRINTED = {0.1: ("0.9800 N", 0.98), 1.0: ("9.7999 N", 9.8), 4.0: ("—", 39.2), 10.0: ("97.9899 N", 98.0)}
@@ -34,18 +34,21 @@ def weigh(folder: Path, progress: Callable) -> Chapter:
         "paper) for two seconds; the row is the sum of all texels' normal forces at the end. Gravity is 9.8 m/s² here, as in "
         "Table 3.",
     )
-    scene = bench.fresh(weighing.build)
-    scenario = replace(bench.scenario_of(scene), gravity=np.array([0.0, 0.0, -PAPERS_GRAVITY]))
+    scene = experiment_tools.new_scene(weighing.build)
+    scenario = replace(experiment_tools.scenario_of(scene), gravity=np.array([0.0, 0.0, -PAPERS_GRAVITY]))
     for mass, (printed, required) in PRINTED.items():
-        recording = run(bench.with_mass(scenario, weighing.CUBE, mass))
-        felt = recording.sensors[weighing.PAD]
-        total, lit = float(felt.normal_force[-1].sum()), int(felt.contact[-1].sum())
-        note = f"{lit} of {felt.contact.shape[1]} texels lit; the paper's tolerance is 1e-4"
+        recording = run(experiment_tools.with_mass(scenario, weighing.CUBE, mass))
+        readings = recording.sensors[weighing.PAD]
+        total, lit = float(readings.normal_force[-1].sum()), int(readings.contact[-1].sum())
+        note = f"{lit} of {readings.contact.shape[1]} texels lit; the paper's tolerance is 1e-4"
         chapter.rows.append(compare(f"{mass:g} kg", printed, required, total, 1e-6 * required, "N", note))
         progress()
-    bench.bake(scene, folder / "bake-weighing")
+    experiment_tools.bake(scene, folder / "bake-weighing")
     chapter.pictures.append(
-        Picture(bench.picture(scene, folder / "weighing.png", scene.frame_end), "1 kg at rest; colours are each texel's force.")
+        Picture(
+            experiment_tools.picture(scene, folder / "weighing.png", scene.frame_end),
+            "1 kg at rest; colours are each texel's force.",
+        )
     )
     progress()
     return chapter
@@ -60,21 +63,21 @@ def hold(folder: Path, progress: Callable, minutes: float = MINUTES) -> Chapter:
         "for twenty minutes; so must ours, with no sleeping and no freezing of bodies. The bristles are as stiff as the foam "
         "(1000 N/m): with Table 2's 1 N/m they would carry 1.7 N only after 20 mm, and the cube leaves the pad before.",
     )
-    scene = bench.fresh(tilt.build)
-    sampled = bench.scenario_of(scene)
+    scene = experiment_tools.new_scene(tilt.build)
+    sampled = experiment_tools.scenario_of(scene)
     scenario = replace(sampled, fps=float(FPS), frame_end=sampled.frame_start + round(60 * minutes * FPS), dt=1e-3)
     recording = run(scenario)
     progress()
-    times, path = recording.times, bench.place_of(recording, weighing.CUBE)
+    times, path = recording.times, experiment_tools.path_of(recording, weighing.CUBE)
     moved = np.linalg.norm(path - path[0], axis=1)
-    felt = recording.sensors[weighing.PAD]
+    readings = recording.sensors[weighing.PAD]
     settled = times >= SETTLED
     wander = float(np.linalg.norm(path[settled] - path[settled][0], axis=1).max())
     # Both components of the weight, and how exactly the texels have to show them
     weight = tilt.MASS * float(np.linalg.norm(scenario.gravity))
     slope = math.radians(tilt.TILT)
-    along = float(np.hypot(felt.net_force[-1, 0], felt.net_force[-1, 1]))
-    across = float(-felt.net_force[-1, 2])
+    along = float(np.hypot(readings.net_force[-1, 0], readings.net_force[-1, 1]))
+    across = float(-readings.net_force[-1, 2])
     for name, share, force in (("along", math.sin(slope), along), ("across", math.cos(slope), across)):
         expected = weight * share
         chapter.rows.append(compare(f"force {name} the slope", "—", expected, force, 1e-4 * expected, "N", "relative 1e-4"))
@@ -84,9 +87,9 @@ def hold(folder: Path, progress: Callable, minutes: float = MINUTES) -> Chapter:
     progress()
     for kind in ("pdf", "png"):
         _creep(folder / f"fig9-creep.{kind}", times, moved)
-    bench.bake(scene, folder / "bake-tilt")
+    experiment_tools.bake(scene, folder / "bake-tilt")
     chapter.pictures += [
-        Picture(bench.picture(scene, folder / "tilt.png", scene.frame_end), "1 kg held at 10 degrees."),
+        Picture(experiment_tools.picture(scene, folder / "tilt.png", scene.frame_end), "1 kg held at 10 degrees."),
         Picture(folder / "fig9-creep.png", "How far the cube is from where it was put (Fig. 9)."),
     ]
     progress()

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 
 from ..addon.render import render
-from . import studio
+from . import scene_builder
 
 FPS = 24
 FRAME_END = 112
@@ -43,38 +43,38 @@ the pads. Palpate > Figures makes pictures of the bake; the pads' colours have o
 
 def build(scene) -> None:
     """Fill `scene`, which is emptied first, with the demo; the add-on's classes must be registered."""
-    studio.prepare(scene, FRAME_END, FPS)
-    rubber = studio.material("Rubber", (0.035, 0.036, 0.04), roughness=0.55)
-    black = studio.material("Black anodised", (0.012, 0.012, 0.014), metallic=0.6, roughness=0.32)
-    screw = studio.material("Screw", (0.55, 0.56, 0.58), metallic=1.0, roughness=0.25)
-    paper = studio.material("Backdrop", (0.30, 0.32, 0.35), roughness=0.85)
+    scene_builder.prepare(scene, FRAME_END, FPS)
+    rubber = scene_builder.material("Rubber", (0.035, 0.036, 0.04), roughness=0.55)
+    black = scene_builder.material("Black anodised", (0.012, 0.012, 0.014), metallic=0.6, roughness=0.32)
+    screw = scene_builder.material("Screw", (0.55, 0.56, 0.58), metallic=1.0, roughness=0.25)
+    paper = scene_builder.material("Backdrop", (0.30, 0.32, 0.35), roughness=0.85)
 
     pad_a = _finger(scene, PAD_A, PITCH_A, (-44.0, -22.0), math.radians(24), rubber, black, screw)
     pad_b = _finger(scene, PAD_B, PITCH_B, (26.0, 10.0), math.radians(24), rubber, black, screw)
 
-    ball = studio.ball(scene, BALL, BALL_RADIUS)
-    ball.data.materials.append(studio.ghost_steel("Steel, seen through (ball)", clear=0.85, groove=0.45))
+    ball = scene_builder.ball(scene, BALL, BALL_RADIUS)
+    ball.data.materials.append(scene_builder.see_through_steel("Steel, seen through (ball)", clear=0.85, groove=0.45))
     _slide(ball, pad_a)
 
-    cube = studio.box(scene, CUBE, (CUBE_EDGE,) * 3, bevel=1.2, flat_bottom=True)
-    cube.data.materials.append(studio.ghost_steel("Steel, seen through", clear=0.86, edge=0.3))
-    cube.data.materials.append(studio.material("Steel", studio.STEEL, metallic=1.0, roughness=0.16))
+    cube = scene_builder.box(scene, CUBE, (CUBE_EDGE,) * 3, bevel=1.2, flat_bottom=True)
+    cube.data.materials.append(scene_builder.see_through_steel("Steel, seen through", clear=0.86, edge=0.3))
+    cube.data.materials.append(scene_builder.material("Steel", scene_builder.STEEL, metallic=1.0, roughness=0.16))
     cube.modifiers["Bevel"].material = 1  # its edges stay solid
     cube.location = (pad_b.location.x, pad_b.location.y, PAD_HEIGHT + CUBE_EDGE / 2 + DROP)
     cube.rotation_euler = (0.0, 0.0, pad_b.rotation_euler.z + math.radians(18))
 
     _author(scene, pad_a, pad_b, ball, cube)
-    studio.stage(scene, paper, aim=(0.0, 0.0, 20.0), camera=(60.0, -300.0, 190.0))
+    scene_builder.add_stage(scene, paper, aim=(0.0, 0.0, 20.0), camera=(60.0, -300.0, 190.0))
     frame_picture(scene, (1280, 720))
-    studio.explain(TEXT)
+    scene_builder.add_readme(TEXT)
     scene.frame_set(scene.frame_start)
 
 
 def _finger(scene, name: str, pitch: float, location, turn: float, rubber, black, screw):
     """Return the pad of a gripper finger, whose texels are the vertex group "tactile"; its black base comes along."""
     margin, thickness = 0.9 * pitch + 0.6, 6.0
-    vertices, faces, texels = studio.pad_mesh(PAD_ROWS, PAD_COLUMNS, pitch, margin, thickness)
-    pad = studio.mesh_object(scene, name, vertices, faces)
+    vertices, faces, texels = scene_builder.pad_mesh(PAD_ROWS, PAD_COLUMNS, pitch, margin, thickness)
+    pad = scene_builder.mesh_object(scene, name, vertices, faces)
     pad.location, pad.rotation_euler = (*location, PAD_HEIGHT), (0.0, 0.0, turn)
     pad.data.materials.append(rubber)
     pad.vertex_groups.new(name="tactile").add(texels, 1.0, "REPLACE")
@@ -82,11 +82,11 @@ def _finger(scene, name: str, pitch: float, location, turn: float, rubber, black
     wide = (PAD_COLUMNS - 1) * pitch + 2 * margin
     long = (PAD_ROWS - 1) * pitch + 2 * margin
     height = PAD_HEIGHT - thickness + 1.0
-    base = studio.box(scene, f"{name} base", (wide + 5, long + 22, height), bevel=2.2)
+    base = scene_builder.box(scene, f"{name} base", (wide + 5, long + 22, height), bevel=2.2)
     base.location, base.parent = (0.0, 6.0, 0.5 * height - PAD_HEIGHT), pad
     base.data.materials.append(black)
     for side in (-1, 1):
-        head = studio.cylinder(scene, f"{name} screw", 1.9, 1.4, bevel=0.3)
+        head = scene_builder.cylinder(scene, f"{name} screw", 1.9, 1.4, bevel=0.3)
         head.location = (side * (wide / 2 - 3.2), long / 2 + 11, height - PAD_HEIGHT + 0.4)
         head.parent = pad
         head.data.materials.append(screw)
@@ -138,5 +138,5 @@ def frame_picture(scene, size) -> None:
     scene.render.resolution_x, scene.render.resolution_y = size
     names = (PAD_A, PAD_B, BALL, CUBE, f"{PAD_A} base", f"{PAD_B} base")
     scene.frame_set(PICTURE_FRAME)
-    render.frame_camera(scene, render.corners([scene.objects[name] for name in names]), (0.05, 0.06, 0.78, 0.88))
+    render.fit_camera(scene, render.bounding_box_corners([scene.objects[name] for name in names]), (0.05, 0.06, 0.78, 0.88))
     scene.frame_set(scene.frame_start)

@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 
-from . import studio
+from . import scene_builder
 
 FPS = 24
 FRAME_END = 48
@@ -27,10 +27,10 @@ Space plays; Bake writes the tactile images and puts heat map, net force and an 
 
 def build(scene) -> None:
     """Fill `scene`, which is emptied first; the add-on's classes must be registered."""
-    studio.prepare(scene, FRAME_END, FPS)
+    scene_builder.prepare(scene, FRAME_END, FPS)
     vertices, faces = capsule()
-    finger = studio.mesh_object(scene, FINGER, vertices, faces)
-    finger.data.materials.append(studio.material("Rubber", (0.035, 0.036, 0.04), roughness=0.55))
+    finger = scene_builder.mesh_object(scene, FINGER, vertices, faces)
+    finger.data.materials.append(scene_builder.material("Rubber", (0.035, 0.036, 0.04), roughness=0.55))
     # The upper side, down to 60 degrees from the top, without the rim of the flat end: its face would belong to the sensor.
     group = finger.vertex_groups.new(name="tactile")
     group.add([int(i) for i in np.flatnonzero((vertices[:, 2] > 0.5 * RADIUS) & (vertices[:, 1] > -LENGTH))], 1.0, "REPLACE")
@@ -38,8 +38,8 @@ def build(scene) -> None:
 
     finger.palpate.max_penetration = 0.006  # less than the radius, or segments would come out on the other side
 
-    rod = studio.cylinder(scene, ROD, ROD_RADIUS, 40.0)
-    rod.data.materials.append(studio.ghost_steel("Steel, seen through", clear=0.8, edge=0.6))
+    rod = scene_builder.cylinder(scene, ROD, ROD_RADIUS, 40.0)
+    rod.data.materials.append(scene_builder.see_through_steel("Steel, seen through", clear=0.8, edge=0.6))
     rod.rotation_mode = "XYZ"
     top = 30.0 + RADIUS + ROD_RADIUS
     for frame, y, depth in ((1, -4.0, -2.0), (12, -4.0, 1.5), (36, 6.0, 1.5), (48, 6.0, -3.0)):
@@ -56,9 +56,9 @@ def build(scene) -> None:
     rod.palpate.role = "TARGET"
     scene.palpate.overlays = {"FORCE", "SHEARS"}
 
-    paper = studio.material("Backdrop", (0.30, 0.32, 0.35), roughness=0.85)
-    studio.stage(scene, paper, aim=(0.0, -3.0, 32.0), camera=(95.0, 90.0, 85.0), size=0.3)
-    studio.explain(TEXT)
+    paper = scene_builder.material("Backdrop", (0.30, 0.32, 0.35), roughness=0.85)
+    scene_builder.add_stage(scene, paper, aim=(0.0, -3.0, 32.0), camera=(95.0, 90.0, 85.0), size=0.3)
+    scene_builder.add_readme(TEXT)
     scene.frame_set(scene.frame_start)
 
 

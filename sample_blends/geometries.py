@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 
-from . import fingertip, studio
+from . import fingertip, scene_builder
 
 FPS = 24
 FRAME_END = 24
@@ -25,33 +25,33 @@ the triangles around the vertex, as long as the maximum penetration. A ball is p
 
 def build(scene) -> None:
     """Fill `scene`, which is emptied first; the add-on's classes must be registered."""
-    studio.prepare(scene, FRAME_END, FPS)
-    rubber = studio.material("Rubber", (0.10, 0.16, 0.22), roughness=0.6)
-    needle = studio.material("Normals", (0.85, 0.35, 0.06), roughness=0.5)
+    scene_builder.prepare(scene, FRAME_END, FPS)
+    rubber = scene_builder.material("Rubber", (0.10, 0.16, 0.22), roughness=0.6)
+    needle = scene_builder.material("Normals", (0.85, 0.35, 0.06), roughness=0.5)
     sensors = [_grid(scene), _sphere(scene), _tip(scene)]
-    steel = studio.ghost_steel("Steel, seen through", clear=0.75, edge=0.8)
+    steel = scene_builder.see_through_steel("Steel, seen through", clear=0.75, edge=0.8)
     for sensor, top in sensors:
         sensor.data.materials.append(rubber)
         settings = sensor.palpate
         settings.role, settings.max_penetration = "SENSOR", 1e-3 * NEEDLE
         settings.k, settings.cn = 30.0, 0.3
-        studio.needles(scene, sensor, NEEDLE, needle)
-        ball = studio.ball(scene, f"Ball on {sensor.name}", BALL_RADIUS)
+        scene_builder.add_normal_needles(scene, sensor, NEEDLE, needle)
+        ball = scene_builder.ball(scene, f"Ball on {sensor.name}", BALL_RADIUS)
         ball.data.materials.append(steel)
         ball.palpate.role = "TARGET"
         for frame, depth in ((1, -16.0), (14, 2.0), (24, 2.0)):
             ball.location = (sensor.location.x, sensor.location.y, top + BALL_RADIUS - depth)
             ball.keyframe_insert("location", frame=frame)
-    paper = studio.material("Backdrop", (0.30, 0.32, 0.35), roughness=0.85)
-    studio.stage(scene, paper, aim=(0.0, 0.0, 15.0), camera=(60.0, -230.0, 150.0), size=0.6)
+    paper = scene_builder.material("Backdrop", (0.30, 0.32, 0.35), roughness=0.85)
+    scene_builder.add_stage(scene, paper, aim=(0.0, 0.0, 15.0), camera=(60.0, -230.0, 150.0), size=0.6)
     scene.frame_set(scene.frame_start)
-    studio.frame_objects(scene, [sensor for sensor, _ in sensors], region=(0.06, 0.06, 0.94, 0.62), size=(1100, 600))
-    studio.explain(TEXT)
+    scene_builder.frame_objects(scene, [sensor for sensor, _ in sensors], region=(0.06, 0.06, 0.94, 0.62), size=(1100, 600))
+    scene_builder.add_readme(TEXT)
 
 
 def _grid(scene):
-    vertices, faces, texels = studio.pad_mesh(10, 10, 3.0, 4.0, 6.0)
-    sensor = studio.mesh_object(scene, GRID, vertices, faces)
+    vertices, faces, texels = scene_builder.pad_mesh(10, 10, 3.0, 4.0, 6.0)
+    sensor = scene_builder.mesh_object(scene, GRID, vertices, faces)
     sensor.location = (-46.0, 0.0, 14.0)
     _choose(sensor, texels)
     return sensor, 14.0
@@ -62,7 +62,9 @@ def _sphere(scene):
 
     made = bmesh.new()
     bmesh.ops.create_icosphere(made, subdivisions=3, radius=SPHERE_RADIUS)
-    sensor = studio.mesh_object(scene, SPHERE, [v.co for v in made.verts], [[v.index for v in f.verts] for f in made.faces])
+    sensor = scene_builder.mesh_object(
+        scene, SPHERE, [v.co for v in made.verts], [[v.index for v in f.verts] for f in made.faces]
+    )
     made.free()
     sensor.location = (0.0, 0.0, 14.0)
     up = [v.index for v in sensor.data.vertices if v.co.z > -0.2 * SPHERE_RADIUS]
@@ -72,7 +74,7 @@ def _sphere(scene):
 
 def _tip(scene):
     vertices, faces = fingertip.capsule()
-    sensor = studio.mesh_object(scene, TIP, vertices, faces)
+    sensor = scene_builder.mesh_object(scene, TIP, vertices, faces)
     sensor.location, sensor.rotation_euler = (44.0, 0.0, 14.0), (0.0, 0.0, math.radians(-125.0))
     _choose(sensor, np.flatnonzero((vertices[:, 2] > 0.2 * fingertip.RADIUS) & (vertices[:, 1] > -14.0)))
     return sensor, 14.0 + fingertip.RADIUS

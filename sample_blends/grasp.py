@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 
-from . import studio
+from . import scene_builder
 
 FPS = 24
 FRAME_END = 60
@@ -35,20 +35,20 @@ Space plays; Bake writes the tactile images of both fingers and puts heat maps, 
 
 def build(scene) -> None:
     """Fill `scene`, which is emptied first; the add-on's classes must be registered."""
-    studio.prepare(scene, FRAME_END, FPS)
-    rubber = studio.material("Rubber", (0.035, 0.036, 0.04), roughness=0.55)
-    black = studio.material("Black anodised", (0.012, 0.012, 0.014), metallic=0.6, roughness=0.32)
-    paper = studio.material("Backdrop", (0.30, 0.32, 0.35), roughness=0.85)
+    scene_builder.prepare(scene, FRAME_END, FPS)
+    rubber = scene_builder.material("Rubber", (0.035, 0.036, 0.04), roughness=0.55)
+    black = scene_builder.material("Black anodised", (0.012, 0.012, 0.014), metallic=0.6, roughness=0.32)
+    paper = scene_builder.material("Backdrop", (0.30, 0.32, 0.35), roughness=0.85)
 
     for name, side in ((LEFT, -1), (RIGHT, 1)):
         _finger(scene, name, side, rubber, black)
-    cylinder = studio.cylinder(scene, CYLINDER, RADIUS, HEIGHT, bevel=0.0)
+    cylinder = scene_builder.cylinder(scene, CYLINDER, RADIUS, HEIGHT, bevel=0.0)
     cylinder.modifiers.clear()  # its rim stays sharp: the lower one stands on the table
-    cylinder.data.materials.append(studio.ghost_steel("Steel, seen through", clear=0.8, edge=0.5))
+    cylinder.data.materials.append(scene_builder.see_through_steel("Steel, seen through", clear=0.8, edge=0.5))
     cylinder.location.z = HEIGHT / 2
 
-    vertices, faces, texels = studio.pad_mesh(9, 9, 5.0, 4.0, 4.0)
-    table = studio.mesh_object(scene, TABLE, vertices, faces)
+    vertices, faces, texels = scene_builder.pad_mesh(9, 9, 5.0, 4.0, 4.0)
+    table = scene_builder.mesh_object(scene, TABLE, vertices, faces)
     table.data.materials.append(rubber)
     table.vertex_groups.new(name="tactile").add(texels, 1.0, "REPLACE")
 
@@ -63,19 +63,19 @@ def build(scene) -> None:
     scene.palpate.color_map = "VIRIDIS"
     scene.palpate.overlays = {"FORCE", "SHEARS"}
 
-    studio.stage(scene, paper, aim=(0.0, 0.0, 50.0), camera=(190.0, -330.0, 130.0))
+    scene_builder.add_stage(scene, paper, aim=(0.0, 0.0, 50.0), camera=(190.0, -330.0, 130.0))
     scene.objects["Key"].visible_glossy = False  # else its reflection in the steel covers a pad
     scene.objects["Key"].data.specular_factor = 0.0
     backdrop = scene.objects["Backdrop"]
     backdrop.location.z = -4.0
-    studio.explain(TEXT)
+    scene_builder.add_readme(TEXT)
     scene.frame_set(scene.frame_start)
 
 
 def _finger(scene, name: str, side: int, rubber, black) -> None:
     """Add a finger at x < 0 (side −1) or x > 0 whose pad looks at the middle; it closes and lifts."""
-    vertices, faces, texels = studio.pad_mesh(ROWS, COLUMNS, PITCH, 2.5, THICKNESS)
-    pad = studio.mesh_object(scene, name, vertices, faces)
+    vertices, faces, texels = scene_builder.pad_mesh(ROWS, COLUMNS, PITCH, 2.5, THICKNESS)
+    pad = scene_builder.mesh_object(scene, name, vertices, faces)
     pad.data.materials.append(rubber)
     pad.vertex_groups.new(name="tactile").add(texels, 1.0, "REPLACE")
     pad.rotation_mode = "XYZ"
@@ -86,6 +86,6 @@ def _finger(scene, name: str, side: int, rubber, black) -> None:
         pad.location = (side * (closed + gap + (SQUEEZE if frame == 1 else 0.0)), 0.0, MIDDLE + height)
         pad.keyframe_insert("location", frame=frame)
     long = ROWS * PITCH + 5.0
-    back = studio.box(scene, f"{name} back", (COLUMNS * PITCH + 6.0, long + 30.0, 9.0), bevel=2.2)
+    back = scene_builder.box(scene, f"{name} back", (COLUMNS * PITCH + 6.0, long + 30.0, 9.0), bevel=2.2)
     back.location, back.parent = (0.0, 14.0, -THICKNESS - 4.0), pad
     back.data.materials.append(black)

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from . import gripper, studio
+from . import gripper, scene_builder
 
 FPS = 24
 FRAME_END = 72
@@ -34,20 +34,20 @@ class Object:
 
 
 def _sphere(scene, name):
-    made = studio.ball(scene, name, 20.0)
-    made.data.materials.append(studio.ghost_steel("Steel, seen through", clear=0.8, edge=0.6))
+    made = scene_builder.ball(scene, name, 20.0)
+    made.data.materials.append(scene_builder.see_through_steel("Steel, seen through", clear=0.8, edge=0.6))
     return made
 
 
 def _box(scene, name):
-    made = studio.box(scene, name, (30.0, 44.0, 64.0), bevel=1.2)
-    made.data.materials.append(studio.material("Wood", (0.55, 0.36, 0.19), roughness=0.55))
+    made = scene_builder.box(scene, name, (30.0, 44.0, 64.0), bevel=1.2)
+    made.data.materials.append(scene_builder.material("Wood", (0.55, 0.36, 0.19), roughness=0.55))
     return made
 
 
 def _cylinder(scene, name):
-    made = studio.cylinder(scene, name, 16.0, 70.0, bevel=0.8)
-    made.data.materials.append(studio.material("Brass", (0.8, 0.58, 0.25), metallic=1.0, roughness=0.28))
+    made = scene_builder.cylinder(scene, name, 16.0, 70.0, bevel=0.8)
+    made.data.materials.append(scene_builder.material("Brass", (0.8, 0.58, 0.25), metallic=1.0, roughness=0.28))
     return made
 
 
@@ -68,7 +68,7 @@ table then sinks away, and friction alone holds the object.
 
 def build(scene, kind: str) -> None:
     """Fill `scene`, which is emptied first, with the grasp of one of `OBJECTS`; the add-on's classes must be registered."""
-    studio.prepare(scene, FRAME_END, FPS)
+    scene_builder.prepare(scene, FRAME_END, FPS)
     look = gripper.materials()
     thing = OBJECTS[kind]
     fingers = [gripper.finger(scene, side, thing.reach + START, HEIGHT, look) for side in (-1, 1)]
@@ -83,9 +83,9 @@ def build(scene, kind: str) -> None:
         table.keyframe_insert("location", frame=frame)
     scene.palpate.use_auto_dt, scene.palpate.dt = False, 5e-4
     scene.palpate.color_map = "MAGMA"
-    paper = studio.material("Backdrop", (0.30, 0.32, 0.35), roughness=0.85)
-    studio.stage(scene, paper, aim=(0.0, 0.0, HEIGHT), camera=(150.0, -270.0, 150.0), size=0.8)
+    paper = scene_builder.material("Backdrop", (0.30, 0.32, 0.35), roughness=0.85)
+    scene_builder.add_stage(scene, paper, aim=(0.0, 0.0, HEIGHT), camera=(150.0, -270.0, 150.0), size=0.8)
     scene.frame_set(scene.frame_start)
     shown = [obj, *obj.children, *fingers, *(part for pad in fingers for part in pad.children)]
-    studio.frame_objects(scene, shown, (0.04, 0.04, 0.96, 0.96))
-    studio.explain(TEXT.format(what=f"a {thing.name.lower()}"))
+    scene_builder.frame_objects(scene, shown, (0.04, 0.04, 0.96, 0.96))
+    scene_builder.add_readme(TEXT.format(what=f"a {thing.name.lower()}"))

@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from . import studio
+from . import scene_builder
 
 ROWS, COLUMNS, PITCH = 14, 6, 3.4
 FINGER_MASS = 0.3  # kg
@@ -28,9 +28,9 @@ a centimetre before friction holds it."""
 def materials() -> dict:
     """Return the gripper's materials by name."""
     return {
-        "rubber": studio.material("Rubber", (0.035, 0.036, 0.04), roughness=0.55),
-        "black": studio.material("Black anodised", (0.012, 0.012, 0.014), metallic=0.6, roughness=0.32),
-        "aluminium": studio.material("Aluminium", (0.55, 0.57, 0.6), metallic=1.0, roughness=0.34),
+        "rubber": scene_builder.material("Rubber", (0.035, 0.036, 0.04), roughness=0.55),
+        "black": scene_builder.material("Black anodised", (0.012, 0.012, 0.014), metallic=0.6, roughness=0.32),
+        "aluminium": scene_builder.material("Aluminium", (0.55, 0.57, 0.6), metallic=1.0, roughness=0.34),
     }
 
 
@@ -49,8 +49,8 @@ def finger(scene, side: int, gap: float, height: float, look: dict):
     from mathutils import Matrix
 
     name = LEFT if side < 0 else RIGHT
-    vertices, faces, texels = studio.pad_mesh(ROWS, COLUMNS, PITCH, MARGIN, THICKNESS, rounding=0.8)
-    pad = studio.mesh_object(scene, name, vertices, faces)
+    vertices, faces, texels = scene_builder.pad_mesh(ROWS, COLUMNS, PITCH, MARGIN, THICKNESS, rounding=0.8)
+    pad = scene_builder.mesh_object(scene, name, vertices, faces)
     pad.data.materials.append(look["rubber"])
     pad.vertex_groups.new(name="tactile").add(texels, 1.0, "REPLACE")
     # Columns of the rotation: the pad's own x, y and z axis in the world. It looks inwards, and its rows run upwards.
@@ -60,10 +60,10 @@ def finger(scene, side: int, gap: float, height: float, look: dict):
     pad.location = (side * gap, 0.0, height)
 
     tall = PAD_TALL + 2 * MARGIN
-    block = studio.box(scene, f"{name} block", (PAD_WIDE + 2 * MARGIN + 3, tall + 34, 9.0), bevel=1.6)
+    block = scene_builder.box(scene, f"{name} block", (PAD_WIDE + 2 * MARGIN + 3, tall + 34, 9.0), bevel=1.6)
     block.parent, block.location = pad, (0.0, 15.0, -THICKNESS - 4.0)
     block.data.materials.append(look["black"])
-    foot = studio.box(scene, f"{name} foot", (PAD_WIDE + 2 * MARGIN + 3, 14.0, 26.0), bevel=1.6)
+    foot = scene_builder.box(scene, f"{name} foot", (PAD_WIDE + 2 * MARGIN + 3, 14.0, 26.0), bevel=1.6)
     foot.parent, foot.location = pad, (0.0, tall / 2 + 27.0, -THICKNESS - 6.0)
     foot.data.materials.append(look["aluminium"])
 
@@ -76,13 +76,13 @@ def finger(scene, side: int, gap: float, height: float, look: dict):
 def housing(scene, height: float, look: dict):
     """Return the gripper's body, which carries both fingers; `height` (mm) is that of the middle of the pads."""
     z = height + (PAD_TALL + 2 * MARGIN) / 2 + 27.0 + 7.0 + 21.0
-    body = studio.box(scene, "Gripper", (150.0, 56.0, 42.0), bevel=4.0)
+    body = scene_builder.box(scene, "Gripper", (150.0, 56.0, 42.0), bevel=4.0)
     body.location = (0.0, 0.0, z)
     body.data.materials.append(look["aluminium"])
-    rail = studio.box(scene, "Gripper rail", (140.0, 30.0, 8.0), bevel=1.0)
+    rail = scene_builder.box(scene, "Gripper rail", (140.0, 30.0, 8.0), bevel=1.0)
     rail.parent, rail.location = body, (0.0, 0.0, -20.0)
     rail.data.materials.append(look["black"])
-    flange = studio.cylinder(scene, "Gripper flange", 24.0, 20.0, bevel=1.5)
+    flange = scene_builder.cylinder(scene, "Gripper flange", 24.0, 20.0, bevel=1.5)
     flange.parent, flange.location = body, (0.0, 0.0, 30.0)
     flange.data.materials.append(look["black"])
     return body
@@ -118,16 +118,16 @@ def spray_bottle(scene, name: str):
     body += [(8.0 + 14.0 * math.cos(a), 34.0 + 10.0 * math.sin(a)) for a in np.linspace(0.0, math.pi / 2, 9)[1:]]
     body += [(8.0, 52.0)]
     vertices, faces = lathe(body)
-    bottle = studio.mesh_object(scene, name, vertices, faces)
-    plastic = studio.material("Blue plastic, seen through", (0.05, 0.22, 0.6), roughness=0.25)
+    bottle = scene_builder.mesh_object(scene, name, vertices, faces)
+    plastic = scene_builder.material("Blue plastic, seen through", (0.05, 0.22, 0.6), roughness=0.25)
     bottle.data.materials.append(plastic)
-    white = studio.material("White plastic", (0.8, 0.8, 0.78), roughness=0.4)
-    cap = studio.cylinder(scene, f"{name} cap", 10.5, 12.0, (0.0, 0.0, 57.0), bevel=0.8)
-    head = studio.box(scene, f"{name} head", (13.0, 42.0, 13.0), bevel=3.0)
+    white = scene_builder.material("White plastic", (0.8, 0.8, 0.78), roughness=0.4)
+    cap = scene_builder.cylinder(scene, f"{name} cap", 10.5, 12.0, (0.0, 0.0, 57.0), bevel=0.8)
+    head = scene_builder.box(scene, f"{name} head", (13.0, 42.0, 13.0), bevel=3.0)
     head.location = (0.0, -9.0, 69.0)
-    trigger = studio.box(scene, f"{name} trigger", (6.0, 4.0, 24.0), bevel=1.2)
+    trigger = scene_builder.box(scene, f"{name} trigger", (6.0, 4.0, 24.0), bevel=1.2)
     trigger.location, trigger.rotation_euler = (0.0, -21.0, 54.0), (math.radians(-24), 0.0, 0.0)
-    nozzle = studio.cylinder(scene, f"{name} nozzle", 3.4, 7.0, (0.0, -32.5, 69.0), bevel=0.5)
+    nozzle = scene_builder.cylinder(scene, f"{name} nozzle", 3.4, 7.0, (0.0, -32.5, 69.0), bevel=0.5)
     nozzle.rotation_euler = (math.pi / 2, 0.0, 0.0)
     for part in (cap, head, trigger, nozzle):
         part.parent = bottle
@@ -166,7 +166,7 @@ def drive(fingers, grip, speed: float, max_force: float, axes) -> None:
         first.palpate.drive_force = force
         if not isinstance(grip, float):
             first.keyframe_insert("palpate.drive_force", frame=frame)
-    studio.step_keys(first)
+    scene_builder.use_constant_interpolation(first)
 
 
 def mount(arm, fingers) -> None:
@@ -181,11 +181,11 @@ def mount(arm, fingers) -> None:
 
 def table(scene, name: str, height: float):
     """Return a table whose top is at `height` (mm): a pad that gives way under what stands on it, and is not read out."""
-    vertices, faces, texels = studio.pad_mesh(15, 15, 4.0, 8.0, 8.0, rounding=1.0)
-    made = studio.mesh_object(scene, name, vertices, faces)
+    vertices, faces, texels = scene_builder.pad_mesh(15, 15, 4.0, 8.0, 8.0, rounding=1.0)
+    made = scene_builder.mesh_object(scene, name, vertices, faces)
     made.location = (0.0, 0.0, height)
     made.vertex_groups.new(name="top").add(texels, 1.0, "REPLACE")
-    made.data.materials.append(studio.material("Table", (0.2, 0.21, 0.23), roughness=0.6))
+    made.data.materials.append(scene_builder.material("Table", (0.2, 0.21, 0.23), roughness=0.6))
     settings = made.palpate
     settings.role, settings.region, settings.vertex_group = "PAD", "GROUP", "top"
     settings.k, settings.cn, settings.sigma0, settings.sigma1 = 300.0, 6.0, 150.0, 1.5

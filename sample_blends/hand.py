@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from . import gripper, studio
+from . import gripper, scene_builder
 
 FPS = 24
 FRAME_END = 72
@@ -46,7 +46,7 @@ index finger feels 2 N; then the support under the cylinder sinks away, and fric
 
 def build(scene) -> None:
     """Fill `scene`, which is emptied first; the add-on's classes must be registered."""
-    studio.prepare(scene, FRAME_END, FPS)
+    scene_builder.prepare(scene, FRAME_END, FPS)
     index, thumb, cylinder = bodies(scene)
     for finger in (index, thumb):
         settings = finger.palpate
@@ -61,36 +61,36 @@ def build(scene) -> None:
         table.keyframe_insert("location", frame=frame)
     scene.palpate.use_auto_dt, scene.palpate.dt = False, 5e-4
     scene.palpate.color_map = "MAGMA"
-    paper = studio.material("Backdrop", (0.30, 0.32, 0.35), roughness=0.85)
-    studio.stage(scene, paper, aim=(0.0, 0.0, 0.0), camera=(-150.0, -210.0, 150.0), size=0.8)
+    paper = scene_builder.material("Backdrop", (0.30, 0.32, 0.35), roughness=0.85)
+    scene_builder.add_stage(scene, paper, aim=(0.0, 0.0, 0.0), camera=(-150.0, -210.0, 150.0), size=0.8)
     scene.objects["Backdrop"].location.z = -90.0
     scene.frame_set(scene.frame_start)
-    studio.frame_objects(scene, (index, thumb, cylinder), (0.05, 0.05, 0.95, 0.95))
-    studio.explain(TEXT)
+    scene_builder.frame_objects(scene, (index, thumb, cylinder), (0.05, 0.05, 0.95, 0.95))
+    scene_builder.add_readme(TEXT)
 
 
 def bodies(scene):
     """Model hand and cylinder; return the two fingers that feel, and the cylinder."""
-    skin = studio.material("Skin", (0.72, 0.42, 0.30), roughness=0.45)
+    skin = scene_builder.material("Skin", (0.72, 0.42, 0.30), roughness=0.45)
     fingers = []
     for name, joints, side in ((INDEX, INDEX_JOINTS, 1.0), (THUMB, THUMB_JOINTS, -1.0)):
         spine = np.array([(x, y, 0.0, r) for x, y, r in joints])
         vertices, faces, pad = sweep(spine, inwards=(-side, 0.0, 0.0))
         # The origin of a finger is in its tip, so that its place is where it touches.
         vertices = vertices - np.array([spine[-1, 0], 0.0, 0.0])
-        finger = studio.mesh_object(scene, name, vertices, faces)
+        finger = scene_builder.mesh_object(scene, name, vertices, faces)
         finger.location = (spine[-1, 0] + side * GAP, 0.0, 0.0)
         finger.data.materials.append(skin)
         finger.vertex_groups.new(name="tactile").add([int(i) for i in pad], 1.0, "REPLACE")
         fingers.append(finger)
     for number, joints in enumerate(CURLED):
         vertices, faces, _ = sweep(np.array(joints, float), inwards=(0.0, 0.0, -1.0))
-        studio.mesh_object(scene, f"Finger {number + 3}", vertices, faces).data.materials.append(skin)
-    palm = studio.box(scene, "Palm", (70.0, 88.0, 27.0), bevel=12.0)
+        scene_builder.mesh_object(scene, f"Finger {number + 3}", vertices, faces).data.materials.append(skin)
+    palm = scene_builder.box(scene, "Palm", (70.0, 88.0, 27.0), bevel=12.0)
     palm.location, palm.rotation_euler = (14.0, 130.0, -2.0), (0.0, 0.0, math.radians(6))
     palm.data.materials.append(skin)
-    cylinder = studio.cylinder(scene, CYLINDER, RADIUS, HEIGHT, bevel=0.6)
-    cylinder.data.materials.append(studio.ghost_steel("Steel, seen through", clear=0.8, edge=0.6))
+    cylinder = scene_builder.cylinder(scene, CYLINDER, RADIUS, HEIGHT, bevel=0.6)
+    cylinder.data.materials.append(scene_builder.see_through_steel("Steel, seen through", clear=0.8, edge=0.6))
     return *fingers, cylinder
 
 

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from . import gripper, studio
+from . import gripper, scene_builder
 
 FPS = 24
 FRAME_END = 168
@@ -35,7 +35,7 @@ The arm and the wanted force are keyframed; the way of the fingers is the contro
 
 def build(scene) -> None:
     """Fill `scene`, which is emptied first; the add-on's classes must be registered."""
-    studio.prepare(scene, FRAME_END, FPS)
+    scene_builder.prepare(scene, FRAME_END, FPS)
     look = gripper.materials()
     tall = gripper.ROWS * gripper.PITCH
     height = EDGE + tall / 2 - COVERED * tall  # of the pads' middle when the cube's top covers the wanted share
@@ -48,17 +48,17 @@ def build(scene) -> None:
         arm.location.z = rest + above
         arm.keyframe_insert("location", frame=frame)
 
-    cube = studio.box(scene, CUBE, (EDGE,) * 3, bevel=0.6)
+    cube = scene_builder.box(scene, CUBE, (EDGE,) * 3, bevel=0.6)
     cube.location = (0.0, 0.0, EDGE / 2)
-    cube.data.materials.append(studio.material("Wood", (0.55, 0.36, 0.19), roughness=0.55))
+    cube.data.materials.append(scene_builder.material("Wood", (0.55, 0.36, 0.19), roughness=0.55))
     cube.palpate.role, cube.palpate.body, cube.palpate.mass = "TARGET", "FREE", MASS
     table = gripper.table(scene, TABLE, 0.0)
     scene.palpate.use_auto_dt, scene.palpate.dt = False, 5e-4
     scene.palpate.color_map = "MAGMA"
 
-    paper = studio.material("Backdrop", (0.30, 0.32, 0.35), roughness=0.85)
-    studio.stage(scene, paper, aim=(0.0, 0.0, 60.0), camera=(190.0, -330.0, 190.0), size=0.9)
+    paper = scene_builder.material("Backdrop", (0.30, 0.32, 0.35), roughness=0.85)
+    scene_builder.add_stage(scene, paper, aim=(0.0, 0.0, 60.0), camera=(190.0, -330.0, 190.0), size=0.9)
     scene.objects["Backdrop"].location.z = -8.0
     scene.frame_set(scene.frame_start)
-    studio.frame_objects(scene, [*fingers, arm, table], (0.04, 0.04, 0.96, 0.96), size=(720, 720))
-    studio.explain(TEXT)
+    scene_builder.frame_objects(scene, [*fingers, arm, table], (0.04, 0.04, 0.96, 0.96), size=(720, 720))
+    scene_builder.add_readme(TEXT)

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from . import studio, weighing
+from . import scene_builder, weighing
 
 TILT = 10.0  # degrees
 MASS = 1.0  # kg
@@ -22,4 +22,4 @@ def build(scene) -> None:
     """Fill `scene`, which is emptied first; the add-on's classes must be registered."""
     weighing.weigh(scene, MASS, TILT)
     scene.palpate.dt = 1e-3
-    studio.explain(TEXT)
+    scene_builder.add_readme(TEXT)

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 
-from . import studio
+from . import scene_builder
 
 FPS = 24
 FRAME_END = 48
@@ -32,23 +32,23 @@ Press Space to play, or Bake for tactile images and keyframes.
 def build(scene) -> None:
     """Fill `scene`, which is emptied first; the add-on's classes must be registered."""
     weigh(scene, 1.0, 0.0)
-    studio.explain(TEXT)
+    scene_builder.add_readme(TEXT)
 
 
 def weigh(scene, mass: float, tilt: float, frame_end: int = FRAME_END, fps: int = FPS) -> None:
     """Put a cube of `mass` (kg) on a pad that is tilted by `tilt` degrees about x, so along its rows."""
-    studio.prepare(scene, frame_end, fps)
-    rubber = studio.material("Rubber", (0.035, 0.036, 0.04), roughness=0.55)
-    vertices, faces, texels = studio.pad_mesh(ROWS, COLUMNS, PITCH, 0.9 * PITCH + 0.6, 6.0)
-    pad = studio.mesh_object(scene, PAD, vertices, faces)
+    scene_builder.prepare(scene, frame_end, fps)
+    rubber = scene_builder.material("Rubber", (0.035, 0.036, 0.04), roughness=0.55)
+    vertices, faces, texels = scene_builder.pad_mesh(ROWS, COLUMNS, PITCH, 0.9 * PITCH + 0.6, 6.0)
+    pad = scene_builder.mesh_object(scene, PAD, vertices, faces)
     pad.data.materials.append(rubber)
     pad.vertex_groups.new(name="tactile").add(texels, 1.0, "REPLACE")
     turn = math.radians(tilt)
     pad.location, pad.rotation_euler = (0.0, 0.0, HEIGHT), (turn, 0.0, 0.0)
 
-    cube = studio.box(scene, CUBE, (EDGE,) * 3, bevel=1.2, flat_bottom=True)
-    cube.data.materials.append(studio.ghost_steel("Steel, seen through", clear=0.86, edge=0.3))
-    cube.data.materials.append(studio.material("Steel", studio.STEEL, metallic=1.0, roughness=0.16))
+    cube = scene_builder.box(scene, CUBE, (EDGE,) * 3, bevel=1.2, flat_bottom=True)
+    cube.data.materials.append(scene_builder.see_through_steel("Steel, seen through", clear=0.86, edge=0.3))
+    cube.data.materials.append(scene_builder.material("Steel", scene_builder.STEEL, metallic=1.0, roughness=0.16))
     cube.modifiers["Bevel"].material = 1
     up = EDGE / 2 + 0.1
     cube.location = (0.0, -up * math.sin(turn), HEIGHT + up * math.cos(turn))
@@ -61,6 +61,6 @@ def weigh(scene, mass: float, tilt: float, frame_end: int = FRAME_END, fps: int 
     scene.palpate.use_auto_dt, scene.palpate.dt = False, 1e-4  # the paper's step
     scene.palpate.color_map = "MAGMA"
 
-    paper = studio.material("Backdrop", (0.30, 0.32, 0.35), roughness=0.85)
-    studio.stage(scene, paper, aim=(0.0, 0.0, 25.0), camera=(190.0, -170.0, 110.0), size=0.5)
-    studio.frame_objects(scene, (pad, cube))
+    paper = scene_builder.material("Backdrop", (0.30, 0.32, 0.35), roughness=0.85)
+    scene_builder.add_stage(scene, paper, aim=(0.0, 0.0, 25.0), camera=(190.0, -170.0, 110.0), size=0.5)
+    scene_builder.frame_objects(scene, (pad, cube))

@@ -7,20 +7,20 @@ import queue
 import threading
 from collections.abc import Callable
 
-MOST_WAITING = 8
+MAX_WAITING_TASKS = 8
 """Tasks that may wait: what they hold stays in memory, so a slow disk slows the solver down in the end."""
 
 
-class Behind:
+class BackgroundWriter:
     """Does tasks one after the other, in order, in a thread. What goes wrong is raised by the next call."""
 
     def __init__(self):
-        self._tasks: queue.Queue[Callable[[], None] | None] = queue.Queue(MOST_WAITING)
+        self._tasks: queue.Queue[Callable[[], None] | None] = queue.Queue(MAX_WAITING_TASKS)
         self._error: BaseException | None = None
         self._stopped = False
         self._thread: threading.Thread | None = None
 
-    def do(self, task: Callable[[], None]) -> None:
+    def submit(self, task: Callable[[], None]) -> None:
         """Add a task; waits when too many wait already."""
         self._raise()
         if self._thread is None:

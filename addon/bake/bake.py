@@ -20,7 +20,7 @@ from . import bake_files, scene_writer
 
 
 @dataclass(frozen=True)
-class Baked:
+class BakeResult:
     """What a bake leaves: the recording, what was solved, and the folder of each sensor."""
 
     recording: Recording
@@ -28,7 +28,7 @@ class Baked:
     folders: dict[str, Path]
 
 
-def bake(scene, into_scene: bool = True) -> Generator[Progress, None, Baked]:
+def bake(scene, into_scene: bool = True) -> Generator[Progress, None, BakeResult]:
     """Compute the whole frame range of a scene, write its files, and put the result into the scene.
 
     With `into_scene` False only files are written, also of objects that are linked and could not hold a bake.
@@ -49,7 +49,7 @@ def bake(scene, into_scene: bool = True) -> Generator[Progress, None, Baked]:
             session_state.session.bake = None
 
 
-def _bake(scene, name: str, into_scene: bool) -> Generator[Progress, None, Baked]:
+def _bake(scene, name: str, into_scene: bool) -> Generator[Progress, None, BakeResult]:
     folder = bake_files.bake_folder(scene)
     bake_files.check_folder(folder)
     total = 2 * max(1, scene.frame_end - scene.frame_start + 1)
@@ -64,13 +64,13 @@ def _bake(scene, name: str, into_scene: bool) -> Generator[Progress, None, Baked
         yield _progress("Reading the scene", step.frame, step.done, total)
 
     if into_scene:
-        scene_writer.check(scene, scenario, binding)
+        scene_writer.check_writable(scene, scenario, binding)
     for step in first_use.wait():
         session_state.session.bake = step
         yield step
     solver = dependencies.solver()
     simulation = solver.Simulation(scenario)
-    files = bake_files.Files(folder, scenario, bpy.data.filepath)
+    files = bake_files.BakeFiles(folder, scenario, bpy.data.filepath)
     try:
         frames = files.resume(simulation)
         job = solver.solve(scenario, simulation, frames)
@@ -81,7 +81,7 @@ def _bake(scene, name: str, into_scene: bool) -> Generator[Progress, None, Baked
                 recording = stop.value
                 break
             files.write_frame(step.result)
-            files.keep(simulation, frames)
+            files.save_checkpoint(simulation, frames)
             binding.objects(_still_there(name))
             yield _progress("Computing forces", step.frame, total // 2 + step.done, total)
         recording = replace(recording, warnings=binding.warnings + recording.warnings)
@@ -92,10 +92,10 @@ def _bake(scene, name: str, into_scene: bool) -> Generator[Progress, None, Baked
         files.discard()
         raise
     if into_scene:
-        scene_writer.commit(scene, scenario, binding, recording, files.folders)
+        scene_writer.write(scene, scenario, binding, recording, files.folders)
         scene.frame_set(scene.frame_current, subframe=scene.frame_subframe)  # the new keyframes show
         playback.baked(scene, recording, files.folders)
-    return Baked(recording, scenario, files.folders)
+    return BakeResult(recording, scenario, files.folders)
 
 
 def _progress(stage: str, frame: int, done: int, total: int) -> Progress:

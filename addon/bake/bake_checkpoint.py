@@ -22,13 +22,13 @@ from ...core.io.recording_npz import load_recording, save_recording
 from ...core.model.recording import Frame, Recording
 from ...core.solver import checkpoint
 
-FOLDER = "unfinished.partial"
-STATE = "state.npz"
-PATIENCE = 5.0
+CHECKPOINT_FOLDER = "unfinished.partial"
+STATE_FILE = "state.npz"
+CHECKPOINT_INTERVAL = 5.0
 """Seconds of work between two states: what a kill costs at the most, beside the reading of the scene."""
 
 
-class Unfinished:
+class BakeCheckpoint:
     """The folder of one running bake.
 
     Parameters
@@ -40,16 +40,16 @@ class Unfinished:
     """
 
     def __init__(self, folder: Path, digest: str):
-        self.place = folder / FOLDER
+        self.place = folder / CHECKPOINT_FOLDER
         self._key = {"palpate": __version__, "digest": digest}
         self._pieces = 0
         self._kept = 0
         self._last = time.monotonic()
 
-    def resume(self, simulation) -> list[Frame] | None:
+    def restore(self, simulation) -> list[Frame] | None:
         """Bring a new simulation to where a killed bake was, and return the frames so far; None when there is none."""
         try:
-            with np.load(self.place / STATE, allow_pickle=False) as members:
+            with np.load(self.place / STATE_FILE, allow_pickle=False) as members:
                 packed = {name: members[name] for name in members.files}
             about = json.loads(str(packed.pop("about")))
             if about["key"] != self._key:
@@ -64,21 +64,21 @@ class Unfinished:
 
     def is_due(self, frames: list[Frame]) -> bool:
         """Whether enough work has come together to be put aside."""
-        return time.monotonic() - self._last >= PATIENCE and len(frames) > self._kept
+        return time.monotonic() - self._last >= CHECKPOINT_INTERVAL and len(frames) > self._kept
 
-    def keep(self, simulation, frames: list[Frame]) -> None:
+    def save(self, simulation, frames: list[Frame]) -> None:
         """Put the work aside."""
         self.place.mkdir(exist_ok=True)
         names = [body.name for body in simulation.scenario.bodies]
         piece = Recording.stack(frames[self._kept :], names, simulation.dt)
         save_recording(self.place / _piece(self._pieces), piece)
         about = {"key": self._key, "pieces": self._pieces + 1}
-        with atomic_write(self.place / STATE) as temporary, open(temporary, "wb") as file:
+        with atomic_write(self.place / STATE_FILE) as temporary, open(temporary, "wb") as file:
             np.savez(file, about=np.array(json.dumps(about)), **checkpoint.pack(simulation))
         self._pieces, self._kept = self._pieces + 1, len(frames)
         self._last = time.monotonic()
 
-    def drop(self) -> None:
+    def remove(self) -> None:
         """Remove it: the bake is finished, or was stopped on purpose."""
         shutil.rmtree(self.place, ignore_errors=True)
 

@@ -4,7 +4,7 @@
 A kill at any moment leaves the old bake or the new one, and an unfinished one that the next bake goes on with
 (:mod:`.bake_checkpoint`). Between the two renames of a swap the old one is called
 ``<sensor>.old``; the next bake puts that right. What the user has put into a sensor's folder moves on into the new one. Then
-the old one is removed while the user goes on (:func:`settle` waits for it): that may take as long as the bake.
+the old one is removed while the user goes on (:func:`wait_for_removals` waits for it): that may take as long as the bake.
 """
 
 from __future__ import annotations
@@ -37,15 +37,15 @@ from ...core.io.tactile_exr import describe, write_exrs
 from ...core.model.recording import Frame, Recording
 from ...core.model.scenario import Scenario
 from ...core.model.sensor import Sensor
-from .background_writer import Behind
-from .bake_checkpoint import Unfinished
-from .folder_lock import Claim
+from .background_writer import BackgroundWriter
+from .bake_checkpoint import BakeCheckpoint
+from .folder_lock import FolderLock
 
-OURS = re.compile(rf"tactile_-?\d+\.exr|{'|'.join(map(re.escape, (RECORDING_NAME, SENSOR_NAME, MANIFEST_NAME)))}")
+BAKE_FILE_NAMES = re.compile(rf"tactile_-?\d+\.exr|{'|'.join(map(re.escape, (RECORDING_NAME, SENSOR_NAME, MANIFEST_NAME)))}")
 """Names of the files in a sensor's folder that a bake writes and replaces."""
-BATCH, BATCH_PIXELS = 16, 16384
+MAX_BATCH_IMAGES, MAX_BATCH_PIXELS = 16, 16384
 """Most images of a sensor, and pixels in them, that are written together: small ones cost little more than one then."""
-SYNCS = hasattr(os, "sync")
+CAN_SYNC_ALL = hasattr(os, "sync")
 """Whether all that was written can be brought onto the disk at once; else it is done file by file."""
 
 _removals: list[threading.Thread] = []
@@ -74,7 +74,7 @@ def check_folder(folder: Path) -> None:
     writable_folder(folder if folder.exists() else folder.parent)
 
 
-class Files:
+class BakeFiles:
     """The growing files of one bake.
 
     Parameters
@@ -99,21 +99,21 @@ class Files:
         names = folder_names(self._sensors)
         self.folders = {name: self.folder / names[name] for name in self._sensors}
         self._scenario, self._digest = scenario, scenario.digest()
-        self._claim = Claim(self.folder)
-        self._unfinished = Unfinished(self.folder, self._digest)
-        self._writer = Behind()
+        self._lock = FolderLock(self.folder)
+        self._checkpoint = BakeCheckpoint(self.folder, self._digest)
+        self._writer = BackgroundWriter()
         self._waiting: list[Frame] = []
-        settle()
+        wait_for_removals()
         try:
             for place in self.folders.values():
-                _recover(place)
+                _finish_interrupted_swap(place)
                 self._check_replaceable(place)
         except FileError:
             self.discard()
             raise
         except OSError as error:
             self.discard()
-            raise _problem(self.folder, error) from error
+            raise _write_error(self.folder, error) from error
 
     def resume(self, simulation) -> list[Frame]:
         """Bring a new simulation to where a killed bake of the same scenario was, and return its frames, if there are any.
@@ -123,23 +123,23 @@ class Files:
         FileError
             The folders cannot be made.
         """
-        growing = [_beside(place, "partial") for place in self.folders.values()]
-        frames = self._unfinished.resume(simulation) if all(place.is_dir() for place in growing) else None
+        growing = [_sibling(place, "partial") for place in self.folders.values()]
+        frames = self._checkpoint.restore(simulation) if all(place.is_dir() for place in growing) else None
         try:
             if frames is None:
                 self._clean()
                 for place in growing:
                     place.mkdir()
         except OSError as error:
-            raise _problem(self.folder, error) from error
+            raise _write_error(self.folder, error) from error
         return frames or []
 
-    def keep(self, simulation, frames: list[Frame]) -> None:
+    def save_checkpoint(self, simulation, frames: list[Frame]) -> None:
         """Put the work so far aside, every few seconds, for the case that the process is killed."""
-        if self._unfinished.is_due(frames):
+        if self._checkpoint.is_due(frames):
             self._write_waiting()
             self._writer.finish()  # a state belongs to images that are there
-            self._unfinished.keep(simulation, frames)
+            self._checkpoint.save(simulation, frames)
 
     def _manifest(self, name: str, recording: Recording) -> Manifest:
         sensor, scenario = self._sensors[name], self._scenario
@@ -165,14 +165,14 @@ class Files:
         """Write the tactile image of every sensor, some frames at a time, while the solver goes on."""
         self._waiting.append(frame)
         pixels = max((math.prod(sensor.texels.layout.shape) for sensor in self._sensors.values()), default=1)
-        if len(self._waiting) >= min(BATCH, BATCH_PIXELS // pixels):
+        if len(self._waiting) >= min(MAX_BATCH_IMAGES, MAX_BATCH_PIXELS // pixels):
             self._write_waiting()
 
     def _write_waiting(self) -> None:
         frames, self._waiting = self._waiting, []
         for name, place in self.folders.items():
             if frames:
-                self._writer.do(partial(self._write_images, self._sensors[name], _beside(place, "partial"), frames))
+                self._writer.submit(partial(self._write_images, self._sensors[name], _sibling(place, "partial"), frames))
 
     def _write_images(self, sensor: Sensor, folder: Path, frames: list[Frame]) -> None:
         paths = [folder / frame_file(frame.frame) for frame in frames]
@@ -183,34 +183,34 @@ class Files:
         """Write the recordings, and let the new folders take the place of the old ones: all of them, or none."""
         self._write_waiting()
         for name, place in self.folders.items():
-            growing = _beside(place, "partial")
+            growing = _sibling(place, "partial")
             own, sensor = replace(recording, sensors={name: recording.sensors[name]}), self._sensors[name]
-            save_recording(growing / RECORDING_NAME, own, atomic=not SYNCS)
-            save_sensor(growing / SENSOR_NAME, sensor.texels, sensor.painted, atomic=not SYNCS)
-            write_manifest(growing, self._manifest(name, recording), atomic=not SYNCS)
+            save_recording(growing / RECORDING_NAME, own, atomic=not CAN_SYNC_ALL)
+            save_sensor(growing / SENSOR_NAME, sensor.texels, sensor.painted, atomic=not CAN_SYNC_ALL)
+            write_manifest(growing, self._manifest(name, recording), atomic=not CAN_SYNC_ALL)
         self._writer.finish()
         self._writer.stop()
         for place in self.folders.values():
             self._check_replaceable(place)  # again: a bake takes long enough for somebody to put something there
-        if SYNCS:
+        if CAN_SYNC_ALL:
             os.sync()  # once for all files: nobody sees them before the swap
         try:
             _swap(list(self.folders.values()))
-            self._unfinished.drop()
+            self._checkpoint.remove()
         except OSError as error:
-            raise _problem(self.folder, error) from error
-        self._claim.give_back()
+            raise _write_error(self.folder, error) from error
+        self._lock.release()
 
     def discard(self) -> None:
         """Remove what is unfinished."""
         self._writer.stop()
         self._clean()
-        self._claim.give_back()
+        self._lock.release()
 
     def _clean(self) -> None:
-        self._unfinished.drop()
+        self._checkpoint.remove()
         for place in self.folders.values():
-            shutil.rmtree(_beside(place, "partial"), ignore_errors=True)
+            shutil.rmtree(_sibling(place, "partial"), ignore_errors=True)
 
     def _check_replaceable(self, place: Path) -> None:
         if not place.exists():
@@ -226,22 +226,22 @@ class Files:
             )
 
 
-def stored_recording(folder: Path) -> Recording:
+def read_recording(folder: Path) -> Recording:
     """Read the recording of one sensor's folder."""
     return load_recording(folder / RECORDING_NAME)
 
 
-def _beside(place: Path, ending: str) -> Path:
+def _sibling(place: Path, ending: str) -> Path:
     return place.with_name(f"{place.name}.{ending}")
 
 
-def _recover(place: Path) -> None:
+def _finish_interrupted_swap(place: Path) -> None:
     """Put right what a kill left of a swap: one that was cut in two is taken back."""
-    old = _beside(place, "old")
+    old = _sibling(place, "old")
     if old.exists() and not place.exists():
         old.rename(place)
     if old.exists():
-        _hand_on(old, place)
+        _move_foreign_files(old, place)
         shutil.rmtree(old)
 
 
@@ -263,8 +263,8 @@ def _swap(places: list[Path]) -> None:
     try:
         for place in places:
             if place.exists():
-                place.rename(_beside(place, "old"))
-            _beside(place, "partial").rename(place)
+                place.rename(_sibling(place, "old"))
+            _sibling(place, "partial").rename(place)
     except BaseException:
         for place in places:
             with suppress(OSError):
@@ -272,15 +272,15 @@ def _swap(places: list[Path]) -> None:
         raise
     emptied = []
     for place in places:
-        old = _beside(place, "old")
+        old = _sibling(place, "old")
         with suppress(OSError):  # the new bake is there; what could not be moved waits in the old folder for the next
             if old.exists():
-                _hand_on(old, place)
+                _move_foreign_files(old, place)
                 emptied.append(old)
-    _remove_behind(emptied)
+    _remove_in_background(emptied)
 
 
-def _remove_behind(folders: list[Path]) -> None:
+def _remove_in_background(folders: list[Path]) -> None:
     """Remove folders while the user goes on; Blender, or the command, does not end before it is done."""
     if folders:
         work = threading.Thread(
@@ -290,27 +290,27 @@ def _remove_behind(folders: list[Path]) -> None:
         work.start()
 
 
-def settle() -> None:
+def wait_for_removals() -> None:
     """Return when the folders of bakes that were replaced are gone."""
     while _removals:
         _removals.pop().join()
 
 
 def _swap_back(place: Path) -> None:
-    partial, old = _beside(place, "partial"), _beside(place, "old")
+    partial, old = _sibling(place, "partial"), _sibling(place, "old")
     if not partial.exists():
         place.rename(partial)
     if old.exists() and not place.exists():
         old.rename(place)
 
 
-def _hand_on(old: Path, new: Path) -> None:
+def _move_foreign_files(old: Path, new: Path) -> None:
     """Move what no bake has written from one sensor's folder to another, unless something there has its name."""
     for path in old.iterdir():
-        if not OURS.fullmatch(path.name) and not (new / path.name).exists():
+        if not BAKE_FILE_NAMES.fullmatch(path.name) and not (new / path.name).exists():
             path.rename(new / path.name)
 
 
-def _problem(folder: Path, error: OSError) -> FileError:
+def _write_error(folder: Path, error: OSError) -> FileError:
     reason = (error.strerror or str(error)).lower()
     return FileError(f"The bake could not be written to '{folder}' ({reason}): check its permissions or choose another.")

@@ -13,10 +13,10 @@ from typing import IO
 
 from ...core.errors import FileError
 
-NAME = "baking.lock"
+LOCK_FILE_NAME = "baking.lock"
 
 
-class Claim:
+class FolderLock:
     """The right to write into a bake folder, until it is given back.
 
     Raises
@@ -26,7 +26,7 @@ class Claim:
     """
 
     def __init__(self, folder: Path):
-        self._path = folder / NAME
+        self._path = folder / LOCK_FILE_NAME
         self._file: IO[bytes] | None = None
         while self._file is None:
             try:
@@ -41,7 +41,7 @@ class Claim:
             else:  # whoever held it has just removed it
                 file.close()
 
-    def give_back(self) -> None:
+    def release(self) -> None:
         """Let others bake there; nothing is left behind."""
         file, self._file = self._file, None
         if file is None:

@@ -19,8 +19,8 @@ from ..session import identity
 from ..timeline import staleness
 
 
-def check(scene, scenario: Scenario, binding: Binding) -> None:
-    """Raise SceneError when :func:`commit` could not write on an object."""
+def check_writable(scene, scenario: Scenario, binding: Binding) -> None:
+    """Raise SceneError when :func:`write` could not write on an object."""
     objects = binding.objects(scene)
     read_out = [obj for sensor, obj in zip(scenario.sensors, sensor_objects(scene, binding)) if sensor.readout]
     for obj in {*(objects[index] for index in binding.starts), *read_out}:
@@ -53,7 +53,7 @@ def sensor_objects(scene, binding: Binding) -> list:
     return found
 
 
-def commit(scene, scenario: Scenario, binding: Binding, recording: Recording, folders: dict[str, Path]) -> None:
+def write(scene, scenario: Scenario, binding: Binding, recording: Recording, folders: dict[str, Path]) -> None:
     """Put a recording into its scene, replacing an earlier bake's.
 
     Parameters
@@ -73,15 +73,15 @@ def commit(scene, scenario: Scenario, binding: Binding, recording: Recording, fo
     for index in binding.starts:
         _free_body(objects[index], index, binding, recording)
     moved = {objects[index] for index in binding.starts}
-    worn = []
+    baked_sensors = []
     for sensor, obj in zip(scenario.sensors, sensors):
         if sensor.readout:
-            worn.append(_worn(obj, objects[sensor.body], sensor, binding, recording, folders[sensor.name]))
+            baked_sensors.append(_baked_sensor(obj, objects[sensor.body], sensor, binding, recording, folders[sensor.name]))
             obj.palpate.is_baked = True
         elif obj.palpate.is_baked and obj not in moved:
             clear_object(scene, obj)
-    bake_display.dress(scene, worn)
-    sweep()
+    bake_display.show_bake(scene, baked_sensors)
+    remove_orphans()
     settings = scene.palpate
     settings.baked_digest = recording.digest
     settings.baked_shapes = staleness.pack(binding.looks)
@@ -93,14 +93,14 @@ def _free_body(obj, index: int, binding: Binding, recording: Recording) -> None:
     moved_bodies.bake(obj, placement, recording.frames, recording.poses[:, index], np.array(binding.parents[index]))
 
 
-def _worn(obj, body, sensor, binding: Binding, recording: Recording, folder: Path) -> markers.Worn:
-    return markers.Worn(
+def _baked_sensor(obj, body, sensor, binding: Binding, recording: Recording, folder: Path) -> markers.BakedSensor:
+    return markers.BakedSensor(
         obj=obj,
         body=body,
         texels=sensor.texels,
         painted=sensor.painted,
         parameters=sensor.parameters,
-        felt=recording.sensors[sensor.name],
+        readings=recording.sensors[sensor.name],
         frames=recording.frames,
         poses=recording.poses[:, sensor.body],
         scale=binding.scale,
@@ -118,7 +118,7 @@ def bake_folder(obj) -> Path | None:
 
     It is where the images are: their path follows when the .blend is saved somewhere else, the text in our settings does not.
     """
-    image = materials.find(bpy.data.images, obj.palpate.uid) if obj.palpate.bake_folder else None
+    image = materials.find_block(bpy.data.images, obj.palpate.uid) if obj.palpate.bake_folder else None
     return None if image is None else Path(os.path.abspath(bpy.path.abspath(image.filepath))).parent
 
 
@@ -131,22 +131,22 @@ def clear(scene) -> None:
     """Take a bake out of its scene; its files stay."""
     for obj in baked_objects(scene):
         clear_object(scene, obj)
-    sweep()
+    remove_orphans()
     scene.palpate.baked_digest = ""
 
 
-def sweep() -> None:
+def remove_orphans() -> None:
     """Remove markers, materials, nodes and images of sensors that were deleted."""
     uids = {obj.palpate.uid for obj in bpy.data.objects}
-    markers.sweep(uids)
-    materials.sweep(uids)
+    markers.remove_orphans(uids)
+    materials.remove_orphans(uids)
 
 
 def has_bake(scene) -> bool:
     """Whether there is anything for :func:`clear`: an object's part of a bake, or the arrow of a deleted sensor."""
     if baked_objects(scene):
         return True
-    return bool(scene.palpate.baked_digest) and bool(markers.of_deleted(scene.objects))
+    return bool(scene.palpate.baked_digest) and bool(markers.orphans(scene.objects))
 
 
 def clear_object(scene, obj) -> None:

@@ -20,13 +20,13 @@ from ...core.response import metrics
 from ..session import units
 from . import heat_map, markers, materials, texel_arrows
 
-LEAST_RANGE = 1e-6
+MIN_COLOR_RANGE = 1e-6
 """Newtons, or pascals, at the end of the heat maps of sensors that nothing touched."""
-TEXEL_ARROW = 0.2
+LONGEST_TEXEL_ARROW = 0.2
 """Longest arrow of a texel, in sizes of the largest sensor, where its length is chosen automatically."""
-FACING = 0.7
+FACING_COSINE = 0.7
 """Cosine of the angle within which the force of one sensor points at another."""
-ARROW_GAP = 0.94
+FACING_ARROWS_SHARE = 0.94
 """Of the way between two such sensors that their arrows take up together."""
 
 
@@ -53,41 +53,41 @@ class Scales:
     longest: dict[str, float]
 
     @classmethod
-    def of(cls, settings, worn: list[markers.Worn]) -> Scales:
+    def of(cls, settings, baked_sensors: list[markers.BakedSensor]) -> Scales:
         """Choose the scales for all sensors of a scene, or take those that are set."""
-        size = max((item.size for item in worn), default=1.0)
-        unit = worn[0].scale if worn else 1.0
-        net = _largest(np.linalg.norm(item.felt.net_force, axis=1) for item in worn)
-        turn = _largest(np.linalg.norm(metrics.free_moment(item.felt), axis=1) for item in worn)
+        size = max((item.size for item in baked_sensors), default=1.0)
+        unit = baked_sensors[0].scale if baked_sensors else 1.0
+        net = _largest(np.linalg.norm(item.readings.net_force, axis=1) for item in baked_sensors)
+        turn = _largest(np.linalg.norm(metrics.free_moment(item.readings), axis=1) for item in baked_sensors)
         force = units.as_typed(settings.arrow_scale) / unit
         if settings.use_auto_arrow:
-            force = min(size / net, _room_between(worn)) if net > 0 else 0.0
+            force = min(size / net, _max_scale_of_facing_arrows(baked_sensors)) if net > 0 else 0.0
         peaks = {
-            "NORMALS": _largest(item.felt.normal_force for item in worn),
-            "SHEARS": _largest(np.linalg.norm(item.felt.shear, axis=2) for item in worn),
+            "NORMALS": _largest(item.readings.normal_force for item in baked_sensors),
+            "SHEARS": _largest(np.linalg.norm(item.readings.shear, axis=2) for item in baked_sensors),
         }
         texel = dict.fromkeys(peaks, units.as_typed(settings.texel_arrow_scale) / unit)
         if settings.use_auto_arrow:
-            texel = {kind: TEXEL_ARROW * size / peak if peak > 0 else 0.0 for kind, peak in peaks.items()}
+            texel = {kind: LONGEST_TEXEL_ARROW * size / peak if peak > 0 else 0.0 for kind, peak in peaks.items()}
         longest = {kind: texel[kind] * peak for kind, peak in peaks.items()}
         moment = 0.6 * size / turn if turn > 0 else 0.0
-        return cls(heat_range(settings, worn), force, moment, texel, longest)
+        return cls(color_range(settings, baked_sensors), force, moment, texel, longest)
 
 
-def _room_between(worn: list[markers.Worn]) -> float:
+def _max_scale_of_facing_arrows(baked_sensors: list[markers.BakedSensor]) -> float:
     """Return the Blender units per newton up to which arrows of sensors that face each other, as in a grasp, do not cross."""
     room = np.inf
-    ways = [item.in_world() for item in worn]
-    touching = [item.felt.contact.any(axis=1) for item in worn]
-    for a, b in combinations(range(len(worn)), 2):
+    ways = [item.in_world() for item in baked_sensors]
+    touching = [item.readings.contact.any(axis=1) for item in baked_sensors]
+    for a, b in combinations(range(len(baked_sensors)), 2):
         frames = touching[a] & touching[b]
         (from_a, push_a), (from_b, push_b) = ((foot[frames], push[frames]) for foot, push in (ways[a], ways[b]))
         distance = np.linalg.norm(from_b - from_a, axis=1)
         way = (from_b - from_a) / np.maximum(distance, 1e-12)[:, None]
         strengths = [np.maximum(np.linalg.norm(push, axis=1), 1e-12) for push in (push_a, push_b)]
         towards = (push_a * way).sum(axis=1) / strengths[0], -(push_b * way).sum(axis=1) / strengths[1]
-        facing = (np.minimum(*towards) > FACING) & (distance > 0)
-        room = min(room, (0.5 * ARROW_GAP * distance / np.maximum(*strengths))[facing].min(initial=np.inf))
+        facing = (np.minimum(*towards) > FACING_COSINE) & (distance > 0)
+        room = min(room, (0.5 * FACING_ARROWS_SHARE * distance / np.maximum(*strengths))[facing].min(initial=np.inf))
     return room
 
 
@@ -95,26 +95,26 @@ def _largest(tables) -> float:
     return max((float(table.max(initial=0.0)) for table in tables), default=0.0)
 
 
-def heat_range(settings, worn: list[markers.Worn]) -> float:
+def color_range(settings, baked_sensors: list[markers.BakedSensor]) -> float:
     """Return the end of the colour scale, N or Pa: as set, or as in figures (:meth:`.FigureStyle.scale_limit`)."""
     unit = 1e3 if settings.quantity == "PRESSURE" else 1.0
     if not settings.use_auto_range:
-        return fixed_range(settings)
-    largest = _largest(shown(settings, item.felt.normal_force, item.texels) for item in worn)
-    return unit * metrics.scale_limit(largest / unit) if largest > 0 else LEAST_RANGE
+        return user_range(settings)
+    largest = _largest(displayed_values(settings, item.readings.normal_force, item.texels) for item in baked_sensors)
+    return unit * metrics.scale_limit(largest / unit) if largest > 0 else MIN_COLOR_RANGE
 
 
-def fixed_range(settings) -> float:
+def user_range(settings) -> float:
     """Return the end of the colours that is set, N or Pa."""
     return 1e3 * settings.range_max_pressure if settings.quantity == "PRESSURE" else settings.range_max
 
 
-def shown(settings, normal_force: np.ndarray, texels) -> np.ndarray:
+def displayed_values(settings, normal_force: np.ndarray, texels) -> np.ndarray:
     """Return what the colours show, N or Pa."""
     return metrics.pressure(normal_force, texels) if settings.quantity == "PRESSURE" else normal_force
 
 
-def look_of(scene, **others) -> FigureStyle:
+def figure_style(scene, **others) -> FigureStyle:
     """Return the look of figures that agree with what the scene shows."""
     own = scene.palpate
     limit = None
@@ -123,21 +123,21 @@ def look_of(scene, **others) -> FigureStyle:
     return FigureStyle(**{"colour_map": own.color_map, "quantity": own.quantity.lower(), "limit": limit, **others})
 
 
-def dress(scene, worn: list[markers.Worn]) -> None:
+def show_bake(scene, baked_sensors: list[markers.BakedSensor]) -> None:
     """Put heat maps, markers and arrows on the sensors of a finished bake, replacing earlier ones."""
     settings = scene.palpate
-    scales = Scales.of(settings, worn)
+    scales = Scales.of(settings, baked_sensors)
     relative = settings.folder.startswith("//")
-    for item in worn:
+    for item in baked_sensors:
         obj, frames = item.obj, (int(item.frames[0]), int(item.frames[-1]))
         image = materials.load_sequence(obj.palpate.uid, item.folder / frame_file(frames[0]), relative)
         heat_map.apply(obj, item.texels, image, frames, scales.maximum, settings.color_map, settings.quantity == "PRESSURE")
-        markers.bake(scene, item, settings.overlays, {"FORCE": scales.force, "TORQUE": scales.moment})
-        texel_arrows.bake(scene, item, image, settings.overlays, scales.texel, scales.longest)
+        markers.keyframe_markers(scene, item, settings.overlays, {"FORCE": scales.force, "TORQUE": scales.moment})
+        texel_arrows.build_arrows(scene, item, image, settings.overlays, scales.texel, scales.longest)
         obj.palpate.bake_folder = bpy.path.relpath(str(item.folder)) if relative else str(item.folder)
 
 
-def again(scene, places: dict) -> None:
+def refresh(scene, places: dict) -> None:
     """Dress a scene anew from the files of its bake.
 
     Parameters
@@ -155,7 +155,7 @@ def again(scene, places: dict) -> None:
     bake: Bake = read_sensors(list(places.values()))
     names = {place: name for name, place in bake.folders.items()}
     recording = bake.recording
-    worn = []
+    baked_sensors = []
     for obj, place in places.items():
         name = names[place]
         body_name = bake.manifests[name].body or obj.name
@@ -164,18 +164,18 @@ def again(scene, places: dict) -> None:
             raise SceneError(f"'{body_name}', which moves sensor '{obj.name}', is not in the bake any more: bake again.")
         if len(obj.data.vertices) <= bake.texels[name].vertex.max():
             raise SceneError(f"The mesh of sensor '{obj.name}' has changed since it was baked: bake again.")
-        worn.append(
-            markers.Worn(
+        baked_sensors.append(
+            markers.BakedSensor(
                 obj=obj,
                 body=body,
                 texels=bake.texels[name],
                 painted=bake.painted[name],
                 parameters=bake.parameters[name],
-                felt=recording.sensors[name],
+                readings=recording.sensors[name],
                 frames=recording.frames,
                 poses=recording.poses[:, recording.body_names.index(body_name)],
                 scale=units.metres_per_unit(scene),
                 folder=place,
             )
         )
-    dress(scene, worn)
+    show_bake(scene, baked_sensors)

@@ -41,15 +41,17 @@ def apply(obj, texels: Texels, image, frames: tuple[int, int], maximum: float, c
         _store_texel_uv(mesh, texels)
         _store_area(mesh, texels)
         modifier = obj.modifiers.new(MODIFIER, "NODES")
-        modifier.node_group = materials.force_nodes(uid, obj.name, image, frames)
+        modifier.node_group = materials.force_node_group(uid, obj.name, image, frames)
         obj.modifiers.move(len(obj.modifiers) - 1, 0)  # where the vertices are still the texels'
     elif uv is not None:
         _write_uv(mesh, texels, uv)
     area = None
     if pressure:
         area = materials.AREA if on_vertices else materials.area_image(uid, obj.name, layout.image(texels.area))
-    coordinates = materials.Coordinates(own_map, not layout.nearest) if own_map else materials.Coordinates()
-    material = materials.heat_map(uid, obj.name, None if on_vertices else image, frames, maximum, color_map, area, coordinates)
+    coordinates = materials.ImageMapping(own_map, not layout.nearest) if own_map else materials.ImageMapping()
+    material = materials.heat_map_material(
+        uid, obj.name, None if on_vertices else image, frames, maximum, color_map, area, coordinates
+    )
     _assign(obj, texels, material)
 
 
@@ -70,7 +72,7 @@ def clear(obj, keep_image: bool = False) -> None:
             attribute = mesh.attributes.get(name)
             if attribute is not None:
                 mesh.attributes.remove(attribute)
-    materials.remove(uid, keep_image)
+    materials.remove_blocks(uid, keep_image)
 
 
 def _one_uv_per_texel(texels: Texels) -> np.ndarray | None:
@@ -148,7 +150,7 @@ def _shown_slot(obj) -> int | None:
     Found by our mark and not by the faces: these, the slots and what is in them may have been changed since.
     """
     for number, slot in enumerate(obj.material_slots):
-        if slot.link == "OBJECT" and slot.material is not None and materials.MARK in slot.material:
+        if slot.link == "OBJECT" and slot.material is not None and materials.SENSOR_KEY in slot.material:
             return number
     return None
 

@@ -13,18 +13,18 @@ from ...core.geometry.layout import GridLayout
 from ..session import redraw
 from . import bake_display
 
-MOST = 4
+MAX_SENSORS = 4
 """Sensors that are shown."""
 IMAGE, GAP, CURVE, BAR = 120.0, 12.0, 56.0, 10.0
 """Sides of the images, distances, height of the curve and width of the colour bar; pixels at a resolution scale of one."""
-LARGEST = 256
+MAX_IMAGE_SIDE = 256
 """Pixels along a side of an image: larger ones are thinned out, the screen has no more for them, and few texels get many."""
 COLORS = ((0.34, 0.7, 0.91), (1.0, 0.62, 0.25), (0.4, 0.85, 0.6), (0.9, 0.6, 0.8))
-BACK, FRAME = (0.05, 0.05, 0.06, 0.72), (1.0, 1.0, 1.0, 0.35)
+BACKGROUND_COLOR, AXIS_COLOR = (0.05, 0.05, 0.06, 0.72), (1.0, 1.0, 1.0, 0.35)
 
 
 @dataclass
-class Inset:
+class SensorInset:
     """What is shown of one sensor.
 
     Attributes
@@ -46,7 +46,7 @@ class Inset:
 
 
 @dataclass
-class Board:
+class InsetContent:
     """All insets of a scene, on one scale.
 
     Attributes
@@ -61,7 +61,7 @@ class Board:
         The present one.
     """
 
-    insets: list[Inset]
+    insets: list[SensorInset]
     color_map: str
     end: str
     span: tuple[float, float]
@@ -69,24 +69,24 @@ class Board:
     bar: object = None
 
 
-_boards: dict[int, Board] = {}
+_boards: dict[int, InsetContent] = {}
 _handle = None
 
 
-def picture(layout, values: np.ndarray, maximum: float, color_map: str) -> np.ndarray:
+def tactile_pixels(layout, values: np.ndarray, maximum: float, color_map: str) -> np.ndarray:
     """(h, w, 4) float32: a tactile image in colours, clear where no texel is."""
     image, mask = layout.image(values), layout.mask()
-    step = -(-max(image.shape) // LARGEST)
+    step = -(-max(image.shape) // MAX_IMAGE_SIDE)
     image, mask = image[::step, ::step], mask[::step, ::step]
     rgb = color_maps.colors(color_map, image.ravel() / maximum).reshape(*image.shape, 3)
     pixels = np.dstack([rgb, mask]).astype(np.float32)
     if isinstance(layout, GridLayout):  # the screen blends pixels, and texels are to stay apart
-        times = -(-LARGEST // max(image.shape))
+        times = -(-MAX_IMAGE_SIDE // max(image.shape))
         pixels = pixels.repeat(times, axis=0).repeat(times, axis=1)
     return pixels
 
 
-def board(scene, frame, texels: dict, frames: np.ndarray, loads: dict, maximum: float) -> Board:
+def inset_content(scene, frame, texels: dict, frames: np.ndarray, loads: dict, maximum: float) -> InsetContent:
     """Return what is shown of one frame.
 
     Parameters
@@ -101,20 +101,22 @@ def board(scene, frame, texels: dict, frames: np.ndarray, loads: dict, maximum: 
         End of the colours.
     """
     settings, insets = scene.palpate, []
-    for name, own in list(texels.items())[:MOST]:
-        felt = frame.sensors[name]
-        pixels = picture(own.layout, bake_display.shown(settings, felt.normal_force, own), maximum, settings.color_map)
-        insets.append(Inset(name, pixels, frames, loads[name], float(felt.normal_force.sum())))
+    for name, own in list(texels.items())[:MAX_SENSORS]:
+        readings = frame.sensors[name]
+        pixels = tactile_pixels(
+            own.layout, bake_display.displayed_values(settings, readings.normal_force, own), maximum, settings.color_map
+        )
+        insets.append(SensorInset(name, pixels, frames, loads[name], float(readings.normal_force.sum())))
     span = float(scene.frame_start), float(scene.frame_end)
-    return Board(insets, settings.color_map, words(settings, maximum), span, float(frame.frame))
+    return InsetContent(insets, settings.color_map, range_label(settings, maximum), span, float(frame.frame))
 
 
-def words(settings, maximum: float) -> str:
+def range_label(settings, maximum: float) -> str:
     """Say what the end of the colours stands for."""
     return f"{maximum / 1e3:.3g} kPa" if settings.quantity == "PRESSURE" else f"{maximum:.3g} N"
 
 
-def show(scene, board: Board) -> None:
+def show(scene, board: InsetContent) -> None:
     """Show the present frame."""
     _boards[scene.session_uid] = board
     redraw.views()
@@ -144,23 +146,23 @@ def _draw() -> None:
     gpu.state.blend_set("NONE")
 
 
-def _sizes(inset: Inset, scale: float) -> tuple[float, float]:
+def _sizes(inset: SensorInset, scale: float) -> tuple[float, float]:
     height, width = inset.pixels.shape[:2]
     longest = IMAGE * scale / max(height, width)
     return width * longest, height * longest
 
 
-def _height(board: Board, scale: float) -> float:
+def _height(board: InsetContent, scale: float) -> float:
     return max(_sizes(inset, scale)[1] for inset in board.insets) + (CURVE + 4 * GAP + 22.0) * scale
 
 
-def _draw_board(board: Board, canvas, x: float, top: float) -> None:
+def _draw_board(board: InsetContent, canvas, x: float, top: float) -> None:
     scale, gap = canvas.scale, GAP * canvas.scale
     tall = max(_sizes(inset, scale)[1] for inset in board.insets)
     widths = [max(_sizes(inset, scale)[0], 70.0 * scale) for inset in board.insets]
     whole = sum(widths) + gap * (len(widths) + 1) + (BAR + 58.0) * scale
     height = _height(board, scale)
-    canvas.rectangle(x, top - height, whole, height, BACK)
+    canvas.rectangle(x, top - height, whole, height, BACKGROUND_COLOR)
     at, upper = x + gap, top - gap - 12.0 * scale
     for inset, width, color in zip(board.insets, widths, COLORS):
         canvas.text(at, upper + 3.0 * scale, inset.name, (*color, 1.0), width)
@@ -179,19 +181,19 @@ def _draw_board(board: Board, canvas, x: float, top: float) -> None:
     _draw_curves(board, canvas, x + gap, top - height + gap, whole - 2 * gap)
 
 
-def _draw_curves(board: Board, canvas, x: float, y: float, width: float) -> None:
+def _draw_curves(board: InsetContent, canvas, x: float, y: float, width: float) -> None:
     scale = canvas.scale
     height = CURVE * scale
     largest = max((float(inset.force.max(initial=0.0)) for inset in board.insets), default=0.0)
     first, last = board.span
     span = max(last - first, 1.0)
-    canvas.line([(x, y + height), (x, y), (x + width, y)], FRAME, 1.0)
+    canvas.line([(x, y + height), (x, y), (x + width, y)], AXIS_COLOR, 1.0)
     if largest > 0.0:
         for below, (inset, color) in zip(range(len(board.insets) - 1, -1, -1), zip(board.insets, COLORS)):
             points = np.column_stack([x + (inset.frames - first) / span * width, y + inset.force / largest * height])
             canvas.line(points, (*color, 1.0), 1.5 + 2.0 * below)  # the first are wider: equal curves do not hide each other
     now = x + (board.frame - first) / span * width
-    canvas.line([(now, y), (now, y + height)], FRAME, 1.0)
+    canvas.line([(now, y), (now, y + height)], AXIS_COLOR, 1.0)
     text = ",  ".join(f"{inset.now:.3g} N" for inset in board.insets)
     canvas.text(x + 4.0 * scale, y + height + 3.0 * scale, f"normal force  {text}", (1.0, 1.0, 1.0, 1.0))
 

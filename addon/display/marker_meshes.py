@@ -7,7 +7,7 @@ import math
 
 import bpy
 
-MARK = "palpate_arrow"
+SHAPE_KEY = "palpate_arrow"
 """Custom property of a shared mesh: its name in :data:`PROFILES`."""
 SHAFT, HEAD, HEAD_START = 0.025, 0.07, 0.75
 """Radii of an arrow and where its head begins, as shares of its length."""
@@ -35,18 +35,18 @@ COLORS = {
 def shared_mesh(name: str):
     """Return the mesh of a shape, made when there is none yet."""
     # a file from before there were several has the number 1 on its arrow
-    found = next((mesh for mesh in bpy.data.meshes if mesh.get(MARK) in ((name, 1) if name == "Arrow" else (name,))), None)
+    found = next((mesh for mesh in bpy.data.meshes if mesh.get(SHAPE_KEY) in ((name, 1) if name == "Arrow" else (name,))), None)
     if found is not None:
         return found
     mesh = bpy.data.meshes.new(f"Palpate {name}")
-    mesh.from_pydata(*lathe(PROFILES[name]))
-    mesh[MARK] = name
-    mesh.materials.append(material(name))
+    mesh.from_pydata(*surface_of_revolution(PROFILES[name]))
+    mesh[SHAPE_KEY] = name
+    mesh.materials.append(marker_material(name))
     mesh.update()
     return mesh
 
 
-def lathe(profile) -> tuple[list, list, list]:
+def surface_of_revolution(profile) -> tuple[list, list, list]:
     """Return vertices, no edges, and faces of a profile turned around z; where it meets the axis it has a single vertex."""
     vertices, rings, faces = [], [], []
     for radius, height in profile:
@@ -68,14 +68,14 @@ def lathe(profile) -> tuple[list, list, list]:
     return vertices, [], faces
 
 
-def material(name: str):
+def marker_material(name: str):
     """Return the material of a shape, a little bright by itself."""
     full = f"Palpate {name}"
-    found = next((block for block in bpy.data.materials if block.get(MARK) == name), None)
+    found = next((block for block in bpy.data.materials if block.get(SHAPE_KEY) == name), None)
     if found is not None:
         return found
     made = bpy.data.materials.new(full)
-    made[MARK] = name
+    made[SHAPE_KEY] = name
     color = (*COLORS[name], 1.0)
     made.diffuse_color = color
     if made.node_tree is None:

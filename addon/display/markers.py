@@ -26,7 +26,7 @@ from ...core.response import metrics
 from ..session import fcurves, transforms
 from . import marker_meshes, materials
 
-KIND = "palpate_marker"
+KIND_KEY = "palpate_marker"
 """Custom property of a marker: which it is. One without is a FORCE of an earlier version."""
 KINDS = {
     "FORCE": ("Net Force", "Arrow"),
@@ -40,7 +40,7 @@ BALL_SHARE, RING_SHARE = 0.03, 0.25
 
 
 @dataclass(frozen=True)
-class Worn:
+class BakedSensor:
     """A sensor with its part of a bake, as markers need it.
 
     Attributes
@@ -50,7 +50,7 @@ class Worn:
         That moves it: itself, unless it is part of another.
     texels, painted, parameters
         Of the sensor.
-    felt : SensorRecording
+    readings : SensorRecording
     frames : (F,) int
     poses : (F, 7) float
         Of its body.
@@ -65,7 +65,7 @@ class Worn:
     texels: Texels
     painted: Painted
     parameters: SensorParameters
-    felt: SensorRecording
+    readings: SensorRecording
     frames: np.ndarray
     poses: np.ndarray
     scale: float
@@ -78,20 +78,20 @@ class Worn:
 
     def in_world(self) -> tuple[np.ndarray, np.ndarray]:
         """(F, 3) float: where the net force acts, Blender units, and with what the sensor pushes back there, N."""
-        foot = self.poses[:, :3] + self.turned(self.felt.centre_of_pressure)
-        return foot / self.scale, -self.turned(self.felt.net_force)
+        foot = self.poses[:, :3] + self.turned(self.readings.centre_of_pressure)
+        return foot / self.scale, -self.turned(self.readings.net_force)
 
     def turned(self, vectors: np.ndarray) -> np.ndarray:
         """(F, 3) float: vectors in the body's frame, as they are in the world at each frame."""
         return np.einsum("fij,fj->fi", transforms.rotation(self.poses[:, 3:]), vectors)
 
 
-def find(objects, uid: str, kind: str):
+def find_marker(objects, uid: str, kind: str):
     """Return a sensor's marker among some objects; None when there is none."""
-    return next((obj for obj in objects if obj.get(materials.MARK) == uid and obj.get(KIND, "FORCE") == kind), None)
+    return next((obj for obj in objects if obj.get(materials.SENSOR_KEY) == uid and obj.get(KIND_KEY, "FORCE") == kind), None)
 
 
-def bake(scene, worn: Worn, kinds, lengths: dict[str, float]) -> None:
+def keyframe_markers(scene, sensor: BakedSensor, kinds, lengths: dict[str, float]) -> None:
     """Keyframe the markers of one sensor, and remove those that are not wanted.
 
     Parameters
@@ -102,24 +102,24 @@ def bake(scene, worn: Worn, kinds, lengths: dict[str, float]) -> None:
         Of arrows: Blender units per newton for FORCE, per newton metre for TORQUE.
     """
     for kind in KINDS:
-        marker = find(scene.objects, worn.obj.palpate.uid, kind)
+        marker = find_marker(scene.objects, sensor.obj.palpate.uid, kind)
         if kind not in kinds:
             if marker is not None:
                 remove(marker)
             continue
-        marker = marker or _make(scene, worn.obj, kind)
+        marker = marker or _make(scene, sensor.obj, kind)
         marker.rotation_mode = "QUATERNION"
-        table = channels(worn, kind, lengths.get(kind, 1.0))
+        table = channels(sensor, kind, lengths.get(kind, 1.0))
         found, _ = fcurves.ensure(marker, f"{marker.name} Palpate")
         for path, columns in (("location", slice(0, 3)), ("rotation_quaternion", slice(3, 7)), ("scale", slice(7, 10))):
-            fcurves.write(found, path, worn.frames, table[:, columns])
+            fcurves.write(found, path, sensor.frames, table[:, columns])
 
 
-def channels(worn: Worn, kind: str, length: float = 1.0) -> np.ndarray:
+def channels(sensor: BakedSensor, kind: str, length: float = 1.0) -> np.ndarray:
     """(F, 10) float: location, quaternion and scale of a marker at each recorded frame; `length` is that of one unit."""
-    direction, size = _SHOWN[kind](worn)
-    size = np.where(worn.felt.contact.any(axis=1), size * length, 0.0)
-    foot, way = worn.in_world()[0], worn.turned(direction)
+    direction, size = _DIRECTION_AND_SIZE[kind](sensor)
+    size = np.where(sensor.readings.contact.any(axis=1), size * length, 0.0)
+    foot, way = sensor.in_world()[0], sensor.turned(direction)
     turns, last = [], Quaternion()
     for i in range(len(size)):
         if size[i] > 0.0:
@@ -130,53 +130,53 @@ def channels(worn: Worn, kind: str, length: float = 1.0) -> np.ndarray:
     return np.hstack([foot, turns, np.repeat(size[:, None], 3, axis=1)])
 
 
-def _force(worn: Worn) -> tuple[np.ndarray, np.ndarray]:
-    return -worn.felt.net_force, np.linalg.norm(worn.felt.net_force, axis=1)
+def _force(sensor: BakedSensor) -> tuple[np.ndarray, np.ndarray]:
+    return -sensor.readings.net_force, np.linalg.norm(sensor.readings.net_force, axis=1)
 
 
-def _torque(worn: Worn) -> tuple[np.ndarray, np.ndarray]:
-    moment = metrics.free_moment(worn.felt)
+def _torque(sensor: BakedSensor) -> tuple[np.ndarray, np.ndarray]:
+    moment = metrics.free_moment(sensor.readings)
     return -moment, np.linalg.norm(moment, axis=1)
 
 
-def _centre(worn: Worn) -> tuple[np.ndarray, np.ndarray]:
-    return _outwards(worn), np.full(len(worn.frames), BALL_SHARE * worn.size)
+def _centre(sensor: BakedSensor) -> tuple[np.ndarray, np.ndarray]:
+    return _outwards(sensor), np.full(len(sensor.frames), BALL_SHARE * sensor.size)
 
 
-def _slip(worn: Worn) -> tuple[np.ndarray, np.ndarray]:
-    share = metrics.slip_share(worn.felt, worn.parameters, worn.painted)
-    return _outwards(worn), share * RING_SHARE * worn.size
+def _slip(sensor: BakedSensor) -> tuple[np.ndarray, np.ndarray]:
+    share = metrics.slip_share(sensor.readings, sensor.parameters, sensor.painted)
+    return _outwards(sensor), share * RING_SHARE * sensor.size
 
 
-def _outwards(worn: Worn) -> np.ndarray:
+def _outwards(sensor: BakedSensor) -> np.ndarray:
     """(F, 3) float: the mean normal of the texels that bear, in the body's frame."""
-    mean = worn.felt.normal_force @ worn.texels.normal
+    mean = sensor.readings.normal_force @ sensor.texels.normal
     flat = np.linalg.norm(mean, axis=1) == 0.0
-    mean[flat] = worn.texels.normal[0]
+    mean[flat] = sensor.texels.normal[0]
     return mean
 
 
-_SHOWN = {"FORCE": _force, "TORQUE": _torque, "CENTRE": _centre, "SLIP": _slip}
+_DIRECTION_AND_SIZE = {"FORCE": _force, "TORQUE": _torque, "CENTRE": _centre, "SLIP": _slip}
 
 
 def clear(scene, uid: str) -> None:
     """Remove the markers of a sensor."""
-    for marker in [obj for obj in scene.objects if obj.get(materials.MARK) == uid]:
+    for marker in [obj for obj in scene.objects if obj.get(materials.SENSOR_KEY) == uid]:
         remove(marker)
 
 
-def sweep(uids) -> None:
+def remove_orphans(uids) -> None:
     """Remove the markers of sensors that were deleted; `uids` are those of all objects."""
-    for marker in of_deleted(bpy.data.objects, uids):
+    for marker in orphans(bpy.data.objects, uids):
         remove(marker)
 
 
-def of_deleted(objects, uids=None) -> list:
+def orphans(objects, uids=None) -> list:
     """Return the markers among some objects whose sensor was deleted."""
-    found = [obj for obj in objects if materials.MARK in obj and obj.library is None]
+    found = [obj for obj in objects if materials.SENSOR_KEY in obj and obj.library is None]
     if found and uids is None:
         uids = {obj.palpate.uid for obj in bpy.data.objects}
-    return [marker for marker in found if marker[materials.MARK] not in uids]
+    return [marker for marker in found if marker[materials.SENSOR_KEY] not in uids]
 
 
 def remove(marker) -> None:
@@ -208,7 +208,7 @@ def _make(scene, obj, kind: str):
 
 def link(scene, obj, marker, kind: str) -> None:
     """Put a new marker where its sensor is: in a collection of this scene, since the sensor may be in other scenes, too."""
-    marker[materials.MARK], marker[KIND] = obj.palpate.uid, kind
+    marker[materials.SENSOR_KEY], marker[KIND_KEY] = obj.palpate.uid, kind
     own = {scene.collection, *scene.collection.children_recursive}
     place = next((found for found in obj.users_collection if found in own and found.is_editable), scene.collection)
     place.objects.link(marker)

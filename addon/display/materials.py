@@ -22,26 +22,26 @@ FORCE = "palpate_force"
 """Vertex attribute with the normal force (N): from geometry nodes after a bake, from the timeline while playing."""
 AREA = "palpate_area"
 """Vertex attribute with the area of the texel, m²."""
-MARK = "palpate_sensor"
+SENSOR_KEY = "palpate_sensor"
 """Custom property that tells whose a material, an image, a node group or an arrow is."""
 RAMP_STOPS = 32
-MISSING = (1.0, 0.0, 1.0)
+MISSING_COLOR = (1.0, 0.0, 1.0)
 """What Blender shows for an image that it does not find. As forces in newtons it will not occur to the sixth digit."""
 MIX_SOCKETS = ("Factor_Float", "A_Color", "B_Color")
 
 
-def find(blocks, uid: str):
+def find_block(blocks, uid: str):
     """Return the data-block of a sensor in a collection of bpy.data; None when there is none."""
-    return next((block for block in blocks if block.get(MARK) == uid), None)
+    return next((block for block in blocks if block.get(SENSOR_KEY) == uid), None)
 
 
 def load_sequence(uid: str, first: Path, relative: bool):
     """Return the image that plays a baked sequence, by a path relative to the .blend or an absolute one."""
-    image = find(bpy.data.images, uid)
+    image = find_block(bpy.data.images, uid)
     path = bpy.path.relpath(str(first)) if relative else str(first)
     if image is None:
         image = bpy.data.images.load(path)
-        image[MARK] = uid
+        image[SENSOR_KEY] = uid
     image.name = f"Palpate {first.parent.name}"
     image.filepath = path
     image.source = "SEQUENCE"
@@ -50,7 +50,7 @@ def load_sequence(uid: str, first: Path, relative: bool):
     return image
 
 
-def play(user, frame_start: int, frame_end: int) -> None:
+def set_image_frames(user, frame_start: int, frame_end: int) -> None:
     """Make an image user show file number f at frame f and hold the last beyond; before the first it finds no file."""
     user.frame_duration = frame_end - frame_start + 1
     user.frame_start = frame_start
@@ -62,12 +62,12 @@ def play(user, frame_start: int, frame_end: int) -> None:
 def area_image(uid: str, name: str, area: np.ndarray):
     """Return an image of the texels' areas, (height, width) float in m², that is kept in the .blend."""
     mark = f"{uid}:area"
-    image = find(bpy.data.images, mark)
+    image = find_block(bpy.data.images, mark)
     if image is not None:
         bpy.data.images.remove(image)
     height, width = area.shape
     image = bpy.data.images.new(f"Palpate {name} area", width, height, alpha=False, float_buffer=True, is_data=True)
-    image[MARK] = mark
+    image[SENSOR_KEY] = mark
     pixels = np.ones((height, width, 4), dtype=np.float32)
     pixels[..., :3] = area[..., None]
     image.pixels.foreach_set(pixels.ravel())
@@ -76,14 +76,14 @@ def area_image(uid: str, name: str, area: np.ndarray):
 
 
 @dataclass(frozen=True)
-class Coordinates:
+class ImageMapping:
     """Where an image lies on a sensor: by which UV map, and if its pixels are blended."""
 
     uv_map: str = UV_NAME
     smooth: bool = False
 
 
-def heat_map(
+def heat_map_material(
     uid: str,
     name: str,
     image,
@@ -91,7 +91,7 @@ def heat_map(
     maximum: float,
     color_map: str,
     area=None,
-    coordinates: Coordinates = Coordinates(),
+    coordinates: ImageMapping = ImageMapping(),
 ):
     """Return a sensor's heat-map material, made or made anew.
 
@@ -112,20 +112,20 @@ def heat_map(
     coordinates : Coordinates
         Of the images.
     """
-    material = find(bpy.data.materials, uid) or bpy.data.materials.new(f"Palpate {name}")
-    material[MARK] = uid
+    material = find_block(bpy.data.materials, uid) or bpy.data.materials.new(f"Palpate {name}")
+    material[SENSOR_KEY] = uid
     if material.node_tree is None:
         material.use_nodes = True
     tree = material.node_tree
     tree.nodes.clear()
-    add = Adder(tree)
+    add = NodeAdder(tree)
     missing = None
     if image is None:
         value = add("ShaderNodeAttribute", attribute_name=FORCE).outputs["Fac"]
     else:
         texture = _texture(add, image, coordinates)
-        play(texture.image_user, *frames)
-        value, missing = _red(add, texture), is_missing(add, texture.outputs["Color"])
+        set_image_frames(texture.image_user, *frames)
+        value, missing = _red(add, texture), add_missing_test(add, texture.outputs["Color"])
     if area is not None:
         own = add("ShaderNodeAttribute", attribute_name=area).outputs["Fac"] if isinstance(area, str) else None
         over = add("ShaderNodeMath", operation="DIVIDE", label="Pressure (Pa)")
@@ -145,7 +145,7 @@ def heat_map(
         factor, below, above = (next(s for s in mix.inputs if s.identifier == key) for key in MIX_SOCKETS)
         tree.links.new(missing, factor)
         tree.links.new(color, below)
-        above.default_value = (*MISSING, 1.0)
+        above.default_value = (*MISSING_COLOR, 1.0)
         color = next(s for s in mix.outputs if s.identifier == "Result_Color")
     surface = add("ShaderNodeBsdfPrincipled")
     surface.inputs["Roughness"].default_value = 0.6
@@ -158,7 +158,7 @@ def heat_map(
     return material
 
 
-def _texture(add, image, coordinates: Coordinates):
+def _texture(add, image, coordinates: ImageMapping):
     """Return a node that shows an image by texture coordinates."""
     interpolation = "Linear" if coordinates.smooth else "Closest"
     texture = add("ShaderNodeTexImage", image=image, interpolation=interpolation, extension="EXTEND")
@@ -173,10 +173,10 @@ def _red(add, texture):
     return channels.outputs["Red"]
 
 
-def is_missing(add, color):
+def add_missing_test(add, color):
     """Return a socket that is 1 where Blender found no image: its sign for that must not pass for a large force."""
     distance = add("ShaderNodeVectorMath", operation="DISTANCE")
-    distance.inputs[1].default_value = MISSING
+    distance.inputs[1].default_value = MISSING_COLOR
     add.tree.links.new(color, distance.inputs[0])
     near = add("ShaderNodeMath", operation="LESS_THAN")
     near.inputs[1].default_value = 1e-6
@@ -184,7 +184,7 @@ def is_missing(add, color):
     return near.outputs[0]
 
 
-class Adder:
+class NodeAdder:
     """Adds nodes from left to right."""
 
     def __init__(self, tree):
@@ -209,19 +209,19 @@ def _fill(ramp, color_map: str) -> None:
         element.color = (*color, 1.0)
 
 
-def new_nodes(mark: str, name: str):
+def empty_node_group(mark: str, name: str):
     """Return an empty group of geometry nodes, a sensor's own by its mark; an earlier one is emptied."""
-    group = find(bpy.data.node_groups, mark)
+    group = find_block(bpy.data.node_groups, mark)
     if group is None:
         group = bpy.data.node_groups.new(f"Palpate {name}", "GeometryNodeTree")
-        group[MARK] = mark
+        group[SENSOR_KEY] = mark
         group.interface.new_socket("Geometry", in_out="INPUT", socket_type="NodeSocketGeometry")
         group.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
     group.nodes.clear()
     return group
 
 
-def look_up(add, image, frames: tuple[int, int]):
+def add_image_lookup(add, image, frames: tuple[int, int]):
     """Return the socket of the image's colour at each texel: normal force, shear along x and along y, N."""
     link = add.tree.links.new
     where = add("GeometryNodeInputNamedAttribute", data_type="FLOAT_VECTOR")
@@ -238,13 +238,13 @@ def look_up(add, image, frames: tuple[int, int]):
     return texture.outputs["Color"]
 
 
-def force_nodes(uid: str, name: str, image, frames: tuple[int, int]):
+def force_node_group(uid: str, name: str, image, frames: tuple[int, int]):
     """Return the geometry nodes that look the image up at each texel and store the force on the vertices."""
-    group = new_nodes(uid, name)
-    add, link = Adder(group), group.links.new
+    group = empty_node_group(uid, name)
+    add, link = NodeAdder(group), group.links.new
     start = add("NodeGroupInput")
     channels = add("FunctionNodeSeparateColor")
-    link(look_up(add, image, frames), channels.inputs["Color"])
+    link(add_image_lookup(add, image, frames), channels.inputs["Color"])
     store = add("GeometryNodeStoreNamedAttribute", data_type="FLOAT", domain="POINT")
     store.inputs["Name"].default_value = FORCE
     link(start.outputs[0], store.inputs["Geometry"])
@@ -253,7 +253,7 @@ def force_nodes(uid: str, name: str, image, frames: tuple[int, int]):
     return group
 
 
-def remove(uid: str, keep_image: bool = False) -> None:
+def remove_blocks(uid: str, keep_image: bool = False) -> None:
     """Remove everything of a sensor's heat map that is not on its mesh."""
     for blocks, mark in (
         (bpy.data.materials, uid),
@@ -261,14 +261,19 @@ def remove(uid: str, keep_image: bool = False) -> None:
         (bpy.data.images, f"{uid}:area"),
         (bpy.data.images, uid),
     ):
-        block = find(blocks, mark)
+        block = find_block(blocks, mark)
         if block is not None and not (keep_image and mark == uid and blocks == bpy.data.images):
             blocks.remove(block)
 
 
-def sweep(uids) -> None:
+def remove_orphans(uids) -> None:
     """Remove what heat maps of deleted sensors have left, as far as nobody uses it; `uids` are those of all objects."""
     for blocks in (bpy.data.materials, bpy.data.node_groups, bpy.data.images):  # images last: the others use them
         for block in list(blocks):
-            if block.users == 0 and block.library is None and MARK in block and block[MARK].partition(":")[0] not in uids:
+            if (
+                block.users == 0
+                and block.library is None
+                and SENSOR_KEY in block
+                and block[SENSOR_KEY].partition(":")[0] not in uids
+            ):
                 blocks.remove(block)

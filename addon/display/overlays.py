@@ -19,7 +19,7 @@ ARROW_SHARE = 1.0
 
 
 @dataclass
-class Picture:
+class SensorOverlay:
     """Triangles and lines of one sensor in the world; GPU batches are made when it is first drawn.
 
     Attributes
@@ -36,7 +36,7 @@ class Picture:
     batches: list | None = None
 
 
-_pictures: dict[int, list[Picture]] = {}
+_overlays: dict[int, list[SensorOverlay]] = {}
 _largest: dict[int, tuple[float, float]] = {}
 """Largest value and net force of any sensor so far, by scene."""
 _handle = None
@@ -51,28 +51,30 @@ def show(scene, run, frame) -> None:
         clear(scene)
         return
     if settings.show_overlay:
-        _pictures[scene.session_uid] = pictures_of(scene, run, frame)
+        _overlays[scene.session_uid] = sensor_overlays(scene, run, frame)
     if settings.show_inset:
-        inset.show(scene, board_of(scene, run, frame))
+        inset.show(scene, inset_content(scene, run, frame))
     redraw.views()
 
 
-def pictures_of(scene, run, frame) -> list[Picture]:
+def sensor_overlays(scene, run, frame) -> list[SensorOverlay]:
     """Return the heat maps and arrows of one frame of a run, all sensors on one scale."""
     maximum, strongest = _scale(scene, run, frame)
     return [
-        _picture(scene, sensor, frame.sensors[sensor.name], frame.poses[sensor.body], maximum, strongest, run.binding.scale)
+        _sensor_overlay(
+            scene, sensor, frame.sensors[sensor.name], frame.poses[sensor.body], maximum, strongest, run.binding.scale
+        )
         for sensor in _read_out(run)
     ]
 
 
-def board_of(scene, run, frame) -> inset.Board:
+def inset_content(scene, run, frame) -> inset.InsetContent:
     """Return the tactile images and curves of one frame of a run."""
     maximum, _ = _scale(scene, run, frame)
     known = sorted(run.frames)
     texels = {sensor.name: sensor.texels for sensor in _read_out(run)}
     loads = {name: np.array([run.load(number)[name] for number in known]) for name in texels}
-    return inset.board(scene, frame, texels, np.array(known, float), loads, maximum)
+    return inset.inset_content(scene, frame, texels, np.array(known, float), loads, maximum)
 
 
 def _read_out(run) -> list:
@@ -85,45 +87,49 @@ def _scale(scene, run, frame) -> tuple[float, float]:
     key = hash((scene.session_uid, settings.quantity))
     value, net = _largest.get(key, (1e-9, 1e-9))
     for sensor in _read_out(run):
-        felt = frame.sensors[sensor.name]
-        value = max(value, float(bake_display.shown(settings, felt.normal_force, sensor.texels).max(initial=0.0)))
-        net = max(net, float(np.linalg.norm(felt.net_force)))
+        readings = frame.sensors[sensor.name]
+        value = max(
+            value, float(bake_display.displayed_values(settings, readings.normal_force, sensor.texels).max(initial=0.0))
+        )
+        net = max(net, float(np.linalg.norm(readings.net_force)))
     _largest[key] = value, net
-    return (value if settings.use_auto_range else bake_display.fixed_range(settings)), net
+    return (value if settings.use_auto_range else bake_display.user_range(settings)), net
 
 
-def _picture(scene, sensor, felt, pose, maximum: float, strongest: float, scale: float) -> Picture:
+def _sensor_overlay(scene, sensor, readings, pose, maximum: float, strongest: float, scale: float) -> SensorOverlay:
     texels = sensor.texels
     rotation = transforms.rotation(pose[3:])
     size = float(np.ptp(texels.position, axis=0).max())
     points = texels.position + LIFT * size * texels.normal
     world = (pose[:3] + points @ rotation.T) / scale
-    rgb = color_maps.colors(scene.palpate.color_map, bake_display.shown(scene.palpate, felt.normal_force, texels) / maximum)
+    rgb = color_maps.colors(
+        scene.palpate.color_map, bake_display.displayed_values(scene.palpate, readings.normal_force, texels) / maximum
+    )
     corner = texels.layout.triangles.ravel()
     colors = np.column_stack([rgb, np.ones(len(rgb))])[corner]
     line = None
-    if felt.contact.any():
-        foot = felt.centre_of_pressure
-        tip = foot - felt.net_force * (ARROW_SHARE * size / strongest)
+    if readings.contact.any():
+        foot = readings.centre_of_pressure
+        tip = foot - readings.net_force * (ARROW_SHARE * size / strongest)
         line = (pose[:3] + np.array([foot, tip]) @ rotation.T) / scale
-    return Picture(world[corner].astype(np.float32), colors.astype(np.float32), line)
+    return SensorOverlay(world[corner].astype(np.float32), colors.astype(np.float32), line)
 
 
 def clear(scene=None) -> None:
     """Stop showing a scene, or all."""
     if scene is None:
-        _pictures.clear()
+        _overlays.clear()
         _largest.clear()
         inset.clear()
     else:
-        _pictures.pop(scene.session_uid, None)
+        _overlays.pop(scene.session_uid, None)
         inset.clear(scene)
     redraw.views()
 
 
 def _draw() -> None:
     """Called by each 3D view after the scene's own geometry."""
-    pictures = _pictures.get(bpy.context.scene.session_uid)
+    pictures = _overlays.get(bpy.context.scene.session_uid)
     space = bpy.context.space_data
     if not pictures or not space.overlay.show_overlays:
         return
@@ -143,7 +149,7 @@ def _draw() -> None:
     gpu.state.depth_test_set("NONE")
 
 
-def _batches(picture: Picture) -> list:
+def _batches(picture: SensorOverlay) -> list:
     import gpu
     from gpu_extras.batch import batch_for_shader
 

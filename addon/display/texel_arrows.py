@@ -21,17 +21,17 @@ KINDS = {"NORMALS": ("Normal Forces", "Normal Arrow"), "SHEARS": ("Shear Forces"
 """Name of the object, without its sensor's, and material."""
 NORMAL, X_AXIS, Y_AXIS = "palpate_normal", "palpate_x", "palpate_y"
 """Vector attributes of the points."""
-SMALLEST = 0.02
+MIN_ARROW_SHARE = 0.02
 """Newtons times length below which no arrow is drawn, as a share of the longest arrow."""
 MODIFIER = "Palpate Arrows"
 
 
-def bake(scene, worn: markers.Worn, image, kinds, lengths: dict, longest: dict) -> None:
+def build_arrows(scene, sensor: markers.BakedSensor, image, kinds, lengths: dict, longest: dict) -> None:
     """Put up the arrows of one sensor, and remove those that are not wanted.
 
     Parameters
     ----------
-    worn : Worn
+    sensor : Worn
     image : Image
         The baked sequence.
     kinds : collection of str
@@ -39,30 +39,30 @@ def bake(scene, worn: markers.Worn, image, kinds, lengths: dict, longest: dict) 
     lengths, longest : dict of str to float
         By kind: Blender units per newton, and the longest arrow of all sensors.
     """
-    frames = int(worn.frames[0]), int(worn.frames[-1])
+    frames = int(sensor.frames[0]), int(sensor.frames[-1])
     for kind, (name, look) in KINDS.items():
-        uid = worn.obj.palpate.uid
-        found = markers.find(scene.objects, uid, kind)
+        uid = sensor.obj.palpate.uid
+        found = markers.find_marker(scene.objects, uid, kind)
         if found is not None:
             markers.remove(found)
         if kind not in kinds:
             continue
-        mesh = _points(worn, f"{name} {worn.obj.name}")
+        mesh = _points(sensor, f"{name} {sensor.obj.name}")
         made = bpy.data.objects.new(mesh.name, mesh)
-        markers.link(scene, worn.obj, made, kind)
-        made.parent = worn.body
-        _, _, stretch = transforms.split(transforms.array(worn.body.matrix_world))
+        markers.link(scene, sensor.obj, made, kind)
+        made.parent = sensor.body
+        _, _, stretch = transforms.split(transforms.array(sensor.body.matrix_world))
         made.matrix_parent_inverse = Matrix(np.vstack([np.column_stack([np.linalg.inv(stretch), np.zeros(3)]), [0, 0, 0, 1]]))
         made.hide_select = True
         made.color = (*marker_meshes.COLORS[look], 1.0)  # Workbench shows these of what nodes make
         modifier = made.modifiers.new(MODIFIER, "NODES")
         modifier.node_group = _nodes(
-            f"{uid}:{kind}", made.name, image, frames, kind, lengths[kind], longest[kind], marker_meshes.material(look)
+            f"{uid}:{kind}", made.name, image, frames, kind, lengths[kind], longest[kind], marker_meshes.marker_material(look)
         )
 
 
 @contextmanager
-def resting(scene) -> Iterator[None]:
+def hidden_arrows(scene) -> Iterator[None]:
     """Let no arrows be made for a while: in each frame that is read, their nodes would read an image of the bake before."""
     names = [obj.name for obj in scene.objects if obj.library is None and (own := _own(obj)) is not None and own.show_viewport]
     try:
@@ -84,12 +84,12 @@ def _show(scene, names, shown: bool) -> None:
             own.show_viewport = shown
 
 
-def _points(worn: markers.Worn, name: str):
+def _points(sensor: markers.BakedSensor, name: str):
     """Return a mesh of loose vertices, the texels, with what the nodes need to know of them."""
-    texels = worn.texels
+    texels = sensor.texels
     mesh = bpy.data.meshes.new(name)
     mesh.vertices.add(len(texels))
-    mesh.vertices.foreach_set("co", (texels.position / worn.scale).astype(np.float32).ravel())
+    mesh.vertices.foreach_set("co", (texels.position / sensor.scale).astype(np.float32).ravel())
     uv = np.column_stack([texels.layout.uv(), np.zeros(len(texels))])
     for key, table in (
         (materials.TEXEL_UV, uv), (NORMAL, texels.normal), (X_AXIS, texels.tangent), (Y_AXIS, texels.bitangent)
@@ -102,8 +102,8 @@ def _points(worn: markers.Worn, name: str):
 
 def _nodes(mark: str, name: str, image, frames, kind: str, length: float, longest: float, material):
     """Return the nodes of one kind: a vector per texel, an arrow along it where it is long enough."""
-    group = materials.new_nodes(mark, name)
-    add, link = materials.Adder(group), group.links.new
+    group = materials.empty_node_group(mark, name)
+    add, link = materials.NodeAdder(group), group.links.new
 
     def vector(operation: str, *inputs, **values):
         node = add("ShaderNodeVectorMath", operation=operation)
@@ -119,7 +119,7 @@ def _nodes(mark: str, name: str, image, frames, kind: str, length: float, longes
         return node.outputs["Attribute"]
 
     start = add("NodeGroupInput")
-    color = materials.look_up(add, image, frames)
+    color = materials.add_image_lookup(add, image, frames)
     parts = add("FunctionNodeSeparateColor")
     link(color, parts.inputs["Color"])
 
@@ -137,10 +137,10 @@ def _nodes(mark: str, name: str, image, frames, kind: str, length: float, longes
     size = vector("LENGTH", arrow).outputs["Value"]
     long_enough = add("ShaderNodeMath", operation="GREATER_THAN")
     link(size, long_enough.inputs[0])
-    long_enough.inputs[1].default_value = SMALLEST * longest
+    long_enough.inputs[1].default_value = MIN_ARROW_SHARE * longest
     there = add("ShaderNodeMath", operation="SUBTRACT")
     link(long_enough.outputs[0], there.inputs[0])
-    link(materials.is_missing(add, color), there.inputs[1])
+    link(materials.add_missing_test(add, color), there.inputs[1])
     turn = add("FunctionNodeAlignRotationToVector", axis="Z")
     link(arrow, turn.inputs["Vector"])
 

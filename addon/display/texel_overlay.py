@@ -13,9 +13,14 @@ from ..authoring import sensor_report
 from ..session import transforms
 from ..timeline import playback
 
-FINE, FAULTY, NORMAL, REACH = (0.1, 0.75, 0.95, 0.9), (1.0, 0.15, 0.1, 1.0), (0.2, 0.5, 1.0, 1.0), (1.0, 0.65, 0.1, 0.9)
-SIDES = 8
-MOST_NUMBERS = 600
+VALID_COLOR, FAULTY_COLOR, NORMAL_COLOR, REACH_COLOR = (
+    (0.1, 0.75, 0.95, 0.9),
+    (1.0, 0.15, 0.1, 1.0),
+    (0.2, 0.5, 1.0, 1.0),
+    (1.0, 0.65, 0.1, 0.9),
+)
+DISC_SIDES = 8
+MAX_LABELS = 600
 _handles: list = []
 
 
@@ -42,7 +47,7 @@ def drawing_of(report) -> Drawing:
     for problem in report.problems:
         faulty[problem.texels] = True
     lifted = texels.position + 0.04 * spacing * texels.normal
-    turn = np.arange(SIDES) * 2 * np.pi / SIDES
+    turn = np.arange(DISC_SIDES) * 2 * np.pi / DISC_SIDES
     rim = lifted[:, None] + 0.16 * spacing * (
         np.cos(turn)[:, None] * texels.tangent[:, None] + np.sin(turn)[:, None] * texels.bitangent[:, None]
     )
@@ -61,9 +66,9 @@ def _labels(texels, places: np.ndarray) -> list[tuple[str, np.ndarray]]:
     """Row and column where texels form a grid, else their number; along the rim only where there are many."""
     layout = texels.layout
     if not isinstance(layout, GridLayout):
-        return [(str(i), places[i]) for i in range(len(places))] if len(places) <= MOST_NUMBERS else []
+        return [(str(i), places[i]) for i in range(len(places))] if len(places) <= MAX_LABELS else []
     rim = (layout.row == 0) | (layout.column == 0)
-    shown = np.flatnonzero(rim if len(places) > MOST_NUMBERS else np.ones(len(places), bool))
+    shown = np.flatnonzero(rim if len(places) > MAX_LABELS else np.ones(len(places), bool))
     return [(f"{layout.row[i]},{layout.column[i]}", places[i]) for i in shown]
 
 
@@ -107,17 +112,17 @@ def _draw() -> None:
     with gpu.matrix.push_pop():
         gpu.matrix.multiply_matrix(_frame(obj))
         gpu.state.depth_test_set("NONE" if bpy.context.space_data.shading.show_xray else "LESS_EQUAL")
-        felt = playback.status(bpy.context.scene).frame
-        shown = obj.mode == "OBJECT" and felt is not None and obj.name in felt.sensors  # the heat map is where they are
+        readings = playback.status(bpy.context.scene).frame
+        shown = obj.mode == "OBJECT" and readings is not None and obj.name in readings.sensors  # the heat map is where they are
         if own.show_texels and not shown:
-            _triangles(drawing, "fine", FINE)
+            _triangles(drawing, "fine", VALID_COLOR)
         if own.show_normals and not shown:
-            _lines(drawing, "normals", NORMAL)
+            _lines(drawing, "normals", NORMAL_COLOR)
         gpu.state.depth_test_set("NONE")  # what follows may be inside the object
         if own.show_texels and not shown:
-            _triangles(drawing, "faulty", FAULTY)
+            _triangles(drawing, "faulty", FAULTY_COLOR)
         if own.show_reach:
-            _lines(drawing, "reach", REACH)
+            _lines(drawing, "reach", REACH_COLOR)
     gpu.state.blend_set("NONE")
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What figures a scene asks for: `Scene.palpate.figures`, and the :class:`.figure_export.Wish` that it means."""
+"""What figures a scene asks for: `Scene.palpate.figures`, and the :class:`.figure_export.FigureRequest` that it means."""
 
 from __future__ import annotations
 
@@ -148,9 +148,9 @@ def wish(scene, active=None):
         sensors = (active.name,)
     if not (own.kinds or own.exports):
         raise ParameterError("Nothing is chosen: choose at least one figure in Palpate › Figures.")
-    return figure_export.Wish(
+    return figure_export.FigureRequest(
         kinds=_chosen(KINDS, own.kinds),
-        look=figure_export.look_of(scene, width=own.width.lower(), dpi=own.dpi),
+        style=figure_export.scene_style(scene, width=own.width.lower(), dpi=own.dpi),
         frames=frames_of(own.frames),
         sensors=sensors,
         formats=_chosen(FORMATS, own.formats) or ("png",),

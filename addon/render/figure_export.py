@@ -34,14 +34,14 @@ FORMATS = ("png", "pdf", "svg")
 
 
 @dataclass(frozen=True)
-class Wish:
+class FigureRequest:
     """What is to be made.
 
     Attributes
     ----------
     kinds : tuple of str
         Of :data:`KINDS`.
-    look : FigureStyle
+    style : FigureStyle
     frames : tuple of int
         For scene and numbers; none: the one with the largest force. Two or more are also the strip's columns.
     sensors : tuple of str
@@ -51,7 +51,7 @@ class Wish:
     exports : tuple of str
         Kinds of :func:`..formats.export.export`; each gets a folder of its own.
     engine, view, transparent
-        See :func:`.render_setup.photographed`.
+        See :func:`.render_setup.render_setup`.
     own_camera : bool
         The scene's camera stays where it is.
     size : (2,) int, pixels
@@ -61,7 +61,7 @@ class Wish:
     """
 
     kinds: tuple[str, ...] = ("scene", "strip", "curves", "numbers")
-    look: FigureStyle = field(default_factory=FigureStyle)
+    style: FigureStyle = field(default_factory=FigureStyle)
     frames: tuple[int, ...] = ()
     sensors: tuple[str, ...] = ()
     formats: tuple[str, ...] = ("png", "pdf")
@@ -80,7 +80,7 @@ class Wish:
                     raise ParameterError(f"There is no {what} '{word}': choose from {', '.join(known)}.")
 
 
-def bake_of(scene) -> Bake:
+def read_scene_bake(scene) -> Bake:
     """Read the bake that a scene plays.
 
     Raises
@@ -96,7 +96,7 @@ def bake_of(scene) -> Bake:
     return read_sensors(list(places.values()))
 
 
-def make(scene, folder, wish: Wish) -> Generator[Progress, None, list[Path]]:
+def make_figures(scene, folder, request: FigureRequest) -> Generator[Progress, None, list[Path]]:
     """Make the figures of a baked scene.
 
     Parameters
@@ -113,123 +113,125 @@ def make(scene, folder, wish: Wish) -> Generator[Progress, None, list[Path]]:
     PalpateError
         The scene is not baked, a frame was not, or a file cannot be written.
     """
-    bake = bake_of(scene)
-    if wish.sensors:
-        bake = bake.select(wish.sensors)
+    bake = read_scene_bake(scene)
+    if request.sensors:
+        bake = bake.select(request.sensors)
     place = writable_folder(folder, create=True)
-    frames = wish.frames or (_busiest(bake),)
+    frames = request.frames or (_frame_of_largest_force(bake),)
     for number in frames:
         frame_index(bake.recording, number)
-    steps = _Steps(wish, frames, len(bake.recording.frames))
+    steps = _StepCounter(request, frames, len(bake.recording.frames))
     written: list[Path] = []
-    if "scene" in wish.kinds:
-        yield from _scene(scene, place, wish, bake, frames, steps, written)
-    if {"strip", "curves", "numbers"} & set(wish.kinds):
+    if "scene" in request.kinds:
+        yield from _scene(scene, place, request, bake, frames, steps, written)
+    if {"strip", "curves", "numbers"} & set(request.kinds):
         yield steps.next("Drawing figures", frames[0])
-        written += draw(bake, place, wish, frames)
-    for kind in wish.exports:
+        written += draw_figures(bake, place, request, frames)
+    for kind in request.exports:
         yield steps.next(f"Writing {kind.upper()}", frames[0])
-        written += drive(export(bake, kind, place / f"data {kind}", wish.look))
-    if "video" in wish.kinds:
-        yield from _video(scene, place, wish, bake, steps, written)
+        written += drive(export(bake, kind, place / f"data {kind}", request.style))
+    if "video" in request.kinds:
+        yield from _video(scene, place, request, bake, steps, written)
     return written
 
 
-def draw(bake: Bake, place: Path, wish: Wish, frames: Sequence[int]) -> list[Path]:
+def draw_figures(bake: Bake, place: Path, request: FigureRequest, frames: Sequence[int]) -> list[Path]:
     """Draw strip, curves and numbers, as far as they are wanted."""
     written = []
-    for ending in wish.formats:
+    for ending in request.formats:
         parts = (bake.recording, bake.texels)
-        if "strip" in wish.kinds:
-            columns = wish.frames if len(wish.frames) > 1 else None
-            tactile_strip(place / f"strip.{ending}", *parts, columns, wish.look)
+        if "strip" in request.kinds:
+            columns = request.frames if len(request.frames) > 1 else None
+            tactile_strip(place / f"strip.{ending}", *parts, columns, request.style)
             written.append(place / f"strip.{ending}")
-        if "curves" in wish.kinds:
-            time_curves(place / f"curves.{ending}", *parts, bake.parameters, style=wish.look)
+        if "curves" in request.kinds:
+            time_curves(place / f"curves.{ending}", *parts, bake.parameters, style=request.style)
             written.append(place / f"curves.{ending}")
-        if "numbers" in wish.kinds:
+        if "numbers" in request.kinds:
             for name, stem in folder_names(bake.texels).items():
-                if len(bake.texels[name]) > MOST and not wish.sensors:
+                if len(bake.texels[name]) > MOST and not request.sensors:
                     continue  # nobody could read them; asked for by name, it says so
                 for number in frames:
                     path = place / f"numbers {stem} {number:04d}.{ending}"
-                    texel_numbers(path, *parts, name, number, wish.look)
+                    texel_numbers(path, *parts, name, number, request.style)
                     written.append(path)
     return written
 
 
-def _scene(scene, place, wish, bake, frames, steps, written):
-    with _photographed(scene, wish, bake, frames, wish.size) as show:
+def _scene(scene, place, request, bake, frames, steps, written):
+    with _prepared_scene(scene, request, bake, frames, request.size) as show:
         for number in frames:
             yield steps.next("Rendering", number)
             show(number)
             plain = place / f"scene {number:04d}.png"
-            written.append(render.render_frame(scene, plain, number, samples=wish.samples, size=wish.size))
+            written.append(render.render_frame(scene, plain, number, samples=request.samples, size=request.size))
             beside = place / f"scene and touch {number:04d}.png"
-            side_by_side(plain, beside, bake.recording, bake.texels, number, wish.look, wish.size[1])
+            side_by_side(plain, beside, bake.recording, bake.texels, number, request.style, request.size[1])
             written.append(beside)
 
 
-def _video(scene, place, wish, bake, steps, written):
+def _video(scene, place, request, bake, steps, written):
     numbers = [int(number) for number in bake.recording.frames]
-    height = 2 * (min(wish.size[1], 720) // 2)
-    size = (2 * round(0.5 * height * wish.size[0] / wish.size[1]), height)
+    height = 2 * (min(request.size[1], 720) // 2)
+    size = (2 * round(0.5 * height * request.size[0] / request.size[1]), height)
     with tempfile.TemporaryDirectory(prefix="palpate-video-") as scratch:
         pictures = []
-        with _photographed(scene, wish, bake, numbers, size) as show:
+        with _prepared_scene(scene, request, bake, numbers, size) as show:
             for number in numbers:
                 yield steps.next("Rendering the video", number)
                 show(number)
                 picture = Path(scratch) / f"{number - numbers[0]:06d}.png"
-                render.render_frame(scene, picture, number, samples=wish.samples, size=size)
-                side_by_side(picture, picture, bake.recording, bake.texels, number, wish.look, height)
+                render.render_frame(scene, picture, number, samples=request.samples, size=size)
+                side_by_side(picture, picture, bake.recording, bake.texels, number, request.style, height)
                 pictures.append(picture)
         yield steps.next("Encoding the video", numbers[-1])
-        written.append(video.encode(pictures, place / "video.mp4", bake.manifests[next(iter(bake.texels))].fps))
+        written.append(video.encode_video(pictures, place / "video.mp4", bake.manifests[next(iter(bake.texels))].fps))
 
 
 @contextmanager
-def _photographed(scene, wish: Wish, bake: Bake, frames, size) -> Iterator[Callable[[int], None]]:
+def _prepared_scene(scene, request: FigureRequest, bake: Bake, frames, size) -> Iterator[Callable[[int], None]]:
     """Prepare a scene for its pictures; yields what has to be called before each of them with its frame."""
     with (
-        render_setup.photographed(
+        render_setup.render_setup(
             scene,
             frames,
-            engine=wish.engine,
-            view=wish.view,
-            transparent=wish.transparent,
-            frame=not wish.own_camera,
+            engine=request.engine,
+            view=request.view,
+            transparent=request.transparent,
+            frame=not request.own_camera,
             size=size,
         ),
         ExitStack() as more,
     ):
-        show = _nothing
+        show = _draw_nothing
         if scene.render.engine == "BLENDER_WORKBENCH":
-            show = more.enter_context(workbench_colors.painted(scene_writer.bake_folders(scene), bake, wish.look))
+            show = more.enter_context(workbench_colors.workbench_colors(scene_writer.bake_folders(scene), bake, request.style))
         yield show
 
 
-def _nothing(_number: int) -> None:
+def _draw_nothing(_number: int) -> None:
     """Cycles and EEVEE draw the heat maps' materials."""
 
 
-def _busiest(bake: Bake) -> int:
-    total = sum(felt.normal_force.sum(axis=1) for felt in bake.recording.sensors.values())
+def _frame_of_largest_force(bake: Bake) -> int:
+    total = sum(readings.normal_force.sum(axis=1) for readings in bake.recording.sensors.values())
     return int(bake.recording.frames[total.argmax()])
 
 
-class _Steps:
+class _StepCounter:
     """Counts what is done."""
 
-    def __init__(self, wish: Wish, frames, whole: int):
+    def __init__(self, request: FigureRequest, frames, whole: int):
         self.done = 0
-        self.total = len(frames) * ("scene" in wish.kinds) + 1 + len(wish.exports) + (whole + 1) * ("video" in wish.kinds)
+        self.total = (
+            len(frames) * ("scene" in request.kinds) + 1 + len(request.exports) + (whole + 1) * ("video" in request.kinds)
+        )
 
     def next(self, stage: str, frame: int) -> Progress:
         self.done = min(self.done + 1, self.total)
         return Progress(stage, frame, self.done, self.total)
 
 
-def look_of(scene, **others) -> FigureStyle:
+def scene_style(scene, **others) -> FigureStyle:
     """Return the look that agrees with what the scene shows."""
-    return bake_display.look_of(scene, **others)
+    return bake_display.figure_style(scene, **others)

@@ -24,7 +24,7 @@ _SURFACELESS = 0x31DD
 """EGL_PLATFORM_SURFACELESS_MESA"""
 
 
-def corners(objects) -> np.ndarray:
+def bounding_box_corners(objects) -> np.ndarray:
     """Return the corners of the objects' bounding boxes, with their modifiers, in the world.
 
     Returns
@@ -41,7 +41,7 @@ def corners(objects) -> np.ndarray:
     return np.concatenate(found)
 
 
-def frame_camera(scene, points: np.ndarray, region=(0.05, 0.05, 0.95, 0.95)) -> None:
+def fit_camera(scene, points: np.ndarray, region=(0.05, 0.05, 0.95, 0.95)) -> None:
     """Move the scene's camera, without turning it, so that all points just fit into a part of the picture.
 
     Parameters
@@ -78,7 +78,7 @@ def frame_camera(scene, points: np.ndarray, region=(0.05, 0.05, 0.95, 0.95)) -> 
     bpy.context.view_layer.update()
 
 
-def picture_position(scene, point) -> tuple[float, float]:
+def image_position(scene, point) -> tuple[float, float]:
     """Return where a point of the world lies on the picture, as shares of its width and height from the lower left corner."""
     camera = _camera(scene)
     width, height = _half_angles(scene, camera)
@@ -108,7 +108,7 @@ def render_frame(scene, path: str | os.PathLike, frame: int, *, samples: int | N
         The picture cannot be written.
     """
     _camera(scene)
-    if scene.render.engine in NEED_GL and not can_draw():
+    if scene.render.engine in NEED_GL and not has_opengl():
         raise SceneError(
             f"EEVEE and Workbench need OpenGL, which this machine has not without a window, so '{scene.name}' cannot be "
             "rendered: choose Cycles."
@@ -129,7 +129,7 @@ def render_frame(scene, path: str | os.PathLike, frame: int, *, samples: int | N
 
 
 @lru_cache
-def can_draw() -> bool:
+def has_opengl() -> bool:
     """Whether Blender can draw: without a window, and without EGL to draw beside one, EEVEE and Workbench end the process."""
     if not bpy.app.background or not sys.platform.startswith("linux"):
         return True

@@ -17,13 +17,13 @@ from . import render
 
 ENGINES = {"cycles": ("CYCLES",), "eevee": ("BLENDER_EEVEE_NEXT", "BLENDER_EEVEE"), "workbench": ("BLENDER_WORKBENCH",)}
 """Words for engines → their names, which changed with Blender's versions."""
-VIEW = (-55.0, 30.0)
+DEFAULT_VIEW = (-55.0, 30.0)
 """Azimuth, from +x towards +y, and elevation, degrees, from which a scene without a camera is looked at."""
 MARGIN = 0.06
 """Of the picture's width and height, left free around what is framed."""
-_FAR = 3.0
+_BACKDROP_SIZE_RATIO = 3.0
 """Sizes of what is seen from which on an object that takes no part is a backdrop."""
-_MOST_LOOKED_AT = 60
+_MAX_FRAMED_FRAMES = 60
 """Frames at which a camera's view is made sure of."""
 _LAMPS = (((-35.0, 50.0), 3.2, (1.0, 0.97, 0.93)), ((70.0, 30.0), 1.2, (0.9, 0.95, 1.0)), ((170.0, 45.0), 2.0, (1.0, 1.0, 1.0)))
 """Suns: azimuth from the camera's and elevation, degrees; strength; colour."""
@@ -48,9 +48,9 @@ def engine_of(scene, name: str) -> str:
     raise ParameterError(f"This Blender has no engine '{name}': choose from {', '.join(ENGINES)}.")
 
 
-def seen_objects(scene) -> list:
+def subjects(scene) -> list:
     """Return what a picture should show: sensors, pads, targets and their children, arrows and markers."""
-    taking_part = {obj for obj in scene.objects if obj.palpate.role != "NONE" or materials.MARK in obj}
+    taking_part = {obj for obj in scene.objects if obj.palpate.role != "NONE" or materials.SENSOR_KEY in obj}
     return [obj for obj in scene.objects if _shows(obj) and (obj in taking_part or taking_part & set(_above(obj)))]
 
 
@@ -65,7 +65,7 @@ def _shows(obj) -> bool:
 
 
 @contextmanager
-def photographed(
+def render_setup(
     scene, frames, *, engine: str | None = None, view=None, transparent: bool = False, frame: bool = True, size=None
 ):
     """Prepare a scene for pictures, and put everything back.
@@ -77,7 +77,7 @@ def photographed(
     engine : {"cycles", "eevee", "workbench"}, optional
         Default: the scene's.
     view : (2,) float, degrees, optional
-        Azimuth and elevation of the camera. Default: the direction of the scene's camera, or :data:`VIEW`.
+        Azimuth and elevation of the camera. Default: the direction of the scene's camera, or :data:`DEFAULT_VIEW`.
     transparent : bool
         No background: no world, and no floor or backdrop that reaches far beyond everything else.
     frame : bool
@@ -107,7 +107,7 @@ def photographed(
             camera = _camera(scene, own, view)
             made.append(camera)
             change(scene, "camera", camera)
-            render.frame_camera(scene, _corners(scene, frames), (MARGIN, MARGIN, 1 - MARGIN, 1 - MARGIN))
+            render.fit_camera(scene, _corners(scene, frames), (MARGIN, MARGIN, 1 - MARGIN, 1 - MARGIN))
             _clip(scene, camera)
         if not any(obj.type == "LIGHT" and not obj.hide_render for obj in scene.objects):
             made += _lamps(scene, scene.camera)
@@ -136,11 +136,15 @@ def photographed(
 
 def _backdrops(scene) -> list:
     """Return what is only there to be in front of: it takes no part, carries nothing, and is far larger than what does."""
-    seen = seen_objects(scene)
+    seen = subjects(scene)
     carriers = {above for obj in seen for above in _above(obj)}
-    size = float(np.linalg.norm(np.ptp(render.corners(seen), axis=0))) if seen else 0.0
+    size = float(np.linalg.norm(np.ptp(render.bounding_box_corners(seen), axis=0))) if seen else 0.0
     others = [obj for obj in scene.objects if _shows(obj) and obj not in seen and obj not in carriers]
-    return [obj for obj in others if np.linalg.norm(np.ptp(render.corners([obj]), axis=0)) > _FAR * size]
+    return [
+        obj
+        for obj in others
+        if np.linalg.norm(np.ptp(render.bounding_box_corners([obj]), axis=0)) > _BACKDROP_SIZE_RATIO * size
+    ]
 
 
 def _camera(scene, own, view):
@@ -153,7 +157,7 @@ def _camera(scene, own, view):
     if own is not None and view is None:
         turn = own.matrix_world.to_euler()
     else:
-        azimuth, elevation = (math.radians(angle) for angle in (view or VIEW))
+        azimuth, elevation = (math.radians(angle) for angle in (view or DEFAULT_VIEW))
         turn = Euler((math.pi / 2 - elevation, 0.0, azimuth + math.pi / 2))
     camera.rotation_euler = turn
     bpy.context.view_layer.update()
@@ -162,17 +166,17 @@ def _camera(scene, own, view):
 
 def _corners(scene, frames) -> np.ndarray:
     """Corners of all that matters at some frames; of many, at enough of them that an arrow's longest is not missed by much."""
-    places = np.linspace(0, len(frames) - 1, min(len(frames), _MOST_LOOKED_AT)).round().astype(int)
+    places = np.linspace(0, len(frames) - 1, min(len(frames), _MAX_FRAMED_FRAMES)).round().astype(int)
     chosen = sorted({int(frames[place]) for place in places})
     found = []
     for number in chosen:
         scene.frame_set(number)
-        found.append(render.corners(seen_objects(scene)))
+        found.append(render.bounding_box_corners(subjects(scene)))
     return np.concatenate(found)
 
 
 def _clip(scene, camera) -> None:
-    distance = max((camera.matrix_world.translation - obj.matrix_world.translation).length for obj in seen_objects(scene))
+    distance = max((camera.matrix_world.translation - obj.matrix_world.translation).length for obj in subjects(scene))
     camera.data.clip_start, camera.data.clip_end = 0.005 * distance, 20.0 * distance
 
 

@@ -13,7 +13,7 @@ from ...core.errors import FileError, SceneError
 from ...core.io.file_writing import atomic_write
 
 
-def encode(pictures: Sequence[str | os.PathLike], path: str | os.PathLike, fps: float) -> Path:
+def encode_video(pictures: Sequence[str | os.PathLike], path: str | os.PathLike, fps: float) -> Path:
     """Write an MP4 (H.264) of pictures of one size, one per frame.
 
     Parameters

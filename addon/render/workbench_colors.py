@@ -19,16 +19,16 @@ from ...core.io.bake_reader import Bake, frame_index
 from ..display import heat_map, materials
 from ..scene import meshes
 
-NAME = "Palpate Colour"
-PLAIN = (0.8, 0.8, 0.8, 1.0)
+COLOR_ATTRIBUTE = "Palpate Colour"
+DEFAULT_COLOR = (0.8, 0.8, 0.8, 1.0)
 """Linear colour of what has no material."""
-CLEAR_NODES = {"BSDF_TRANSPARENT", "BSDF_GLASS", "BSDF_REFRACTION"}
-CLEAR = 0.12
+TRANSPARENT_NODES = {"BSDF_TRANSPARENT", "BSDF_GLASS", "BSDF_REFRACTION"}
+GLASS_OPACITY = 0.12
 """How solid Workbench draws glass."""
 
 
 @contextmanager
-def painted(places: dict, bake: Bake, look: FigureStyle) -> Iterator[Callable[[int], None]]:
+def workbench_colors(places: dict, bake: Bake, style: FigureStyle) -> Iterator[Callable[[int], None]]:
     """Put sensors in colours and everything else in its materials' viewport colours, and take them off again.
 
     Parameters
@@ -36,7 +36,7 @@ def painted(places: dict, bake: Bake, look: FigureStyle) -> Iterator[Callable[[i
     places : dict of Object to Path
         Folder of each sensor's bake.
     bake : Bake
-    look : FigureStyle
+    style : FigureStyle
 
     Yields
     ------
@@ -44,23 +44,23 @@ def painted(places: dict, bake: Bake, look: FigureStyle) -> Iterator[Callable[[i
         That shows a frame, by its number.
     """
     names = {place: name for name, place in bake.folders.items()}
-    worn = {obj: names[place] for obj, place in places.items() if place in names}
+    sensors = {obj: names[place] for obj, place in places.items() if place in names}
     solid = [obj for obj in bpy.context.scene.objects if obj.type == "MESH" and len(obj.data.polygons)]
     before = {obj: (obj.data, tuple(obj.color)) for obj in solid}
-    top = look.scale_limit(bake.recording, bake.texels)
+    top = style.scale_limit(bake.recording, bake.texels)
     try:
         plain = {obj: _in_material_colours(obj) for obj in solid}
-        looks = {obj: _corners_of_region(obj.data, bake.texels[name]) for obj, name in worn.items()}
+        looks = {obj: _corners_of_region(obj.data, bake.texels[name]) for obj, name in sensors.items()}
 
         def show(number: int) -> None:
             index = frame_index(bake.recording, number)
-            for obj, name in worn.items():
+            for obj, name in sensors.items():
                 texels = bake.texels[name]
-                values = look.values(bake.recording.sensors[name].at(index), texels)
+                values = style.values(bake.recording.sensors[name].at(index), texels)
                 corners, texel = looks[obj]
                 table = plain[obj].copy()
-                table[corners, :3] = color_maps.linear(color_maps.colors(look.colour_map, values / top))[texel]
-                obj.data.attributes[NAME].data.foreach_set("color", table.ravel())
+                table[corners, :3] = color_maps.linear(color_maps.colors(style.colour_map, values / top))[texel]
+                obj.data.attributes[COLOR_ATTRIBUTE].data.foreach_set("color", table.ravel())
                 obj.data.update_tag()
 
         yield show
@@ -77,34 +77,36 @@ def _in_material_colours(obj) -> np.ndarray:
     sides, material = np.empty(len(mesh.polygons), dtype=np.int32), np.empty(len(mesh.polygons), dtype=np.int32)
     mesh.polygons.foreach_get("loop_total", sides)
     mesh.polygons.foreach_get("material_index", material)
-    slots = [PLAIN if slot.material is None else tuple(slot.material.diffuse_color) for slot in obj.material_slots] or [PLAIN]
+    slots = [DEFAULT_COLOR if slot.material is None else tuple(slot.material.diffuse_color) for slot in obj.material_slots] or [
+        DEFAULT_COLOR
+    ]
     table = np.array(slots, dtype=np.float32)[np.clip(np.repeat(material, sides), 0, len(slots) - 1)]
     table[:, 3] = 1.0
-    solidity = min(map(_solidity, obj.data.materials), default=1.0)
+    solidity = min(map(_opacity, obj.data.materials), default=1.0)
     if solidity < 1.0:
         for attribute in list(mesh.color_attributes):
             mesh.color_attributes.remove(attribute)
         obj.color = (*table[:, :3].mean(axis=0), solidity)
         return table
-    attribute = mesh.attributes.new(NAME, "FLOAT_COLOR", "CORNER")
+    attribute = mesh.attributes.new(COLOR_ATTRIBUTE, "FLOAT_COLOR", "CORNER")
     attribute.data.foreach_set("color", table.ravel())
     mesh.attributes.active_color_name = attribute.name
     mesh.attributes.render_color_index = mesh.color_attributes.find(attribute.name)
     return table
 
 
-def _solidity(material) -> float:
+def _opacity(material) -> float:
     """Return 1 for what hides what is behind it, less for glass and the like."""
-    if material is None or materials.MARK in material:
+    if material is None or materials.SENSOR_KEY in material:
         return 1.0
     found = [material.diffuse_color[3]]
     for node in material.node_tree.nodes if material.node_tree else ():
-        if node.type in CLEAR_NODES:
-            found.append(CLEAR)
+        if node.type in TRANSPARENT_NODES:
+            found.append(GLASS_OPACITY)
         elif node.type == "BSDF_PRINCIPLED":
             alpha, clear = node.inputs["Alpha"], node.inputs["Transmission Weight"]
             found.append(1.0 if alpha.is_linked else max(alpha.default_value, 0.05))
-            found.append(1.0 - (1.0 - CLEAR) * (0.0 if clear.is_linked else clear.default_value))
+            found.append(1.0 - (1.0 - GLASS_OPACITY) * (0.0 if clear.is_linked else clear.default_value))
     return min(found)
 
 

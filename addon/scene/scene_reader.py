@@ -344,7 +344,7 @@ def sample_scenario(scene) -> Generator[Progress, None, tuple[Scenario, Binding]
     """Read a scene over its whole frame range, frame by frame, and leave it at the frame where it stood."""
     before = scene.frame_current, scene.frame_subframe
     try:
-        with clock.unstretched(scene), texel_arrows.resting(scene):
+        with clock.unstretched(scene), texel_arrows.hidden_arrows(scene):
             return (yield from _sample_scenario(scene))
     finally:
         with suppress(ReferenceError):  # the scene went while its frames were read

@@ -301,10 +301,10 @@ def _show_board(scene, frame: Frame) -> None:
             texels.update(dict.fromkeys(recording.sensors, own))
     if last is None:
         return
-    look = bake_display.look_of(scene)
-    top = look.scale_limit(replace(last, sensors=sensors), texels) * (1e3 if look.quantity == "pressure" else 1.0)
-    loads = {name: felt.normal_force.sum(axis=1) for name, felt in sensors.items()}
-    inset.show(scene, inset.board(scene, frame, texels, last.frames.astype(float), loads, top))
+    style = bake_display.figure_style(scene)
+    top = style.scale_limit(replace(last, sensors=sensors), texels) * (1e3 if style.quantity == "pressure" else 1.0)
+    loads = {name: readings.normal_force.sum(axis=1) for name, readings in sensors.items()}
+    inset.show(scene, inset.inset_content(scene, frame, texels, last.frames.astype(float), loads, top))
 
 
 def _texels(obj):
@@ -325,7 +325,7 @@ def _recording(obj):
         return None
     if place not in _recordings:
         try:
-            _recordings[place] = bake_files.stored_recording(place)
+            _recordings[place] = bake_files.read_recording(place)
         except PalpateError:
             _recordings[place] = None
     return _recordings[place]

@@ -243,4 +243,4 @@ def test_what_is_drawn_is_where_the_texels_are():
     up = drawing.lines["normals"].reshape(-1, 2, 3)
     assert (up[:, 1, 2] > up[:, 0, 2]).all()
     assert len(drawing.spots["faulty"]) == 0
-    assert len(drawing.spots["fine"]) == 84 * texel_overlay.SIDES * 3
+    assert len(drawing.spots["fine"]) == 84 * texel_overlay.DISC_SIDES * 3

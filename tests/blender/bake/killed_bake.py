@@ -17,7 +17,7 @@ from palpate.addon.bake import bake_checkpoint  # noqa: E402
 from palpate.addon.bake.bake import bake  # noqa: E402
 from palpate.core.jobs.job_runner import drive  # noqa: E402
 
-bake_checkpoint.PATIENCE = 0.0
+bake_checkpoint.CHECKPOINT_INTERVAL = 0.0
 bpy.ops.wm.open_mainfile(filepath=sys.argv[1])
 computed = []
 

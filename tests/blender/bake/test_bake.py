@@ -23,7 +23,7 @@ from palpate.core.jobs.job_runner import drive
 
 def baked(scene):
     result = drive(bake(scene))
-    bake_files.settle()
+    bake_files.wait_for_removals()
     return result
 
 
@@ -90,18 +90,18 @@ def test_the_arrow_is_the_reaction_at_the_centre_of_pressure(tmp_path):
     scene.palpate.use_auto_arrow, scene.palpate.arrow_scale = False, 0.5
     save(tmp_path)
     result = baked(scene)
-    arrow = materials.find(scene.objects, pad.palpate.uid)
-    felt = result.recording.sensors["Pad"]
-    assert felt.contact.any(axis=1).tolist()[0] is False and felt.contact[-1].any()
+    arrow = materials.find_block(scene.objects, pad.palpate.uid)
+    readings = result.recording.sensors["Pad"]
+    assert readings.contact.any(axis=1).tolist()[0] is False and readings.contact[-1].any()
     for i, frame in enumerate(range(1, 7)):
         scene.frame_set(frame)
-        size = np.linalg.norm(felt.net_force[i])
+        size = np.linalg.norm(readings.net_force[i])
         assert list(arrow.scale) == pytest.approx([0.5 * size] * 3, rel=1e-5)
         if size > 0:
             world = transforms.array(arrow.matrix_world)
             rotation = transforms.rotation(result.recording.poses[i, 0, 3:])
-            assert world[:3, 2] / 0.5 == pytest.approx(-rotation @ felt.net_force[i], rel=1e-4, abs=1e-6)
-            foot = result.recording.poses[i, 0, :3] + rotation @ felt.centre_of_pressure[i]
+            assert world[:3, 2] / 0.5 == pytest.approx(-rotation @ readings.net_force[i], rel=1e-4, abs=1e-6)
+            foot = result.recording.poses[i, 0, :3] + rotation @ readings.centre_of_pressure[i]
             assert world[:3, 3] == pytest.approx(foot, abs=1e-7)
 
 
@@ -343,13 +343,13 @@ def test_a_sensor_all_around_has_a_heat_map_on_its_vertices(tmp_path):
     tip.palpate.role = "SENSOR"
     save(tmp_path)
     target.location.z = 0.0
-    felt = baked(scene).recording.sensors["Tip"]
+    readings = baked(scene).recording.sensors["Tip"]
     for i in (0, 3, 5):
         scene.frame_set(i + 1)
         mesh = tip.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
         values = np.zeros(8, dtype=np.float32)
         mesh.attributes[materials.FORCE].data.foreach_get("value", values)
-        assert values == pytest.approx(felt.normal_force[i], abs=1e-7)
+        assert values == pytest.approx(readings.normal_force[i], abs=1e-7)
     scenario = drive(scene_reader.sample_scenario(scene))[0]  # its own nodes do not change what is sampled
     assert scenario.digest() == drive(bake(scene)).recording.digest
 
@@ -360,8 +360,8 @@ def test_an_arrow_without_contact_has_no_size(tmp_path):
     target.location.z = 1.0
     save(tmp_path)
     baked(scene)
-    assert list(materials.find(scene.objects, pad.palpate.uid).scale) == [0.0, 0.0, 0.0]
-    assert marker_meshes.MARK in materials.find(scene.objects, pad.palpate.uid).data
+    assert list(materials.find_block(scene.objects, pad.palpate.uid).scale) == [0.0, 0.0, 0.0]
+    assert marker_meshes.SHAPE_KEY in materials.find_block(scene.objects, pad.palpate.uid).data
 
 
 def test_frame_zero_can_be_baked(tmp_path):
@@ -426,8 +426,8 @@ def test_the_arrow_is_in_the_scene_that_was_baked(tmp_path):
         second.collection.objects.link(obj)
     save(tmp_path)
     baked(second)
-    assert materials.find(second.objects, pad.palpate.uid) is not None
-    assert materials.find(first.objects, pad.palpate.uid) is None
+    assert materials.find_block(second.objects, pad.palpate.uid) is not None
+    assert materials.find_block(first.objects, pad.palpate.uid) is None
 
 
 @pytest.mark.parametrize("mode", ["EDIT", "WEIGHT_PAINT"])
@@ -457,7 +457,7 @@ def test_clearing_a_copy_leaves_the_original_alone_in_a_reopened_file(tmp_path):
     assert bpy.ops.palpate.sensor_remove() == {"FINISHED"}
     pad = scene.objects["Pad"]
     assert pad.material_slots[1].material.name == "Palpate Pad"
-    assert materials.find(scene.objects, pad.palpate.uid) is not None
+    assert materials.find_block(scene.objects, pad.palpate.uid) is not None
 
 
 @pytest.mark.parametrize("around", [False, True])
@@ -475,14 +475,14 @@ def test_nothing_is_left_of_a_deleted_sensor(tmp_path, around):
     kinds = ("materials", "images", "node_groups", "actions")
 
     def ours():
-        arrows_left = [obj.name for obj in scene.objects if materials.MARK in obj]
+        arrows_left = [obj.name for obj in scene.objects if materials.SENSOR_KEY in obj]
         return arrows_left, {kind: sorted(block.name for block in getattr(bpy.data, kind)) for kind in kinds}
 
     baked(scene)
     name = pad.name
     assert f"Palpate {name}" in ours()[1]["materials"] and f"Palpate {name}" in ours()[1]["images"]
     kept = bpy.data.materials.new("Mine")
-    kept[materials.MARK] = pad.palpate.uid  # a copy that the user has put on something
+    kept[materials.SENSOR_KEY] = pad.palpate.uid  # a copy that the user has put on something
     target.data.materials.append(kept)
     bpy.data.objects.remove(pad)
     baked(scene)

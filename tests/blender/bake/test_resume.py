@@ -69,31 +69,31 @@ def contents_of_a_whole_bake(scene, tmp_path):
 def abandon(scene, steps):
     """Stop a bake as a kill would: it cannot clean up."""
     work = jobs.Slice(bake(scene))
-    discard = bake_files.Files.discard
-    bake_files.Files.discard = lambda self: self._claim.give_back()  # as the operating system does
+    discard = bake_files.BakeFiles.discard
+    bake_files.BakeFiles.discard = lambda self: self._lock.release()  # as the operating system does
     try:
         for _ in range(steps):
             work.work(0.0)
         work.cancel()
     finally:
-        bake_files.Files.discard = discard
+        bake_files.BakeFiles.discard = discard
 
 
 @pytest.fixture
 def killed(tmp_path, monkeypatch):
     """A scene whose bake was killed at its sixth frame."""
-    monkeypatch.setattr(bake_checkpoint, "PATIENCE", 0.0)
+    monkeypatch.setattr(bake_checkpoint, "CHECKPOINT_INTERVAL", 0.0)
     scene, pad, *_ = press_and_drop(frames=8)
     save(tmp_path)
     abandon(scene, 8 + 6)
-    assert (tmp_path / "palpate" / bake_checkpoint.FOLDER / bake_checkpoint.STATE).is_file()
+    assert (tmp_path / "palpate" / bake_checkpoint.CHECKPOINT_FOLDER / bake_checkpoint.STATE_FILE).is_file()
     return scene, pad
 
 
 def computed(scene):
     frames = []
     drive(bake(scene), lambda step: frames.append(step.frame) if step.stage == "Computing forces" else None)
-    bake_files.settle()
+    bake_files.wait_for_removals()
     return frames
 
 
@@ -107,11 +107,11 @@ def test_the_next_bake_goes_on(killed, tmp_path):
 @pytest.mark.parametrize("what", ["parameter", "damaged state", "lost frames", "lost images"])
 def test_what_does_not_fit_is_begun_anew(killed, tmp_path, what):
     scene, pad = killed
-    place = tmp_path / "palpate" / bake_checkpoint.FOLDER
+    place = tmp_path / "palpate" / bake_checkpoint.CHECKPOINT_FOLDER
     if what == "parameter":
         pad.palpate.k = 77.0
     elif what == "damaged state":
-        (place / bake_checkpoint.STATE).write_bytes((place / bake_checkpoint.STATE).read_bytes()[:1000])
+        (place / bake_checkpoint.STATE_FILE).write_bytes((place / bake_checkpoint.STATE_FILE).read_bytes()[:1000])
     elif what == "lost frames":
         next(place.glob("frames_*")).unlink()
     else:
@@ -129,20 +129,20 @@ def test_one_bake_at_a_time(tmp_path):
     expected = contents_of_a_whole_bake(scene, tmp_path)
     scene.palpate.folder = "//palpate"
     first = bake(scene)
-    while not (tmp_path / "palpate" / folder_lock.NAME).exists():
+    while not (tmp_path / "palpate" / folder_lock.LOCK_FILE_NAME).exists():
         next(first)
     with pytest.raises(FileError, match="Another bake is writing to"):
         drive(bake(scene))
     drive(first)
-    bake_files.settle()
+    bake_files.wait_for_removals()
     assert contents(tmp_path / "palpate") == expected
     drive(bake(scene))
-    bake_files.settle()
+    bake_files.wait_for_removals()
     assert contents(tmp_path / "palpate") == expected
 
 
 def test_escape_leaves_nothing(tmp_path, monkeypatch):
-    monkeypatch.setattr(bake_checkpoint, "PATIENCE", 0.0)
+    monkeypatch.setattr(bake_checkpoint, "CHECKPOINT_INTERVAL", 0.0)
     scene, *_ = press_and_drop(frames=8)
     save(tmp_path)
     work = jobs.Slice(bake(scene))

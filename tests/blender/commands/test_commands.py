@@ -310,7 +310,8 @@ def test_ctrl_c_ends_a_call_into_blender_at_once(tmp_path):
     code = (
         "import time, pathlib; from palpate.commands import console\n"
         f"path = pathlib.Path({str(tmp_path / 'unfinished')!r}); path.touch()\n"
-        "with console.Interrupt.noted(), console.stop_at_once('stopped while rendering', path.unlink), console.quiet():\n"
+        "interrupted = console.exit_on_interrupt('stopped while rendering', path.unlink)\n"
+        "with console.Interrupt.noted(), interrupted, console.blender_output_hidden():\n"
         "    print('chatter'); end = time.monotonic() + 30\n"
         "    while time.monotonic() < end: time.sleep(0.01)\n"
     )
@@ -329,13 +330,13 @@ def test_ctrl_c_ends_a_call_into_blender_at_once(tmp_path):
 
 
 def test_blenders_words_come_back_when_something_is_wrong(capfd):
-    with pytest.raises(ZeroDivisionError), console.quiet():
+    with pytest.raises(ZeroDivisionError), console.blender_output_hidden():
         os.write(1, b"what Blender said\n")
         print(1 / 0)
     out, err = capfd.readouterr()
     assert "what Blender said" in err
     assert out == ""
-    with console.quiet():
+    with console.blender_output_hidden():
         os.write(1, b"chatter\n")
         os.write(2, b"chatter\n")
         print("chatter")
@@ -343,14 +344,14 @@ def test_blenders_words_come_back_when_something_is_wrong(capfd):
 
 
 def test_tables_have_even_columns():
-    assert console.table([("a", "bb"), ("ccc", "d")], "<>") == "a    bb\nccc   d"
+    assert console.text_table([("a", "bb"), ("ccc", "d")], "<>") == "a    bb\nccc   d"
 
 
 def test_peak_shear_adds_forces_and_not_numbers_of_different_axes():
     """Two texels whose x axes point against each other, each pushed along its own by 1 N: the sensor feels nothing."""
     texels = SimpleNamespace(tangent=np.array([[1.0, 0, 0], [-1.0, 0, 0]]), bitangent=np.array([[0, 1.0, 0], [0, 1.0, 0]]))
-    felt = SimpleNamespace(normal_force=np.ones((1, 2)), shear=np.array([[[1.0, 0.0], [1.0, 0.0]]]))
-    recording = SimpleNamespace(frames=[1], times=[0.0], dt=1e-3, warnings=(), sensors={"Tip": felt})
+    readings = SimpleNamespace(normal_force=np.ones((1, 2)), shear=np.array([[[1.0, 0.0], [1.0, 0.0]]]))
+    recording = SimpleNamespace(frames=[1], times=[0.0], dt=1e-3, warnings=(), sensors={"Tip": readings})
     scenario = SimpleNamespace(sensors=[SimpleNamespace(name="Tip", texels=texels)])
     row = report(SimpleNamespace(recording=recording, scenario=scenario, folders={"Tip": None})).splitlines()[-1]
     assert row.split() == ["Tip", "2", "1.0000", "N", "2.0000", "N", "0.0000", "N", "2.0000", "N"]

@@ -46,14 +46,14 @@ def test_texel_arrows_are_the_forces_of_their_texels(baked, kind):
     scene, pad, result = baked
     scene.frame_set(8)
     body, texels = result.scenario.sensors[0].body, result.scenario.sensors[0].texels
-    felt = result.recording.at(8).sensors["Pad"]
+    readings = result.recording.at(8).sensors["Pad"]
     rotation = transforms.rotation(result.recording.poses[-1, body, 3:])
-    force = felt.normal_force[:, None] * texels.normal
+    force = readings.normal_force[:, None] * texels.normal
     if kind == "SHEARS":
-        force = -felt.shear[:, :1] * texels.tangent - felt.shear[:, 1:] * texels.bitangent
-    found = instances(markers.find(scene.objects, pad.palpate.uid, kind))
+        force = -readings.shear[:, :1] * texels.tangent - readings.shear[:, 1:] * texels.bitangent
+    found = instances(markers.find_marker(scene.objects, pad.palpate.uid, kind))
     size = np.linalg.norm(force, axis=1)
-    assert len(found) == (size > texel_arrows.SMALLEST * size.max()).sum() >= 3
+    assert len(found) == (size > texel_arrows.MIN_ARROW_SHARE * size.max()).sum() >= 3
     place = result.recording.poses[-1, body, :3] + texels.position @ rotation.T
     ratios = []
     for matrix in found:
@@ -67,22 +67,22 @@ def test_texel_arrows_are_the_forces_of_their_texels(baked, kind):
 
 def test_markers_stand_at_the_centre_of_pressure_and_show_moment_and_slip(baked):
     scene, pad, result = baked
-    felt = result.recording.sensors["Pad"]
-    share = metrics.slip_share(felt, result.scenario.sensors[0].parameters)
-    moment = metrics.free_moment(felt)
+    readings = result.recording.sensors["Pad"]
+    share = metrics.slip_share(readings, result.scenario.sensors[0].parameters)
+    moment = metrics.free_moment(readings)
     radius = float(np.ptp(result.scenario.sensors[0].texels.position, axis=0).max()) * markers.RING_SHARE
     for frame in (1, 6, 8):
         scene.frame_set(frame)
         i = frame - 1
         rotation = transforms.rotation(result.recording.poses[i, 0, 3:])
-        foot = result.recording.poses[i, 0, :3] + rotation @ felt.centre_of_pressure[i]
+        foot = result.recording.poses[i, 0, :3] + rotation @ readings.centre_of_pressure[i]
         for kind in ("TORQUE", "CENTRE", "SLIP"):
-            marker = markers.find(scene.objects, pad.palpate.uid, kind)
+            marker = markers.find_marker(scene.objects, pad.palpate.uid, kind)
             assert list(marker.location) == pytest.approx(foot, abs=1e-7)
-            assert (marker.scale.x > 0) <= bool(felt.contact[i].any())
+            assert (marker.scale.x > 0) <= bool(readings.contact[i].any())
         assert marker.scale.x == pytest.approx(share[i] * radius, abs=1e-7)  # SLIP
-        arrow = markers.find(scene.objects, pad.palpate.uid, "TORQUE")
-        if felt.contact[i].any():
+        arrow = markers.find_marker(scene.objects, pad.palpate.uid, "TORQUE")
+        if readings.contact[i].any():
             axis = transforms.array(arrow.matrix_world)[:3, 2] / arrow.scale.x
             assert axis == pytest.approx(-rotation @ moment[i] / np.linalg.norm(moment[i]), abs=1e-4)
 
@@ -92,14 +92,14 @@ def test_all_sensors_share_one_scale(baked):
     lengths = {}
     scene.frame_set(8)
     for name, obj in (("Pad", pad), ("Pad 2", scene.objects["Pad 2"])):
-        arrow = markers.find(scene.objects, obj.palpate.uid, "FORCE")
+        arrow = markers.find_marker(scene.objects, obj.palpate.uid, "FORCE")
         lengths[name] = arrow.scale.x / np.linalg.norm(result.recording.sensors[name].net_force[-1])
     assert lengths["Pad"] == pytest.approx(lengths["Pad 2"], rel=1e-5)
     ends = {
         next(node.inputs[1].default_value for node in slot.material.node_tree.nodes if "maximum" in node.label)
         for obj in (pad, scene.objects["Pad 2"])
         for slot in obj.material_slots
-        if slot.material is not None and materials.MARK in slot.material
+        if slot.material is not None and materials.SENSOR_KEY in slot.material
     }
     assert list(ends) == [pytest.approx(metrics.scale_limit(metrics.peak_force(result.recording)))]
 
@@ -112,7 +112,9 @@ def test_arrows_of_fingers_that_face_each_other_do_not_cross(tmp_path):
     save(tmp_path)
     drive(bake(scene))
     scene.frame_set(15)
-    left, right = (markers.find(scene.objects, scene.objects[name].palpate.uid, "FORCE") for name in (grasp.LEFT, grasp.RIGHT))
+    left, right = (
+        markers.find_marker(scene.objects, scene.objects[name].palpate.uid, "FORCE") for name in (grasp.LEFT, grasp.RIGHT)
+    )
     between = right.location.x - left.location.x
     assert left.scale.z + right.scale.z == pytest.approx(0.94 * between, rel=0.05)  # the tightest is of another frame
 
@@ -124,7 +126,7 @@ def test_display_settings_are_applied_to_a_bake_without_computing(baked, monkeyp
     scene.palpate.color_map = "CIVIDIS"
     scene.palpate.use_auto_range, scene.palpate.range_max = False, 0.25
     assert bpy.ops.palpate.dress() == {"FINISHED"}
-    left = [obj.name for obj in scene.objects if materials.MARK in obj]
+    left = [obj.name for obj in scene.objects if materials.SENSOR_KEY in obj]
     assert sorted(left) == ["Centre of Pressure Pad", "Centre of Pressure Pad 2"]
     kinds = {name: [block.name for block in getattr(bpy.data, name)] for name in ("node_groups", "materials")}
     assert kinds["node_groups"] == [] and not [name for name in kinds["materials"] if "Arrow" in name]
@@ -136,7 +138,7 @@ def test_applying_without_the_files_says_so(baked, tmp_path):
     scene, *_ = baked
     (tmp_path / "palpate").rename(tmp_path / "lost")
     with pytest.raises(PalpateError, match="bake"):
-        bake_display.again(scene, scene_writer.bake_folders(scene))
+        bake_display.refresh(scene, scene_writer.bake_folders(scene))
 
 
 def test_clearing_takes_all_overlays_away(tmp_path):
@@ -149,7 +151,7 @@ def test_clearing_takes_all_overlays_away(tmp_path):
     before = dump()
     drive(bake(scene))
     drive(bake(scene))
-    assert len([obj for obj in scene.objects if materials.MARK in obj]) == 18
+    assert len([obj for obj in scene.objects if materials.SENSOR_KEY in obj]) == 18
     assert bpy.ops.palpate.bake_clear() == {"FINISHED"}
     assert [line for line in changes(before, dump()) if "baked_" not in line and "settings" not in line] == []
 
@@ -174,7 +176,7 @@ def test_a_heat_map_of_pressure_divides_by_the_texels_area(tmp_path, around):
         pad.data.attributes[materials.AREA].data.foreach_get("value", values)
         assert values == pytest.approx(sensor.texels.area, rel=1e-6)
     else:
-        image = materials.find(bpy.data.images, f"{pad.palpate.uid}:area")
+        image = materials.find_block(bpy.data.images, f"{pad.palpate.uid}:area")
         assert image.packed_file is not None
         pixels = np.array(image.pixels[:]).reshape(14, 6, 4)
         assert pixels[..., 0] == pytest.approx(sensor.texels.area.reshape(14, 6), rel=1e-6)
@@ -184,16 +186,19 @@ def test_arrows_of_a_lost_image_do_not_show(baked, tmp_path):
     scene, pad, _ = baked
     assert texel_arrows.KINDS.keys() <= ALL
     (tmp_path / "palpate").rename(tmp_path / "lost")
-    materials.find(bpy.data.images, pad.palpate.uid).reload()
+    materials.find_block(bpy.data.images, pad.palpate.uid).reload()
     scene.frame_set(7)
     scene.frame_set(8)
-    assert instances(markers.find(scene.objects, pad.palpate.uid, "NORMALS")) == []
+    assert instances(markers.find_marker(scene.objects, pad.palpate.uid, "NORMALS")) == []
 
 
 @pytest.mark.parametrize("end", ["whole", "stopped"])
 def test_arrows_rest_while_the_scene_is_read(baked, end):
     scene, pad, _ = baked
-    own = [markers.find(scene.objects, pad.palpate.uid, kind).modifiers[texel_arrows.MODIFIER] for kind in texel_arrows.KINDS]
+    own = [
+        markers.find_marker(scene.objects, pad.palpate.uid, kind).modifiers[texel_arrows.MODIFIER]
+        for kind in texel_arrows.KINDS
+    ]
     own[1].show_viewport = False  # as the user left it
     work = scene_reader.sample_scenario(scene)
     for _ in range(3):

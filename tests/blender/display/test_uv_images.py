@@ -59,26 +59,26 @@ def test_files_and_material_show_the_force_on_the_uv_map(tmp_path, pixels):
     scene, obj = tip(image_size=200, image_filter=pixels)
     save(tmp_path)
     result = drive(bake(scene))
-    felt, texels = result.recording.at(4).sensors["Tip"], result.scenario.sensors[0].texels
+    readings, texels = result.recording.at(4).sensors["Tip"], result.scenario.sensors[0].texels
     channels, about = read_exr(result.folders["Tip"] / frame_file(4))
     assert channels["R"].shape == (200, 200) and about["map"] == "UVMap"
-    assert channels["R"].max() == pytest.approx(felt.normal_force.max(), rel=1e-6 if pixels == "NEAREST" else 0.15)
+    assert channels["R"].max() == pytest.approx(readings.normal_force.max(), rel=1e-6 if pixels == "NEAREST" else 0.15)
     if pixels == "NEAREST":
         shown = np.unique(channels["R"][texels.layout.mask()])
-        assert shown == pytest.approx(np.unique(felt.normal_force.astype(np.float32)), rel=1e-6)
+        assert shown == pytest.approx(np.unique(readings.normal_force.astype(np.float32)), rel=1e-6)
     # Blender's own coordinates, looked up corner by corner in what Blender's own image shows
     scene.frame_set(4)
-    image = materials.find(bpy.data.images, obj.palpate.uid)
+    image = materials.find_block(bpy.data.images, obj.palpate.uid)
     node = next(node for node in obj.material_slots[-1].material.node_tree.nodes if node.type == "TEX_IMAGE")
     assert node.image == image and node.interpolation == {"SMOOTH": "Linear", "NEAREST": "Closest"}[pixels]
     assert node.inputs["Vector"].links[0].from_node.uv_map == "UVMap"
     assert list(obj.data.uv_layers.keys()) == ["UVMap"]
     force = np.zeros(len(obj.data.vertices))
-    force[texels.vertex] = felt.normal_force
+    force[texels.vertex] = readings.normal_force
     uv = np.array([corner.vector[:] for corner in obj.data.uv_layers[0].uv])
     corner = np.array([loop.vertex_index for loop in obj.data.loops])
     column, row = np.clip(np.floor(uv * 200).astype(int), 0, 199).T
-    assert channels["R"][row, column] == pytest.approx(force[corner], abs=0.2 * felt.normal_force.max())
+    assert channels["R"][row, column] == pytest.approx(force[corner], abs=0.2 * readings.normal_force.max())
 
 
 def test_images_do_not_change_forces(tmp_path):

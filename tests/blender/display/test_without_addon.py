@@ -20,7 +20,7 @@ FRAMES = (1, 7, 8)
 SCRIPT = Path(__file__).with_name("without_addon.py")
 
 
-def look_from_above(scene, height=0.5, width=0.05):
+def figure_style_from_above(scene, height=0.5, width=0.05):
     """A camera straight above the first pad, and no light but the heat map's own."""
     bpy.ops.object.camera_add(location=(0.0, 0.0, height), rotation=(0.0, 0.0, 0.0))
     scene.camera = bpy.context.object
@@ -52,7 +52,7 @@ def scene_file(tmp_path):
     plate.keyframe_insert("location", frame=8)
     for obj in (target, *[o for o in scene.objects if o.name == "Cube"]):
         obj.hide_render = True  # see the pad and not what presses on it
-    look_from_above(scene)
+    figure_style_from_above(scene)
     folder = tmp_path / "project"
     folder.mkdir()
     path = save(folder)

@@ -12,7 +12,7 @@ import pytest
 
 from palpate.commands import main
 from palpate.core.solver.simulation import run
-from palpate.paper import bench, grasping, page, weighing
+from palpate.paper import experiment_tools, grasping, page, weighing
 from palpate.paper.chapter import Chapter, Picture, Row, below, compare
 from palpate.sample_blends import grasps, gripper, hand, pick_and_place, tilt
 
@@ -70,43 +70,45 @@ def test_an_unknown_experiment_is_one_line(tmp_path, capfd):
 
 def test_the_slope_holds():
     """Fig. 9 for twenty seconds: the bar of the long run, 1e-10 m from ten seconds on."""
-    scene = bench.fresh(tilt.build)
-    scenario = bench.scenario_of(scene)
+    scene = experiment_tools.new_scene(tilt.build)
+    scenario = experiment_tools.scenario_of(scene)
     recording = run(weighing.replace(scenario, fps=10.0, frame_end=scenario.frame_start + 200, dt=1e-3))
-    path = bench.place_of(recording, "Cube")[recording.times >= 10.0]
+    path = experiment_tools.path_of(recording, "Cube")[recording.times >= 10.0]
     assert np.abs(path - path[0]).max() < 1e-10
 
 
 @pytest.mark.parametrize("kind", ["sphere", "bottle"])
 def test_each_object_is_held(kind):
     """Controlled sum within 1e-6 N, and not a micrometre in the last ten seconds."""
-    scene = bench.fresh(partial(grasps.build, kind=kind))
-    rows = grasping.held_rows(bench.scenario_of(scene), grasps.OBJECTS[kind].name, gripper.LEFT, grasps.FORCE, SECONDS)
+    scene = experiment_tools.new_scene(partial(grasps.build, kind=kind))
+    rows = grasping.held_rows(
+        experiment_tools.scenario_of(scene), grasps.OBJECTS[kind].name, gripper.LEFT, grasps.FORCE, SECONDS
+    )
     assert all(row.kept for row in rows), rows
 
 
 def test_a_heavy_box_slips_at_coulombs_limit():
     """Held one per cent below 2 · mus · N, let go one per cent above it; palpate paper finds the limit by bisection."""
-    scenario = grasping.slowly(bench.scenario_of(bench.fresh(partial(grasps.build, kind="box"))))
+    scenario = grasping.slowly(experiment_tools.scenario_of(experiment_tools.new_scene(partial(grasps.build, kind="box"))))
     limit = grasping.coulomb_limit(scenario)
     assert not grasping.slips(scenario, "Box", 0.99 * limit)
     assert grasping.slips(scenario, "Box", 1.01 * limit)
 
 
 def test_pick_and_place_sets_the_cube_down_where_it_was():
-    scene = bench.fresh(pick_and_place.build)
-    recording = run(bench.scenario_of(scene))
+    scene = experiment_tools.new_scene(pick_and_place.build)
+    recording = run(experiment_tools.scenario_of(scene))
     rows = grasping.cycle_rows(recording)
     assert all(row.kept for row in rows), rows
 
 
 def test_finger_and_thumb_hold():
-    scene = bench.fresh(hand.build)
-    rows = grasping.held_rows(bench.scenario_of(scene), hand.CYLINDER, hand.INDEX, hand.FORCE, SECONDS)
+    scene = experiment_tools.new_scene(hand.build)
+    rows = grasping.held_rows(experiment_tools.scenario_of(scene), hand.CYLINDER, hand.INDEX, hand.FORCE, SECONDS)
     assert all(row.kept for row in rows), rows
 
 
 @pytest.mark.parametrize("build", [tilt.build, pick_and_place.build, hand.build, partial(grasps.build, kind="bottle")])
 def test_each_scene_explains_itself(build):
-    bench.fresh(build)
+    experiment_tools.new_scene(build)
     assert "paper, section" in bpy.data.texts["Read me"].as_string()

@@ -39,11 +39,13 @@ def test_everything_at_once_and_nothing_left_behind(baked, tmp_path):
     scene, _ = baked
     before = dump()
     worlds, lights, cameras = len(bpy.data.worlds), len(bpy.data.lights), len(bpy.data.cameras)
-    wish = figure_export.Wish(
+    request = figure_export.FigureRequest(
         figure_export.KINDS, FigureStyle(dpi=50), frames=(3, 4), size=(96, 64), samples=1, formats=("png", "pdf")
     )
     stages = []
-    written = drive(figure_export.make(scene, tmp_path / "out", wish), lambda step: stages.append((step.done, step.total)))
+    written = drive(
+        figure_export.make_figures(scene, tmp_path / "out", request), lambda step: stages.append((step.done, step.total))
+    )
     assert {path.name for path in written} == {path.name for path in (tmp_path / "out").iterdir()}
     assert {path.suffix for path in written} == {".png", ".pdf", ".mp4"}
     assert image(tmp_path / "out" / "scene 0003.png").shape[:2] == (64, 96)
@@ -60,7 +62,7 @@ def test_the_video_has_a_picture_per_frame(baked, tmp_path):
 
     for i, grey in enumerate((0.1, 0.5, 0.9)):
         imsave(tmp_path / f"{i}.png", np.full((64, 96, 3), grey))
-    path = video.encode([tmp_path / f"{i}.png" for i in range(3)], tmp_path / "out", 24.0)
+    path = video.encode_video([tmp_path / f"{i}.png" for i in range(3)], tmp_path / "out", 24.0)
     clip = bpy.data.movieclips.load(str(path))
     assert clip.frame_duration == 3 and tuple(clip.size) == (96, 64) and clip.fps == pytest.approx(24.0)
     assert [path.name for path in tmp_path.glob("*.mp4")] == ["out.mp4"]
@@ -68,9 +70,9 @@ def test_the_video_has_a_picture_per_frame(baked, tmp_path):
 
 def test_all_that_matters_is_in_the_picture_and_lit(baked, tmp_path):
     scene, _ = baked
-    with render_setup.photographed(scene, [1, 4], view=(-60.0, 35.0), transparent=True):
-        points = render.corners(render_setup.seen_objects(scene))
-        places = np.array([render.picture_position(scene, point) for point in points])
+    with render_setup.render_setup(scene, [1, 4], view=(-60.0, 35.0), transparent=True):
+        points = render.bounding_box_corners(render_setup.subjects(scene))
+        places = np.array([render.image_position(scene, point) for point in points])
         render.render_frame(scene, tmp_path / "a.png", 4, samples=4, size=(96, 64))
     assert (places > 0.0).all() and (places < 1.0).all()
     picture = image(tmp_path / "a.png")
@@ -82,28 +84,28 @@ def test_all_that_matters_is_in_the_picture_and_lit(baked, tmp_path):
 def test_the_scene_shows_the_colours_of_the_colour_bar(baked):
     """The heat map ends where the figures' colour bar does."""
     scene, _ = baked
-    made = figure_export.bake_of(scene)
+    made = figure_export.read_scene_bake(scene)
     pad = scene.objects["Pad"]
     nodes = pad.material_slots[-1].material.node_tree.nodes
     end = next(node.inputs[1].default_value for node in nodes if "maximum" in node.label)
-    assert end == pytest.approx(figure_export.look_of(scene).scale_limit(made.recording, made.texels))
+    assert end == pytest.approx(figure_export.scene_style(scene).scale_limit(made.recording, made.texels))
 
 
 def test_a_scene_that_is_not_baked_and_a_frame_that_is_not_are_one_sentence(baked, tmp_path):
     scene, _ = baked
     with pytest.raises(FileError, match="from 1 to 4"):
-        drive(figure_export.make(scene, tmp_path / "out", figure_export.Wish(frames=(9,))))
+        drive(figure_export.make_figures(scene, tmp_path / "out", figure_export.FigureRequest(frames=(9,))))
     bpy.ops.palpate.bake_clear()
     with pytest.raises(SceneError, match="is not baked"):
-        drive(figure_export.make(scene, tmp_path / "out", figure_export.Wish()))
+        drive(figure_export.make_figures(scene, tmp_path / "out", figure_export.FigureRequest()))
     with pytest.raises(ParameterError, match="choose from"):
-        figure_export.Wish(kinds=("hologram",))
+        figure_export.FigureRequest(kinds=("hologram",))
 
 
 def test_an_error_in_the_middle_puts_the_scene_back(baked):
     scene, _ = baked
     before = dump()
-    with pytest.raises(RuntimeError), render_setup.photographed(scene, [1], engine="workbench", transparent=True):
+    with pytest.raises(RuntimeError), render_setup.render_setup(scene, [1], engine="workbench", transparent=True):
         raise RuntimeError
     assert changes(before, dump()) == [] and scene.camera is None and scene.render.engine == "CYCLES"
 
@@ -126,7 +128,7 @@ def test_workbench_shows_the_heat_map_and_leaves_meshes_alone(baked, tmp_path):
     glass.node_tree.nodes["Principled BSDF"].inputs["Transmission Weight"].default_value = 1.0
     ball.data.materials.append(glass)
     before, meshes = dump(), len(bpy.data.meshes)
-    wish = figure_export.Wish(
+    request = figure_export.FigureRequest(
         ("scene",),
         FigureStyle(colour_map="MAGMA"),
         frames=(4,),
@@ -135,7 +137,7 @@ def test_workbench_shows_the_heat_map_and_leaves_meshes_alone(baked, tmp_path):
         engine="workbench",
         view=(-90, 89),
     )
-    drive(figure_export.make(scene, tmp_path / "out", wish))
+    drive(figure_export.make_figures(scene, tmp_path / "out", request))
     picture = image(tmp_path / "out" / "scene 0004.png")[..., :3]
     assert np.ptp(picture, axis=2).max() > 0.4  # the purples and oranges of magma, on grey
     assert [line for line in changes(before, dump()) if "Render Result" not in line] == []
@@ -151,7 +153,7 @@ def test_a_transparent_picture_leaves_the_backdrop_out_but_not_what_carries_a_se
     robot = bpy.context.object
     scene.objects["Pad"].parent = robot
     for transparent, hidden in ((False, set()), (True, {floor})):
-        with render_setup.photographed(scene, [1], transparent=transparent):
+        with render_setup.render_setup(scene, [1], transparent=transparent):
             assert {obj for obj in scene.objects if obj.hide_render} == hidden
     assert not floor.hide_render
 
@@ -159,9 +161,9 @@ def test_a_transparent_picture_leaves_the_backdrop_out_but_not_what_carries_a_se
 @pytest.mark.parametrize("size", [(160, 90), (90, 160)])
 def test_the_picture_is_filled_whatever_its_shape(baked, size):
     scene, _ = baked
-    with render_setup.photographed(scene, [1, 4], view=(-60.0, 35.0), size=size):
-        points = render.corners(render_setup.seen_objects(scene))
-        places = np.array([render.picture_position(scene, point) for point in points])
+    with render_setup.render_setup(scene, [1, 4], view=(-60.0, 35.0), size=size):
+        points = render.bounding_box_corners(render_setup.subjects(scene))
+        places = np.array([render.image_position(scene, point) for point in points])
         assert (scene.render.resolution_x, scene.render.resolution_y) == size
     assert (places > 0.0).all() and (places < 1.0).all() and np.ptp(places, axis=0).max() > 0.7
 
@@ -188,7 +190,7 @@ def test_what_moves_away_in_between_stays_in_the_picture(baked):
     for frame, height in ((1, 0.01), (2, 0.4), (4, 0.01)):
         ball.location.z = height
         ball.keyframe_insert("location", frame=frame)
-    with render_setup.photographed(scene, [1, 2, 3, 4], view=(-60.0, 35.0)):
+    with render_setup.render_setup(scene, [1, 2, 3, 4], view=(-60.0, 35.0)):
         scene.frame_set(2)
-        places = np.array([render.picture_position(scene, point) for point in render.corners([ball])])
+        places = np.array([render.image_position(scene, point) for point in render.bounding_box_corners([ball])])
     assert (places > 0.0).all() and (places < 1.0).all()

@@ -14,7 +14,7 @@ from palpate.core.errors import SceneError
 from palpate.core.io.recording_npz import load_recording
 from palpate.core.jobs.job_runner import drive
 from palpate.core.response import metrics
-from palpate.sample_blends import build_samples, demo, studio
+from palpate.sample_blends import build_samples, demo, scene_builder
 
 
 def evaluated(obj):
@@ -51,7 +51,7 @@ def test_the_cube_stands_on_a_flat_side(scene):
 
 @pytest.mark.parametrize(("rows", "columns"), [(14, 6), (2, 2), (3, 9)])
 def test_pads_are_closed_and_flat_where_they_feel(rows, columns):
-    vertices, faces, texels = studio.pad_mesh(rows, columns, pitch=3.0, margin=3.0, thickness=6.0)
+    vertices, faces, texels = scene_builder.pad_mesh(rows, columns, pitch=3.0, margin=3.0, thickness=6.0)
     edges = [(face[i - 1], face[i]) for face in faces for i in range(len(face))]
     assert len(set(edges)) == len(edges)  # no edge is walked twice in one direction …
     assert set(edges) == {(b, a) for a, b in edges}  # … and each once in the other: closed and oriented
@@ -80,16 +80,16 @@ def test_demo_prints_and_draws_what_it_promises(tmp_path, capfd):
     assert not (out / "demo.blend1").exists()
     assert (out / "demo.blend").stat().st_size < 1_000_000
 
-    felt = load_recording(out / "palpate" / demo.PAD_A / "recording.npz").sensors[demo.PAD_A]
-    normal = felt.normal_force.sum(axis=1)
-    shear = np.linalg.norm(felt.shear.sum(axis=1), axis=1)
+    readings = load_recording(out / "palpate" / demo.PAD_A / "recording.npz").sensors[demo.PAD_A]
+    normal = readings.normal_force.sum(axis=1)
+    shear = np.linalg.norm(readings.shear.sum(axis=1), axis=1)
     share = np.divide(shear, 0.435 * normal, out=np.zeros_like(shear), where=normal > 0.1)
     assert share[20] < 0.05  # pressed, not yet sliding
     assert share[30] < 0.5  # sliding, the bristles hold
     assert 0.9 < share[demo.PICTURE_FRAME - 1] < 1.05  # slips
     assert normal[0] == 0
     assert normal[-1] == 0  # lifted
-    assert felt.depth.max() < 0.012  # nothing bottomed out
+    assert readings.depth.max() < 0.012  # nothing bottomed out
 
 
 def test_the_demo_s_scene_shows_its_bake(tmp_path):
@@ -134,9 +134,9 @@ def test_demo_into_a_place_that_is_none(tmp_path, capfd):
 def test_the_camera_frames_everything_and_no_more(scene, size, region):
     demo.build(scene)
     scene.render.resolution_x, scene.render.resolution_y = size
-    points = render.corners([scene.objects[name] for name in (demo.BALL, demo.CUBE, demo.PAD_A)])
-    render.frame_camera(scene, points, region)
-    places = np.array([render.picture_position(scene, point) for point in points])
+    points = render.bounding_box_corners([scene.objects[name] for name in (demo.BALL, demo.CUBE, demo.PAD_A)])
+    render.fit_camera(scene, points, region)
+    places = np.array([render.image_position(scene, point) for point in points])
     left, bottom, right, top = region
     assert places[:, 0].min() >= left - 1e-4
     assert places[:, 0].max() <= right + 1e-4
@@ -155,7 +155,7 @@ def test_positions_on_the_picture_are_blenders(scene):
     scene.camera.data.shift_x = 0.0
     for point in ((0.0, 0.0, 20.0), (30.0, -10.0, 50.0), (-50.0, 5.0, 0.0)):
         expected = world_to_camera_view(scene, scene.camera, Vector(point))
-        assert render.picture_position(scene, point) == pytest.approx((expected.x, expected.y), abs=1e-5)
+        assert render.image_position(scene, point) == pytest.approx((expected.x, expected.y), abs=1e-5)
 
 
 def test_rendering_leaves_the_scene_as_it_was(scene, tmp_path):

@@ -10,7 +10,7 @@ from ..core.jobs.job_runner import drive
 from . import support
 
 
-class Working(support.Reporting):
+class ModalJob(support.ErrorReporting):
     """Mixin: `job(context)` returns the generator, `done(result)` says what came of it, `stopped` is said after ESC."""
 
     stopped = "Stopped"

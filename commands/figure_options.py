@@ -22,7 +22,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--dpi", metavar="N", type=int, help="of PNG figures (default: 300)")
 
 
-def of(arguments: argparse.Namespace, **others) -> FigureStyle:
+def figure_style_from(arguments: argparse.Namespace, **others) -> FigureStyle:
     """Return the look that the words ask for; `others` are what else than the usual is meant where they say nothing."""
     given = {key: value for key in OPTIONS if (value := getattr(arguments, key)) is not None}
     if "colour_map" in given:

@@ -21,7 +21,7 @@ SAMPLES = 12
 """Samples per pixel of the renders: soft light needs few, and the denoiser does the rest."""
 
 
-def fresh(build: Callable) -> bpy.types.Scene:
+def new_scene(build: Callable) -> bpy.types.Scene:
     """Return the scene of an empty file, filled by a sample's `build`."""
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     build(bpy.context.scene)
@@ -54,6 +54,6 @@ def with_mass(scenario: Scenario, name: str, mass: float) -> Scenario:
     return replace(scenario, bodies=bodies)
 
 
-def place_of(recording: Recording, name: str) -> np.ndarray:
+def path_of(recording: Recording, name: str) -> np.ndarray:
     """(F, 3) float, metres: where a body was at every frame."""
     return recording.poses[:, recording.body_names.index(name), :3]

@@ -180,7 +180,7 @@ def material(name: str, color, metallic: float = 0.0, roughness: float = 0.5, **
 STEEL = (0.62, 0.64, 0.67)
 
 
-def ghost_steel(name: str, clear: float, edge: float = 1.0, groove: float = 0.0):
+def see_through_steel(name: str, clear: float, edge: float = 1.0, groove: float = 0.0):
     """Return polished steel that one can look through.
 
     The tactile image lies under the object that makes it, so an opaque object would hide exactly what the picture is about.
@@ -279,7 +279,7 @@ def world(scene, color=(0.9, 0.92, 1.0), strength: float = 0.35) -> None:
     scene.world = made
 
 
-def stage(scene, paper, aim, camera, size: float = 1.0) -> None:
+def add_stage(scene, paper, aim, camera, size: float = 1.0) -> None:
     """Put up backdrop, three soft lamps and a camera that looks at `aim`; `size` 1 suits things of 20 cm."""
     backdrop(scene).data.materials.append(paper)
     world(scene)
@@ -297,7 +297,7 @@ def stage(scene, paper, aim, camera, size: float = 1.0) -> None:
     made.location, made.rotation_euler = camera, look_at(camera, aim)
 
 
-def explain(text: str) -> None:
+def add_readme(text: str) -> None:
     """Put a text into the file that says what it shows; the text editor shows it under "Read me"."""
     made = bpy.data.texts.new("Read me")
     made.from_string(text)
@@ -309,12 +309,12 @@ def frame_objects(scene, objects, region=(0.06, 0.06, 0.94, 0.94), size=(960, 72
 
     scene.render.resolution_x, scene.render.resolution_y = size
     bpy.context.view_layer.update()
-    render.frame_camera(scene, render.corners(objects), region)
+    render.fit_camera(scene, render.bounding_box_corners(objects), region)
     # To a tenth of a millimetre: the last digits are not the same in all Blenders.
     scene.camera.location = [round(x, 1) for x in scene.camera.location]
 
 
-def needles(scene, sensor, length: float, look, radius: float = 0.26):
+def add_normal_needles(scene, sensor, length: float, look, radius: float = 0.26):
     """Return thin needles on all texels of a sensor, along their normals and `length` long; they follow the sensor."""
     from ..addon.scene import meshes
     from ..core.geometry.mesh import checked_mesh
@@ -329,7 +329,7 @@ def needles(scene, sensor, length: float, look, radius: float = 0.26):
     )
     texels = texels_from_region(mesh, meshes.region(sensor, len(data.vertices)), sensor.name)
     side = np.array([[1.0, 0.0], [-0.5, 0.866], [-0.5, -0.866]]) * radius
-    foot = texels.position * 1e3  # studio scenes are in mm
+    foot = texels.position * 1e3  # sample scenes are in mm
     corners = [foot + a * texels.tangent + b * texels.bitangent for a, b in side]
     points = np.stack([*corners, foot + length * texels.normal], axis=1).reshape(-1, 3)
     first = 4 * np.arange(len(texels))
@@ -340,7 +340,7 @@ def needles(scene, sensor, length: float, look, radius: float = 0.26):
     return made
 
 
-def step_keys(obj) -> None:
+def use_constant_interpolation(obj) -> None:
     """Let the animated numbers of an object jump at their keyframes, since a command changes at once."""
     from ..addon.session import fcurves
 
