@@ -23,7 +23,7 @@ class Effects(Part):
         kind, form = effect_stack.kind_of(item), effect_stack.form_of(item)
         row = box.row(align=True)
         row.prop(item, "show", text="", icon="DOWNARROW_HLT" if item.show else "RIGHTARROW", emboss=False)
-        row.label(text=kind.title, icon=effect_stack.STAGE_ICONS[kind.stage_of(form)])
+        row.label(text=kind.title, icon=effect_stack.SITE_ICONS[kind.site_of(form)])
         row.prop(item, "use", text="", icon="HIDE_OFF" if item.use else "HIDE_ON", emboss=False)
         for way, icon in (("UP", "TRIA_UP"), ("DOWN", "TRIA_DOWN")):
             move = row.operator("palpate.effect_move", text="", icon=icon, emboss=False)

@@ -67,10 +67,10 @@ def page() -> str:
 
     parts = [INTRODUCTION]
     for kind in library().values():
-        parts.append(f"\n## {kind.title}\n\n`{kind.name}` · {kind.stage}. {kind.text}\n")
+        parts.append(f"\n## {kind.title}\n\n`{kind.name}` · {kind.site}. {kind.text}\n")
         for form in kind.forms:
-            stage = kind.stage_of(form)
-            where = f" ({stage})" if stage != kind.stage else ""
+            stage = kind.site_of(form)
+            where = f" ({stage})" if stage != kind.site else ""
             side = ""
             if stage == "readout":
                 side = " After the conversion." if form.after_conversion else " Before the conversion."
@@ -106,12 +106,12 @@ def picture(path: Path) -> None:
 
 
 def _setting():
-    from palpate.core.effects.engine.specification import Site
+    from palpate.core.effects.engine.specification import TransducerArray
     from palpate.core.model.sensor_parameters import SensorParameters
 
     row, column = (index.ravel() for index in np.mgrid[0:ROWS, 0:COLUMNS])
     position = np.stack([column * PITCH, row * PITCH, np.zeros(ROWS * COLUMNS)], axis=1)
-    return Site(position, np.full(len(position), PITCH**2), row, column), SensorParameters(k=1000.0, cn=0.0)
+    return TransducerArray(position, np.full(len(position), PITCH**2), row, column), SensorParameters(k=1000.0, cn=0.0)
 
 
 def _curves(axes, kind, x, base, of_form, xlabel, ylabel, **values):
@@ -137,12 +137,13 @@ def _curves(axes, kind, x, base, of_form, xlabel, ylabel, **values):
 
 def _pressed(time, depth, slide=None):
     """Return what one texel reads over a history of depths, with an effect of whatever stage."""
-    from palpate.core.effects.engine.binding import forces, readings
+    from palpate.core.effects.engine.contact_forces import normal_forces
+    from palpate.core.effects.engine.readout_chain import readings
 
     site, parameters = _setting()
     one = type(site)(np.zeros((1, 3)), np.ones(1))
     slide = None if slide is None else slide[:, None]
-    return lambda *items: readings(items, one, time, forces(items, parameters, time, depth[:, None], slide))[:, 0]
+    return lambda *items: readings(items, one, time, normal_forces(items, parameters, time, depth[:, None], slide))[:, 0]
 
 
 def _force_over_depth(depth, ylabel="force (N)", **values):
@@ -164,7 +165,7 @@ def _over_time(time, depth, ylabel="reading (N)", **values):
 
 def _reading_over_force(**values):
     def draw(axes, kind):
-        from palpate.core.effects.engine.binding import readings
+        from palpate.core.effects.engine.readout_chain import readings
 
         site, force = _setting()[0], np.linspace(0, 2, 801)
         one = type(site)(np.zeros((1, 3)), np.ones(1))
@@ -175,13 +176,13 @@ def _reading_over_force(**values):
 
 
 def _over_speed(axes, kind):
-    from palpate.core.effects.engine.binding import friction
+    from palpate.core.effects.engine.contact_forces import friction_factors
     from palpate.core.model.sensor_parameters import SensorParameters
 
     v, p = np.linspace(0, 0.06, 400), SensorParameters()
 
     def drag(*items):
-        factor, viscous = friction(items, v, np.ones_like(v)) if items else (1.0, 0.0)
+        factor, viscous = friction_factors(items, v, np.ones_like(v)) if items else (1.0, 0.0)
         return factor * (p.mud + (p.mus - p.mud) * np.exp(-((v / p.x0) ** 2))) + (viscous + p.ct) * v
 
     more = {"linear": {"viscosity": 2.0}, "load": {"viscosity": 4.0}, "power": {"drag": 0.3}}
@@ -199,7 +200,7 @@ def _peaks(axes, kind):
 
 def _across(axes, kind):
     """A column of the pad under a load on one texel."""
-    from palpate.core.effects.engine.binding import readings
+    from palpate.core.effects.engine.readout_chain import readings
 
     site = _setting()[0]
     force = np.zeros((1, ROWS * COLUMNS))
@@ -211,7 +212,7 @@ def _across(axes, kind):
 
 def _texels(**values):
     def draw(axes, kind):
-        from palpate.core.effects.engine.binding import readings
+        from palpate.core.effects.engine.readout_chain import readings
 
         site = _setting()[0]
         force = np.ones((1, ROWS * COLUMNS))
@@ -224,14 +225,14 @@ def _texels(**values):
 
 def _ball(axes, kind):
     """What a ball on the middle of the pad reads along one column."""
-    from palpate.core.effects.engine.registry import placed
+    from palpate.core.effects.engine.registry import actual_placement
 
     site = _setting()[0]
     middle = site.position.mean(axis=0)
     up, across = np.tile([0.0, 0.0, 1.0], (len(site), 1)), np.tile([1.0, 0.0, 0.0], (len(site), 1))
 
     def felt(*items):
-        position, _, _ = placed(items, site.position, up, across)
+        position, _, _ = actual_placement(items, site.position, up, across)
         r = np.linalg.norm((position - middle)[:, :2], axis=1)
         depth = np.maximum(position[:, 2] + 0.002 - 0.04 + np.sqrt(np.maximum(0.04**2 - r**2, 0)), 0)
         return 1000.0 * depth.reshape(ROWS, COLUMNS)[:, 3]

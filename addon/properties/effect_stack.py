@@ -20,7 +20,7 @@ from ...core.model.effect import Effect
 from ...core.model.parameter import Parameter
 from ..session import units
 
-STAGE_ICONS = {"contact": "MOD_PHYSICS", "pad": "MOD_CLOTH", "readout": "DRIVER"}
+SITE_ICONS = {"contact": "MOD_PHYSICS", "pad": "MOD_CLOTH", "readout": "DRIVER"}
 
 _fixed = {"options": set(), "override": {"LIBRARY_OVERRIDABLE"}}
 
@@ -41,7 +41,7 @@ def _items(entries) -> list[tuple]:
 
 def kind_items() -> list[tuple]:
     """Enum items of all kinds, in the order in which they act."""
-    return _items((kind.name, kind.title, kind.text, STAGE_ICONS[kind.stage]) for kind in registry.library().values())
+    return _items((kind.name, kind.title, kind.text, SITE_ICONS[kind.site]) for kind in registry.library().values())
 
 
 def title(name: str) -> str:

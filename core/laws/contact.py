@@ -23,7 +23,7 @@ import numpy as np
 
 from ..compiled.kernels import inlined, kernel
 from ..compiled.struct_reference import by_reference
-from ..effects.engine.compiled_program import Program
+from ..effects.engine.compiled_program import EffectProgram
 from ..model.sensor_parameters import HUNT_CROSSLEY, SensorParameters
 
 # Contact rows: one per touching texel and target, in the frame of the sensor's body; they are all that the solver's inner loop
@@ -144,7 +144,7 @@ class SolverModel(NamedTuple):
         The unknown of each drive.
     drives : (d, 4) float
         See :mod:`.actuators`.
-    program : Program
+    program : EffectProgram
         The sensors' effects on forces.
     share, part : (q,) float
         Of a texel's force that one of its contact points moves the bodies with; of the depth that is the sensor's own.
@@ -180,7 +180,7 @@ class SolverModel(NamedTuple):
     drive_of: np.ndarray
     drive_at: np.ndarray
     drives: np.ndarray
-    program: Program
+    program: EffectProgram
     share: np.ndarray
     part: np.ndarray
 

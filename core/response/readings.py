@@ -5,10 +5,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..effects.engine.binding import Reader, readings, site_of
+from ..effects.engine.readout_chain import ReadoutChain, readings, transducers_of
 from ..model.sensor import Sensor
 
-__all__ = ["Reader", "respond"]
+__all__ = ["ReadoutChain", "respond"]
 
 
 def respond(sensor: Sensor, time: np.ndarray, normal_force: np.ndarray) -> np.ndarray:
@@ -20,4 +20,4 @@ def respond(sensor: Sensor, time: np.ndarray, normal_force: np.ndarray) -> np.nd
     time : (t,) float, s, increasing
     normal_force : (t, n) float, N
     """
-    return readings(sensor.effects, site_of(sensor), time, normal_force)
+    return readings(sensor.effects, transducers_of(sensor), time, normal_force)

@@ -28,7 +28,7 @@ from ..model.recording import Frame, Recording, SensorFrame
 from ..model.scenario import Scenario
 from ..model.sensor import Sensor
 from ..model.target import Target
-from ..response.readings import Reader
+from ..response.readings import ReadoutChain
 from .detection.deformation import SurfaceMotion
 from .detection.deforming_surfaces import DeformingSurfaces, bounding_sphere, point_rows
 from .detection.narrow_phase import count_too_deep
@@ -104,7 +104,7 @@ class Simulation:
         self._neighbour_lists = neighbour_lists_for(len(self._state.hint), len(self._model.pairs))
         queue, self._helpers = make_queue(len(self._state.hint), threads)
         self._workspace = workspace_for(self._model, self._state, self._surface_motion, queue)
-        self._readers = [Reader.of(sensor) for sensor in scenario.sensors]
+        self._readers = [ReadoutChain.of(sensor) for sensor in scenario.sensors]
         self._drive_commands = DriveCommands(scenario)
         self._texel_start = _texel_start(scenario)
 

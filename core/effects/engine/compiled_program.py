@@ -2,9 +2,9 @@
 """Compiled: what the solver asks of a sensor's effects in every step, and the same over a whole signal (kernels).
 
 A texel is one spring with one past, whatever presses on it. Per contact point of a sensor there is one row of memory, zero at
-first. In each step the solver may ask :func:`apply_laws` as often as it likes with ``commit=False``; at the step's end it asks
-once with ``commit=True`` for *every* point of the sensor, with depth, rate and slide zero where nothing touches, because what
-was pressed recovers. Where several targets press on one point, the deepest is the one that is remembered.
+first. In each step the solver may ask :func:`apply_force_laws` as often as it likes with ``commit=False``; at the step's end it
+asks once with ``commit=True`` for *every* point of the sensor, with depth, rate and slide zero where nothing touches, because
+what was pressed recovers. Where several targets press on one point, the deepest is the one that is remembered.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike
 from ...compiled.kernels import COMPILED, call_address, carray, compiled_callback, kernel
 from ...compiled.struct_reference import by_reference
 from ...model.effect import Effect
-from .registry import complete_values, in_order
+from .registry import complete_values, in_signal_order
 from .specification import Form
 
 # What this name stands for differs from copy to copy of the functions that use it, see _link.
@@ -104,7 +104,7 @@ if COMPILED:
 
     @kernel
     def call_law(number, work, block, a, b, c, d, count, slots, slot, offset, numbers, row, memory, at, commit):
-        """Let a law act on `count` points; see :func:`apply_laws`."""
+        """Let a law act on `count` points; see :func:`apply_force_laws`."""
         start = block * work.shape[1]
         call_address(
             number, work.ctypes.data, work.size, slots.ctypes.data, slots.size, numbers.ctypes.data, numbers.shape[0],
@@ -114,7 +114,7 @@ if COMPILED:
 else:
 
     def call_law(number, work, block, a, b, c, d, count, slots, slot, offset, numbers, row, memory, at, commit):
-        """Let a law act on `count` points; see :func:`apply_laws`."""
+        """Let a law act on `count` points; see :func:`apply_force_laws`."""
         start = block * work.shape[1]
         _UNCOMPILED[number](
             work.reshape(-1), start + a, start + b, start + c, start + d, count, slots.reshape(-1), slot, offset,
@@ -156,7 +156,7 @@ def law_over_time(
 
 
 @by_reference
-class Program(NamedTuple):
+class EffectProgram(NamedTuple):
     """The laws of m sensors as arrays; of sensor s those with index ``start[s]`` to ``start[s + 1]``.
 
     Attributes
@@ -195,7 +195,7 @@ class Program(NamedTuple):
         return np.zeros((points, self.columns))
 
 
-def compile_program(stacks: Sequence[Sequence[Effect]], dt: ArrayLike) -> Program:
+def compile_program(stacks: Sequence[Sequence[Effect]], dt: ArrayLike) -> EffectProgram:
     """Return what acts on the forces of several sensors, for steps of the given lengths.
 
     Parameters
@@ -216,7 +216,7 @@ def compile_program(stacks: Sequence[Sequence[Effect]], dt: ArrayLike) -> Progra
     columns = 0
     for stack in stacks:
         column, after = 0, 0
-        for item, form in in_order(stack, readout=False):
+        for item, form in in_signal_order(stack, readout=False):
             if form.constants is None:
                 continue
             first = sum(len(table) for table in tables)
@@ -227,8 +227,8 @@ def compile_program(stacks: Sequence[Sequence[Effect]], dt: ArrayLike) -> Progra
                 column += form.memory
                 after += form.after_clip
             else:
-                assert form.friction is not None
-                friction_code.append(_number_of(form.friction, _friction_over_points))
+                assert form.friction_law is not None
+                friction_code.append(_number_of(form.friction_law, _friction_over_points))
                 friction_row.append(first)
             tables.append(form.constants(complete_values(item), lengths))
         start.append(len(code))
@@ -241,7 +241,7 @@ def compile_program(stacks: Sequence[Sequence[Effect]], dt: ArrayLike) -> Progra
     for table in tables:
         numbers[first : first + len(table), : table.shape[1]] = table
         first += len(table)
-    return Program(
+    return EffectProgram(
         start=np.array(start, dtype=np.int64),
         clip=np.array(clip, dtype=np.int64),
         code=np.array(code, dtype=np.int64),
@@ -291,7 +291,7 @@ def press(work, block, stride, i, depth, rate, slide, speed, k, cn, exponent, di
 
 
 @kernel
-def apply_laws(sensor, step, work, block, stride, begin, count, slots, slot, offset, linear, program, memory, commit):
+def apply_force_laws(sensor, step, work, block, stride, begin, count, slots, slot, offset, linear, program, memory, commit):
     """Let the effects act on what :func:`press` wrote.
 
     FORCE is then the normal force (N), SLOPE and DAMPING its derivatives by the depth at the step's end (N/m) and by the rate
@@ -309,7 +309,7 @@ def apply_laws(sensor, step, work, block, stride, begin, count, slots, slot, off
         The memory of the i-th of them is row ``offset + slots.ravel()[slot + i]``.
     linear : bool
         The base law is Eq. 8.
-    program : Program
+    program : EffectProgram
     memory : (points, columns) float
     commit : bool
         Write the memory: once per step and point, at the step's end.
@@ -336,7 +336,7 @@ def apply_laws(sensor, step, work, block, stride, begin, count, slots, slot, off
 
 
 @kernel
-def apply_friction(sensor, work, block, stride, begin, count, slots, program, memory):
+def apply_friction_laws(sensor, work, block, stride, begin, count, slots, program, memory):
     """How the effects change friction at SPEED under FORCE: written into FACTOR and VISCOUS.
 
     FACTOR is on the friction coefficient of Eq. 10–12, at speed zero also on what static friction can hold; VISCOUS is to be

@@ -14,7 +14,7 @@ import numpy as np
 
 from ...errors import EffectError
 from ...model.effect import Effect, Value, Values
-from .specification import STAGES, Form, Kind
+from .specification import SITES_OF_ACTION, Form, Kind
 
 LIBRARY = f"{__package__.rpartition('.')[0]}.library"
 """The package of the effects."""
@@ -25,7 +25,7 @@ def library() -> dict[str, Kind]:
     """Return every kind by its standard name, in the order in which they act."""
     package = importlib.import_module(LIBRARY)
     found = [importlib.import_module(f"{LIBRARY}.{module.name}").KIND for module in pkgutil.iter_modules(package.__path__)]
-    found.sort(key=lambda kind: (STAGES.index(kind.stage), kind.order, kind.name))
+    found.sort(key=lambda kind: (SITES_OF_ACTION.index(kind.site), kind.order, kind.name))
     return {kind.name: kind for kind in found}
 
 
@@ -47,9 +47,9 @@ def form_of(name: str, form: str = "") -> Form:
     return forms[form]
 
 
-def stage_of(effect: Effect) -> str:
-    """Return the stage at which an effect acts."""
-    return kind_of(effect.name).stage_of(form_of(effect.name, effect.form))
+def site_of_action(effect: Effect) -> str:
+    """Return the site at which an effect acts."""
+    return kind_of(effect.name).site_of(form_of(effect.name, effect.form))
 
 
 def effect(name: str, form: str = "", seed: int = 0, gain: float = 1.0, **values: Any) -> Effect:
@@ -107,24 +107,26 @@ def check(effects: Iterable[Effect], sensor: str, texels: int | None = None, gai
                 )
 
 
-def in_order(effects: Iterable[Effect], readout: bool) -> list[tuple[Effect, Form]]:
+def in_signal_order(effects: Iterable[Effect], readout: bool) -> list[tuple[Effect, Form]]:
     """Return a sensor's effects on forces, or those on readings, in the order in which they act."""
     chosen = []
     for item in effects:
         kind, form = kind_of(item.name), form_of(item.name, item.form)
-        stage = kind.stage_of(form)
-        if (stage == "readout") == readout:
-            rank = (form.after_conversion, form.after_clip, stage == "pad", kind.order)
+        site = kind.site_of(form)
+        if (site == "readout") == readout:
+            rank = (form.after_conversion, form.after_clip, site == "pad", kind.order)
             chosen.append((rank, item, form))
     chosen.sort(key=lambda entry: entry[0])  # stable: of two alike the first in the stack acts first
     return [(item, form) for _, item, form in chosen]
 
 
-def placed(effects: Iterable[Effect], position: np.ndarray, normal: np.ndarray, tangent: np.ndarray) -> tuple[np.ndarray, ...]:
+def actual_placement(
+    effects: Iterable[Effect], position: np.ndarray, normal: np.ndarray, tangent: np.ndarray
+) -> tuple[np.ndarray, ...]:
     """Where the texels really are, with the effects that move them: position (m), normal and tangent, each (n, 3)."""
-    for item, form in in_order(effects, readout=False):
-        if form.place is not None:
-            position, normal, tangent = form.place(position, normal, tangent, complete_values(item))
+    for item, form in in_signal_order(effects, readout=False):
+        if form.placement is not None:
+            position, normal, tangent = form.placement(position, normal, tangent, complete_values(item))
     return position, normal, tangent
 
 

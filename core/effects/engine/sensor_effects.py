@@ -8,7 +8,7 @@ from dataclasses import replace
 from ...geometry.texels import Texels
 from ...model.scenario import Scenario
 from ...model.sensor import Sensor
-from .registry import check, placed
+from .registry import actual_placement, check
 
 
 def check_scenario(scenario: Scenario) -> None:
@@ -34,5 +34,5 @@ def mounted_texels(sensor: Sensor) -> Texels:
     Effects such as misalignment move texels. Without such an effect the sensor's own texels are returned.
     """
     texels = sensor.texels
-    position, normal, tangent = placed(sensor.effects, texels.position, texels.normal, texels.tangent)
+    position, normal, tangent = actual_placement(sensor.effects, texels.position, texels.normal, texels.tangent)
     return texels if position is texels.position else replace(texels, position=position, normal=normal, tangent=tangent)

@@ -1,20 +1,20 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What an effect is: plain data on a sensor, a kind in the library, and the ways in which a form of it can act.
+"""What an effect is: plain data on a sensor, a kind in the library, and the mechanism by which a form of it acts.
 
-Each file of this folder but its machinery defines a ``KIND``; nothing else has to know of it. Its forms are different formulas
-for the same thing, since no two papers agree on one. A form acts in exactly one way:
+Each module of the library defines one ``KIND``. A kind has several forms: different formulas for the same phenomenon, since no
+two papers agree on one. A form acts by exactly one mechanism:
 
-=============  ==============================================================================================================
-``law``        scalar law with memory, the same for the solver, for whole signals and for streams (see :data:`Law`)
-``shape``      formula on readings that needs no past: ``shape(x (t, n), time (t,), values, site, seed) → (t, n)``
-``mix``        weights of a linear mix of texels: ``mix(values, site) → Mixing``, made once and applied to every sample
-``delay``      seconds by which the reading comes late: ``delay(values) → float``
-``friction``   law of sliding: ``friction(speed, force, numbers, row) → (factor on the friction coefficient, N·s/m)``
-``place``      where the texels really are: ``place(position, normal, tangent, values) → the same three``
-=============  ==============================================================================================================
+================  ===========================================================================================================
+``law``           law with memory, equal in the solver, over whole signals and over streams (see :data:`Law`)
+``memoryless``    formula on readings: ``memoryless(signal (t, n), time (t,), values, transducers, seed) → (t, n)``
+``coupling``      linear coupling of texels, made once for all samples: ``coupling(values, transducers) → CouplingMatrix``
+``delay``         seconds by which the reading comes late: ``delay(values) → float``
+``friction_law``  law of sliding: ``friction_law(speed, force, numbers, row) → (factor on the friction coefficient, N·s/m)``
+``placement``     where the texels really are: ``placement(position, normal, tangent, values) → the same three``
+================  ===========================================================================================================
 
-Laws and friction are compiled, so they are plain functions of numbers and arrays that use nothing but :mod:`math`; this file
-and those of the effects import nothing heavy, because Blender's panels list them.
+Laws and friction laws are compiled, so they use only numbers, arrays and :mod:`math`. This module and those of the library
+import nothing heavy, because Blender's panels list them.
 """
 
 from __future__ import annotations
@@ -26,9 +26,9 @@ import numpy as np
 
 from ...model.effect import Value, Values
 from ...model.parameter import Parameter
-from .mixing import Mixing
+from .coupling_matrix import CouplingMatrix
 
-STAGES = ("contact", "pad", "readout")
+SITES_OF_ACTION = ("contact", "pad", "readout")
 """`contact`: the law of contact itself, without memory. `pad`: with memory; both act on the bodies. `readout`: only on what
 the sensor reports."""
 
@@ -55,7 +55,7 @@ commit : bool
 
 
 @dataclass(frozen=True)
-class Site:
+class TransducerArray:
     """Where an effect sits: the texels and the linear conversion of the sensor it belongs to.
 
     Attributes
@@ -94,16 +94,16 @@ class Form:
         As the documentation prints it.
     reference : str
     parameters : tuple of Parameter
-    off : dict of str to float
+    neutral : dict of str to float
         Values, possibly outside the bounds, at which the effect is not there: ``strength`` zero, a level of infinity.
-    law, shape, mix, delay, friction, place
+    law, memoryless, coupling, delay, friction_law, placement
         How it acts; exactly one is given (see the module's text).
     constants : callable
         ``constants(values, dt (m,)) → (m, c)``: the numbers of a law for steps of these lengths (s), of a friction law for
         none in particular.
     memory : int
         How many numbers a law remembers.
-    stage : str
+    site : str
         Where it differs from that of its kind.
     after_conversion : bool
         A readout form that acts on the reading in the sensor's unit, and not on newtons before gain and zero.
@@ -117,25 +117,25 @@ class Form:
     formula: str
     reference: str
     parameters: tuple[Parameter, ...]
-    off: dict[str, float]
+    neutral: dict[str, float]
     law: Law | None = None
-    shape: Callable[..., np.ndarray] | None = None
-    mix: Callable[[Values, Site], Mixing] | None = None
+    memoryless: Callable[..., np.ndarray] | None = None
+    coupling: Callable[[Values, TransducerArray], CouplingMatrix] | None = None
     delay: Callable[[Values], float] | None = None
-    friction: Callable[..., tuple[float, float]] | None = None
-    place: Callable[..., tuple[np.ndarray, np.ndarray, np.ndarray]] | None = None
+    friction_law: Callable[..., tuple[float, float]] | None = None
+    placement: Callable[..., tuple[np.ndarray, np.ndarray, np.ndarray]] | None = None
     constants: Callable[[Values, np.ndarray], np.ndarray] | None = None
     memory: int = 0
-    stage: str = ""
+    site: str = ""
     after_conversion: bool = False
     after_clip: bool = False
     random: bool = False
 
     @property
-    def way(self) -> str:
+    def mechanism(self) -> str:
         """How it acts: the name of the one attribute that is given."""
-        ways = ("law", "shape", "mix", "delay", "friction", "place")
-        return next(name for name in ways if getattr(self, name) is not None)
+        mechanisms = ("law", "memoryless", "coupling", "delay", "friction_law", "placement")
+        return next(name for name in mechanisms if getattr(self, name) is not None)
 
     def defaults(self, gain: float = 1.0) -> dict[str, Value]:
         """Return the default of every parameter, for a sensor with this gain."""
@@ -154,10 +154,10 @@ class Kind:
         For people.
     text : str
         What it does, in one sentence.
-    stage : str
-        One of :data:`STAGES`.
+    site : str
+        One of :data:`SITES_OF_ACTION`.
     order : float
-        Place in the chain among those of its stage.
+        Place in the chain among those of its site.
     forms : tuple of Form
         The first is the usual one.
     """
@@ -165,26 +165,26 @@ class Kind:
     name: str
     title: str
     text: str
-    stage: str
+    site: str
     order: float
     forms: tuple[Form, ...]
 
-    def stage_of(self, form: Form) -> str:
+    def site_of(self, form: Form) -> str:
         """Return where a form of this kind acts."""
-        return form.stage or self.stage
+        return form.site or self.site
 
 
-def number(values: Values, name: str) -> float:
+def scalar(values: Values, name: str) -> float:
     """Return a value that is one number."""
     value = values[name]
     assert isinstance(value, float | int)
     return float(value)
 
 
-def same_for_all_steps(*names: str) -> Callable[[Values, np.ndarray], np.ndarray]:
+def constants_from(*names: str) -> Callable[[Values, np.ndarray], np.ndarray]:
     """Return the `constants` of a law whose numbers are its parameters of these names, whatever the step."""
 
     def constants(values: Values, dt: np.ndarray) -> np.ndarray:
-        return np.tile([number(values, name) for name in names], (len(dt), 1))
+        return np.tile([scalar(values, name) for name in names], (len(dt), 1))
 
     return constants

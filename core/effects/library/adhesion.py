@@ -13,7 +13,7 @@ import numpy as np
 
 from ...model.effect import Values
 from ...model.parameter import Parameter
-from ..engine.specification import Form, Kind, number, same_for_all_steps
+from ..engine.specification import Form, Kind, constants_from, scalar
 
 
 def constant(force, slope, depth, slide, numbers, row, memory, point, at, commit):
@@ -68,22 +68,22 @@ def cohesive(force, slope, depth, slide, numbers, row, memory, point, at, commit
 
 
 def _at_once(values: Values, dt: np.ndarray) -> np.ndarray:
-    return np.tile([number(values, "pull"), number(values, "depth"), 1.0, 1.0], (len(dt), 1))
+    return np.tile([scalar(values, "pull"), scalar(values, "depth"), 1.0, 1.0], (len(dt), 1))
 
 
 def _with_time(values: Values, dt: np.ndarray) -> np.ndarray:
-    left = np.exp(-np.asarray(dt) / number(values, "time"))
-    same = np.tile([number(values, "pull"), number(values, "depth")], (len(dt), 1))
+    left = np.exp(-np.asarray(dt) / scalar(values, "time"))
+    same = np.tile([scalar(values, "pull"), scalar(values, "depth")], (len(dt), 1))
     return np.column_stack([same, left, np.zeros(len(dt))])
 
 
 def _held(values: Values, dt: np.ndarray) -> np.ndarray:
-    return np.tile([number(values, "pull"), number(values, "depth"), 0.0], (len(dt), 1))
+    return np.tile([scalar(values, "pull"), scalar(values, "depth"), 0.0], (len(dt), 1))
 
 
 def _relaxing(values: Values, dt: np.ndarray) -> np.ndarray:
-    same = np.tile([number(values, "pull"), number(values, "depth")], (len(dt), 1))
-    return np.column_stack([same, np.asarray(dt) / number(values, "time")])
+    same = np.tile([scalar(values, "pull"), scalar(values, "depth")], (len(dt), 1))
+    return np.column_stack([same, np.asarray(dt) / scalar(values, "time")])
 
 
 _PULL = Parameter("pull", "N", 0.02, 0.0, 100.0, "Largest pull F of one texel.")
@@ -94,7 +94,7 @@ KIND = Kind(
     name="adhesion",
     title="Adhesion",
     text="Sticks: the force goes below that of the spring when the object comes off, and may pull.",
-    stage="pad",
+    site="pad",
     order=50,
     forms=(
         Form(
@@ -102,7 +102,7 @@ KIND = Kind(
             "f = f₀ − F u,  u → 1 on the way back, → 0 on the way in, within D",
             "Johnson, Kendall and Roberts, Proc. R. Soc. A 324 (1971): contact is held longer than it was made",
             (_PULL, _WAY),
-            off={"pull": 0.0},
+            neutral={"pull": 0.0},
             law=unloading,
             constants=_at_once,
             memory=3,
@@ -113,9 +113,9 @@ KIND = Kind(
             "f = f₀ − F · (1 − exp(−d/D))",
             "Derjaguin, Muller and Toporov, J. Colloid Interface Sci. 53 (1975)",
             (_PULL, Parameter("depth", "m", 1e-4, 1e-6, 0.02, "Depth D at which 63 % of the pull is there.", log=True)),
-            off={"pull": 0.0},
+            neutral={"pull": 0.0},
             law=constant,
-            constants=same_for_all_steps("pull", "depth"),
+            constants=constants_from("pull", "depth"),
             after_clip=True,
         ),
         Form(
@@ -127,7 +127,7 @@ KIND = Kind(
                 _WAY,
                 Parameter("time", "s", 2.0, 0.01, 1000.0, "Time of contact τ that makes 63 % of the pull.", log=True),
             ),
-            off={"pull": 0.0},
+            neutral={"pull": 0.0},
             law=unloading,
             constants=_with_time,
             memory=3,
@@ -139,7 +139,7 @@ KIND = Kind(
             "Rose, Ferrante and Smith, Phys. Rev. Lett. 47 (1981); Xu and Needleman, Model. Simul. Mater. Sci. Eng. 1 (1993): "
             "traction over separation",
             (_PULL, _ZONE),
-            off={"pull": 0.0},
+            neutral={"pull": 0.0},
             law=cohesive,
             constants=_held,
             memory=2,
@@ -154,7 +154,7 @@ KIND = Kind(
                 _ZONE,
                 Parameter("time", "s", 0.1, 1e-3, 1000.0, "Time τ after which 37 % of the pull are left at rest.", log=True),
             ),
-            off={"pull": 0.0},
+            neutral={"pull": 0.0},
             law=cohesive,
             constants=_relaxing,
             memory=2,

@@ -14,7 +14,7 @@ import numpy as np
 
 from ...model.effect import Values
 from ...model.parameter import Parameter
-from ..engine.specification import Form, Kind, number
+from ..engine.specification import Form, Kind, scalar
 
 LOG_RATES = np.arange(-13.75, 2.76, 1.25)
 """Logarithm of the rates that stand for a spectrum; a step of 1.25 keeps the sum within 0.1 % of the closed formula."""
@@ -83,14 +83,14 @@ def logarithmic(values: Values) -> tuple[np.ndarray, np.ndarray]:
     # 1 - exp(-x s) weighted with exp(-x) dx / x integrates to ln(1 + s).
     rates = np.exp(LOG_RATES)
     weights = (LOG_RATES[1] - LOG_RATES[0]) * np.exp(-rates) / math.log(10.0)
-    return number(values, "amount") * weights, number(values, "time") / rates
+    return scalar(values, "amount") * weights, scalar(values, "time") / rates
 
 
 def power(values: Values) -> tuple[np.ndarray, np.ndarray]:
     """``a · (1 − (1 + t/τ)^−p)``: the power law's own spectrum x^(p−1) exp(−x) / Γ(p), at even steps of ln x."""
-    exponent, rates = number(values, "exponent"), np.exp(LOG_RATES)
+    exponent, rates = scalar(values, "exponent"), np.exp(LOG_RATES)
     weights = (LOG_RATES[1] - LOG_RATES[0]) * rates**exponent * np.exp(-rates) / math.gamma(exponent)
-    return number(values, "amount") * weights, number(values, "time") / rates
+    return scalar(values, "amount") * weights, scalar(values, "time") / rates
 
 
 _TIME = Parameter("time", "s", 2.0, 0.02, 1000.0, "Time in which the settling has come 63 % of its way.", log=True)
@@ -113,7 +113,7 @@ KIND = Kind(
     name="creep",
     title="Creep",
     text="Settles slowly: held at one depth the force relaxes, or under one load the reading goes on rising.",
-    stage="pad",
+    site="pad",
     order=30,
     forms=(
         Form(
@@ -121,7 +121,7 @@ KIND = Kind(
             "f(t) = fₑ − a · q,  τ q̇ = fₑ − q",
             _VISCOELASTIC,
             (_AMOUNT, _TIME),
-            off={"amount": 0.0},
+            neutral={"amount": 0.0},
             law=settling,
             constants=_constants(prony, -1.0),
             memory=2,
@@ -131,7 +131,7 @@ KIND = Kind(
             "f(t) = fₑ − a₁ q₁ − a₂ q₂,  τᵢ q̇ᵢ = fₑ − qᵢ",
             _VISCOELASTIC,
             (_AMOUNT, _TIME, *_SECOND),
-            off={"amount": 0.0, "amount_2": 0.0},
+            neutral={"amount": 0.0, "amount_2": 0.0},
             law=settling,
             constants=_constants(prony, -1.0),
             memory=3,
@@ -141,7 +141,7 @@ KIND = Kind(
             "step response 1 − a · log₁₀(1 + t/τ)",
             _LOG,
             (_DECADE, _ONSET),
-            off={"amount": 0.0},
+            neutral={"amount": 0.0},
             law=settling,
             constants=_constants(logarithmic, -1.0),
             memory=1 + TERMS,
@@ -151,7 +151,7 @@ KIND = Kind(
             "step response 1 − a · (1 − (1 + t/τ)⁻ᵖ)",
             _POWER,
             (_AMOUNT, _ONSET, _EXPONENT),
-            off={"amount": 0.0},
+            neutral={"amount": 0.0},
             law=settling,
             constants=_constants(power, -1.0),
             memory=1 + TERMS,
@@ -161,22 +161,22 @@ KIND = Kind(
             "r(t) = f + a · q,  τ q̇ = f − q",
             _VISCOELASTIC,
             (_RISE, _TIME),
-            off={"amount": 0.0},
+            neutral={"amount": 0.0},
             law=settling,
             constants=_constants(prony, 1.0),
             memory=2,
-            stage="readout",
+            site="readout",
         ),
         Form(
             "rising-logarithmic",
             "step response 1 + a · log₁₀(1 + t/τ)",
             _LOG,
             (_RISE_DECADE, _ONSET),
-            off={"amount": 0.0},
+            neutral={"amount": 0.0},
             law=settling,
             constants=_constants(logarithmic, 1.0),
             memory=1 + TERMS,
-            stage="readout",
+            site="readout",
         ),
     ),
 )

@@ -8,40 +8,45 @@ import numpy as np
 from ...errors import EffectError
 from ...model.effect import Values
 from ...model.parameter import Parameter
-from ..engine.mixing import Mixing, mixing, nearest_distance
-from ..engine.specification import Form, Kind, Site, number
+from ..engine.coupling_matrix import CouplingMatrix, coupling_matrix, nearest_distance
+from ..engine.specification import Form, Kind, TransducerArray, scalar
 
 
-def neighbours(values: Values, site: Site) -> Mixing:
+def neighbours(values: Values, transducers: TransducerArray) -> CouplingMatrix:
     """Each texel gets a share of those next to it, up to a quarter farther away than the nearest usually is."""
-    reach, share = 1.25 * nearest_distance(site.position), number(values, "share")
-    return mixing(site.position, lambda r: np.where(r == 0.0, 1.0, np.where(r <= reach, share, 0.0)), reach, None)
+    reach, share = 1.25 * nearest_distance(transducers.position), scalar(values, "share")
+
+    def weight(distance: np.ndarray) -> np.ndarray:
+        return np.where(distance == 0.0, 1.0, np.where(distance <= reach, share, 0.0))
+
+    return coupling_matrix(transducers.position, weight, reach, None)
 
 
-def lines(x: np.ndarray, time: np.ndarray, values: Values, site: Site, seed: int) -> np.ndarray:
+def lines(x: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
     """Each texel gets a share of the mean of its row and of that of its column."""
-    if site.row is None or site.column is None:
+    if transducers.row is None or transducers.column is None:
         raise EffectError(
-            f"Effect 'crosstalk' (lines) of sensor '{site.name}' needs texels in rows and columns: choose the form neighbours."
+            f"Effect 'crosstalk' (lines) of sensor '{transducers.name}' needs texels in rows and columns: "
+            "choose the form neighbours."
         )
-    share = number(values, "share")
+    share = scalar(values, "share")
     result = x.copy()
-    for line in (site.row, site.column):
+    for line in (transducers.row, transducers.column):
         member = (line[:, None] == np.unique(line)).astype(float)
         result += share * (x @ (member / member.sum(axis=0))) @ member.T
     return result
 
 
-def common(x: np.ndarray, time: np.ndarray, values: Values, site: Site, seed: int) -> np.ndarray:
+def common(x: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
     """Each texel gets a share of the mean of all."""
-    return x + number(values, "share") * x.mean(axis=1, keepdims=True)
+    return x + scalar(values, "share") * x.mean(axis=1, keepdims=True)
 
 
 KIND = Kind(
     name="crosstalk",
     title="Crosstalk",
     text="Texels leak into the readings of others that share their wires or lie beside them.",
-    stage="readout",
+    site="readout",
     order=50,
     forms=(
         Form(
@@ -49,24 +54,24 @@ KIND = Kind(
             "rᵢ = fᵢ + c · Σ fⱼ over the texels next to i",
             "Dahiya and Valle, Robotic Tactile Sensing (2013)",
             (Parameter("share", "1", 0.05, 0.0, 0.25, "Share c that each neighbour adds."),),
-            off={"share": 0.0},
-            mix=neighbours,
+            neutral={"share": 0.0},
+            coupling=neighbours,
         ),
         Form(
             "lines",
             "rᵢ = fᵢ + c · (mean of the row of i + mean of its column)",
             "D'Alessio, Sens. Actuators A 72 (1999): arrays of resistors scanned by rows and columns",
             (Parameter("share", "1", 0.1, 0.0, 2.0, "Share c of the mean of a line that is added."),),
-            off={"share": 0.0},
-            shape=lines,
+            neutral={"share": 0.0},
+            memoryless=lines,
         ),
         Form(
             "common",
             "rᵢ = fᵢ + c · mean of all f",
             "Saxena, Bhan and Aggrawal, Sens. Actuators A 149 (2009): common parts of the readout of resistive arrays",
             (Parameter("share", "1", 0.2, 0.0, 5.0, "Share c of the mean of all texels that is added."),),
-            off={"share": 0.0},
-            shape=common,
+            neutral={"share": 0.0},
+            memoryless=common,
         ),
     ),
 )

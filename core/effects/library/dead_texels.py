@@ -7,30 +7,30 @@ import numpy as np
 
 from ...model.effect import Values
 from ...model.parameter import Parameter
-from ..engine.random_numbers import uniform
-from ..engine.specification import Form, Kind, Site, number
+from ..engine.random_streams import uniform
+from ..engine.specification import Form, Kind, TransducerArray, scalar
 
 
 def _dead(values: Values, seed: int, texels: int) -> np.ndarray:
-    return uniform("dead-texels", seed, np.arange(texels)) < number(values, "share")
+    return uniform("dead-texels", seed, np.arange(texels)) < scalar(values, "share")
 
 
-def random(x: np.ndarray, time: np.ndarray, values: Values, site: Site, seed: int) -> np.ndarray:
+def random(x: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
     """Nothing where a texel is dead."""
     return np.where(_dead(values, seed, x.shape[1]), 0.0, x)
 
 
-def listed(x: np.ndarray, time: np.ndarray, values: Values, site: Site, seed: int) -> np.ndarray:
+def listed(x: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
     """Nothing where a texel is listed as dead; half dead ones report half."""
     return x * (1.0 - np.asarray(values["dead"]))
 
 
-def stuck(x: np.ndarray, time: np.ndarray, values: Values, site: Site, seed: int) -> np.ndarray:
+def stuck(x: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
     """One reading for ever where a texel is dead."""
-    return np.where(_dead(values, seed, x.shape[1]), site.zero + number(values, "level"), x)
+    return np.where(_dead(values, seed, x.shape[1]), transducers.zero + scalar(values, "level"), x)
 
 
-def held(x: np.ndarray, time: np.ndarray, values: Values, site: Site, seed: int) -> np.ndarray:
+def held(x: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
     """A reading of its own for ever where a texel is listed as dead."""
     gone = np.asarray(values["dead"])
     return (1.0 - gone) * x + gone * np.asarray(values["level"])
@@ -43,7 +43,7 @@ KIND = Kind(
     name="dead-texels",
     title="Dead Texels",
     text="Some texels report nothing, whatever presses on them.",
-    stage="readout",
+    site="readout",
     order=45,
     forms=(
         Form(
@@ -51,8 +51,8 @@ KIND = Kind(
             "rᵢ = 0 for a share of the texels",
             "Ni et al., ACM Trans. Sens. Netw. 5 (2009): fault types",
             (_SHARE,),
-            off={"share": 0.0},
-            shape=random,
+            neutral={"share": 0.0},
+            memoryless=random,
             random=True,
         ),
         Form(
@@ -60,8 +60,8 @@ KIND = Kind(
             "rᵢ = (1 − deadᵢ) · fᵢ",
             "Ni et al., ACM Trans. Sens. Netw. 5 (2009): fault types",
             (_DEAD,),
-            off={"dead": 0.0},
-            shape=listed,
+            neutral={"dead": 0.0},
+            memoryless=listed,
         ),
         Form(
             "held",
@@ -71,8 +71,8 @@ KIND = Kind(
                 _DEAD,
                 Parameter("level", "unit", 0.1, -1e5, 1e5, "Reading L at which a dead texel stays.", per_texel=True),
             ),
-            off={"dead": 0.0},
-            shape=held,
+            neutral={"dead": 0.0},
+            memoryless=held,
             after_conversion=True,
         ),
         Form(
@@ -80,8 +80,8 @@ KIND = Kind(
             "rᵢ = r₀ + L for a share of the texels",
             "Ni et al., ACM Trans. Sens. Netw. 5 (2009): stuck-at fault",
             (_SHARE, Parameter("level", "unit", 0.1, -1e5, 1e5, "Reading L above the one without load at which they stay.")),
-            off={"share": 0.0},
-            shape=stuck,
+            neutral={"share": 0.0},
+            memoryless=stuck,
             after_conversion=True,
             random=True,
         ),

@@ -7,23 +7,23 @@ import numpy as np
 
 from ...model.effect import Values
 from ...model.parameter import Parameter
-from ..engine.random_numbers import random_walk
-from ..engine.specification import Form, Kind, Site, number
+from ..engine.random_streams import random_walk
+from ..engine.specification import Form, Kind, TransducerArray, scalar
 
 
-def linear(x: np.ndarray, time: np.ndarray, values: Values, site: Site, seed: int) -> np.ndarray:
+def linear(x: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
     """By so much each second."""
-    return x + number(values, "rate") * time[:, None]
+    return x + scalar(values, "rate") * time[:, None]
 
 
-def warm_up(x: np.ndarray, time: np.ndarray, values: Values, site: Site, seed: int) -> np.ndarray:
+def warm_up(x: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
     """Fast at first, then to a halt."""
-    return x - number(values, "amount") * np.expm1(-time[:, None] / number(values, "time"))
+    return x - scalar(values, "amount") * np.expm1(-time[:, None] / scalar(values, "time"))
 
 
-def walk(x: np.ndarray, time: np.ndarray, values: Values, site: Site, seed: int) -> np.ndarray:
+def walk(x: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
     """At random, each texel by itself."""
-    spread = number(values, "spread")
+    spread = scalar(values, "spread")
     return x + spread * random_walk("drift", seed, time, x.shape[1]) if spread else x
 
 
@@ -31,7 +31,7 @@ KIND = Kind(
     name="drift",
     title="Drift",
     text="The reading moves slowly by itself, with or without load.",
-    stage="readout",
+    site="readout",
     order=64,
     forms=(
         Form(
@@ -39,8 +39,8 @@ KIND = Kind(
             "r = r₀ + b t",
             "ISO/IEC Guide 99 (2007), 4.21: instrumental drift",
             (Parameter("rate", "unit/s", 1e-3, -1e3, 1e3, "Change b of the reading per second."),),
-            off={"rate": 0.0},
-            shape=linear,
+            neutral={"rate": 0.0},
+            memoryless=linear,
             after_conversion=True,
         ),
         Form(
@@ -51,8 +51,8 @@ KIND = Kind(
                 Parameter("amount", "unit", 0.05, -1e4, 1e4, "Change a of the reading when warm."),
                 Parameter("time", "s", 30.0, 0.1, 1e5, "Time τ in which 63 % of it have come.", log=True),
             ),
-            off={"amount": 0.0},
-            shape=warm_up,
+            neutral={"amount": 0.0},
+            memoryless=warm_up,
             after_conversion=True,
         ),
         Form(
@@ -60,8 +60,8 @@ KIND = Kind(
             "r = r₀ + s · W(t),  W Brownian motion",
             "IEEE Std 952 (1997), annex C: random walk; constructed after Lévy (1948)",
             (Parameter("spread", "unit/√s", 0.005, 0.0, 1e3, "Standard deviation s after one second."),),
-            off={"spread": 0.0},
-            shape=walk,
+            neutral={"spread": 0.0},
+            memoryless=walk,
             after_conversion=True,
             random=True,
         ),

@@ -7,33 +7,33 @@ import numpy as np
 
 from ...model.effect import Values
 from ...model.parameter import Parameter
-from ..engine.random_numbers import normal
-from ..engine.specification import Form, Kind, Site, number
+from ..engine.random_streams import normal
+from ..engine.specification import Form, Kind, TransducerArray, scalar
 
 
-def random(x: np.ndarray, time: np.ndarray, values: Values, site: Site, seed: int) -> np.ndarray:
+def random(x: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
     """Factors ``exp(s ε)``, log-normal with median one."""
-    return x * np.exp(number(values, "spread") * normal("gain-mismatch", seed, np.arange(x.shape[1])))
+    return x * np.exp(scalar(values, "spread") * normal("gain-mismatch", seed, np.arange(x.shape[1])))
 
 
-def listed(x: np.ndarray, time: np.ndarray, values: Values, site: Site, seed: int) -> np.ndarray:
+def listed(x: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
     """A factor for each texel."""
     return x * np.asarray(values["factor"])
 
 
-def gradient(x: np.ndarray, time: np.ndarray, values: Values, site: Site, seed: int) -> np.ndarray:
+def gradient(x: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
     """Factors that change evenly along x and y, from ``1 − g`` at one end to ``1 + g`` at the other."""
-    middle = 0.5 * (site.position.min(axis=0) + site.position.max(axis=0))
-    half = np.maximum(0.5 * np.ptp(site.position, axis=0), 1e-12)
-    place = (site.position - middle) / half
-    return x * (1.0 + number(values, "along_x") * place[:, 0] + number(values, "along_y") * place[:, 1])
+    middle = 0.5 * (transducers.position.min(axis=0) + transducers.position.max(axis=0))
+    half = np.maximum(0.5 * np.ptp(transducers.position, axis=0), 1e-12)
+    place = (transducers.position - middle) / half
+    return x * (1.0 + scalar(values, "along_x") * place[:, 0] + scalar(values, "along_y") * place[:, 1])
 
 
 KIND = Kind(
     name="gain-mismatch",
     title="Gain Mismatch",
     text="Some texels read more, others less, under the same load.",
-    stage="readout",
+    site="readout",
     order=40,
     forms=(
         Form(
@@ -41,8 +41,8 @@ KIND = Kind(
             "rᵢ = exp(s εᵢ) · fᵢ,  ε normal",
             "Schürmann et al., IEEE World Haptics (2011): a modular sensor, calibrated texel by texel",
             (Parameter("spread", "1", 0.1, 0.0, 1.5, "Standard deviation s of the factors' logarithm."),),
-            off={"spread": 0.0},
-            shape=random,
+            neutral={"spread": 0.0},
+            memoryless=random,
             random=True,
         ),
         Form(
@@ -50,8 +50,8 @@ KIND = Kind(
             "rᵢ = gᵢ · fᵢ",
             "ISO/IEC Guide 99 (2007), 2.39: calibration",
             (Parameter("factor", "1", 1.0, 0.0, 100.0, "Factor g of each texel.", per_texel=True),),
-            off={"factor": 1.0},
-            shape=listed,
+            neutral={"factor": 1.0},
+            memoryless=listed,
         ),
         Form(
             "gradient",
@@ -61,8 +61,8 @@ KIND = Kind(
                 Parameter("along_x", "1", 0.2, -0.5, 0.5, "Change g of the factor from the middle to the end in +x."),
                 Parameter("along_y", "1", 0.0, -0.5, 0.5, "Change g of the factor from the middle to the end in +y."),
             ),
-            off={"along_x": 0.0, "along_y": 0.0},
-            shape=gradient,
+            neutral={"along_x": 0.0, "along_y": 0.0},
+            memoryless=gradient,
         ),
     ),
 )

@@ -13,7 +13,7 @@ import numpy as np
 
 from ...model.effect import Values
 from ...model.parameter import Parameter
-from ..engine.specification import Form, Kind, number, same_for_all_steps
+from ..engine.specification import Form, Kind, constants_from, scalar
 
 ELEMENTS = 4
 """Elements of the operators; their thresholds are spread evenly around the given one."""
@@ -132,14 +132,14 @@ def trailing(force, slope, depth, slide, numbers, row, memory, point, at, commit
 def _operators(values: Values, dt: np.ndarray) -> np.ndarray:
     """Share, how many elements, and their thresholds, whose mean is the given one."""
     spread = 2.0 * np.arange(1, ELEMENTS + 1) / (ELEMENTS + 1)
-    row = np.concatenate([[number(values, "share"), ELEMENTS], number(values, "force") * spread])
+    row = np.concatenate([[scalar(values, "share"), ELEMENTS], scalar(values, "force") * spread])
     return np.tile(row, (len(dt), 1))
 
 
 def _relays(values: Values, dt: np.ndarray) -> np.ndarray:
     """Share, how many elements, and their widths: middles of equal parts of an exponential distribution of given mean."""
     widths = -np.log1p(-(np.arange(ELEMENTS) + 0.5) / ELEMENTS)
-    row = np.concatenate([[number(values, "share"), ELEMENTS], number(values, "force") * widths / widths.mean()])
+    row = np.concatenate([[scalar(values, "share"), ELEMENTS], scalar(values, "force") * widths / widths.mean()])
     return np.tile(row, (len(dt), 1))
 
 
@@ -151,7 +151,7 @@ KIND = Kind(
     name="hysteresis",
     title="Hysteresis",
     text="Reads differently at the same depth on the way in and on the way back, however slowly it is done.",
-    stage="pad",
+    site="pad",
     order=20,
     forms=(
         Form(
@@ -159,9 +159,9 @@ KIND = Kind(
             "f = fₑ · (1 + h z),  dz/dd = (sgn ḋ − z) / D",
             "Visintin, Differential Models of Hysteresis (1994): Duhem; Coleman and Hodgdon, Int. J. Eng. Sci. 24 (1986)",
             (_WIDTH, Parameter("depth", "m", 3e-4, 1e-6, 0.05, "Way D after which the other branch is reached.", log=True)),
-            off={"width": 0.0},
+            neutral={"width": 0.0},
             law=duhem,
-            constants=same_for_all_steps("width", "depth"),
+            constants=constants_from("width", "depth"),
             memory=2,
         ),
         Form(
@@ -173,9 +173,9 @@ KIND = Kind(
                 _FORCE,
                 Parameter("beta", "1", 0.75, 0.5, 1.0, "Shape β of the loop: how much of the yielding is on the way back."),
             ),
-            off={"share": 0.0},
+            neutral={"share": 0.0},
             law=bouc_wen,
-            constants=same_for_all_steps("share", "force", "beta"),
+            constants=constants_from("share", "force", "beta"),
             memory=2,
         ),
         Form(
@@ -183,7 +183,7 @@ KIND = Kind(
             "f = (1 − a) fₑ + a · mean of sⱼ,  sⱼ follows fₑ within ±rⱼ",
             "Iwan, J. Appl. Mech. 33 (1966); Al-Bender et al., IEEE Trans. Autom. Control 50 (2005)",
             (_SHARE, _FORCE),
-            off={"share": 0.0},
+            neutral={"share": 0.0},
             law=maxwell_slip,
             constants=_operators,
             memory=1 + ELEMENTS,
@@ -196,11 +196,11 @@ KIND = Kind(
                 Parameter("share", "1", 0.4, 0.0, 1.0, "Share a of the reading that goes through the elements with play."),
                 Parameter("force", "N", 0.05, 1e-6, 1e3, "Force Y by which they trail behind.", log=True),
             ),
-            off={"share": 0.0},
+            neutral={"share": 0.0},
             law=play,
             constants=_operators,
             memory=ELEMENTS,
-            stage="readout",
+            site="readout",
         ),
         Form(
             "preisach",
@@ -210,22 +210,22 @@ KIND = Kind(
                 Parameter("share", "1", 0.4, 0.0, 1.0, "Share a of the reading that goes through the relays."),
                 Parameter("force", "N", 0.1, 1e-6, 1e3, "Mean width w between switching on and off.", log=True),
             ),
-            off={"share": 0.0},
+            neutral={"share": 0.0},
             law=preisach,
             constants=_relays,
             memory=ELEMENTS,
-            stage="readout",
+            site="readout",
         ),
         Form(
             "trailing",
             "r = f · (1 − h z),  dz/df = (sgn ḟ − z) / F",
             "Visintin, Differential Models of Hysteresis (1994): Duhem's model",
             (_WIDTH, Parameter("force", "N", 0.02, 1e-6, 1e3, "Force F after which the other branch is reached.", log=True)),
-            off={"width": 0.0},
+            neutral={"width": 0.0},
             law=trailing,
-            constants=same_for_all_steps("width", "force"),
+            constants=constants_from("width", "force"),
             memory=2,
-            stage="readout",
+            site="readout",
         ),
     ),
 )

@@ -7,7 +7,7 @@ import numpy as np
 
 from ...model.effect import Values
 from ...model.parameter import Parameter
-from ..engine.specification import Form, Kind, number
+from ..engine.specification import Form, Kind, scalar
 from .creep import shares_of_a_step
 
 
@@ -35,12 +35,12 @@ def second_order(force, slope, depth, slide, numbers, row, memory, point, at, co
 
 
 def _first(values: Values, dt: np.ndarray) -> np.ndarray:
-    return np.stack(shares_of_a_step(np.asarray(dt, float) / max(number(values, "time"), 1e-12)), axis=1)
+    return np.stack(shares_of_a_step(np.asarray(dt, float) / max(scalar(values, "time"), 1e-12)), axis=1)
 
 
 def _second(values: Values, dt: np.ndarray) -> np.ndarray:
     first = _first(values, dt)
-    x = np.asarray(dt, float) / max(number(values, "time"), 1e-12)
+    x = np.asarray(dt, float) / max(scalar(values, "time"), 1e-12)
     keep = first[:, 0]
     turn = np.where(np.isfinite(keep * x), keep * x, 0.0)
     # Answers at the step's end to an input of 1, and to one that grows from 0 to 1; their series where digits would be lost.
@@ -57,7 +57,7 @@ KIND = Kind(
     name="lag",
     title="Lag",
     text="Answers late to a change.",
-    stage="readout",
+    site="readout",
     order=60,
     forms=(
         Form(
@@ -65,7 +65,7 @@ KIND = Kind(
             "τ ṙ = r₀ − r",
             "Doebelin, Measurement Systems (2003), section 3.3: first-order instrument",
             (_TIME,),
-            off={"time": 0.0},
+            neutral={"time": 0.0},
             law=first_order,
             constants=_first,
             memory=3,
@@ -76,8 +76,8 @@ KIND = Kind(
             "r(t) = r₀(t − T)",
             "Doebelin, Measurement Systems (2003), section 3.3: dead-time element",
             (Parameter("time", "s", 0.05, 0.0, 10.0, "Dead time T."),),
-            off={"time": 0.0},
-            delay=lambda values: number(values, "time"),
+            neutral={"time": 0.0},
+            delay=lambda values: scalar(values, "time"),
             after_conversion=True,
         ),
         Form(
@@ -85,7 +85,7 @@ KIND = Kind(
             "τ² r̈ + 2 τ ṙ + r = r₀",
             "Doebelin, Measurement Systems (2003), section 3.3: second-order instrument, critically damped",
             (_TIME,),
-            off={"time": 0.0},
+            neutral={"time": 0.0},
             law=second_order,
             constants=_second,
             memory=4,

@@ -7,26 +7,28 @@ import numpy as np
 
 from ...model.effect import Values
 from ...model.parameter import Parameter
-from ..engine.mixing import Mixing, mixing
-from ..engine.specification import Form, Kind, Site, number
+from ..engine.coupling_matrix import CouplingMatrix, coupling_matrix
+from ..engine.specification import Form, Kind, TransducerArray, scalar
 
 
-def gaussian(values: Values, site: Site) -> Mixing:
+def gaussian(values: Values, transducers: TransducerArray) -> CouplingMatrix:
     """Weights ``exp(−r²/2s²)``."""
-    width = max(number(values, "width"), 1e-9)
-    return mixing(site.position, lambda r: np.exp(-0.5 * (r / width) ** 2), 5.0 * width, site.area)
+    width = max(scalar(values, "width"), 1e-9)
+    return coupling_matrix(transducers.position, lambda r: np.exp(-0.5 * (r / width) ** 2), 5.0 * width, transducers.area)
 
 
-def exponential(values: Values, site: Site) -> Mixing:
+def exponential(values: Values, transducers: TransducerArray) -> CouplingMatrix:
     """Weights ``exp(−r/s)``."""
-    width = max(number(values, "width"), 1e-9)
-    return mixing(site.position, lambda r: np.exp(-r / width), 12.0 * width, site.area)
+    width = max(scalar(values, "width"), 1e-9)
+    return coupling_matrix(transducers.position, lambda r: np.exp(-r / width), 12.0 * width, transducers.area)
 
 
-def half_space(values: Values, site: Site) -> Mixing:
+def half_space(values: Values, transducers: TransducerArray) -> CouplingMatrix:
     """Weights ``(1 + r²/h²)^(−5/2)``."""
-    thickness = max(number(values, "thickness"), 1e-9)
-    return mixing(site.position, lambda r: (1.0 + (r / thickness) ** 2) ** -2.5, 12.0 * thickness, site.area)
+    thickness = max(scalar(values, "thickness"), 1e-9)
+    return coupling_matrix(
+        transducers.position, lambda r: (1.0 + (r / thickness) ** 2) ** -2.5, 12.0 * thickness, transducers.area
+    )
 
 
 _WIDTH = Parameter("width", "m", 0.003, 0.0, 0.1, "How far a point load spreads, s.")
@@ -35,7 +37,7 @@ KIND = Kind(
     name="load-spreading",
     title="Load Spreading",
     text="A cover shares the load of a texel with its neighbours, so that small things look wider.",
-    stage="readout",
+    site="readout",
     order=10,
     forms=(
         Form(
@@ -43,24 +45,24 @@ KIND = Kind(
             "rᵢ = Σⱼ wᵢⱼ fⱼ,  w ∝ exp(−r²/2s²), Σᵢ wᵢⱼ = 1",
             "Shimojo, IEEE Trans. Robot. Autom. 13 (1997): a cover as a spatial low-pass filter",
             (_WIDTH,),
-            off={"width": 0.0},
-            mix=gaussian,
+            neutral={"width": 0.0},
+            coupling=gaussian,
         ),
         Form(
             "exponential",
             "rᵢ = Σⱼ wᵢⱼ fⱼ,  w ∝ exp(−r/s), Σᵢ wᵢⱼ = 1",
             "Kerr, J. Appl. Mech. 31 (1964): foundation under a shear layer, whose influence fades exponentially",
             (_WIDTH,),
-            off={"width": 0.0},
-            mix=exponential,
+            neutral={"width": 0.0},
+            coupling=exponential,
         ),
         Form(
             "half-space",
             "rᵢ = Σⱼ wᵢⱼ fⱼ,  w ∝ (1 + r²/h²)^(−5/2), Σᵢ wᵢⱼ = 1",
             "Johnson, Contact Mechanics (1985), section 3.2: Boussinesq's stress at depth h under a point load",
             (Parameter("thickness", "m", 0.003, 0.0, 0.1, "Thickness h of the cover above the texels."),),
-            off={"thickness": 0.0},
-            mix=half_space,
+            neutral={"thickness": 0.0},
+            coupling=half_space,
         ),
     ),
 )

@@ -10,7 +10,7 @@ import numpy as np
 
 from ...model.effect import Values
 from ...model.parameter import Parameter
-from ..engine.specification import Form, Kind, number
+from ..engine.specification import Form, Kind, scalar
 
 
 def moved(
@@ -22,7 +22,7 @@ def moved(
     across = across - (across @ up) * up
     across = _unit(across, np.cross(up, np.eye(3)[np.abs(up).argmin()]))
     frame = np.stack([across, np.cross(up, across), up], axis=1)
-    given = {key: number(values, key) for key in values}
+    given = {key: scalar(values, key) for key in values}
     turn = frame @ _turn(given.get("about_x", 0.0), given.get("about_y", 0.0), given.get("about_z", 0.0)) @ frame.T
     shift = frame @ np.array([given.get("x", 0.0), given.get("y", 0.0), given.get("z", 0.0)])
     middle = position.mean(axis=0)
@@ -50,7 +50,7 @@ KIND = Kind(
     name="misalignment",
     title="Misalignment",
     text="The texels sit beside or askew of where the model has them.",
-    stage="contact",
+    site="contact",
     order=0,
     forms=(
         Form(
@@ -58,16 +58,16 @@ KIND = Kind(
             "p = p₀ + s",
             "Craig, Introduction to Robotics (2005), section 2.8: a frame's error as a rigid motion",
             (_X, _Y),
-            off={"x": 0.0, "y": 0.0},
-            place=moved,
+            neutral={"x": 0.0, "y": 0.0},
+            placement=moved,
         ),
         Form(
             "turn",
             "p = R_z (p₀ − m) + m + s",
             "Craig, Introduction to Robotics (2005), section 2.8",
             (_X, _Y, _Z),
-            off={"x": 0.0, "y": 0.0, "about_z": 0.0},
-            place=moved,
+            neutral={"x": 0.0, "y": 0.0, "about_z": 0.0},
+            placement=moved,
         ),
         Form(
             "tilt",
@@ -78,8 +78,8 @@ KIND = Kind(
                 Parameter("about_y", "rad", 0.0, -0.5, 0.5, "Turn about the texels' y axis."),
                 Parameter("z", "m", 0.0, -0.02, 0.02, "Shift outwards, along the normal."),
             ),
-            off={"about_x": 0.0, "about_y": 0.0, "z": 0.0},
-            place=moved,
+            neutral={"about_x": 0.0, "about_y": 0.0, "z": 0.0},
+            placement=moved,
         ),
     ),
 )

@@ -7,29 +7,29 @@ import numpy as np
 
 from ...model.effect import Values
 from ...model.parameter import Parameter
-from ..engine.random_numbers import normal, ticks
-from ..engine.specification import Form, Kind, Site, number
+from ..engine.random_streams import normal, ticks
+from ..engine.specification import Form, Kind, TransducerArray, scalar
 
 
-def white(x: np.ndarray, time: np.ndarray, values: Values, site: Site, seed: int) -> np.ndarray:
+def white(x: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
     """Each sample by itself."""
-    return x + number(values, "spread") * _normal(seed, ticks(time), x.shape[1])
+    return x + scalar(values, "spread") * _normal(seed, ticks(time), x.shape[1])
 
 
-def proportional(x: np.ndarray, time: np.ndarray, values: Values, site: Site, seed: int) -> np.ndarray:
+def proportional(x: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
     """The more, the more is read."""
-    return x + number(values, "share") * (x - site.zero) * _normal(seed, ticks(time), x.shape[1])
+    return x + scalar(values, "share") * (x - transducers.zero) * _normal(seed, ticks(time), x.shape[1])
 
 
-def coloured(x: np.ndarray, time: np.ndarray, values: Values, site: Site, seed: int) -> np.ndarray:
+def coloured(x: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
     """Normal numbers at every multiple of τ, linear in between, and scaled to the same variance everywhere."""
-    place = np.asarray(time, float) / number(values, "time")
+    place = np.asarray(time, float) / scalar(values, "time")
     left = np.floor(place)
     share = (place - left)[:, None]
     corners, where = np.unique(np.concatenate([left, left + 1.0]).astype(np.int64), return_inverse=True)
     drawn = _normal(seed, corners, x.shape[1])[where.ravel()]
     mixed = (1.0 - share) * drawn[: len(left)] + share * drawn[len(left) :]
-    return x + number(values, "spread") * mixed / np.sqrt((1.0 - share) ** 2 + share**2)
+    return x + scalar(values, "spread") * mixed / np.sqrt((1.0 - share) ** 2 + share**2)
 
 
 def _normal(seed: int, moments: np.ndarray, texels: int) -> np.ndarray:
@@ -42,7 +42,7 @@ KIND = Kind(
     name="noise",
     title="Noise",
     text="The reading trembles.",
-    stage="readout",
+    site="readout",
     order=66,
     forms=(
         Form(
@@ -50,8 +50,8 @@ KIND = Kind(
             "r = r₀ + s ε,  ε normal",
             "JCGM 100 (2008), section 4.2: repeatability",
             (_SPREAD,),
-            off={"spread": 0.0},
-            shape=white,
+            neutral={"spread": 0.0},
+            memoryless=white,
             after_conversion=True,
             random=True,
         ),
@@ -60,8 +60,8 @@ KIND = Kind(
             "r = r₀ · (1 + s ε),  ε normal",
             "JCGM 100 (2008), section 4.2: relative repeatability",
             (Parameter("share", "1", 0.02, 0.0, 1.0, "Standard deviation s as a share of the reading."),),
-            off={"share": 0.0},
-            shape=proportional,
+            neutral={"share": 0.0},
+            memoryless=proportional,
             after_conversion=True,
             random=True,
         ),
@@ -70,8 +70,8 @@ KIND = Kind(
             "r = r₀ + s ε(t),  ε normal with correlation over τ",
             "Perlin, SIGGRAPH (1985): noise on a lattice; IEEE Std 952 (1997), annex C: correlated noise",
             (_SPREAD, Parameter("time", "s", 0.2, 1e-3, 1e3, "Time τ over which it is correlated.", log=True)),
-            off={"spread": 0.0},
-            shape=coloured,
+            neutral={"spread": 0.0},
+            memoryless=coloured,
             after_conversion=True,
             random=True,
         ),

@@ -7,21 +7,21 @@ import numpy as np
 
 from ...model.effect import Values
 from ...model.parameter import Parameter
-from ..engine.random_numbers import normal
-from ..engine.specification import Form, Kind, Site, number
+from ..engine.random_streams import normal
+from ..engine.specification import Form, Kind, TransducerArray, scalar
 
 
-def common(x: np.ndarray, time: np.ndarray, values: Values, site: Site, seed: int) -> np.ndarray:
+def common(x: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
     """The same for all texels."""
-    return x + number(values, "offset")
+    return x + scalar(values, "offset")
 
 
-def random(x: np.ndarray, time: np.ndarray, values: Values, site: Site, seed: int) -> np.ndarray:
+def random(x: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
     """Another for each texel, normally distributed."""
-    return x + number(values, "spread") * normal("offset", seed, np.arange(x.shape[1]))
+    return x + scalar(values, "spread") * normal("offset", seed, np.arange(x.shape[1]))
 
 
-def listed(x: np.ndarray, time: np.ndarray, values: Values, site: Site, seed: int) -> np.ndarray:
+def listed(x: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
     """A known one for each texel."""
     return x + np.asarray(values["offset"])
 
@@ -30,7 +30,7 @@ KIND = Kind(
     name="offset",
     title="Offset",
     text="Reads something without load.",
-    stage="readout",
+    site="readout",
     order=62,
     forms=(
         Form(
@@ -38,8 +38,8 @@ KIND = Kind(
             "r = r₀ + b",
             "ISO/IEC Guide 99 (2007), 4.28: zero error",
             (Parameter("offset", "unit", 0.05, -1e5, 1e5, "Offset b of all texels."),),
-            off={"offset": 0.0},
-            shape=common,
+            neutral={"offset": 0.0},
+            memoryless=common,
             after_conversion=True,
         ),
         Form(
@@ -47,8 +47,8 @@ KIND = Kind(
             "rᵢ = r₀ᵢ + s εᵢ,  ε normal",
             "ISO/IEC Guide 99 (2007), 4.28: zero error",
             (Parameter("spread", "unit", 0.05, 0.0, 1e5, "Standard deviation s of the texels' offsets."),),
-            off={"spread": 0.0},
-            shape=random,
+            neutral={"spread": 0.0},
+            memoryless=random,
             after_conversion=True,
             random=True,
         ),
@@ -57,8 +57,8 @@ KIND = Kind(
             "rᵢ = r₀ᵢ + bᵢ",
             "ISO/IEC Guide 99 (2007), 4.28: zero error",
             (Parameter("offset", "unit", 0.0, -1e5, 1e5, "Offset b of each texel.", per_texel=True),),
-            off={"offset": 0.0},
-            shape=listed,
+            neutral={"offset": 0.0},
+            memoryless=listed,
             after_conversion=True,
         ),
     ),

@@ -9,32 +9,32 @@ import numpy as np
 
 from ...model.effect import Values
 from ...model.parameter import Parameter
-from ..engine.specification import Form, Kind, Site, number
+from ..engine.specification import Form, Kind, TransducerArray, scalar
 
 
-def rounded(x: np.ndarray, time: np.ndarray, values: Values, site: Site, seed: int) -> np.ndarray:
+def rounded(x: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
     """To the nearest step."""
-    return _stepped(x, number(values, "step"), np.round)
+    return _stepped(x, scalar(values, "step"), np.round)
 
 
-def cut(x: np.ndarray, time: np.ndarray, values: Values, site: Site, seed: int) -> np.ndarray:
+def cut(x: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
     """To the step below."""
-    return _stepped(x, number(values, "step"), np.floor)
+    return _stepped(x, scalar(values, "step"), np.floor)
 
 
-def converter(x: np.ndarray, time: np.ndarray, values: Values, site: Site, seed: int) -> np.ndarray:
+def converter(x: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
     """To the nearest of ``2^bits`` steps over a range."""
-    return _stepped(x, number(values, "range") / 2.0 ** number(values, "bits"), np.round)
+    return _stepped(x, scalar(values, "range") / 2.0 ** scalar(values, "bits"), np.round)
 
 
-def companded(x: np.ndarray, time: np.ndarray, values: Values, site: Site, seed: int) -> np.ndarray:
+def companded(x: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
     """To the step below, of steps that grow with the reading's change."""
-    scale, growth = number(values, "scale"), number(values, "growth")
+    scale, growth = scalar(values, "scale"), scalar(values, "growth")
     if growth <= 0.0:
         return x
-    change = x - site.zero
+    change = x - transducers.zero
     steps = np.floor(np.log1p(np.abs(change) / scale) / growth)
-    return site.zero + np.sign(change) * scale * np.expm1(growth * steps)
+    return transducers.zero + np.sign(change) * scale * np.expm1(growth * steps)
 
 
 def _stepped(x: np.ndarray, step: float, way: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
@@ -47,7 +47,7 @@ KIND = Kind(
     name="quantization",
     title="Quantization",
     text="The reading comes in steps.",
-    stage="readout",
+    site="readout",
     order=90,
     forms=(
         Form(
@@ -55,8 +55,8 @@ KIND = Kind(
             "r = Δ · round(r₀ / Δ)",
             "IEEE Std 1241 (2010): mid-tread quantizer",
             (_STEP,),
-            off={"step": 0.0},
-            shape=rounded,
+            neutral={"step": 0.0},
+            memoryless=rounded,
             after_conversion=True,
         ),
         Form(
@@ -64,8 +64,8 @@ KIND = Kind(
             "r = Δ · floor(r₀ / Δ)",
             "IEEE Std 1241 (2010): truncating quantizer",
             (_STEP,),
-            off={"step": 0.0},
-            shape=cut,
+            neutral={"step": 0.0},
+            memoryless=cut,
             after_conversion=True,
         ),
         Form(
@@ -76,8 +76,8 @@ KIND = Kind(
                 Parameter("bits", "1", 8.0, 1.0, 24.0, "Bits b of the converter."),
                 Parameter("range", "unit", 1.0, 1e-6, 1e6, "Range R that they divide.", log=True),
             ),
-            off={"range": 0.0},
-            shape=converter,
+            neutral={"range": 0.0},
+            memoryless=converter,
             after_conversion=True,
         ),
         Form(
@@ -88,8 +88,8 @@ KIND = Kind(
                 Parameter("scale", "unit", 0.1, 1e-6, 1e5, "Reading A from which on steps grow with it.", log=True),
                 Parameter("growth", "1", 0.05, 0.0, 3.0, "Width b of a step as a share of A and the reading together."),
             ),
-            off={"growth": 0.0},
-            shape=companded,
+            neutral={"growth": 0.0},
+            memoryless=companded,
             after_conversion=True,
         ),
     ),

@@ -9,36 +9,36 @@ import numpy as np
 
 from ...model.effect import Values
 from ...model.parameter import Parameter
-from ..engine.specification import Form, Kind, Site, number
+from ..engine.specification import Form, Kind, TransducerArray, scalar
 
 _LEVEL = Parameter("level", "unit", 1.0, 1e-4, 1e5, "Largest change of the reading from the one without load.", log=True)
 
 
-def clip(x: np.ndarray, time: np.ndarray, values: Values, site: Site, seed: int) -> np.ndarray:
+def clip(x: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
     """Cut off at the level."""
-    level = number(values, "level")
-    return site.zero + np.clip(x - site.zero, -level, level)
+    level = scalar(values, "level")
+    return transducers.zero + np.clip(x - transducers.zero, -level, level)
 
 
-def tanh(x: np.ndarray, time: np.ndarray, values: Values, site: Site, seed: int) -> np.ndarray:
+def tanh(x: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
     """Flatten as the hyperbolic tangent does."""
-    level = number(values, "level")
+    level = scalar(values, "level")
     if math.isinf(level):
         return x
-    return site.zero + level * np.tanh((x - site.zero) / level)
+    return transducers.zero + level * np.tanh((x - transducers.zero) / level)
 
 
-def rational(x: np.ndarray, time: np.ndarray, values: Values, site: Site, seed: int) -> np.ndarray:
+def rational(x: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
     """Flatten as a voltage divider does."""
-    change = x - site.zero
-    return site.zero + change / (1.0 + np.abs(change) / number(values, "level"))
+    change = x - transducers.zero
+    return transducers.zero + change / (1.0 + np.abs(change) / scalar(values, "level"))
 
 
 KIND = Kind(
     name="saturation",
     title="Saturation",
     text="The reading stops growing at a highest level.",
-    stage="readout",
+    site="readout",
     order=70,
     forms=(
         Form(
@@ -46,8 +46,8 @@ KIND = Kind(
             "r = min(r₀, L)",
             "IEEE Std 1241 (2010), section 3: full scale of a converter",
             (_LEVEL,),
-            off={"level": math.inf},
-            shape=clip,
+            neutral={"level": math.inf},
+            memoryless=clip,
             after_conversion=True,
         ),
         Form(
@@ -55,8 +55,8 @@ KIND = Kind(
             "r = L · tanh(r₀ / L)",
             "Dahiya and Valle, Robotic Tactile Sensing (2013)",
             (_LEVEL,),
-            off={"level": math.inf},
-            shape=tanh,
+            neutral={"level": math.inf},
+            memoryless=tanh,
             after_conversion=True,
         ),
         Form(
@@ -64,8 +64,8 @@ KIND = Kind(
             "r = r₀ / (1 + |r₀| / L)",
             "Flórez and Velásquez, IEEE ANDESCON (2010): force-sensing resistor in a voltage divider",
             (_LEVEL,),
-            off={"level": math.inf},
-            shape=rational,
+            neutral={"level": math.inf},
+            memoryless=rational,
             after_conversion=True,
         ),
     ),

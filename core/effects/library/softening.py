@@ -6,7 +6,7 @@ from __future__ import annotations
 import math
 
 from ...model.parameter import Parameter
-from ..engine.specification import Form, Kind, same_for_all_steps
+from ..engine.specification import Form, Kind, constants_from
 
 
 def ogden_roxburgh(force, slope, depth, slide, numbers, row, memory, point, at, commit):
@@ -53,7 +53,7 @@ KIND = Kind(
     name="softening",
     title="Softening",
     text="Is stiff when pressed for the first time and softer in the cycles after it.",
-    stage="pad",
+    site="pad",
     order=10,
     forms=(
         Form(
@@ -61,9 +61,9 @@ KIND = Kind(
             "f = fₑ · (1 − s · erf((1 − W/Wₘ) / b)),  W = fₑ d / 2, Wₘ the largest W so far",
             "Ogden and Roxburgh, Proc. R. Soc. A 455 (1999), without their constant m",
             (_SHARE, Parameter("width", "1", 0.5, 0.05, 3.0, "Width b of the way back to the first curve.")),
-            off={"share": 0.0},
+            neutral={"share": 0.0},
             law=ogden_roxburgh,
-            constants=same_for_all_steps("share", "width"),
+            constants=constants_from("share", "width"),
             memory=1,
         ),
         Form(
@@ -71,9 +71,9 @@ KIND = Kind(
             "f = fₑ · (1 − s · (1 − exp(−dₘ/D))),  dₘ the largest depth so far",
             "Simo, Comput. Methods Appl. Mech. Eng. 60 (1987): damage by the largest strain",
             (_SHARE, Parameter("depth", "m", 0.002, 1e-5, 0.1, "Depth D that does 63 % of it.", log=True)),
-            off={"share": 0.0},
+            neutral={"share": 0.0},
             law=peak,
-            constants=same_for_all_steps("share", "depth"),
+            constants=constants_from("share", "depth"),
             memory=1,
         ),
         Form(
@@ -81,9 +81,9 @@ KIND = Kind(
             "f = fₑ · (1 − s · (1 − exp(−p/P))),  p all the way pressed in so far",
             "Miehe, Eur. J. Mech. A 14 (1995): continuous damage by the arc length of the strain",
             (_SHARE, Parameter("path", "m", 0.01, 1e-5, 10.0, "Way P, over all cycles, that does 63 % of it.", log=True)),
-            off={"share": 0.0},
+            neutral={"share": 0.0},
             law=path,
-            constants=same_for_all_steps("share", "path"),
+            constants=constants_from("share", "path"),
             memory=2,
         ),
     ),

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 
 from ...model.parameter import Parameter
-from ..engine.specification import Form, Kind, same_for_all_steps
+from ..engine.specification import Form, Kind, constants_from
 
 
 def polynomial(force, slope, depth, slide, numbers, row, memory, point, at, commit):
@@ -53,7 +53,7 @@ KIND = Kind(
     name="stiffening",
     title="Stiffening",
     text="Gets stiffer the deeper it is pressed.",
-    stage="contact",
+    site="contact",
     order=10,
     forms=(
         Form(
@@ -61,18 +61,18 @@ KIND = Kind(
             "f = k d · (1 + (d/D)ᵖ)",
             "Rusch, J. Appl. Polym. Sci. 13 (1969): load of flexible foams with a power of the compression",
             (_DOUBLE, _POWER),
-            off={"depth": math.inf},
+            neutral={"depth": math.inf},
             law=polynomial,
-            constants=same_for_all_steps("depth", "exponent"),
+            constants=constants_from("depth", "exponent"),
         ),
         Form(
             "exponential",
             "f = k D · (exp(d/D) − 1)",
             "Fung, Biomechanics (1993), section 7.5: exponential stress-strain law of soft tissue",
             (Parameter("depth", "m", 0.004, 1e-4, 0.1, "Depth D by which the stiffness grows e-fold.", log=True),),
-            off={"depth": math.inf},
+            neutral={"depth": math.inf},
             law=exponential,
-            constants=same_for_all_steps("depth"),
+            constants=constants_from("depth"),
         ),
         Form(
             "foam",
@@ -82,9 +82,9 @@ KIND = Kind(
                 Parameter("depth", "m", 0.01, 2e-4, 0.1, "Depth L at which the foam's cells are closed.", log=True),
                 Parameter("exponent", "1", 2.0, 0.5, 8.0, "How suddenly it densifies."),
             ),
-            off={"depth": math.inf},
+            neutral={"depth": math.inf},
             law=foam,
-            constants=same_for_all_steps("depth", "exponent"),
+            constants=constants_from("depth", "exponent"),
         ),
     ),
 )

@@ -6,7 +6,7 @@ from __future__ import annotations
 import math
 
 from ...model.parameter import Parameter
-from ..engine.specification import Form, Kind, same_for_all_steps
+from ..engine.specification import Form, Kind, constants_from
 
 
 def gaussian(speed, force, numbers, row):
@@ -30,13 +30,13 @@ _PARAMETERS = (
     Parameter("rise", "1", 0.5, 0.0, 4.0, "By what share a friction is larger at rest than when sliding fast."),
     Parameter("speed", "m/s", 0.01, 1e-5, 2.0, "Sliding speed V at which the rise is mostly gone.", log=True),
 )
-_CONSTANTS = same_for_all_steps("rise", "speed")
+_CONSTANTS = constants_from("rise", "speed")
 
 KIND = Kind(
     name="stribeck",
     title="Stribeck Friction",
     text="Grips harder when it slides slowly than when it slides fast.",
-    stage="contact",
+    site="contact",
     order=20,
     forms=(
         Form(
@@ -44,8 +44,8 @@ KIND = Kind(
             "μ = μ₀ · (1 + a exp(−(v/V)²))",
             "Bo and Pavelescu, Wear 82 (1982); Canudas de Wit et al., IEEE Trans. Autom. Control 40 (1995)",
             _PARAMETERS,
-            off={"rise": 0.0},
-            friction=gaussian,
+            neutral={"rise": 0.0},
+            friction_law=gaussian,
             constants=_CONSTANTS,
         ),
         Form(
@@ -53,8 +53,8 @@ KIND = Kind(
             "μ = μ₀ · (1 + a exp(−v/V))",
             "Tustin, J. IEE 94 (1947); Armstrong-Hélouvry, Dupont and Canudas de Wit, Automatica 30 (1994)",
             _PARAMETERS,
-            off={"rise": 0.0},
-            friction=exponential,
+            neutral={"rise": 0.0},
+            friction_law=exponential,
             constants=_CONSTANTS,
         ),
         Form(
@@ -62,8 +62,8 @@ KIND = Kind(
             "μ = μ₀ · (1 + a / (1 + (v/V)²))",
             "Hess and Soom, J. Tribol. 112 (1990)",
             _PARAMETERS,
-            off={"rise": 0.0},
-            friction=rational,
+            neutral={"rise": 0.0},
+            friction_law=rational,
             constants=_CONSTANTS,
         ),
     ),

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from ...model.parameter import Parameter
-from ..engine.specification import Form, Kind, same_for_all_steps
+from ..engine.specification import Form, Kind, constants_from
 
 
 def linear(speed, force, numbers, row):
@@ -26,7 +26,7 @@ KIND = Kind(
     name="viscous-friction",
     title="Viscous Friction",
     text="Drags the harder the faster it slides.",
-    stage="contact",
+    site="contact",
     order=30,
     forms=(
         Form(
@@ -34,18 +34,18 @@ KIND = Kind(
             "fₜ = fₜ₀ + c v",
             "Armstrong-Hélouvry, Dupont and Canudas de Wit, Automatica 30 (1994)",
             (Parameter("viscosity", "N·s/m", 0.05, 0.0, 1e3, "Drag c of one texel per metre per second."),),
-            off={"viscosity": 0.0},
-            friction=linear,
-            constants=same_for_all_steps("viscosity"),
+            neutral={"viscosity": 0.0},
+            friction_law=linear,
+            constants=constants_from("viscosity"),
         ),
         Form(
             "load",
             "fₜ = fₜ₀ + c f v",
             "Bowden and Tabor, The Friction and Lubrication of Solids (1950): the area that is sheared grows with the load",
             (Parameter("viscosity", "s/m", 0.5, 0.0, 1e3, "Drag c per newton of load and metre per second."),),
-            off={"viscosity": 0.0},
-            friction=load,
-            constants=same_for_all_steps("viscosity"),
+            neutral={"viscosity": 0.0},
+            friction_law=load,
+            constants=constants_from("viscosity"),
         ),
         Form(
             "power",
@@ -55,9 +55,9 @@ KIND = Kind(
                 Parameter("drag", "N·(s/m)^p", 0.05, 0.0, 1e3, "Drag C of one texel at one metre per second."),
                 Parameter("exponent", "1", 0.5, 0.2, 2.0, "Exponent p of the speed."),
             ),
-            off={"drag": 0.0},
-            friction=power,
-            constants=same_for_all_steps("drag", "exponent"),
+            neutral={"drag": 0.0},
+            friction_law=power,
+            constants=constants_from("drag", "exponent"),
         ),
     ),
 )

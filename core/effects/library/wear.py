@@ -12,7 +12,7 @@ import numpy as np
 
 from ...model.effect import Values
 from ...model.parameter import Parameter
-from ..engine.specification import Form, Kind, number, same_for_all_steps
+from ..engine.specification import Form, Kind, constants_from, scalar
 
 
 def exponential(force, slope, depth, slide, numbers, row, memory, point, at, commit):
@@ -42,7 +42,7 @@ def dose(force, slope, depth, slide, numbers, row, memory, point, at, commit):
 
 
 def _with_step(values: Values, dt: np.ndarray) -> np.ndarray:
-    return np.column_stack([np.full(len(dt), number(values, "life")), dt])
+    return np.column_stack([np.full(len(dt), scalar(values, "life")), dt])
 
 
 def archard(force, slope, depth, slide, numbers, row, memory, point, at, commit):
@@ -71,7 +71,7 @@ KIND = Kind(
     name="wear",
     title="Wear",
     text="Loses force for good, the more it has been pressed or rubbed.",
-    stage="pad",
+    site="pad",
     order=40,
     forms=(
         Form(
@@ -79,9 +79,9 @@ KIND = Kind(
             "f = fₑ · exp(−A/L),  A the sum of all loads put on so far",
             "Lemaitre and Desmorat, Engineering Damage Mechanics (2005): fatigue damage",
             (Parameter("life", "N", 100.0, 0.01, 1e9, "Sum L of loads that leaves 37 % of the force.", log=True),),
-            off={"life": math.inf},
+            neutral={"life": math.inf},
             law=exponential,
-            constants=same_for_all_steps("life"),
+            constants=constants_from("life"),
             memory=2,
         ),
         Form(
@@ -89,9 +89,9 @@ KIND = Kind(
             "f = fₑ · (1 − A/L),  A the sum of all loads put on so far",
             "Palmgren (1924); Miner, J. Appl. Mech. 12 (1945): linear damage",
             (Parameter("life", "N", 100.0, 0.01, 1e9, "Sum L of loads that leaves nothing.", log=True),),
-            off={"life": math.inf},
+            neutral={"life": math.inf},
             law=linear,
-            constants=same_for_all_steps("life"),
+            constants=constants_from("life"),
             memory=2,
         ),
         Form(
@@ -99,7 +99,7 @@ KIND = Kind(
             "f = fₑ · exp(−B/L),  Ḃ = fₑ",
             "Lemaitre and Desmorat, Engineering Damage Mechanics (2005), section 5: creep damage",
             (Parameter("life", "N·s", 100.0, 0.01, 1e9, "Load over time L that leaves 37 % of the force.", log=True),),
-            off={"life": math.inf},
+            neutral={"life": math.inf},
             law=dose,
             constants=_with_step,
             memory=1,
@@ -109,9 +109,9 @@ KIND = Kind(
             "f = fₑ · (1 − δ/d),  δ̇ = κ fₑ |v|",
             "Archard, J. Appl. Phys. 24 (1953)",
             (Parameter("rate", "1/N", 1e-3, 0.0, 10.0, "Thickness κ lost per newton and metre slid, m/(N·m)."),),
-            off={"rate": 0.0},
+            neutral={"rate": 0.0},
             law=archard,
-            constants=same_for_all_steps("rate"),
+            constants=constants_from("rate"),
             memory=1,
         ),
         Form(
@@ -119,9 +119,9 @@ KIND = Kind(
             "f = fₑ · exp(−W/L),  Ẇ = fₑ √(v² + ḋ²)",
             "Fouvry, Kapsa and Vincent, Wear 200 (1996): what is lost goes with the energy that was dissipated",
             (Parameter("life", "J", 0.1, 1e-6, 1e9, "Load times way L that leaves 37 % of the force.", log=True),),
-            off={"life": math.inf},
+            neutral={"life": math.inf},
             law=work,
-            constants=same_for_all_steps("life"),
+            constants=constants_from("life"),
             memory=2,
         ),
     ),

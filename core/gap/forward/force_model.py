@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from ...compiled.kernels import kernel
-from ...effects.engine import binding
+from ...effects.engine import contact_forces
 from ...laws.contact import bristle_rate, bristle_step, friction_force, max_bristle_deflection, parameter_row
 from ...model.effect import Effect
 from ...model.sensor_parameters import SensorParameters
@@ -108,7 +108,7 @@ class Felt:
         None of the effects may have a number for each texel.
         """
         force = np.zeros((len(self.time), self.width))
-        found = binding.forces(acting, p, self.time, self.depth, self.slide, self.rate)
+        found = contact_forces.normal_forces(acting, p, self.time, self.depth, self.slide, self.rate)
         force[:, self.place] = found[:, self.group]
         return force
 
@@ -130,7 +130,7 @@ class Felt:
         total = np.zeros((len(self.time), 3))
         factor, viscous = np.ones(1), np.zeros(1)
         if rubbing:
-            factor, viscous = binding.friction(rubbing, np.sqrt(t.square), pressed)
+            factor, viscous = contact_forces.friction_factors(rubbing, np.sqrt(t.square), pressed)
         work = np.empty((5, len(pressed)))
         sum_forces(t, pressed, factor, viscous, parameter_row(p), work, total)
         return total

@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...effects.engine import binding
-from ...effects.engine.registry import form_of, stage_of
-from ...effects.engine.registry import placed as placed_texels
+from ...effects.engine import readout_chain
+from ...effects.engine.registry import actual_placement as placed_texels
+from ...effects.engine.registry import form_of, site_of_action
 from ...model.effect import Effect
 from ...model.sensor import Sensor
 from ...model.sensor_parameters import SensorParameters
@@ -80,10 +80,10 @@ class Predictor:
     def _reading(self, model: Model, columns: np.ndarray | None) -> np.ndarray:
         p = model.parameters
         # Noise is left out: what is predicted is what is to be expected.
-        reading = tuple(e for e in model.effects if stage_of(e) == "readout" and e.name != "noise")
+        reading = tuple(e for e in model.effects if site_of_action(e) == "readout" and e.name != "noise")
         key = (self._force_key(model, columns), p.gain, p.zero, _key(reading))
         if key not in self._readings:
-            site = binding.site_of(Sensor("sensor", 0, self.rig.texels, p))
+            site = readout_chain.transducers_of(Sensor("sensor", 0, self.rig.texels, p))
             if columns is not None:
                 site = replace(
                     site,
@@ -94,12 +94,12 @@ class Predictor:
                 )
                 reading = tuple(_restricted(effect, columns) for effect in reading)
             force = self.normal_force(model, columns)
-            _keep(self._readings, key, binding.readings(reading, site, self.trial.time, force), KEPT)
+            _keep(self._readings, key, readout_chain.readings(reading, site, self.trial.time, force), KEPT)
         return self._readings[key]
 
     def _total(self, model: Model) -> np.ndarray:
         """Sum of normal and friction forces on the sensor, (T, 3) N."""
-        p, rubbing = model.parameters, tuple(effect for effect in model.effects if _has(effect, "friction"))
+        p, rubbing = model.parameters, tuple(effect for effect in model.effects if _has(effect, "friction_law"))
         slides = (p.sigma0, p.sigma1, p.mus, p.mud, p.x0, p.ct, _key(rubbing))
         key = (self._force_key(model, None), slides)
         if key not in self._totals:
@@ -108,7 +108,7 @@ class Predictor:
 
     def placed(self, model: Model) -> Stimulus:
         """Return what the texels meet with the effects that move them."""
-        moving = tuple(effect for effect in model.effects if _has(effect, "place"))
+        moving = tuple(effect for effect in model.effects if _has(effect, "placement"))
         if not moving or self.trial.stimulus != "pose":
             return self.stimulus
         key = _key(moving)
@@ -138,7 +138,7 @@ class Predictor:
 
     def _felt_by(self, model: Model, columns: np.ndarray | None) -> Felt:
         which = None if columns is None else columns.tobytes()
-        key = which, _key(tuple(effect for effect in model.effects if _has(effect, "place")))
+        key = which, _key(tuple(effect for effect in model.effects if _has(effect, "placement")))
         if key not in self._felt:
             _keep(self._felt, key, Felt.of(self.placed(model), columns, self.rig), 2 * KEPT)
         return self._felt[key]
@@ -146,11 +146,11 @@ class Predictor:
 
 def _acting(model: Model) -> tuple[Effect, ...]:
     """The effects on normal forces, and those that move the texels."""
-    return tuple(e for e in model.effects if stage_of(e) != "readout" and not _has(e, "friction"))
+    return tuple(e for e in model.effects if site_of_action(e) != "readout" and not _has(e, "friction_law"))
 
 
-def _has(effect: Effect, way: str) -> bool:
-    return form_of(effect.name, effect.form).way == way
+def _has(effect: Effect, mechanism: str) -> bool:
+    return form_of(effect.name, effect.form).mechanism == mechanism
 
 
 def _keep(memory: dict, key: object, value: object, most: int) -> None:

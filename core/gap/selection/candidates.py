@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...effects.engine.registry import library
-from ...effects.engine.specification import Form, Kind, Site
+from ...effects.engine.specification import Form, Kind, TransducerArray
 from ...model.effect import Effect
 from ...model.parameter import Parameter
 from ..fitting.least_squares import Free
@@ -140,7 +140,7 @@ class Candidate:
             _, top = search_range(p, scales)
             size = max(abs(p.default), 0.1 * top) if p.unit == "1" else 0.3 * top
             high = min(p.high, LIMITS.get((self.kind.name, self.form.name, p.name), p.high))
-            rest = float(self.form.off.get(p.name, p.default)) if p.per_texel else 0.0
+            rest = float(self.form.neutral.get(p.name, p.default)) if p.per_texel else 0.0
             made.append(Free(index, p.name, p.low, high, p.log, max(size, 1e-12), p.per_texel, rest))
         return made
 
@@ -170,14 +170,14 @@ class Candidate:
 
     def strength(self) -> str | None:
         """The parameter that is zero when the effect is not there, if there is one."""
-        for name, value in self.form.off.items():
+        for name, value in self.form.neutral.items():
             if value == 0.0:
                 return name
         return None
 
     def reach(self) -> str | None:
         """The parameter that is infinite when the effect is not there, if there is one: its inverse is the strength."""
-        for name, value in self.form.off.items():
+        for name, value in self.form.neutral.items():
             if np.isinf(value):
                 return name
         return None
@@ -205,15 +205,15 @@ def candidates(predictors: Sequence[Predictor], model: Model) -> list[Candidate]
         if kind.name in NEVER or kind.name in cannot:
             continue
         for form in kind.forms:
-            acts_on_force = kind.stage_of(form) != "readout"
+            acts_on_force = kind.site_of(form) != "readout"
             if (
                 form.random
                 or form.name == "bits"
-                or (form.place is not None and not posed)
-                or (form.friction is not None and not dragged)
+                or (form.placement is not None and not posed)
+                or (form.friction_law is not None and not dragged)
             ):
                 continue
-            if form.friction is None and acts_on_force and loaded:
+            if form.friction_law is None and acts_on_force and loaded:
                 continue  # known loads leave a law of contact nothing to say
             if not acts_on_force and not read:
                 continue
@@ -226,16 +226,16 @@ def candidates(predictors: Sequence[Predictor], model: Model) -> list[Candidate]
 
 def is_spatial(form: Form) -> bool:
     """Whether a form lets texels feel their neighbours: found out by loading one of three."""
-    if form.mix is not None:
+    if form.coupling is not None:
         return True
-    if form.shape is None:
+    if form.memoryless is None:
         return False
     position = np.array([[0.0, 0.0, 0.0], [0.003, 0.0, 0.0], [0.006, 0.0, 0.0]])
-    site = Site(position, np.full(3, 9e-6), np.zeros(3, int), np.arange(3))
+    site = TransducerArray(position, np.full(3, 9e-6), np.zeros(3, int), np.arange(3))
     values = form.defaults()
     for p in form.parameters:
         if p.per_texel:
             values[p.name] = tuple([float(values[p.name])] * 3)  # type: ignore[arg-type]
     time = np.zeros(2)
-    alone, loaded = (form.shape(np.array([[0.0, x, 0.0]] * 2), time, values, site, 0)[0] for x in (0.0, 0.05))
+    alone, loaded = (form.memoryless(np.array([[0.0, x, 0.0]] * 2), time, values, site, 0)[0] for x in (0.0, 0.05))
     return bool(np.abs(loaded - alone)[[0, 2]].max() > 1e-9)

@@ -104,7 +104,7 @@ class Ground:
 
 def friction_kinds() -> list[str]:
     """Names of the effects that act on friction alone."""
-    return [kind.name for kind in library().values() if all(form.friction is not None for form in kind.forms)]
+    return [kind.name for kind in library().values() if all(form.friction_law is not None for form in kind.forms)]
 
 
 @dataclass
@@ -235,7 +235,7 @@ class Explainer:
         forms = [c for c in forms if c.name not in taken or may_repeat(c)]
         forms = [c for c in forms if not is_free_already(c, account.fit.free) and (first or c.name not in self.mixed)]
         if self.ground.both:
-            forms = [c for c in forms if (c.form.friction is not None) == friction]
+            forms = [c for c in forms if (c.form.friction_law is not None) == friction]
         ranked: list[Found] = []
         for what, done, found in search(self.views, account.fit, forms, self.scales):
             yield what, start + share * done
@@ -384,7 +384,7 @@ class Explainer:
 
 def may_repeat(candidate: Candidate) -> bool:
     """Whether a second effect of the kind would be more than the first with other numbers."""
-    return not candidate.local and candidate.name not in READ_OFF and candidate.form.place is None
+    return not candidate.local and candidate.name not in READ_OFF and candidate.form.placement is None
 
 
 def is_free_already(candidate: Candidate, free: Sequence[Free]) -> bool:

@@ -57,8 +57,8 @@ class Views:
         if candidate.name in READ_OFF:
             return self.whole
         forms = [candidate.form, *(form_of(e.name, e.form) for e in model.effects)]
-        rubs = candidate.form.friction is not None
-        if any(is_spatial(form) or form.place is not None for form in forms):
+        rubs = candidate.form.friction_law is not None
+        if any(is_spatial(form) or form.placement is not None for form in forms):
             return self.whole if rubs else self.thin  # bristles need every sample, and friction shows in net forces alone
         return self.rubbed if rubs else self.narrow
 
@@ -134,7 +134,7 @@ def visible(shares: Sequence[Share], found: Fit) -> tuple[Free, ...]:
         if item.effect < 0:
             return item.name in FRICTION
         effect = found.model.effects[item.effect]
-        return form_of(effect.name, effect.form).friction is not None
+        return form_of(effect.name, effect.form).friction_law is not None
 
     return tuple(item for item in found.free if not rubs(item))
 
@@ -200,7 +200,7 @@ def promising(
         parameter = next(q.scaled(gain) for q in form.parameters if q.per_texel)
         moved = candidate.effect({parameter.name: float(parameter.default) + 0.01 * _local_size(parameter, scales)}, n, gain)
         return [(_texel_score(direction, model.with_effect(moved)), candidate.effect({}, n, gain))]
-    if form.place is not None:
+    if form.placement is not None:
         return sorted(
             [_placed_score(candidate, direction, model, scales, gain), *_placed_far(candidate, direction, model, scales, gain)],
             key=lambda entry: -entry[0],
@@ -250,7 +250,7 @@ def _placed_score(
     candidate: Candidate, direction: Direction, model: Model, scales: Scales, gain: float
 ) -> tuple[float, Effect]:
     """The same for a form that moves the texels: all its numbers at once, each by a small step from where texels should be."""
-    off = {name: 0.0 for name in candidate.form.off}
+    off = {name: 0.0 for name in candidate.form.neutral}
     steps = [0.02 * scales.pitch if q.unit == "m" else 2e-3 for q in candidate.form.parameters]
     changes = []
     for q, step in zip(candidate.form.parameters, steps, strict=True):

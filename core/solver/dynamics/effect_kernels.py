@@ -11,7 +11,16 @@ import math
 
 from ...compiled.kernels import kernel
 from ...effects.engine import compiled_program
-from ...effects.engine.compiled_program import DAMPING, FACTOR, FORCE, RATE, VISCOUS, apply_friction, apply_laws, press
+from ...effects.engine.compiled_program import (
+    DAMPING,
+    FACTOR,
+    FORCE,
+    RATE,
+    VISCOUS,
+    apply_force_laws,
+    apply_friction_laws,
+    press,
+)
 from ...laws.contact import (
     CN,
     CT,
@@ -75,8 +84,8 @@ def apply_effects(sensor, when, block, begin, count, offset, p, model, memory, s
     """
     linear = p[EXPONENT] == LINEAR
     slot = block * LANES + begin
-    apply_laws(sensor, when, felt, block, LANES, begin, count, slots, slot, offset, linear, model.program, memory, False)
-    apply_friction(sensor, felt, block, LANES, begin, count, slots, model.program, memory)
+    apply_force_laws(sensor, when, felt, block, LANES, begin, count, slots, slot, offset, linear, model.program, memory, False)
+    apply_friction_laws(sensor, felt, block, LANES, begin, count, slots, model.program, memory)
 
 
 @kernel
@@ -115,7 +124,7 @@ def commit_memory(sensor, p, model, pressed, every, memory):
     """Bring the memory of a sensor's points to the step's end, and forget what pressed on them; `every` counts all points."""
     points, first = len(model.points), model.point_start[sensor]
     count, linear = model.point_start[sensor + 1] - first, p[EXPONENT] == LINEAR
-    apply_laws(sensor, STEP, pressed, 0, points, first, count, every, first, 0, linear, model.program, memory, True)
+    apply_force_laws(sensor, STEP, pressed, 0, points, first, count, every, first, 0, linear, model.program, memory, True)
     for column in range(compiled_program.COLUMNS):
         for i in range(count):
             pressed[0, column * points + first + i] = 0.0

@@ -8,7 +8,7 @@ import pytest
 from solver_scenes import box, cube_on_pad, pressed, shape
 from trimesh.creation import icosphere
 
-from palpate.core.effects.engine.binding import forces
+from palpate.core.effects.engine.contact_forces import normal_forces
 from palpate.core.effects.engine.registry import effect, library
 from palpate.core.effects.engine.sensor_effects import check_scenario, mounted_texels
 from palpate.core.errors import EffectError
@@ -128,7 +128,7 @@ FORCE_FORMS = [
     (kind.name, form.name)
     for kind in library().values()
     for form in kind.forms
-    if kind.stage_of(form) != "readout" and form.law is not None
+    if kind.site_of(form) != "readout" and form.law is not None
 ]
 
 
@@ -144,7 +144,7 @@ def test_the_solver_feels_what_the_law_says_over_time(name, form):
     time = np.arange((frames - 1) * steps + 1) / (fps * steps)
     depth = np.maximum(np.interp(time, np.arange(frames) / fps, 0.01 - path[:, 2]), 0.0)[:, None]
     # The run begins with nothing done: what presses at its first frame counts from its first step on.
-    whole = forces((item,), scenario.sensors[0].parameters, time, depth)[::steps, 0]
+    whole = normal_forces((item,), scenario.sensors[0].parameters, time, depth)[::steps, 0]
     scale = np.abs(whole).max()
     np.testing.assert_allclose(felt.min(axis=1)[1:], whole[1:], atol=5e-3 * scale)
     np.testing.assert_allclose(felt.max(axis=1)[1:], whole[1:], atol=5e-3 * scale)

@@ -6,8 +6,8 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.special import erf
 
-from palpate.core.effects.engine.binding import forces, friction
-from palpate.core.effects.engine.registry import effect, placed
+from palpate.core.effects.engine.contact_forces import friction_factors, normal_forces
+from palpate.core.effects.engine.registry import actual_placement, effect
 from palpate.core.model.sensor_parameters import SensorParameters
 
 K = 1000.0
@@ -18,7 +18,7 @@ TIME = np.linspace(0.0, 20.0, 2001)
 def force(item, depth, slide=None, time=TIME, parameters=SPRING):
     """One texel's force over time."""
     slide = None if slide is None else np.asarray(slide, float)[:, None]
-    return forces((item,), parameters, time, np.asarray(depth, float)[:, None], slide)[:, 0]
+    return normal_forces((item,), parameters, time, np.asarray(depth, float)[:, None], slide)[:, 0]
 
 
 def ramp_and_hold(at=1.0, depth=0.002):
@@ -168,7 +168,7 @@ def test_hysteresis_takes_energy_and_forgets_on_release(form):
     depth = np.concatenate([cycle()[:-1], [0.0]])
     found = force(effect("hysteresis", form), depth)
     assert np.sum(0.5 * (found[1:] + found[:-1]) * np.diff(depth)) > 1e-4 * K * 0.002**2
-    twice = forces((effect("hysteresis", form),), SPRING, np.arange(2.0 * len(TIME)), np.tile(depth, 2)[:, None])[:, 0]
+    twice = normal_forces((effect("hysteresis", form),), SPRING, np.arange(2.0 * len(TIME)), np.tile(depth, 2)[:, None])[:, 0]
     np.testing.assert_allclose(twice[: len(TIME)], twice[len(TIME) :], atol=1e-12)
 
 
@@ -291,7 +291,7 @@ def test_friction_laws():
     speed, load = np.array([0.0, 0.005, 0.01, 0.1]), np.array([0.5, 1.0, 2.0, 3.0])
     x = speed / 0.01
     for form, shape in (("gaussian", np.exp(-(x**2))), ("exponential", np.exp(-x)), ("rational", 1 / (1 + x**2))):
-        factor, viscous = friction((effect("stribeck", form, rise=0.7, speed=0.01),), speed, load)
+        factor, viscous = friction_factors((effect("stribeck", form, rise=0.7, speed=0.01),), speed, load)
         np.testing.assert_allclose(factor, 1 + 0.7 * shape, rtol=1e-12)
         assert not viscous.any()
     for form, values, expected in (
@@ -299,11 +299,11 @@ def test_friction_laws():
         ("load", {"viscosity": 0.3}, 0.3 * load * speed),
         ("power", {"drag": 0.3, "exponent": 0.5}, 0.3 * speed**0.5),
     ):
-        factor, viscous = friction((effect("viscous-friction", form, **values),), speed, load)
+        factor, viscous = friction_factors((effect("viscous-friction", form, **values),), speed, load)
         np.testing.assert_allclose(viscous * speed, expected, rtol=1e-12)
         assert (factor == 1.0).all()
     both = (effect("stribeck", rise=1.0), effect("stribeck", rise=0.5), effect("viscous-friction"))
-    assert friction(both, np.zeros(1), np.ones(1)) == (3.0, 0.05)
+    assert friction_factors(both, np.zeros(1), np.ones(1)) == (3.0, 0.05)
 
 
 def test_misalignment_is_a_rigid_motion():
@@ -311,14 +311,18 @@ def test_misalignment_is_a_rigid_motion():
     position = random.normal(size=(20, 3))
     normal = np.tile([0.0, 0.0, 1.0], (20, 1))
     tangent = np.tile([1.0, 0.0, 0.0], (20, 1))
-    found, up, across = placed((effect("misalignment", "shift", x=0.01, y=-0.02),), position, normal, tangent)
+    found, up, across = actual_placement((effect("misalignment", "shift", x=0.01, y=-0.02),), position, normal, tangent)
     np.testing.assert_allclose(found - position, np.tile([0.01, -0.02, 0.0], (20, 1)), atol=1e-15)
-    found, up, across = placed((effect("misalignment", "turn", x=0.0, y=0.0, about_z=0.3),), position, normal, tangent)
+    found, up, across = actual_placement(
+        (effect("misalignment", "turn", x=0.0, y=0.0, about_z=0.3),), position, normal, tangent
+    )
     middle = position.mean(axis=0)
     turn = np.array([[np.cos(0.3), -np.sin(0.3), 0], [np.sin(0.3), np.cos(0.3), 0], [0, 0, 1]])
     np.testing.assert_allclose(found, middle + (position - middle) @ turn.T, atol=1e-14)
     np.testing.assert_allclose(across, tangent @ turn.T, atol=1e-15)
-    found, up, across = placed((effect("misalignment", "tilt", about_x=0.2, about_y=0.1, z=0.001),), position, normal, tangent)
+    found, up, across = actual_placement(
+        (effect("misalignment", "tilt", about_x=0.2, about_y=0.1, z=0.001),), position, normal, tangent
+    )
     np.testing.assert_allclose(
         np.linalg.norm(found[:, None] - found, axis=2), np.linalg.norm(position[:, None] - position, axis=2)
     )

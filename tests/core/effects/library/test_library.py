@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 
 from palpate.core.effects.engine import specification
-from palpate.core.effects.engine.binding import Pad, Reader, forces, friction, readings
-from palpate.core.effects.engine.registry import check, effect, form_of, from_dict, kind_of, library, placed, to_dict
-from palpate.core.effects.engine.specification import Site
+from palpate.core.effects.engine.contact_forces import StepwiseNormalForces, friction_factors, normal_forces
+from palpate.core.effects.engine.readout_chain import ReadoutChain, readings
+from palpate.core.effects.engine.registry import actual_placement, check, effect, form_of, from_dict, kind_of, library, to_dict
+from palpate.core.effects.engine.specification import TransducerArray
 from palpate.core.errors import EffectError
 from palpate.core.model.effect import Effect
 from palpate.core.model.sensor_parameters import SensorParameters
@@ -21,10 +22,10 @@ ROWS, COLUMNS, PITCH = 4, 3, 0.0034
 PARAMETERS = SensorParameters(k=1000.0, cn=10.0)
 
 
-def site(gain=1.0, zero=0.0) -> Site:
+def site(gain=1.0, zero=0.0) -> TransducerArray:
     row, column = (grid.ravel() for grid in np.mgrid[0:ROWS, 0:COLUMNS])
     position = np.stack([column * PITCH, row * PITCH, np.zeros(ROWS * COLUMNS)], axis=1)
-    return Site(position, np.full(len(position), PITCH**2), row, column, gain, zero)
+    return TransducerArray(position, np.full(len(position), PITCH**2), row, column, gain, zero)
 
 
 def presses(samples=400, dt=0.02, seed=1) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -48,19 +49,19 @@ def corners(form, gain=1.0):
 def noticeable(form) -> dict[str, float]:
     """The defaults, but nothing that is off."""
     defaults = form.defaults()
-    return {p.name: 0.9 * p.low + 0.1 * p.high for p in form.parameters if defaults[p.name] == form.off.get(p.name)}
+    return {p.name: 0.9 * p.low + 0.1 * p.high for p in form.parameters if defaults[p.name] == form.neutral.get(p.name)}
 
 
 @every_form
 def test_a_form_says_what_it_is(name, form):
     kind, found = kind_of(name), form_of(name, form)
-    assert kind.stage_of(found) in specification.STAGES
+    assert kind.site_of(found) in specification.SITES_OF_ACTION
     assert kind.text.endswith(".") and found.formula and found.reference
-    ways = [found.law, found.shape, found.mix, found.delay, found.friction, found.place]
-    assert getattr(found, found.way) is not None
+    ways = [found.law, found.memoryless, found.coupling, found.delay, found.friction_law, found.placement]
+    assert getattr(found, found.mechanism) is not None
     assert sum(way is not None for way in ways) == 1
-    assert (found.constants is not None) == (found.law is not None or found.friction is not None)
-    assert set(found.off) <= {parameter.name for parameter in found.parameters}
+    assert (found.constants is not None) == (found.law is not None or found.friction_law is not None)
+    assert set(found.neutral) <= {parameter.name for parameter in found.parameters}
     for parameter in found.parameters:
         assert parameter.low <= parameter.default <= parameter.high
         assert parameter.text.endswith(".") and parameter.unit
@@ -69,17 +70,17 @@ def test_a_form_says_what_it_is(name, form):
 
 @every_form
 def test_nothing_is_left_of_it_when_it_is_off(name, form):
-    off = Effect(name, form, {**form_of(name, form).defaults(), **form_of(name, form).off}, seed=3)
+    off = Effect(name, form, {**form_of(name, form).defaults(), **form_of(name, form).neutral}, seed=3)
     time, depth, slide = presses()
-    base_force = forces((), PARAMETERS, time, depth)
-    np.testing.assert_allclose(forces((off,), PARAMETERS, time, depth, slide), base_force, rtol=1e-9, atol=1e-12)
+    base_force = normal_forces((), PARAMETERS, time, depth)
+    np.testing.assert_allclose(normal_forces((off,), PARAMETERS, time, depth, slide), base_force, rtol=1e-9, atol=1e-12)
     there = site(gain=-2.0, zero=5.0)
     np.testing.assert_allclose(readings((off,), there, time, base_force), 5.0 - 2.0 * base_force, rtol=1e-9, atol=1e-9)
-    factor, viscous = friction((off,), np.array([0.0, 0.1, 1.0]), 1.0)
+    factor, viscous = friction_factors((off,), np.array([0.0, 0.1, 1.0]), 1.0)
     np.testing.assert_allclose(factor, 1.0, rtol=1e-12)
     np.testing.assert_allclose(viscous, 0.0, atol=1e-12)
     normal, tangent = np.tile([0.0, 0.0, 1.0], (len(there), 1)), np.tile([1.0, 0.0, 0.0], (len(there), 1))
-    for found, given in zip(placed((off,), there.position, normal, tangent), (there.position, normal, tangent)):
+    for found, given in zip(actual_placement((off,), there.position, normal, tangent), (there.position, normal, tangent)):
         np.testing.assert_allclose(found, given, atol=1e-15)
 
 
@@ -90,10 +91,10 @@ def test_numbers_stay_finite_at_the_bounds(name, form):
     for values in corners(form_of(name, form)):
         item = Effect(name, form, values)
         check((item,), "pad")
-        force = forces((item,), PARAMETERS, time, depth, slide)
+        force = normal_forces((item,), PARAMETERS, time, depth, slide)
         assert np.isfinite(force).all()
         assert np.isfinite(readings((item,), site(), time, force)).all()
-        assert np.isfinite(friction((item,), np.array([0.0, 1e-9, 1.0, 1e3]), 1.0)).all()
+        assert np.isfinite(friction_factors((item,), np.array([0.0, 1e-9, 1.0, 1e3]), 1.0)).all()
 
 
 @every_form
@@ -101,9 +102,9 @@ def test_sample_by_sample_gives_what_the_whole_signal_gives(name, form):
     """Both from the start, and after any pause; lengths of step are told apart to a billionth."""
     item = effect(name, form, seed=7)
     time, depth, slide = presses()
-    whole = forces((item,), PARAMETERS, time, depth, slide)
+    whole = normal_forces((item,), PARAMETERS, time, depth, slide)
     lengths = np.diff(time, prepend=time[0])
-    pad, single = Pad((item,), PARAMETERS, lengths, depth.shape[1]), np.zeros_like(depth)
+    pad, single = StepwiseNormalForces((item,), PARAMETERS, lengths, depth.shape[1]), np.zeros_like(depth)
     rate = np.diff(depth, axis=0, prepend=depth[:1]) / np.where(lengths > 0, lengths, 1.0)[:, None]
     for i in range(len(time)):
         asked, _, _ = pad.step(i, depth[i], rate[i], slide[i], commit=False)
@@ -111,7 +112,7 @@ def test_sample_by_sample_gives_what_the_whole_signal_gives(name, form):
         np.testing.assert_array_equal(asked, single[i])
     np.testing.assert_allclose(single, whole, rtol=1e-7, atol=1e-9)
 
-    reader = Reader((item,), site())
+    reader = ReadoutChain((item,), site())
     pieces = np.split(np.arange(len(time)), [1, 2, 17, 200])
     stream = np.concatenate([reader.read(time[piece], whole[piece]) for piece in pieces])
     np.testing.assert_allclose(stream, readings((item,), site(), time, whole), rtol=1e-7, atol=1e-9)
@@ -119,7 +120,7 @@ def test_sample_by_sample_gives_what_the_whole_signal_gives(name, form):
 
 @every_form
 def test_the_tangent_is_the_derivative_of_the_force(name, form):
-    pad = Pad((effect(name, form),), SensorParameters(k=1000.0, cn=0.0), [0.01], 1)
+    pad = StepwiseNormalForces((effect(name, form),), SensorParameters(k=1000.0, cn=0.0), [0.01], 1)
     still = np.zeros(1)
     for depth in (0.0, 5e-4, 1.5e-3, 1.2e-3):
         pad.step(0, np.array([depth]), still)
@@ -134,7 +135,7 @@ def test_the_tangent_is_the_derivative_of_the_force(name, form):
 def test_the_same_moment_asked_twice_reads_the_same(name, form):
     item = effect(name, form, seed=2)
     time, depth, _ = presses(50)
-    reader = Reader((item,), site())
+    reader = ReadoutChain((item,), site())
     reader.read(time, 1000.0 * depth)
     once = reader.step(time[-1] + 0.5, 1000.0 * depth[30])
     np.testing.assert_array_equal(reader.step(time[-1] + 0.5, 1000.0 * depth[30]), once)
@@ -170,14 +171,14 @@ def test_the_law_of_hunt_and_crossley_is_a_base_as_well():
     parameters = SensorParameters(k=3e4, normal_law="hunt-crossley", exponent=1.5, dissipation=2.0)
     time, depth, slide = presses(80)
     items = (effect("stiffening"), effect("creep"))
-    whole = forces(items, parameters, time, depth)
+    whole = normal_forces(items, parameters, time, depth)
     lengths = np.diff(time, prepend=time[0])
-    pad = Pad(items, parameters, lengths, depth.shape[1])
+    pad = StepwiseNormalForces(items, parameters, lengths, depth.shape[1])
     rate = np.diff(depth, axis=0, prepend=depth[:1]) / np.where(lengths > 0, lengths, 1.0)[:, None]
     for i in range(len(time)):
         np.testing.assert_allclose(pad.step(i, depth[i], rate[i])[0], whole[i], rtol=1e-9, atol=1e-12)
     np.testing.assert_allclose(
-        forces((), parameters, time, depth, rate=np.zeros_like(depth)), 3e4 * depth**1.5, rtol=1e-12, atol=1e-12
+        normal_forces((), parameters, time, depth, rate=np.zeros_like(depth)), 3e4 * depth**1.5, rtol=1e-12, atol=1e-12
     )
 
 
@@ -205,10 +206,10 @@ def test_forms_differ_from_one_another():
         seen = []
         for form in kind.forms:
             item = effect(kind.name, form.name, seed=5, **noticeable(form))
-            force = forces((item,), PARAMETERS, time, depth, slide)
+            force = normal_forces((item,), PARAMETERS, time, depth, slide)
             reading = readings((item,), site(), time, force)
-            factor, viscous = friction((item,), np.geomspace(1e-5, 1, 9), np.linspace(0.5, 2, 9))
-            moved = placed((item,), site().position, np.ones((12, 3)), np.ones((12, 3)))
+            factor, viscous = friction_factors((item,), np.geomspace(1e-5, 1, 9), np.linspace(0.5, 2, 9))
+            moved = actual_placement((item,), site().position, np.ones((12, 3)), np.ones((12, 3)))
             seen.append(np.concatenate([np.ravel(part) for part in (force, reading, factor, viscous, *moved)]))
         for i, one in enumerate(seen):
             assert not any(np.allclose(one, other, rtol=1e-6) for other in seen[:i]), kind.forms[i].name

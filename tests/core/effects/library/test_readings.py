@@ -5,18 +5,18 @@ import numpy as np
 import pytest
 from scipy.signal import TransferFunction, lsim
 
-from palpate.core.effects.engine import random_numbers
-from palpate.core.effects.engine.binding import Reader, readings
-from palpate.core.effects.engine.mixing import mixing, nearest_distance, pairs_within
+from palpate.core.effects.engine import random_streams
+from palpate.core.effects.engine.coupling_matrix import coupling_matrix, nearest_distance, pairs_within
+from palpate.core.effects.engine.readout_chain import ReadoutChain, readings
 from palpate.core.effects.engine.registry import effect
-from palpate.core.effects.engine.specification import Site
+from palpate.core.effects.engine.specification import TransducerArray
 from palpate.core.errors import EffectError
 
 ROWS, COLUMNS, PITCH = 14, 6, 0.0034
 N = ROWS * COLUMNS
 ROW, COLUMN = (grid.ravel() for grid in np.mgrid[0:ROWS, 0:COLUMNS])
 POSITION = np.stack([COLUMN * PITCH, ROW * PITCH, np.zeros(N)], axis=1)
-GRID = Site(POSITION, np.full(N, PITCH**2), ROW, COLUMN)
+GRID = TransducerArray(POSITION, np.full(N, PITCH**2), ROW, COLUMN)
 TIME = np.linspace(0.0, 10.0, 501)
 
 
@@ -63,7 +63,7 @@ def test_formulas(name, form, values, formula):
 
 
 def test_saturation_counts_from_the_reading_without_load():
-    site = Site(POSITION, GRID.area, gain=-2.0, zero=5.0)
+    site = TransducerArray(POSITION, GRID.area, gain=-2.0, zero=5.0)
     force = np.linspace(0.0, 3.0, len(TIME))[:, None] * np.ones(N)
     found = read(effect("saturation", "clip", level=4.0), force, site=site)
     np.testing.assert_allclose(found, np.maximum(5.0 - 2.0 * force, 1.0), rtol=1e-12)
@@ -178,7 +178,7 @@ def test_the_elastic_half_space_is_boussinesqs():
     side, pitch, h = 37, 0.001, 0.003
     y, x = np.mgrid[0:side, 0:side] * pitch
     position = np.stack([x.ravel(), y.ravel(), np.zeros(side * side)], axis=1)
-    site = Site(position, np.full(side * side, pitch**2))
+    site = TransducerArray(position, np.full(side * side, pitch**2))
     middle = side * side // 2
     force = np.zeros((1, side * side))
     force[0, middle] = 1.0
@@ -204,7 +204,7 @@ def test_crosstalk():
 
 def test_lines_need_rows_and_columns():
     with pytest.raises(EffectError, match="rows and columns"):
-        read(effect("crosstalk", "lines"), image(0), np.zeros(1), Site(POSITION, GRID.area, name="pad"))
+        read(effect("crosstalk", "lines"), image(0), np.zeros(1), TransducerArray(POSITION, GRID.area, name="pad"))
 
 
 def test_the_near_part_of_a_matrix_does_what_the_whole_does(monkeypatch):
@@ -212,9 +212,9 @@ def test_the_near_part_of_a_matrix_does_what_the_whole_does(monkeypatch):
     random = np.random.default_rng(3)
     position, area, signal = random.uniform(0, 0.05, (N, 3)), random.uniform(1, 2, N), random.random((4, N))
     for areas in (area, None):
-        whole = mixing(position, weight, reach, areas)
-        monkeypatch.setattr("palpate.core.effects.engine.mixing.WHOLE", 0)
-        near = mixing(position, weight, reach, areas)
+        whole = coupling_matrix(position, weight, reach, areas)
+        monkeypatch.setattr("palpate.core.effects.engine.coupling_matrix.LARGEST_DENSE", 0)
+        near = coupling_matrix(position, weight, reach, areas)
         monkeypatch.undo()
         assert near.matrix is None
         np.testing.assert_allclose(near.apply(signal), whole.apply(signal), rtol=1e-12)
@@ -252,7 +252,7 @@ def test_a_gradient_of_gains():
     assert found[0, 0] == pytest.approx(1 - 0.2 + 0.1) and found[-1, -1] == pytest.approx(1 + 0.2 - 0.1)
 
 
-MANY = Site(np.zeros((40_000, 3)), np.ones(40_000))
+MANY = TransducerArray(np.zeros((40_000, 3)), np.ones(40_000))
 
 
 def test_chance_has_the_distribution_that_it_says():
@@ -301,11 +301,11 @@ def test_any_moment_can_be_asked_for_by_itself(name, form):
     item, force = effect(name, form, seed=9), np.ones((len(TIME), N))
     whole = read(item, force)
     for i in (500, 3, 77):
-        np.testing.assert_array_equal(Reader((item,), GRID).step(TIME[i], force[i]), whole[i])
+        np.testing.assert_array_equal(ReadoutChain((item,), GRID).step(TIME[i], force[i]), whole[i])
 
 
 def test_uniform_numbers_fill_their_interval():
-    numbers = random_numbers.uniform("test", 1, np.arange(100_000))
+    numbers = random_streams.uniform("test", 1, np.arange(100_000))
     counts, _ = np.histogram(numbers, 100, (0, 1))
     assert ((counts - 1000) ** 2 / 1000).sum() < 150  # chi-squared with 99 degrees of freedom: 1 in 1,000 is above 149
     assert numbers.min() > 0 and numbers.max() < 1

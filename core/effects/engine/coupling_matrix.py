@@ -8,12 +8,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-WHOLE = 1500
+LARGEST_DENSE = 1500
 """Up to so many texels every pair counts; of more only those within reach, since the matrix would not fit."""
 
 
 @dataclass(frozen=True)
-class Mixing:
+class CouplingMatrix:
     """A matrix of weights: what texel ``source`` adds to texel ``target``.
 
     Attributes
@@ -41,7 +41,9 @@ class Mixing:
         return result
 
 
-def mixing(position: np.ndarray, weight: Callable[[np.ndarray], np.ndarray], reach: float, area: np.ndarray | None) -> Mixing:
+def coupling_matrix(
+    position: np.ndarray, weight: Callable[[np.ndarray], np.ndarray], reach: float, area: np.ndarray | None
+) -> CouplingMatrix:
     """Return weights that depend on the distance of two texels.
 
     Parameters
@@ -50,24 +52,24 @@ def mixing(position: np.ndarray, weight: Callable[[np.ndarray], np.ndarray], rea
     weight : callable
         From distances (m) to weights.
     reach : float, m
-        Beyond it nothing counts where there are more than :data:`WHOLE` texels.
+        Beyond it nothing counts where there are more than :data:`LARGEST_DENSE` texels.
     area : (n,) float, m², or None
         With areas, each texel's load is shared out by weight and area and its sum kept; without, weights are taken as they are.
     """
     n = len(position)
-    if n <= WHOLE:
+    if n <= LARGEST_DENSE:
         matrix = weight(np.linalg.norm(position[:, None] - position[None], axis=2))
         if area is not None:
             matrix = matrix * area[:, None]
             matrix = matrix / matrix.sum(axis=0)
         nothing = np.zeros(0, dtype=int)
-        return Mixing(matrix, nothing, nothing, np.zeros(0))
+        return CouplingMatrix(matrix, nothing, nothing, np.zeros(0))
     target, source, distance = pairs_within(position, reach)
     values = weight(distance)
     if area is not None:
         values = values * area[target]
         values = values / np.bincount(source, values, n)[source]
-    return Mixing(None, target, source, values)
+    return CouplingMatrix(None, target, source, values)
 
 
 def pairs_within(position: np.ndarray, reach: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
