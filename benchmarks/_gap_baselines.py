@@ -33,9 +33,9 @@ def stepwise(result: Any, most: int = 3) -> tuple[list[str], Any]:
     """Add the form that lowers the BIC on the fitted trials most, until none does."""
     from palpate.core.gap.fitting.least_squares import fit
     from palpate.core.gap.selection.candidates import candidates
-    from palpate.core.gap.selection.screening import Direction, free_of, promising, views_of
+    from palpate.core.gap.selection.screening import ScoreTest, free_with, starting_points, view_set_of
 
-    views = views_of(result.of("fit"), (result.noise[0].deviation, result.noise[1].deviation))
+    view_set = view_set_of(result.of("fit"), (result.noise[0].deviation, result.noise[1].deviation))
     current = result.base
     samples = float(current.count.sum())
     bic = float(current.sse.sum()) + _size(current.free, result) * np.log(samples)
@@ -43,15 +43,15 @@ def stepwise(result: Any, most: int = 3) -> tuple[list[str], Any]:
         best, best_bic = None, bic
         taken = {effect.name for effect in current.model.effects}
         gain = abs(current.model.parameters.gain)
-        direction = Direction(views.whole, current)
+        score_test = ScoreTest(view_set.whole, current)
         for candidate in candidates(result.of("fit"), current.model):
             if candidate.name in taken:
                 continue
-            starts = promising(candidate, direction, views.whole, current.model, result.scales, gain)
+            starts = starting_points(candidate, score_test, view_set.whole, current.model, result.scales, gain)
             if not starts:
                 continue
-            free = free_of(current.free, current.model, candidate, result.scales)
-            tried = fit(views.whole, current.model.with_effect(starts[0][1]), free, turns=4, tolerance=1e-3)
+            free = free_with(current.free, current.model, candidate, result.scales)
+            tried = fit(view_set.whole, current.model.with_effect(starts[0][1]), free, max_steps=4, tolerance=1e-3)
             value = float(tried.sse.sum()) + _size(free, result) * np.log(samples)
             if value < best_bic:
                 best, best_bic = tried, value

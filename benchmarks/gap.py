@@ -152,14 +152,14 @@ def examine(kind: str, number: int, compare: bool = False) -> dict[str, Any]:
 
 def score(case: cases.Case, result: Any) -> dict[str, Any]:
     """Return what was said of a case and how right it is."""
-    from palpate.core.gap.fitting.intervals import numbers
-    from palpate.core.gap.report.amended_sensor import next_experiment, normalised
+    from palpate.core.gap.fitting.intervals import parameter_intervals
+    from palpate.core.gap.report.amended_sensor import next_experiment, with_mean_gain_moved
 
-    model = normalised(result)
-    sure = [named.name for named in result.named if named.confidence >= SURE]
-    said = [[n.name, n.form, n.confidence] for n in result.named]
+    model = with_mean_gain_moved(result)
+    sure = [named.name for named in result.findings if named.confidence >= SURE]
+    said = [[n.name, n.form, n.confidence] for n in result.findings]
     inside = []
-    for one in numbers(result):
+    for one in parameter_intervals(result):
         true = _truth(case, one, model)
         if true is not None:
             inside.append([one.name, bool(min(one.low, one.high) <= true <= max(one.low, one.high))])

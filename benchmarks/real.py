@@ -60,10 +60,10 @@ def _found_in(name: str, recording: Recording) -> Iterator[dict]:
 
     folder = HOUSE / "build" / "real" / name
     result = _diagnosed(recording, folder)
-    for _ in summary.write(result, folder):
+    for _ in summary.write_report(result, folder):
         pass
     print(f"{name}: {summary.headline(result)}", file=sys.stderr, flush=True)
-    found = "+".join(one.name for one in result.named) or result.verdict.replace(" ", "_")
+    found = "+".join(one.name for one in result.findings) or result.verdict.replace(" ", "_")
     last = LAST.get(name, ())
     parts = {
         "fit": result.of("fit"),
@@ -81,9 +81,9 @@ def _found_in(name: str, recording: Recording) -> Iterator[dict]:
 
 def _friction(name: str, result: Any) -> Iterator[dict]:
     """What the base model's own friction closes, of the error of a sensor without any: it is in every base, and no effect."""
-    from palpate.core.gap.report.comparison import nrmse, without_friction
+    from palpate.core.gap.report.comparison import nrmse, nrmse_without_friction
 
-    for use, without in (without_friction(result) or {}).items():
+    for use, without in (nrmse_without_friction(result) or {}).items():
         own = nrmse(result.of(use), result.base.model, result.full)
         figure = {"name": f"real.{name}.friction_of_the_base.{use}", "value": own / without, "unit": "gap with / without"}
         yield figure | ({"goal": GOALS[name]} if use == "check" else {})
@@ -110,7 +110,7 @@ def _recall(data: Path) -> Iterator[dict]:
                 outcome, told = _outcome(effect, result), _is_told(effect, changed, result)
                 for of in ("all", "told") if told else ("all",):
                     outcomes[size, of][outcome] += 1
-                said = ", ".join(f"{one.name} {one.confidence}" for one in result.named) or result.verdict
+                said = ", ".join(f"{one.name} {one.confidence}" for one in result.findings) or result.verdict
                 note = "" if told else " (these recordings cannot tell it)"
                 print(f"{name} with {size:g} x {effect}: {outcome}: {said}{note}", file=sys.stderr, flush=True)
     for (size, of), count in outcomes.items():
@@ -124,7 +124,7 @@ def _recall(data: Path) -> Iterator[dict]:
 def _sure(result: Any) -> list[str]:
     from palpate.core.gap.report.summary import SURE
 
-    return [one.name for one in result.named if one.confidence >= SURE]
+    return [one.name for one in result.findings if one.confidence >= SURE]
 
 
 def _outcome(effect: str, result: Any) -> str:
@@ -132,17 +132,17 @@ def _outcome(effect: str, result: Any) -> str:
     sure = _sure(result)
     if sure:
         return "right" if effect in sure and len(sure) == 1 else "wrong"
-    return "ambiguous" if any(effect in (one.name, *one.rivals) for one in result.named) else "missed"
+    return "ambiguous" if any(effect in (one.name, *one.rivals) for one in result.findings) else "missed"
 
 
 def _is_told(effect: str, recording: Recording, result: Any) -> bool:
     """Whether recordings could tell an effect by what was done to the sensor in them, whatever came out."""
-    from palpate.core.gap.selection.identifiability import alike, bend_of, untold
+    from palpate.core.gap.selection.identifiability import curvature_ratio, indistinguishable, unidentifiable
 
     if effect == "drift" and read_in_turn(recording):
         return False
-    bend = bend_of(result.of("fit"), result.best.model)
-    return effect not in untold(result.coverage) and not alike(result.coverage, effect, bend)
+    curvature = curvature_ratio(result.of("fit"), result.best.model)
+    return effect not in unidentifiable(result.coverage) and not indistinguishable(result.coverage, effect, curvature)
 
 
 def _diagnosed(recording: Recording, folder: Path) -> Any:

@@ -23,9 +23,9 @@ def run(arguments: argparse.Namespace) -> int:
 
     dependencies.prepare_numba()
     from ..core.gap.dataset.rig import read_rig
-    from ..core.gap.fitting.intervals import numbers
+    from ..core.gap.fitting.intervals import parameter_intervals
     from ..core.gap.report import summary
-    from ..core.gap.report.amended_sensor import amended
+    from ..core.gap.report.amended_sensor import amended_sensor
     from ..core.gap.selection.diagnosis import Diagnosis, diagnose
     from ..core.solver import precompile
 
@@ -48,11 +48,11 @@ def run(arguments: argparse.Namespace) -> int:
             else:
                 show(step.stage, int(0.95 * step.done))
         assert result is not None
-        for stage, share in summary.write(result, folder):
+        for stage, share in summary.write_report(result, folder):
             show(stage, 950 + int(50 * share))
     print(summary.headline(result))
     rows = [("", "parameter", "value (95 % interval)")]
-    for one in numbers(result):
+    for one in parameter_intervals(result):
         owner = "base model" if one.effect < 0 else result.best.model.effects[one.effect].name
         rows.append((owner, one.name, summary.interval_text(one)))
     print()
@@ -63,7 +63,7 @@ def run(arguments: argparse.Namespace) -> int:
     print(f"report: {folder / 'report.html'}")
     print(f"sensor: {folder / 'sensor.toml'}")
     if arguments.blend:
-        print(f"saved:  {_put_into_scene(arguments.blend, arguments.sensor, amended(result))}")
+        print(f"saved:  {_put_into_scene(arguments.blend, arguments.sensor, amended_sensor(result))}")
     return 0
 
 

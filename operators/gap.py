@@ -131,7 +131,7 @@ class PALPATE_OT_gap_report(support.ErrorReporting, bpy.types.Operator):
         from ..core.io.file_writing import writable_folder
 
         folder = writable_folder(bpy.path.abspath(self.directory), create=True)
-        for _ in summary.write(gap_results.of(context.object).diagnosis, folder):
+        for _ in summary.write_report(gap_results.of(context.object).diagnosis, folder):
             pass
         self.report({"INFO"}, f"Wrote {folder / 'report.html'}")
 

@@ -100,12 +100,12 @@ def find(obj):
 
 def add_found(obj) -> int:
     """Put the fitted parameters and what was found on the sensor; return how many effects it has now."""
-    from ...core.gap.report.amended_sensor import amended
+    from ...core.gap.report.amended_sensor import amended_sensor
 
     result = of(obj)
     if result is None:
         raise SceneError(f"Nothing was found for '{obj.name}' yet: use Find Gap first.")
-    model = amended(result.diagnosis)
+    model = amended_sensor(result.diagnosis)
     per_texel = [e.name for e in model.effects if any(isinstance(value, tuple) for value in e.values.values())]
     own = len(_texels(bpy.context, obj)) if per_texel else 0
     if per_texel and own != len(result.diagnosis.rig.texels):
@@ -173,14 +173,14 @@ def _texels(context, obj):
 
 def mark_phases(scene, obj) -> int:
     """Put timeline markers where the most loaded texel of the first fitted trial enters a phase; return how many."""
-    from ...core.gap.forward.contact_phases import PHASES, load_of, phases
+    from ...core.gap.forward.contact_phases import PHASES, phase_indices, relative_load
 
     result = of(obj)
     if result is None:
         raise SceneError(f"Nothing was found for '{obj.name}' yet: use Find Gap first.")
     predictor = result.diagnosis.of("fit")[0]
-    texel = int(load_of(predictor.stimulus).sum(axis=0).argmax())
-    at, time = phases(predictor.stimulus)[:, texel], predictor.trial.time
+    texel = int(relative_load(predictor.stimulus).sum(axis=0).argmax())
+    at, time = phase_indices(predictor.stimulus)[:, texel], predictor.trial.time
     clear_marks(scene)
     fps = scene.render.fps / scene.render.fps_base
     changes = [0, *(int(i) for i in np.flatnonzero(np.diff(at)) + 1)]

@@ -23,7 +23,6 @@ from .csv_columns import read_table
 FORMAT = "palpate-rig/1"
 POSE, TURN, SLIDE = ("x", "y", "z"), ("qw", "qx", "qy", "qz"), ("slide_x", "slide_y")
 FORCE = ("force_x", "force_y", "force_z")
-STIMULI = ("pose", "depth", "force")
 MOST_TEXELS = 65536
 LONGEST_STEP = 5.0
 """Seconds between samples above which the clock is taken for one in milliseconds."""

@@ -15,63 +15,66 @@ import numpy as np
 
 from ...model.effect import Effect
 from ..forward.predictor import Model
-from .least_squares import Share
+from .least_squares import TrialView
 
-LEAST_RISE = 1.5
+LEAST_VARIANCE_RATIO = 1.5
 """Least mean square of the residual at large readings, in units of that at rest."""
-ALIKE = 0.15
+MOST_CORRELATION = 0.15
 """Largest correlation with the sample before, beyond that at rest, and between texels."""
 
 
 @dataclass(frozen=True)
-class _Trial:
+class _LoadedSamples:
     """Loaded samples of one trial: size of the reading and squares of the residual, both in units of the noise."""
 
     size: np.ndarray
     square: np.ndarray
-    following: float
-    between: float
+    serial_correlation: float
+    texel_correlation: float
 
 
-def trembling(shares: Sequence[Share], model: Model) -> Effect | None:
+def proportional_noise(views: Sequence[TrialView], model: Model) -> Effect | None:
     """Return noise in proportion to the reading where a model's residual is that; None where it is not.
 
     Parameters
     ----------
-    shares : sequence of Share
+    shares : sequence of TrialView
         Whole trials, with readings.
     model : Model
         As it was fitted, without noise.
     """
     found, rest = [], []
-    for share in shares:
-        reading = share.predictor.trial.reading
+    for view in views:
+        reading = view.predictor.trial.reading
         if reading is None:
             continue
-        residual = share.residual(model)[:, : reading.shape[1]]
-        size = np.abs(share.predictor.predict(model).reading - model.parameters.zero) / share.noise[0]
+        residual = view.residual(model)[:, : reading.shape[1]]
+        size = np.abs(view.predictor.predict(model).reading - model.parameters.zero) / view.noise[0]
         known = np.isfinite(reading)
         rest.append(residual[known & (size < 1.0)])
-        found.append(_looked_at(size, residual, known & (size > 3.0)))
+        found.append(_loaded_samples(size, residual, known & (size > 3.0)))
     still = np.concatenate(rest) if rest else np.zeros(0)
     if len(still) < 100 or sum(len(one.size) for one in found) < 400:
         return None
     floor = max(float(np.mean(still * still)), 1e-6)
     size, square = (np.concatenate([getattr(one, name) for one in found]) for name in ("size", "square"))
-    each, pooled = [_share(one.size, one.square, floor) for one in found if len(one.size) > 100], _share(size, square, floor)
+    each, pooled = (
+        [_variance_coefficient(one.size, one.square, floor) for one in found if len(one.size) > 100],
+        _variance_coefficient(size, square, floor),
+    )
     large = square[size > np.quantile(size, 0.67)]
     small = square[size < np.quantile(size, 0.33)]
-    grows = large.mean() > LEAST_RISE * floor and large.mean() > 1.2 * small.mean()
+    grows = large.mean() > LEAST_VARIANCE_RATIO * floor and large.mean() > 1.2 * small.mean()
     steady = pooled > 0.0 and min(each, default=0.0) > 0.3 * pooled and max(each, default=0.0) < 3.0 * pooled
     weight = np.array([len(one.size) for one in found], float)
-    following = float(np.average([one.following for one in found], weights=weight))
-    between = float(np.average([one.between for one in found], weights=weight))
-    if not (grows and steady and following < ALIKE and between < ALIKE):
+    serial_correlation = float(np.average([one.serial_correlation for one in found], weights=weight))
+    texel_correlation = float(np.average([one.texel_correlation for one in found], weights=weight))
+    if not (grows and steady and serial_correlation < MOST_CORRELATION and texel_correlation < MOST_CORRELATION):
         return None
     return Effect("noise", "proportional", {"share": float(np.sqrt(pooled))})
 
 
-def _looked_at(size: np.ndarray, residual: np.ndarray, loaded: np.ndarray) -> _Trial:
+def _loaded_samples(size: np.ndarray, residual: np.ndarray, loaded: np.ndarray) -> _LoadedSamples:
     """Correlations are of residuals in units of their local size, so that few large ones do not decide.
 
     Only large readings count there: at small ones the noise that is always there hides what a model lacks.
@@ -80,16 +83,16 @@ def _looked_at(size: np.ndarray, residual: np.ndarray, loaded: np.ndarray) -> _T
     unit = np.where(large, residual / np.maximum(size, 1.0), 0.0)
     both = large[1:] & large[:-1]
     square = float((unit * unit).sum())
-    following = float((unit[1:] * unit[:-1])[both].sum()) / max(square, 1e-300)
+    serial_correlation = float((unit[1:] * unit[:-1])[both].sum()) / max(square, 1e-300)
     together = unit.sum(axis=1)
     pairs = float((together * together).sum()) - square
     count = large.sum(axis=1)
     possible = float((count * (count - 1)).sum()) / max(float(count.sum()), 1.0)
-    between = pairs / max(square * possible, 1e-300) if possible > 0 else 0.0
-    return _Trial(size[loaded], residual[loaded] ** 2, following, between)
+    texel_correlation = pairs / max(square * possible, 1e-300) if possible > 0 else 0.0
+    return _LoadedSamples(size[loaded], residual[loaded] ** 2, serial_correlation, texel_correlation)
 
 
-def _share(size: np.ndarray, square: np.ndarray, floor: float) -> float:
+def _variance_coefficient(size: np.ndarray, square: np.ndarray, floor: float) -> float:
     """Square of the share of the reading that trembles: weighted least squares of the squares on those of the reading."""
     squares, value = size**2, 0.0
     for _ in range(4):

@@ -8,21 +8,21 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .least_squares import PRIOR, Fit, Sums, flattened, total_of, value_of
+from .least_squares import TEXEL_PRECISION, Fit, NormalEquations, all_equations, summed_equations, value_of
 from .regression import student
 
 if TYPE_CHECKING:
     from ..selection.diagnosis import Diagnosis
 
-NORMAL_REACH = 1.959964
+NORMAL_QUANTILE = 1.959964
 """Standard deviations on either side that hold 95 % of a normal distribution."""
-UNTOLD = 1e-8
+UNIDENTIFIED = 1e-8
 """Eigenvalue of the normal equations, with a diagonal of ones, up to which they tell nothing of a direction: as of two drags
 that only act as their sum."""
 
 
 @dataclass(frozen=True)
-class Number:
+class ParameterInterval:
     """A fitted number.
 
     Attributes
@@ -41,7 +41,7 @@ class Number:
     high: float
 
 
-def numbers(result: Diagnosis) -> list[Number]:
+def parameter_intervals(result: Diagnosis) -> list[ParameterInterval]:
     """Return the numbers of the amended model that are not one per texel.
 
     Each has the widest of four intervals: of noise as it is where nothing touches; from the scatter of the gradients of
@@ -55,26 +55,28 @@ def numbers(result: Diagnosis) -> list[Number]:
     kinds = _covariances(found)
     made = []
     for i, item in enumerate(common):
-        at = float(item.to(value_of(found.model, item)))
-        spread = NORMAL_REACH * max(float(np.sqrt(max(kind[i, i], 0.0))) for kind in kinds)
-        ends = sorted((float(item.back(at - spread)), float(item.back(at + spread))))
-        made.append(Number(item.effect, item.name, float(value_of(found.model, item)), ends[0], ends[1]))
+        at = float(item.to_coordinate(value_of(found.model, item)))
+        spread = NORMAL_QUANTILE * max(float(np.sqrt(max(kind[i, i], 0.0))) for kind in kinds)
+        ends = sorted((float(item.from_coordinate(at - spread)), float(item.from_coordinate(at + spread))))
+        made.append(ParameterInterval(item.effect, item.name, float(value_of(found.model, item)), ends[0], ends[1]))
     return made
 
 
 def _covariances(found: Fit) -> tuple[np.ndarray, ...]:
-    """Covariances of the common numbers in their coordinates, (p, p) each: of noise alone, and by groups (:func:`numbers`)."""
-    assert found.sums is not None
-    t = total_of(flattened(found.sums))
-    m = t.h.shape[1]
-    shift = _followed(t) if m else np.zeros((t.b.shape[0], m, len(t.a)))
-    a = t.a - np.einsum("nmp,nmq->pq", t.b, shift)
+    """Covariances of the common numbers in their coordinates, (p, p) each: of noise alone, and by groups (see
+    :func:`parameter_intervals`).
+    """
+    assert found.equations is not None
+    total = summed_equations(all_equations(found.equations))
+    m = total.texel_gradient.shape[1]
+    shift = _texel_response(total) if m else np.zeros((total.coupling.shape[0], m, len(total.common)))
+    a = total.common - np.einsum("nmp,nmq->pq", total.coupling, shift)
     bread = _inverse(a)
     blocks, texels, trials = [], [], []
-    for trial in found.sums:
+    for trial in found.equations:
         gradient = np.concatenate([one.gradients for one in trial])
         if m:  # what the numbers per texel take up of it; of which block that is, is not known
-            own = np.einsum("nmp,nm->np", shift, np.sum([one.h for one in trial], axis=0))
+            own = np.einsum("nmp,nm->np", shift, np.sum([one.texel_gradient for one in trial], axis=0))
             gradient[:, : len(shift)] -= own / len(gradient)
         blocks.append(gradient.reshape(-1, len(a)))
         texels.append(gradient.sum(axis=0))
@@ -82,18 +84,18 @@ def _covariances(found: Fit) -> tuple[np.ndarray, ...]:
     return bread, *(_sandwich(bread, np.concatenate(groups)) for groups in (blocks, texels, trials))
 
 
-def _followed(t: Sums) -> np.ndarray:
+def _texel_response(total: NormalEquations) -> np.ndarray:
     """How numbers per texel give way to the common ones, (n, m, p), while their mean over the texels that were touched stays.
 
     What all texels have in common is a common number's: each texel's gain times two is the sensor's.
     """
-    m = t.h.shape[1]
-    inverse = np.linalg.inv(t.c + PRIOR * np.eye(m))
-    told = np.einsum("nmm->nm", t.c)
-    told = (told > 1e-9 * told.max(initial=1e-300)).astype(float)
-    follow = inverse @ t.b
-    pulled = np.einsum("nmk,nk->nmk", inverse, told)
-    stiffness, drift = np.einsum("nm,nmk->mk", told, pulled), np.einsum("nm,nmp->mp", told, follow)
+    m = total.texel_gradient.shape[1]
+    inverse = np.linalg.inv(total.texel + TEXEL_PRECISION * np.eye(m))
+    informed = np.einsum("nmm->nm", total.texel)
+    informed = (informed > 1e-9 * informed.max(initial=1e-300)).astype(float)
+    follow = inverse @ total.coupling
+    pulled = np.einsum("nmk,nk->nmk", inverse, informed)
+    stiffness, drift = np.einsum("nm,nmk->mk", informed, pulled), np.einsum("nm,nmp->mp", informed, follow)
     kept: np.ndarray = follow - pulled @ np.linalg.lstsq(stiffness, drift, rcond=None)[0]
     return kept
 
@@ -102,8 +104,10 @@ def _inverse(a: np.ndarray) -> np.ndarray:
     """Inverse of normal equations (p, p), next to infinite along what they do not tell."""
     squares = np.diag(a)
     size = np.sqrt(np.where(squares > 1e-30 * squares.max(initial=0.0), squares, 1.0))  # one without any effect stays so
-    told, along = np.linalg.eigh(a / np.outer(size, size))
-    inverse: np.ndarray = (along / np.where(told > UNTOLD, told, 1e-4 * UNTOLD)) @ along.T / np.outer(size, size)
+    informed, along = np.linalg.eigh(a / np.outer(size, size))
+    inverse: np.ndarray = (
+        (along / np.where(informed > UNIDENTIFIED, informed, 1e-4 * UNIDENTIFIED)) @ along.T / np.outer(size, size)
+    )
     return inverse
 
 
@@ -119,7 +123,7 @@ def _sandwich(bread: np.ndarray, gradients: np.ndarray) -> np.ndarray:
     influence = gradients @ bread
     squares, fourth = (influence**2).sum(axis=0), (influence**4).sum(axis=0)
     effective = np.clip(3.0 * squares**2 / np.maximum(fourth, 1e-300), 2.0, max(groups, 2))
-    reach = np.array([student(number - 1.0) for number in effective]) / NORMAL_REACH
+    reach = np.array([student(number - 1.0) for number in effective]) / NORMAL_QUANTILE
     factor = groups / max(groups - len(bread), 1)
     covariance: np.ndarray = factor * np.outer(reach, reach) * (influence.T @ influence)
     return covariance

@@ -12,12 +12,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..forward.contact_phases import features, load_of
+from ..forward.contact_phases import features, relative_load
 from ..forward.predictor import Predictor
 
 
 @dataclass(frozen=True)
-class Structure:
+class ResidualStructure:
     """How much of a residual's mean square can be predicted.
 
     Attributes
@@ -37,7 +37,7 @@ class Structure:
         return max(self.shares, key=lambda name: self.shares[name]) if self.shares else ""
 
 
-def structure_of(predictors: Sequence[Predictor], residuals: Sequence[np.ndarray]) -> Structure:
+def residual_structure(predictors: Sequence[Predictor], residuals: Sequence[np.ndarray]) -> ResidualStructure:
     """Find out what residuals vary with.
 
     Parameters
@@ -63,20 +63,20 @@ def structure_of(predictors: Sequence[Predictor], residuals: Sequence[np.ndarray
         folds.append((table[:, part].reshape(sum(sizes), -1), residual[part]))
     total = sum(float(np.vdot(r, r)) for _, r in folds)
     if total <= 0:
-        return Structure(0.0, dict.fromkeys(names, 0.0))
+        return ResidualStructure(0.0, dict.fromkeys(names, 0.0))
     sums = [(x @ x.T, x @ r.ravel()) for x, r in folds]
     shares, start = {}, 0
     for name, size in zip(names, sizes, strict=True):
-        shares[name] = _explained(folds, sums, np.arange(start, start + size), total)
+        shares[name] = _share_predicted(folds, sums, np.arange(start, start + size), total)
         start += size
-    everything = _explained(folds, sums, np.arange(start), total)
+    everything = _share_predicted(folds, sums, np.arange(start), total)
     if residuals[0].shape[1] > 1 and not halves:
-        shares["texel"] = _by_texel(predictors, [r for _, r in folds], total)
+        shares["texel"] = _share_predicted_by_texel(predictors, [r for _, r in folds], total)
         everything = 1.0 - (1.0 - max(everything, 0.0)) * (1.0 - max(shares["texel"], 0.0))
-    return Structure(max(everything, *shares.values(), 0.0), {name: max(share, 0.0) for name, share in shares.items()})
+    return ResidualStructure(max(everything, *shares.values(), 0.0), {name: max(share, 0.0) for name, share in shares.items()})
 
 
-def _explained(
+def _share_predicted(
     folds: list[tuple[np.ndarray, np.ndarray]], sums: list[tuple[np.ndarray, np.ndarray]], use: np.ndarray, total: float
 ) -> float:
     """Share of the squares that a regression on some features predicts on the folds it has not seen."""
@@ -90,11 +90,11 @@ def _explained(
     return 1.0 - left / total
 
 
-def _by_texel(predictors: Sequence[Predictor], residuals: Sequence[np.ndarray], total: float) -> float:
+def _share_predicted_by_texel(predictors: Sequence[Predictor], residuals: Sequence[np.ndarray], total: float) -> float:
     """The same for a constant and a gain of each texel."""
     parts = []
     for predictor, r in zip(predictors, residuals, strict=True):
-        d = load_of(predictor.stimulus)
+        d = relative_load(predictor.stimulus)
         moments = [np.full(d.shape[1], float(len(d))), d.sum(axis=0), (d * d).sum(axis=0), r.sum(axis=0), (d * r).sum(axis=0)]
         parts.append(np.stack(moments))
     left = 0.0
@@ -104,6 +104,6 @@ def _by_texel(predictors: Sequence[Predictor], residuals: Sequence[np.ndarray], 
         one, d2 = one * 1.01 + 1.0, d2 * 1.01 + 1.0
         det = one * d2 - d1 * d1
         offset, gain = (d2 * r1 - d1 * rd) / det, (one * rd - d1 * r1) / det
-        miss = r - offset - gain * load_of(predictor.stimulus)
+        miss = r - offset - gain * relative_load(predictor.stimulus)
         left += float(np.vdot(miss, miss))
     return 1.0 - left / total

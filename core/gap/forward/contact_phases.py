@@ -9,22 +9,22 @@ from .predictor import Predictor
 from .stimulus import Stimulus
 
 PHASES = ("approach", "loading", "hold", "unloading", "released", "sliding")
-STILL, STILL_OF_PACE = 0.02, 0.2
+HOLD_RATE, HOLD_RATE_SHARE = 0.02, 0.2
 """Share of the largest load per second below which a texel counts as held; in a slow trial so much of the trial's own pace."""
-CONSTANT = 1e-6
+ROUNDING_RATE = 1e-6
 """Share of the largest load per second below which nothing but rounding moves."""
-FAST_SLIDE = 2e-4
+SLIDING_SPEED = 2e-4
 """Metres per second above which a held surface counts as sliding."""
 
 
-def load_of(stimulus: Stimulus) -> np.ndarray:
+def relative_load(stimulus: Stimulus) -> np.ndarray:
     """Depth of a texel, or its share of a known force, as a share of the largest in the trial, (T, n) float."""
-    load = stimulus.pressed_by
+    load = stimulus.load
     shares: np.ndarray = load / max(float(load.max(initial=0.0)), 1e-300)
     return shares
 
 
-def pace_of(rate: np.ndarray) -> float:
+def hold_rate_limit(rate: np.ndarray) -> float:
     """Rate below which a load is held: a fixed one, or where all of a trial is slow, one that its fastest parts exceed by far.
 
     Parameters
@@ -32,14 +32,16 @@ def pace_of(rate: np.ndarray) -> float:
     rate : float, 1/s
         Of the load, as a share of the largest.
     """
-    return float(np.clip(STILL_OF_PACE * np.quantile(np.abs(rate), 0.99), CONSTANT, STILL)) if rate.size else STILL
+    return (
+        float(np.clip(HOLD_RATE_SHARE * np.quantile(np.abs(rate), 0.99), ROUNDING_RATE, HOLD_RATE)) if rate.size else HOLD_RATE
+    )
 
 
-def phases(stimulus: Stimulus) -> np.ndarray:
+def phase_indices(stimulus: Stimulus) -> np.ndarray:
     """Return which of :data:`PHASES` each texel is in at each sample, (T, n) int."""
-    load = load_of(stimulus)
+    load = relative_load(stimulus)
     rate = np.gradient(load, stimulus.time, axis=0)
-    still = pace_of(rate[load > 0]) * np.maximum(load.max(axis=0, keepdims=True), 1e-12)
+    still = hold_rate_limit(rate[load > 0]) * np.maximum(load.max(axis=0, keepdims=True), 1e-12)
     touching = load > 0
     before = ~np.maximum.accumulate(touching, axis=0)
     found = np.full(load.shape, PHASES.index("released"))
@@ -47,13 +49,13 @@ def phases(stimulus: Stimulus) -> np.ndarray:
     found[touching] = PHASES.index("hold")
     found[touching & (rate > still)] = PHASES.index("loading")
     found[touching & (rate < -still)] = PHASES.index("unloading")
-    found[touching & (np.abs(rate) <= 5 * still) & (stimulus.slide > FAST_SLIDE)] = PHASES.index("sliding")
+    found[touching & (np.abs(rate) <= 5 * still) & (stimulus.slide > SLIDING_SPEED)] = PHASES.index("sliding")
     return found
 
 
-ALWAYS = 1e-9
+CONSTANT_LOAD = 1e-9
 """Share of the largest load within which a load never changes, and nothing can vary with it."""
-WAYS = (0.0, 0.02, 0.04, 0.06, 0.09, 0.12, 0.16, 0.2, 0.25, 0.32, 0.4, 1.01)
+TRAVEL_BANDS = (0.0, 0.02, 0.04, 0.06, 0.09, 0.12, 0.16, 0.2, 0.25, 0.32, 0.4, 1.01)
 """Bands of the way since the surface turned back, as shares of the longest."""
 
 
@@ -81,12 +83,12 @@ def features(predictor: Predictor, residual: np.ndarray) -> dict[str, np.ndarray
         Only the last two groups look at it, and then at the other texels'.
     """
     s = predictor.stimulus
-    d = load_of(s)
+    d = relative_load(s)
     time = s.time
     rate = np.gradient(d, time, axis=0)
     rate /= max(float(np.abs(rate).max(initial=0.0)), 1e-300)
     touching = d > 0
-    since = _since(touching, time)
+    since = _time_since_contact(touching, time)
     top = np.maximum.accumulate(d, axis=0)
     step = np.diff(time, prepend=time[0])[:, None]
     done = np.cumsum(d * step, axis=0)
@@ -105,22 +107,22 @@ def features(predictor: Predictor, residual: np.ndarray) -> dict[str, np.ndarray
         "history": [top - d, (top - d) * touching, top**2 - d**2, done * d, done],
         "clock": [clock, clock**2, clock * d],
     }
-    if np.ptp(d) < ALWAYS:
+    if np.ptp(d) < CONSTANT_LOAD:
         del groups["depth"]
     if predictor.trial.reading is None and s.slip is not None:
-        groups |= _sliding(s.slip, time, d.shape)
+        groups |= _sliding_features(s.slip, time, d.shape)
     n = d.shape[1]
     if n > 1:
-        around = _neighbours(predictor, d)
+        around = _neighbour_load(predictor, d)
         groups["neighbours"] = [around - d, around * (d > 0), np.broadcast_to(d.mean(axis=1, keepdims=True), d.shape)]
         others = (residual.sum(axis=1, keepdims=True) - residual) / (n - 1)
         groups["common mode"] = [others]
-        shared = [_share_of_others(residual, d), _share_of_others(residual, rate)]
+        shared = [_pattern_of_others(residual, d), _pattern_of_others(residual, rate)]
         groups["shared by loaded texels"] = shared
     return {name: np.stack(columns) for name, columns in groups.items()}
 
 
-def _sliding(slip: np.ndarray, time: np.ndarray, shape: tuple[int, ...]) -> dict[str, list[np.ndarray]]:
+def _sliding_features(slip: np.ndarray, time: np.ndarray, shape: tuple[int, ...]) -> dict[str, list[np.ndarray]]:
     """Speed along the direction in which the surface slides most, and the way since that speed last changed its sign.
 
     Parameters
@@ -140,11 +142,11 @@ def _sliding(slip: np.ndarray, time: np.ndarray, shape: tuple[int, ...]) -> dict
     since = way - np.maximum.accumulate(np.where(turned, way, 0.0))
     since /= max(float(since.max()), 1e-300)
     wide = lambda x: np.broadcast_to(x[:, None], shape)  # noqa: E731
-    bands = [wide(sign * ((since >= a) & (since < b))) for a, b in zip(WAYS[:-1], WAYS[1:], strict=True)]
+    bands = [wide(sign * ((since >= a) & (since < b))) for a, b in zip(TRAVEL_BANDS[:-1], TRAVEL_BANDS[1:], strict=True)]
     return {"sliding": [wide(x) for x in (np.ones(len(sign)), sign, speed / fast, (speed / fast) ** 2)], "turning": bands}
 
 
-def _since(touching: np.ndarray, time: np.ndarray) -> np.ndarray:
+def _time_since_contact(touching: np.ndarray, time: np.ndarray) -> np.ndarray:
     """Seconds since each texel was last touched anew, (T, n); zero where nothing touches."""
     began = touching.copy()
     began[1:] &= ~touching[:-1]
@@ -152,7 +154,7 @@ def _since(touching: np.ndarray, time: np.ndarray) -> np.ndarray:
     return np.where(touching, time[:, None] - start, 0.0)
 
 
-def _neighbours(predictor: Predictor, d: np.ndarray) -> np.ndarray:
+def _neighbour_load(predictor: Predictor, d: np.ndarray) -> np.ndarray:
     """Mean load of the four nearest texels."""
     p = predictor.rig.texels.position
     count = min(4, len(p) - 1)
@@ -166,7 +168,7 @@ def _neighbours(predictor: Predictor, d: np.ndarray) -> np.ndarray:
     return mean / count
 
 
-def _share_of_others(residual: np.ndarray, shape: np.ndarray) -> np.ndarray:
+def _pattern_of_others(residual: np.ndarray, shape: np.ndarray) -> np.ndarray:
     """The residual that a texel would have if all followed `shape` with one amplitude per sample, found from the others."""
     top = (residual * shape).sum(axis=1, keepdims=True) - residual * shape
     square = (shape * shape).sum(axis=1, keepdims=True) - shape * shape

@@ -14,10 +14,10 @@ from ...model.effect import Effect
 from ...model.sensor import Sensor
 from ...model.sensor_parameters import SensorParameters
 from ..dataset.rig import Rig, Trial
-from .force_model import Felt
+from .force_model import ContactHistory
 from .stimulus import Stimulus, stimulus_of
 
-KEPT = 4
+CACHE_SIZE = 4
 """Placements, forces and readings that are remembered per trial: a derivative by one number asks for the others again."""
 
 
@@ -58,12 +58,12 @@ class Predictor:
         self.trial, self.rig = trial, rig
         self.stimulus = stimulus_of(trial, rig)
         self._placed: dict[object, Stimulus] = {}
-        self._felt: dict[object, Felt] = {}
+        self._histories: dict[object, ContactHistory] = {}
         self._forces: dict[object, np.ndarray] = {}
         self._totals: dict[object, np.ndarray] = {}
         self._readings: dict[object, np.ndarray] = {}
 
-    def predict(self, model: Model, columns: np.ndarray | None = None, forces: bool = True) -> Prediction:
+    def predict(self, model: Model, subset: np.ndarray | None = None, with_forces: bool = True) -> Prediction:
         """Return the prediction of a model; its arrays are kept and not to be written to.
 
         Parameters
@@ -74,99 +74,109 @@ class Predictor:
         forces : bool
             Whether the net force is wanted, where it was measured.
         """
-        wanted = forces and self.trial.force is not None
-        return Prediction(self._reading(model, columns), self._total(model) if wanted else None)
+        wanted = with_forces and self.trial.force is not None
+        return Prediction(self._reading(model, subset), self._total(model) if wanted else None)
 
-    def _reading(self, model: Model, columns: np.ndarray | None) -> np.ndarray:
+    def _reading(self, model: Model, subset: np.ndarray | None) -> np.ndarray:
         p = model.parameters
         # Noise is left out: what is predicted is what is to be expected.
         reading = tuple(e for e in model.effects if site_of_action(e) == "readout" and e.name != "noise")
-        key = (self._force_key(model, columns), p.gain, p.zero, _key(reading))
+        key = (self._force_key(model, subset), p.gain, p.zero, _effects_key(reading))
         if key not in self._readings:
             site = readout_chain.transducers_of(Sensor("sensor", 0, self.rig.texels, p))
-            if columns is not None:
+            if subset is not None:
                 site = replace(
                     site,
-                    position=site.position[columns],
-                    area=site.area[columns],
-                    row=None if site.row is None else site.row[columns],
-                    column=None if site.column is None else site.column[columns],
+                    position=site.position[subset],
+                    area=site.area[subset],
+                    row=None if site.row is None else site.row[subset],
+                    column=None if site.column is None else site.column[subset],
                 )
-                reading = tuple(_restricted(effect, columns) for effect in reading)
-            force = self.normal_force(model, columns)
-            _keep(self._readings, key, readout_chain.readings(reading, site, self.trial.time, force), KEPT)
+                reading = tuple(_effect_on_texels(effect, subset) for effect in reading)
+            force = self.normal_force(model, subset)
+            _remember(self._readings, key, readout_chain.readings(reading, site, self.trial.time, force), CACHE_SIZE)
         return self._readings[key]
 
     def _total(self, model: Model) -> np.ndarray:
         """Sum of normal and friction forces on the sensor, (T, 3) N."""
-        p, rubbing = model.parameters, tuple(effect for effect in model.effects if _has(effect, "friction_law"))
-        slides = (p.sigma0, p.sigma1, p.mus, p.mud, p.x0, p.ct, _key(rubbing))
+        p, rubbing = model.parameters, tuple(effect for effect in model.effects if _acts_through(effect, "friction_law"))
+        slides = (p.sigma0, p.sigma1, p.mus, p.mud, p.x0, p.ct, _effects_key(rubbing))
         key = (self._force_key(model, None), slides)
         if key not in self._totals:
-            _keep(self._totals, key, self._felt_by(model, None).total(p, rubbing, self.normal_force(model)), KEPT)
+            _remember(
+                self._totals,
+                key,
+                self._contact_history(model, None).total_force(p, rubbing, self.normal_force(model)),
+                CACHE_SIZE,
+            )
         return self._totals[key]
 
     def placed(self, model: Model) -> Stimulus:
         """Return what the texels meet with the effects that move them."""
-        moving = tuple(effect for effect in model.effects if _has(effect, "placement"))
+        moving = tuple(effect for effect in model.effects if _acts_through(effect, "placement"))
         if not moving or self.trial.stimulus != "pose":
             return self.stimulus
-        key = _key(moving)
+        key = _effects_key(moving)
         if key not in self._placed:
             t = self.rig.texels
             position, normal, tangent = placed_texels(moving, t.position, t.normal, t.tangent)
             moved = replace(t, position=position, normal=normal, tangent=tangent)
-            _keep(self._placed, key, stimulus_of(self.trial, self.rig, moved), KEPT)
+            _remember(self._placed, key, stimulus_of(self.trial, self.rig, moved), CACHE_SIZE)
         return self._placed[key]
 
-    def normal_force(self, model: Model, columns: np.ndarray | None = None) -> np.ndarray:
+    def normal_force(self, model: Model, subset: np.ndarray | None = None) -> np.ndarray:
         """Normal force of each texel (or of some), (T, n) N: from the law of contact with its effects, or known."""
         stimulus = self.placed(model)
-        if stimulus.load is not None:
-            return stimulus.load if columns is None else stimulus.load[:, columns]
+        if stimulus.force_share is not None:
+            return stimulus.force_share if subset is None else stimulus.force_share[:, subset]
         whole = self._forces.get(self._force_key(model, None))
-        if columns is not None and whole is not None:
-            return whole[:, columns]
-        key = self._force_key(model, columns)
+        if subset is not None and whole is not None:
+            return whole[:, subset]
+        key = self._force_key(model, subset)
         if key not in self._forces:
-            _keep(self._forces, key, self._felt_by(model, columns).force(model.parameters, _acting(model)), KEPT)
+            _remember(
+                self._forces,
+                key,
+                self._contact_history(model, subset).force(model.parameters, _effects_on_normal_force(model)),
+                CACHE_SIZE,
+            )
         return self._forces[key]
 
-    def _force_key(self, model: Model, columns: np.ndarray | None) -> object:
-        p, which = model.parameters, None if columns is None else columns.tobytes()
-        return which, p.k, p.cn, p.exponent, p.dissipation, _key(_acting(model))
+    def _force_key(self, model: Model, subset: np.ndarray | None) -> object:
+        p, which = model.parameters, None if subset is None else subset.tobytes()
+        return which, p.k, p.cn, p.exponent, p.dissipation, _effects_key(_effects_on_normal_force(model))
 
-    def _felt_by(self, model: Model, columns: np.ndarray | None) -> Felt:
-        which = None if columns is None else columns.tobytes()
-        key = which, _key(tuple(effect for effect in model.effects if _has(effect, "placement")))
-        if key not in self._felt:
-            _keep(self._felt, key, Felt.of(self.placed(model), columns, self.rig), 2 * KEPT)
-        return self._felt[key]
+    def _contact_history(self, model: Model, subset: np.ndarray | None) -> ContactHistory:
+        which = None if subset is None else subset.tobytes()
+        key = which, _effects_key(tuple(effect for effect in model.effects if _acts_through(effect, "placement")))
+        if key not in self._histories:
+            _remember(self._histories, key, ContactHistory.of(self.placed(model), subset, self.rig), 2 * CACHE_SIZE)
+        return self._histories[key]
 
 
-def _acting(model: Model) -> tuple[Effect, ...]:
+def _effects_on_normal_force(model: Model) -> tuple[Effect, ...]:
     """The effects on normal forces, and those that move the texels."""
-    return tuple(e for e in model.effects if site_of_action(e) != "readout" and not _has(e, "friction_law"))
+    return tuple(e for e in model.effects if site_of_action(e) != "readout" and not _acts_through(e, "friction_law"))
 
 
-def _has(effect: Effect, mechanism: str) -> bool:
+def _acts_through(effect: Effect, mechanism: str) -> bool:
     return form_of(effect.name, effect.form).mechanism == mechanism
 
 
-def _keep(memory: dict, key: object, value: object, most: int) -> None:
+def _remember(memory: dict, key: object, value: object, most: int) -> None:
     """Remember something, and forget the oldest where there is too much."""
     while len(memory) >= most:
         del memory[next(iter(memory))]
     memory[key] = value
 
 
-def _key(effects: tuple[Effect, ...]) -> object:
+def _effects_key(effects: tuple[Effect, ...]) -> object:
     return tuple((effect.name, effect.form, effect.seed, *effect.values.items()) for effect in effects)
 
 
-def _restricted(effect: Effect, columns: np.ndarray) -> Effect:
+def _effect_on_texels(effect: Effect, subset: np.ndarray) -> Effect:
     """The effect on some of the texels."""
     if not any(isinstance(value, tuple) for value in effect.values.values()):
         return effect
-    values = {k: tuple(np.asarray(v)[columns]) if isinstance(v, tuple) else v for k, v in effect.values.items()}
+    values = {k: tuple(np.asarray(v)[subset]) if isinstance(v, tuple) else v for k, v in effect.values.items()}
     return replace(effect, values=values)

@@ -35,7 +35,7 @@ class Stimulus:
         Perpendicular penetration; zero where nothing touches. Of a force trial: zeros.
     rate : (T, n) float, m/s
         Speed at which the surface comes closer along its normal; zero where nothing touches.
-    load : (T, n) float or None, newtons
+    force_share : (T, n) float or None, newtons
         Each texel's share of the force in a force trial.
     normal : (T, n, 3) float or None
         Outward normal of what presses, in the sensor's frame: the direction of the normal force on the sensor. None: straight
@@ -51,16 +51,16 @@ class Stimulus:
     trial: Trial
     depth: np.ndarray
     rate: np.ndarray
-    load: np.ndarray | None
+    force_share: np.ndarray | None
     normal: np.ndarray | None
     slide: np.ndarray
     slip: np.ndarray | None
-    sunk: int = 0
+    overpressed: int = 0
 
     @property
-    def pressed_by(self) -> np.ndarray:
+    def load(self) -> np.ndarray:
         """What presses each texel, (T, n) float: the depth, or its share of a known force."""
-        return self.depth if self.load is None else self.load
+        return self.depth if self.force_share is None else self.force_share
 
     @property
     def time(self) -> np.ndarray:
@@ -103,7 +103,7 @@ def _posed(trial: Trial, rig: Rig, texels: Texels, along: np.ndarray | None) -> 
     limit, deep = reach, 0
     for _ in range(6):
         if radius is not None:
-            depth, normal, point, deep = ball_contact(trial.position, radius, texels.position, texels.normal, reach)
+            depth, normal, point, deep = sphere_contact(trial.position, radius, texels.position, texels.normal, reach)
         elif rig.indenter.edges is not None:
             pose, edges = (trial.position, trial.quaternion), np.array(rig.indenter.edges)
             depth, normal, point, deep = box_contact(*pose, edges, texels.position, texels.normal, reach)
@@ -129,8 +129,8 @@ def _posed(trial: Trial, rig: Rig, texels: Texels, along: np.ndarray | None) -> 
     slip = None
     if trial.force is not None:
         slip = np.where(touching[:, :, None], velocity - rate[:, :, None] * normal, 0.0)
-    sunk = int((depth > limit).sum(axis=1).max(initial=0))
-    return Stimulus(trial, depth, rate, None, normal, slide, slip, sunk)
+    overpressed = int((depth > limit).sum(axis=1).max(initial=0))
+    return Stimulus(trial, depth, rate, None, normal, slide, slip, overpressed)
 
 
 def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
@@ -149,7 +149,7 @@ def _spin(quaternion: np.ndarray, time: np.ndarray) -> np.ndarray:
     return turn / (time[after] - time[before])[:, None]
 
 
-def ball_contact(
+def sphere_contact(
     center: np.ndarray, radius: float, position: np.ndarray, outward: np.ndarray, reach: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, int]:
     """Contact of texels with a true sphere, in closed form (paper, Eq. 4: the segment against the surface).
@@ -181,8 +181,8 @@ def ball_contact(
     normal = np.where(touching[:, :, None], (offset + s[:, :, None] * outward) / radius, -outward)
     depth = np.where(touching, (reach - s) * np.abs(_dot(normal, outward)), 0.0)
     point = position - np.where(touching, reach - s, 0.0)[:, :, None] * outward
-    sunk = (inside < 0).sum(axis=1).max(initial=0)
-    return depth, normal, point, int(sunk)
+    overpressed = (inside < 0).sum(axis=1).max(initial=0)
+    return depth, normal, point, int(overpressed)
 
 
 def box_contact(
@@ -190,7 +190,7 @@ def box_contact(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, int]:
     """The same for a box of full sizes `edges` (3,), turned by `quaternion` (T, 4): the segment against three pairs of planes.
 
-    Its returns are those of :func:`ball_contact`.
+    Its returns are those of :func:`sphere_contact`.
     """
     frame = rotation_matrices(quaternion)  # box → sensor
     base = position - reach * outward - center[:, None, :]
@@ -208,12 +208,12 @@ def box_contact(
     normal = np.where(touching[:, :, None], own, -outward)
     left = np.where(touching, reach - s, 0.0)
     depth = left * np.abs(_dot(normal, outward))
-    sunk = between.all(axis=2).sum(axis=1).max(initial=0)
-    return depth, normal, position - left[:, :, None] * outward, int(sunk)
+    overpressed = between.all(axis=2).sum(axis=1).max(initial=0)
+    return depth, normal, position - left[:, :, None] * outward, int(overpressed)
 
 
 def _mesh_contact(trial: Trial, rig: Rig, texels: Texels, reach: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, int]:
-    """The same as :func:`ball_contact` for any mesh, through the solver's contact search."""
+    """The same as :func:`sphere_contact` for any mesh, through the solver's contact search."""
     assert trial.position is not None and trial.quaternion is not None and rig.indenter is not None
     parameters = replace(rig.parameters, max_penetration=reach)
     scenario = Scenario(

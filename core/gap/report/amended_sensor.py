@@ -11,16 +11,16 @@ from ...io.sensor_toml import SHAPE_WORDS, SensorModel
 from ..fitting.least_squares import fit
 from ..forward.predictor import Model
 from ..selection.diagnosis import Diagnosis
-from ..selection.screening import views_of
+from ..selection.screening import view_set_of
 
 
-def normalised(result: Diagnosis) -> Model:
+def with_mean_gain_moved(result: Diagnosis) -> Model:
     """Return the best model with the mean of its gains per texel put where it belongs: into `gain`, or `k` in newtons."""
     model = result.best.model
     touched = np.zeros(len(result.rig.texels), bool)
     for predictor in result.of("fit"):
         s = predictor.stimulus
-        touched |= (s.pressed_by > 0).any(axis=0)
+        touched |= (s.load > 0).any(axis=0)
     for index, effect in enumerate(model.effects):
         if effect.name != "gain-mismatch" or "factor" not in effect.values or not touched.any():
             continue
@@ -40,23 +40,23 @@ def normalised(result: Diagnosis) -> Model:
     return model
 
 
-def amended(result: Diagnosis) -> SensorModel:
+def amended_sensor(result: Diagnosis) -> SensorModel:
     """Return the sensor with fitted parameters and what was found, ready to be written or loaded."""
-    model = normalised(result)
+    model = with_mean_gain_moved(result)
     shape = {key: result.rig.words[key] for key in SHAPE_WORDS if key in result.rig.words}
     return SensorModel(result.rig.name, model.parameters, model.effects, shape)
 
 
-def stages(result: Diagnosis) -> list[Model]:
+def intermediate_models(result: Diagnosis) -> list[Model]:
     """Return the base model and then, one effect more each, the models on the way to the amended one."""
     made = [result.base.model]
     effects = result.best.model.effects
     if len(effects) > 1:
-        views = views_of(result.of("fit"), (result.noise[0].deviation, result.noise[1].deviation))
+        view_set = view_set_of(result.of("fit"), (result.noise[0].deviation, result.noise[1].deviation))
         for count in range(1, len(effects)):
             free = [item for item in result.best.free if item.effect < count]
             begun = Model(result.best.model.parameters, effects[:count])
-            made.append(fit(views.whole, begun, free, turns=6, tolerance=1e-4).model)
+            made.append(fit(view_set.whole, begun, free, max_steps=6, tolerance=1e-4).model)
     if effects:
         made.append(result.best.model)
     return made
@@ -117,13 +117,13 @@ def next_experiment(result: Diagnosis) -> str:
     lacking = []
     if result.noise[0].deviation > LOUD * result.full[0]:
         lacking.append("press harder, or repeat a trial exactly and average, until the noise is below a hundredth of the range")
-    if c.texels < 0.999:
-        lacking.append(f"touch the {1.0 - c.texels:.0%} of the texels that no trial reaches")
+    if c.touched_share < 0.999:
+        lacking.append(f"touch the {1.0 - c.touched_share:.0%} of the texels that no trial reaches")
     if c.cycles < 2:
         lacking.append("repeat the cycle at least three times in one trial")
     if c.longest_hold < 2.0:
         lacking.append("hold one depth for some ten seconds")
-    if c.rates < 5.0:
+    if c.speed_ratio < 5.0:
         lacking.append("press at speeds at least tenfold apart")
     if not c.unloading:
         lacking.append("record the unloading too")

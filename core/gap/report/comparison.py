@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ..forward.contact_phases import PHASES, load_of, phases
+from ..forward.contact_phases import PHASES, phase_indices, relative_load
 from ..forward.predictor import Model, Predictor
 from ..selection.diagnosis import Diagnosis
 
@@ -36,17 +36,17 @@ def nrmse(predictors: Sequence[Predictor], model: Model, full: tuple[float, floa
     return float(np.sqrt(square / count)) if count else None
 
 
-def without_friction(result: Diagnosis) -> dict[str, float | None] | None:
+def nrmse_without_friction(result: Diagnosis) -> dict[str, float | None] | None:
     """NRMSE by use that a base model without any friction has; None where nothing slides or no net force was measured.
 
     Friction is the base model's own, so it is in every error that is reported, and no missing effect.
     """
     if not any(p.trial.force is not None and p.stimulus.slide.any() for p in result.predictors):
         return None
-    return {use: nrmse(result.of(use), smooth(result.base.model), result.full) for use in ("fit", "check")}
+    return {use: nrmse(result.of(use), frictionless(result.base.model), result.full) for use in ("fit", "check")}
 
 
-def smooth(model: Model) -> Model:
+def frictionless(model: Model) -> Model:
     """Return a model without the base model's friction."""
     return replace(model, parameters=replace(model.parameters, mus=0.0, mud=0.0, ct=0.0))
 
@@ -63,7 +63,7 @@ def noise_floor(result: Diagnosis) -> float:
     return float(np.sqrt(square / max(count, 1.0)))
 
 
-def where(result: Diagnosis, model: Model) -> list[dict[str, Any]]:
+def error_location(result: Diagnosis, model: Model) -> list[dict[str, Any]]:
     """Shares of the squared error on the fitted trials: by phase, by part of the range, and of the worst texels."""
     n = len(result.rig.texels)
     by_phase, by_range, by_texel = np.zeros(len(PHASES)), np.zeros(RANGES + 1), np.zeros(n)
@@ -71,8 +71,8 @@ def where(result: Diagnosis, model: Model) -> list[dict[str, Any]]:
         square = squares(predictor, model, result)
         if square is None:
             continue
-        at = phases(predictor.stimulus)
-        part = np.ceil(load_of(predictor.stimulus) * RANGES).astype(int).clip(0, RANGES)
+        at = phase_indices(predictor.stimulus)
+        part = np.ceil(relative_load(predictor.stimulus) * RANGES).astype(int).clip(0, RANGES)
         by_phase += np.bincount(at.ravel(), square.ravel(), len(PHASES))
         by_range += np.bincount(part.ravel(), square.ravel(), RANGES + 1)
         by_texel += square.sum(axis=0)

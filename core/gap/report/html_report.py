@@ -26,7 +26,7 @@ figure { margin: 1.2rem 0 } figcaption { color: #68727f; font-size: .9rem } img 
 """
 
 
-def page(result: Diagnosis, found: dict[str, Any], headline: str, pictures: list[str], folder: Path) -> str:
+def render_page(result: Diagnosis, found: dict[str, Any], headline: str, pictures: list[str], folder: Path) -> str:
     """Return report.html.
 
     Parameters
@@ -204,13 +204,13 @@ def _recording(result: Diagnosis) -> str:
     noise, unit = result.noise[0 if read else 1], result.rig.parameters.unit if read else "N"
     rows = [
         [f"noise of a {'reading' if read else 'net force'}", f"{noise.deviation:.3g} {unit}, from {noise.source}"],
-        ["memory of the noise", "none" if noise.memory < 1.5 else f"{noise.memory:.3g} samples"],
-        ["texels touched", f"{c.texels:.0%}"],
-        ["fast to slow loading", f"{c.rates:.3g} to 1"],
+        ["memory of the noise", "none" if noise.correlation_time < 1.5 else f"{noise.correlation_time:.3g} samples"],
+        ["texels touched", f"{c.touched_share:.0%}"],
+        ["fast to slow loading", f"{c.speed_ratio:.3g} to 1"],
         ["longest hold", f"{c.longest_hold:.3g} s"],
         ["cycles in one trial", f"{c.cycles}"],
         ["unloading recorded", "yes" if c.unloading else "no"],
-        ["something without load", f"over {c.rest:.0%} of a trial"],
+        ["something without load", f"over {c.unloaded_share:.0%} of a trial"],
         ["sliding", "yes" if c.slides else "no"],
     ]
     trials = [

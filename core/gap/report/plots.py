@@ -15,7 +15,7 @@ from ...geometry.layout import GridLayout
 from ..forward.contact_phases import PHASES
 from ..forward.predictor import Model, Predictor
 from ..selection.diagnosis import Diagnosis
-from .comparison import noise_floor, nrmse, rms_by_texel, smooth, where, without_friction
+from .comparison import error_location, frictionless, noise_floor, nrmse, nrmse_without_friction, rms_by_texel
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -58,7 +58,7 @@ def _models(result: Diagnosis) -> list[tuple[str, Model, str]]:
 
 def _rough(result: Diagnosis) -> list[tuple[str, Model, str]]:
     """The base model without its friction, where a surface slides."""
-    return [] if without_friction(result) is None else [("without friction", smooth(result.base.model), GREY)]
+    return [] if nrmse_without_friction(result) is None else [("without friction", frictionless(result.base.model), GREY)]
 
 
 def curves(result: Diagnosis) -> Figure:
@@ -163,7 +163,7 @@ def phase_bars(result: Diagnosis) -> Figure:
     base = nrmse(result.of("fit"), result.base.model, result.full) or 1.0
     for offset, (label, model, colour) in enumerate(_models(result)):
         left = ((nrmse(result.of("fit"), model, result.full) or 0.0) / base) ** 2
-        shares = {entry["phase"]: entry["share"] for entry in where(result, model) if "phase" in entry}
+        shares = {entry["phase"]: entry["share"] for entry in error_location(result, model) if "phase" in entry}
         heights = [100.0 * left * shares[phase] for phase in PHASES]
         axes.bar(
             np.arange(len(PHASES)) + 0.36 * (offset - 0.5 * (len(_models(result)) - 1)),
@@ -186,8 +186,8 @@ def loops(result: Diagnosis) -> Figure:
     s, trial = predictor.stimulus, predictor.trial
     if "texel" in name:
         texel = int(name.split()[1])
-        x = s.load[:, texel] if s.load is not None else 1e3 * s.depth[:, texel]
-        label = "load (N)" if s.load is not None else "depth (mm)"
+        x = s.force_share[:, texel] if s.force_share is not None else 1e3 * s.depth[:, texel]
+        label = "load (N)" if s.force_share is not None else "depth (mm)"
     elif s.slide.any():
         travel = trial.slide if trial.slide.any() else trial.position[:, :2] if trial.position is not None else trial.slide
         x, label = 1e3 * travel[:, int(np.argmax(np.ptp(travel, axis=0)))], "travel (mm)"

@@ -12,12 +12,12 @@ from ...effects.engine.registry import library
 from ...effects.engine.specification import Form, Kind, TransducerArray
 from ...model.effect import Effect
 from ...model.parameter import Parameter
-from ..fitting.least_squares import Free
+from ..fitting.least_squares import FreeParameter
 from ..fitting.noise_floor import coverage
 from ..forward.predictor import Model, Predictor
-from .identifiability import untold
+from .identifiability import unidentifiable
 
-LIMITS = {
+TIGHTER_BOUNDS = {
     ("creep", "rising-exponential", "amount"): 1.0,
     ("creep", "rising-logarithmic", "amount"): 0.3,
     ("softening", "path", "share"): 0.5,
@@ -28,9 +28,9 @@ LIMITS = {
 """Tighter bounds than the effects' own: past them a formula is still sound, but it is another effect that it then describes (a
 reading that rises fivefold is a lag, a softening that leaves nothing is wear)."""
 
-NEVER = ("noise",)
+NOT_FITTED = ("noise",)
 """Kinds that are not found by fitting but by what is left in the end (see :mod:`.heteroscedastic_noise`)."""
-READ_OFF = ("dead-texels", "quantization")
+DIRECTLY_ESTIMATED = ("dead-texels", "quantization")
 """Kinds whose numbers are read off the recordings, since a texel is dead or is not, and a step is there or is not."""
 
 
@@ -128,20 +128,20 @@ class Candidate:
         return f"{self.kind.name}/{self.form.name}"
 
     @property
-    def local(self) -> bool:
+    def has_texel_parameters(self) -> bool:
         """Whether it has a number for each texel."""
         return any(p.per_texel for p in self.form.parameters)
 
-    def free(self, index: int, scales: Scales, gain: float) -> list[Free]:
+    def free_parameters(self, index: int, scales: Scales, gain: float) -> list[FreeParameter]:
         """Return its numbers as those of the `index`-th effect of a stack."""
         made = []
         for raw in self.form.parameters:
             p = raw.scaled(gain)
             _, top = search_range(p, scales)
             size = max(abs(p.default), 0.1 * top) if p.unit == "1" else 0.3 * top
-            high = min(p.high, LIMITS.get((self.kind.name, self.form.name, p.name), p.high))
+            high = min(p.high, TIGHTER_BOUNDS.get((self.kind.name, self.form.name, p.name), p.high))
             rest = float(self.form.neutral.get(p.name, p.default)) if p.per_texel else 0.0
-            made.append(Free(index, p.name, p.low, high, p.log, max(size, 1e-12), p.per_texel, rest))
+            made.append(FreeParameter(index, p.name, p.low, high, p.log, max(size, 1e-12), p.per_texel, rest))
         return made
 
     def effect(self, values: dict[str, float], texels: int, gain: float) -> Effect:
@@ -154,7 +154,7 @@ class Candidate:
         }
         return Effect(self.kind.name, self.form.name, {**complete, **spread})
 
-    def starts(self, scales: Scales, gain: float, count: int = 8) -> Iterator[dict[str, float]]:
+    def starting_values(self, scales: Scales, gain: float, count: int = 8) -> Iterator[dict[str, float]]:
         """Yield places to begin: spread evenly over the search ranges (Halton's sequence)."""
         for i in range(count):
             values = {}
@@ -168,14 +168,14 @@ class Candidate:
                     values[p.name] = float(low + share * (high - low))
             yield values
 
-    def strength(self) -> str | None:
+    def strength_parameter(self) -> str | None:
         """The parameter that is zero when the effect is not there, if there is one."""
         for name, value in self.form.neutral.items():
             if value == 0.0:
                 return name
         return None
 
-    def reach(self) -> str | None:
+    def inverse_strength_parameter(self) -> str | None:
         """The parameter that is infinite when the effect is not there, if there is one: its inverse is the strength."""
         for name, value in self.form.neutral.items():
             if np.isinf(value):
@@ -199,10 +199,10 @@ def candidates(predictors: Sequence[Predictor], model: Model) -> list[Candidate]
     read = any(p.trial.reading is not None for p in predictors)
     several = len(predictors[0].rig.texels) > 1
     loaded = all(p.trial.stimulus == "force" for p in predictors)
-    cannot = untold(coverage(predictors))
+    cannot = unidentifiable(coverage(predictors))
     found = []
     for kind in library().values():
-        if kind.name in NEVER or kind.name in cannot:
+        if kind.name in NOT_FITTED or kind.name in cannot:
             continue
         for form in kind.forms:
             acts_on_force = kind.site_of(form) != "readout"
@@ -218,7 +218,7 @@ def candidates(predictors: Sequence[Predictor], model: Model) -> list[Candidate]
             if not acts_on_force and not read:
                 continue
             one = Candidate(kind, form)
-            if not several and (one.local or is_spatial(form)):
+            if not several and (one.has_texel_parameters or is_spatial(form)):
                 continue
             found.append(one)
     return found

@@ -14,26 +14,37 @@ import numpy as np
 from ...effects.engine.registry import library
 from ...model.effect import Effect
 from ..dataset.rig import Rig
-from ..fitting.heteroscedastic_noise import trembling
-from ..fitting.least_squares import FRICTION, LEVEL, Fit, base_numbers, fit, held_out
-from ..fitting.noise_floor import SHORTEST, Coverage, Noise, coverage, force_noise, reading_noise
-from ..fitting.residual_tests import Structure, structure_of
-from ..fitting.spectral_lines import Line, line_of
+from ..fitting.heteroscedastic_noise import proportional_noise
+from ..fitting.least_squares import FRICTION_LEVEL, FRICTION_PARAMETERS, Fit, fit, free_base_parameters, held_out_squares
+from ..fitting.noise_floor import SHORTEST_STRETCH, ChannelNoise, Coverage, coverage, force_noise, reading_noise
+from ..fitting.residual_tests import ResidualStructure, residual_structure
+from ..fitting.spectral_lines import SpectralLine, strongest_line
 from ..forward.predictor import Model, Predictor
-from .candidates import NEVER, Scales, candidates, scales_of
-from .confidence import EXPLAINED, UNSURE, doubted, is_doubtful, least_share, may_be_bent
-from .forward_selection import FORCES, LEAST, READINGS, STRUCTURE, Account, Explainer, Ground, Step, friction_kinds, means_of
-from .identifiability import PASSED_ON, alike, bend_of, nearly_alike, untold
-from .screening import Views, views_of
+from .candidates import NOT_FITTED, Scales, candidates, scales_of
+from .confidence import EXPLAINED, UNSURE_CONFIDENCE, is_doubtful, least_share, may_absorb_misfit, unsure_names
+from .forward_selection import (
+    FORCES,
+    LEAST_IMPROVEMENT,
+    LEAST_STRUCTURE,
+    READINGS,
+    ForwardSelection,
+    NoiseFloor,
+    SelectionState,
+    SelectionStep,
+    friction_kinds,
+    means_of,
+)
+from .identifiability import SPREADING, curvature_ratio, hardly_distinguishable, indistinguishable, unidentifiable
+from .screening import ViewSet, view_set_of
 
-RIVAL = 1.35
+RIVAL_RATIO = 1.35
 """A rival is one that leaves at most so many times as much of the gap as the best does, and closes nearly as much."""
-OF_A_KIND = 3.0
-"""The same for those that are much alike (see :func:`.identifiability.nearly_alike`)."""
+HARDLY_DISTINGUISHABLE_RATIO = 3.0
+"""The same for those that are much alike (see :func:`.identifiability.hardly_distinguishable`)."""
 
 
 @dataclass(frozen=True)
-class Named:
+class Finding:
     """An effect that was found.
 
     Attributes
@@ -65,19 +76,19 @@ class Diagnosis:
 
     rig: Rig
     predictors: list[Predictor]
-    noise: tuple[Noise, Noise]
+    noise: tuple[ChannelNoise, ChannelNoise]
     full: tuple[float, float]
     coverage: Coverage
     scales: Scales
     base: Fit
     best: Fit
-    base_structure: Structure
-    structure: Structure
+    base_structure: ResidualStructure
+    structure: ResidualStructure
     verdict: str = "no gap"
-    named: list[Named] = field(default_factory=list)
+    findings: list[Finding] = field(default_factory=list)
     ambiguous: list[tuple[str, ...]] = field(default_factory=list)
     ruled_out: list[tuple[str, str]] = field(default_factory=list)
-    line: Line | None = None
+    line: SpectralLine | None = None
 
     def of(self, use: str) -> list[Predictor]:
         """Return the predictors of the trials of one use."""
@@ -93,16 +104,18 @@ class Progress:
     total: int
 
 
-def free_base(rig: Rig, predictors: Sequence[Predictor]) -> list[str]:
+def base_parameters_to_search(rig: Rig, predictors: Sequence[Predictor]) -> list[str]:
     """Return which of the base model's own numbers are free while effects are looked for.
 
     Of depth and pose the readings tell only gain times stiffness: in newtons, or where the rig gives the gain, that is `k`.
     """
-    names = numbers_told(rig, predictors)
-    return [name for name in names if name not in FRICTION] + (free_friction(rig) if set(FRICTION) & set(names) else [])
+    names = identified_base_parameters(rig, predictors)
+    return [name for name in names if name not in FRICTION_PARAMETERS] + (
+        friction_parameters_to_search(rig) if set(FRICTION_PARAMETERS) & set(names) else []
+    )
 
 
-def numbers_told(rig: Rig, predictors: Sequence[Predictor]) -> list[str]:
+def identified_base_parameters(rig: Rig, predictors: Sequence[Predictor]) -> list[str]:
     """Return which of the base model's own numbers these recordings tell."""
     read = any(p.trial.reading is not None for p in predictors)
     pressed = any(p.trial.stimulus != "force" for p in predictors)
@@ -123,11 +136,11 @@ def numbers_told(rig: Rig, predictors: Sequence[Predictor]) -> list[str]:
     if own_unit and read:
         names.append("zero")
     if dragged:
-        names += FRICTION
+        names += FRICTION_PARAMETERS
     return names
 
 
-def free_friction(rig: Rig) -> list[str]:
+def friction_parameters_to_search(rig: Rig) -> list[str]:
     """Return which of the base model's numbers of friction are free while effects are looked for.
 
     By how much friction falls from rest to sliding, and over which speeds, is itself a law of Stribeck's, and `ct` a viscous
@@ -135,15 +148,15 @@ def free_friction(rig: Rig) -> list[str]:
     or another drag is such an effect, and the level of friction alone is a better number.
     """
     p = rig.parameters
-    names = list(FRICTION)
+    names = list(FRICTION_PARAMETERS)
     if {"mus", "mud", "x0"} <= rig.given and p.mus > 0:
-        names = [LEVEL, *(name for name in names if name not in ("mus", "mud", "x0"))]
+        names = [FRICTION_LEVEL, *(name for name in names if name not in ("mus", "mud", "x0"))]
     if "ct" in rig.given:
         names.remove("ct")
     return names
 
 
-def begin(rig: Rig) -> tuple[list[Predictor], tuple[Noise, Noise], tuple[float, float]]:
+def prepared(rig: Rig) -> tuple[list[Predictor], tuple[ChannelNoise, ChannelNoise], tuple[float, float]]:
     """Compute what the texels meet in each trial, and measure noise and range."""
     predictors = [Predictor(trial, rig) for trial in rig.trials]
     readings = [p.trial.reading for p in predictors if p.trial.reading is not None]
@@ -193,167 +206,183 @@ def diagnose(rig: Rig) -> Iterator[Progress | Diagnosis]:
     """
     total = 1000
     yield Progress("contacts of every trial", 0, total)
-    predictors, noise, full = begin(rig)
+    predictors, noise, full = prepared(rig)
     fitted = [p for p in predictors if p.trial.use == "fit"]
-    views = views_of(fitted, (noise[0].deviation, noise[1].deviation))
+    view_set = view_set_of(fitted, (noise[0].deviation, noise[1].deviation))
     yield Progress("base model", 40, total)
     start = start_model(rig, fitted)
-    base = fit(views.whole, start, base_numbers(start.parameters, free_base(rig, fitted), full[0]), turns=40, tolerance=1e-7)
-    before = _structure(views, base)
+    base = fit(
+        view_set.whole,
+        start,
+        free_base_parameters(start.parameters, base_parameters_to_search(rig, fitted), full[0]),
+        max_steps=40,
+        tolerance=1e-7,
+    )
+    before = _structure(view_set, base)
     scales = scales_of(fitted, base.model)
     result = Diagnosis(rig, predictors, noise, full, coverage(fitted), scales, base, base, before, before)
-    for progress in _explain(result, views):
+    for progress in _select_effects(result, view_set):
         yield Progress(progress[0], 60 + int(940 * progress[1]), total)
     yield result
 
 
-def _structure(views: Views, found: Fit) -> Structure:
-    width = len(views.whole[0].predictor.rig.texels)
-    residuals = [share.residual(found.model) for share in views.whole]
-    if not any(share.predictor.trial.reading is not None for share in views.whole):  # forces alone: three channels for texels
-        return _force_structure(views, residuals)
-    return structure_of([share.predictor for share in views.whole], [r[:, :width] for r in residuals])
+def _structure(view_set: ViewSet, found: Fit) -> ResidualStructure:
+    width = len(view_set.whole[0].predictor.rig.texels)
+    residuals = [share.residual(found.model) for share in view_set.whole]
+    if not any(
+        share.predictor.trial.reading is not None for share in view_set.whole
+    ):  # forces alone: three channels for texels
+        return _force_structure(view_set, residuals)
+    return residual_structure([share.predictor for share in view_set.whole], [r[:, :width] for r in residuals])
 
 
-def _force_structure(views: Views, residuals: list[np.ndarray]) -> Structure:
+def _force_structure(view_set: ViewSet, residuals: list[np.ndarray]) -> ResidualStructure:
     """The same where only the net force was measured: its largest component stands for all texels."""
-    width = len(views.whole[0].predictor.rig.texels)
+    width = len(view_set.whole[0].predictor.rig.texels)
     total = np.sum([(r[:, width:] ** 2).sum(axis=0) for r in residuals], axis=0)
     axis = width + int(np.argmax(total))
-    return structure_of([s.predictor for s in views.whole], [np.tile(r[:, axis : axis + 1], (1, width)) for r in residuals])
+    return residual_structure(
+        [s.predictor for s in view_set.whole], [np.tile(r[:, axis : axis + 1], (1, width)) for r in residuals]
+    )
 
 
-def _explain(result: Diagnosis, views: Views) -> Iterator[tuple[str, float]]:
+def _select_effects(result: Diagnosis, view_set: ViewSet) -> Iterator[tuple[str, float]]:
     """Add effects to the base model while they earn their place; write everything into `result`."""
-    base = Account(result.base, held_out(views.whole, result.base))
+    base = SelectionState(result.base, held_out_squares(view_set.whole, result.base))
     start = base.means
-    floor = np.array([min(1.0, start[READINGS]), min(_trembling_at_rest(views, result.base), start[FORCES])])
-    ground = Ground(start, floor, result.base.count.sum(axis=0).astype(float))
-    explainer = Explainer(views, result.scales, result.coverage, ground)
-    account = yield from explainer.run(base, partial(_structure, views))
-    account = replace(account, fit=_loosened(result, views, account.fit))
-    result.best, result.structure = account.fit, _structure(views, account.fit)
-    result.line = line_of(views.whole, account.fit.model)
-    main, mean = ground.main, float(account.means[ground.main])
-    noise = min(start[main] * (1.0 - result.base_structure.total), mean * (1.0 - result.structure.total))
-    ground.floor[main] = float(np.clip(noise, 0.8, 1.0))
-    if result.structure.total < STRUCTURE and result.line is None:
-        tremble = trembling(views.whole, account.fit.model)
-        if tremble is not None:  # then all that is left is noise
-            result.best = replace(account.fit, model=account.fit.model.with_effect(tremble))
-            ground.floor[main] = max(ground.floor[main], mean)
-    _conclude(result, account, ground)
-    unsure = doubted(result, views, account, ground)
-    result.named = [replace(n, confidence=min(n.confidence, UNSURE)) if n.name in unsure else n for n in result.named]
-    _rule_out(result, account.first, ground)
+    noise = np.array([min(1.0, start[READINGS]), min(_force_noise_unloaded(view_set, result.base), start[FORCES])])
+    floor = NoiseFloor(start, noise, result.base.count.sum(axis=0).astype(float))
+    explainer = ForwardSelection(view_set, result.scales, result.coverage, floor)
+    state = yield from explainer.run(base, partial(_structure, view_set))
+    state = replace(state, fit=_refitted_base(result, view_set, state.fit))
+    result.best, result.structure = state.fit, _structure(view_set, state.fit)
+    result.line = strongest_line(view_set.whole, state.fit.model)
+    main, mean = floor.main_quantity, float(state.means[floor.main_quantity])
+    least = min(start[main] * (1.0 - result.base_structure.total), mean * (1.0 - result.structure.total))
+    floor.noise[main] = float(np.clip(least, 0.8, 1.0))
+    if result.structure.total < LEAST_STRUCTURE and result.line is None:
+        noise_effect = proportional_noise(view_set.whole, state.fit.model)
+        if noise_effect is not None:  # then all that is left is noise
+            result.best = replace(state.fit, model=state.fit.model.with_effect(noise_effect))
+            floor.noise[main] = max(floor.noise[main], mean)
+    _conclude(result, state, floor)
+    unsure = unsure_names(result, view_set, state, floor)
+    result.findings = [
+        replace(n, confidence=min(n.confidence, UNSURE_CONFIDENCE)) if n.name in unsure else n for n in result.findings
+    ]
+    _rule_out(result, state.first, floor)
 
 
-def _loosened(result: Diagnosis, views: Views, found: Fit) -> Fit:
+def _refitted_base(result: Diagnosis, view_set: ViewSet, found: Fit) -> Fit:
     """The fit with all the base model's numbers free, as those that a rig states are rounded.
 
     Where an effect on friction was found they would take its part. There they stay, and only make the intervals as wide as
     what the recordings tell.
     """
-    names = numbers_told(result.rig, [share.predictor for share in views.whole])
+    names = identified_base_parameters(result.rig, [share.predictor for share in view_set.whole])
     if set(names) == {item.name for item in found.free if item.effect < 0}:
         return found
     rubbed = any(effect.name in friction_kinds() for effect in found.model.effects)
-    free = base_numbers(found.model.parameters, names, result.full[READINGS])
+    free = free_base_parameters(found.model.parameters, names, result.full[READINGS])
     free += [item for item in found.free if item.effect >= 0]
-    return fit(views.whole, found.model, free, turns=0 if rubbed else 10, tolerance=1e-5)
+    return fit(view_set.whole, found.model, free, max_steps=0 if rubbed else 10, tolerance=1e-5)
 
 
-def _trembling_at_rest(views: Views, found: Fit) -> float:
+def _force_noise_unloaded(view_set: ViewSet, found: Fit) -> float:
     """Mean square of the forces' residual while nothing touches; at least 1, which is what white noise has."""
     squares = []
-    for share in views.whole:
+    for share in view_set.whole:
         stimulus = share.predictor.stimulus
-        load = stimulus.pressed_by
+        load = stimulus.load
         rest = ~(load > 0).any(axis=1)
-        if share.forces and share.predictor.trial.force is not None and rest.sum() >= SHORTEST:
+        if share.with_forces and share.predictor.trial.force is not None and rest.sum() >= SHORTEST_STRETCH:
             squares.append(share.residual(found.model)[rest, -3:] ** 2)
     return max(float(np.concatenate(squares).mean()), 1.0) if squares else 1.0
 
 
-def _conclude(result: Diagnosis, account: Account, ground: Ground) -> None:
+def _conclude(result: Diagnosis, state: SelectionState, floor: NoiseFloor) -> None:
     """Write verdict, names and rivals."""
     effects = result.best.model.effects
     fitted = [effect for effect in effects if effect.name != "noise"]
-    closed = [ground.closed(account.means, side) for side in (READINGS, FORCES)]
-    is_open = any(ground.matters(side) and closed[side] < EXPLAINED for side in (READINGS, FORCES))
-    result.verdict = _verdict(result, ground, is_open)
-    bend = bend_of(result.of("fit"), result.best.model)
+    closed = [floor.closed_share(state.means, quantity) for quantity in (READINGS, FORCES)]
+    is_open = any(floor.has_gap(quantity) and closed[quantity] < EXPLAINED for quantity in (READINGS, FORCES))
+    result.verdict = _verdict(result, floor, is_open)
+    curvature = curvature_ratio(result.of("fit"), result.best.model)
     for index, effect in enumerate(effects):
-        others, leaves = _beside(effect, account, {e.name for e in effects})
-        rivals = _rivals(effect, account, result.coverage, bend, others, ground)
+        others, leaves = _alternatives(effect, state, {e.name for e in effects})
+        rivals = _rivals(effect, state, result.coverage, curvature, others, floor)
         weight = 1.0 / (1.0 + sum(ratio**-4.0 for ratio in others.values()))
-        share = closed[ground.side(effect.name)] if fitted else 1.0
+        share = closed[floor.quantity_for(effect.name)] if fitted else 1.0
         confidence = weight * (0.5 + 0.5 * share if share >= least_share(effect.name, leaves) else 0.5 * share)
-        bent = is_open and may_be_bent(effect, account)
-        if rivals or (len(fitted) > 1 and (bent or is_doubtful(effect, account, fitted, ground))):
-            confidence = min(confidence, UNSURE)
+        bent = is_open and may_absorb_misfit(effect, state)
+        if rivals or (len(fitted) > 1 and (bent or is_doubtful(effect, state, fitted, floor))):
+            confidence = min(confidence, UNSURE_CONFIDENCE)
         if rivals:
             result.ambiguous.append((effect.name, *rivals))
         nearest = min(others, key=lambda name: others[name], default="")
-        result.named.append(
-            Named(index, effect.name, effect.form, round(confidence, 3), rivals, nearest, leaves.get(nearest, np.inf))
+        result.findings.append(
+            Finding(index, effect.name, effect.form, round(confidence, 3), rivals, nearest, leaves.get(nearest, np.inf))
         )
 
 
-def _verdict(result: Diagnosis, ground: Ground, is_open: bool) -> str:
+def _verdict(result: Diagnosis, floor: NoiseFloor, is_open: bool) -> str:
     """One word on the whole; `is_open` where much of what the base model lacks is left."""
     effects = result.best.model.effects
     if all(effect.name == "noise" for effect in effects) and effects:
         return "explained"
     if effects:
         return "unexplained" if is_open else "explained"
-    mean, gap = float(ground.start[ground.main]), ground.gap(ground.main)
-    quiet = result.base_structure.total < STRUCTURE and (mean < 2.0 or gap < LEAST) and result.line is None
-    return "no gap" if quiet and not (ground.both and ground.matters(FORCES)) else "unexplained"
+    mean, gap = float(floor.base[floor.main_quantity]), floor.gap(floor.main_quantity)
+    quiet = result.base_structure.total < LEAST_STRUCTURE and (mean < 2.0 or gap < LEAST_IMPROVEMENT) and result.line is None
+    return "no gap" if quiet and not (floor.both and floor.has_gap(FORCES)) else "unexplained"
 
 
-def _beside(effect: Effect, account: Account, taken: set[str]) -> tuple[dict[str, float], dict[str, float]]:
+def _alternatives(effect: Effect, state: SelectionState, taken: set[str]) -> tuple[dict[str, float], dict[str, float]]:
     """How many times as bad as an effect each other kind is in its place, and how many times as much it leaves, by name."""
-    step = account.steps.get(effect.name, Step([], []))
+    step = state.steps.get(effect.name, SelectionStep([], []))
     own = step.of(effect.name)
     others: dict[str, float] = {}
     leaves: dict[str, float] = {}
-    for one, left in zip(step.ranked, step.left, strict=True):
+    for one, left in zip(step.ranked, step.remaining, strict=True):
         name = one.candidate.name
-        if name not in taken and not (effect.name == "dead-texels" and one.candidate.local):
-            others[name] = min(step.worse(left, effect.name), others.get(name, np.inf))
+        if name not in taken and not (effect.name == "dead-texels" and one.candidate.has_texel_parameters):
+            others[name] = min(step.times_worse(left, effect.name), others.get(name, np.inf))
             leaves[name] = min(left / own, leaves.get(name, np.inf))
     return others, leaves
 
 
 def _rivals(
-    effect: Effect, account: Account, covered: Coverage, bend: float, others: dict[str, float], ground: Ground
+    effect: Effect, state: SelectionState, covered: Coverage, curvature: float, others: dict[str, float], floor: NoiseFloor
 ) -> tuple[str, ...]:
-    """Kinds that would do as well, or that these recordings cannot tell from it; `others` are those of :func:`_beside`."""
-    taken = {e.name for e in account.fit.model.effects}
-    own = account.steps.get(effect.name, Step([], [])).of(effect.name)
-    hit = effect.name in PASSED_ON and own < 2.0 * ground.untold(ground.side(effect.name))  # leaves nothing: the sensor's own
-    akin = () if hit else nearly_alike(covered, effect.name)
-    near = [name for name, ratio in others.items() if ratio < (OF_A_KIND if name in akin else RIVAL)]
-    return tuple(dict.fromkeys([*near, *(name for name in alike(covered, effect.name, bend) if name not in taken)]))
+    """Kinds that would do as well, or that these recordings cannot tell from it; `others` as from :func:`_alternatives`."""
+    taken = {e.name for e in state.fit.model.effects}
+    own = state.steps.get(effect.name, SelectionStep([], [])).of(effect.name)
+    hit = effect.name in SPREADING and own < 2.0 * floor.unresolved(
+        floor.quantity_for(effect.name)
+    )  # leaves nothing: the sensor's own
+    akin = () if hit else hardly_distinguishable(covered, effect.name)
+    near = [name for name, ratio in others.items() if ratio < (HARDLY_DISTINGUISHABLE_RATIO if name in akin else RIVAL_RATIO)]
+    return tuple(
+        dict.fromkeys([*near, *(name for name in indistinguishable(covered, effect.name, curvature) if name not in taken)])
+    )
 
 
-def _rule_out(result: Diagnosis, alone: Step, ground: Ground) -> None:
+def _rule_out(result: Diagnosis, alone: SelectionStep, floor: NoiseFloor) -> None:
     """Say of each kind why it was not named; `alone` are those that were fitted on top of the base model."""
     tried: dict[str, float] = {}
     for one in alone.ranked:
         name = one.candidate.name
-        closed = ground.closed(means_of(one.unseen, one.fit), ground.side(name))
+        closed = floor.closed_share(means_of(one.held_out, one.fit), floor.quantity_for(name))
         tried[name] = max(tried.get(name, 0.0), closed)
-    named = {name for pair in result.ambiguous for name in pair} | {n.name for n in result.named}
+    named = {name for pair in result.ambiguous for name in pair} | {n.name for n in result.findings}
     looked = {c.name for c in candidates(result.of("fit"), result.base.model)}
     for kind in library().values():
         if kind.name in named:
             continue
-        if kind.name in NEVER:
+        if kind.name in NOT_FITTED:
             why = "what is left does not tremble the more, the larger the reading"
         elif kind.name not in looked:
-            why = untold(result.coverage).get(kind.name, "these recordings cannot show it")
+            why = unidentifiable(result.coverage).get(kind.name, "these recordings cannot show it")
         elif kind.name in tried and result.verdict != "no gap":
             why = f"alone it closes {tried[kind.name]:.0%} of the squared gap on unseen trials"
         elif result.verdict == "no gap":

@@ -8,25 +8,25 @@ from collections.abc import Sequence
 import numpy as np
 
 from ...model.effect import Effect
-from ..fitting.least_squares import Share
-from ..forward.contact_phases import load_of
+from ..fitting.least_squares import TrialView
+from ..forward.contact_phases import relative_load
 from ..forward.predictor import Model
 from .candidates import Candidate
 
-FEW_LEVELS = 48
+MOST_LEVELS = 48
 """Values of all readings together up to which they are steps: noise alone makes thousands."""
 
 
-def dead(shares: Sequence[Share], model: Model, candidate: Candidate, texels: int) -> Effect | None:
+def unresponsive_texels(views: Sequence[TrialView], model: Model, candidate: Candidate, texels: int) -> Effect | None:
     """Return the effect with those texels dead that hardly follow the model although it loads them; None when all follow.
 
     One that goes to a rail as soon as it is touched is as dead: loaded it reads the same always, and far from what it should.
     """
-    pairs = [(share.predictor.predict(model).reading, share.predictor.trial.reading) for share in shares]
+    pairs = [(view.predictor.predict(model).reading, view.predictor.trial.reading) for view in views]
     known = [(a, b) for a, b in pairs if b is not None]
     if not known:
         return None
-    noise = shares[0].noise[0]
+    noise = views[0].noise[0]
     predicted, measured = ((np.concatenate(side) - model.parameters.zero) / noise for side in zip(*known, strict=True))
     good = np.isfinite(measured)
     loaded = (predicted**2 * good).sum(axis=0) > 200.0  # by so much that the noise cannot hide whether it answers
@@ -48,24 +48,24 @@ def dead(shares: Sequence[Share], model: Model, candidate: Candidate, texels: in
     return Effect(candidate.name, candidate.form.name, {name: tuple(values[name].tolist()) for name in own})
 
 
-def stepped(shares: Sequence[Share], model: Model, candidate: Candidate) -> list[Effect]:
+def quantization_starts(views: Sequence[TrialView], model: Model, candidate: Candidate) -> list[Effect]:
     """Return the effect with each step in which the readings may come, if they do.
 
     A handful of values that all samples share is seen at once; uneven steps stand for several even ones. Readings in finer
     steps of q have a characteristic function that is large at the frequency 1/q, however they are spread otherwise (Widrow and
     Kollár, Quantization Noise, 2008). Held values would look alike: only samples that change are taken.
     """
-    values = moving_readings(shares, model)
+    values = moving_readings(views, model)
     if len(values) < 400:
         return []
     levels = few_levels(values)
     if candidate.form.name == "companding":
-        return [] if levels is None else growing(levels, resting(shares) - model.parameters.zero, candidate)
+        return [] if levels is None else companding_starts(levels, unloaded_reading(views) - model.parameters.zero, candidate)
     if levels is not None:
         apart = np.diff(levels)
         tried = np.unique([np.median(apart), apart.mean(), apart.max(), float(np.average(apart, weights=apart))])
         return [Effect(candidate.name, candidate.form.name, {"step": float(step)}) for step in tried]
-    noise, full = shares[0].noise[0], float(np.ptp(values))
+    noise, full = views[0].noise[0], float(np.ptp(values))
     frequency = np.arange(5.0 / full, 1.0 / (2.5 * noise), 0.12 / full)  # coarser steps than a fifth are seen by eye
     if not 2 < len(frequency) < 20000:
         return []
@@ -78,7 +78,7 @@ def stepped(shares: Sequence[Share], model: Model, candidate: Candidate) -> list
     return [Effect(candidate.name, candidate.form.name, {"step": float(1.0 / top)})]
 
 
-def growing(levels: np.ndarray, rest: float, candidate: Candidate) -> list[Effect]:
+def companding_starts(levels: np.ndarray, rest: float, candidate: Candidate) -> list[Effect]:
     """Return the effect whose steps are those between some levels above the one at rest: ``A (exp(b k) - 1)`` for the k-th."""
     above = levels[levels > rest + 1e-9] - rest
     if len(above) < 3:
@@ -90,35 +90,35 @@ def growing(levels: np.ndarray, rest: float, candidate: Candidate) -> list[Effec
     return [Effect(candidate.name, candidate.form.name, {"scale": float(scale[best]), "growth": float(growth[best])})]
 
 
-def coarsest(shares: Sequence[Share], model: Model) -> float:
+def coarsest_step(views: Sequence[TrialView], model: Model) -> float:
     """Return the largest step in which readings come, in the sensor's unit; 0 where there are none that can be seen."""
-    levels = few_levels(moving_readings(shares, model))
+    levels = few_levels(moving_readings(views, model))
     return 0.0 if levels is None else float(np.diff(levels).max())
 
 
-def moving_readings(shares: Sequence[Share], model: Model) -> np.ndarray:
+def moving_readings(views: Sequence[TrialView], model: Model) -> np.ndarray:
     """Return some thousand readings, less the zero, of samples at which the model changes by more than the noise."""
     moving = [np.zeros(0)]
-    for share in shares:
-        reading = share.predictor.trial.reading
+    for view in views:
+        reading = view.predictor.trial.reading
         if reading is not None:
-            change = np.abs(np.gradient(share.predictor.predict(model).reading, axis=0))
-            moving.append(reading[(change > 0.5 * share.noise[0]) & np.isfinite(reading)])
+            change = np.abs(np.gradient(view.predictor.predict(model).reading, axis=0))
+            moving.append(reading[(change > 0.5 * view.noise[0]) & np.isfinite(reading)])
     values = np.concatenate(moving) - model.parameters.zero
     return values[:: max(1, len(values) // 6000)]
 
 
-def resting(shares: Sequence[Share]) -> float:
+def unloaded_reading(views: Sequence[TrialView]) -> float:
     """Return the median of what is read while nothing touches."""
     found = []
-    for share in shares:
-        reading = share.predictor.trial.reading
+    for view in views:
+        reading = view.predictor.trial.reading
         if reading is not None:
-            found.append(reading[(load_of(share.predictor.stimulus) <= 0) & np.isfinite(reading)])
+            found.append(reading[(relative_load(view.predictor.stimulus) <= 0) & np.isfinite(reading)])
     return float(np.median(np.concatenate(found))) if any(map(len, found)) else 0.0
 
 
 def few_levels(values: np.ndarray) -> np.ndarray | None:
     """Return the values between which readings jump, in order, if they have so few that noise did not make them; else None."""
     levels = np.unique(np.round(values, 12))
-    return levels if 3 <= len(levels) <= FEW_LEVELS and len(values) >= 20 * len(levels) else None
+    return levels if 3 <= len(levels) <= MOST_LEVELS and len(values) >= 20 * len(levels) else None

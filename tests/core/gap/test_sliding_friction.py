@@ -6,10 +6,10 @@ from dataclasses import replace
 import numpy as np
 
 from palpate.core.gap.dataset.rig import Rig, Trial, grid_texels
-from palpate.core.gap.forward.contact_phases import WAYS, features
+from palpate.core.gap.forward.contact_phases import TRAVEL_BANDS, features
 from palpate.core.gap.forward.predictor import Model, Predictor
 from palpate.core.gap.report import summary
-from palpate.core.gap.report.comparison import nrmse, without_friction
+from palpate.core.gap.report.comparison import nrmse, nrmse_without_friction
 from palpate.core.gap.selection.diagnosis import diagnose
 from palpate.core.model.sensor_parameters import SensorParameters
 
@@ -35,14 +35,14 @@ def brake(backlash):
 
 def test_the_report_says_what_friction_does_and_what_is_left(tmp_path):
     *_, result = diagnose(brake(backlash=2.0))
-    bare, own = without_friction(result), nrmse(result.of("fit"), result.base.model, result.full)
+    bare, own = nrmse_without_friction(result), nrmse(result.of("fit"), result.base.model, result.full)
     assert bare["fit"] > 3.0 * own and bare["check"] > 3.0 * nrmse(result.of("check"), result.base.model, result.full)
-    assert not any(named.confidence >= summary.SURE for named in result.named)
+    assert not any(named.confidence >= summary.SURE for named in result.findings)
     assert result.structure.strongest == "turning"
     said = summary.headline(result)
     assert "slid since it last turned" in said and "Friction is not missing" in said
     assert summary.summary(result)["base"]["gap_without_friction"] == bare
-    *_, _ = summary.write(result, tmp_path)
+    *_, _ = summary.write_report(result, tmp_path)
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert "1 texel, 1 trial fitted" in page and "base without its friction" in page and "base model, refitted" in page
     assert "not told by these recordings" in page  # friction and stiffness are known as a product alone
@@ -53,6 +53,6 @@ def test_the_way_since_the_last_turn():
     found = features(predictor, np.zeros((801, 1)))
     assert "depth" not in found  # it is the same all the time
     bands = found["turning"][:, :, 0]
-    assert ((bands != 0).sum(axis=0) <= 1).all() and len(bands) == len(WAYS) - 1
+    assert ((bands != 0).sum(axis=0) <= 1).all() and len(bands) == len(TRAVEL_BANDS) - 1
     peak = np.flatnonzero(np.isclose(predictor.trial.slide[:, 0], 0.02, atol=1e-9))[0]
     assert bands[0, peak + 2] == -1.0 and bands[-1, peak - 2] == 1.0  # just turned back; at the end of the way there

@@ -13,10 +13,10 @@ from scipy.optimize import least_squares
 from scipy.signal import lfilter
 
 from palpate.core.effects.engine.registry import effect
-from palpate.core.gap.fitting.intervals import numbers
-from palpate.core.gap.fitting.least_squares import Free, Share, base_numbers, fit, held_out
+from palpate.core.gap.fitting.intervals import parameter_intervals
+from palpate.core.gap.fitting.least_squares import FreeParameter, TrialView, fit, free_base_parameters, held_out_squares
 from palpate.core.gap.fitting.noise_floor import reading_noise
-from palpate.core.gap.fitting.residual_tests import structure_of
+from palpate.core.gap.fitting.residual_tests import residual_structure
 from palpate.core.gap.forward.predictor import Model, Predictor
 from palpate.core.gap.report import summary
 from palpate.core.gap.report.amended_sensor import next_experiment
@@ -31,21 +31,25 @@ def diagnosed(rig):
     return result
 
 
-def shares_of(rig, noise=1.0):
-    return [Share(Predictor(trial, rig), noise=(noise, 1.0), parts=2) for trial in rig.of("fit")]
+def views_of(rig, noise=1.0):
+    return [TrialView(Predictor(trial, rig), noise=(noise, 1.0), stretch_count=2) for trial in rig.of("fit")]
 
 
 def test_the_fit_is_that_of_scipy():
     rig = cases.rig(contact=cases.relaxing(), seed=1, trials=3, seconds=6.0)
-    shares = shares_of(rig)
+    views = views_of(rig)
     start = Model(rig.parameters, (effect("creep", "exponential"),))
-    free = [*base_numbers(rig.parameters, ("k", "cn"), 1.0), Free(0, "amount", 0, 0.95), Free(0, "time", 0.02, 100, log=True)]
-    found = fit(shares, start, free, turns=40, tolerance=1e-10)
+    free = [
+        *free_base_parameters(rig.parameters, ("k", "cn"), 1.0),
+        FreeParameter(0, "amount", 0, 0.95),
+        FreeParameter(0, "time", 0.02, 100, log=True),
+    ]
+    found = fit(views, start, free, max_steps=40, tolerance=1e-10)
 
     def residual(x):
         parameters = replace(rig.parameters, k=x[0], cn=x[1])
         model = Model(parameters, (effect("creep", "exponential", amount=x[2], time=x[3]),))
-        return np.concatenate([share.residual(model).ravel() for share in shares])
+        return np.concatenate([view.residual(model).ravel() for view in views])
 
     other = least_squares(
         residual, [60, 0.6, 0.2, 2.0], bounds=([1, 0, 0, 0.02], [1e3, 10, 0.95, 100]), x_scale=[60, 0.6, 0.2, 2]
@@ -58,24 +62,27 @@ def test_the_fit_is_that_of_scipy():
 def test_a_gain_per_texel_is_found_with_the_common_numbers():
     gains = np.exp(np.random.default_rng(3).normal(0, 0.2, cases.ROWS * cases.COLUMNS))
     rig = cases.rig(change=lambda reading, time: reading * gains, noise=0.001, seed=3, trials=6)
-    shares = shares_of(rig, 1e-4)
+    views = views_of(rig, 1e-4)
     ones = tuple([1.0] * len(gains))
-    free = [*base_numbers(rig.parameters, ("cn",), 1.0), Free(0, "factor", 0, 100, per_texel=True, rest=1.0)]
+    free = [
+        *free_base_parameters(rig.parameters, ("cn",), 1.0),
+        FreeParameter(0, "factor", 0, 100, per_texel=True, resting_value=1.0),
+    ]
     start = Model(replace(rig.parameters, k=80.0, cn=0.5), (effect("gain-mismatch", "listed", factor=ones),))
-    found = fit(shares, start, free, turns=20, tolerance=1e-8)
-    touched = np.any([(s.predictor.stimulus.depth > 5e-4).any(axis=0) for s in shares], axis=0)
+    found = fit(views, start, free, max_steps=20, tolerance=1e-8)
+    touched = np.any([(s.predictor.stimulus.depth > 5e-4).any(axis=0) for s in views], axis=0)
     factor = np.array(found.model.effects[0].values["factor"])
     np.testing.assert_allclose(factor[touched], gains[touched], rtol=0.02)
 
 
 def test_leaving_a_trial_out_is_nearly_fitting_without_it():
     rig = cases.rig(contact=cases.relaxing(), seed=2, trials=4, seconds=8.0)
-    shares = shares_of(rig)
-    free = base_numbers(rig.parameters, ("k", "cn"), 1.0)
-    unseen = held_out(shares, fit(shares, Model(rig.parameters), free, turns=30, tolerance=1e-9))
-    for i, share in enumerate(shares):
-        without = fit([s for s in shares if s is not share], Model(rig.parameters), free, turns=30, tolerance=1e-9)
-        r = share.residual(without.model)
+    views = views_of(rig)
+    free = free_base_parameters(rig.parameters, ("k", "cn"), 1.0)
+    unseen = held_out_squares(views, fit(views, Model(rig.parameters), free, max_steps=30, tolerance=1e-9))
+    for i, view in enumerate(views):
+        without = fit([s for s in views if s is not view], Model(rig.parameters), free, max_steps=30, tolerance=1e-9)
+        r = view.residual(without.model)
         assert unseen[i].sum() == pytest.approx(float((r * r).sum()), rel=0.05)
 
 
@@ -87,7 +94,7 @@ def test_noise_is_measured_where_nothing_is_pressed(colour):
     noise = reading_noise(predictors, full)
     assert noise.deviation / full == pytest.approx(0.006, rel=0.12)
     expected = (1 + colour) / (1 - colour)  # of an autoregressive process; short stretches hide the slow part of it
-    assert 0.5 * expected < noise.memory < 1.3 * expected
+    assert 0.5 * expected < noise.correlation_time < 1.3 * expected
 
 
 def test_noise_has_no_structure_and_hum_has():
@@ -95,25 +102,25 @@ def test_noise_has_no_structure_and_hum_has():
     rig = cases.rig(seed=5)
     predictors = [Predictor(trial, rig) for trial in rig.of("fit")]
     noise = [lfilter([1], [1, -0.95], rng.normal(size=p.trial.reading.shape), axis=0) for p in predictors]
-    assert structure_of(predictors, noise).total < 0.03
+    assert residual_structure(predictors, noise).total < 0.03
     hum = [
         0.5 * np.sin(40 * p.trial.time + i)[:, None] + rng.normal(size=p.trial.reading.shape) for i, p in enumerate(predictors)
     ]
-    found = structure_of(predictors, hum)
+    found = residual_structure(predictors, hum)
     assert found.strongest == "common mode" and found.total > 0.05
 
 
 def test_nothing_hidden_but_wrong_parameters_is_no_gap():
     result = diagnosed(cases.rig(seed=6, colour=0.8, stated=130.0))
-    assert result.verdict == "no gap" and not result.named and not result.ambiguous
+    assert result.verdict == "no gap" and not result.findings and not result.ambiguous
     assert result.best.model.parameters.k == pytest.approx(80.0, rel=0.01)
 
 
 def test_creep_is_named_and_the_gap_closes(tmp_path):
     result = diagnosed(cases.rig(contact=cases.relaxing(), seed=7))
-    assert [named.name for named in result.named] == ["creep"]
-    assert result.verdict == "explained" and result.named[0].confidence > 0.6
-    for _ in summary.write(result, tmp_path):
+    assert [named.name for named in result.findings] == ["creep"]
+    assert result.verdict == "explained" and result.findings[0].confidence > 0.6
+    for _ in summary.write_report(result, tmp_path):
         pass
     found = json.loads((tmp_path / "gap.json").read_text())
     assert found["format"] == "palpate-gap/1" and found["found"][0]["effect"] == "creep"
@@ -136,12 +143,12 @@ def test_creep_is_named_and_the_gap_closes(tmp_path):
 def test_two_effects_are_named():
     gains = np.exp(np.random.default_rng(8).normal(0, 0.2, cases.ROWS * cases.COLUMNS))
     result = diagnosed(cases.rig(contact=cases.relaxing(0.35), change=lambda r, t: r * gains, seed=8, trials=6))
-    assert {named.name for named in result.named} == {"creep", "gain-mismatch"}
+    assert {named.name for named in result.findings} == {"creep", "gain-mismatch"}
 
 
 def test_hum_is_unexplained():
     result = diagnosed(cases.rig(change=lambda r, t: r + 0.01 * np.sin(2 * np.pi * 7.3 * t)[:, None], seed=9))
-    assert result.verdict == "unexplained" and not result.named
+    assert result.verdict == "unexplained" and not result.findings
     assert result.structure.strongest == "common mode"
     assert "without touching" in next_experiment(result)
 
@@ -150,13 +157,13 @@ def test_intervals_hold_what_was_hidden():
     """The library's own form is hidden; its intervals should hold it, and be narrow enough to mean something."""
     rig = cases.rig(change=lambda r, t: 0.15 * np.tanh(r / 0.15), seed=10)
     result = diagnosed(rig)
-    assert [named.name for named in result.named] == ["saturation"]
-    (level,) = (one for one in numbers(result) if one.name == "level")
+    assert [named.name for named in result.findings] == ["saturation"]
+    (level,) = (one for one in parameter_intervals(result) if one.name == "level")
     assert level.low < 0.15 < level.high and level.high - level.low < 0.03
 
 
 def test_noise_that_grows_with_the_reading_is_named():
     rng = np.random.default_rng(12)
     result = diagnosed(cases.rig(change=lambda r, t: r * (1 + 0.2 * rng.normal(size=r.shape)), noise=0.003, seed=12))
-    assert [named.name for named in result.named] == ["noise"] and result.verdict == "explained"
+    assert [named.name for named in result.findings] == ["noise"] and result.verdict == "explained"
     assert result.best.model.effects[-1].values["share"] == pytest.approx(0.2, rel=0.1)

@@ -59,7 +59,7 @@ def edited(row, column, value, **options):
     return rows
 
 
-def changed(column, factor, add=0.0):
+def with_values(column, factor, add=0.0):
     rows = table()
     at = rows[0].index(column)
     return [rows[0], *([*row[:at], str(float(row[at]) * factor + add), *row[at + 1 :]] for row in rows[1:])]
@@ -108,7 +108,7 @@ BAD = {
     "no response": (dict(press=table(texels=0)), "no response"),
     "time backwards": (dict(press=edited(7, "time", "0.01")), "goes backwards at line 8"),
     "time stands": (dict(press=edited(7, "time", "0.1")), "stands still at line 8"),
-    "time in milliseconds": (dict(press=changed("time", 1e3)), "seconds"),
+    "time in milliseconds": (dict(press=with_values("time", 1e3)), "seconds"),
     "nan": (dict(press=edited(7, "texel_2", "nan")), "Line 8 of 'press.csv' has nan for texel_2"),
     "infinite": (dict(press=edited(7, "texel_2", "inf")), "Line 8"),
     "words": (dict(press=edited(7, "texel_2", "low")), "'low' for texel_2"),
@@ -119,7 +119,7 @@ BAD = {
     "empty file": (dict(press=""), "empty"),
     "empty trial": (dict(press=table(samples=0)), "no data"),
     "one sample": (dict(press=table(samples=1)), "one sample"),
-    "millimetres": (dict(press=changed("z", 1e3, add=300.0)), "in metres"),
+    "millimetres": (dict(press=with_values("z", 1e3, add=300.0)), "in metres"),
     "depth in millimetres": (dict(press=edited(7, "depth", "2.5", names=("depth",))), "in metres"),
     "binary": (dict(press=None), "not text"),
 }  # fmt: skip

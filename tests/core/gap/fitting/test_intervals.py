@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from palpate.core.gap.dataset.rig import Rig, Trial, grid_texels
-from palpate.core.gap.fitting.intervals import NORMAL_REACH, _inverse, _sandwich
+from palpate.core.gap.fitting.intervals import NORMAL_QUANTILE, _inverse, _sandwich
 from palpate.core.gap.forward.predictor import Model, Predictor
 from palpate.core.model.sensor_parameters import SensorParameters
 
@@ -39,7 +39,7 @@ def test_few_groups_hold_as_often_as_many(groups):
         values = scatter * rng.normal(size=groups)
         mean = float(values.mean())
         covariance = _sandwich(np.array([[1.0 / groups]]), (values - mean)[:, None])
-        held.append(abs(mean) < NORMAL_REACH * float(np.sqrt(covariance[0, 0])))
+        held.append(abs(mean) < NORMAL_QUANTILE * float(np.sqrt(covariance[0, 0])))
     assert 0.92 < np.mean(held) < 0.98
 
 

@@ -5,15 +5,15 @@ import gap_cases as cases
 import numpy as np
 import pytest
 
-from palpate.core.gap.fitting.least_squares import Share
-from palpate.core.gap.fitting.spectral_lines import line_of
+from palpate.core.gap.fitting.least_squares import TrialView
+from palpate.core.gap.fitting.spectral_lines import strongest_line
 from palpate.core.gap.forward.predictor import Model, Predictor
 from palpate.core.gap.selection.diagnosis import diagnose
 
 
 def line_in(rig, deviation):
-    shares = [Share(Predictor(trial, rig), noise=(deviation, 1.0)) for trial in rig.of("fit")]
-    return line_of(shares, Model(rig.parameters))
+    views = [TrialView(Predictor(trial, rig), noise=(deviation, 1.0)) for trial in rig.of("fit")]
+    return strongest_line(views, Model(rig.parameters))
 
 
 def hum(amplitude, frequency):
@@ -36,4 +36,4 @@ def test_noise_has_no_line(colour, seed):
 
 def test_hum_of_many_phases_is_unexplained():
     *_, result = diagnose(cases.rig(change=hum(0.01, 7.3), seed=22))
-    assert result.verdict == "unexplained" and not result.named and result.line is not None
+    assert result.verdict == "unexplained" and not result.findings and result.line is not None

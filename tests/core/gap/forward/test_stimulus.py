@@ -112,14 +112,14 @@ def test_depth_and_force_trials_load_all_texels_alike():
     np.testing.assert_array_equal(found.depth, np.tile(level[:, None], (1, 84)))
     np.testing.assert_allclose(found.slip[level > 0], np.tile([0.01, 0.0, 0.0], (np.count_nonzero(level), 84, 1)), atol=1e-15)
     pushed = stimulus_of(replace(one, stimulus="force"), rig(None, one))
-    np.testing.assert_allclose(pushed.load.sum(axis=1), level)
+    np.testing.assert_allclose(pushed.force_share.sum(axis=1), level)
 
 
 def test_deeper_than_the_model_reaches_still_counts_and_right_through_is_refused():
     path = np.tile([0.0, 0.0, RADIUS - 0.015], (10, 1))
     one = trial(path)
     found = stimulus_of(one, rig(Indenter(solid(trimesh.creation.icosphere(2, RADIUS)), RADIUS), one))
-    assert 0.012 < found.depth.max() < 0.015 and found.sunk > 0
+    assert 0.012 < found.depth.max() < 0.015 and found.overpressed > 0
     through = trial(path - [0, 0, 1.0])
     hollow = Indenter(solid(trimesh.creation.box((0.01, 0.01, 4.0))))
     with pytest.raises(PalpateError, match="right through"):

@@ -8,9 +8,9 @@ import pytest
 from palpate.core.effects.engine.registry import form_of, kind_of
 from palpate.core.gap.forward.predictor import Model
 from palpate.core.gap.selection.candidates import Candidate
-from palpate.core.gap.selection.diagnosis import begin
-from palpate.core.gap.selection.direct_estimates import dead
-from palpate.core.gap.selection.screening import views_of
+from palpate.core.gap.selection.diagnosis import prepared
+from palpate.core.gap.selection.direct_estimates import unresponsive_texels
+from palpate.core.gap.selection.screening import view_set_of
 
 GONE, TOUCH = [5, 9, 14], 0.004
 
@@ -40,10 +40,10 @@ def test_texels_that_do_not_answer(change, level):
         return reading
 
     rig = cases.rig(change=changed, seed=3, stated=80.0, noise=1e-4)
-    predictors, noise, _ = begin(rig)
-    views = views_of(predictors, (noise[0].deviation, 1.0))
+    predictors, noise, _ = prepared(rig)
+    view_set = view_set_of(predictors, (noise[0].deviation, 1.0))
     candidate = Candidate(kind_of("dead-texels"), form_of("dead-texels", "held"))
-    found = dead(views.whole, Model(rig.parameters), candidate, len(rig.texels))
+    found = unresponsive_texels(view_set.whole, Model(rig.parameters), candidate, len(rig.texels))
     if level is None:
         assert found is None
         return

@@ -9,20 +9,20 @@ import pytest
 from palpate.core.effects.engine.registry import effect
 from palpate.core.gap.dataset.rig import Rig, Trial, grid_texels
 from palpate.core.gap.fitting.noise_floor import coverage
-from palpate.core.gap.forward.contact_phases import PHASES, phases
+from palpate.core.gap.forward.contact_phases import PHASES, phase_indices
 from palpate.core.gap.forward.predictor import Model, Predictor
 from palpate.core.gap.selection.candidates import candidates
 from palpate.core.gap.selection.identifiability import (
-    BY_CYCLE,
-    BY_PLACE,
-    BY_TIME,
-    LEAVES_BEHIND,
-    LOOP,
-    alike,
-    bend_of,
+    KNOWN_FROM_CYCLES,
+    KNOWN_FROM_PLACES,
+    KNOWN_FROM_TIMING,
+    KNOWN_FROM_UNLOADING,
+    LOOP_CURVATURE,
     confounded,
-    nearly_alike,
-    untold,
+    curvature_ratio,
+    hardly_distinguishable,
+    indistinguishable,
+    unidentifiable,
 )
 from palpate.core.model.sensor_parameters import SensorParameters
 
@@ -51,22 +51,22 @@ def predictor(programme, seconds):
 def test_unloading_is_seen_at_any_pace(programme, unloads, seconds):
     seen = coverage([predictor(programme, seconds)])
     assert seen.unloading == unloads
-    expected = set() if unloads else set(LEAVES_BEHIND)
-    assert set(untold(seen)) - {"drift"} == expected
+    expected = set() if unloads else set(KNOWN_FROM_UNLOADING)
+    assert set(unidentifiable(seen)) - {"drift"} == expected
     # Those that unload end without load; what settles at two loads does not go with the clock alone.
-    assert ("drift" in untold(seen)) == (programme == "ramp")
-    assert seen.levels == pytest.approx(2.0 if programme == "stairs" else 1.0, rel=0.05)
+    assert ("drift" in unidentifiable(seen)) == (programme == "ramp")
+    assert seen.held_load_ratio == pytest.approx(2.0 if programme == "stairs" else 1.0, rel=0.05)
 
 
 def test_without_rest_settling_and_drift_are_told_by_the_load_alone():
     stairs, press = (coverage([predictor(programme, 20.0)]) for programme in ("stairs", "press"))
-    assert nearly_alike(stairs, "creep") == ("drift",) and nearly_alike(stairs, "drift") == ("creep",)
-    assert nearly_alike(press, "drift") == () == nearly_alike(stairs, "lag")
-    assert nearly_alike(press, "crosstalk") == ("load-spreading",)
+    assert hardly_distinguishable(stairs, "creep") == ("drift",) and hardly_distinguishable(stairs, "drift") == ("creep",)
+    assert hardly_distinguishable(press, "drift") == () == hardly_distinguishable(stairs, "lag")
+    assert hardly_distinguishable(press, "crosstalk") == ("load-spreading",)
 
 
 def test_time_and_depth_are_one_in_a_single_ramp():
-    assert confounded(coverage([predictor("ramp", 60.0)])) == BY_TIME
+    assert confounded(coverage([predictor("ramp", 60.0)])) == KNOWN_FROM_TIMING
     for programme in ("press", "held", "stairs"):
         assert not confounded(coverage([predictor(programme, 60.0)]))
     assert not confounded(coverage([predictor("ramp", 60.0), predictor("ramp", 6.0)]))
@@ -76,22 +76,22 @@ def test_time_and_depth_are_one_in_a_single_ramp():
 def test_a_slow_ramp_is_no_hold(seconds):
     assert coverage([predictor("ramp", seconds)]).longest_hold == 0.0
     assert coverage([predictor("held", seconds)]).longest_hold == pytest.approx(0.8 * seconds, rel=0.02)
-    found = phases(predictor("ramp", seconds).stimulus)[5:]
+    found = phase_indices(predictor("ramp", seconds).stimulus)[5:]
     assert (found == PHASES.index("loading")).all()
 
 
 def test_what_was_never_brought_out_is_no_candidate():
     up, back = (predictor(programme, 20.0) for programme in ("ramp", "press"))
     asked = [{c.name for c in candidates([one], Model(one.rig.parameters))} for one in (up, back)]
-    assert not asked[0] & set(LEAVES_BEHIND) and set(LEAVES_BEHIND) <= asked[1]
+    assert not asked[0] & set(KNOWN_FROM_UNLOADING) and set(KNOWN_FROM_UNLOADING) <= asked[1]
     assert {"stiffening", "creep"} <= asked[0]
 
 
 def test_one_cycle_does_not_tell_what_a_second_would():
     once = coverage([predictor("press", 20.0)])
-    assert set(alike(once, "softening")) == {*BY_CYCLE, "creep", "lag"} - {"softening"}
-    assert set(alike(coverage([predictor("held", 20.0)]), "softening")) == set(BY_CYCLE) - {"softening"}
-    assert alike(replace(once, cycles=3), "softening") == () == alike(once, "stiffening")
+    assert set(indistinguishable(once, "softening")) == {*KNOWN_FROM_CYCLES, "creep", "lag"} - {"softening"}
+    assert set(indistinguishable(coverage([predictor("held", 20.0)]), "softening")) == set(KNOWN_FROM_CYCLES) - {"softening"}
+    assert indistinguishable(replace(once, cycles=3), "softening") == () == indistinguishable(once, "stiffening")
 
 
 @pytest.mark.parametrize("depth", [1e-1, 4e-3, 2e-4])
@@ -101,10 +101,10 @@ def test_the_way_in_alone_may_be_that_of_a_loop(depth):
     model = Model(up.rig.parameters, (effect("stiffening", "polynomial", depth=depth, exponent=1.0),))
     at = 1e-3 / depth * np.linspace(0, 1, 9)
     slopes = np.diff(at * (1 + at))
-    found = bend_of([up], model)
+    found = curvature_ratio([up], model)
     assert found == pytest.approx(slopes[-1] / slopes[0], rel=0.02)
-    assert alike(coverage([up]), "stiffening", found) == (("hysteresis",) if found < LOOP else ())
-    assert alike(coverage([back]), "stiffening", found) == ()
+    assert indistinguishable(coverage([up]), "stiffening", found) == (("hysteresis",) if found < LOOP_CURVATURE else ())
+    assert indistinguishable(coverage([back]), "stiffening", found) == ()
 
 
 @pytest.mark.parametrize(("stays", "told"), [(True, False), (False, True)])
@@ -118,5 +118,5 @@ def test_one_place_does_not_tell_neighbours_from_gains(stays, told):
     trial = Trial("t", "fit", time, "depth", None, None, depth.max(axis=1), np.zeros((600, 2)), 50.0 * depth, None)
     one = Predictor(trial, rig)
     one.stimulus = replace(one.stimulus, depth=depth)
-    assert (alike(coverage([one]), "crosstalk") == ()) == told
-    assert told or set(alike(coverage([one]), "crosstalk")) == set(BY_PLACE) - {"crosstalk"}
+    assert (indistinguishable(coverage([one]), "crosstalk") == ()) == told
+    assert told or set(indistinguishable(coverage([one]), "crosstalk")) == set(KNOWN_FROM_PLACES) - {"crosstalk"}

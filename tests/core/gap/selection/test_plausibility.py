@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from palpate.core.effects.engine.registry import effect
-from palpate.core.gap.fitting.least_squares import base_numbers, fit
+from palpate.core.gap.fitting.least_squares import fit, free_base_parameters
 from palpate.core.gap.forward.predictor import Model
 from palpate.core.gap.selection.candidates import Candidate, scales_of
-from palpate.core.gap.selection.diagnosis import begin
-from palpate.core.gap.selection.plausibility import admissible
-from palpate.core.gap.selection.screening import Found, views_of
+from palpate.core.gap.selection.diagnosis import prepared
+from palpate.core.gap.selection.plausibility import is_plausible
+from palpate.core.gap.selection.screening import FittedCandidate, view_set_of
 
 SPREAD = 0.02 * np.random.default_rng(1).normal(size=cases.ROWS * cases.COLUMNS)
 """N, of each texel."""
@@ -19,15 +19,15 @@ SPREAD = 0.02 * np.random.default_rng(1).normal(size=cases.ROWS * cases.COLUMNS)
 
 def offset_each(rig):
     """An offset for each texel, fitted on top of the base model."""
-    predictors, noise, full = begin(rig)
-    views, none = views_of(predictors, (noise[0].deviation, 1.0)), tuple([0.0] * len(SPREAD))
+    predictors, noise, full = prepared(rig)
+    view_set, none = view_set_of(predictors, (noise[0].deviation, 1.0)), tuple([0.0] * len(SPREAD))
     from palpate.core.effects.engine.registry import form_of, kind_of
 
     candidate = Candidate(kind_of("offset"), form_of("offset", "listed"))
-    free = base_numbers(rig.parameters, ("k", "cn"), full[0])
-    free += candidate.free(0, scales_of(predictors, Model(rig.parameters)), 1.0)
-    found = fit(views.whole, Model(rig.parameters, (effect("offset", "listed", offset=none),)), free)
-    return Found(candidate, found, found.sse), views
+    free = free_base_parameters(rig.parameters, ("k", "cn"), full[0])
+    free += candidate.free_parameters(0, scales_of(predictors, Model(rig.parameters)), 1.0)
+    found = fit(view_set.whole, Model(rig.parameters, (effect("offset", "listed", offset=none),)), free)
+    return FittedCandidate(candidate, found, found.sse), view_set
 
 
 def always(reading, _time):
@@ -44,8 +44,8 @@ def later(reading, time):
 
 @pytest.mark.parametrize(("change", "is_one"), [(always, True), (only_under_load, False), (later, False)])
 def test_an_offset_is_there_without_load_from_the_beginning(change, is_one):
-    found, views = offset_each(cases.rig(change=change, seed=4, trials=6))
-    touched = np.any([(s.predictor.stimulus.depth > 0).any(axis=0) for s in views.whole], axis=0)
+    found, view_set = offset_each(cases.rig(change=change, seed=4, trials=6))
+    touched = np.any([(s.predictor.stimulus.depth > 0).any(axis=0) for s in view_set.whole], axis=0)
     values = np.array(found.fit.model.effects[0].values["offset"])[touched]
     assert np.corrcoef(values, SPREAD[touched])[0, 1] > 0.6  # it fits either way
-    assert admissible(found, views) == is_one
+    assert is_plausible(found, view_set) == is_one
