@@ -148,8 +148,7 @@ def _is_told(effect: str, recording: Recording, result: Any) -> bool:
 def _diagnosed(recording: Recording, folder: Path) -> Any:
     from palpate.core.gap.dataset.rig import read_rig
     from palpate.core.gap.selection.diagnosis import Diagnosis, diagnose
-    from palpate.core.jobs.job_runner import run_job
 
-    result = run_job(diagnose(read_rig(recording.write(folder / "rig"))))
+    *_, result = diagnose(read_rig(recording.write(folder / "rig")))
     assert isinstance(result, Diagnosis)
     return result

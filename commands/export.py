@@ -8,8 +8,7 @@ import argparse
 from ..core.figures.figure_style import FigureStyle
 from ..core.io.bake_reader import Bake, read_bake
 from ..core.io.export import KINDS, export
-from ..core.jobs.job_runner import run_job
-from ..core.jobs.progress import Progress
+from ..core.jobs.job_runner import drive
 from . import console, figure_options
 
 
@@ -30,12 +29,12 @@ def run(arguments: argparse.Namespace) -> int:
     style: FigureStyle = figure_options.figure_style_from(arguments)
     with console.progress_bar("export", len(bake.texels), unit="sensor") as bar:
 
-        def show(progress: Progress) -> None:
+        def show(name: str) -> None:
             console.Interrupt.check()
-            bar.set_description(progress.stage, refresh=False)
+            bar.set_description(name, refresh=False)
             bar.update()
 
-        written = run_job(export(bake, arguments.format, arguments.out, style), show)
+        written = drive(export(bake, arguments.format, arguments.out, style), show)
     for path in written:
         print(path)
     return 0
