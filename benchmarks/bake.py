@@ -105,14 +105,14 @@ def sample_bake_and_solve(name: str) -> tuple[float, float]:
 def _in_turn(scene, rounds: int) -> tuple[float, float]:
     from palpate.addon.bake import bake_files
     from palpate.addon.bake.bake import bake
-    from palpate.core.jobs.job_runner import drive
+    from palpate.core.jobs.job_runner import run_job
     from palpate.core.solver.simulation import run
 
-    run(drive(bake(scene)).scenario)  # compiles and warms up
+    run(run_job(bake(scene)).scenario)  # compiles and warms up
     times = []
     for _ in range(rounds):
         start = time.perf_counter()
-        scenario = drive(bake(scene)).scenario
+        scenario = run_job(bake(scene)).scenario
         middle = time.perf_counter()
         bake_files.wait_for_removals()
         begun = time.perf_counter()

@@ -122,7 +122,8 @@ def _results(plan: list[tuple[str, int]], compared: set[tuple[str, int]]) -> lis
 def examine(kind: str, number: int, compare: bool = False) -> dict[str, Any]:
     """Draw a case, have it diagnosed from its files, and hold the outcome against the answer."""
     from palpate.core.gap.dataset.rig import read_rig
-    from palpate.core.gap.selection.diagnosis import Diagnosis, diagnose
+    from palpate.core.gap.selection.diagnosis import diagnose
+    from palpate.core.jobs.job_runner import run_job
 
     case = cases.draw(kind, number)
     with tempfile.TemporaryDirectory() as folder:
@@ -130,9 +131,7 @@ def examine(kind: str, number: int, compare: bool = False) -> dict[str, Any]:
         began, used = time.perf_counter(), time.process_time()
         result, failed = None, ""
         try:
-            for step in diagnose(read_rig(rig_path)):
-                if isinstance(step, Diagnosis):
-                    result = step
+            result = run_job(diagnose(read_rig(rig_path)))
         except Exception as error:  # counts as anything but right; the other cases go on
             failed = repr(error)
         seconds, cpu = time.perf_counter() - began, time.process_time() - used

@@ -148,7 +148,8 @@ def _is_told(effect: str, recording: Recording, result: Any) -> bool:
 def _diagnosed(recording: Recording, folder: Path) -> Any:
     from palpate.core.gap.dataset.rig import read_rig
     from palpate.core.gap.selection.diagnosis import Diagnosis, diagnose
+    from palpate.core.jobs.job_runner import run_job
 
-    *_, result = diagnose(read_rig(recording.write(folder / "rig")))
+    result = run_job(diagnose(read_rig(recording.write(folder / "rig"))))
     assert isinstance(result, Diagnosis)
     return result

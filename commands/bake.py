@@ -11,7 +11,7 @@ import numpy as np
 
 from ..core.errors import SceneError
 from ..core.io.file_writing import writable_folder
-from ..core.jobs.job_runner import drive
+from ..core.jobs.job_runner import run_job
 from ..core.response.metrics import net_shear
 from . import blender, console
 
@@ -89,7 +89,7 @@ def bake_with_progress(scene, into_scene: bool = True):
             bar.set_description(progress.stage, refresh=False)
             bar.update(progress.done - bar.n)
 
-        return drive(bake.bake(scene, into_scene), show)
+        return run_job(bake.bake(scene, into_scene), show)
 
 
 def report(baked) -> str:

@@ -8,7 +8,8 @@ import argparse
 from ..core.figures.figure_style import FigureStyle
 from ..core.io.bake_reader import Bake, read_bake
 from ..core.io.export import KINDS, export
-from ..core.jobs.job_runner import drive
+from ..core.jobs.job_runner import run_job
+from ..core.jobs.progress import Progress
 from . import console, figure_options
 
 
@@ -29,12 +30,12 @@ def run(arguments: argparse.Namespace) -> int:
     style: FigureStyle = figure_options.figure_style_from(arguments)
     with console.progress_bar("export", len(bake.texels), unit="sensor") as bar:
 
-        def show(name: str) -> None:
+        def show(progress: Progress) -> None:
             console.Interrupt.check()
-            bar.set_description(name, refresh=False)
+            bar.set_description(progress.stage, refresh=False)
             bar.update()
 
-        written = drive(export(bake, arguments.format, arguments.out, style), show)
+        written = run_job(export(bake, arguments.format, arguments.out, style), show)
     for path in written:
         print(path)
     return 0

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from ..core.errors import SceneError
 from ..core.io.file_writing import writable_folder
+from ..core.jobs.job_runner import run_job
 from . import console
 
 
@@ -26,7 +27,7 @@ def run(arguments: argparse.Namespace) -> int:
     from ..core.gap.fitting.intervals import parameter_intervals
     from ..core.gap.report import summary
     from ..core.gap.report.amended_sensor import amended_sensor
-    from ..core.gap.selection.diagnosis import Diagnosis, diagnose
+    from ..core.gap.selection.diagnosis import diagnose
     from ..core.solver import precompile
 
     if arguments.sensor and not arguments.blend:
@@ -34,7 +35,6 @@ def run(arguments: argparse.Namespace) -> int:
     rig = read_rig(arguments.rig)
     folder = writable_folder(arguments.out, create=True)
     precompile.compile_solver_with_notice()
-    result = None
     with console.progress_bar("gap", 1000, unit="step") as bar:
 
         def show(stage: str, done: int) -> None:
@@ -42,14 +42,8 @@ def run(arguments: argparse.Namespace) -> int:
             bar.set_description(stage, refresh=False)
             bar.update(max(done - bar.n, 0))
 
-        for step in diagnose(rig):
-            if isinstance(step, Diagnosis):
-                result = step
-            else:
-                show(step.stage, int(0.95 * step.done))
-        assert result is not None
-        for stage, share in summary.write_report(result, folder):
-            show(stage, 950 + int(50 * share))
+        result = run_job(diagnose(rig), lambda step: show(step.stage, int(950 * step.share)))
+        run_job(summary.write_report(result, folder), lambda step: show(step.stage, 950 + int(50 * step.share)))
     print(summary.headline(result))
     rows = [("", "parameter", "value (95 % interval)")]
     for one in parameter_intervals(result):

@@ -7,7 +7,7 @@ import argparse
 
 from ..core.figures.figure_canvas import FILE_TYPES as FORMATS
 from ..core.io.file_writing import remove_leftovers, writable_folder
-from ..core.jobs.job_runner import drive
+from ..core.jobs.job_runner import run_job
 from . import blender, console, figure_options
 
 FIGURES = ("scene", "strip", "curves", "numbers", "video")
@@ -77,7 +77,7 @@ def run(arguments: argparse.Namespace) -> int:
                 bar.set_description(f"{progress.stage}, frame {progress.frame}", refresh=False)
                 bar.update(progress.done - bar.n)
 
-            written = drive(figure_export.make_figures(scene, folder, request), show)
+            written = run_job(figure_export.make_figures(scene, folder, request), show)
     for path in written:
         print(path)
     return 0

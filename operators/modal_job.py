@@ -5,8 +5,7 @@ from __future__ import annotations
 
 import bpy
 
-from ..addon.session import jobs
-from ..core.jobs.job_runner import drive
+from ..core.jobs.job_runner import SlicedJob, run_job
 from . import support
 
 
@@ -21,13 +20,13 @@ class ModalJob(support.ErrorReporting):
         return self.reporting(lambda: self._start(context))
 
     def run(self, context):
-        self.done(drive(self.job(context)))
+        self.done(run_job(self.job(context)))
 
     def done(self, result):
         """Report what was done."""
 
     def _start(self, context):
-        self._slice = jobs.Slice(self.job(context))
+        self._slice = SlicedJob(self.job(context))
         self._slice.work(0.0)  # what is wrong from the beginning is said at once
         manager = context.window_manager
         self._timer = manager.event_timer_add(0.01, window=context.window)
@@ -57,7 +56,7 @@ class ModalJob(support.ErrorReporting):
             self.done(self._slice.result)
             return {"FINISHED"}
         progress = self._slice.progress
-        share = progress.done / progress.total
+        share = progress.share
         context.window_manager.progress_update(share)
         context.workspace.status_text_set(f"{progress.text}, {share:.0%}    ESC: stop")
         redraw_panels(context)

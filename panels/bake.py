@@ -27,7 +27,7 @@ class Bake(Part):
         progress = session_state.session.bake
         if progress is not None:
             text = "Preparing the solver" if progress.frame is None else progress.text
-            layout.progress(text=f"{text} (ESC: stop)", factor=progress.done / progress.total)
+            layout.progress(text=f"{text} (ESC: stop)", factor=progress.share)
             return
         row = layout.row(align=True)
         row.operator("palpate.bake", text=f"Bake {scene.frame_start}–{scene.frame_end}", icon="RENDER_ANIMATION")

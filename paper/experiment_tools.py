@@ -13,7 +13,7 @@ import numpy as np
 from ..addon.bake import bake as baking
 from ..addon.render import render
 from ..addon.scene import scene_reader
-from ..core.jobs.job_runner import drive
+from ..core.jobs.job_runner import run_job
 from ..core.model.recording import Recording
 from ..core.model.scenario import Scenario
 
@@ -30,14 +30,14 @@ def new_scene(build: Callable) -> bpy.types.Scene:
 
 def scenario_of(scene) -> Scenario:
     """Return what the solver is given for a scene."""
-    scenario, _ = drive(scene_reader.sample_scenario(scene))
+    scenario, _ = run_job(scene_reader.sample_scenario(scene))
     return scenario
 
 
 def bake(scene, folder: Path, on_progress=None) -> Recording:
     """Bake a scene into a folder, so that its heat maps show, and return the recording."""
     scene.palpate.folder = str(folder)
-    return drive(baking.bake(scene), on_progress).recording
+    return run_job(baking.bake(scene), on_progress).recording
 
 
 def picture(scene, path: Path, frame: int, size=(640, 480)) -> Path:

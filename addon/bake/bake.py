@@ -10,11 +10,12 @@ from pathlib import Path
 import bpy
 
 from ...core.errors import SceneError
+from ...core.jobs.job_runner import part_of_job
+from ...core.jobs.progress import Progress
 from ...core.model.recording import Recording
 from ...core.model.scenario import Scenario
 from ..scene import scene_reader
 from ..session import dependencies, first_use, session_state
-from ..session.jobs import Progress
 from ..timeline import playback
 from . import bake_files, scene_writer
 
@@ -54,20 +55,14 @@ def _bake(scene, name: str, into_scene: bool) -> Generator[Progress, None, BakeR
     bake_files.check_folder(folder)
     total = 2 * max(1, scene.frame_end - scene.frame_start + 1)
 
-    job = scene_reader.sample_scenario(scene)
-    while True:
-        try:
-            step = next(job)
-        except StopIteration as stop:
-            scenario, binding = stop.value
-            break
-        yield _progress("Reading the scene", step.frame, step.done, total)
+    reading = scene_reader.sample_scenario(scene)
+    scenario, binding = yield from part_of_job(
+        reading, lambda step: _noted(replace(step, stage="Reading the scene", total=total))
+    )
 
     if into_scene:
         scene_writer.check_writable(scene, scenario, binding)
-    for step in first_use.wait():
-        session_state.session.bake = step
-        yield step
+    yield from part_of_job(first_use.wait(), _noted)
     solver = dependencies.solver()
     simulation = solver.Simulation(scenario)
     files = bake_files.BakeFiles(folder, scenario, bpy.data.filepath)
@@ -80,10 +75,10 @@ def _bake(scene, name: str, into_scene: bool) -> Generator[Progress, None, BakeR
             except StopIteration as stop:
                 recording = stop.value
                 break
-            files.write_frame(step.result)
+            files.write_frame(frames[-1])
             files.save_checkpoint(simulation, frames)
             binding.objects(_still_there(name))
-            yield _progress("Computing forces", step.frame, total // 2 + step.done, total)
+            yield _noted(replace(step, done=total // 2 + step.done, total=total))
         recording = replace(recording, warnings=binding.warnings + recording.warnings)
         scene = _still_there(name)
         binding.objects(scene)
@@ -98,9 +93,10 @@ def _bake(scene, name: str, into_scene: bool) -> Generator[Progress, None, BakeR
     return BakeResult(recording, scenario, files.folders)
 
 
-def _progress(stage: str, frame: int, done: int, total: int) -> Progress:
-    session_state.session.bake = Progress(stage, frame, done, total)
-    return session_state.session.bake
+def _noted(progress: Progress) -> Progress:
+    """Note the progress for the panel and return it."""
+    session_state.session.bake = progress
+    return progress
 
 
 def _still_there(name: str):

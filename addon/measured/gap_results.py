@@ -7,7 +7,7 @@ Results live in this session only; what is kept in the file is the path of the r
 from __future__ import annotations
 
 import tempfile
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -16,11 +16,12 @@ import numpy as np
 
 from ...core.errors import SceneError
 from ...core.figures import color_maps
+from ...core.jobs.job_runner import part_of_job
+from ...core.jobs.progress import Progress
 from ..authoring import exchange
 from ..properties import effect_stack
 from ..scene import scene_reader
 from ..session import first_use, identity
-from ..session.jobs import Progress
 
 if TYPE_CHECKING:
     from ...core.gap.selection.diagnosis import Diagnosis
@@ -73,23 +74,17 @@ def find(obj):
     from ...core.gap.report import summary
     from ...core.gap.report.amended_sensor import next_experiment
     from ...core.gap.report.plots import PICTURES
-    from ...core.gap.selection.diagnosis import Diagnosis, diagnose
+    from ...core.gap.selection.diagnosis import diagnose
 
     yield from first_use.wait()
-    yield Progress("Reading the recordings", None, 0, 1000)
+    yield Progress("Reading the recordings", 0, 1000)
     rig = read_rig(rig_path(obj))
-    diagnosis = None
-    for step in diagnose(rig):
-        if isinstance(step, Diagnosis):
-            diagnosis = step
-        else:
-            yield Progress(f"Finding the gap: {step.stage}", None, step.done, step.total)
-    assert diagnosis is not None
+    diagnosis = yield from part_of_job(diagnose(rig), lambda step: replace(step, stage=f"Finding the gap: {step.stage}"))
     folder, pictures = Path(tempfile.mkdtemp(prefix="gap-", dir=bpy.app.tempdir)), {}
     from ...core.figures.figure_canvas import save_figure
 
     for name in ("curves", "gap", "loops"):
-        yield Progress("Drawing", None, 990, 1000)
+        yield Progress("Drawing", 990, 1000)
         pictures[name] = folder / f"{name}.png"
         save_figure(PICTURES[name][0](diagnosis), pictures[name], 150)
     identity.ensure(obj)

@@ -22,10 +22,10 @@ from ...core.io.bake_folder import folder_names
 from ...core.io.bake_reader import Bake, frame_index, read_sensors
 from ...core.io.export import export
 from ...core.io.file_writing import writable_folder
-from ...core.jobs.job_runner import drive
+from ...core.jobs.job_runner import run_job
+from ...core.jobs.progress import Progress
 from ..bake import scene_writer
 from ..display import bake_display
-from ..session.jobs import Progress
 from . import render, render_setup, video, workbench_colors
 
 KINDS = ("scene", "strip", "curves", "numbers", "video")
@@ -129,7 +129,7 @@ def make_figures(scene, folder, request: FigureRequest) -> Generator[Progress, N
         written += draw_figures(bake, place, request, frames)
     for kind in request.exports:
         yield steps.next(f"Writing {kind.upper()}", frames[0])
-        written += drive(export(bake, kind, place / f"data {kind}", request.style))
+        written += run_job(export(bake, kind, place / f"data {kind}", request.style))
     if "video" in request.kinds:
         yield from _video(scene, place, request, bake, steps, written)
     return written
@@ -229,7 +229,7 @@ class _StepCounter:
 
     def next(self, stage: str, frame: int) -> Progress:
         self.done = min(self.done + 1, self.total)
-        return Progress(stage, frame, self.done, self.total)
+        return Progress(stage, self.done, self.total, frame)
 
 
 def scene_style(scene, **others) -> FigureStyle:

@@ -21,6 +21,7 @@ from ...core.effects.engine.sensor_effects import check_scenario
 from ...core.errors import SceneError
 from ...core.geometry.mesh import TriangleMesh, checked_mesh, mass_properties
 from ...core.geometry.texels import texels_from_region
+from ...core.jobs.progress import Progress
 from ...core.model.body import Body
 from ...core.model.motion import Motion, Signal
 from ...core.model.scenario import Scenario
@@ -30,7 +31,6 @@ from ...core.model.target import Target
 from ..display import texel_arrows
 from ..properties import effect_stack, properties
 from ..session import clock, identity, transforms, units
-from ..session.jobs import Progress
 from . import attached_objects, deforming_objects, drives, meshes, moved_bodies, uv_layouts
 from .mesh_snapshot import Seen
 
@@ -364,7 +364,7 @@ def _sample_scenario(scene) -> Generator[Progress, None, tuple[Scenario, Binding
     samples = {index: [(motion.positions[0], motion.quaternions[0])] for index, motion in motions.items()}
     targets = {index: list(scenario.bodies[index].drive.target.values) for index in binding.driven}
     shapes = deforming_objects.Shapes(scenario)
-    yield Progress("Reading", frames[0], 1, len(frames))
+    yield Progress("Reading", 1, len(frames), frames[0])
     for frame in frames[1:]:
         for part in range(1, parts_of_frame + 1):
             whole, rest = _whole_and_part(frame - 1, part, parts_of_frame)
@@ -378,7 +378,7 @@ def _sample_scenario(scene) -> Generator[Progress, None, tuple[Scenario, Binding
         for index, matrix in moment.parents.items():
             binding.parents[index].append(matrix)
         _look(scene, watched, binding)
-        yield Progress("Reading", frame, frame - frames[0] + 1, len(frames))
+        yield Progress("Reading", frame - frames[0] + 1, len(frames), frame)
     times = np.array([step / (scenario.fps * parts_of_frame) for step in range((len(frames) - 1) * parts_of_frame + 1)])
     bodies = list(scenario.bodies)
     for index, path in samples.items():

@@ -20,9 +20,9 @@ from pathlib import Path
 
 import bpy
 
+from ...core.jobs.progress import Progress
 from ...core.solver import precompile, precompile_process
 from . import dependencies, redraw
-from .jobs import Progress
 
 STAGE = "Palpate is preparing its solver (first use only)"
 LOOK = 0.5
@@ -87,8 +87,8 @@ def progress() -> Progress | None:
         return None
     with suppress(OSError, ValueError, IndexError):  # nothing is written yet
         said = json.loads(_work.log.read_bytes().splitlines()[-1])
-        return Progress(_stage(f"{said['done']} of {said['total']} parts, "), None, said["done"], said["total"])
-    return Progress(_stage(""), None, 0, 1)
+        return Progress(_stage(f"{said['done']} of {said['total']} parts, "), said["done"], said["total"])
+    return Progress(_stage(""), 0, 1)
 
 
 def _stage(parts: str) -> str:

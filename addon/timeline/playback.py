@@ -14,12 +14,12 @@ import numpy as np
 from ...core.errors import PalpateError
 from ...core.geometry.texels import Texels
 from ...core.io.sensor_npz import SENSOR_NAME, load_sensor
+from ...core.jobs.progress import Progress
 from ...core.model.recording import Frame, Recording
 from ..bake import bake_files, scene_writer
 from ..display import bake_display, inset, materials, overlays
 from ..scene import moved_bodies, scene_reader
 from ..session import clock, first_use, session_state
-from ..session.jobs import Progress
 from . import live_cache, staleness
 
 
@@ -173,7 +173,7 @@ def catch_up(scene) -> Generator[Progress, None, None]:
                 run = live_cache.get(scene)
                 if run is None or number not in run.frames:
                     break  # the panel says why
-                yield Progress("Computing forces", number, done, len(frames))
+                yield Progress("Computing forces", done, len(frames), number)
     finally:
         session_state.session.catching_up = False
         with suppress(ReferenceError):  # the scene went meanwhile

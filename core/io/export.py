@@ -10,7 +10,7 @@ from __future__ import annotations
 import csv
 import json
 import os
-from collections.abc import Callable, Generator, Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any
@@ -21,6 +21,7 @@ from ..errors import PalpateError
 from ..figures import color_maps
 from ..figures.figure_style import FigureStyle
 from ..geometry.layout import GridLayout
+from ..jobs.progress import Job, Progress
 from ..model.recording import SensorRecording
 from ..response import metrics
 from .bake_folder import folder_names
@@ -46,9 +47,7 @@ _LEAST_PIXELS = 256
 """Along the longer side of a PNG: smaller images are magnified by a whole number, pixel by pixel."""
 
 
-def export(
-    bake: Bake, kind: str, folder: str | os.PathLike, style: FigureStyle | None = None
-) -> Generator[str, None, list[Path]]:
+def export(bake: Bake, kind: str, folder: str | os.PathLike, style: FigureStyle | None = None) -> Job[list[Path]]:
     """Write a bake in another format.
 
     Parameters
@@ -62,8 +61,8 @@ def export(
 
     Yields
     ------
-    str
-        The name of each sensor before it is written.
+    Progress
+        Before each sensor is written; the stage is the sensor's name.
 
     Returns
     -------
@@ -81,6 +80,12 @@ def export(
     return (yield from KINDS[kind](bake, place, style or FigureStyle()))
 
 
+def _sensor_progress(bake: Bake, name: str) -> Progress:
+    """Return the progress of an export that begins with a sensor."""
+    names = list(bake.texels)
+    return Progress(name, names.index(name) + 1, len(names))
+
+
 def arrays_of(bake: Bake, name: str) -> dict[str, np.ndarray]:
     """Return everything about one sensor as arrays: what it felt, and, under ``texel_…``, where its texels are."""
     texels, felt = bake.texels[name], bake.recording.sensors[name]
@@ -95,10 +100,10 @@ def arrays_of(bake: Bake, name: str) -> dict[str, np.ndarray]:
 # --- NPZ
 
 
-def _npz(bake: Bake, place: Path, _: FigureStyle) -> Generator[str, None, list[Path]]:
+def _npz(bake: Bake, place: Path, _: FigureStyle) -> Job[list[Path]]:
     written = []
     for name, stem in folder_names(bake.texels).items():
-        yield name
+        yield _sensor_progress(bake, name)
         path = place / f"{stem}.npz"
         write_arrays(path, {"frame": bake.recording.frames, "time": bake.recording.times, **arrays_of(bake, name)})
         written.append(path)
@@ -108,7 +113,7 @@ def _npz(bake: Bake, place: Path, _: FigureStyle) -> Generator[str, None, list[P
 # --- HDF5
 
 
-def _hdf5(bake: Bake, place: Path, _: FigureStyle) -> Generator[str, None, list[Path]]:
+def _hdf5(bake: Bake, place: Path, _: FigureStyle) -> Job[list[Path]]:
     try:
         import h5py
     except ImportError as error:
@@ -126,7 +131,7 @@ def _hdf5(bake: Bake, place: Path, _: FigureStyle) -> Generator[str, None, list[
             _dataset(group, "velocity", recording.velocities[:, i], "m/s, rad/s")
         sensors = file.create_group("sensors")
         for name in bake.texels:
-            yield name
+            yield _sensor_progress(bake, name)
             group = sensors.create_group(_hdf5_name(name, sensors))
             group.attrs["name"], group.attrs["unit"] = name, bake.parameters[name].unit
             group.attrs["parameters"] = json.dumps(asdict(bake.parameters[name]))
@@ -157,7 +162,7 @@ def _unit(bake: Bake, name: str, key: str) -> str:
 # --- CSV
 
 
-def _csv(bake: Bake, place: Path, _: FigureStyle) -> Generator[str, None, list[Path]]:
+def _csv(bake: Bake, place: Path, _: FigureStyle) -> Job[list[Path]]:
     recording = bake.recording
     header = ["frame", "time"] + [
         f"{body} {key}" for body in recording.body_names for key in ("x", "y", "z", "qw", "qx", "qy", "qz")
@@ -166,7 +171,7 @@ def _csv(bake: Bake, place: Path, _: FigureStyle) -> Generator[str, None, list[P
     _table(place / "bodies.csv", header, rows)
     written = [place / "bodies.csv"]
     for name, stem in folder_names(bake.texels).items():
-        yield name
+        yield _sensor_progress(bake, name)
         folder = writable_folder(place / stem, create=True)
         _csv_sensor(bake, name, folder)
         written.append(folder)
@@ -218,13 +223,13 @@ def _table(path: Path, header: Sequence[str], rows: Iterable[Sequence[float]]) -
 # --- PNG
 
 
-def _png(bake: Bake, place: Path, style: FigureStyle) -> Generator[str, None, list[Path]]:
+def _png(bake: Bake, place: Path, style: FigureStyle) -> Job[list[Path]]:
     from matplotlib.image import imsave
 
     recording, written = bake.recording, []
     top = style.scale_limit(recording, bake.texels)
     for name, stem in folder_names(bake.texels).items():
-        yield name
+        yield _sensor_progress(bake, name)
         folder = writable_folder(place / stem, create=True)
         texels = bake.texels[name]
         layout, values = texels.layout, style.values(recording.sensors[name], texels)
@@ -248,7 +253,7 @@ def _png(bake: Bake, place: Path, style: FigureStyle) -> Generator[str, None, li
     return written
 
 
-KINDS: dict[str, Callable[[Bake, Path, FigureStyle], Generator[str, None, list[Path]]]] = {
+KINDS: dict[str, Callable[[Bake, Path, FigureStyle], Job[list[Path]]]] = {
     "csv": _csv,
     "npz": _npz,
     "hdf5": _hdf5,

@@ -1,17 +1,27 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Long work is a generator that yields its progress; this runs one in a plain loop."""
+"""Run a job to its end, a slice at a time, or as a part of another job."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator
-from typing import TypeVar
+import time
+from collections.abc import Callable
+from typing import Generic
 
-P = TypeVar("P")
-R = TypeVar("R")
+from .progress import Job, Progress, Result
+
+SLICE = 0.1
+"""Seconds of work between two looks at the keyboard."""
 
 
-def drive(job: Generator[P, None, R], on_progress: Callable[[P], None] | None = None) -> R:
-    """Run a job to its end and return its result; an exception, Ctrl-C as well, closes it."""
+def run_job(job: Job[Result], on_progress: Callable[[Progress], None] | None = None) -> Result:
+    """Run a job to its end and return its result.
+
+    Parameters
+    ----------
+    job : Job
+    on_progress : callable, optional
+        Called with each :class:`.Progress`. An exception that it raises, KeyboardInterrupt included, cancels the job.
+    """
     try:
         while True:
             try:
@@ -22,3 +32,59 @@ def drive(job: Generator[P, None, R], on_progress: Callable[[P], None] | None = 
                 on_progress(progress)
     finally:
         job.close()
+
+
+def part_of_job(job: Job[Result], change: Callable[[Progress], Progress]) -> Job[Result]:
+    """Return a job as a part of a longer one: `change` makes the longer job's progress out of the part's.
+
+    Use it as ``result = yield from part_of_job(job, change)``.
+    """
+    try:
+        while True:
+            try:
+                progress = next(job)
+            except StopIteration as stop:
+                return stop.value
+            yield change(progress)
+    finally:
+        job.close()
+
+
+class SlicedJob(Generic[Result]):
+    """A job that is run a little at a time, beside a window that stays responsive.
+
+    Parameters
+    ----------
+    job : Job
+
+    Attributes
+    ----------
+    is_done : bool
+        True after the end and after :meth:`cancel`.
+    result : object
+        What the job returned; None before its end.
+    progress : Progress or None
+        The last one.
+    """
+
+    def __init__(self, job: Job[Result]):
+        self._job = job
+        self.is_done = False
+        self.result: Result | None = None
+        self.progress: Progress | None = None
+
+    def work(self, seconds: float = SLICE) -> None:
+        """Run at least one step, and more until this time has passed."""
+        end = time.monotonic() + seconds
+        while not self.is_done:
+            try:
+                self.progress = next(self._job)
+            except StopIteration as stop:
+                self.is_done, self.result = True, stop.value
+            if time.monotonic() >= end:
+                return
+
+    def cancel(self) -> None:
+        """Stop the job, which removes what it has begun."""
+        self._job.close()
+        self.is_done = True

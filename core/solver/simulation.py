@@ -8,8 +8,8 @@ write down what the sensors feel.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping
+from dataclasses import replace
 
 import numpy as np
 
@@ -20,7 +20,8 @@ from ..geometry.bvh import Tree, build_tree
 from ..geometry.contact_points import ContactPoints, contact_points
 from ..geometry.mesh import is_closed
 from ..geometry.rotations import DRIVEN, FREE, KEYFRAMED, quaternion_product, rotation_matrices, rotation_vectors
-from ..jobs.job_runner import drive
+from ..jobs.job_runner import run_job
+from ..jobs.progress import Job, Progress
 from ..laws.contact import SolverModel, State, parameter_row
 from ..laws.series_compliance import coupling
 from ..model.pose_interpolation import poses_at
@@ -44,16 +45,6 @@ from .workspace import Workspace, contacts_of, workspace_for
 
 MAX_PAIR_POINTS = 512
 """Most contact points of a pair: what a thread takes at a time."""
-
-
-@dataclass(frozen=True)
-class Progress:
-    """One frame is done: `done` of `total`, and what it holds."""
-
-    frame: int
-    done: int
-    total: int
-    result: Frame
 
 
 class Simulation:
@@ -418,9 +409,7 @@ def _initial_state(scenario: Scenario, model: SolverModel, center: np.ndarray) -
     )
 
 
-def solve(
-    scenario: Scenario, simulation: Simulation | None = None, frames: list[Frame] | None = None
-) -> Generator[Progress, None, Recording]:
+def solve(scenario: Scenario, simulation: Simulation | None = None, frames: list[Frame] | None = None) -> Job[Recording]:
     """Run a scenario frame by frame.
 
     Closing the generator stops the run; nothing outside is touched.
@@ -436,7 +425,7 @@ def solve(
     Yields
     ------
     Progress
-        After each frame.
+        After each frame; what the frame holds is then the last item of `frames`.
 
     Returns
     -------
@@ -447,14 +436,14 @@ def solve(
     frames = [] if frames is None else frames
     if not frames:
         frames.append(simulation.observe())
-    yield Progress(simulation.frame, len(frames), total, frames[-1])
+    yield Progress("Computing forces", len(frames), total, simulation.frame)
     while simulation.frame < scenario.frame_end:
         frames.append(simulation.advance())
-        yield Progress(simulation.frame, len(frames), total, frames[-1])
+        yield Progress("Computing forces", len(frames), total, simulation.frame)
     names = [body.name for body in scenario.bodies]
     return Recording.stack(frames, names, simulation.dt, scenario.digest(), simulation.warnings, simulation.step_reason)
 
 
 def run(scenario: Scenario, progress: Callable[[Progress], None] | None = None) -> Recording:
     """Run a scenario to its end and return the recording; `progress` is called after each frame."""
-    return drive(solve(scenario), progress)
+    return run_job(solve(scenario), progress)

@@ -4,12 +4,12 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 from ...io.file_writing import atomic_write
 from ...io.sensor_toml import write_sensor
+from ...jobs.progress import Job, Progress
 from ..fitting.intervals import ParameterInterval, parameter_intervals
 from ..forward.contact_phases import FEATURES
 from ..selection.diagnosis import Diagnosis
@@ -94,25 +94,24 @@ def warnings(result: Diagnosis) -> list[str]:
     return said
 
 
-def write_report(result: Diagnosis, folder: Path) -> Iterator[tuple[str, float]]:
+def write_report(result: Diagnosis, folder: Path) -> Job[None]:
     """Write everything into a folder, gap.json last.
 
     Yields
     ------
-    what : str
-    share : float
+    Progress
     """
-    yield "writing the amended sensor", 0.0
+    yield Progress("writing the amended sensor", 0, 1000)
     write_sensor(folder / "sensor.toml", amended_sensor(result))
-    yield "drawing", 0.1
+    yield Progress("drawing", 100, 1000)
     pictures = draw(result, folder)
-    yield "writing the report", 0.9
+    yield Progress("writing the report", 900, 1000)
     found = summary(result)
     with atomic_write(folder / "report.html") as temporary:
         temporary.write_text(render_page(result, found, headline(result), pictures, folder), encoding="utf-8")
     with atomic_write(folder / "gap.json") as temporary:
         temporary.write_text(json.dumps(found, indent=2, ensure_ascii=False, allow_nan=False) + "\n", encoding="utf-8")
-    yield "done", 1.0
+    yield Progress("done", 1000, 1000)
 
 
 def headline(result: Diagnosis) -> str:

@@ -12,6 +12,7 @@ from functools import partial
 import numpy as np
 
 from ...effects.engine.registry import library
+from ...jobs.progress import Job, Progress
 from ...model.effect import Effect
 from ..dataset.rig import Rig
 from ..fitting.heteroscedastic_noise import proportional_noise
@@ -93,15 +94,6 @@ class Diagnosis:
     def of(self, use: str) -> list[Predictor]:
         """Return the predictors of the trials of one use."""
         return [p for p in self.predictors if p.trial.use == use]
-
-
-@dataclass(frozen=True)
-class Progress:
-    """How far a diagnosis has come: `done` of `total`, and what it does."""
-
-    stage: str
-    done: int
-    total: int
 
 
 def base_parameters_to_search(rig: Rig, predictors: Sequence[Predictor]) -> list[str]:
@@ -194,15 +186,17 @@ def start_model(rig: Rig, predictors: Sequence[Predictor]) -> Model:
     return Model(replace(p, gain=float(gain), zero=p.zero if "zero" in rig.given else float(zero)))
 
 
-def diagnose(rig: Rig) -> Iterator[Progress | Diagnosis]:
+def diagnose(rig: Rig) -> Job[Diagnosis]:
     """Find out what the base model misses in a rig.
 
     Yields
     ------
     Progress
         While it works; closing the generator stops it.
+
+    Returns
+    -------
     Diagnosis
-        At last.
     """
     total = 1000
     yield Progress("contacts of every trial", 0, total)
@@ -223,7 +217,7 @@ def diagnose(rig: Rig) -> Iterator[Progress | Diagnosis]:
     result = Diagnosis(rig, predictors, noise, full, coverage(fitted), scales, base, base, before, before)
     for progress in _select_effects(result, view_set):
         yield Progress(progress[0], 60 + int(940 * progress[1]), total)
-    yield result
+    return result
 
 
 def _structure(view_set: ViewSet, found: Fit) -> ResidualStructure:

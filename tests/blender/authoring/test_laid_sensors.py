@@ -9,7 +9,7 @@ from blender_scenes import ball, changes, cube, dump, grid, select
 from palpate.addon.authoring import laid_sensors
 from palpate.addon.scene import scene_reader
 from palpate.addon.session import transforms
-from palpate.core.jobs.job_runner import drive
+from palpate.core.jobs.job_runner import run_job
 from palpate.core.solver.simulation import run
 
 
@@ -113,7 +113,7 @@ def test_one_object_carries_several_sensors_that_feel_on_their_own():
     for z in (0.0195, -0.0195):
         plate = cube("Plate", (0.0, 0.0, z), 0.02)
         plate.palpate.role = "TARGET"
-    recording = run(drive(scene_reader.sample_scenario(scene))[0])
+    recording = run(run_job(scene_reader.sample_scenario(scene))[0])
     above, below = (recording.sensors[name].normal_force[-1].sum() for name in names)
     assert above > 0
     assert below == pytest.approx(2 * above, rel=0.15)  # other patterns of the same density

@@ -8,7 +8,7 @@ from blender_scenes import ball, grid, reopen, save
 
 from palpate.addon.authoring import laid_sensors, sensor_report, surface_binding
 from palpate.addon.scene import meshes, scene_reader
-from palpate.core.jobs.job_runner import drive
+from palpate.core.jobs.job_runner import run_job
 
 
 def finger():
@@ -32,7 +32,7 @@ def shapes(obj):
     """(frames, n, 9) where the texels of a sensor are, as the solver gets it."""
     target = ball("Target", (0.0, 0.0, 1.0))
     target.palpate.role = "TARGET"
-    scenario, _ = drive(scene_reader.sample_scenario(bpy.context.scene))
+    scenario, _ = run_job(scene_reader.sample_scenario(bpy.context.scene))
     bpy.data.objects.remove(target)
     return next(s for s in scenario.sensors if s.name == obj.name).deformation.values
 

@@ -15,7 +15,7 @@ import palpate
 palpate.register()
 from palpate.addon.bake import bake_checkpoint  # noqa: E402
 from palpate.addon.bake.bake import bake  # noqa: E402
-from palpate.core.jobs.job_runner import drive  # noqa: E402
+from palpate.core.jobs.job_runner import run_job  # noqa: E402
 
 bake_checkpoint.CHECKPOINT_INTERVAL = 0.0
 bpy.ops.wm.open_mainfile(filepath=sys.argv[1])
@@ -28,6 +28,6 @@ def note(progress) -> None:
         print(progress.frame, flush=True)
 
 
-drive(bake(bpy.context.scene), note)
+run_job(bake(bpy.context.scene), note)
 bpy.ops.wm.save_mainfile()
 Path(sys.argv[2]).write_text(json.dumps(computed))

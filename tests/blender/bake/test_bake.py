@@ -12,17 +12,17 @@ from palpate.addon.bake import bake_files
 from palpate.addon.bake.bake import bake
 from palpate.addon.display import heat_map, marker_meshes, materials
 from palpate.addon.scene import scene_reader
-from palpate.addon.session import fcurves, jobs, transforms
+from palpate.addon.session import fcurves, transforms
 from palpate.addon.timeline import playback
 from palpate.core.errors import FileError
 from palpate.core.io.bake_folder import read_manifest
 from palpate.core.io.recording_npz import load_recording
 from palpate.core.io.tactile_exr import read_exr
-from palpate.core.jobs.job_runner import drive
+from palpate.core.jobs.job_runner import SlicedJob, run_job
 
 
 def baked(scene):
-    result = drive(bake(scene))
+    result = run_job(bake(scene))
     bake_files.wait_for_removals()
     return result
 
@@ -49,7 +49,7 @@ def test_progress_reaches_its_end(tmp_path):
     scene, *_ = press(frames=4)
     save(tmp_path)
     seen = []
-    drive(bake(scene), seen.append)
+    run_job(bake(scene), seen.append)
     assert [step.done for step in seen] == list(range(1, 9)) and {step.total for step in seen} == {8}
     assert not playback.is_baking()
 
@@ -192,7 +192,7 @@ def test_a_stopped_bake_leaves_the_old_one(tmp_path):
     before = dump()
     pad.palpate.k = 70.0
     for steps in (1, 3, 5, 7):
-        work = jobs.Slice(bake(scene))
+        work = SlicedJob(bake(scene))
         for _ in range(steps):
             work.work(0.0)
         work.cancel()
@@ -219,7 +219,7 @@ def test_a_folder_with_other_files_is_not_overwritten(tmp_path):
     mine.write_text("years of work")
     stages = []
     with pytest.raises(Exception, match="holds other files than a bake"):
-        drive(bake(scene), lambda progress: stages.append(progress.stage))
+        run_job(bake(scene), lambda progress: stages.append(progress.stage))
     assert set(stages) == {"Reading the scene"}  # nobody waits for forces that cannot be kept
     assert mine.read_text() == "years of work"
     assert [path.name for path in (tmp_path / "palpate").iterdir()] == ["Pad"]
@@ -291,7 +291,7 @@ def test_the_bake_of_another_blend_beside_it_is_not_replaced(tmp_path):
     save(tmp_path, "second.blend")
     stages = []
     with pytest.raises(FileError) as caught:
-        drive(bake(scene), lambda progress: stages.append(progress.stage))
+        run_job(bake(scene), lambda progress: stages.append(progress.stage))
     assert str(caught.value) == (
         f"'{folder}' holds the bake of 'first.blend', which lies beside 'second.blend': choose another bake folder."
     )
@@ -350,8 +350,8 @@ def test_a_sensor_all_around_has_a_heat_map_on_its_vertices(tmp_path):
         values = np.zeros(8, dtype=np.float32)
         mesh.attributes[materials.FORCE].data.foreach_get("value", values)
         assert values == pytest.approx(readings.normal_force[i], abs=1e-7)
-    scenario = drive(scene_reader.sample_scenario(scene))[0]  # its own nodes do not change what is sampled
-    assert scenario.digest() == drive(bake(scene)).recording.digest
+    scenario = run_job(scene_reader.sample_scenario(scene))[0]  # its own nodes do not change what is sampled
+    assert scenario.digest() == run_job(bake(scene)).recording.digest
 
 
 def test_an_arrow_without_contact_has_no_size(tmp_path):

@@ -14,10 +14,9 @@ from blender_scenes import press_and_drop, save
 
 from palpate.addon.bake import bake_checkpoint, bake_files, folder_lock
 from palpate.addon.bake.bake import bake
-from palpate.addon.session import jobs
 from palpate.core.errors import FileError
 from palpate.core.io.recording_npz import load_recording
-from palpate.core.jobs.job_runner import drive
+from palpate.core.jobs.job_runner import SlicedJob, run_job
 
 SCRIPT = Path(__file__).with_name("killed_bake.py")
 FRAMES = 60
@@ -62,13 +61,13 @@ def test_sigkill_at_any_moment(tmp_path):
 
 def contents_of_a_whole_bake(scene, tmp_path):
     scene.palpate.folder = str(tmp_path / "whole")
-    drive(bake(scene))
+    run_job(bake(scene))
     return contents(tmp_path / "whole")
 
 
 def abandon(scene, steps):
     """Stop a bake as a kill would: it cannot clean up."""
-    work = jobs.Slice(bake(scene))
+    work = SlicedJob(bake(scene))
     discard = bake_files.BakeFiles.discard
     bake_files.BakeFiles.discard = lambda self: self._lock.release()  # as the operating system does
     try:
@@ -92,7 +91,7 @@ def killed(tmp_path, monkeypatch):
 
 def computed(scene):
     frames = []
-    drive(bake(scene), lambda step: frames.append(step.frame) if step.stage == "Computing forces" else None)
+    run_job(bake(scene), lambda step: frames.append(step.frame) if step.stage == "Computing forces" else None)
     bake_files.wait_for_removals()
     return frames
 
@@ -132,11 +131,11 @@ def test_one_bake_at_a_time(tmp_path):
     while not (tmp_path / "palpate" / folder_lock.LOCK_FILE_NAME).exists():
         next(first)
     with pytest.raises(FileError, match="Another bake is writing to"):
-        drive(bake(scene))
-    drive(first)
+        run_job(bake(scene))
+    run_job(first)
     bake_files.wait_for_removals()
     assert contents(tmp_path / "palpate") == expected
-    drive(bake(scene))
+    run_job(bake(scene))
     bake_files.wait_for_removals()
     assert contents(tmp_path / "palpate") == expected
 
@@ -145,7 +144,7 @@ def test_escape_leaves_nothing(tmp_path, monkeypatch):
     monkeypatch.setattr(bake_checkpoint, "CHECKPOINT_INTERVAL", 0.0)
     scene, *_ = press_and_drop(frames=8)
     save(tmp_path)
-    work = jobs.Slice(bake(scene))
+    work = SlicedJob(bake(scene))
     for _ in range(14):
         work.work(0.0)
     work.cancel()

@@ -14,9 +14,8 @@ from blender_scenes import ball, changes, cube, dump, press, press_and_drop, sav
 
 from palpate.addon.bake.bake import bake
 from palpate.addon.scene import scene_reader
-from palpate.addon.session import jobs
 from palpate.core.errors import PalpateError, SceneError
-from palpate.core.jobs.job_runner import drive
+from palpate.core.jobs.job_runner import SlicedJob, run_job
 
 
 @pytest.fixture
@@ -50,7 +49,7 @@ def everything_in(folder):
 
 
 def warnings_of(scene):
-    return " ".join(drive(bake(scene)).recording.warnings)
+    return " ".join(run_job(bake(scene)).recording.warnings)
 
 
 def test_the_scene_bakes_when_nothing_is_wrong(pressed):
@@ -155,11 +154,11 @@ def test_negative_scale_is_used(pressed):
 def test_non_uniform_scale_is_exact(pressed):
     """A ball of half the height, reached by scale, is felt like a mesh of half the height."""
     pressed.target.scale = (1.0, 1.0, 0.5)
-    scaled = drive(bake(pressed.scene)).recording
+    scaled = run_job(bake(pressed.scene)).recording
     for vertex in pressed.target.data.vertices:
         vertex.co.z *= 0.5
     pressed.target.scale = (1.0, 1.0, 1.0)
-    modelled = drive(bake(pressed.scene)).recording
+    modelled = run_job(bake(pressed.scene)).recording
     assert scaled.warnings == ()
     assert scaled.sensors["Pad"].normal_force == pytest.approx(modelled.sensors["Pad"].normal_force, abs=1e-9)
 
@@ -229,7 +228,7 @@ def test_a_mesh_in_edit_mode(pressed):
     bpy.context.view_layer.objects.active = pressed.pad
     bpy.ops.object.mode_set(mode="EDIT")
     with pytest.raises(SceneError, match="'Pad' is in Edit Mode"):
-        drive(bake(pressed.scene))
+        run_job(bake(pressed.scene))
 
 
 def test_a_baked_body_that_is_no_longer_free(tmp_path):
@@ -299,11 +298,11 @@ def test_a_target_deleted_while_its_bake_runs(tmp_path, steps):
     bpy.ops.palpate.reset()
     scene.palpate.use_live = False
     save(tmp_path)
-    drive(bake(scene))
+    run_job(bake(scene))
     other = ball("Other")
     other.palpate.role = "TARGET"
     files = {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
-    work = jobs.Slice(bake(scene))
+    work = SlicedJob(bake(scene))
     for _ in range(steps):
         work.work(0.0)
     bpy.data.objects.remove(other)
@@ -320,7 +319,7 @@ def test_a_target_deleted_while_its_bake_runs(tmp_path, steps):
 def test_a_scene_deleted_while_its_bake_runs(tmp_path):
     scene, *_ = press(frames=4)
     save(tmp_path)
-    work = jobs.Slice(bake(scene))
+    work = SlicedJob(bake(scene))
     for _ in range(6):
         work.work(0.0)
     bpy.data.scenes.new("Other")

@@ -18,7 +18,7 @@ from palpate.commands import COMMANDS, READY, blender, console, main
 from palpate.commands.bake import report
 from palpate.core.errors import FileError
 from palpate.core.io.recording_npz import load_recording
-from palpate.core.jobs.job_runner import drive
+from palpate.core.jobs.job_runner import run_job
 
 
 @pytest.fixture
@@ -361,7 +361,7 @@ def test_peak_shear_adds_forces_and_not_numbers_of_different_axes():
 def test_export_of_a_baked_file(tmp_path, where, capsys):
     scene, *_ = press(frames=3)
     path = save(tmp_path)
-    recording = drive(bake(scene)).recording
+    recording = run_job(bake(scene)).recording
     save(tmp_path)
     source = path if where == "blend" else tmp_path / "palpate"
     assert main(["export", str(source), "--out", str(tmp_path / "out"), "--format", "npz"]) == 0

@@ -12,7 +12,7 @@ from palpate.addon.display import bake_display, markers, materials, texel_arrows
 from palpate.addon.scene import scene_reader
 from palpate.addon.session import transforms
 from palpate.core.errors import PalpateError
-from palpate.core.jobs.job_runner import drive
+from palpate.core.jobs.job_runner import run_job
 from palpate.core.response import metrics
 from palpate.sample_blends import grasp
 
@@ -28,7 +28,7 @@ def baked(tmp_path):
     scene.frame_set(1)
     scene.palpate.overlays = ALL
     save(tmp_path)
-    return scene, pad, drive(bake(scene))
+    return scene, pad, run_job(bake(scene))
 
 
 def instances(obj):
@@ -110,7 +110,7 @@ def test_arrows_of_fingers_that_face_each_other_do_not_cross(tmp_path):
     grasp.build(scene)
     scene.frame_start, scene.frame_end = 10, 15
     save(tmp_path)
-    drive(bake(scene))
+    run_job(bake(scene))
     scene.frame_set(15)
     left, right = (
         markers.find_marker(scene.objects, scene.objects[name].palpate.uid, "FORCE") for name in (grasp.LEFT, grasp.RIGHT)
@@ -149,8 +149,8 @@ def test_clearing_takes_all_overlays_away(tmp_path):
     bpy.ops.palpate.reset()
     save(tmp_path)
     before = dump()
-    drive(bake(scene))
-    drive(bake(scene))
+    run_job(bake(scene))
+    run_job(bake(scene))
     assert len([obj for obj in scene.objects if materials.SENSOR_KEY in obj]) == 18
     assert bpy.ops.palpate.bake_clear() == {"FINISHED"}
     assert [line for line in changes(before, dump()) if "baked_" not in line and "settings" not in line] == []
@@ -165,7 +165,7 @@ def test_a_heat_map_of_pressure_divides_by_the_texels_area(tmp_path, around):
         pad.palpate.role = "SENSOR"
     scene.palpate.quantity = "PRESSURE"
     save(tmp_path)
-    result = drive(bake(scene))
+    result = run_job(bake(scene))
     sensor = next(s for s in result.scenario.sensors if s.name == pad.name)
     nodes = pad.material_slots[-1].material.node_tree.nodes
     peak = metrics.peak_pressure(result.recording, {s.name: s.texels for s in result.scenario.sensors if s.readout})
@@ -205,7 +205,7 @@ def test_arrows_rest_while_the_scene_is_read(baked, end):
         next(work)
         assert not any(modifier.show_viewport for modifier in own)
     if end == "whole":
-        drive(work)
+        run_job(work)
     else:
         work.close()
     assert [modifier.show_viewport for modifier in own] == [True, False]

@@ -13,7 +13,7 @@ from palpate.addon.timeline import playback
 from palpate.core.errors import SensorError
 from palpate.core.io.bake_folder import frame_file
 from palpate.core.io.tactile_exr import read_exr
-from palpate.core.jobs.job_runner import drive
+from palpate.core.jobs.job_runner import run_job
 
 
 def tip(kind="uv_sphere", **settings):
@@ -58,7 +58,7 @@ def test_the_maps_that_blender_makes_can_be_used(kind):
 def test_files_and_material_show_the_force_on_the_uv_map(tmp_path, pixels):
     scene, obj = tip(image_size=200, image_filter=pixels)
     save(tmp_path)
-    result = drive(bake(scene))
+    result = run_job(bake(scene))
     readings, texels = result.recording.at(4).sensors["Tip"], result.scenario.sensors[0].texels
     channels, about = read_exr(result.folders["Tip"] / frame_file(4))
     assert channels["R"].shape == (200, 200) and about["map"] == "UVMap"
@@ -88,7 +88,7 @@ def test_images_do_not_change_forces(tmp_path):
         scene, obj = tip()
         obj.palpate.image_layout = layout
         save(tmp_path)
-        recordings.append(drive(bake(scene)).recording.sensors["Tip"])
+        recordings.append(run_job(bake(scene)).recording.sensors["Tip"])
     np.testing.assert_allclose(recordings[0].normal_force, recordings[1].normal_force, rtol=1e-12, atol=1e-15)
     np.testing.assert_allclose(recordings[0].shear, recordings[1].shear, rtol=1e-12, atol=1e-15)
 
@@ -98,10 +98,10 @@ def test_without_a_map_it_is_one_sentence(tmp_path):
     save(tmp_path)
     obj.palpate.image_map = "Lightmap"
     with pytest.raises(SensorError, match=r"'Tip' has no UV map 'Lightmap': choose one of 'UVMap'"):
-        drive(bake(scene))
+        run_job(bake(scene))
     obj.data.uv_layers.remove(obj.data.uv_layers[0])
     with pytest.raises(SensorError, match=r"'Tip' has no UV map for its tactile image: unwrap it"):
-        drive(bake(scene))
+        run_job(bake(scene))
 
 
 def test_too_coarse_an_image_is_said():
@@ -114,7 +114,7 @@ def test_too_coarse_an_image_is_said():
 def test_another_image_makes_the_bake_stale(tmp_path, change):
     scene, obj = tip()
     save(tmp_path)
-    drive(bake(scene))
+    run_job(bake(scene))
     scene.frame_set(2)
     assert playback.status(scene).text == "Frame 2 of the bake."
     if change == "coordinates":

@@ -13,7 +13,7 @@ from blender_scenes import cube, press_and_drop, save
 
 from palpate.addon.bake.bake import bake
 from palpate.core.figures import color_maps
-from palpate.core.jobs.job_runner import drive
+from palpate.core.jobs.job_runner import run_job
 from palpate.core.response import metrics
 
 FRAMES = (1, 7, 8)
@@ -56,7 +56,7 @@ def scene_file(tmp_path):
     folder = tmp_path / "project"
     folder.mkdir()
     path = save(folder)
-    recording = drive(bake(scene)).recording
+    recording = run_job(bake(scene)).recording
     for obj in scene.objects:
         if obj.name.startswith("Net Force"):
             obj.hide_render = True

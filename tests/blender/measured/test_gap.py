@@ -10,9 +10,9 @@ import pytest
 from blender_scenes import grid
 
 from palpate.addon.measured import gap_results
-from palpate.addon.session import jobs
 from palpate.commands import main
 from palpate.core.errors import SceneError
+from palpate.core.jobs.job_runner import SlicedJob
 from palpate.core.solver import precompile
 
 
@@ -61,7 +61,7 @@ def test_from_a_rig_to_an_amended_sensor(scene, rig_file, tmp_path):
 def test_stopping_keeps_what_was_known(scene, rig_file):
     obj = pad()
     obj.palpate.measured = str(rig_file)
-    work = jobs.Slice(gap_results.find(obj))
+    work = SlicedJob(gap_results.find(obj))
     for _ in range(3):
         work.work(0.0)
     work.cancel()

@@ -13,7 +13,7 @@ from palpate.addon.timeline import live_cache, playback, staleness
 from palpate.core.effects.engine.registry import effect, library
 from palpate.core.effects.engine.sensor_effects import check_scenario
 from palpate.core.errors import EffectError
-from palpate.core.jobs.job_runner import drive
+from palpate.core.jobs.job_runner import run_job
 
 FORMS = [(kind.name, form.name) for kind in library().values() for form in kind.forms]
 
@@ -26,7 +26,7 @@ def pad():
 
 
 def baked(scene):
-    return drive(bake.bake(scene)).recording.sensors["Pad"]
+    return run_job(bake.bake(scene)).recording.sensors["Pad"]
 
 
 def test_every_effect_can_be_added_moved_and_removed(pad):
@@ -126,7 +126,7 @@ def test_a_sensor_with_an_effect_out_of_bounds_says_where():
     bpy.ops.palpate.effect_add(effect="offset")
     pad.palpate.effects[0].offset_common_offset = 1e9
     with pytest.raises(EffectError, match="offset of effect 'offset' \\(common\\) of sensor 'Pad' is 1e\\+09 unit"):
-        check_scenario(drive(scene_reader.sample_scenario(scene))[0])
+        check_scenario(run_job(scene_reader.sample_scenario(scene))[0])
 
 
 def test_settings_tell_stacks_apart(pad):

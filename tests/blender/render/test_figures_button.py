@@ -11,14 +11,14 @@ from palpate.addon.bake.bake import bake
 from palpate.addon.properties.properties import figure_properties
 from palpate.commands import render
 from palpate.core.errors import ParameterError
-from palpate.core.jobs.job_runner import drive
+from palpate.core.jobs.job_runner import run_job
 
 
 @pytest.fixture
 def baked(tmp_path):
     scene, pad, _ = press(frames=4)
     save(tmp_path)
-    drive(bake(scene))
+    run_job(bake(scene))
     return scene, pad, tmp_path
 
 

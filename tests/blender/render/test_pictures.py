@@ -15,7 +15,7 @@ from palpate.addon.render import figure_export, render, render_setup, video
 from palpate.commands import main
 from palpate.core.errors import FileError, ParameterError, SceneError
 from palpate.core.figures.figure_style import FigureStyle
-from palpate.core.jobs.job_runner import drive
+from palpate.core.jobs.job_runner import run_job
 
 
 @pytest.fixture
@@ -24,7 +24,7 @@ def baked(tmp_path):
     scene.render.engine = "CYCLES"
     scene.cycles.samples, scene.cycles.use_denoising = 1, False
     path = save(tmp_path)
-    drive(bake(scene))
+    run_job(bake(scene))
     save(tmp_path)
     return scene, path
 
@@ -43,7 +43,7 @@ def test_everything_at_once_and_nothing_left_behind(baked, tmp_path):
         figure_export.KINDS, FigureStyle(dpi=50), frames=(3, 4), size=(96, 64), samples=1, formats=("png", "pdf")
     )
     stages = []
-    written = drive(
+    written = run_job(
         figure_export.make_figures(scene, tmp_path / "out", request), lambda step: stages.append((step.done, step.total))
     )
     assert {path.name for path in written} == {path.name for path in (tmp_path / "out").iterdir()}
@@ -94,10 +94,10 @@ def test_the_scene_shows_the_colours_of_the_colour_bar(baked):
 def test_a_scene_that_is_not_baked_and_a_frame_that_is_not_are_one_sentence(baked, tmp_path):
     scene, _ = baked
     with pytest.raises(FileError, match="from 1 to 4"):
-        drive(figure_export.make_figures(scene, tmp_path / "out", figure_export.FigureRequest(frames=(9,))))
+        run_job(figure_export.make_figures(scene, tmp_path / "out", figure_export.FigureRequest(frames=(9,))))
     bpy.ops.palpate.bake_clear()
     with pytest.raises(SceneError, match="is not baked"):
-        drive(figure_export.make_figures(scene, tmp_path / "out", figure_export.FigureRequest()))
+        run_job(figure_export.make_figures(scene, tmp_path / "out", figure_export.FigureRequest()))
     with pytest.raises(ParameterError, match="choose from"):
         figure_export.FigureRequest(kinds=("hologram",))
 
@@ -137,7 +137,7 @@ def test_workbench_shows_the_heat_map_and_leaves_meshes_alone(baked, tmp_path):
         engine="workbench",
         view=(-90, 89),
     )
-    drive(figure_export.make_figures(scene, tmp_path / "out", request))
+    run_job(figure_export.make_figures(scene, tmp_path / "out", request))
     picture = image(tmp_path / "out" / "scene 0004.png")[..., :3]
     assert np.ptp(picture, axis=2).max() > 0.4  # the purples and oranges of magma, on grey
     assert [line for line in changes(before, dump()) if "Render Result" not in line] == []

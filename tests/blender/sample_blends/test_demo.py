@@ -12,7 +12,7 @@ from palpate.addon.render import render
 from palpate.commands import main
 from palpate.core.errors import SceneError
 from palpate.core.io.recording_npz import load_recording
-from palpate.core.jobs.job_runner import drive
+from palpate.core.jobs.job_runner import run_job
 from palpate.core.response import metrics
 from palpate.sample_blends import build_samples, demo, scene_builder
 
@@ -228,7 +228,7 @@ def test_samples_open_and_bake(name, repository, tmp_path):
     bpy.ops.wm.open_mainfile(filepath=str(repository / "sample_blends" / f"{name}.blend"))
     scene = bpy.context.scene
     scene.palpate.folder = str(tmp_path / "bake")
-    baked = drive(bake(scene))
+    baked = run_job(bake(scene))
     assert baked.recording.warnings == ()
     assert metrics.peak_force(baked.recording) > 0.01
     for sensor in baked.recording.sensors.values():

@@ -9,7 +9,7 @@ from blender_scenes import ball, cube, grid
 from palpate.addon.bake import bake
 from palpate.addon.scene import scene_reader
 from palpate.core.errors import SceneError
-from palpate.core.jobs.job_runner import drive
+from palpate.core.jobs.job_runner import run_job
 from palpate.core.solver.simulation import run
 
 
@@ -43,7 +43,7 @@ def box_on_soles(frames=24):
 
 def test_two_soles_carry_a_free_box():
     scene, box, soles, _ = box_on_soles()
-    scenario, binding = drive(scene_reader.sample_scenario(scene))
+    scenario, binding = run_job(scene_reader.sample_scenario(scene))
     assert [body.name for body in scenario.bodies] == ["Box", "Table"]
     assert [sensor.body for sensor in scenario.sensors] == [0, 0]
     assert binding.sensor_objects(scene) == soles
@@ -72,7 +72,7 @@ def test_texels_of_a_part_are_where_blender_shows_them():
 def test_a_bake_puts_each_part_its_own_heat_map(tmp_path):
     scene, box, soles, _ = box_on_soles(4)
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "box.blend"))
-    baked = drive(bake.bake(scene))
+    baked = run_job(bake.bake(scene))
     assert sorted(baked.folders) == ["Sole 0", "Sole 1"]
     assert all(sole.palpate.is_baked and sole.modifiers or sole.data.uv_layers for sole in soles)
     assert box.palpate.is_baked  # keyframed
@@ -88,7 +88,7 @@ def test_a_part_of_something_that_takes_no_part_follows_it():
     stick.keyframe_insert("location", frame=10)
     scene = bpy.context.scene
     scene.frame_start, scene.frame_end = 1, 10
-    scenario, _ = drive(scene_reader.sample_scenario(scene))
+    scenario, _ = run_job(scene_reader.sample_scenario(scene))
     assert [body.name for body in scenario.bodies] == ["Pad", "Ball"]
     assert scenario.bodies[0].motion.positions[-1][2] - scenario.bodies[0].motion.positions[0][2] == pytest.approx(0.01)
 
@@ -97,7 +97,7 @@ def test_a_part_never_touches_its_own_body():
     scene, _, soles, table = box_on_soles(2)
     soles[0].location.z += 0.003  # into the box, facing outwards
     table.location.z = -1.0
-    recording = run(drive(scene_reader.sample_scenario(scene))[0])
+    recording = run(run_job(scene_reader.sample_scenario(scene))[0])
     assert all(not recording.sensors[sole.name].contact.any() for sole in soles)
 
 
@@ -107,14 +107,14 @@ def test_a_part_that_moves_on_its_parent_is_refused():
     soles[0].location.z -= 0.01
     soles[0].keyframe_insert("location", frame=4)
     with pytest.raises(SceneError, match="'Sole 0' moves on its parent"):
-        drive(scene_reader.sample_scenario(scene))
+        run_job(scene_reader.sample_scenario(scene))
 
 
 def test_a_child_of_a_free_body_says_what_to_do():
     scene, _, soles, _ = box_on_soles(4)
     soles[0].palpate.body = "KEYFRAMED"
     with pytest.raises(SceneError, match="Part of Parent"):
-        drive(scene_reader.sample_scenario(scene))
+        run_job(scene_reader.sample_scenario(scene))
 
 
 def test_playing_a_free_body_moves_its_parts_and_does_not_start_anew(monkeypatch):

@@ -9,7 +9,7 @@ from mathutils import Matrix
 
 from palpate.addon.scene import scene_reader
 from palpate.core.errors import SceneError
-from palpate.core.jobs.job_runner import drive
+from palpate.core.jobs.job_runner import run_job
 from palpate.core.solver.simulation import run
 
 FRAMES = 7
@@ -123,7 +123,7 @@ def reference():
 @pytest.mark.parametrize("way", WAYS, ids=lambda way: way.__name__)
 def test_whatever_moves_a_sensor_gives_the_same_forces(way, reference):
     scene, pad = scene_with(way)
-    scenario, _ = drive(scene_reader.sample_scenario(scene))
+    scenario, _ = run_job(scene_reader.sample_scenario(scene))
     motion = scenario.bodies[0].motion
     for i, frame in enumerate(range(1, FRAMES + 1)):
         scene.frame_set(frame)
@@ -147,9 +147,9 @@ def test_free_bodies_with_constraints_are_refused(constraint, says):
     free.palpate.body = "FREE"
     free.constraints.new(constraint)
     with pytest.raises(SceneError, match=says):
-        drive(scene_reader.sample_scenario(scene))
+        run_job(scene_reader.sample_scenario(scene))
     free.constraints[0].enabled = False
-    drive(scene_reader.sample_scenario(scene))
+    run_job(scene_reader.sample_scenario(scene))
 
 
 def test_motion_is_read_between_frames_where_that_is_asked_for():
@@ -158,7 +158,7 @@ def test_motion_is_read_between_frames_where_that_is_asked_for():
     pad.driver_add("location", 2).driver.expression = "0.001 * sin(2 * frame)"
     scene.palpate.subframes, scene.palpate.interpolation = 4, "SMOOTH"
     scene.frame_set(2, subframe=0.25)
-    scenario, binding = drive(scene_reader.sample_scenario(scene))
+    scenario, binding = run_job(scene_reader.sample_scenario(scene))
     assert (scene.frame_current, scene.frame_subframe) == (2, 0.25)
     assert scenario.interpolation == "smooth"
     motion = scenario.bodies[0].motion

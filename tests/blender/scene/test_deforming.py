@@ -13,11 +13,11 @@ from palpate.addon.scene import meshes, scene_reader
 from palpate.addon.session import transforms
 from palpate.addon.timeline import playback
 from palpate.core.errors import SceneError
-from palpate.core.jobs.job_runner import drive
+from palpate.core.jobs.job_runner import run_job
 
 
 def sampled(scene):
-    return drive(scene_reader.sample_scenario(scene))
+    return run_job(scene_reader.sample_scenario(scene))
 
 
 def world_of(scenario, values, body, frame):
@@ -154,7 +154,7 @@ def test_played_and_baked_alike(tmp_path):
         scene.frame_set(frame)
         played.append(playback.status(scene).frame.sensors["Pad"].normal_force)
     playback.reset(scene)
-    recording = drive(bake(scene)).recording
+    recording = run_job(bake(scene)).recording
     assert recording.sensors["Pad"].contact[-1].any()
     np.testing.assert_array_equal(np.array(played), recording.sensors["Pad"].normal_force)
 
@@ -201,9 +201,9 @@ def test_only_a_free_body_that_does_deform_is_warned_of():
     """A modifier that rounds the edges changes nothing over time, and is nothing to warn of."""
     cube = press_and_drop(frames=4)[-1]
     cube.modifiers.new("Bevel", "BEVEL").width = 1e-3
-    _, binding = drive(scene_reader.sample_scenario(bpy.context.scene))
+    _, binding = run_job(scene_reader.sample_scenario(bpy.context.scene))
     assert not any("deforms" in warning for warning in binding.warnings)
     wave = cube.modifiers.new("Wave", "WAVE")
     wave.height, wave.speed = 1e-3, 1e-3
-    _, binding = drive(scene_reader.sample_scenario(bpy.context.scene))
+    _, binding = run_job(scene_reader.sample_scenario(bpy.context.scene))
     assert any("deforms while forces move it" in warning for warning in binding.warnings)

@@ -13,11 +13,11 @@ from palpate.addon.scene import scene_reader
 from palpate.addon.session import transforms, units
 from palpate.core.errors import SceneError
 from palpate.core.geometry.mesh import face_normals
-from palpate.core.jobs.job_runner import drive
+from palpate.core.jobs.job_runner import run_job
 
 
 def sampled(scene):
-    return drive(scene_reader.sample_scenario(scene))
+    return run_job(scene_reader.sample_scenario(scene))
 
 
 def of(scenario, name):

@@ -16,7 +16,7 @@ import pytest
 from palpate.addon.bake import bake as baking
 from palpate.addon.session import dependencies, first_use
 from palpate.addon.timeline import playback
-from palpate.core.jobs.job_runner import drive
+from palpate.core.jobs.job_runner import run_job
 from palpate.core.solver import precompile, precompile_process
 
 
@@ -118,7 +118,7 @@ def test_how_far_it_is_comes_from_the_process(window):
 def test_when_it_fails_the_solver_is_compiled_at_its_first_use(window, capfd):
     window("raise SystemExit('no compiler here')")
     first_use.begin()
-    drive(first_use.wait())
+    run_job(first_use.wait())
     assert first_use.is_ready()
     assert "no compiler here" in capfd.readouterr().err
 

@@ -14,14 +14,14 @@ from palpate.addon.session import identity, transforms
 from palpate.commands import main
 from palpate.core.errors import PalpateError
 from palpate.core.io.recording_npz import load_recording
-from palpate.core.jobs.job_runner import drive
+from palpate.core.jobs.job_runner import run_job
 from palpate.core.solver.simulation import run
 
 
 def forces(scene=None):
     """Sum of the normal forces of every sensor at the last frame."""
     scene = scene or bpy.context.scene
-    recording = run(drive(scene_reader.sample_scenario(scene))[0])
+    recording = run(run_job(scene_reader.sample_scenario(scene))[0])
     return {name: float(felt.normal_force[-1].sum()) for name, felt in recording.sensors.items()}
 
 
@@ -161,10 +161,10 @@ def test_renamed(tmp_path):
     """A renamed object keeps its sensor; its bake plays on; the next bake goes by the new name."""
     scene, pad, _ = press(3)
     save(tmp_path)
-    drive(bake.bake(scene))
+    run_job(bake.bake(scene))
     pad.name = "Thumb"
     assert forces_after_clearing(scene)["Thumb"] > 0
-    baked = drive(bake.bake(scene))
+    baked = run_job(bake.bake(scene))
     assert list(baked.folders) == ["Thumb"]
 
 

@@ -13,7 +13,7 @@ from palpate.addon.display import materials
 from palpate.addon.events import handlers as handlers_of_palpate
 from palpate.addon.session import session_state
 from palpate.addon.timeline import live_cache, playback
-from palpate.core.jobs.job_runner import drive
+from palpate.core.jobs.job_runner import run_job
 from palpate.core.model.recording import SensorFrame
 
 
@@ -37,7 +37,7 @@ def test_playing_gives_the_numbers_of_a_bake(tmp_path):
     frames = dict(live_cache.get(scene).frames)
     assert sorted(frames) == list(range(1, 9))
     save(tmp_path)
-    recording = drive(bake(scene)).recording
+    recording = run_job(bake(scene)).recording
     for number, frame in frames.items():
         baked = recording.at(number)
         assert frame.poses.tobytes() == baked.poses.tobytes()
@@ -88,7 +88,7 @@ def test_a_jump_ahead_is_computed_with_progress(tmp_path):
     scene, *_ = press_and_drop(frames=12)
     play(scene, 1, 2, 9)
     steps = []
-    drive(playback.catch_up(scene), lambda step: steps.append((step.frame, step.done, step.total)))
+    run_job(playback.catch_up(scene), lambda step: steps.append((step.frame, step.done, step.total)))
     assert steps == [(frame, frame - 2, 7) for frame in range(3, 10)] and scene.frame_current == 9
     jumped = live_cache.get(scene).frames[9]
     assert playback.status(scene).frame is jumped
@@ -130,7 +130,7 @@ def test_sub_frames_loops_steps_and_handlers_off_give_the_same_pictures(tmp_path
     played = watched(scene, free, moments)
     bpy.ops.palpate.reset()
     save(tmp_path)
-    drive(bake(scene))
+    run_job(bake(scene))
     baked = watched(scene, free, moments)
     assert played == pytest.approx(baked, abs=1e-6)
     playback.forget()
@@ -146,7 +146,7 @@ def test_sub_frames_loops_steps_and_handlers_off_give_the_same_pictures(tmp_path
 def test_steps_loops_and_handlers_off_render_the_same_pixels(tmp_path):
     scene, pad, _, _, free = press_and_drop(frames=16)
     save(tmp_path)
-    drive(bake(scene))
+    run_job(bake(scene))
     bpy.ops.object.light_add(type="SUN")
     bpy.context.object.data.energy = 10.0
     camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
@@ -195,12 +195,12 @@ def test_time_stretching_shows_the_same_bake_slower(tmp_path):
     """Twice as slow: frame 2 n of the timeline is frame n of the animation, for bodies, images and numbers alike."""
     scene, pad, _, _, free = press_and_drop(frames=8)
     save(tmp_path)
-    plain = drive(bake(scene)).recording
+    plain = run_job(bake(scene)).recording
     at_speed = watched(scene, free, [(number, 0.0) for number in range(1, 9)])
     bpy.ops.palpate.bake_clear()
     scene.render.frame_map_old, scene.render.frame_map_new = 100, 200
     scene.palpate.overlays = {"NORMALS"}
-    slow = drive(bake(scene)).recording
+    slow = run_job(bake(scene)).recording
     assert slow.digest == plain.digest and slow.poses.tobytes() == plain.poses.tobytes()
     assert (scene.render.frame_map_old, scene.render.frame_map_new) == (100, 200)
     assert watched(scene, free, [(2 * number, 0.0) for number in range(1, 9)]) == pytest.approx(at_speed, abs=1e-6)
@@ -431,7 +431,7 @@ def test_the_numbers_of_a_bake_follow_a_file_saved_elsewhere(tmp_path):
     (tmp_path / "there").mkdir()
     scene, *_ = press(frames=4)
     save(tmp_path / "here")
-    felt = drive(bake(scene)).recording.sensors["Pad"]
+    felt = run_job(bake(scene)).recording.sensors["Pad"]
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "there" / "scene.blend"), relative_remap=True)
     scene = reopen(tmp_path / "there" / "scene.blend")
     play(scene, 3)
@@ -462,7 +462,7 @@ def test_rendering_never_simulates(tmp_path):
 def test_a_baked_scene_is_not_simulated_again(tmp_path):
     scene, pad, *_ = press_and_drop(frames=4)
     save(tmp_path)
-    recording = drive(bake(scene)).recording
+    recording = run_job(bake(scene)).recording
     path = save(tmp_path)
     play(scene, 1, 2, 3)
     assert live_cache.get(scene) is None
@@ -501,7 +501,7 @@ def test_a_scene_without_roles_costs_nothing(monkeypatch):
 def test_a_bake_that_is_out_of_date_says_so(tmp_path, change):
     scene, *_ = press_and_drop(frames=4)
     save(tmp_path)
-    drive(bake(scene))
+    run_job(bake(scene))
     path = save(tmp_path)
     scene = reopen(path)
     for frame in (1, 2, 4, 3):

@@ -8,7 +8,7 @@ from blender_scenes import ball, press, press_and_drop, reopen, save
 
 from palpate.addon.bake.bake import bake
 from palpate.addon.timeline import live_cache, playback
-from palpate.core.jobs.job_runner import drive
+from palpate.core.jobs.job_runner import run_job
 
 FRESH, STALE = "Frame {} of the bake.", "The bake is out of date, something has changed since: bake again."
 
@@ -36,7 +36,7 @@ def baked(tmp_path):
     scene.collection.objects.link(bpy.data.objects.new("Arm", None))
     target.parent = bpy.data.objects["Arm"]
     save(tmp_path)
-    drive(bake(scene))
+    run_job(bake(scene))
     return reopen(save(tmp_path))
 
 
@@ -138,7 +138,7 @@ def hung(tmp_path):
         modifier[socket] = others["Nodes"]
     scene.frame_set(1)
     save(tmp_path)
-    drive(bake(scene))
+    run_job(bake(scene))
     return reopen(save(tmp_path))
 
 
@@ -184,7 +184,7 @@ def test_a_target_that_is_a_curve_is_watched(tmp_path):
     ring = bpy.context.object
     ring.data.bevel_depth, ring.palpate.role = 0.002, "TARGET"
     save(tmp_path)
-    drive(bake(scene))
+    run_job(bake(scene))
     assert texts(scene, [1, 2]) == [FRESH.format(1), FRESH.format(2)]
     ring.data.bevel_depth = 0.003
     bpy.context.view_layer.update()
@@ -215,7 +215,7 @@ def test_playing_reads_between_frames_as_a_bake_does(tmp_path, stretched, bends)
     played = dict(live_cache.get(scene).frames)
     bpy.ops.palpate.reset()
     save(tmp_path)
-    recording = drive(bake(scene)).recording
+    recording = run_job(bake(scene)).recording
     felt = recording.sensors["Pad"].normal_force
     assert felt[-1].max() > 0
     for number in range(2 if stretched else 1, 7):

@@ -8,6 +8,7 @@ from palpate.core.gap.dataset.rig import read_rig
 from palpate.core.gap.fitting.intervals import parameter_intervals
 from palpate.core.gap.report.summary import summary
 from palpate.core.gap.selection.diagnosis import diagnose
+from palpate.core.jobs.job_runner import run_job
 
 
 def test_the_sample_rig_is_what_its_script_writes(tmp_path):
@@ -25,7 +26,7 @@ def test_the_sample_rig_is_what_its_script_writes(tmp_path):
 
 def test_what_is_hidden_in_the_sample_rig_is_named_and_nothing_else():
     """What the library's creep and gain lack beside the generator's is no noise that grows with the reading."""
-    *_, found = diagnose(read_rig(sample_rig.FOLDER / "rig.toml"))
+    found = run_job(diagnose(read_rig(sample_rig.FOLDER / "rig.toml")))
     assert sorted(named.name for named in found.findings) == ["creep", "gain-mismatch"]
     gap = summary(found)["gap"]
     assert gap["after"]["check"] < 0.01 < 0.02 < gap["before"]["check"]

@@ -11,6 +11,7 @@ from palpate.core.gap.forward.predictor import Model, Predictor
 from palpate.core.gap.report import summary
 from palpate.core.gap.report.comparison import nrmse, nrmse_without_friction
 from palpate.core.gap.selection.diagnosis import diagnose
+from palpate.core.jobs.job_runner import run_job
 from palpate.core.model.sensor_parameters import SensorParameters
 
 PARAMETERS = SensorParameters(k=1e4, cn=0.0, sigma0=5e3, sigma1=1.0, mus=0.6, mud=0.5, x0=0.02, ct=0.0)
@@ -34,7 +35,7 @@ def brake(backlash):
 
 
 def test_the_report_says_what_friction_does_and_what_is_left(tmp_path):
-    *_, result = diagnose(brake(backlash=2.0))
+    result = run_job(diagnose(brake(backlash=2.0)))
     bare, own = nrmse_without_friction(result), nrmse(result.of("fit"), result.base.model, result.full)
     assert bare["fit"] > 3.0 * own and bare["check"] > 3.0 * nrmse(result.of("check"), result.base.model, result.full)
     assert not any(named.confidence >= summary.SURE for named in result.findings)

@@ -23,10 +23,11 @@ from palpate.core.gap.report.amended_sensor import next_experiment
 from palpate.core.gap.report.comparison import nrmse
 from palpate.core.gap.selection.diagnosis import Diagnosis, diagnose
 from palpate.core.io.sensor_toml import read_sensor
+from palpate.core.jobs.job_runner import run_job
 
 
 def diagnosed(rig):
-    *_, result = diagnose(rig)
+    result = run_job(diagnose(rig))
     assert isinstance(result, Diagnosis)
     return result
 

@@ -17,7 +17,7 @@ from palpate.core.io.bake_reader import frame_index, read_bake
 from palpate.core.io.export import export
 from palpate.core.io.recording_npz import save_recording
 from palpate.core.io.sensor_npz import load_sensor, save_sensor
-from palpate.core.jobs.job_runner import drive
+from palpate.core.jobs.job_runner import run_job
 from palpate.core.model.sensor_parameters import Painted, SensorParameters
 
 
@@ -97,7 +97,7 @@ def table(path):
 
 
 def test_csv_holds_every_texel_and_the_sums(bake, tmp_path):
-    drive(export(bake, "csv", tmp_path / "out"))
+    run_job(export(bake, "csv", tmp_path / "out"))
     assert sorted(path.name for path in (tmp_path / "out").iterdir())[:2] == ["bodies.csv", "pad"]
     felt = bake.recording.sensors["pad"]
     header, rows = table(tmp_path / "out" / "pad" / "normal_force.csv")
@@ -116,7 +116,7 @@ def test_csv_holds_every_texel_and_the_sums(bake, tmp_path):
 
 def test_npz_and_hdf5_hold_the_same_arrays_in_full_precision(bake, tmp_path):
     h5py = pytest.importorskip("h5py")
-    written = drive(export(bake, "npz", tmp_path / "out")) + drive(export(bake, "hdf5", tmp_path / "out"))
+    written = run_job(export(bake, "npz", tmp_path / "out")) + run_job(export(bake, "hdf5", tmp_path / "out"))
     assert all(path.is_file() for path in written)
     with h5py.File(tmp_path / "out" / "palpate.h5") as file, np.load(written[0]) as members:
         group = file["sensors/pad"]
@@ -132,14 +132,14 @@ def test_npz_and_hdf5_hold_the_same_arrays_in_full_precision(bake, tmp_path):
 def test_hdf5_without_its_package_says_how_to_get_it(bake, tmp_path, monkeypatch):
     monkeypatch.setitem(__import__("sys").modules, "h5py", None)
     with pytest.raises(PalpateError, match="pip install h5py"):
-        drive(export(bake, "hdf5", tmp_path / "out"))
+        run_job(export(bake, "hdf5", tmp_path / "out"))
 
 
 def test_png_has_one_scale_for_all_sensors(bake, tmp_path):
     from matplotlib.image import imread
 
     bake.recording.sensors["tip/1"].normal_force[4, 0] = 0.2
-    drive(export(bake, "png", tmp_path / "out", FigureStyle("PAPER", limit=0.4)))
+    run_job(export(bake, "png", tmp_path / "out", FigureStyle("PAPER", limit=0.4)))
     scale = json.loads((tmp_path / "out" / "pad" / "scale.json").read_text())
     assert scale["last_colour"] == 0.4 and scale["quantity"].endswith("(N)")
     picture = imread(tmp_path / "out" / "pad" / "tactile_0005.png")
@@ -156,4 +156,4 @@ def test_png_has_one_scale_for_all_sensors(bake, tmp_path):
 
 def test_an_unknown_format_is_refused(bake, tmp_path):
     with pytest.raises(PalpateError, match="csv, npz, hdf5, png"):
-        drive(export(bake, "xls", tmp_path))
+        run_job(export(bake, "xls", tmp_path))

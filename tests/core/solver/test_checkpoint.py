@@ -8,7 +8,7 @@ import pytest
 from solver_scenes import box, cube_on_pad, gripper
 
 from palpate.core.effects.engine.registry import effect
-from palpate.core.jobs.job_runner import drive
+from palpate.core.jobs.job_runner import run_job
 from palpate.core.model.recording import SensorFrame
 from palpate.core.solver import checkpoint
 from palpate.core.solver.simulation import Simulation, solve
@@ -42,7 +42,7 @@ def with_effects():
 @pytest.mark.parametrize("at", [1, 9])
 def test_a_run_goes_on_where_it_was(make, at, tmp_path):
     scenario = make()
-    whole = drive(solve(scenario))
+    whole = run_job(solve(scenario))
     before = Simulation(scenario)
     frames = [before.observe()]
     frames += [before.advance() for _ in range(at)]
@@ -50,7 +50,7 @@ def test_a_run_goes_on_where_it_was(make, at, tmp_path):
     after = Simulation(scenario)
     with np.load(tmp_path / "state.npz", allow_pickle=False) as packed:
         checkpoint.unpack(after, packed)
-    found = drive(solve(scenario, after, frames))
+    found = run_job(solve(scenario, after, frames))
     assert found.frames.tolist() == whole.frames.tolist() and found.warnings == whole.warnings
     assert found.poses.tobytes() == whole.poses.tobytes() and found.velocities.tobytes() == whole.velocities.tobytes()
     for name, felt in whole.sensors.items():

@@ -9,6 +9,7 @@ from palpate.core.gap.fitting.least_squares import TrialView
 from palpate.core.gap.fitting.spectral_lines import strongest_line
 from palpate.core.gap.forward.predictor import Model, Predictor
 from palpate.core.gap.selection.diagnosis import diagnose
+from palpate.core.jobs.job_runner import run_job
 
 
 def line_in(rig, deviation):
@@ -35,5 +36,5 @@ def test_noise_has_no_line(colour, seed):
 
 
 def test_hum_of_many_phases_is_unexplained():
-    *_, result = diagnose(cases.rig(change=hum(0.01, 7.3), seed=22))
+    result = run_job(diagnose(cases.rig(change=hum(0.01, 7.3), seed=22)))
     assert result.verdict == "unexplained" and not result.findings and result.line is not None
