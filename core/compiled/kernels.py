@@ -75,14 +75,15 @@ if COMPILED:
     from numba import carray, types
     from numba.extending import intrinsic
 
-    _POINTERS, _NUMBERS = (0, 2, 4, 7), 20
-    """Which of the numbers that such a function takes are addresses of arrays, and how many there are."""
+    _POINTERS, _INTEGER_POINTERS, _NUMBERS = range(7), (6,), 13
+    """Which arguments of such a function are addresses of arrays, which of those arrays hold integers, and how many arguments
+    there are."""
 
     def compiled_callback(function: Callable[..., Any]) -> Any:
-        """Compile `function` for calls by its `address`: twenty whole numbers, of which some are pointers to arrays."""
+        """Compile `function` for calls by its `address`, with pointers to arrays first and integers after them."""
         function.__qualname__ += f"_{FINGERPRINT}"
-        kinds = {0: types.float64, 2: types.int64, 4: types.float64, 7: types.float64}
-        arguments = [types.CPointer(kinds[i]) if i in kinds else types.int64 for i in range(_NUMBERS)]
+        kinds = [types.int64 if i in _INTEGER_POINTERS else types.float64 for i in _POINTERS]
+        arguments = [types.CPointer(kind) for kind in kinds] + [types.int64] * (_NUMBERS - len(kinds))
         return numba.cfunc(types.void(*arguments), cache=True, error_model="numpy")(function)
 
     @intrinsic
@@ -94,7 +95,7 @@ if COMPILED:
             given = [builder.extract_value(arguments[1], i) for i in range(_NUMBERS)]
             kinds = [ir.IntType(64)] * _NUMBERS
             for i in _POINTERS:
-                kinds[i] = (ir.IntType(64) if i == 2 else ir.DoubleType()).as_pointer()
+                kinds[i] = (ir.IntType(64) if i in _INTEGER_POINTERS else ir.DoubleType()).as_pointer()
                 given[i] = builder.inttoptr(given[i], kinds[i])
             kind = ir.FunctionType(ir.VoidType(), kinds)
             builder.call(builder.inttoptr(arguments[0], kind.as_pointer()), given)

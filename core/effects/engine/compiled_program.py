@@ -21,82 +21,88 @@ from ...compiled.kernels import COMPILED, call_address, carray, compiled_callbac
 from ...compiled.struct_reference import by_reference
 from ...model.effect import Effect
 from .registry import complete_values, in_signal_order
-from .specification import Form
+from .specification import Form, TexelInput
 
-# What this name stands for differs from copy to copy of the functions that use it, see _link.
-ONE: Any = None
+# The loops below are compiled once for each law: `_specialised` copies them with LAW standing for that law.
+LAW: Any = None
 
 
-def _law_over_time(force, depth, slide, step, numbers, memory, result):
+def kernel_template(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Mark a function of which :func:`_specialised` compiles a copy for each law; by itself it is never called."""
+    return function
+
+
+@kernel_template
+def _law_over_time(force, depth, slide, step, constants, memory, result):
     for i in range(force.shape[0]):
-        row = step[i]
+        row = constants[step[i]]
         for point in range(force.shape[1]):
-            result[i, point], _ = ONE(
-                force[i, point], 1.0, depth[i, point], slide[i, point], numbers, row, memory, point, 0, True
-            )
+            texel = TexelInput(force[i, point], 1.0, depth[i, point], slide[i, point])
+            result[i, point], _ = LAW(texel, row, memory[point], True)
 
 
-def _law_over_points(work, force, slope, depth, slide, count, slots, slot, offset, numbers, row, memory, at, commit):
-    for i in range(count):
-        point = offset + slots[slot + i]
-        work[force + i], work[slope + i] = ONE(
-            work[force + i], work[slope + i], work[depth + i], work[slide + i], numbers, row, memory, point, at, commit
-        )
+@kernel_template
+def _law_over_points(columns, constants, memory, rows, offset, commit):
+    force, slope, depth, slide = columns
+    for i in range(len(rows)):
+        texel = TexelInput(force[i], slope[i], depth[i], slide[i])
+        force[i], slope[i] = LAW(texel, constants, memory[offset + rows[i]], commit)
 
 
-def _friction_over_points(work, speed, force, factor, viscous, count, slots, slot, offset, numbers, row, memory, at, commit):
-    for i in range(count):
-        more, thicker = ONE(work[speed + i], work[force + i], numbers, row)
-        work[factor + i] *= more
-        work[viscous + i] += thicker
+@kernel_template
+def _friction_law_over_points(columns, constants, memory, rows, offset, commit):
+    speed, force, factor, viscous = columns
+    for i in range(len(rows)):
+        factor_here, viscous_here = LAW(speed[i], force[i], constants)
+        factor[i] *= factor_here
+        viscous[i] += viscous_here
 
 
-def _entry(
-    work, works, slots, slotted, numbers, rows, width, memory, points, columns, a, b, c, d, count, slot, offset, row, at, commit
-):
-    ONE(
-        carray(work, (works,)), a, b, c, d, count, carray(slots, (slotted,)), slot, offset,
-        carray(numbers, (rows, width)), row, carray(memory, (points, columns)), at, commit != 0,
-    )  # fmt: skip
+@kernel_template
+def _entry(a, b, c, d, constants, memory, rows, count, width, points, state_size, offset, commit):
+    """Make arrays of the addresses and numbers that :func:`call_address` hands over; `LAW` is one of the loops over points."""
+    columns = carray(a, (count,)), carray(b, (count,)), carray(c, (count,)), carray(d, (count,))
+    LAW(columns, carray(constants, (width,)), carray(memory, (points, state_size)), carray(rows, (count,)), offset, commit != 0)
 
 
-def _link(function: Any, name: str, wrap: Callable[[Any], Any] = kernel, **meaning: Any) -> Any:
-    """Return a copy of a function, compiled, in which global names mean what is given, under a name of its own in the cache."""
-    copy = FunctionType(function.__code__, {**meaning, "__name__": __name__})
-    copy.__qualname__ = f"{function.__name__}_{name}"
+def _specialised(template: Any, law: Any, name: str, compiler: Callable[[Any], Any] = kernel) -> Any:
+    """Return a compiled copy of a template in which LAW means `law`, under a name of its own in numba's cache."""
+    copy = FunctionType(template.__code__, {"LAW": law, "TexelInput": TexelInput, "carray": carray, "__name__": __name__})
+    copy.__qualname__ = f"{template.__name__}_{name}"
     copy.__module__ = __name__
-    return wrap(copy)
+    return compiler(copy)
 
 
 @cache
-def _compiled(function: Callable[..., Any]) -> Any:
-    return kernel(function)
+def _compiled(law: Callable[..., Any]) -> Any:
+    return kernel(law)
 
 
-def _name(function: Callable[..., Any]) -> str:
-    return f"{function.__module__.rpartition('.')[2]}_{function.__name__}"
+def _name(law: Callable[..., Any]) -> str:
+    return f"{law.__module__.rpartition('.')[2]}_{law.__name__}"
 
 
 @cache
 def _over_time(law: Callable[..., Any]) -> Any:
-    return _link(_law_over_time, _name(law), ONE=_compiled(law))
+    return _specialised(_law_over_time, _compiled(law), _name(law))
 
 
-# --- laws by number, for kernels that are compiled once and for all: which laws a sensor has is only known when it runs
+# --- Laws by number, for kernels that are compiled once for all sensors: which laws a sensor has is known only at run time.
 
 _UNCOMPILED: list[Callable[..., Any]] = []
 _ENTRIES: dict[int, Any] = {}
+"""Keeps the compiled entries alive, by their addresses."""
 
 
 @cache
-def _number_of(form_way: Callable[..., Any], loop: Any) -> int:
-    """Number under which :func:`call_law` knows a law: the address of its machine code; without numba its place in a list."""
-    over_points = _link(loop, _name(form_way), ONE=_compiled(form_way))
+def _number_of(law: Callable[..., Any], loop: Any) -> int:
+    """Return the number by which :func:`call_law` finds a law: the address of its machine code, or without numba an index."""
+    over_points = _specialised(loop, _compiled(law), _name(law))
     if not COMPILED:
         _UNCOMPILED.append(over_points)
         return len(_UNCOMPILED) - 1
-    entry = _link(_entry, _name(form_way), compiled_callback, ONE=over_points, carray=carray)
-    _ENTRIES[entry.address] = entry  # has to stay alive
+    entry = _specialised(_entry, over_points, _name(law), compiled_callback)
+    _ENTRIES[entry.address] = entry
     return int(entry.address)
 
 
@@ -105,53 +111,51 @@ if COMPILED:
     @kernel
     def call_law(number, work, block, a, b, c, d, count, slots, slot, offset, numbers, row, memory, at, commit):
         """Let a law act on `count` points; see :func:`apply_force_laws`."""
-        start = block * work.shape[1]
+        start = work.ctypes.data + 8 * block * work.shape[1]
         call_address(
-            number, work.ctypes.data, work.size, slots.ctypes.data, slots.size, numbers.ctypes.data, numbers.shape[0],
-            numbers.shape[1], memory.ctypes.data, memory.shape[0], memory.shape[1], start + a, start + b, start + c, start + d,
-            count, slot, offset, row, at, 1 if commit else 0,
+            number, start + 8 * a, start + 8 * b, start + 8 * c, start + 8 * d,
+            numbers.ctypes.data + 8 * row * numbers.shape[1], memory.ctypes.data + 8 * at, slots.ctypes.data + 8 * slot,
+            count, numbers.shape[1], memory.shape[0], memory.shape[1], offset, 1 if commit else 0,
         )  # fmt: skip
 else:
 
     def call_law(number, work, block, a, b, c, d, count, slots, slot, offset, numbers, row, memory, at, commit):
         """Let a law act on `count` points; see :func:`apply_force_laws`."""
-        start = block * work.shape[1]
-        _UNCOMPILED[number](
-            work.reshape(-1), start + a, start + b, start + c, start + d, count, slots.reshape(-1), slot, offset,
-            numbers, row, memory, at, commit,
-        )  # fmt: skip
+        columns = tuple(work[block, first : first + count] for first in (a, b, c, d))
+        _UNCOMPILED[number](columns, numbers[row], memory[:, at:], slots.reshape(-1)[slot : slot + count], offset, commit)
 
 
 def law_over_time(
     form: Form,
     force: np.ndarray,
     step: np.ndarray,
-    numbers: np.ndarray,
+    constants: np.ndarray,
     memory: np.ndarray,
     depth: np.ndarray | None = None,
     slide: np.ndarray | None = None,
 ) -> np.ndarray:
-    """Run one law over t samples of n points, (t, n) float: the same numbers as step by step, with less to decide on the way.
+    """Run one law over t samples of n points; return (t, n) float. The numbers are those of the same run step by step.
 
     Parameters
     ----------
     form : Form
         With a law.
     force, depth, slide : (t, n) float
-        What goes into the law.
+        Inputs of the law, see :class:`.TexelInput`.
     step : (t,) int
-        Which row of `numbers` belongs to each sample.
-    numbers : (…, c) float
-    memory : (n, columns) float
+        The row of `constants` that belongs to each sample.
+    constants : (lengths of step, c) float
+    memory : (n, state_size) float
         Brought up to date.
     """
     assert form.law is not None
-    # Arrays of one kind, so that the law is compiled only once.
+    # Contiguous arrays of one type, so that the law is compiled only once.
     force = np.ascontiguousarray(force, dtype=float)
     depth = np.zeros_like(force) if depth is None else np.ascontiguousarray(depth, dtype=float)
     slide = np.zeros_like(force) if slide is None else np.ascontiguousarray(slide, dtype=float)
+    constants = np.ascontiguousarray(constants, dtype=float)
     result = np.empty_like(force)
-    _over_time(form.law)(force, depth, slide, step, numbers, memory, result)
+    _over_time(form.law)(force, depth, slide, step, constants, memory, result)
     return result
 
 
@@ -224,11 +228,11 @@ def compile_program(stacks: Sequence[Sequence[Effect]], dt: ArrayLike) -> Effect
                 code.append(_number_of(form.law, _law_over_points))
                 at.append(column)
                 row.append(first)
-                column += form.memory
+                column += form.state_size
                 after += form.after_clip
             else:
                 assert form.friction_law is not None
-                friction_code.append(_number_of(form.friction_law, _friction_over_points))
+                friction_code.append(_number_of(form.friction_law, _friction_law_over_points))
                 friction_row.append(first)
             tables.append(form.constants(complete_values(item), lengths))
         start.append(len(code))

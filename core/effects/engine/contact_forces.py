@@ -73,7 +73,7 @@ def normal_forces(
             continue
         if form.after_clip and not clipped:
             force, clipped = _cut_off(force, inside, damping, linear), True
-        memory = np.zeros((depth.shape[1], form.memory))
+        memory = np.zeros((depth.shape[1], form.state_size))
         force = law_over_time(form, force, step, form.constants(complete_values(item), lengths), memory, inside, slide)
     return force if clipped else _cut_off(force, inside, damping, linear)
 

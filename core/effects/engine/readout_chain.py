@@ -133,7 +133,7 @@ class _Law:
     def run(self, time: np.ndarray, signal: np.ndarray) -> np.ndarray:
         assert self.form.constants is not None
         if self.memory is None:
-            self.memory = np.zeros((signal.shape[1], self.form.memory))
+            self.memory = np.zeros((signal.shape[1], self.form.state_size))
         lengths, step = steps_of(time, self.last)
         self.last = float(time[-1])
         return law_over_time(self.form, signal, step, self.form.constants(self.values, lengths), self.memory)

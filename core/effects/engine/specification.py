@@ -9,7 +9,7 @@ two papers agree on one. A form acts by exactly one mechanism:
 ``memoryless``    formula on readings: ``memoryless(signal (t, n), time (t,), values, transducers, seed) → (t, n)``
 ``coupling``      linear coupling of texels, made once for all samples: ``coupling(values, transducers) → CouplingMatrix``
 ``delay``         seconds by which the reading comes late: ``delay(values) → float``
-``friction_law``  law of sliding: ``friction_law(speed, force, numbers, row) → (factor on the friction coefficient, N·s/m)``
+``friction_law``  law of sliding (see :data:`FrictionLaw`)
 ``placement``     where the texels really are: ``placement(position, normal, tangent, values) → the same three``
 ================  ===========================================================================================================
 
@@ -21,6 +21,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -29,45 +30,74 @@ from ...model.parameter import Parameter
 from .coupling_matrix import CouplingMatrix
 
 SITES_OF_ACTION = ("contact", "pad", "readout")
-"""`contact`: the law of contact itself, without memory. `pad`: with memory; both act on the bodies. `readout`: only on what
-the sensor reports."""
+"""Where an effect acts, in the order in which a load passes: `contact` changes the contact law itself and has no memory, `pad`
+has a memory in each texel; both act on the bodies. `readout` changes only what the sensor reports."""
 
-Law = Callable[..., tuple[float, float]]
-"""``law(force, slope, depth, slide, numbers, row, memory, point, at, commit) → (force, slope)``
+
+class TexelInput(NamedTuple):
+    """What a law is told about one texel and one step.
+
+    Attributes
+    ----------
+    force : float, N (of a readout law: the reading so far)
+        What the effects before this one give at the end of the step.
+    slope : float, N/m
+        Derivative of `force` with respect to the depth at the end of the step.
+    depth : float, m
+        Penetration at the end of the step, zero while nothing touches. Zero for a readout law.
+    slide : float, m
+        Distance slid during the step. Zero for a readout law.
+    """
+
+    force: float
+    slope: float
+    depth: float
+    slide: float
+
+
+Law = Callable[[TexelInput, np.ndarray, np.ndarray, bool], tuple[float, float]]
+"""``law(texel, constants, state, commit) → (force, slope)``
 
 Parameters
 ----------
-force : float, N (of a readout law: the reading so far)
-    What the laws before this one give at the end of the step.
-slope : float, N/m
-    Its derivative by the depth at the end of the step.
-depth : float, m
-    Penetration at the end of the step, zero while nothing touches. A readout law gets zero.
-slide : float, m
-    Distance slid in the step. A readout law gets zero.
-numbers, row : (…, c) float, int
-    The law's constants for this length of step are ``numbers[row]``.
-memory, point, at : (…, m) float, int, int
-    The law's own memory are the columns from ``at`` on of ``memory[point]``; it is all zero at first.
+texel : TexelInput
+constants : (c,) float
+    What :attr:`Form.constants` gives for the length of this step.
+state : (:attr:`Form.state_size`,) float
+    What the law remembers of this texel. All zeros at the start.
 commit : bool
-    Write the memory. Without it the law is only asked what would be.
+    Write the new state. If false, the law is only evaluated, and `state` must stay as it is.
+"""
+
+FrictionLaw = Callable[[float, float, np.ndarray], tuple[float, float]]
+"""``friction_law(speed, force, constants) → (factor on the friction coefficient, viscous drag in N·s/m)``
+
+Parameters
+----------
+speed : float, m/s
+    Sliding speed, never negative.
+force : float, N
+    Normal force.
+constants : (c,) float
 """
 
 
 @dataclass(frozen=True)
 class TransducerArray:
-    """Where an effect sits: the texels and the linear conversion of the sensor it belongs to.
+    """The texels of a sensor, as effects on readings see them, and its linear conversion from force to reading.
 
     Attributes
     ----------
     position : (n, 3) float, m
     area : (n,) float, m²
     row, column : (n,) int or None
-        Of texels that form a grid.
+        Place of each texel in a grid, if the texels form one.
     gain, zero : float
-        Conversion from newtons to the sensor's unit.
+        Conversion ``reading = zero + gain · force`` from newtons to the unit of the sensor.
     painted : float or (n,) float
         Multiplies the gain of each texel.
+    name : str
+        Of the sensor, for messages.
     """
 
     position: np.ndarray
@@ -93,24 +123,25 @@ class Form:
     formula : str
         As the documentation prints it.
     reference : str
+        Where the formula comes from.
     parameters : tuple of Parameter
     neutral : dict of str to float
-        Values, possibly outside the bounds, at which the effect is not there: ``strength`` zero, a level of infinity.
+        Values at which the effect vanishes; they may lie outside the bounds. Examples: strength zero, level infinity.
     law, memoryless, coupling, delay, friction_law, placement
-        How it acts; exactly one is given (see the module's text).
+        The mechanism; exactly one is given (see the text of the module).
     constants : callable
-        ``constants(values, dt (m,)) → (m, c)``: the numbers of a law for steps of these lengths (s), of a friction law for
-        none in particular.
-    memory : int
-        How many numbers a law remembers.
+        ``constants(values, dt (m,)) → (m, c)``: the constants of a law for steps of these lengths (s). The constants of a
+        friction law must not depend on the length.
+    state_size : int
+        How many numbers a law remembers for each texel.
     site : str
-        Where it differs from that of its kind.
+        Site of action, if it differs from that of the kind.
     after_conversion : bool
-        A readout form that acts on the reading in the sensor's unit, and not on newtons before gain and zero.
+        A readout form that acts on the reading in the unit of the sensor, not on newtons before gain and zero.
     after_clip : bool
-        A law that acts after the force was cut off at zero, so that it may pull.
+        A law that acts after the normal force was clipped at zero, so that the texel can pull.
     random : bool
-        It depends on the seed.
+        It draws random numbers, which depend on the seed.
     """
 
     name: str
@@ -122,10 +153,10 @@ class Form:
     memoryless: Callable[..., np.ndarray] | None = None
     coupling: Callable[[Values, TransducerArray], CouplingMatrix] | None = None
     delay: Callable[[Values], float] | None = None
-    friction_law: Callable[..., tuple[float, float]] | None = None
+    friction_law: FrictionLaw | None = None
     placement: Callable[..., tuple[np.ndarray, np.ndarray, np.ndarray]] | None = None
     constants: Callable[[Values, np.ndarray], np.ndarray] | None = None
-    memory: int = 0
+    state_size: int = 0
     site: str = ""
     after_conversion: bool = False
     after_clip: bool = False
@@ -133,7 +164,7 @@ class Form:
 
     @property
     def mechanism(self) -> str:
-        """How it acts: the name of the one attribute that is given."""
+        """The name of the mechanism that is given."""
         mechanisms = ("law", "memoryless", "coupling", "delay", "friction_law", "placement")
         return next(name for name in mechanisms if getattr(self, name) is not None)
 
@@ -149,15 +180,15 @@ class Kind:
     Attributes
     ----------
     name : str
-        Its standard name: files and reports use it.
+        Standard name, used in files and reports.
     title : str
         For people.
     text : str
         What it does, in one sentence.
     site : str
-        One of :data:`SITES_OF_ACTION`.
+        Site of action, one of :data:`SITES_OF_ACTION`.
     order : float
-        Place in the chain among those of its site.
+        Rank among the effects with the same site of action: lower acts first.
     forms : tuple of Form
         The first is the usual one.
     """
@@ -170,7 +201,7 @@ class Kind:
     forms: tuple[Form, ...]
 
     def site_of(self, form: Form) -> str:
-        """Return where a form of this kind acts."""
+        """Return the site of action of a form of this kind."""
         return form.site or self.site
 
 
@@ -182,7 +213,7 @@ def scalar(values: Values, name: str) -> float:
 
 
 def constants_from(*names: str) -> Callable[[Values, np.ndarray], np.ndarray]:
-    """Return the `constants` of a law whose numbers are its parameters of these names, whatever the step."""
+    """Return the `constants` of a form whose constants are the parameters of these names, for steps of any length."""
 
     def constants(values: Values, dt: np.ndarray) -> np.ndarray:
         return np.tile([scalar(values, name) for name in names], (len(dt), 1))

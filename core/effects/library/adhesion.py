@@ -13,58 +13,62 @@ import numpy as np
 
 from ...model.effect import Values
 from ...model.parameter import Parameter
-from ..engine.specification import Form, Kind, constants_from, scalar
+from ..engine.specification import Form, Kind, TexelInput, constants_from, scalar
 
 
-def constant(force, slope, depth, slide, numbers, row, memory, point, at, commit):
-    """``f − F · (1 − exp(−d/D))``."""
-    if depth <= 0.0:
-        return force, slope
-    left = math.exp(-depth / numbers[row, 1])
-    return force - numbers[row, 0] * (1.0 - left), slope - numbers[row, 0] * left / numbers[row, 1]
+def constant(texel: TexelInput, constants: np.ndarray, state: np.ndarray, commit: bool) -> tuple[float, float]:
+    """``f − F · (1 − exp(−d/D))``. Constants: F, D."""
+    pull, length = constants[0], constants[1]
+    if texel.depth <= 0.0:
+        return texel.force, texel.slope
+    left = math.exp(-texel.depth / length)
+    return texel.force - pull * (1.0 - left), texel.slope - pull * left / length
 
 
-def unloading(force, slope, depth, slide, numbers, row, memory, point, at, commit):
-    """``f − F u c``: u goes to 1 on the way back and to 0 on the way in, c grows with the time of contact (or is 1).
+def unloading(texel: TexelInput, constants: np.ndarray, state: np.ndarray, commit: bool) -> tuple[float, float]:
+    """``f − F u c``: u goes to 1 on the way out and to 0 on the way in, c grows with the time of contact (or is 1).
 
-    Memory: u, the last depth, c. Constants: F, D, how much of 1 − c is left after the step, least c.
+    State: u, the depth at the end of the last step, c. Constants: F, D, the share of 1 − c that is left after the step, lower
+    bound of c.
     """
-    if depth <= 0.0:
+    pull, length = constants[0], constants[1]
+    if texel.depth <= 0.0:
         if commit:
-            memory[point, at], memory[point, at + 1], memory[point, at + 2] = 0.0, 0.0, 0.0
-        return force, slope
-    change = depth - memory[point, at + 1]
+            state[0], state[1], state[2] = 0.0, 0.0, 0.0
+        return texel.force, texel.slope
+    change = texel.depth - state[1]
     aim = 0.0 if change >= 0.0 else 1.0
-    u = aim + (memory[point, at] - aim) * math.exp(-abs(change) / numbers[row, 1])
-    old = 1.0 - (1.0 - memory[point, at + 2]) * numbers[row, 2]
-    c = max(old, numbers[row, 3])
+    u = aim + (state[0] - aim) * math.exp(-abs(change) / length)
+    aged = 1.0 - (1.0 - state[2]) * constants[2]
+    c = max(aged, constants[3])
     if commit:
-        memory[point, at], memory[point, at + 1], memory[point, at + 2] = u, depth, old
-    pull = numbers[row, 0] * c
-    return force - pull * u, slope + pull * abs(aim - u) / numbers[row, 1]
+        state[0], state[1], state[2] = u, texel.depth, aged
+    pull = pull * c
+    return texel.force - pull * u, texel.slope + pull * abs(aim - u) / length
 
 
-def cohesive(force, slope, depth, slide, numbers, row, memory, point, at, commit):
-    """``f − F u x exp(1 − x)``, x = d/D: on the way back the last of the depth is a layer that parts.
+def cohesive(texel: TexelInput, constants: np.ndarray, state: np.ndarray, commit: bool) -> tuple[float, float]:
+    """``f − F u x exp(1 − x)``, x = d/D: on the way out the last of the depth is a cohesive zone that opens.
 
-    ``du/dt = (aim − u) |ḋ|/D − u/τ``, exact over a step: u goes to 1 on the way back, to 0 on the way in, and fades in time.
-    Memory: u and the last depth. Constants: F, D, the length of the step by τ.
+    ``du/dt = (aim − u) |ḋ|/D − u/τ`` is solved exactly over a step: u goes to 1 on the way out, to 0 on the way in, and fades
+    in time. State: u, the depth at the end of the last step. Constants: F, D, the length of the step divided by τ.
     """
-    if depth <= 0.0:
+    pull, length, fading = constants[0], constants[1], constants[2]
+    if texel.depth <= 0.0:
         if commit:
-            memory[point, at], memory[point, at + 1] = 0.0, 0.0
-        return force, slope
-    change, x = depth - memory[point, at + 1], depth / numbers[row, 1]
-    aim, way = 0.0 if change >= 0.0 else 1.0, abs(change) / numbers[row, 1]
-    rate = way + numbers[row, 2]
-    end, lags = (aim * way / rate, aim * numbers[row, 2] / (rate * rate)) if rate > 0.0 else (0.0, 0.0)
-    u = end + (memory[point, at] - end) * math.exp(-rate)
+            state[0], state[1] = 0.0, 0.0
+        return texel.force, texel.slope
+    change, x = texel.depth - state[1], texel.depth / length
+    aim, path = 0.0 if change >= 0.0 else 1.0, abs(change) / length
+    rate = path + fading
+    end, end_slope = (aim * path / rate, aim * fading / (rate * rate)) if rate > 0.0 else (0.0, 0.0)
+    u = end + (state[0] - end) * math.exp(-rate)
     if commit:
-        memory[point, at], memory[point, at + 1] = u, depth
+        state[0], state[1] = u, texel.depth
     traction = x * math.exp(1.0 - x)
-    further = end - u - lags * math.expm1(-rate)  # du by the way over D; back is against the depth
-    bend = u * (1.0 - x) * math.exp(1.0 - x) + (1.0 - 2.0 * aim) * further * traction
-    return force - numbers[row, 0] * u * traction, slope - numbers[row, 0] * bend / numbers[row, 1]
+    u_slope = end - u - end_slope * math.expm1(-rate)  # du by the path; on the way out the path grows as the depth shrinks
+    bend = u * (1.0 - x) * math.exp(1.0 - x) + (1.0 - 2.0 * aim) * u_slope * traction
+    return texel.force - pull * u * traction, texel.slope - pull * bend / length
 
 
 def _at_once(values: Values, dt: np.ndarray) -> np.ndarray:
@@ -105,7 +109,7 @@ KIND = Kind(
             neutral={"pull": 0.0},
             law=unloading,
             constants=_at_once,
-            memory=3,
+            state_size=3,
             after_clip=True,
         ),
         Form(
@@ -130,7 +134,7 @@ KIND = Kind(
             neutral={"pull": 0.0},
             law=unloading,
             constants=_with_time,
-            memory=3,
+            state_size=3,
             after_clip=True,
         ),
         Form(
@@ -142,7 +146,7 @@ KIND = Kind(
             neutral={"pull": 0.0},
             law=cohesive,
             constants=_held,
-            memory=2,
+            state_size=2,
             after_clip=True,
         ),
         Form(
@@ -157,7 +161,7 @@ KIND = Kind(
             neutral={"pull": 0.0},
             law=cohesive,
             constants=_relaxing,
-            memory=2,
+            state_size=2,
             after_clip=True,
         ),
     ),

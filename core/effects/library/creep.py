@@ -14,32 +14,31 @@ import numpy as np
 
 from ...model.effect import Values
 from ...model.parameter import Parameter
-from ..engine.specification import Form, Kind, scalar
+from ..engine.specification import Form, Kind, TexelInput, scalar
 
 LOG_RATES = np.arange(-13.75, 2.76, 1.25)
 """Logarithm of the rates that stand for a spectrum; a step of 1.25 keeps the sum within 0.1 % of the closed formula."""
 TERMS = len(LOG_RATES)
 
 
-def settling(force, slope, depth, slide, numbers, row, memory, point, at, commit):
+def settling(texel: TexelInput, constants: np.ndarray, state: np.ndarray, commit: bool) -> tuple[float, float]:
     """Add ``Σ a_i q_i`` with ``τ_i q̇_i = f − q_i``; `f` is taken as linear over the step, for which this is exact.
 
-    Memory: the force at the last step's end, then the q_i. Constants: how many, then for each the old q's share, the old and
-    the new force's share in q, and a_i.
+    State: the force at the end of the last step, then the q_i. Constants: how many exponentials, then for each of them the
+    weights of the old q, the old force and the new force in the new q, and a_i.
     """
-    count = int(numbers[row, 0])
+    count, before, force = int(constants[0]), state[0], texel.force
     total, rise = force, 1.0
-    before = memory[point, at]
     for i in range(count):
         j = 1 + 4 * i
-        q = numbers[row, j] * memory[point, at + 1 + i] + numbers[row, j + 1] * before + numbers[row, j + 2] * force
-        total += numbers[row, j + 3] * q
-        rise += numbers[row, j + 3] * numbers[row, j + 2]
+        q = constants[j] * state[1 + i] + constants[j + 1] * before + constants[j + 2] * force
+        total += constants[j + 3] * q
+        rise += constants[j + 3] * constants[j + 2]
         if commit:
-            memory[point, at + 1 + i] = q
+            state[1 + i] = q
     if commit:
-        memory[point, at] = force
-    return total, slope * rise
+        state[0] = force
+    return total, texel.slope * rise
 
 
 def filter_constants(amplitudes: np.ndarray, times: np.ndarray, dt: np.ndarray) -> np.ndarray:
@@ -124,7 +123,7 @@ KIND = Kind(
             neutral={"amount": 0.0},
             law=settling,
             constants=_constants(prony, -1.0),
-            memory=2,
+            state_size=2,
         ),
         Form(
             "two-exponentials",
@@ -134,7 +133,7 @@ KIND = Kind(
             neutral={"amount": 0.0, "amount_2": 0.0},
             law=settling,
             constants=_constants(prony, -1.0),
-            memory=3,
+            state_size=3,
         ),
         Form(
             "logarithmic",
@@ -144,7 +143,7 @@ KIND = Kind(
             neutral={"amount": 0.0},
             law=settling,
             constants=_constants(logarithmic, -1.0),
-            memory=1 + TERMS,
+            state_size=1 + TERMS,
         ),
         Form(
             "power",
@@ -154,7 +153,7 @@ KIND = Kind(
             neutral={"amount": 0.0},
             law=settling,
             constants=_constants(power, -1.0),
-            memory=1 + TERMS,
+            state_size=1 + TERMS,
         ),
         Form(
             "rising-exponential",
@@ -164,7 +163,7 @@ KIND = Kind(
             neutral={"amount": 0.0},
             law=settling,
             constants=_constants(prony, 1.0),
-            memory=2,
+            state_size=2,
             site="readout",
         ),
         Form(
@@ -175,7 +174,7 @@ KIND = Kind(
             neutral={"amount": 0.0},
             law=settling,
             constants=_constants(logarithmic, 1.0),
-            memory=1 + TERMS,
+            state_size=1 + TERMS,
             site="readout",
         ),
     ),

@@ -13,34 +13,39 @@ import numpy as np
 
 from ...model.effect import Values
 from ...model.parameter import Parameter
-from ..engine.specification import Form, Kind, constants_from, scalar
+from ..engine.specification import Form, Kind, TexelInput, constants_from, scalar
 
 ELEMENTS = 4
 """Elements of the operators; their thresholds are spread evenly around the given one."""
 
 
-def duhem(force, slope, depth, slide, numbers, row, memory, point, at, commit):
-    """``f (1 + h z)`` with ``dz/dd = (±1 − z) / D``, plus on the way in. Memory: z and the last depth."""
-    z, change = memory[point, at], depth - memory[point, at + 1]
+def duhem(texel: TexelInput, constants: np.ndarray, state: np.ndarray, commit: bool) -> tuple[float, float]:
+    """``f (1 + h z)`` with ``dz/dd = (±1 − z) / D``, plus on the way in.
+
+    State: z, the depth at the end of the last step. Constants: h, D.
+    """
+    width, length = constants[0], constants[1]
+    z, change = state[0], texel.depth - state[1]
     aim = 1.0 if change >= 0.0 else -1.0
-    left = math.exp(-abs(change) / numbers[row, 1])
+    left = math.exp(-abs(change) / length)
     z = aim + (z - aim) * left
     if commit:
-        memory[point, at] = z if depth > 0.0 else 0.0
-        memory[point, at + 1] = depth
-    factor = 1.0 + numbers[row, 0] * z
-    return force * factor, slope * factor + force * numbers[row, 0] * (1.0 - aim * z) / numbers[row, 1]
+        state[0] = z if texel.depth > 0.0 else 0.0
+        state[1] = texel.depth
+    factor = 1.0 + width * z
+    return texel.force * factor, texel.slope * factor + texel.force * width * (1.0 - aim * z) / length
 
 
-def bouc_wen(force, slope, depth, slide, numbers, row, memory, point, at, commit):
-    """``(1 − a) f + a z`` with ``dz = df − (β |df| z + γ df |z|) / Y``, β + γ = 1; piecewise exponential and so exact.
+def bouc_wen(texel: TexelInput, constants: np.ndarray, state: np.ndarray, commit: bool) -> tuple[float, float]:
+    """``(1 − a) f + a z`` with ``dz = df − (β |df| z + γ df |z|) / Y``, β + γ = 1; piecewise exponential, hence exact.
 
-    Memory: z and the last force. Along the way of the force, u = ±z grows by 1 − u/Y above zero, by 1 − (β − γ) u/Y below.
+    Let u = ±z along the direction in which the force changes. It grows by 1 − u/Y above zero and by 1 − (β − γ) u/Y below.
+    State: z, the force at the end of the last step. Constants: a, Y, β.
     """
-    share, yield_force, below = numbers[row, 0], numbers[row, 1], 2.0 * numbers[row, 2] - 1.0
-    change = force - memory[point, at + 1]
-    way = 1.0 if change >= 0.0 else -1.0
-    u, path = way * memory[point, at], abs(change)
+    share, yield_force, below = constants[0], constants[1], 2.0 * constants[2] - 1.0
+    change = texel.force - state[1]
+    direction = 1.0 if change >= 0.0 else -1.0
+    u, path = direction * state[0], abs(change)
     if u < 0.0:
         to_zero = -u
         if below * -u > 1e-9 * yield_force:
@@ -56,77 +61,88 @@ def bouc_wen(force, slope, depth, slide, numbers, row, memory, point, at, commit
             u, path = 0.0, path - to_zero
     if u >= 0.0:
         u = yield_force + (u - yield_force) * math.exp(-path / yield_force)
-        steep = 1.0 - u / yield_force
+        u_slope = 1.0 - u / yield_force
     else:
-        steep = 1.0 - below * u / yield_force
+        u_slope = 1.0 - below * u / yield_force
     if commit:
-        memory[point, at] = way * u if depth > 0.0 else 0.0
-        memory[point, at + 1] = force
-    return (1.0 - share) * force + share * way * u, slope * (1.0 - share + share * steep)
+        state[0] = direction * u if texel.depth > 0.0 else 0.0
+        state[1] = texel.force
+    return (1.0 - share) * texel.force + share * direction * u, texel.slope * (1.0 - share + share * u_slope)
 
 
-def maxwell_slip(force, slope, depth, slide, numbers, row, memory, point, at, commit):
-    """``(1 − a) f + a · mean of s_j``, where s_j follows f until it slips at ±r_j. Memory: the last force, then the s_j."""
-    share, count = numbers[row, 0], int(numbers[row, 1])
-    change = force - memory[point, at]
+def maxwell_slip(texel: TexelInput, constants: np.ndarray, state: np.ndarray, commit: bool) -> tuple[float, float]:
+    """``(1 − a) f + a · mean of s_j``, where s_j follows f until it slips at ±r_j.
+
+    State: the force at the end of the last step, then the s_j. Constants: a, how many elements, then the r_j.
+    """
+    share, count = constants[0], int(constants[1])
+    change = texel.force - state[0]
     total, sticking = 0.0, 0.0
     for j in range(count):
-        threshold = numbers[row, 2 + j]
-        s = memory[point, at + 1 + j] + change
+        threshold = constants[2 + j]
+        s = state[1 + j] + change
         if abs(s) <= threshold:
             sticking += 1.0
         s = min(max(s, -threshold), threshold)
         total += s
         if commit:
-            memory[point, at + 1 + j] = s if depth > 0.0 else 0.0
+            state[1 + j] = s if texel.depth > 0.0 else 0.0
     if commit:
-        memory[point, at] = force
-    return (1.0 - share) * force + share * total / count, slope * (1.0 - share + share * sticking / count)
+        state[0] = texel.force
+    return (1.0 - share) * texel.force + share * total / count, texel.slope * (1.0 - share + share * sticking / count)
 
 
-def play(force, slope, depth, slide, numbers, row, memory, point, at, commit):
-    """``(1 − a) x + a · mean of p_j``, where p_j is dragged along once x is r_j ahead of it. Memory: the p_j."""
-    share, count = numbers[row, 0], int(numbers[row, 1])
-    total, moving = 0.0, 0.0
-    for j in range(count):
-        threshold, before = numbers[row, 2 + j], memory[point, at + j]
-        p = min(max(before, force - threshold), force + threshold)
-        if p != before:
-            moving += 1.0
-        total += p
-        if commit:
-            memory[point, at + j] = p
-    return (1.0 - share) * force + share * total / count, slope * (1.0 - share + share * moving / count)
+def play(texel: TexelInput, constants: np.ndarray, state: np.ndarray, commit: bool) -> tuple[float, float]:
+    """``(1 − a) x + a · mean of p_j``, where x drags p_j along once it is r_j ahead.
 
-
-def preisach(force, slope, depth, slide, numbers, row, memory, point, at, commit):
-    """``(1 − a) x + a · mean of p_j``, where p_j stays between x − w_j and x, and above zero. Memory: the p_j.
-
-    Relays that switch on at b + w and off at b, b spread evenly from zero on, add up to p: max(x − w, 0) on a first way up.
+    State: the p_j. Constants: a, how many elements, then the r_j.
     """
-    share, count = numbers[row, 0], int(numbers[row, 1])
+    share, count = constants[0], int(constants[1])
     total, moving = 0.0, 0.0
     for j in range(count):
-        before = memory[point, at + j]
-        p = min(max(before, force - numbers[row, 2 + j], 0.0), max(force, 0.0))
+        threshold, before = constants[2 + j], state[j]
+        p = min(max(before, texel.force - threshold), texel.force + threshold)
         if p != before:
             moving += 1.0
         total += p
         if commit:
-            memory[point, at + j] = p
-    return (1.0 - share) * force + share * total / count, slope * (1.0 - share + share * moving / count)
+            state[j] = p
+    return (1.0 - share) * texel.force + share * total / count, texel.slope * (1.0 - share + share * moving / count)
 
 
-def trailing(force, slope, depth, slide, numbers, row, memory, point, at, commit):
-    """``x (1 − h z)`` with ``dz/dx = (±1 − z) / F``, plus on the way up. Memory: z and the last x."""
-    change = force - memory[point, at + 1]
+def preisach(texel: TexelInput, constants: np.ndarray, state: np.ndarray, commit: bool) -> tuple[float, float]:
+    """``(1 − a) x + a · mean of p_j``, where p_j stays between x − w_j and x, and above zero.
+
+    Relays that switch on at b + w and off at b, with b spread evenly from zero on, add up to p: it is max(x − w, 0) while x
+    rises for the first time. State: the p_j. Constants: a, how many elements, then the w_j.
+    """
+    share, count = constants[0], int(constants[1])
+    total, moving = 0.0, 0.0
+    for j in range(count):
+        before = state[j]
+        p = min(max(before, texel.force - constants[2 + j], 0.0), max(texel.force, 0.0))
+        if p != before:
+            moving += 1.0
+        total += p
+        if commit:
+            state[j] = p
+    return (1.0 - share) * texel.force + share * total / count, texel.slope * (1.0 - share + share * moving / count)
+
+
+def trailing(texel: TexelInput, constants: np.ndarray, state: np.ndarray, commit: bool) -> tuple[float, float]:
+    """``x (1 − h z)`` with ``dz/dx = (±1 − z) / F``, plus on the way up.
+
+    State: z, the reading x of the last step. Constants: h, F.
+    """
+    width, scale = constants[0], constants[1]
+    change = texel.force - state[1]
     aim = 1.0 if change >= 0.0 else -1.0
-    z = aim + (memory[point, at] - aim) * math.exp(-abs(change) / numbers[row, 1])
+    z = aim + (state[0] - aim) * math.exp(-abs(change) / scale)
     if commit:
-        memory[point, at] = z
-        memory[point, at + 1] = force
-    factor = 1.0 - numbers[row, 0] * z
-    return force * factor, slope * (factor - force * numbers[row, 0] * (1.0 - aim * z) / numbers[row, 1])
+        state[0] = z
+        state[1] = texel.force
+    factor = 1.0 - width * z
+    return texel.force * factor, texel.slope * (factor - texel.force * width * (1.0 - aim * z) / scale)
 
 
 def _operators(values: Values, dt: np.ndarray) -> np.ndarray:
@@ -162,7 +178,7 @@ KIND = Kind(
             neutral={"width": 0.0},
             law=duhem,
             constants=constants_from("width", "depth"),
-            memory=2,
+            state_size=2,
         ),
         Form(
             "bouc-wen",
@@ -176,7 +192,7 @@ KIND = Kind(
             neutral={"share": 0.0},
             law=bouc_wen,
             constants=constants_from("share", "force", "beta"),
-            memory=2,
+            state_size=2,
         ),
         Form(
             "maxwell-slip",
@@ -186,7 +202,7 @@ KIND = Kind(
             neutral={"share": 0.0},
             law=maxwell_slip,
             constants=_operators,
-            memory=1 + ELEMENTS,
+            state_size=1 + ELEMENTS,
         ),
         Form(
             "play",
@@ -199,7 +215,7 @@ KIND = Kind(
             neutral={"share": 0.0},
             law=play,
             constants=_operators,
-            memory=ELEMENTS,
+            state_size=ELEMENTS,
             site="readout",
         ),
         Form(
@@ -213,7 +229,7 @@ KIND = Kind(
             neutral={"share": 0.0},
             law=preisach,
             constants=_relays,
-            memory=ELEMENTS,
+            state_size=ELEMENTS,
             site="readout",
         ),
         Form(
@@ -224,7 +240,7 @@ KIND = Kind(
             neutral={"width": 0.0},
             law=trailing,
             constants=constants_from("width", "force"),
-            memory=2,
+            state_size=2,
             site="readout",
         ),
     ),

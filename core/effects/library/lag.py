@@ -7,31 +7,38 @@ import numpy as np
 
 from ...model.effect import Values
 from ...model.parameter import Parameter
-from ..engine.specification import Form, Kind, scalar
+from ..engine.specification import Form, Kind, TexelInput, scalar
 from .creep import shares_of_a_step
 
 
-def first_order(force, slope, depth, slide, numbers, row, memory, point, at, commit):
-    """``τ q̇ = x − q``, x linear over the step. Memory: started, the last x, q. Constants: shares of q, old x, new x."""
-    before, q = force, force
-    if memory[point, at] != 0.0:
-        before, q = memory[point, at + 1], memory[point, at + 2]
-    q = numbers[row, 0] * q + numbers[row, 1] * before + numbers[row, 2] * force
+def first_order(texel: TexelInput, constants: np.ndarray, state: np.ndarray, commit: bool) -> tuple[float, float]:
+    """``τ q̇ = x − q``, x linear over the step.
+
+    State: 1 once started, the last x, q. Constants: the weights of q, the old x and the new x in the new q.
+    """
+    before, q = texel.force, texel.force
+    if state[0] != 0.0:
+        before, q = state[1], state[2]
+    q = constants[0] * q + constants[1] * before + constants[2] * texel.force
     if commit:
-        memory[point, at], memory[point, at + 1], memory[point, at + 2] = 1.0, force, q
-    return q, slope * numbers[row, 2]
+        state[0], state[1], state[2] = 1.0, texel.force, q
+    return q, texel.slope * constants[2]
 
 
-def second_order(force, slope, depth, slide, numbers, row, memory, point, at, commit):
-    """Two equal lags in turn, p and q. Memory: started, the last x, p, q. Constants: as above for p, then for q by p, x, x."""
-    before, p, q = force, force, force
-    if memory[point, at] != 0.0:
-        before, p, q = memory[point, at + 1], memory[point, at + 2], memory[point, at + 3]
-    q = numbers[row, 0] * q + numbers[row, 3] * p + numbers[row, 4] * before + numbers[row, 5] * force
-    p = numbers[row, 0] * p + numbers[row, 1] * before + numbers[row, 2] * force
+def second_order(texel: TexelInput, constants: np.ndarray, state: np.ndarray, commit: bool) -> tuple[float, float]:
+    """Two equal lags in series, p and q.
+
+    State: 1 once started, the last x, p, q. Constants: as for the first order, for p; then the weights of p, the old x and the
+    new x in the new q.
+    """
+    before, p, q = texel.force, texel.force, texel.force
+    if state[0] != 0.0:
+        before, p, q = state[1], state[2], state[3]
+    q = constants[0] * q + constants[3] * p + constants[4] * before + constants[5] * texel.force
+    p = constants[0] * p + constants[1] * before + constants[2] * texel.force
     if commit:
-        memory[point, at], memory[point, at + 1], memory[point, at + 2], memory[point, at + 3] = 1.0, force, p, q
-    return q, slope * numbers[row, 5]
+        state[0], state[1], state[2], state[3] = 1.0, texel.force, p, q
+    return q, texel.slope * constants[5]
 
 
 def _first(values: Values, dt: np.ndarray) -> np.ndarray:
@@ -68,7 +75,7 @@ KIND = Kind(
             neutral={"time": 0.0},
             law=first_order,
             constants=_first,
-            memory=3,
+            state_size=3,
             after_conversion=True,
         ),
         Form(
@@ -88,7 +95,7 @@ KIND = Kind(
             neutral={"time": 0.0},
             law=second_order,
             constants=_second,
-            memory=4,
+            state_size=4,
             after_conversion=True,
         ),
     ),

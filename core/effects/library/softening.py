@@ -5,46 +5,53 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from ...model.parameter import Parameter
-from ..engine.specification import Form, Kind, constants_from
+from ..engine.specification import Form, Kind, TexelInput, constants_from
 
 
-def ogden_roxburgh(force, slope, depth, slide, numbers, row, memory, point, at, commit):
-    """``f η``, ``η = 1 − s · erf((1 − W/Wm) / b)``, with W = f d / 2 and Wm the largest so far. Memory: Wm."""
-    work = 0.5 * force * depth
-    most = memory[point, at]
+def ogden_roxburgh(texel: TexelInput, constants: np.ndarray, state: np.ndarray, commit: bool) -> tuple[float, float]:
+    """``f η``, ``η = 1 − s · erf((1 − W/Wm) / b)``, with W = f d / 2 and Wm the largest so far. State: Wm. Constants: s, b."""
+    share, width, most = constants[0], constants[1], state[0]
+    work = 0.5 * texel.force * texel.depth
     if work >= most:
         if commit:
-            memory[point, at] = work
-        return force, slope
-    x = (1.0 - work / most) / numbers[row, 1]
-    eta = 1.0 - numbers[row, 0] * math.erf(x)
-    rise = 0.5 * (slope * depth + force) / (most * numbers[row, 1])
-    steep = numbers[row, 0] * 2.0 / math.sqrt(math.pi) * math.exp(-x * x) * rise
-    return force * eta, slope * eta + force * steep
+            state[0] = work
+        return texel.force, texel.slope
+    x = (1.0 - work / most) / width
+    eta = 1.0 - share * math.erf(x)
+    rise = 0.5 * (texel.slope * texel.depth + texel.force) / (most * width)
+    eta_slope = share * 2.0 / math.sqrt(math.pi) * math.exp(-x * x) * rise
+    return texel.force * eta, texel.slope * eta + texel.force * eta_slope
 
 
-def peak(force, slope, depth, slide, numbers, row, memory, point, at, commit):
-    """``f · (1 − s · (1 − exp(−dm/D)))`` with dm the largest depth so far. Memory: dm."""
-    most = max(memory[point, at], depth)
-    left = math.exp(-most / numbers[row, 1])
-    factor = 1.0 - numbers[row, 0] * (1.0 - left)
-    steep = -numbers[row, 0] * left / numbers[row, 1] if depth >= memory[point, at] else 0.0
+def peak(texel: TexelInput, constants: np.ndarray, state: np.ndarray, commit: bool) -> tuple[float, float]:
+    """``f · (1 − s · (1 − exp(−dm/D)))`` with dm the largest depth so far. State: dm. Constants: s, D."""
+    share, length = constants[0], constants[1]
+    most = max(state[0], texel.depth)
+    left = math.exp(-most / length)
+    factor = 1.0 - share * (1.0 - left)
+    factor_slope = -share * left / length if texel.depth >= state[0] else 0.0
     if commit:
-        memory[point, at] = most
-    return force * factor, slope * factor + force * steep
+        state[0] = most
+    return texel.force * factor, texel.slope * factor + texel.force * factor_slope
 
 
-def path(force, slope, depth, slide, numbers, row, memory, point, at, commit):
-    """``f · (1 − s · (1 − exp(−p/P)))`` with p the way pressed in so far, all pressings together. Memory: p, the last depth."""
-    more = max(depth - memory[point, at + 1], 0.0)
-    left = math.exp(-(memory[point, at] + more) / numbers[row, 1])
-    factor = 1.0 - numbers[row, 0] * (1.0 - left)
-    steep = -numbers[row, 0] * left / numbers[row, 1] if more > 0.0 else 0.0
+def path(texel: TexelInput, constants: np.ndarray, state: np.ndarray, commit: bool) -> tuple[float, float]:
+    """``f · (1 − s · (1 − exp(−p/P)))`` with p the path pressed in so far, over all cycles.
+
+    State: p, the depth at the end of the last step. Constants: s, P.
+    """
+    share, length = constants[0], constants[1]
+    more = max(texel.depth - state[1], 0.0)
+    left = math.exp(-(state[0] + more) / length)
+    factor = 1.0 - share * (1.0 - left)
+    factor_slope = -share * left / length if more > 0.0 else 0.0
     if commit:
-        memory[point, at] += more
-        memory[point, at + 1] = depth
-    return force * factor, slope * factor + force * steep
+        state[0] += more
+        state[1] = texel.depth
+    return texel.force * factor, texel.slope * factor + texel.force * factor_slope
 
 
 _SHARE = Parameter("share", "1", 0.25, 0.0, 0.9, "Share s of the force that is lost at most.")
@@ -64,7 +71,7 @@ KIND = Kind(
             neutral={"share": 0.0},
             law=ogden_roxburgh,
             constants=constants_from("share", "width"),
-            memory=1,
+            state_size=1,
         ),
         Form(
             "peak",
@@ -74,7 +81,7 @@ KIND = Kind(
             neutral={"share": 0.0},
             law=peak,
             constants=constants_from("share", "depth"),
-            memory=1,
+            state_size=1,
         ),
         Form(
             "path",
@@ -84,7 +91,7 @@ KIND = Kind(
             neutral={"share": 0.0},
             law=path,
             constants=constants_from("share", "path"),
-            memory=2,
+            state_size=2,
         ),
     ),
 )

@@ -8,42 +8,47 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from ...model.parameter import Parameter
-from ..engine.specification import Form, Kind, constants_from
+from ..engine.specification import Form, Kind, TexelInput, constants_from
 
 
-def polynomial(force, slope, depth, slide, numbers, row, memory, point, at, commit):
-    """``1 + (d/D)^p``."""
-    if depth <= 0.0:
-        return force, slope
-    share = (depth / numbers[row, 0]) ** numbers[row, 1]
-    return force * (1.0 + share), slope * (1.0 + share) + force * share * numbers[row, 1] / depth
+def polynomial(texel: TexelInput, constants: np.ndarray, state: np.ndarray, commit: bool) -> tuple[float, float]:
+    """``1 + (d/D)^p``. Constants: D, p."""
+    length, exponent = constants[0], constants[1]
+    if texel.depth <= 0.0:
+        return texel.force, texel.slope
+    share = (texel.depth / length) ** exponent
+    return texel.force * (1.0 + share), texel.slope * (1.0 + share) + texel.force * share * exponent / texel.depth
 
 
-def exponential(force, slope, depth, slide, numbers, row, memory, point, at, commit):
-    """``(exp(x) − 1) / x`` with ``x = d/D``; past x = 30 the factor goes on along its tangent."""
-    x = depth / numbers[row, 0]
+def exponential(texel: TexelInput, constants: np.ndarray, state: np.ndarray, commit: bool) -> tuple[float, float]:
+    """``(exp(x) − 1) / x`` with ``x = d/D``; past x = 30 the factor continues along its tangent. Constants: D."""
+    length = constants[0]
+    x = texel.depth / length
     if x < 1e-4:
-        factor, steep = 1.0 + 0.5 * x, 0.5 + x / 3.0
+        factor, factor_slope = 1.0 + 0.5 * x, 0.5 + x / 3.0
     else:
         y = min(x, 30.0)
         factor = math.expm1(y) / y
-        steep = (math.exp(y) - factor) / y
-        factor += steep * (x - y)
-    return force * factor, slope * factor + force * steep / numbers[row, 0]
+        factor_slope = (math.exp(y) - factor) / y
+        factor += factor_slope * (x - y)
+    return texel.force * factor, texel.slope * factor + texel.force * factor_slope / length
 
 
-def foam(force, slope, depth, slide, numbers, row, memory, point, at, commit):
-    """``1 / (1 − x^p)`` with ``x = d/L``; past x = 0.95 the factor goes on along its tangent."""
-    x = depth / numbers[row, 0]
+def foam(texel: TexelInput, constants: np.ndarray, state: np.ndarray, commit: bool) -> tuple[float, float]:
+    """``1 / (1 − x^p)`` with ``x = d/L``; past x = 0.95 the factor continues along its tangent. Constants: L, p."""
+    length, exponent = constants[0], constants[1]
+    x = texel.depth / length
     if x <= 0.0:
-        return force, slope
+        return texel.force, texel.slope
     y = min(x, 0.95)
-    share = y ** numbers[row, 1]
+    share = y**exponent
     factor = 1.0 / (1.0 - share)
-    steep = factor * factor * numbers[row, 1] * share / y
-    factor += steep * (x - y)
-    return force * factor, slope * factor + force * steep / numbers[row, 0]
+    factor_slope = factor * factor * exponent * share / y
+    factor += factor_slope * (x - y)
+    return texel.force * factor, texel.slope * factor + texel.force * factor_slope / length
 
 
 _DOUBLE = Parameter("depth", "m", 0.004, 1e-4, 0.1, "Depth D at which the force is twice that of the linear spring.", log=True)

@@ -5,25 +5,27 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from ...model.parameter import Parameter
 from ..engine.specification import Form, Kind, constants_from
 
 
-def gaussian(speed, force, numbers, row):
+def gaussian(speed: float, force: float, constants: np.ndarray) -> tuple[float, float]:
     """``1 + a · exp(−(v/V)²)``."""
-    x = speed / numbers[row, 1]
-    return 1.0 + numbers[row, 0] * math.exp(-x * x), 0.0
+    x = speed / constants[1]
+    return 1.0 + constants[0] * math.exp(-x * x), 0.0
 
 
-def exponential(speed, force, numbers, row):
+def exponential(speed: float, force: float, constants: np.ndarray) -> tuple[float, float]:
     """``1 + a · exp(−v/V)``."""
-    return 1.0 + numbers[row, 0] * math.exp(-speed / numbers[row, 1]), 0.0
+    return 1.0 + constants[0] * math.exp(-speed / constants[1]), 0.0
 
 
-def rational(speed, force, numbers, row):
+def rational(speed: float, force: float, constants: np.ndarray) -> tuple[float, float]:
     """``1 + a / (1 + (v/V)²)``."""
-    x = speed / numbers[row, 1]
-    return 1.0 + numbers[row, 0] / (1.0 + x * x), 0.0
+    x = speed / constants[1]
+    return 1.0 + constants[0] / (1.0 + x * x), 0.0
 
 
 _PARAMETERS = (

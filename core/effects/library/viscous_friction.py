@@ -3,23 +3,25 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from ...model.parameter import Parameter
 from ..engine.specification import Form, Kind, constants_from
 
 
-def linear(speed, force, numbers, row):
+def linear(speed: float, force: float, constants: np.ndarray) -> tuple[float, float]:
     """``c v``."""
-    return 1.0, numbers[row, 0]
+    return 1.0, constants[0]
 
 
-def power(speed, force, numbers, row):
+def power(speed: float, force: float, constants: np.ndarray) -> tuple[float, float]:
     """``C · v^p``, below a hundredth of a millimetre per second linear."""
-    return 1.0, numbers[row, 0] * max(speed, 1e-5) ** (numbers[row, 1] - 1.0)
+    return 1.0, constants[0] * max(speed, 1e-5) ** (constants[1] - 1.0)
 
 
-def load(speed, force, numbers, row):
+def load(speed: float, force: float, constants: np.ndarray) -> tuple[float, float]:
     """``c f v``."""
-    return 1.0, numbers[row, 0] * max(force, 0.0)
+    return 1.0, constants[0] * max(force, 0.0)
 
 
 KIND = Kind(

@@ -12,59 +12,62 @@ import numpy as np
 
 from ...model.effect import Values
 from ...model.parameter import Parameter
-from ..engine.specification import Form, Kind, constants_from, scalar
+from ..engine.specification import Form, Kind, TexelInput, constants_from, scalar
 
 
-def exponential(force, slope, depth, slide, numbers, row, memory, point, at, commit):
-    """``f exp(−A/L)`` with A all loads put on so far. Memory: A and the last force."""
-    factor = math.exp(-memory[point, at] / numbers[row, 0])
+def exponential(texel: TexelInput, constants: np.ndarray, state: np.ndarray, commit: bool) -> tuple[float, float]:
+    """``f exp(−A/L)`` with A the sum of all loads put on so far. State: A, the last force. Constants: L."""
+    factor = math.exp(-state[0] / constants[0])
     if commit:
-        memory[point, at] += max(force - memory[point, at + 1], 0.0)
-        memory[point, at + 1] = force
-    return force * factor, slope * factor
+        state[0] += max(texel.force - state[1], 0.0)
+        state[1] = texel.force
+    return texel.force * factor, texel.slope * factor
 
 
-def linear(force, slope, depth, slide, numbers, row, memory, point, at, commit):
-    """``f · max(1 − A/L, 0)`` with A all loads put on so far. Memory: A and the last force."""
-    factor = max(1.0 - memory[point, at] / numbers[row, 0], 0.0)
+def linear(texel: TexelInput, constants: np.ndarray, state: np.ndarray, commit: bool) -> tuple[float, float]:
+    """``f · max(1 − A/L, 0)`` with A the sum of all loads put on so far. State: A, the last force. Constants: L."""
+    factor = max(1.0 - state[0] / constants[0], 0.0)
     if commit:
-        memory[point, at] += max(force - memory[point, at + 1], 0.0)
-        memory[point, at + 1] = force
-    return force * factor, slope * factor
+        state[0] += max(texel.force - state[1], 0.0)
+        state[1] = texel.force
+    return texel.force * factor, texel.slope * factor
 
 
-def dose(force, slope, depth, slide, numbers, row, memory, point, at, commit):
-    """``f exp(−B/L)`` with B the load summed over time. Memory: B. Constants: L and the length of the step."""
-    factor = math.exp(-memory[point, at] / numbers[row, 0])
+def dose(texel: TexelInput, constants: np.ndarray, state: np.ndarray, commit: bool) -> tuple[float, float]:
+    """``f exp(−B/L)`` with B the load integrated over time. State: B. Constants: L, the length of the step."""
+    factor = math.exp(-state[0] / constants[0])
     if commit:
-        memory[point, at] += max(force, 0.0) * numbers[row, 1]
-    return force * factor, slope * factor
+        state[0] += max(texel.force, 0.0) * constants[1]
+    return texel.force * factor, texel.slope * factor
 
 
 def _with_step(values: Values, dt: np.ndarray) -> np.ndarray:
     return np.column_stack([np.full(len(dt), scalar(values, "life")), dt])
 
 
-def archard(force, slope, depth, slide, numbers, row, memory, point, at, commit):
-    """``f · max(1 − δ/d, 0)``, as if the surface lay δ lower; δ grows with load times way slid. Memory: δ."""
-    gone = memory[point, at]
+def archard(texel: TexelInput, constants: np.ndarray, state: np.ndarray, commit: bool) -> tuple[float, float]:
+    """``f · max(1 − δ/d, 0)``, as if the surface lay δ lower; δ grows with load times distance slid. State: δ. Constants: κ."""
+    worn = state[0]
     if commit:
-        memory[point, at] += numbers[row, 0] * max(force, 0.0) * slide
-    if depth <= gone:
+        state[0] += constants[0] * max(texel.force, 0.0) * texel.slide
+    if texel.depth <= worn:
         return 0.0, 0.0
-    if gone == 0.0:
-        return force, slope
-    left = 1.0 - gone / depth
-    return force * left, slope * left + force * gone / (depth * depth)
+    if worn == 0.0:
+        return texel.force, texel.slope
+    left = 1.0 - worn / texel.depth
+    return texel.force * left, texel.slope * left + texel.force * worn / (texel.depth * texel.depth)
 
 
-def work(force, slope, depth, slide, numbers, row, memory, point, at, commit):
-    """``f exp(−W/L)`` with W the load summed over the way its surface goes, in and along. Memory: W and the last depth."""
-    factor = math.exp(-memory[point, at] / numbers[row, 0])
+def work(texel: TexelInput, constants: np.ndarray, state: np.ndarray, commit: bool) -> tuple[float, float]:
+    """``f exp(−W/L)`` with W the load integrated over the path of its surface, inwards and sideways.
+
+    State: W, the depth at the end of the last step. Constants: L.
+    """
+    factor = math.exp(-state[0] / constants[0])
     if commit:
-        memory[point, at] += max(force, 0.0) * math.hypot(slide, max(depth, 0.0) - memory[point, at + 1])
-        memory[point, at + 1] = max(depth, 0.0)
-    return force * factor, slope * factor
+        state[0] += max(texel.force, 0.0) * math.hypot(texel.slide, max(texel.depth, 0.0) - state[1])
+        state[1] = max(texel.depth, 0.0)
+    return texel.force * factor, texel.slope * factor
 
 
 KIND = Kind(
@@ -82,7 +85,7 @@ KIND = Kind(
             neutral={"life": math.inf},
             law=exponential,
             constants=constants_from("life"),
-            memory=2,
+            state_size=2,
         ),
         Form(
             "linear",
@@ -92,7 +95,7 @@ KIND = Kind(
             neutral={"life": math.inf},
             law=linear,
             constants=constants_from("life"),
-            memory=2,
+            state_size=2,
         ),
         Form(
             "dose",
@@ -102,7 +105,7 @@ KIND = Kind(
             neutral={"life": math.inf},
             law=dose,
             constants=_with_step,
-            memory=1,
+            state_size=1,
         ),
         Form(
             "archard",
@@ -112,7 +115,7 @@ KIND = Kind(
             neutral={"rate": 0.0},
             law=archard,
             constants=constants_from("rate"),
-            memory=1,
+            state_size=1,
         ),
         Form(
             "work",
@@ -122,7 +125,7 @@ KIND = Kind(
             neutral={"life": math.inf},
             law=work,
             constants=constants_from("life"),
-            memory=2,
+            state_size=2,
         ),
     ),
 )
