@@ -57,7 +57,6 @@ KNOWN: dict[tuple[str, str], int] = {
     ("core", "circle"): 1,
     ("core", "depth"): 1,
     ("core.compiled", "package"): 2,
-    ("core.effects", "package"): 5,
     ("core.figures", "package"): 1,
     ("core.gap", "circle"): 3,
     ("core.gap", "order"): 1,
