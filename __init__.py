@@ -20,8 +20,9 @@ def _rooms():
     from . import operators, panels
     from .addon.events import handlers
     from .addon.properties import properties
+    from .addon.session import openexr_check
 
-    return [properties, operators, panels, handlers, _CommandLine]
+    return [openexr_check, properties, operators, panels, handlers, _CommandLine]
 
 
 class _CommandLine:

@@ -32,6 +32,8 @@ def debug_info() -> str:
     """Return what a maintainer has to know about this installation, as plain text."""
     import bpy
 
+    from ...core.io import exr_backend
+
     lost = missing()
     return "\n".join(
         [
@@ -39,6 +41,7 @@ def debug_info() -> str:
             f"Blender {bpy.app.version_string} ({bpy.app.build_platform.decode(errors='replace')})",
             f"Python {sys.version.split()[0]} on {platform.platform()} ({platform.machine()})",
             f"missing: {', '.join(lost) or 'nothing'}",
+            f"tactile images: {exr_backend.describe()}",
             *(f"{name}: {importlib.util.find_spec(name).origin}" for name in NEEDED if name not in lost),
         ]
     )

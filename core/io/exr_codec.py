@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The part of the OpenEXR file format that tactile images need, in plain Python: scan lines, one part, ZIP compression.
 
-The OpenEXR library from PyPI cannot be used beside a real Blender: both carry the library, the dynamic linker mixes their
-symbols, and the first file written ends in a segmentation fault (seen in Debian's Blender 4.3). The format is small:
+This codec is for Blenders in which the OpenEXR library cannot be loaded, see :mod:`.exr_backend`. Format:
 https://openexr.com/en/latest/OpenEXRFileLayout.html
 """
 
@@ -12,6 +11,7 @@ import os
 import struct
 import zlib
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
@@ -28,24 +28,12 @@ _LEVEL = 2
 """Of zlib: 4 takes four times as long and makes tactile images 3 % smaller."""
 
 
+_DAMAGE = (struct.error, IndexError, UnicodeDecodeError, zlib.error, OverflowError, MemoryError)
+"""Exceptions that a damaged file may raise."""
+
+
 class FormatError(ValueError):
     """The file is damaged, or uses a part of the format that is not read here."""
-
-
-def write(path: str | os.PathLike, channels: Mapping[str, np.ndarray], attributes: Mapping[str, str]) -> None:
-    """Write an image.
-
-    Parameters
-    ----------
-    path : path
-    channels : mapping of str to (height, width) float32
-        The first row is the top of the picture.
-    attributes : mapping of str to str
-        Added to the header.
-    """
-    names = in_order(channels)
-    table = np.stack([np.asarray(channels[name], "<f4") for name in names], axis=1)
-    write_all([path], names, table[None], [attributes])
 
 
 def in_order(names: Iterable[str]) -> tuple[str, ...]:
@@ -86,15 +74,19 @@ def write_all(
 
 
 def _header(names: tuple[str, ...], width: int, height: int, attributes: Mapping[str, str]) -> bytes:
-    beginning = _beginning(names, tuple(attributes), width, height)
-    return b"".join([beginning, *(_string(name, value) for name, value in attributes.items()), b"\0"])
+    """Return a header whose attributes are in the order of their names, as the OpenEXR library writes them."""
+    longest = max(len(name.encode()) for name in (*names, *attributes, ""))
+    flags = _LONG_NAMES if longest > 31 else 0
+    entries = [
+        *_standard_entries(names, width, height),
+        *((name.encode(), _string(name, value)) for name, value in attributes.items()),
+    ]
+    return b"".join([struct.pack("<ii", MAGIC, VERSION | flags), *(entry for _, entry in sorted(entries)), b"\0"])
 
 
 @lru_cache(maxsize=64)
-def _beginning(names: tuple[str, ...], own: tuple[str, ...], width: int, height: int) -> bytes:
-    """The part of a header that all images of a sequence share; `own` are the names of the other attributes."""
-    longest = max(len(name.encode()) for name in (*names, *own, ""))
-    flags = _LONG_NAMES if longest > 31 else 0
+def _standard_entries(names: tuple[str, ...], width: int, height: int) -> list[tuple[bytes, bytes]]:
+    """Names and bytes of the attributes that every header has."""
     window = struct.pack("<4i", 0, 0, width - 1, height - 1)
     channels = b"".join(_text(name) + struct.pack("<iB3xii", _FLOAT, 0, 1, 1) for name in names) + b"\0"
     entries = [
@@ -107,7 +99,7 @@ def _beginning(names: tuple[str, ...], own: tuple[str, ...], width: int, height:
         ("screenWindowCenter", "v2f", struct.pack("<2f", 0.0, 0.0)),
         ("screenWindowWidth", "float", struct.pack("<f", 1.0)),
     ]
-    return struct.pack("<ii", MAGIC, VERSION | flags) + b"".join(_entry(*entry) for entry in entries)
+    return [(entry[0].encode(), _entry(*entry)) for entry in entries]
 
 
 @lru_cache(maxsize=256)
@@ -153,6 +145,35 @@ def _unpack(packed: bytes, size: int) -> bytes:
     return result.tobytes()
 
 
+@dataclass(frozen=True)
+class Header:
+    """What the header of an image says.
+
+    Attributes
+    ----------
+    channels : dict of str to dtype
+        In the order of the file.
+    width, height : int
+        Pixels.
+    first : int
+        Number of the first scan line.
+    compression : int
+        As in the format.
+    texts : dict of str to str
+        Attributes of type string.
+    end : int
+        Bytes that the header takes up.
+    """
+
+    channels: dict[str, np.dtype]
+    width: int
+    height: int
+    first: int
+    compression: int
+    texts: dict[str, str]
+    end: int
+
+
 def read(path: str | os.PathLike) -> tuple[dict[str, np.ndarray], dict[str, str]]:
     """Read an image.
 
@@ -165,37 +186,51 @@ def read(path: str | os.PathLike) -> tuple[dict[str, np.ndarray], dict[str, str]
 
     Raises
     ------
+    OSError
+        The file cannot be read.
     FormatError
+        The file is damaged, or uses a part of the format that is not read here.
     """
     with open(path, "rb") as file:
         data = file.read()
+    header = read_header(data)
     try:
-        return _read(data)
-    except (struct.error, IndexError, UnicodeDecodeError, zlib.error, OverflowError, MemoryError) as error:
+        return _pixels(data, header), header.texts
+    except _DAMAGE as error:
         raise FormatError(str(error)) from error
 
 
-def _read(data: bytes) -> tuple[dict[str, np.ndarray], dict[str, str]]:
+def read_header(data: bytes) -> Header:
+    """Read the header of a file's content; raises FormatError as :func:`read` does."""
+    try:
+        return _header_of(data)
+    except _DAMAGE as error:
+        raise FormatError(str(error)) from error
+
+
+def _header_of(data: bytes) -> Header:
     magic, version = struct.unpack_from("<ii", data)
     if magic != MAGIC or version & 0xFF != VERSION:
         raise FormatError("it does not begin like an OpenEXR file")
     if version & _OTHER_FLAGS:
         raise FormatError("it has tiles or several parts")
-    entries, at = _entries(data, 8)
+    entries, end = _entries(data, 8)
     for name in ("channels", "compression", "dataWindow"):
         if name not in entries:
             raise FormatError(f"its header has no {name}")
-    compression = entries["compression"][1][0]
-    if compression not in _LINES:
-        raise FormatError("its compression is not ZIP")
     left, bottom, right, top = struct.unpack("<4i", entries["dataWindow"][1])
     width, height = right - left + 1, top - bottom + 1
     if not (0 < width <= 1 << 20 and 0 < height <= 1 << 20):
         raise FormatError("its size makes no sense")
-    kinds = _channels(entries["channels"][1])
-    channels = _pixels(data, at, kinds, width, height, bottom, compression)
-    texts = {name: value.decode("utf-8", "surrogatepass") for name, (kind, value) in entries.items() if kind == "string"}
-    return channels, texts
+    return Header(
+        channels=_channels(entries["channels"][1]),
+        width=width,
+        height=height,
+        first=bottom,
+        compression=entries["compression"][1][0],
+        texts={name: value.decode("utf-8", "surrogatepass") for name, (kind, value) in entries.items() if kind == "string"},
+        end=end,
+    )
 
 
 def _entries(data: bytes, at: int) -> tuple[dict[str, tuple[str, bytes]], int]:
@@ -232,22 +267,23 @@ def _channels(data: bytes) -> dict[str, np.dtype]:
     return kinds
 
 
-def _pixels(
-    data: bytes, at: int, kinds: dict[str, np.dtype], width: int, height: int, first: int, compression: int
-) -> dict[str, np.ndarray]:
+def _pixels(data: bytes, header: Header) -> dict[str, np.ndarray]:
+    if header.compression not in _LINES:
+        raise FormatError("its compression is not ZIP")
+    kinds, width, height = header.channels, header.width, header.height
     channels = {name: np.zeros((height, width), kind) for name, kind in kinds.items()}
     line = sum(kind.itemsize for kind in kinds.values()) * width
-    step = _LINES[compression]
+    step = _LINES[header.compression]
     count = -(-height // step)
     seen = 0
-    for place in struct.unpack_from(f"<{count}Q", data, at):
+    for place in struct.unpack_from(f"<{count}Q", data, header.end):
         y, size = struct.unpack_from("<ii", data, place)
-        top = y - first
+        top = y - header.first
         if top % step or not 0 <= top < height or size < 0 or place + 8 + size > len(data):
             raise FormatError("its blocks are not where they should be")
         lines = min(step, height - top)
         block = data[place + 8 : place + 8 + size]
-        raw = _unpack(block, lines * line) if compression else block
+        raw = _unpack(block, lines * line) if header.compression else block
         if len(raw) != lines * line:
             raise FormatError("a block has the wrong length")
         rows = np.frombuffer(raw, np.uint8).reshape(lines, line)

@@ -18,7 +18,8 @@ from ..errors import FileError
 from ..geometry.layout import GridLayout, UVLayout
 from ..model.recording import Frame, SensorFrame
 from ..model.sensor import Sensor
-from . import exr_codec
+from .exr_backend import backend
+from .exr_codec import FormatError, in_order
 from .file_writing import atomic_write, os_error_reason, write_file
 
 CHANNELS = ("R", "G", "B", "reading", "depth", "slip", "contact")
@@ -27,7 +28,7 @@ CHANNELS = ("R", "G", "B", "reading", "depth", "slip", "contact")
 UNITS = {"R": "N", "G": "N", "B": "N", "depth": "m", "slip": "m/s", "contact": "1"}
 """Units of the channels; that of ``reading`` is the sensor's."""
 
-_IN_FILE = exr_codec.in_order(CHANNELS)
+_IN_FILE = in_order(CHANNELS)
 _PREFIX = "palpate."  # OpenEXR has header attributes of its own, some with a type ("name", "owner", "type")
 
 
@@ -142,7 +143,7 @@ def _write(
     metadata: Sequence[Mapping[str, str]],
 ) -> None:
     attributes = [{_PREFIX + key: str(value) for key, value in about.items()} for about in metadata]
-    exr_codec.write_all(paths, _IN_FILE, _pictures(layout, frames, _IN_FILE), attributes)
+    backend().module.write_all(paths, _IN_FILE, _pictures(layout, frames, _IN_FILE), attributes)
 
 
 def read_exr(path: str | os.PathLike) -> tuple[dict[str, np.ndarray], dict[str, str]]:
@@ -163,10 +164,10 @@ def read_exr(path: str | os.PathLike) -> tuple[dict[str, np.ndarray], dict[str, 
     if not Path(path).is_file():
         raise FileError(f"'{path}' does not exist: bake first, or choose another file.")
     try:
-        pictures, attributes = exr_codec.read(path)
+        pictures, attributes = backend().module.read(path)
     except OSError as error:
         raise FileError(f"'{path}' could not be read ({os_error_reason(error)}): check its permissions.") from error
-    except exr_codec.FormatError as error:
+    except FormatError as error:
         raise FileError(f"'{path}' is damaged or not an OpenEXR image ({error}): bake again.") from error
     found = {name: picture[::-1].astype(np.float32) for name, picture in pictures.items()}
     order = [name for name in CHANNELS if name in found] + [name for name in found if name not in CHANNELS]
