@@ -48,12 +48,14 @@ def run(arguments: argparse.Namespace) -> int:
     folder = writable_folder(arguments.out, create=True)
     with console.blender_output_hidden():
         bpy = blender.start_blender()
+        from ..addon.display import bake_display
         from ..addon.render import figure_export
+        from ..addon.render.figure_request import FigureRequest
 
         blender.open_blend(arguments.scene)
         scene = bpy.context.scene
-        request = figure_export.FigureRequest(
-            style=figure_options.figure_style_from(arguments, **vars(figure_export.scene_style(scene))),
+        request = FigureRequest(
+            style=figure_options.figure_style_from(arguments, **vars(bake_display.figure_style(scene))),
             frames=tuple(arguments.frame or ()),
             sensors=tuple(arguments.sensor or ()),
             engine=arguments.engine,

@@ -3,9 +3,8 @@
 
 import bpy
 
-from ..addon.bake import scene_writer
 from ..addon.bake.bake import bake
-from ..addon.display import bake_display
+from ..addon.display import bake_display, baked_scene
 from ..addon.timeline import playback
 from . import modal_job, support
 
@@ -79,14 +78,14 @@ class PALPATE_OT_bake_clear(support.ErrorReporting, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        if context.scene is None or not scene_writer.has_bake(context.scene):
+        if context.scene is None or not baked_scene.has_bake(context.scene):
             cls.poll_message_set("Nothing is baked in this scene")
             return False
         return True
 
     def run(self, context):
         support.leave_edit_mode(context)
-        scene_writer.clear(context.scene)
+        baked_scene.clear_scene(context.scene)
         playback.reset(context.scene)
 
 
@@ -102,7 +101,7 @@ class PALPATE_OT_reset(support.ErrorReporting, bpy.types.Operator):
         if context.scene is None or not playback.has_roles(context.scene):
             cls.poll_message_set("No object has a role")
             return False
-        if scene_writer.baked_objects(context.scene):
+        if baked_scene.baked_objects(context.scene):
             cls.poll_message_set("The scene is baked: use Clear Bake")
             return False
         return True
@@ -120,14 +119,14 @@ class PALPATE_OT_dress(support.ErrorReporting, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        if context.scene is None or not scene_writer.baked_objects(context.scene):
+        if context.scene is None or not baked_scene.baked_objects(context.scene):
             cls.poll_message_set("Nothing is baked in this scene")
             return False
         return True
 
     def run(self, context):
         support.leave_edit_mode(context)
-        bake_display.refresh(context.scene, scene_writer.bake_folders(context.scene))
+        bake_display.refresh(context.scene, baked_scene.bake_folders(context.scene))
 
 
 CLASSES = (PALPATE_OT_bake, PALPATE_OT_catch_up, PALPATE_OT_bake_clear, PALPATE_OT_reset, PALPATE_OT_dress)

@@ -3,8 +3,7 @@
 
 import bpy
 
-from ..addon.bake import scene_writer
-from ..addon.properties import figure_properties
+from ..addon.display import baked_scene
 from . import modal_job, support
 
 
@@ -18,16 +17,17 @@ class PALPATE_OT_figures_make(modal_job.ModalJob, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        if context.scene is None or not scene_writer.bake_folders(context.scene):
+        if context.scene is None or not baked_scene.bake_folders(context.scene):
             cls.poll_message_set("Nothing is baked in this scene: bake first")
             return False
         return support.poll_idle(cls)
 
     def job(self, context):
-        from ..addon.render import figure_export
+        from ..addon.render import figure_export, figure_request
 
         scene = context.scene
-        return figure_export.make_figures(scene, figure_properties.folder(scene), figure_properties.wish(scene, context.object))
+        request = figure_request.requested_figures(scene, context.object)
+        return figure_export.make_figures(scene, figure_request.figure_folder(scene), request)
 
     def done(self, result):
         names = ", ".join(f"'{path.name}'" for path in result[:4])

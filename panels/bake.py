@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Panels of what the scene does: bake, and how results look."""
 
-from ..addon.bake import scene_writer
+from ..addon.display import baked_scene
 from ..addon.session import session_state
 from ..addon.timeline import playback
 from .places import Part, named, sentences
@@ -31,7 +31,7 @@ class Bake(Part):
             return
         row = layout.row(align=True)
         row.operator("palpate.bake", text=f"Bake {scene.frame_start}–{scene.frame_end}", icon="RENDER_ANIMATION")
-        if scene_writer.has_bake(scene):
+        if baked_scene.has_bake(scene):
             row.operator("palpate.bake_clear", text="", icon="TRASH")
         else:
             row = layout.row(align=True)
@@ -65,7 +65,7 @@ class Display(Part):
         if not own.use_auto_arrow:
             column.prop(own, "arrow_scale")
             column.prop(own, "texel_arrow_scale")
-        if scene_writer.baked_objects(context.scene):
+        if baked_scene.baked_objects(context.scene):
             layout.operator("palpate.dress")
 
 

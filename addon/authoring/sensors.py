@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from ...core.errors import SensorError
-from ..bake import scene_writer
+from ..display import baked_scene
 from ..properties import effect_stack, properties
 from ..scene import meshes
 
@@ -172,7 +172,7 @@ def _check(obj, chosen: np.ndarray, source: str) -> None:
 def remove_role(scene, obj) -> None:
     """Take an object out: its role, and its part of a bake. Parameters and vertex groups stay."""
     if obj.palpate.is_baked:
-        scene_writer.clear_object(scene, obj)
+        baked_scene.clear_object(scene, obj)
     obj.palpate.role = "NONE"
 
 

@@ -14,6 +14,7 @@ from ...core.jobs.job_runner import part_of_job
 from ...core.jobs.progress import Progress
 from ...core.model.recording import Recording
 from ...core.model.scenario import Scenario
+from ..display import texel_arrows
 from ..scene import scene_reader
 from ..session import dependencies, first_use, session_state
 from ..timeline import playback
@@ -55,10 +56,11 @@ def _bake(scene, name: str, into_scene: bool) -> Generator[Progress, None, BakeR
     bake_files.check_folder(folder)
     total = 2 * max(1, scene.frame_end - scene.frame_start + 1)
 
-    reading = scene_reader.sample_scenario(scene)
-    scenario, binding = yield from part_of_job(
-        reading, lambda step: _noted(replace(step, stage="Reading the scene", total=total))
-    )
+    with texel_arrows.hidden_arrows(scene):
+        reading = scene_reader.sample_scenario(scene)
+        scenario, binding = yield from part_of_job(
+            reading, lambda step: _noted(replace(step, stage="Reading the scene", total=total))
+        )
 
     if into_scene:
         scene_writer.check_writable(scene, scenario, binding)

@@ -31,7 +31,7 @@ from ...core.io.bake_folder import (
     write_manifest,
 )
 from ...core.io.file_writing import writable_folder
-from ...core.io.recording_npz import load_recording, save_recording
+from ...core.io.recording_npz import save_recording
 from ...core.io.sensor_npz import SENSOR_NAME, save_sensor
 from ...core.io.tactile_exr import describe, write_exrs
 from ...core.model.recording import Frame, Recording
@@ -224,11 +224,6 @@ class BakeFiles:
             raise FileError(
                 f"'{place}' holds the bake of '{other}', which lies beside '{self._blend.name}': choose another bake folder."
             )
-
-
-def read_recording(folder: Path) -> Recording:
-    """Read the recording of one sensor's folder."""
-    return load_recording(folder / RECORDING_NAME)
 
 
 def _sibling(place: Path, ending: str) -> Path:

@@ -1,21 +1,18 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A finished recording goes back into the scene: motion of free bodies, force arrows, heat maps. And out of it again."""
+"""Writes a finished recording into its scene: keyframes of the bodies that forces moved, heat maps, markers and arrows."""
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
-import bpy
 import numpy as np
 
 from ...core.errors import SceneError
 from ...core.model.recording import Recording
 from ...core.model.scenario import Scenario
-from ..display import bake_display, heat_map, markers, materials
+from ..display import bake_display, baked_scene, markers
 from ..scene import moved_bodies
 from ..scene.scene_reader import Binding
-from ..session import identity
 from ..timeline import staleness
 
 
@@ -69,7 +66,7 @@ def write(scene, scenario: Scenario, binding: Binding, recording: Recording, fol
     taking_part = {*objects, *sensors}
     for obj in scene.objects:  # who took part in an earlier bake and no longer does
         if obj.palpate.is_baked and obj not in taking_part:
-            clear_object(scene, obj)
+            baked_scene.clear_object(scene, obj)
     for index in binding.starts:
         _free_body(objects[index], index, binding, recording)
     moved = {objects[index] for index in binding.starts}
@@ -79,9 +76,9 @@ def write(scene, scenario: Scenario, binding: Binding, recording: Recording, fol
             baked_sensors.append(_baked_sensor(obj, objects[sensor.body], sensor, binding, recording, folders[sensor.name]))
             obj.palpate.is_baked = True
         elif obj.palpate.is_baked and obj not in moved:
-            clear_object(scene, obj)
+            baked_scene.clear_object(scene, obj)
     bake_display.show_bake(scene, baked_sensors)
-    remove_orphans()
+    baked_scene.remove_orphans()
     settings = scene.palpate
     settings.baked_digest = recording.digest
     settings.baked_shapes = staleness.pack(binding.looks)
@@ -106,54 +103,3 @@ def _baked_sensor(obj, body, sensor, binding: Binding, recording: Recording, fol
         scale=binding.scale,
         folder=folder,
     )
-
-
-def baked_objects(scene) -> list:
-    """Return the objects that hold a part of the scene's bake."""
-    return [obj for obj in scene.objects if obj.palpate.is_baked]
-
-
-def bake_folder(obj) -> Path | None:
-    """Return the folder of a sensor's bake; None when it shows none.
-
-    It is where the images are: their path follows when the .blend is saved somewhere else, the text in our settings does not.
-    """
-    image = materials.find_block(bpy.data.images, obj.palpate.uid) if obj.palpate.bake_folder else None
-    return None if image is None else Path(os.path.abspath(bpy.path.abspath(image.filepath))).parent
-
-
-def bake_folders(scene) -> dict:
-    """Return the folders of the scene's bake by the sensors' objects."""
-    return {obj: place for obj in baked_objects(scene) if (place := bake_folder(obj)) is not None}
-
-
-def clear(scene) -> None:
-    """Take a bake out of its scene; its files stay."""
-    for obj in baked_objects(scene):
-        clear_object(scene, obj)
-    remove_orphans()
-    scene.palpate.baked_digest = ""
-
-
-def remove_orphans() -> None:
-    """Remove markers, materials, nodes and images of sensors that were deleted."""
-    uids = {obj.palpate.uid for obj in bpy.data.objects}
-    markers.remove_orphans(uids)
-    materials.remove_orphans(uids)
-
-
-def has_bake(scene) -> bool:
-    """Whether there is anything for :func:`clear`: an object's part of a bake, or the arrow of a deleted sensor."""
-    if baked_objects(scene):
-        return True
-    return bool(scene.palpate.baked_digest) and bool(markers.orphans(scene.objects))
-
-
-def clear_object(scene, obj) -> None:
-    """Take one object's part of a bake away: keyframes, heat map, arrow; a free body is put back to its start."""
-    identity.ensure(obj)
-    moved_bodies.clear(obj)
-    if obj.palpate.bake_folder:
-        heat_map.clear(obj)
-        markers.clear(scene, obj.palpate.uid)
-        obj.palpate.bake_folder = ""

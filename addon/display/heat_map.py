@@ -9,12 +9,12 @@ import numpy as np
 from ...core.geometry.layout import UVLayout
 from ...core.geometry.texels import Texels
 from ..scene import meshes
+from ..scene.display_names import HEAT_MAP_MODIFIER, UV_MAP
 from ..scene.meshes import OLD_MATERIAL
 from . import materials
 
 EMPTY_SLOT = "palpate_empty_slot"
 """Custom property of a mesh that had no material slot."""
-MODIFIER = "Palpate Heat Map"
 
 
 def apply(obj, texels: Texels, image, frames: tuple[int, int], maximum: float, color_map: str, pressure: bool = False) -> None:
@@ -40,7 +40,7 @@ def apply(obj, texels: Texels, image, frames: tuple[int, int], maximum: float, c
     if on_vertices:
         _store_texel_uv(mesh, texels)
         _store_area(mesh, texels)
-        modifier = obj.modifiers.new(MODIFIER, "NODES")
+        modifier = obj.modifiers.new(HEAT_MAP_MODIFIER, "NODES")
         modifier.node_group = materials.force_node_group(uid, obj.name, image, frames)
         obj.modifiers.move(len(obj.modifiers) - 1, 0)  # where the vertices are still the texels'
     elif uv is not None:
@@ -61,11 +61,11 @@ def clear(obj, keep_image: bool = False) -> None:
         return
     mesh, uid = obj.data, obj.palpate.uid
     _unassign(obj)
-    modifier = obj.modifiers.get(MODIFIER)
+    modifier = obj.modifiers.get(HEAT_MAP_MODIFIER)
     if modifier is not None:
         obj.modifiers.remove(modifier)
     if _slot_of(mesh) is None:
-        layer = mesh.uv_layers.get(materials.UV_NAME)
+        layer = mesh.uv_layers.get(UV_MAP)
         if layer is not None:
             mesh.uv_layers.remove(layer)
         for name in (materials.TEXEL_UV, materials.FORCE, materials.AREA):
@@ -83,10 +83,10 @@ def _one_uv_per_texel(texels: Texels) -> np.ndarray | None:
 
 
 def _write_uv(mesh, texels: Texels, uv: np.ndarray) -> None:
-    layer = mesh.uv_layers.get(materials.UV_NAME)
+    layer = mesh.uv_layers.get(UV_MAP)
     if layer is None:
         active = mesh.uv_layers.active_index
-        layer = mesh.uv_layers.new(name=materials.UV_NAME, do_init=False)
+        layer = mesh.uv_layers.new(name=UV_MAP, do_init=False)
         if active >= 0:
             mesh.uv_layers.active_index = active
     table = np.zeros((len(mesh.vertices), 2))

@@ -15,8 +15,8 @@ import bpy
 import numpy as np
 
 from ...core.figures import color_maps
+from ..scene.display_names import UV_MAP
 
-UV_NAME = "Palpate"
 TEXEL_UV = "palpate_uv"
 FORCE = "palpate_force"
 """Vertex attribute with the normal force (N): from geometry nodes after a bake, from the timeline while playing."""
@@ -79,7 +79,7 @@ def area_image(uid: str, name: str, area: np.ndarray):
 class ImageMapping:
     """Where an image lies on a sensor: by which UV map, and if its pixels are blended."""
 
-    uv_map: str = UV_NAME
+    uv_map: str = UV_MAP
     smooth: bool = False
 
 

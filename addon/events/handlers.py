@@ -6,8 +6,8 @@ from __future__ import annotations
 import bpy
 from bpy.app.handlers import persistent
 
-from ..authoring import sensor_report
-from ..display import overlays, texel_overlay
+from ..authoring import sensor_report, texel_overlay
+from ..display import overlays
 from ..properties import migrations
 from ..scene import scene_reader
 from ..session import first_use, identity, session_state

@@ -1,15 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What figures a scene asks for: `Scene.palpate.figures`, and the :class:`.figure_export.FigureRequest` that it means."""
+"""Which figures a scene asks for: `Scene.palpate.figures`."""
 
 from __future__ import annotations
 
-import re
-from pathlib import Path
-
 import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatVectorProperty, IntProperty, IntVectorProperty, StringProperty
-
-from ...core.errors import FileError, ParameterError
 
 KINDS = (
     ("SCENE", "Scene", "The scene with its overlays, alone and with the tactile images beside it"),
@@ -123,80 +118,3 @@ class PALPATE_PG_figures(bpy.types.PropertyGroup):
     samples: IntProperty(
         name="Samples", description="Per pixel of renders; 0: as in the render properties", min=0, max=65536, **_plain
     )
-
-
-def wish(scene, active=None):
-    """Return what a scene asks for.
-
-    Parameters
-    ----------
-    active : Object, optional
-        The active one, if only its figures are wanted.
-
-    Raises
-    ------
-    ParameterError
-        The frames make no sense, nothing is chosen, or the active object is no sensor.
-    """
-    from ..render import figure_export
-
-    own = scene.palpate.figures
-    sensors: tuple[str, ...] = ()
-    if own.sensors == "ACTIVE":
-        if active is None or active.palpate.role != "SENSOR":
-            raise ParameterError("The active object is no sensor: choose another, or set Figures › Sensors to All Sensors.")
-        sensors = (active.name,)
-    if not (own.kinds or own.exports):
-        raise ParameterError("Nothing is chosen: choose at least one figure in Palpate › Figures.")
-    return figure_export.FigureRequest(
-        kinds=_chosen(KINDS, own.kinds),
-        style=figure_export.scene_style(scene, width=own.width.lower(), dpi=own.dpi),
-        frames=frames_of(own.frames),
-        sensors=sensors,
-        formats=_chosen(FORMATS, own.formats) or ("png",),
-        exports=_chosen(EXPORTS, own.exports),
-        engine=None if own.engine == "SCENE" else own.engine.lower(),
-        view=tuple(own.view) if own.camera == "VIEW" else None,
-        transparent=own.transparent,
-        own_camera=own.camera == "OWN",
-        size=tuple(own.size),
-        samples=own.samples or None,
-    )
-
-
-def _chosen(items, names: set[str]) -> tuple[str, ...]:
-    return tuple(key.lower() for key, *_ in items if key in names)
-
-
-def frames_of(text: str) -> tuple[int, ...]:
-    """Return the frames that words like ``12, 40-44`` mean, in order and each once; none for an empty text.
-
-    Raises
-    ------
-    ParameterError
-        Something else is written there.
-    """
-    found: list[int] = []
-    for part in filter(None, re.split(r"[,;\s]+", text.strip())):
-        match = re.fullmatch(r"(-?\d{1,7})(?:-(-?\d{1,7}))?", part)
-        if match is None:
-            raise ParameterError(f"'{part}' in Figures › Frames is no frame: write numbers as in 12, 40-44.")
-        first = int(match[1])
-        found += range(first, (int(match[2]) if match[2] else first) + 1)
-    return tuple(dict.fromkeys(found))
-
-
-def folder(scene) -> Path:
-    """Return where a scene's figures go.
-
-    Raises
-    ------
-    FileError
-        It is relative to a .blend that has not been saved yet, or empty.
-    """
-    text = scene.palpate.figures.folder
-    if not text.strip():
-        raise FileError("The folder of the figures is empty: name one in Palpate › Figures.")
-    if text.startswith("//") and not bpy.data.filepath:
-        raise FileError(f"The folder '{text}' is relative to a file that is not saved yet: save the .blend first.")
-    return Path(bpy.path.abspath(text))

@@ -9,11 +9,9 @@ from __future__ import annotations
 import tempfile
 from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass, field
 from pathlib import Path
 
-from ...core.errors import ParameterError, SceneError
-from ...core.figures.figure_style import FigureStyle
+from ...core.errors import SceneError
 from ...core.figures.side_by_side import side_by_side
 from ...core.figures.tactile_strip import tactile_strip
 from ...core.figures.texel_numbers import MOST, texel_numbers
@@ -24,60 +22,9 @@ from ...core.io.export import export
 from ...core.io.file_writing import writable_folder
 from ...core.jobs.job_runner import run_job
 from ...core.jobs.progress import Progress
-from ..bake import scene_writer
-from ..display import bake_display
+from ..display import baked_scene
 from . import render, render_setup, video, workbench_colors
-
-KINDS = ("scene", "strip", "curves", "numbers", "video")
-"""What can be made."""
-FORMATS = ("png", "pdf", "svg")
-
-
-@dataclass(frozen=True)
-class FigureRequest:
-    """What is to be made.
-
-    Attributes
-    ----------
-    kinds : tuple of str
-        Of :data:`KINDS`.
-    style : FigureStyle
-    frames : tuple of int
-        For scene and numbers; none: the one with the largest force. Two or more are also the strip's columns.
-    sensors : tuple of str
-        None: all.
-    formats : tuple of str
-        Of figures that are no renders.
-    exports : tuple of str
-        Kinds of :func:`..formats.export.export`; each gets a folder of its own.
-    engine, view, transparent
-        See :func:`.render_setup.render_setup`.
-    own_camera : bool
-        The scene's camera stays where it is.
-    size : (2,) int, pixels
-        Of renders.
-    samples : int or None
-        Per pixel; None: the scene's.
-    """
-
-    kinds: tuple[str, ...] = ("scene", "strip", "curves", "numbers")
-    style: FigureStyle = field(default_factory=FigureStyle)
-    frames: tuple[int, ...] = ()
-    sensors: tuple[str, ...] = ()
-    formats: tuple[str, ...] = ("png", "pdf")
-    exports: tuple[str, ...] = ()
-    engine: str | None = None
-    view: tuple[float, float] | None = None
-    transparent: bool = False
-    own_camera: bool = False
-    size: tuple[int, int] = (1280, 960)
-    samples: int | None = None
-
-    def __post_init__(self) -> None:
-        for what, chosen, known in (("figure", self.kinds, KINDS), ("format", self.formats, FORMATS)):
-            for word in chosen:
-                if word not in known:
-                    raise ParameterError(f"There is no {what} '{word}': choose from {', '.join(known)}.")
+from .figure_request import FigureRequest
 
 
 def read_scene_bake(scene) -> Bake:
@@ -88,7 +35,7 @@ def read_scene_bake(scene) -> Bake:
     PalpateError
         It plays none, or its files are gone.
     """
-    places = scene_writer.bake_folders(scene)
+    places = baked_scene.bake_folders(scene)
     if not places:
         raise SceneError(
             f"'{scene.name}' is not baked: bake it first ('palpate bake' with --save, or Physics › Palpate › Bake)."
@@ -205,7 +152,7 @@ def _prepared_scene(scene, request: FigureRequest, bake: Bake, frames, size) -> 
     ):
         show = _draw_nothing
         if scene.render.engine == "BLENDER_WORKBENCH":
-            show = more.enter_context(workbench_colors.workbench_colors(scene_writer.bake_folders(scene), bake, request.style))
+            show = more.enter_context(workbench_colors.workbench_colors(baked_scene.bake_folders(scene), bake, request.style))
         yield show
 
 
@@ -230,8 +177,3 @@ class _StepCounter:
     def next(self, stage: str, frame: int) -> Progress:
         self.done = min(self.done + 1, self.total)
         return Progress(stage, self.done, self.total, frame)
-
-
-def scene_style(scene, **others) -> FigureStyle:
-    """Return the look that agrees with what the scene shows."""
-    return bake_display.figure_style(scene, **others)

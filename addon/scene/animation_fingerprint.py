@@ -13,9 +13,8 @@ from functools import cache
 import bpy
 import numpy as np
 
-from ..display import heat_map
 from ..session import fcurves
-from . import moved_bodies
+from . import display_names, moved_bodies
 
 _PLACES = ("co", "handle_left", "handle_right")
 _EASES = ("easing", "back", "amplitude", "period")
@@ -72,7 +71,7 @@ def _named_by(block) -> Iterator:
         yield from (block.parent, block.data)
         yield from _of_constraints(block.constraints)
         for modifier in block.modifiers:
-            if modifier.name != heat_map.MODIFIER:
+            if modifier.name != display_names.HEAT_MAP_MODIFIER:
                 yield from _pointers(modifier)
                 yield from _inputs(modifier)
         for bone in () if block.pose is None else block.pose.bones:

@@ -18,9 +18,9 @@ from ...core.model.deformation import Deformation
 from ...core.model.scenario import Scenario
 from ...core.model.sensor import Sensor
 from ...core.model.target import Target
-from ..display import heat_map
 from ..session import fcurves, identity
 from . import meshes
+from .display_names import HEAT_MAP_MODIFIER
 from .mesh_snapshot import Surface
 
 SCALES = {"scale", "delta_scale"}
@@ -28,7 +28,7 @@ SCALES = {"scale", "delta_scale"}
 
 def may_deform(obj) -> bool:
     """Whether anything could change the shape of an object over time."""
-    if any(modifier.show_viewport and modifier.name != heat_map.MODIFIER for modifier in obj.modifiers) or obj.parent_type in {
+    if any(modifier.show_viewport and modifier.name != HEAT_MAP_MODIFIER for modifier in obj.modifiers) or obj.parent_type in {
         "ARMATURE",
         "LATTICE",
     }:

@@ -28,7 +28,6 @@ from ...core.model.scenario import Scenario
 from ...core.model.sensor import Sensor
 from ...core.model.sensor_parameters import Painted, SensorParameters
 from ...core.model.target import Target
-from ..display import texel_arrows
 from ..properties import effect_stack, properties
 from ..session import clock, identity, transforms, units
 from . import attached_objects, deforming_objects, drives, meshes, moved_bodies, uv_layouts
@@ -344,7 +343,7 @@ def sample_scenario(scene) -> Generator[Progress, None, tuple[Scenario, Binding]
     """Read a scene over its whole frame range, frame by frame, and leave it at the frame where it stood."""
     before = scene.frame_current, scene.frame_subframe
     try:
-        with clock.unstretched(scene), texel_arrows.hidden_arrows(scene):
+        with clock.unstretched(scene):
             return (yield from _sample_scenario(scene))
     finally:
         with suppress(ReferenceError):  # the scene went while its frames were read

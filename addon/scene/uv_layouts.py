@@ -10,8 +10,7 @@ import numpy as np
 from ...core.errors import ImageError
 from ...core.geometry.layout import UVLayout, mapped_layout
 from ...core.geometry.texels import Texels
-from ..display import materials
-from . import meshes
+from . import display_names, meshes
 
 SETTINGS = ("image_layout", "image_map", "image_size", "image_filter")
 """Names in :class:`.properties.PALPATE_PG_object`."""
@@ -54,7 +53,7 @@ def uv_layer(obj):
     ImageError
         There is none, or the mesh is being edited.
     """
-    layers = [layer for layer in obj.data.uv_layers if layer.name != materials.UV_NAME]
+    layers = [layer for layer in obj.data.uv_layers if layer.name != display_names.UV_MAP]
     wanted = obj.palpate.image_map
     if not layers:
         raise ImageError(

@@ -13,11 +13,12 @@ import numpy as np
 
 from ...core.errors import PalpateError
 from ...core.geometry.texels import Texels
+from ...core.io.bake_folder import RECORDING_NAME
+from ...core.io.recording_npz import load_recording
 from ...core.io.sensor_npz import SENSOR_NAME, load_sensor
 from ...core.jobs.progress import Progress
 from ...core.model.recording import Frame, Recording
-from ..bake import bake_files, scene_writer
-from ..display import bake_display, inset, materials, overlays
+from ..display import bake_display, baked_scene, inset, materials, overlays
 from ..scene import moved_bodies, scene_reader
 from ..session import clock, first_use, session_state
 from . import live_cache, staleness
@@ -95,7 +96,7 @@ def on_frame(scene, depsgraph) -> None:
     """Compute or show the frame that the scene has arrived at."""
     if not has_roles(scene) or session_state.session.suspended or _renders_beside_window(scene):
         return
-    if scene_writer.baked_objects(scene):
+    if baked_scene.baked_objects(scene):
         live_cache.drop(scene)
         overlays.clear(scene)
         _show_bake(scene, depsgraph)
@@ -192,7 +193,7 @@ def _is_on(scene) -> bool:
         scene.palpate.use_live
         and not session_state.session.suspended
         and has_roles(scene)
-        and not scene_writer.baked_objects(scene)
+        and not baked_scene.baked_objects(scene)
     )
 
 
@@ -272,7 +273,7 @@ def _show_bake(scene, depsgraph) -> None:
     """Keyframes and material show the bake by themselves; only the panel's numbers come from its recording."""
     number, _ = clock.moment(scene)
     sensors, poses, velocities, recording = {}, np.zeros((0, 7)), np.zeros((0, 6)), None
-    for obj in scene_writer.baked_objects(scene):
+    for obj in baked_scene.baked_objects(scene):
         found = _recording(obj)
         if found is not None:
             recording = found
@@ -293,7 +294,7 @@ def _show_bake(scene, depsgraph) -> None:
 def _show_board(scene, frame: Frame) -> None:
     """Show the tactile images and curves of a bake's present frame."""
     sensors, texels, last = {}, {}, None
-    for obj in scene_writer.baked_objects(scene):
+    for obj in baked_scene.baked_objects(scene):
         recording, own = _recording(obj), _texels(obj)
         if recording is not None and own is not None and frame.frame in recording.frames:
             last = recording
@@ -309,7 +310,7 @@ def _show_board(scene, frame: Frame) -> None:
 
 def _texels(obj):
     """Return the texels of a sensor's bake, read when they are first asked for; None when they are not there."""
-    place = scene_writer.bake_folder(obj)
+    place = baked_scene.bake_folder(obj)
     if place is not None and place not in _known_texels:
         try:
             _known_texels[place] = load_sensor(place / SENSOR_NAME)[0]
@@ -320,12 +321,12 @@ def _texels(obj):
 
 def _recording(obj):
     """Return the recording of a sensor's bake, read when it is first asked for; None when it is not there."""
-    place = scene_writer.bake_folder(obj)
+    place = baked_scene.bake_folder(obj)
     if place is None:
         return None
     if place not in _recordings:
         try:
-            _recordings[place] = bake_files.read_recording(place)
+            _recordings[place] = load_recording(place / RECORDING_NAME)
         except PalpateError:
             _recordings[place] = None
     return _recordings[place]

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from blender_scenes import ball, cube, grid, press_and_drop
 
-from palpate.addon.authoring import problems, sensor_report
-from palpate.addon.display import texel_overlay
+from palpate.addon.authoring import problems, sensor_report, texel_overlay
 
 
 def look(obj):

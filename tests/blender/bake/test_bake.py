@@ -11,7 +11,7 @@ from blender_scenes import changes, cube, dump, grid, press, press_and_drop, reo
 from palpate.addon.bake import bake_files
 from palpate.addon.bake.bake import bake
 from palpate.addon.display import heat_map, marker_meshes, materials
-from palpate.addon.scene import scene_reader
+from palpate.addon.scene import display_names, scene_reader
 from palpate.addon.session import fcurves, transforms
 from palpate.addon.timeline import playback
 from palpate.core.errors import FileError
@@ -442,7 +442,7 @@ def test_the_buttons_leave_the_mode_in_which_a_mesh_is_changed(tmp_path, mode):
         bpy.ops.object.mode_set(mode="EDIT")  # which would bring back what the mesh was before
         bpy.ops.object.mode_set(mode="OBJECT")
         assert pad.palpate.is_baked == is_baked
-        assert (materials.UV_NAME in pad.data.uv_layers) == is_baked
+        assert (display_names.UV_MAP in pad.data.uv_layers) == is_baked
         assert {face.material_index for face in pad.data.polygons} == {int(is_baked)}
 
 

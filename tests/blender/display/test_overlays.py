@@ -6,10 +6,8 @@ import numpy as np
 import pytest
 from blender_scenes import changes, cube, dump, press_and_drop, save
 
-from palpate.addon.bake import scene_writer
 from palpate.addon.bake.bake import bake
-from palpate.addon.display import bake_display, markers, materials, texel_arrows
-from palpate.addon.scene import scene_reader
+from palpate.addon.display import bake_display, baked_scene, markers, materials, texel_arrows
 from palpate.addon.session import transforms
 from palpate.core.errors import PalpateError
 from palpate.core.jobs.job_runner import run_job
@@ -138,7 +136,7 @@ def test_applying_without_the_files_says_so(baked, tmp_path):
     scene, *_ = baked
     (tmp_path / "palpate").rename(tmp_path / "lost")
     with pytest.raises(PalpateError, match="bake"):
-        bake_display.refresh(scene, scene_writer.bake_folders(scene))
+        bake_display.refresh(scene, baked_scene.bake_folders(scene))
 
 
 def test_clearing_takes_all_overlays_away(tmp_path):
@@ -192,20 +190,22 @@ def test_arrows_of_a_lost_image_do_not_show(baked, tmp_path):
     assert instances(markers.find_marker(scene.objects, pad.palpate.uid, "NORMALS")) == []
 
 
-@pytest.mark.parametrize("end", ["whole", "stopped"])
-def test_arrows_rest_while_the_scene_is_read(baked, end):
+@pytest.mark.parametrize("end", ["read", "stopped"])
+def test_arrows_rest_while_a_bake_reads_the_scene(baked, end):
     scene, pad, _ = baked
     own = [
         markers.find_marker(scene.objects, pad.palpate.uid, kind).modifiers[texel_arrows.MODIFIER]
         for kind in texel_arrows.KINDS
     ]
     own[1].show_viewport = False  # as the user left it
-    work = scene_reader.sample_scenario(scene)
+    work = bake(scene)
     for _ in range(3):
         next(work)
         assert not any(modifier.show_viewport for modifier in own)
-    if end == "whole":
-        run_job(work)
+    if end == "read":
+        while next(work).stage == "Reading the scene":
+            pass
     else:
         work.close()
     assert [modifier.show_viewport for modifier in own] == [True, False]
+    work.close()

@@ -8,7 +8,7 @@ import pytest
 from blender_scenes import press, save
 
 from palpate.addon.bake.bake import bake
-from palpate.addon.properties.properties import figure_properties
+from palpate.addon.render import figure_request
 from palpate.commands import render
 from palpate.core.errors import ParameterError
 from palpate.core.jobs.job_runner import run_job
@@ -79,8 +79,8 @@ def test_what_cannot_be_made_is_one_sentence(baked):
 
 
 def test_words_for_frames():
-    assert figure_properties.frames_of("") == ()
-    assert figure_properties.frames_of("5 3, 7-9; 8") == (5, 3, 7, 8, 9)
-    assert figure_properties.frames_of("-2-1") == (-2, -1, 0, 1)
+    assert figure_request.frames_of("") == ()
+    assert figure_request.frames_of("5 3, 7-9; 8") == (5, 3, 7, 8, 9)
+    assert figure_request.frames_of("-2-1") == (-2, -1, 0, 1)
     with pytest.raises(ParameterError, match="1.5"):
-        figure_properties.frames_of("1.5")
+        figure_request.frames_of("1.5")

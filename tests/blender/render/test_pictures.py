@@ -11,7 +11,9 @@ import pytest
 from blender_scenes import changes, dump, press_and_drop, save
 
 from palpate.addon.bake.bake import bake
-from palpate.addon.render import figure_export, render, render_setup, video
+from palpate.addon.display import bake_display
+from palpate.addon.render import figure_export, figure_request, render, render_setup, video
+from palpate.addon.render.figure_request import FigureRequest
 from palpate.commands import main
 from palpate.core.errors import FileError, ParameterError, SceneError
 from palpate.core.figures.figure_style import FigureStyle
@@ -39,8 +41,8 @@ def test_everything_at_once_and_nothing_left_behind(baked, tmp_path):
     scene, _ = baked
     before = dump()
     worlds, lights, cameras = len(bpy.data.worlds), len(bpy.data.lights), len(bpy.data.cameras)
-    request = figure_export.FigureRequest(
-        figure_export.KINDS, FigureStyle(dpi=50), frames=(3, 4), size=(96, 64), samples=1, formats=("png", "pdf")
+    request = FigureRequest(
+        figure_request.KINDS, FigureStyle(dpi=50), frames=(3, 4), size=(96, 64), samples=1, formats=("png", "pdf")
     )
     stages = []
     written = run_job(
@@ -88,18 +90,18 @@ def test_the_scene_shows_the_colours_of_the_colour_bar(baked):
     pad = scene.objects["Pad"]
     nodes = pad.material_slots[-1].material.node_tree.nodes
     end = next(node.inputs[1].default_value for node in nodes if "maximum" in node.label)
-    assert end == pytest.approx(figure_export.scene_style(scene).scale_limit(made.recording, made.texels))
+    assert end == pytest.approx(bake_display.figure_style(scene).scale_limit(made.recording, made.texels))
 
 
 def test_a_scene_that_is_not_baked_and_a_frame_that_is_not_are_one_sentence(baked, tmp_path):
     scene, _ = baked
     with pytest.raises(FileError, match="from 1 to 4"):
-        run_job(figure_export.make_figures(scene, tmp_path / "out", figure_export.FigureRequest(frames=(9,))))
+        run_job(figure_export.make_figures(scene, tmp_path / "out", FigureRequest(frames=(9,))))
     bpy.ops.palpate.bake_clear()
     with pytest.raises(SceneError, match="is not baked"):
-        run_job(figure_export.make_figures(scene, tmp_path / "out", figure_export.FigureRequest()))
+        run_job(figure_export.make_figures(scene, tmp_path / "out", FigureRequest()))
     with pytest.raises(ParameterError, match="choose from"):
-        figure_export.FigureRequest(kinds=("hologram",))
+        FigureRequest(kinds=("hologram",))
 
 
 def test_an_error_in_the_middle_puts_the_scene_back(baked):
@@ -128,7 +130,7 @@ def test_workbench_shows_the_heat_map_and_leaves_meshes_alone(baked, tmp_path):
     glass.node_tree.nodes["Principled BSDF"].inputs["Transmission Weight"].default_value = 1.0
     ball.data.materials.append(glass)
     before, meshes = dump(), len(bpy.data.meshes)
-    request = figure_export.FigureRequest(
+    request = FigureRequest(
         ("scene",),
         FigureStyle(colour_map="MAGMA"),
         frames=(4,),

@@ -481,7 +481,7 @@ def test_a_baked_scene_is_not_simulated_again(tmp_path):
 def test_a_scene_without_roles_costs_nothing(monkeypatch):
     scene = bpy.context.scene
     scene.frame_set(1)
-    monkeypatch.setattr(playback.scene_writer, "baked_objects", lambda scene: pytest.fail("looked at objects"))
+    monkeypatch.setattr(playback.baked_scene, "baked_objects", lambda scene: pytest.fail("looked at objects"))
     play(scene, 2, 3)
 
 

@@ -9,9 +9,9 @@ import bpy
 import numpy as np
 
 from ...core.geometry.layout import GridLayout
-from ..authoring import sensor_report
 from ..session import transforms
 from ..timeline import playback
+from . import sensor_report
 
 VALID_COLOR, FAULTY_COLOR, NORMAL_COLOR, REACH_COLOR = (
     (0.1, 0.75, 0.95, 0.9),

@@ -1,0 +1,141 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Which figures are wanted: from the panel's settings, or from words of a command line."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import bpy
+
+from ...core.errors import FileError, ParameterError
+from ...core.figures.figure_style import FigureStyle
+from ..display import bake_display
+from ..properties import figure_properties
+
+KINDS = ("scene", "strip", "curves", "numbers", "video")
+"""What can be made."""
+FORMATS = ("png", "pdf", "svg")
+
+
+@dataclass(frozen=True)
+class FigureRequest:
+    """What is to be made.
+
+    Attributes
+    ----------
+    kinds : tuple of str
+        Of :data:`KINDS`.
+    style : FigureStyle
+    frames : tuple of int
+        For scene and numbers; none: the one with the largest force. Two or more are also the strip's columns.
+    sensors : tuple of str
+        None: all.
+    formats : tuple of str
+        Of figures that are no renders.
+    exports : tuple of str
+        Kinds of :func:`..formats.export.export`; each gets a folder of its own.
+    engine, view, transparent
+        See :func:`.render_setup.render_setup`.
+    own_camera : bool
+        The scene's camera stays where it is.
+    size : (2,) int, pixels
+        Of renders.
+    samples : int or None
+        Per pixel; None: the scene's.
+    """
+
+    kinds: tuple[str, ...] = ("scene", "strip", "curves", "numbers")
+    style: FigureStyle = field(default_factory=FigureStyle)
+    frames: tuple[int, ...] = ()
+    sensors: tuple[str, ...] = ()
+    formats: tuple[str, ...] = ("png", "pdf")
+    exports: tuple[str, ...] = ()
+    engine: str | None = None
+    view: tuple[float, float] | None = None
+    transparent: bool = False
+    own_camera: bool = False
+    size: tuple[int, int] = (1280, 960)
+    samples: int | None = None
+
+    def __post_init__(self) -> None:
+        for what, chosen, known in (("figure", self.kinds, KINDS), ("format", self.formats, FORMATS)):
+            for word in chosen:
+                if word not in known:
+                    raise ParameterError(f"There is no {what} '{word}': choose from {', '.join(known)}.")
+
+
+def requested_figures(scene, active=None) -> FigureRequest:
+    """Return what a scene asks for.
+
+    Parameters
+    ----------
+    active : Object, optional
+        The active one, if only its figures are wanted.
+
+    Raises
+    ------
+    ParameterError
+        The frames make no sense, nothing is chosen, or the active object is no sensor.
+    """
+    own = scene.palpate.figures
+    sensors: tuple[str, ...] = ()
+    if own.sensors == "ACTIVE":
+        if active is None or active.palpate.role != "SENSOR":
+            raise ParameterError("The active object is no sensor: choose another, or set Figures › Sensors to All Sensors.")
+        sensors = (active.name,)
+    if not (own.kinds or own.exports):
+        raise ParameterError("Nothing is chosen: choose at least one figure in Palpate › Figures.")
+    return FigureRequest(
+        kinds=_chosen(figure_properties.KINDS, own.kinds),
+        style=bake_display.figure_style(scene, width=own.width.lower(), dpi=own.dpi),
+        frames=frames_of(own.frames),
+        sensors=sensors,
+        formats=_chosen(figure_properties.FORMATS, own.formats) or ("png",),
+        exports=_chosen(figure_properties.EXPORTS, own.exports),
+        engine=None if own.engine == "SCENE" else own.engine.lower(),
+        view=tuple(own.view) if own.camera == "VIEW" else None,
+        transparent=own.transparent,
+        own_camera=own.camera == "OWN",
+        size=tuple(own.size),
+        samples=own.samples or None,
+    )
+
+
+def _chosen(items, names: set[str]) -> tuple[str, ...]:
+    return tuple(key.lower() for key, *_ in items if key in names)
+
+
+def frames_of(text: str) -> tuple[int, ...]:
+    """Return the frames that words like ``12, 40-44`` mean, in order and each once; none for an empty text.
+
+    Raises
+    ------
+    ParameterError
+        Something else is written there.
+    """
+    found: list[int] = []
+    for part in filter(None, re.split(r"[,;\s]+", text.strip())):
+        match = re.fullmatch(r"(-?\d{1,7})(?:-(-?\d{1,7}))?", part)
+        if match is None:
+            raise ParameterError(f"'{part}' in Figures › Frames is no frame: write numbers as in 12, 40-44.")
+        first = int(match[1])
+        found += range(first, (int(match[2]) if match[2] else first) + 1)
+    return tuple(dict.fromkeys(found))
+
+
+def figure_folder(scene) -> Path:
+    """Return where a scene's figures go.
+
+    Raises
+    ------
+    FileError
+        It is relative to a .blend that has not been saved yet, or empty.
+    """
+    text = scene.palpate.figures.folder
+    if not text.strip():
+        raise FileError("The folder of the figures is empty: name one in Palpate › Figures.")
+    if text.startswith("//") and not bpy.data.filepath:
+        raise FileError(f"The folder '{text}' is relative to a file that is not saved yet: save the .blend first.")
+    return Path(bpy.path.abspath(text))

@@ -1,0 +1,9 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Names, stored in .blend files, of what a bake puts on a sensor to be seen: reading a scene must leave these things out."""
+
+from __future__ import annotations
+
+UV_MAP = "Palpate"
+"""Texture coordinates of the heat map."""
+HEAT_MAP_MODIFIER = "Palpate Heat Map"
+"""Geometry nodes that store the baked force on the vertices."""
