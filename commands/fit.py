@@ -6,7 +6,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from ..core.model.sensor_parameters import SensorParameters
+from ..core.model.sensor_parameters import SensorParameters, unit_of
 from . import console
 
 
@@ -73,7 +73,7 @@ def _pascals(fit) -> str:
 
 
 def _friction(arguments: argparse.Namespace) -> None:
-    from ..core.gap.calibration.friction import UNITS, fit_friction, read_friction
+    from ..core.gap.calibration.friction import fit_friction, read_friction
 
     data = read_friction(arguments.file, arguments.texels)
     fit = fit_friction(data, arguments.normal_force, SensorParameters())
@@ -81,7 +81,8 @@ def _friction(arguments: argparse.Namespace) -> None:
     print(f"{len(data.force)} measurements from '{arguments.file}' as {kind}, {arguments.normal_force:g} N on a texel\n")
     rows = [("parameter", "value", "95 % interval", "unit")]
     for name, estimate in fit.estimates.items():
-        rows.append((name, f"{estimate.value:.4g}", f"{estimate.low:.4g} to {estimate.high:.4g}", UNITS[name]))
+        unit = unit_of(name, "").removeprefix("1")  # no word for a number without a unit
+        rows.append((name, f"{estimate.value:.4g}", f"{estimate.low:.4g} to {estimate.high:.4g}", unit))
     print(console.text_table(rows, "<>><"))
     print(f"\nroot mean square of what is left: {fit.residual:.3g} N")
     if fit.untold:

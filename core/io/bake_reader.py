@@ -13,7 +13,7 @@ import numpy as np
 from ..errors import FileError
 from ..geometry.texels import Texels
 from ..model.recording import Recording
-from ..model.sensor_parameters import Painted, SensorParameters
+from ..model.sensor_parameters import SENSOR_PARAMETERS, Painted, SensorParameters
 from .bake_folder import MANIFEST_NAME, RECORDING_NAME, Manifest, read_manifest
 from .recording_npz import load_recording
 from .sensor_npz import SENSOR_NAME, load_sensor
@@ -83,13 +83,14 @@ def read_sensors(places: Sequence[Path]) -> Bake:
     recordings = [load_recording(place / RECORDING_NAME) for place in places]
     sensors = {name: felt for recording in recordings for name, felt in recording.sensors.items()}
     read = {manifest.sensor: load_sensor(place / SENSOR_NAME) for place, manifest in manifests.items()}
-    known = {item.name for item in fields(SensorParameters)}
     return Bake(
         recording=replace(recordings[0], sensors=sensors),
         texels={name: texels for name, (texels, _) in read.items()},
         painted={name: painted for name, (_, painted) in read.items()},
         parameters={
-            manifest.sensor: SensorParameters(**{key: value for key, value in manifest.parameters.items() if key in known})
+            manifest.sensor: SensorParameters(
+                **{key: value for key, value in manifest.parameters.items() if key in SENSOR_PARAMETERS}
+            )
             for manifest in manifests.values()
         },
         folders={manifest.sensor: place for place, manifest in manifests.items()},

@@ -25,14 +25,14 @@ from __future__ import annotations
 import os
 import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from ..effects.engine.registry import check, from_dict, to_dict
 from ..errors import FileError, PalpateError
 from ..model.effect import Effect
-from ..model.sensor_parameters import SensorParameters
+from ..model.sensor_parameters import SENSOR_PARAMETERS, SensorParameters
 from .file_writing import atomic_write
 
 FORMAT = "palpate-sensor-toml/1"
@@ -70,7 +70,7 @@ def sensor_text(model: SensorModel) -> str:
     """Return the text of a sensor's file."""
     import tomli_w
 
-    words = {item.name: getattr(model.parameters, item.name) for item in fields(SensorParameters)}
+    words = {name: getattr(model.parameters, name) for name in SENSOR_PARAMETERS}
     table: dict[str, Any] = {"format": FORMAT, "name": model.name, "sensor": {**words, **_plain(model.shape)}}
     if model.effects:
         table["effect"] = [to_dict(item) for item in model.effects]
@@ -107,38 +107,48 @@ def sensor_of(table: Mapping[str, Any]) -> SensorModel:
     """Return the sensor that the tables of a file describe; the errors are those of :func:`read_sensor`."""
     if table.get("format") != FORMAT:
         raise FileError(f'Its format is {table.get("format")!r}: a sensor\'s file begins with format = "{FORMAT}".')
-    _known(table, {"format", "name", "sensor", "effect"}, "the file")
+    known_words(table, {"format", "name", "sensor", "effect"}, "the file")
     name, words, entries = table.get("name", "sensor"), table.get("sensor", {}), table.get("effect", [])
     if not isinstance(name, str) or not isinstance(words, Mapping):
         raise FileError('It needs name = "…" and [sensor] with the sensor\'s words.')
     if not isinstance(entries, list) or not all(isinstance(entry, Mapping) for entry in entries):
         raise FileError("Its effects have to be written as [[effect]], one for each.")
-    parameters = parameters_of(words)
+    known_words(words, {*SENSOR_PARAMETERS, *SHAPE_WORDS}, "[sensor]")
+    parameters = SensorParameters(**stated_parameters(words, "[sensor]"))
     parameters.check(name)
     effects = tuple(from_dict(entry, parameters.gain) for entry in entries)
     check(effects, name, gain=parameters.gain)
     return SensorModel(name, parameters, effects, {key: words[key] for key in SHAPE_WORDS if key in words})
 
 
-def parameters_of(words: Mapping[str, Any]) -> SensorParameters:
-    """Return the parameters among the words of a [sensor], defaults for what is left out; raises :class:`FileError`."""
-    known = {item.name: getattr(SensorParameters, item.name) for item in fields(SensorParameters)}
-    _known(words, {*known, *SHAPE_WORDS}, "[sensor]")
-    values: dict[str, Any] = {}
-    for key, default in known.items():
-        if key not in words:
-            continue
-        value, kind = words[key], type(default)
-        if kind is float and isinstance(value, int) and not isinstance(value, bool):
-            value = float(value)
-        if type(value) is not kind:
-            wanted = {float: "a number", int: "a whole number", str: "a text"}[kind]
-            raise FileError(f"{key} of [sensor] is {value!r}: give {wanted}.")
-        values[key] = value
-    return SensorParameters(**values)
+def stated_parameters(words: Mapping[str, Any], where: str) -> dict[str, Any]:
+    """Return the values of those parameters of a sensor that the words of a [sensor] state.
+
+    Every file with a [sensor] is read here. What a parameter may be is in :class:`.SensorParameters`.
+
+    Parameters
+    ----------
+    words : mapping
+        The table as it was written; words that are no parameters are left out.
+    where : str
+        Which table of which file this is, for the message.
+
+    Raises
+    ------
+    FileError
+        A word is of another kind than its parameter, such as a text where a number belongs.
+    """
+    values = {}
+    for name, specification in SENSOR_PARAMETERS.items():
+        if name in words:
+            values[name] = specification.read(words[name])
+            if values[name] is None:
+                raise FileError(f"{name} of {where} is {words[name]!r}: give {specification.wanted}.")
+    return values
 
 
-def _known(table: Mapping[str, Any], words: set[str], where: str) -> None:
+def known_words(table: Mapping[str, Any], words: set[str], where: str) -> None:
+    """Raise :class:`FileError` for the first key of a table that is not among the `words` of its format."""
     for key in table:
         if key not in words:
             raise FileError(f"'{key}' in {where} is not a word of this format: it knows {', '.join(sorted(words))}.")

@@ -1,29 +1,52 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The specification of a parameter."""
+"""Specifications of parameters: what one is called and means, its unit, its default and its bounds.
+
+A dataclass with parameters states each of them once, as ``k: float = specified(Parameter("k", "N/m", …))``. Panels, files,
+checks, reports and presets read :func:`specifications`. The parameters of effects are :class:`Parameter` too.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields, replace
+from typing import Any
+
+from ..errors import ParameterError
+
+SPECIFICATION = "specification"
+"""Key of a dataclass field's metadata under which the specification of its parameter stands."""
 
 
 @dataclass(frozen=True)
 class Parameter:
-    """One number of a form.
+    """A parameter that is a number.
 
     Attributes
     ----------
     name : str
     unit : str
-        "1", "N", "m", "s", … and "unit" for the sensor's own unit: default and bounds are then given for a gain of one unit
-        per newton; :meth:`scaled` gives those of a sensor.
+        "1", "N", "m", "s", …. In "unit", "unit/N" and the like the word ``unit`` stands for the sensor's own unit. Default and
+        bounds of such a parameter of an effect are given for a gain of one unit per newton; :meth:`scaled` gives those of a
+        sensor.
     default, low, high : float
-        Bounds are inclusive: outside them the formula means nothing or nothing real is like that.
+        Bounds are inclusive, unless `above_low` is true. Outside them the parameter has no meaning.
     text : str
-        One sentence for people.
+        What the parameter means, in one sentence.
     log : bool
-        Looked for on a logarithmic scale.
+        True when a fit looks for the parameter on a logarithmic scale.
     per_texel : bool
-        One number per texel; a single number stands for all texels.
+        True when the value may be one number per texel; a single number is then the same for all texels.
+    above_low : bool
+        True when `low` itself is outside the bounds.
+    label, symbol : str
+        Name and symbol in panels.
+    source : str
+        Equation of the paper, or the law that has the parameter.
+    note : str
+        Typical values and how to find one, for panels.
+    group : str
+        Panel that shows the parameter.
     """
 
     name: str
@@ -34,12 +57,121 @@ class Parameter:
     text: str
     log: bool = False
     per_texel: bool = False
+    above_low: bool = False
+    label: str = ""
+    symbol: str = ""
+    source: str = ""
+    note: str = ""
+    group: str = ""
 
     def scaled(self, gain: float) -> Parameter:
         """Return the parameter as it is for a sensor with this gain."""
         if not self.unit.startswith("unit"):
             return self
         size = abs(gain)
-        return Parameter(
-            self.name, self.unit, self.default * size, self.low * size, self.high * size, self.text, self.log, self.per_texel
-        )
+        return replace(self, default=self.default * size, low=self.low * size, high=self.high * size)
+
+    def unit_of(self, sensor_unit: str) -> str:
+        """Return the unit of the parameter on a sensor that reports in `sensor_unit`; "1" where it has none."""
+        return self.unit.replace("unit", sensor_unit)
+
+    @property
+    def bounds(self) -> str:
+        """The numbers that are allowed, as in "a value above zero"."""
+        number = "zero" if self.low == 0.0 else f"{self.low:g}"
+        if math.isinf(self.high):
+            if math.isinf(self.low):
+                return "a finite value"
+            return f"a value above {number}" if self.above_low else f"a value of {number} or more"
+        return f"a value from {self.low:g} to {self.high:g}"
+
+    def check(self, value: Any, owner: str) -> None:
+        """Raise :class:`ParameterError` for a value outside the bounds; `owner` is who has it, as in "sensor 'tip'"."""
+        inside = self.low < value <= self.high if self.above_low else self.low <= value <= self.high
+        if not (math.isfinite(value) and inside):
+            raise ParameterError(f"{self.name} of {owner} is {value:g}: give it {self.bounds}.")
+
+    def read(self, word: Any) -> float | None:
+        """Return the value that a word of a file means, None when it means none."""
+        return float(word) if isinstance(word, int | float) and not isinstance(word, bool) else None
+
+    wanted = "a number"
+    """What a file has to give."""
+
+
+@dataclass(frozen=True)
+class Choice:
+    """One of the values of a :class:`ChoiceParameter`: the value, its label and what it means."""
+
+    value: str | int
+    label: str
+    text: str
+
+
+@dataclass(frozen=True)
+class ChoiceParameter:
+    """A parameter that has one of a few values; attributes as those of :class:`Parameter`."""
+
+    name: str
+    default: str | int
+    choices: tuple[Choice, ...]
+    text: str
+    label: str = ""
+    group: str = ""
+
+    def check(self, value: Any, owner: str) -> None:
+        """Raise :class:`ParameterError` for a value that is not among the choices."""
+        values = [choice.value for choice in self.choices]
+        if value not in values:
+            raise ParameterError(
+                f"{self.name} of {owner} is {value!r}: use one of {', '.join(str(value) for value in values)}."
+            )
+
+    def read(self, word: Any) -> str | int | None:
+        """Return the value that a word of a file means, None when it means none."""
+        return word if type(word) is type(self.default) else None
+
+    @property
+    def wanted(self) -> str:
+        """What a file has to give."""
+        return "a text" if isinstance(self.default, str) else "a whole number"
+
+
+@dataclass(frozen=True)
+class TextParameter:
+    """A parameter that is any text; attributes as those of :class:`Parameter`."""
+
+    name: str
+    default: str
+    text: str
+    label: str = ""
+    group: str = ""
+
+    def check(self, value: Any, owner: str) -> None:
+        """Accept every text."""
+
+    def read(self, word: Any) -> str | None:
+        """Return the value that a word of a file means, None when it means none."""
+        return word if isinstance(word, str) else None
+
+    wanted = "a text"
+    """What a file has to give."""
+
+
+Specification = Parameter | ChoiceParameter | TextParameter
+
+
+def specified(specification: Specification) -> Any:
+    """Return the dataclass field of a parameter, with its default."""
+    return field(default=specification.default, metadata={SPECIFICATION: specification})
+
+
+def specifications(owner: type) -> Mapping[str, Specification]:
+    """Return the specifications of a dataclass by field name, in the order of its fields; other fields are left out.
+
+    Parameters
+    ----------
+    owner : type
+        A dataclass whose parameters are :func:`specified`.
+    """
+    return {item.name: item.metadata[SPECIFICATION] for item in fields(owner) if SPECIFICATION in item.metadata}

@@ -3,105 +3,110 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, fields
+from math import inf
 
 import numpy as np
 
 from ..errors import ParameterError
+from .parameter import Choice, ChoiceParameter, Parameter, TextParameter, specifications, specified
 
-HUNT_CROSSLEY = "hunt-crossley"
-NORMAL_LAWS = ("linear", HUNT_CROSSLEY)
-"""What the normal force may be: Eq. 8 of the paper, or ``k dᵖ (1 + 3/2 α ḋ)``."""
+LINEAR, HUNT_CROSSLEY = "linear", "hunt-crossley"
+NORMAL_LAWS = (
+    Choice(LINEAR, "Linear", "k d + cn ḋ (Eq. 8): a spring and a damper"),
+    Choice(HUNT_CROSSLEY, "Hunt–Crossley", "k dᵖ (1 + 3/2 α ḋ): no force jump at first touch; e = 1 - α v for slow impacts"),
+)
+"""The laws of the normal force. The second one (J. Appl. Mech. 42, 1975) has `exponent` and `dissipation`, and no `cn`."""
 
+CONTACT_POINTS = (
+    Choice(1, "1", "At the texel's vertex, as in the paper"),
+    *(Choice(n * n, f"{n} × {n}", f"{n * n} points in the cell of each texel") for n in range(2, 11)),
+)
 
-MOST_POINTS = 100
-"""Contact points that a texel may have."""
+CONTACT, FRICTION, READOUT = "contact", "friction", "readout"
+"""The groups of parameters: each is a panel."""
 
 
 @dataclass(frozen=True)
 class SensorParameters:
-    """What one texel is made of; names as in the paper's Tables 1 and 2, every value per texel.
+    """The parameters of one texel; names as in the paper's Tables 1 and 2, every value per texel.
 
-    Attributes
-    ----------
-    k : float, N/m
-        Normal stiffness (Eq. 8, 18).
-    cn : float, N·s/m
-        Normal damping (Eq. 8); about 1 % of `k` in number.
-    ct : float, N·s/m
-        Tangential viscous damping (Eq. 13).
-    sigma0 : float, N/m
-        Bristle stiffness (Eq. 9, 13).
-    sigma1 : float, N·s/m
-        Bristle damping (Eq. 13).
-    x0 : float, m/s
-        Stribeck velocity (Eq. 10).
-    mus, mud : float
-        Static and dynamic friction coefficients (Eq. 11, 12).
-    max_penetration : float, m
-        Depth past which a texel no longer acts (section 3.3.3: about twice the foam's thickness).
-    normal_law : str
-        One of :data:`NORMAL_LAWS`.
-    exponent : float
-        `p` in the law of Hunt and Crossley (J. Appl. Mech. 42, 1975), whose `k` then is in N/mᵖ; 3/2 is Hertz's.
-    dissipation : float, s/m
-        `α` in that law, which has no `cn`: slow impacts at speed v leave with ``(1 - α v) v``.
-    points_per_texel : int
-        Contact points in the cell of each texel, a square number; they share out all that the texel's spring, damper and
-        bristles do.
-    gain, zero : float
-        Linear conversion to what the sensor reports: ``reading = zero + gain · force``, in `unit`.
-    unit : str
+    Each line below is the whole specification of a parameter. The digest of a scenario hashes these fields by name and in this
+    order, so a new parameter changes the digest of every scene and goes to the end.
     """
 
-    k: float = 58.5
-    cn: float = 0.0583
-    ct: float = 0.01
-    sigma0: float = 1.0
-    sigma1: float = 0.1
-    x0: float = 0.3
-    mus: float = 0.435
-    mud: float = 0.23
-    max_penetration: float = 0.012
-    normal_law: str = "linear"
-    exponent: float = 1.5
-    dissipation: float = 0.2
-    points_per_texel: int = 1
-    gain: float = 1.0
-    zero: float = 0.0
-    unit: str = "N"
+    # fmt: off
+    k: float = specified(Parameter(
+        "k", "N/m", 58.5, 0.0, inf, "Normal stiffness of one texel",
+        above_low=True, label="Stiffness", symbol="k", source="Eq. 8", group=CONTACT,
+        note="Eq. 18 finds it from foam data. Table 2: 58.5; the pad of Table 3: 1000"))
+    cn: float = specified(Parameter(
+        "cn", "N·s/m", 0.0583, 0.0, inf, "Normal damping of one texel",
+        label="Damping", symbol="cn", source="Eq. 8", group=CONTACT,
+        note="About 1 % of k in number; Table 2 has 0.0583"))
+    ct: float = specified(Parameter(
+        "ct", "N·s/m", 0.01, 0.0, inf, "Viscous friction: grows with sliding speed",
+        label="Viscous", symbol="ct", source="Eq. 13", group=FRICTION, note="Table 2: 0.01"))
+    sigma0: float = specified(Parameter(
+        "sigma0", "N/m", 1.0, 0.0, inf, "Bristle stiffness: tangential stiffness before a texel slips",
+        above_low=True, label="Bristles", symbol="σ0", source="Eq. 9, 13", group=FRICTION, note="Table 2: 1"))
+    sigma1: float = specified(Parameter(
+        "sigma1", "N·s/m", 0.1, 0.0, inf, "Bristle damping",
+        label="Bristles", symbol="σ1", source="Eq. 13", group=FRICTION, note="Table 2: 0.1"))
+    x0: float = specified(Parameter(
+        "x0", "m/s", 0.3, 0.0, inf, "Stribeck velocity: speed at which static friction gives way to dynamic",
+        above_low=True, label="Stribeck", symbol="x0", source="Eq. 10", group=FRICTION, note="Table 2: 0.3"))
+    mus: float = specified(Parameter(
+        "mus", "1", 0.435, 0.0, inf, "Coefficient at which sliding begins",
+        label="Static Friction", symbol="μs", source="Eq. 11", group=FRICTION, note="Foam on metal: 0.435"))
+    mud: float = specified(Parameter(
+        "mud", "1", 0.23, 0.0, inf, "Coefficient of fast sliding, at most μs",
+        label="Dynamic Friction", symbol="μd", source="Eq. 12", group=FRICTION, note="Foam on metal: 0.23"))
+    max_penetration: float = specified(Parameter(
+        "max_penetration", "m", 0.012, 0.0, inf, "Depth past which a texel no longer acts",
+        above_low=True, label="Max Penetration", group=CONTACT,
+        note="About twice the thickness of the foam (section 3.3.3): 0.012 for 6 mm"))
+    normal_law: str = specified(ChoiceParameter(
+        "normal_law", LINEAR, NORMAL_LAWS, "How the normal force follows from depth and its rate",
+        label="Normal Law", group=CONTACT))
+    exponent: float = specified(Parameter(
+        "exponent", "1", 1.5, 1.0, 4.0, "Power of the depth",
+        label="Exponent", symbol="p", source="Hunt–Crossley", group=CONTACT, note="k then is in N/mᵖ. Hertz: 1.5"))
+    dissipation: float = specified(Parameter(
+        "dissipation", "s/m", 0.2, 0.0, inf, "Dissipation: a slow impact at v m/s leaves with the share 1 - α v",
+        label="Dissipation", symbol="α", source="Hunt–Crossley", group=CONTACT))
+    points_per_texel: int = specified(ChoiceParameter(
+        "points_per_texel", 1, CONTACT_POINTS,
+        "Per texel, spread over its cell; they share out its stiffness. More of them are slower and make force and "
+        "contact area of small or curved objects exact on coarser pads",
+        label="Contact Points", group=CONTACT))
+    gain: float = specified(Parameter(
+        "gain", "unit/N", 1.0, -inf, inf, "Reading = zero + gain · normal force; what one newton adds to the reading",
+        label="Gain", group=READOUT))
+    zero: float = specified(Parameter(
+        "zero", "unit", 0.0, -inf, inf, "Reading without load",
+        label="Zero", group=READOUT))
+    unit: str = specified(TextParameter(
+        "unit", "N", "Of the reading, as in N, V or counts",
+        label="Unit", group=READOUT))
+    # fmt: on
 
     def check(self, name: str) -> None:
-        """Raise :class:`ParameterError` for the first value that means nothing."""
-        for key in ("k", "sigma0", "x0", "max_penetration"):
-            value = getattr(self, key)
-            if not (np.isfinite(value) and value > 0):
-                raise ParameterError(f"{key} of sensor '{name}' is {value:g}: give it a value above zero.")
-        for key in ("cn", "ct", "sigma1", "mus", "mud"):
-            value = getattr(self, key)
-            if not (np.isfinite(value) and value >= 0):
-                raise ParameterError(f"{key} of sensor '{name}' is {value:g}: give it a value of zero or more.")
-        if not 1 <= self.points_per_texel <= MOST_POINTS or math.isqrt(self.points_per_texel) ** 2 != self.points_per_texel:
-            raise ParameterError(
-                f"points_per_texel of sensor '{name}' is {self.points_per_texel}: "
-                f"give it a square number, as 1, 4 or 9, of at most {MOST_POINTS}."
-            )
-        if self.normal_law not in NORMAL_LAWS:
-            raise ParameterError(
-                f"The normal law of sensor '{name}' is '{self.normal_law}': use one of {', '.join(NORMAL_LAWS)}."
-            )
-        if not 1.0 <= self.exponent <= 4.0:
-            raise ParameterError(f"exponent of sensor '{name}' is {self.exponent:g}: give it a value from 1 to 4.")
-        if not (np.isfinite(self.dissipation) and self.dissipation >= 0):
-            raise ParameterError(f"dissipation of sensor '{name}' is {self.dissipation:g}: give it a value of zero or more.")
+        """Raise :class:`ParameterError` for the first value of sensor `name` that has no meaning."""
+        owner = f"sensor '{name}'"
+        for key, specification in SENSOR_PARAMETERS.items():
+            specification.check(getattr(self, key), owner)
         if self.mud > self.mus:
             raise ParameterError(
-                f"mud of sensor '{name}' ({self.mud:g}) is larger than mus ({self.mus:g}): "
+                f"mud of {owner} ({self.mud:g}) is larger than mus ({self.mus:g}): "
                 "dynamic friction cannot exceed static friction, lower mud or raise mus."
             )
-        if not (np.isfinite(self.gain) and np.isfinite(self.zero) and self.gain != 0):
-            raise ParameterError(f"gain and zero of sensor '{name}' must be finite and gain not zero.")
+        if self.gain == 0:
+            raise ParameterError(f"gain of {owner} is 0: give it another value, or the sensor reports nothing.")
+
+
+SENSOR_PARAMETERS = specifications(SensorParameters)
+"""The specifications of a sensor's parameters by name."""
 
 
 @dataclass(frozen=True)
@@ -138,3 +143,9 @@ class Painted:
                     f"The painted {item.name} of sensor '{name}' is {values.min():g} at texel {values.argmin()}: "
                     "give every texel a factor above zero."
                 )
+
+
+def unit_of(name: str, sensor_unit: str) -> str:
+    """Return the unit of a parameter on a sensor that reports in `sensor_unit`; "1" where it has none."""
+    specification = SENSOR_PARAMETERS[name]
+    return specification.unit_of(sensor_unit) if isinstance(specification, Parameter) else "1"

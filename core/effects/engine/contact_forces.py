@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...model.effect import Effect
+from ...model.sensor_parameters import LINEAR
 from .compiled_program import (
     COLUMNS,
     DAMPING,
@@ -64,7 +65,7 @@ def normal_forces(
         rate[1:] = np.diff(depth, axis=0) / np.diff(time)[:, None]
     lengths, step = steps_of(time)
     inside = np.maximum(depth, 0.0)
-    linear = parameters.normal_law == "linear"
+    linear = parameters.normal_law == LINEAR
     force = parameters.k * (inside if linear else inside**parameters.exponent)
     damping = parameters.cn * rate if linear else 1.5 * parameters.dissipation * rate
     clipped = False
@@ -136,7 +137,7 @@ class StepwiseNormalForces:
         """
         p, n = self.parameters, len(depth)
         slide = np.zeros(n) if slide is None else slide
-        linear = p.normal_law == "linear"
+        linear = p.normal_law == LINEAR
         work = self._work.reshape(1, -1)
         for i in range(n):
             press(work, 0, n, i, depth[i], rate[i], slide[i], 0.0, p.k, p.cn, 0.0 if linear else p.exponent, p.dissipation)

@@ -22,7 +22,6 @@ from ..fitting.regression import Estimate, intervals
 
 STEADY = ("mus", "mud", "x0", "ct")
 DYNAMIC = (*STEADY, "sigma0", "sigma1")
-UNITS = {"mus": "", "mud": "", "x0": "m/s", "ct": "N·s/m", "sigma0": "N/m", "sigma1": "N·s/m"}
 
 
 @dataclass(frozen=True)

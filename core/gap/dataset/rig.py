@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +17,8 @@ import numpy as np
 from ...errors import FileError, ParameterError, SensorError
 from ...geometry.mesh import TriangleMesh, checked_mesh
 from ...geometry.texels import Texels, texels_from_region
-from ...model.sensor_parameters import SensorParameters
+from ...io.sensor_toml import SHAPE_WORDS, stated_parameters
+from ...model.sensor_parameters import SENSOR_PARAMETERS, SensorParameters
 from .csv_columns import read_table
 
 FORMAT = "palpate-rig/1"
@@ -177,7 +178,7 @@ def read_rig(path: str | Path) -> Rig:
         name=str(words.get("name", path.stem)),
         texels=texels,
         parameters=parameters,
-        given=frozenset(set(sensor) & {item.name for item in fields(SensorParameters)}),
+        given=frozenset(set(sensor) & set(SENSOR_PARAMETERS)),
         thickness=thickness,
         grid=grid,
         indenter=indenter,
@@ -306,22 +307,16 @@ def _mesh(path: Path, name: str) -> tuple[TriangleMesh, list[str]]:
 
 
 def _parameters(sensor: dict[str, Any], path: Path) -> tuple[SensorParameters, float | None]:
-    known = {item.name for item in fields(SensorParameters)}
-    _known(sensor, known | {"grid", "mesh", "thickness", "name"}, f"[sensor] of '{path.name}'")
+    where = f"[sensor] of '{path.name}'"
+    _known(sensor, {*SENSOR_PARAMETERS, *SHAPE_WORDS, "name"}, where)
     thickness = None
     if "thickness" in sensor:
         (thickness,) = _numbers(sensor["thickness"], 1, "thickness", path)
         if thickness > 1.0:
             raise ParameterError(f"thickness of '{path.name}' is {thickness:g} m: give it in metres.")
-    values: dict[str, Any] = {}
-    for key in known & set(sensor):
-        value = sensor[key]
-        if key == "unit":
-            if not isinstance(value, str) or not value.strip():
-                raise ParameterError(f"unit of '{path.name}' is {value!r}: write the unit's name, \"N\" for newtons.")
-        elif not isinstance(value, int | float) or isinstance(value, bool):
-            raise ParameterError(f"{key} of '{path.name}' is {value!r}: give a number.")
-        values[key] = value if key == "unit" else float(value)
+    values = stated_parameters(sensor, where)
+    if not values.get("unit", "N").strip():
+        raise ParameterError(f"unit of '{path.name}' is empty: write the unit's name, \"N\" for newtons.")
     if "k" in values and "cn" not in values:
         values["cn"] = 0.01 * values["k"]
     if thickness is not None and "max_penetration" not in values:

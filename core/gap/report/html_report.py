@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from ...effects.engine.registry import form_of, kind_of
+from ...model.sensor_parameters import unit_of
 from ..forward.contact_phases import FEATURES
 from ..selection.diagnosis import Diagnosis
 from .plots import PICTURES
@@ -139,15 +140,14 @@ def _evidence(found: dict[str, Any]) -> str:
 
 def _numbers(result: Diagnosis, found: dict[str, Any]) -> str:
     unit = result.rig.parameters.unit
-    units = {"k": "N/m", "cn": "N·s/m", "ct": "N·s/m", "sigma0": "N/m", "x0": "m/s", "zero": unit, "gain": f"{unit}/N"}
     rows = []
     for name, value in found["base"]["parameters"].items():
         low, high = found["base"]["intervals"][name]
-        rows.append(["base model", name, f"{value:.4g}", _interval(value, low, high), units.get(name, "1")])
+        rows.append(["base model", name, f"{value:.4g}", _interval(value, low, high), unit_of(name, unit)])
     for one in found["found"]:
         for parameter in form_of(one["effect"], one["form"]).parameters:
             value = one["parameters"].get(parameter.name)
-            own = parameter.unit.replace("unit", unit)
+            own = parameter.unit_of(unit)
             if isinstance(value, list):
                 rows.append(
                     [one["effect"], parameter.name, f"{len(value)} numbers, {min(value):.3g} … {max(value):.3g}", "", own]

@@ -14,6 +14,7 @@ import numpy as np
 from ...effects.engine.registry import library
 from ...jobs.progress import Job, Progress
 from ...model.effect import Effect
+from ...model.sensor_parameters import LINEAR
 from ..dataset.rig import Rig
 from ..fitting.heteroscedastic_noise import proportional_noise
 from ..fitting.least_squares import FRICTION_LEVEL, FRICTION_PARAMETERS, Fit, fit, free_base_parameters, held_out_squares
@@ -117,7 +118,7 @@ def identified_base_parameters(rig: Rig, predictors: Sequence[Predictor]) -> lis
     own_unit = rig.parameters.unit != "N"
     names: list[str] = []
     if pressed:
-        names += ["k", "cn"] if rig.parameters.normal_law == "linear" else ["k"]
+        names += ["k", "cn"] if rig.parameters.normal_law == LINEAR else ["k"]
         if own_unit and read and "gain" not in rig.given and not felt:
             names.remove("k")
             names.append("gain")

@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Rigs are read as docs/gap.md says, and each bad one gets a sentence that names what, where, and what to do."""
 
+import json
+from dataclasses import asdict
+
 import numpy as np
 import pytest
 import trimesh
@@ -9,6 +12,7 @@ from palpate.benchmarks._recordings import Recording
 from palpate.core.errors import PalpateError
 from palpate.core.gap.dataset import csv_columns
 from palpate.core.gap.dataset.rig import read_rig
+from palpate.core.model.sensor_parameters import SensorParameters
 
 TEXELS = 6
 RIG = """
@@ -85,6 +89,15 @@ def test_a_rig_is_read(tmp_path):
     assert np.isnan(trial.reading[3, 3]) and np.isnan(trial.reading).sum() == 1
 
 
+def test_a_rig_knows_every_word_that_a_sensor_file_knows(tmp_path):
+    """Choices and whole numbers too; a pad that follows Hunt and Crossley is described as anywhere else."""
+    words = {**asdict(SensorParameters()), "normal_law": "hunt-crossley", "exponent": 1.25, "points_per_texel": 4, "unit": "V"}
+    text = "\n".join(f"{key} = {json.dumps(value)}" for key, value in words.items())
+    rig = read_rig(write(tmp_path, RIG.replace("k = 80.0", text)))
+    assert rig.parameters == SensorParameters(**words)
+    assert rig.given == set(words)
+
+
 def test_other_stimuli_meshes_and_forces(tmp_path):
     trimesh.creation.box((0.02, 0.02, 0.02)).export(tmp_path / "pad.ply")
     rig = RIG.replace("grid = { rows = 3, columns = 2, pitch = [0.003, 0.004] }", 'mesh = "pad.ply"')
@@ -149,6 +162,10 @@ BAD_RIGS = {
     "unit that is no text": (("k = 80.0", "k = 80.0\nunit = 3"), "unit"),
     "k that is text": (("80.0", '"80"'), "give a number"),
     "k below zero": (("80.0", "-80.0"), "above zero"),
+    "no such law": (("k = 80.0", 'k = 80.0\nnormal_law = "cubic"'), "use one of linear, hunt-crossley"),
+    "half a point": (("k = 80.0", "k = 80.0\npoints_per_texel = 1.5"), "whole number"),
+    "five points": (("k = 80.0", "k = 80.0\npoints_per_texel = 5"), "points_per_texel"),
+    "empty unit": (("k = 80.0", 'k = 80.0\nunit = " "'), "unit"),
     "rows": (("rows = 3", "rows = 0"), "rows"),
     "texel count": (("rows = 3", "rows = 4"), "6 texel columns and the sensor has 8"),
     "no trial": (('[[trial]]\nfile = "press.csv"\n[[trial]]\nfile = "again.csv"\nuse = "check"', ""), "no [[trial]]"),
