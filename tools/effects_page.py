@@ -17,9 +17,11 @@ INTRODUCTION = """\
 
 <!-- Written by tools/effects_page.py from core/effects; change it there. -->
 
-A real sensor does more than the base model of [model.md](model.md) says: foam settles, transducers trail behind, wires leak.
-Each of these is an *effect* that a sensor can be given, in one of several formulas, since no two papers agree on one. In
-Blender: Physics › Palpate › Effects › *Add Effect*. In a script or a file, an effect is its name, its form and its values:
+A real sensor does more than the base model of [model.md](model.md): foam settles, transducers trail behind the load, wires
+leak.
+Each of these phenomena is an *effect* that a sensor can be given. Most effects come in several formulas, called forms, since no
+two papers agree on one. In Blender: Physics › Palpate › Effects › *Add Effect*. In a script or a file, an effect is its name,
+its form and its values:
 
 ```python
 from palpate.core.effects.engine.registry import effect
@@ -37,27 +39,27 @@ time = 2.0
 
 ![What each effect does](images/effects.png)
 
-*What each effect does: grey the base model, coloured the forms with their default values, or a little more of them.*
+*What each effect does: the base model in grey, the forms in colour, with their default values or slightly larger ones.*
 
 ## Where effects act
 
-| stage | what it changes |
+| site of action | what it changes |
 | --- | --- |
-| contact | the law of contact itself, without memory: forces, and so the bodies, and what is read |
-| pad | the same, with memory of what happened to each texel |
+| contact | the contact law itself, without memory: the forces, hence the bodies and the readings |
+| pad | the same, with a memory in each texel |
 | readout | only what the sensor reports |
 
-Within a sensor they act in the order of this page, on the way from the contact to the reading, however they are stacked.
-Effects on readings come before the conversion `reading = zero + gain · force` (their parameters are in newtons), or after it
-(in the sensor's own unit; defaults and bounds below are for a gain of one unit per newton and grow with the gain). Names of
-parameters are those of files and scripts.
+The effects of a sensor act in the order of this page, from the contact to the reading, in whatever order they are stacked.
+Effects on readings act before the conversion `reading = zero + gain · force` (then their parameters are in newtons) or after
+it (then they are in the unit of the sensor; the defaults and bounds below are for a gain of one unit per newton and scale with
+the gain). The parameters have these names in files and scripts.
 
-In the formulas *fₑ* is the elastic force `k d` (or Hunt and Crossley's), to which the damping is added behind the effects of
-the pad; *f* the force that comes out; *r* the reading, *r₀* the one that comes in. What is called texel by texel in the pad has
-its memory in each contact point, whatever presses on it; what is pressed recovers while nothing touches, and hysteresis and
-adhesion forget then. Whatever acts by chance depends on its seed, the texel and the moment alone: a frame reads the same
-whether it is played, baked or asked for by itself. Time counts from the first frame. Effects with memory on readings
-take the force as linear between two frames.
+In the formulas *fₑ* is the elastic force `k d` (or Hunt and Crossley's), to which damping is added after the effects of the
+pad; *f* is the force that results, *r* the reading, and *r₀* the reading before the effect. Effects of the pad have a memory in
+each contact point, whatever presses on it. While nothing touches, what was pressed recovers, and hysteresis and adhesion are
+reset. Random numbers depend only on the seed, the texel and the time: a frame reads the same whether it is played, baked or
+computed by itself. Time counts from the first frame. Effects on readings that have a memory take the force as linear between
+two frames.
 """
 
 
@@ -87,12 +89,12 @@ def page() -> str:
 # --- the picture
 
 ROWS, COLUMNS, PITCH = 14, 6, 0.0034
-ROOM = {"creep": 2.3, "lag": 1.6, "wear": 1.4}
-"""By how much more than the curves need some plots are high, for the legend."""
+HEADROOM = {"creep": 2.3, "lag": 1.6, "wear": 1.4}
+"""Factors that make some plots higher, so that the legend has room above the curves."""
 
 
 def picture(path: Path) -> None:
-    """Draw each effect in the experiment that shows it best."""
+    """Draw each effect in an experiment that shows it."""
     from palpate.core.effects.engine.registry import library
     from palpate.core.figures.figure_canvas import new_figure, save_figure
 
@@ -115,7 +117,7 @@ def _setting():
 
 
 def _curves(axes, kind, x, base, of_form, xlabel, ylabel, **values):
-    """Grey the base, in colour what each form makes of it; `values` by form name go beyond the defaults."""
+    """Draw the base model in grey and each form in colour; `values` by name of the form replace defaults."""
     from palpate.core.effects.engine.registry import effect
     from palpate.core.figures.figure_canvas import tidy_axes
     from palpate.core.figures.figure_style import GREY, SERIES
@@ -130,13 +132,13 @@ def _curves(axes, kind, x, base, of_form, xlabel, ylabel, **values):
     tidy_axes(axes)
     axes.set_xlabel(xlabel, labelpad=1)
     axes.set_ylabel(ylabel, labelpad=1)
-    axes.set_ylim(top=axes.get_ylim()[1] * ROOM.get(kind.name, 1.0))
-    place = "upper right" if kind.name in ROOM else "best"
+    axes.set_ylim(top=axes.get_ylim()[1] * HEADROOM.get(kind.name, 1.0))
+    place = "upper right" if kind.name in HEADROOM else "best"
     axes.legend(fontsize=8, frameon=False, handlelength=1.0, borderpad=0.1, labelspacing=0.2, loc=place)
 
 
 def _pressed(time, depth, slide=None):
-    """Return what one texel reads over a history of depths, with an effect of whatever stage."""
+    """Return a function from effects to the readings of one texel over a history of depths."""
     from palpate.core.effects.engine.contact_forces import normal_forces
     from palpate.core.effects.engine.readout_chain import readings
 
@@ -190,7 +192,7 @@ def _over_speed(axes, kind):
 
 
 def _peaks(axes, kind):
-    """The highest reading of each of forty pressings, rubbed all the while."""
+    """Draw the peak reading of each of forty pressings under steady sliding."""
     time = np.linspace(0, 40, 4001)
     depth = _cycles(40)(time)
     texel = _pressed(time, depth, np.full(len(time), 1e-3))
@@ -199,7 +201,7 @@ def _peaks(axes, kind):
 
 
 def _across(axes, kind):
-    """A column of the pad under a load on one texel."""
+    """Draw a column of the pad under a load on one texel."""
     from palpate.core.effects.engine.readout_chain import readings
 
     site = _setting()[0]
@@ -224,21 +226,21 @@ def _texels(**values):
 
 
 def _ball(axes, kind):
-    """What a ball on the middle of the pad reads along one column."""
+    """Draw the forces of a ball on the centre of the pad along one column."""
     from palpate.core.effects.engine.registry import actual_placement
 
     site = _setting()[0]
     middle = site.position.mean(axis=0)
     up, across = np.tile([0.0, 0.0, 1.0], (len(site), 1)), np.tile([1.0, 0.0, 0.0], (len(site), 1))
 
-    def felt(*items):
+    def forces_along_column(*items):
         position, _, _ = actual_placement(items, site.position, up, across)
         r = np.linalg.norm((position - middle)[:, :2], axis=1)
         depth = np.maximum(position[:, 2] + 0.002 - 0.04 + np.sqrt(np.maximum(0.04**2 - r**2, 0)), 0)
         return 1000.0 * depth.reshape(ROWS, COLUMNS)[:, 3]
 
     more = {"shift": {"x": 0.0, "y": 0.005}, "turn": {"x": 0.003, "y": 0.0, "about_z": 0.4}, "tilt": {"about_x": 0.08}}
-    _curves(axes, kind, np.arange(ROWS), felt(), felt, "row", "force of a ball (N)", **more)
+    _curves(axes, kind, np.arange(ROWS), forces_along_column(), forces_along_column, "row", "force of a ball (N)", **more)
 
 
 def _cycles(turns, top=0.002):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Forces of contact with a sensor's effects on a known motion: over a whole signal, and step by step with equal results."""
+"""Contact forces of a sensor with effects along a known motion: over a whole signal, or step by step with equal results."""
 
 from __future__ import annotations
 
@@ -39,25 +39,22 @@ def normal_forces(
     depth: np.ndarray,
     slide: np.ndarray | None = None,
     rate: np.ndarray | None = None,
-    stiffness: ArrayLike = 1.0,
 ) -> np.ndarray:
-    """Normal forces that a sensor's effects make of a known motion, (t, n) float, N.
+    """Return the normal forces on the texels of a sensor along a known motion, (t, n) float, N.
 
     Parameters
     ----------
     effects : sequence of Effect
-        Those on readings are left out.
+        Effects on readings are ignored.
     parameters : SensorParameters
     time : (t,) float, s, increasing
-        At the first sample nothing has happened yet: no force was there before it.
+        Nothing has touched the sensor before the first sample.
     depth : (t, n) float, m
         Zero or less where nothing touches.
     slide : (t, n) float, m, optional
-        Distance slid since the sample before.
+        Distance slid since the sample before; zero by default.
     rate : (t, n) float, m/s, optional
-        Of the depth; without it the change since the sample before.
-    stiffness : float or (n,) float
-        Multiplies k and cn of each texel, as where it is painted.
+        Rate of the depth; by default the difference quotient since the sample before.
     """
     time, depth = np.asarray(time, float), np.ascontiguousarray(depth, dtype=float)
     if rate is None:
@@ -73,25 +70,33 @@ def normal_forces(
         if form.law is None or form.constants is None:
             continue
         if form.after_clip and not clipped:
-            force, clipped = _cut_off(force, inside, damping, linear), True
+            force, clipped = _damped_and_clipped(force, inside, damping, linear), True
         memory = np.zeros((depth.shape[1], form.state_size))
         force = law_over_time(form, force, step, form.constants(complete_values(item), lengths), memory, inside, slide)
-    return force if clipped else _cut_off(force, inside, damping, linear)
+    return force if clipped else _damped_and_clipped(force, inside, damping, linear)
 
 
-def _cut_off(elastic: np.ndarray, depth: np.ndarray, damping: np.ndarray, linear: bool) -> np.ndarray:
-    """Elastic force and damping together never pull (Eq. 8, or Hunt and Crossley's law)."""
+def _damped_and_clipped(elastic: np.ndarray, depth: np.ndarray, damping: np.ndarray, linear: bool) -> np.ndarray:
+    """Return elastic force and damping together, clipped at zero (Eq. 8, or Hunt and Crossley's law)."""
     total = elastic + damping if linear else elastic * (1.0 + damping)
     return np.where(depth > 0.0, np.maximum(total, 0.0), 0.0)
 
 
 def friction_factors(effects: Sequence[Effect], speed: np.ndarray, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """How a sensor's effects change sliding: factor on the friction coefficient, and N·s/m to add to `ct`.
+    """Return how the effects of a sensor change its friction.
 
     Parameters
     ----------
     effects : sequence of Effect
     speed, force : (...) float, m/s and N
+        Sliding speed and normal force.
+
+    Returns
+    -------
+    factor : (...) float
+        Multiplies the friction coefficients.
+    viscosity : (...) float, N·s/m
+        Is added to `ct`.
     """
     speed, force = np.broadcast_arrays(np.asarray(speed, float), np.asarray(force, float))
     program, n = compile_program([effects], 0.0), speed.size
@@ -102,16 +107,17 @@ def friction_factors(effects: Sequence[Effect], speed: np.ndarray, force: np.nda
 
 
 class StepwiseNormalForces:
-    """Normal forces sample by sample, as the solver asks for them: any number of guesses, then the step itself.
+    """Normal forces step by step, as the solver needs them: any number of trial evaluations, then the step itself.
 
     Parameters
     ----------
     effects : sequence of Effect
-        Those on readings are left out.
+        Effects on readings are ignored.
     parameters : SensorParameters
     dt : (m,) float, s
         Lengths of step that will occur.
     points : int
+        Number of contact points.
     """
 
     def __init__(self, effects: Sequence[Effect], parameters: SensorParameters, dt: ArrayLike, points: int):
@@ -124,16 +130,22 @@ class StepwiseNormalForces:
     def step(
         self, length: int, depth: np.ndarray, rate: np.ndarray, slide: np.ndarray | None = None, commit: bool = True
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return the forces at the step's end (N), and their derivatives by depth (N/m) and by rate (N·s/m), each (n,) float.
+        """Return forces and tangents at the end of a step.
 
         Parameters
         ----------
         length : int
-            Which of the lengths of step.
+            Index of the length of the step.
         depth, rate, slide : (n,) float, m, m/s, m
-            At the step's end, during it, and in it.
+            Depth at the end of the step, its rate during the step, and the distance slid in the step.
         commit : bool
-            The step is done; without it one only asks.
+            Update the memory of the effects. If false, the step is only evaluated.
+
+        Returns
+        -------
+        force : (n,) float, N
+        by_depth, by_rate : (n,) float, N/m and N·s/m
+            Derivatives of the force.
         """
         p, n = self.parameters, len(depth)
         slide = np.zeros(n) if slide is None else slide

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What one texel gives to the others: weights as a matrix, whole for few texels and only its near part for many."""
+"""Linear coupling of texels: a dense matrix for few texels, and a list of the pairs within reach for many."""
 
 from __future__ import annotations
 
@@ -9,12 +9,13 @@ from dataclasses import dataclass
 import numpy as np
 
 LARGEST_DENSE = 1500
-"""Up to so many texels every pair counts; of more only those within reach, since the matrix would not fit."""
+"""Up to this number of texels every pair counts. Of more texels only pairs within reach count, since the matrix would not fit
+into memory."""
 
 
 @dataclass(frozen=True)
 class CouplingMatrix:
-    """A matrix of weights: what texel ``source`` adds to texel ``target``.
+    """Weights with which the texels `source` add to the texels `target`.
 
     Attributes
     ----------
@@ -22,7 +23,7 @@ class CouplingMatrix:
         Row: target; column: source.
     target, source : (p,) int
     weight : (p,) float
-        The same as a list, sorted by target, where there is no matrix.
+        The same as a list of pairs, sorted by target, if there is no matrix.
     """
 
     matrix: np.ndarray | None
@@ -31,7 +32,7 @@ class CouplingMatrix:
     weight: np.ndarray
 
     def apply(self, signal: np.ndarray) -> np.ndarray:
-        """Return the mixed signal, (t, n) float."""
+        """Return the coupled signal, (t, n) float."""
         if self.matrix is not None:
             return signal @ self.matrix.T
         result = np.zeros_like(signal)
@@ -44,7 +45,7 @@ class CouplingMatrix:
 def coupling_matrix(
     position: np.ndarray, weight: Callable[[np.ndarray], np.ndarray], reach: float, area: np.ndarray | None
 ) -> CouplingMatrix:
-    """Return weights that depend on the distance of two texels.
+    """Return weights that depend on the distance between two texels.
 
     Parameters
     ----------
@@ -52,9 +53,10 @@ def coupling_matrix(
     weight : callable
         From distances (m) to weights.
     reach : float, m
-        Beyond it nothing counts where there are more than :data:`LARGEST_DENSE` texels.
+        With more than :data:`LARGEST_DENSE` texels, pairs farther apart are left out.
     area : (n,) float, m², or None
-        With areas, each texel's load is shared out by weight and area and its sum kept; without, weights are taken as they are.
+        With areas, the load of each texel is distributed in proportion to weight and area, and its sum is preserved. Without
+        areas the weights are used as they are.
     """
     n = len(position)
     if n <= LARGEST_DENSE:
@@ -73,41 +75,35 @@ def coupling_matrix(
 
 
 def pairs_within(position: np.ndarray, reach: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """All pairs of points no farther apart than `reach`, each with itself too: two (p,) int, sorted, and distances (p,)."""
+    """Return all ordered pairs of points no farther apart than `reach` (m), including each point with itself.
+
+    Returns
+    -------
+    first, second : (p,) int
+        Sorted by first, then by second.
+    distance : (p,) float, m
+    """
+    from scipy.spatial import cKDTree
+
     reach = max(float(reach), 1e-12)
-    cell = np.floor((position - position.min(axis=0)) / reach).astype(np.int64) + 1
-    size = cell.max(axis=0) + 2
-    key = (cell[:, 0] * size[1] + cell[:, 1]) * size[2] + cell[:, 2]
-    order = np.argsort(key, kind="stable")
-    found = key[order]
-    firsts, seconds = [], []
-    for step in np.ndindex(3, 3, 3):
-        x, y, z = (int(s) - 1 for s in step)
-        wanted = key + (x * size[1] + y) * size[2] + z
-        start, stop = np.searchsorted(found, wanted, "left"), np.searchsorted(found, wanted, "right")
-        count = stop - start
-        firsts.append(np.repeat(np.arange(len(position)), count))
-        within = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
-        seconds.append(order[np.repeat(start, count) + within])
-    first, second = np.concatenate(firsts), np.concatenate(seconds)
+    tree = cKDTree(position)
+    # The tree rounds distances in its own way: ask for a little more, and decide by the distances computed here.
+    found = tree.query_pairs(reach * (1.0 + 1e-9), output_type="ndarray")
+    each = np.arange(len(position))
+    first, second = np.concatenate([found[:, 0], found[:, 1], each]), np.concatenate([found[:, 1], found[:, 0], each])
     distance = np.linalg.norm(position[first] - position[second], axis=1)
-    near = distance <= reach
-    first, second, distance = first[near], second[near], distance[near]
     order = np.lexsort((second, first))
+    order = order[distance[order] <= reach]
     return first[order], second[order], distance[order]
 
 
 def nearest_distance(position: np.ndarray) -> float:
-    """Return the median over all points of the distance to the nearest other one, m."""
+    """Return the median over all points of the distance to the nearest other point, m."""
+    from scipy.spatial import cKDTree
+
     if len(position) < 2:
         return 1.0
-    size = np.ptp(position, axis=0)
-    reach = 2.0 * float(np.sort(size)[-2:].prod() / len(position)) ** 0.5 or float(size.max())
-    while True:
-        first, second, distance = pairs_within(position, reach)
-        other = first != second
-        if len(np.unique(first[other])) == len(position):
-            closest = np.full(len(position), np.inf)
-            np.minimum.at(closest, first[other], distance[other])
-            return float(np.median(closest))
-        reach *= 2.0
+    _, nearest = cKDTree(position).query(position, k=2)
+    itself = np.arange(len(position))
+    other = np.where(nearest[:, 0] == itself, nearest[:, 1], nearest[:, 0])  # of two equal points either may come first
+    return float(np.median(np.linalg.norm(position - position[other], axis=1)))

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Random numbers that are functions of what they are for, so that frames can be computed in any order.
+"""Counter-based random number streams: each number is a function of its counters, so frames can be computed in any order.
 
-Each number comes from a hash (Steele, Lea and Flood, OOPSLA 2014: SplitMix64) of seed, purpose, texel and moment; nothing is
-drawn in turn. Moments are counted in microseconds.
+A number is a hash (Steele, Lea and Flood, OOPSLA 2014: SplitMix64) of the stream's name, the seed, the texel and the time. No
+generator keeps a state. Times are counted in microseconds.
 """
 
 from __future__ import annotations
@@ -14,12 +14,22 @@ from numpy.typing import ArrayLike
 
 TICKS_PER_SECOND = 1e6
 FINEST, COARSEST = 10, 20
-"""A random walk is drawn at 2⁻¹⁰ s and linear in between; it begins to repeat nothing before 2²⁰ s, twelve days."""
+"""Logarithms of the resolution and the length of a random walk: it is drawn every 2⁻¹⁰ s, linear in between, and stops after
+2²⁰ s, twelve days."""
 
 
-def uniform(purpose: str, seed: int, *counters: ArrayLike) -> np.ndarray:
-    """Return numbers in (0, 1), of the shape that the integer counters broadcast to."""
-    start = np.uint64(zlib.crc32(purpose.encode()) << 32 | (seed & 0xFFFFFFFF))
+def uniform(stream: str, seed: int, *counters: ArrayLike) -> np.ndarray:
+    """Return uniformly distributed numbers in (0, 1).
+
+    Parameters
+    ----------
+    stream : str
+        Streams of different names are independent.
+    seed : int
+    *counters : (...) int
+        Which numbers of the stream; the result has the shape that they broadcast to.
+    """
+    start = np.uint64(zlib.crc32(stream.encode()) << 32 | (seed & 0xFFFFFFFF))
     state = _mixed(np.atleast_1d(start))
     with np.errstate(over="ignore"):
         for counter in counters:
@@ -27,31 +37,31 @@ def uniform(purpose: str, seed: int, *counters: ArrayLike) -> np.ndarray:
     return ((state >> np.uint64(11)).astype(float) + 0.5) * 2.0**-53
 
 
-def normal(purpose: str, seed: int, *counters: ArrayLike) -> np.ndarray:
-    """Return normally distributed numbers of mean 0 and variance 1 (Box and Muller)."""
-    radius = np.sqrt(-2.0 * np.log(uniform(purpose, seed, *counters)))
-    return radius * np.cos(2.0 * np.pi * uniform(purpose + "'", seed, *counters))
+def normal(stream: str, seed: int, *counters: ArrayLike) -> np.ndarray:
+    """Return normally distributed numbers of mean 0 and variance 1 (Box and Muller); arguments as in :func:`uniform`."""
+    radius = np.sqrt(-2.0 * np.log(uniform(stream, seed, *counters)))
+    return radius * np.cos(2.0 * np.pi * uniform(stream + "'", seed, *counters))
 
 
 def ticks(time: np.ndarray) -> np.ndarray:
-    """Return moments (t,) as counters."""
+    """Return times (t,) in seconds as counters."""
     return np.round(np.asarray(time, float) * TICKS_PER_SECOND).astype(np.int64)
 
 
-def random_walk(purpose: str, seed: int, time: np.ndarray, texels: int) -> np.ndarray:
-    """Return Brownian motions from 0 at time 0, (t, n) float, of variance 1 per second, one per texel.
+def random_walk(stream: str, seed: int, time: np.ndarray, texels: int) -> np.ndarray:
+    """Return Brownian motions that start from 0 at time 0, (t, n) float, one per texel, with a variance of 1 per second.
 
-    By Lévy's construction: halfway between two known points lies their mean and a normal number of a quarter of the interval's
-    variance. So any moment is known without what came before.
+    Lévy's construction: the value halfway between two known points is their mean plus a normal number with a quarter of the
+    variance of the interval. So the value at any time is found without computing the times before it.
     """
     texel = np.arange(texels)
     time = np.clip(np.asarray(time, float), 0.0, 2.0**COARSEST)
     left, width = np.zeros(len(time), dtype=np.int64), 2.0**COARSEST
     low = np.zeros((len(time), texels))
-    high = np.sqrt(width) * normal(purpose, seed, -1, texel[None, :]) + low
+    high = np.sqrt(width) * normal(stream, seed, -1, texel[None, :]) + low
     for level in range(COARSEST + FINEST):
         index, where = np.unique(left, return_inverse=True)
-        kick = normal(purpose, seed, level, index[:, None], texel[None, :])[where.ravel()]
+        kick = normal(stream, seed, level, index[:, None], texel[None, :])[where.ravel()]
         middle = 0.5 * (low + high) + 0.5 * np.sqrt(width) * kick
         width *= 0.5
         right = time >= (2 * left + 1) * width

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 def transducers_of(sensor: Sensor) -> TransducerArray:
-    """Return where the effects of a scenario's sensor sit."""
+    """Return the texels of a sensor as its effects on readings see them."""
     texels, parameters = sensor.texels, sensor.parameters
     row, column = getattr(texels.layout, "row", None), getattr(texels.layout, "column", None)
     painted = 1.0 if sensor.painted.gain is None else sensor.painted.gain
@@ -28,12 +28,12 @@ def transducers_of(sensor: Sensor) -> TransducerArray:
 
 
 def readings(effects: Iterable[Effect], transducers: TransducerArray, time: np.ndarray, force: np.ndarray) -> np.ndarray:
-    """What a sensor reports under known forces, (t, n) float in its unit.
+    """Return what a sensor reports under known forces, (t, n) float, in its unit.
 
     Parameters
     ----------
     effects : iterable of Effect
-        Those on forces are left out.
+        Effects on contact forces are ignored.
     transducers : TransducerArray
     time : (t,) float, s, increasing
     force : (t, n) float, N
@@ -42,48 +42,50 @@ def readings(effects: Iterable[Effect], transducers: TransducerArray, time: np.n
 
 
 class ReadoutChain:
-    """Turns forces into readings, a stretch of samples at a time; the pieces add up to what the whole would give.
+    """Turns forces into readings, any number of samples at a time.
+
+    The readings do not depend on how the samples are divided.
 
     Parameters
     ----------
     effects : iterable of Effect
-        Those on forces are left out.
+        Effects on contact forces are ignored.
     transducers : TransducerArray
     """
 
     def __init__(self, effects: Iterable[Effect], transducers: TransducerArray):
         self.transducers = transducers
-        self._stages: list[_Memoryless | _Coupling | _Law | _Delay | _Conversion] = []
+        self._links: list[_Memoryless | _Coupling | _Law | _Delay | _Conversion] = []
         converted = False
         for item, form in in_signal_order(effects, readout=True):
             if form.after_conversion and not converted:
-                self._stages.append(_Conversion(transducers))
+                self._links.append(_Conversion(transducers))
                 converted = True
             values = complete_values(item, transducers.gain)
             if form.law is not None:
-                self._stages.append(_Law(form, values))
+                self._links.append(_Law(form, values))
             elif form.coupling is not None:
-                self._stages.append(_Coupling(form.coupling(values, transducers)))
+                self._links.append(_Coupling(form.coupling(values, transducers)))
             elif form.delay is not None:
-                self._stages.append(_Delay(form.delay(values)))
+                self._links.append(_Delay(form.delay(values)))
             else:
-                self._stages.append(_Memoryless(form, values, transducers, item.seed))
+                self._links.append(_Memoryless(form, values, transducers, item.seed))
         if not converted:
-            self._stages.append(_Conversion(transducers))
+            self._links.append(_Conversion(transducers))
 
     @classmethod
     def of(cls, sensor: Sensor) -> ReadoutChain:
-        """Return the reader of a scenario's sensor."""
+        """Return the readout chain of a sensor."""
         return cls(sensor.effects, transducers_of(sensor))
 
     def read(self, time: np.ndarray, force: np.ndarray) -> np.ndarray:
         """Return the readings (t, n) of the next samples: `time` (t,) s, increasing, and `force` (t, n) N.
 
-        A first sample at the time of the last one asks for that one once more.
+        If the first sample has the time of the last one before, that sample is read again.
         """
         signal = force
-        for stage in self._stages:
-            signal = stage.run(time, signal)
+        for link in self._links:
+            signal = link.apply(time, signal)
         return signal
 
     def step(self, time: float, force: np.ndarray) -> np.ndarray:
@@ -92,45 +94,45 @@ class ReadoutChain:
 
 
 class _Conversion:
-    """Newtons to the sensor's unit (paper, section 4)."""
+    """Converts newtons to the unit of the sensor (paper, section 4)."""
 
     def __init__(self, transducers: TransducerArray):
         self.transducers = transducers
 
-    def run(self, time: np.ndarray, signal: np.ndarray) -> np.ndarray:
+    def apply(self, time: np.ndarray, signal: np.ndarray) -> np.ndarray:
         return self.transducers.zero + self.transducers.gain * self.transducers.painted * signal
 
 
 class _Memoryless:
-    """A formula that needs no past."""
+    """Applies a formula without memory."""
 
     def __init__(self, form: Form, values: Values, transducers: TransducerArray, seed: int):
         self.form, self.values, self.transducers, self.seed = form, values, transducers, seed
 
-    def run(self, time: np.ndarray, signal: np.ndarray) -> np.ndarray:
+    def apply(self, time: np.ndarray, signal: np.ndarray) -> np.ndarray:
         assert self.form.memoryless is not None
         return self.form.memoryless(signal, time, self.values, self.transducers, self.seed)
 
 
 class _Coupling:
-    """A linear mix of texels."""
+    """Applies a linear coupling of texels."""
 
     def __init__(self, weights: CouplingMatrix):
         self.weights = weights
 
-    def run(self, time: np.ndarray, signal: np.ndarray) -> np.ndarray:
+    def apply(self, time: np.ndarray, signal: np.ndarray) -> np.ndarray:
         return self.weights.apply(signal)
 
 
 class _Law:
-    """A law with memory."""
+    """Applies a law with memory."""
 
     def __init__(self, form: Form, values: Values):
         self.form, self.values = form, values
         self.memory: np.ndarray | None = None
         self.last: float | None = None
 
-    def run(self, time: np.ndarray, signal: np.ndarray) -> np.ndarray:
+    def apply(self, time: np.ndarray, signal: np.ndarray) -> np.ndarray:
         assert self.form.constants is not None
         if self.memory is None:
             self.memory = np.zeros((signal.shape[1], self.form.state_size))
@@ -140,26 +142,26 @@ class _Law:
 
 
 class _Delay:
-    """The signal as it was some time ago, linear between samples; before the first sample it was as at the first."""
+    """Delays the signal, which is linear between samples and constant before the first."""
 
     def __init__(self, delay: float):
         self.delay = delay
-        self.time = np.zeros(0)
+        self.time = np.zeros(0)  # the part of the past that is still needed
         self.signal: np.ndarray | None = None
 
-    def run(self, time: np.ndarray, signal: np.ndarray) -> np.ndarray:
+    def apply(self, time: np.ndarray, signal: np.ndarray) -> np.ndarray:
         if self.signal is None:
             self.time, self.signal = time, signal
         else:
             fresh = time > self.time[-1]
             self.time = np.concatenate([self.time, time[fresh]])
             self.signal = np.concatenate([self.signal, signal[fresh]])
-        wanted = time - self.delay
-        right = np.clip(np.searchsorted(self.time, wanted, side="left"), 1, max(len(self.time) - 1, 1))
+        source_time = time - self.delay
+        right = np.clip(np.searchsorted(self.time, source_time, side="left"), 1, max(len(self.time) - 1, 1))
         left = right - 1
         right = np.minimum(right, len(self.time) - 1)
         gap = self.time[right] - self.time[left]
-        share = np.clip((wanted - self.time[left]) / np.where(gap > 0.0, gap, 1.0), 0.0, 1.0)[:, None]
+        share = np.clip((source_time - self.time[left]) / np.where(gap > 0.0, gap, 1.0), 0.0, 1.0)[:, None]
         result: np.ndarray = (1.0 - share) * self.signal[left] + share * self.signal[right]
         keep = max(0, int(np.searchsorted(self.time, time[-1] - self.delay, side="right")) - 1)
         self.time, self.signal = self.time[keep:], self.signal[keep:]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""All effects there are: every module of the library defines a ``KIND``."""
+"""The registry of effects: finds every module of the library by its ``KIND``, and makes, checks and orders effects."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from typing import Any
 import numpy as np
 
 from ...errors import EffectError
-from ...model.effect import Effect, Value, Values
+from ...model.effect import Effect, Value
 from .specification import SITES_OF_ACTION, Form, Kind
 
 LIBRARY = f"{__package__.rpartition('.')[0]}.library"
-"""The package of the effects."""
+"""Name of the package whose modules are the effects."""
 
 
 @cache
 def library() -> dict[str, Kind]:
-    """Return every kind by its standard name, in the order in which they act."""
+    """Return every kind by its standard name, in the order in which the kinds act."""
     package = importlib.import_module(LIBRARY)
     found = [importlib.import_module(f"{LIBRARY}.{module.name}").KIND for module in pkgutil.iter_modules(package.__path__)]
     found.sort(key=lambda kind: (SITES_OF_ACTION.index(kind.site), kind.order, kind.name))
@@ -30,44 +30,44 @@ def library() -> dict[str, Kind]:
 
 
 def kind_of(name: str) -> Kind:
-    """Return the kind of a standard name; raises :class:`EffectError` when there is none."""
+    """Return the kind with a standard name; raise :class:`EffectError` if there is none."""
     kinds = library()
     if name not in kinds:
-        raise EffectError(f"There is no effect '{name}'{_perhaps(name, kinds)}; the library has {', '.join(kinds)}.")
+        raise EffectError(f"There is no effect '{name}'{_suggestion(name, kinds)}; the library has {', '.join(kinds)}.")
     return kinds[name]
 
 
 def form_of(name: str, form: str = "") -> Form:
-    """Return a form of an effect by its name, the usual one when none is given; raises :class:`EffectError`."""
+    """Return a form by its name, or the usual form if no name is given; raise :class:`EffectError` if there is none."""
     forms = {item.name: item for item in kind_of(name).forms}
     if not form:
         return next(iter(forms.values()))
     if form not in forms:
-        raise EffectError(f"Effect '{name}' has no form '{form}'{_perhaps(form, forms)}; it has {', '.join(forms)}.")
+        raise EffectError(f"Effect '{name}' has no form '{form}'{_suggestion(form, forms)}; it has {', '.join(forms)}.")
     return forms[form]
 
 
 def site_of_action(effect: Effect) -> str:
-    """Return the site at which an effect acts."""
+    """Return the site of action of an effect."""
     return kind_of(effect.name).site_of(form_of(effect.name, effect.form))
 
 
 def effect(name: str, form: str = "", seed: int = 0, gain: float = 1.0, **values: Any) -> Effect:
-    """Return a complete effect: the usual form unless one is named, defaults for what is not given.
+    """Return a complete effect, with the usual form and default values for what is not given.
 
     Parameters
     ----------
     name, form : str
     seed : int
     gain : float
-        Of the sensor it is meant for, since some defaults are in its unit.
+        Of the sensor that gets the effect (units per newton); some defaults scale with it.
     **values
-        Parameters by name; a number, or one number per texel.
+        Parameters by name: a number, or one number per texel.
 
     Raises
     ------
     EffectError
-        An unknown name, form or parameter, or a value outside its bounds.
+        A name, form or parameter is unknown, or a value is outside its bounds.
     """
     found = form_of(name, form)
     complete: dict[str, Value] = found.defaults(gain)
@@ -83,14 +83,25 @@ def complete_values(item: Effect, gain: float = 1.0) -> dict[str, Value]:
 
 
 def check(effects: Iterable[Effect], sensor: str, texels: int | None = None, gain: float = 1.0) -> None:
-    """Raise :class:`EffectError` for the first effect of a sensor that means nothing."""
+    """Raise :class:`EffectError` for the first effect that is unknown or has a value that is not allowed.
+
+    Parameters
+    ----------
+    effects : iterable of Effect
+    sensor : str
+        Name of the sensor, for the message.
+    texels : int, optional
+        Number of texels, which lists of values must have.
+    gain : float
+        Of the sensor, units per newton.
+    """
     for item in effects:
         form = form_of(item.name, item.form)
         where = f"effect '{item.name}' ({form.name}) of sensor '{sensor}'"
         known = {parameter.name: parameter for parameter in form.parameters}
         for key, value in item.values.items():
             if key not in known:
-                raise EffectError(f"{key} is no parameter of {where}{_perhaps(key, known)}; it has {', '.join(known)}.")
+                raise EffectError(f"{key} is no parameter of {where}{_suggestion(key, known)}; it has {', '.join(known)}.")
             parameter = known[key].scaled(gain)
             numbers = np.asarray(value, dtype=float)
             if numbers.ndim and not parameter.per_texel:
@@ -108,7 +119,14 @@ def check(effects: Iterable[Effect], sensor: str, texels: int | None = None, gai
 
 
 def in_signal_order(effects: Iterable[Effect], readout: bool) -> list[tuple[Effect, Form]]:
-    """Return a sensor's effects on forces, or those on readings, in the order in which they act."""
+    """Return the effects of a sensor in the order in which they act.
+
+    Parameters
+    ----------
+    effects : iterable of Effect
+    readout : bool
+        Return the effects on readings if true, and those on contact forces otherwise.
+    """
     chosen = []
     for item in effects:
         kind, form = kind_of(item.name), form_of(item.name, item.form)
@@ -116,14 +134,27 @@ def in_signal_order(effects: Iterable[Effect], readout: bool) -> list[tuple[Effe
         if (site == "readout") == readout:
             rank = (form.after_conversion, form.after_clip, site == "pad", kind.order)
             chosen.append((rank, item, form))
-    chosen.sort(key=lambda entry: entry[0])  # stable: of two alike the first in the stack acts first
+    chosen.sort(key=lambda entry: entry[0])  # stable: of two equal ranks the first in the stack acts first
     return [(item, form) for _, item, form in chosen]
 
 
 def actual_placement(
     effects: Iterable[Effect], position: np.ndarray, normal: np.ndarray, tangent: np.ndarray
 ) -> tuple[np.ndarray, ...]:
-    """Where the texels really are, with the effects that move them: position (m), normal and tangent, each (n, 3)."""
+    """Return where the texels really are, given the effects that move them.
+
+    Parameters
+    ----------
+    effects : iterable of Effect
+    position : (n, 3) float, m
+    normal, tangent : (n, 3) float
+        Outward normal and x axis of each texel.
+
+    Returns
+    -------
+    position, normal, tangent : (n, 3) float
+        The arrays given, if no effect moves the texels.
+    """
     for item, form in in_signal_order(effects, readout=False):
         if form.placement is not None:
             position, normal, tangent = form.placement(position, normal, tangent, complete_values(item))
@@ -131,14 +162,14 @@ def actual_placement(
 
 
 def to_dict(item: Effect) -> dict[str, Any]:
-    """Return an effect as a TOML table: ``name``, ``form``, ``seed`` where chance plays a part, and its values."""
+    """Return an effect as a TOML table: ``name``, ``form``, the values, and ``seed`` if the form draws random numbers."""
     seed = {"seed": item.seed} if form_of(item.name, item.form).random else {}
     values = {key: list(value) if isinstance(value, tuple) else value for key, value in item.values.items()}
     return {"name": item.name, "form": item.form, **seed, **values}
 
 
 def from_dict(table: Mapping[str, Any], gain: float = 1.0) -> Effect:
-    """Return the effect that a TOML table describes; raises :class:`EffectError`."""
+    """Return the effect that a TOML table describes; raise :class:`EffectError` if it is not valid."""
     rest = dict(table)
     name, form, seed = rest.pop("name", None), rest.pop("form", ""), rest.pop("seed", 0)
     if not isinstance(name, str) or not isinstance(form, str):
@@ -152,17 +183,13 @@ def from_dict(table: Mapping[str, Any], gain: float = 1.0) -> Effect:
     return effect(name, form, seed, gain, **rest)
 
 
-def scalars(values: Values) -> dict[str, float]:
-    """Return the values that are single numbers."""
-    return {key: value for key, value in values.items() if not isinstance(value, tuple)}
-
-
 def _plain(value: Any) -> Value:
-    """A number, or numbers as a tuple, whatever kind of array they came in."""
+    """Return a number, or numbers as a tuple, from any kind of array."""
     numbers = np.asarray(value, dtype=float)
     return float(numbers) if numbers.ndim == 0 else tuple(float(number) for number in numbers.ravel())
 
 
-def _perhaps(name: str, known: Iterable[str]) -> str:
+def _suggestion(name: str, known: Iterable[str]) -> str:
+    """Return a hint at the known name that is most like a wrong one, or nothing."""
     near = difflib.get_close_matches(name, list(known), n=1)
     return f" (did you mean '{near[0]}'?)" if near else ""

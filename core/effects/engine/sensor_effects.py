@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the library of effects says about a sensor and about a run, which themselves are plain data."""
+"""Effects of a whole sensor or scenario: whether they are valid, and where they put the texels."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from .registry import actual_placement, check
 
 
 def check_scenario(scenario: Scenario) -> None:
-    """Raise a :class:`PalpateError` when a scenario does not make a run or an effect of a sensor means nothing.
+    """Raise a :class:`PalpateError` when a scenario cannot be run or an effect of a sensor is not valid.
 
     Parameters
     ----------

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The few different lengths of step that a series of time stamps has."""
+"""The different lengths of step in a series of time stamps."""
 
 from __future__ import annotations
 
@@ -7,9 +7,21 @@ import numpy as np
 
 
 def steps_of(time: np.ndarray, before: float | None = None) -> tuple[np.ndarray, np.ndarray]:
-    """Lengths of step that occur (m,), and which of them leads to each sample (t,); to the very first one leads none.
+    """Return the lengths of step that occur in a series of time stamps.
 
-    Lengths that differ by rounding of the time stamps only are the same.
+    Lengths that differ only by the rounding of the time stamps count as one.
+
+    Parameters
+    ----------
+    time : (t,) float, s, increasing
+    before : float, s, optional
+        Time of the sample before these. Without it, the step that leads to the first sample has length zero.
+
+    Returns
+    -------
+    lengths : (m,) float, s
+    step : (t,) int
+        Index of the length of the step that leads to each sample.
     """
     start = time[0] if before is None else before
     lengths = np.diff(time, prepend=start)

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The surfaces stick: the force at small depth is less than the spring's and may pull.
+"""The surfaces stick: at small depth the force is less than that of the spring, and may pull.
 
-A texel knows nothing of an object that no longer reaches into it, so the pull ends where the contact does: abruptly, or
-with the traction of a cohesive zone, which rises and fades while the last of the depth is given back.
+A texel has no information about an object that no longer penetrates it, so the pull ends where the contact ends: abruptly, or
+with the traction of a cohesive zone, which rises and falls while the depth goes to zero.
 """
 
 from __future__ import annotations
@@ -91,8 +91,8 @@ def _relaxing(values: Values, dt: np.ndarray) -> np.ndarray:
 
 
 _PULL = Parameter("pull", "N", 0.02, 0.0, 100.0, "Largest pull F of one texel.")
-_ZONE = Parameter("depth", "m", 2e-4, 1e-6, 0.02, "Depth D, before contact ends, at which it pulls most.", log=True)
-_WAY = Parameter("depth", "m", 2e-4, 1e-6, 0.02, "Way back D after which the pull has come to 63 %.", log=True)
+_ZONE = Parameter("depth", "m", 2e-4, 1e-6, 0.02, "Depth D, before contact ends, at which the pull is largest.", log=True)
+_WAY = Parameter("depth", "m", 2e-4, 1e-6, 0.02, "Distance D on the way out after which the pull has reached 63 %.", log=True)
 
 KIND = Kind(
     name="adhesion",
@@ -116,7 +116,7 @@ KIND = Kind(
             "constant",
             "f = f₀ − F · (1 − exp(−d/D))",
             "Derjaguin, Muller and Toporov, J. Colloid Interface Sci. 53 (1975)",
-            (_PULL, Parameter("depth", "m", 1e-4, 1e-6, 0.02, "Depth D at which 63 % of the pull is there.", log=True)),
+            (_PULL, Parameter("depth", "m", 1e-4, 1e-6, 0.02, "Depth D at which the pull has reached 63 %.", log=True)),
             neutral={"pull": 0.0},
             law=constant,
             constants=constants_from("pull", "depth"),
@@ -129,7 +129,7 @@ KIND = Kind(
             (
                 _PULL,
                 _WAY,
-                Parameter("time", "s", 2.0, 0.01, 1000.0, "Time of contact τ that makes 63 % of the pull.", log=True),
+                Parameter("time", "s", 2.0, 0.01, 1000.0, "Time of contact τ after which the pull has reached 63 %.", log=True),
             ),
             neutral={"pull": 0.0},
             law=unloading,
@@ -156,7 +156,7 @@ KIND = Kind(
             (
                 _PULL,
                 _ZONE,
-                Parameter("time", "s", 0.1, 1e-3, 1000.0, "Time τ after which 37 % of the pull are left at rest.", log=True),
+                Parameter("time", "s", 0.1, 1e-3, 1000.0, "Time τ after which 37 % of the pull is left at rest.", log=True),
             ),
             neutral={"pull": 0.0},
             law=cohesive,

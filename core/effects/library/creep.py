@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Slow settling: under constant depth the force relaxes, or under constant load the reading rises.
 
-All forms are sums of exponentials ``G(t) = 1 ∓ Σ a_i (1 − exp(−t/τ_i))``; the logarithmic and the power law are spread over the
-logarithm of time, so that their states stay few and the cost does not grow with the past.
+All forms are sums of exponentials ``G(t) = 1 ∓ Σ a_i (1 − exp(−t/τ_i))``. For the logarithmic and the power law the τ_i are
+spread evenly over the logarithm of time, so few states suffice and the cost does not grow with the length of the past.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from ...model.parameter import Parameter
 from ..engine.specification import Form, Kind, TexelInput, scalar
 
 LOG_RATES = np.arange(-13.75, 2.76, 1.25)
-"""Logarithm of the rates that stand for a spectrum; a step of 1.25 keeps the sum within 0.1 % of the closed formula."""
+"""Logarithms of the rates that represent a continuous spectrum. A step of 1.25 keeps the sum within 0.1 % of the formula."""
 TERMS = len(LOG_RATES)
 
 
@@ -44,16 +44,17 @@ def settling(texel: TexelInput, constants: np.ndarray, state: np.ndarray, commit
 def filter_constants(amplitudes: np.ndarray, times: np.ndarray, dt: np.ndarray) -> np.ndarray:
     """Return the constants of :func:`settling`, (m, 1 + 4 c), for steps `dt` (m,) and c exponentials."""
     x = np.asarray(dt, float)[:, None] / times
-    table = np.stack([*shares_of_a_step(x), np.broadcast_to(amplitudes, x.shape)], axis=-1)
+    table = np.stack([*step_weights(x), np.broadcast_to(amplitudes, x.shape)], axis=-1)
     return np.hstack([np.full((len(x), 1), float(len(times))), table.reshape(len(x), -1)])
 
 
-def shares_of_a_step(x: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Shares of the old q, the old f and the new f in q after a step `x` = dt/τ of ``τ q̇ = f − q`` over which f is linear."""
+def step_weights(x: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the weights of the old q, the old f and the new f in the new q, for ``τ q̇ = f − q`` with f linear over the step.
+
+    `x` (m,) is the length of the step divided by τ.
+    """
     risen = -np.expm1(-x)
-    new = np.where(
-        x > 1e-4, 1.0 - risen / np.maximum(x, 1e-300), 0.5 * x - x * x / 6.0
-    )  # the series where digits would be lost
+    new = np.where(x > 1e-4, 1.0 - risen / np.maximum(x, 1e-300), 0.5 * x - x * x / 6.0)  # the series avoids cancellation
     return np.exp(-x), risen - new, new
 
 
@@ -68,17 +69,17 @@ def _constants(
 
 
 def prony(values: Values) -> tuple[np.ndarray, np.ndarray]:
-    """Amplitudes and times of one or two exponentials."""
+    """Return amplitudes and times of one or two exponentials."""
     pairs = [("amount", "time"), ("amount_2", "time_2")]
     found = [(values[a], values[t]) for a, t in pairs if a in values]
     amplitudes, times = np.array(found, dtype=float).T
-    if len(amplitudes) > 1:  # together they never take more than the whole force
+    if len(amplitudes) > 1:  # together they take at most 95 % of the force
         amplitudes = amplitudes / max(1.0, float(amplitudes.sum()) / 0.95)
     return amplitudes, times
 
 
 def logarithmic(values: Values) -> tuple[np.ndarray, np.ndarray]:
-    """``a · log10(1 + t/τ)`` until a hundred thousand times τ: exponentials at even steps of log time."""
+    """Return exponentials whose sum is ``a · log10(1 + t/τ)`` up to 100,000 τ, at even steps of the logarithm of time."""
     # 1 - exp(-x s) weighted with exp(-x) dx / x integrates to ln(1 + s).
     rates = np.exp(LOG_RATES)
     weights = (LOG_RATES[1] - LOG_RATES[0]) * np.exp(-rates) / math.log(10.0)
@@ -86,21 +87,21 @@ def logarithmic(values: Values) -> tuple[np.ndarray, np.ndarray]:
 
 
 def power(values: Values) -> tuple[np.ndarray, np.ndarray]:
-    """``a · (1 − (1 + t/τ)^−p)``: the power law's own spectrum x^(p−1) exp(−x) / Γ(p), at even steps of ln x."""
+    """Return exponentials whose sum is ``a · (1 − (1 + t/τ)^−p)``: its spectrum is x^(p−1) exp(−x) / Γ(p)."""
     exponent, rates = scalar(values, "exponent"), np.exp(LOG_RATES)
     weights = (LOG_RATES[1] - LOG_RATES[0]) * rates**exponent * np.exp(-rates) / math.gamma(exponent)
     return scalar(values, "amount") * weights, scalar(values, "time") / rates
 
 
-_TIME = Parameter("time", "s", 2.0, 0.02, 1000.0, "Time in which the settling has come 63 % of its way.", log=True)
+_TIME = Parameter("time", "s", 2.0, 0.02, 1000.0, "Time after which 63 % of the settling is over.", log=True)
 _ONSET = Parameter("time", "s", 0.5, 0.01, 100.0, "Time after which the settling follows the logarithm of time.", log=True)
-_AMOUNT = Parameter("amount", "1", 0.2, 0.0, 0.95, "Share of the force that is gone in the end.")
+_AMOUNT = Parameter("amount", "1", 0.2, 0.0, 0.95, "Share of the force that is lost in the end.")
 _RISE = Parameter("amount", "1", 0.2, 0.0, 5.0, "Share by which the reading has risen in the end.")
 _SECOND = (
-    Parameter("amount_2", "1", 0.1, 0.0, 0.95, "The same of a second, slower settling."),
+    Parameter("amount_2", "1", 0.1, 0.0, 0.95, "Amount of a second, slower settling."),
     Parameter("time_2", "s", 20.0, 0.02, 1000.0, "Time of the second settling.", log=True),
 )
-_DECADE = Parameter("amount", "1", 0.05, 0.0, 0.15, "Share of the force that goes per decade of time.")
+_DECADE = Parameter("amount", "1", 0.05, 0.0, 0.15, "Share of the force that is lost per decade of time.")
 _RISE_DECADE = Parameter("amount", "1", 0.05, 0.0, 1.0, "Share by which the reading rises per decade of time.")
 _EXPONENT = Parameter("exponent", "1", 0.3, 0.05, 1.5, "Exponent p of the power law.")
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Texels leak into one another on the way to the reading; unlike a spread load, what leaks is added."""
+"""Texels leak into each other on the way to the reading. Unlike load spreading, what leaks is added and not taken away."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from ..engine.specification import Form, Kind, TransducerArray, scalar
 
 
 def neighbours(values: Values, transducers: TransducerArray) -> CouplingMatrix:
-    """Each texel gets a share of those next to it, up to a quarter farther away than the nearest usually is."""
+    """Add a share of the neighbours: texels up to 1.25 times the median distance of nearest neighbours away."""
     reach, share = 1.25 * nearest_distance(transducers.position), scalar(values, "share")
 
     def weight(distance: np.ndarray) -> np.ndarray:
@@ -22,24 +22,24 @@ def neighbours(values: Values, transducers: TransducerArray) -> CouplingMatrix:
     return coupling_matrix(transducers.position, weight, reach, None)
 
 
-def lines(x: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
-    """Each texel gets a share of the mean of its row and of that of its column."""
+def lines(signal: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
+    """Add a share of the mean of the row and of the mean of the column."""
     if transducers.row is None or transducers.column is None:
         raise EffectError(
             f"Effect 'crosstalk' (lines) of sensor '{transducers.name}' needs texels in rows and columns: "
             "choose the form neighbours."
         )
     share = scalar(values, "share")
-    result = x.copy()
+    result = signal.copy()
     for line in (transducers.row, transducers.column):
         member = (line[:, None] == np.unique(line)).astype(float)
-        result += share * (x @ (member / member.sum(axis=0))) @ member.T
+        result += share * (signal @ (member / member.sum(axis=0))) @ member.T
     return result
 
 
-def common(x: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
-    """Each texel gets a share of the mean of all."""
-    return x + scalar(values, "share") * x.mean(axis=1, keepdims=True)
+def common(signal: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
+    """Add a share of the mean of all texels."""
+    return signal + scalar(values, "share") * signal.mean(axis=1, keepdims=True)
 
 
 KIND = Kind(

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Some texels report nothing, or always the same."""
+"""Some texels report nothing, or a constant value."""
 
 from __future__ import annotations
 
@@ -12,28 +12,29 @@ from ..engine.specification import Form, Kind, TransducerArray, scalar
 
 
 def _dead(values: Values, seed: int, texels: int) -> np.ndarray:
+    """Return which texels are dead, (texels,) bool."""
     return uniform("dead-texels", seed, np.arange(texels)) < scalar(values, "share")
 
 
-def random(x: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
-    """Nothing where a texel is dead."""
-    return np.where(_dead(values, seed, x.shape[1]), 0.0, x)
+def random(signal: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
+    """Read zero where a texel is dead."""
+    return np.where(_dead(values, seed, signal.shape[1]), 0.0, signal)
 
 
-def listed(x: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
-    """Nothing where a texel is listed as dead; half dead ones report half."""
-    return x * (1.0 - np.asarray(values["dead"]))
+def listed(signal: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
+    """Read zero where a texel is listed as dead; a number between 0 and 1 weakens the texel."""
+    return signal * (1.0 - np.asarray(values["dead"]))
 
 
-def stuck(x: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
-    """One reading for ever where a texel is dead."""
-    return np.where(_dead(values, seed, x.shape[1]), transducers.zero + scalar(values, "level"), x)
+def stuck(signal: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
+    """Read one constant value where a texel is dead."""
+    return np.where(_dead(values, seed, signal.shape[1]), transducers.zero + scalar(values, "level"), signal)
 
 
-def held(x: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
-    """A reading of its own for ever where a texel is listed as dead."""
+def held(signal: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
+    """Read a constant value of its own where a texel is listed as dead."""
     gone = np.asarray(values["dead"])
-    return (1.0 - gone) * x + gone * np.asarray(values["level"])
+    return (1.0 - gone) * signal + gone * np.asarray(values["level"])
 
 
 _DEAD = Parameter("dead", "1", 0.0, 0.0, 1.0, "1 for each dead texel, 0 for the others.", per_texel=True)
@@ -79,7 +80,10 @@ KIND = Kind(
             "stuck",
             "rᵢ = r₀ + L for a share of the texels",
             "Ni et al., ACM Trans. Sens. Netw. 5 (2009): stuck-at fault",
-            (_SHARE, Parameter("level", "unit", 0.1, -1e5, 1e5, "Reading L above the one without load at which they stay.")),
+            (
+                _SHARE,
+                Parameter("level", "unit", 0.1, -1e5, 1e5, "Constant reading L, counted from the reading without load."),
+            ),
             neutral={"share": 0.0},
             memoryless=stuck,
             after_conversion=True,

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Light touches are not felt."""
+"""Loads below a threshold are not measured."""
 
 from __future__ import annotations
 
@@ -10,23 +10,23 @@ from ...model.parameter import Parameter
 from ..engine.specification import Form, Kind, TransducerArray, scalar
 
 
-def hard(x: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
-    """The threshold is taken off."""
-    return np.sign(x) * np.maximum(np.abs(x) - scalar(values, "threshold"), 0.0)
+def hard(signal: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
+    """Subtract the threshold."""
+    return np.sign(signal) * np.maximum(np.abs(signal) - scalar(values, "threshold"), 0.0)
 
 
-def soft(x: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
-    """Little by little: quadratic at first, and the threshold is taken off in the end."""
-    size = np.abs(x)
-    return x * size / np.maximum(size + scalar(values, "threshold"), 1e-300)
+def soft(signal: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
+    """Grow quadratically at first; under large loads the threshold is subtracted."""
+    size = np.abs(signal)
+    return signal * size / np.maximum(size + scalar(values, "threshold"), 1e-300)
 
 
-def step(x: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
-    """Nothing below the threshold, everything above it."""
-    return np.where(np.abs(x) > scalar(values, "threshold"), x, 0.0)
+def step(signal: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
+    """Read zero below the threshold, and the whole load above it."""
+    return np.where(np.abs(signal) > scalar(values, "threshold"), signal, 0.0)
 
 
-_THRESHOLD = Parameter("threshold", "N", 0.01, 0.0, 100.0, "Force T that is just not felt yet.")
+_THRESHOLD = Parameter("threshold", "N", 0.01, 0.0, 100.0, "Largest force T that is not measured.")
 
 KIND = Kind(
     name="dead-zone",

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The reading moves with the clock, whatever the load; time counts from the start of the recording or the first frame."""
+"""The reading changes with time, whatever the load. Time counts from the start of the recording, or from the first frame."""
 
 from __future__ import annotations
 
@@ -11,20 +11,20 @@ from ..engine.random_streams import random_walk
 from ..engine.specification import Form, Kind, TransducerArray, scalar
 
 
-def linear(x: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
-    """By so much each second."""
-    return x + scalar(values, "rate") * time[:, None]
+def linear(signal: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
+    """Change at a constant rate."""
+    return signal + scalar(values, "rate") * time[:, None]
 
 
-def warm_up(x: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
-    """Fast at first, then to a halt."""
-    return x - scalar(values, "amount") * np.expm1(-time[:, None] / scalar(values, "time"))
+def warm_up(signal: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
+    """Approach a final value exponentially."""
+    return signal - scalar(values, "amount") * np.expm1(-time[:, None] / scalar(values, "time"))
 
 
-def walk(x: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
-    """At random, each texel by itself."""
+def walk(signal: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
+    """Perform a random walk, independently in each texel."""
     spread = scalar(values, "spread")
-    return x + spread * random_walk("drift", seed, time, x.shape[1]) if spread else x
+    return signal + spread * random_walk("drift", seed, time, signal.shape[1]) if spread else signal
 
 
 KIND = Kind(
@@ -49,7 +49,7 @@ KIND = Kind(
             "Doebelin, Measurement Systems (2003): warm-up of an instrument",
             (
                 Parameter("amount", "unit", 0.05, -1e4, 1e4, "Change a of the reading when warm."),
-                Parameter("time", "s", 30.0, 0.1, 1e5, "Time τ in which 63 % of it have come.", log=True),
+                Parameter("time", "s", 30.0, 0.1, 1e5, "Time τ after which 63 % of the change is over.", log=True),
             ),
             neutral={"amount": 0.0},
             memoryless=warm_up,

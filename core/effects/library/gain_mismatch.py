@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""No two texels are equally sensitive."""
+"""Texels differ in sensitivity."""
 
 from __future__ import annotations
 
@@ -11,22 +11,22 @@ from ..engine.random_streams import normal
 from ..engine.specification import Form, Kind, TransducerArray, scalar
 
 
-def random(x: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
-    """Factors ``exp(s ε)``, log-normal with median one."""
-    return x * np.exp(scalar(values, "spread") * normal("gain-mismatch", seed, np.arange(x.shape[1])))
+def random(signal: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
+    """Multiply by ``exp(s ε)``, which is log-normal with median one."""
+    return signal * np.exp(scalar(values, "spread") * normal("gain-mismatch", seed, np.arange(signal.shape[1])))
 
 
-def listed(x: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
-    """A factor for each texel."""
-    return x * np.asarray(values["factor"])
+def listed(signal: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
+    """Multiply by a given factor for each texel."""
+    return signal * np.asarray(values["factor"])
 
 
-def gradient(x: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
-    """Factors that change evenly along x and y, from ``1 − g`` at one end to ``1 + g`` at the other."""
+def gradient(signal: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
+    """Multiply by a factor that is linear in x and y, from ``1 − g`` at one end to ``1 + g`` at the other."""
     middle = 0.5 * (transducers.position.min(axis=0) + transducers.position.max(axis=0))
     half = np.maximum(0.5 * np.ptp(transducers.position, axis=0), 1e-12)
     place = (transducers.position - middle) / half
-    return x * (1.0 + scalar(values, "along_x") * place[:, 0] + scalar(values, "along_y") * place[:, 1])
+    return signal * (1.0 + scalar(values, "along_x") * place[:, 0] + scalar(values, "along_y") * place[:, 1])
 
 
 KIND = Kind(
@@ -58,8 +58,8 @@ KIND = Kind(
             "r = (1 + gₓ x + g_y y) · f,  x and y from −1 to 1 across the sensor",
             "ISO/IEC Guide 99 (2007), 2.39: calibration, to first order in the place",
             (
-                Parameter("along_x", "1", 0.2, -0.5, 0.5, "Change g of the factor from the middle to the end in +x."),
-                Parameter("along_y", "1", 0.0, -0.5, 0.5, "Change g of the factor from the middle to the end in +y."),
+                Parameter("along_x", "1", 0.2, -0.5, 0.5, "Change g of the factor from the centre to the end in +x."),
+                Parameter("along_y", "1", 0.0, -0.5, 0.5, "Change g of the factor from the centre to the end in +y."),
             ),
             neutral={"along_x": 0.0, "along_y": 0.0},
             memoryless=gradient,

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Loading and unloading go different ways, however slowly.
+"""Loading and unloading follow different curves, however slowly they happen.
 
-Laws on the force take energy: the way back lies below the way in. They forget when the contact is released. Laws on the reading
-are transducers that trail behind: the reading lies lower on the way up and higher on the way down.
+Laws on the force dissipate energy: the unloading curve lies below the loading curve. Their state is reset when the contact is
+released. Laws on the reading describe transducers that trail behind the load: the reading is too low while the load rises and
+too high while it falls.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from ...model.parameter import Parameter
 from ..engine.specification import Form, Kind, TexelInput, constants_from, scalar
 
 ELEMENTS = 4
-"""Elements of the operators; their thresholds are spread evenly around the given one."""
+"""Number of elements of the operators; their thresholds are spread evenly around the given one."""
 
 
 def duhem(texel: TexelInput, constants: np.ndarray, state: np.ndarray, commit: bool) -> tuple[float, float]:
@@ -146,14 +147,14 @@ def trailing(texel: TexelInput, constants: np.ndarray, state: np.ndarray, commit
 
 
 def _operators(values: Values, dt: np.ndarray) -> np.ndarray:
-    """Share, how many elements, and their thresholds, whose mean is the given one."""
+    """Return the share, the number of elements, and their thresholds, whose mean is the given one."""
     spread = 2.0 * np.arange(1, ELEMENTS + 1) / (ELEMENTS + 1)
     row = np.concatenate([[scalar(values, "share"), ELEMENTS], scalar(values, "force") * spread])
     return np.tile(row, (len(dt), 1))
 
 
 def _relays(values: Values, dt: np.ndarray) -> np.ndarray:
-    """Share, how many elements, and their widths: middles of equal parts of an exponential distribution of given mean."""
+    """Return the share, the number of elements, and their widths: quantiles of an exponential distribution of given mean."""
     widths = -np.log1p(-(np.arange(ELEMENTS) + 0.5) / ELEMENTS)
     row = np.concatenate([[scalar(values, "share"), ELEMENTS], scalar(values, "force") * widths / widths.mean()])
     return np.tile(row, (len(dt), 1))
@@ -174,7 +175,18 @@ KIND = Kind(
             "duhem",
             "f = fₑ · (1 + h z),  dz/dd = (sgn ḋ − z) / D",
             "Visintin, Differential Models of Hysteresis (1994): Duhem; Coleman and Hodgdon, Int. J. Eng. Sci. 24 (1986)",
-            (_WIDTH, Parameter("depth", "m", 3e-4, 1e-6, 0.05, "Way D after which the other branch is reached.", log=True)),
+            (
+                _WIDTH,
+                Parameter(
+                    "depth",
+                    "m",
+                    3e-4,
+                    1e-6,
+                    0.05,
+                    "Depth D that leads 63 % of the way to the other branch.",
+                    log=True,
+                ),
+            ),
             neutral={"width": 0.0},
             law=duhem,
             constants=constants_from("width", "depth"),
@@ -187,7 +199,7 @@ KIND = Kind(
             (
                 _SHARE,
                 _FORCE,
-                Parameter("beta", "1", 0.75, 0.5, 1.0, "Shape β of the loop: how much of the yielding is on the way back."),
+                Parameter("beta", "1", 0.75, 0.5, 1.0, "Shape β of the loop: how much of the yielding happens on unloading."),
             ),
             neutral={"share": 0.0},
             law=bouc_wen,
@@ -210,7 +222,7 @@ KIND = Kind(
             "Krasnosel'skii and Pokrovskii, Systems with Hysteresis (1989); Kuhnen, Eur. J. Control 9 (2003): play operators",
             (
                 Parameter("share", "1", 0.4, 0.0, 1.0, "Share a of the reading that goes through the elements with play."),
-                Parameter("force", "N", 0.05, 1e-6, 1e3, "Force Y by which they trail behind.", log=True),
+                Parameter("force", "N", 0.05, 1e-6, 1e3, "Mean force Y by which they trail behind.", log=True),
             ),
             neutral={"share": 0.0},
             law=play,
@@ -236,7 +248,18 @@ KIND = Kind(
             "trailing",
             "r = f · (1 − h z),  dz/df = (sgn ḟ − z) / F",
             "Visintin, Differential Models of Hysteresis (1994): Duhem's model",
-            (_WIDTH, Parameter("force", "N", 0.02, 1e-6, 1e3, "Force F after which the other branch is reached.", log=True)),
+            (
+                _WIDTH,
+                Parameter(
+                    "force",
+                    "N",
+                    0.02,
+                    1e-6,
+                    1e3,
+                    "Force F that leads 63 % of the way to the other branch.",
+                    log=True,
+                ),
+            ),
             neutral={"width": 0.0},
             law=trailing,
             constants=constants_from("width", "force"),

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The reading comes late. It starts where it would have come to rest."""
+"""The reading comes late. At the first sample it is in equilibrium."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 from ...model.effect import Values
 from ...model.parameter import Parameter
 from ..engine.specification import Form, Kind, TexelInput, scalar
-from .creep import shares_of_a_step
+from .creep import step_weights
 
 
 def first_order(texel: TexelInput, constants: np.ndarray, state: np.ndarray, commit: bool) -> tuple[float, float]:
@@ -42,7 +42,7 @@ def second_order(texel: TexelInput, constants: np.ndarray, state: np.ndarray, co
 
 
 def _first(values: Values, dt: np.ndarray) -> np.ndarray:
-    return np.stack(shares_of_a_step(np.asarray(dt, float) / max(scalar(values, "time"), 1e-12)), axis=1)
+    return np.stack(step_weights(np.asarray(dt, float) / max(scalar(values, "time"), 1e-12)), axis=1)
 
 
 def _second(values: Values, dt: np.ndarray) -> np.ndarray:
@@ -50,7 +50,7 @@ def _second(values: Values, dt: np.ndarray) -> np.ndarray:
     x = np.asarray(dt, float) / max(scalar(values, "time"), 1e-12)
     keep = first[:, 0]
     turn = np.where(np.isfinite(keep * x), keep * x, 0.0)
-    # Answers at the step's end to an input of 1, and to one that grows from 0 to 1; their series where digits would be lost.
+    # Responses at the end of the step to an input of 1, and to one that grows from 0 to 1; series avoid cancellation.
     small = x < 1e-2
     whole = np.where(small, x * x / 2.0 - x**3 / 3.0 + x**4 / 8.0, 1.0 - keep - turn)
     exact = (x - 2.0 + 2.0 * keep + turn) / np.maximum(x, 1e-300)

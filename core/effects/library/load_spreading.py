@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A cover spreads the load: each texel's force is shared with its neighbours, and the sum stays what it was."""
+"""A cover spreads the load: the force on each texel is distributed among its neighbours, and the sum is preserved."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The texels are not where the model has them: a sensor glued on askew, an array that has slipped.
+"""The texels are not where the model has them: a sensor was mounted at an angle, or an array has slipped.
 
-x runs along the texels' mean x axis, z along their mean normal, through their middle.
+The axes go through the centre of the texels: x along their mean x axis, z along their mean normal.
 """
 
 from __future__ import annotations
@@ -13,28 +13,30 @@ from ...model.parameter import Parameter
 from ..engine.specification import Form, Kind, scalar
 
 
-def moved(
+def displaced(
     position: np.ndarray, normal: np.ndarray, tangent: np.ndarray, values: Values
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Turn about z, then about y, then about x, and shift."""
+    """Rotate about z, then about y, then about x, and translate."""
     up = _unit(normal.sum(axis=0), np.array([0.0, 0.0, 1.0]))
     across = tangent.sum(axis=0)
     across = across - (across @ up) * up
     across = _unit(across, np.cross(up, np.eye(3)[np.abs(up).argmin()]))
     frame = np.stack([across, np.cross(up, across), up], axis=1)
     given = {key: scalar(values, key) for key in values}
-    turn = frame @ _turn(given.get("about_x", 0.0), given.get("about_y", 0.0), given.get("about_z", 0.0)) @ frame.T
+    rotation = frame @ _rotation(given.get("about_x", 0.0), given.get("about_y", 0.0), given.get("about_z", 0.0)) @ frame.T
     shift = frame @ np.array([given.get("x", 0.0), given.get("y", 0.0), given.get("z", 0.0)])
-    middle = position.mean(axis=0)
-    return middle + (position - middle) @ turn.T + shift, normal @ turn.T, tangent @ turn.T
+    centre = position.mean(axis=0)
+    return centre + (position - centre) @ rotation.T + shift, normal @ rotation.T, tangent @ rotation.T
 
 
 def _unit(vector: np.ndarray, otherwise: np.ndarray) -> np.ndarray:
+    """Return a vector of length one, in the direction of `otherwise` if the vector is zero."""
     length = float(np.linalg.norm(vector))
     return vector / length if length > 1e-9 else otherwise / np.linalg.norm(otherwise)
 
 
-def _turn(x: float, y: float, z: float) -> np.ndarray:
+def _rotation(x: float, y: float, z: float) -> np.ndarray:
+    """Return the matrix of the rotations by these angles (rad) about the axes."""
     (a, b), (c, d), (e, f) = ((np.cos(angle), np.sin(angle)) for angle in (x, y, z))
     about_x = np.array([[1, 0, 0], [0, a, -b], [0, b, a]])
     about_y = np.array([[c, 0, d], [0, 1, 0], [-d, 0, c]])
@@ -59,7 +61,7 @@ KIND = Kind(
             "Craig, Introduction to Robotics (2005), section 2.8: a frame's error as a rigid motion",
             (_X, _Y),
             neutral={"x": 0.0, "y": 0.0},
-            placement=moved,
+            placement=displaced,
         ),
         Form(
             "turn",
@@ -67,7 +69,7 @@ KIND = Kind(
             "Craig, Introduction to Robotics (2005), section 2.8",
             (_X, _Y, _Z),
             neutral={"x": 0.0, "y": 0.0, "about_z": 0.0},
-            placement=moved,
+            placement=displaced,
         ),
         Form(
             "tilt",
@@ -79,7 +81,7 @@ KIND = Kind(
                 Parameter("z", "m", 0.0, -0.02, 0.02, "Shift outwards, along the normal."),
             ),
             neutral={"about_x": 0.0, "about_y": 0.0, "z": 0.0},
-            placement=moved,
+            placement=displaced,
         ),
     ),
 )

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The reading trembles. The numbers depend on seed, texel and moment alone, so any frame can be computed by itself."""
+"""The reading is noisy. The noise depends only on seed, texel and time, so any frame can be computed by itself."""
 
 from __future__ import annotations
 
@@ -11,28 +11,32 @@ from ..engine.random_streams import normal, ticks
 from ..engine.specification import Form, Kind, TransducerArray, scalar
 
 
-def white(x: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
-    """Each sample by itself."""
-    return x + scalar(values, "spread") * _normal(seed, ticks(time), x.shape[1])
+def white(signal: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
+    """Add independent numbers to all samples."""
+    return signal + scalar(values, "spread") * _normal(seed, ticks(time), signal.shape[1])
 
 
-def proportional(x: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
-    """The more, the more is read."""
-    return x + scalar(values, "share") * (x - transducers.zero) * _normal(seed, ticks(time), x.shape[1])
+def proportional(signal: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
+    """Add noise in proportion to the reading."""
+    return signal + scalar(values, "share") * (signal - transducers.zero) * _normal(seed, ticks(time), signal.shape[1])
 
 
-def coloured(x: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
-    """Normal numbers at every multiple of τ, linear in between, and scaled to the same variance everywhere."""
+def coloured(signal: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
+    """Add noise that is correlated over τ.
+
+    Normal numbers are drawn at every multiple of τ and interpolated linearly, then scaled to the same variance everywhere.
+    """
     place = np.asarray(time, float) / scalar(values, "time")
     left = np.floor(place)
     share = (place - left)[:, None]
     corners, where = np.unique(np.concatenate([left, left + 1.0]).astype(np.int64), return_inverse=True)
-    drawn = _normal(seed, corners, x.shape[1])[where.ravel()]
+    drawn = _normal(seed, corners, signal.shape[1])[where.ravel()]
     mixed = (1.0 - share) * drawn[: len(left)] + share * drawn[len(left) :]
-    return x + scalar(values, "spread") * mixed / np.sqrt((1.0 - share) ** 2 + share**2)
+    return signal + scalar(values, "spread") * mixed / np.sqrt((1.0 - share) ** 2 + share**2)
 
 
 def _normal(seed: int, moments: np.ndarray, texels: int) -> np.ndarray:
+    """Return normal numbers for these times (counters, (t,)) and all texels, (t, texels)."""
     return normal("noise", seed, moments[:, None], np.arange(texels)[None, :])
 
 

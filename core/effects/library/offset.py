@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The reading without load is not what it should be."""
+"""The reading without load is wrong."""
 
 from __future__ import annotations
 
@@ -11,19 +11,19 @@ from ..engine.random_streams import normal
 from ..engine.specification import Form, Kind, TransducerArray, scalar
 
 
-def common(x: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
-    """The same for all texels."""
-    return x + scalar(values, "offset")
+def common(signal: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
+    """Add the same offset to all texels."""
+    return signal + scalar(values, "offset")
 
 
-def random(x: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
-    """Another for each texel, normally distributed."""
-    return x + scalar(values, "spread") * normal("offset", seed, np.arange(x.shape[1]))
+def random(signal: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
+    """Add a normally distributed offset to each texel."""
+    return signal + scalar(values, "spread") * normal("offset", seed, np.arange(signal.shape[1]))
 
 
-def listed(x: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
-    """A known one for each texel."""
-    return x + np.asarray(values["offset"])
+def listed(signal: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
+    """Add a given offset to each texel."""
+    return signal + np.asarray(values["offset"])
 
 
 KIND = Kind(

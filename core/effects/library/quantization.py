@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The reading comes in steps."""
+"""The reading takes only discrete values."""
 
 from __future__ import annotations
 
@@ -12,33 +12,34 @@ from ...model.parameter import Parameter
 from ..engine.specification import Form, Kind, TransducerArray, scalar
 
 
-def rounded(x: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
-    """To the nearest step."""
-    return _stepped(x, scalar(values, "step"), np.round)
+def rounded(signal: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
+    """Round to the nearest step."""
+    return _stepped(signal, scalar(values, "step"), np.round)
 
 
-def cut(x: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
-    """To the step below."""
-    return _stepped(x, scalar(values, "step"), np.floor)
+def rounded_down(signal: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
+    """Round down."""
+    return _stepped(signal, scalar(values, "step"), np.floor)
 
 
-def converter(x: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
-    """To the nearest of ``2^bits`` steps over a range."""
-    return _stepped(x, scalar(values, "range") / 2.0 ** scalar(values, "bits"), np.round)
+def converter(signal: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
+    """Round to the nearest of ``2^bits`` steps over a range."""
+    return _stepped(signal, scalar(values, "range") / 2.0 ** scalar(values, "bits"), np.round)
 
 
-def companded(x: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
-    """To the step below, of steps that grow with the reading's change."""
+def companded(signal: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
+    """Round towards the reading without load, in steps that grow with the distance from it."""
     scale, growth = scalar(values, "scale"), scalar(values, "growth")
     if growth <= 0.0:
-        return x
-    change = x - transducers.zero
+        return signal
+    change = signal - transducers.zero
     steps = np.floor(np.log1p(np.abs(change) / scale) / growth)
     return transducers.zero + np.sign(change) * scale * np.expm1(growth * steps)
 
 
-def _stepped(x: np.ndarray, step: float, way: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
-    return step * way(x / step) if step > 0.0 else x
+def _stepped(signal: np.ndarray, step: float, rounding: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
+    """Return multiples of a step, or the signal itself if the step is zero."""
+    return step * rounding(signal / step) if step > 0.0 else signal
 
 
 _STEP = Parameter("step", "unit", 0.01, 0.0, 1e4, "Width Δ of a step.")
@@ -65,7 +66,7 @@ KIND = Kind(
             "IEEE Std 1241 (2010): truncating quantizer",
             (_STEP,),
             neutral={"step": 0.0},
-            memoryless=cut,
+            memoryless=rounded_down,
             after_conversion=True,
         ),
         Form(
@@ -74,7 +75,7 @@ KIND = Kind(
             "IEEE Std 1241 (2010): converter of b bits",
             (
                 Parameter("bits", "1", 8.0, 1.0, 24.0, "Bits b of the converter."),
-                Parameter("range", "unit", 1.0, 1e-6, 1e6, "Range R that they divide.", log=True),
+                Parameter("range", "unit", 1.0, 1e-6, 1e6, "Range R that they divide into steps.", log=True),
             ),
             neutral={"range": 0.0},
             memoryless=converter,
@@ -85,8 +86,8 @@ KIND = Kind(
             "r = A · (exp(b · floor(ln(1 + r₀/A) / b)) − 1)",
             "ITU-T Recommendation G.711 (1988): companding by a logarithm",
             (
-                Parameter("scale", "unit", 0.1, 1e-6, 1e5, "Reading A from which on steps grow with it.", log=True),
-                Parameter("growth", "1", 0.05, 0.0, 3.0, "Width b of a step as a share of A and the reading together."),
+                Parameter("scale", "unit", 0.1, 1e-6, 1e5, "Reading A above which the steps grow with the reading.", log=True),
+                Parameter("growth", "1", 0.05, 0.0, 3.0, "Width b of a step, as a share of the sum of A and the reading."),
             ),
             neutral={"growth": 0.0},
             memoryless=companded,

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The reading cannot grow without end: a converter's last count, a transducer that flattens."""
+"""The reading is limited: by the last count of a converter, or by a transducer that flattens."""
 
 from __future__ import annotations
 
@@ -14,23 +14,23 @@ from ..engine.specification import Form, Kind, TransducerArray, scalar
 _LEVEL = Parameter("level", "unit", 1.0, 1e-4, 1e5, "Largest change of the reading from the one without load.", log=True)
 
 
-def clip(x: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
-    """Cut off at the level."""
+def clip(signal: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
+    """Clip at the level."""
     level = scalar(values, "level")
-    return transducers.zero + np.clip(x - transducers.zero, -level, level)
+    return transducers.zero + np.clip(signal - transducers.zero, -level, level)
 
 
-def tanh(x: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
-    """Flatten as the hyperbolic tangent does."""
+def tanh(signal: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
+    """Flatten like the hyperbolic tangent."""
     level = scalar(values, "level")
     if math.isinf(level):
-        return x
-    return transducers.zero + level * np.tanh((x - transducers.zero) / level)
+        return signal
+    return transducers.zero + level * np.tanh((signal - transducers.zero) / level)
 
 
-def rational(x: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
-    """Flatten as a voltage divider does."""
-    change = x - transducers.zero
+def rational(signal: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
+    """Flatten like a voltage divider."""
+    change = signal - transducers.zero
     return transducers.zero + change / (1.0 + np.abs(change) / scalar(values, "level"))
 
 

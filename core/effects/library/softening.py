@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The first cycles are stiffer than the later ones: what has been pressed once gives way more easily (Mullins' effect)."""
+"""The first cycles are stiffer than the later ones (Mullins' effect)."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ KIND = Kind(
             "ogden-roxburgh",
             "f = fₑ · (1 − s · erf((1 − W/Wₘ) / b)),  W = fₑ d / 2, Wₘ the largest W so far",
             "Ogden and Roxburgh, Proc. R. Soc. A 455 (1999), without their constant m",
-            (_SHARE, Parameter("width", "1", 0.5, 0.05, 3.0, "Width b of the way back to the first curve.")),
+            (_SHARE, Parameter("width", "1", 0.5, 0.05, 3.0, "Width b of the transition back to the first curve.")),
             neutral={"share": 0.0},
             law=ogden_roxburgh,
             constants=constants_from("share", "width"),
@@ -77,7 +77,7 @@ KIND = Kind(
             "peak",
             "f = fₑ · (1 − s · (1 − exp(−dₘ/D))),  dₘ the largest depth so far",
             "Simo, Comput. Methods Appl. Mech. Eng. 60 (1987): damage by the largest strain",
-            (_SHARE, Parameter("depth", "m", 0.002, 1e-5, 0.1, "Depth D that does 63 % of it.", log=True)),
+            (_SHARE, Parameter("depth", "m", 0.002, 1e-5, 0.1, "Largest depth D that causes 63 % of the loss.", log=True)),
             neutral={"share": 0.0},
             law=peak,
             constants=constants_from("share", "depth"),
@@ -87,7 +87,10 @@ KIND = Kind(
             "path",
             "f = fₑ · (1 − s · (1 − exp(−p/P))),  p all the way pressed in so far",
             "Miehe, Eur. J. Mech. A 14 (1995): continuous damage by the arc length of the strain",
-            (_SHARE, Parameter("path", "m", 0.01, 1e-5, 10.0, "Way P, over all cycles, that does 63 % of it.", log=True)),
+            (
+                _SHARE,
+                Parameter("path", "m", 0.01, 1e-5, 10.0, "Path P, over all cycles, that does 63 % of the loss.", log=True),
+            ),
             neutral={"share": 0.0},
             law=path,
             constants=constants_from("share", "path"),

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The deeper, the stiffer: an elastic force that grows faster than the depth.
+"""The elastic force grows faster than the depth.
 
-Each law multiplies the force that comes in by a factor ≥ 1 of the depth alone.
+Each law multiplies the force by a factor ≥ 1 that depends only on the depth.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ def foam(texel: TexelInput, constants: np.ndarray, state: np.ndarray, commit: bo
 
 
 _DOUBLE = Parameter("depth", "m", 0.004, 1e-4, 0.1, "Depth D at which the force is twice that of the linear spring.", log=True)
-_POWER = Parameter("exponent", "1", 1.0, 0.5, 4.0, "How suddenly it sets in: 1 is a quadratic force, 2 a cubic one.")
+_POWER = Parameter("exponent", "1", 1.0, 0.5, 4.0, "How suddenly it sets in: 1 adds a quadratic force, 2 a cubic one.")
 
 KIND = Kind(
     name="stiffening",

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Friction is larger when it starts to slide: a rise of the friction coefficient at low speed, on top of the base model's."""
+"""Friction is larger at low sliding speed, in addition to the Stribeck effect of the base model."""
 
 from __future__ import annotations
 
@@ -29,8 +29,8 @@ def rational(speed: float, force: float, constants: np.ndarray) -> tuple[float, 
 
 
 _PARAMETERS = (
-    Parameter("rise", "1", 0.5, 0.0, 4.0, "By what share a friction is larger at rest than when sliding fast."),
-    Parameter("speed", "m/s", 0.01, 1e-5, 2.0, "Sliding speed V at which the rise is mostly gone.", log=True),
+    Parameter("rise", "1", 0.5, 0.0, 4.0, "Share a by which friction is larger at rest than in fast sliding."),
+    Parameter("speed", "m/s", 0.01, 1e-5, 2.0, "Sliding speed V at which most of the rise is gone.", log=True),
 )
 _CONSTANTS = constants_from("rise", "speed")
 

@@ -15,7 +15,7 @@ def linear(speed: float, force: float, constants: np.ndarray) -> tuple[float, fl
 
 
 def power(speed: float, force: float, constants: np.ndarray) -> tuple[float, float]:
-    """``C · v^p``, below a hundredth of a millimetre per second linear."""
+    """``C · v^p``; linear below 0.01 mm/s."""
     return 1.0, constants[0] * max(speed, 1e-5) ** (constants[1] - 1.0)
 
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Use takes something away for good: less force the more was pressed, or less foam the more was rubbed.
+"""Use takes force away for good: loads reduce the stiffness, rubbing removes material.
 
-What a step wears off acts from the next step on; it is far too little in one step to matter.
+What a step wears off acts from the next step on; the wear of one step is too small to matter.
 """
 
 from __future__ import annotations
@@ -101,7 +101,11 @@ KIND = Kind(
             "dose",
             "f = fₑ · exp(−B/L),  Ḃ = fₑ",
             "Lemaitre and Desmorat, Engineering Damage Mechanics (2005), section 5: creep damage",
-            (Parameter("life", "N·s", 100.0, 0.01, 1e9, "Load over time L that leaves 37 % of the force.", log=True),),
+            (
+                Parameter(
+                    "life", "N·s", 100.0, 0.01, 1e9, "Integral L of load over time that leaves 37 % of the force.", log=True
+                ),
+            ),
             neutral={"life": math.inf},
             law=dose,
             constants=_with_step,
@@ -121,7 +125,7 @@ KIND = Kind(
             "work",
             "f = fₑ · exp(−W/L),  Ẇ = fₑ √(v² + ḋ²)",
             "Fouvry, Kapsa and Vincent, Wear 200 (1996): what is lost goes with the energy that was dissipated",
-            (Parameter("life", "J", 0.1, 1e-6, 1e9, "Load times way L that leaves 37 % of the force.", log=True),),
+            (Parameter("life", "J", 0.1, 1e-6, 1e9, "Load times path L that leaves 37 % of the force.", log=True),),
             neutral={"life": math.inf},
             law=work,
             constants=constants_from("life"),
