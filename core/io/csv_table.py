@@ -1,16 +1,22 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Tables of measurements: CSV files with one header line, whose columns say what they are and in which unit.
+"""Tables of numbers from CSV files with one header line. Every complaint about a cell names its line and its column.
 
-A column is called by its quantity, ``compression``, and is then in SI units, or by quantity and unit, ``compression (mm)``,
-``compression [mm]`` or ``compression_mm``. Commas, semicolons and tabs separate; lines that begin with # are skipped.
+Two kinds of tables are read, see :class:`CsvFormat`: recordings, which programs write, and measurements, which people type.
+:func:`read_table` reads all columns, :func:`read_columns` those of given quantities in SI units. For the latter, the header of
+a column is a quantity, ``compression``, when its numbers are in SI units, or a quantity and a unit: ``compression (mm)``,
+``compression [mm]`` or ``compression_mm``.
 """
 
 from __future__ import annotations
 
 import csv
+import math
 import os
 import re
-from collections.abc import Mapping
+from array import array
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
@@ -24,14 +30,99 @@ UNITS: dict[str, dict[str, float]] = {
     "N": {"N": 1.0, "mN": 1e-3, "kN": 1e3},
     "Pa": {"Pa": 1.0, "kPa": 1e3, "MPa": 1e6},
 }
-"""SI unit → units that a column may be written in, and what one of them is worth."""
+"""SI unit → units that a column may be written in, and the SI value of one of them."""
 
-LARGEST = 200 * 2**20
-"""Longest file that is read, bytes: a table of measurements that is fitted at once has some thousands of lines."""
+
+@dataclass(frozen=True)
+class CsvFormat:
+    """What a table may look like.
+
+    Attributes
+    ----------
+    separators : str
+        Characters that may separate cells; the one that is most frequent in the header does.
+    comments : bool
+        Lines that begin with # are skipped.
+    missing : bool
+        A cell may be empty and is then NaN.
+    largest : int, bytes
+        Longer files are refused.
+    """
+
+    separators: str
+    comments: bool
+    missing: bool
+    largest: int
+
+
+RECORDINGS = CsvFormat(separators=",", comments=False, missing=True, largest=512 * 2**20)
+"""Long tables that programs write. Some hundred million numbers would fill the memory long before a fit ends."""
+MEASUREMENTS = CsvFormat(separators=",;\t", comments=True, missing=False, largest=200 * 2**20)
+"""Tables that people type or export from spreadsheets; some thousands of lines are enough for a fit."""
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table that was read.
+
+    Attributes
+    ----------
+    names : list of str
+        Of the columns, as in the header.
+    values : (rows, columns) float
+        NaN where a cell is empty and may be.
+    """
+
+    names: list[str]
+    values: np.ndarray
+
+
+def read_table(
+    path: str | os.PathLike, form: CsvFormat = RECORDINGS, choose: Callable[[list[str]], Sequence[int]] | None = None
+) -> Table:
+    """Read a CSV file.
+
+    Parameters
+    ----------
+    path : path
+    form : CsvFormat
+    choose : callable, optional
+        Returns the numbers of the columns to read, given the names of all. Cells of other columns may hold anything. Without
+        it all columns are read, their names must differ, and all lines must have the same number of cells.
+
+    Raises
+    ------
+    FileError
+        The file cannot be read, is too large, has no header or no data, or a cell is not a finite number.
+    """
+    path = Path(path)
+    try:
+        size = path.stat().st_size
+        if size > form.largest:
+            raise FileError(
+                f"'{path.name}' holds {size / 1e9:.1f} GB and at most {form.largest / 1e9:.1f} GB are read: "
+                "cut it into several files, or keep fewer samples per second."
+            )
+        with path.open(encoding="utf-8-sig", newline="") as file:
+            lines = _lines(file, form)
+            names, separator = _header(lines, path, form)
+            chosen = None if choose is None else list(choose(names))
+            if chosen is None:
+                _check_names(names, path)
+            values = _values(lines, names, chosen, separator, _Context(path, form))
+    except FileNotFoundError as error:
+        raise FileError(f"There is no file '{path}': check its name and folder.") from error
+    except UnicodeDecodeError as error:
+        raise FileError(f"'{path.name}' is not a text file in UTF-8: export the table as CSV.") from error
+    except OSError as error:
+        raise FileError(f"'{path}' could not be read ({error.strerror}): check its name and permissions.") from error
+    if len(values) == 0:
+        raise FileError(f"'{path.name}' has a header and no data: there are no measurements below its header, add them.")
+    return Table(names if chosen is None else [names[i] for i in chosen], values)
 
 
 def read_columns(path: str | os.PathLike, quantities: Mapping[str, str]) -> dict[str, np.ndarray]:
-    """Read the columns of a CSV file that are asked for, in SI units.
+    """Read the columns of given quantities from a table of measurements, in SI units.
 
     Parameters
     ----------
@@ -47,51 +138,31 @@ def read_columns(path: str | os.PathLike, quantities: Mapping[str, str]) -> dict
     Raises
     ------
     FileError
-        There is no such file, it is no table, a unit is not known, or a cell is no number.
+        As :func:`read_table`; or the file has none of the quantities, one of them twice, or in an unknown unit.
     """
-    rows = _rows(path)
-    if not rows:
-        raise FileError(f"'{path}' is empty: give a CSV file whose first line names its columns.")
-    _, header = rows[0]
-    found: dict[str, tuple[int, float]] = {}
-    for place, cell in enumerate(header):
-        for name, unit in quantities.items():
-            factor = _factor(path, cell.strip(), name, unit)
-            if factor is None:
-                continue
-            if name in found:
-                raise FileError(f"'{path}' has two columns for {name}: leave only one of them.")
-            found[name] = (place, factor)
-    if not found:
-        raise FileError(f"'{path}' has none of the columns {', '.join(quantities)}: its first line must name them.")
-    if len(rows) == 1:
-        raise FileError(f"'{path}' has a header and no measurements: add a line for each.")
-    return {name: np.array([_number(path, row, place, name) for row in rows[1:]]) * f for name, (place, f) in found.items()}
+    found: dict[str, float] = {}
+
+    def choose(names: list[str]) -> list[int]:
+        chosen = []
+        for number, cell in enumerate(names):
+            for name, unit in quantities.items():
+                factor = _unit_factor(path, cell, name, unit)
+                if factor is None:
+                    continue
+                if name in found:
+                    raise FileError(f"'{path}' has two columns for {name}: leave only one of them.")
+                found[name] = factor
+                chosen.append(number)
+        if not found:
+            raise FileError(f"'{path}' has none of the columns {', '.join(quantities)}: its first line must name them.")
+        return chosen
+
+    table = read_table(path, MEASUREMENTS, choose)
+    return {name: table.values[:, i] * factor for i, (name, factor) in enumerate(found.items())}
 
 
-def _rows(path: str | os.PathLike) -> list[tuple[int, list[str]]]:
-    """Lines of the table with their numbers in the file, without comments and empty ones."""
-    try:
-        if os.path.getsize(path) > LARGEST:
-            raise FileError(f"'{path}' is larger than {LARGEST // 2**20} MB: give a shorter table, a fit needs no more.")
-        with open(path, encoding="utf-8-sig", newline="") as file:
-            text = file.read()
-    except FileNotFoundError as error:
-        raise FileError(f"There is no file '{path}': check its name and folder.") from error
-    except UnicodeDecodeError as error:
-        raise FileError(f"'{path}' is not a text file: save the table as CSV in UTF-8.") from error
-    except OSError as error:
-        raise FileError(f"'{path}' cannot be read ({error.strerror}): check its name and permissions.") from error
-    lines = [(i, line) for i, line in enumerate(text.splitlines(), 1) if line.strip() and not line.lstrip().startswith("#")]
-    if not lines:
-        return []
-    separator = max(",;\t", key=lines[0][1].count)
-    cells = csv.reader([line for _, line in lines], delimiter=separator)
-    return [(number, row) for (number, _), row in zip(lines, cells, strict=True)]
-
-
-def _factor(path: str | os.PathLike, cell: str, name: str, unit: str) -> float | None:
-    """What a column's numbers are multiplied by to be in `unit`; None when the column is another quantity."""
+def _unit_factor(path: str | os.PathLike, cell: str, name: str, unit: str) -> float | None:
+    """Return the factor from a column's unit to `unit`; None when the column is another quantity."""
     match = re.fullmatch(rf"{re.escape(name)}(?:\s*[(\[]\s*(.+?)\s*[)\]]|_(\S+))?", cell, flags=re.IGNORECASE)
     if match is None:
         return None
@@ -103,13 +174,87 @@ def _factor(path: str | os.PathLike, cell: str, name: str, unit: str) -> float |
     return UNITS[unit][written]
 
 
-def _number(path: str | os.PathLike, row: tuple[int, list[str]], place: int, name: str) -> float:
-    line, cells = row
-    text = cells[place].strip() if place < len(cells) else ""
+def _lines(file: Iterable[str], form: CsvFormat) -> Iterator[tuple[int, str]]:
+    """Yield the lines that hold cells, with their numbers in the file."""
+    for number, line in enumerate(file, start=1):
+        text = line.rstrip("\r\n")
+        if text.strip() and not (form.comments and text.lstrip().startswith("#")):
+            yield number, text
+
+
+def _header(lines: Iterator[tuple[int, str]], path: Path, form: CsvFormat) -> tuple[list[str], str]:
+    """Return the names of the columns and the separator."""
+    _, line = next(lines, (0, ""))
+    separator = max(form.separators, key=line.count)
+    names = [name.strip() for name in next(csv.reader([line], delimiter=separator), [])]
+    if not any(names):
+        raise FileError(f"'{path.name}' is empty: it needs a first line that names its columns, and numbers below.")
+    if len(names) == 1 and any(mark in names[0] for mark in ";\t"):
+        raise FileError(f"The columns of '{path.name}' are not separated by commas: export it with a comma as separator.")
+    return names, separator
+
+
+def _check_names(names: list[str], path: Path) -> None:
+    if all(_is_number(name) for name in names):
+        raise FileError(f"'{path.name}' begins with numbers, not with column names: write `time` and the others in line 1.")
+    seen: set[str] = set()
+    for name in names:
+        if name in seen:
+            raise FileError(f"Column '{name}' is twice in the header of '{path.name}': rename or remove one of them.")
+        seen.add(name)
+
+
+def _is_number(text: str) -> bool:
     try:
-        value = float(text)
+        float(text)
     except ValueError:
-        value = float("nan")
-    if not np.isfinite(value):
-        raise FileError(f"Line {line} of '{path}' has '{text}' for {name}, which is no number: correct it or remove the line.")
-    return value
+        return False
+    return True
+
+
+@dataclass(frozen=True)
+class _Context:
+    """Which file is read, and as what: for complaints."""
+
+    path: Path
+    form: CsvFormat
+
+    def complain(self, line: int, names: Sequence[str], cells: Sequence[str]) -> None:
+        """Raise for the first cell of a line that is no finite number."""
+        remedy = "write a number, or leave the cell empty" if self.form.missing else "write a number, or remove the line"
+        for name, cell in zip(names, cells, strict=True):
+            text = cell.strip()
+            if not text and self.form.missing:
+                continue
+            if not _is_number(text):
+                raise FileError(f"Line {line} of '{self.path.name}' has '{text[:40]}' for {name}: {remedy}.")
+            if not math.isfinite(float(text)):
+                raise FileError(f"Line {line} of '{self.path.name}' has {text} for {name}: {remedy}.")
+
+
+def _values(
+    lines: Iterator[tuple[int, str]], names: list[str], chosen: list[int] | None, separator: str, context: _Context
+) -> np.ndarray:
+    """(rows, columns) float: the chosen cells of all lines."""
+    values, width = array("d"), len(names)
+    heads = names if chosen is None else [names[i] for i in chosen]
+    for number, line in lines:
+        cells = line.split(separator) if '"' not in line else next(csv.reader([line], delimiter=separator))
+        if chosen is not None:
+            cells = [cells[i] if i < len(cells) else "" for i in chosen]
+        elif len(cells) != width:
+            raise FileError(
+                f"Line {number} of '{context.path.name}' has {len(cells)} cells and the header has {width}: "
+                "leave a missing value's cell empty, but keep its comma."
+            )
+        try:
+            row = [float(cell) if cell and not cell.isspace() else math.nan for cell in cells]
+        except ValueError:
+            context.complain(number, heads, cells)
+        if not all(map(math.isfinite, row)) and (
+            not context.form.missing
+            or any(cell.strip() and not math.isfinite(value) for cell, value in zip(cells, row, strict=True))
+        ):
+            context.complain(number, heads, cells)
+        values.extend(row)
+    return np.frombuffer(values, float).reshape(-1, len(heads)) if values else np.zeros((0, len(heads)))

@@ -17,9 +17,9 @@ import numpy as np
 from ...errors import FileError, ParameterError, SensorError
 from ...geometry.mesh import TriangleMesh, checked_mesh
 from ...geometry.texels import Texels, texels_from_region
+from ...io.csv_table import read_table
 from ...io.sensor_toml import SHAPE_WORDS, stated_parameters
 from ...model.sensor_parameters import SENSOR_PARAMETERS, SensorParameters
-from .csv_columns import read_table
 
 FORMAT = "palpate-rig/1"
 POSE, TURN, SLIDE = ("x", "y", "z"), ("qw", "qx", "qy", "qz"), ("slide_x", "slide_y")
@@ -378,8 +378,8 @@ def _trial(entry: Any, number: int, folder: Path, path: Path, texels: int, has_i
     if use not in ("fit", "check"):
         raise FileError(f'{where} of \'{path.name}\' has use = {use!r}: write "fit" or "check".')
     file = _inside(entry.get("file"), folder, f"{where}'s file", path)
-    names, values = read_table(file)
-    columns = {name: values[:, i] for i, name in enumerate(names)}
+    table = read_table(file)
+    columns = {name: table.values[:, i] for i, name in enumerate(table.names)}
     time = _clock(columns, file)
     kind = _stimulus_kind(columns, file, has_indenter)
     reading = _readings(columns, texels, file)
@@ -397,7 +397,7 @@ def _trial(entry: Any, number: int, folder: Path, path: Path, texels: int, has_i
     said = _gaps_filled([position, quaternion, level, slide], time, file)
     if quaternion is not None:
         quaternion = quaternion / np.linalg.norm(quaternion, axis=1, keepdims=True)
-    strangers = [name for name in names if not _meaning(name)]
+    strangers = [name for name in table.names if not _meaning(name)]
     if strangers:
         said.append(f"'{file.name}': {', '.join(repr(name) for name in strangers)} mean nothing here and were left out.")
     stimulus = position if kind == "pose" else level

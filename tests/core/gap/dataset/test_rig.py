@@ -10,8 +10,8 @@ import trimesh
 
 from palpate.benchmarks._recordings import Recording
 from palpate.core.errors import PalpateError
-from palpate.core.gap.dataset import csv_columns
 from palpate.core.gap.dataset.rig import read_rig
+from palpate.core.io import csv_table
 from palpate.core.model.sensor_parameters import SensorParameters
 
 TEXELS = 6
@@ -134,7 +134,7 @@ BAD = {
     "one sample": (dict(press=table(samples=1)), "one sample"),
     "millimetres": (dict(press=with_values("z", 1e3, add=300.0)), "in metres"),
     "depth in millimetres": (dict(press=edited(7, "depth", "2.5", names=("depth",))), "in metres"),
-    "binary": (dict(press=None), "not text"),
+    "binary": (dict(press=None), "not a text file"),
 }  # fmt: skip
 
 
@@ -228,7 +228,7 @@ def test_a_missing_rig_and_missing_stimulus_values(tmp_path):
 def test_columns_without_meaning_are_said(tmp_path):
     rig = read_rig(write(tmp_path, press=table(names=("x", "y", "z", "temperature"))))
     assert any("temperature" in warning for warning in rig.warnings)
-    assert csv_columns.LARGEST < 10**9
+    assert csv_table.RECORDINGS.largest < 10**9
 
 
 def test_recordings_become_rigs_with_empty_cells_where_nothing_was_measured(tmp_path):
