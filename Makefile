@@ -13,13 +13,14 @@ PYTEST_ARGS ?=
 ONLY ?=
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-ui bench zip lint clean distclean env env50
+.PHONY: help demo test test-ui bench docs zip lint clean distclean env env50
 
 help:
 	@echo 'make demo     set up and run the demo: a picture, tactile images and the forces, in $(DEMO_OUT)/'
 	@echo 'make test     lint, type check, and all tests in bpy $(BPY45) and $(BPY50)'
 	@echo 'make test-ui  the extension in a real Blender window (Debian, as root: it sets up a Blender of its own)'
 	@echo 'make bench    benchmarks, one JSON line per figure; ONLY=solver for one group'
+	@echo 'make docs     the documentation as a site, in build/site/'
 	@echo 'make zip      the extension zips for every platform and Python, in dist/'
 	@echo 'make lint     ruff and mypy alone'
 	@echo 'make clean    remove build products; distclean: the environments too'
@@ -64,6 +65,14 @@ $(VENV)/.bench: $(VENV)/.ready
 
 bench: $(VENV)/.bench
 	@$(BIN)/python -m benchmarks $(ONLY)
+
+$(VENV)/.docs: $(VENV)/.ready
+	$(BIN)/python -m pip install --quiet --editable '.[docs]'
+	touch $@
+
+# A warning, as of a link that leads nowhere, is an error.
+docs: $(VENV)/.docs
+	$(BIN)/sphinx-build --quiet --fail-on-warning --keep-going --fresh-env -b html -c docs . build/site
 
 zip: env
 	$(BIN)/python tools/build_zip.py

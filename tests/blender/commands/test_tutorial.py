@@ -69,13 +69,6 @@ def test_the_pictures_of_the_readme_are_there_and_small(repository):
         assert 5_000 < (repository / name).stat().st_size < 400_000
 
 
-def test_links_of_the_pages_lead_somewhere(repository):
-    for page in [repository / "README.md", *(repository / "docs").glob("*.md")]:
-        for link in re.findall(r"\]\(([^)#\s]+)[^)]*\)", page.read_text(encoding="utf-8")):
-            if not link.startswith(("http:", "https:", "mailto:")):
-                assert (page.parent / link).exists(), f"{page.name}: {link}"
-
-
 def test_numbers_of_the_sphere(repository):
     """Sanity of the promised force: a sphere pressed into springs of k per texel of area A feels k/A times the cap's volume."""
     radius, depth, k, area = 0.015, 0.0025, 58.5, (0.02 / 5) * (0.05 / 13)

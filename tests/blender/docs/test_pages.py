@@ -1,0 +1,188 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Links, commands, paths and code blocks in README.md, docs/ and the other pages are true.
+
+Short code is run. Commands that take long are parsed by the command line's own parser and not run.
+"""
+
+from __future__ import annotations
+
+import importlib
+import re
+import shlex
+import shutil
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from palpate.commands import COMMANDS, READY, _parser, main
+from palpate.core.gap.dataset.rig import read_rig
+
+ROOT = Path(__file__).resolve().parents[3]
+PAGES = [
+    *(ROOT / name for name in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "tests/ui/README.md")),
+    *sorted((ROOT / "docs").glob("*.md")),
+]
+FOLDERS = {path.name for path in ROOT.iterdir() if path.is_dir() and not path.name.startswith(".")} - {"build", "dist"}
+on_every_page = pytest.mark.parametrize("page", PAGES, ids=lambda page: page.relative_to(ROOT).as_posix())
+
+
+def blocks(text: str, language: str) -> list[str]:
+    """Fenced blocks in a language."""
+    return re.findall(rf"^```{language}\n(.*?)^```", text, re.DOTALL | re.MULTILINE)
+
+
+def inline_code(text: str) -> list[str]:
+    """Code between single backticks, without the fenced blocks."""
+    return re.findall(r"(?<!`)`([^`\n]+)`(?!`)", re.sub(r"^```.*?^```", "", text, flags=re.DOTALL | re.MULTILINE))
+
+
+def anchors(page: Path) -> set[str]:
+    """Anchors of a page's headings as GitHub and MyST make them."""
+    text = re.sub(r"^```.*?^```", "", page.read_text(encoding="utf-8"), flags=re.DOTALL | re.MULTILINE)
+    headings = re.findall(r"^#+ (.+)$", text, re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
+
+
+def command_lines(text: str) -> list[str]:
+    """Command lines of `palpate` in shell blocks and indented blocks, without loops and redirections around them."""
+    lines = [line for block in blocks(text, "sh") for line in block.splitlines()]
+    lines += re.findall(r"^    (.*)$", text, re.MULTILINE)
+    found = []
+    for line in lines:
+        for part in re.split(r"&&|\|\||;", line.partition(" #")[0]):
+            words = re.search(r"(?:^|\s|/)palpate (\w+ .*)", part)
+            if words and words.group(1).split()[0] in COMMANDS:
+                found.append(words.group(1))
+    return found
+
+
+@on_every_page
+def test_links_lead_somewhere(page):
+    for link in re.findall(r"\]\(([^)\s]+)[^)]*\)", page.read_text(encoding="utf-8")):
+        if re.match(r"[a-z]+:", link):
+            continue
+        name, _, anchor = link.partition("#")
+        target = page.parent / name if name else page
+        assert target.exists(), link
+        assert not anchor or anchor in anchors(target), link
+
+
+@on_every_page
+def test_paths_and_modules_exist(page):
+    """A path in code that begins with a folder of the repository is there, and so is every module of `palpate`."""
+    text = page.read_text(encoding="utf-8")
+    for code in inline_code(text):
+        path = re.fullmatch(r"([\w.-]+/[\w./-]*\w/?)", code)
+        if path and code.split("/")[0] in FOLDERS:
+            assert (ROOT / code).exists(), code
+    for name in set(re.findall(r"\bpalpate\.core(?:\.\w+)+", text)):
+        module, attributes = name, []
+        while True:
+            try:
+                found = importlib.import_module(module)
+                break
+            except ModuleNotFoundError:
+                module, _, attribute = module.rpartition(".")
+                attributes.insert(0, attribute)
+        for attribute in attributes:
+            assert hasattr(found, attribute), name
+            found = getattr(found, attribute)
+
+
+@on_every_page
+def test_commands_are_ones_that_the_command_line_takes(page, capsys):
+    for line in command_lines(page.read_text(encoding="utf-8")):
+        words = shlex.split(line.replace('$(basename "$f" .blend)', "name").replace("[", "").replace("]", ""))
+        try:
+            _parser().parse_args(words)
+        except SystemExit:
+            pytest.fail(f"palpate {line}: {capsys.readouterr().err}")
+
+
+@on_every_page
+def test_options_that_are_told_of_are_in_the_help(page, capsys):
+    """`palpate bake SCENE.blend [--out DIR]` in a sentence or a table names options of that command."""
+    for code in inline_code(page.read_text(encoding="utf-8").replace("\\|", "|")):
+        words = re.match(r"palpate (\w+)", code)
+        if words and words.group(1) in READY:
+            told = re.match(r"palpate (\w+(?: (?:stiffness|friction|show|import|export)\b)?)", code).group(1).split()
+            assert main([*told, "--help"]) == 0
+            text = capsys.readouterr().out
+            for option in re.findall(r"--[a-z][a-z-]*", code):
+                assert option in text, code
+
+
+@on_every_page
+def test_targets_of_make_and_tools_exist(page):
+    text = page.read_text(encoding="utf-8")
+    makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
+    code = [*inline_code(text), *(line for block in blocks(text, "sh") for line in block.splitlines())]
+    for line in code:
+        for target in re.findall(r"(?:^|&& )make ([a-z][\w-]*)", line):
+            assert re.search(rf"^{target}:", makefile, re.MULTILINE), line
+        for group in re.findall(r"python -m benchmarks (\w+)", line) + re.findall(r"make bench ONLY=(\w+)", line):
+            assert (ROOT / "benchmarks" / f"{group}.py").exists(), line
+
+
+@pytest.fixture(scope="module")
+def bake_folder(tmp_path_factory):
+    """Folder in which `palpate` holds the bake of the demo scene's frames 71 and 72, and `rig.toml` the sample rig."""
+    folder = tmp_path_factory.mktemp("pages")
+    shutil.copytree(ROOT / "docs" / "sample-rig", folder, dirs_exist_ok=True)
+    scene = str(ROOT / "sample_blends" / "demo.blend")
+    command = [
+        sys.executable,
+        "-m",
+        "palpate.commands",
+        "bake",
+        scene,
+        "--frames",
+        "71",
+        "72",
+        "--out",
+        str(folder / "palpate"),
+    ]
+    subprocess.run(command, check=True, capture_output=True, timeout=300)
+    return folder
+
+
+def python_blocks() -> list:
+    found = []
+    for page in PAGES:
+        for number, block in enumerate(blocks(page.read_text(encoding="utf-8"), "python")):
+            if "bpy" not in block:  # test_tutorial.py runs the one that needs Blender
+                found.append(pytest.param(block, id=f"{page.stem}-{number}"))
+    return found
+
+
+@pytest.mark.parametrize("block", python_blocks())
+def test_python_blocks_run(block, bake_folder, monkeypatch, capsys):
+    import dataclasses
+
+    from solver_scenes import cube_on_pad
+
+    monkeypatch.chdir(bake_folder)
+    exec(compile(block, "page", "exec"), {"dataclasses": dataclasses, "sensor": cube_on_pad().sensors[0]})
+
+
+def toml_blocks() -> list:
+    return [
+        pytest.param(block, id=f"{page.stem}-{number}")
+        for page in PAGES
+        for number, block in enumerate(blocks(page.read_text(encoding="utf-8"), "toml"))
+    ]
+
+
+@pytest.mark.parametrize("block", toml_blocks())
+def test_toml_blocks_are_read(block, bake_folder):
+    table = tomllib.loads(block)
+    if table.get("format") == "palpate-rig/1":
+        for trial in table["trial"]:
+            shutil.copy(bake_folder / "press_0.csv", bake_folder / trial["file"])
+        (bake_folder / "page.toml").write_text(block, encoding="utf-8")
+        assert read_rig(bake_folder / "page.toml").trials
+    else:
+        assert table
