@@ -19,10 +19,10 @@ def _rooms():
         return [missing]
     from . import operators, panels
     from .addon.events import handlers
-    from .addon.properties import properties
+    from .addon.properties import registration
     from .addon.session import openexr_check
 
-    return [openexr_check, properties, operators, panels, handlers, _CommandLine]
+    return [openexr_check, registration, operators, panels, handlers, _CommandLine]
 
 
 class _CommandLine:

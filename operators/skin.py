@@ -6,7 +6,7 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty
 from bpy_extras.object_utils import AddObjectHelper, object_data_add
 
 from ..addon.authoring import laid_sensors, sensors
-from ..addon.properties import properties
+from ..addon.properties import laid_sensor_properties
 from . import support
 
 
@@ -81,7 +81,9 @@ class PALPATE_OT_skin_add(support.ErrorReporting, bpy.types.Operator):
         default="AUTO",
         options={"SKIP_SAVE"},
     )
-    method: EnumProperty(name="Pattern", description="How texels are laid", items=properties.SKIN_METHODS[1:], default="NOISE")
+    method: EnumProperty(
+        name="Pattern", description="How texels are laid", items=laid_sensor_properties.SKIN_METHODS[1:], default="NOISE"
+    )
     spacing: FloatProperty(
         name="Spacing (m)",
         description="From texel to texel, m",

@@ -9,14 +9,14 @@ from bpy_extras.object_utils import object_data_add
 from ...core.errors import SceneError
 from ...core.geometry.layout import GridLayout
 from ...core.model.sensor_parameters import SensorParameters
-from ..properties import effect_stack, properties
+from ..properties import effect_stack, parameter_properties
 from ..scene import scene_reader
 from . import laid_sensors, sensors
 
 
 def parameters(obj) -> SensorParameters:
     """Return the parameters of an object's panel."""
-    return scene_reader.parameters(obj.palpate)
+    return parameter_properties.sensor_parameters(obj.palpate)
 
 
 def put_parameters(obj, values: SensorParameters) -> None:
@@ -34,9 +34,7 @@ def put_parameters(obj, values: SensorParameters) -> None:
     if obj.palpate.role not in {"SENSOR", "PAD"}:
         raise SceneError(f"'{obj.name}' is no sensor: make it one with Physics › Palpate › Make Sensor first.")
     values.check(obj.name)
-    for key in properties.PARAMETERS:
-        value = getattr(values, key)
-        setattr(obj.palpate, key, str(value) if key == "points_per_texel" else value)
+    parameter_properties.put_sensor_parameters(obj.palpate, values)
 
 
 def save_toml(context, obj, path) -> None:

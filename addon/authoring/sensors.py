@@ -8,13 +8,14 @@ from pathlib import Path
 import numpy as np
 
 from ...core.errors import SensorError
+from ...core.model.sensor_parameters import SENSOR_PARAMETERS
 from ..display import baked_scene
-from ..properties import effect_stack, properties
+from ..properties import effect_stack
 from ..scene import meshes
 
 GROUP_NAME = "Palpate Sensor"
 PRESETS = Path(__file__).parents[1] / "presets"
-COPIED = (*properties.PARAMETERS, "k_factor", "friction_factor", "gain_factor")
+COPIED = (*SENSOR_PARAMETERS, "k_factor", "friction_factor", "gain_factor")
 """What is copied from sensor to sensor and kept in presets: everything that does not hang on one mesh."""
 
 

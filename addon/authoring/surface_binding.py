@@ -15,6 +15,7 @@ from mathutils import Vector
 from mathutils.bvhtree import BVHTree
 from mathutils.interpolate import poly_3d_calc
 
+from ..properties import painted_maps
 from ..scene import deforming_objects, meshes, scene_reader
 from ..session import transforms
 
@@ -187,7 +188,7 @@ def painted(skin) -> Painted:
         meshes.vertices(mesh),
         [list(face.vertices) for face in mesh.polygons],
         {group.name: meshes.weights(mesh, group.index) for group in skin.vertex_groups},
-        {item.name: _values(item) for item in mesh.attributes if meshes.is_map(item)},
+        {item.name: _values(item) for item in mesh.attributes if painted_maps.is_map(item)},
     )
 
 

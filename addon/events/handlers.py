@@ -8,8 +8,8 @@ from bpy.app.handlers import persistent
 
 from ..authoring import sensor_report, texel_overlay
 from ..display import overlays
-from ..properties import migrations
-from ..scene import scene_reader
+from ..properties import migrations, object_properties
+from ..scene import moved_bodies, scene_reader
 from ..session import first_use, identity, session_state
 from ..timeline import playback
 
@@ -112,6 +112,7 @@ def register():
     for name, function in LISTS.items():
         getattr(bpy.app.handlers, name).append(function)
     first_use.when_ready.append(playback.solver_is_ready)
+    object_properties.when_body_changes.append(moved_bodies.body_changed)
     overlays.register()
     texel_overlay.register()
 
@@ -122,6 +123,7 @@ def unregister():
     sensor_report.forget()
     first_use.stop()
     first_use.when_ready.clear()
+    object_properties.when_body_changes.clear()
     for name, function in LISTS.items():
         getattr(bpy.app.handlers, name).remove(function)
     playback.forget()

@@ -1,1 +1,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
+"""What a user says about objects and scenes: the properties that Blender shows in panels and saves with the file.
+
+Only what has to be saved lives here, no state of a simulation. Numbers are in SI units with the unit in the name, since Blender
+has no unit for N/m. Names of properties stand in saved files, so a property that is renamed needs a migration.
+"""
+
+__all__ = [
+    "effect_stack",
+    "figure_properties",
+    "laid_sensor_properties",
+    "migrations",
+    "object_properties",
+    "painted_maps",
+    "parameter_properties",
+    "registration",
+]

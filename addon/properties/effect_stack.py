@@ -19,10 +19,9 @@ from ...core.errors import EffectError
 from ...core.model.effect import Effect
 from ...core.model.parameter import Parameter
 from ..session import units
+from .parameter_properties import FIXED, unit_in_words, with_unit
 
 SITE_ICONS = {"contact": "MOD_PHYSICS", "pad": "MOD_CLOTH", "readout": "DRIVER"}
-
-_fixed = {"options": set(), "override": {"LIBRARY_OVERRIDABLE"}}
 
 
 def form_key(kind: Kind) -> str:
@@ -50,22 +49,22 @@ def title(name: str) -> str:
 
 
 def _label(parameter: Parameter) -> str:
-    name = title(parameter.name.replace("_", "-"))
-    return name if parameter.unit == "1" else f"{name} ({parameter.unit})"
+    return with_unit(title(parameter.name.replace("_", "-")), parameter)
 
 
 def _tooltip(form: Form, parameter: Parameter) -> str:
     """What a parameter does, its unit and bounds, and where the formula comes from."""
-    unit = "no unit" if parameter.unit == "1" else parameter.unit
     bounds = "" if parameter.unit.startswith("unit") else f"; {parameter.low:g} to {parameter.high:g}"
-    return f"{parameter.text.removesuffix('.')} ({unit}{bounds}). Source: {form.reference.removesuffix('.')}"
+    return (
+        f"{parameter.text.removesuffix('.')} ({unit_in_words(parameter)}{bounds}). Source: {form.reference.removesuffix('.')}"
+    )
 
 
 def _property(form: Form, parameter: Parameter):
     text = _tooltip(form, parameter)
     if parameter.per_texel:
         text = f"Numbers separated by commas, one per texel or one for all. {text}"
-        return StringProperty(name=_label(parameter), description=text, **_fixed)
+        return StringProperty(name=_label(parameter), description=text, **FIXED)
     limits = {} if parameter.unit.startswith("unit") else {"min": parameter.low, "max": parameter.high}
     return FloatProperty(
         name=_label(parameter),
@@ -74,21 +73,21 @@ def _property(form: Form, parameter: Parameter):
         precision=5,
         step=0.1 if parameter.unit == "m" else 1,
         **limits,
-        **_fixed,
+        **FIXED,
     )
 
 
 def _annotations() -> dict:
     made = {
-        "use": BoolProperty(name="Use", description="Take part", default=True, **_fixed),
+        "use": BoolProperty(name="Use", description="Take part", default=True, **FIXED),
         "show": BoolProperty(name="Show", description="Show its parameters", default=True, options=set()),
-        "kind": EnumProperty(name="Effect", description="What real sensors do", items=kind_items(), **_fixed),
-        "seed": IntProperty(name="Seed", description="Other random numbers for each", min=0, **_fixed),
+        "kind": EnumProperty(name="Effect", description="What real sensors do", items=kind_items(), **FIXED),
+        "seed": IntProperty(name="Seed", description="Other random numbers for each", min=0, **FIXED),
     }
     for kind in registry.library().values():
         forms = _items((form.name, title(form.name), form.formula, "NONE") for form in kind.forms)
         made[form_key(kind)] = EnumProperty(
-            name="Form", description="Which formula", items=forms, default=kind.forms[0].name, **_fixed
+            name="Form", description="Which formula", items=forms, default=kind.forms[0].name, **FIXED
         )
         for form in kind.forms:
             for parameter in form.parameters:

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...core.errors import MeshError, PaintedError, RegionError, SensorError
+from ..properties import painted_maps
 from ..session import units
 
 PAINTED = ("k", "friction", "gain")
@@ -198,11 +199,6 @@ def corners_of(mesh, faces: np.ndarray) -> np.ndarray:
     return chosen
 
 
-def is_map(attribute) -> bool:
-    """Whether an attribute of a mesh holds a number for each vertex that a user may mean."""
-    return attribute.domain == "POINT" and attribute.data_type == "FLOAT" and not attribute.name.startswith((".", "palpate_"))
-
-
 def multipliers(obj, key: str) -> np.ndarray | None:
     """(nv,) float: what a parameter is multiplied by at each vertex, from the group or attribute that is painted for it.
 
@@ -228,7 +224,7 @@ def multipliers(obj, key: str) -> np.ndarray | None:
     if group is not None:
         return 1.0 + (units.as_typed(factor) - 1.0) * weights(obj.data, group.index).astype(float)
     attribute = obj.data.attributes.get(name)
-    if attribute is None or not is_map(attribute):
+    if attribute is None or not painted_maps.is_map(attribute):
         what = obj.palpate.bl_rna.properties[f"{key}_map"].name
         raise PaintedError(
             f"Sensor '{obj.name}' has no vertex group or attribute '{name}' any more, which its {what} names: "

@@ -21,6 +21,13 @@ MOVED = ("FREE", "DRIVEN")
 PATHS = ("location", "rotation_euler", "rotation_quaternion", "rotation_axis_angle")
 
 
+def body_changed(obj) -> None:
+    """Put an object back to where it started when no run will move it any more."""
+    settings = obj.palpate
+    if (settings.body not in MOVED or settings.role == "NONE") and not settings.is_baked:
+        restore(obj)
+
+
 def check(obj) -> None:
     """Raise SceneError when something else than forces, parents and its drive moves a body."""
     kind = "Free" if obj.palpate.body == "FREE" else "Driven"

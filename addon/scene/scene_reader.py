@@ -26,9 +26,10 @@ from ...core.model.body import Body
 from ...core.model.motion import Motion, Signal
 from ...core.model.scenario import Scenario
 from ...core.model.sensor import Sensor
-from ...core.model.sensor_parameters import Painted, SensorParameters
+from ...core.model.sensor_parameters import Painted
 from ...core.model.target import Target
-from ..properties import effect_stack, properties
+from ..properties import effect_stack
+from ..properties.parameter_properties import sensor_parameters
 from ..session import clock, identity, transforms, units
 from . import attached_objects, deforming_objects, drives, meshes, moved_bodies, uv_layouts
 from .mesh_snapshot import Seen
@@ -480,13 +481,6 @@ def _moved(obj, body: Body, mesh: TriangleMesh) -> tuple[Body, list[str]]:
     ), warnings
 
 
-def parameters(settings) -> SensorParameters:
-    """Return the parameters of an object's panel."""
-    values = {key: getattr(settings, key) for key in properties.PARAMETERS}
-    values = {key: units.as_typed(v) if isinstance(v, float) else v for key, v in values.items()}
-    return SensorParameters(**{**values, "points_per_texel": int(values["points_per_texel"])})
-
-
 def sensor_alone(scene, obj, depsgraph) -> tuple[Sensor, TriangleMesh]:
     """Return a sensor in the frame of its own object, and its mesh.
 
@@ -501,7 +495,7 @@ def sensor_alone(scene, obj, depsgraph) -> tuple[Sensor, TriangleMesh]:
 
 
 def _sensor(obj, body: int, mesh: TriangleMesh) -> Sensor:
-    found = parameters(obj.palpate)
+    found = sensor_parameters(obj.palpate)
     found.check(obj.name)
     texels = texels_from_region(mesh, meshes.region(obj, len(mesh.vertices)), obj.name)
     if obj.palpate.role == "SENSOR":

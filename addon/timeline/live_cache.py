@@ -15,14 +15,15 @@ import numpy as np
 from ...core.errors import PalpateError
 from ...core.model.recording import Frame
 from ...core.model.scenario import Scenario
-from ..properties import effect_stack, properties
+from ...core.model.sensor_parameters import SENSOR_PARAMETERS
+from ..properties import effect_stack
 from ..scene import drives, meshes, moved_bodies, scene_reader, uv_layouts
 from ..session import clock, dependencies, session_state, units
 
 PAINTED = tuple(f"{key}_{part}" for key in meshes.PAINTED for part in ("map", "factor"))
 REGION = ("region", "vertex_group", "threshold", "material", "face_set")
 SETTINGS = (
-    *properties.PARAMETERS,
+    *SENSOR_PARAMETERS,
     *PAINTED,
     *REGION,
     *drives.SETTINGS,

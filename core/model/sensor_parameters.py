@@ -73,8 +73,9 @@ class SensorParameters:
         "exponent", "1", 1.5, 1.0, 4.0, "Power of the depth",
         label="Exponent", symbol="p", source="Hunt–Crossley", group=CONTACT, note="k then is in N/mᵖ. Hertz: 1.5"))
     dissipation: float = specified(Parameter(
-        "dissipation", "s/m", 0.2, 0.0, inf, "Dissipation: a slow impact at v m/s leaves with the share 1 - α v",
-        label="Dissipation", symbol="α", source="Hunt–Crossley", group=CONTACT))
+        "dissipation", "s/m", 0.2, 0.0, inf, "What an impact loses",
+        label="Dissipation", symbol="α", source="Hunt–Crossley", group=CONTACT,
+        note="A slow impact at v m/s leaves with the share 1 - α v"))
     points_per_texel: int = specified(ChoiceParameter(
         "points_per_texel", 1, CONTACT_POINTS,
         "Per texel, spread over its cell; they share out its stiffness. More of them are slower and make force and "

@@ -10,7 +10,7 @@ import bpy
 import pytest
 
 import palpate
-from palpate.addon.properties import properties
+from palpate.addon.properties import registration
 
 
 def kinds_of(base):
@@ -187,7 +187,7 @@ def test_every_icon_exists(repository):
 
 def test_every_number_with_a_unit_says_it_in_its_tooltip():
     """A name as in "Stiffness k (N/m)" may be cut off where it is drawn; what it says when the mouse rests on it is not."""
-    owners = [cls.bl_rna for cls in properties.CLASSES]
+    owners = [cls.bl_rna for cls in registration.CLASSES]
     owners += [getattr(bpy.ops.palpate, name).get_rna_type() for name in dir(bpy.ops.palpate)]
     counted = 0
     for rna in owners:

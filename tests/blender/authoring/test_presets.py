@@ -10,6 +10,7 @@ import pytest
 from blender_scenes import ball, grid, press
 
 from palpate.addon.authoring import sensors
+from palpate.addon.properties.parameter_properties import sensor_parameters
 from palpate.addon.scene import meshes, scene_reader
 from palpate.addon.timeline import live_cache
 from palpate.core.errors import SensorError
@@ -27,10 +28,10 @@ def test_blender_finds_the_presets():
 def test_a_preset_makes_a_sensor_that_works_and_names_its_source(path):
     pad = grid()
     bpy.ops.palpate.sensor_add()
-    before = scene_reader.parameters(pad.palpate)
+    before = sensor_parameters(pad.palpate)
     pad.palpate.normal_law = "hunt-crossley"  # a preset's k is that of the linear law
     assert bpy.ops.palpate.preset_load(filepath=str(path)) == {"FINISHED"}
-    after = scene_reader.parameters(pad.palpate)
+    after = sensor_parameters(pad.palpate)
     after.check(pad.name)
     text = path.read_text(encoding="utf-8")
     assert after.k == float(re.search(r"settings\.k = ([\d.]+)", text).group(1))

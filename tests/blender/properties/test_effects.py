@@ -7,7 +7,7 @@ import pytest
 from blender_scenes import grid, press, reopen, save
 
 from palpate.addon.bake import bake
-from palpate.addon.properties.properties import effect_stack
+from palpate.addon.properties import effect_stack
 from palpate.addon.scene import scene_reader
 from palpate.addon.timeline import live_cache, playback, staleness
 from palpate.core.effects.engine.registry import effect, library

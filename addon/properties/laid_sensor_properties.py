@@ -1,0 +1,46 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How the texels of a sensor were laid onto the surface of its parent object."""
+
+import bpy
+from bpy.props import EnumProperty, FloatProperty, IntProperty, StringProperty
+
+SKIN_METHODS = (
+    ("NONE", "None", "Not laid onto a surface"),
+    ("ARRAY", "Array", "Rows and columns of a given pitch, wrapped around the surface"),
+    ("GRID", "Rows at a Spacing", "Rows and columns at a spacing, as far as the region goes"),
+    ("NOISE", "Even", "Evenly spaced without rows (blue noise)"),
+    ("VERTICES", "Vertices", "One texel for each vertex of the region"),
+)
+
+
+def _length(name: str, text: str, **more):
+    """Return a property that is a length in metres."""
+    return FloatProperty(name=name, description=text, precision=5, step=0.01, options=set(), **more)
+
+
+class PALPATE_PG_skin(bpy.types.PropertyGroup):
+    """How the texels of a sensor were laid onto its parent's surface; `Object.palpate.skin`"""
+
+    method: EnumProperty(
+        name="Pattern",
+        description="How texels are laid onto the surface",
+        items=SKIN_METHODS,
+        options=set(),
+        override={"LIBRARY_OVERRIDABLE"},
+    )
+    rows: IntProperty(name="Rows", description="Of the array", default=14, min=2, options=set())
+    columns: IntProperty(name="Columns", description="Of the array", default=6, min=2, options=set())
+    pitch_x: _length("Column Pitch (m)", "From column to column, m", default=0.0034, min=1e-6)
+    pitch_y: _length("Row Pitch (m)", "From row to row, m", default=0.0034, min=1e-6)
+    shift_x: _length("Shift Across (m)", "Of the array's middle, along its rows, m")
+    shift_y: _length("Shift Along (m)", "Of the array's middle, from row to row, m")
+    angle: FloatProperty(
+        name="Turn", description="Of the rows, anticlockwise seen from outside", subtype="ANGLE", options=set()
+    )
+    spacing: _length("Spacing (m)", "From texel to texel, m", default=0.002, min=1e-6)
+    seed: IntProperty(name="Seed", description="Another pattern for each", min=0, options=set())
+    lift: _length("Lift (m)", "How far above the surface the texels are, m: so much earlier they are touched", min=0.0)
+    region: StringProperty(options={"HIDDEN"})
+    region_name: StringProperty(options={"HIDDEN"})
+    region_number: IntProperty(options={"HIDDEN"})
+    made_from: StringProperty(options={"HIDDEN"})

@@ -1,0 +1,79 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Properties of Blender made from the specifications of parameters in :mod:`..core.model`, and read back as plain data."""
+
+from bpy.props import EnumProperty, FloatProperty, StringProperty
+
+from ...core.model.drive import DRIVE_PARAMETERS
+from ...core.model.parameter import ChoiceParameter, Parameter, Specification
+from ...core.model.sensor_parameters import SENSOR_PARAMETERS, SensorParameters
+from ..session import units
+
+FIXED: dict = {"options": set(), "override": {"LIBRARY_OVERRIDABLE"}}
+"""A parameter is one number for the whole run, so it has no keyframes."""
+LOWEST = -1e9
+"""Least value that a panel takes for a parameter without a lower bound."""
+
+
+def unit_in_words(parameter: Parameter) -> str:
+    """Return the unit for a tooltip."""
+    return {"1": "no unit", "unit": "in the sensor's unit"}.get(parameter.unit, parameter.unit)
+
+
+def with_unit(label: str, parameter: Parameter) -> str:
+    """Return a label for a panel, followed by the unit where there is one."""
+    return label if parameter.unit == "1" else f"{label} ({parameter.unit})"
+
+
+def float_property(parameter: Parameter, label: str, description: str, **more):
+    """Return a number of Blender with a parameter's default and bounds; `more` goes to FloatProperty."""
+    limits = {"min": max(parameter.low, LOWEST)}
+    if parameter.high < 3e38:  # the largest number of Blender
+        limits["max"] = parameter.high
+    return FloatProperty(
+        name=with_unit(label, parameter), description=description, default=parameter.default, **limits, **more, **FIXED
+    )
+
+
+def property_of(specification: Specification):
+    """Return the property of Blender that holds a parameter."""
+    if isinstance(specification, ChoiceParameter):
+        items = [(str(choice.value), choice.label, choice.text) for choice in specification.choices]
+        default = str(specification.default)
+        return EnumProperty(name=specification.label, description=specification.text, items=items, default=default, **FIXED)
+    if not isinstance(specification, Parameter):
+        return StringProperty(name=specification.label, description=specification.text, default=specification.default, **FIXED)
+    description = f"{specification.text}, {unit_in_words(specification)}"
+    if specification.source:
+        description += f" ({specification.source})"
+    if specification.note:
+        description += f". {specification.note}"
+    digits = {"precision": 5, "step": 0.1} if specification.unit == "m" else {"precision": 4, "step": 10}
+    return float_property(specification, f"{specification.label} {specification.symbol}".strip(), description, **digits)
+
+
+class SensorParameterProperties:
+    """The parameters of a sensor, each under its own name."""
+
+    __annotations__ = {name: property_of(specification) for name, specification in SENSOR_PARAMETERS.items()}
+
+
+class DriveParameterProperties:
+    """The parameters of a drive that have a label, each under its name behind ``drive_``."""
+
+    __annotations__ = {f"drive_{name}": property_of(item) for name, item in DRIVE_PARAMETERS.items() if item.label}
+
+
+def sensor_parameters(settings) -> SensorParameters:
+    """Return the parameters that the settings of a sensor hold."""
+    values = {}
+    for name, specification in SENSOR_PARAMETERS.items():
+        value = getattr(settings, name)
+        values[name] = units.as_typed(value) if isinstance(value, float) else type(specification.default)(value)
+    return SensorParameters(**values)
+
+
+def put_sensor_parameters(settings, parameters: SensorParameters) -> None:
+    """Write parameters into the settings of a sensor."""
+    for name, specification in SENSOR_PARAMETERS.items():
+        value = getattr(parameters, name)
+        setattr(settings, name, str(value) if isinstance(specification, ChoiceParameter) else value)

@@ -1,0 +1,156 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a user says about a scene: `Scene.palpate`."""
+
+import bpy
+from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, PointerProperty, StringProperty
+
+from ...core.figures import color_maps
+from . import figure_properties
+
+COLOR_MAPS = tuple((name, *words) for name, words in color_maps.NAMES.items())
+OVERLAYS = (
+    ("FORCE", "Net Force", "Arrow at the centre of pressure: what the sensor pushes back with"),
+    ("TORQUE", "Free Moment", "Double arrow: the net torque about the centre of pressure, as the sensor pushes back"),
+    ("CENTRE", "Centre of Pressure", "Ball at the centre of pressure"),
+    ("SLIP", "Slip", "Ring around it, as wide as the share of the load on slipping texels"),
+    ("NORMALS", "Texel Normals", "Arrow at each texel, as long as its normal force"),
+    ("SHEARS", "Texel Shear", "Arrow at each texel, along the shear with which it pushes back"),
+)
+
+
+class PALPATE_PG_scene(bpy.types.PropertyGroup):
+    """`Scene.palpate`"""
+
+    schema_version: IntProperty(options={"HIDDEN"})
+    folder: StringProperty(
+        name="Bake Folder",
+        description="Tactile images and recordings go here, in one folder per sensor; // is the folder of the .blend",
+        default="//palpate",
+        subtype="DIR_PATH",
+        options=set(),
+    )
+    use_auto_dt: BoolProperty(
+        name="Auto Time Step",
+        description="Choose the substep from the stability limit of the stiffest contact",
+        default=True,
+        options=set(),
+    )
+    dt: FloatProperty(
+        name="Time Step (s)", description="Longest substep, s", default=1e-4, min=0.0, precision=6, step=0.001, options=set()
+    )
+    interpolation: EnumProperty(
+        name="Between Frames",
+        description="How animated bodies move between the frames that are read",
+        items=(
+            ("LINEAR", "Linear", "Straight, with constant speed: speeds jump at the frames"),
+            ("SMOOTH", "Smooth", "Without jumps of speed"),
+        ),
+        options=set(),
+    )
+    subframes: IntProperty(
+        name="Samples per Frame",
+        description="How often the motion of animated bodies is read in each frame, in a bake and while playing",
+        default=1,
+        min=1,
+        soft_max=16,
+        max=1000,
+        options=set(),
+    )
+    use_live: BoolProperty(
+        name="Live Playback",
+        description="Playing forward from the first frame computes frame by frame; scrubbing shows what was computed",
+        default=True,
+        options=set(),
+    )
+    show_texels: BoolProperty(
+        name="Texels",
+        description="Mark the texels of the active sensor in the 3D view; red ones have a problem",
+        default=True,
+        options=set(),
+    )
+    show_normals: BoolProperty(
+        name="Normals", description="Show which way the texels of the active sensor feel", default=True, options=set()
+    )
+    show_numbers: BoolProperty(
+        name="Numbers",
+        description="Show row and column of the texels where they form a grid, and their number where not",
+        default=False,
+        options=set(),
+    )
+    show_reach: BoolProperty(
+        name="Reach",
+        description="Show the maximum penetration: how deep the texels of the active sensor reach",
+        default=False,
+        options=set(),
+    )
+    show_overlay: BoolProperty(
+        name="Live Heat Map",
+        description="Colour the texels in the 3D view while playing; nothing of it is saved",
+        default=True,
+        options=set(),
+    )
+    show_inset: BoolProperty(
+        name="Live Images and Curves",
+        description="Tactile images, their scale and the force over time in a corner of the 3D view",
+        default=True,
+        options=set(),
+    )
+    color_map: EnumProperty(name="Colour Map", description="Colours of the heat map", items=COLOR_MAPS, options=set())
+    use_auto_range: BoolProperty(
+        name="Auto Range",
+        description="The heat maps of all sensors end at the largest value of any of them",
+        default=True,
+        options=set(),
+    )
+    quantity: EnumProperty(
+        name="Shows",
+        description="What the colours of heat maps and tactile images mean",
+        items=(
+            ("FORCE", "Force", "Normal force of the texel, N"),
+            ("PRESSURE", "Pressure", "Normal force over the area of the texel, kPa"),
+        ),
+        options=set(),
+    )
+    range_max_pressure: FloatProperty(
+        name="Maximum (kPa)", description="Pressure at the end of the heat map, kPa", default=10.0, min=1e-9, options=set()
+    )
+    overlays: EnumProperty(
+        name="On Baked Sensors",
+        description="What a bake puts on its sensors, besides the heat map; Shift-click adds one to those chosen",
+        items=OVERLAYS,
+        default={"FORCE"},
+        options={"ENUM_FLAG"},
+    )
+    texel_arrow_scale: FloatProperty(
+        name="Texel Arrow Scale (m/N)",
+        description="Length of the arrow at a texel for each newton, m/N",
+        default=0.1,
+        min=0.0,
+        precision=5,
+        options=set(),
+    )
+    range_max: FloatProperty(
+        name="Maximum (N)", description="Normal force at the end of the heat map, N", default=0.1, min=1e-9, options=set()
+    )
+    use_auto_arrow: BoolProperty(
+        name="Auto Length",
+        description="The longest arrow of a bake is as long as the largest side of any sensor",
+        default=True,
+        options=set(),
+    )
+    arrow_scale: FloatProperty(
+        name="Arrow Scale (m/N)",
+        description="Length of the net-force arrow for each newton, m/N",
+        default=0.05,
+        min=0.0,
+        precision=5,
+        options=set(),
+    )
+    figures: PointerProperty(
+        type=figure_properties.PALPATE_PG_figures, description="What figures are made of the bake, and how"
+    )
+    baked_digest: StringProperty(options={"HIDDEN"})
+    baked_fingerprint: StringProperty(options={"HIDDEN"})
+    baked_shapes: StringProperty(options={"HIDDEN"})
+    baked_start: IntProperty(options={"HIDDEN"})
+    baked_end: IntProperty(options={"HIDDEN"})
