@@ -58,7 +58,7 @@ def _stiffness(arguments: argparse.Namespace) -> None:
     ]
     print(f"{len(data.compression)} measurements from '{arguments.file}', {arguments.texels} texels on {arguments.area:g} m²\n")
     print(console.text_table(rows, "<>>>"))
-    if fit.offset_is_real and fit.offset.value < 0:
+    if fit.offset_is_significant and fit.offset.value < 0:
         print(f"\nThe foam gives way by {fit.dead_zone * 1e3:.3g} mm before it carries: a dead zone, which the model's line")
         print("through zero does not have; add the effect dead-zone to the sensor for it.")
     print(f"\nSuggested: k = {fit.k.value:.4g} N/m, cn = {0.01 * fit.k.value:.3g} N·s/m (1 % of k)")
@@ -85,8 +85,8 @@ def _friction(arguments: argparse.Namespace) -> None:
         rows.append((name, f"{estimate.value:.4g}", f"{estimate.low:.4g} to {estimate.high:.4g}", unit))
     print(console.text_table(rows, "<>><"))
     print(f"\nroot mean square of what is left: {fit.residual:.3g} N")
-    if fit.untold:
-        print(f"These measurements do not tell {', '.join(fit.untold)}: add some at other velocities.")
+    if fit.unidentifiable:
+        print(f"These measurements do not tell {', '.join(fit.unidentifiable)}: add some at other velocities.")
     if arguments.plot:
         from ..core.gap.calibration.plots import plot_friction
 

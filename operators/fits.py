@@ -105,7 +105,7 @@ class PALPATE_OT_stiffness_fit(MeasurementFit, bpy.types.Operator):
             obj.palpate.cn = DAMPING * chosen.value
         self.picture(context, plot_stiffness, fit, "Palpate Stiffness Fit")
         text = f"k = {chosen.value:.4g} N/m (95 %: {chosen.low:.4g} to {chosen.high:.4g}) for {len(report.texels)} texels"
-        if fit.offset_is_real and fit.dead_zone > 0:
+        if fit.offset_is_significant and fit.dead_zone > 0:
             text += f"; the foam gives way by {fit.dead_zone * 1e3:.3g} mm before it carries: add the effect dead-zone for it"
         self.report({"INFO"}, text)
 
@@ -135,8 +135,8 @@ class PALPATE_OT_friction_fit(MeasurementFit, bpy.types.Operator):
         self.picture(context, plot_friction, fit, "Palpate Friction Fit")
         values = ", ".join(f"{name} = {e.value:.3g} ({e.low:.3g} to {e.high:.3g})" for name, e in fit.estimates.items())
         self.report({"INFO"}, values)
-        if fit.untold:
-            names = ", ".join(fit.untold)
+        if fit.unidentifiable:
+            names = ", ".join(fit.unidentifiable)
             self.report({"WARNING"}, f"These measurements do not tell {names}: add some at other velocities")
 
 

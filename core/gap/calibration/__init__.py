@@ -1,2 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Parameters of a sensor from measurements: stiffness of its foam, friction of its surface (paper, sections 3.3 and 3.4)."""
+"""Parameters of the base model from two simple measurements (paper, sections 3.3 and 3.4).
+
+`stiffness` fits the stiffness of a texel to the compression of its foam, `friction` fits LuGre friction to a force–velocity
+curve, and `plots` draws both fits. They are small cases of :mod:`..fitting`, whose estimates and intervals they use.
+"""
+
+__all__ = ["friction", "plots", "stiffness"]

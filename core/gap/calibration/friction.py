@@ -1,9 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Friction of one texel from a force–velocity curve (paper, section 3.3.4, Fig. 7; the fit that it calls for and leaves out).
+"""Friction of one texel from a force–velocity curve (paper, section 3.3.4, Fig. 7, which asks for such a fit).
 
-Sliding steadily, the bristles of Eq. 9 stand still and Eq. 13 becomes ``ft(v) = fn (mud + (mus - mud) exp(-v²/x0²)) + ct v``:
-such a curve tells `mus`, `mud`, `x0` and `ct`. The bristles' stiffness and damping show only where the velocity changes; a
-recording with a `time` column, started from rest, tells `sigma0` and `sigma1` as well.
+In steady sliding the bristles of Eq. 9 are at rest and Eq. 13 becomes ``ft(v) = fn (mud + (mus - mud) exp(-v²/x0²)) + ct v``.
+Such a curve identifies `mus`, `mud`, `x0` and `ct`. The stiffness and the damping of the bristles have an influence only where
+the velocity changes: a recording with a `time` column that starts from rest identifies `sigma0` and `sigma1` as well.
+
+The fit starts from the curve of steady sliding, whose values other than `x0` are linear, and refines all values by nonlinear
+least squares.
 """
 
 from __future__ import annotations
@@ -18,7 +21,7 @@ from ...errors import FileError, ParameterError
 from ...io.csv_table import read_columns
 from ...laws.contact import friction_along_path, parameter_row, stribeck_force
 from ...model.sensor_parameters import SensorParameters
-from ..fitting.regression import Estimate, intervals
+from ..fitting.regression import Estimate, linearised_estimates
 
 STEADY = ("mus", "mud", "x0", "ct")
 DYNAMIC = (*STEADY, "sigma0", "sigma1")
@@ -52,10 +55,10 @@ class FrictionFit:
     normal_force : float, N
         Per texel.
     parameters : SensorParameters
-        Those given to the fit with the fitted values put in.
+        Those given to the fit, with the fitted values.
     estimates : dict of Estimate
-        By name: those of `STEADY`, or of `DYNAMIC` for a recording over time. An infinite interval says that the measurements
-        do not tell this value.
+        By name: those of `STEADY`, or of `DYNAMIC` for a recording over time. An infinite interval means that the measurements
+        do not depend on this value.
     residual : float, N
         Root mean square.
     """
@@ -67,13 +70,15 @@ class FrictionFit:
     residual: float
 
     @property
-    def untold(self) -> list[str]:
-        """Names of the values that these measurements cannot tell: their interval is wider than twice the value."""
+    def unidentifiable(self) -> list[str]:
+        """Names of the values that these measurements do not identify: their interval is wider than twice the value."""
         return [name for name, e in self.estimates.items() if not e.high - e.low < 2 * max(abs(e.value), 1e-12)]
 
 
 def steady_friction(velocity: np.ndarray, normal_force: float, parameters: SensorParameters) -> np.ndarray:
-    """Return the friction of steady sliding (Eq. 9, 10, 13 with resting bristles), N; at rest what it takes to begin.
+    """Return the friction of steady sliding (Eq. 9, 10, 13 with bristles at rest), N.
+
+    At velocity zero it is the largest static friction.
 
     Parameters
     ----------
@@ -88,7 +93,7 @@ def steady_friction(velocity: np.ndarray, normal_force: float, parameters: Senso
 def friction_over_time(time: np.ndarray, velocity: np.ndarray, normal_force: float, parameters: SensorParameters) -> np.ndarray:
     """Return the friction of Eq. 9 and 13 along a velocity, from rest, N.
 
-    Between samples the velocity is the mean of its ends, for which Eq. 9 is solved exactly.
+    Between two samples the velocity is the mean of both, for which Eq. 9 is solved exactly.
 
     Parameters
     ----------
@@ -112,7 +117,7 @@ def read_friction(path: str | os.PathLike, texels: int = 1) -> FrictionData:
     path : path
         See :mod:`.csv_table` for other units.
     texels : int
-        How many texels shared the force; the curve returned is that of one.
+        Number of texels that shared the force; the curve of one texel is returned.
 
     Raises
     ------
@@ -143,12 +148,12 @@ def fit_friction(data: FrictionData, normal_force: float, parameters: SensorPara
     normal_force : float, N
         On one texel.
     parameters : SensorParameters, optional
-        What is not fitted, and where the fit of `sigma0` and `sigma1` starts.
+        Values that are not fitted, and start values of `sigma0` and `sigma1`.
 
     Raises
     ------
     ParameterError
-        The normal force is not above zero, or everything was measured at one velocity.
+        The normal force is not above zero, or all velocities are equal.
     """
     if not (np.isfinite(normal_force) and normal_force > 0):
         raise ParameterError(f"The normal force is {normal_force:g} N: give a value above zero.")
@@ -163,7 +168,7 @@ def fit_friction(data: FrictionData, normal_force: float, parameters: SensorPara
 
 
 def _steady_start(data: FrictionData, normal_force: float) -> dict[str, float]:
-    """Values for the curve of steady sliding: for each `x0` the other three are linear, and none is below zero."""
+    """Return start values from the curve of steady sliding: given `x0`, the others follow by non-negative least squares."""
     from scipy.optimize import nnls
 
     speed = np.abs(data.velocity)
@@ -175,64 +180,91 @@ def _steady_start(data: FrictionData, normal_force: float) -> dict[str, float]:
         if best is None or misfit < best[0]:
             best = misfit, float(x0), values
     assert best is not None
-    _, x0, (mud, more, ct) = best
-    return {"mus": mud + more, "mud": mud, "x0": x0, "ct": ct}
+    _, x0, (mud, rise, ct) = best
+    return {"mus": mud + rise, "mud": mud, "x0": x0, "ct": ct}
 
 
 def _with(base: SensorParameters, values: dict[str, float]) -> SensorParameters:
+    """Return parameters with some of them replaced."""
     changes: dict[str, Any] = dict(values)
     return replace(base, **changes)
+
+
+@dataclass(frozen=True)
+class _Search:
+    """The variables of the nonlinear fit: the fitted values in units of order one, and `mus` as its excess over `mud`.
+
+    The bounds of the variables then keep `mus` from falling below `mud`.
+
+    Attributes
+    ----------
+    names : tuple of str
+        The fitted parameters; the first two are `mus` and `mud`.
+    units : (p,) float
+        Of the variables.
+    """
+
+    names: tuple[str, ...]
+    units: np.ndarray
+
+    @classmethod
+    def of(cls, data: FrictionData, normal_force: float, base: SensorParameters, names: tuple[str, ...]) -> _Search:
+        """Return the search for some parameters, with units from the measurements."""
+        weight, speed = max(normal_force, 1e-12), max(float(np.abs(data.velocity).max()), 1e-12)
+        units = {"mus": 1.0, "mud": 1.0, "x0": speed, "ct": weight / speed}
+        units |= {"sigma0": base.sigma0, "sigma1": max(base.sigma1, 1e-6)}
+        return cls(names, np.array([units[name] for name in names]))
+
+    @property
+    def low(self) -> np.ndarray:
+        """Lower bounds of the variables."""
+        return np.array([0.0, 0.0, 1e-3, 0.0, 1e-4, 0.0][: len(self.names)])
+
+    @property
+    def transformation(self) -> np.ndarray:
+        """Derivatives of the values with respect to the variables, (p, p) float."""
+        matrix = np.diag(self.units)
+        matrix[0, 1] = self.units[1]
+        return matrix
+
+    def values(self, variables: np.ndarray) -> np.ndarray:
+        """Return the values of the parameters."""
+        values = variables * self.units
+        values[0] += values[1]
+        return values
+
+    def variables(self, values: dict[str, float]) -> np.ndarray:
+        """Return the variables that belong to some values, just inside their bounds."""
+        first = np.array([values[name] for name in self.names])
+        first[0] -= first[1]
+        return np.clip(first / self.units, self.low + 1e-9, None)
 
 
 def _refine(
     data: FrictionData, normal_force: float, base: SensorParameters, names: tuple[str, ...], start: dict[str, float]
 ) -> FrictionFit:
-    """Nonlinear least squares from `start`, in values of order one; mus is searched as mud plus what it is above it."""
+    """Return the fit by nonlinear least squares from start values."""
     from scipy.optimize import least_squares
 
-    weight = max(normal_force, 1e-12)
-    speed = max(float(np.abs(data.velocity).max()), 1e-12)
-    scale = {"mus": 1.0, "mud": 1.0, "x0": speed, "ct": weight / speed, "sigma0": base.sigma0, "sigma1": max(base.sigma1, 1e-6)}
-    scales = np.array([scale[name] for name in names])
+    search, weight = _Search.of(data, normal_force, base, names), max(normal_force, 1e-12)
 
-    def values_of(q: np.ndarray) -> np.ndarray:
-        values = q * scales
-        values[0] += values[1]
-        return values
-
-    def predicted(values: np.ndarray) -> np.ndarray:
-        law = _with(base, dict(zip(names, map(float, values), strict=True)))
+    def residual_of(values: np.ndarray) -> np.ndarray:
+        parameters = _with(base, dict(zip(names, map(float, values), strict=True)))
         if data.time is None:
-            return steady_friction(data.velocity, normal_force, law)
-        return friction_over_time(data.time, data.velocity, normal_force, law)
+            return steady_friction(data.velocity, normal_force, parameters) - data.force
+        return friction_over_time(data.time, data.velocity, normal_force, parameters) - data.force
 
-    first = np.array([start[name] for name in names])
-    first[0] -= first[1]
-    low = np.array([0.0, 0.0, 1e-3, 0.0, 1e-4, 0.0][: len(names)])
     found = least_squares(
-        lambda q: (predicted(values_of(q)) - data.force) / weight,
-        np.clip(first / scales, low + 1e-9, None),
-        bounds=(low, np.inf),
+        lambda variables: residual_of(search.values(variables)) / weight,
+        search.variables(start),
+        bounds=(search.low, np.inf),
         x_scale="jac",
         xtol=1e-14,
         ftol=1e-14,
         gtol=1e-14,
     )
-    values = values_of(found.x)
-    freedom = len(data.force) - len(names)
-    residual = predicted(values) - data.force
-    # From the searched values to the named ones: mus = (mus - mud) + mud.
-    change = np.diag(scales)
-    change[0, 1] = scales[1]
-    covariance = np.linalg.pinv(found.jac.T @ found.jac, rcond=1e-14) * (residual @ residual) / weight**2 / max(freedom, 1)
-    spread = np.sqrt(np.clip(np.diag(change @ covariance @ change.T), 0.0, None))
-    flat = np.linalg.norm(found.jac, axis=0) < 1e-9 * np.linalg.norm(found.jac)  # a value that nothing depends on
-    spread[flat] = np.inf
-    estimates = dict(zip(names, intervals(values, spread, freedom), strict=True))
-    return FrictionFit(
-        data,
-        normal_force,
-        _with(base, {name: estimate.value for name, estimate in estimates.items()}),
-        estimates,
-        float(np.sqrt(np.mean(residual**2))),
-    )
+    values = search.values(found.x)
+    residual = residual_of(values)
+    estimates = dict(zip(names, linearised_estimates(values, found.jac, search.transformation, residual, weight), strict=True))
+    fitted = _with(base, {name: estimate.value for name, estimate in estimates.items()})
+    return FrictionFit(data, normal_force, fitted, estimates, float(np.sqrt(np.mean(residual**2))))

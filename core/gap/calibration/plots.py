@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Pictures of the fits: foam compression (paper, Fig. 6) and friction curve (Fig. 7), at the width of a journal column."""
+"""Plots of the fits: foam compression (paper, Fig. 6) and friction curve (Fig. 7), at the width of a journal column."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ COLUMN = 3.5
 
 
 def plot_stiffness(path: str | Path, fit: StiffnessFit, dpi: int = 200) -> None:
-    """Write the measurements with both lines (PNG, PDF or SVG by the file's ending)."""
+    """Plot the measurements with both lines into a file (PNG, PDF or SVG by its suffix)."""
     figure = new_figure(COLUMN, 2.7)
     axes = figure.add_axes((0.165, 0.165, 0.8, 0.8))
     x = np.array([0.0, fit.data.compression.max() * 1.06])
@@ -38,7 +38,7 @@ def plot_stiffness(path: str | Path, fit: StiffnessFit, dpi: int = 200) -> None:
 
 
 def plot_friction(path: str | Path, fit: FrictionFit, dpi: int = 200) -> None:
-    """Write the measured friction with the fitted law (PNG, PDF or SVG by the file's ending)."""
+    """Plot the measured friction with the fitted law into a file (PNG, PDF or SVG by its suffix)."""
     figure = new_figure(COLUMN, 2.7)
     axes = figure.add_axes((0.165, 0.165, 0.8, 0.8))
     data, law = fit.data, fit.parameters
@@ -46,7 +46,7 @@ def plot_friction(path: str | Path, fit: FrictionFit, dpi: int = 200) -> None:
     if data.time is not None:
         force = friction_over_time(data.time, data.velocity, fit.normal_force, law)
         axes.plot(data.velocity, force * 1e3, color=NORMAL_COLOUR, lw=1.3, label="fitted, from rest (Eq. 9, 13)")
-    # Steady sliding turns its direction with a jump: two branches, each drawn on its own side of zero.
+    # Steady friction jumps at velocity zero, so each sign of the velocity is a line of its own.
     low, high = min(data.velocity.min(), 0.0), max(data.velocity.max(), 0.0)
     label = "steady sliding (Eq. 10, 13)"
     for start, stop in ((low, -1e-12), (0.0, high)):
@@ -65,6 +65,7 @@ def plot_friction(path: str | Path, fit: FrictionFit, dpi: int = 200) -> None:
 
 
 def _finish(axes: Axes) -> None:
+    """Style the axes and add the legend."""
     axes.tick_params(labelsize=8, length=2.5, width=0.6, colors=INK)
     axes.spines[["top", "right"]].set_visible(False)
     axes.legend(frameon=False, handlelength=1.6, loc="best")

@@ -13,7 +13,7 @@ from ...io.csv_table import read_columns
 from ..fitting.regression import Estimate, linear_estimates
 
 STANDARD_GRAVITY = 9.80665
-"""What a measured mass weighs, m/s²."""
+"""Standard acceleration of gravity, which converts masses to forces, m/s²."""
 
 
 @dataclass(frozen=True)
@@ -32,20 +32,20 @@ class FoamData:
 
 @dataclass(frozen=True)
 class StiffnessFit:
-    """Two straight lines through foam measurements, and the texel's stiffness that follows from each.
+    """Two straight lines through foam measurements, and the stiffness of a texel that follows from each.
 
     Attributes
     ----------
     data : FoamData
     k : Estimate, N/m
-        From the line through zero: the one that the model wants, since a texel without depth has no force.
+        From the line through zero. The model needs this one, since its texels have no force at depth zero.
     k_offset : Estimate, N/m
         From the line with an offset.
     slope, slope_offset : float, Pa/m
     offset : Estimate, Pa
-        Pressure of the second line at no compression. Below zero: the foam gives way before it carries.
+        Pressure of the second line at compression zero. If it is negative, the foam yields before it carries.
     dead_zone : float, metres
-        Compression at which the second line begins to carry; zero when it carries from the start.
+        Compression at which the second line becomes positive; zero if it is positive from the start.
     """
 
     data: FoamData
@@ -57,8 +57,8 @@ class StiffnessFit:
     dead_zone: float
 
     @property
-    def offset_is_real(self) -> bool:
-        """True when the interval of `offset` leaves out zero: the measurements do tell the two lines apart."""
+    def offset_is_significant(self) -> bool:
+        """True if the interval of `offset` does not contain zero: the measurements distinguish the two lines."""
         return not self.offset.low <= 0.0 <= self.offset.high
 
 
@@ -92,12 +92,12 @@ def read_foam(path: str | os.PathLike, weight_area: float | None = None) -> Foam
     path : path
         See :mod:`.csv_table` for other units.
     weight_area : float or None, m²
-        What the force or the mass rested on.
+        Area on which the force or the mass rested.
 
     Raises
     ------
     FileError
-        A column is missing, or `weight_area` is, which forces and masses need.
+        A column is missing, or `weight_area`, which forces and masses need, is not given.
     """
     columns = read_columns(path, {"compression": "m", "pressure": "Pa", "force": "N", "mass": "kg"})
     if "compression" not in columns:
@@ -128,7 +128,7 @@ def fit_stiffness(data: FoamData, area: float, texels: int) -> StiffnessFit:
     Raises
     ------
     ParameterError
-        There are not enough different measurements, or the foam does not resist.
+        There are not enough different compressions, or the pressure does not rise with the compression.
     """
     x, p = np.asarray(data.compression, float), np.asarray(data.pressure, float)
     if len(np.unique(x)) < 2 or not np.any(x > 0):

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .least_squares import TEXEL_PRECISION, Fit, NormalEquations, all_equations, summed_equations, value_of
-from .regression import student
+from .regression import student_quantile
 
 if TYPE_CHECKING:
     from ..selection.diagnosis import Diagnosis
@@ -123,7 +123,7 @@ def _sandwich(bread: np.ndarray, gradients: np.ndarray) -> np.ndarray:
     influence = gradients @ bread
     squares, fourth = (influence**2).sum(axis=0), (influence**4).sum(axis=0)
     effective = np.clip(3.0 * squares**2 / np.maximum(fourth, 1e-300), 2.0, max(groups, 2))
-    reach = np.array([student(number - 1.0) for number in effective]) / NORMAL_QUANTILE
+    reach = np.array([student_quantile(number - 1.0) for number in effective]) / NORMAL_QUANTILE
     factor = groups / max(groups - len(bread), 1)
     covariance: np.ndarray = factor * np.outer(reach, reach) * (influence.T @ influence)
     return covariance

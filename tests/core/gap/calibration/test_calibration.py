@@ -33,7 +33,7 @@ def test_an_offset_is_found_and_called_real():
     x = np.linspace(0.5e-3, 4e-3, 12)
     rng = np.random.default_rng(5)
     fit = fit_stiffness(FoamData(x, 4e6 * (x - 0.3e-3) + rng.normal(0, 40, 12)), 0.00125, 84)
-    assert fit.offset_is_real
+    assert fit.offset_is_significant
     assert fit.dead_zone == pytest.approx(0.3e-3, rel=0.15)
     assert fit.k_offset.low < 4e6 * 0.00125 / 84 < fit.k_offset.high
     assert fit.k.value < fit.k_offset.value  # the line through zero has to carry less
@@ -124,7 +124,7 @@ def test_what_a_curve_cannot_tell_is_said():
     v = np.linspace(3.0, 5.0, 30)
     noise = np.random.default_rng(0).normal(0, 1e-4, 30)
     fit = fit_friction(FrictionData(v, steady_friction(v, LOAD, PAPER) + noise), LOAD)
-    assert {"mus", "x0"} & set(fit.untold)
+    assert {"mus", "x0"} & set(fit.unidentifiable)
 
 
 def test_columns_in_other_units(tmp_path):
