@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What every form of every effect has to keep; a new file in the library is tested by this one as it is."""
 
-import dataclasses
-
 import numpy as np
 import pytest
 
@@ -22,7 +20,7 @@ ROWS, COLUMNS, PITCH = 4, 3, 0.0034
 PARAMETERS = SensorParameters(k=1000.0, cn=10.0)
 
 
-def site(gain=1.0, zero=0.0) -> TransducerArray:
+def transducers(gain=1.0, zero=0.0) -> TransducerArray:
     row, column = (grid.ravel() for grid in np.mgrid[0:ROWS, 0:COLUMNS])
     position = np.stack([column * PITCH, row * PITCH, np.zeros(ROWS * COLUMNS)], axis=1)
     return TransducerArray(position, np.full(len(position), PITCH**2), row, column, gain, zero)
@@ -57,9 +55,9 @@ def test_a_form_says_what_it_is(name, form):
     kind, found = kind_of(name), form_of(name, form)
     assert kind.site_of(found) in specification.SITES_OF_ACTION
     assert kind.text.endswith(".") and found.formula and found.reference
-    ways = [found.law, found.memoryless, found.coupling, found.delay, found.friction_law, found.placement]
+    mechanisms = [found.law, found.memoryless, found.coupling, found.delay, found.friction_law, found.placement]
     assert getattr(found, found.mechanism) is not None
-    assert sum(way is not None for way in ways) == 1
+    assert sum(mechanism is not None for mechanism in mechanisms) == 1
     assert (found.constants is not None) == (found.law is not None or found.friction_law is not None)
     assert set(found.neutral) <= {parameter.name for parameter in found.parameters}
     for parameter in found.parameters:
@@ -74,7 +72,7 @@ def test_nothing_is_left_of_it_when_it_is_off(name, form):
     time, depth, slide = presses()
     base_force = normal_forces((), PARAMETERS, time, depth)
     np.testing.assert_allclose(normal_forces((off,), PARAMETERS, time, depth, slide), base_force, rtol=1e-9, atol=1e-12)
-    there = site(gain=-2.0, zero=5.0)
+    there = transducers(gain=-2.0, zero=5.0)
     np.testing.assert_allclose(readings((off,), there, time, base_force), 5.0 - 2.0 * base_force, rtol=1e-9, atol=1e-9)
     factor, viscous = friction_factors((off,), np.array([0.0, 0.1, 1.0]), 1.0)
     np.testing.assert_allclose(factor, 1.0, rtol=1e-12)
@@ -93,7 +91,7 @@ def test_numbers_stay_finite_at_the_bounds(name, form):
         check((item,), "pad")
         force = normal_forces((item,), PARAMETERS, time, depth, slide)
         assert np.isfinite(force).all()
-        assert np.isfinite(readings((item,), site(), time, force)).all()
+        assert np.isfinite(readings((item,), transducers(), time, force)).all()
         assert np.isfinite(friction_factors((item,), np.array([0.0, 1e-9, 1.0, 1e3]), 1.0)).all()
 
 
@@ -112,10 +110,10 @@ def test_sample_by_sample_gives_what_the_whole_signal_gives(name, form):
         np.testing.assert_array_equal(asked, single[i])
     np.testing.assert_allclose(single, whole, rtol=1e-7, atol=1e-9)
 
-    reader = ReadoutChain((item,), site())
+    reader = ReadoutChain((item,), transducers())
     pieces = np.split(np.arange(len(time)), [1, 2, 17, 200])
     stream = np.concatenate([reader.read(time[piece], whole[piece]) for piece in pieces])
-    np.testing.assert_allclose(stream, readings((item,), site(), time, whole), rtol=1e-7, atol=1e-9)
+    np.testing.assert_allclose(stream, readings((item,), transducers(), time, whole), rtol=1e-7, atol=1e-9)
 
 
 @every_form
@@ -135,7 +133,7 @@ def test_the_tangent_is_the_derivative_of_the_force(name, form):
 def test_the_same_moment_asked_twice_reads_the_same(name, form):
     item = effect(name, form, seed=2)
     time, depth, _ = presses(50)
-    reader = ReadoutChain((item,), site())
+    reader = ReadoutChain((item,), transducers())
     reader.read(time, 1000.0 * depth)
     once = reader.step(time[-1] + 0.5, 1000.0 * depth[30])
     np.testing.assert_array_equal(reader.step(time[-1] + 0.5, 1000.0 * depth[30]), once)
@@ -153,7 +151,7 @@ def test_a_toml_table_brings_it_back(name, form):
 @every_form
 def test_seeds(name, form):
     found, (time, depth, _) = form_of(name, form), presses(60)
-    one, same, other = (readings((effect(name, form, seed=seed),), site(), time, 1000.0 * depth) for seed in (1, 1, 2))
+    one, same, other = (readings((effect(name, form, seed=seed),), transducers(), time, 1000.0 * depth) for seed in (1, 1, 2))
     np.testing.assert_array_equal(one, same)
     assert found.random != np.array_equal(one, other)
 
@@ -166,39 +164,6 @@ def test_a_value_outside_the_bounds_is_refused(name, form):
                 effect(name, form, **{parameter.name: value})
 
 
-def test_the_law_of_hunt_and_crossley_is_a_base_as_well():
-    """Step by step as over the whole signal, with an effect between its spring and its damping."""
-    parameters = SensorParameters(k=3e4, normal_law="hunt-crossley", exponent=1.5, dissipation=2.0)
-    time, depth, slide = presses(80)
-    items = (effect("stiffening"), effect("creep"))
-    whole = normal_forces(items, parameters, time, depth)
-    lengths = np.diff(time, prepend=time[0])
-    pad = StepwiseNormalForces(items, parameters, lengths, depth.shape[1])
-    rate = np.diff(depth, axis=0, prepend=depth[:1]) / np.where(lengths > 0, lengths, 1.0)[:, None]
-    for i in range(len(time)):
-        np.testing.assert_allclose(pad.step(i, depth[i], rate[i])[0], whole[i], rtol=1e-9, atol=1e-12)
-    np.testing.assert_allclose(
-        normal_forces((), parameters, time, depth, rate=np.zeros_like(depth)), 3e4 * depth**1.5, rtol=1e-12, atol=1e-12
-    )
-
-
-def test_wrong_words_get_a_hint():
-    with pytest.raises(EffectError, match="did you mean 'creep'"):
-        effect("crep")
-    with pytest.raises(EffectError, match="did you mean 'exponential'"):
-        effect("creep", "exponental")
-    with pytest.raises(EffectError, match="did you mean 'amount'"):
-        effect("creep", amout=0.1)
-    with pytest.raises(EffectError, match="one number"):
-        effect("creep", amount=[0.1, 0.2])
-    with pytest.raises(EffectError, match="needs name"):
-        from_dict({"form": "exponential"})
-    with pytest.raises(EffectError, match="whole number"):
-        from_dict({"name": "creep", "seed": -1})
-    with pytest.raises(EffectError, match="give it a number"):
-        from_dict({"name": "creep", "amount": "much"})
-
-
 def test_forms_differ_from_one_another():
     """Two forms with equal formulas would be one too many."""
     time, depth, slide = presses()
@@ -207,13 +172,9 @@ def test_forms_differ_from_one_another():
         for form in kind.forms:
             item = effect(kind.name, form.name, seed=5, **noticeable(form))
             force = normal_forces((item,), PARAMETERS, time, depth, slide)
-            reading = readings((item,), site(), time, force)
+            reading = readings((item,), transducers(), time, force)
             factor, viscous = friction_factors((item,), np.geomspace(1e-5, 1, 9), np.linspace(0.5, 2, 9))
-            moved = actual_placement((item,), site().position, np.ones((12, 3)), np.ones((12, 3)))
+            moved = actual_placement((item,), transducers().position, np.ones((12, 3)), np.ones((12, 3)))
             seen.append(np.concatenate([np.ravel(part) for part in (force, reading, factor, viscous, *moved)]))
         for i, one in enumerate(seen):
             assert not any(np.allclose(one, other, rtol=1e-6) for other in seen[:i]), kind.forms[i].name
-
-
-def test_effects_are_plain_data():
-    assert dataclasses.asdict(effect("creep", amount=0.5))["values"] == {"amount": 0.5, "time": 2.0}

@@ -5,8 +5,6 @@ import numpy as np
 import pytest
 from scipy.signal import TransferFunction, lsim
 
-from palpate.core.effects.engine import random_streams
-from palpate.core.effects.engine.coupling_matrix import coupling_matrix, nearest_distance, pairs_within
 from palpate.core.effects.engine.readout_chain import ReadoutChain, readings
 from palpate.core.effects.engine.registry import effect
 from palpate.core.effects.engine.specification import TransducerArray
@@ -20,8 +18,8 @@ GRID = TransducerArray(POSITION, np.full(N, PITCH**2), ROW, COLUMN)
 TIME = np.linspace(0.0, 10.0, 501)
 
 
-def read(item, force, time=TIME, site=GRID):
-    return readings((item,), site, time, np.asarray(force, float))
+def read(item, force, time=TIME, transducers=GRID):
+    return readings((item,), transducers, time, np.asarray(force, float))
 
 
 def image(texel, value=1.0):
@@ -63,9 +61,9 @@ def test_formulas(name, form, values, formula):
 
 
 def test_saturation_counts_from_the_reading_without_load():
-    site = TransducerArray(POSITION, GRID.area, gain=-2.0, zero=5.0)
+    array = TransducerArray(POSITION, GRID.area, gain=-2.0, zero=5.0)
     force = np.linspace(0.0, 3.0, len(TIME))[:, None] * np.ones(N)
-    found = read(effect("saturation", "clip", level=4.0), force, site=site)
+    found = read(effect("saturation", "clip", level=4.0), force, transducers=array)
     np.testing.assert_allclose(found, np.maximum(5.0 - 2.0 * force, 1.0), rtol=1e-12)
 
 
@@ -178,11 +176,11 @@ def test_the_elastic_half_space_is_boussinesqs():
     side, pitch, h = 37, 0.001, 0.003
     y, x = np.mgrid[0:side, 0:side] * pitch
     position = np.stack([x.ravel(), y.ravel(), np.zeros(side * side)], axis=1)
-    site = TransducerArray(position, np.full(side * side, pitch**2))
+    array = TransducerArray(position, np.full(side * side, pitch**2))
     middle = side * side // 2
     force = np.zeros((1, side * side))
     force[0, middle] = 1.0
-    found = readings((effect("load-spreading", "half-space", thickness=h),), site, np.zeros(1), force)[0]
+    found = readings((effect("load-spreading", "half-space", thickness=h),), array, np.zeros(1), force)[0]
     r = np.linalg.norm(position - position[middle], axis=1)
     stress = 3 / (2 * np.pi * h**2) * (1 + (r / h) ** 2) ** -2.5
     np.testing.assert_allclose(found, stress * pitch**2, rtol=1e-2)  # what lies beyond the sheet's edge, and the cells' size
@@ -205,32 +203,6 @@ def test_crosstalk():
 def test_lines_need_rows_and_columns():
     with pytest.raises(EffectError, match="rows and columns"):
         read(effect("crosstalk", "lines"), image(0), np.zeros(1), TransducerArray(POSITION, GRID.area, name="pad"))
-
-
-def test_the_near_part_of_a_matrix_does_what_the_whole_does(monkeypatch):
-    weight, reach = lambda r: np.where(r <= 0.008, np.exp(-r / 0.003), 0.0), 0.008  # noqa: E731
-    random = np.random.default_rng(3)
-    position, area, signal = random.uniform(0, 0.05, (N, 3)), random.uniform(1, 2, N), random.random((4, N))
-    for areas in (area, None):
-        whole = coupling_matrix(position, weight, reach, areas)
-        monkeypatch.setattr("palpate.core.effects.engine.coupling_matrix.LARGEST_DENSE", 0)
-        near = coupling_matrix(position, weight, reach, areas)
-        monkeypatch.undo()
-        assert near.matrix is None
-        np.testing.assert_allclose(near.apply(signal), whole.apply(signal), rtol=1e-12)
-
-
-def test_pairs_of_points():
-    position = np.random.default_rng(5).uniform(-1, 1, (200, 3))
-    distance = np.linalg.norm(position[:, None] - position, axis=2)
-    first, second, found = pairs_within(position, 0.4)
-    expected = np.argwhere(distance <= 0.4)
-    np.testing.assert_array_equal(np.stack([first, second], axis=1), expected)
-    np.testing.assert_allclose(found, distance[first, second])
-    np.fill_diagonal(distance, np.inf)
-    assert nearest_distance(position) == pytest.approx(np.median(distance.min(axis=1)))
-    assert nearest_distance(POSITION) == pytest.approx(PITCH)
-    assert nearest_distance(np.linspace(0, 1, 5)[:, None] * [1.0, 0, 0]) == pytest.approx(0.25)
 
 
 # --- texels by themselves
@@ -302,19 +274,3 @@ def test_any_moment_can_be_asked_for_by_itself(name, form):
     whole = read(item, force)
     for i in (500, 3, 77):
         np.testing.assert_array_equal(ReadoutChain((item,), GRID).step(TIME[i], force[i]), whole[i])
-
-
-def test_uniform_numbers_fill_their_interval():
-    numbers = random_streams.uniform("test", 1, np.arange(100_000))
-    counts, _ = np.histogram(numbers, 100, (0, 1))
-    assert ((counts - 1000) ** 2 / 1000).sum() < 150  # chi-squared with 99 degrees of freedom: 1 in 1,000 is above 149
-    assert numbers.min() > 0 and numbers.max() < 1
-
-
-def test_the_chain_runs_in_the_order_of_a_sensor():
-    """Cover, transducer, converter: noise is quantized, not the other way round, however the stack is written."""
-    stack = (effect("quantization", step=0.25), effect("noise", spread=0.05), effect("load-spreading"))
-    force = np.random.default_rng(0).random((20, N))
-    found = readings(stack, GRID, TIME[:20], force)
-    np.testing.assert_array_equal(found, readings(stack[::-1], GRID, TIME[:20], force))
-    np.testing.assert_allclose(found / 0.25, np.round(found / 0.25), atol=1e-12)

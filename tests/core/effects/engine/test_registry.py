@@ -1,0 +1,59 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The registry: it finds the modules of the library, and refuses what is not valid with a sentence."""
+
+import dataclasses
+import sys
+
+import pytest
+
+from palpate.core.effects import library as library_package
+from palpate.core.effects.engine.registry import effect, from_dict, library
+from palpate.core.errors import EffectError
+
+MODULE = """
+from palpate.core.effects.engine.specification import Form, Kind, constants_from
+from palpate.core.model.parameter import Parameter
+
+def halved(signal, time, values, transducers, seed):
+    return 0.5 * signal
+
+KIND = Kind("halving", "Halving", "Halves the reading.", "readout", 1.0, (
+    Form("half", "r = f / 2", "No one (2026)", (), {}, memoryless=halved),
+))
+"""
+
+
+def test_a_module_of_the_library_is_an_effect(tmp_path, monkeypatch):
+    """One file with a KIND is all that a new effect needs."""
+    (tmp_path / "halving.py").write_text(MODULE, encoding="utf-8")
+    monkeypatch.setattr(library_package, "__path__", [*library_package.__path__, str(tmp_path)])
+    library.cache_clear()
+    try:
+        assert library()["halving"].title == "Halving"
+        assert effect("halving").form == "half"
+    finally:
+        monkeypatch.undo()
+        library.cache_clear()
+        sys.modules.pop(f"{library_package.__name__}.halving", None)
+    assert "halving" not in library()
+
+
+def test_wrong_words_get_a_hint():
+    with pytest.raises(EffectError, match="did you mean 'creep'"):
+        effect("crep")
+    with pytest.raises(EffectError, match="did you mean 'exponential'"):
+        effect("creep", "exponental")
+    with pytest.raises(EffectError, match="did you mean 'amount'"):
+        effect("creep", amout=0.1)
+    with pytest.raises(EffectError, match="one number"):
+        effect("creep", amount=[0.1, 0.2])
+    with pytest.raises(EffectError, match="needs name"):
+        from_dict({"form": "exponential"})
+    with pytest.raises(EffectError, match="whole number"):
+        from_dict({"name": "creep", "seed": -1})
+    with pytest.raises(EffectError, match="give it a number"):
+        from_dict({"name": "creep", "amount": "much"})
+
+
+def test_effects_are_plain_data():
+    assert dataclasses.asdict(effect("creep", amount=0.5))["values"] == {"amount": 0.5, "time": 2.0}
