@@ -33,7 +33,8 @@ def stepwise(result: Any, most: int = 3) -> tuple[list[str], Any]:
     """Add the form that lowers the BIC on the fitted trials most, until none does."""
     from palpate.core.gap.fitting.least_squares import fit
     from palpate.core.gap.selection.candidates import candidates
-    from palpate.core.gap.selection.screening import ScoreTest, free_with, starting_points, view_set_of
+    from palpate.core.gap.selection.screening import ScoreTest, free_with, starting_points
+    from palpate.core.gap.selection.view_set import view_set_of
 
     view_set = view_set_of(result.of("fit"), (result.noise[0].deviation, result.noise[1].deviation))
     current = result.base

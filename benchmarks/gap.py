@@ -87,8 +87,8 @@ def _fingerprint() -> str:
     """Of all that a result depends on; how it is shown is not of it."""
     seen = hashlib.sha256()
     for part in ("core/gap", "core/effects", "benchmarks/_hidden"):
-        for path in sorted((HOUSE / part).glob("*.py")):
-            if path.stem not in ("report", "page", "plots", "tables"):
+        for path in sorted((HOUSE / part).rglob("*.py")):
+            if path.parent.name not in ("report", "calibration"):
                 seen.update(path.read_bytes())
     return seen.hexdigest()[:12]
 
@@ -151,14 +151,14 @@ def examine(kind: str, number: int, compare: bool = False) -> dict[str, Any]:
 
 def score(case: cases.Case, result: Any) -> dict[str, Any]:
     """Return what was said of a case and how right it is."""
-    from palpate.core.gap.fitting.intervals import parameter_intervals
-    from palpate.core.gap.report.amended_sensor import next_experiment, with_mean_gain_moved
+    from palpate.core.gap.report.amended_sensor import with_mean_gain_moved
+    from palpate.core.gap.report.experiments import next_experiment
 
     model = with_mean_gain_moved(result)
     sure = [named.name for named in result.findings if named.confidence >= SURE]
     said = [[n.name, n.form, n.confidence] for n in result.findings]
     inside = []
-    for one in parameter_intervals(result):
+    for one in result.intervals:
         true = _truth(case, one, model)
         if true is not None:
             inside.append([one.name, bool(min(one.low, one.high) <= true <= max(one.low, one.high))])

@@ -55,14 +55,15 @@ def run() -> Iterator[dict]:
 
 
 def _found_in(name: str, recording: Recording) -> Iterator[dict]:
-    from palpate.core.gap.report import summary
-    from palpate.core.gap.report.comparison import nrmse
+    from palpate.core.gap.report import sentences, summary
+    from palpate.core.gap.report.comparison import gap_errors, nrmse
 
     folder = HOUSE / "build" / "real" / name
     result = _diagnosed(recording, folder)
-    for _ in summary.write_report(result, folder):
+    errors = gap_errors(result)
+    for _ in summary.write_report(result, folder, errors):
         pass
-    print(f"{name}: {summary.headline(result)}", file=sys.stderr, flush=True)
+    print(f"{name}: {sentences.headline(result, errors)}", file=sys.stderr, flush=True)
     found = "+".join(one.name for one in result.findings) or result.verdict.replace(" ", "_")
     last = LAST.get(name, ())
     parts = {
@@ -81,9 +82,9 @@ def _found_in(name: str, recording: Recording) -> Iterator[dict]:
 
 def _friction(name: str, result: Any) -> Iterator[dict]:
     """What the base model's own friction closes, of the error of a sensor without any: it is in every base, and no effect."""
-    from palpate.core.gap.report.comparison import nrmse, nrmse_without_friction
+    from palpate.core.gap.report.comparison import frictionless_nrmse, nrmse
 
-    for use, without in (nrmse_without_friction(result) or {}).items():
+    for use, without in (frictionless_nrmse(result) or {}).items():
         own = nrmse(result.of(use), result.base.model, result.full)
         figure = {"name": f"real.{name}.friction_of_the_base.{use}", "value": own / without, "unit": "gap with / without"}
         yield figure | ({"goal": GOALS[name]} if use == "check" else {})
@@ -122,7 +123,7 @@ def _recall(data: Path) -> Iterator[dict]:
 
 
 def _sure(result: Any) -> list[str]:
-    from palpate.core.gap.report.summary import SURE
+    from palpate.core.gap.report.sentences import SURE
 
     return [one.name for one in result.findings if one.confidence >= SURE]
 
@@ -147,7 +148,8 @@ def _is_told(effect: str, recording: Recording, result: Any) -> bool:
 
 def _diagnosed(recording: Recording, folder: Path) -> Any:
     from palpate.core.gap.dataset.rig import read_rig
-    from palpate.core.gap.selection.diagnosis import Diagnosis, diagnose
+    from palpate.core.gap.selection.diagnosis import diagnose
+    from palpate.core.gap.selection.findings import Diagnosis
     from palpate.core.jobs.job_runner import run_job
 
     result = run_job(diagnose(read_rig(recording.write(folder / "rig"))))

@@ -24,9 +24,9 @@ def run(arguments: argparse.Namespace) -> int:
 
     dependencies.prepare_numba()
     from ..core.gap.dataset.rig import read_rig
-    from ..core.gap.fitting.intervals import parameter_intervals
-    from ..core.gap.report import summary
+    from ..core.gap.report import sentences, summary
     from ..core.gap.report.amended_sensor import amended_sensor
+    from ..core.gap.report.comparison import gap_errors
     from ..core.gap.selection.diagnosis import diagnose
     from ..core.solver import precompile
 
@@ -43,16 +43,17 @@ def run(arguments: argparse.Namespace) -> int:
             bar.update(max(done - bar.n, 0))
 
         result = run_job(diagnose(rig), lambda step: show(step.stage, int(950 * step.share)))
-        run_job(summary.write_report(result, folder), lambda step: show(step.stage, 950 + int(50 * step.share)))
-    print(summary.headline(result))
+        errors = gap_errors(result)
+        run_job(summary.write_report(result, folder, errors), lambda step: show(step.stage, 950 + int(50 * step.share)))
+    print(sentences.headline(result, errors))
     rows = [("", "parameter", "value (95 % interval)")]
-    for one in parameter_intervals(result):
+    for one in result.intervals:
         owner = "base model" if one.effect < 0 else result.best.model.effects[one.effect].name
-        rows.append((owner, one.name, summary.interval_text(one)))
+        rows.append((owner, one.name, sentences.interval_text(one)))
     print()
     print(console.text_table(rows, "<<<"))
     print()
-    for text in summary.summary(result)["warnings"]:
+    for text in [*rig.warnings, *sentences.warnings(result)]:
         print(f"note: {text}")
     print(f"report: {folder / 'report.html'}")
     print(f"sensor: {folder / 'sensor.toml'}")

@@ -131,7 +131,8 @@ class PALPATE_OT_gap_report(support.ErrorReporting, bpy.types.Operator):
         from ..core.io.file_writing import writable_folder
 
         folder = writable_folder(bpy.path.abspath(self.directory), create=True)
-        for _ in summary.write_report(gap_results.of(context.object).diagnosis, folder):
+        result = gap_results.of(context.object)
+        for _ in summary.write_report(result.diagnosis, folder, result.errors):
             pass
         self.report({"INFO"}, f"Wrote {folder / 'report.html'}")
 

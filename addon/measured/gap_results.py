@@ -24,7 +24,8 @@ from ..scene import scene_reader
 from ..session import first_use, identity
 
 if TYPE_CHECKING:
-    from ...core.gap.selection.diagnosis import Diagnosis
+    from ...core.gap.report.comparison import GapErrors
+    from ...core.gap.selection.findings import Diagnosis
 
 ATTRIBUTE = "Palpate Gap"
 """Colours of the residual on the sensor's vertices."""
@@ -37,6 +38,7 @@ class Result:
     """What was found out for one sensor."""
 
     diagnosis: Diagnosis
+    errors: GapErrors
     headline: str
     lines: list[str]
     experiment: str
@@ -71,24 +73,27 @@ def find(obj):
     Result
     """
     from ...core.gap.dataset.rig import read_rig
-    from ...core.gap.report import summary
-    from ...core.gap.report.amended_sensor import next_experiment
-    from ...core.gap.report.plots import PICTURES
+    from ...core.gap.report import sentences
+    from ...core.gap.report.comparison import gap_errors
+    from ...core.gap.report.experiments import next_experiment
+    from ...core.gap.report.plots import picture
     from ...core.gap.selection.diagnosis import diagnose
 
     yield from first_use.wait()
     yield Progress("Reading the recordings", 0, 1000)
     rig = read_rig(rig_path(obj))
     diagnosis = yield from part_of_job(diagnose(rig), lambda step: replace(step, stage=f"Finding the gap: {step.stage}"))
+    errors = gap_errors(diagnosis)
     folder, pictures = Path(tempfile.mkdtemp(prefix="gap-", dir=bpy.app.tempdir)), {}
     from ...core.figures.figure_canvas import save_figure
 
     for name in ("curves", "gap", "loops"):
         yield Progress("Drawing", 990, 1000)
         pictures[name] = folder / f"{name}.png"
-        save_figure(PICTURES[name][0](diagnosis), pictures[name], 150)
+        save_figure(picture(name, diagnosis, errors), pictures[name], 150)
     identity.ensure(obj)
-    result = Result(diagnosis, summary.headline(diagnosis), summary.evidence(diagnosis), next_experiment(diagnosis), pictures)
+    headline, evidence = sentences.headline(diagnosis, errors), sentences.evidence(diagnosis, errors)
+    result = Result(diagnosis, errors, headline, evidence, next_experiment(diagnosis), pictures)
     _results[identity.key(obj)] = result
     return result
 

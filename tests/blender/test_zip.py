@@ -16,7 +16,7 @@ from pathlib import Path
 import build_zip
 import pytest
 
-HEAVY = {"numba", "llvmlite", "scipy", "matplotlib", "trimesh", "OpenEXR", "tqdm", "tomli_w"}
+HEAVY = {"numba", "llvmlite", "scipy", "matplotlib", "trimesh", "OpenEXR", "tqdm", "tomli_w", "jinja2"}
 
 
 @pytest.fixture(scope="module")
@@ -119,7 +119,7 @@ def test_enabling_loads_nothing_heavy(life):
 
 def test_the_wheels_are_the_ones_in_use(life):
     site_packages = str(life["user"] / "extensions" / ".local")
-    assert set(life["wheels"]) >= {"numba", "trimesh", "tqdm", "matplotlib", "tomli_w"}
+    assert set(life["wheels"]) >= {"numba", "trimesh", "tqdm", "matplotlib", "tomli_w", "jinja2", "markupsafe"}
     for name, origin in life["wheels"].items():
         assert origin.startswith(site_packages), name
     assert life["compiled"] == 45

@@ -76,6 +76,8 @@ def state():
 
 def wheels():
     """Where each heavy module comes from, and the sum that numba compiled."""
+    import jinja2
+    import markupsafe
     import matplotlib
     import numba
     import tomli_w
@@ -89,7 +91,7 @@ def wheels():
             result += i
         return result
 
-    return {m.__name__: m.__file__ for m in (matplotlib, numba, tomli_w, tqdm, trimesh)}, total(10)
+    return {m.__name__: m.__file__ for m in (jinja2, markupsafe, matplotlib, numba, tomli_w, tqdm, trimesh)}, total(10)
 
 
 def road():

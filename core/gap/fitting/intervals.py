@@ -4,15 +4,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from .least_squares import TEXEL_PRECISION, Fit, NormalEquations, all_equations, summed_equations, value_of
 from .regression import student_quantile
-
-if TYPE_CHECKING:
-    from ..selection.diagnosis import Diagnosis
 
 NORMAL_QUANTILE = 1.959964
 """Standard deviations on either side that hold 95 % of a normal distribution."""
@@ -41,7 +37,7 @@ class ParameterInterval:
     high: float
 
 
-def parameter_intervals(result: Diagnosis) -> list[ParameterInterval]:
+def parameter_intervals(found: Fit) -> list[ParameterInterval]:
     """Return the numbers of the amended model that are not one per texel.
 
     Each has the widest of four intervals: of noise as it is where nothing touches; from the scatter of the gradients of
@@ -50,7 +46,6 @@ def parameter_intervals(result: Diagnosis) -> list[ParameterInterval]:
     that few channels or trials tell, as those of friction, has too few gradients for the last two: they sum to zero where the
     fit ends, and hold for the others only.
     """
-    found = result.best
     common = [item for item in found.free if not item.per_texel]
     kinds = _covariances(found)
     made = []

@@ -1,28 +1,82 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How far a model is from the recordings, and where: phases, texels, parts of the range."""
+"""How far models are from the recordings, and where: by phase of contact, by part of the load's range, by texel."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from ..forward.contact_phases import PHASES, phase_indices, relative_load
 from ..forward.predictor import Model, Predictor
-from ..selection.diagnosis import Diagnosis
+from ..selection.findings import Diagnosis
 
-RANGES = 5
-"""Parts that the range of loads is cut into."""
+RANGE_PARTS = 5
+"""Number of equal parts into which the range of loads is divided."""
+WORST_TEXELS_SHARE = 0.5
+"""The worst texels are as few as together have this share of the squared error."""
+
+USES = ("fit", "check")
+"""Uses of trials: "check" trials are never fitted."""
+
+
+@dataclass(frozen=True)
+class GapErrors:
+    """NRMSE (see :func:`nrmse`) of the models of a diagnosis, by use of the trials; None without trials of that use.
+
+    Attributes
+    ----------
+    base, amended : dict of str to (float or None)
+    stages : list of float or None
+        Of the models of `Diagnosis.stages` on the fitted trials.
+    frictionless : dict of str to (float or None), or None
+        Of the base model without friction; None if nothing slides or no net force was measured.
+    noise_floor : float
+        That of noise alone, on the fitted trials.
+    """
+
+    base: dict[str, float | None]
+    amended: dict[str, float | None]
+    stages: list[float | None]
+    frictionless: dict[str, float | None] | None
+    noise_floor: float
+
+
+def gap_errors(result: Diagnosis) -> GapErrors:
+    """Compute the errors of all models of a diagnosis, once for summary, sentences and pictures."""
+
+    def by_use(model: Model) -> dict[str, float | None]:
+        return {use: nrmse(result.of(use), model, result.full) for use in USES}
+
+    return GapErrors(
+        base=by_use(result.base.model),
+        amended=by_use(result.best.model),
+        stages=[nrmse(result.of("fit"), model, result.full) for model in result.stages],
+        frictionless=frictionless_nrmse(result),
+        noise_floor=noise_floor_nrmse(result),
+    )
 
 
 def nrmse(predictors: Sequence[Predictor], model: Model, full: tuple[float, float]) -> float | None:
-    """Root mean square of measured minus predicted, as a share of the range of what was measured.
+    """Return the normalised root mean square error: that of measured minus predicted, as a share of the measured range.
 
     The mean is over all samples, texels and force components that were measured in these trials. Readings are divided by the
     range of all readings of the rig (largest minus smallest, all trials and texels together), forces by that of all forces.
-    Noise is in it: :func:`noise_floor` is what a perfect model would have left. None without trials.
+    The error contains the noise: :func:`noise_floor_nrmse` is the error of a perfect model.
+
+    Parameters
+    ----------
+    predictors : sequence of Predictor
+    model : Model
+    full : (float, float)
+        Range of readings and of forces.
+
+    Returns
+    -------
+    float or None
+        None without trials.
     """
     square, count = 0.0, 0
     for predictor in predictors:
@@ -30,29 +84,29 @@ def nrmse(predictors: Sequence[Predictor], model: Model, full: tuple[float, floa
         for measured, simulated, size in ((trial.reading, predicted.reading, full[0]), (trial.force, predicted.force, full[1])):
             if measured is None or simulated is None:
                 continue
-            miss = (measured - simulated)[np.isfinite(measured)] / size
-            square += float(miss @ miss)
-            count += len(miss)
+            error = (measured - simulated)[np.isfinite(measured)] / size
+            square += float(error @ error)
+            count += len(error)
     return float(np.sqrt(square / count)) if count else None
 
 
-def nrmse_without_friction(result: Diagnosis) -> dict[str, float | None] | None:
-    """NRMSE by use that a base model without any friction has; None where nothing slides or no net force was measured.
+def frictionless_nrmse(result: Diagnosis) -> dict[str, float | None] | None:
+    """Return the NRMSE of the base model without friction, by use; None if nothing slides or no net force was measured.
 
-    Friction is the base model's own, so it is in every error that is reported, and no missing effect.
+    The base model has friction of its own. It is part of every reported error and is no missing effect.
     """
     if not any(p.trial.force is not None and p.stimulus.slide.any() for p in result.predictors):
         return None
-    return {use: nrmse(result.of(use), frictionless(result.base.model), result.full) for use in ("fit", "check")}
+    return {use: nrmse(result.of(use), frictionless(result.base.model), result.full) for use in USES}
 
 
 def frictionless(model: Model) -> Model:
-    """Return a model without the base model's friction."""
+    """Return the model without the base model's friction."""
     return replace(model, parameters=replace(model.parameters, mus=0.0, mud=0.0, ct=0.0))
 
 
-def noise_floor(result: Diagnosis) -> float:
-    """NRMSE that noise alone would leave on the fitted trials."""
+def noise_floor_nrmse(result: Diagnosis) -> float:
+    """Return the NRMSE of noise alone on the fitted trials."""
     square = count = 0.0
     for predictor in result.of("fit"):
         channels = (predictor.trial.reading, predictor.trial.force)
@@ -64,49 +118,59 @@ def noise_floor(result: Diagnosis) -> float:
 
 
 def error_location(result: Diagnosis, model: Model) -> list[dict[str, Any]]:
-    """Shares of the squared error on the fitted trials: by phase, by part of the range, and of the worst texels."""
+    """Return shares of the squared error on the fitted trials: by phase, by part of the load's range, and of the worst texels.
+
+    Returns
+    -------
+    list of dict
+        As under ``where`` in gap.json: each entry has a ``share`` and one of ``phase``, ``range`` and ``texels``.
+    """
     n = len(result.rig.texels)
-    by_phase, by_range, by_texel = np.zeros(len(PHASES)), np.zeros(RANGES + 1), np.zeros(n)
+    by_phase, by_range, by_texel = np.zeros(len(PHASES)), np.zeros(RANGE_PARTS + 1), np.zeros(n)
     for predictor in result.of("fit"):
-        square = squares(predictor, model, result)
+        square = squared_errors(predictor, model, result)
         if square is None:
             continue
-        at = phase_indices(predictor.stimulus)
-        part = np.ceil(relative_load(predictor.stimulus) * RANGES).astype(int).clip(0, RANGES)
-        by_phase += np.bincount(at.ravel(), square.ravel(), len(PHASES))
-        by_range += np.bincount(part.ravel(), square.ravel(), RANGES + 1)
+        phase = phase_indices(predictor.stimulus)
+        part = np.ceil(relative_load(predictor.stimulus) * RANGE_PARTS).astype(int).clip(0, RANGE_PARTS)
+        by_phase += np.bincount(phase.ravel(), square.ravel(), len(PHASES))
+        by_range += np.bincount(part.ravel(), square.ravel(), RANGE_PARTS + 1)
         by_texel += square.sum(axis=0)
     total = max(float(by_phase.sum()), 1e-300)
     entries: list[dict[str, Any]] = [
         {"phase": name, "share": round(float(share / total), 4)} for name, share in zip(PHASES, by_phase, strict=True)
     ]
-    bounds = ["no load", *(f"{100 * i // RANGES}–{100 * (i + 1) // RANGES} % of the largest load" for i in range(RANGES))]
-    entries += [{"range": name, "share": round(float(share / total), 4)} for name, share in zip(bounds, by_range, strict=True)]
+    limits = [100 * i // RANGE_PARTS for i in range(RANGE_PARTS + 1)]
+    names = ["no load", *(f"{a}–{b} % of the largest load" for a, b in zip(limits[:-1], limits[1:], strict=True))]
+    entries += [{"range": name, "share": round(float(share / total), 4)} for name, share in zip(names, by_range, strict=True)]
     if n > 1:
         worst = np.argsort(by_texel)[::-1]
-        count = int(np.searchsorted(np.cumsum(by_texel[worst]) / total, 0.5)) + 1
+        count = int(np.searchsorted(np.cumsum(by_texel[worst]) / total, WORST_TEXELS_SHARE)) + 1
         share = float(by_texel[worst[:count]].sum() / total)
         entries.append({"texels": sorted(int(i) for i in worst[:count]), "share": round(share, 4)})
     return entries
 
 
-def squares(predictor: Predictor, model: Model, result: Diagnosis) -> np.ndarray | None:
-    """Squared error of each texel at each sample, (T, n), in units of the range; of forces the sum, shared by all texels."""
+def squared_errors(predictor: Predictor, model: Model, result: Diagnosis) -> np.ndarray | None:
+    """Return the squared error of each texel at each sample, (T, n), as a share of the squared range.
+
+    Without readings it is that of the net force, divided equally among the texels; None without either.
+    """
     trial, predicted = predictor.trial, predictor.predict(model)
     n = len(result.rig.texels)
     if trial.reading is not None:
         return np.nan_to_num((trial.reading - predicted.reading) / result.full[0]) ** 2
     if trial.force is not None and predicted.force is not None:
-        miss = np.nan_to_num((trial.force - predicted.force) / result.full[1]) ** 2
-        return np.tile(miss.sum(axis=1, keepdims=True) / n, (1, n))
+        error = np.nan_to_num((trial.force - predicted.force) / result.full[1]) ** 2
+        return np.tile(error.sum(axis=1, keepdims=True) / n, (1, n))
     return None
 
 
 def rms_by_texel(result: Diagnosis, model: Model, use: str = "fit") -> np.ndarray:
-    """Root mean square error of each texel over the trials of one use, (n,) float, as a share of the range."""
+    """Return the root mean square error of each texel over the trials of one use, (n,) float, as a share of the range."""
     total, count = np.zeros(len(result.rig.texels)), 0
     for predictor in result.of(use):
-        square = squares(predictor, model, result)
+        square = squared_errors(predictor, model, result)
         if square is not None:
             total, count = total + square.sum(axis=0), count + len(square)
     return np.sqrt(total / max(count, 1))

@@ -1,144 +1,138 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""report.html: one page, pictures inside, for someone who has to be convinced."""
+"""report.html: one page with its pictures inside, for a reader who has to be convinced."""
 
 from __future__ import annotations
 
 import base64
-from html import escape
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from ...effects.engine.registry import form_of, kind_of
+from ...io.html_templates import render_html
 from ...model.sensor_parameters import unit_of
 from ..forward.contact_phases import FEATURES
-from ..selection.diagnosis import Diagnosis
-from .plots import PICTURES
+from ..selection.findings import Diagnosis
+from .plots import CAPTIONS
 
-WIDE = 20.0
-"""An interval that reaches so many times below and above the value tells nothing of it."""
-STYLE = """
-body { font: 15px/1.5 system-ui, sans-serif; color: #1c2430; max-width: 56rem; margin: 2rem auto; padding: 0 1rem }
-h1 { font-size: 1.5rem; margin-bottom: 0 } h2 { font-size: 1.1rem; margin-top: 2rem }
-.verdict { font-size: 1.15rem; padding: .8rem 1rem; border-left: 5px solid #1f5fa8; background: #f2f5f9 }
-table { border-collapse: collapse } td, th { padding: .2rem .8rem .2rem 0; text-align: left; vertical-align: top }
-th { font-weight: 600; border-bottom: 1px solid #9aa3ad } td.number { text-align: right; font-variant-numeric: tabular-nums }
-figure { margin: 1.2rem 0 } figcaption { color: #68727f; font-size: .9rem } img { max-width: 100% }
-.pair { display: flex; flex-wrap: wrap; gap: 1rem } .pair figure { flex: 1 1 20rem; margin: 0; max-width: 30rem }
-"""
+TEMPLATE = Path(__file__).parent / "templates" / "report.html"
+
+WIDE_INTERVAL = 20.0
+"""If an interval reaches this many times below and above its value, the recordings do not identify the value."""
+CLOSED_FROM = 0.2
+"""A closed share is shown if the gap, noise removed, is at least this share of the noise floor."""
+AS_MUCH = 1.05
+"""Up to this ratio the next best effect leaves "as much"."""
+WHITE_MEMORY = 1.5
+"""Correlation time in samples up to which noise counts as white."""
 
 
-def render_page(result: Diagnosis, found: dict[str, Any], headline: str, pictures: list[str], folder: Path) -> str:
+@dataclass(frozen=True)
+class Table:
+    """A table of the page: its head, its rows, and the columns that hold numbers."""
+
+    head: list[str]
+    rows: list[list[str]]
+    numeric: set[int] = field(default_factory=set)
+
+
+def html_report(result: Diagnosis, found: dict[str, Any], headline: str, pictures: list[str], folder: Path) -> str:
     """Return report.html.
 
     Parameters
     ----------
+    result : Diagnosis
     found : dict
-        What gap.json holds.
+        Contents of gap.json.
     headline : str
         The result in one sentence.
     pictures : list of str
-        Names of those that were drawn into `folder`.
+        Names of the pictures that were drawn into `folder`.
+    folder : Path
     """
-    shown = {name: _picture(folder / f"{name}.png", PICTURES[name][1]) for name in pictures}
-    rig = result.rig
-    seconds = sum(float(t.time[-1] - t.time[0]) for t in rig.trials)
-    uses = f"{_count(len(result.of('fit')), 'trial')} fitted, {len(result.of('check'))} for checking only"
-    parts = [
-        f"<h1>{escape(rig.name)}</h1>",
-        f"<p>{_count(len(rig.texels), 'texel')}, {uses}, {seconds:.0f} s in all.</p>",
-        f'<p class="verdict">{escape(headline)}</p>',
-        '<div class="pair">' + shown.get("gap", "") + shown.get("loops", "") + "</div>",
-        _gap_table(found),
-        _found(found),
-        _evidence(found),
-        _numbers(result, found),
-        _open_questions(found),
-        "<h2>Before and after</h2>" + shown.get("curves", ""),
-        "<h2>Where the error sits</h2>",
-        '<div class="pair">' + shown.get("map", "") + shown.get("phases", "") + "</div>",
-        _varies_table(found),
-        _ruled_out(found),
-        _recording(result),
-        f"<h2>Method</h2><p>{METHOD}</p>",
-    ]
-    title = escape(f"Gap of {rig.name}")
-    body = "\n".join(parts)
-    return (
-        f'<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8"><title>{title}</title><style>{STYLE}</style></head>\n'
-        f"<body>\n{body}\n</body></html>\n"
+    return render_html(
+        TEMPLATE,
+        name=result.rig.name,
+        extent=_extent(result),
+        headline=headline,
+        pictures={name: {"caption": CAPTIONS[name], "data": _encoded(folder / f"{name}.png")} for name in pictures},
+        gap=_gap_table(found),
+        effects=[_effect(one) for one in found["found"]],
+        evidence=_evidence_table(found),
+        parameters=_parameter_table(result, found),
+        questions=_open_questions(found),
+        varies_with=_structure_table(found),
+        ruled_out=_ruled_out_table(found),
+        recordings=_recordings_table(result),
+        trials=_trials_table(result),
     )
+
+
+def _extent(result: Diagnosis) -> str:
+    """How much was recorded."""
+    trials = result.rig.trials
+    seconds = sum(float(t.time[-1] - t.time[0]) for t in trials)
+    uses = f"{_count(len(result.of('fit')), 'trial')} fitted, {len(result.of('check'))} for checking only"
+    return f"{_count(len(result.rig.texels), 'texel')}, {uses}, {seconds:.0f} s in all."
 
 
 def _count(number: int, what: str) -> str:
     return f"{number} {what}" + ("" if number == 1 else "s")
 
 
-def _picture(path: Path, caption: str) -> str:
-    data = base64.b64encode(path.read_bytes()).decode()
-    text = escape(caption)
-    return f'<figure><img alt="{text}" src="data:image/png;base64,{data}"><figcaption>{text}</figcaption></figure>'
+def _encoded(path: Path) -> str:
+    """A file's bytes in base64."""
+    return base64.b64encode(path.read_bytes()).decode()
 
 
-def _table(head: list[str], rows: list[list[str]], numeric: set[int] = frozenset()) -> str:  # type: ignore[assignment]
-    lines = ["<table><tr>" + "".join(f"<th>{escape(cell)}</th>" for cell in head) + "</tr>"]
-    for row in rows:
-        cells = (f'<td class="number">{escape(c)}</td>' if i in numeric else f"<td>{escape(c)}</td>" for i, c in enumerate(row))
-        lines.append("<tr>" + "".join(cells) + "</tr>")
-    return "\n".join([*lines, "</table>"])
-
-
-def _gap_table(found: dict[str, Any]) -> str:
-    gap, bare = found["gap"], found["base"]["gap_without_friction"]
+def _gap_table(found: dict[str, Any]) -> Table:
+    """Errors of the models on fitted and on check trials."""
+    gap, frictionless, floor = found["gap"], found["base"]["gap_without_friction"], found["gap"]["noise_floor"]
     rows = []
     for use, words in (("fit", "fitted trials"), ("check", "check trials, never fitted")):
         before, after = gap["before"][use], gap["after"][use]
         if before is None:
             continue
-        floor = gap["noise_floor"]
         left = [max(value**2 - floor**2, 0.0) ** 0.5 for value in (before, after)]
-        closed = f"{1.0 - left[1] / left[0]:.0%}" if left[0] > 0.2 * floor else "–"
+        closed = f"{1.0 - left[1] / left[0]:.0%}" if left[0] > CLOSED_FROM * floor else "–"
         row = [words, f"{before:.3%}", f"{after:.3%}" if found["found"] else "–", f"{floor:.3%}"]
         rows.append([*row, closed if found["found"] else "–"])
-        if bare is not None:
-            rows[-1].insert(1, f"{bare[use]:.3%}")
+        if frictionless is not None:
+            rows[-1].insert(1, f"{frictionless[use]:.3%}")
     head = ["NRMSE, share of the range", "base", "amended", "noise floor", "gap closed, noise removed"]
-    if bare is not None:
+    if frictionless is not None:
         head.insert(1, "base without its friction")
-    return "<h2>The gap</h2>" + _table(head, rows, set(range(1, len(head))))
+    return Table(head, rows, set(range(1, len(head))))
 
 
-def _found(found: dict[str, Any]) -> str:
-    words = []
-    for one in found["found"]:
-        kind, form = kind_of(one["effect"]), form_of(one["effect"], one["form"])
-        words.append(
-            f"<p><b>{escape(kind.title)}</b> ({escape(one['form'])}), confidence {one['confidence']:.0%}: {escape(kind.text)} "
-            f"<i>{escape(form.formula)}</i> – {escape(form.reference)}.</p>"
-        )
-    return "<h2>What is missing</h2>" + ("".join(words) or "<p>Nothing was added.</p>")
+def _effect(one: dict[str, Any]) -> dict[str, str]:
+    """What the page says of an effect that was found."""
+    kind, form = kind_of(one["effect"]), form_of(one["effect"], one["form"])
+    return {
+        "title": kind.title,
+        "form": one["form"],
+        "confidence": f"{one['confidence']:.0%}",
+        "text": kind.text,
+        "formula": form.formula,
+        "reference": form.reference,
+    }
 
 
-def _evidence(found: dict[str, Any]) -> str:
-    """How far each effect brings the error down, and how near another one came to that."""
-    if not found["found"]:
-        return ""
+def _evidence_table(found: dict[str, Any]) -> Table:
+    """How much each effect reduces the error, and how much the next best one leaves in its place."""
     rows = []
     for one in found["found"]:
         rival = one["next_best"]
         near = "none came near"
         if rival:
-            much = "as much" if rival["leaves"] < 1.05 else f"{rival['leaves']:.2g} times as much"
+            much = "as much" if rival["leaves"] < AS_MUCH else f"{rival['leaves']:.2g} times as much"
             near = f"{rival['effect']}, which leaves {much}"
         rows.append([one["effect"], f"{one['gap_before']:.3%}", f"{one['gap_after']:.3%}", f"{one['confidence']:.0%}", near])
-    text = (
-        "<p>Error on the fitted trials without and with each effect, one after the other. The next best was fitted in its "
-        "place; what it leaves is the squared error above the noise, on stretches that no fit had seen.</p>"
-    )
-    head = ["effect", "without", "with", "confidence", "next best in its place"]
-    return "<h2>Evidence</h2>" + text + _table(head, rows, {1, 2, 3})
+    return Table(["effect", "without", "with", "confidence", "next best in its place"], rows, {1, 2, 3})
 
 
-def _numbers(result: Diagnosis, found: dict[str, Any]) -> str:
+def _parameter_table(result: Diagnosis, found: dict[str, Any]) -> Table:
+    """Fitted parameters with their intervals."""
     unit = result.rig.parameters.unit
     rows = []
     for name, value in found["base"]["parameters"].items():
@@ -149,62 +143,58 @@ def _numbers(result: Diagnosis, found: dict[str, Any]) -> str:
             value = one["parameters"].get(parameter.name)
             own = parameter.unit_of(unit)
             if isinstance(value, list):
-                rows.append(
-                    [one["effect"], parameter.name, f"{len(value)} numbers, {min(value):.3g} … {max(value):.3g}", "", own]
-                )
+                span = f"{len(value)} numbers, {min(value):.3g} … {max(value):.3g}"
+                rows.append([one["effect"], parameter.name, span, "", own])
             elif value is not None:
                 low, high = one["intervals"].get(parameter.name, (value, value))
                 rows.append([one["effect"], parameter.name, f"{value:.4g}", _interval(value, low, high), own])
-    head = ["", "parameter", "value", "95 % interval", "unit"]
-    what = "amended sensor" if found["found"] else "base model, refitted"
-    return f"<h2>Parameters of the {what}</h2>" + _table(head, rows, {2, 3})
+    return Table(["", "parameter", "value", "95 % interval", "unit"], rows, {2, 3})
 
 
 def _interval(value: float, low: float, high: float) -> str:
-    """An interval in words; one that leaves the number's size open is none."""
-    if (low >= 0.0 and high > WIDE * value and low * WIDE <= value) or high - low > WIDE**2 * abs(value) > 0.0:
+    """An interval in words, or a remark if it leaves even the order of magnitude open."""
+    on_both_sides = low >= 0.0 and high > WIDE_INTERVAL * value and low * WIDE_INTERVAL <= value
+    if on_both_sides or high - low > WIDE_INTERVAL**2 * abs(value) > 0.0:
         return "not told by these recordings"
     return f"{low:.4g} … {high:.4g}"
 
 
-def _open_questions(found: dict[str, Any]) -> str:
-    lines = []
-    for names in found["ambiguous"]:
-        lines.append(f"These recordings do not tell {' from '.join(escape(name) for name in names)}.")
+def _open_questions(found: dict[str, Any]) -> list[str]:
+    """Rivals, the next experiment and warnings."""
+    lines = [f"These recordings do not tell {' from '.join(names)}." for names in found["ambiguous"]]
     if found["next_experiment"]:
-        lines.append(escape(found["next_experiment"]))
-    lines += [escape(text) for text in found["warnings"]]
-    return "<h2>Open questions</h2><ul>" + "".join(f"<li>{line}</li>" for line in lines) + "</ul>" if lines else ""
+        lines.append(found["next_experiment"])
+    return lines + found["warnings"]
 
 
-def _varies_table(found: dict[str, Any]) -> str:
-    rows = []
-    order = sorted(found["varies_with"], key=lambda key: -found["varies_with"][key])
-    for key in order:
-        before, after = found["varies_with"][key], found["left_varies_with"].get(key, 0.0)
-        rows.append([FEATURES.get(key, key), f"{before:.1%}", f"{after:.1%}"])
-    text = (
-        "<p>Share of the squared residual that a regression on each predicts in trials it has not seen; noise gives zero.</p>"
-    )
-    return "<h2>What the residual varies with</h2>" + text + _table(["", "base", "amended"], rows, {1, 2})
+def _structure_table(found: dict[str, Any]) -> Table:
+    """What the residual depends on, before and after."""
+    before, after = found["varies_with"], found["left_varies_with"]
+    rows = [
+        [FEATURES.get(key, key), f"{before[key]:.1%}", f"{after.get(key, 0.0):.1%}"]
+        for key in sorted(before, key=lambda key: -before[key])
+    ]
+    return Table(["", "base", "amended"], rows, {1, 2})
 
 
-def _ruled_out(found: dict[str, Any]) -> str:
-    """Effects with one reason in one row; those that were fitted first, the nearest on top."""
+def _ruled_out_table(found: dict[str, Any]) -> Table:
+    """Effects with the same reason share a row; those that were fitted come first."""
     reasons: dict[str, list[str]] = {}
     for entry in found["ruled_out"]:
         reasons.setdefault(entry["why"], []).append(entry["effect"])
     rows = [[", ".join(names), why] for why, names in reasons.items()]
     rows.sort(key=lambda row: (not any(sign.isdigit() for sign in row[1]), row[0]))
-    return "<h2>What was ruled out</h2>" + _table(["effect", "why"], rows) if rows else ""
+    return Table(["effect", "why"], rows)
 
 
-def _recording(result: Diagnosis) -> str:
-    read, c = any(p.trial.reading is not None for p in result.predictors), result.coverage
-    noise, unit = result.noise[0 if read else 1], result.rig.parameters.unit if read else "N"
+def _recordings_table(result: Diagnosis) -> Table:
+    """Noise of the recordings, and what was done to the sensor in them."""
+    has_readings, c = any(p.trial.reading is not None for p in result.predictors), result.coverage
+    noise, unit = result.noise[0 if has_readings else 1], result.rig.parameters.unit if has_readings else "N"
+    memory = "none" if noise.correlation_time < WHITE_MEMORY else f"{noise.correlation_time:.3g} samples"
     rows = [
-        [f"noise of a {'reading' if read else 'net force'}", f"{noise.deviation:.3g} {unit}, from {noise.source}"],
-        ["memory of the noise", "none" if noise.correlation_time < 1.5 else f"{noise.correlation_time:.3g} samples"],
+        [f"noise of a {'reading' if has_readings else 'net force'}", f"{noise.deviation:.3g} {unit}, from {noise.source}"],
+        ["memory of the noise", memory],
         ["texels touched", f"{c.touched_share:.0%}"],
         ["fast to slow loading", f"{c.speed_ratio:.3g} to 1"],
         ["longest hold", f"{c.longest_hold:.3g} s"],
@@ -213,18 +203,13 @@ def _recording(result: Diagnosis) -> str:
         ["something without load", f"over {c.unloaded_share:.0%} of a trial"],
         ["sliding", "yes" if c.slides else "no"],
     ]
-    trials = [
+    return Table(["", ""], rows)
+
+
+def _trials_table(result: Diagnosis) -> Table:
+    """One row for each trial."""
+    rows = [
         [t.name, t.use, t.stimulus, f"{len(t.time)}", f"{t.time[-1] - t.time[0]:.3g} s", f"{1.0 / t.step:.4g} Hz"]
         for t in result.rig.trials
     ]
-    head = ["trial", "use", "stimulus", "samples", "length", "rate"]
-    return "<h2>The recordings</h2>" + _table(["", ""], rows) + "<p></p>" + _table(head, trials, {3, 4, 5})
-
-
-METHOD = """
-The base model's own parameters are refitted first. Then every form of every effect is fitted jointly with them and judged by
-its squared error on recordings that the fit has not seen; an effect is kept when it closes enough of the gap there, further
-ones when they close enough of what is left. NRMSE is the root mean square of measured minus simulated over all samples and
-channels, divided by the range of the measurements. Intervals allow for coloured noise (sums of gradients by texel and trial)
-and for formulas that are not quite the sensor's (by trial).
-"""
+    return Table(["trial", "use", "stimulus", "samples", "length", "rate"], rows, {3, 4, 5})

@@ -14,8 +14,8 @@ from ...figures.figure_style import GREY, INK, NORMAL_COLOUR, SHEAR_COLOUR, WIDT
 from ...geometry.layout import GridLayout
 from ..forward.contact_phases import PHASES
 from ..forward.predictor import Model, Predictor
-from ..selection.diagnosis import Diagnosis
-from .comparison import error_location, frictionless, noise_floor, nrmse, nrmse_without_friction, rms_by_texel
+from ..selection.findings import Diagnosis
+from .comparison import GapErrors, error_location, rms_by_texel
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -26,20 +26,23 @@ LONG = 12
 """How many times as long as wide a grid is no picture any more."""
 
 
-def gap_bars(result: Diagnosis) -> Figure:
-    """NRMSE of base and amended model on fitted and held-out trials, with the noise floor."""
+def gap_bars(result: Diagnosis, errors: GapErrors) -> Figure:
+    """NRMSE of base and amended model on fitted and on check trials, with the noise floor."""
     figure = new_figure(WIDTHS["single"], 2.5)
     axes = figure.add_axes((0.15, 0.18, 0.82, 0.58))
     uses = [use for use in ("fit", "check") if result.of(use)]
-    shown = [*_rough(result), *_models(result)]
-    wide = 0.72 / max(len(shown), 2)
-    for offset, (label, model, colour) in enumerate(shown):
-        heights = [100.0 * (nrmse(result.of(use), model, result.full) or 0.0) for use in uses]
-        places = np.arange(len(uses)) + wide * (offset - 0.5 * (len(shown) - 1))
-        bars = axes.bar(places, heights, 0.95 * wide, color=colour, label=label)
+    by_label = {"without friction": (errors.frictionless, GREY), "base model": (errors.base, BEFORE)}
+    if result.best.model.effects:
+        by_label["amended"] = (errors.amended, AFTER)
+    shown = [(label, error, colour) for label, (error, colour) in by_label.items() if error is not None]
+    width = 0.72 / max(len(shown), 2)
+    for offset, (label, error, colour) in enumerate(shown):
+        heights = [100.0 * (error[use] or 0.0) for use in uses]
+        places = np.arange(len(uses)) + width * (offset - 0.5 * (len(shown) - 1))
+        bars = axes.bar(places, heights, 0.95 * width, color=colour, label=label)
         for bar, height in zip(bars, heights, strict=True):
-            axes.text(bar.get_x() + 0.475 * wide, height, f"{height:.2f}", ha="center", va="bottom", fontsize=8, color=INK)
-    floor = 100.0 * noise_floor(result)
+            axes.text(bar.get_x() + 0.475 * width, height, f"{height:.2f}", ha="center", va="bottom", fontsize=8, color=INK)
+    floor = 100.0 * errors.noise_floor
     axes.axhline(floor, color=INK, lw=0.9, ls=(0, (4, 3)), label=f"noise floor {floor:.2f} %")
     names = {"fit": "fitted trials", "check": "check trials,\nnever fitted"}
     axes.set_xticks(np.arange(len(uses)), [names[use] for use in uses])
@@ -54,11 +57,6 @@ def _models(result: Diagnosis) -> list[tuple[str, Model, str]]:
     """The models to be compared: the base alone where nothing was added to it."""
     base = ("base model", result.base.model, BEFORE)
     return [base, ("amended", result.best.model, AFTER)] if result.best.model.effects else [base]
-
-
-def _rough(result: Diagnosis) -> list[tuple[str, Model, str]]:
-    """The base model without its friction, where a surface slides."""
-    return [] if nrmse_without_friction(result) is None else [("without friction", frictionless(result.base.model), GREY)]
 
 
 def curves(result: Diagnosis) -> Figure:
@@ -156,13 +154,14 @@ def _error_line(maps: list[tuple[str, np.ndarray]]) -> Figure:
     return figure
 
 
-def phase_bars(result: Diagnosis) -> Figure:
-    """Squared error by phase, before and after, as shares of that before."""
+def phase_bars(result: Diagnosis, errors: GapErrors) -> Figure:
+    """Squared error by phase of base and amended model, as shares of that of the base model."""
     figure = new_figure(WIDTHS["single"], 2.3)
     axes = figure.add_axes((0.17, 0.27, 0.8, 0.6))
-    base = nrmse(result.of("fit"), result.base.model, result.full) or 1.0
+    base = errors.base["fit"] or 1.0
     for offset, (label, model, colour) in enumerate(_models(result)):
-        left = ((nrmse(result.of("fit"), model, result.full) or 0.0) / base) ** 2
+        error = errors.base["fit"] if model is result.base.model else errors.amended["fit"]
+        left = ((error or 0.0) / base) ** 2
         shares = {entry["phase"]: entry["share"] for entry in error_location(result, model) if "phase" in entry}
         heights = [100.0 * left * shares[phase] for phase in PHASES]
         axes.bar(
@@ -181,7 +180,7 @@ def phase_bars(result: Diagnosis) -> Figure:
 
 def loops(result: Diagnosis) -> Figure:
     """Reading over depth (or load, or travel) of the texel with the largest error: what an effect's signature looks like."""
-    predictor = max(result.of("fit"), key=lambda p: float(np.nansum(_base_miss(p, result))))
+    predictor = max(result.of("fit"), key=lambda p: float(np.nansum(_base_squared_error(p, result))))
     name, measured, pick = _worst_channel(result, predictor)
     s, trial = predictor.stimulus, predictor.trial
     if "texel" in name:
@@ -214,7 +213,8 @@ def loops(result: Diagnosis) -> Figure:
     return figure
 
 
-def _base_miss(predictor: Predictor, result: Diagnosis) -> np.ndarray:
+def _base_squared_error(predictor: Predictor, result: Diagnosis) -> np.ndarray:
+    """Squared error of the base model in a trial, as a share of the squared range."""
     predicted = predictor.predict(result.base.model)
     if predictor.trial.reading is not None:
         return ((predictor.trial.reading - predicted.reading) / result.full[0]) ** 2
@@ -222,23 +222,35 @@ def _base_miss(predictor: Predictor, result: Diagnosis) -> np.ndarray:
     return ((predictor.trial.force - predicted.force) / result.full[1]) ** 2
 
 
-PICTURES: dict[str, tuple[Callable[[Diagnosis], Figure], str]] = {
-    "gap": (gap_bars, "The gap before and after. Check trials were never fitted, and took no part in choosing."),
-    "curves": (curves, "What was measured and what the models say, where the base model errs most in each trial."),
-    "loops": (loops, "The same over what was done to the sensor: the shape by which an effect is known."),
-    "map": (error_map, "Root mean square error of each texel on the fitted trials."),
-    "phases": (phase_bars, "Squared error by phase of contact, as a share of that of the base model."),
+CAPTIONS = {
+    "gap": "The gap before and after. Check trials were never fitted, and took no part in choosing.",
+    "curves": "What was measured and what the models say, where the base model errs most in each trial.",
+    "loops": "The same over what was done to the sensor: the shape by which an effect is known.",
+    "map": "Root mean square error of each texel on the fitted trials.",
+    "phases": "Squared error by phase of contact, as a share of that of the base model.",
 }
-"""The pictures by file name, with their captions."""
+"""Captions of the pictures by file name."""
 
 
-def draw(result: Diagnosis, folder: Path) -> list[str]:
+def picture(name: str, result: Diagnosis, errors: GapErrors) -> Figure:
+    """Draw the picture of this name (see :data:`CAPTIONS`)."""
+    drawings: dict[str, Callable[[], Figure]] = {
+        "gap": lambda: gap_bars(result, errors),
+        "curves": lambda: curves(result),
+        "loops": lambda: loops(result),
+        "map": lambda: error_map(result),
+        "phases": lambda: phase_bars(result, errors),
+    }
+    return drawings[name]()
+
+
+def draw(result: Diagnosis, errors: GapErrors, folder: Path) -> list[str]:
     """Write every picture that makes sense for a rig as PNG and PDF; return their names."""
     names = []
-    for name, (make, _) in PICTURES.items():
+    for name in CAPTIONS:
         if name == "map" and len(result.rig.texels) == 1:
             continue
-        figure = make(result)
+        figure = picture(name, result, errors)
         for kind in ("png", "pdf"):
             save_figure(figure, folder / f"{name}.{kind}", 200)
         names.append(name)

@@ -12,7 +12,7 @@ from ...effects.engine.registry import library
 from ...effects.engine.specification import Form, Kind, TransducerArray
 from ...model.effect import Effect
 from ...model.parameter import Parameter
-from ..fitting.least_squares import FreeParameter
+from ..fitting.least_squares import Fit, FreeParameter
 from ..fitting.noise_floor import coverage
 from ..forward.predictor import Model, Predictor
 from .identifiability import unidentifiable
@@ -181,6 +181,35 @@ class Candidate:
             if np.isinf(value):
                 return name
         return None
+
+
+@dataclass
+class FittedCandidate:
+    """A candidate fitted on top of a model.
+
+    Attributes
+    ----------
+    candidate : Candidate
+    fit : Fit
+    held_out : (trials, 2) float
+        Squares of each trial, of readings and of forces, as predicted by a fit that has not seen it, in units of the noise.
+    """
+
+    candidate: Candidate
+    fit: Fit
+    held_out: np.ndarray
+
+    @property
+    def mean(self) -> float:
+        """Mean square on unseen trials."""
+        return float(self.held_out.sum() / self.fit.count.sum())
+
+    @property
+    def parameter_count(self) -> int:
+        """How many numbers it takes."""
+        n = len(self.fit.model.effects)
+        values = self.fit.model.effects[n - 1].values
+        return sum(len(v) if isinstance(v, tuple) else 1 for v in values.values())
 
 
 def _halton(index: int, base: int) -> float:

@@ -6,7 +6,6 @@ what these recordings do not tell.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,6 +14,7 @@ from ...model.effect import Effect
 from ..fitting.least_squares import Fit
 from .candidates import DIRECTLY_ESTIMATED, is_spatial
 from .direct_estimates import coarsest_step
+from .findings import Diagnosis
 from .forward_selection import FORCES, READINGS, NoiseFloor, SelectionState, friction_kinds
 from .identifiability import (
     LEAST_UNLOADED_SHARE,
@@ -24,10 +24,7 @@ from .identifiability import (
     curvature_ratio,
     indistinguishable,
 )
-from .screening import ViewSet
-
-if TYPE_CHECKING:
-    from .diagnosis import Diagnosis
+from .view_set import ViewSet
 
 EXPLAINED = 0.5
 """Share of the gap that must be closed for the verdict "explained", and for a sure name."""

@@ -20,10 +20,11 @@ from ..fitting.least_squares import Fit, FreeParameter, fit, held_out_squares
 from ..fitting.noise_floor import Coverage
 from ..fitting.residual_tests import ResidualStructure
 from ..forward.predictor import Model
-from .candidates import DIRECTLY_ESTIMATED, Candidate, Scales, candidates
+from .candidates import DIRECTLY_ESTIMATED, Candidate, FittedCandidate, Scales, candidates
 from .identifiability import confounded
 from .plausibility import is_plausible
-from .screening import FittedCandidate, ViewSet, screen
+from .screening import screen
+from .view_set import ViewSet
 
 FIRST_LEAST_SHARE, NEXT_LEAST_SHARE, NEXT_LEAST_SHARE_OF_GAP = 0.25, 0.2, 0.01
 """Least share of the gap that the first effect closes; of what is left that a further one closes; and of the whole gap."""

@@ -11,7 +11,8 @@ import numpy as np
 
 from ..fitting.noise_floor import UNLOADED_SHARE
 from ..forward.contact_phases import relative_load
-from .screening import FittedCandidate, ViewSet
+from .candidates import FittedCandidate
+from .view_set import ViewSet
 
 PULL_LEVEL = -0.5
 """Standard deviations of the noise below which a reading pulls."""

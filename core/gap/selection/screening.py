@@ -9,8 +9,7 @@ neighbours; the last ones see everything.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -26,114 +25,16 @@ from ..fitting.least_squares import (
     held_out_squares,
     value_of,
 )
-from ..forward.predictor import Model, Predictor
-from .candidates import DIRECTLY_ESTIMATED, Candidate, Scales, is_spatial
+from ..forward.predictor import Model
+from .candidates import DIRECTLY_ESTIMATED, Candidate, FittedCandidate, Scales
 from .direct_estimates import few_levels, moving_readings, quantization_starts, unresponsive_texels
+from .view_set import ViewSet
 
-TEXELS_IN_QUICK_LOOK = 16
-"""Per trial, in the quick look."""
 MOST_TIMES_THE_BEST = 3.0
 """A candidate that leaves so many times as much of the gap as the best, after a first fit, is not fitted to everything."""
 SMALL_RECORDING = 20_000
 """Measured values up to which a recording is so quick to fit that candidates are begun from several places and more of them are
 judged, in more of their forms: a quick look from one place loses those whose numbers bend most."""
-SAMPLE_STRIDE = 4
-"""Of so many samples one is looked at where texels feel their neighbours."""
-
-
-@dataclass
-class ViewSet:
-    """The trials as the stages of the search look at them.
-
-    Attributes
-    ----------
-    whole : list of TrialView
-    few_texels : list of TrialView
-        Few texels, all samples, without net forces where there are readings: for what a texel feels by itself.
-    few_texels_with_forces : list of TrialView
-        The same with net forces: for friction.
-    few_samples : list of TrialView
-        All texels, few samples: for what texels feel of each other, and for where they are.
-    """
-
-    whole: list[TrialView]
-    few_texels: list[TrialView]
-    few_texels_with_forces: list[TrialView]
-    few_samples: list[TrialView]
-
-    def quick(self, candidate: Candidate, model: Model) -> list[TrialView]:
-        """Return the view for a quick look at a candidate on top of a model."""
-        if candidate.name in DIRECTLY_ESTIMATED:
-            return self.whole
-        forms = [candidate.form, *(form_of(e.name, e.form) for e in model.effects)]
-        rubs = candidate.form.friction_law is not None
-        if any(is_spatial(form) or form.placement is not None for form in forms):
-            return (
-                self.whole if rubs else self.few_samples
-            )  # bristles need every sample, and friction shows in net forces alone
-        return self.few_texels_with_forces if rubs else self.few_texels
-
-
-def view_set_of(predictors: Sequence[Predictor], noise: tuple[float, float]) -> ViewSet:
-    """Prepare the views of some trials."""
-    whole = [TrialView(p, noise=noise, stretch_count=2) for p in predictors]
-    rubbed = [TrialView(p, _texels_for_quick_look(p), noise=noise) for p in predictors]
-    read = all(p.trial.reading is not None for p in predictors)
-    narrow = [replace(view, with_forces=not read) for view in rubbed]
-    thin = []
-    for p in predictors:
-        every = slice(None, None, SAMPLE_STRIDE if len(p.trial.time) >= 60 * SAMPLE_STRIDE else 1)
-        t = p.trial
-        parts: dict[str, Any] = {
-            name: None if getattr(t, name) is None else getattr(t, name)[every]
-            for name in ("time", "position", "quaternion", "level", "slide", "reading", "force")
-        }
-        thin.append(TrialView(Predictor(replace(t, **parts), p.rig), noise=noise, with_forces=not read))
-    return ViewSet(whole, narrow, rubbed, thin)
-
-
-def _texels_for_quick_look(predictor: Predictor) -> np.ndarray | None:
-    """Texels for the quick look: some of each degree of load, and two that carry nothing."""
-    n = len(predictor.rig.texels)
-    if n <= TEXELS_IN_QUICK_LOOK:
-        return None
-    s = predictor.stimulus
-    load = s.load.sum(axis=0)
-    order = np.argsort(load)[::-1]
-    loaded = order[load[order] > 0]
-    idle = order[load[order] <= 0]
-    picked = loaded[np.unique(np.linspace(0, len(loaded) - 1, min(len(loaded), TEXELS_IN_QUICK_LOOK - 2)).astype(int))]
-    rest = idle[np.linspace(0, len(idle) - 1, min(len(idle), TEXELS_IN_QUICK_LOOK - len(picked))).astype(int)]
-    return np.sort(np.concatenate([picked, rest]))
-
-
-@dataclass
-class FittedCandidate:
-    """A candidate fitted on top of a model.
-
-    Attributes
-    ----------
-    candidate : Candidate
-    fit : Fit
-    held_out : (trials, 2) float
-        Squares of each trial, of readings and of forces, as predicted by a fit that has not seen it, in units of the noise.
-    """
-
-    candidate: Candidate
-    fit: Fit
-    held_out: np.ndarray
-
-    @property
-    def mean(self) -> float:
-        """Mean square on unseen trials."""
-        return float(self.held_out.sum() / self.fit.count.sum())
-
-    @property
-    def parameter_count(self) -> int:
-        """How many numbers it takes."""
-        n = len(self.fit.model.effects)
-        values = self.fit.model.effects[n - 1].values
-        return sum(len(v) if isinstance(v, tuple) else 1 for v in values.values())
 
 
 def visible_parameters(views: Sequence[TrialView], found: Fit) -> tuple[FreeParameter, ...]:

@@ -5,8 +5,7 @@ import numpy as np
 import sample_rig
 
 from palpate.core.gap.dataset.rig import read_rig
-from palpate.core.gap.fitting.intervals import parameter_intervals
-from palpate.core.gap.report.summary import summary
+from palpate.core.gap.report.comparison import gap_errors
 from palpate.core.gap.selection.diagnosis import diagnose
 from palpate.core.jobs.job_runner import run_job
 
@@ -28,8 +27,8 @@ def test_what_is_hidden_in_the_sample_rig_is_named_and_nothing_else():
     """What the library's creep and gain lack beside the generator's is no noise that grows with the reading."""
     found = run_job(diagnose(read_rig(sample_rig.FOLDER / "rig.toml")))
     assert sorted(named.name for named in found.findings) == ["creep", "gain-mismatch"]
-    gap = summary(found)["gap"]
-    assert gap["after"]["check"] < 0.01 < 0.02 < gap["before"]["check"]
+    errors = gap_errors(found)
+    assert errors.amended["check"] < 0.01 < 0.02 < errors.base["check"]
     # What all texels have in common is the sensor's gain, not theirs: both at once could be anything
-    gain = next(one for one in parameter_intervals(found) if one.name == "gain")
+    gain = next(one for one in found.intervals if one.name == "gain")
     assert 0.0 < gain.high - gain.low < 0.05 * gain.value

@@ -8,8 +8,8 @@ import numpy as np
 from palpate.core.gap.dataset.rig import Rig, Trial, grid_texels
 from palpate.core.gap.forward.contact_phases import TRAVEL_BANDS, features
 from palpate.core.gap.forward.predictor import Model, Predictor
-from palpate.core.gap.report import summary
-from palpate.core.gap.report.comparison import nrmse, nrmse_without_friction
+from palpate.core.gap.report import sentences, summary
+from palpate.core.gap.report.comparison import gap_errors
 from palpate.core.gap.selection.diagnosis import diagnose
 from palpate.core.jobs.job_runner import run_job
 from palpate.core.model.sensor_parameters import SensorParameters
@@ -36,13 +36,13 @@ def brake(backlash):
 
 def test_the_report_says_what_friction_does_and_what_is_left(tmp_path):
     result = run_job(diagnose(brake(backlash=2.0)))
-    bare, own = nrmse_without_friction(result), nrmse(result.of("fit"), result.base.model, result.full)
-    assert bare["fit"] > 3.0 * own and bare["check"] > 3.0 * nrmse(result.of("check"), result.base.model, result.full)
-    assert not any(named.confidence >= summary.SURE for named in result.findings)
+    errors = gap_errors(result)
+    assert all(errors.frictionless[use] > 3.0 * errors.base[use] for use in ("fit", "check"))
+    assert not any(named.confidence >= sentences.SURE for named in result.findings)
     assert result.structure.strongest == "turning"
-    said = summary.headline(result)
+    said = sentences.headline(result, errors)
     assert "slid since it last turned" in said and "Friction is not missing" in said
-    assert summary.summary(result)["base"]["gap_without_friction"] == bare
+    assert summary.summary(result, errors)["base"]["gap_without_friction"] == errors.frictionless
     *_, _ = summary.write_report(result, tmp_path)
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert "1 texel, 1 trial fitted" in page and "base without its friction" in page and "base model, refitted" in page

@@ -13,15 +13,15 @@ from scipy.optimize import least_squares
 from scipy.signal import lfilter
 
 from palpate.core.effects.engine.registry import effect
-from palpate.core.gap.fitting.intervals import parameter_intervals
 from palpate.core.gap.fitting.least_squares import FreeParameter, TrialView, fit, free_base_parameters, held_out_squares
 from palpate.core.gap.fitting.noise_floor import reading_noise
 from palpate.core.gap.fitting.residual_tests import residual_structure
 from palpate.core.gap.forward.predictor import Model, Predictor
 from palpate.core.gap.report import summary
-from palpate.core.gap.report.amended_sensor import next_experiment
 from palpate.core.gap.report.comparison import nrmse
-from palpate.core.gap.selection.diagnosis import Diagnosis, diagnose
+from palpate.core.gap.report.experiments import next_experiment
+from palpate.core.gap.selection.diagnosis import diagnose
+from palpate.core.gap.selection.findings import Diagnosis
 from palpate.core.io.sensor_toml import read_sensor
 from palpate.core.jobs.job_runner import run_job
 
@@ -159,7 +159,7 @@ def test_intervals_hold_what_was_hidden():
     rig = cases.rig(change=lambda r, t: 0.15 * np.tanh(r / 0.15), seed=10)
     result = diagnosed(rig)
     assert [named.name for named in result.findings] == ["saturation"]
-    (level,) = (one for one in parameter_intervals(result) if one.name == "level")
+    (level,) = (one for one in result.intervals if one.name == "level")
     assert level.low < 0.15 < level.high and level.high - level.low < 0.03
 
 

@@ -7,10 +7,10 @@ import pytest
 
 from palpate.core.effects.engine.registry import form_of, kind_of
 from palpate.core.gap.forward.predictor import Model
+from palpate.core.gap.selection.base_model import prepared
 from palpate.core.gap.selection.candidates import Candidate
-from palpate.core.gap.selection.diagnosis import prepared
 from palpate.core.gap.selection.direct_estimates import unresponsive_texels
-from palpate.core.gap.selection.screening import view_set_of
+from palpate.core.gap.selection.view_set import view_set_of
 
 GONE, TOUCH = [5, 9, 14], 0.004
 

@@ -8,9 +8,9 @@ from palpate.core.effects.engine.registry import effect, form_of, kind_of
 from palpate.core.gap.dataset.rig import Rig, grid_texels
 from palpate.core.gap.fitting.least_squares import FRICTION_LEVEL, free_base_parameters, with_values
 from palpate.core.gap.forward.predictor import Model
+from palpate.core.gap.selection.base_model import friction_parameters_to_search
 from palpate.core.gap.selection.candidates import Candidate
 from palpate.core.gap.selection.confidence import is_doubtful, least_share, may_absorb_misfit
-from palpate.core.gap.selection.diagnosis import friction_parameters_to_search
 from palpate.core.gap.selection.direct_estimates import companding_starts, few_levels
 from palpate.core.gap.selection.forward_selection import (
     FORCES,
@@ -21,7 +21,7 @@ from palpate.core.gap.selection.forward_selection import (
     SelectionStep,
     friction_kinds,
 )
-from palpate.core.gap.selection.screening import ViewSet
+from palpate.core.gap.selection.view_set import ViewSet
 from palpate.core.model.sensor_parameters import SensorParameters
 
 WITH_FORCES, READ_ALONE = (NoiseFloor(np.full(2, 9.0), np.ones(2), np.array([900.0, count])) for count in (300.0, 0.0))

@@ -1,0 +1,112 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The next experiment: what to record in order to answer the questions that these recordings leave open."""
+
+from __future__ import annotations
+
+from ..selection.findings import Diagnosis
+
+LOUD_NOISE = 0.05
+"""Noise, as a share of the range, above which it hides the smaller effects."""
+ALL_TEXELS = 0.999
+"""Share of the texels that must be touched for the recordings to cover the sensor."""
+LEAST_CYCLES = 2
+LEAST_HOLD = 2.0
+"""Seconds."""
+LEAST_SPEED_RATIO = 5.0
+"""Ratio of fast to slow loading that shows an effect of speed."""
+
+EXPERIMENTS = {
+    "creep": "hold one depth for at least a minute, then release and wait as long",
+    "softening": "press the same spot ten times equally deep, then deeper, and again after an hour",
+    "hysteresis": "load and unload to the same depth at speeds a hundredfold apart, with partial unloadings",
+    "adhesion": "retract slowly after contacts of one second and of one minute, and record until well after release",
+    "wear": "repeat one cycle several hundred times on the same texels",
+    "load-spreading": "press single texels with a pin that is narrower than a texel",
+    "crosstalk": "press single texels with a pin, along one row and along one column, at two loads",
+    "gain-mismatch": "press every texel with the same flat indenter to the same depth",
+    "dead-texels": "press every texel once",
+    "dead-zone": "approach slowly, with many samples at the first touch, with a flat and with a round indenter",
+    "saturation": "go on to the highest load that the sensor may bear",
+    "stiffening": "go on to the largest depth that the sensor may bear, slowly",
+    "lag": "press and release as fast as the rig can, and record at a high rate",
+    "drift": "record an hour without touching the sensor",
+    "offset": "record a minute without touching the sensor, before and after a trial",
+    "quantization": "raise the load very slowly through its whole range",
+    "misalignment": "press at many known places, beyond the sensor's edges as well",
+    "stribeck": "slide at constant speeds from a tenth of a millimetre to a hundred millimetres per second",
+    "viscous-friction": "slide at constant speeds, up to the fastest that the rig can",
+    "noise": "record a minute at rest, unloaded and under a constant load",
+}
+"""The recording that shows each effect most clearly."""
+
+REPEAT = "repeat one trial exactly, to see what of the difference comes again"
+HINTS = {
+    "common mode": "record the same seconds without touching the sensor, to see whether it is there as well",
+    "shared by loaded texels": "hold one constant load for as long as a trial, to see how the reading moves by itself",
+    "clock": "record as long without touching the sensor",
+}
+"""What to record for an unexplained gap, by the feature that its residual depends on most."""
+SLIDING_HINTS = {
+    "turning": (
+        "turn back after slides of several lengths, some very slowly, to see whether what is left goes with the way "
+        "or with the time since the turn"
+    ),
+    "sliding": "slide both ways at several constant speeds",
+}
+"""The same for recordings of net forces under a sliding surface."""
+
+
+def next_experiment(result: Diagnosis) -> str:
+    """Return what to record next, in one sentence; empty if no question is open."""
+    if result.ambiguous:
+        return _experiment_between_rivals(result)
+    if result.coverage.slides and all(p.trial.reading is None for p in result.predictors):
+        return _sliding_experiment(result)
+    lacking = _lacking(result)
+    if result.verdict == "unexplained":
+        return f"To find out what it is: {'; '.join([_hint(result), *lacking])}."
+    return f"To cover what these recordings do not: {'; '.join(lacking)}." if lacking else ""
+
+
+def _experiment_between_rivals(result: Diagnosis) -> str:
+    """What distinguishes the kinds of effects that these recordings leave as rivals."""
+    pairs = [f"{names[0]} from {' and '.join(names[1:])}" for names in result.ambiguous]
+    involved = list(dict.fromkeys(name for names in result.ambiguous for name in names))
+    parts = [EXPERIMENTS[name] for name in involved if name in EXPERIMENTS]
+    return f"To tell {', and '.join(pairs)}: {'; and '.join(dict.fromkeys(parts))}."
+
+
+def _sliding_experiment(result: Diagnosis) -> str:
+    """What to record if only net forces were measured while a surface slid."""
+    if result.verdict != "unexplained":
+        return ""
+    hint = SLIDING_HINTS.get(result.structure.strongest, REPEAT)
+    return f"To find out what it is: {hint}; slide under two other loads, and record the normal force."
+
+
+def _hint(result: Diagnosis) -> str:
+    """What to record to find the cause of an unexplained gap."""
+    if result.line is not None:
+        return (
+            f"record the same seconds without touching the sensor, with mains, motors and fans off in turn: what hums at "
+            f"{result.line.frequency:.3g} Hz (or was folded down to that by the sampling) is there without any load"
+        )
+    return HINTS.get(result.structure.strongest, REPEAT)
+
+
+def _lacking(result: Diagnosis) -> list[str]:
+    """What the trials did not do to the sensor."""
+    coverage, lacking = result.coverage, []
+    if result.noise[0].deviation > LOUD_NOISE * result.full[0]:
+        lacking.append("press harder, or repeat a trial exactly and average, until the noise is below a hundredth of the range")
+    if coverage.touched_share < ALL_TEXELS:
+        lacking.append(f"touch the {1.0 - coverage.touched_share:.0%} of the texels that no trial reaches")
+    if coverage.cycles < LEAST_CYCLES:
+        lacking.append("repeat the cycle at least three times in one trial")
+    if coverage.longest_hold < LEAST_HOLD:
+        lacking.append("hold one depth for some ten seconds")
+    if coverage.speed_ratio < LEAST_SPEED_RATIO:
+        lacking.append("press at speeds at least tenfold apart")
+    if not coverage.unloading:
+        lacking.append("record the unloading too")
+    return lacking

@@ -1,0 +1,111 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The base model of a rig: where its fit starts, and which of its parameters the recordings identify."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ..dataset.rig import Rig
+from ..fitting.least_squares import FRICTION_LEVEL, FRICTION_PARAMETERS
+from ..fitting.noise_floor import ChannelNoise, force_noise, reading_noise
+from ..forward.predictor import Model, Predictor
+
+
+def prepared(rig: Rig) -> tuple[list[Predictor], tuple[ChannelNoise, ChannelNoise], tuple[float, float]]:
+    """Compute the contacts of each trial, and measure noise and range of readings and of net forces.
+
+    Returns
+    -------
+    predictors : list of Predictor
+    noise : (ChannelNoise, ChannelNoise)
+    full : (float, float)
+        Largest minus smallest value over all trials and channels.
+    """
+    predictors = [Predictor(trial, rig) for trial in rig.trials]
+    readings = [p.trial.reading for p in predictors if p.trial.reading is not None]
+    forces = [p.trial.force for p in predictors if p.trial.force is not None]
+    full = _range(readings), _range(forces)
+    noise = reading_noise(predictors, full[0]), force_noise(predictors, full[1])
+    return predictors, noise, full
+
+
+def _range(arrays: Sequence[np.ndarray]) -> float:
+    """Largest minus smallest of all measured values; 1 if nothing was measured."""
+    if not arrays:
+        return 1.0
+    high, low = max(float(np.nanmax(a)) for a in arrays), min(float(np.nanmin(a)) for a in arrays)
+    return max(high - low, 1e-12)
+
+
+def start_model(rig: Rig, predictors: Sequence[Predictor]) -> Model:
+    """Return the model with the rig's own parameters; a linear fit to the readings gives gain and zero if the rig does not."""
+    p = rig.parameters
+    if p.unit == "N" or "gain" in rig.given:
+        return Model(p)
+    base = Model(replace(p, gain=1.0, zero=0.0))
+    x, y = [], []
+    for predictor in predictors:
+        if predictor.trial.reading is not None:
+            good = np.isfinite(predictor.trial.reading)
+            x.append(predictor.predict(base).reading[good])
+            y.append(predictor.trial.reading[good])
+    if not x:
+        return Model(p)
+    gain, zero = np.polyfit(np.concatenate(x), np.concatenate(y), 1)
+    if not np.isfinite(gain) or gain == 0:
+        gain = 1.0
+    return Model(replace(p, gain=float(gain), zero=p.zero if "zero" in rig.given else float(zero)))
+
+
+def identified_base_parameters(rig: Rig, predictors: Sequence[Predictor]) -> list[str]:
+    """Return the names of the base model's parameters that these recordings identify.
+
+    Readings under a known depth or pose identify only the product of gain and stiffness. It is fitted as `k` if the readings
+    are in newtons or if the rig gives the gain, and as `gain` otherwise.
+    """
+    has_readings = any(p.trial.reading is not None for p in predictors)
+    has_forces = any(p.trial.force is not None for p in predictors)
+    depth_known = any(p.trial.stimulus != "force" for p in predictors)
+    force_known = any(p.trial.stimulus == "force" for p in predictors)
+    slides = any(p.trial.force is not None and p.stimulus.slide.any() for p in predictors)
+    own_unit = rig.parameters.unit != "N"
+    names: list[str] = []
+    if depth_known:
+        names += ["k", "cn"] if rig.parameters.normal_law == "linear" else ["k"]
+        if own_unit and has_readings and "gain" not in rig.given and not has_forces:
+            names.remove("k")
+            names.append("gain")
+        elif own_unit and has_readings and (has_forces or force_known):
+            names.append("gain")
+    if force_known and has_readings and "gain" not in names:
+        names.append("gain")
+    if own_unit and has_readings:
+        names.append("zero")
+    if slides:
+        names += FRICTION_PARAMETERS
+    return names
+
+
+def base_parameters_to_search(rig: Rig, predictors: Sequence[Predictor]) -> list[str]:
+    """Return the names of the base model's parameters that are free during the search for effects."""
+    names = identified_base_parameters(rig, predictors)
+    slides = set(FRICTION_PARAMETERS) & set(names)
+    return [name for name in names if name not in FRICTION_PARAMETERS] + (friction_parameters_to_search(rig) if slides else [])
+
+
+def friction_parameters_to_search(rig: Rig) -> list[str]:
+    """Return the names of the friction parameters that are free during the search for effects.
+
+    `mus`, `mud` and `x0` are a Stribeck law of their own, and `ct` is viscous friction. If they were free, they would hide
+    the two effects of these names. So those that the rig states are held, and only the level of friction is fitted.
+    """
+    p = rig.parameters
+    names = list(FRICTION_PARAMETERS)
+    if {"mus", "mud", "x0"} <= rig.given and p.mus > 0:
+        names = [FRICTION_LEVEL, *(name for name in names if name not in ("mus", "mud", "x0"))]
+    if "ct" in rig.given:
+        names.remove("ct")
+    return names

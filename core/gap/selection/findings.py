@@ -1,0 +1,107 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The result of a diagnosis: fitted models, the effects that were found, and how sure each of them is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..dataset.rig import Rig
+from ..fitting.intervals import ParameterInterval
+from ..fitting.least_squares import Fit
+from ..fitting.noise_floor import ChannelNoise, Coverage
+from ..fitting.residual_tests import ResidualStructure
+from ..fitting.spectral_lines import SpectralLine
+from ..forward.predictor import Model, Predictor
+from .candidates import Scales
+
+
+@dataclass(frozen=True)
+class Finding:
+    """An effect that was found.
+
+    Attributes
+    ----------
+    effect : int
+        Index of the effect in the model's stack.
+    name, form : str
+        Standard names of the effect and of its formula.
+    confidence : float
+        Between 0 and 1.
+    rivals : tuple of str
+        Other kinds of effects that explain the recordings as well.
+    next_best : str
+        The other kind that came nearest to this one; empty if none was fitted.
+    leaves : float
+        How many times as much of the gap `next_best` leaves.
+    """
+
+    effect: int
+    name: str
+    form: str
+    confidence: float
+    rivals: tuple[str, ...]
+    next_best: str = ""
+    leaves: float = np.inf
+
+
+@dataclass
+class Diagnosis:
+    """All that was found out about a rig. Whatever was fitted is kept here, so that a report fits nothing again.
+
+    Attributes
+    ----------
+    rig : Rig
+    predictors : list of Predictor
+        One for each trial, in the rig's order.
+    noise : (ChannelNoise, ChannelNoise)
+        Of readings and of net forces.
+    full : (float, float)
+        Range of readings and of net forces, largest minus smallest over all trials and channels.
+    coverage : Coverage
+        What the fitted trials did to the sensor.
+    scales : Scales
+        How large depths, forces, readings and times are in the fitted trials.
+    base : Fit
+        The base model, refitted, without effects.
+    best : Fit
+        The amended model.
+    base_structure, structure : ResidualStructure
+        What the residuals of `base` and of `best` depend on.
+    stages : list of Model
+        The base model, then the models with the first effect, the first two, and so on; the last one is the amended model.
+    intervals : list of ParameterInterval
+        Of the amended model's parameters that all texels share.
+    verdict : "no gap", "explained" or "unexplained"
+    findings : list of Finding
+        One for each effect of the amended model.
+    ambiguous : list of tuple of str
+        Groups of kinds that these recordings do not distinguish; the first of each group is in the amended model.
+    ruled_out : list of (str, str)
+        Kinds that were not found, each with the reason.
+    line : SpectralLine or None
+        A periodic disturbance of the readings without load.
+    """
+
+    rig: Rig
+    predictors: list[Predictor]
+    noise: tuple[ChannelNoise, ChannelNoise]
+    full: tuple[float, float]
+    coverage: Coverage
+    scales: Scales
+    base: Fit
+    best: Fit
+    base_structure: ResidualStructure
+    structure: ResidualStructure
+    stages: list[Model] = field(default_factory=list)
+    intervals: list[ParameterInterval] = field(default_factory=list)
+    verdict: str = "no gap"
+    findings: list[Finding] = field(default_factory=list)
+    ambiguous: list[tuple[str, ...]] = field(default_factory=list)
+    ruled_out: list[tuple[str, str]] = field(default_factory=list)
+    line: SpectralLine | None = None
+
+    def of(self, use: str) -> list[Predictor]:
+        """Return the predictors of the trials of one use, "fit" or "check"."""
+        return [p for p in self.predictors if p.trial.use == use]

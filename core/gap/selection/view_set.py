@@ -1,0 +1,106 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Four views of the trials, so that each step of the search looks at no more data than it needs.
+
+A score test and a first fit of a candidate look at a part of the texels, or at a part of the samples if texels depend on their
+neighbours. The final fits look at everything.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from ...effects.engine.registry import form_of
+from ..fitting.least_squares import TrialView
+from ..forward.predictor import Model, Predictor
+from .candidates import DIRECTLY_ESTIMATED, Candidate, is_spatial
+
+FEW_TEXELS = 16
+"""Texels of each trial in the views with few texels."""
+UNLOADED_TEXELS = 2
+"""How many of these texels carry no load, if there are any such."""
+SAMPLE_STRIDE = 4
+"""The view with few samples has every fourth sample."""
+LEAST_SAMPLES = 60
+"""A trial with fewer samples than this after thinning keeps all of them."""
+HELD_OUT_STRETCHES = 2
+"""Number of stretches of time into which a trial is cut if a part of it has to be left out of a fit."""
+
+
+@dataclass
+class ViewSet:
+    """The trials, as the steps of the search look at them.
+
+    Attributes
+    ----------
+    whole : list of TrialView
+        All texels, all samples, readings and net forces.
+    few_texels : list of TrialView
+        Few texels, all samples. Net forces are included only if some trial has no readings. For effects on single texels.
+    few_texels_with_forces : list of TrialView
+        The same with net forces. For effects on friction.
+    few_samples : list of TrialView
+        All texels, few samples. For effects that couple texels or displace them.
+    """
+
+    whole: list[TrialView]
+    few_texels: list[TrialView]
+    few_texels_with_forces: list[TrialView]
+    few_samples: list[TrialView]
+
+    def quick(self, candidate: Candidate, model: Model) -> list[TrialView]:
+        """Return the smallest view in which a candidate can be tested on top of a model."""
+        if candidate.name in DIRECTLY_ESTIMATED:
+            return self.whole
+        forms = [candidate.form, *(form_of(e.name, e.form) for e in model.effects)]
+        on_friction = candidate.form.friction_law is not None
+        if any(is_spatial(form) or form.placement is not None for form in forms):
+            # Bristle states need every sample, and friction shows in net forces alone.
+            return self.whole if on_friction else self.few_samples
+        return self.few_texels_with_forces if on_friction else self.few_texels
+
+
+def view_set_of(predictors: Sequence[Predictor], noise: tuple[float, float]) -> ViewSet:
+    """Prepare the views of some trials.
+
+    Parameters
+    ----------
+    predictors : sequence of Predictor
+    noise : (float, float)
+        Standard deviation of readings and of forces, in their units.
+    """
+    whole = [TrialView(p, noise=noise, stretch_count=HELD_OUT_STRETCHES) for p in predictors]
+    few_texels_with_forces = [TrialView(p, _texels_of_all_loads(p), noise=noise) for p in predictors]
+    all_have_readings = all(p.trial.reading is not None for p in predictors)
+    few_texels = [replace(view, with_forces=not all_have_readings) for view in few_texels_with_forces]
+    few_samples = [TrialView(_thinned(p), noise=noise, with_forces=not all_have_readings) for p in predictors]
+    return ViewSet(whole, few_texels, few_texels_with_forces, few_samples)
+
+
+def _thinned(predictor: Predictor) -> Predictor:
+    """Predictor of every fourth sample of a trial."""
+    trial = predictor.trial
+    every = slice(None, None, SAMPLE_STRIDE if len(trial.time) >= LEAST_SAMPLES * SAMPLE_STRIDE else 1)
+    parts: dict[str, Any] = {
+        name: None if getattr(trial, name) is None else getattr(trial, name)[every]
+        for name in ("time", "position", "quaternion", "level", "slide", "reading", "force")
+    }
+    return Predictor(replace(trial, **parts), predictor.rig)
+
+
+def _texels_of_all_loads(predictor: Predictor) -> np.ndarray | None:
+    """A few texels, evenly over the order of their loads, and two without load; None if the sensor has few texels anyway."""
+    n = len(predictor.rig.texels)
+    if n <= FEW_TEXELS:
+        return None
+    load = predictor.stimulus.load.sum(axis=0)
+    order = np.argsort(load)[::-1]
+    loaded = order[load[order] > 0]
+    unloaded = order[load[order] <= 0]
+    count = min(len(loaded), FEW_TEXELS - UNLOADED_TEXELS)
+    picked = loaded[np.unique(np.linspace(0, len(loaded) - 1, count).astype(int))]
+    rest = unloaded[np.linspace(0, len(unloaded) - 1, min(len(unloaded), FEW_TEXELS - len(picked))).astype(int)]
+    return np.sort(np.concatenate([picked, rest]))
