@@ -4,6 +4,7 @@
 from ..addon.authoring import laid_sensors
 from ..addon.session import first_use, session_state
 from ..addon.timeline import playback
+from ..core.model.sensor_parameters import CONTACT, FRICTION, READOUT, SENSOR_PARAMETERS
 from ..operators import presets
 from .places import ROOT, Part, named, sentences
 
@@ -121,6 +122,21 @@ def painted(layout, settings, key: str) -> None:
         column.prop(settings, f"{key}_factor", text=f"{name.removeprefix('Painted ')} × at Weight 1")
 
 
+PLACED = {
+    *("normal_law", "k", "cn", "exponent", "dissipation", "max_penetration", "points_per_texel"),
+    *("mus", "mud", "x0", "sigma0", "sigma1", "ct"),
+    *("unit", "gain", "zero"),
+}
+"""The parameters that have their own place in the panels below."""
+
+
+def other_parameters(layout, settings, group: str) -> None:
+    """Draw the parameters of a group that have no place of their own."""
+    for name, specification in SENSOR_PARAMETERS.items():
+        if specification.group == group and name not in PLACED:
+            layout.prop(settings, name)
+
+
 class Contact(Part):
     name = "contact"
     bl_label = "Contact"
@@ -138,6 +154,7 @@ class Contact(Part):
             column.prop(settings, "dissipation")
         column.prop(settings, "max_penetration")
         named(column, settings, "points_per_texel", "Points")
+        other_parameters(column, settings, CONTACT)
         painted(layout, settings, "k")
         layout.operator("palpate.stiffness_fit", icon="FCURVE_SNAPSHOT")
 
@@ -157,6 +174,7 @@ class Friction(Part):
         column.prop(settings, "sigma0")
         column.prop(settings, "sigma1")
         column.prop(settings, "ct")
+        other_parameters(column, settings, FRICTION)
         painted(layout, settings, "friction")
         layout.operator("palpate.friction_fit", icon="FCURVE_SNAPSHOT")
 
@@ -173,6 +191,7 @@ class Readout(Part):
         named(column, settings, "unit")
         column.prop(settings, "gain")
         column.prop(settings, "zero")
+        other_parameters(column, settings, READOUT)
         painted(layout, settings, "gain")
         column = layout.column()
         named(column, settings, "image_layout", "Image")

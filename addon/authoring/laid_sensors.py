@@ -27,7 +27,7 @@ from ...core.geometry.sampling.texel_arrays import (
 )
 from ..scene import meshes, scene_reader
 from ..session import identity, transforms, units
-from . import sensors, surface_binding
+from . import sensor_presets, sensors, surface_binding
 
 RECIPE = ("method", "rows", "columns", "pitch_x", "pitch_y", "shift_x", "shift_y", "angle", "spacing", "seed", "lift")
 """Settings of :class:`.properties.PALPATE_PG_skin` that a skin is made from."""
@@ -72,7 +72,7 @@ def lay(context, carrier, source: str, recipe: dict):
     obj.parent = carrier
     _remember(obj, carrier, where, recipe)
     if carrier.palpate.role in {"SENSOR", "PAD"}:
-        sensors.copy_parameters(carrier, obj)
+        sensor_presets.copy_parameters(carrier, obj)
     context.view_layer.update()
     surface_binding.cling(context, obj, carrier)
     obj.palpate.body = "PARENT"

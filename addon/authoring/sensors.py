@@ -3,20 +3,13 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 
 from ...core.errors import SensorError
-from ...core.model.sensor_parameters import SENSOR_PARAMETERS
 from ..display import baked_scene
-from ..properties import effect_stack
 from ..scene import meshes
 
 GROUP_NAME = "Palpate Sensor"
-PRESETS = Path(__file__).parents[1] / "presets"
-COPIED = (*SENSOR_PARAMETERS, "k_factor", "friction_factor", "gain_factor")
-"""What is copied from sensor to sensor and kept in presets: everything that does not hang on one mesh."""
 
 
 def source_of(obj, mode: str) -> str:
@@ -145,13 +138,6 @@ def set_brush(tools) -> None:
             setattr(shared, part, 1.0)
         elif brush is not None:
             setattr(brush, part, 1.0)
-
-
-def copy_parameters(source, target) -> None:
-    """Give a sensor what another one is made of; its region and its name stay; effects that are switched off are left out."""
-    for name in COPIED:
-        setattr(target.palpate, name, getattr(source.palpate, name))
-    effect_stack.put_stack(target, effect_stack.stack(source))
 
 
 def _check(obj, chosen: np.ndarray, source: str) -> None:

@@ -19,8 +19,8 @@ class Body:
     ----------
     name : str
     motion : Motion
-        Of a keyframed body: its path. Of a driven body: its path without the way of its drive. Of a free body: the first
-        sample is where it starts.
+        The path of a keyframed body, or the path of a driven body without the displacement by its drive. The first sample is
+        the start of a free body.
     free : bool
         True when forces move it, False when `motion` does.
     drive : Drive or None
@@ -28,7 +28,7 @@ class Body:
     center_of_mass : (3,) float, metres, body frame
     inertia : (3, 3) float, kg·m², about the centre of mass, body axes
     velocity, angular_velocity : (3,) float, m/s and rad/s, world frame
-        A free body's start.
+        Of a free body at the start.
     """
 
     name: str
@@ -43,5 +43,5 @@ class Body:
 
     @property
     def moved_by_forces(self) -> bool:
-        """Whether forces have a say in where it goes: it is free or driven."""
+        """True when forces change the path of the body: it is free or driven."""
         return self.free or self.drive is not None

@@ -12,24 +12,30 @@ from ..errors import SceneError
 
 @dataclass(frozen=True)
 class Deformation:
-    """A surface that changes its shape in its body's frame; linear between samples, held before the first and after the last.
+    """The shape of a surface over time, in the frame of its body.
+
+    The shape is interpolated linearly between samples, and constant before the first and after the last.
 
     Attributes
     ----------
     times : (m,) float, seconds, increasing
     values : (m, n, c) float
-        Of a target: position of each vertex of its mesh, metres. Of a sensor: position (m), normal and tangent of each texel.
+        For a target the position of each vertex of its mesh, metres; for a sensor the position (m), normal and tangent of each
+        texel.
     """
 
     times: np.ndarray
     values: np.ndarray
 
     def extended(self, time: float, values: np.ndarray) -> Deformation:
-        """Return this with one more sample at its end and all but the last two left out (the timeline looks only ahead)."""
+        """Return the deformation from the last sample to a new one.
+
+        Earlier samples are left out, because the timeline only goes forward.
+        """
         return Deformation(np.append(self.times[-1:], time), np.concatenate([self.values[-1:], values[None]]))
 
     def check(self, name: str, shape: tuple[int, ...]) -> None:
-        """Raise :class:`SceneError` when the samples do not fit a surface of `shape`, or one is no number."""
+        """Raise :class:`SceneError` when the samples do not fit a surface of `shape` or are not finite."""
         if self.values.shape != (len(self.times), *shape):
             raise SceneError(
                 f"'{name}' deforms with {self.values.shape[1]} vertices and has {shape[0]}: "

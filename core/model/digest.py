@@ -10,7 +10,16 @@ import numpy as np
 
 
 def digest_of(value: object) -> str:
-    """Return a hash of a description: a dataclass of numbers, words, arrays and others of its kind, or a tuple of them."""
+    """Return a hash of a description, the same in every process and on every platform.
+
+    Names of fields and their order count. Bakes keep the hash of their scenario, so a field that is renamed or moved makes them
+    stale.
+
+    Parameters
+    ----------
+    value : object
+        A dataclass, or a tuple of dataclasses. Their fields hold numbers, texts, arrays, dictionaries and again dataclasses.
+    """
     digest = hashlib.sha256(b"palpate-scenario/1")
     _feed(digest, value)
     return digest.hexdigest()

@@ -13,38 +13,34 @@ from .motion import Signal
 from .parameter import Parameter, specifications, specified
 
 CONTROLS = ("position", "velocity", "force")
-"""What the target of a :class:`Drive` is: metres along the axis, metres per second, or newtons of a sensor's tactile sum."""
+"""The target of a :class:`Drive` is a distance along the axis (m), a speed (m/s) or the sum of a sensor's forces (N)."""
 
 
 @dataclass(frozen=True)
 class Drive:
-    """A servo that slides its body along one axis, with no more than a certain force.
+    """An actuator that moves its body along one axis with a limited force.
 
-    The body's motion is that of its carrier: the drive adds a way along the axis. The servo's force is
-    ``stiffness (x* - x) + damping (v* - v)`` with its own weight and its carrier's acceleration fed forward, all of it
-    together limited to `max_force`.
+    The body follows the motion of its carrier, and the drive adds a displacement along the axis. The force of the actuator is
+    ``stiffness (x* - x) + damping (v* - v)`` plus a feed-forward of the body's weight and of the carrier's acceleration. The
+    sum is limited to `max_force`.
 
     Attributes
     ----------
     control : str
         One of :data:`CONTROLS`.
     target : Signal
-        In m from where the motion has the body, m/s, or N.
+        For position control in m, counted from where the motion puts the body; else in m/s or N.
     axis : (3,) float
-        Unit vector, the direction of positive ways; a finger closes along it.
+        Unit vector of positive displacements; a finger closes along it.
     axis_in_world : bool
-        True when the axis stands still in the world; False when it is given in the body's own frame and turns along.
-    stiffness, damping : float, N/m and N·s/m
-    max_force : float, N
-    max_speed : float, m/s
-        That the servo asks for; force control approaches with it.
+        True when the axis is fixed in the world; False when it is fixed in the frame of the body and turns with it.
+    stiffness, damping, max_force, max_speed, settling, period : float
+        See the specifications below. `settling` is the time constant of :class:`.grip_controller.GripControl`.
     sensor : int
-        For force control: the sensor whose tactile sum is controlled.
-    settling, period : float, seconds
-        For force control: time constant of :class:`.grip_controller.GripControl`, and how often it is asked.
+        For force control: index of the sensor whose sum of normal forces is controlled.
     leader : int or None
-        Body whose drive moves this body as well, each along its own axis by the same way, as the two fingers of a parallel
-        gripper; then only the axis of this drive counts. What is said of forces is said of each of them.
+        Index of the body whose drive also moves this body: both move by the same distance, each along its own axis, as the two
+        fingers of a parallel gripper do. Of this drive only the axis counts then. Forces are those of each body.
     """
 
     control: str = "position"
@@ -59,7 +55,7 @@ class Drive:
     max_force: float = specified(Parameter(
         "max_force", "N", 40.0, 0.0, inf, "Largest force of the drive", label="Max Force"))
     max_speed: float = specified(Parameter(
-        "max_speed", "m/s", 0.05, 0.0, inf, "Speed that the drive asks for at the most", above_low=True, label="Max Speed",
+        "max_speed", "m/s", 0.05, 0.0, inf, "Largest speed that the drive asks for", above_low=True, label="Max Speed",
         note="Force control approaches with it"))
     sensor: int = -1
     settling: float = specified(Parameter(
@@ -71,7 +67,7 @@ class Drive:
     leader: int | None = None
 
     def check(self, name: str) -> None:
-        """Raise :class:`ParameterError` for the first value that means nothing."""
+        """Raise :class:`ParameterError` for the first value of the drive of body `name` that has no meaning."""
         if self.control not in CONTROLS:
             raise ParameterError(f"The control of '{name}' is '{self.control}': choose one of {', '.join(CONTROLS)}.")
         for key, specification in DRIVE_PARAMETERS.items():

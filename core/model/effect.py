@@ -7,21 +7,23 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 Value = float | tuple[float, ...]
+"""The value of a parameter: one number, or one number per texel."""
 Values = Mapping[str, Value]
+"""Values by parameter name."""
 
 
 @dataclass(frozen=True)
 class Effect:
-    """An effect on a sensor: plain data that a file can hold.
+    """An effect of a sensor: plain data that a file can hold.
 
     Attributes
     ----------
     name, form : str
-        Which effect of the library, and which of its formulas.
+        Names of an effect of the library and of one of its formulas.
     values : dict of str to float or tuple of float
-        By parameter name; a tuple has one number per texel. What is absent has the form's default.
+        By parameter name. A tuple has one number per texel. A parameter without a value has the default of the form.
     seed : int
-        Of effects with chance in them; equal seeds give equal numbers.
+        Seed of the random numbers of an effect; equal seeds give equal numbers.
     """
 
     name: str

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 @dataclass(frozen=True)
 class Motion:
-    """Poses of a body's frame over time; what is between the samples, :attr:`Scenario.interpolation` says.
+    """Poses of the frame of a body over time. :attr:`.Scenario.interpolation` says how they are interpolated.
 
     Attributes
     ----------
@@ -30,7 +30,7 @@ class Motion:
         return cls(np.zeros(1), np.atleast_2d(np.array(position, float)), np.atleast_2d(np.array(quaternion, float)))
 
     def extended(self, time: float, position: np.ndarray, quaternion: np.ndarray) -> Motion:
-        """Return this motion with one more sample at its end (the timeline learns poses frame by frame)."""
+        """Return this motion with one more sample at its end. The timeline reads poses frame by frame."""
         return Motion(
             np.append(self.times, time), np.vstack([self.positions, position]), np.vstack([self.quaternions, quaternion])
         )
@@ -38,7 +38,7 @@ class Motion:
 
 @dataclass(frozen=True)
 class Signal:
-    """A number over time: linear between samples, held before the first and after the last.
+    """A number over time: linear between samples, and constant before the first and after the last.
 
     Attributes
     ----------
@@ -55,7 +55,7 @@ class Signal:
         return cls(np.zeros(1), np.array([float(value)]))
 
     def at(self, times: np.ndarray) -> np.ndarray:
-        """(n,) values at (n,) times."""
+        """Return the (n,) values at (n,) times."""
         return np.interp(times, self.times, self.values)
 
     def extended(self, time: float, value: float) -> Signal:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a run produced: per frame and texel, per frame and sensor, per frame and body."""
+"""The results of a run: per frame and texel, per frame and sensor, per frame and body."""
 
 from __future__ import annotations
 
@@ -19,14 +19,15 @@ class SensorFrame:
     Attributes
     ----------
     normal_force : (n,) float, N
-        Of the force along the object's surface normal (paper, Eq. 8); below zero only where the effect adhesion pulls.
+        Force along the surface normal of the target (paper, Eq. 8). Only the effect adhesion makes it negative.
     shear : (n, 2) float, N
-        The part of the whole force that lies in the texel's own plane, along its x and y axes: on a flat sensor the texels'
-        shear adds up to the tangential part of `net_force`, to rounding.
+        Components of the whole force along the x and y axes of the texel. On a flat sensor the shear of all texels adds up to
+        the tangential part of `net_force`, apart from rounding.
     friction : (n,) float, N
-        Magnitude of the friction force (Eq. 13), which lies in the object's surface; never above what friction can hold.
+        Magnitude of the friction force (Eq. 13), which is tangential to the target's surface. It never exceeds the limit
+        of friction.
     depth : (n,) float, m
-        Penetration, perpendicular to the object's surface (Eq. 4).
+        Penetration, perpendicular to the target's surface (Eq. 4).
     slip : (n,) float, m/s
         Relative tangential speed (Eq. 6).
     contact : (n,) bool
@@ -89,7 +90,7 @@ class SensorRecording:
     centre_of_pressure: np.ndarray
 
     def at(self, i: int) -> SensorFrame:
-        """Return the `i`-th recorded frame."""
+        """Return the recorded frame with index `i`."""
         return SensorFrame(**{item.name: getattr(self, item.name)[i] for item in fields(self)})
 
 
@@ -108,9 +109,9 @@ class Recording:
     dt : float, seconds
         The substep that was used.
     step_reason : str
-        Why that one, in words for the user.
+        Why this substep was used, in words for the user.
     digest : str
-        :meth:`Scenario.digest` of what was solved.
+        :meth:`.Scenario.digest` of the scenario that was solved.
     warnings : tuple of str
         What the user should know (a texel bottomed out, a mesh was repaired), one sentence each.
     """
@@ -136,7 +137,7 @@ class Recording:
         warnings: Sequence[str] = (),
         step_reason: str = "",
     ) -> Recording:
-        """Put single frames, in order, behind one another."""
+        """Return the recording of frames that are given in order."""
         sensors = {
             name: SensorRecording(
                 **{

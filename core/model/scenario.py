@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The plain-data description of a run: everything the solver needs and nothing of Blender."""
+"""The description of a whole run: everything the solver needs and nothing of Blender."""
 
 from __future__ import annotations
 
@@ -21,16 +21,18 @@ class Scenario:
     Attributes
     ----------
     bodies, sensors, targets : tuple
-        `Sensor.body` and `Target.body` index `bodies`. A sensor never touches the targets of its own body.
+        :class:`.Body`, :class:`.Sensor` and :class:`.Target`. A sensor never touches the targets of its own body.
     frame_start, frame_end : int
         Frames that are recorded, both included; time zero is `frame_start`.
     fps : float
         Frames per second.
     gravity : (3,) float, m/s²
     dt : float or None, seconds
-        Longest substep. None: the adviser chooses (:mod:`.time_step_adviser`).
+        Longest substep. With None :mod:`.time_step_adviser` chooses it.
+    name : str
+        Of the scene, for messages.
     interpolation : str
-        Of motions between their samples, ``linear`` or ``smooth`` (:mod:`.pose_interpolation`).
+        How motions are interpolated between their samples: ``linear`` or ``smooth`` (:mod:`.pose_interpolation`).
     """
 
     bodies: tuple[Body, ...]
@@ -50,7 +52,7 @@ class Scenario:
         return range(self.frame_start, self.frame_end + 1)
 
     def check(self) -> None:
-        """Raise a :class:`PalpateError` when the parts do not make a run.
+        """Raise a :class:`.PalpateError` when the parts do not make a run.
 
         Effects are checked by :func:`.sensor_effects.check_scenario`, which also calls this method.
         """

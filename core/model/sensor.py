@@ -15,10 +15,24 @@ from .sensor_parameters import Painted, SensorParameters
 
 @dataclass(frozen=True)
 class Sensor:
-    """Texels on a body, which differ by what is painted. With `readout` False it is a pad: it acts, and reports nothing.
+    """Texels on a body. All have the same parameters, apart from the painted factors.
 
-    Its `effects` are what the base model leaves out (:mod:`.effects`); each has its place, so their order matters only between
-    two of a kind.
+    Attributes
+    ----------
+    name : str
+    body : int
+        Index in :attr:`.Scenario.bodies`.
+    texels : Texels
+        In the frame of the body. :func:`.sensor_effects.mounted_texels` returns where the effects put them.
+    parameters : SensorParameters
+    readout : bool
+        False for a pad, which takes part in contact and reports nothing.
+    painted : Painted
+    deformation : Deformation or None
+        How the texels move in the frame of the body.
+    effects : tuple of Effect
+        What real sensors do and the base model leaves out. Each kind has its place in the chain, so the order matters only
+        between two effects of the same kind.
     """
 
     name: str
@@ -32,5 +46,5 @@ class Sensor:
 
     @cached_property
     def settings_digest(self) -> str:
-        """Hash of the parameters, of what is painted and of the effects."""
+        """Hash of the parameters, the painted factors and the effects."""
         return digest_of((self.parameters, self.painted, self.effects))

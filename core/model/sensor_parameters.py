@@ -112,16 +112,16 @@ SENSOR_PARAMETERS = specifications(SensorParameters)
 
 @dataclass(frozen=True)
 class Painted:
-    """Multipliers of a sensor's parameters, texel by texel; None is one everywhere.
+    """Factors by which parameters of a sensor differ from texel to texel; None means a factor of one everywhere.
 
     Attributes
     ----------
     k : (n,) float or None
-        Of `k` and `cn`, as for more or less of the same foam.
+        Factor of `k` and `cn`, as for more or less of the same foam.
     friction : (n,) float or None
-        Of `mus` and `mud`.
+        Factor of `mus` and `mud`.
     gain : (n,) float or None
-        Of `gain`.
+        Factor of `gain`.
     """
 
     k: np.ndarray | None = None
@@ -129,7 +129,7 @@ class Painted:
     gain: np.ndarray | None = None
 
     def check(self, name: str, count: int) -> None:
-        """Raise :class:`ParameterError` for multipliers that mean nothing; `count` is the number of texels."""
+        """Raise :class:`ParameterError` for factors of sensor `name` that have no meaning; `count` is the number of texels."""
         for item in fields(self):
             values = getattr(self, item.name)
             if values is None:

@@ -17,14 +17,16 @@ class Target:
     ----------
     name : str
     body : int
+        Index in :attr:`.Scenario.bodies`.
     mesh : TriangleMesh
         In the frame of its body, metres; its shape at the first frame.
     deformation : Deformation or None
-        Where its vertices go, when it is not rigid.
+        How its vertices move when the target is not rigid.
     sensor : int or None
-        The sensor whose surface this is, when it is soft: sensors then feel each other.
+        Index of the sensor whose surface this is, when the target is the soft surface of another sensor.
     smooth : bool
-        Whether the contact normals are interpolated between the vertices, as for smooth shading, or those of the triangles.
+        True when contact normals are interpolated between the vertices, as for smooth shading; False when they are the normals
+        of the triangles.
     """
 
     name: str

@@ -9,19 +9,19 @@ import numpy as np
 import pytest
 from blender_scenes import ball, grid, press
 
-from palpate.addon.authoring import sensors
+from palpate.addon.authoring import sensor_presets
 from palpate.addon.properties.parameter_properties import sensor_parameters
 from palpate.addon.scene import meshes, scene_reader
 from palpate.addon.timeline import live_cache
 from palpate.core.errors import SensorError
 from palpate.core.model.sensor_parameters import SensorParameters
 
-PRESETS = sorted((sensors.PRESETS / "palpate" / "sensor").glob("*.py"))
+PRESETS = sorted((sensor_presets.FOLDER / "palpate" / "sensor").glob("*.py"))
 
 
 def test_blender_finds_the_presets():
     found = {Path(path) for path in bpy.utils.preset_paths("palpate/sensor")}
-    assert sensors.PRESETS / "palpate" / "sensor" in found
+    assert sensor_presets.FOLDER / "palpate" / "sensor" in found
 
 
 @pytest.mark.parametrize("path", PRESETS, ids=lambda path: path.stem)
