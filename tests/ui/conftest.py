@@ -72,7 +72,7 @@ class RealBlender:
             blender --enable-event-simulate -noaudio --window-geometry 0 0 {SCREEN[0]} {SCREEN[1]} \\
                 --python-exit-code 1 --python {HERE}/driver.py -- {HERE}/roads/{road.name} {inner}
             sleep 1
-            ! grep -ls 'compile_besid[e]' /proc/[0-9]*/cmdline  # nothing that Blender started outlives it
+            ! grep -ls 'precompile_proces[s]' /proc/[0-9]*/cmdline  # nothing that Blender started outlives it
         """
         try:
             code: int | str = self.run(["sh", "-euc", script], log, timeout)

@@ -10,12 +10,13 @@ import pytest
 
 def test_early_end(play_road):
     """Blender closes at once while the solver is being compiled, and nothing goes on."""
-    play_road("early_end")
+    assert play_road("early_end")["finished"]
 
 
 def test_first_use(play_road):
     """The solver is compiled beside the window, with nothing in numba's cache."""
-    play_road("first_use", timeout=1200)
+    result = play_road("first_use", timeout=1200)
+    assert result["screenshots"] == ["preparing.png", "playing.png", "bake-waits.png", "computed.png"]
 
 
 def test_window(play_road):

@@ -165,7 +165,10 @@ def test_python_blocks_run(block, bake_folder, monkeypatch, capsys):
     from solver_scenes import cube_on_pad
 
     monkeypatch.chdir(bake_folder)
-    exec(compile(block, "page", "exec"), {"dataclasses": dataclasses, "sensor": cube_on_pad().sensors[0]})
+    names = {"dataclasses": dataclasses, "sensor": cube_on_pad().sensors[0]}
+    given = set(names)
+    exec(compile(block, "page", "exec"), names)
+    assert set(names) - given - {"__builtins__"}
 
 
 def toml_blocks() -> list:

@@ -26,8 +26,8 @@ def test_every_field_is_specified_under_its_own_name_and_none_has_moved():
 
 def test_defaults_are_inside_their_bounds():
     for specification in SENSOR_PARAMETERS.values():
-        specification.check(specification.default, "a default")
-    SensorParameters().check("default")
+        assert specification.check(specification.default, "a default") is None
+    assert SensorParameters().check("default") is None
 
 
 @pytest.mark.parametrize(

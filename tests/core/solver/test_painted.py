@@ -104,4 +104,9 @@ def test_paint_that_means_nothing_is_refused(maps, text):
 
 
 def test_no_friction_may_be_painted():
-    with_painted(cube_on_pad(), friction=np.zeros(N)).check()
+    """A plate that is pressed on such a pad slides over it without any friction; on a plain pad it does not."""
+    scenario = with_parameters(pressed(PLATE, press_and_slide(3), sigma0=1e4), sigma1=0.0, ct=0.0)
+    slippery, plain = felt(with_painted(scenario, friction=np.zeros(N))), felt(scenario)
+    assert np.array_equal(slippery.normal_force, plain.normal_force)
+    assert not slippery.shear.any() and not slippery.friction.any()
+    assert plain.friction.max() > 0.01

@@ -33,7 +33,7 @@ def rigid(mesh, **more):
     return replace(scenario, frame_end=FRAMES)
 
 
-def same(mine, theirs, mask=slice(None)):
+def assert_same_forces(mine, theirs, mask=slice(None)):
     """Forces are equal to 1e-9 of the largest, on all frames but the first, which knows no motion yet."""
     a, b = mine.sensors["pad"], theirs.sensors["pad"]
     assert np.abs(b.shear[mask]).max() > 1e-3
@@ -54,7 +54,7 @@ def test_a_deformation_that_mimics_a_rigid_motion_gives_its_forces(smooth):
     values = np.einsum("tij,vj->tvi", rotation_matrices(turns), ball.vertices) + path[:, None]
     target = replace(scenario.targets[0], mesh=replace(ball, vertices=values[0]), deformation=Deformation(times, values))
     still = replace(scenario, bodies=(scenario.bodies[0], Body("probe", Motion.at_rest())), targets=(target,))
-    same(run(still), run(scenario))
+    assert_same_forces(run(still), run(scenario))
 
 
 def test_half_in_the_body_half_in_the_vertices():
@@ -68,7 +68,7 @@ def test_half_in_the_body_half_in_the_vertices():
     values = np.einsum("tji,tvj->tvi", rotation_matrices(half), world - shift[:, None])
     body = Body("probe", Motion(times, shift, half))
     target = replace(scenario.targets[0], mesh=replace(ball, vertices=values[0]), deformation=Deformation(times, values))
-    same(run(replace(scenario, bodies=(scenario.bodies[0], body), targets=(target,))), run(scenario))
+    assert_same_forces(run(replace(scenario, bodies=(scenario.bodies[0], body), targets=(target,))), run(scenario))
 
 
 def test_a_sensor_that_bends_as_if_it_moved_feels_as_if_it_moved():
@@ -145,7 +145,7 @@ def test_smooth_normals_of_a_flat_surface_are_its_own():
     sheet = replace(sheet, triangles=sheet.triangles[:, ::-1])
     scenario = pressed(sheet, [[0.0005 * i, 0, -0.001] for i in range(5)], **STIFF_FRICTION)
     smooth = replace(scenario, targets=(replace(scenario.targets[0], smooth=True),))
-    same(run(smooth), run(scenario), slice(1, None))
+    assert_same_forces(run(smooth), run(scenario), slice(1, None))
 
 
 def test_a_free_cube_rests_on_a_pad_that_heaves():
