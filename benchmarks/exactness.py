@@ -6,16 +6,11 @@ What is measured lives in tests/oracles, where the tests use it too.
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Iterator
-from pathlib import Path
 
 import numpy as np
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
-
-from oracles import balance, foundation, friction, loads, plain, rays, sweep  # noqa: E402
-from solver_scenes import GRAVITY, about  # noqa: E402
+from oracles import balance, foundation, friction, loads, plain, rays, sweep
+from solver_scenes import GRAVITY, about
 
 SETS, SEGMENTS = 1000, 1_000_000
 

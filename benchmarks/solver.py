@@ -17,8 +17,9 @@ from pathlib import Path
 
 import numpy as np
 import trimesh
+from solver_scenes import GRAVITY, free_body, grid_mesh
 
-from palpate.core.geometry.mesh import TriangleMesh, checked_mesh, mass_properties
+from palpate.core.geometry.mesh import TriangleMesh, checked_mesh
 from palpate.core.geometry.texels import texels_from_region
 from palpate.core.model.body import Body
 from palpate.core.model.motion import Motion
@@ -34,7 +35,6 @@ CUBE, BALL = 0.06, 0.02
 """Edge of the cube and radius of the ball, metres."""
 GRIDS = {84: (14, 6), 1024: (32, 32), 10000: (100, 100)}
 ROUNDS = 7
-GRAVITY = 9.81
 SLOPE = 10.0
 """Degrees."""
 STEPS = (1e-2, 5e-3, 2e-3, 1e-3)
@@ -52,14 +52,8 @@ def cube(subdivisions: int) -> trimesh.Trimesh:
 
 
 def pad(rows: int, columns: int) -> TriangleMesh:
-    """Return a flat sheet of rows × columns vertices."""
-    pitch = SIDE / (max(rows, columns) - 1)
-    y, x = np.mgrid[0:rows, 0:columns] * pitch
-    vertices = np.stack([x - x.mean(), y - y.mean(), np.zeros_like(x)], axis=-1).reshape(-1, 3)
-    corner = (np.arange(rows - 1)[:, None] * columns + np.arange(columns - 1)).ravel()
-    quads = np.stack([corner, corner + 1, corner + columns + 1, corner + columns], axis=1)
-    triangles = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
-    return checked_mesh(vertices, triangles, "pad", quads)[0]
+    """Return a flat sheet of rows × columns vertices whose longer side is SIDE."""
+    return grid_mesh(rows, columns, SIDE / (max(rows, columns) - 1))
 
 
 def gravity(slope: float) -> np.ndarray:
@@ -73,12 +67,10 @@ def weighing(
     """1 kg on the pad; stiffness shared out so that every resolution sinks alike."""
     sheet = pad(*GRIDS[texels])
     mesh, _ = checked_mesh(solid.vertices, solid.faces, "cube")
-    center, inertia, _ = mass_properties(mesh, 1.0, "cube")
     k = 84e3 / texels
     parameters = SensorParameters(k=k, cn=0.01 * k, sigma0=k, sigma1=0.01 * k)
-    start = Motion.at_rest((0, 0, CUBE / 2 + gap))
     return Scenario(
-        bodies=(Body("pad", Motion.at_rest()), Body("cube", start, True, 1.0, center, inertia)),
+        bodies=(Body("pad", Motion.at_rest()), free_body("cube", mesh, 1.0, (0, 0, CUBE / 2 + gap))),
         sensors=(Sensor("pad", 0, texels_from_region(sheet, np.ones(len(sheet.vertices), bool)), parameters),),
         targets=(Target("cube", 1, mesh),),
         frame_end=10**6,
