@@ -5,9 +5,9 @@ from __future__ import annotations
 
 import argparse
 
+from ..core.export.registry import export, exporters
 from ..core.figures.figure_style import FigureStyle
 from ..core.io.bake_reader import Bake, read_bake
-from ..core.io.export import KINDS, export
 from ..core.jobs.job_runner import run_job
 from ..core.jobs.progress import Progress
 from . import console, figure_options
@@ -16,7 +16,7 @@ from . import console, figure_options
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("bake", metavar="BAKE", help="a bake folder, the folder of one sensor in it, or a baked .blend")
     parser.add_argument(
-        "--format", metavar="KIND", choices=KINDS, default="csv", help=f"{', '.join(KINDS)} (default: %(default)s)"
+        "--format", metavar="KIND", choices=exporters(), default="csv", help=f"{', '.join(exporters())} (default: %(default)s)"
     )
     parser.add_argument("--out", metavar="DIR", default="palpate-export", help="folder to write to (default: %(default)s)")
     parser.add_argument("--sensor", metavar="NAME", action="append", help="only this sensor; may be given again")

@@ -18,5 +18,6 @@ __all__ = [
     "solver",
     "io",
     "figures",
+    "export",
     "gap",
 ]

@@ -2,7 +2,7 @@
 """Panel of a sensor's texels: how many, how dense, how long a step may be, what is wrong and the button against it."""
 
 from ..addon.authoring import problems, sensor_report
-from ..core.geometry.layout import GridLayout
+from ..core.geometry.layout.grid_layout import GridLayout
 from .places import Part, sentences
 
 

@@ -44,6 +44,7 @@ ORDER: dict[str, tuple[str, ...]] = {
         "solver",
         "io",
         "figures",
+        "export",
         "gap",
     ),
     "core.effects": ("engine", "library"),

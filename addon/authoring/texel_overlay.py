@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import bpy
 import numpy as np
 
-from ...core.geometry.layout import GridLayout
+from ...core.geometry.layout.grid_layout import GridLayout
 from ..session import transforms
 from ..timeline import playback
 from . import sensor_report

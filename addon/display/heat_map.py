@@ -6,7 +6,7 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
-from ...core.geometry.layout import UVLayout
+from ...core.geometry.layout.texture_maps import UVLayout
 from ...core.geometry.texels import Texels
 from ..scene import meshes
 from ..scene.display_names import HEAT_MAP_MODIFIER, UV_MAP

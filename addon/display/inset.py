@@ -9,7 +9,7 @@ import bpy
 import numpy as np
 
 from ...core.figures import color_maps
-from ...core.geometry.layout import GridLayout
+from ...core.geometry.layout.grid_layout import GridLayout
 from ..session import redraw
 from . import bake_display
 

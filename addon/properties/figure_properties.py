@@ -6,6 +6,8 @@ from __future__ import annotations
 import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatVectorProperty, IntProperty, IntVectorProperty, StringProperty
 
+from ...core.export.registry import exporters
+
 KINDS = (
     ("SCENE", "Scene", "The scene with its overlays, alone and with the tactile images beside it"),
     ("STRIP", "Strip", "Tactile images over time"),
@@ -18,12 +20,7 @@ FORMATS = (
     ("PDF", "PDF", "Lines and text that stay lines and text"),
     ("SVG", "SVG", "The same for web pages"),
 )
-EXPORTS = (
-    ("CSV", "CSV", "Tables, one column per texel"),
-    ("NPZ", "NPZ", "Arrays for NumPy in double precision"),
-    ("HDF5", "HDF5", "One file with units; needs the package h5py"),
-    ("PNG", "PNG", "Every tactile image as a picture in colours"),
-)
+EXPORTS = tuple((exporter.name.upper(), exporter.title, exporter.description) for exporter in exporters().values())
 _plain: dict = {"options": set()}
 
 

@@ -12,13 +12,13 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 from ...core.errors import SceneError
+from ...core.export.registry import export
 from ...core.figures.side_by_side import side_by_side
 from ...core.figures.tactile_strip import tactile_strip
 from ...core.figures.texel_numbers import MOST, texel_numbers
 from ...core.figures.time_curves import time_curves
 from ...core.io.bake_folder import folder_names
 from ...core.io.bake_reader import Bake, frame_index, read_sensors
-from ...core.io.export import export
 from ...core.io.file_writing import writable_folder
 from ...core.jobs.job_runner import run_job
 from ...core.jobs.progress import Progress

@@ -35,7 +35,7 @@ class FigureRequest:
     formats : tuple of str
         Of figures that are no renders.
     exports : tuple of str
-        Kinds of :func:`..formats.export.export`; each gets a folder of its own.
+        Kinds of :func:`.registry.exporters`; each gets a folder of its own.
     engine, view, transparent
         See :func:`.render_setup.render_setup`.
     own_camera : bool

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from ...core.errors import ImageError
-from ...core.geometry.layout import UVLayout, mapped_layout
+from ...core.geometry.layout.texture_maps import UVLayout, mapped_layout
 from ...core.geometry.texels import Texels
 from . import display_names, meshes
 

@@ -1,6 +1,18 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Figures of a recording: tactile images over time, curves, numbers, and what goes on a rendered picture.
+"""Figures of a recording: tactile images over time, curves, numbers of texels, and labels on rendered pictures.
 
-Forces are in newtons, pressures in kilopascals, lengths in millimetres, and no text is smaller than 8 pt at the size of the
-written figure. What a figure looks like is said once, by a :class:`FigureStyle`, for all figures of a recording.
+Forces are in newtons, pressures in kilopascals, lengths in millimetres. No text is smaller than 8 pt at the size of the written
+figure. One :class:`.figure_style.FigureStyle` sets the style of all figures of a recording.
 """
+
+__all__ = [
+    "color_maps",
+    "figure_canvas",
+    "figure_style",
+    "picture_labels",
+    "side_by_side",
+    "tactile_image",
+    "tactile_strip",
+    "texel_numbers",
+    "time_curves",
+]

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..geometry.layout import GridLayout
+from ..geometry.layout.grid_layout import GridLayout
 from ..geometry.texels import Texels
 from .figure_style import FONT, INK, SMALL, FigureStyle, force_label
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import SensorError
-from ..geometry.layout import GridLayout
+from ..geometry.layout.grid_layout import GridLayout
 from ..geometry.texels import Texels
 from ..model.recording import Recording
 from .figure_canvas import new_figure, save_figure

@@ -1,1 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
+"""Geometry: triangle meshes, texels on them, contact points of texels, and the images that texels become.
+
+:mod:`.mesh` checks meshes and computes their normals, areas and mass properties; :mod:`.bvh` finds where segments meet them.
+:mod:`.texels` makes texels of a region's vertices. :mod:`.layout` arranges texels as images, and :mod:`.sampling` places texels
+on a surface that has none.
+"""
+
+__all__ = ["bvh", "contact_points", "layout", "mesh", "rotations", "sampling", "texels"]

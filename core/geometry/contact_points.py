@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .layout import GridLayout
+from .layout.grid_layout import GridLayout
 from .texels import Texels
 
 

@@ -8,7 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..errors import RegionError, SensorError
-from .layout import GridLayout, UVLayout, grid_layout, uv_layout
+from .layout.grid_layout import GridLayout, grid_layout
+from .layout.texture_maps import UVLayout, uv_layout
 from .mesh import TriangleMesh, vertex_areas, vertex_normals
 
 

@@ -1,2 +1,23 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Reading and writing files; each format has a module of its own, imported when it is needed."""
+"""Files in and out: one module per format, and atomic writing for all of them.
+
+A bake folder (:mod:`.bake_folder`, :mod:`.bake_reader`) holds tactile images (:mod:`.tactile_exr`), recordings and sensors as
+.npz, and a manifest. Tables of measurements, sensor descriptions and OpenRAVE files are read and written beside it. The formats
+that a bake can be exported to are in the package ``export``, because some of them need colours of figures.
+"""
+
+__all__ = [
+    "bake_folder",
+    "bake_reader",
+    "csv_table",
+    "exr_backend",
+    "file_writing",
+    "html_templates",
+    "npz",
+    "openrave",
+    "recording_npz",
+    "sensor_npz",
+    "sensor_toml",
+    "settings_migration",
+    "tactile_exr",
+]

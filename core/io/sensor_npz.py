@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 
 from ..errors import FileError
-from ..geometry.layout import GridLayout, UVLayout
+from ..geometry.layout.grid_layout import GridLayout
+from ..geometry.layout.texture_maps import UVLayout
 from ..geometry.texels import Texels
 from ..model.sensor_parameters import Painted
 from .file_writing import os_error_reason

@@ -15,7 +15,8 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import FileError
-from ..geometry.layout import GridLayout, UVLayout
+from ..geometry.layout.grid_layout import GridLayout
+from ..geometry.layout.texture_maps import UVLayout
 from ..model.recording import Frame, SensorFrame
 from ..model.sensor import Sensor
 from .exr_backend import backend

@@ -277,7 +277,7 @@ def grid_texels(rows: int, columns: int, pitch_x: float, pitch_y: float) -> Texe
     rows, columns : int
     pitch_x, pitch_y : float, metres
     """
-    from ...geometry.layout import GridLayout
+    from ...geometry.layout.grid_layout import GridLayout
 
     row, column = np.divmod(np.arange(rows * columns), columns)
     x, y = (column - 0.5 * (columns - 1)) * pitch_x, (row - 0.5 * (rows - 1)) * pitch_y

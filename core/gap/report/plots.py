@@ -11,7 +11,7 @@ import numpy as np
 
 from ...figures.figure_canvas import new_figure, save_figure, tidy_axes
 from ...figures.figure_style import GREY, INK, NORMAL_COLOUR, SHEAR_COLOUR, WIDTHS
-from ...geometry.layout import GridLayout
+from ...geometry.layout.grid_layout import GridLayout
 from ..forward.contact_phases import PHASES
 from ..forward.predictor import Model, Predictor
 from ..selection.findings import Diagnosis

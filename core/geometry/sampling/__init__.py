@@ -1,2 +1,4 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Texels laid onto a surface: arrays that are wrapped around it, and points spread evenly over it."""
+"""Placing texels on a surface: in rows and columns along straightest geodesics, or evenly without rows."""
+
+__all__ = ["poisson_disk", "straightest_geodesics", "texel_arrays"]

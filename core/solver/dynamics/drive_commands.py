@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Mapping
 
 import numpy as np
 
-from ...geometry.layout import GridLayout
+from ...geometry.layout.grid_layout import GridLayout
 from ...model.scenario import Scenario
 from .actuators import HOLD_TRAVEL, PUSH, TARGET_SPEED, TARGET_TRAVEL
 from .grip_controller import Command, GripControl, TactileData

@@ -10,7 +10,8 @@ import bpy
 import numpy as np
 import pytest
 
-from palpate.core.geometry.layout import GridLayout, uv_layout
+from palpate.core.geometry.layout.grid_layout import GridLayout
+from palpate.core.geometry.layout.texture_maps import uv_layout
 from palpate.core.io.bake_folder import frame_file
 from palpate.core.io.tactile_exr import CHANNELS, exr_channels, read_exr, write_exr
 from palpate.core.model.recording import SensorFrame

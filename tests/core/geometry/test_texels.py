@@ -7,7 +7,8 @@ import trimesh
 from solver_scenes import grid_mesh, pad, shape
 
 from palpate.core.errors import SensorError
-from palpate.core.geometry.layout import GridLayout, UVLayout
+from palpate.core.geometry.layout.grid_layout import GridLayout
+from palpate.core.geometry.layout.texture_maps import UVLayout
 from palpate.core.geometry.mesh import TriangleMesh
 from palpate.core.geometry.texels import texels_from_region
 

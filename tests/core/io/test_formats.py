@@ -21,7 +21,8 @@ import OpenEXR
 import pytest
 
 from palpate.core.errors import FileError, PalpateError
-from palpate.core.geometry.layout import GridLayout, uv_layout
+from palpate.core.geometry.layout.grid_layout import GridLayout
+from palpate.core.geometry.layout.texture_maps import uv_layout
 from palpate.core.geometry.mesh import TriangleMesh
 from palpate.core.geometry.texels import texels_from_region
 from palpate.core.io import exr_backend, exr_codec, exr_library, file_writing

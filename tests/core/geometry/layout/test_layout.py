@@ -9,7 +9,9 @@ import numpy as np
 import pytest
 import trimesh
 
-from palpate.core.geometry.layout import GridLayout, UVLayout, grid_layout, rasterization, texture_maps, uv_layout
+from palpate.core.geometry.layout import rasterization, texture_maps
+from palpate.core.geometry.layout.grid_layout import GridLayout, grid_layout
+from palpate.core.geometry.layout.texture_maps import UVLayout, uv_layout
 from palpate.core.geometry.mesh import checked_mesh
 from palpate.core.geometry.texels import texels_from_region
 

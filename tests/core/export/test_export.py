@@ -10,11 +10,11 @@ import pytest
 from recordings import grid_texels, recording_of, round_texels
 
 from palpate.core.errors import FileError, PalpateError
+from palpate.core.export.registry import export
 from palpate.core.figures import color_maps
 from palpate.core.figures.figure_style import FigureStyle
 from palpate.core.io.bake_folder import Manifest, write_manifest
 from palpate.core.io.bake_reader import frame_index, read_bake
-from palpate.core.io.export import export
 from palpate.core.io.recording_npz import save_recording
 from palpate.core.io.sensor_npz import load_sensor, save_sensor
 from palpate.core.jobs.job_runner import run_job

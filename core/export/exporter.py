@@ -1,0 +1,73 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What an exporter is, and what all of them need from a bake."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, fields
+from pathlib import Path
+
+import numpy as np
+
+from ..figures.figure_style import FigureStyle
+from ..geometry.layout.grid_layout import GridLayout
+from ..io.bake_reader import Bake
+from ..jobs.progress import Job, Progress
+from ..model.recording import SensorRecording
+
+UNITS = {
+    "normal_force": "N",
+    "shear": "N",
+    "depth": "m",
+    "slip": "m/s",
+    "contact": "1",
+    "net_force": "N",
+    "net_torque": "N m",
+    "centre_of_pressure": "m",
+    "texel_position": "m",
+    "texel_area": "m2",
+}
+"""Units of the arrays of :func:`bake_arrays` that have one; `reading` has the sensor's own."""
+
+Write = Callable[[Bake, Path, FigureStyle], Job[list[Path]]]
+
+
+@dataclass(frozen=True)
+class Exporter:
+    """A format that a bake can be written in.
+
+    Attributes
+    ----------
+    name : str
+        As on the command line, in lower case.
+    title, description : str
+        As in Blender's panels.
+    position : int
+        Place in lists, from 0, without gaps. Scenes store a choice by this number: a new format takes the next one.
+    write : callable
+        Takes the bake, a folder that exists, and a style for colours. It yields :func:`sensor_progress` before each sensor is
+        written, and returns what was written: files, or one folder per sensor.
+    """
+
+    name: str
+    title: str
+    description: str
+    position: int
+    write: Write
+
+
+def bake_arrays(bake: Bake, name: str) -> dict[str, np.ndarray]:
+    """Return everything about one sensor as arrays: its recording, and its texels under names that begin with ``texel_``."""
+    texels, recorded = bake.texels[name], bake.recording.sensors[name]
+    arrays = {item.name: getattr(recorded, item.name) for item in fields(SensorRecording)}
+    arrays |= {f"texel_{key}": getattr(texels, key) for key in ("position", "normal", "tangent", "area", "vertex")}
+    arrays["texel_uv"] = texels.layout.uv()
+    if isinstance(texels.layout, GridLayout):
+        arrays["texel_row"], arrays["texel_column"] = texels.layout.row, texels.layout.column
+    return arrays
+
+
+def sensor_progress(bake: Bake, name: str) -> Progress:
+    """Return the progress of an export that is about to write a sensor."""
+    names = list(bake.texels)
+    return Progress(name, names.index(name) + 1, len(names))

@@ -1,0 +1,27 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""NPZ: one archive of NumPy arrays per sensor, in double precision."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from ...figures.figure_style import FigureStyle
+from ...io.bake_folder import folder_names
+from ...io.bake_reader import Bake
+from ...io.npz import write_arrays
+from ...jobs.progress import Job
+from ..exporter import Exporter, bake_arrays, sensor_progress
+
+
+def write_npz(bake: Bake, folder: Path, _style: FigureStyle) -> Job[list[Path]]:
+    """Write one archive per sensor."""
+    written = []
+    for name, stem in folder_names(bake.texels).items():
+        yield sensor_progress(bake, name)
+        path = folder / f"{stem}.npz"
+        write_arrays(path, {"frame": bake.recording.frames, "time": bake.recording.times, **bake_arrays(bake, name)})
+        written.append(path)
+    return written
+
+
+EXPORTER = Exporter("npz", "NPZ", "Arrays for NumPy in double precision", 1, write_npz)

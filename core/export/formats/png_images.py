@@ -1,0 +1,54 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""PNG: every tactile image as a picture in colours, with the colour scale beside it."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+
+from ...figures import color_maps
+from ...figures.figure_style import FigureStyle
+from ...io.bake_folder import folder_names
+from ...io.bake_reader import Bake
+from ...io.file_writing import atomic_write, writable_folder
+from ...jobs.progress import Job
+from ..exporter import Exporter, sensor_progress
+
+_LEAST_PIXELS = 256
+"""Pixels along the longer side: smaller images are magnified by a whole number, pixel by pixel."""
+
+
+def write_png(bake: Bake, folder: Path, style: FigureStyle) -> Job[list[Path]]:
+    """Write one picture per frame and ``scale.json`` into a folder per sensor; all sensors share one colour scale."""
+    from matplotlib.image import imsave
+
+    recording, written = bake.recording, []
+    top = style.scale_limit(recording, bake.texels)
+    for name, stem in folder_names(bake.texels).items():
+        yield sensor_progress(bake, name)
+        own_folder = writable_folder(folder / stem, create=True)
+        texels = bake.texels[name]
+        layout, values = texels.layout, style.values(recording.sensors[name], texels)
+        mask = layout.mask()
+        magnified = max(1, -(-_LEAST_PIXELS // max(layout.shape)))
+        for frame, own in zip(recording.frames, values, strict=True):
+            color = color_maps.colors(style.colour_map, layout.image(own).ravel() / top).reshape(*layout.shape, 3)
+            pixels = np.dstack([color, mask])[::-1]
+            pixels = np.repeat(np.repeat(pixels, magnified, axis=0), magnified, axis=1)
+            with atomic_write(own_folder / f"tactile_{frame:04d}.png") as temporary:
+                imsave(temporary, (pixels * 255 + 0.5).astype(np.uint8), metadata={"Software": "Palpate"})
+        scale = {
+            "quantity": " ".join(style.quantity_label),
+            "first_colour": 0.0,
+            "last_colour": top,
+            "colour_map": style.colour_map,
+        }
+        with atomic_write(own_folder / "scale.json") as temporary:
+            temporary.write_text(json.dumps(scale, indent=2) + "\n", encoding="utf-8")
+        written.append(own_folder)
+    return written
+
+
+EXPORTER = Exporter("png", "PNG", "Every tactile image as a picture in colours", 3, write_png)

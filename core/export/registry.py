@@ -1,0 +1,62 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""All formats that a bake can be exported to: every module of :mod:`.formats` defines an ``EXPORTER``."""
+
+from __future__ import annotations
+
+import importlib
+import os
+import pkgutil
+from functools import cache
+from pathlib import Path
+
+from ..errors import PalpateError
+from ..figures.figure_style import FigureStyle
+from ..io.bake_reader import Bake
+from ..io.file_writing import writable_folder
+from ..jobs.progress import Job
+from .exporter import Exporter
+
+FORMATS = f"{__package__}.formats"
+"""The package of the formats."""
+
+
+@cache
+def exporters() -> dict[str, Exporter]:
+    """Return every exporter by its name, in the order of their positions."""
+    package = importlib.import_module(FORMATS)
+    found = [importlib.import_module(f"{FORMATS}.{module.name}").EXPORTER for module in pkgutil.iter_modules(package.__path__)]
+    return {exporter.name: exporter for exporter in sorted(found, key=lambda exporter: exporter.position)}
+
+
+def export(bake: Bake, kind: str, folder: str | os.PathLike, style: FigureStyle | None = None) -> Job[list[Path]]:
+    """Write a bake in another format.
+
+    Parameters
+    ----------
+    bake : Bake
+    kind : str
+        Name of an exporter, as "csv".
+    folder : path
+        Created if it is missing and its parent folder exists.
+    style : FigureStyle, optional
+        Colours and their scale, for formats with pictures.
+
+    Yields
+    ------
+    Progress
+        Before each sensor is written; the stage is the sensor's name.
+
+    Returns
+    -------
+    list of Path
+        What was written: files, or one folder per sensor.
+
+    Raises
+    ------
+    PalpateError
+        The format is unknown or needs a package that is not installed, or a file cannot be written.
+    """
+    known = exporters()
+    if kind not in known:
+        raise PalpateError(f"There is no export to '{kind}': choose from {', '.join(known)}.")
+    return (yield from known[kind].write(bake, writable_folder(folder, create=True), style or FigureStyle()))
