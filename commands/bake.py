@@ -11,7 +11,6 @@ import numpy as np
 
 from ..core.errors import SceneError
 from ..core.io.file_writing import writable_folder
-from ..core.jobs.job_runner import run_job
 from ..core.response.metrics import net_shear
 from . import blender, console
 
@@ -81,15 +80,7 @@ def bake_with_progress(scene, into_scene: bool = True):
     """Bake a scene with a progress bar on stderr; Ctrl-C leaves an earlier bake as it was."""
     from ..addon.bake import bake
 
-    with console.progress_bar("bake", 1, unit="step") as bar:
-
-        def show(progress) -> None:
-            console.Interrupt.check()
-            bar.total = progress.total
-            bar.set_description(progress.stage, refresh=False)
-            bar.update(progress.done - bar.n)
-
-        return run_job(bake.bake(scene, into_scene), show)
+    return console.run_with_progress_bar("bake", bake.bake(scene, into_scene))
 
 
 def report(baked) -> str:

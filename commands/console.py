@@ -16,6 +16,8 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 
 from ..core.errors import PalpateError
+from ..core.jobs.job_runner import run_job
+from ..core.jobs.progress import Job, Progress, Result
 
 
 class Interrupt:
@@ -164,6 +166,32 @@ def progress_bar(label: str, total: int, unit: str = "frame"):
     from tqdm import tqdm
 
     return tqdm(total=total, desc=label, unit=unit, file=sys.stderr, leave=False, disable=None, dynamic_ncols=True)
+
+
+def run_with_progress_bar(
+    label: str, job: Job[Result], unit: str = "step", describe: Callable[[Progress], str] = lambda progress: progress.stage
+) -> Result:
+    """Run a job with a progress bar on stderr and return its result; Ctrl-C cancels the job.
+
+    Parameters
+    ----------
+    label : str
+        Before the first progress.
+    job : Job
+    unit : str
+        What the job counts.
+    describe : callable, optional
+        Makes the words beside the bar out of a :class:`.Progress`; the default is its stage.
+    """
+    with progress_bar(label, 1, unit) as bar:
+
+        def show(progress: Progress) -> None:
+            Interrupt.check()
+            bar.total = progress.total
+            bar.set_description(describe(progress), refresh=False)
+            bar.update(progress.done - bar.n)
+
+        return run_job(job, show)
 
 
 def text_table(rows: Sequence[Sequence[str]], align: str) -> str:

@@ -8,8 +8,6 @@ import argparse
 from ..core.export.registry import export, exporters
 from ..core.figures.figure_style import FigureStyle
 from ..core.io.bake_reader import Bake, read_bake
-from ..core.jobs.job_runner import run_job
-from ..core.jobs.progress import Progress
 from . import console, figure_options
 
 
@@ -28,14 +26,7 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.sensor:
         bake = bake.select(arguments.sensor)
     style: FigureStyle = figure_options.figure_style_from(arguments)
-    with console.progress_bar("export", len(bake.texels), unit="sensor") as bar:
-
-        def show(progress: Progress) -> None:
-            console.Interrupt.check()
-            bar.set_description(progress.stage, refresh=False)
-            bar.update()
-
-        written = run_job(export(bake, arguments.format, arguments.out, style), show)
+    written = console.run_with_progress_bar("export", export(bake, arguments.format, arguments.out, style), unit="sensor")
     for path in written:
         print(path)
     return 0

@@ -4,11 +4,13 @@
 from __future__ import annotations
 
 import argparse
+from dataclasses import replace
 from pathlib import Path
 
 from ..core.errors import SceneError
 from ..core.io.file_writing import writable_folder
-from ..core.jobs.job_runner import run_job
+from ..core.jobs.job_runner import part_of_job
+from ..core.jobs.progress import Job
 from . import console
 
 
@@ -24,10 +26,8 @@ def run(arguments: argparse.Namespace) -> int:
 
     dependencies.prepare_numba()
     from ..core.gap.dataset.rig import read_rig
-    from ..core.gap.report import sentences, summary
+    from ..core.gap.report import sentences
     from ..core.gap.report.amended_sensor import amended_sensor
-    from ..core.gap.report.comparison import gap_errors
-    from ..core.gap.selection.diagnosis import diagnose
     from ..core.solver import precompile
 
     if arguments.sensor and not arguments.blend:
@@ -35,16 +35,7 @@ def run(arguments: argparse.Namespace) -> int:
     rig = read_rig(arguments.rig)
     folder = writable_folder(arguments.out, create=True)
     precompile.compile_solver_with_notice()
-    with console.progress_bar("gap", 1000, unit="step") as bar:
-
-        def show(stage: str, done: int) -> None:
-            console.Interrupt.check()
-            bar.set_description(stage, refresh=False)
-            bar.update(max(done - bar.n, 0))
-
-        result = run_job(diagnose(rig), lambda step: show(step.stage, int(950 * step.share)))
-        errors = gap_errors(result)
-        run_job(summary.write_report(result, folder, errors), lambda step: show(step.stage, 950 + int(50 * step.share)))
+    result, errors = console.run_with_progress_bar("gap", _diagnose_and_report(rig, folder))
     print(sentences.headline(result, errors))
     rows = [("", "parameter", "value (95 % interval)")]
     for one in result.intervals:
@@ -60,6 +51,19 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.blend:
         print(f"saved:  {_put_into_scene(arguments.blend, arguments.sensor, amended_sensor(result))}")
     return 0
+
+
+def _diagnose_and_report(rig, folder: Path) -> Job[tuple]:
+    """Find the gap of a rig and write its report; return the diagnosis and its errors."""
+    from ..core.gap.report import summary
+    from ..core.gap.report.comparison import gap_errors
+    from ..core.gap.selection.diagnosis import diagnose
+
+    result = yield from part_of_job(diagnose(rig), lambda step: replace(step, done=int(950 * step.share), total=1000))
+    errors = gap_errors(result)
+    report = summary.write_report(result, folder, errors)
+    yield from part_of_job(report, lambda step: replace(step, done=950 + int(50 * step.share), total=1000))
+    return result, errors
 
 
 def _put_into_scene(blend: str, name: str | None, sensor) -> Path:

@@ -7,7 +7,6 @@ import argparse
 
 from ..core.figures.figure_canvas import FILE_TYPES as FORMATS
 from ..core.io.file_writing import remove_leftovers, writable_folder
-from ..core.jobs.job_runner import run_job
 from . import blender, console, figure_options
 
 FIGURES = ("scene", "strip", "curves", "numbers", "video")
@@ -68,18 +67,9 @@ def run(arguments: argparse.Namespace) -> int:
             **({"formats": tuple(arguments.format)} if arguments.format else {}),
         )
         stopped = "palpate render: stopped; figures that were finished are there."
-        with (
-            console.progress_bar("render", 1, unit="step") as bar,
-            console.exit_on_interrupt(stopped, lambda: remove_leftovers(folder)),
-        ):
-
-            def show(progress) -> None:
-                console.Interrupt.check()
-                bar.total = progress.total
-                bar.set_description(f"{progress.stage}, frame {progress.frame}", refresh=False)
-                bar.update(progress.done - bar.n)
-
-            written = run_job(figure_export.make_figures(scene, folder, request), show)
+        with console.exit_on_interrupt(stopped, lambda: remove_leftovers(folder)):
+            job = figure_export.make_figures(scene, folder, request)
+            written = console.run_with_progress_bar("render", job, describe=lambda step: f"{step.stage}, frame {step.frame}")
     for path in written:
         print(path)
     return 0

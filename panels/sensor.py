@@ -4,7 +4,7 @@
 from ..addon.authoring import laid_sensors
 from ..addon.session import first_use, session_state
 from ..addon.timeline import playback
-from ..core.model.sensor_parameters import CONTACT, FRICTION, READOUT, SENSOR_PARAMETERS
+from ..core.model.sensor_parameters import CONTACT, FRICTION, HUNT_CROSSLEY, LINEAR, READOUT, SENSOR_PARAMETERS
 from ..operators import presets
 from .places import ROOT, Part, named, sentences
 
@@ -122,19 +122,31 @@ def painted(layout, settings, key: str) -> None:
         column.prop(settings, f"{key}_factor", text=f"{name.removeprefix('Painted ')} × at Weight 1")
 
 
-PLACED = {
-    *("normal_law", "k", "cn", "exponent", "dissipation", "max_penetration", "points_per_texel"),
-    *("mus", "mud", "x0", "sigma0", "sigma1", "ct"),
-    *("unit", "gain", "zero"),
-}
-"""The parameters that have their own place in the panels below."""
+class ParameterRows:
+    """Draws the parameters of one group: some at a place of their choice, and all others behind them."""
 
+    def __init__(self, settings, group: str):
+        self._settings = settings
+        self._left = [name for name, specification in SENSOR_PARAMETERS.items() if specification.group == group]
 
-def other_parameters(layout, settings, group: str) -> None:
-    """Draw the parameters of a group that have no place of their own."""
-    for name, specification in SENSOR_PARAMETERS.items():
-        if specification.group == group and name not in PLACED:
-            layout.prop(settings, name)
+    def draw(self, layout, *names: str) -> None:
+        """Draw the parameters of these names."""
+        for name in names:
+            layout.prop(self._settings, name)
+        self.leave_out(*names)
+
+    def draw_named(self, layout, name: str, text: str = "") -> None:
+        """Draw a parameter with its name beside it."""
+        named(layout, self._settings, name, text)
+        self.leave_out(name)
+
+    def leave_out(self, *names: str) -> None:
+        """Take note of parameters that are drawn, or have no meaning now."""
+        self._left = [name for name in self._left if name not in names]
+
+    def draw_others(self, layout) -> None:
+        """Draw all parameters of the group that were not drawn yet."""
+        self.draw(layout, *self._left)
 
 
 class Contact(Part):
@@ -145,16 +157,16 @@ class Contact(Part):
 
     def draw_part(self, layout, settings, _context):
         column = layout.column()
-        named(column, settings, "normal_law")
-        column.prop(settings, "k")
-        if settings.normal_law == "linear":
-            column.prop(settings, "cn")
-        else:
-            column.prop(settings, "exponent")
-            column.prop(settings, "dissipation")
-        column.prop(settings, "max_penetration")
-        named(column, settings, "points_per_texel", "Points")
-        other_parameters(column, settings, CONTACT)
+        rows = ParameterRows(settings, CONTACT)
+        rows.draw_named(column, "normal_law")
+        rows.draw(column, "k")
+        of_laws = {LINEAR: ("cn",), HUNT_CROSSLEY: ("exponent", "dissipation")}
+        rows.draw(column, *of_laws.pop(settings.normal_law))
+        for of_other_law in of_laws.values():
+            rows.leave_out(*of_other_law)
+        rows.draw(column, "max_penetration")
+        rows.draw_named(column, "points_per_texel", "Points")
+        rows.draw_others(column)
         painted(layout, settings, "k")
         layout.operator("palpate.stiffness_fit", icon="FCURVE_SNAPSHOT")
 
@@ -167,14 +179,11 @@ class Friction(Part):
 
     def draw_part(self, layout, settings, _context):
         column = layout.column(align=True)
-        column.prop(settings, "mus")
-        column.prop(settings, "mud")
-        column.prop(settings, "x0")
+        rows = ParameterRows(settings, FRICTION)
+        rows.draw(column, "mus", "mud", "x0")
         column = layout.column(align=True)
-        column.prop(settings, "sigma0")
-        column.prop(settings, "sigma1")
-        column.prop(settings, "ct")
-        other_parameters(column, settings, FRICTION)
+        rows.draw(column, "sigma0", "sigma1", "ct")
+        rows.draw_others(column)
         painted(layout, settings, "friction")
         layout.operator("palpate.friction_fit", icon="FCURVE_SNAPSHOT")
 
@@ -188,10 +197,10 @@ class Readout(Part):
 
     def draw_part(self, layout, settings, context):
         column = layout.column()
-        named(column, settings, "unit")
-        column.prop(settings, "gain")
-        column.prop(settings, "zero")
-        other_parameters(column, settings, READOUT)
+        rows = ParameterRows(settings, READOUT)
+        rows.draw_named(column, "unit")
+        rows.draw(column, "gain", "zero")
+        rows.draw_others(column)
         painted(layout, settings, "gain")
         column = layout.column()
         named(column, settings, "image_layout", "Image")
