@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,10 +17,15 @@ from .figure_canvas import new_figure, save_figure
 from .figure_style import FONT, INK, SMALL, FigureStyle
 from .tactile_image import SensorView, draw_colour_bar
 
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
 MOST = 1024
 """Texels whose numbers can still be told apart on a page."""
 _LETTER = 0.62
 """Width of a digit over the size of its font."""
+_RIGHT, _ABOVE, _SIDE = 0.95, 0.32, 0.12
+"""Inches around the image: for the colour bar, for the title, and elsewhere."""
 
 
 def texel_numbers(
@@ -48,8 +54,6 @@ def texel_numbers(
     KeyError
         The frame was not recorded.
     """
-    from matplotlib.patheffects import withStroke
-
     style = style or FigureStyle()
     own = texels[name]
     if len(own) > MOST:
@@ -57,53 +61,52 @@ def texel_numbers(
             f"Sensor '{name}' has {len(own)} texels, whose numbers could not be read (at most {MOST}): "
             "export them as CSV instead."
         )
-    felt = recording.at(frame).sensors[name]
-    values, view = style.values(felt, own), SensorView.of(own, recording.sensors[name].normal_force.sum(axis=0))
-    top = style.scale_limit(recording, texels)
-    peak = float(values.max(initial=0.0))
-    unit, factor = _unit(peak, style.quantity)
-    words = [_digits(value * factor, peak * factor) for value in values]
-    longest = max(len(word) for word in words)
+    values = style.values(recording.at(frame).sensors[name], own)
+    view = SensorView.of(own, recording.sensors[name].normal_force.sum(axis=0))
+    unit, words = _numbers(values, style.quantity)
 
     # The closest pair of texels must leave room for a number of 8 pt between their middles.
-    letters = longest * _LETTER * SMALL / 72 + 0.05
+    letters = max(len(word) for word in words) * _LETTER * SMALL / 72 + 0.05
     inches = max(letters / _room(view), (1.5 * SMALL / 72) / _room(view, 1))
-    right, above, side = 0.95, 0.32, 0.12
-    inches = max(inches, min((style.width_inches - right - 2 * side) / view.width, 6.0 / view.height))
-    width, height = inches * view.width + 2 * side + right, inches * view.height + above + side
-    height = max(height, 1.9)
+    inches = max(inches, min((style.width_inches - _RIGHT - 2 * _SIDE) / view.width, 6.0 / view.height))
+    width, height = inches * view.width + 2 * _SIDE + _RIGHT, max(inches * view.height + _ABOVE + _SIDE, 1.9)
     figure = new_figure(width, height)
     axes = figure.add_axes(
-        (side / width, side / height, inches * view.width / width, inches * view.height / height), anchor="NW"
+        (_SIDE / width, _SIDE / height, inches * view.width / width, inches * view.height / height), anchor="NW"
     )
-    image = view.draw(axes, values, np.zeros((len(own), 2)), 0.0, top, style)
-    on_grid = isinstance(own.layout, GridLayout)
-    if not on_grid:  # texels lie on the very rim there: room for their numbers
+    image = view.draw(axes, values, np.zeros((len(own), 2)), 0.0, style.scale_limit(recording, texels), style)
+    if not isinstance(own.layout, GridLayout):  # texels lie on the very rim there: room for their numbers
         room = 0.5 * letters / inches
         axes.set_xlim(view.window[0] - room, view.window[1] + room)
         axes.set_ylim(view.window[2] - room, view.window[3] + room)
-    colours = image.cmap(image.norm(values))
+    _write_numbers(axes, view, words, image.cmap(image.norm(values)))
+    time = recording.times[int(np.searchsorted(recording.frames, frame))]
+    title = f"{name}, {time:.2f} s, numbers in {unit}"
+    figure.text(_SIDE / width, 1 - 0.05 / height, title, fontsize=FONT, color=INK, weight="bold", va="top")
+    tall = max(inches * view.height, 1.2)
+    bar = figure.add_axes(((width - _RIGHT + 0.08) / width, _SIDE / height, 0.11 / width, tall / height))
+    draw_colour_bar(figure, image, bar, style)
+    save_figure(figure, path, style.dpi)
+
+
+def _numbers(values: np.ndarray, quantity: str) -> tuple[str, list[str]]:
+    """Return the unit that suits the largest value, and the values in it as words."""
+    peak = float(values.max(initial=0.0))
+    unit, factor = _unit(peak, quantity)
+    return unit, [_digits(value * factor, peak * factor) for value in values]
+
+
+def _write_numbers(axes: Axes, view: SensorView, words: list[str], colours: np.ndarray) -> None:
+    """Write a word on each texel in view, in white or black ink, whichever is legible on the texel's (n, 4) colour."""
+    from matplotlib.patheffects import withStroke
+
+    on_grid = isinstance(view.texels.layout, GridLayout)
     for (x, y), word, colour in zip(view.points[view.seen], np.array(words)[view.seen], colours[view.seen], strict=True):
         light = float(np.dot(colour[:3], (0.299, 0.587, 0.114))) > 0.5
         ink, around = (INK, "white") if light else ("white", INK)
-        rim = (
-            [] if on_grid else [withStroke(linewidth=1.2, foreground=around, alpha=0.55)]
-        )  # on the edge they lie half on white
+        # Without a grid, numbers at the edge lie half on the white page.
+        rim = [] if on_grid else [withStroke(linewidth=1.2, foreground=around, alpha=0.55)]
         axes.text(x, y, word, fontsize=SMALL, color=ink, ha="center", va="center_baseline", path_effects=rim)
-    time = recording.times[int(np.searchsorted(recording.frames, frame))]
-    figure.text(
-        side / width,
-        1 - 0.05 / height,
-        f"{name}, {time:.2f} s, numbers in {unit}",
-        fontsize=FONT,
-        color=INK,
-        weight="bold",
-        va="top",
-    )
-    tall = max(inches * view.height, 1.2)
-    bar = figure.add_axes(((width - right + 0.08) / width, side / height, 0.11 / width, tall / height))
-    draw_colour_bar(figure, image, bar, style)
-    save_figure(figure, path, style.dpi)
 
 
 def _unit(peak: float, quantity: str) -> tuple[str, float]:

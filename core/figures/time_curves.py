@@ -20,6 +20,7 @@ from .figure_style import FONT, INK, NORMAL_COLOUR, SERIES, SHEAR_COLOUR, SMALL,
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 KINDS = ("force", "slip", "pressure centre")
 _LOADED = 1e-3
@@ -52,14 +53,15 @@ def time_curves(
         if kind not in KINDS:
             raise ParameterError(f"There are no curves of '{kind}': choose from {', '.join(KINDS)}.")
     names = list(texels)
-    legend = 0.2 * (1 + (len(names) - 1) // max(1, int(style.width_inches / 1.3)))
-    each, above, below, gap = 1.25, 0.12 + legend, 0.45, 0.12
+    legend_columns = max(1, int(style.width_inches / 1.3))
+    legend = 0.2 * (1 + (len(names) - 1) // legend_columns)
+    each, above, below, gap, left = 1.25, 0.12 + legend, 0.45, 0.12, 0.8
     height = above + below + len(kinds) * each + (len(kinds) - 1) * gap
     figure = new_figure(style.width_inches, height)
     grid = figure.subplots(len(kinds), 1, sharex=True, squeeze=False)[:, 0]
     for axes, kind in zip(grid, kinds, strict=True):
         for i, name in enumerate(names):
-            # the first lie below and are wider, so that equal curves do not hide each other
+            # The first curves lie below the others and are wider, so that equal curves do not hide each other.
             pen = _Pen(SERIES[i % len(SERIES)], 1.3 + min(0.9 * (len(names) - 1 - i), 2.7))
             _DRAW[kind](axes, recording, name, texels[name], parameters[name], pen)
         tidy_axes(axes)
@@ -69,7 +71,6 @@ def time_curves(
             axes.axvline(mark, color=INK, lw=0.6, ls=(0, (1, 2)))
         _style_legend(axes)
     grid[-1].set_xlabel("time (s)")
-    left = 0.8
     figure.subplots_adjust(
         left=left / style.width_inches,
         right=1 - 0.15 / style.width_inches,
@@ -78,21 +79,26 @@ def time_curves(
         hspace=gap / each,
     )
     figure.align_ylabels(list(grid))
+    _sensor_legend(figure, names, (left / style.width_inches, 1 - 0.02 / height), legend_columns)
+    save_figure(figure, path, style.dpi)
+
+
+def _sensor_legend(figure: Figure, names: Sequence[str], corner: tuple[float, float], columns: int) -> None:
+    """Name the sensors' colours above all panels."""
     from matplotlib.lines import Line2D
 
     handles = [Line2D([], [], color=SERIES[i % len(SERIES)], lw=1.6, label=name) for i, name in enumerate(names)]
     figure.legend(
         handles=handles,
         loc="upper left",
-        bbox_to_anchor=(left / style.width_inches, 1 - 0.02 / height),
-        ncols=max(1, int(style.width_inches / 1.3)),
+        bbox_to_anchor=corner,
+        ncols=columns,
         frameon=False,
         fontsize=SMALL,
         handlelength=1.4,
         borderaxespad=0,
         columnspacing=1.2,
     )
-    save_figure(figure, path, style.dpi)
 
 
 @dataclass(frozen=True)
