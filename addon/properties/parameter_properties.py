@@ -9,7 +9,7 @@ from ...core.model.sensor_parameters import SENSOR_PARAMETERS, SensorParameters
 from ..session import units
 
 FIXED: dict = {"options": set(), "override": {"LIBRARY_OVERRIDABLE"}}
-"""A parameter is one number for the whole run, so it has no keyframes."""
+"""A parameter is constant during a run, so it has no keyframes."""
 LOWEST = -1e9
 """Least value that a panel takes for a parameter without a lower bound."""
 
