@@ -103,7 +103,7 @@ def sample_bake_and_solve(name: str) -> tuple[float, float]:
 
 
 def _in_turn(scene, rounds: int) -> tuple[float, float]:
-    from palpate.addon.bake import bake_files
+    from palpate.addon.bake import folder_swap
     from palpate.addon.bake.bake import bake
     from palpate.core.jobs.job_runner import run_job
     from palpate.core.solver.simulation import run
@@ -114,7 +114,7 @@ def _in_turn(scene, rounds: int) -> tuple[float, float]:
         start = time.perf_counter()
         scenario = run_job(bake(scene)).scenario
         middle = time.perf_counter()
-        bake_files.wait_for_removals()
+        folder_swap.wait_for_removals()
         begun = time.perf_counter()
         run(scenario)
         times.append((middle - start, time.perf_counter() - begun))

@@ -27,7 +27,7 @@ COMMANDS = {
     "sweep": "bake one scene over a range of parameters",
     "openrave": "read and write OpenRAVE sensor definitions",
 }
-"""In the order in which the help lists them. A command works once it has a module of its own name here."""
+"""Commands in the order of the help. A command is ready once this package has a module of its name."""
 
 READY = tuple(name for name in COMMANDS if (Path(__file__).parent / f"{name}.py").is_file())
 
@@ -45,7 +45,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     int
         The exit status.
     """
-    say = "palpate:"
+    prefix = "palpate:"
     try:
         with console.Interrupt.noted():
             parser = _parser()
@@ -53,28 +53,28 @@ def main(argv: Sequence[str] | None = None) -> int:
             if arguments.command is None:
                 parser.print_help(sys.stderr)
                 return 2
-            say = f"palpate {arguments.command}:"
+            prefix = f"palpate {arguments.command}:"
             if arguments.command not in READY:
-                print(say, "not yet", file=sys.stderr)
+                print(prefix, "not yet", file=sys.stderr)
                 return 1
             if rest:
-                _complain(parser, arguments.command, rest)
+                _reject_unknown(parser, arguments.command, rest)
             return arguments.run(arguments)
-    except SystemExit as stop:  # argparse has printed its help or what is wrong with the usage
+    except SystemExit as stop:  # argparse has printed its help or an error
         return int(stop.code or 0)
     except KeyboardInterrupt:
-        print(say, "stopped; an earlier bake is still as it was.", file=sys.stderr)
+        print(prefix, "stopped; an earlier bake is still as it was.", file=sys.stderr)
         return 130
     except Cancelled as stop:
-        print(say, stop, file=sys.stderr)
+        print(prefix, stop, file=sys.stderr)
         return 130
     except PalpateError as error:
-        print(say, error, file=sys.stderr)
+        print(prefix, error, file=sys.stderr)
         return 1
 
 
-def _complain(parser: argparse.ArgumentParser, command: str, rest: list[str]) -> None:
-    """Say what is wrong with words that a command does not know, and stop."""
+def _reject_unknown(parser: argparse.ArgumentParser, command: str, rest: list[str]) -> None:
+    """Exit with a message about arguments that a command does not know."""
     if any(word.startswith("-") for word in rest):
         advice = f"palpate {command} --help lists what it knows"
     else:
@@ -83,6 +83,7 @@ def _complain(parser: argparse.ArgumentParser, command: str, rest: list[str]) ->
 
 
 def _parser() -> argparse.ArgumentParser:
+    """Return the parser of all commands. Each module has ``add_arguments(parser)`` and ``run(arguments)``."""
     parser = argparse.ArgumentParser(
         prog="palpate",
         description="Make any mesh a tactile sensor: simulate, bake and render what it feels.",

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""``palpate bake``: a .blend becomes tactile images, and on request a .blend that shows them."""
+"""``palpate bake``: bakes the sensors of a .blend to tactile images, and on request saves a .blend that shows them."""
 
 from __future__ import annotations
 
@@ -49,20 +49,9 @@ def run(arguments: argparse.Namespace) -> int:
         print("palpate bake: --sensor bakes a part of the scene, which cannot be saved: leave one of them out", file=sys.stderr)
         return 2
     with console.blender_output_hidden():
-        bpy = blender.start_blender()
-        blender.open_blend(arguments.scene)
-        scene = bpy.context.scene
+        scene = blender.open_scene(arguments.scene)
         own_start = scene.frame_start
-        for words in arguments.model:
-            _put_model(scene, words)
-        if arguments.frames:
-            scene.frame_start, scene.frame_end = _frames(scene, *arguments.frames)
-        if arguments.out:
-            scene.palpate.folder = str(writable_folder(arguments.out, create=True))
-        if not arguments.save:
-            _leave_saved_bake(bpy, scene, arguments.scene)
-        if arguments.sensor:
-            _read_out_only(scene, arguments.sensor)
+        _prepare(scene, arguments)
         baked = bake_with_progress(scene, into_scene=bool(arguments.save or arguments.save_as))
         saved = save_scene(arguments)
     print(report(baked))
@@ -76,6 +65,20 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
+def _prepare(scene, arguments: argparse.Namespace) -> None:
+    """Change the open scene as the options ask."""
+    for option in arguments.model:
+        _put_model(scene, option)
+    if arguments.frames:
+        scene.frame_start, scene.frame_end = _frame_range(*arguments.frames)
+    if arguments.out:
+        scene.palpate.folder = str(writable_folder(arguments.out, create=True))
+    if not arguments.save:
+        _check_saved_bake(scene, arguments.scene)
+    if arguments.sensor:
+        _read_out_only(scene, arguments.sensor)
+
+
 def bake_with_progress(scene, into_scene: bool = True):
     """Bake a scene with a progress bar on stderr; Ctrl-C leaves an earlier bake as it was."""
     from ..addon.bake import bake
@@ -84,7 +87,7 @@ def bake_with_progress(scene, into_scene: bool = True):
 
 
 def report(baked) -> str:
-    """Return what a bake did, in words for the terminal."""
+    """Return a summary of a bake for the terminal."""
     recording = baked.recording
     first, last = recording.frames[0], recording.frames[-1]
     span = f"{first} to {last} ({recording.times[-1]:.2f} s), substep {recording.dt * 1e3:.3g} ms"
@@ -103,11 +106,12 @@ def report(baked) -> str:
 
 
 def _newtons(value: float) -> str:
+    """Return a force as text; rounding errors appear as zero."""
     return f"{value if value > 1e-9 else 0.0:.4f} N"
 
 
 def save_scene(arguments: argparse.Namespace) -> Path | None:
-    """Save the open scene where the user wants it, if anywhere."""
+    """Save the open scene if --save or --save-as asks for it, and return its path."""
     if not (arguments.save or arguments.save_as):
         return None
     path = Path(arguments.save_as or arguments.scene)
@@ -117,33 +121,36 @@ def save_scene(arguments: argparse.Namespace) -> Path | None:
     return path
 
 
-def _leave_saved_bake(bpy, scene, blend: str) -> None:
-    """Raise SceneError when the bake that the saved file plays would be replaced, and the file not told."""
+def _check_saved_bake(scene, blend: str) -> None:
+    """Raise SceneError if the bake would replace the one that the saved file shows."""
+    import bpy
+
     from ..addon.bake import bake_files
 
     target = bake_files.bake_folder(scene).resolve()
     for obj in scene.objects:
-        played = obj.palpate.bake_folder
-        if played and Path(bpy.path.abspath(played)).resolve().parent == target:
+        shown = obj.palpate.bake_folder
+        if shown and Path(bpy.path.abspath(shown)).resolve().parent == target:
             raise SceneError(
                 f"'{blend}' plays the bake in '{target}', which would no longer fit it: "
                 "add --save to renew both, or --out DIR to bake elsewhere."
             )
 
 
-def _put_model(scene, words: str) -> None:
-    """Put what ``[NAME=]SENSOR.toml`` says on a sensor."""
+def _put_model(scene, option: str) -> None:
+    """Apply the option ``--model [NAME=]SENSOR.toml`` to a sensor."""
     from ..addon.measured import gap_results
     from ..core.io.sensor_toml import read_sensor
 
-    name, _, file = ("", "", words) if Path(words).is_file() else words.partition("=")
+    name, _, file = ("", "", option) if Path(option).is_file() else option.partition("=")
     if not file:
         name, file = "", name
     model = read_sensor(file)
     gap_results.put(gap_results.sensor_called(scene, name or None, f"write --model NAME={file}"), model)
 
 
-def _frames(scene, first: int, last: int) -> tuple[int, int]:
+def _frame_range(first: int, last: int) -> tuple[int, int]:
+    """Return the frame range of --frames; raise SceneError if it is not one."""
     if last < first:
         raise SceneError(f"--frames {first} {last} runs backwards: give the first frame first.")
     if first < 0:
@@ -152,6 +159,7 @@ def _frames(scene, first: int, last: int) -> tuple[int, int]:
 
 
 def _read_out_only(scene, wanted: list[str]) -> None:
+    """Make all sensors but the wanted ones pads."""
     sensors = {obj.name: obj for obj in scene.objects if obj.palpate.role == "SENSOR"}
     for name in wanted:
         if name not in sensors:

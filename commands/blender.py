@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Blender as the commands need it: with the add-on's classes, and with a file opened or a good reason why not."""
+"""Starts Blender for the commands, and opens and saves .blend files with error messages that say what to do."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ _SEEKABLE_END = b"\xb1\xea\x92\x8f"
 
 
 def start_blender():
-    """Start Blender where there is none yet; return bpy with the add-on's classes.
+    """Start Blender if it does not run yet, register the add-on, and return bpy.
 
     Raises
     ------
     PalpateError
-        There is no Blender in this Python.
+        This Python has no Blender.
     """
     try:
         import bpy
@@ -33,13 +33,20 @@ def start_blender():
         raise PalpateError(
             f"This Python has no Blender ({error}): run 'pip install bpy', or 'blender --command palpate …' instead."
         ) from error
-    if not bpy.app.binary_path:  # bpy as a module; Blender itself ends in its own way
+    if not bpy.app.binary_path:  # bpy was imported as a module; the Blender program prints nothing at its end
         console.silence_at_exit()
     if not hasattr(bpy.types.Object, "palpate"):
-        # The package's root: "palpate" from pip, "bl_ext.<repository>.palpate" as an extension.
+        # The root package: "palpate" from pip, "bl_ext.<repository>.palpate" as an extension.
         importlib.import_module(__package__.rpartition(".")[0]).register()
     console.Interrupt.check()
     return bpy
+
+
+def open_scene(path: str | os.PathLike):
+    """Start Blender, open a .blend and return its scene; raises what :func:`start_blender` and :func:`open_blend` raise."""
+    bpy = start_blender()
+    open_blend(path)
+    return bpy.context.scene
 
 
 def open_blend(path: str | os.PathLike) -> None:
@@ -48,7 +55,7 @@ def open_blend(path: str | os.PathLike) -> None:
     Raises
     ------
     FileError
-        It is missing, is no .blend, is damaged, or comes from a newer Blender.
+        The file is missing, is not a .blend, is damaged, or comes from a newer Blender.
     """
     import bpy
 
@@ -57,15 +64,15 @@ def open_blend(path: str | os.PathLike) -> None:
         raise FileError(f"'{path}' is a folder: give the name of a .blend file in it.")
     try:
         with path.open("rb") as file:
-            start = file.read(7)
+            magic = file.read(7)
     except FileNotFoundError as error:
         raise FileError(f"There is no file '{path}': check its name and folder.") from error
     except OSError as error:
         raise FileError(f"'{path}' cannot be read ({error.strerror}): check its permissions.") from error
-    if start != b"BLENDER" and not start.startswith(_COMPRESSED):
+    if magic != b"BLENDER" and not magic.startswith(_COMPRESSED):
         raise FileError(f"'{path}' is not a .blend file: give a file that was saved by Blender.")
     try:
-        # No scripts: a file from somebody else must not run its own code in a batch job.
+        # No scripts: a file from another person must not run its code in a batch job.
         bpy.ops.wm.open_mainfile(filepath=str(path.absolute()), load_ui=False, use_scripts=False)
     except RuntimeError as error:
         reason = str(error).strip().splitlines()[-1].rpartition(": ")[2].strip().rstrip(".")
@@ -73,17 +80,17 @@ def open_blend(path: str | os.PathLike) -> None:
             f"'{path}' cannot be opened by Blender {bpy.app.version_string} ({reason}): it is damaged, cut short, "
             "or not a .blend; save it again or take a backup (.blend1)."
         ) from error
-    if bpy.context.object is not None and bpy.context.object.mode != "OBJECT":  # files keep the mode that they were saved in
+    if bpy.context.object is not None and bpy.context.object.mode != "OBJECT":  # files store the mode in which they were saved
         bpy.ops.object.mode_set(mode="OBJECT")
 
 
 def save_blend(path: str | os.PathLike, backup: bool = True) -> None:
-    """Save the open scene, compressed; with `backup` a file that was there becomes .blend1, as in Blender itself.
+    """Save the open scene, compressed. With `backup`, an existing file becomes .blend1, as in Blender itself.
 
     Raises
     ------
     FileError
-        It cannot be written. A file that was there is still as it was.
+        The file cannot be written. An existing file is unchanged.
     """
     import bpy
 
@@ -97,7 +104,7 @@ def save_blend(path: str | os.PathLike, backup: bool = True) -> None:
     versions = files.save_version
     try:
         files.save_version = versions if backup else 0
-        with _kept(path):
+        with _restored_on_error(path):
             bpy.ops.wm.save_as_mainfile(filepath=str(path), compress=True, relative_remap=True)
             if not _is_whole(path):
                 raise OSError("it was cut short")
@@ -109,26 +116,26 @@ def save_blend(path: str | os.PathLike, backup: bool = True) -> None:
 
 
 def _is_whole(path: Path) -> bool:
-    """Tell whether a compressed .blend ends with its table of frames: on a full disk Blender cuts it off and says nothing."""
+    """Return True if a compressed .blend ends with its table of frames: on a full disk Blender truncates it silently."""
     with path.open("rb") as file:
         file.seek(-len(_SEEKABLE_END), os.SEEK_END)
         return file.read() == _SEEKABLE_END
 
 
 @contextmanager
-def _kept(path: Path) -> Iterator[None]:
-    """Put a file back, or remove what has come in its place, when the body raises; a second name of it takes no space."""
-    second = path.with_name(f".{path.name}.{secrets.token_hex(4)}.partial") if path.exists() else None
-    if second is not None:
+def _restored_on_error(path: Path) -> Iterator[None]:
+    """Restore a file, or remove a new one, if the body raises. The copy is a hard link where the file system has them."""
+    copy = path.with_name(f".{path.name}.{secrets.token_hex(4)}.partial") if path.exists() else None
+    if copy is not None:
         try:
-            os.link(path, second)
-        except OSError:  # a file system without links
-            shutil.copy2(path, second)
+            os.link(path, copy)
+        except OSError:  # the file system has no hard links
+            shutil.copy2(path, copy)
     try:
         yield
     except BaseException:
         with suppress(OSError):
-            os.replace(second, path) if second is not None else path.unlink()
+            os.replace(copy, path) if copy is not None else path.unlink()
         raise
-    if second is not None:
-        second.unlink()
+    if copy is not None:
+        copy.unlink()

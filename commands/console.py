@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the commands print, kept apart from what Blender prints."""
+"""Terminal of the commands: progress bars, tables, Ctrl-C, and Blender's own output kept away."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ from ..core.jobs.progress import Job, Progress, Result
 
 
 class Interrupt:
-    """Ctrl-C, noticed where it is safe to stop.
+    """Ctrl-C, which stops a command only where that is safe.
 
-    An exception that comes out of nowhere would hit Blender's start, its handlers or an import half-way: Blender prints and
-    forgets it, or goes on with half of itself. So the first Ctrl-C is only noted, and :meth:`check` acts on it, many times a
-    second; a second one insists.
+    An exception at an arbitrary moment would interrupt Blender's start, a handler or an import: Blender would print and ignore
+    it, or continue half initialised. Therefore the first Ctrl-C is only noted, and :meth:`check`, called many times a second,
+    raises the exception. A second Ctrl-C raises it at once.
     """
 
     pressed = False
@@ -33,7 +33,7 @@ class Interrupt:
     @classmethod
     @contextmanager
     def noted(cls) -> Iterator[None]:
-        """Note Ctrl-C. Inside a Blender without a window it would only set a flag that nobody here looks at."""
+        """Note Ctrl-C while the body runs. A Blender without a window would only set a flag that nothing reads."""
         if threading.current_thread() is not threading.main_thread():
             yield
             return
@@ -51,18 +51,18 @@ class Interrupt:
 
     @classmethod
     def check(cls) -> None:
-        """Raise KeyboardInterrupt when Ctrl-C was pressed."""
+        """Raise KeyboardInterrupt if Ctrl-C was pressed."""
         if cls.pressed:
             raise KeyboardInterrupt
 
 
 @contextmanager
 def blender_output_hidden() -> Iterator[None]:
-    """Keep Blender's own words off the terminal while it works.
+    """Keep Blender's own output off the terminal while the body runs.
 
-    Most come from C, so the descriptors themselves are turned away, into a file that nobody sees unless something unexpected
-    happens: then it is printed with the traceback. Operators write to Python's `sys.stdout`, which goes the same way; only
-    `sys.stderr` stays on the terminal, for progress bars.
+    Most of it is printed by C code, so the file descriptors themselves are redirected into a temporary file. It is printed if
+    the body raises an unexpected error. Operators write to Python's `sys.stdout`, which is redirected as well. `sys.stderr`
+    stays on the terminal, for progress bars.
     """
     with tempfile.TemporaryFile() as kept:
         before = sys.stdout, sys.stderr
@@ -73,7 +73,7 @@ def blender_output_hidden() -> Iterator[None]:
         saved = [os.dup(descriptor) for descriptor in (1, 2)]
         opened = [os.fdopen(os.dup(kept.fileno()), "w", encoding="utf-8", errors="replace", buffering=1)]
         sys.stdout = opened[0]
-        if _descriptor(sys.stderr) == 2:  # one that a test has put there is not in Blender's way
+        if _descriptor(sys.stderr) == 2:  # not where a test has replaced it
             opened.append(os.fdopen(os.dup(2), "w", encoding=sys.stderr.encoding, errors="replace", buffering=1))
             sys.stderr = opened[1]
         for descriptor in (1, 2):
@@ -101,27 +101,28 @@ def blender_output_hidden() -> Iterator[None]:
 
 @functools.cache
 def silence_at_exit() -> None:
-    """Keep what Blender says about its own memory after everything is done off the terminal."""
+    """Keep Blender's message about its memory, printed when the process ends, off the terminal."""
 
-    def hush() -> None:
+    def silence() -> None:
         for stream in (sys.stdout, sys.stderr):
             if stream is not None and not stream.closed:
                 stream.flush()
         _flush_c()
-        nowhere = os.open(os.devnull, os.O_WRONLY)
+        null = os.open(os.devnull, os.O_WRONLY)
         for descriptor in (1, 2):
-            os.dup2(nowhere, descriptor)
+            os.dup2(null, descriptor)
 
-    atexit.register(hush)
+    atexit.register(silence)
 
 
 def _flush_c() -> None:
-    """Empty the buffers of C's streams, which would otherwise end up on the other side of a redirection."""
+    """Flush the buffers of C's streams, so that their content does not appear after a redirection has changed."""
     library = ctypes.CDLL("ucrtbase" if sys.platform == "win32" else None)
     library.fflush(None)
 
 
 def _descriptor(stream) -> int | None:
+    """Return the file descriptor of a stream; None if it has none."""
     try:
         return stream.fileno()
     except (AttributeError, OSError, ValueError):  # none, closed, or one that is not a file (io.UnsupportedOperation)
@@ -129,40 +130,40 @@ def _descriptor(stream) -> int | None:
 
 
 @contextmanager
-def exit_on_interrupt(words: str, clean_up: Callable[[], object]) -> Iterator[None]:
-    """Let Ctrl-C end the process in the middle of a call into Blender, a render above all.
+def exit_on_interrupt(message: str, clean_up: Callable[[], object]) -> Iterator[None]:
+    """Let Ctrl-C end the process during a call into Blender, such as a render.
 
-    Python tells of an interrupt only once the call has returned, a minute later. Its signal handler writes to a socket at once,
-    though, and a thread that waits there tidies up, prints `words` and leaves with status 130.
+    Python raises KeyboardInterrupt only after the call has returned, which can take a minute. But the signal handler writes to
+    a socket at once. A thread that waits at this socket calls `clean_up`, prints `message` and exits with status 130.
     """
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    ear, mouth = socket.socketpair()
-    mouth.setblocking(False)
+    receiver, sender = socket.socketpair()
+    sender.setblocking(False)
     stderr = os.dup(2)
 
     def listen() -> None:
-        if ear.recv(1) == bytes([signal.SIGINT]):
+        if receiver.recv(1) == bytes([signal.SIGINT]):
             clean_up()
-            os.write(stderr, f"\n{words}\n".encode())
+            os.write(stderr, f"\n{message}\n".encode())
             os._exit(130)
 
-    before = signal.set_wakeup_fd(mouth.fileno(), warn_on_full_buffer=False)
+    before = signal.set_wakeup_fd(sender.fileno(), warn_on_full_buffer=False)
     thread = threading.Thread(target=listen, daemon=True)
     thread.start()
     try:
         yield
     finally:
         signal.set_wakeup_fd(before)
-        mouth.close()  # the thread reads the end and returns
+        sender.close()  # the thread reads the end of the stream and returns
         thread.join()
-        ear.close()
+        receiver.close()
         os.close(stderr)
 
 
 def progress_bar(label: str, total: int, unit: str = "frame"):
-    """Return a tqdm bar on stderr, which shows nothing where stderr is not a terminal."""
+    """Return a tqdm bar on stderr; it shows nothing if stderr is not a terminal."""
     from tqdm import tqdm
 
     return tqdm(total=total, desc=label, unit=unit, file=sys.stderr, leave=False, disable=None, dynamic_ncols=True)
@@ -195,7 +196,7 @@ def run_with_progress_bar(
 
 
 def text_table(rows: Sequence[Sequence[str]], align: str) -> str:
-    """Return rows of words as lines with even columns; `align` has "<" or ">" for each column."""
+    """Return rows of cells as lines with aligned columns; `align` has "<" or ">" for each column."""
     widths = [max(len(row[i]) for row in rows) for i in range(len(align))]
     lines = []
     for row in rows:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""``palpate demo``: from nothing to a picture of what two finger pads feel, with the numbers beside it."""
+"""``palpate demo``: builds, bakes and renders the demo scene, and prints the forces on its two finger pads."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from ..core.figures.tactile_strip import tactile_strip
 from ..core.figures.time_curves import force_curves
 from ..core.io.file_writing import remove_leftovers, writable_folder
 from ..core.response import metrics
-from . import blender, console
+from . import blender, console, figure_options
 from .bake import bake_with_progress, report
 
 
@@ -24,72 +24,88 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--out", metavar="DIR", default="palpate-demo", help="folder for all that is made (default: %(default)s)"
     )
     parser.add_argument(
-        "--size", metavar=("W", "H"), nargs=2, type=_positive, default=(1280, 720), help="of the picture, pixels (1280 720)"
+        "--size",
+        metavar=("W", "H"),
+        nargs=2,
+        type=figure_options.pixels,
+        default=(1280, 720),
+        help="of the picture, pixels (1280 720)",
     )
     parser.add_argument(
-        "--samples", metavar="N", type=_positive, default=16, help="per pixel of the picture (default: %(default)s)"
+        "--samples", metavar="N", type=figure_options.pixels, default=16, help="per pixel of the picture (default: %(default)s)"
     )
     parser.add_argument("--no-render", action="store_true", help="leave the picture out, everything else takes seconds")
-
-
-def _positive(text: str) -> int:
-    value = int(text)
-    if not 0 < value <= 16384:
-        raise argparse.ArgumentTypeError(f"{value} is not between 1 and 16384")
-    return value
 
 
 def run(arguments: argparse.Namespace) -> int:
     began = time.monotonic()
     folder = writable_folder(arguments.out, create=True)
     with console.blender_output_hidden():
-        bpy = blender.start_blender()
-        from ..sample_blends import demo
-
-        bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
-        scene = bpy.context.scene
-        demo.build(scene)
-        demo.frame_picture(scene, arguments.size)
-        blend = folder / "demo.blend"
-        blender.save_blend(blend, backup=False)  # the bake folder is relative to it
-        baked = bake_with_progress(scene)
-        scene.frame_set(demo.PICTURE_FRAME)
-        blender.save_blend(blend, backup=False)
-    recording = baked.recording
-    sensors = {sensor.name: sensor for sensor in baked.scenario.sensors if sensor.readout}
-    texels = {name: sensor.texels for name, sensor in sensors.items()}
-    style = FigureStyle(scene.palpate.color_map, limit=demo.RANGE, dpi=200)
-    required = demo.CUBE_MASS * float(np.linalg.norm(baked.scenario.gravity))
-
-    strip, curves, picture = folder / "tactile-strip.png", folder / "forces.png", folder / "scene.png"
-    tactile_strip(strip, recording, texels, demo.STRIP_FRAMES, style)
-    parameters = {name: sensor.parameters for name, sensor in sensors.items()}
-    force_curves(curves, recording, texels, parameters, {demo.PAD_B: required}, style)
-    if not arguments.no_render:
-        _picture(scene, picture, recording, sensors, texels, arguments, style)
-
+        scene, baked = _build_and_bake(folder / "demo.blend", arguments.size)
+    files = _draw(scene, baked, folder, arguments)
     print(report(baked))
     print()
-    print(_slide(recording, sensors[demo.PAD_A]))
+    print(_report_on_contacts(baked))
     print()
-    measured = recording.sensors[demo.PAD_B].normal_force[-1].sum()
-    print(f"{demo.CUBE} at rest on {demo.PAD_B}: required {required:.6f} N, measured {measured:.6f} N")
-    print()
-    for what, path in (
-        ("picture", picture),
-        ("tactile images", strip),
-        ("forces", curves),
-        ("scene", blend),
-        *((f"bake of {name}", place) for name, place in baked.folders.items()),
-    ):
+    files["scene"] = folder / "demo.blend"
+    files |= {f"bake of {name}": place for name, place in baked.folders.items()}
+    for what, path in files.items():
         if path.exists():
             print(f"{what + ':':<18} {path}")
     print(f"{'took:':<18} {time.monotonic() - began:.0f} s")
     return 0
 
 
-def _picture(scene, path: Path, recording, sensors, texels, arguments, style) -> None:
-    """Render the scene and put the colour bar, tactile images and labels on it."""
+def _build_and_bake(blend: Path, size: tuple[int, int]):
+    """Build the demo scene, bake it and save it; return the scene and the result of the bake."""
+    bpy = blender.start_blender()
+    from ..sample_blends import demo
+
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    scene = bpy.context.scene
+    demo.build(scene)
+    demo.frame_picture(scene, size)
+    blender.save_blend(blend, backup=False)  # before the bake, because the bake folder is relative to the file
+    baked = bake_with_progress(scene)
+    scene.frame_set(demo.PICTURE_FRAME)
+    blender.save_blend(blend, backup=False)
+    return scene, baked
+
+
+def _sensors(baked) -> dict:
+    """Return the sensors that are read out, by name."""
+    return {sensor.name: sensor for sensor in baked.scenario.sensors if sensor.readout}
+
+
+def _draw(scene, baked, folder: Path, arguments: argparse.Namespace) -> dict[str, Path]:
+    """Draw tactile strip and forces, and render the picture; return the files by what they show."""
+    from ..sample_blends import demo
+
+    sensors = _sensors(baked)
+    texels = {name: sensor.texels for name, sensor in sensors.items()}
+    parameters = {name: sensor.parameters for name, sensor in sensors.items()}
+    style = FigureStyle(scene.palpate.color_map, limit=demo.RANGE, dpi=200)
+    files = {"picture": folder / "scene.png", "tactile images": folder / "tactile-strip.png", "forces": folder / "forces.png"}
+    tactile_strip(files["tactile images"], baked.recording, texels, demo.STRIP_FRAMES, style)
+    force_curves(files["forces"], baked.recording, texels, parameters, {demo.PAD_B: _weight(baked)}, style)
+    if not arguments.no_render:
+        _render_picture(scene, files["picture"], arguments)
+        labels = _labels(scene, baked.recording, sensors, demo)
+        label_picture(
+            files["picture"], files["picture"], baked.recording, texels, demo.PICTURE_FRAME, labels=labels, style=style
+        )
+    return files
+
+
+def _weight(baked) -> float:
+    """Return the weight of the cube, N."""
+    from ..sample_blends import demo
+
+    return demo.CUBE_MASS * float(np.linalg.norm(baked.scenario.gravity))
+
+
+def _render_picture(scene, path: Path, arguments: argparse.Namespace) -> None:
+    """Render the scene; Ctrl-C ends the process during the render."""
     from ..addon.render import render
     from ..sample_blends import demo
 
@@ -101,13 +117,20 @@ def _picture(scene, path: Path, recording, sensors, texels, arguments, style) ->
     ):
         render.render_frame(scene, path, demo.PICTURE_FRAME, samples=arguments.samples, size=arguments.size)
         scene.frame_set(demo.PICTURE_FRAME)
-        labels = _labels(scene, recording, sensors, demo)
         bar.update()
-    label_picture(path, path, recording, texels, demo.PICTURE_FRAME, labels=labels, style=style)
+
+
+def _report_on_contacts(baked) -> str:
+    """Return what the pads measure: friction under the ball, and the weight of the cube."""
+    from ..sample_blends import demo
+
+    slide = _slide(baked.recording, _sensors(baked)[demo.PAD_A])
+    required, measured = _weight(baked), baked.recording.sensors[demo.PAD_B].normal_force[-1].sum()
+    return f"{slide}\n\n{demo.CUBE} at rest on {demo.PAD_B}: required {required:.6f} N, measured {measured:.6f} N"
 
 
 def _labels(scene, recording, sensors, demo) -> list[Label]:
-    """Words for the ball and the cube, from what their pads feel."""
+    """Return labels for the ball and the cube, with the forces on their pads."""
     from ..addon.render import render
 
     i = int(np.searchsorted(recording.frames, demo.PICTURE_FRAME))

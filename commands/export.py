@@ -8,7 +8,7 @@ import argparse
 from ..core.export.registry import export, exporters
 from ..core.figures.figure_style import FigureStyle
 from ..core.io.bake_reader import Bake, read_bake
-from . import console, figure_options
+from . import blender, console, figure_options
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -33,20 +33,17 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def find_bake(where: str) -> Bake:
-    """Read a bake from its folder, or from the one that a .blend names.
+    """Read a bake from its folder, or the bake that a .blend shows.
 
     Raises
     ------
     PalpateError
-        There is none.
+        There is no bake.
     """
     if not where.endswith(".blend"):
         return read_bake(where)
-    from . import blender
-
     with console.blender_output_hidden():
-        bpy = blender.start_blender()
-        blender.open_blend(where)
+        scene = blender.open_scene(where)
         from ..addon.render import figure_export
 
-        return figure_export.read_scene_bake(bpy.context.scene)
+        return figure_export.read_scene_bake(scene)

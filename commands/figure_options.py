@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Options of all commands that draw: colours, their scale, the width of the page."""
+"""Options of the commands that draw figures: colours, their scale, and the sizes of figures and renders."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import argparse
 from ..core.figures import color_maps
 from ..core.figures.figure_style import WIDTHS, FigureStyle
 
-OPTIONS = ("colour_map", "quantity", "limit", "width", "dpi")
+STYLE_OPTIONS = ("colour_map", "quantity", "limit", "width", "dpi")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -22,9 +22,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--dpi", metavar="N", type=int, help="of PNG figures (default: 300)")
 
 
+def pixels(text: str) -> int:
+    """Return the number in an option that counts pixels or samples."""
+    value = int(text)
+    if not 0 < value <= 16384:
+        raise argparse.ArgumentTypeError(f"{value} is not between 1 and 16384")
+    return value
+
+
 def figure_style_from(arguments: argparse.Namespace, **others) -> FigureStyle:
-    """Return the look that the words ask for; `others` are what else than the usual is meant where they say nothing."""
-    given = {key: value for key in OPTIONS if (value := getattr(arguments, key)) is not None}
+    """Return the figure style of the options; `others` replaces the defaults where no option is given."""
+    given = {key: value for key in STYLE_OPTIONS if (value := getattr(arguments, key)) is not None}
     if "colour_map" in given:
         given["colour_map"] = given["colour_map"].upper()
     return FigureStyle(**{**others, **given})

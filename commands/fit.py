@@ -22,7 +22,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     foam.add_argument("--area", type=float, required=True, metavar="M2", help="area of the whole sensor, m²")
     foam.add_argument("--texels", type=int, required=True, metavar="N", help="number of texels on it")
     foam.add_argument("--weight-area", type=float, metavar="M2", help="what forces or masses rested on, m²")
-    foam.set_defaults(fit=_stiffness)
+    foam.set_defaults(action=_stiffness)
     slide = kinds.add_parser(
         "friction",
         help="mus, mud, x0 and ct from a force–velocity curve (Eq. 13); sigma0 and sigma1 too where it has a time column",
@@ -34,13 +34,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     slide.add_argument(
         "--texels", type=int, default=1, metavar="N", help="how many texels shared the measured force (default: 1)"
     )
-    slide.set_defaults(fit=_friction)
+    slide.set_defaults(action=_friction)
     for kind in (foam, slide):
         kind.add_argument("--plot", metavar="FILE", help="picture of measurements and fit: .png, .pdf or .svg")
 
 
 def run(arguments: argparse.Namespace) -> int:
-    arguments.fit(arguments)
+    arguments.action(arguments)
     if arguments.plot:
         print(f"plot: {Path(arguments.plot).absolute()}")
     return 0

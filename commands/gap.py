@@ -71,11 +71,10 @@ def _put_into_scene(blend: str, name: str | None, sensor) -> Path:
     from . import blender
 
     with console.blender_output_hidden():
-        bpy = blender.start_blender()
-        blender.open_blend(blend)
+        scene = blender.open_scene(blend)
         from ..addon.measured import gap_results
 
-        gap_results.put(gap_results.sensor_called(bpy.context.scene, name), sensor)
+        gap_results.put(gap_results.sensor_called(scene, name), sensor)
         path = Path(blend)
         blender.save_blend(path)
     return path

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""``palpate openrave``: sensor definitions in OpenRAVE's XML (paper, Table 2), into a scene and out of it."""
+"""``palpate openrave``: reads sensor definitions in OpenRAVE's XML (paper, Table 2) into a scene, and writes them."""
 
 from __future__ import annotations
 
@@ -16,24 +16,24 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     kinds = parser.add_subparsers(dest="kind", metavar="show | import | export", required=True)
     show = kinds.add_parser("show", help="print the tactile sensors of an XML file")
     show.add_argument("file", metavar="ROBOT.xml")
-    show.set_defaults(work=_show)
+    show.set_defaults(action=_show)
     load = kinds.add_parser("import", help="put the parameters of an XML file on the sensors of a .blend")
     load.add_argument("file", metavar="ROBOT.xml")
     load.add_argument("scene", metavar="SCENE.blend")
     load.add_argument("--from", dest="name", metavar="NAME", help="which sensor of the XML (default: the one there is)")
     load.add_argument("--sensor", metavar="OBJECT", help="object that gets them (default: the one that <link> names)")
     load.add_argument("--save-as", metavar="FILE", help="save into another .blend (default: SCENE.blend itself)")
-    load.set_defaults(work=_import)
+    load.set_defaults(action=_import)
     save = kinds.add_parser("export", help="write the sensors of a .blend as XML")
     save.add_argument("scene", metavar="SCENE.blend")
     save.add_argument("--sensor", metavar="OBJECT", action="append", help="only this one; may be given again")
     save.add_argument("--robot", metavar="NAME", help="put a <Robot> of this name around them")
     save.add_argument("--out", metavar="FILE", help="where to write (default: print)")
-    save.set_defaults(work=_export)
+    save.set_defaults(action=_export)
 
 
 def run(arguments: argparse.Namespace) -> int:
-    arguments.work(arguments)
+    arguments.action(arguments)
     return 0
 
 
@@ -63,12 +63,11 @@ def _say_missing(sensor: OpenRaveSensor) -> None:
 def _import(arguments: argparse.Namespace) -> None:
     sensor = _chosen(read_openrave(arguments.file), arguments.name, arguments.file)
     with console.blender_output_hidden():
-        bpy = blender.start_blender()
-        blender.open_blend(arguments.scene)
+        scene = blender.open_scene(arguments.scene)
         from ..addon.authoring import exchange
 
         name = arguments.sensor or sensor.link
-        obj = bpy.context.scene.objects.get(name)
+        obj = scene.objects.get(name)
         if obj is None:
             raise SceneError(f"There is no object '{name}' in '{arguments.scene}': name the sensor's with --sensor.")
         exchange.put_parameters(obj, sensor.parameters)
@@ -91,11 +90,10 @@ def _chosen(sensors: list[OpenRaveSensor], name: str | None, file: str) -> OpenR
 
 def _export(arguments: argparse.Namespace) -> None:
     with console.blender_output_hidden():
-        bpy = blender.start_blender()
-        blender.open_blend(arguments.scene)
+        scene = blender.open_scene(arguments.scene)
         from ..addon.authoring import exchange
 
-        found = {obj.name: obj for obj in bpy.context.scene.objects if obj.palpate.role in {"SENSOR", "PAD"}}
+        found = {obj.name: obj for obj in scene.objects if obj.palpate.role in {"SENSOR", "PAD"}}
         wanted = arguments.sensor or [name for name, obj in found.items() if obj.palpate.role == "SENSOR"]
         for name in wanted:
             if name not in found:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""``palpate paper``: every table and figure of the paper's experiments, our number beside the printed one, on one page."""
+"""``palpate paper``: every table and figure of the paper's experiments on one page, our numbers beside the printed ones."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def report(chapters) -> str:
-    """Return all rows in words for the terminal."""
+    """Return all rows as text for the terminal."""
     lines = []
     for chapter in chapters:
         rows = [(row.what, row.printed, row.expected, row.measured, MARKS[row.kept]) for row in chapter.rows]

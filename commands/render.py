@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""``palpate render``: pictures of a baked scene, its tactile images, curves and numbers, and a video of both."""
+"""``palpate render``: pictures of a baked scene, its tactile images, curves and numbers, and a video."""
 
 from __future__ import annotations
 
@@ -28,31 +28,26 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--format", metavar="KIND", action="append", choices=FORMATS, help="of figures: png, pdf, svg (default: png and pdf)"
     )
     parser.add_argument("--engine", choices=("cycles", "eevee", "workbench"), help="default: the scene's")
-    parser.add_argument("--size", metavar=("W", "H"), nargs=2, type=_positive, default=(1280, 960), help="of renders, pixels")
-    parser.add_argument("--samples", metavar="N", type=_positive, help="per pixel of renders (default: the scene's)")
+    parser.add_argument(
+        "--size", metavar=("W", "H"), nargs=2, type=figure_options.pixels, default=(1280, 960), help="of renders, pixels"
+    )
+    parser.add_argument(
+        "--samples", metavar="N", type=figure_options.pixels, help="per pixel of renders (default: the scene's)"
+    )
     parser.add_argument("--view", metavar=("AZIMUTH", "ELEVATION"), nargs=2, type=float, help="of the camera, degrees")
     parser.add_argument("--own-camera", action="store_true", help="leave the scene's camera where it is")
     parser.add_argument("--transparent", action="store_true", help="no background")
     figure_options.add_arguments(parser)
 
 
-def _positive(text: str) -> int:
-    value = int(text)
-    if not 0 < value <= 16384:
-        raise argparse.ArgumentTypeError(f"{value} is not between 1 and 16384")
-    return value
-
-
 def run(arguments: argparse.Namespace) -> int:
     folder = writable_folder(arguments.out, create=True)
     with console.blender_output_hidden():
-        bpy = blender.start_blender()
+        scene = blender.open_scene(arguments.scene)
         from ..addon.display import bake_display
         from ..addon.render import figure_export
         from ..addon.render.figure_request import FigureRequest
 
-        blender.open_blend(arguments.scene)
-        scene = bpy.context.scene
         request = FigureRequest(
             style=figure_options.figure_style_from(arguments, **vars(bake_display.figure_style(scene))),
             frames=tuple(arguments.frame or ()),

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Work that goes on behind the solver's back: files are written by a thread of their own while the next frame is computed."""
+"""A thread that writes files while the solver computes the next frame."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ import threading
 from collections.abc import Callable
 
 MAX_WAITING_TASKS = 8
-"""Tasks that may wait: what they hold stays in memory, so a slow disk slows the solver down in the end."""
+"""Tasks that may wait. Each keeps its images in memory, so that a slow disk has to slow the solver down."""
 
 
 class BackgroundWriter:
-    """Does tasks one after the other, in order, in a thread. What goes wrong is raised by the next call."""
+    """A thread that executes tasks in the order of their submission. An error in a task is raised by the next call."""
 
     def __init__(self):
         self._tasks: queue.Queue[Callable[[], None] | None] = queue.Queue(MAX_WAITING_TASKS)
@@ -21,27 +21,28 @@ class BackgroundWriter:
         self._thread: threading.Thread | None = None
 
     def submit(self, task: Callable[[], None]) -> None:
-        """Add a task; waits when too many wait already."""
-        self._raise()
+        """Add a task; block while :data:`MAX_WAITING_TASKS` are waiting."""
+        self._raise_error()
         if self._thread is None:
-            self._thread = threading.Thread(target=self._work, name="palpate-writer", daemon=True)
+            self._thread = threading.Thread(target=self._run, name="palpate-writer", daemon=True)
             self._thread.start()
         self._tasks.put(task)
 
     def finish(self) -> None:
-        """Return when all that was added is done."""
+        """Return once all submitted tasks are done."""
         self._tasks.join()
-        self._raise()
+        self._raise_error()
 
     def stop(self) -> None:
-        """Drop what waits, let what is being done end, and end the thread; nothing is raised."""
+        """Drop the waiting tasks, let the current one end, and end the thread. Raise nothing."""
         self._stopped = True
         if self._thread is not None:
             self._tasks.put(None)
             self._thread.join()
             self._thread = None
 
-    def _work(self) -> None:
+    def _run(self) -> None:
+        """Execute tasks until None is submitted; after an error only take them off the queue."""
         while True:
             task = self._tasks.get()
             try:
@@ -49,12 +50,12 @@ class BackgroundWriter:
                     return
                 if self._error is None and not self._stopped:
                     task()
-            except BaseException as error:  # for the thread that waits for it
+            except BaseException as error:  # kept for the thread that submits or finishes
                 self._error = error
             finally:
                 self._tasks.task_done()
 
-    def _raise(self) -> None:
+    def _raise_error(self) -> None:
         if self._error is not None:
             error, self._error = self._error, None
             raise error

@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Sample → solve → write, as one generator; the operator and the command line drive it."""
+"""A bake, step by step: read the scene, solve it, write the files, show the result. Operator and command line drive it."""
 
 from __future__ import annotations
 
-from collections.abc import Generator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -11,7 +10,7 @@ import bpy
 
 from ...core.errors import SceneError
 from ...core.jobs.job_runner import part_of_job
-from ...core.jobs.progress import Progress
+from ...core.jobs.progress import Job, Progress
 from ...core.model.recording import Recording
 from ...core.model.scenario import Scenario
 from ..display import texel_arrows
@@ -23,85 +22,112 @@ from . import bake_files, scene_writer
 
 @dataclass(frozen=True)
 class BakeResult:
-    """What a bake leaves: the recording, what was solved, and the folder of each sensor."""
+    """The result of a bake.
+
+    Attributes
+    ----------
+    recording : Recording
+    scenario : Scenario
+        What was solved.
+    folders : dict of str to Path
+        Bake folder of each sensor, by the sensor's name.
+    """
 
     recording: Recording
     scenario: Scenario
     folders: dict[str, Path]
 
 
-def bake(scene, into_scene: bool = True) -> Generator[Progress, None, BakeResult]:
-    """Compute the whole frame range of a scene, write its files, and put the result into the scene.
+def bake(scene, into_scene: bool = True) -> Job[BakeResult]:
+    """Compute the whole frame range of a scene, write the files, and put the result into the scene.
 
-    With `into_scene` False only files are written, also of objects that are linked and could not hold a bake.
+    Nothing in the scene changes before the last step, and an earlier bake stays as it is until then: closing the generator, an
+    error or a kill leaves either the old bake or the new one. After a kill, the next bake of the same scene continues where the
+    killed one stopped.
 
-    Until the last step nothing in the scene changes, and an earlier bake stays as it is: closing the generator, an error and a
-    kill leave the old or the new bake, never half of one. After a kill the next bake of the same scene goes on where it was.
+    Parameters
+    ----------
+    scene : Scene
+    into_scene : bool
+        False writes the files only. Use it where objects are linked from other files and cannot show a bake.
 
     Raises
     ------
     PalpateError
-        Before anything is touched when the scene or the bake folder is not fit; later when the folder fills up or an
-        object that takes part is deleted.
+        Before anything changes, if the scene or the bake folder is unsuitable; later, if the folder fills up or if the user
+        deletes an object that takes part.
     """
     with session_state.suspended():
         try:
-            return (yield from _bake(scene, scene.name, into_scene))
+            return (yield from part_of_job(_bake(scene, into_scene), _note_for_panel))
         finally:
             session_state.session.bake = None
 
 
-def _bake(scene, name: str, into_scene: bool) -> Generator[Progress, None, BakeResult]:
-    folder = bake_files.bake_folder(scene)
-    bake_files.check_folder(folder)
-    total = 2 * max(1, scene.frame_end - scene.frame_start + 1)
-
-    with texel_arrows.hidden_arrows(scene):
-        reading = scene_reader.sample_scenario(scene)
-        scenario, binding = yield from part_of_job(
-            reading, lambda step: _noted(replace(step, stage="Reading the scene", total=total))
-        )
-
+def _bake(scene, into_scene: bool) -> Job[BakeResult]:
+    """Do the steps of a bake, each in the room that owns it."""
+    name = scene.name
+    folder = bake_files.writable_bake_folder(scene)
+    scenario, binding = yield from _sample(scene)
     if into_scene:
         scene_writer.check_writable(scene, scenario, binding)
-    yield from part_of_job(first_use.wait(), _noted)
-    solver = dependencies.solver()
-    simulation = solver.Simulation(scenario)
-    files = bake_files.BakeFiles(folder, scenario, bpy.data.filepath)
-    try:
-        frames = files.resume(simulation)
-        job = solver.solve(scenario, simulation, frames)
-        while True:
-            try:
-                step = next(job)
-            except StopIteration as stop:
-                recording = stop.value
-                break
-            files.write_frame(frames[-1])
-            files.save_checkpoint(simulation, frames)
-            binding.objects(_still_there(name))
-            yield _noted(replace(step, done=total // 2 + step.done, total=total))
-        recording = replace(recording, warnings=binding.warnings + recording.warnings)
-        scene = _still_there(name)
-        binding.objects(scene)
+    yield from first_use.wait()
+    simulation = dependencies.solver().Simulation(scenario)
+    with bake_files.BakeFiles(folder, scenario, bpy.data.filepath) as files:
+        recording = yield from _solve(name, simulation, binding, files)
         files.finish(recording)
-    except BaseException:
-        files.discard()
-        raise
     if into_scene:
-        scene_writer.write(scene, scenario, binding, recording, files.folders)
-        scene.frame_set(scene.frame_current, subframe=scene.frame_subframe)  # the new keyframes show
-        playback.baked(scene, recording, files.folders)
+        _show(_scene_called(name), scenario, binding, recording, files.folders)
     return BakeResult(recording, scenario, files.folders)
 
 
-def _noted(progress: Progress) -> Progress:
-    """Note the progress for the panel and return it."""
+def _sample(scene) -> Job[tuple[Scenario, scene_reader.Binding]]:
+    """Read the scene over its whole frame range: the first half of the work."""
+    total = _total_steps(scene.frame_start, scene.frame_end)
+    with texel_arrows.hidden_arrows(scene):
+        return (
+            yield from part_of_job(
+                scene_reader.sample_scenario(scene), lambda step: replace(step, stage="Reading the scene", total=total)
+            )
+        )
+
+
+def _solve(name: str, simulation, binding: scene_reader.Binding, files: bake_files.BakeFiles) -> Job[Recording]:
+    """Compute forces and readings frame by frame, and write each frame while the next is computed: the second half."""
+    scenario = simulation.scenario
+    total = _total_steps(scenario.frame_start, scenario.frame_end)
+    frames = files.resume(simulation)
+
+    def write_frame(step: Progress) -> Progress:
+        files.write_frame(frames[-1])
+        files.save_checkpoint(simulation, frames)
+        binding.objects(_scene_called(name))  # raises if the user has deleted one
+        return replace(step, done=total // 2 + step.done, total=total)
+
+    recording = yield from part_of_job(dependencies.solver().solve(scenario, simulation, frames), write_frame)
+    binding.objects(_scene_called(name))
+    return replace(recording, warnings=binding.warnings + recording.warnings)
+
+
+def _show(scene, scenario: Scenario, binding: scene_reader.Binding, recording: Recording, folders: dict[str, Path]) -> None:
+    """Put the result into the scene and evaluate the present frame again, so that the new keyframes take effect."""
+    scene_writer.write(scene, scenario, binding, recording, folders)
+    scene.frame_set(scene.frame_current, subframe=scene.frame_subframe)
+    playback.baked(scene, recording, folders)
+
+
+def _total_steps(frame_start: int, frame_end: int) -> int:
+    """Return the steps of a bake: each frame is read and solved."""
+    return 2 * max(1, frame_end - frame_start + 1)
+
+
+def _note_for_panel(progress: Progress) -> Progress:
     session_state.session.bake = progress
     return progress
 
 
-def _still_there(name: str):
+def _scene_called(name: str):
+    """Return the scene that is being baked; looked up by name, because the user may delete it meanwhile."""
     scene = bpy.data.scenes.get(name)
     if scene is None:
         raise SceneError(f"Scene '{name}' was deleted or renamed while it was baked: undo that, or start again.")

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a bake puts aside while it runs, so that one that was killed goes on where it was.
+"""The checkpoint of a running bake: after a kill, the next bake of the same scene continues from it.
 
-A folder beside those of the sensors holds the frames so far, in pieces, and the solver's state at the last of them. The state
-is written after its frames and names how many pieces belong to it: a kill in between leaves the earlier state, as good a one.
+A folder beside those of the sensors holds the frames so far, in pieces, and the state of the solver after the last of them. The
+state is written after its frames and says how many pieces belong to it, so a kill between the two leaves the previous
+checkpoint valid.
 """
 
 from __future__ import annotations
@@ -25,62 +26,62 @@ from ...core.solver import checkpoint
 CHECKPOINT_FOLDER = "unfinished.partial"
 STATE_FILE = "state.npz"
 CHECKPOINT_INTERVAL = 5.0
-"""Seconds of work between two states: what a kill costs at the most, beside the reading of the scene."""
+"""Seconds between two checkpoints: a kill loses no more solver time than this."""
 
 
 class BakeCheckpoint:
-    """The folder of one running bake.
+    """The checkpoint folder of one running bake.
 
     Parameters
     ----------
     folder : Path
         The bake folder.
     digest : str
-        Of the scenario: a state of another one is of no use.
+        Digest of the scenario. A checkpoint of another scenario is ignored.
     """
 
     def __init__(self, folder: Path, digest: str):
-        self.place = folder / CHECKPOINT_FOLDER
+        self.folder = folder / CHECKPOINT_FOLDER
         self._key = {"palpate": __version__, "digest": digest}
-        self._pieces = 0
-        self._kept = 0
-        self._last = time.monotonic()
+        self._saved_pieces = 0
+        self._saved_frames = 0
+        self._last_save = time.monotonic()
 
     def restore(self, simulation) -> list[Frame] | None:
-        """Bring a new simulation to where a killed bake was, and return the frames so far; None when there is none."""
+        """Bring a new simulation to the checkpoint and return the frames so far; None if there is no usable checkpoint."""
         try:
-            with np.load(self.place / STATE_FILE, allow_pickle=False) as members:
+            with np.load(self.folder / STATE_FILE, allow_pickle=False) as members:
                 packed = {name: members[name] for name in members.files}
             about = json.loads(str(packed.pop("about")))
             if about["key"] != self._key:
                 return None
-            pieces = [load_recording(self.place / _piece(i)) for i in range(about["pieces"])]
+            pieces = [load_recording(self.folder / _piece(i)) for i in range(about["pieces"])]
             frames = [piece.at(int(number)) for piece in pieces for number in piece.frames]
             checkpoint.unpack(simulation, packed)
         except (OSError, FileError, *DAMAGED):
-            return None  # begun anew, nothing is lost but time
-        self._pieces, self._kept = len(pieces), len(frames)
+            return None  # the bake starts again, which costs only time
+        self._saved_pieces, self._saved_frames = len(pieces), len(frames)
         return frames
 
     def is_due(self, frames: list[Frame]) -> bool:
-        """Whether enough work has come together to be put aside."""
-        return time.monotonic() - self._last >= CHECKPOINT_INTERVAL and len(frames) > self._kept
+        """Return True if the last checkpoint is old enough and there are new frames."""
+        return time.monotonic() - self._last_save >= CHECKPOINT_INTERVAL and len(frames) > self._saved_frames
 
     def save(self, simulation, frames: list[Frame]) -> None:
-        """Put the work aside."""
-        self.place.mkdir(exist_ok=True)
+        """Save the frames since the last checkpoint and the present state of the solver."""
+        self.folder.mkdir(exist_ok=True)
         names = [body.name for body in simulation.scenario.bodies]
-        piece = Recording.stack(frames[self._kept :], names, simulation.dt)
-        save_recording(self.place / _piece(self._pieces), piece)
-        about = {"key": self._key, "pieces": self._pieces + 1}
-        with atomic_write(self.place / STATE_FILE) as temporary, open(temporary, "wb") as file:
+        piece = Recording.stack(frames[self._saved_frames :], names, simulation.dt)
+        save_recording(self.folder / _piece(self._saved_pieces), piece)
+        about = {"key": self._key, "pieces": self._saved_pieces + 1}
+        with atomic_write(self.folder / STATE_FILE) as temporary, open(temporary, "wb") as file:
             np.savez(file, about=np.array(json.dumps(about)), **checkpoint.pack(simulation))
-        self._pieces, self._kept = self._pieces + 1, len(frames)
-        self._last = time.monotonic()
+        self._saved_pieces, self._saved_frames = self._saved_pieces + 1, len(frames)
+        self._last_save = time.monotonic()
 
     def remove(self) -> None:
-        """Remove it: the bake is finished, or was stopped on purpose."""
-        shutil.rmtree(self.place, ignore_errors=True)
+        """Remove the checkpoint, because the bake has finished or was cancelled."""
+        shutil.rmtree(self.folder, ignore_errors=True)
 
 
 def _piece(number: int) -> str:

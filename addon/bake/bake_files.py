@@ -1,23 +1,20 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The files of a bake. They grow in folders named ``<sensor>.partial``, which take the sensors' places when all is done.
+"""The files of a bake: images are written frame by frame into temporary folders, which replace the old ones at the end.
 
-A kill at any moment leaves the old bake or the new one, and an unfinished one that the next bake goes on with
-(:mod:`.bake_checkpoint`). Between the two renames of a swap the old one is called
-``<sensor>.old``; the next bake puts that right. What the user has put into a sensor's folder moves on into the new one. Then
-the old one is removed while the user goes on (:func:`wait_for_removals` waits for it): that may take as long as the bake.
+A kill at any moment leaves either the old bake or the new one (:mod:`.folder_swap`), and a checkpoint from which the next bake
+continues (:mod:`.bake_checkpoint`).
 """
 
 from __future__ import annotations
 
 import math
 import os
-import re
 import shutil
-import threading
-from contextlib import suppress
 from dataclasses import asdict, replace
 from functools import partial
 from pathlib import Path
+
+import bpy
 
 from ... import __version__
 from ...core.errors import FileError
@@ -37,18 +34,16 @@ from ...core.io.tactile_exr import describe, write_exrs
 from ...core.model.recording import Frame, Recording
 from ...core.model.scenario import Scenario
 from ...core.model.sensor import Sensor
+from . import folder_swap
 from .background_writer import BackgroundWriter
 from .bake_checkpoint import BakeCheckpoint
 from .folder_lock import FolderLock
+from .folder_swap import partial_folder
 
-BAKE_FILE_NAMES = re.compile(rf"tactile_-?\d+\.exr|{'|'.join(map(re.escape, (RECORDING_NAME, SENSOR_NAME, MANIFEST_NAME)))}")
-"""Names of the files in a sensor's folder that a bake writes and replaces."""
 MAX_BATCH_IMAGES, MAX_BATCH_PIXELS = 16, 16384
-"""Most images of a sensor, and pixels in them, that are written together: small ones cost little more than one then."""
+"""Most images of one sensor that are written together, and most pixels in them: one call for many small images is faster."""
 CAN_SYNC_ALL = hasattr(os, "sync")
-"""Whether all that was written can be brought onto the disk at once; else it is done file by file."""
-
-_removals: list[threading.Thread] = []
+"""True where one call brings all written files onto the disk; elsewhere each file is synchronised by itself."""
 
 
 def bake_folder(scene) -> Path:
@@ -57,10 +52,8 @@ def bake_folder(scene) -> Path:
     Raises
     ------
     FileError
-        It is relative to a .blend that has not been saved yet, or empty.
+        The folder is empty, or relative to a .blend that has not been saved yet.
     """
-    import bpy
-
     text = scene.palpate.folder
     if not text.strip():
         raise FileError(f"The bake folder of '{scene.name}' is empty: name one in Physics › Palpate › Bake.")
@@ -69,27 +62,40 @@ def bake_folder(scene) -> Path:
     return Path(bpy.path.abspath(text))
 
 
-def check_folder(folder: Path) -> None:
-    """Raise FileError when a bake could not be written to `folder`, which need not be there yet. Nothing is made."""
-    writable_folder(folder if folder.exists() else folder.parent)
-
-
-class BakeFiles:
-    """The growing files of one bake.
-
-    Parameters
-    ----------
-    folder : Path
-        The bake folder; made when only it is missing.
-    scenario : Scenario
-    blend : str
-        Path of the .blend that is baked; empty when it has none.
+def writable_bake_folder(scene) -> Path:
+    """Return the absolute bake folder of a scene, which need not exist yet. Nothing is created.
 
     Raises
     ------
     FileError
-        The folder cannot be made or written to, another bake is writing to it, or a sensor's folder holds something that must
-        not be replaced.
+        As :func:`bake_folder`, or a bake could not be written there.
+    """
+    folder = bake_folder(scene)
+    writable_folder(folder if folder.exists() else folder.parent)
+    return folder
+
+
+class BakeFiles:
+    """The files of one bake while it runs; as a context manager it discards them if the body raises.
+
+    Parameters
+    ----------
+    folder : Path
+        The bake folder. It is created if its parent exists.
+    scenario : Scenario
+    blend : str
+        Path of the .blend that is baked; empty if the scene has not been saved.
+
+    Attributes
+    ----------
+    folders : dict of str to Path
+        Folder of each sensor that is read out, by the sensor's name.
+
+    Raises
+    ------
+    FileError
+        The folder cannot be created or written to, another bake is writing to it, or a sensor's folder holds something that
+        must not be replaced.
     """
 
     def __init__(self, folder: Path, scenario: Scenario, blend: str = ""):
@@ -102,12 +108,12 @@ class BakeFiles:
         self._lock = FolderLock(self.folder)
         self._checkpoint = BakeCheckpoint(self.folder, self._digest)
         self._writer = BackgroundWriter()
-        self._waiting: list[Frame] = []
-        wait_for_removals()
+        self._unwritten: list[Frame] = []
+        folder_swap.wait_for_removals()
         try:
-            for place in self.folders.values():
-                _finish_interrupted_swap(place)
-                self._check_replaceable(place)
+            for sensor_folder in self.folders.values():
+                folder_swap.repair(sensor_folder)
+                _check_replaceable(sensor_folder, self._blend)
         except FileError:
             self.discard()
             raise
@@ -115,36 +121,104 @@ class BakeFiles:
             self.discard()
             raise _write_error(self.folder, error) from error
 
+    def __enter__(self) -> BakeFiles:
+        return self
+
+    def __exit__(self, error_type, *_) -> None:
+        if error_type is not None:
+            self.discard()
+
     def resume(self, simulation) -> list[Frame]:
-        """Bring a new simulation to where a killed bake of the same scenario was, and return its frames, if there are any.
+        """Bring a new simulation to the checkpoint of a killed bake of the same scenario.
+
+        Returns
+        -------
+        list of Frame
+            The frames up to the checkpoint; empty if there is none.
 
         Raises
         ------
         FileError
-            The folders cannot be made.
+            The temporary folders cannot be created.
         """
-        growing = [_sibling(place, "partial") for place in self.folders.values()]
-        frames = self._checkpoint.restore(simulation) if all(place.is_dir() for place in growing) else None
+        partials = [partial_folder(folder) for folder in self.folders.values()]
+        frames = self._checkpoint.restore(simulation) if all(folder.is_dir() for folder in partials) else None
         try:
             if frames is None:
-                self._clean()
-                for place in growing:
-                    place.mkdir()
+                self._remove_unfinished()
+                for folder in partials:
+                    folder.mkdir()
         except OSError as error:
             raise _write_error(self.folder, error) from error
         return frames or []
 
+    def write_frame(self, frame: Frame) -> None:
+        """Write the tactile image of every sensor, some frames together, while the solver continues."""
+        self._unwritten.append(frame)
+        pixels = max((math.prod(sensor.texels.layout.shape) for sensor in self._sensors.values()), default=1)
+        if len(self._unwritten) >= min(MAX_BATCH_IMAGES, MAX_BATCH_PIXELS // pixels):
+            self._submit_images()
+
     def save_checkpoint(self, simulation, frames: list[Frame]) -> None:
-        """Put the work so far aside, every few seconds, for the case that the process is killed."""
+        """Save the frames and the state of the solver, if the last checkpoint is some seconds old."""
         if self._checkpoint.is_due(frames):
-            self._write_waiting()
-            self._writer.finish()  # a state belongs to images that are there
+            self._submit_images()
+            self._writer.finish()  # the images of a checkpoint have to exist before it
             self._checkpoint.save(simulation, frames)
 
-    def _manifest(self, name: str, recording: Recording) -> Manifest:
-        sensor, scenario = self._sensors[name], self._scenario
+    def finish(self, recording: Recording) -> None:
+        """Write the recordings, then let the new folders replace the old ones: all of them or none.
+
+        Raises
+        ------
+        FileError
+            A file cannot be written, or a folder cannot be replaced. The old bake is unchanged.
+        """
+        self._submit_images()
+        for name, folder in self.folders.items():
+            self._write_recording(name, partial_folder(folder), recording)
+        self._writer.finish()
+        self._writer.stop()
+        for folder in self.folders.values():
+            _check_replaceable(folder, self._blend)  # again, because the user may have put files there during the bake
+        if CAN_SYNC_ALL:
+            os.sync()  # once for all files, because nobody sees them before the swap
+        try:
+            folder_swap.swap(list(self.folders.values()))
+            self._checkpoint.remove()
+        except OSError as error:
+            raise _write_error(self.folder, error) from error
+        self._lock.release()
+
+    def discard(self) -> None:
+        """Remove the unfinished files and release the folder."""
+        self._writer.stop()
+        self._remove_unfinished()
+        self._lock.release()
+
+    def _submit_images(self) -> None:
+        """Hand the images of the frames so far to the writer's thread."""
+        frames, self._unwritten = self._unwritten, []
+        for name, folder in self.folders.items():
+            if frames:
+                self._writer.submit(partial(self._write_images, self._sensors[name], partial_folder(folder), frames))
+
+    def _write_images(self, sensor: Sensor, folder: Path, frames: list[Frame]) -> None:
+        paths = [folder / frame_file(frame.frame) for frame in frames]
+        headers = [describe(sensor, frame, self._digest) for frame in frames]
+        write_exrs(paths, sensor.texels.layout, [frame.sensors[sensor.name] for frame in frames], headers)
+
+    def _write_recording(self, name: str, folder: Path, recording: Recording) -> None:
+        """Write the recording of one sensor, what its texels are, and the manifest."""
+        sensor, atomic = self._sensors[name], not CAN_SYNC_ALL
+        save_recording(folder / RECORDING_NAME, replace(recording, sensors={name: recording.sensors[name]}), atomic=atomic)
+        save_sensor(folder / SENSOR_NAME, sensor.texels, sensor.painted, atomic=atomic)
+        write_manifest(folder, self._manifest(sensor, recording), atomic=atomic)
+
+    def _manifest(self, sensor: Sensor, recording: Recording) -> Manifest:
+        scenario = self._scenario
         return Manifest(
-            sensor=name,
+            sensor=sensor.name,
             palpate=__version__,
             frame_start=scenario.frame_start,
             frame_end=scenario.frame_end,
@@ -161,149 +235,38 @@ class BakeFiles:
             step_reason=recording.step_reason,
         )
 
-    def write_frame(self, frame: Frame) -> None:
-        """Write the tactile image of every sensor, some frames at a time, while the solver goes on."""
-        self._waiting.append(frame)
-        pixels = max((math.prod(sensor.texels.layout.shape) for sensor in self._sensors.values()), default=1)
-        if len(self._waiting) >= min(MAX_BATCH_IMAGES, MAX_BATCH_PIXELS // pixels):
-            self._write_waiting()
-
-    def _write_waiting(self) -> None:
-        frames, self._waiting = self._waiting, []
-        for name, place in self.folders.items():
-            if frames:
-                self._writer.submit(partial(self._write_images, self._sensors[name], _sibling(place, "partial"), frames))
-
-    def _write_images(self, sensor: Sensor, folder: Path, frames: list[Frame]) -> None:
-        paths = [folder / frame_file(frame.frame) for frame in frames]
-        about = [describe(sensor, frame, self._digest) for frame in frames]
-        write_exrs(paths, sensor.texels.layout, [frame.sensors[sensor.name] for frame in frames], about)
-
-    def finish(self, recording: Recording) -> None:
-        """Write the recordings, and let the new folders take the place of the old ones: all of them, or none."""
-        self._write_waiting()
-        for name, place in self.folders.items():
-            growing = _sibling(place, "partial")
-            own, sensor = replace(recording, sensors={name: recording.sensors[name]}), self._sensors[name]
-            save_recording(growing / RECORDING_NAME, own, atomic=not CAN_SYNC_ALL)
-            save_sensor(growing / SENSOR_NAME, sensor.texels, sensor.painted, atomic=not CAN_SYNC_ALL)
-            write_manifest(growing, self._manifest(name, recording), atomic=not CAN_SYNC_ALL)
-        self._writer.finish()
-        self._writer.stop()
-        for place in self.folders.values():
-            self._check_replaceable(place)  # again: a bake takes long enough for somebody to put something there
-        if CAN_SYNC_ALL:
-            os.sync()  # once for all files: nobody sees them before the swap
-        try:
-            _swap(list(self.folders.values()))
-            self._checkpoint.remove()
-        except OSError as error:
-            raise _write_error(self.folder, error) from error
-        self._lock.release()
-
-    def discard(self) -> None:
-        """Remove what is unfinished."""
-        self._writer.stop()
-        self._clean()
-        self._lock.release()
-
-    def _clean(self) -> None:
+    def _remove_unfinished(self) -> None:
         self._checkpoint.remove()
-        for place in self.folders.values():
-            shutil.rmtree(_sibling(place, "partial"), ignore_errors=True)
-
-    def _check_replaceable(self, place: Path) -> None:
-        if not place.exists():
-            return
-        if not (place / MANIFEST_NAME).exists():
-            if any(place.iterdir()):
-                raise FileError(f"'{place}' holds other files than a bake: rename it, or choose another bake folder.")
-            return
-        other = _other_blend(place, self._blend)
-        if other:
-            raise FileError(
-                f"'{place}' holds the bake of '{other}', which lies beside '{self._blend.name}': choose another bake folder."
-            )
+        for folder in self.folders.values():
+            shutil.rmtree(partial_folder(folder), ignore_errors=True)
 
 
-def _sibling(place: Path, ending: str) -> Path:
-    return place.with_name(f"{place.name}.{ending}")
+def _check_replaceable(folder: Path, blend: Path | None) -> None:
+    """Raise FileError if a sensor's folder holds other files than a bake, or the bake of another .blend beside this one."""
+    if not folder.exists():
+        return
+    if not (folder / MANIFEST_NAME).exists():
+        if any(folder.iterdir()):
+            raise FileError(f"'{folder}' holds other files than a bake: rename it, or choose another bake folder.")
+        return
+    other = _other_blend(folder, blend) if blend else ""
+    if other:
+        raise FileError(
+            f"'{folder}' holds the bake of '{other}', which lies beside '{blend.name}': choose another bake folder."
+        )
 
 
-def _finish_interrupted_swap(place: Path) -> None:
-    """Put right what a kill left of a swap: one that was cut in two is taken back."""
-    old = _sibling(place, "old")
-    if old.exists() and not place.exists():
-        old.rename(place)
-    if old.exists():
-        _move_foreign_files(old, place)
-        shutil.rmtree(old)
-
-
-def _other_blend(place: Path, blend: Path | None) -> str:
-    """Return the name of another .blend in the same folder whose bake is at `place`; empty when there is none."""
+def _other_blend(folder: Path, blend: Path) -> str:
+    """Return the name of another .blend beside `blend` whose bake is in `folder`; empty if there is none."""
     try:
-        name = read_manifest(place).scene_file
+        name = read_manifest(folder).scene_file
     except FileError:
-        return ""  # a bake that nobody can read may be replaced
-    if blend is None or not name or name == blend.name:
+        return ""  # a bake that cannot be read may be replaced
+    if not name or name == blend.name:
         return ""
     other = blend.with_name(name)
-    # where case does not count, the old name of a renamed file is still found
+    # On a file system that ignores case, the old name of a renamed file still leads to the file.
     return name if other.is_file() and not (blend.exists() and other.samefile(blend)) else ""
-
-
-def _swap(places: list[Path]) -> None:
-    """Put the new folders where the old ones are; when one of them cannot be moved, those moved before it go back."""
-    try:
-        for place in places:
-            if place.exists():
-                place.rename(_sibling(place, "old"))
-            _sibling(place, "partial").rename(place)
-    except BaseException:
-        for place in places:
-            with suppress(OSError):
-                _swap_back(place)
-        raise
-    emptied = []
-    for place in places:
-        old = _sibling(place, "old")
-        with suppress(OSError):  # the new bake is there; what could not be moved waits in the old folder for the next
-            if old.exists():
-                _move_foreign_files(old, place)
-                emptied.append(old)
-    _remove_in_background(emptied)
-
-
-def _remove_in_background(folders: list[Path]) -> None:
-    """Remove folders while the user goes on; Blender, or the command, does not end before it is done."""
-    if folders:
-        work = threading.Thread(
-            target=lambda: [shutil.rmtree(old, ignore_errors=True) for old in folders], name="palpate-remover", daemon=False
-        )
-        _removals.append(work)
-        work.start()
-
-
-def wait_for_removals() -> None:
-    """Return when the folders of bakes that were replaced are gone."""
-    while _removals:
-        _removals.pop().join()
-
-
-def _swap_back(place: Path) -> None:
-    partial, old = _sibling(place, "partial"), _sibling(place, "old")
-    if not partial.exists():
-        place.rename(partial)
-    if old.exists() and not place.exists():
-        old.rename(place)
-
-
-def _move_foreign_files(old: Path, new: Path) -> None:
-    """Move what no bake has written from one sensor's folder to another, unless something there has its name."""
-    for path in old.iterdir():
-        if not BAKE_FILE_NAMES.fullmatch(path.name) and not (new / path.name).exists():
-            path.rename(new / path.name)
 
 
 def _write_error(folder: Path, error: OSError) -> FileError:

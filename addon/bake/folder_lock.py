@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One bake at a time writes into a folder; two would mix their images in one unfinished sensor.
+"""A file lock on the bake folder: two bakes at once would mix their images in one unfinished folder.
 
-A lock of the operating system's is held on a file in the folder, so that a killed bake lets go as well.
+The operating system holds the lock, so a bake that is killed releases it.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ LOCK_FILE_NAME = "baking.lock"
 
 
 class FolderLock:
-    """The right to write into a bake folder, until it is given back.
+    """An exclusive lock on a bake folder, held until it is released.
 
     Raises
     ------
     FileError
-        Another bake has it.
+        Another bake holds it.
     """
 
     def __init__(self, folder: Path):
@@ -30,32 +30,32 @@ class FolderLock:
         self._file: IO[bytes] | None = None
         while self._file is None:
             try:
-                file = open(self._path, "ab")  # noqa: SIM115 - it stays open as long as the folder is claimed
+                file = open(self._path, "ab")  # noqa: SIM115 - it stays open as long as the lock is held
             except OSError:
-                return  # a folder that takes no file is told of where the bake's own are written
+                return  # the folder is not writable: writing the bake's own files will say so
             if not _lock(file):
                 file.close()
                 raise FileError(f"Another bake is writing to '{folder}': wait for it, or choose another bake folder.")
-            if _is_still(self._path, file):
+            if _is_same_file(self._path, file):
                 self._file = file
-            else:  # whoever held it has just removed it
+            else:  # the bake that held the lock has just removed the file: create it again
                 file.close()
 
     def release(self) -> None:
-        """Let others bake there; nothing is left behind."""
+        """Release the lock and remove its file."""
         file, self._file = self._file, None
         if file is None:
             return
-        with suppress(OSError):  # while it is held, so that nobody else's is removed
+        with suppress(OSError):  # removed while the lock is held, so that it cannot be another bake's file
             self._path.unlink()
         file.close()
-        if os.name == "nt":  # where open files cannot be removed, another bake's neither
+        if os.name == "nt":  # Windows cannot remove an open file, neither this one nor another bake's
             with suppress(OSError):
                 self._path.unlink()
 
 
 def _lock(file: IO[bytes]) -> bool:
-    """Lock an open file unless somebody else has; where locks are not supported nobody has."""
+    """Lock an open file; return False if another process holds the lock. True where locks are not supported."""
     if os.name == "nt":
         import msvcrt
 
@@ -70,13 +70,13 @@ def _lock(file: IO[bytes]) -> bool:
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
         return False
-    except OSError:  # some network folders
+    except OSError:  # some network file systems support no locks
         pass
     return True
 
 
-def _is_still(path: Path, file: IO[bytes]) -> bool:
-    """Whether a path leads to an open file."""
+def _is_same_file(path: Path, file: IO[bytes]) -> bool:
+    """Return True if the path still leads to this open file."""
     try:
         return os.path.samestat(os.stat(path), os.fstat(file.fileno()))
     except OSError:

@@ -5,4 +5,14 @@ What a bake shows is stored in the .blend as Blender's own materials, node group
 Palpate is not installed. What playing shows is drawn over the 3D view and is part of no file.
 """
 
-__all__ = ["bake_display", "baked_scene", "heat_map", "inset", "markers", "materials", "overlays", "texel_arrows"]
+__all__ = [
+    "bake_display",
+    "baked_scene",
+    "baked_sensor",
+    "heat_map",
+    "inset",
+    "markers",
+    "materials",
+    "overlays",
+    "texel_arrows",
+]

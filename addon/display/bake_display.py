@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the scene shows of a bake: heat maps, markers and arrows, all sensors on one scale.
+"""What the scene shows of a bake: heat maps, markers and arrows, with the same scales for all sensors.
 
-Made when a scene is baked, and made anew from the bake's files when only the display's settings have changed.
+:func:`show_bake` makes them when a scene is baked. :func:`refresh` makes them again from the files of the bake, after the
+settings of the display have changed.
 """
 
 from __future__ import annotations
@@ -19,31 +20,33 @@ from ...core.io.bake_reader import Bake, read_sensors
 from ...core.response import metrics
 from ..session import units
 from . import heat_map, markers, materials, texel_arrows
+from .baked_sensor import BakedSensor
 
 MIN_COLOR_RANGE = 1e-6
-"""Newtons, or pascals, at the end of the heat maps of sensors that nothing touched."""
+"""End of the colours, N or Pa, if nothing touched any sensor."""
 LONGEST_TEXEL_ARROW = 0.2
-"""Longest arrow of a texel, in sizes of the largest sensor, where its length is chosen automatically."""
+"""Automatic length of the longest arrow of a texel, as a share of the largest sensor's size."""
 FACING_COSINE = 0.7
-"""Cosine of the angle within which the force of one sensor points at another."""
+"""Cosine of the largest angle between a force and the direction to another sensor at which it points at that sensor."""
 FACING_ARROWS_SHARE = 0.94
-"""Of the way between two such sensors that their arrows take up together."""
+"""Share of the distance between two sensors facing each other that their arrows may take up together."""
 
 
 @dataclass(frozen=True)
 class Scales:
-    """What all sensors of a scene share.
+    """Scales that all sensors of a scene share.
 
     Attributes
     ----------
     maximum : float, N or Pa
         End of the colours.
     force, moment : float
-        Blender units per newton and per newton metre, of the large arrows.
+        Blender units per newton and per newton metre, for the markers.
     texel : dict of str to float
-        Blender units per newton of the arrows at the texels, by kind: shear is much smaller than what presses.
+        Blender units per newton for the arrows at the texels, by kind. Each kind has its own, because shear forces are much
+        smaller than normal forces.
     longest : dict of str to float
-        Longest of these, Blender units.
+        Length of the longest of these arrows by kind, Blender units.
     """
 
     maximum: float
@@ -53,15 +56,15 @@ class Scales:
     longest: dict[str, float]
 
     @classmethod
-    def of(cls, settings, baked_sensors: list[markers.BakedSensor]) -> Scales:
-        """Choose the scales for all sensors of a scene, or take those that are set."""
+    def of(cls, settings, baked_sensors: list[BakedSensor]) -> Scales:
+        """Return the scales that the settings name, or choose them automatically."""
         size = max((item.size for item in baked_sensors), default=1.0)
         unit = baked_sensors[0].scale if baked_sensors else 1.0
-        net = _largest(np.linalg.norm(item.readings.net_force, axis=1) for item in baked_sensors)
-        turn = _largest(np.linalg.norm(metrics.free_moment(item.readings), axis=1) for item in baked_sensors)
+        largest_force = _largest(np.linalg.norm(item.readings.net_force, axis=1) for item in baked_sensors)
+        largest_moment = _largest(np.linalg.norm(metrics.free_moment(item.readings), axis=1) for item in baked_sensors)
         force = units.as_typed(settings.arrow_scale) / unit
         if settings.use_auto_arrow:
-            force = min(size / net, _max_scale_of_facing_arrows(baked_sensors)) if net > 0 else 0.0
+            force = min(size / largest_force, _max_scale_of_facing_arrows(baked_sensors)) if largest_force > 0 else 0.0
         peaks = {
             "NORMALS": _largest(item.readings.normal_force for item in baked_sensors),
             "SHEARS": _largest(np.linalg.norm(item.readings.shear, axis=2) for item in baked_sensors),
@@ -70,32 +73,35 @@ class Scales:
         if settings.use_auto_arrow:
             texel = {kind: LONGEST_TEXEL_ARROW * size / peak if peak > 0 else 0.0 for kind, peak in peaks.items()}
         longest = {kind: texel[kind] * peak for kind, peak in peaks.items()}
-        moment = 0.6 * size / turn if turn > 0 else 0.0
+        moment = 0.6 * size / largest_moment if largest_moment > 0 else 0.0
         return cls(color_range(settings, baked_sensors), force, moment, texel, longest)
 
 
-def _max_scale_of_facing_arrows(baked_sensors: list[markers.BakedSensor]) -> float:
-    """Return the Blender units per newton up to which arrows of sensors that face each other, as in a grasp, do not cross."""
-    room = np.inf
-    ways = [item.in_world() for item in baked_sensors]
-    touching = [item.readings.contact.any(axis=1) for item in baked_sensors]
+def _max_scale_of_facing_arrows(baked_sensors: list[BakedSensor]) -> float:
+    """Return the largest scale, Blender units per newton, at which arrows of sensors that face each other do not meet.
+
+    Sensors face each other in a grasp: each pushes towards the other.
+    """
+    limit = np.inf
+    reactions = [item.reactions() for item in baked_sensors]
+    touching = [item.in_contact for item in baked_sensors]
     for a, b in combinations(range(len(baked_sensors)), 2):
         frames = touching[a] & touching[b]
-        (from_a, push_a), (from_b, push_b) = ((foot[frames], push[frames]) for foot, push in (ways[a], ways[b]))
+        (from_a, push_a), (from_b, push_b) = ((foot[frames], push[frames]) for foot, push in (reactions[a], reactions[b]))
         distance = np.linalg.norm(from_b - from_a, axis=1)
         way = (from_b - from_a) / np.maximum(distance, 1e-12)[:, None]
         strengths = [np.maximum(np.linalg.norm(push, axis=1), 1e-12) for push in (push_a, push_b)]
         towards = (push_a * way).sum(axis=1) / strengths[0], -(push_b * way).sum(axis=1) / strengths[1]
         facing = (np.minimum(*towards) > FACING_COSINE) & (distance > 0)
-        room = min(room, (0.5 * FACING_ARROWS_SHARE * distance / np.maximum(*strengths))[facing].min(initial=np.inf))
-    return room
+        limit = min(limit, (0.5 * FACING_ARROWS_SHARE * distance / np.maximum(*strengths))[facing].min(initial=np.inf))
+    return limit
 
 
 def _largest(tables) -> float:
     return max((float(table.max(initial=0.0)) for table in tables), default=0.0)
 
 
-def color_range(settings, baked_sensors: list[markers.BakedSensor]) -> float:
+def color_range(settings, baked_sensors: list[BakedSensor]) -> float:
     """Return the end of the colour scale, N or Pa: as set, or as in figures (:meth:`.FigureStyle.scale_limit`)."""
     unit = 1e3 if settings.quantity == "PRESSURE" else 1.0
     if not settings.use_auto_range:
@@ -105,17 +111,17 @@ def color_range(settings, baked_sensors: list[markers.BakedSensor]) -> float:
 
 
 def user_range(settings) -> float:
-    """Return the end of the colours that is set, N or Pa."""
+    """Return the end of the colours from the settings, N or Pa."""
     return 1e3 * settings.range_max_pressure if settings.quantity == "PRESSURE" else settings.range_max
 
 
 def displayed_values(settings, normal_force: np.ndarray, texels) -> np.ndarray:
-    """Return what the colours show, N or Pa."""
+    """Return the values that the colours show, (n,) or (F, n) float, N or Pa."""
     return metrics.pressure(normal_force, texels) if settings.quantity == "PRESSURE" else normal_force
 
 
 def figure_style(scene, **others) -> FigureStyle:
-    """Return the look of figures that agree with what the scene shows."""
+    """Return a figure style that agrees with the colours in the scene; `others` are further fields of it."""
     own = scene.palpate
     limit = None
     if not own.use_auto_range:
@@ -123,22 +129,23 @@ def figure_style(scene, **others) -> FigureStyle:
     return FigureStyle(**{"colour_map": own.color_map, "quantity": own.quantity.lower(), "limit": limit, **others})
 
 
-def show_bake(scene, baked_sensors: list[markers.BakedSensor]) -> None:
-    """Put heat maps, markers and arrows on the sensors of a finished bake, replacing earlier ones."""
+def show_bake(scene, baked_sensors: list[BakedSensor]) -> None:
+    """Put heat maps, markers and arrows on the sensors of a finished bake; they replace earlier ones."""
     settings = scene.palpate
     scales = Scales.of(settings, baked_sensors)
+    colors = materials.ColorScale(scales.maximum, settings.color_map, settings.quantity == "PRESSURE")
     relative = settings.folder.startswith("//")
     for item in baked_sensors:
         obj, frames = item.obj, (int(item.frames[0]), int(item.frames[-1]))
         image = materials.load_sequence(obj.palpate.uid, item.folder / frame_file(frames[0]), relative)
-        heat_map.apply(obj, item.texels, image, frames, scales.maximum, settings.color_map, settings.quantity == "PRESSURE")
+        heat_map.apply(obj, item.texels, image, frames, colors)
         markers.keyframe_markers(scene, item, settings.overlays, {"FORCE": scales.force, "TORQUE": scales.moment})
         texel_arrows.build_arrows(scene, item, image, settings.overlays, scales.texel, scales.longest)
         obj.palpate.bake_folder = bpy.path.relpath(str(item.folder)) if relative else str(item.folder)
 
 
 def refresh(scene, places: dict) -> None:
-    """Dress a scene anew from the files of its bake.
+    """Make heat maps, markers and arrows again from the files of the bake.
 
     Parameters
     ----------
@@ -148,7 +155,7 @@ def refresh(scene, places: dict) -> None:
     Raises
     ------
     PalpateError
-        The files are gone, or do not fit the scene any more.
+        The files are missing, or no longer match the scene.
     """
     if not places:
         raise SceneError(f"Nothing is baked in '{scene.name}': bake first.")
@@ -165,7 +172,7 @@ def refresh(scene, places: dict) -> None:
         if len(obj.data.vertices) <= bake.texels[name].vertex.max():
             raise SceneError(f"The mesh of sensor '{obj.name}' has changed since it was baked: bake again.")
         baked_sensors.append(
-            markers.BakedSensor(
+            BakedSensor(
                 obj=obj,
                 body=body,
                 texels=bake.texels[name],

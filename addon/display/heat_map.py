@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A heat map on the region's faces of a sensor: texture coordinates, material slot, and the way back."""
+"""The heat map on the faces of a sensor's region: UV map, vertex attributes, material slot, and their removal."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from ..scene.meshes import OLD_MATERIAL
 from . import materials
 
 EMPTY_SLOT = "palpate_empty_slot"
-"""Custom property of a mesh that had no material slot."""
+"""Custom property of a mesh that had no material slot before."""
 
 
-def apply(obj, texels: Texels, image, frames: tuple[int, int], maximum: float, color_map: str, pressure: bool = False) -> None:
-    """Show a baked sequence on a sensor; an earlier bake's heat map is replaced.
+def apply(obj, texels: Texels, image, frames: tuple[int, int], scale: materials.ColorScale) -> None:
+    """Show a baked image sequence on a sensor; it replaces the heat map of an earlier bake.
 
     Parameters
     ----------
@@ -27,36 +27,32 @@ def apply(obj, texels: Texels, image, frames: tuple[int, int], maximum: float, c
     image : Image
         From :func:`.materials.load_sequence`.
     frames : (int, int)
-    maximum : float, N or Pa
-    color_map : str
-    pressure : bool
-        Colours show force over area.
+        First and last frame of the bake.
+    scale : ColorScale
     """
     clear(obj, keep_image=True)
     uid, mesh, layout = obj.palpate.uid, obj.data, texels.layout
-    own_map = isinstance(layout, UVLayout) and layout.map_name
-    uv = None if own_map else _one_uv_per_texel(texels)
-    on_vertices = uv is None and not own_map
+    user_map = isinstance(layout, UVLayout) and layout.map_name
+    uv = None if user_map else _one_uv_per_texel(texels)
+    on_vertices = uv is None and not user_map
     if on_vertices:
         _store_texel_uv(mesh, texels)
         _store_area(mesh, texels)
         modifier = obj.modifiers.new(HEAT_MAP_MODIFIER, "NODES")
         modifier.node_group = materials.force_node_group(uid, obj.name, image, frames)
-        obj.modifiers.move(len(obj.modifiers) - 1, 0)  # where the vertices are still the texels'
+        obj.modifiers.move(len(obj.modifiers) - 1, 0)  # before modifiers that would change the vertices
     elif uv is not None:
         _write_uv(mesh, texels, uv)
     area = None
-    if pressure:
+    if scale.pressure:
         area = materials.AREA if on_vertices else materials.area_image(uid, obj.name, layout.image(texels.area))
-    coordinates = materials.ImageMapping(own_map, not layout.nearest) if own_map else materials.ImageMapping()
-    material = materials.heat_map_material(
-        uid, obj.name, None if on_vertices else image, frames, maximum, color_map, area, coordinates
-    )
+    mapping = materials.ImageMapping(user_map, not layout.nearest) if user_map else materials.ImageMapping()
+    material = materials.heat_map_material(uid, obj.name, None if on_vertices else image, frames, scale, area, mapping)
     _assign(obj, texels, material)
 
 
 def clear(obj, keep_image: bool = False) -> None:
-    """Take the heat map off a sensor: its faces have their materials again, and nothing of ours is left."""
+    """Remove the heat map of a sensor: its faces get their materials back, and nothing of the heat map remains."""
     if obj.type != "MESH":
         return
     mesh, uid = obj.data, obj.palpate.uid
@@ -76,7 +72,7 @@ def clear(obj, keep_image: bool = False) -> None:
 
 
 def _one_uv_per_texel(texels: Texels) -> np.ndarray | None:
-    """(n, 2) texture coordinates; None when a texel has others in each of its triangles."""
+    """(n, 2) UV coordinates of the texels; None if a texel has different ones in different triangles."""
     layout = texels.layout
     uv = layout.uv()
     return uv if np.allclose(layout.corner_uv, uv[layout.triangles], atol=1e-9) else None
@@ -121,7 +117,7 @@ def region_faces(mesh, texels: Texels) -> np.ndarray:
 
 
 def _assign(obj, texels: Texels, material) -> None:
-    """Put the material on the region's faces, in a slot of the object, since its mesh may have other users."""
+    """Assign the material to the region's faces, in a slot of the object, because its mesh may have other users."""
     mesh = obj.data
     count = len(mesh.polygons)
     index = np.empty(count, dtype=np.int32)
@@ -130,7 +126,7 @@ def _assign(obj, texels: Texels, material) -> None:
     old = mesh.attributes.get(OLD_MATERIAL)
     if old is None:
         if not len(mesh.materials):
-            mesh.materials.append(None)  # the faces outside keep the look of an object without material
+            mesh.materials.append(None)  # faces outside the region continue to have no material
             mesh[EMPTY_SLOT] = 1
         mesh.materials.append(None)
         slot = len(mesh.materials) - 1
@@ -138,16 +134,16 @@ def _assign(obj, texels: Texels, material) -> None:
         old.data.foreach_set("value", np.where(faces, index, -1).astype(np.int32))
         mesh.polygons.foreach_set("material_index", np.where(faces, slot, index).astype(np.int32))
         mesh.update()
-    else:  # another object with this mesh shows its heat map there
+    else:  # another object with this mesh already shows a heat map in this slot
         slot = _slot_of(mesh)
     obj.material_slots[slot].link = "OBJECT"
     obj.material_slots[slot].material = material
 
 
 def _shown_slot(obj) -> int | None:
-    """Return the slot in which an object shows its heat map.
+    """Return the index of the slot in which an object shows its heat map; None if it shows none.
 
-    Found by our mark and not by the faces: these, the slots and what is in them may have been changed since.
+    The slot is found by the custom property of the material, since the user may have changed slots and faces.
     """
     for number, slot in enumerate(obj.material_slots):
         if slot.link == "OBJECT" and slot.material is not None and materials.SENSOR_KEY in slot.material:
@@ -156,13 +152,13 @@ def _shown_slot(obj) -> int | None:
 
 
 def _slot_of(mesh) -> int | None:
-    """Return the slot of the heat maps on a mesh; None when nobody shows one."""
+    """Return the index of the heat maps' slot on a mesh; None if no object with this mesh shows one."""
     shown = (_shown_slot(obj) for obj in bpy.data.objects if obj.data == mesh)
     return next((slot for slot in shown if slot is not None), None)
 
 
 def _unassign(obj) -> None:
-    """Give the faces their materials back, except those to which the user has given another since."""
+    """Give the faces their materials back, except faces to which the user has assigned another one since."""
     mesh = obj.data
     attribute, slot = mesh.attributes.get(OLD_MATERIAL), _slot_of(mesh)
     if attribute is None and slot is None:
@@ -175,17 +171,17 @@ def _unassign(obj) -> None:
     count = len(mesh.polygons)
     index, old = np.empty(count, dtype=np.int32), np.zeros(count, dtype=np.int32)
     mesh.polygons.foreach_get("material_index", index)
-    if attribute is not None:  # a mesh that was made anew, as by Remesh, has lost it
+    if attribute is not None:  # Remesh and similar tools remove the attribute
         attribute.data.foreach_get("value", old)
         mesh.attributes.remove(attribute)
     if slot is not None:
         index = np.where((old >= 0) & (index == slot), old, index).astype(np.int32)
         mesh.polygons.foreach_set("material_index", index)
-        mesh.materials.pop(index=slot)  # also counts the slots after it down, on the faces
+        mesh.materials.pop(index=slot)  # Blender also corrects the indices of the following slots on the faces
     if EMPTY_SLOT in mesh:
         del mesh[EMPTY_SLOT]
         if not any(mesh.materials):
             mesh.materials.clear()
-    if not index.any() and "material_index" in mesh.attributes:  # no attribute says the same as zeros everywhere
+    if not index.any() and "material_index" in mesh.attributes:  # a missing attribute means index zero everywhere
         mesh.attributes.remove(mesh.attributes["material_index"])
     mesh.update()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The live view: tactile images, colour bar and force curves in a corner of the 3D view while the timeline moves."""
+"""The inset: tactile images, colour bar and force curves in a corner of the 3D view while the timeline plays."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ from ..session import redraw
 from . import bake_display
 
 MAX_SENSORS = 4
-"""Sensors that are shown."""
+"""Number of sensors that are shown at most."""
 IMAGE, GAP, CURVE, BAR = 120.0, 12.0, 56.0, 10.0
-"""Sides of the images, distances, height of the curve and width of the colour bar; pixels at a resolution scale of one."""
+"""Longest side of an image, gap, height of the curves and width of the colour bar; pixels at a resolution scale of one."""
 MAX_IMAGE_SIDE = 256
-"""Pixels along a side of an image: larger ones are thinned out, the screen has no more for them, and few texels get many."""
+"""Pixels along a side of an image: larger images are subsampled, images of few texels are enlarged."""
 COLORS = ((0.34, 0.7, 0.91), (1.0, 0.62, 0.25), (0.4, 0.85, 0.6), (0.9, 0.6, 0.8))
 BACKGROUND_COLOR, AXIS_COLOR = (0.05, 0.05, 0.06, 0.72), (1.0, 1.0, 1.0, 0.35)
 
 
 @dataclass
 class SensorInset:
-    """What is shown of one sensor.
+    """The content of the inset for one sensor.
 
     Attributes
     ----------
@@ -33,8 +33,9 @@ class SensorInset:
     pixels : (h, w, 4) float32
         sRGB, row 0 at the bottom.
     frames, force : (f,) float
-        The sum of the normal forces so far, N.
+        Frames so far, and the sum of the normal forces at each of them, N.
     now : float, N
+        The sum of the normal forces at the present frame.
     """
 
     name: str
@@ -47,18 +48,18 @@ class SensorInset:
 
 @dataclass
 class InsetContent:
-    """All insets of a scene, on one scale.
+    """The content of the inset for a scene; all sensors share one colour scale.
 
     Attributes
     ----------
     insets : list of Inset
     color_map : str
     end : str
-        Words at the end of the colour bar.
+        Label at the upper end of the colour bar.
     span : (2,) float
         First and last frame of the scene.
     frame : float
-        The present one.
+        The present frame.
     """
 
     insets: list[SensorInset]
@@ -69,34 +70,35 @@ class InsetContent:
     bar: object = None
 
 
-_boards: dict[int, InsetContent] = {}
+_contents: dict[int, InsetContent] = {}
 _handle = None
 
 
 def tactile_pixels(layout, values: np.ndarray, maximum: float, color_map: str) -> np.ndarray:
-    """(h, w, 4) float32: a tactile image in colours, clear where no texel is."""
+    """(h, w, 4) float32: a tactile image in colours, transparent where there is no texel."""
     image, mask = layout.image(values), layout.mask()
     step = -(-max(image.shape) // MAX_IMAGE_SIDE)
     image, mask = image[::step, ::step], mask[::step, ::step]
     rgb = color_maps.colors(color_map, image.ravel() / maximum).reshape(*image.shape, 3)
     pixels = np.dstack([rgb, mask]).astype(np.float32)
-    if isinstance(layout, GridLayout):  # the screen blends pixels, and texels are to stay apart
-        times = -(-MAX_IMAGE_SIDE // max(image.shape))
-        pixels = pixels.repeat(times, axis=0).repeat(times, axis=1)
+    if isinstance(layout, GridLayout):  # the screen blends neighbouring pixels, but texels shall stay distinct
+        repeats = -(-MAX_IMAGE_SIDE // max(image.shape))
+        pixels = pixels.repeat(repeats, axis=0).repeat(repeats, axis=1)
     return pixels
 
 
 def inset_content(scene, frame, texels: dict, frames: np.ndarray, loads: dict, maximum: float) -> InsetContent:
-    """Return what is shown of one frame.
+    """Return the content of the inset for one frame.
 
     Parameters
     ----------
     frame : Frame
     texels : dict of str to Texels
-        The sensors, of which the first few are shown.
+        The first :data:`MAX_SENSORS` of these sensors are shown.
     frames : (f,) float
-        For which there are sums of normal forces:
+        Frames of the force curves.
     loads : dict of str to (f,) float, N
+        Sum of the normal forces of each sensor at these frames.
     maximum : float, N or Pa
         End of the colours.
     """
@@ -112,37 +114,37 @@ def inset_content(scene, frame, texels: dict, frames: np.ndarray, loads: dict, m
 
 
 def range_label(settings, maximum: float) -> str:
-    """Say what the end of the colours stands for."""
+    """Return the value at the end of the colours with its unit."""
     return f"{maximum / 1e3:.3g} kPa" if settings.quantity == "PRESSURE" else f"{maximum:.3g} N"
 
 
-def show(scene, board: InsetContent) -> None:
-    """Show the present frame."""
-    _boards[scene.session_uid] = board
+def show(scene, content: InsetContent) -> None:
+    """Show this content in the 3D views of a scene."""
+    _contents[scene.session_uid] = content
     redraw.views()
 
 
 def clear(scene=None) -> None:
-    """Stop showing a scene, or all."""
+    """Stop showing the inset of a scene, or of all scenes."""
     if scene is None:
-        _boards.clear()
+        _contents.clear()
     else:
-        _boards.pop(scene.session_uid, None)
+        _contents.pop(scene.session_uid, None)
     redraw.views()
 
 
 def _draw() -> None:
     """Called by each 3D view, in pixels of its region."""
-    board = _boards.get(bpy.context.scene.session_uid)
-    if board is None or not bpy.context.space_data.overlay.show_overlays:
+    content = _contents.get(bpy.context.scene.session_uid)
+    if content is None or not bpy.context.space_data.overlay.show_overlays:
         return
     import gpu
 
     gpu.state.blend_set("ALPHA")
     scale = bpy.context.preferences.system.ui_scale
-    canvas = _Canvas(scale)
-    x, top = 20.0 * scale, 20.0 * scale + _height(board, scale)
-    _draw_board(board, canvas, x, top)
+    canvas = _PixelPainter(scale)
+    x, top = 20.0 * scale, 20.0 * scale + _height(content, scale)
+    _draw_content(content, canvas, x, top)
     gpu.state.blend_set("NONE")
 
 
@@ -152,54 +154,56 @@ def _sizes(inset: SensorInset, scale: float) -> tuple[float, float]:
     return width * longest, height * longest
 
 
-def _height(board: InsetContent, scale: float) -> float:
-    return max(_sizes(inset, scale)[1] for inset in board.insets) + (CURVE + 4 * GAP + 22.0) * scale
+def _height(content: InsetContent, scale: float) -> float:
+    return max(_sizes(inset, scale)[1] for inset in content.insets) + (CURVE + 4 * GAP + 22.0) * scale
 
 
-def _draw_board(board: InsetContent, canvas, x: float, top: float) -> None:
+def _draw_content(content: InsetContent, canvas, x: float, top: float) -> None:
     scale, gap = canvas.scale, GAP * canvas.scale
-    tall = max(_sizes(inset, scale)[1] for inset in board.insets)
-    widths = [max(_sizes(inset, scale)[0], 70.0 * scale) for inset in board.insets]
+    tall = max(_sizes(inset, scale)[1] for inset in content.insets)
+    widths = [max(_sizes(inset, scale)[0], 70.0 * scale) for inset in content.insets]
     whole = sum(widths) + gap * (len(widths) + 1) + (BAR + 58.0) * scale
-    height = _height(board, scale)
+    height = _height(content, scale)
     canvas.rectangle(x, top - height, whole, height, BACKGROUND_COLOR)
     at, upper = x + gap, top - gap - 12.0 * scale
-    for inset, width, color in zip(board.insets, widths, COLORS):
+    for inset, width, color in zip(content.insets, widths, COLORS):
         canvas.text(at, upper + 3.0 * scale, inset.name, (*color, 1.0), width)
         if inset.texture is None:
             inset.texture = _texture(inset.pixels)
         size = _sizes(inset, scale)
         canvas.image(inset.texture, at, upper - 3.0 * scale - size[1], *size)
         at += width + gap
-    if board.bar is None:
-        colors = color_maps.colors(board.color_map, np.linspace(0.0, 1.0, 64))
-        board.bar = _texture(np.column_stack([colors, np.ones(64)])[:, None].astype(np.float32))
+    if content.bar is None:
+        colors = color_maps.colors(content.color_map, np.linspace(0.0, 1.0, 64))
+        content.bar = _texture(np.column_stack([colors, np.ones(64)])[:, None].astype(np.float32))
     low = upper - 3.0 * scale - tall
-    canvas.image(board.bar, at, low, BAR * scale, tall)
-    canvas.text(at + (BAR + 4.0) * scale, low + tall - 9.0 * scale, board.end, (1.0, 1.0, 1.0, 1.0))
+    canvas.image(content.bar, at, low, BAR * scale, tall)
+    canvas.text(at + (BAR + 4.0) * scale, low + tall - 9.0 * scale, content.end, (1.0, 1.0, 1.0, 1.0))
     canvas.text(at + (BAR + 4.0) * scale, low, "0", (1.0, 1.0, 1.0, 1.0))
-    _draw_curves(board, canvas, x + gap, top - height + gap, whole - 2 * gap)
+    _draw_curves(content, canvas, x + gap, top - height + gap, whole - 2 * gap)
 
 
-def _draw_curves(board: InsetContent, canvas, x: float, y: float, width: float) -> None:
+def _draw_curves(content: InsetContent, canvas, x: float, y: float, width: float) -> None:
     scale = canvas.scale
     height = CURVE * scale
-    largest = max((float(inset.force.max(initial=0.0)) for inset in board.insets), default=0.0)
-    first, last = board.span
+    largest = max((float(inset.force.max(initial=0.0)) for inset in content.insets), default=0.0)
+    first, last = content.span
     span = max(last - first, 1.0)
     canvas.line([(x, y + height), (x, y), (x + width, y)], AXIS_COLOR, 1.0)
     if largest > 0.0:
-        for below, (inset, color) in zip(range(len(board.insets) - 1, -1, -1), zip(board.insets, COLORS)):
+        for below, (inset, color) in zip(range(len(content.insets) - 1, -1, -1), zip(content.insets, COLORS)):
             points = np.column_stack([x + (inset.frames - first) / span * width, y + inset.force / largest * height])
-            canvas.line(points, (*color, 1.0), 1.5 + 2.0 * below)  # the first are wider: equal curves do not hide each other
-    now = x + (board.frame - first) / span * width
+            canvas.line(
+                points, (*color, 1.0), 1.5 + 2.0 * below
+            )  # the first curves are wider, so that equal curves do not hide each other
+    now = x + (content.frame - first) / span * width
     canvas.line([(now, y), (now, y + height)], AXIS_COLOR, 1.0)
-    text = ",  ".join(f"{inset.now:.3g} N" for inset in board.insets)
+    text = ",  ".join(f"{inset.now:.3g} N" for inset in content.insets)
     canvas.text(x + 4.0 * scale, y + height + 3.0 * scale, f"normal force  {text}", (1.0, 1.0, 1.0, 1.0))
 
 
-class _Canvas:
-    """Rectangles, images, lines and words in pixels."""
+class _PixelPainter:
+    """Draws rectangles, images, lines and text, in pixels of the region."""
 
     def __init__(self, scale: float):
         import gpu
@@ -244,7 +248,7 @@ class _Canvas:
         shader.bind()
         for name, value in (uniforms or {}).items():
             shader.uniform_float(name, value)
-        gpu.state.blend_set("ALPHA")  # words that were drawn before have switched it off
+        gpu.state.blend_set("ALPHA")  # drawing text switches blending off
         batch.draw(shader)
 
 
@@ -257,7 +261,7 @@ def _texture(pixels: np.ndarray):
 
     height, width = pixels.shape[:2]
     pixels = pixels.copy()
-    pixels[..., :3] = color_maps.linear(pixels[..., :3])  # the shader takes images as scene-linear
+    pixels[..., :3] = color_maps.linear(pixels[..., :3])  # the shader expects scene-linear colours
     buffer = gpu.types.Buffer("FLOAT", height * width * 4, np.ascontiguousarray(pixels, np.float32).ravel())
     return gpu.types.GPUTexture((width, height), format="RGBA32F", data=buffer)
 

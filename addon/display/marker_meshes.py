@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The meshes of markers, each shared by all sensors: turned around z, one unit long or wide, in a colour of their own."""
+"""The meshes of the markers: surfaces of revolution around z, of length or radius one, shared by all sensors."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import bpy
 SHAPE_KEY = "palpate_arrow"
 """Custom property of a shared mesh: its name in :data:`PROFILES`."""
 SHAFT, HEAD, HEAD_START = 0.025, 0.07, 0.75
-"""Radii of an arrow and where its head begins, as shares of its length."""
+"""Radii of an arrow's shaft and head, and where its head begins, as shares of its length."""
 SIDES = 24
 
 _ARROW = ((0.0, 0.0), (SHAFT, 0.0), (SHAFT, HEAD_START), (HEAD, HEAD_START), (0.0, 1.0))
@@ -20,7 +20,7 @@ _BALL = tuple((math.sin(a) if 0 < i < 12 else 0.0, -math.cos(a)) for i, a in enu
 _RING = tuple((1.0 + 0.1 * math.cos(2 * a), 0.1 * math.sin(2 * a)) for a in _ARC[:-1])
 
 PROFILES = {"Arrow": _ARROW, "Torque Arrow": _TWICE, "Ball": _BALL, "Ring": _RING}
-"""Radius and height of points along the outline; one that does not end on the axis is closed."""
+"""Radius and height of the points of each outline. An outline that does not end on the axis is closed."""
 COLORS = {
     "Arrow": (1.0, 0.25, 0.02),
     "Torque Arrow": (0.1, 0.45, 1.0),
@@ -29,12 +29,12 @@ COLORS = {
     "Normal Arrow": (0.95, 0.95, 0.95),
     "Shear Arrow": (1.0, 0.12, 0.4),
 }
-"""Scene-linear."""
+"""Scene-linear colours."""
 
 
 def shared_mesh(name: str):
-    """Return the mesh of a shape, made when there is none yet."""
-    # a file from before there were several has the number 1 on its arrow
+    """Return the mesh of a shape; create it if there is none yet."""
+    # files of the first version, which had arrows only, have the value 1 in this property
     found = next((mesh for mesh in bpy.data.meshes if mesh.get(SHAPE_KEY) in ((name, 1) if name == "Arrow" else (name,))), None)
     if found is not None:
         return found
@@ -47,7 +47,7 @@ def shared_mesh(name: str):
 
 
 def surface_of_revolution(profile) -> tuple[list, list, list]:
-    """Return vertices, no edges, and faces of a profile turned around z; where it meets the axis it has a single vertex."""
+    """Return vertices, no edges, and faces of an outline rotated around z; a point on the axis becomes a single vertex."""
     vertices, rings, faces = [], [], []
     for radius, height in profile:
         start = len(vertices)
@@ -69,7 +69,7 @@ def surface_of_revolution(profile) -> tuple[list, list, list]:
 
 
 def marker_material(name: str):
-    """Return the material of a shape, a little bright by itself."""
+    """Return the material of a shape, which emits some light of its own."""
     full = f"Palpate {name}"
     found = next((block for block in bpy.data.materials if block.get(SHAPE_KEY) == name), None)
     if found is not None:

@@ -1,105 +1,53 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What stands on a baked sensor: objects of their own with keyframes, which play in any Blender.
+"""Markers on a baked sensor: keyframed objects of their own, which play in any Blender.
 
 * ``FORCE``: an arrow at the centre of pressure. It shows the force that the sensor pushes *back* with, as biomechanics draws
-  ground reaction forces: out of the sensor, where it can be seen. The force on the sensor is its negative.
-* ``TORQUE``: a double arrow along the axis of the free moment there (the net torque about the centre of pressure), likewise.
+  ground reaction forces: out of the sensor, where it is visible. The force on the sensor is its negative.
+* ``TORQUE``: a double arrow along the free moment, the net torque about the centre of pressure; also of the reaction.
 * ``CENTRE``: a ball at the centre of pressure.
-* ``SLIP``: a ring around it, as wide as the share of the load that rests on slipping texels.
+* ``SLIP``: a ring around it. Its width shows the share of the normal force that slipping texels carry.
 
-Without contact their scale is zero.
+Without contact the scale of a marker is zero.
 """
 
 from __future__ import annotations
-
-from dataclasses import dataclass
-from pathlib import Path
 
 import bpy
 import numpy as np
 from mathutils import Quaternion, Vector
 
-from ...core.geometry.texels import Texels
-from ...core.model.recording import SensorRecording
-from ...core.model.sensor_parameters import Painted, SensorParameters
 from ...core.response import metrics
-from ..session import fcurves, transforms
+from ..session import fcurves
 from . import marker_meshes, materials
+from .baked_sensor import BakedSensor
 
 KIND_KEY = "palpate_marker"
-"""Custom property of a marker: which it is. One without is a FORCE of an earlier version."""
+"""Custom property of a marker: its key in :data:`KINDS`. Earlier versions had only FORCE, without this property."""
 KINDS = {
     "FORCE": ("Net Force", "Arrow"),
     "TORQUE": ("Free Moment", "Torque Arrow"),
     "CENTRE": ("Centre of Pressure", "Ball"),
     "SLIP": ("Slip", "Ring"),
 }
-"""Name of the object, without its sensor's, and shape."""
+"""Name of the object (the sensor's name is appended) and its shape."""
 BALL_SHARE, RING_SHARE = 0.03, 0.25
-"""Radii of the ball and of the ring when everything slips, in sizes of the sensor."""
-
-
-@dataclass(frozen=True)
-class BakedSensor:
-    """A sensor with its part of a bake, as markers need it.
-
-    Attributes
-    ----------
-    obj : Object
-    body : Object
-        That moves it: itself, unless it is part of another.
-    texels, painted, parameters
-        Of the sensor.
-    readings : SensorRecording
-    frames : (F,) int
-    poses : (F, 7) float
-        Of its body.
-    scale : float
-        Metres per Blender unit.
-    folder : Path
-        Of its bake.
-    """
-
-    obj: object
-    body: object
-    texels: Texels
-    painted: Painted
-    parameters: SensorParameters
-    readings: SensorRecording
-    frames: np.ndarray
-    poses: np.ndarray
-    scale: float
-    folder: Path
-
-    @property
-    def size(self) -> float:
-        """Longest side of the sensor, Blender units."""
-        return float(np.ptp(self.texels.position, axis=0).max()) / self.scale
-
-    def in_world(self) -> tuple[np.ndarray, np.ndarray]:
-        """(F, 3) float: where the net force acts, Blender units, and with what the sensor pushes back there, N."""
-        foot = self.poses[:, :3] + self.turned(self.readings.centre_of_pressure)
-        return foot / self.scale, -self.turned(self.readings.net_force)
-
-    def turned(self, vectors: np.ndarray) -> np.ndarray:
-        """(F, 3) float: vectors in the body's frame, as they are in the world at each frame."""
-        return np.einsum("fij,fj->fi", transforms.rotation(self.poses[:, 3:]), vectors)
+"""Radius of the ball, and of the ring if all texels slip, as shares of the sensor's size."""
 
 
 def find_marker(objects, uid: str, kind: str):
-    """Return a sensor's marker among some objects; None when there is none."""
+    """Return a sensor's marker among some objects; None if there is none."""
     return next((obj for obj in objects if obj.get(materials.SENSOR_KEY) == uid and obj.get(KIND_KEY, "FORCE") == kind), None)
 
 
 def keyframe_markers(scene, sensor: BakedSensor, kinds, lengths: dict[str, float]) -> None:
-    """Keyframe the markers of one sensor, and remove those that are not wanted.
+    """Keyframe the markers of one sensor and remove those that are not wanted.
 
     Parameters
     ----------
     kinds : collection of str
         Keys of :data:`KINDS`.
     lengths : dict
-        Of arrows: Blender units per newton for FORCE, per newton metre for TORQUE.
+        Scale of the arrows: Blender units per newton (FORCE) and per newton metre (TORQUE).
     """
     for kind in KINDS:
         marker = find_marker(scene.objects, sensor.obj.palpate.uid, kind)
@@ -116,18 +64,21 @@ def keyframe_markers(scene, sensor: BakedSensor, kinds, lengths: dict[str, float
 
 
 def channels(sensor: BakedSensor, kind: str, length: float = 1.0) -> np.ndarray:
-    """(F, 10) float: location, quaternion and scale of a marker at each recorded frame; `length` is that of one unit."""
+    """(F, 10) float: location, quaternion and scale of a marker at each recorded frame.
+
+    `length` is the length of an arrow for one newton or newton metre, in Blender units.
+    """
     direction, size = _DIRECTION_AND_SIZE[kind](sensor)
-    size = np.where(sensor.readings.contact.any(axis=1), size * length, 0.0)
-    foot, way = sensor.in_world()[0], sensor.turned(direction)
+    size = np.where(sensor.in_contact, size * length, 0.0)
+    points, axes = sensor.reactions()[0], sensor.to_world(direction)
     turns, last = [], Quaternion()
     for i in range(len(size)):
         if size[i] > 0.0:
-            turn = Vector(way[i] / np.linalg.norm(way[i])).to_track_quat("Z", "Y")  # which takes short vectors for none
+            turn = Vector(axes[i] / np.linalg.norm(axes[i])).to_track_quat("Z", "Y")  # normalised, as it ignores short vectors
             turn.make_compatible(last)
             last = turn
         turns.append(tuple(last))
-    return np.hstack([foot, turns, np.repeat(size[:, None], 3, axis=1)])
+    return np.hstack([points, turns, np.repeat(size[:, None], 3, axis=1)])
 
 
 def _force(sensor: BakedSensor) -> tuple[np.ndarray, np.ndarray]:
@@ -140,16 +91,16 @@ def _torque(sensor: BakedSensor) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _centre(sensor: BakedSensor) -> tuple[np.ndarray, np.ndarray]:
-    return _outwards(sensor), np.full(len(sensor.frames), BALL_SHARE * sensor.size)
+    return _outward_direction(sensor), np.full(len(sensor.frames), BALL_SHARE * sensor.size)
 
 
 def _slip(sensor: BakedSensor) -> tuple[np.ndarray, np.ndarray]:
     share = metrics.slip_share(sensor.readings, sensor.parameters, sensor.painted)
-    return _outwards(sensor), share * RING_SHARE * sensor.size
+    return _outward_direction(sensor), share * RING_SHARE * sensor.size
 
 
-def _outwards(sensor: BakedSensor) -> np.ndarray:
-    """(F, 3) float: the mean normal of the texels that bear, in the body's frame."""
+def _outward_direction(sensor: BakedSensor) -> np.ndarray:
+    """(F, 3) float: mean normal of the texels, weighted with their normal forces, in the body's frame."""
     mean = sensor.readings.normal_force @ sensor.texels.normal
     flat = np.linalg.norm(mean, axis=1) == 0.0
     mean[flat] = sensor.texels.normal[0]
@@ -166,13 +117,13 @@ def clear(scene, uid: str) -> None:
 
 
 def remove_orphans(uids) -> None:
-    """Remove the markers of sensors that were deleted; `uids` are those of all objects."""
+    """Remove the markers of sensors that were deleted; `uids` are the identities of all objects."""
     for marker in orphans(bpy.data.objects, uids):
         remove(marker)
 
 
 def orphans(objects, uids=None) -> list:
-    """Return the markers among some objects whose sensor was deleted."""
+    """Return the markers among some objects whose sensor was deleted; `uids` are the identities of all objects, if known."""
     found = [obj for obj in objects if materials.SENSOR_KEY in obj and obj.library is None]
     if found and uids is None:
         uids = {obj.palpate.uid for obj in bpy.data.objects}
@@ -180,21 +131,21 @@ def orphans(objects, uids=None) -> list:
 
 
 def remove(marker) -> None:
-    """Remove a marker and what only it used."""
+    """Remove a marker with its animation, mesh, nodes and materials, as far as nothing else uses them."""
     action = marker.animation_data.action if marker.animation_data else None
     groups = [modifier.node_group for modifier in marker.modifiers if modifier.type == "NODES"]
     mesh = marker.data
     bpy.data.objects.remove(marker)
     if action is not None and action.users == 0:
         bpy.data.actions.remove(action)
-    looks = [material for material in mesh.materials if material is not None] if mesh is not None else []
+    used = [material for material in mesh.materials if material is not None] if mesh is not None else []
     if mesh is not None and mesh.users == 0:
         bpy.data.meshes.remove(mesh)
     for group in groups:
         if group is not None and group.users == 0:
-            looks += [node.inputs["Material"].default_value for node in group.nodes if node.type == "SET_MATERIAL"]
+            used += [node.inputs["Material"].default_value for node in group.nodes if node.type == "SET_MATERIAL"]
             bpy.data.node_groups.remove(group)
-    for material in looks:
+    for material in used:
         if material is not None and material.users == 0:
             bpy.data.materials.remove(material)
 
@@ -207,7 +158,7 @@ def _make(scene, obj, kind: str):
 
 
 def link(scene, obj, marker, kind: str) -> None:
-    """Put a new marker where its sensor is: in a collection of this scene, since the sensor may be in other scenes, too."""
+    """Link a new marker to a collection of this scene that holds its sensor, which may be in other scenes as well."""
     marker[materials.SENSOR_KEY], marker[KIND_KEY] = obj.palpate.uid, kind
     own = {scene.collection, *scene.collection.children_recursive}
     place = next((found for found in obj.users_collection if found in own and found.is_editable), scene.collection)

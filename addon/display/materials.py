@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The heat-map material: normal force from the baked images, coloured. Made of Blender's own nodes, so it plays without us.
+"""The heat-map material shows the normal force of the baked images in colours. It consists of Blender's own nodes only.
 
-Where a texture map of the region is in one piece, an image texture shows the EXR sequence pixel by pixel. On a region that
-had to be cut up (a whole sphere) no texture map of shared corners exists; there geometry nodes look the image up once per
-texel and hand the force to the material as an attribute.
+Where the tactile image of the region is in one piece, an image texture shows the EXR sequence pixel by pixel. A region that is
+cut open for its image, such as a whole sphere, has no UV map in which faces share corners. There, geometry nodes look up the
+image once per texel and pass the force to the material as a vertex attribute.
 """
 
 from __future__ import annotations
@@ -19,24 +19,34 @@ from ..scene.display_names import UV_MAP
 
 TEXEL_UV = "palpate_uv"
 FORCE = "palpate_force"
-"""Vertex attribute with the normal force (N): from geometry nodes after a bake, from the timeline while playing."""
+"""Vertex attribute with the normal force (N): written by geometry nodes after a bake, by the timeline while it plays."""
 AREA = "palpate_area"
 """Vertex attribute with the area of the texel, m²."""
 SENSOR_KEY = "palpate_sensor"
-"""Custom property that tells whose a material, an image, a node group or an arrow is."""
+"""Custom property of a material, image, node group or marker: the identity of its sensor."""
 RAMP_STOPS = 32
 MISSING_COLOR = (1.0, 0.0, 1.0)
-"""What Blender shows for an image that it does not find. As forces in newtons it will not occur to the sixth digit."""
+"""Colour that Blender shows for an image that it does not find. Forces of exactly these values (N) do not occur in practice."""
 MIX_SOCKETS = ("Factor_Float", "A_Color", "B_Color")
 
 
 def find_block(blocks, uid: str):
-    """Return the data-block of a sensor in a collection of bpy.data; None when there is none."""
+    """Return the data-block of a sensor in a collection of bpy.data; None if there is none."""
     return next((block for block in blocks if block.get(SENSOR_KEY) == uid), None)
 
 
 def load_sequence(uid: str, first: Path, relative: bool):
-    """Return the image that plays a baked sequence, by a path relative to the .blend or an absolute one."""
+    """Return the image that plays a baked sequence.
+
+    Parameters
+    ----------
+    uid : str
+        Identity of the sensor.
+    first : Path
+        File of the first frame.
+    relative : bool
+        True to store the path relative to the .blend.
+    """
     image = find_block(bpy.data.images, uid)
     path = bpy.path.relpath(str(first)) if relative else str(first)
     if image is None:
@@ -51,7 +61,7 @@ def load_sequence(uid: str, first: Path, relative: bool):
 
 
 def set_image_frames(user, frame_start: int, frame_end: int) -> None:
-    """Make an image user show file number f at frame f and hold the last beyond; before the first it finds no file."""
+    """Make an image user show file f at frame f and keep the last file afterwards; before the first frame it finds no file."""
     user.frame_duration = frame_end - frame_start + 1
     user.frame_start = frame_start
     user.frame_offset = frame_start - 1
@@ -60,7 +70,14 @@ def set_image_frames(user, frame_start: int, frame_end: int) -> None:
 
 
 def area_image(uid: str, name: str, area: np.ndarray):
-    """Return an image of the texels' areas, (height, width) float in m², that is kept in the .blend."""
+    """Return an image of the texels' areas that is stored in the .blend.
+
+    Parameters
+    ----------
+    uid, name : str
+        Identity and name of the sensor.
+    area : (height, width) float, m²
+    """
     mark = f"{uid}:area"
     image = find_block(bpy.data.images, mark)
     if image is not None:
@@ -77,89 +94,124 @@ def area_image(uid: str, name: str, area: np.ndarray):
 
 @dataclass(frozen=True)
 class ImageMapping:
-    """Where an image lies on a sensor: by which UV map, and if its pixels are blended."""
+    """Where an image lies on a sensor: by which UV map, and whether its pixels are blended."""
 
     uv_map: str = UV_MAP
     smooth: bool = False
 
 
+@dataclass(frozen=True)
+class ColorScale:
+    """What the colours of a heat map mean.
+
+    Attributes
+    ----------
+    maximum : float, N or Pa
+        Value at the upper end of the colour map.
+    color_map : str
+        Key of :data:`.color_maps.STOPS`.
+    pressure : bool
+        True if the colours show force over area (Pa), False if they show the force (N).
+    """
+
+    maximum: float
+    color_map: str
+    pressure: bool = False
+
+
 def heat_map_material(
-    uid: str,
-    name: str,
-    image,
-    frames: tuple[int, int],
-    maximum: float,
-    color_map: str,
-    area=None,
-    coordinates: ImageMapping = ImageMapping(),
+    uid: str, name: str, image, frames: tuple[int, int], scale: ColorScale, area=None, mapping: ImageMapping = ImageMapping()
 ):
-    """Return a sensor's heat-map material, made or made anew.
+    """Create a sensor's heat-map material, or build the nodes of the existing one anew.
 
     Parameters
     ----------
     uid, name : str
-        Of the sensor.
+        Identity and name of the sensor.
     image : Image or None
-        From :func:`load_sequence`; None to take the force from the vertex attribute.
+        From :func:`load_sequence`; None to read the force from the vertex attribute :data:`FORCE`.
     frames : (int, int)
         First and last frame of the bake.
-    maximum : float, N or Pa
-        At the upper end of the colours.
-    color_map : str
-        Key of :data:`.colormaps.STOPS`.
+    scale : ColorScale
     area : Image, str or None
-        What the force is divided by: an image as :func:`area_image` makes it, or the name of a vertex attribute.
-    coordinates : Coordinates
-        Of the images.
+        What the force is divided by if the colours show pressure: an image from :func:`area_image`, or the name of a vertex
+        attribute.
+    mapping : ImageMapping
+        Of both images.
+
+    Returns
+    -------
+    Material
     """
     material = find_block(bpy.data.materials, uid) or bpy.data.materials.new(f"Palpate {name}")
     material[SENSOR_KEY] = uid
     if material.node_tree is None:
         material.use_nodes = True
-    tree = material.node_tree
-    tree.nodes.clear()
-    add = NodeAdder(tree)
-    missing = None
-    if image is None:
-        value = add("ShaderNodeAttribute", attribute_name=FORCE).outputs["Fac"]
-    else:
-        texture = _texture(add, image, coordinates)
-        set_image_frames(texture.image_user, *frames)
-        value, missing = _red(add, texture), add_missing_test(add, texture.outputs["Color"])
+    material.node_tree.nodes.clear()
+    add = NodeAdder(material.node_tree)
+    value, missing = _add_force(add, image, frames, mapping)
     if area is not None:
-        own = add("ShaderNodeAttribute", attribute_name=area).outputs["Fac"] if isinstance(area, str) else None
-        over = add("ShaderNodeMath", operation="DIVIDE", label="Pressure (Pa)")
-        tree.links.new(value, over.inputs[0])
-        tree.links.new(own or _red(add, _texture(add, area, coordinates)), over.inputs[1])
-        value = over.outputs[0]
-    label = "Normal force / maximum (N)" if area is None else "Pressure / maximum (Pa)"
-    share = add("ShaderNodeMath", operation="DIVIDE", use_clamp=True, label=label)
-    tree.links.new(value, share.inputs[0])
-    share.inputs[1].default_value = maximum
-    ramp = add("ShaderNodeValToRGB")
-    _fill(ramp.color_ramp, color_map)
-    tree.links.new(share.outputs[0], ramp.inputs["Fac"])
-    color = ramp.outputs["Color"]
+        value = _add_pressure(add, value, area, mapping)
+    color = _add_colors(add, value, scale, "Normal force / maximum (N)" if area is None else "Pressure / maximum (Pa)")
     if missing is not None:
-        mix = add("ShaderNodeMix", data_type="RGBA", label="Magenta: no image")
-        factor, below, above = (next(s for s in mix.inputs if s.identifier == key) for key in MIX_SOCKETS)
-        tree.links.new(missing, factor)
-        tree.links.new(color, below)
-        above.default_value = (*MISSING_COLOR, 1.0)
-        color = next(s for s in mix.outputs if s.identifier == "Result_Color")
-    surface = add("ShaderNodeBsdfPrincipled")
-    surface.inputs["Roughness"].default_value = 0.6
-    surface.inputs["Specular IOR Level"].default_value = 0.1  # a shine would lighten the dark end of the colours
-    surface.inputs["Emission Strength"].default_value = 0.4
-    tree.links.new(color, surface.inputs["Base Color"])
-    tree.links.new(color, surface.inputs["Emission Color"])
-    output = add("ShaderNodeOutputMaterial")
-    tree.links.new(surface.outputs["BSDF"], output.inputs["Surface"])
+        color = _add_missing_color(add, color, missing)
+    _add_surface(add, color)
     return material
 
 
+def _add_force(add, image, frames: tuple[int, int], mapping: ImageMapping):
+    """Return the sockets of the force and, where it comes from an image, of a test that the image is missing."""
+    if image is None:
+        return add("ShaderNodeAttribute", attribute_name=FORCE).outputs["Fac"], None
+    texture = _texture(add, image, mapping)
+    set_image_frames(texture.image_user, *frames)
+    return _red(add, texture), add_missing_test(add, texture.outputs["Color"])
+
+
+def _add_pressure(add, force, area, mapping: ImageMapping):
+    """Return the socket of force over area."""
+    attribute = add("ShaderNodeAttribute", attribute_name=area).outputs["Fac"] if isinstance(area, str) else None
+    quotient = add("ShaderNodeMath", operation="DIVIDE", label="Pressure (Pa)")
+    add.tree.links.new(force, quotient.inputs[0])
+    add.tree.links.new(attribute or _red(add, _texture(add, area, mapping)), quotient.inputs[1])
+    return quotient.outputs[0]
+
+
+def _add_colors(add, value, scale: ColorScale, label: str):
+    """Return the socket of the colour of a force or pressure."""
+    share = add("ShaderNodeMath", operation="DIVIDE", use_clamp=True, label=label)
+    add.tree.links.new(value, share.inputs[0])
+    share.inputs[1].default_value = scale.maximum
+    ramp = add("ShaderNodeValToRGB")
+    _fill_ramp(ramp.color_ramp, scale.color_map)
+    add.tree.links.new(share.outputs[0], ramp.inputs["Fac"])
+    return ramp.outputs["Color"]
+
+
+def _add_missing_color(add, color, missing):
+    """Return the socket of a colour that turns to :data:`MISSING_COLOR` where there is no image."""
+    mix = add("ShaderNodeMix", data_type="RGBA", label="Magenta: no image")
+    factor, below, above = (next(s for s in mix.inputs if s.identifier == key) for key in MIX_SOCKETS)
+    add.tree.links.new(missing, factor)
+    add.tree.links.new(color, below)
+    above.default_value = (*MISSING_COLOR, 1.0)
+    return next(s for s in mix.outputs if s.identifier == "Result_Color")
+
+
+def _add_surface(add, color) -> None:
+    """Add a surface that shows a colour with little gloss and some light of its own."""
+    surface = add("ShaderNodeBsdfPrincipled")
+    surface.inputs["Roughness"].default_value = 0.6
+    surface.inputs["Specular IOR Level"].default_value = 0.1  # gloss would brighten the dark end of the colours
+    surface.inputs["Emission Strength"].default_value = 0.4
+    add.tree.links.new(color, surface.inputs["Base Color"])
+    add.tree.links.new(color, surface.inputs["Emission Color"])
+    output = add("ShaderNodeOutputMaterial")
+    add.tree.links.new(surface.outputs["BSDF"], output.inputs["Surface"])
+
+
 def _texture(add, image, coordinates: ImageMapping):
-    """Return a node that shows an image by texture coordinates."""
+    """Return a node that shows an image by a UV map."""
     interpolation = "Linear" if coordinates.smooth else "Closest"
     texture = add("ShaderNodeTexImage", image=image, interpolation=interpolation, extension="EXTEND")
     uv = add("ShaderNodeUVMap", uv_map=coordinates.uv_map)
@@ -168,24 +220,25 @@ def _texture(add, image, coordinates: ImageMapping):
 
 
 def _red(add, texture):
+    """Return the socket of an image's red channel, the normal force."""
     channels = add("ShaderNodeSeparateColor")
     add.tree.links.new(texture.outputs["Color"], channels.inputs["Color"])
     return channels.outputs["Red"]
 
 
 def add_missing_test(add, color):
-    """Return a socket that is 1 where Blender found no image: its sign for that must not pass for a large force."""
+    """Return a socket that is 1 where Blender found no image: the colour shown there must not be read as a large force."""
     distance = add("ShaderNodeVectorMath", operation="DISTANCE")
     distance.inputs[1].default_value = MISSING_COLOR
     add.tree.links.new(color, distance.inputs[0])
-    near = add("ShaderNodeMath", operation="LESS_THAN")
-    near.inputs[1].default_value = 1e-6
-    add.tree.links.new(distance.outputs["Value"], near.inputs[0])
-    return near.outputs[0]
+    is_equal = add("ShaderNodeMath", operation="LESS_THAN")
+    is_equal.inputs[1].default_value = 1e-6
+    add.tree.links.new(distance.outputs["Value"], is_equal.inputs[0])
+    return is_equal.outputs[0]
 
 
 class NodeAdder:
-    """Adds nodes from left to right."""
+    """Adds nodes to a tree, from left to right."""
 
     def __init__(self, tree):
         self.tree, self.x = tree, 0.0
@@ -199,7 +252,7 @@ class NodeAdder:
         return node
 
 
-def _fill(ramp, color_map: str) -> None:
+def _fill_ramp(ramp, color_map: str) -> None:
     at = np.linspace(0.0, 1.0, RAMP_STOPS)
     colors = color_maps.linear(color_maps.colors(color_map, at))
     while len(ramp.elements) < RAMP_STOPS:
@@ -210,7 +263,7 @@ def _fill(ramp, color_map: str) -> None:
 
 
 def empty_node_group(mark: str, name: str):
-    """Return an empty group of geometry nodes, a sensor's own by its mark; an earlier one is emptied."""
+    """Return an empty group of geometry nodes with this mark as its :data:`SENSOR_KEY`; an existing one is emptied."""
     group = find_block(bpy.data.node_groups, mark)
     if group is None:
         group = bpy.data.node_groups.new(f"Palpate {name}", "GeometryNodeTree")
@@ -222,7 +275,7 @@ def empty_node_group(mark: str, name: str):
 
 
 def add_image_lookup(add, image, frames: tuple[int, int]):
-    """Return the socket of the image's colour at each texel: normal force, shear along x and along y, N."""
+    """Return the socket of the image's colour at each texel, whose channels are normal force, shear x and shear y (N)."""
     link = add.tree.links.new
     where = add("GeometryNodeInputNamedAttribute", data_type="FLOAT_VECTOR")
     where.inputs["Name"].default_value = TEXEL_UV
@@ -239,7 +292,7 @@ def add_image_lookup(add, image, frames: tuple[int, int]):
 
 
 def force_node_group(uid: str, name: str, image, frames: tuple[int, int]):
-    """Return the geometry nodes that look the image up at each texel and store the force on the vertices."""
+    """Return geometry nodes that look up the image at each texel and store the force on the vertices."""
     group = empty_node_group(uid, name)
     add, link = NodeAdder(group), group.links.new
     start = add("NodeGroupInput")
@@ -254,7 +307,7 @@ def force_node_group(uid: str, name: str, image, frames: tuple[int, int]):
 
 
 def remove_blocks(uid: str, keep_image: bool = False) -> None:
-    """Remove everything of a sensor's heat map that is not on its mesh."""
+    """Remove the data-blocks of a sensor's heat map; `keep_image` keeps the image sequence."""
     for blocks, mark in (
         (bpy.data.materials, uid),
         (bpy.data.node_groups, uid),
@@ -267,7 +320,7 @@ def remove_blocks(uid: str, keep_image: bool = False) -> None:
 
 
 def remove_orphans(uids) -> None:
-    """Remove what heat maps of deleted sensors have left, as far as nobody uses it; `uids` are those of all objects."""
+    """Remove unused data-blocks of sensors that were deleted; `uids` are the identities of all objects."""
     for blocks in (bpy.data.materials, bpy.data.node_groups, bpy.data.images):  # images last: the others use them
         for block in list(blocks):
             if (

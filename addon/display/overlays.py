@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Live heat maps in the 3D view: drawn over the sensors while playing, and part of no file."""
+"""Heat maps and force arrows drawn over the sensors in the 3D view while the timeline plays. They are stored in no file."""
 
 from __future__ import annotations
 
@@ -13,21 +13,21 @@ from ..session import redraw, transforms
 from . import bake_display, inset
 
 LIFT = 0.004
-"""Share of the sensor's size by which the picture hovers above its surface, so that the two do not flicker."""
+"""Distance of the overlay from the sensor's surface, as a share of the sensor's size: at zero the two would flicker."""
 ARROW_SHARE = 1.0
-"""Length of the longest arrow, in sizes of the sensor."""
+"""Length of the longest arrow, as a share of the sensor's size."""
 
 
 @dataclass
 class SensorOverlay:
-    """Triangles and lines of one sensor in the world; GPU batches are made when it is first drawn.
+    """Triangles and arrow of one sensor in the world; its GPU batches are made when it is first drawn.
 
     Attributes
     ----------
     corners : (t, 3) float32
     colors : (t, 4) float32
     line : (2, 3) float32 or None
-        The net-force arrow's ends.
+        Ends of the net-force arrow.
     """
 
     corners: np.ndarray
@@ -38,12 +38,12 @@ class SensorOverlay:
 
 _overlays: dict[int, list[SensorOverlay]] = {}
 _largest: dict[int, tuple[float, float]] = {}
-"""Largest value and net force of any sensor so far, by scene."""
+"""Largest displayed value and net force of any sensor so far, by scene and quantity."""
 _handle = None
 
 
 def show(scene, run, frame) -> None:
-    """Show one frame of a run."""
+    """Show one frame of a live simulation."""
     if bpy.app.background:
         return
     settings = scene.palpate
@@ -58,7 +58,7 @@ def show(scene, run, frame) -> None:
 
 
 def sensor_overlays(scene, run, frame) -> list[SensorOverlay]:
-    """Return the heat maps and arrows of one frame of a run, all sensors on one scale."""
+    """Return the heat maps and arrows of one frame of a live simulation; all sensors share one scale."""
     maximum, strongest = _scale(scene, run, frame)
     return [
         _sensor_overlay(
@@ -69,7 +69,7 @@ def sensor_overlays(scene, run, frame) -> list[SensorOverlay]:
 
 
 def inset_content(scene, run, frame) -> inset.InsetContent:
-    """Return the tactile images and curves of one frame of a run."""
+    """Return the tactile images and curves of one frame of a live simulation."""
     maximum, _ = _scale(scene, run, frame)
     known = sorted(run.frames)
     texels = {sensor.name: sensor.texels for sensor in _read_out(run)}
@@ -78,11 +78,12 @@ def inset_content(scene, run, frame) -> inset.InsetContent:
 
 
 def _read_out(run) -> list:
+    """Return the sensors of a live simulation that are read out."""
     return [sensor for sensor in run.scenario.sensors if sensor.readout]
 
 
 def _scale(scene, run, frame) -> tuple[float, float]:
-    """Return the end of the colours, N or Pa, and the net force of the longest arrow."""
+    """Return the end of the colours (N or Pa) and the net force (N) that the longest arrow shows."""
     settings = scene.palpate
     key = hash((scene.session_uid, settings.quantity))
     value, net = _largest.get(key, (1e-9, 1e-9))
@@ -116,7 +117,7 @@ def _sensor_overlay(scene, sensor, readings, pose, maximum: float, strongest: fl
 
 
 def clear(scene=None) -> None:
-    """Stop showing a scene, or all."""
+    """Stop showing the overlays of a scene, or of all scenes."""
     if scene is None:
         _overlays.clear()
         _largest.clear()
@@ -129,18 +130,18 @@ def clear(scene=None) -> None:
 
 def _draw() -> None:
     """Called by each 3D view after the scene's own geometry."""
-    pictures = _overlays.get(bpy.context.scene.session_uid)
+    overlays = _overlays.get(bpy.context.scene.session_uid)
     space = bpy.context.space_data
-    if not pictures or not space.overlay.show_overlays:
+    if not overlays or not space.overlay.show_overlays:
         return
     import gpu
 
     gpu.state.depth_test_set("LESS_EQUAL")
     gpu.state.depth_mask_set(True)
-    for picture in pictures:
-        if picture.batches is None:
-            picture.batches = _batches(picture)
-        for shader, batch, uniforms in picture.batches:
+    for overlay in overlays:
+        if overlay.batches is None:
+            overlay.batches = _batches(overlay)
+        for shader, batch, uniforms in overlay.batches:
             shader.bind()
             for name, value in uniforms.items():
                 shader.uniform_float(name, value)
@@ -149,17 +150,17 @@ def _draw() -> None:
     gpu.state.depth_test_set("NONE")
 
 
-def _batches(picture: SensorOverlay) -> list:
+def _batches(overlay: SensorOverlay) -> list:
     import gpu
     from gpu_extras.batch import batch_for_shader
 
     smooth = gpu.shader.from_builtin("SMOOTH_COLOR")
-    result = [(smooth, batch_for_shader(smooth, "TRIS", {"pos": picture.corners, "color": picture.colors}), {})]
-    if picture.line is not None:
+    result = [(smooth, batch_for_shader(smooth, "TRIS", {"pos": overlay.corners, "color": overlay.colors}), {})]
+    if overlay.line is not None:
         lines = gpu.shader.from_builtin("POLYLINE_UNIFORM_COLOR")
         viewport = gpu.state.viewport_get()[2:]
         uniforms = {"color": (1.0, 0.35, 0.05, 1.0), "lineWidth": 4.0, "viewportSize": viewport}
-        result.append((lines, batch_for_shader(lines, "LINES", {"pos": picture.line.astype(np.float32)}), uniforms))
+        result.append((lines, batch_for_shader(lines, "LINES", {"pos": overlay.line.astype(np.float32)}), uniforms))
     return result
 
 

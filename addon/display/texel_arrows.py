@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""An arrow at every texel, made by geometry nodes from the baked images, so that they play in any Blender.
+"""An arrow at every texel, made by geometry nodes from the baked images, so that the arrows play in any Blender.
 
-``NORMALS`` stand on the surface, as long as the normal force; ``SHEARS`` lie on it. Like the large arrows they show what the
-sensor pushes back with. Each kind is an object of points, one per texel, that is a child of the sensor's body.
+``NORMALS`` are normal to the surface and ``SHEARS`` tangential; their lengths show the force. Like the markers they show the
+reaction, the force with which the sensor pushes back. Each kind is an object of points, one per texel, that is a child of the
+sensor's body.
 """
 
 from __future__ import annotations
@@ -16,31 +17,32 @@ from mathutils import Matrix
 
 from ..session import transforms
 from . import marker_meshes, markers, materials
+from .baked_sensor import BakedSensor
 
 KINDS = {"NORMALS": ("Normal Forces", "Normal Arrow"), "SHEARS": ("Shear Forces", "Shear Arrow")}
-"""Name of the object, without its sensor's, and material."""
+"""Name of the object (the sensor's name is appended) and its material."""
 NORMAL, X_AXIS, Y_AXIS = "palpate_normal", "palpate_x", "palpate_y"
-"""Vector attributes of the points."""
+"""Vector attributes of the points: the texel's axes."""
 MIN_ARROW_SHARE = 0.02
-"""Newtons times length below which no arrow is drawn, as a share of the longest arrow."""
+"""Length below which an arrow is not drawn, as a share of the longest arrow."""
 MODIFIER = "Palpate Arrows"
 
 
-def build_arrows(scene, sensor: markers.BakedSensor, image, kinds, lengths: dict, longest: dict) -> None:
-    """Put up the arrows of one sensor, and remove those that are not wanted.
+def build_arrows(scene, sensor: BakedSensor, image, kinds, lengths: dict, longest: dict) -> None:
+    """Build the arrows of one sensor and remove those that are not wanted.
 
     Parameters
     ----------
-    sensor : Worn
+    sensor : BakedSensor
     image : Image
-        The baked sequence.
+        The baked image sequence.
     kinds : collection of str
         Keys of :data:`KINDS`.
     lengths, longest : dict of str to float
-        By kind: Blender units per newton, and the longest arrow of all sensors.
+        By kind: Blender units per newton, and the length of the longest arrow of all sensors.
     """
     frames = int(sensor.frames[0]), int(sensor.frames[-1])
-    for kind, (name, look) in KINDS.items():
+    for kind, (name, material) in KINDS.items():
         uid = sensor.obj.palpate.uid
         found = markers.find_marker(scene.objects, uid, kind)
         if found is not None:
@@ -54,38 +56,49 @@ def build_arrows(scene, sensor: markers.BakedSensor, image, kinds, lengths: dict
         _, _, stretch = transforms.split(transforms.array(sensor.body.matrix_world))
         made.matrix_parent_inverse = Matrix(np.vstack([np.column_stack([np.linalg.inv(stretch), np.zeros(3)]), [0, 0, 0, 1]]))
         made.hide_select = True
-        made.color = (*marker_meshes.COLORS[look], 1.0)  # Workbench shows these of what nodes make
+        made.color = (*marker_meshes.COLORS[material], 1.0)  # Workbench shows these of what nodes make
         modifier = made.modifiers.new(MODIFIER, "NODES")
         modifier.node_group = _nodes(
-            f"{uid}:{kind}", made.name, image, frames, kind, lengths[kind], longest[kind], marker_meshes.marker_material(look)
+            f"{uid}:{kind}",
+            made.name,
+            image,
+            frames,
+            kind,
+            lengths[kind],
+            longest[kind],
+            marker_meshes.marker_material(material),
         )
 
 
 @contextmanager
 def hidden_arrows(scene) -> Iterator[None]:
-    """Let no arrows be made for a while: in each frame that is read, their nodes would read an image of the bake before."""
-    names = [obj.name for obj in scene.objects if obj.library is None and (own := _own(obj)) is not None and own.show_viewport]
+    """Switch the arrows off while the body runs: in every frame, their nodes would load an image of the previous bake."""
+    names = [
+        obj.name
+        for obj in scene.objects
+        if obj.library is None and (modifier := _arrow_modifier(obj)) is not None and modifier.show_viewport
+    ]
     try:
         _show(scene, names, False)
         yield
     finally:
-        with suppress(ReferenceError):  # the scene went meanwhile
+        with suppress(ReferenceError):  # the scene was removed meanwhile
             _show(scene, names, True)
 
 
-def _own(obj):
+def _arrow_modifier(obj):
     return obj.modifiers.get(MODIFIER)
 
 
 def _show(scene, names, shown: bool) -> None:
     for name in names:
-        obj = scene.objects.get(name)  # it may have been deleted meanwhile
-        if obj is not None and (own := _own(obj)) is not None:
-            own.show_viewport = shown
+        obj = scene.objects.get(name)  # the user may have deleted it meanwhile
+        if obj is not None and (modifier := _arrow_modifier(obj)) is not None:
+            modifier.show_viewport = shown
 
 
-def _points(sensor: markers.BakedSensor, name: str):
-    """Return a mesh of loose vertices, the texels, with what the nodes need to know of them."""
+def _points(sensor: BakedSensor, name: str):
+    """Return a mesh of loose vertices, one per texel, with the attributes that the nodes read."""
     texels = sensor.texels
     mesh = bpy.data.meshes.new(name)
     mesh.vertices.add(len(texels))
@@ -101,7 +114,7 @@ def _points(sensor: markers.BakedSensor, name: str):
 
 
 def _nodes(mark: str, name: str, image, frames, kind: str, length: float, longest: float, material):
-    """Return the nodes of one kind: a vector per texel, an arrow along it where it is long enough."""
+    """Return geometry nodes that compute a vector per texel and put an arrow along it where it is long enough."""
     group = materials.empty_node_group(mark, name)
     add, link = materials.NodeAdder(group), group.links.new
 
@@ -130,7 +143,7 @@ def _nodes(mark: str, name: str, image, frames, kind: str, length: float, longes
 
     if kind == "NORMALS":
         force = times(NORMAL, "Red")
-    else:  # the shear on the sensor, turned round
+    else:  # the reaction: the negative of the shear on the sensor
         along = vector("ADD", times(X_AXIS, "Green"), times(Y_AXIS, "Blue")).outputs["Vector"]
         force = vector("SCALE", along, Scale=-1.0).outputs["Vector"]
     arrow = vector("SCALE", force, Scale=length).outputs["Vector"]
@@ -159,7 +172,7 @@ def _nodes(mark: str, name: str, image, frames, kind: str, length: float, longes
 
 
 def _arrow(add, material):
-    """Return the socket of an arrow one unit long along z: the nodes bring it along, so that no other object is needed."""
+    """Return the socket of an arrow of length one along z; it is built by nodes, so that no other object is needed."""
     link = add.tree.links.new
     join = add("GeometryNodeJoinGeometry")
     for bottom, top, begin, end in ((0.035, 0.035, 0.0, 0.66), (0.1, 0.0, 0.66, 1.0)):

@@ -13,37 +13,37 @@ from ...core.errors import FileError, ParameterError
 from ...core.figures.figure_style import FigureStyle
 from ..display import bake_display
 from ..properties import figure_properties
+from .render_setup import RenderOptions
 
 KINDS = ("scene", "strip", "curves", "numbers", "video")
-"""What can be made."""
+"""Kinds of figures."""
 FORMATS = ("png", "pdf", "svg")
 
 
 @dataclass(frozen=True)
 class FigureRequest:
-    """What is to be made.
+    """The figures that are wanted.
 
     Attributes
     ----------
     kinds : tuple of str
-        Of :data:`KINDS`.
+        From :data:`KINDS`.
     style : FigureStyle
     frames : tuple of int
-        For scene and numbers; none: the one with the largest force. Two or more are also the strip's columns.
+        Frames of the pictures and numbers; two or more are also the columns of the strip. Empty: the frame with the largest
+        force.
     sensors : tuple of str
-        None: all.
+        Names; empty: all sensors.
     formats : tuple of str
-        Of figures that are no renders.
+        File formats of the figures that are not renders.
     exports : tuple of str
-        Kinds of :func:`.registry.exporters`; each gets a folder of its own.
-    engine, view, transparent
-        See :func:`.render_setup.render_setup`.
-    own_camera : bool
-        The scene's camera stays where it is.
+        Names from :func:`.registry.exporters`; each is written into a folder of its own.
+    engine, view, transparent, own_camera
+        See :class:`.render_setup.RenderOptions`.
     size : (2,) int, pixels
-        Of renders.
+        Width and height of the renders.
     samples : int or None
-        Per pixel; None: the scene's.
+        Samples per pixel; None: the scene's.
     """
 
     kinds: tuple[str, ...] = ("scene", "strip", "curves", "numbers")
@@ -65,19 +65,23 @@ class FigureRequest:
                 if word not in known:
                     raise ParameterError(f"There is no {what} '{word}': choose from {', '.join(known)}.")
 
+    def render_options(self, size: tuple[int, int]) -> RenderOptions:
+        """Return how the scene's pictures are to be taken, in this size (pixels)."""
+        return RenderOptions(self.engine, self.view, self.transparent, self.own_camera, size)
+
 
 def requested_figures(scene, active=None) -> FigureRequest:
-    """Return what a scene asks for.
+    """Return the figures that the panel of a scene asks for.
 
     Parameters
     ----------
     active : Object, optional
-        The active one, if only its figures are wanted.
+        The active object, if only its figures are wanted.
 
     Raises
     ------
     ParameterError
-        The frames make no sense, nothing is chosen, or the active object is no sensor.
+        The frames cannot be read, no figure is chosen, or the active object is no sensor.
     """
     own = scene.palpate.figures
     sensors: tuple[str, ...] = ()
@@ -108,12 +112,12 @@ def _chosen(items, names: set[str]) -> tuple[str, ...]:
 
 
 def frames_of(text: str) -> tuple[int, ...]:
-    """Return the frames that words like ``12, 40-44`` mean, in order and each once; none for an empty text.
+    """Return the frames in a text like ``12, 40-44``, in its order and each once; none for an empty text.
 
     Raises
     ------
     ParameterError
-        Something else is written there.
+        The text holds something else.
     """
     found: list[int] = []
     for part in filter(None, re.split(r"[,;\s]+", text.strip())):
@@ -126,12 +130,12 @@ def frames_of(text: str) -> tuple[int, ...]:
 
 
 def figure_folder(scene) -> Path:
-    """Return where a scene's figures go.
+    """Return the folder of a scene's figures.
 
     Raises
     ------
     FileError
-        It is relative to a .blend that has not been saved yet, or empty.
+        The folder is empty, or relative to a .blend that has not been saved yet.
     """
     text = scene.palpate.figures.folder
     if not text.strip():

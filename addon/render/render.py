@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A frame of the scene as a PNG, and a camera that frames what matters by itself."""
+"""Renders a frame of the scene as a PNG, and places the camera so that given points fit into the picture."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ from ...core.errors import FileError, SceneError
 from ...core.io.file_writing import atomic_write
 
 NEED_GL = {"BLENDER_EEVEE_NEXT", "BLENDER_EEVEE", "BLENDER_WORKBENCH"}
-"""Engines that draw with the graphics card, or with Mesa's software in its place."""
+"""Engines that need OpenGL, from a graphics card or from Mesa's software renderer."""
 _SURFACELESS = 0x31DD
 """EGL_PLATFORM_SURFACELESS_MESA"""
 
 
 def bounding_box_corners(objects) -> np.ndarray:
-    """Return the corners of the objects' bounding boxes, with their modifiers, in the world.
+    """Return the corners of the objects' bounding boxes, modifiers included, in world coordinates.
 
     Returns
     -------
@@ -42,15 +42,15 @@ def bounding_box_corners(objects) -> np.ndarray:
 
 
 def fit_camera(scene, points: np.ndarray, region=(0.05, 0.05, 0.95, 0.95)) -> None:
-    """Move the scene's camera, without turning it, so that all points just fit into a part of the picture.
+    """Move the scene's camera, without rotating it, so that all points just fit into a region of the picture.
 
     Parameters
     ----------
     scene : bpy.types.Scene
-        With a perspective camera; the size of its render counts.
+        Its camera is perspective; the size of its render determines the aspect ratio.
     points : (n, 3) float, Blender units, world
     region : (4,) float
-        Left, bottom, right and top of that part, as shares of the picture's width and height.
+        Left, bottom, right and top of the region, as shares of the picture's width and height.
 
     Raises
     ------
@@ -79,7 +79,7 @@ def fit_camera(scene, points: np.ndarray, region=(0.05, 0.05, 0.95, 0.95)) -> No
 
 
 def image_position(scene, point) -> tuple[float, float]:
-    """Return where a point of the world lies on the picture, as shares of its width and height from the lower left corner."""
+    """Return the position of a world point in the picture, as shares of its width and height from the lower left corner."""
     camera = _camera(scene)
     width, height = _half_angles(scene, camera)
     x, y, z = camera.matrix_world.normalized().inverted() @ Vector(point)
@@ -87,16 +87,16 @@ def image_position(scene, point) -> tuple[float, float]:
 
 
 def render_frame(scene, path: str | os.PathLike, frame: int, *, samples: int | None = None, size=None) -> Path:
-    """Render one frame of `scene` with its own engine and camera to a PNG; the scene's settings stay as they were.
+    """Render one frame of `scene` with its engine and camera to a PNG; the scene's settings are restored.
 
     Parameters
     ----------
     path : path
-        Replaced whole or not at all.
+        An existing file is replaced as a whole or not at all.
     frame : int
     samples : int, optional
-        Samples per pixel for Cycles and EEVEE. Default: the scene's. Cycles takes twice as many where the scene wants
-        its picture denoised and this Blender cannot.
+        Samples per pixel for Cycles and EEVEE. Default: the scene's. Cycles takes twice as many if the scene asks for
+        denoising and this Blender cannot denoise.
     size : (2,) int, optional
         Width and height, pixels. Default: the scene's.
 
@@ -117,7 +117,7 @@ def render_frame(scene, path: str | os.PathLike, frame: int, *, samples: int | N
     if path.suffix.lower() != ".png":
         path = path.with_name(path.name + ".png")
     with atomic_write(path) as temporary, _settings(scene, temporary, frame, samples, size):
-        temporary.unlink()  # so that a render which writes nothing is noticed
+        temporary.unlink()  # so that a render that writes no file is noticed
         try:
             bpy.ops.render.render(write_still=True, scene=scene.name)
         except RuntimeError as error:
@@ -130,7 +130,7 @@ def render_frame(scene, path: str | os.PathLike, frame: int, *, samples: int | N
 
 @lru_cache
 def has_opengl() -> bool:
-    """Whether Blender can draw: without a window, and without EGL to draw beside one, EEVEE and Workbench end the process."""
+    """Return True if Blender can use OpenGL. Without a window and without EGL, EEVEE and Workbench would end the process."""
     if not bpy.app.background or not sys.platform.startswith("linux"):
         return True
     try:
@@ -173,7 +173,7 @@ def _half_angles(scene, camera) -> tuple[float, float]:
 
 @contextmanager
 def _settings(scene, path: Path, frame: int, samples: int | None, size) -> Iterator[None]:
-    """Change the scene for one render and put everything back."""
+    """Change the settings of a scene for one render, then restore them."""
     render, image = scene.render, scene.render.image_settings
     changes: list[tuple[object, str, object]] = []
     if hasattr(image, "media_type"):  # Blender 5.0: decides which file formats there are to choose from

@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A camera and light for one picture, where a scene has none of its own or another view is wanted; taken away again."""
+"""Camera, light and settings for pictures of a scene, for scenes without a camera or light and for other views."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 
 import bpy
 import numpy as np
@@ -16,17 +17,17 @@ from ..display import materials
 from . import render
 
 ENGINES = {"cycles": ("CYCLES",), "eevee": ("BLENDER_EEVEE_NEXT", "BLENDER_EEVEE"), "workbench": ("BLENDER_WORKBENCH",)}
-"""Words for engines → their names, which changed with Blender's versions."""
+"""Engines by the name that users give; Blender's own names depend on its version."""
 DEFAULT_VIEW = (-55.0, 30.0)
-"""Azimuth, from +x towards +y, and elevation, degrees, from which a scene without a camera is looked at."""
+"""Azimuth (from +x towards +y) and elevation of the camera, degrees, for a scene without a camera."""
 MARGIN = 0.06
-"""Of the picture's width and height, left free around what is framed."""
+"""Free margin around the subjects, as a share of the picture's width and height."""
 _BACKDROP_SIZE_RATIO = 3.0
-"""Sizes of what is seen from which on an object that takes no part is a backdrop."""
+"""An object that takes no part is a backdrop if it is larger than the subjects by this factor."""
 _MAX_FRAMED_FRAMES = 60
-"""Frames at which a camera's view is made sure of."""
+"""Number of frames, at most, at which the subjects are measured for the camera."""
 _LAMPS = (((-35.0, 50.0), 3.2, (1.0, 0.97, 0.93)), ((70.0, 30.0), 1.2, (0.9, 0.95, 1.0)), ((170.0, 45.0), 2.0, (1.0, 1.0, 1.0)))
-"""Suns: azimuth from the camera's and elevation, degrees; strength; colour."""
+"""Sun lamps: azimuth relative to the camera and elevation, degrees; strength; colour."""
 
 
 def engine_of(scene, name: str) -> str:
@@ -35,13 +36,13 @@ def engine_of(scene, name: str) -> str:
     Raises
     ------
     ParameterError
-        There is none of that name.
+        This Blender has no such engine.
     """
     before = scene.render.engine
     for candidate in ENGINES[name]:
         try:
             scene.render.engine = candidate
-        except TypeError:  # the list of engines is made on request, and only this asks for it
+        except TypeError:  # the names of the engines can only be found by trying
             continue
         scene.render.engine = before
         return candidate
@@ -49,97 +50,148 @@ def engine_of(scene, name: str) -> str:
 
 
 def subjects(scene) -> list:
-    """Return what a picture should show: sensors, pads, targets and their children, arrows and markers."""
+    """Return the objects that a picture should show: sensors, pads, targets, their children, arrows and markers."""
     taking_part = {obj for obj in scene.objects if obj.palpate.role != "NONE" or materials.SENSOR_KEY in obj}
-    return [obj for obj in scene.objects if _shows(obj) and (obj in taking_part or taking_part & set(_above(obj)))]
+    return [obj for obj in scene.objects if _is_rendered(obj) and (obj in taking_part or taking_part & set(_ancestors(obj)))]
 
 
-def _above(obj) -> Iterator:
+def _ancestors(obj) -> Iterator:
     while obj.parent is not None:
         obj = obj.parent
         yield obj
 
 
-def _shows(obj) -> bool:
+def _is_rendered(obj) -> bool:
     return obj.type in {"MESH", "CURVE", "SURFACE", "META", "FONT"} and not obj.hide_render and obj.visible_get()
 
 
-@contextmanager
-def render_setup(
-    scene, frames, *, engine: str | None = None, view=None, transparent: bool = False, frame: bool = True, size=None
-):
-    """Prepare a scene for pictures, and put everything back.
+@dataclass(frozen=True)
+class RenderOptions:
+    """How pictures of a scene are to be taken.
 
-    Parameters
+    Attributes
     ----------
-    frames : sequence of int
-        At which all that matters has to be in the picture.
     engine : {"cycles", "eevee", "workbench"}, optional
         Default: the scene's.
     view : (2,) float, degrees, optional
         Azimuth and elevation of the camera. Default: the direction of the scene's camera, or :data:`DEFAULT_VIEW`.
     transparent : bool
-        No background: no world, and no floor or backdrop that reaches far beyond everything else.
-    frame : bool
-        False leaves the scene's own camera where it is.
+        No background: no world, and no floor or backdrop that is much larger than everything else.
+    own_camera : bool
+        The scene's camera stays where it is.
     size : (2,) int, pixels, optional
-        Of the pictures. Default: the scene's.
+        Width and height of the pictures. Default: the scene's.
     """
-    made, changes = [], []
 
-    def change(owner, name, value):
-        changes.append((owner, name, getattr(owner, name)))
+    engine: str | None = None
+    view: tuple[float, float] | None = None
+    transparent: bool = False
+    own_camera: bool = False
+    size: tuple[int, int] | None = None
+
+
+class _TemporaryChanges:
+    """Properties that are changed, and data-blocks that are added, until :meth:`undo`."""
+
+    def __init__(self):
+        self._before: list[tuple[object, str, object]] = []
+        self._added: list = []
+
+    def set(self, owner, name: str, value) -> None:
+        self._before.append((owner, name, getattr(owner, name)))
         setattr(owner, name, value)
 
+    def add(self, block):
+        self._added.append(block)
+        return block
+
+    def undo(self) -> None:
+        for owner, name, value in reversed(self._before):
+            setattr(owner, name, value)
+        for block in self._added:
+            _remove(block)
+
+
+@contextmanager
+def render_setup(scene, frames: Sequence[int], options: RenderOptions) -> Iterator[None]:
+    """Prepare a scene for pictures, and restore it afterwards.
+
+    Parameters
+    ----------
+    scene : Scene
+    frames : sequence of int
+        At all these frames the :func:`subjects` have to be in the picture.
+    options : RenderOptions
+    """
+    changes = _TemporaryChanges()
     now = scene.frame_current, scene.frame_subframe
     try:
-        if engine is not None:
-            change(scene.render, "engine", engine_of(scene, engine))
-        if size is not None:
-            change(scene.render, "resolution_x", int(size[0]))
-            change(scene.render, "resolution_y", int(size[1]))
-        if transparent:
-            change(scene.render, "film_transparent", True)
-            for obj in _backdrops(scene):
-                change(obj, "hide_render", True)
-        own = scene.camera if scene.camera is not None and scene.camera.data.type == "PERSP" else None
-        if own is None or view is not None or frame:
-            camera = _camera(scene, own, view)
-            made.append(camera)
-            change(scene, "camera", camera)
-            render.fit_camera(scene, _corners(scene, frames), (MARGIN, MARGIN, 1 - MARGIN, 1 - MARGIN))
-            _clip(scene, camera)
-        if not any(obj.type == "LIGHT" and not obj.hide_render for obj in scene.objects):
-            made += _lamps(scene, scene.camera)
-            if scene.world is None or not transparent and _is_dark(scene.world):
-                world = _world()
-                change(scene, "world", world)
-                made.append(world)
+        _set_output(scene, options, changes)
+        _set_camera(scene, frames, options, changes)
+        _set_lights(scene, options, changes)
         if scene.render.engine == "BLENDER_WORKBENCH":
-            shading = scene.display.shading
-            change(shading, "light", "FLAT")  # in a lamp's shade a heat map would not have the colours of its bar
-            change(shading, "color_type", "VERTEX")
-            change(shading, "show_cavity", True)
-            change(shading, "cavity_type", "BOTH")
-            change(shading, "show_object_outline", True)
-            change(scene.display, "render_aa", "16")
-        if scene.view_settings.view_transform != "Standard":  # a heat map must have the colours of its colour bar
-            change(scene.view_settings, "view_transform", "Standard")
+            _set_workbench(scene, changes)
+        if scene.view_settings.view_transform != "Standard":  # others would change the colours of the heat maps
+            changes.set(scene.view_settings, "view_transform", "Standard")
         yield
     finally:
-        for owner, name, value in reversed(changes):
-            setattr(owner, name, value)
-        for block in made:
-            _drop(block)
+        changes.undo()
         scene.frame_set(now[0], subframe=now[1])
 
 
+def _set_output(scene, options: RenderOptions, changes: _TemporaryChanges) -> None:
+    """Set engine, size and background."""
+    if options.engine is not None:
+        changes.set(scene.render, "engine", engine_of(scene, options.engine))
+    if options.size is not None:
+        changes.set(scene.render, "resolution_x", int(options.size[0]))
+        changes.set(scene.render, "resolution_y", int(options.size[1]))
+    if options.transparent:
+        changes.set(scene.render, "film_transparent", True)
+        for obj in _backdrops(scene):
+            changes.set(obj, "hide_render", True)
+
+
+def _set_camera(scene, frames: Sequence[int], options: RenderOptions, changes: _TemporaryChanges) -> None:
+    """Add a camera that frames the subjects, unless the scene's own is to stay."""
+    own = scene.camera if scene.camera is not None and scene.camera.data.type == "PERSP" else None
+    if own is not None and options.view is None and options.own_camera:
+        return
+    camera = changes.add(_camera(scene, own, options.view))
+    changes.set(scene, "camera", camera)
+    render.fit_camera(scene, _corners(scene, frames), (MARGIN, MARGIN, 1 - MARGIN, 1 - MARGIN))
+    _set_clipping(scene, camera)
+
+
+def _set_lights(scene, options: RenderOptions, changes: _TemporaryChanges) -> None:
+    """Add lamps and a bright world to a scene without light."""
+    if any(obj.type == "LIGHT" and not obj.hide_render for obj in scene.objects):
+        return
+    for lamp in _lamps(scene, scene.camera):
+        changes.add(lamp)
+    if scene.world is None or not options.transparent and _is_dark(scene.world):
+        world = _world()
+        changes.set(scene, "world", world)
+        changes.add(world)
+
+
+def _set_workbench(scene, changes: _TemporaryChanges) -> None:
+    """Let Workbench show the colours of the vertices, unshaded."""
+    shading = scene.display.shading
+    changes.set(shading, "light", "FLAT")  # shading would make a heat map darker than its colour bar
+    changes.set(shading, "color_type", "VERTEX")
+    changes.set(shading, "show_cavity", True)
+    changes.set(shading, "cavity_type", "BOTH")
+    changes.set(shading, "show_object_outline", True)
+    changes.set(scene.display, "render_aa", "16")
+
+
 def _backdrops(scene) -> list:
-    """Return what is only there to be in front of: it takes no part, carries nothing, and is far larger than what does."""
+    """Return floors and backdrops: objects that take no part, carry no subject, and are far larger than the subjects."""
     seen = subjects(scene)
-    carriers = {above for obj in seen for above in _above(obj)}
+    carriers = {ancestor for obj in seen for ancestor in _ancestors(obj)}
     size = float(np.linalg.norm(np.ptp(render.bounding_box_corners(seen), axis=0))) if seen else 0.0
-    others = [obj for obj in scene.objects if _shows(obj) and obj not in seen and obj not in carriers]
+    others = [obj for obj in scene.objects if _is_rendered(obj) and obj not in seen and obj not in carriers]
     return [
         obj
         for obj in others
@@ -148,6 +200,7 @@ def _backdrops(scene) -> list:
 
 
 def _camera(scene, own, view):
+    """Add a camera in the given direction, else in that of the scene's `own` camera, else in the default direction."""
     camera = bpy.data.objects.new("Palpate Camera", bpy.data.cameras.new("Palpate Camera"))
     scene.collection.objects.link(camera)
     if own is not None:
@@ -165,7 +218,7 @@ def _camera(scene, own, view):
 
 
 def _corners(scene, frames) -> np.ndarray:
-    """Corners of all that matters at some frames; of many, at enough of them that an arrow's longest is not missed by much."""
+    """Return the corners of the subjects' bounding boxes at the frames; of many frames, at evenly spaced ones."""
     places = np.linspace(0, len(frames) - 1, min(len(frames), _MAX_FRAMED_FRAMES)).round().astype(int)
     chosen = sorted({int(frames[place]) for place in places})
     found = []
@@ -175,12 +228,14 @@ def _corners(scene, frames) -> np.ndarray:
     return np.concatenate(found)
 
 
-def _clip(scene, camera) -> None:
+def _set_clipping(scene, camera) -> None:
+    """Set the clipping distances by the distance of the farthest subject."""
     distance = max((camera.matrix_world.translation - obj.matrix_world.translation).length for obj in subjects(scene))
     camera.data.clip_start, camera.data.clip_end = 0.005 * distance, 20.0 * distance
 
 
 def _lamps(scene, camera) -> list:
+    """Add three sun lamps around the direction of the camera."""
     back = camera.matrix_world.to_3x3() @ Vector((0.0, 0.0, 1.0))
     heading = math.atan2(back.y, back.x)
     made = []
@@ -195,7 +250,7 @@ def _lamps(scene, camera) -> list:
 
 
 def _is_dark(world) -> bool:
-    """Whether a world is the plain one of a new file, which is nearly black."""
+    """Return True for the plain, nearly black world of a new file."""
     tree = world.node_tree
     if tree is None:
         return max(world.color) < 0.1
@@ -213,7 +268,7 @@ def _world():
     return world
 
 
-def _drop(block) -> None:
+def _remove(block) -> None:
     if isinstance(block, bpy.types.World):
         bpy.data.worlds.remove(block)
         return

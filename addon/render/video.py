@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Pictures become a video: Blender's own sequencer and encoder, in a scene that is gone afterwards."""
+"""Encodes pictures as a video with Blender's sequencer and encoder, in a temporary scene."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from ...core.io.file_writing import atomic_write
 
 
 def encode_video(pictures: Sequence[str | os.PathLike], path: str | os.PathLike, fps: float) -> Path:
-    """Write an MP4 (H.264) of pictures of one size, one per frame.
+    """Write pictures of equal size as an MP4 (H.264), one per frame.
 
     Parameters
     ----------
     pictures : sequence of path
-        PNG, of even width and height, all in one folder.
+        PNG files of even width and height in one folder.
     path : path
-        Replaced whole or not at all; gets the ending .mp4.
+        An existing file is replaced as a whole or not at all. The suffix becomes .mp4.
     fps : float
 
     Raises

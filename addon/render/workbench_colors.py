@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Heat maps for Workbench, which draws no materials' nodes: colours of vertices, on copies of the meshes, while it renders.
+"""Heat maps for Workbench, which ignores the nodes of materials: vertex colours on copies of the meshes while it renders.
 
-What is seen through has no colours of vertices, which are never clear, but its object's, to which Workbench then turns.
+Workbench draws vertex colours opaque. A transparent object gets no vertex colours, so that Workbench draws it in the object's
+colour, which may be transparent.
 """
 
 from __future__ import annotations
@@ -21,43 +22,43 @@ from ..scene import meshes
 
 COLOR_ATTRIBUTE = "Palpate Colour"
 DEFAULT_COLOR = (0.8, 0.8, 0.8, 1.0)
-"""Linear colour of what has no material."""
+"""Colour of faces without material, scene-linear."""
 TRANSPARENT_NODES = {"BSDF_TRANSPARENT", "BSDF_GLASS", "BSDF_REFRACTION"}
 GLASS_OPACITY = 0.12
-"""How solid Workbench draws glass."""
+"""Opacity with which Workbench draws glass."""
 
 
 @contextmanager
-def workbench_colors(places: dict, bake: Bake, style: FigureStyle) -> Iterator[Callable[[int], None]]:
-    """Put sensors in colours and everything else in its materials' viewport colours, and take them off again.
+def workbench_colors(folders: dict, bake: Bake, style: FigureStyle) -> Iterator[Callable[[int], None]]:
+    """Show sensors in heat-map colours and everything else in the viewport colours of its materials, then restore them.
 
     Parameters
     ----------
-    places : dict of Object to Path
+    folders : dict of Object to Path
         Folder of each sensor's bake.
     bake : Bake
     style : FigureStyle
 
     Yields
     ------
-    function
-        That shows a frame, by its number.
+    callable
+        Shows the frame whose number it is given.
     """
-    names = {place: name for name, place in bake.folders.items()}
-    sensors = {obj: names[place] for obj, place in places.items() if place in names}
-    solid = [obj for obj in bpy.context.scene.objects if obj.type == "MESH" and len(obj.data.polygons)]
-    before = {obj: (obj.data, tuple(obj.color)) for obj in solid}
+    names = {folder: name for name, folder in bake.folders.items()}
+    sensors = {obj: names[folder] for obj, folder in folders.items() if folder in names}
+    meshes_shown = [obj for obj in bpy.context.scene.objects if obj.type == "MESH" and len(obj.data.polygons)]
+    before = {obj: (obj.data, tuple(obj.color)) for obj in meshes_shown}
     top = style.scale_limit(bake.recording, bake.texels)
     try:
-        plain = {obj: _in_material_colours(obj) for obj in solid}
-        looks = {obj: _corners_of_region(obj.data, bake.texels[name]) for obj, name in sensors.items()}
+        plain = {obj: _in_material_colours(obj) for obj in meshes_shown}
+        regions = {obj: _corners_of_region(obj.data, bake.texels[name]) for obj, name in sensors.items()}
 
         def show(number: int) -> None:
             index = frame_index(bake.recording, number)
             for obj, name in sensors.items():
                 texels = bake.texels[name]
                 values = style.values(bake.recording.sensors[name].at(index), texels)
-                corners, texel = looks[obj]
+                corners, texel = regions[obj]
                 table = plain[obj].copy()
                 table[corners, :3] = color_maps.linear(color_maps.colors(style.colour_map, values / top))[texel]
                 obj.data.attributes[COLOR_ATTRIBUTE].data.foreach_set("color", table.ravel())
@@ -72,7 +73,7 @@ def workbench_colors(places: dict, bake: Bake, style: FigureStyle) -> Iterator[C
 
 
 def _in_material_colours(obj) -> np.ndarray:
-    """Give an object a mesh of its own with a colour at each corner; returns these, (nc, 4) float32."""
+    """Give an object a copy of its mesh with a colour at each corner; return the colours, (nc, 4) float32."""
     obj.data = mesh = obj.data.copy()
     sides, material = np.empty(len(mesh.polygons), dtype=np.int32), np.empty(len(mesh.polygons), dtype=np.int32)
     mesh.polygons.foreach_get("loop_total", sides)
@@ -82,11 +83,11 @@ def _in_material_colours(obj) -> np.ndarray:
     ]
     table = np.array(slots, dtype=np.float32)[np.clip(np.repeat(material, sides), 0, len(slots) - 1)]
     table[:, 3] = 1.0
-    solidity = min(map(_opacity, obj.data.materials), default=1.0)
-    if solidity < 1.0:
+    opacity = min(map(_opacity, obj.data.materials), default=1.0)
+    if opacity < 1.0:
         for attribute in list(mesh.color_attributes):
             mesh.color_attributes.remove(attribute)
-        obj.color = (*table[:, :3].mean(axis=0), solidity)
+        obj.color = (*table[:, :3].mean(axis=0), opacity)
         return table
     attribute = mesh.attributes.new(COLOR_ATTRIBUTE, "FLOAT_COLOR", "CORNER")
     attribute.data.foreach_set("color", table.ravel())
@@ -96,7 +97,7 @@ def _in_material_colours(obj) -> np.ndarray:
 
 
 def _opacity(material) -> float:
-    """Return 1 for what hides what is behind it, less for glass and the like."""
+    """Return 1 for an opaque material and less for glass and other transparent ones."""
     if material is None or materials.SENSOR_KEY in material:
         return 1.0
     found = [material.diffuse_color[3]]
@@ -111,7 +112,7 @@ def _opacity(material) -> float:
 
 
 def _corners_of_region(mesh, texels: Texels) -> tuple[np.ndarray, np.ndarray]:
-    """Return the corners of the faces that a sensor's texels span, and the texel of each."""
+    """Return the corners of the faces in a sensor's region, and the texel at each of these corners."""
     corner, sides = meshes.corners(mesh), np.empty(len(mesh.polygons), dtype=np.int32)
     mesh.polygons.foreach_get("loop_total", sides)
     number = np.full(len(mesh.vertices), -1)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from blender_scenes import changes, cube, dump, grid, press, press_and_drop, reopen, save
 
-from palpate.addon.bake import bake_files
+from palpate.addon.bake import folder_swap
 from palpate.addon.bake.bake import bake
 from palpate.addon.display import heat_map, marker_meshes, materials
 from palpate.addon.scene import display_names, scene_reader
@@ -23,7 +23,7 @@ from palpate.core.jobs.job_runner import SlicedJob, run_job
 
 def baked(scene):
     result = run_job(bake(scene))
-    bake_files.wait_for_removals()
+    folder_swap.wait_for_removals()
     return result
 
 

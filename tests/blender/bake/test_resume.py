@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 from blender_scenes import press_and_drop, save
 
-from palpate.addon.bake import bake_checkpoint, bake_files, folder_lock
+from palpate.addon.bake import bake_checkpoint, bake_files, folder_lock, folder_swap
 from palpate.addon.bake.bake import bake
 from palpate.core.errors import FileError
 from palpate.core.io.recording_npz import load_recording
@@ -92,7 +92,7 @@ def killed(tmp_path, monkeypatch):
 def computed(scene):
     frames = []
     run_job(bake(scene), lambda step: frames.append(step.frame) if step.stage == "Computing forces" else None)
-    bake_files.wait_for_removals()
+    folder_swap.wait_for_removals()
     return frames
 
 
@@ -133,10 +133,10 @@ def test_one_bake_at_a_time(tmp_path):
     with pytest.raises(FileError, match="Another bake is writing to"):
         run_job(bake(scene))
     run_job(first)
-    bake_files.wait_for_removals()
+    folder_swap.wait_for_removals()
     assert contents(tmp_path / "palpate") == expected
     run_job(bake(scene))
-    bake_files.wait_for_removals()
+    folder_swap.wait_for_removals()
     assert contents(tmp_path / "palpate") == expected
 
 

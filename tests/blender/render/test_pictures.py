@@ -72,7 +72,7 @@ def test_the_video_has_a_picture_per_frame(baked, tmp_path):
 
 def test_all_that_matters_is_in_the_picture_and_lit(baked, tmp_path):
     scene, _ = baked
-    with render_setup.render_setup(scene, [1, 4], view=(-60.0, 35.0), transparent=True):
+    with render_setup.render_setup(scene, [1, 4], render_setup.RenderOptions(view=(-60.0, 35.0), transparent=True)):
         points = render.bounding_box_corners(render_setup.subjects(scene))
         places = np.array([render.image_position(scene, point) for point in points])
         render.render_frame(scene, tmp_path / "a.png", 4, samples=4, size=(96, 64))
@@ -107,7 +107,10 @@ def test_a_scene_that_is_not_baked_and_a_frame_that_is_not_are_one_sentence(bake
 def test_an_error_in_the_middle_puts_the_scene_back(baked):
     scene, _ = baked
     before = dump()
-    with pytest.raises(RuntimeError), render_setup.render_setup(scene, [1], engine="workbench", transparent=True):
+    with (
+        pytest.raises(RuntimeError),
+        render_setup.render_setup(scene, [1], render_setup.RenderOptions(engine="workbench", transparent=True)),
+    ):
         raise RuntimeError
     assert changes(before, dump()) == [] and scene.camera is None and scene.render.engine == "CYCLES"
 
@@ -155,7 +158,7 @@ def test_a_transparent_picture_leaves_the_backdrop_out_but_not_what_carries_a_se
     robot = bpy.context.object
     scene.objects["Pad"].parent = robot
     for transparent, hidden in ((False, set()), (True, {floor})):
-        with render_setup.render_setup(scene, [1], transparent=transparent):
+        with render_setup.render_setup(scene, [1], render_setup.RenderOptions(transparent=transparent)):
             assert {obj for obj in scene.objects if obj.hide_render} == hidden
     assert not floor.hide_render
 
@@ -163,7 +166,7 @@ def test_a_transparent_picture_leaves_the_backdrop_out_but_not_what_carries_a_se
 @pytest.mark.parametrize("size", [(160, 90), (90, 160)])
 def test_the_picture_is_filled_whatever_its_shape(baked, size):
     scene, _ = baked
-    with render_setup.render_setup(scene, [1, 4], view=(-60.0, 35.0), size=size):
+    with render_setup.render_setup(scene, [1, 4], render_setup.RenderOptions(view=(-60.0, 35.0), size=size)):
         points = render.bounding_box_corners(render_setup.subjects(scene))
         places = np.array([render.image_position(scene, point) for point in points])
         assert (scene.render.resolution_x, scene.render.resolution_y) == size
@@ -192,7 +195,7 @@ def test_what_moves_away_in_between_stays_in_the_picture(baked):
     for frame, height in ((1, 0.01), (2, 0.4), (4, 0.01)):
         ball.location.z = height
         ball.keyframe_insert("location", frame=frame)
-    with render_setup.render_setup(scene, [1, 2, 3, 4], view=(-60.0, 35.0)):
+    with render_setup.render_setup(scene, [1, 2, 3, 4], render_setup.RenderOptions(view=(-60.0, 35.0))):
         scene.frame_set(2)
         places = np.array([render.image_position(scene, point) for point in render.bounding_box_corners([ball])])
     assert (places > 0.0).all() and (places < 1.0).all()
