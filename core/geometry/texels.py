@@ -79,21 +79,8 @@ def texels_from_region(mesh: TriangleMesh, region: np.ndarray, name: str = "sens
         The region is empty, has no triangle, or a texel has no normal.
     """
     region = np.asarray(region, dtype=bool)
-    vertex = np.flatnonzero(region)
-    if len(vertex) == 0:
-        raise RegionError(
-            f"The region of sensor '{name}' is empty: select or paint all corners of at least one face, or take its role away."
-        )
-    inside = region[mesh.triangles].all(axis=1)
-    if not inside.any():
-        raise RegionError(
-            f"The {len(vertex)} vertices of sensor '{name}' span no face: select or paint all corners of at least one face."
-        )
-    triangles = mesh.triangles[inside]
-    on_face = np.zeros(len(mesh.vertices), dtype=bool)
-    on_face[triangles] = True
-    vertex = np.flatnonzero(on_face)
-
+    inside = _triangles_inside(mesh, region, name)
+    vertex = np.unique(mesh.triangles[inside])
     normals = vertex_normals(mesh)[vertex]
     flat = np.linalg.norm(normals, axis=1) < 0.5
     if flat.any():
@@ -101,32 +88,55 @@ def texels_from_region(mesh: TriangleMesh, region: np.ndarray, name: str = "sens
             f"Vertex {vertex[flat][0]} of sensor '{name}' has no normal, its faces cancel out: "
             "recalculate the normals or leave the vertex out."
         )
-    index = np.full(len(mesh.vertices), -1)
-    index[vertex] = np.arange(len(vertex))
-    position = mesh.vertices[vertex]
-    local_triangles = index[triangles]
-    local_polygons = index[mesh.quads[region[mesh.quads].all(axis=1)]] if mesh.quads is not None else None
-    grid, along = grid_layout(position, normals, local_triangles, local_polygons)
-    layout: GridLayout | UVLayout
-    if grid is not None and along is not None:
-        layout = grid
-    else:
-        layout, along = uv_layout(position, normals, local_triangles)
-    tangent = along - np.einsum("ij,ij->i", along, normals)[:, None] * normals
-    length = np.linalg.norm(tangent, axis=1)
-    bad = length < 1e-9
-    if bad.any():  # the axis stands on the normal there: any direction across will do, as long as it is always the same
-        tangent[bad] = np.cross(normals[bad], np.eye(3)[np.abs(normals[bad]).argmin(axis=1)])
-        length = np.linalg.norm(tangent, axis=1)
-    tangent /= length[:, None]
+    texel = np.full(len(mesh.vertices), -1)
+    texel[vertex] = np.arange(len(vertex))
+    position, triangles = mesh.vertices[vertex], texel[mesh.triangles[inside]]
+    quads = texel[mesh.quads[region[mesh.quads].all(axis=1)]] if mesh.quads is not None else None
+    layout, along = _layout(position, normals, triangles, quads)
     return Texels(
         vertex=vertex,
         position=position,
         normal=normals,
-        tangent=tangent,
+        tangent=_tangents(along, normals),
         area=vertex_areas(mesh, inside)[vertex],
         layout=layout,
     )
+
+
+def _triangles_inside(mesh: TriangleMesh, region: np.ndarray, name: str) -> np.ndarray:
+    """Return which triangles have all corners in the region, (nt,) bool; raises RegionError when none has."""
+    if not region.any():
+        raise RegionError(
+            f"The region of sensor '{name}' is empty: select or paint all corners of at least one face, or take its role away."
+        )
+    inside = region[mesh.triangles].all(axis=1)
+    if not inside.any():
+        raise RegionError(
+            f"The {np.count_nonzero(region)} vertices of sensor '{name}' span no face: "
+            "select or paint all corners of at least one face."
+        )
+    return inside
+
+
+def _layout(
+    position: np.ndarray, normals: np.ndarray, triangles: np.ndarray, quads: np.ndarray | None
+) -> tuple[GridLayout | UVLayout, np.ndarray]:
+    """Return a grid where the texels form one, a texture map otherwise; and (n, 3) directions of the image's x axis."""
+    grid, along = grid_layout(position, normals, triangles, quads)
+    if grid is not None and along is not None:
+        return grid, along
+    return uv_layout(position, normals, triangles)
+
+
+def _tangents(along: np.ndarray, normals: np.ndarray) -> np.ndarray:
+    """Return (n, 3) unit vectors: the parts of `along` that are perpendicular to the normals."""
+    tangent = along - np.einsum("ij,ij->i", along, normals)[:, None] * normals
+    length = np.linalg.norm(tangent, axis=1)
+    parallel = length < 1e-9
+    if parallel.any():  # any perpendicular direction will do, as long as it is always the same
+        tangent[parallel] = np.cross(normals[parallel], np.eye(3)[np.abs(normals[parallel]).argmin(axis=1)])
+        length = np.linalg.norm(tangent, axis=1)
+    return tangent / length[:, None]
 
 
 class DeformedTexels:

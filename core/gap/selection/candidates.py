@@ -34,6 +34,10 @@ DIRECTLY_ESTIMATED = ("dead-texels", "quantization")
 """Kinds whose numbers are read off the recordings, since a texel is dead or is not, and a step is there or is not."""
 
 
+_HALTON_DIMENSIONS = 5
+"""Parameters of a form whose starting values are independent of each other; further ones repeat those of the first."""
+
+
 @dataclass(frozen=True)
 class Scales:
     """How large things are in a recording.
@@ -155,13 +159,17 @@ class Candidate:
         return Effect(self.kind.name, self.form.name, {**complete, **spread})
 
     def starting_values(self, scales: Scales, gain: float, count: int = 8) -> Iterator[dict[str, float]]:
-        """Yield places to begin: spread evenly over the search ranges (Halton's sequence)."""
-        for i in range(count):
+        """Yield values to start a search from, spread evenly over the search ranges (Halton's sequence)."""
+        from scipy.stats import qmc
+
+        sequence = qmc.Halton(_HALTON_DIMENSIONS, scramble=False)
+        sequence.fast_forward(1)  # the first point is the corner of all ranges
+        for shares in sequence.random(count):
             values = {}
             for k, raw in enumerate(self.form.parameters):
                 p = raw.scaled(gain)
                 low, high = search_range(p, scales)
-                share = _halton(i + 1, (2, 3, 5, 7, 11)[k % 5])
+                share = shares[k % _HALTON_DIMENSIONS]
                 if low > 0 and (p.log or high > 30.0 * low):
                     values[p.name] = float(np.exp(np.log(low) + share * (np.log(high) - np.log(low))))
                 else:
@@ -210,15 +218,6 @@ class FittedCandidate:
         n = len(self.fit.model.effects)
         values = self.fit.model.effects[n - 1].values
         return sum(len(v) if isinstance(v, tuple) else 1 for v in values.values())
-
-
-def _halton(index: int, base: int) -> float:
-    share, result = 1.0, 0.0
-    while index > 0:
-        share /= base
-        result += share * (index % base)
-        index //= base
-    return result
 
 
 def candidates(predictors: Sequence[Predictor], model: Model) -> list[Candidate]:
