@@ -5,6 +5,7 @@ import bpy
 from bpy.props import BoolProperty, StringProperty
 
 from ..addon.measured import gap_results
+from ..core.jobs.job_runner import run_job
 from . import modal_job, support
 from .fits import show_image
 
@@ -132,8 +133,7 @@ class PALPATE_OT_gap_report(support.ErrorReporting, bpy.types.Operator):
 
         folder = writable_folder(bpy.path.abspath(self.directory), create=True)
         result = gap_results.of(context.object)
-        for _ in summary.write_report(result.diagnosis, folder, result.errors):
-            pass
+        run_job(summary.write_report(result.diagnosis, folder, result.errors))
         self.report({"INFO"}, f"Wrote {folder / 'report.html'}")
 
 

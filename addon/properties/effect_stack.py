@@ -11,7 +11,7 @@ import json
 import zlib
 
 import bpy
-from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
+from bpy.props import BoolProperty, EnumProperty, IntProperty, StringProperty
 
 from ...core.effects.engine import registry
 from ...core.effects.engine.specification import Form, Kind
@@ -19,7 +19,7 @@ from ...core.errors import EffectError
 from ...core.model.effect import Effect
 from ...core.model.parameter import Parameter
 from ..session import units
-from .parameter_properties import FIXED, unit_in_words, with_unit
+from .parameter_properties import FIXED, float_property, unit_in_words, with_unit
 
 SITE_ICONS = {"contact": "MOD_PHYSICS", "pad": "MOD_CLOTH", "readout": "DRIVER"}
 
@@ -44,16 +44,12 @@ def kind_items() -> list[tuple]:
 
 
 def title(name: str) -> str:
-    """A form's name as people read it."""
+    """Return a name of the library as a title for people."""
     return name.replace("-", " ").title()
 
 
-def _label(parameter: Parameter) -> str:
-    return with_unit(title(parameter.name.replace("_", "-")), parameter)
-
-
 def _tooltip(form: Form, parameter: Parameter) -> str:
-    """What a parameter does, its unit and bounds, and where the formula comes from."""
+    """Say what a parameter does, its unit and bounds, and where the formula comes from."""
     bounds = "" if parameter.unit.startswith("unit") else f"; {parameter.low:g} to {parameter.high:g}"
     return (
         f"{parameter.text.removesuffix('.')} ({unit_in_words(parameter)}{bounds}). Source: {form.reference.removesuffix('.')}"
@@ -61,20 +57,15 @@ def _tooltip(form: Form, parameter: Parameter) -> str:
 
 
 def _property(form: Form, parameter: Parameter):
-    text = _tooltip(form, parameter)
+    """Return the property that holds a parameter of a form."""
+    label, text = title(parameter.name.replace("_", "-")), _tooltip(form, parameter)
     if parameter.per_texel:
         text = f"Numbers separated by commas, one per texel or one for all. {text}"
-        return StringProperty(name=_label(parameter), description=text, **FIXED)
-    limits = {} if parameter.unit.startswith("unit") else {"min": parameter.low, "max": parameter.high}
-    return FloatProperty(
-        name=_label(parameter),
-        description=text,
-        default=parameter.default,
-        precision=5,
-        step=0.1 if parameter.unit == "m" else 1,
-        **limits,
-        **FIXED,
-    )
+        return StringProperty(name=with_unit(label, parameter), description=text, **FIXED)
+    # Bounds in the sensor's own unit depend on its gain: they are checked when the stack is read.
+    limits = {} if parameter.unit.startswith("unit") else None
+    step = 0.1 if parameter.unit == "m" else 1
+    return float_property(parameter, label, text, limits, precision=5, step=step)
 
 
 def _annotations() -> dict:

@@ -10,8 +10,8 @@ from ..session import units
 
 FIXED: dict = {"options": set(), "override": {"LIBRARY_OVERRIDABLE"}}
 """A parameter is constant during a run, so it has no keyframes."""
-LOWEST = -1e9
-"""Least value that a panel takes for a parameter without a lower bound."""
+LOWEST, HIGHEST = -1e9, 3.402823466e38
+"""Bounds of a panel's number where the parameter has none; the second is the largest number of Blender."""
 
 
 def unit_in_words(parameter: Parameter) -> str:
@@ -24,14 +24,23 @@ def with_unit(label: str, parameter: Parameter) -> str:
     return label if parameter.unit == "1" else f"{label} ({parameter.unit})"
 
 
-def float_property(parameter: Parameter, label: str, description: str, **more):
-    """Return a number of Blender with a parameter's default and bounds; `more` goes to FloatProperty."""
-    limits = {"min": max(parameter.low, LOWEST)}
-    if parameter.high < 3e38:  # the largest number of Blender
-        limits["max"] = parameter.high
-    return FloatProperty(
-        name=with_unit(label, parameter), description=description, default=parameter.default, **limits, **more, **FIXED
-    )
+def float_property(parameter: Parameter, label: str, description: str, limits: dict | None = None, **more):
+    """Return a number of Blender with a parameter's default.
+
+    Parameters
+    ----------
+    parameter : Parameter
+    label, description : str
+        Without and with the unit.
+    limits : dict, optional
+        ``min`` and ``max``. Default: the bounds of the parameter.
+    **more
+        Precision and step.
+    """
+    if limits is None:
+        limits = {"min": max(parameter.low, LOWEST), "max": min(parameter.high, HIGHEST)}
+    name = with_unit(label, parameter)
+    return FloatProperty(name=name, description=description, default=parameter.default, **limits, **more, **FIXED)
 
 
 def property_of(specification: Specification):
