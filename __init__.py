@@ -13,7 +13,7 @@ def _rooms():
     """What registers, in order; each has register() and unregister()."""
     from .addon.session import dependencies
 
-    if dependencies.missing():
+    if dependencies.missing_modules():
         from .panels import missing
 
         return [missing]

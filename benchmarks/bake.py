@@ -59,7 +59,8 @@ def _enable() -> None:
 def cached_frame(texels: int) -> float:
     """Milliseconds that showing a remembered frame adds to Blender's own frame change, with a live picture as in a window."""
     from palpate.addon.display import overlays
-    from palpate.addon.timeline import live_cache, playback
+    from palpate.addon.session import frame_status
+    from palpate.addon.timeline import live_cache
 
     with tempfile.TemporaryDirectory() as folder:
         scene = scene_of(texels, 6, Path(folder))
@@ -80,7 +81,7 @@ def cached_frame(texels: int) -> float:
             pictures = overlays.sensor_overlays(scene, run, run.frames[frame])  # in the background nothing is drawn
             overlays.inset_content(scene, run, run.frames[frame])
             times.append(time.perf_counter() - start - plain)
-            if live_cache.get(scene) is not run or not pictures or playback.status(scene).frame is None:
+            if live_cache.get(scene) is not run or not pictures or frame_status.status_of(scene).frame is None:
                 raise RuntimeError("the frame was computed anew or not shown: this would not be the same work")
         return statistics.median(times) * 1e3
 

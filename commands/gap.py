@@ -24,7 +24,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     from ..addon.session import dependencies
 
-    dependencies.prepare_numba()
+    dependencies.choose_numba_cache()
     from ..core.gap.dataset.rig import read_rig
     from ..core.gap.report import sentences
     from ..core.gap.report.amended_sensor import amended_sensor

@@ -8,7 +8,6 @@ from pathlib import Path
 
 from ..core.errors import SceneError
 from ..core.io.openrave import NUMBERS, OpenRaveSensor, openrave_xml, read_openrave, write_openrave
-from ..core.model.sensor_parameters import DEPTH_PER_THICKNESS
 from . import blender, console
 
 
@@ -42,14 +41,7 @@ def _show(arguments: argparse.Namespace) -> None:
     rows = [("sensor", "link", "thickness", *NUMBERS)]
     for sensor in sensors:
         values = [getattr(sensor.parameters, key) for key in NUMBERS]
-        rows.append(
-            (
-                sensor.name,
-                sensor.link,
-                f"{sensor.parameters.max_penetration / DEPTH_PER_THICKNESS:g}",
-                *(f"{v:g}" for v in values),
-            )
-        )
+        rows.append((sensor.name, sensor.link, f"{sensor.parameters.max_penetration / 2:g}", *(f"{v:g}" for v in values)))
     print(console.text_table(rows, "<<" + ">" * (1 + len(NUMBERS))))
     for sensor in sensors:
         _say_missing(sensor)
@@ -101,7 +93,7 @@ def _export(arguments: argparse.Namespace) -> None:
                 raise SceneError(f"There is no sensor '{name}' in '{arguments.scene}': choose from {known}.")
         if not wanted:
             raise SceneError(f"'{arguments.scene}' has no sensor: make one with Physics › Palpate › Make Sensor.")
-        sensors = [OpenRaveSensor(name, name, exchange.parameters(found[name])) for name in wanted]
+        sensors = [OpenRaveSensor(name, name, exchange.parameters_of(found[name])) for name in wanted]
     if arguments.out:
         write_openrave(arguments.out, sensors, arguments.robot)
         print(f"{len(sensors)} sensors: {Path(arguments.out).absolute()}")

@@ -19,7 +19,7 @@ class PALPATE_OT_bake(modal_job.ModalJob, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        if context.scene is None or not playback.has_roles(context.scene):
+        if context.scene is None or not playback.has_participants(context.scene):
             cls.poll_message_set("No object has a role: make a sensor and a target first")
             return False
         return support.poll_idle(cls)
@@ -48,7 +48,7 @@ class PALPATE_OT_catch_up(modal_job.ModalJob, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        if context.scene is None or not playback.missing(context.scene):
+        if context.scene is None or not playback.missing_frames(context.scene):
             cls.poll_message_set("Nothing is missing up to the present frame")
             return False
         return support.poll_idle(cls)
@@ -57,7 +57,7 @@ class PALPATE_OT_catch_up(modal_job.ModalJob, bpy.types.Operator):
         self._was_playing = context.screen is not None and context.screen.is_animation_playing
         if self._was_playing:
             bpy.ops.screen.animation_cancel(restore_frame=False)  # it would move the frame under the work
-        return playback.catch_up(context.scene)
+        return playback.compute_to_present_frame(context.scene)
 
     def modal(self, context, event):
         if event.type == "SPACE" and event.value == "PRESS":  # whoever wants to stop what seems to be playing
@@ -98,7 +98,7 @@ class PALPATE_OT_reset(support.ErrorReporting, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        if context.scene is None or not playback.has_roles(context.scene):
+        if context.scene is None or not playback.has_participants(context.scene):
             cls.poll_message_set("No object has a role")
             return False
         if baked_scene.baked_objects(context.scene):

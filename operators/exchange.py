@@ -69,7 +69,7 @@ class PALPATE_OT_openrave_export(support.ErrorReporting, ExportHelper, bpy.types
 
         sensors = [obj for obj in context.selected_objects if obj.palpate.role == "SENSOR"]
         sensors = sensors or [obj for obj in context.scene.objects if obj.palpate.role == "SENSOR"]
-        write_openrave(self.filepath, [OpenRaveSensor(o.name, o.name, exchange.parameters(o)) for o in sensors])
+        write_openrave(self.filepath, [OpenRaveSensor(o.name, o.name, exchange.parameters_of(o)) for o in sensors])
         self.report({"INFO"}, f"Wrote {len(sensors)} sensors to '{self.filepath}'")
 
 

@@ -8,8 +8,10 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, St
 
 from ..addon.authoring import exchange, sensor_report
 from ..core.errors import SensorError
-from ..core.model.sensor_parameters import DAMPING_PER_STIFFNESS
 from . import support
+
+DAMPING = 0.01
+"""Damping suggested for a stiffness, as a share of it in number (paper, section 3.4.1)."""
 
 
 class MeasurementFit(support.ErrorReporting, support.FileChooser):
@@ -93,14 +95,14 @@ class PALPATE_OT_stiffness_fit(MeasurementFit, bpy.types.Operator):
         from ..core.gap.calibration.stiffness import fit_stiffness, read_foam
 
         obj = context.object
-        report = sensor_report.now(obj, context.scene)
+        report = sensor_report.fresh_report(obj, context.scene)
         if report.texels is None:
             raise SensorError(report.problems[0].text)
         fit = fit_stiffness(read_foam(self.filepath, self.weight_area or None), report.area, len(report.texels))
         chosen = fit.k if self.line == "ZERO" else fit.k_offset
         obj.palpate.k = chosen.value
         if self.with_damping:
-            obj.palpate.cn = DAMPING_PER_STIFFNESS * chosen.value
+            obj.palpate.cn = DAMPING * chosen.value
         self.picture(context, plot_stiffness, fit, "Palpate Stiffness Fit")
         text = f"k = {chosen.value:.4g} N/m (95 %: {chosen.low:.4g} to {chosen.high:.4g}) for {len(report.texels)} texels"
         if fit.offset_is_significant and fit.dead_zone > 0:
@@ -128,7 +130,7 @@ class PALPATE_OT_friction_fit(MeasurementFit, bpy.types.Operator):
         from ..core.gap.calibration.plots import plot_friction
 
         obj = context.object
-        fit = fit_friction(read_friction(self.filepath, self.texels), self.normal_force, exchange.parameters(obj))
+        fit = fit_friction(read_friction(self.filepath, self.texels), self.normal_force, exchange.parameters_of(obj))
         exchange.put_parameters(obj, fit.parameters)
         self.picture(context, plot_friction, fit, "Palpate Friction Fit")
         values = ", ".join(f"{name} = {e.value:.3g} ({e.low:.3g} to {e.high:.3g})" for name, e in fit.estimates.items())

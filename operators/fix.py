@@ -29,8 +29,8 @@ class PALPATE_OT_fix(support.ErrorReporting, bpy.types.Operator):
     def run(self, context):
         support.leave_edit_mode(context)
         obj = context.object
-        problems.fix(obj, self.kind, sensor_report.now(obj, context.scene))
-        left = sensor_report.now(obj, context.scene).problems
+        problems.fix(obj, self.kind, sensor_report.fresh_report(obj, context.scene))
+        left = sensor_report.fresh_report(obj, context.scene).problems
         if left:
             self.report({"WARNING"}, left[0].text)
         else:

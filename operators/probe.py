@@ -45,7 +45,7 @@ class PALPATE_OT_probe_add(support.ErrorReporting, bpy.types.Operator):
 
     def run(self, context):
         support.leave_edit_mode(context)
-        probe = probes.add(context, context.object, self.shape, self.size, self.depth)
+        probe = probes.add_probe(context, context.object, self.shape, self.size, self.depth)
         context.scene.frame_set(context.scene.frame_start)
         self.report({"INFO"}, f"'{probe.name}' presses on '{context.object.name}': press Space to play")
 

@@ -6,7 +6,7 @@ import numpy as np
 from bpy.props import EnumProperty
 
 from ..addon.authoring import sensors
-from ..addon.scene import meshes
+from ..addon.scene import sensor_regions
 from . import support
 
 
@@ -45,7 +45,7 @@ class PALPATE_OT_sensor_add(support.ErrorReporting, bpy.types.Operator):
 
     def run(self, context):
         obj = context.object
-        source = sensors.source_of(obj, obj.mode) if self.source == "AUTO" else self.source
+        source = sensors.automatic_source(obj, obj.mode) if self.source == "AUTO" else self.source
         support.leave_edit_mode(context)
         count = sensors.make_sensor(obj, source, self.role)
         self.report({"INFO"}, f"'{obj.name}' is a {self.role.lower()} of {count} texels")
@@ -127,9 +127,9 @@ class PALPATE_OT_weight_paint(support.ErrorReporting, bpy.types.Operator):
 
     def run(self, context):
         support.leave_edit_mode(context)
-        sensors.paint_group(context.object)
+        sensors.group_to_paint(context.object)
         bpy.ops.object.mode_set(mode="WEIGHT_PAINT")
-        sensors.set_brush(context.tool_settings)
+        sensors.set_full_weight_brush(context.tool_settings)
 
 
 def _face_sets(_operator, context):
@@ -137,7 +137,7 @@ def _face_sets(_operator, context):
     obj = context.object
     if obj is None or obj.type != "MESH":
         return []
-    numbers, counts = np.unique(meshes.face_sets(obj.data), return_counts=True)
+    numbers, counts = np.unique(sensor_regions.face_sets(obj.data), return_counts=True)
     _items[:] = [(str(n), f"Face Set {n}", f"{c} faces", int(n)) for n, c in zip(numbers, counts, strict=True)]
     return _items
 

@@ -41,7 +41,7 @@ class PALPATE_OT_pad_mesh_add(support.ErrorReporting, AddObjectHelper, bpy.types
         return True
 
     def run(self, context):
-        mesh = laid_sensors.new_pad(context, self.rows, self.columns, (self.pitch_x, self.pitch_y), self.radius)
+        mesh = laid_sensors.pad_mesh(context, self.rows, self.columns, (self.pitch_x, self.pitch_y), self.radius)
         obj = object_data_add(context, mesh, operator=self)
         if self.make_sensor:
             sensors.make_sensor(obj, "MESH")
@@ -127,10 +127,10 @@ class PALPATE_OT_skin_add(support.ErrorReporting, bpy.types.Operator):
         carrier = context.object
         source = self._source(carrier)
         support.leave_edit_mode(context)
-        recipe = {key: getattr(self, key) for key in laid_sensors.RECIPE}
+        recipe = {key: getattr(self, key) for key in laid_sensors.PATTERN_PROPERTIES}
         recipe["spacing"] = recipe["spacing"] or laid_sensors.usual_spacing(carrier, context.scene)
         was_sensor = carrier.palpate.role == "SENSOR"
-        obj = laid_sensors.lay(context, carrier, source, recipe)
+        obj = laid_sensors.lay_texels(context, carrier, source, recipe)
         text = f"'{obj.name}' has {len(obj.data.vertices)} texels"
         if was_sensor and source == "OWN":  # its own texels would feel the same load a second time
             carrier.palpate.role = "TARGET" if carrier.palpate.body == "FREE" else "NONE"
@@ -140,7 +140,7 @@ class PALPATE_OT_skin_add(support.ErrorReporting, bpy.types.Operator):
     def _source(self, carrier) -> str:
         if self.source != "AUTO":
             return self.source
-        found = sensors.source_of(carrier, carrier.mode)
+        found = sensors.automatic_source(carrier, carrier.mode)
         return "OWN" if found == "MESH" and carrier.palpate.role in {"SENSOR", "PAD"} else found
 
     def draw(self, _context):
@@ -170,14 +170,14 @@ class PALPATE_OT_skin_update(support.ErrorReporting, bpy.types.Operator):
     def poll(cls, context):
         if not support.poll_mesh_object(cls, context):
             return False
-        if not laid_sensors.is_skin(context.object):
+        if not laid_sensors.is_laid(context.object):
             cls.poll_message_set(f"'{context.object.name}' was not laid onto a surface: use Lay Texels first")
             return False
         return True
 
     def run(self, context):
         support.leave_edit_mode(context)
-        count = laid_sensors.lay_anew(context, context.object)
+        count = laid_sensors.update_texels(context, context.object)
         self.report({"INFO"}, f"'{context.object.name}' has {count} texels")
 
 

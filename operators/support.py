@@ -10,9 +10,8 @@ import bpy
 from bpy_extras.io_utils import ImportHelper
 
 from ..addon.measured import gap_results
-from ..addon.scene import meshes
+from ..addon.scene import participants
 from ..addon.session import session_state
-from ..addon.timeline import playback
 from ..core.errors import PalpateError
 
 
@@ -33,7 +32,7 @@ class ErrorReporting:
 
 def poll_idle(cls) -> bool:
     """Poll: no frames are being computed, by a bake or after a jump on the timeline."""
-    if playback.is_baking() or session_state.session.catching_up:
+    if session_state.is_baking() or session_state.session.catching_up:
         cls.poll_message_set("Frames are being computed")
         return False
     return True
@@ -53,7 +52,7 @@ def poll_surface_object(cls, context) -> bool:
     obj = context.object
     if obj is None:
         cls.poll_message_set("Make an object active first")
-    elif obj.type not in meshes.KINDS:
+    elif obj.type not in participants.OBJECT_TYPES:
         cls.poll_message_set(f"'{obj.name}' has no surface: choose a mesh, curve, surface, text or metaball")
     elif not obj.is_editable:
         cls.poll_message_set(f"'{obj.name}' is linked from another file: use Object › Relations › Make Local first")

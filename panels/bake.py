@@ -2,8 +2,7 @@
 """Panels of what the scene does: bake, and how results look."""
 
 from ..addon.display import baked_scene
-from ..addon.session import session_state
-from ..addon.timeline import playback
+from ..addon.session import frame_status, session_state
 from .places import Part, named, sentences
 
 
@@ -24,7 +23,7 @@ class Bake(Part):
         if not own.use_auto_dt:
             column.prop(own, "dt")
         layout.prop(own, "use_live")
-        progress = session_state.session.bake
+        progress = session_state.session.bake_progress
         if progress is not None:
             text = "Preparing the solver" if progress.frame is None else progress.text
             layout.progress(text=f"{text} (ESC: stop)", factor=progress.share)
@@ -37,7 +36,7 @@ class Bake(Part):
             row = layout.row(align=True)
             row.operator("palpate.catch_up")
             row.operator("palpate.reset", text="Reset")
-        status = playback.status(scene)
+        status = frame_status.status_of(scene)
         sentences(layout, status.text, "INFO", context)
         if status.step:
             sentences(layout, status.step, "PREVIEW_RANGE", context)

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Panel of what moves an object."""
 
-from ..addon.scene import drives, moved_bodies
+from ..addon.properties import start_transforms
+from ..addon.scene import drives
 from .places import Part, named, sentences
 
 
@@ -12,7 +13,7 @@ class Body(Part):
 
     def draw_part(self, layout, settings, context):
         layout.prop(settings, "body", text="")
-        if settings.body in moved_bodies.MOVED:
+        if settings.body in start_transforms.MOVED_BY_FORCES:
             layout.prop(settings, "mass")
         if settings.role in {"SENSOR", "PAD"}:
             layout.prop(settings, "presses")
@@ -38,7 +39,7 @@ def _draw_drive(layout, settings) -> None:
     named(layout, settings, "drive_control")
     column = layout.column(align=True)
     column.use_property_decorate = True
-    column.prop(settings, drives.TARGETS[settings.drive_control])
+    column.prop(settings, drives.TARGET_PROPERTIES[settings.drive_control])
     column = layout.column(align=True)
     column.prop(settings, "drive_max_force")
     column.prop(settings, "drive_max_speed")

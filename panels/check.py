@@ -18,7 +18,7 @@ class Texels(Part):
         grid = layout.grid_flow(columns=2, even_columns=True, align=True)
         for name in ("show_texels", "show_normals", "show_numbers", "show_reach"):
             grid.prop(own, name)
-        report = sensor_report.of(context.object, context.scene)
+        report = sensor_report.known_report(context.object, context.scene)
         if report is None:
             layout.label(text="Looking at it…", icon="SORTTIME")
             return

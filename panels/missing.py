@@ -23,7 +23,7 @@ class PALPATE_PT_missing(bpy.types.Panel):
 
 
 def register():
-    PALPATE_PT_missing.lost = tuple(dependencies.missing())
+    PALPATE_PT_missing.lost = tuple(dependencies.missing_modules())
     for cls in (*debug.CLASSES, PALPATE_PT_missing):
         bpy.utils.register_class(cls)
 

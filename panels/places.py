@@ -7,7 +7,7 @@ import textwrap
 
 import bpy
 
-from ..addon.scene import meshes
+from ..addon.scene import participants
 
 PLACES = {
     "": {"bl_space_type": "PROPERTIES", "bl_region_type": "WINDOW", "bl_context": "physics"},
@@ -30,7 +30,7 @@ class Part:
     @classmethod
     def poll(cls, context):
         obj = context.object
-        return obj is not None and obj.type in meshes.KINDS and obj.palpate.role in cls.roles
+        return obj is not None and obj.type in participants.OBJECT_TYPES and obj.palpate.role in cls.roles
 
     def draw(self, context):
         layout = self.layout

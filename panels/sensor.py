@@ -2,8 +2,7 @@
 """Panels of one object: its role, and of a sensor or pad its region, its contact, its friction and what it reads."""
 
 from ..addon.authoring import laid_sensors
-from ..addon.session import first_use, session_state
-from ..addon.timeline import playback
+from ..addon.session import first_use, frame_status, session_state
 from ..core.model.sensor_parameters import CONTACT, FRICTION, HUNT_CROSSLEY, LINEAR, READOUT, SENSOR_PARAMETERS
 from ..operators import presets
 from .places import ROOT, Part, named, sentences
@@ -23,8 +22,8 @@ class Root(Part):
     def draw_part(self, layout, settings, context):
         obj = context.object
         for name in (obj.name, context.scene.name):
-            if name in session_state.session.notes:
-                sentences(layout, session_state.session.notes[name], "ERROR", context)
+            if name in session_state.session.unreadable_settings:
+                sentences(layout, session_state.session.unreadable_settings[name], "ERROR", context)
         coming = first_use.progress()
         if coming is not None:
             layout.progress(text="Preparing the solver", factor=coming.done / coming.total)
@@ -58,11 +57,11 @@ class Skins(Part):
     @classmethod
     def poll(cls, context):
         obj = context.object
-        return super().poll(context) and obj.type == "MESH" and (obj.palpate.role != "NONE" or bool(laid_sensors.skins_of(obj)))
+        return super().poll(context) and obj.type == "MESH" and (obj.palpate.role != "NONE" or bool(laid_sensors.laid_on(obj)))
 
     def draw_part(self, layout, settings, context):
         obj = context.object
-        if laid_sensors.is_skin(obj):
+        if laid_sensors.is_laid(obj):
             own = settings.skin
             box = layout.box().column()
             row = box.row(align=True)
@@ -73,7 +72,7 @@ class Skins(Part):
                 box.prop(own, name)
             layout.operator("palpate.skin_update", icon="FILE_REFRESH")
             return
-        for skin in laid_sensors.skins_of(obj):
+        for skin in laid_sensors.laid_on(obj):
             row = layout.row(align=True)
             row.prop(skin, "name", text="", icon="MOD_SHRINKWRAP")
             row.operator("palpate.object_activate", text="", icon="RESTRICT_SELECT_OFF").name = skin.name
@@ -208,7 +207,7 @@ class Readout(Part):
             column.prop_search(settings, "image_map", context.object.data, "uv_layers", text="", icon="UV")
             column.prop(settings, "image_size")
             column.prop(settings, "image_filter", text="")
-        status = playback.status(context.scene)
+        status = frame_status.status_of(context.scene)
         readings = status.frame.sensors.get(context.object.name) if status.frame is not None else None
         box = layout.box().column()
         if readings is None:

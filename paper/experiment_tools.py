@@ -30,7 +30,7 @@ def new_scene(build: Callable) -> bpy.types.Scene:
 
 def scenario_of(scene) -> Scenario:
     """Return what the solver is given for a scene."""
-    scenario, _ = run_job(scene_reader.sample_scenario(scene))
+    scenario = run_job(scene_reader.read_scene(scene)).scenario
     return scenario
 
 

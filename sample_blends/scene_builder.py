@@ -316,7 +316,7 @@ def frame_objects(scene, objects, region=(0.06, 0.06, 0.94, 0.94), size=(960, 72
 
 def add_normal_needles(scene, sensor, length: float, look, radius: float = 0.26):
     """Return thin needles on all texels of a sensor, along their normals and `length` long; they follow the sensor."""
-    from ..addon.scene import meshes
+    from ..addon.scene import sensor_regions
     from ..core.geometry.mesh import checked_mesh
     from ..core.geometry.texels import texels_from_region
 
@@ -327,7 +327,7 @@ def add_normal_needles(scene, sensor, length: float, look, radius: float = 0.26)
     mesh, _ = checked_mesh(
         np.array([v.co[:] for v in data.vertices]) * 1e-3, np.array(triangles), sensor.name, np.array(quads, int).reshape(-1, 4)
     )
-    texels = texels_from_region(mesh, meshes.region(sensor, len(data.vertices)), sensor.name)
+    texels = texels_from_region(mesh, sensor_regions.region_vertices(sensor, len(data.vertices)), sensor.name)
     side = np.array([[1.0, 0.0], [-0.5, 0.866], [-0.5, -0.866]]) * radius
     foot = texels.position * 1e3  # sample scenes are in mm
     corners = [foot + a * texels.tangent + b * texels.bitangent for a, b in side]
@@ -344,6 +344,6 @@ def use_constant_interpolation(obj) -> None:
     """Let the animated numbers of an object jump at their keyframes, since a command changes at once."""
     from ..addon.session import fcurves
 
-    for curve in fcurves.of(obj) or ():
+    for curve in fcurves.of_object(obj) or ():
         for key in curve.keyframe_points:
             key.interpolation = "CONSTANT"

@@ -10,11 +10,11 @@ from ...core.errors import SceneError
 from ...core.geometry.layout.grid_layout import GridLayout
 from ...core.model.sensor_parameters import SensorParameters
 from ..properties import effect_stack, parameter_properties
-from ..scene import scene_reader
+from ..scene import participants, sensor_reader
 from . import laid_sensors, sensors
 
 
-def parameters(obj) -> SensorParameters:
+def parameters_of(obj) -> SensorParameters:
     """Return the parameters of an object's panel."""
     return parameter_properties.sensor_parameters(obj.palpate)
 
@@ -47,7 +47,7 @@ def save_toml(context, obj, path) -> None:
     """
     from ...core.io.sensor_toml import SensorModel, write_sensor
 
-    values = parameters(obj)
+    values = parameters_of(obj)
     values.check(obj.name)
     write_sensor(path, SensorModel(obj.name, values, effect_stack.stack(obj), _grid_words(context, obj)))
 
@@ -81,7 +81,7 @@ def _new_pad(context, model):
     grid = model.shape.get("grid")
     if grid is None:
         raise SceneError(f"'{model.name}' has no grid to make a pad of: make the sensor that gets it active first.")
-    mesh = laid_sensors.new_pad(context, grid["rows"], grid["columns"], tuple(grid["pitch"]), 0.0)
+    mesh = laid_sensors.pad_mesh(context, grid["rows"], grid["columns"], tuple(grid["pitch"]), 0.0)
     obj = object_data_add(context, mesh, name=model.name)
     sensors.make_sensor(obj, "MESH")
     return obj
@@ -89,7 +89,7 @@ def _new_pad(context, model):
 
 def _grid_words(context, obj) -> dict:
     """Return ``{"grid": …}`` for texels in rows and columns of one pitch on a plane, else nothing."""
-    texels = scene_reader.sensor_alone(context.scene, obj, scene_reader.depsgraph_of(context.scene))[0].texels
+    texels = sensor_reader.sensor_in_own_frame(context.scene, obj, participants.depsgraph_of(context.scene))[0].texels
     layout = texels.layout
     if not isinstance(layout, GridLayout):
         return {}

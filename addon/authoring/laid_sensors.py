@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Sensors with a mesh of their own on another object: wrapped arrays and evenly spaced texels.
+"""Laid sensors: sensors whose texels are laid onto the surface of another object, the carrier.
 
-A skin is a mesh object whose vertices are the texels. It is a child of the object it lies on and part of its body
-(:mod:`.attached_objects`), so that one object can carry several, each with its own parameters. It remembers how it was
-made and can be made anew when the surface has changed.
+A laid sensor is a mesh object whose vertices are the texels. It is a child of its carrier and part of the carrier's body
+(:mod:`.attached_objects`), so that one object can carry several sensors, each with its own parameters. It stores the pattern of
+its texels, so that they can be laid again when the surface has changed.
 """
 
 from __future__ import annotations
@@ -25,56 +25,78 @@ from ...core.geometry.sampling.texel_arrays import (
     shifted_pose,
     wrapped_array,
 )
-from ..scene import meshes, scene_reader
+from ..scene import mesh_arrays, participants, sensor_regions
 from ..session import identity, transforms, units
 from . import sensor_presets, sensors, surface_binding
 
-RECIPE = ("method", "rows", "columns", "pitch_x", "pitch_y", "shift_x", "shift_y", "angle", "spacing", "seed", "lift")
-"""Settings of :class:`.properties.PALPATE_PG_skin` that a skin is made from."""
+PATTERN_PROPERTIES = (
+    "method",
+    "rows",
+    "columns",
+    "pitch_x",
+    "pitch_y",
+    "shift_x",
+    "shift_y",
+    "angle",
+    "spacing",
+    "seed",
+    "lift",
+)
+"""Properties of :class:`.properties.PALPATE_PG_skin` that make up the pattern of the texels."""
 
 
-def new_pad(context, rows: int, columns: int, pitch: tuple[float, float], radius: float):
-    """Return the mesh of a tactile pad; lengths in metres."""
+def pad_mesh(context, rows: int, columns: int, pitch: tuple[float, float], radius: float):
+    """Return the mesh of a tactile pad.
+
+    Parameters
+    ----------
+    context : Context
+    rows, columns : int
+    pitch : (float, float)
+        From column to column and from row to row, metres.
+    radius : float, metres
+        The pad is bent to it; 0: flat, below 0: inwards.
+    """
     return _mesh_of(pad_array(rows, columns, pitch, radius), "Tactile Pad", 1.0 / units.metres_per_unit(context.scene))
 
 
-def lay(context, carrier, source: str, recipe: dict):
-    """Make a sensor on the surface of an object.
+def lay_texels(context, carrier, source: str, pattern: dict):
+    """Make a laid sensor on an object.
 
     Parameters
     ----------
     source : str
         As for :func:`.sensors.make_sensor`; OWN is the region that the object has as a sensor.
-    recipe : dict
-        The settings in :data:`RECIPE`; lengths in metres, the angle in radians.
+    pattern : dict
+        Values of :data:`PATTERN_PROPERTIES`; lengths in metres, the angle in radians.
 
     Returns
     -------
     Object
-        The skin: a child of `carrier`, with the role Sensor.
+        The laid sensor: a child of `carrier`, with the role Sensor.
 
     Raises
     ------
     SensorError
         The region is empty, or the texels do not fit on it. Nothing was changed then.
     """
-    where = sensors.describe_region(carrier, source)
+    region = sensors.describe_region(carrier, source)
     try:
-        skin = _compute(context, carrier, _chosen(carrier, where), recipe)
+        texels = _texels_on(context, carrier, _region_vertices(carrier, region), pattern)
     except SensorError:
         if source == "SELECTION":
-            carrier.vertex_groups.remove(carrier.vertex_groups[where["vertex_group"]])
+            carrier.vertex_groups.remove(carrier.vertex_groups[region["vertex_group"]])
         raise
     name = f"{carrier.name} Skin"
-    obj = bpy.data.objects.new(name, _mesh_of(skin, name))
-    for place in carrier.users_collection[:1] or [context.scene.collection]:
-        place.objects.link(obj)
+    obj = bpy.data.objects.new(name, _mesh_of(texels, name))
+    for collection in carrier.users_collection[:1] or [context.scene.collection]:
+        collection.objects.link(obj)
     obj.parent = carrier
-    _remember(obj, carrier, where, recipe)
+    _store_pattern(obj, carrier, region, pattern)
     if carrier.palpate.role in {"SENSOR", "PAD"}:
         sensor_presets.copy_parameters(carrier, obj)
     context.view_layer.update()
-    surface_binding.cling(context, obj, carrier)
+    surface_binding.bind(context, obj, carrier)
     obj.palpate.body = "PARENT"
     obj.palpate.role = "SENSOR"
     for other in context.selected_objects:
@@ -84,56 +106,56 @@ def lay(context, carrier, source: str, recipe: dict):
     return obj
 
 
-def lay_anew(context, obj) -> int:
-    """Make a skin again from the surface as it is now; returns the number of texels. What was painted on it is carried over.
+def update_texels(context, obj) -> int:
+    """Lay the texels of a laid sensor again onto the surface as it is now, and return their number.
+
+    Painted values are transferred to the new texels.
 
     Raises
     ------
     SensorError
-        The object is no skin, what it lay on is gone, or the texels do not fit any more.
+        The object is no laid sensor, its carrier is gone, or the texels do not fit any more.
     """
     carrier = carrier_of(obj)
-    own = obj.palpate.skin
-    where = {"region": own.region, "vertex_group": own.region_name, "material": own.region_name, "face_set": own.region_number}
-    recipe = recipe_of(obj)
-    skin = _compute(context, carrier, _chosen(carrier, where), recipe)
-    old, painted = obj.data, surface_binding.painted(obj)
-    obj.data = _mesh_of(skin, old.name)
-    surface_binding.carry_over(obj, painted)
+    region, pattern = _stored_region(obj.palpate.skin), pattern_of(obj)
+    texels = _texels_on(context, carrier, _region_vertices(carrier, region), pattern)
+    old, painted = obj.data, surface_binding.painted_values(obj)
+    obj.data = _mesh_of(texels, old.name)
+    surface_binding.transfer_painted_values(obj, painted)
     for material in old.materials:
         obj.data.materials.append(material)
     if old.users == 0:
         bpy.data.meshes.remove(old)
-    surface_binding.cling(context, obj, carrier)
-    _remember(obj, carrier, where, recipe)
-    return len(skin.vertices)
+    surface_binding.bind(context, obj, carrier)
+    _store_pattern(obj, carrier, region, pattern)
+    return len(texels.vertices)
 
 
-def recipe_of(obj) -> dict:
-    """Return how a skin was made."""
+def pattern_of(obj) -> dict:
+    """Return the pattern with which the texels of a laid sensor were made: values of :data:`PATTERN_PROPERTIES`."""
     own = obj.palpate.skin
-    return {key: units.as_typed(v) if isinstance(v := getattr(own, key), float) else v for key in RECIPE}
+    return {key: units.as_typed(v) if isinstance(v := getattr(own, key), float) else v for key in PATTERN_PROPERTIES}
 
 
-def is_skin(obj) -> bool:
-    """Whether an object was made by :func:`lay`."""
+def is_laid(obj) -> bool:
+    """Return True when an object is a laid sensor, made by :func:`lay_texels`."""
     return obj.type == "MESH" and obj.palpate.skin.method != "NONE"
 
 
-def skins_of(obj) -> list:
-    """Return the sensors that lie on an object."""
-    return [child for child in obj.children if is_skin(child) and child.palpate.role in {"SENSOR", "PAD"}]
+def laid_on(obj) -> list:
+    """Return the laid sensors and pads of which an object is the carrier."""
+    return [child for child in obj.children if is_laid(child) and child.palpate.role in {"SENSOR", "PAD"}]
 
 
 def carrier_of(obj):
-    """Return what a skin lies on.
+    """Return the carrier of a laid sensor.
 
     Raises
     ------
     SensorError
-        It has no parent any more.
+        The object is no laid sensor, or has lost its parent.
     """
-    if not is_skin(obj):
+    if not is_laid(obj):
         raise SensorError(f"'{obj.name}' was not laid onto a surface: use Lay Texels on the object that carries the sensor.")
     if obj.parent is None or obj.parent.type != "MESH":
         raise SensorError(f"'{obj.name}' has lost the mesh it lay on: make that its parent again (Object › Parent).")
@@ -141,89 +163,111 @@ def carrier_of(obj):
 
 
 def is_outdated(obj) -> bool:
-    """Whether the surface under a skin has changed since it was made."""
+    """Return True when the carrier's surface has changed since the texels were laid on it."""
     own = obj.palpate.skin
-    return is_skin(obj) and obj.parent is not None and obj.parent.type == "MESH" and own.made_from != _state_of(obj.parent, own)
+    return (
+        is_laid(obj)
+        and obj.parent is not None
+        and obj.parent.type == "MESH"
+        and own.made_from != _surface_fingerprint(obj.parent, own)
+    )
 
 
-def _remember(obj, carrier, where: dict, recipe: dict) -> None:
+def _store_pattern(obj, carrier, region: dict, pattern: dict) -> None:
+    """Store in a laid sensor's properties how its texels were made."""
     own = obj.palpate.skin
-    for key, value in recipe.items():
+    for key, value in pattern.items():
         setattr(own, key, value)
-    own.region, own.region_number = where["region"], where.get("face_set", 0)
-    own.region_name = where.get({"GROUP": "vertex_group", "MATERIAL": "material"}.get(own.region, ""), "")
-    own.made_from = _state_of(carrier, own)
+    own.region, own.region_number = region["region"], region.get("face_set", 0)
+    own.region_name = region.get({"GROUP": "vertex_group", "MATERIAL": "material"}.get(own.region, ""), "")
+    own.made_from = _surface_fingerprint(carrier, own)
     obj.palpate.made_vertices = len(obj.data.vertices)
-    identity.ensure(obj)
+    identity.ensure_uid(obj)
 
 
-def _state_of(carrier, own) -> str:
+def _stored_region(own) -> dict:
+    """Return the region on the carrier that a laid sensor's properties hold, for :func:`.sensor_regions.vertices_of_region`."""
+    name = own.region_name
+    return {"region": own.region, "vertex_group": name, "material": name, "face_set": own.region_number}
+
+
+def _surface_fingerprint(carrier, own) -> str:
     """Return a short text that changes with the carrier's mesh, its scale and the region on it."""
     digest = hashlib.blake2b(digest_size=8)
-    digest.update(meshes.vertices(carrier.data).tobytes())
+    digest.update(mesh_arrays.vertices(carrier.data).tobytes())
     digest.update(np.round(np.array(carrier.scale), 6).tobytes())
-    where = {"region": own.region, "vertex_group": own.region_name, "material": own.region_name, "face_set": own.region_number}
     try:
-        digest.update(np.packbits(_chosen(carrier, where)).tobytes())
+        digest.update(np.packbits(_region_vertices(carrier, _stored_region(own))).tobytes())
     except SensorError:
         digest.update(b"gone")
     return digest.hexdigest()
 
 
-def _chosen(carrier, where: dict) -> np.ndarray:
-    return meshes.region_by(carrier, len(carrier.data.vertices), **where)
+def _region_vertices(carrier, region: dict) -> np.ndarray:
+    """Return which vertices of the carrier belong to a region, (nv,) bool."""
+    return sensor_regions.vertices_of_region(carrier, len(carrier.data.vertices), **region)
 
 
-def _compute(context, carrier, chosen: np.ndarray, recipe: dict) -> TexelMesh:
-    """Return the texels in the coordinates of the carrier."""
-    depsgraph = scene_reader.depsgraph_of(context.scene)
-    arrays, _ = meshes.sensor_arrays(carrier, depsgraph)
-    matrix = transforms.array(carrier.evaluated_get(depsgraph).matrix_world)
+def _texels_on(context, carrier, chosen: np.ndarray, pattern: dict) -> TexelMesh:
+    """Return texels on the vertices that `chosen` (nv,) bool selects, in the coordinates of the carrier."""
+    depsgraph = participants.depsgraph_of(context.scene)
+    arrays, _ = mesh_arrays.sensor_arrays(carrier, depsgraph)
+    matrix = transforms.as_array(carrier.evaluated_get(depsgraph).matrix_world)
     if transforms.is_singular(matrix):
         raise SensorError(f"The scale of '{carrier.name}' is zero: give it a scale before texels are laid onto it.")
-    stretch = transforms.split(matrix)[2] * units.metres_per_unit(context.scene)
-    mirrored = np.linalg.det(stretch) < 0
+    stretch = transforms.decompose(matrix)[2] * units.metres_per_unit(context.scene)
+    is_mirrored = np.linalg.det(stretch) < 0
     triangles = arrays.triangles[chosen[arrays.triangles].all(axis=1)]
     if not len(triangles):
         raise SensorError(f"The region on '{carrier.name}' spans no face: choose all corners of at least one face.")
-    mesh, _ = checked_mesh(arrays.vertices @ stretch.T, triangles[:, ::-1] if mirrored else triangles, carrier.name)
-    skin = make(mesh, recipe)
-    lifted = skin.vertices + recipe["lift"] * vertex_normals(_triangulated(skin))
-    faces = [face[::-1] for face in skin.faces] if mirrored else skin.faces
+    mesh, _ = checked_mesh(arrays.vertices @ stretch.T, triangles[:, ::-1] if is_mirrored else triangles, carrier.name)
+    texels = make_texels(mesh, pattern)
+    lifted = texels.vertices + pattern["lift"] * vertex_normals(_triangulated(texels))
+    faces = [face[::-1] for face in texels.faces] if is_mirrored else texels.faces
     return TexelMesh(lifted @ np.linalg.inv(stretch).T, faces)
 
 
-def make(mesh: TriangleMesh, recipe: dict) -> TexelMesh:
-    """Lay texels onto a region as the recipe says."""
-    if recipe["method"] == "NOISE":
-        return scatter(mesh, recipe["spacing"], recipe["seed"])
-    if recipe["method"] == "GRID":
-        return filled_region(mesh, recipe["spacing"], recipe["angle"])
-    if recipe["method"] == "VERTICES":
+def make_texels(mesh: TriangleMesh, pattern: dict) -> TexelMesh:
+    """Return texels on a region in a pattern.
+
+    Parameters
+    ----------
+    mesh : TriangleMesh
+        The region, metres.
+    pattern : dict
+        Values of :data:`PATTERN_PROPERTIES`.
+    """
+    if pattern["method"] == "NOISE":
+        return scatter(mesh, pattern["spacing"], pattern["seed"])
+    if pattern["method"] == "GRID":
+        return filled_region(mesh, pattern["spacing"], pattern["angle"])
+    if pattern["method"] == "VERTICES":
         used, corners = np.unique(mesh.triangles, return_inverse=True)
         return TexelMesh(mesh.vertices[used], [tuple(face) for face in corners.reshape(-1, 3).tolist()])
-    middle = shifted_pose(mesh, region_middle(mesh), (recipe["shift_x"], recipe["shift_y"]))
-    pitch = recipe["pitch_x"], recipe["pitch_y"]
-    return wrapped_array(mesh, recipe["rows"], recipe["columns"], pitch, middle, recipe["angle"])
+    middle = shifted_pose(mesh, region_middle(mesh), (pattern["shift_x"], pattern["shift_y"]))
+    pitch = pattern["pitch_x"], pattern["pitch_y"]
+    return wrapped_array(mesh, pattern["rows"], pattern["columns"], pitch, middle, pattern["angle"])
 
 
-def _triangulated(skin: TexelMesh) -> TriangleMesh:
-    triangles = [(face[0], face[i], face[i + 1]) for face in skin.faces for i in range(1, len(face) - 1)]
-    return TriangleMesh(skin.vertices, np.array(triangles))
+def _triangulated(texels: TexelMesh) -> TriangleMesh:
+    """Return the mesh of texels with its faces divided into triangles."""
+    triangles = [(face[0], face[i], face[i + 1]) for face in texels.faces for i in range(1, len(face) - 1)]
+    return TriangleMesh(texels.vertices, np.array(triangles))
 
 
-def _mesh_of(skin: TexelMesh, name: str, scale: float = 1.0):
+def _mesh_of(texels: TexelMesh, name: str, scale: float = 1.0):
+    """Return a new mesh data-block whose vertices are the texels, times `scale`."""
     mesh = bpy.data.meshes.new(name)
-    mesh.from_pydata((skin.vertices * scale).tolist(), [], skin.faces)
+    mesh.from_pydata((texels.vertices * scale).tolist(), [], texels.faces)
     mesh.update()
     return mesh
 
 
 def usual_spacing(obj, scene) -> float:
-    """Metres between neighbouring vertices of an object, as a first guess for the spacing of texels."""
+    """Return a first guess for the spacing of texels on an object, metres: the usual distance of its neighbouring vertices."""
     if obj is None or obj.type != "MESH" or not obj.data.edges:
         return 0.002
-    points = meshes.vertices(obj.data) @ np.diag(np.abs(obj.matrix_world.to_scale()))
+    points = mesh_arrays.vertices(obj.data) @ np.diag(np.abs(obj.matrix_world.to_scale()))
     ends = np.empty(2 * len(obj.data.edges), dtype=np.int32)
     obj.data.edges.foreach_get("vertices", ends)
     lengths = np.linalg.norm(np.diff(points[ends.reshape(-1, 2)], axis=1)[:, 0], axis=1)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Something to press a new sensor with: a ball, a box or a rod that comes, presses, holds and goes, keyframed."""
+"""Probes: keyframed balls, boxes or rods that approach a sensor, press on it, hold and leave, to try it out."""
 
 from __future__ import annotations
 
@@ -16,31 +16,32 @@ from ..session import transforms
 from . import sensor_report
 
 APPROACH, PRESS, HOLD = 0.04, 0.2, 0.75
-"""Shares of the frame range at which it arrives, is deepest, and leaves again."""
+"""Shares of the frame range at which the probe arrives, is deepest, and begins to leave."""
 SIDES = 64
 
 
-def add(context, obj, shape: str, size: float, depth: float):
+def add_probe(context, obj, shape: str, size: float, depth: float):
     """Add a target that presses on the middle of a sensor along its normal.
 
     Parameters
     ----------
     shape : {"BALL", "BOX", "ROD"}
     size : float, metres
-        Radius; half the side of a box. 0: a third of the sensor's extent.
+        Radius, or half the side of a box. 0: a third of the sensor's extent.
     depth : float, metres
-        Of the deepest point, from where it first touches. 0: a quarter of the maximum penetration.
+        How deep the probe presses, from its first contact. 0: a quarter of the maximum penetration.
 
     Returns
     -------
     Object
+        The probe, a keyframed target.
 
     Raises
     ------
     SensorError
         The sensor has no texels.
     """
-    report = sensor_report.now(obj, context.scene)
+    report = sensor_report.fresh_report(obj, context.scene)
     if report.texels is None:
         raise SensorError(report.problems[0].text)
     texels, unit = report.texels, report.metres
@@ -53,14 +54,14 @@ def add(context, obj, shape: str, size: float, depth: float):
     across = np.linalg.norm((texels.position - weights @ texels.position) @ flat, axis=1)
     facing = texels.normal @ mean > 0.5 * (texels.normal @ mean).max()  # not those on the back of a closed sensor
     foot = texels.position[np.argmin(np.where(facing, across, np.inf))]
-    location, quaternion, _ = transforms.split(transforms.array(obj.matrix_world))
+    location, quaternion, _ = transforms.decompose(transforms.as_array(obj.matrix_world))
     rotation = transforms.rotation(quaternion)
     normal, ground = rotation @ mean, location + rotation @ foot / unit
     probe = bpy.data.objects.new("Probe", _mesh(shape, size / unit))
     _home(context.scene, obj).objects.link(probe)
     turn = Vector(normal).to_track_quat("Z", "Y")
     probe.rotation_euler = turn.to_euler()
-    around = (texels.position - foot) / unit @ rotation.T @ transforms.array(turn.to_matrix())
+    around = (texels.position - foot) / unit @ rotation.T @ transforms.as_array(turn.to_matrix())
     ground = ground + _meeting(probe.data, around, size / unit) * normal
     _animate(context.scene, probe, ground, normal, size / unit, depth / unit)
     probe.display_type = "WIRE"  # the texels under it are what one wants to see

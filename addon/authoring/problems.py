@@ -15,7 +15,7 @@ from mathutils.bvhtree import BVHTree
 from ...core.errors import ImageError, PaintedError, PalpateError, RegionError, SensorError
 from ...core.geometry.mesh import TriangleMesh, edge_defects, is_closed
 from ...core.geometry.texels import Texels
-from ..scene import meshes
+from ..scene import sensor_regions
 from . import laid_sensors, surface_binding
 
 TOO_NEAR = 0.1
@@ -45,7 +45,7 @@ class Problem:
     texels: np.ndarray = field(default_factory=lambda: np.zeros(0, int))
 
 
-def of_texels(obj, mesh: TriangleMesh, texels: Texels, reach: float, around: TriangleMesh | None = None) -> list[Problem]:
+def texel_problems(obj, mesh: TriangleMesh, texels: Texels, reach: float, around: TriangleMesh | None = None) -> list[Problem]:
     """Return what is wrong with the texels of a sensor.
 
     Parameters
@@ -86,17 +86,17 @@ def of_texels(obj, mesh: TriangleMesh, texels: Texels, reach: float, around: Tri
     return found
 
 
-def of_object(obj, notes: list[str]) -> list[Problem]:
-    """Return what is wrong with a sensor as an object; `notes` come from :func:`.meshes.sensor_arrays`."""
+def object_problems(obj, notes: list[str]) -> list[Problem]:
+    """Return what is wrong with a sensor as an object; `notes` come from :func:`.mesh_arrays.sensor_arrays`."""
     found = [Problem("MODIFIER", note) for note in notes]
-    if laid_sensors.is_skin(obj):
+    if laid_sensors.is_laid(obj):
         if obj.parent is None:
             found.append(Problem("ORPHAN", f"'{obj.name}' has lost its parent: it stays where it is and moves with nothing."))
         elif laid_sensors.is_outdated(obj):
             found.append(
                 Problem("OUTDATED", f"The surface of '{obj.parent.name}' has changed since '{obj.name}' was laid on it.")
             )
-        elif surface_binding.is_needed(obj.parent) and not surface_binding.clings(obj):
+        elif surface_binding.is_needed(obj.parent) and not surface_binding.is_bound(obj):
             found.append(Problem("STILL", f"'{obj.parent.name}' may change its shape, and the texels of '{obj.name}' stay."))
     made = obj.palpate.made_vertices
     if obj.palpate.region == "MESH" and made and made != len(obj.data.vertices):
@@ -236,11 +236,11 @@ def _accept(obj, _problem, _report) -> None:
 
 
 def _lay_anew(obj, _problem, _report) -> None:
-    laid_sensors.lay_anew(bpy.context, obj)
+    laid_sensors.update_texels(bpy.context, obj)
 
 
 def _cling(obj, _problem, _report) -> None:
-    surface_binding.cling(bpy.context, obj, obj.parent)
+    surface_binding.bind(bpy.context, obj, obj.parent)
 
 
 def _whole_mesh(obj, _problem, _report) -> None:
@@ -260,7 +260,7 @@ def _nothing_painted(obj, _problem, _report) -> None:
     """Empty the fields for painted multipliers that cannot be read."""
     for key in ("k", "friction", "gain"):
         try:
-            meshes.multipliers(obj, key)
+            sensor_regions.painted_multipliers(obj, key)
         except PaintedError:
             setattr(obj.palpate, f"{key}_map", "")
 
@@ -302,7 +302,7 @@ def fix(obj, kind: str, report) -> None:
     FIXES[kind][1](obj, problem, report)
 
 
-def of_error(obj, error: PalpateError) -> Problem:
+def problem_of_error(obj, error: PalpateError) -> Problem:
     """Return the problem of a sensor that has no texels because of an error; some kinds have no button."""
     own = obj.palpate
     if isinstance(error, RegionError):

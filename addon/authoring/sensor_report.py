@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What panels and the 3D view show of a sensor while it is being made: its texels, their numbers, and what is wrong.
 
-Drawing only asks (:func:`of`); what has to be computed is computed a moment later, by a timer.
+Drawing only asks (:func:`known_report`); what has to be computed is computed a moment later, by a timer.
 """
 
 from __future__ import annotations
@@ -16,9 +16,8 @@ from ...core.errors import PalpateError, SceneError
 from ...core.geometry.mesh import TriangleMesh
 from ...core.geometry.texels import Texels
 from ...core.solver.time_step_adviser import Advice, advise
-from ..scene import attached_objects, meshes, scene_reader
+from ..scene import attached_objects, mesh_arrays, participants, scene_fingerprint, scene_reader, sensor_reader
 from ..session import session_state, transforms, units
-from ..timeline import live_cache
 from . import laid_sensors, problems
 
 DELAY = 0.2
@@ -69,7 +68,7 @@ _wanted: set[int] = set()
 _last = 0.0
 
 
-def of(obj, scene) -> Report | None:
+def known_report(obj, scene) -> Report | None:
     """Return what is known of a sensor; looks at it anew soon if it may have changed. Cheap enough for drawing."""
     key = _key(obj, scene)
     known = _reports.get(obj.session_uid)
@@ -78,7 +77,7 @@ def of(obj, scene) -> Report | None:
     return known[1] if known else None
 
 
-def now(obj, scene) -> Report:
+def fresh_report(obj, scene) -> Report:
     """Look at a sensor at once."""
     key = _key(obj, scene)
     report = _look(obj, scene)
@@ -96,7 +95,7 @@ def _key(obj, scene) -> tuple:
     """Changes with everything that may change a report; that it changed need not mean that the report does."""
     stretch = tuple(round(length, 6) for length in obj.matrix_world.to_scale())
     lies_on = obj.parent.name if obj.parent else ""
-    return (*live_cache.settings_of(scene, [obj]), session_state.session.geometry_version, stretch, lies_on, obj.mode)
+    return (*scene_fingerprint.settings_of(scene, [obj]), session_state.session.geometry_version, stretch, lies_on, obj.mode)
 
 
 def _ask(obj) -> None:
@@ -111,12 +110,12 @@ def _work() -> float | None:
     """Compute what was asked for, when nothing plays or bakes."""
     global _last
     window = bpy.context.window_manager.windows[0] if bpy.context.window_manager.windows else None
-    if session_state.session.bake is not None or (window and window.screen.is_animation_playing):
+    if session_state.session.bake_progress is not None or (window and window.screen.is_animation_playing):
         return DELAY
     scene, began = bpy.context.scene, time.perf_counter()
     for obj in scene.objects:
         if obj.session_uid in _wanted and obj.palpate.role in {"SENSOR", "PAD"}:
-            now(obj, scene)
+            fresh_report(obj, scene)
     _wanted.clear()
     _last = time.perf_counter() - began
     for window in bpy.context.window_manager.windows:
@@ -127,28 +126,28 @@ def _work() -> float | None:
 
 
 def _look(obj, scene) -> Report:
-    depsgraph = scene_reader.depsgraph_of(scene)
+    depsgraph = participants.depsgraph_of(scene)
     advice, missing = _advice(scene, depsgraph)
     metres = units.metres_per_unit(scene)
     reach = units.as_typed(obj.palpate.max_penetration)
     try:
-        sensor, mesh = scene_reader.sensor_alone(scene, obj, depsgraph)
-        notes = meshes.sensor_arrays(obj, depsgraph)[1]
-        around = _around(obj, depsgraph, metres) if laid_sensors.is_skin(obj) and obj.parent else None
-        found = problems.of_object(obj, notes) + problems.of_texels(obj, mesh, sensor.texels, reach, around)
+        sensor, mesh = sensor_reader.sensor_in_own_frame(scene, obj, depsgraph)
+        notes = mesh_arrays.sensor_arrays(obj, depsgraph)[1]
+        around = _around(obj, depsgraph, metres) if laid_sensors.is_laid(obj) and obj.parent else None
+        found = problems.object_problems(obj, notes) + problems.texel_problems(obj, mesh, sensor.texels, reach, around)
     except PalpateError as error:
-        return Report(None, reach, metres, None, [problems.of_error(obj, error)], advice, missing)
+        return Report(None, reach, metres, None, [problems.problem_of_error(obj, error)], advice, missing)
     return Report(sensor.texels, reach, metres, mesh if around is None else around, found, advice, missing)
 
 
 def _around(obj, depsgraph, metres: float) -> TriangleMesh | None:
     """What a skin lies on, in the frame of the skin's own object, metres."""
     carrier = obj.parent
-    if carrier.type not in meshes.KINDS:
+    if carrier.type not in participants.OBJECT_TYPES:
         return None
-    arrays = meshes.target_arrays(carrier, depsgraph)
-    matrix = transforms.array(obj.evaluated_get(depsgraph).matrix_world)
-    linear, offset = attached_objects.into_body(matrix, np.linalg.inv(matrix) @ transforms.array(carrier.matrix_world))
+    arrays = mesh_arrays.target_arrays(carrier, depsgraph)
+    matrix = transforms.as_array(obj.evaluated_get(depsgraph).matrix_world)
+    linear, offset = attached_objects.to_body_frame(matrix, np.linalg.inv(matrix) @ transforms.as_array(carrier.matrix_world))
     triangles = arrays.triangles[:, ::-1] if np.linalg.det(linear) < 0 else arrays.triangles
     return TriangleMesh((arrays.vertices @ linear.T + offset) * metres, triangles)
 
@@ -156,7 +155,7 @@ def _around(obj, depsgraph, metres: float) -> TriangleMesh | None:
 def _advice(scene, depsgraph) -> tuple[Advice | None, str]:
     """The advised time step of the scene, or why there is none."""
     try:
-        scenario, _ = scene_reader.sample_start(scene, depsgraph)
+        scenario = scene_reader.read_start(scene, depsgraph).scenario
     except SceneError as error:
         return None, str(error)
     except PalpateError:  # of some sensor: its own report says it

@@ -7,12 +7,12 @@ import numpy as np
 
 from ...core.errors import SensorError
 from ..display import baked_scene
-from ..scene import meshes
+from ..scene import sensor_regions
 
 GROUP_NAME = "Palpate Sensor"
 
 
-def source_of(obj, mode: str) -> str:
+def automatic_source(obj, mode: str) -> str:
     """Return what AUTO means in a mode: the selection in Edit Mode, the painted group in Weight Paint, else the whole mesh."""
     if mode == "EDIT":
         obj.update_from_editmode()
@@ -57,7 +57,7 @@ def make_sensor(obj, source: str, role: str = "SENSOR") -> int:
         group = obj.vertex_groups.active
         if group is None:
             raise SensorError(f"'{obj.name}' has no vertex group: paint one, or make the whole mesh a sensor.")
-        chosen = meshes.weights(obj.data, group.index) >= max(settings.threshold, 1e-6)
+        chosen = sensor_regions.vertex_weights(obj.data, group.index) >= max(settings.threshold, 1e-6)
     elif source == "MATERIAL":
         chosen, material = _active_material(obj)
     elif source == "FACE_SET":
@@ -83,7 +83,7 @@ def make_sensor(obj, source: str, role: str = "SENSOR") -> int:
 
 
 def describe_region(obj, source: str) -> dict:
-    """Return what :func:`.meshes.region_by` needs for a region of an object that stays what it is; a selection becomes a group.
+    """Return a lasting region as arguments of :func:`.sensor_regions.vertices_of_region`; a selection becomes a group.
 
     Parameters
     ----------
@@ -117,17 +117,17 @@ def _active_material(obj) -> tuple[np.ndarray, str]:
         raise SensorError(f"'{obj.name}' has no active material: give the sensor's faces one in the Material tab.")
     index = np.empty(len(obj.data.polygons), dtype=np.int32)
     obj.data.polygons.foreach_get("material_index", index)
-    return meshes.corners_of(obj.data, index == obj.active_material_index), material.name
+    return sensor_regions.vertices_of_faces(obj.data, index == obj.active_material_index), material.name
 
 
 def _active_face_set(obj) -> tuple[np.ndarray, int]:
     """Vertices of the face set that the active face is in, and its number."""
-    sets, active = meshes.face_sets(obj.data), obj.data.polygons.active
+    sets, active = sensor_regions.face_sets(obj.data), obj.data.polygons.active
     number = int(sets[active]) if 0 <= active < len(sets) else obj.palpate.face_set
-    return meshes.corners_of(obj.data, sets == number), number
+    return sensor_regions.vertices_of_faces(obj.data, sets == number), number
 
 
-def set_brush(tools) -> None:
+def set_full_weight_brush(tools) -> None:
     """Let the weight brush paint all of a region at once: weight and strength 1, no normalising against other groups."""
     tools.use_auto_normalize = False
     paint = tools.weight_paint
@@ -163,7 +163,7 @@ def remove_role(scene, obj) -> None:
     obj.palpate.role = "NONE"
 
 
-def paint_group(obj):
+def group_to_paint(obj):
     """Return the vertex group to paint a sensor's region in: the one it has, else a new, empty one."""
     settings = obj.palpate
     group = obj.vertex_groups.get(settings.vertex_group) if settings.vertex_group else None

@@ -16,7 +16,7 @@ from mathutils.bvhtree import BVHTree
 from mathutils.interpolate import poly_3d_calc
 
 from ..properties import painted_maps
-from ..scene import deforming_objects, meshes, scene_reader
+from ..scene import deforming_objects, mesh_arrays, participants, sensor_regions
 from ..session import transforms
 
 MODIFIER = NODES = "Palpate Cling"
@@ -38,15 +38,15 @@ def _has_own_cause(carrier) -> bool:
     return bool(carrier.modifiers) or keys or data.animation_data is not None or carrier.parent_type in {"ARMATURE", "LATTICE"}
 
 
-def clings(skin) -> bool:
+def is_bound(skin) -> bool:
     """Whether the texels go with the shape of what they lie on."""
     modifier = skin.modifiers.get(MODIFIER)
     return modifier is not None and modifier.node_group is not None and _carrier_of(modifier) == skin.parent
 
 
-def cling(context, skin, carrier) -> None:
+def bind(context, skin, carrier) -> None:
     """Bind the texels to the surface in the shape that both have now, where it may change."""
-    let_go(skin)
+    unbind(skin)
     if is_needed(carrier):
         _bind(context, skin, carrier)
         modifier = skin.modifiers.new(MODIFIER, "NODES")
@@ -56,7 +56,7 @@ def cling(context, skin, carrier) -> None:
         skin.update_tag()
 
 
-def let_go(skin) -> None:
+def unbind(skin) -> None:
     """Leave the texels where they are on the object, whatever its surface does."""
     modifier = skin.modifiers.get(MODIFIER)
     if modifier is not None:
@@ -88,10 +88,10 @@ def _carrier_of(modifier):
 
 def _bind(context, skin, carrier) -> None:
     """Note for each texel where it is on the surface."""
-    arrays, _ = meshes.sensor_arrays(carrier, scene_reader.depsgraph_of(context.scene))
-    into = np.linalg.inv(transforms.array(carrier.matrix_world)) @ transforms.array(skin.matrix_world)
-    points = meshes.vertices(skin.data) @ into[:3, :3].T + into[:3, 3]
-    surface = Painted(arrays.vertices, arrays.triangles.tolist(), {}, {})
+    arrays, _ = mesh_arrays.sensor_arrays(carrier, participants.depsgraph_of(context.scene))
+    into = np.linalg.inv(transforms.as_array(carrier.matrix_world)) @ transforms.as_array(skin.matrix_world)
+    points = mesh_arrays.vertices(skin.data) @ into[:3, :3].T + into[:3, 3]
+    surface = PaintedMesh(arrays.vertices, arrays.triangles.tolist(), {}, {})
     corners, shares = (np.array(part) for part in zip(*_nearest(surface, points), strict=True))
     a, b, c = (arrays.vertices[corners[:, i]] for i in range(3))
     place = np.einsum("nk,nkj->nj", shares, np.stack([a, b, c], axis=1))
@@ -172,7 +172,7 @@ def _nodes():
 
 
 @dataclass(frozen=True)
-class Painted:
+class PaintedMesh:
     """What is painted on a mesh: corners, faces, and by name the values of its vertex groups and float attributes."""
 
     corners: np.ndarray
@@ -181,20 +181,20 @@ class Painted:
     attributes: dict[str, np.ndarray]
 
 
-def painted(skin) -> Painted:
+def painted_values(skin) -> PaintedMesh:
     """Return what is painted on a skin."""
     mesh = skin.data
-    return Painted(
-        meshes.vertices(mesh),
+    return PaintedMesh(
+        mesh_arrays.vertices(mesh),
         [list(face.vertices) for face in mesh.polygons],
-        {group.name: meshes.weights(mesh, group.index) for group in skin.vertex_groups},
+        {group.name: sensor_regions.vertex_weights(mesh, group.index) for group in skin.vertex_groups},
         {item.name: _values(item) for item in mesh.attributes if painted_maps.is_map(item)},
     )
 
 
-def carry_over(skin, before: Painted) -> None:
+def transfer_painted_values(skin, before: PaintedMesh) -> None:
     """Give the vertices of a skin's new mesh what was painted on the old one, at the nearest place on it."""
-    found = _nearest(before, meshes.vertices(skin.data))
+    found = _nearest(before, mesh_arrays.vertices(skin.data))
 
     def at_each(values: np.ndarray) -> np.ndarray:
         return np.array([values[corners] @ shares for corners, shares in found], dtype=np.float32)
@@ -215,7 +215,7 @@ def _values(attribute) -> np.ndarray:
     return values
 
 
-def _nearest(before: Painted, points: np.ndarray) -> list[tuple[list[int], np.ndarray]]:
+def _nearest(before: PaintedMesh, points: np.ndarray) -> list[tuple[list[int], np.ndarray]]:
     """For each point the corners of the nearest face and their shares in the place on it."""
     tree = BVHTree.FromPolygons(before.corners.tolist(), before.faces)
     result = []

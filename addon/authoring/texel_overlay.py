@@ -9,8 +9,7 @@ import bpy
 import numpy as np
 
 from ...core.geometry.layout.grid_layout import GridLayout
-from ..session import transforms
-from ..timeline import playback
+from ..session import frame_status, transforms
 from . import sensor_report
 
 VALID_COLOR, FAULTY_COLOR, NORMAL_COLOR, REACH_COLOR = (
@@ -81,15 +80,15 @@ def _present():
         return None
     if not context.space_data.overlay.show_overlays or not obj.visible_get() or obj.palpate.is_baked:
         return None
-    report = sensor_report.of(obj, context.scene)
+    report = sensor_report.known_report(obj, context.scene)
     return (obj, own, report) if report is not None and report.texels is not None else None
 
 
 def _frame(obj):
     from mathutils import Matrix
 
-    location, quaternion, _ = transforms.split(transforms.array(obj.matrix_world))
-    return Matrix(transforms.rigid(location, quaternion))
+    location, quaternion, _ = transforms.decompose(transforms.as_array(obj.matrix_world))
+    return Matrix(transforms.pose_matrix(location, quaternion))
 
 
 def _current(report) -> Drawing:
@@ -112,7 +111,7 @@ def _draw() -> None:
     with gpu.matrix.push_pop():
         gpu.matrix.multiply_matrix(_frame(obj))
         gpu.state.depth_test_set("NONE" if bpy.context.space_data.shading.show_xray else "LESS_EQUAL")
-        readings = playback.status(bpy.context.scene).frame
+        readings = frame_status.status_of(bpy.context.scene).frame
         shown = obj.mode == "OBJECT" and readings is not None and obj.name in readings.sensors  # the heat map is where they are
         if own.show_texels and not shown:
             _triangles(drawing, "fine", VALID_COLOR)

@@ -14,7 +14,8 @@ from ...core.jobs.progress import Job, Progress
 from ...core.model.recording import Recording
 from ...core.model.scenario import Scenario
 from ..display import texel_arrows
-from ..scene import scene_reader
+from ..scene import scene_fingerprint, scene_reader
+from ..scene.scene_reading import SceneReading
 from ..session import dependencies, first_use, session_state
 from ..timeline import playback
 from . import bake_files, scene_writer
@@ -61,38 +62,38 @@ def bake(scene, into_scene: bool = True) -> Job[BakeResult]:
         try:
             return (yield from part_of_job(_bake(scene, into_scene), _note_for_panel))
         finally:
-            session_state.session.bake = None
+            session_state.session.bake_progress = None
 
 
 def _bake(scene, into_scene: bool) -> Job[BakeResult]:
     """Do the steps of a bake, each in the room that owns it."""
     name = scene.name
     folder = bake_files.writable_bake_folder(scene)
-    scenario, binding = yield from _sample(scene)
+    reading = yield from _read(scene)
     if into_scene:
-        scene_writer.check_writable(scene, scenario, binding)
+        scene_writer.check_writable(scene, reading)
     yield from first_use.wait()
-    simulation = dependencies.solver().Simulation(scenario)
-    with bake_files.BakeFiles(folder, scenario, bpy.data.filepath) as files:
-        recording = yield from _solve(name, simulation, binding, files)
+    simulation = dependencies.load_solver().Simulation(reading.scenario)
+    with bake_files.BakeFiles(folder, reading.scenario, bpy.data.filepath) as files:
+        recording = yield from _solve(name, simulation, reading, files)
         files.finish(recording)
     if into_scene:
-        _show(_scene_called(name), scenario, binding, recording, files.folders)
-    return BakeResult(recording, scenario, files.folders)
+        _show(_scene_called(name), reading, recording, files.folders)
+    return BakeResult(recording, reading.scenario, files.folders)
 
 
-def _sample(scene) -> Job[tuple[Scenario, scene_reader.Binding]]:
+def _read(scene) -> Job[SceneReading]:
     """Read the scene over its whole frame range: the first half of the work."""
     total = _total_steps(scene.frame_start, scene.frame_end)
     with texel_arrows.hidden_arrows(scene):
         return (
             yield from part_of_job(
-                scene_reader.sample_scenario(scene), lambda step: replace(step, stage="Reading the scene", total=total)
+                scene_reader.read_scene(scene), lambda step: replace(step, stage="Reading the scene", total=total)
             )
         )
 
 
-def _solve(name: str, simulation, binding: scene_reader.Binding, files: bake_files.BakeFiles) -> Job[Recording]:
+def _solve(name: str, simulation, reading: SceneReading, files: bake_files.BakeFiles) -> Job[Recording]:
     """Compute forces and readings frame by frame, and write each frame while the next is computed: the second half."""
     scenario = simulation.scenario
     total = _total_steps(scenario.frame_start, scenario.frame_end)
@@ -101,19 +102,20 @@ def _solve(name: str, simulation, binding: scene_reader.Binding, files: bake_fil
     def write_frame(step: Progress) -> Progress:
         files.write_frame(frames[-1])
         files.save_checkpoint(simulation, frames)
-        binding.objects(_scene_called(name))  # raises if the user has deleted one
+        reading.objects(_scene_called(name))  # raises if the user has deleted one
         return replace(step, done=total // 2 + step.done, total=total)
 
-    recording = yield from part_of_job(dependencies.solver().solve(scenario, simulation, frames), write_frame)
-    binding.objects(_scene_called(name))
-    return replace(recording, warnings=binding.warnings + recording.warnings)
+    recording = yield from part_of_job(dependencies.load_solver().solve(scenario, simulation, frames), write_frame)
+    reading.objects(_scene_called(name))
+    return replace(recording, warnings=reading.warnings + recording.warnings)
 
 
-def _show(scene, scenario: Scenario, binding: scene_reader.Binding, recording: Recording, folders: dict[str, Path]) -> None:
+def _show(scene, reading: SceneReading, recording: Recording, folders: dict[str, Path]) -> None:
     """Put the result into the scene and evaluate the present frame again, so that the new keyframes take effect."""
-    scene_writer.write(scene, scenario, binding, recording, folders)
+    scene_writer.write(scene, reading, recording, folders)
     scene.frame_set(scene.frame_current, subframe=scene.frame_subframe)
-    playback.baked(scene, recording, folders)
+    scene.palpate.baked_fingerprint = scene_fingerprint.fingerprint(scene)
+    playback.show_new_bake(scene, recording, folders)
 
 
 def _total_steps(frame_start: int, frame_end: int) -> int:
@@ -122,7 +124,7 @@ def _total_steps(frame_start: int, frame_end: int) -> int:
 
 
 def _note_for_panel(progress: Progress) -> Progress:
-    session_state.session.bake = progress
+    session_state.session.bake_progress = progress
     return progress
 
 

@@ -9,19 +9,17 @@ import numpy as np
 
 from ...core.errors import SceneError
 from ...core.model.recording import Recording
-from ...core.model.scenario import Scenario
 from ..display import bake_display, baked_scene
 from ..display.baked_sensor import BakedSensor
-from ..scene import moved_bodies
-from ..scene.scene_reader import Binding
-from ..timeline import staleness
+from ..scene import moved_bodies, scene_fingerprint
+from ..scene.scene_reading import SceneReading
 
 
-def check_writable(scene, scenario: Scenario, binding: Binding) -> None:
+def check_writable(scene, reading: SceneReading) -> None:
     """Raise SceneError if an object that the bake has to change cannot be changed."""
-    objects = binding.objects(scene)
-    sensors = [obj for sensor, obj in zip(scenario.sensors, sensor_objects(scene, binding)) if sensor.readout]
-    for obj in {*(objects[index] for index in binding.starts), *sensors}:
+    objects = reading.objects(scene)
+    sensors = [obj for sensor, obj in zip(reading.scenario.sensors, sensor_objects(scene, reading)) if sensor.readout]
+    for obj in {*(objects[index] for index in reading.start_matrices), *sensors}:
         if not obj.is_editable:
             raise SceneError(
                 f"'{obj.name}' is linked from another file, so that a bake cannot be put on it: "
@@ -37,7 +35,7 @@ def check_writable(scene, scenario: Scenario, binding: Binding) -> None:
             )
 
 
-def sensor_objects(scene, binding: Binding) -> list:
+def sensor_objects(scene, reading: SceneReading) -> list:
     """Return the objects that hold the sensors and pads, by sensor index.
 
     Raises
@@ -45,37 +43,36 @@ def sensor_objects(scene, binding: Binding) -> list:
     SceneError
         One of them was deleted.
     """
-    found = binding.sensor_objects(scene)
+    found = reading.sensor_objects(scene)
     if any(obj is None for obj in found):
         raise SceneError("A sensor was deleted while its forces were computed: undo that, or start again without it.")
     return found
 
 
-def write(scene, scenario: Scenario, binding: Binding, recording: Recording, folders: dict[str, Path]) -> None:
+def write(scene, reading: SceneReading, recording: Recording, folders: dict[str, Path]) -> None:
     """Put a recording into its scene. It replaces the recording of an earlier bake.
 
     Parameters
     ----------
-    scenario : Scenario
-        What was solved.
-    binding : Binding
-        Which object of the scene is which body and sensor of the scenario.
+    reading : SceneReading
+        Its scenario was solved.
     recording : Recording
     folders : dict of str to Path
         Finished bake folder of each sensor, by the sensor's name.
     """
-    objects, sensors = binding.objects(scene), sensor_objects(scene, binding)
+    scenario = reading.scenario
+    objects, sensors = reading.objects(scene), sensor_objects(scene, reading)
     taking_part = {*objects, *sensors}
     for obj in scene.objects:  # objects that took part in an earlier bake and no longer do
         if obj.palpate.is_baked and obj not in taking_part:
             baked_scene.clear_object(scene, obj)
-    for index in binding.starts:
-        _keyframe_body(objects[index], index, binding, recording)
-    moved = {objects[index] for index in binding.starts}
+    for index in reading.start_matrices:
+        _keyframe_body(objects[index], index, reading, recording)
+    moved = {objects[index] for index in reading.start_matrices}
     baked_sensors = []
     for sensor, obj in zip(scenario.sensors, sensors):
         if sensor.readout:
-            baked_sensors.append(_baked_sensor(obj, objects[sensor.body], sensor, binding, recording, folders[sensor.name]))
+            baked_sensors.append(_baked_sensor(obj, objects[sensor.body], sensor, reading, recording, folders[sensor.name]))
             obj.palpate.is_baked = True
         elif obj.palpate.is_baked and obj not in moved:
             baked_scene.clear_object(scene, obj)
@@ -83,17 +80,18 @@ def write(scene, scenario: Scenario, binding: Binding, recording: Recording, fol
     baked_scene.remove_orphans()
     settings = scene.palpate
     settings.baked_digest = recording.digest
-    settings.baked_shapes = staleness.pack(binding.looks)
+    settings.baked_shapes = scene_fingerprint.pack_fingerprints(reading.mesh_fingerprints)
     settings.baked_start, settings.baked_end = scenario.frame_start, scenario.frame_end
 
 
-def _keyframe_body(obj, index: int, binding: Binding, recording: Recording) -> None:
+def _keyframe_body(obj, index: int, reading: SceneReading, recording: Recording) -> None:
     """Write the motion of a body that forces have moved as keyframes of its object."""
-    placement = moved_bodies.Placement.of(obj, binding.starts[index], binding.parents[index][0], binding.scale)
-    moved_bodies.bake(obj, placement, recording.frames, recording.poses[:, index], np.array(binding.parents[index]))
+    parents = np.array(reading.parent_matrices[index])
+    placement = moved_bodies.BodyPlacement.of(obj, reading.start_matrices[index], parents[0], reading.metres_per_unit)
+    moved_bodies.keyframe_motion(obj, placement, recording.frames, recording.poses[:, index], parents)
 
 
-def _baked_sensor(obj, body, sensor, binding: Binding, recording: Recording, folder: Path) -> BakedSensor:
+def _baked_sensor(obj, body, sensor, reading: SceneReading, recording: Recording, folder: Path) -> BakedSensor:
     return BakedSensor(
         obj=obj,
         body=body,
@@ -103,6 +101,6 @@ def _baked_sensor(obj, body, sensor, binding: Binding, recording: Recording, fol
         readings=recording.sensors[sensor.name],
         frames=recording.frames,
         poses=recording.poses[:, sensor.body],
-        scale=binding.scale,
+        scale=reading.metres_per_unit,
         folder=folder,
     )

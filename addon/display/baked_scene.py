@@ -56,8 +56,8 @@ def has_bake(scene) -> bool:
 
 def clear_object(scene, obj) -> None:
     """Remove one object's part of a bake: keyframes, heat map and markers; a free body returns to its start."""
-    identity.ensure(obj)
-    moved_bodies.clear(obj)
+    identity.ensure_uid(obj)
+    moved_bodies.remove_motion(obj)
     if obj.palpate.bake_folder:
         heat_map.clear(obj)
         markers.clear(scene, obj.palpate.uid)

@@ -8,9 +8,8 @@ import numpy as np
 
 from ...core.geometry.layout.texture_maps import UVLayout
 from ...core.geometry.texels import Texels
-from ..scene import meshes
-from ..scene.display_names import HEAT_MAP_MODIFIER, UV_MAP
-from ..scene.meshes import OLD_MATERIAL
+from ..scene import mesh_arrays
+from ..scene.display_names import HEAT_MAP_MODIFIER, OLD_MATERIAL, UV_MAP
 from . import materials
 
 EMPTY_SLOT = "palpate_empty_slot"
@@ -87,7 +86,7 @@ def _write_uv(mesh, texels: Texels, uv: np.ndarray) -> None:
             mesh.uv_layers.active_index = active
     table = np.zeros((len(mesh.vertices), 2))
     table[texels.vertex] = uv
-    corner = meshes.corners(mesh)
+    corner = mesh_arrays.corner_vertices(mesh)
     layer.data.foreach_set("uv", table[corner].astype(np.float32).ravel())
 
 

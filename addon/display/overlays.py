@@ -62,7 +62,7 @@ def sensor_overlays(scene, run, frame) -> list[SensorOverlay]:
     maximum, strongest = _scale(scene, run, frame)
     return [
         _sensor_overlay(
-            scene, sensor, frame.sensors[sensor.name], frame.poses[sensor.body], maximum, strongest, run.binding.scale
+            scene, sensor, frame.sensors[sensor.name], frame.poses[sensor.body], maximum, strongest, run.reading.metres_per_unit
         )
         for sensor in _read_out(run)
     ]
@@ -73,7 +73,7 @@ def inset_content(scene, run, frame) -> inset.InsetContent:
     maximum, _ = _scale(scene, run, frame)
     known = sorted(run.frames)
     texels = {sensor.name: sensor.texels for sensor in _read_out(run)}
-    loads = {name: np.array([run.load(number)[name] for number in known]) for name in texels}
+    loads = {name: np.array([run.total_forces(number)[name] for number in known]) for name in texels}
     return inset.inset_content(scene, frame, texels, np.array(known, float), loads, maximum)
 
 

@@ -53,7 +53,7 @@ def build_arrows(scene, sensor: BakedSensor, image, kinds, lengths: dict, longes
         made = bpy.data.objects.new(mesh.name, mesh)
         markers.link(scene, sensor.obj, made, kind)
         made.parent = sensor.body
-        _, _, stretch = transforms.split(transforms.array(sensor.body.matrix_world))
+        _, _, stretch = transforms.decompose(transforms.as_array(sensor.body.matrix_world))
         made.matrix_parent_inverse = Matrix(np.vstack([np.column_stack([np.linalg.inv(stretch), np.zeros(3)]), [0, 0, 0, 1]]))
         made.hide_select = True
         made.color = (*marker_meshes.COLORS[material], 1.0)  # Workbench shows these of what nodes make

@@ -8,18 +8,18 @@ from bpy.app.handlers import persistent
 
 from ..authoring import sensor_report, texel_overlay
 from ..display import overlays
-from ..properties import migrations, object_properties
-from ..scene import moved_bodies, scene_reader
+from ..properties import migrations
+from ..scene import participants
 from ..session import first_use, identity, session_state
 from ..timeline import playback
 
 
 def _settle() -> None:
     """Look through the file once: after it was opened, or at the first event after the add-on was enabled on an open one."""
-    if session_state.session.settled or session_state.session.rendering:
+    if session_state.session.file_examined or session_state.session.rendering:
         return
-    session_state.session.settled = True
-    identity.claim(bpy.data.objects)
+    session_state.session.file_examined = True
+    identity.register_owners(bpy.data.objects)
     migrations.apply()
     for scene in bpy.data.scenes:
         playback.hide(scene)  # a file that was written without save_pre, as by a crash
@@ -35,7 +35,7 @@ def palpate_frame_change_pre(scene, _depsgraph=None):
 
 @persistent
 def palpate_frame_change_post(scene, depsgraph):
-    if depsgraph is not None and depsgraph.view_layer.name == scene_reader.view_layer_of(scene).name:
+    if depsgraph is not None and depsgraph.view_layer.name == participants.view_layer_of(scene).name:
         playback.on_frame(scene, depsgraph)
 
 
@@ -112,7 +112,6 @@ def register():
     for name, function in LISTS.items():
         getattr(bpy.app.handlers, name).append(function)
     first_use.when_ready.append(playback.solver_is_ready)
-    object_properties.when_body_changes.append(moved_bodies.body_changed)
     overlays.register()
     texel_overlay.register()
 
@@ -123,7 +122,6 @@ def unregister():
     sensor_report.forget()
     first_use.stop()
     first_use.when_ready.clear()
-    object_properties.when_body_changes.clear()
     for name, function in LISTS.items():
         getattr(bpy.app.handlers, name).remove(function)
     playback.forget()

@@ -20,7 +20,7 @@ from ...core.jobs.job_runner import part_of_job
 from ...core.jobs.progress import Progress
 from ..authoring import exchange
 from ..properties import effect_stack
-from ..scene import scene_reader
+from ..scene import participants, sensor_reader
 from ..session import first_use, identity
 
 if TYPE_CHECKING:
@@ -91,7 +91,7 @@ def find(obj):
         yield Progress("Drawing", 990, 1000)
         pictures[name] = folder / f"{name}.png"
         save_figure(picture(name, diagnosis, errors), pictures[name], 150)
-    identity.ensure(obj)
+    identity.ensure_uid(obj)
     headline, evidence = sentences.headline(diagnosis, errors), sentences.evidence(diagnosis, errors)
     result = Result(diagnosis, errors, headline, evidence, next_experiment(diagnosis), pictures)
     _results[identity.key(obj)] = result
@@ -168,7 +168,7 @@ def show_on_sensor(context, obj, amended: bool) -> float:
 
 
 def _texels(context, obj):
-    return scene_reader.sensor_alone(context.scene, obj, scene_reader.depsgraph_of(context.scene))[0].texels
+    return sensor_reader.sensor_in_own_frame(context.scene, obj, participants.depsgraph_of(context.scene))[0].texels
 
 
 def mark_phases(scene, obj) -> int:

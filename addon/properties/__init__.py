@@ -14,4 +14,5 @@ __all__ = [
     "painted_maps",
     "parameter_properties",
     "registration",
+    "start_transforms",
 ]

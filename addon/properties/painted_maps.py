@@ -5,6 +5,9 @@ from bpy.props import FloatProperty, StringProperty
 
 from .parameter_properties import FIXED
 
+PAINTED_PARAMETERS = ("k", "friction", "gain")
+"""Each of them has two properties: ``<name>_map`` names a vertex group or attribute, ``<name>_factor`` is its factor."""
+
 
 def is_map(attribute) -> bool:
     """True for an attribute of a mesh that holds a number for each vertex and that a user may mean."""

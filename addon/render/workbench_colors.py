@@ -18,7 +18,7 @@ from ...core.figures.figure_style import FigureStyle
 from ...core.geometry.texels import Texels
 from ...core.io.bake_reader import Bake, frame_index
 from ..display import heat_map, materials
-from ..scene import meshes
+from ..scene import mesh_arrays
 
 COLOR_ATTRIBUTE = "Palpate Colour"
 DEFAULT_COLOR = (0.8, 0.8, 0.8, 1.0)
@@ -113,7 +113,7 @@ def _opacity(material) -> float:
 
 def _corners_of_region(mesh, texels: Texels) -> tuple[np.ndarray, np.ndarray]:
     """Return the corners of the faces in a sensor's region, and the texel at each of these corners."""
-    corner, sides = meshes.corners(mesh), np.empty(len(mesh.polygons), dtype=np.int32)
+    corner, sides = mesh_arrays.corner_vertices(mesh), np.empty(len(mesh.polygons), dtype=np.int32)
     mesh.polygons.foreach_get("loop_total", sides)
     number = np.full(len(mesh.vertices), -1)
     number[texels.vertex] = np.arange(len(texels))

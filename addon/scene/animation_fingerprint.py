@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What moves and bends objects, through however many others: parents, constraints, modifiers, drivers, and their animation.
+"""Hash of everything that moves and deforms objects, directly or through other data-blocks.
 
-Poses and shapes are compared at the frame that is shown. A change that shows at other frames only is seen here.
+Counted are parents, constraints, modifiers, drivers and their animation. Poses and shapes are compared only at the frame that
+is shown; a change at other frames is noticed by this hash.
 """
 
 from __future__ import annotations
@@ -13,69 +14,71 @@ from functools import cache
 import bpy
 import numpy as np
 
+from ..properties import start_transforms
 from ..session import fcurves
-from . import display_names, moved_bodies
+from . import display_names
 
-_PLACES = ("co", "handle_left", "handle_right")
-_EASES = ("easing", "back", "amplitude", "period")
-"""What else keyframes say where they are followed by an easing curve."""
-_EASED = 2
-"""Above this, the number of an interpolation is that of an easing curve."""
-_NO_VALUE = {"name", "show_expanded", "select", "active", "strip_time"}
-"""Properties that say nothing about motion, or something else at every frame."""
+_POINT_PROPERTIES = ("co", "handle_left", "handle_right")
+_EASING_PROPERTIES = ("easing", "back", "amplitude", "period")
+"""Further properties of keyframes that an easing curve follows."""
+_LAST_PLAIN_INTERPOLATION = 2
+"""Interpolations with larger numbers are easing curves."""
+_IGNORED_PROPERTIES = {"name", "show_expanded", "select", "active", "strip_time"}
+"""Properties that do not influence motion, or that change at every frame."""
 
 
-def motion(objects) -> str:
-    """Return a hash of the animation of objects and of all that they hang on, between frames too.
+def fingerprint(objects) -> str:
+    """Return a hash of the animation of objects and of everything that they depend on, also between frames.
 
-    Of a body that forces move only its drivers: its keyframes are the bake's.
+    Of a body that forces move only the drivers count: its keyframes are those of a bake.
     """
     digest = hashlib.blake2b(digest_size=16)
-    for block in blocks(objects):
+    for block in related_data_blocks(objects):
         data = getattr(block, "animation_data", None)
         if data is None:
             continue
-        digest.update(b"next")  # their names may change
+        digest.update(b"next")  # marks the next block; its name may change
         for driver in data.drivers:
             _feed_curve(digest, driver)
             digest.update(repr(_driver(driver.driver)).encode("utf-8", "surrogatepass"))
-        if isinstance(block, bpy.types.Object) and block.palpate.body in moved_bodies.MOVED:
+        if isinstance(block, bpy.types.Object) and block.palpate.body in start_transforms.MOVED_BY_FORCES:
             continue
-        for curve in fcurves.of_action(data) or ():
+        for curve in fcurves.of_animation_data(data) or ():
             _feed_curve(digest, curve)
         for track in data.nla_tracks:
             for strip in track.strips:
                 digest.update(repr((track.mute, track.is_solo, _values(strip))).encode("utf-8", "surrogatepass"))
-                for curve in (*strip.fcurves, *(fcurves.of_action(strip) or ())):
+                for curve in (*strip.fcurves, *(fcurves.of_animation_data(strip) or ())):
                     _feed_curve(digest, curve)
     return digest.hexdigest()
 
 
-def blocks(objects) -> list:
-    """Return objects and every data-block that their place and shape hang on, in an order that stays."""
+def related_data_blocks(objects) -> list:
+    """Return objects and every data-block on which their pose and shape depend, in an order that does not change."""
     found, waiting = {}, list(objects)[::-1]
     while waiting:
         block = waiting.pop()
         if block is not None and block.session_uid not in found:
             found[block.session_uid] = block
-            waiting += _named_by(block)
+            waiting += _references_of(block)
     return list(found.values())
 
 
-def _named_by(block) -> Iterator:
+def _references_of(block) -> Iterator:
+    """Yield the data-blocks that a data-block refers to; some are None."""
     data = getattr(block, "animation_data", None)
     for driver in () if data is None else data.drivers:
         for variable in driver.driver.variables:
             yield from (target.id for target in variable.targets)
     if isinstance(block, bpy.types.Object):
         yield from (block.parent, block.data)
-        yield from _of_constraints(block.constraints)
+        yield from _constraint_targets(block.constraints)
         for modifier in block.modifiers:
             if modifier.name != display_names.HEAT_MAP_MODIFIER:
                 yield from _pointers(modifier)
-                yield from _inputs(modifier)
+                yield from _node_inputs(modifier)
         for bone in () if block.pose is None else block.pose.bones:
-            yield from _of_constraints(bone.constraints)
+            yield from _constraint_targets(bone.constraints)
     elif isinstance(block, bpy.types.NodeTree):
         for node in block.nodes:
             yield getattr(node, "node_tree", None)
@@ -86,14 +89,15 @@ def _named_by(block) -> Iterator:
     yield getattr(block, "shape_keys", None)
 
 
-def _of_constraints(constraints) -> Iterator:
+def _constraint_targets(constraints) -> Iterator:
+    """Yield the data-blocks that constraints refer to."""
     for constraint in constraints:
         yield from _pointers(constraint)
         yield from (item.target for item in getattr(constraint, "targets", ()))
 
 
-def _inputs(modifier) -> Iterator:
-    """Return the data-blocks that Geometry Nodes are given. Newer Blenders (5.2) have properties for inputs."""
+def _node_inputs(modifier) -> Iterator:
+    """Yield the data-blocks that are inputs of Geometry Nodes. Blender 5.2 and later has properties for inputs."""
     nodes = modifier.node_group if modifier.type == "NODES" else None
     for item in () if nodes is None else nodes.interface.items_tree:
         if getattr(item, "in_out", "") != "INPUT":
@@ -107,7 +111,7 @@ def _inputs(modifier) -> Iterator:
 
 
 def _pointers(item) -> Iterator:
-    """Return the data-blocks that a modifier or constraint names."""
+    """Yield the data-blocks that the properties of a modifier or constraint point to."""
     yield from (getattr(item, name) for name in _pointer_names(type(item)))
 
 
@@ -127,13 +131,13 @@ def _feed_curve(digest, curve) -> None:
     digest.update(f"{curve.data_path}[{curve.array_index}]{curve.mute}{curve.extrapolation}".encode("utf-8", "surrogatepass"))
     points = curve.keyframe_points
     places, kinds = np.empty(2 * len(points), dtype=np.float32), np.empty(len(points), dtype=np.int32)
-    for key in _PLACES:
+    for key in _POINT_PROPERTIES:
         points.foreach_get(key, places)
         digest.update(places.tobytes())
     points.foreach_get("interpolation", kinds)
     digest.update(kinds.tobytes())
-    if (kinds > _EASED).any():
-        digest.update(repr([[getattr(point, key) for key in _EASES] for point in points]).encode())
+    if (kinds > _LAST_PLAIN_INTERPOLATION).any():
+        digest.update(repr([[getattr(point, key) for key in _EASING_PROPERTIES] for point in points]).encode())
     for modifier in curve.modifiers:
         digest.update(repr(_values(modifier)).encode("utf-8", "surrogatepass"))
 
@@ -148,14 +152,14 @@ def _block_name(block) -> str:
 
 
 def _values(item) -> list[tuple]:
-    """Return the numbers and words of a part of an animation, by name."""
+    """Return the values of the properties of a part of an animation, by name."""
     found = []
     for name in _value_names(type(item)):
         value = getattr(item, name)
         if name == "influence" and getattr(item, "use_animated_influence", False):
             continue  # its curve counts
         if isinstance(value, set):
-            value = sorted(value)  # which comes first is chance
+            value = sorted(value)  # a set has no order
         found.append((name, value if isinstance(value, int | float | str | list) else tuple(value)))
     return found
 
@@ -164,4 +168,4 @@ def _values(item) -> list[tuple]:
 def _value_names(kind) -> tuple[str, ...]:
     plain = [prop for prop in kind.bl_rna.properties if prop.type in {"BOOLEAN", "INT", "FLOAT", "STRING", "ENUM"}]
     given = [prop.identifier for prop in plain if not prop.is_readonly or prop.identifier == "type"]
-    return tuple(name for name in given if name not in _NO_VALUE)
+    return tuple(name for name in given if name not in _IGNORED_PROPERTIES)

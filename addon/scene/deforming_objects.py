@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Objects whose shape may change from frame to frame: which they are, and what they look like at the present frame.
+"""Objects whose shape may change from frame to frame, and their shapes.
 
-Shape keys, armatures, lattices, cloth, Geometry Nodes, animated scale: whatever moves the vertices of the evaluated mesh
-counts, as long as their number stays.
+Everything that moves the vertices of the evaluated mesh counts, as long as their number stays: shape keys, armatures, lattices,
+cloth, Geometry Nodes, animated scale.
 """
 
 from __future__ import annotations
@@ -19,19 +19,17 @@ from ...core.model.scenario import Scenario
 from ...core.model.sensor import Sensor
 from ...core.model.target import Target
 from ..session import fcurves, identity
-from . import meshes
-from .display_names import HEAT_MAP_MODIFIER
-from .mesh_snapshot import Surface
+from . import display_names, mesh_arrays
+from .mesh_snapshot import MeshSnapshot
 
-SCALES = {"scale", "delta_scale"}
+SCALE_PROPERTIES = {"scale", "delta_scale"}
 
 
 def may_deform(obj) -> bool:
-    """Whether anything could change the shape of an object over time."""
-    if any(modifier.show_viewport and modifier.name != HEAT_MAP_MODIFIER for modifier in obj.modifiers) or obj.parent_type in {
-        "ARMATURE",
-        "LATTICE",
-    }:
+    """Return True when anything could change the shape of an object over time."""
+    if any(modifier.show_viewport and modifier.name != display_names.HEAT_MAP_MODIFIER for modifier in obj.modifiers):
+        return True
+    if obj.parent_type in {"ARMATURE", "LATTICE"}:
         return True
     data = obj.data
     if getattr(data, "shape_keys", None) is not None or data.animation_data is not None:
@@ -40,148 +38,158 @@ def may_deform(obj) -> bool:
 
 
 def has_animated_scale(obj) -> bool:
-    """Whether keyframes or drivers change the scale of an object or of one of its parents."""
+    """Return True when keyframes or drivers change the scale of an object or of one of its parents."""
     while obj is not None:
-        if fcurves.animated_paths(obj) & SCALES:
+        if fcurves.animated_paths(obj) & SCALE_PROPERTIES:
             return True
         obj = obj.parent
     return False
 
 
 @dataclass
-class Skin:
+class DeformingSurface:
     """The surface of a target or sensor that may deform.
 
     Attributes
     ----------
     key, name : str
+        Key (:func:`.identity.key`) and name of the object.
     body, index : int
-        Whose surface it is, and which target or sensor.
-    count : int
-        Vertices of the evaluated mesh.
+        Index of the body, and of the target or sensor.
+    vertex_count : int
+        Number of vertices of the evaluated mesh.
     linear, offset : (3, 3) and (3,) float
-        From the object's vertices to the body's frame in metres, at the first frame.
-    scaled : bool
-        Whether those change.
+        A vertex x of the object is at linear · x + offset in the body's frame, metres, at the first frame.
+    is_scaled : bool
+        True when `linear` and `offset` change over time.
     follower : DeformedTexels or None
-        How texels go with the mesh; None for a target.
+        Moves the texels with the mesh; None for a target.
     """
 
     key: str
     name: str
     body: int
     index: int
-    count: int
+    vertex_count: int
     linear: np.ndarray
     offset: np.ndarray
-    scaled: bool
+    is_scaled: bool
     follower: DeformedTexels | None
     _last: tuple | None = None
-    """What :meth:`at` was asked last, and what it said: most surfaces stay as they are."""
+    """Arguments and result of the last call of :meth:`shape_at`: most surfaces rest most of the time."""
 
-    def at(self, surface: Surface, frame: int, linear: np.ndarray, offset: np.ndarray) -> np.ndarray:
-        """Return the shape at a frame: vertices of a target, frames of a sensor's texels, in the body's frame, metres.
+    def shape_at(self, snapshot: MeshSnapshot, frame: int, linear: np.ndarray, offset: np.ndarray) -> np.ndarray:
+        """Return the shape in the body's frame, metres: vertices of a target, or frames of a sensor's texels.
 
         Parameters
         ----------
-        surface : Surface
-            Of the object at that frame.
+        snapshot : MeshSnapshot
+            The object's mesh at that time.
         frame : int
-            For messages.
+            Named in messages.
         linear, offset : (3, 3) and (3,) float
-            From the object's vertices to the body's frame.
+            A vertex x of the object is at linear · x + offset in the body's frame, metres.
 
         Raises
         ------
         SceneError
-            The surface is no longer what it was: other vertices, turned inside out, or not a number.
+            The number of vertices changed, a vertex is not finite, or the scale turns the surface inside out.
         """
         if self._last is not None:
             before, values = self._last
-            if before[0] is surface and np.array_equal(before[1], linear) and np.array_equal(before[2], offset):
+            if before[0] is snapshot and np.array_equal(before[1], linear) and np.array_equal(before[2], offset):
                 return values
-        values = self._worked_out(surface, frame, linear, offset)
-        self._last = (surface, linear, offset), values
+        values = self._compute(snapshot, frame, linear, offset)
+        self._last = (snapshot, linear, offset), values
         return values
 
-    def _worked_out(self, surface: Surface, frame: int, linear: np.ndarray, offset: np.ndarray) -> np.ndarray:
-        found = surface.vertices
-        if len(found) != self.count:
+    def _compute(self, snapshot: MeshSnapshot, frame: int, linear: np.ndarray, offset: np.ndarray) -> np.ndarray:
+        vertices = snapshot.vertices
+        if len(vertices) != self.vertex_count:
             raise SceneError(
-                f"'{self.name}' has {len(found)} vertices at frame {frame} and had {self.count} at the first: "
+                f"'{self.name}' has {len(vertices)} vertices at frame {frame} and had {self.vertex_count} at the first: "
                 "use modifiers that keep their number while it deforms."
             )
-        if not np.isfinite(found).all():
+        if not np.isfinite(vertices).all():
             raise SceneError(
                 f"A vertex of '{self.name}' is NaN or infinite at frame {frame}: check the modifier that moves it."
             )
         if np.linalg.det(linear) * np.linalg.det(self.linear) < 0:
             raise SceneError(f"The scale of '{self.name}' turns it inside out at frame {frame}: keep the signs of its scale.")
-        values = found @ linear.T + offset
+        values = vertices @ linear.T + offset
         return values if self.follower is None else self.follower.frames(values, self.name)
 
 
-def skin_of(
+def deforming_surface_of(
     obj, depsgraph, part: Target | Sensor, index: int, mesh: TriangleMesh, linear: np.ndarray, offset: np.ndarray
-) -> Skin | None:
-    """Return the skin of a target or sensor that may deform, else None.
+) -> DeformingSurface | None:
+    """Return the surface of a target or sensor that may deform, else None.
 
     Parameters
     ----------
+    obj : Object
+    depsgraph : Depsgraph
+    part : Target or Sensor
+    index : int
+        Index of the target or sensor.
     mesh : TriangleMesh
-        The object's, in its body's frame, at the first frame.
+        Mesh of the object in its body's frame, at the first frame.
     linear, offset : (3, 3) and (3,) float
-        From the object's vertices to those.
+        A vertex x of the object is at linear · x + offset in the body's frame, metres.
     """
     if not may_deform(obj):
         return None
     follower = None
     if isinstance(part, Sensor):
-        with meshes.evaluated(obj, depsgraph) as final:
+        with mesh_arrays.evaluated_mesh(obj, depsgraph) as final:
             if len(final.vertices) != len(mesh.vertices):
                 return None  # texels stand on the mesh without modifiers
         follower = DeformedTexels(part.texels, mesh)
-    scaled = has_animated_scale(obj)
-    return Skin(identity.key(obj), obj.name, part.body, index, len(mesh.vertices), linear, offset, scaled, follower)
+    is_scaled = has_animated_scale(obj)
+    return DeformingSurface(
+        identity.key(obj), obj.name, part.body, index, len(mesh.vertices), linear, offset, is_scaled, follower
+    )
 
 
-def declared(scenario: Scenario, skins) -> tuple[tuple[Sensor, ...], tuple[Target, ...]]:
-    """Return sensors and targets that are known to deform, with their shape at the first frame."""
+def with_first_shapes(scenario: Scenario, surfaces) -> tuple[tuple[Sensor, ...], tuple[Target, ...]]:
+    """Return sensors and targets; those that may deform get their shape at the first frame."""
     sensors, targets = list(scenario.sensors), list(scenario.targets)
-    for skin in skins:
-        group = targets if skin.follower is None else sensors
-        part = group[skin.index]
-        first = part.mesh.vertices if skin.follower is None else skin.follower.frames(skin.follower.start, skin.name)
-        group[skin.index] = replace(part, deformation=Deformation(np.zeros(1), first[None]))
+    for surface in surfaces:
+        group = targets if surface.follower is None else sensors
+        part = group[surface.index]
+        first = (
+            part.mesh.vertices if surface.follower is None else surface.follower.frames(surface.follower.start, surface.name)
+        )
+        group[surface.index] = replace(part, deformation=Deformation(np.zeros(1), first[None]))
     return tuple(sensors), tuple(targets)
 
 
-class Shapes:
-    """Shapes of what may deform, frame after frame; those that never change take the room of one."""
+class ShapeHistory:
+    """Shapes of what may deform, sample after sample. A shape that never changes is stored once."""
 
     def __init__(self, scenario: Scenario):
         groups = (("target", scenario.targets), ("sensor", scenario.sensors))
-        self._known = {
+        self._samples = {
             (kind, index): [part.deformation.values[0]]
             for kind, group in groups
             for index, part in enumerate(group)
             if part.deformation is not None
         }
-        self._seen: dict[tuple[str, int], np.ndarray] = {}
+        self._last: dict[tuple[str, int], np.ndarray] = {}
 
     def append(self, shapes: dict[tuple[str, int], np.ndarray]) -> None:
-        """Add what one more sample says."""
+        """Add the shapes of one more sample, by ("target" or "sensor", index)."""
         for place, found in shapes.items():
-            known, seen = self._known[place], self._seen.get(place)
-            same = found is seen or np.array_equal(found, known[-1])
-            known.append(known[-1] if same else found)
-            self._seen[place] = found
+            samples = self._samples[place]
+            is_same = found is self._last.get(place) or np.array_equal(found, samples[-1])
+            samples.append(samples[-1] if is_same else found)
+            self._last[place] = found
 
-    def finished(self, scenario: Scenario, times: np.ndarray) -> tuple[tuple[Sensor, ...], tuple[Target, ...]]:
-        """Return sensors and targets with their deformations; without where nothing has changed."""
+    def applied_to(self, scenario: Scenario, times: np.ndarray) -> tuple[tuple[Sensor, ...], tuple[Target, ...]]:
+        """Return sensors and targets with their deformations; those that kept their shape get none."""
         groups = {"sensor": list(scenario.sensors), "target": list(scenario.targets)}
-        for (kind, index), samples in self._known.items():
-            still = all(found is samples[0] for found in samples)
-            deformation = None if still else Deformation(times, np.array(samples))
+        for (kind, index), samples in self._samples.items():
+            is_constant = all(found is samples[0] for found in samples)
+            deformation = None if is_constant else Deformation(times, np.array(samples))
             groups[kind][index] = replace(groups[kind][index], deformation=deformation)
         return tuple(groups["sensor"]), tuple(groups["target"])

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Driven bodies: what their panel says becomes a :class:`Drive`, and where their carrier has them.
+"""Driven bodies: their settings become a :class:`.Drive`; their parents move them like any child object.
 
-The carrier is whatever moves the object's parent. What is animated is the target of the drive; the object's own location and
-rotation are those of its start, and a bake keyframes them as it does a free body's.
+The animation of a driven object is the target of its drive. Its own location and rotation are those of its start; a bake
+keyframes them as it does for a free body.
 """
 
 from __future__ import annotations
@@ -14,23 +14,23 @@ from ...core.model.drive import Drive
 from ...core.model.motion import Signal
 from ..session import transforms, units
 
-TARGETS = {"POSITION": "drive_position", "VELOCITY": "drive_speed", "FORCE": "drive_force"}
-"""Property that holds the target, by control."""
-SETTINGS = (
+TARGET_PROPERTIES = {"POSITION": "drive_position", "VELOCITY": "drive_speed", "FORCE": "drive_force"}
+"""Property that holds the target, by kind of control."""
+DRIVE_PROPERTIES = (
     "drive_control", "drive_axis", "drive_space", "drive_stiffness", "drive_damping", "drive_max_force", "drive_max_speed",
     "drive_settling", "drive_sensor", "drive_leader",
 )  # fmt: skip
-"""Properties that hold for the whole run."""
+"""Properties of a drive that are constant during a run."""
 
 
-def target(obj, depsgraph) -> float:
+def drive_target(obj, depsgraph) -> float:
     """Return the target of an object's drive at the present frame."""
     settings = obj.evaluated_get(depsgraph).palpate
-    return units.as_typed(getattr(settings, TARGETS[settings.drive_control]))
+    return units.as_typed(getattr(settings, TARGET_PROPERTIES[settings.drive_control]))
 
 
 def drive_of(obj, matrix: np.ndarray, depsgraph) -> Drive:
-    """Return the drive of a driven object without its sensor and leader.
+    """Return the drive of a driven object, without its sensor and leader.
 
     Parameters
     ----------
@@ -42,11 +42,11 @@ def drive_of(obj, matrix: np.ndarray, depsgraph) -> Drive:
     axis = np.zeros(3)
     axis["XYZ".index(settings.drive_axis[-1])] = -1.0 if settings.drive_axis.startswith("-") else 1.0
     if settings.drive_space == "PARENT":
-        _, body, _ = transforms.split(matrix)
+        _, body, _ = transforms.decompose(matrix)
         axis = transforms.rotation(body).T @ _parent_rotation(obj, depsgraph) @ axis
     return Drive(
         control=settings.drive_control.lower(),
-        target=Signal.constant(target(obj, depsgraph)),
+        target=Signal.constant(drive_target(obj, depsgraph)),
         axis=axis,
         axis_in_world=settings.drive_space == "WORLD",
         stiffness=units.as_typed(settings.drive_stiffness),
@@ -58,16 +58,24 @@ def drive_of(obj, matrix: np.ndarray, depsgraph) -> Drive:
 
 
 def _parent_rotation(obj, depsgraph) -> np.ndarray:
+    """Return the rotation of an object's parent in the world, (3, 3) float."""
     if obj.parent is None:
         return np.eye(3)
-    matrix = transforms.array(obj.parent.evaluated_get(depsgraph).matrix_world)
+    matrix = transforms.as_array(obj.parent.evaluated_get(depsgraph).matrix_world)
     if transforms.is_singular(matrix):
         raise SceneError(f"The scale of '{obj.parent.name}', parent of driven body '{obj.name}', is zero: give it a scale.")
-    return transforms.rotation(transforms.split(matrix)[1])
+    return transforms.rotation(transforms.decompose(matrix)[1])
 
 
-def leader(obj, owners: list) -> int | None:
-    """Index of the body whose drive moves an object as well, None when it has a drive of its own."""
+def leader_index(obj, owners: list) -> int | None:
+    """Return the index of the body whose drive also moves an object; None when the object has its own drive.
+
+    Parameters
+    ----------
+    obj : Object
+    owners : list
+        Objects by body index.
+    """
     chosen = obj.palpate.drive_leader
     if chosen is None or chosen == obj:
         return None
@@ -76,13 +84,13 @@ def leader(obj, owners: list) -> int | None:
     return owners.index(chosen)
 
 
-def sensor(obj, sensor_objects: list) -> int:
-    """Index of the sensor whose sum an object's drive controls: the chosen one, else the object's own.
+def controlled_sensor(obj, sensor_objects: list) -> int:
+    """Return the index of the sensor whose total force an object's drive controls: the chosen sensor, else the object itself.
 
     Parameters
     ----------
     sensor_objects : list
-        Objects that hold the sensors and pads, by sensor index.
+        Objects that are sensors and pads, by sensor index.
     """
     chosen = obj.palpate.drive_sensor or obj
     if chosen in sensor_objects and chosen.palpate.role == "SENSOR":
@@ -90,14 +98,14 @@ def sensor(obj, sensor_objects: list) -> int:
     raise SceneError(f"Driven body '{obj.name}' controls the force on '{chosen.name}', which is no sensor: choose its Sensor.")
 
 
-def carried(matrix: np.ndarray, parent: np.ndarray, parent_now: np.ndarray) -> np.ndarray:
-    """(4, 4) float: world matrix of a driven object now without its drive.
+def matrix_without_drive(matrix: np.ndarray, parent: np.ndarray, parent_now: np.ndarray) -> np.ndarray:
+    """Return the world matrix that a driven object would have now without its drive, (4, 4) float.
 
     Parameters
     ----------
     matrix : (4, 4) float
         World matrix at the start.
     parent, parent_now : (4, 4) float
-        The parents' share of it then and now.
+        The share of its parents in the matrix, at the start and now.
     """
     return parent_now @ np.linalg.inv(parent) @ matrix

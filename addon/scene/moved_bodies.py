@@ -1,9 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Free and driven bodies: where they started, putting them where the solver says, and the keyframes of a bake.
-
-While a body is displaced by playing, or baked, its own location and rotation at the first frame are kept in its
-properties, so that it can be put back exactly.
-"""
+"""Free and driven bodies: where they start, and the location and rotation that put them at a pose of the solver."""
 
 from __future__ import annotations
 
@@ -14,26 +10,18 @@ import numpy as np
 from mathutils import Euler, Matrix, Quaternion
 
 from ...core.errors import SceneError
+from ..properties import start_transforms
 from ..session import fcurves, transforms
 
-MOVED = ("FREE", "DRIVEN")
-"""Values of `body` with which forces move an object."""
-PATHS = ("location", "rotation_euler", "rotation_quaternion", "rotation_axis_angle")
+TRANSFORM_PATHS = ("location", "rotation_euler", "rotation_quaternion", "rotation_axis_angle")
 
 
-def body_changed(obj) -> None:
-    """Put an object back to where it started when no run will move it any more."""
-    settings = obj.palpate
-    if (settings.body not in MOVED or settings.role == "NONE") and not settings.is_baked:
-        restore(obj)
-
-
-def check(obj) -> None:
-    """Raise SceneError when something else than forces, parents and its drive moves a body."""
+def check_movable(obj) -> None:
+    """Raise SceneError when anything but forces, parents and its drive moves a free or driven body."""
     kind = "Free" if obj.palpate.body == "FREE" else "Driven"
     if any(constraint.enabled for constraint in obj.constraints):
         raise SceneError(f"{kind} body '{obj.name}' has constraints: disable them, or set its body to Keyframed.")
-    if not obj.palpate.is_baked and fcurves.animated_paths(obj) & set(PATHS):
+    if not obj.palpate.is_baked and fcurves.animated_paths(obj) & set(TRANSFORM_PATHS):
         raise SceneError(
             f"{kind} body '{obj.name}' has keyframes or drivers of its location or rotation: "
             + ("remove them, " if kind == "Free" else "put them on a parent that carries it, ")
@@ -42,116 +30,90 @@ def check(obj) -> None:
 
 
 def parent_matrix(obj, depsgraph) -> np.ndarray:
-    """(4, 4) float: what its parents do to a body's own matrix at the present frame."""
+    """Return the share of its parents in an object's world matrix at the present frame, (4, 4) float."""
     if obj.parent is None:
         return np.eye(4)
-    if obj.parent_type == "OBJECT" and obj.parent.type != "CURVE":  # the same bits wherever playing has put the body
-        return transforms.array(obj.parent.evaluated_get(depsgraph).matrix_world) @ transforms.array(obj.matrix_parent_inverse)
+    if obj.parent_type == "OBJECT" and obj.parent.type != "CURVE":  # the same bits wherever playing has moved the body
+        return transforms.as_array(obj.parent.evaluated_get(depsgraph).matrix_world) @ transforms.as_array(
+            obj.matrix_parent_inverse
+        )
     found = obj.evaluated_get(depsgraph)
-    return transforms.array(found.matrix_world @ found.matrix_basis.inverted())
+    return transforms.as_array(found.matrix_world @ found.matrix_basis.inverted())
 
 
 def start_matrix(obj, depsgraph) -> np.ndarray:
-    """(4, 4) float: world matrix at the first frame; the kept one while the body is displaced."""
+    """Return the world matrix at the first frame, (4, 4) float: the stored one while the body is displaced."""
     settings = obj.palpate
     if settings.has_start:
         return np.array(settings.start_matrix, dtype=float).reshape(4, 4)
-    return transforms.array(obj.evaluated_get(depsgraph).matrix_world)
-
-
-def remember(obj, matrix: np.ndarray) -> None:
-    """Keep where a body starts, before it is moved for the first time."""
-    settings = obj.palpate
-    if not settings.has_start:
-        settings.start_matrix = matrix.ravel()
-        settings.start_channels = channels(obj)
-        settings.has_start = True
-
-
-def restore(obj) -> None:
-    """Put a body back to where it started, to the last bit, and forget that it was elsewhere."""
-    if obj.palpate.has_start:
-        _set_channels(obj, np.array(obj.palpate.start_channels))
-        for name in ("has_start", "start_matrix", "start_channels"):
-            obj.palpate.property_unset(name)
-
-
-def channels(obj) -> np.ndarray:
-    """(14,) float: location, Euler, quaternion and axis-angle rotation."""
-    return np.concatenate([obj.location, obj.rotation_euler, obj.rotation_quaternion, obj.rotation_axis_angle])
-
-
-def _set_channels(obj, values: np.ndarray) -> None:
-    obj.location, obj.rotation_euler = values[:3], values[3:6]
-    obj.rotation_quaternion, obj.rotation_axis_angle = values[6:10], values[10:14]
+    return transforms.as_array(obj.evaluated_get(depsgraph).matrix_world)
 
 
 @dataclass(frozen=True)
-class Placement:
-    """From a pose of the solver to the location and rotation properties of an object; the object itself is not kept.
+class BodyPlacement:
+    """Converts poses of the solver to the location and rotation properties of an object. It holds no reference to the object.
 
     Attributes
     ----------
     channels : (14,) float
-        Location, Euler, quaternion and axis-angle rotation at the start.
+        Location and rotations at the start (:func:`.start_transforms.transform_channels`).
     world, parent : (4, 4) float
-        The object's world matrix and its parents' share of it at the start.
-    scale : float
-        Metres per Blender unit.
+        World matrix of the object at the start, and the share of its parents in it.
+    metres_per_unit : float
     """
 
     channels: np.ndarray
     world: np.ndarray
     parent: np.ndarray
-    scale: float
+    metres_per_unit: float
 
     @classmethod
-    def of(cls, obj, matrix: np.ndarray, parent: np.ndarray, scale: float) -> Placement:
-        """Describe a body that starts at a world matrix; its kept start counts when it is displaced."""
+    def of(cls, obj, matrix: np.ndarray, parent: np.ndarray, metres_per_unit: float) -> BodyPlacement:
+        """Return the placement of a body that starts at a world matrix; a stored start counts while it is displaced."""
         settings = obj.palpate
-        start = np.array(settings.start_channels) if settings.has_start else channels(obj)
-        return cls(start.astype(float), matrix, parent, scale)
+        start = np.array(settings.start_channels) if settings.has_start else start_transforms.transform_channels(obj)
+        return cls(start.astype(float), matrix, parent, metres_per_unit)
 
-    def pose(self, obj, pose: np.ndarray, parent: np.ndarray, previous: np.ndarray | None = None) -> np.ndarray:
-        """Return the (14,) properties that put the body at a pose.
+    def channels_at(self, obj, pose: np.ndarray, parent: np.ndarray, previous: np.ndarray | None = None) -> np.ndarray:
+        """Return the channels that put the body at a pose, (14,) float.
 
         Parameters
         ----------
         pose : (7,) float
             Position (m) and quaternion of the body's frame in the world.
         parent : (4, 4) float
-            The parents' share at that frame.
+            The share of its parents at that frame.
         previous : (14,) float, optional
-            Properties at the frame before, which the rotation should not jump away from.
+            Channels at the frame before; of equal rotations the one nearest to it is chosen.
         """
-        location, turn = self._moved(pose[None], parent[None])
+        location, turn = self._relative_motion(pose[None], parent[None])
         return np.concatenate([location[0], self._rotations(obj, turn[0], self.channels if previous is None else previous)])
 
-    def path(self, obj, poses: np.ndarray, parents: np.ndarray) -> np.ndarray:
-        """Return the (f, 14) properties of a whole motion, that begins at the start."""
+    def channels_along(self, obj, poses: np.ndarray, parents: np.ndarray) -> np.ndarray:
+        """Return the channels of a whole motion, (f, 14) float, which begins at the start."""
         rows = [self.channels]
-        for location, turn in zip(*self._moved(poses[1:], parents[1:]), strict=True):
+        for location, turn in zip(*self._relative_motion(poses[1:], parents[1:]), strict=True):
             rows.append(np.concatenate([location, self._rotations(obj, turn, rows[-1])]))
         return np.array(rows)
 
-    def _moved(self, poses: np.ndarray, parents: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """(f, 3) locations, and (f, 3, 3) turns from the start's rotation, of poses under what parents do."""
+    def _relative_motion(self, poses: np.ndarray, parents: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return locations (f, 3) of poses and rotations from the start (f, 3, 3), in the parents' coordinates."""
         stretch, basis_before, unturned = self._start
         moved = np.tile(np.eye(4), (len(poses), 1, 1))
-        moved[:, :3, :3], moved[:, :3, 3] = transforms.rotation(poses[:, 3:]), poses[:, :3] / self.scale
+        moved[:, :3, :3], moved[:, :3, 3] = transforms.rotation(poses[:, 3:]), poses[:, :3] / self.metres_per_unit
         basis = np.linalg.inv(parents) @ moved @ stretch
         return self.channels[:3] + basis[:, :3, 3] - basis_before[:3, 3], basis[:, :3, :3] @ unturned
 
     @cached_property
     def _start(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """The world matrix without the rigid motion in it, what the properties make of it, and the inverse of their turn."""
-        location, quaternion, _ = transforms.split(self.world)
+        """At the start: the stretch in the world matrix, the object's own matrix, and the inverse of its upper left (3, 3)."""
+        location, quaternion, _ = transforms.decompose(self.world)
         basis = np.linalg.inv(self.parent) @ self.world
-        stretch = np.linalg.inv(transforms.rigid(location, quaternion)) @ self.world
+        stretch = np.linalg.inv(transforms.pose_matrix(location, quaternion)) @ self.world
         return stretch, basis, np.linalg.inv(basis[:3, :3])
 
     def _rotations(self, obj, turn: np.ndarray, previous: np.ndarray) -> np.ndarray:
-        """Apply a world-side rotation to the start's rotation properties; those of other modes stay as they are."""
+        """Return the 11 rotation channels after a rotation of the start by `turn`; those of other rotation modes stay."""
         mode = obj.rotation_mode
         rest = self.channels[3:].copy()
         turn = Matrix(turn).to_quaternion()
@@ -170,14 +132,14 @@ class Placement:
             rest[:3] = result.to_euler(mode, Euler(previous[3:6], mode))
         return rest
 
-    def put(self, obj, channels: np.ndarray) -> None:
-        """Give the object its (14,) properties; keep where it was before it is moved for the first time."""
-        remember(obj, self.world)
-        _set_channels(obj, channels)
+    def move(self, obj, channels: np.ndarray) -> None:
+        """Give the object its channels, (14,) float, and store its start if it has not been moved before."""
+        start_transforms.store_start(obj, self.world)
+        start_transforms.set_transform_channels(obj, channels)
 
 
-def bake(obj, placement: Placement, frames: np.ndarray, poses: np.ndarray, parents: np.ndarray) -> None:
-    """Keyframe a body's motion, linear between frames; what else its action holds stays.
+def keyframe_motion(obj, placement: BodyPlacement, frames: np.ndarray, poses: np.ndarray, parents: np.ndarray) -> None:
+    """Keyframe a body's motion, linear between frames; other curves of its action stay.
 
     Parameters
     ----------
@@ -185,31 +147,31 @@ def bake(obj, placement: Placement, frames: np.ndarray, poses: np.ndarray, paren
     poses : (f, 7) float
     parents : (f, 4, 4) float
     """
-    table = placement.path(obj, poses, parents)
-    remember(obj, placement.world)
-    found, made = fcurves.ensure(obj, f"{obj.name} Palpate")
-    fcurves.remove(found, PATHS)
+    table = placement.channels_along(obj, poses, parents)
+    start_transforms.store_start(obj, placement.world)
+    found, is_new_action = fcurves.ensure(obj, f"{obj.name} Palpate")
+    fcurves.remove(found, TRANSFORM_PATHS)
     fcurves.write(found, "location", frames, table[:, :3])
     path, columns = {
         "QUATERNION": ("rotation_quaternion", slice(6, 10)),
         "AXIS_ANGLE": ("rotation_axis_angle", slice(10, 14)),
     }.get(obj.rotation_mode, ("rotation_euler", slice(3, 6)))
     fcurves.write(found, path, frames, table[:, columns])
-    obj.palpate.made_action = obj.palpate.made_action or made
+    obj.palpate.made_action = obj.palpate.made_action or is_new_action
     obj.palpate.is_baked = True
 
 
-def clear(obj) -> None:
-    """Take the keyframes of a bake away and put the body back to where it started."""
+def remove_motion(obj) -> None:
+    """Remove the keyframes of a bake and move the body back to its start."""
     import bpy
 
-    found = fcurves.of(obj)
+    found = fcurves.of_object(obj)
     if found is not None:
-        fcurves.remove(found, PATHS)
+        fcurves.remove(found, TRANSFORM_PATHS)
         if obj.palpate.made_action and len(found) == 0:
             data = obj.animation_data
             bpy.data.actions.remove(data.action)
             if not data.drivers and not data.nla_tracks:
                 obj.animation_data_clear()
     obj.palpate.made_action = obj.palpate.is_baked = False
-    restore(obj)
+    start_transforms.restore_start(obj)

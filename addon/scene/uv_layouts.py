@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A sensor's tactile image laid out by a UV map of its own mesh, where the user wants it so."""
+"""Lay out a sensor's tactile image by a UV map of its mesh, if the user has chosen that."""
 
 from __future__ import annotations
 
@@ -10,48 +10,48 @@ import numpy as np
 from ...core.errors import ImageError
 from ...core.geometry.layout.texture_maps import UVLayout, mapped_layout
 from ...core.geometry.texels import Texels
-from . import display_names, meshes
+from . import display_names, mesh_arrays
 
-SETTINGS = ("image_layout", "image_map", "image_size", "image_filter")
-"""Names in :class:`.properties.PALPATE_PG_object`."""
-_kept: list[tuple[tuple, UVLayout]] = []
-"""The last few layouts: panels ask for them again and again, and each takes a while."""
-_MOST_KEPT = 8
+IMAGE_PROPERTIES = ("image_layout", "image_map", "image_size", "image_filter")
+"""Properties of :class:`.properties.PALPATE_PG_object` that choose the layout."""
+_cached_layouts: list[tuple[tuple, UVLayout]] = []
+"""Arguments and results of the last few calls: panels ask for the same layout repeatedly, and computing it takes a while."""
+_CACHE_SIZE = 8
 
 
-def laid_out(obj, texels: Texels) -> Texels:
-    """Return texels with the layout that their object asks for.
+def with_uv_layout(obj, texels: Texels) -> Texels:
+    """Return texels with the layout that their object's settings choose.
 
     Raises
     ------
     ImageError
-        The UV map is missing, or no picture can be made of it.
+        The UV map is missing, or no image can be made of it.
     """
     own = obj.palpate
     if own.image_layout != "UV":
         return texels
     layer = uv_layer(obj)
-    number = np.full(len(obj.data.vertices), -1)
-    number[texels.vertex] = np.arange(len(texels))
+    texel_of_vertex = np.full(len(obj.data.vertices), -1)
+    texel_of_vertex[texels.vertex] = np.arange(len(texels))
     loops, corner = _triangles(obj.data)
-    triangles = number[corner[loops]]
+    triangles = texel_of_vertex[corner[loops]]
     inside = (triangles >= 0).all(axis=1)
     uv = np.empty(2 * len(corner), dtype=np.float32)
     layer.uv.foreach_get("vector", uv)
     triangles, corner_uv = triangles[inside], uv.reshape(-1, 2).astype(float)[loops[inside]]
-    if obj.matrix_world.is_negative:  # anticlockwise from outside, as the sensor's own triangles are then turned
+    if obj.matrix_world.is_negative:  # the sensor's triangles are turned too, so that both are anticlockwise from outside
         triangles, corner_uv = triangles[:, ::-1], corner_uv[:, ::-1]
     key = (triangles.tobytes(), corner_uv.tobytes(), own.image_size, own.image_filter, layer.name, obj.name)
-    return replace(texels, layout=_known(key) or _remember(key, _made(obj, triangles, corner_uv, layer.name)))
+    return replace(texels, layout=_cached(key) or _cache(key, _computed(obj, triangles, corner_uv, layer.name)))
 
 
 def uv_layer(obj):
-    """Return the UV map of a sensor's tactile image: the one that is named, else the one that renders use.
+    """Return the UV map of a sensor's tactile image: the named one, else the one that renders use.
 
     Raises
     ------
     ImageError
-        There is none, or the mesh is being edited.
+        There is no such map, or the mesh is being edited.
     """
     layers = [layer for layer in obj.data.uv_layers if layer.name != display_names.UV_MAP]
     wanted = obj.palpate.image_map
@@ -70,8 +70,8 @@ def uv_layer(obj):
     return found
 
 
-def notes(obj, texels: Texels) -> list[str]:
-    """Return what a user should know about the layout of a sensor's texels."""
+def layout_warnings(obj, texels: Texels) -> list[str]:
+    """Return warnings about the layout of a sensor's texels."""
     layout = texels.layout
     small = layout.too_small() if isinstance(layout, UVLayout) and layout.map_name else 0
     if not small:
@@ -82,19 +82,19 @@ def notes(obj, texels: Texels) -> list[str]:
     ]
 
 
-def _made(obj, triangles: np.ndarray, corner_uv: np.ndarray, name: str) -> UVLayout:
+def _computed(obj, triangles: np.ndarray, corner_uv: np.ndarray, name: str) -> UVLayout:
     own = obj.palpate
     nearest = own.image_filter == "NEAREST"
     return mapped_layout(triangles, corner_uv, own.image_size, map_name=name, nearest=nearest, sensor=obj.name)
 
 
-def _known(key: tuple) -> UVLayout | None:
-    return next((layout for known, layout in _kept if known == key), None)
+def _cached(key: tuple) -> UVLayout | None:
+    return next((layout for other, layout in _cached_layouts if other == key), None)
 
 
-def _remember(key: tuple, layout: UVLayout) -> UVLayout:
-    _kept.append((key, layout))
-    del _kept[:-_MOST_KEPT]
+def _cache(key: tuple, layout: UVLayout) -> UVLayout:
+    _cached_layouts.append((key, layout))
+    del _cached_layouts[:-_CACHE_SIZE]
     return layout
 
 
@@ -103,5 +103,5 @@ def _triangles(mesh) -> tuple[np.ndarray, np.ndarray]:
     mesh.calc_loop_triangles()
     loops = np.empty(3 * len(mesh.loop_triangles), dtype=np.int32)
     mesh.loop_triangles.foreach_get("loops", loops)
-    corner = meshes.corners(mesh)
+    corner = mesh_arrays.corner_vertices(mesh)
     return loops.reshape(-1, 3), corner

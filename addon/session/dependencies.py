@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Is everything here that Palpate needs? Looked up without importing, because enabling the add-on must stay instant."""
+"""Which of the packages that Palpate needs are installed, and how the solver is loaded.
+
+Modules are looked up without importing them, because enabling the add-on must stay instant.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +11,7 @@ import os
 import platform
 import sys
 
-NEEDED = ("numpy", "numba", "llvmlite", "trimesh")
+REQUIRED_MODULES = ("numpy", "numba", "llvmlite", "trimesh")
 
 
 def root_package() -> str:
@@ -16,9 +19,9 @@ def root_package() -> str:
     return __package__.removesuffix(".addon.session")
 
 
-def missing() -> list[str]:
-    """Names of the modules that cannot be found."""
-    return [name for name in NEEDED if not _can_be_found(name)]
+def missing_modules() -> list[str]:
+    """Return the names of the needed modules that cannot be found."""
+    return [name for name in REQUIRED_MODULES if not _can_be_found(name)]
 
 
 def _can_be_found(name: str) -> bool:
@@ -29,46 +32,46 @@ def _can_be_found(name: str) -> bool:
 
 
 def debug_info() -> str:
-    """Return what a maintainer has to know about this installation, as plain text."""
+    """Return what a maintainer needs to know about this installation, as plain text."""
     import bpy
 
     from ...core.io import exr_backend
 
-    lost = missing()
+    missing = missing_modules()
     return "\n".join(
         [
             f"Palpate in {root_package()}",
             f"Blender {bpy.app.version_string} ({bpy.app.build_platform.decode(errors='replace')})",
             f"Python {sys.version.split()[0]} on {platform.platform()} ({platform.machine()})",
-            f"missing: {', '.join(lost) or 'nothing'}",
+            f"missing: {', '.join(missing) or 'nothing'}",
             f"tactile images: {exr_backend.describe()}",
-            *(f"{name}: {importlib.util.find_spec(name).origin}" for name in NEEDED if name not in lost),
+            *(f"{name}: {importlib.util.find_spec(name).origin}" for name in REQUIRED_MODULES if name not in missing),
         ]
     )
 
 
-def prepare_numba() -> None:
-    """Let numba keep what it compiles in the extension's user folder.
+def choose_numba_cache() -> None:
+    """Make numba keep its compiled code in the extension's user folder.
 
-    Beside the source, where it would write by itself, an upgrade wipes it and a system-wide installation forbids it.
-    Only before numba is imported has this an effect; a folder that the user has chosen is kept.
+    By default numba writes beside the source. There an upgrade deletes the code, and a system-wide installation forbids
+    writing. This has an effect only before numba is imported. A folder that the user has chosen stays.
     """
     if "NUMBA_CACHE_DIR" in os.environ or "numba" in sys.modules:
         return
     package = root_package()
-    if not package.startswith("bl_ext."):  # not installed as an extension: numba's own choice is right
+    if not package.startswith("bl_ext."):  # not installed as an extension: keep numba's default
         return
     import bpy
 
     os.environ["NUMBA_CACHE_DIR"] = bpy.utils.extension_path_user(package, path="numba", create=True)
 
 
-def solver():
-    """Return :mod:`.simulation`, which loads numba, compiled: at the first use ever that takes a minute.
+def load_solver():
+    """Import and compile the solver, and return the module :mod:`.simulation`.
 
-    Beside a window :mod:`.first_use` has seen to that before.
+    The first call after installation compiles for about a minute. With a window open, :mod:`.first_use` has compiled before.
     """
-    prepare_numba()
+    choose_numba_cache()
     from ...core.solver import precompile, simulation
 
     precompile.compile_solver_with_notice()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""F-curves of an object, in Blenders whose actions have slots (4.4 and later) and in those whose actions do not."""
+"""Read and write the F-curves of an object, in Blender versions with action slots (4.4 and later) and without."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ import numpy as np
 LINEAR = bpy.types.Keyframe.bl_rna.properties["interpolation"].enum_items["LINEAR"].value
 
 
-def of(obj):
-    """Return the collection of an object's F-curves; None when it has none."""
-    return of_action(obj.animation_data)
+def of_object(obj):
+    """Return the F-curves of an object; None when it has no action."""
+    return of_animation_data(obj.animation_data)
 
 
-def of_action(data):
-    """Return the collection of F-curves that an object's animation data, or a strip of it, plays; None when there is none."""
+def of_animation_data(data):
+    """Return the F-curves of the action that animation data or an NLA strip plays; None when there is no action."""
     if data is None or data.action is None:
         return None
     if not hasattr(data.action, "slots"):
@@ -25,19 +25,20 @@ def of_action(data):
 
 
 def ensure(obj, action_name: str) -> tuple[object, bool]:
-    """Return the collection of an object's F-curves, and whether an action had to be made for it."""
+    """Return the F-curves of an object, and True when an action was created for them."""
     data = obj.animation_data or obj.animation_data_create()
-    made = data.action is None
-    if made:
+    is_new = data.action is None
+    if is_new:
         data.action = bpy.data.actions.new(action_name)
     if not hasattr(data.action, "slots"):
-        return data.action.fcurves, made
+        return data.action.fcurves, is_new
     if data.action_slot is None:
         data.action_slot = data.action.slots.new(id_type="OBJECT", name=obj.name)
-    return _channelbag(data, ensure=True).fcurves, made
+    return _channelbag(data, ensure=True).fcurves, is_new
 
 
 def _channelbag(data, ensure: bool):
+    """Return the channels of the slot that animation data plays; they are created if `ensure` is set."""
     action, slot = data.action, data.action_slot
     if slot is None:
         return None
@@ -51,7 +52,7 @@ def _channelbag(data, ensure: bool):
 
 
 def write(curves, path: str, frames: np.ndarray, values: np.ndarray) -> None:
-    """Replace the F-curves of a property by linear ones.
+    """Replace the F-curves of a property by curves that are linear between keyframes.
 
     Parameters
     ----------
@@ -59,7 +60,7 @@ def write(curves, path: str, frames: np.ndarray, values: np.ndarray) -> None:
     path : str
     frames : (f,) int
     values : (f, c) float
-        Column i becomes the curve with array index i.
+        Column i is written to the curve with array index i.
     """
     remove(curves, (path,))
     for index, column in enumerate(np.asarray(values, float).T):
@@ -72,14 +73,14 @@ def write(curves, path: str, frames: np.ndarray, values: np.ndarray) -> None:
 
 
 def remove(curves, paths) -> None:
-    """Take the F-curves of some properties out."""
+    """Remove the F-curves of the properties in `paths`."""
     for curve in [curve for curve in curves if curve.data_path in paths]:
         curves.remove(curve)
 
 
 def animated_paths(obj) -> set[str]:
-    """Return the properties that keyframes or drivers of an object move."""
-    paths = {curve.data_path for curve in of(obj) or ()}
+    """Return the data paths of the properties that keyframes or drivers of an object animate."""
+    paths = {curve.data_path for curve in of_object(obj) or ()}
     if obj.animation_data is not None:
         paths |= {driver.data_path for driver in obj.animation_data.drivers}
     return paths

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The solver's first use: it is compiled in a process beside the window, which says how far that is and stays usable.
+"""Compile the solver before its first use, in another process, so that Blender's window stays usable and shows progress.
 
-Without a window it is compiled in place, with a line on stderr (:func:`.dependencies.solver`). Nothing of Blender is touched
-from outside the main thread: a timer looks at what the other process wrote.
+Without a window the solver is compiled in place, with a line on stderr (:func:`.dependencies.load_solver`). Only the main
+thread touches Blender: a timer reads what the other process wrote.
 """
 
 from __future__ import annotations
@@ -25,42 +25,42 @@ from ...core.solver import precompile, precompile_process
 from . import dependencies, redraw
 
 STAGE = "Palpate is preparing its solver (first use only)"
-LOOK = 0.5
+POLL_INTERVAL = 0.5
 """Seconds between two looks at the process."""
 
 
 @dataclass
-class _Work:
-    """The process, where it writes, and since when it runs."""
+class _Compilation:
+    """The process that compiles, the file that it writes to, and when it started (monotonic clock)."""
 
     process: subprocess.Popen
     log: Path
-    began: float
+    started: float
 
 
-_work: _Work | None = None
+_compilation: _Compilation | None = None
 _gave_up = False
 when_ready: list[Callable[[], None]] = []
-"""Called in the main thread once the solver is ready."""
+"""Called in the main thread when the solver is ready."""
 
 
 def has_window() -> bool:
-    """Whether somebody looks at a window."""
+    """Return True unless Blender runs in the background."""
     return not bpy.app.background
 
 
 def is_ready() -> bool:
-    """Whether the solver can be used now. Without a window always, because nobody is kept waiting at one."""
+    """Return True if the solver can be used now. Without a window always: then nobody waits at one."""
     if _gave_up or not has_window():
         return True
-    dependencies.prepare_numba()
+    dependencies.choose_numba_cache()
     return not precompile.is_needed()
 
 
 def begin() -> None:
-    """Start preparing the solver unless it is ready or being prepared."""
-    global _work
-    if is_ready() or _work is not None:
+    """Start to compile the solver, unless it is ready or being compiled."""
+    global _compilation
+    if is_ready() or _compilation is not None:
         return
     log = Path(tempfile.mkstemp(prefix="palpate-compiling-", suffix=".log", dir=bpy.app.tempdir or None)[1])
     package = dependencies.root_package()
@@ -69,7 +69,7 @@ def begin() -> None:
         with log.open("wb") as out:
             process = subprocess.Popen(
                 command,
-                stdin=subprocess.PIPE,  # closed when Blender ends, in whatever way; then the process ends as well
+                stdin=subprocess.PIPE,  # it is closed whenever Blender ends; then the process ends too
                 stdout=out,
                 stderr=subprocess.STDOUT,
                 creationflags=getattr(subprocess, "CREATE_NO_WINDOW", 0),
@@ -77,57 +77,57 @@ def begin() -> None:
     except OSError as error:
         _give_up(str(error))
         return
-    _work = _Work(process, log, time.monotonic())
-    bpy.app.timers.register(_watch, first_interval=LOOK, persistent=True)
+    _compilation = _Compilation(process, log, time.monotonic())
+    bpy.app.timers.register(_poll, first_interval=POLL_INTERVAL, persistent=True)
 
 
 def progress() -> Progress | None:
-    """Return how far preparing is; None when it does not go on."""
-    if _work is None or is_ready():
+    """Return the progress of compiling; None when no compilation runs."""
+    if _compilation is None or is_ready():
         return None
-    with suppress(OSError, ValueError, IndexError):  # nothing is written yet
-        said = json.loads(_work.log.read_bytes().splitlines()[-1])
-        return Progress(_stage(f"{said['done']} of {said['total']} parts, "), said["done"], said["total"])
+    with suppress(OSError, ValueError, IndexError):  # nothing has been written yet
+        written = json.loads(_compilation.log.read_bytes().splitlines()[-1])
+        return Progress(_stage(f"{written['done']} of {written['total']} parts, "), written["done"], written["total"])
     return Progress(_stage(""), 0, 1)
 
 
 def _stage(parts: str) -> str:
-    assert _work is not None
-    return f"{STAGE}: {parts}{time.monotonic() - _work.began:.0f} s"
+    assert _compilation is not None
+    return f"{STAGE}: {parts}{time.monotonic() - _compilation.started:.0f} s"
 
 
 def wait() -> Generator[Progress, None, None]:
-    """Yield progress until the solver is ready: the first part of every job that uses it."""
+    """Yield progress until the solver is ready. Every job that uses the solver begins with this."""
     begin()
     while (now := progress()) is not None:
         _check()
         yield now
-        time.sleep(0.05)  # there is nothing to do here but to wait
+        time.sleep(0.05)  # nothing else can be done here
 
 
 def _check() -> None:
-    """Notice that the process ended without having done it."""
-    if _work is not None and _work.process.poll() is not None and not is_ready():
-        _give_up(_work.log.read_text(encoding="utf-8", errors="replace")[-2000:])
+    """Give up if the process ended without having compiled the solver."""
+    if _compilation is not None and _compilation.process.poll() is not None and not is_ready():
+        _give_up(_compilation.log.read_text(encoding="utf-8", errors="replace")[-2000:])
 
 
 def _give_up(why: str) -> None:
-    """Let the solver be compiled where it is first used: the window stands still meanwhile, but the result is the same."""
+    """Compile the solver where it is first used: the window is blocked meanwhile, but the result is the same."""
     global _gave_up
     _gave_up = True
     print(f"Palpate could not prepare its solver beside the window; it does so at first use. {why}", file=sys.stderr)
 
 
-def _watch() -> float | None:
-    """Timer: show how far it is."""
+def _poll() -> float | None:
+    """Timer: show the progress."""
     _check()
     now = progress()
-    if _work is None:
+    if _compilation is None:
         return None
     _show(now and f"{now.stage} …")
     redraw.panels()
     if now is not None:
-        return LOOK
+        return POLL_INTERVAL
     for function in when_ready:
         function()
     return None
@@ -140,16 +140,16 @@ def _show(text: str | None) -> None:
 
 
 def stop() -> None:
-    """End the process, because the add-on is being disabled or Blender closes. The next time it goes on where it was."""
-    global _work, _gave_up
-    work, _work, _gave_up = _work, None, False
-    if work is None:
+    """End the process, because the add-on is being disabled or Blender closes. What was compiled is kept for the next time."""
+    global _compilation, _gave_up
+    compilation, _compilation, _gave_up = _compilation, None, False
+    if compilation is None:
         return
-    work.process.kill()
-    work.process.wait()
-    work.process.stdin.close()
+    compilation.process.kill()
+    compilation.process.wait()
+    compilation.process.stdin.close()
     with suppress(OSError):
-        os.unlink(work.log)
-    if bpy.app.timers.is_registered(_watch):
-        bpy.app.timers.unregister(_watch)
+        os.unlink(compilation.log)
+    if bpy.app.timers.is_registered(_poll):
+        bpy.app.timers.unregister(_poll)
         _show(None)

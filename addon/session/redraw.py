@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Ask the window for a new picture of what depends on the timeline."""
+"""Ask Blender to redraw what depends on the timeline."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import bpy
 
 
 def panels() -> None:
-    """Draw panels anew, and nothing of the scene, which may take long."""
+    """Redraw panels, but no 3D view, because that may take long."""
     for manager in bpy.data.window_managers:
         for window in manager.windows:
             for area in window.screen.areas:
@@ -19,7 +19,7 @@ def panels() -> None:
 
 
 def views() -> None:
-    """Draw 3D views and panels anew."""
+    """Redraw 3D views and panels."""
     if bpy.app.background:
         return
     for window in bpy.context.window_manager.windows:

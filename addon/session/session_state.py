@@ -1,58 +1,66 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the session remembers and no file does: who takes part, what is running, what should not be disturbed."""
+"""State of the Blender session that no file stores: who takes part, what is running, what changed since the last look."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 
 
 @dataclass
 class Session:
-    """What handlers, bake and panels share."""
+    """State that handlers, bake and panels share."""
 
-    settled: bool = False
-    """Whether what the file holds was looked through; also a file that was open before the add-on was enabled."""
+    file_examined: bool = False
+    """True once the objects of the open file were examined, also when the file was open before the add-on was enabled."""
     participants_known: bool = False
-    """False when objects may have got or lost a role since `has_roles` was filled."""
+    """False when an object may have got or lost a role since `has_roles` was filled."""
     changed_geometry: set[str] = field(default_factory=set)
-    """Names of objects whose geometry was touched since the last look."""
+    """Names of objects whose geometry Blender reported as changed, and that were not compared since."""
     geometry_version: int = 0
-    """Counts changes of any object's geometry, for what is shown while a sensor is made."""
+    """Number of geometry changes of any object; reports on sensors are outdated when it grows."""
     changed_motion: set[str] = field(default_factory=set)
-    """Names of objects that were moved by hand, by a script or by an edited animation since a run began."""
+    """Names of objects that the user, a script or an edited animation moved since a live run started."""
     has_roles: dict[int, bool] = field(default_factory=dict)
     object_counts: dict[int, int] = field(default_factory=dict)
-    """By scene: whether any object takes part, and how many objects it had when that was found out."""
-    suspended: int = 0
+    """By scene: whether any object takes part, and the number of objects when this was found out."""
+    suspension_depth: int = 0
     """Above zero while a bake reads the scene: the timeline must not simulate then."""
     rendering: bool = False
     catching_up: bool = False
-    """While frames that a jump has left out are computed."""
-    bake: object = None
-    """The running bake's last Progress, for the panel."""
-    notes: dict[str, str] = field(default_factory=dict)
-    """By scene or object name: what is wrong with settings that could not be read."""
+    """True while the frames that a jump on the timeline left out are computed."""
+    bake_progress: object = None
+    """The last Progress of the running bake, for the panel; None when no bake runs."""
+    unreadable_settings: dict[str, str] = field(default_factory=dict)
+    """By scene or object name: why its settings could not be read."""
 
 
 session = Session()
 
 
+def is_baking() -> bool:
+    """Return True while a bake runs."""
+    return session.bake_progress is not None
+
+
 def participants_changed() -> None:
-    """Look for the participants anew next time."""
+    """Note that an object may have got or lost its role."""
     session.participants_known = False
 
 
 @contextmanager
-def suspended():
-    """Keep the timeline handler quiet."""
-    session.suspended += 1
+def suspended() -> Iterator[None]:
+    """Keep the timeline from simulating while the context is open."""
+    session.suspension_depth += 1
     try:
         yield
     finally:
-        session.suspended = max(0, session.suspended - 1)  # it is zero already when another file was opened meanwhile
+        session.suspension_depth = max(
+            0, session.suspension_depth - 1
+        )  # it is already zero when another file was opened meanwhile
 
 
 def reset() -> None:
-    """Start over, because another file is open or the add-on is being disabled."""
+    """Reset everything, because another file is open or the add-on is being disabled."""
     session.__init__()

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Blender's matrices and the solver's poses.
+"""Conversion between Blender's matrices and the solver's poses.
 
-A body's frame has the location and rotation of its object; what else is in the matrix, scale and shear, is its *stretch*
-and goes into the vertices: ``matrix = translation · rotation · stretch``.
+A body's frame has the location and rotation of its object. The rest of the matrix, scale and shear, is its *stretch* and is
+applied to the vertices: ``matrix = translation · rotation · stretch``.
 """
 
 from __future__ import annotations
@@ -15,13 +15,13 @@ SHEAR = 1e-5
 """Cosine between two axes of a matrix above which it counts as sheared; a 32-bit rotation matrix stays below 1e-6."""
 
 
-def array(matrix) -> np.ndarray:
-    """(4, 4) float64 of a mathutils Matrix."""
+def as_array(matrix) -> np.ndarray:
+    """Return a mathutils Matrix as an array, e.g. (4, 4) float64."""
     return np.array([*map(tuple, matrix)])
 
 
-def split(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Take a matrix apart.
+def decompose(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Decompose a matrix into location, rotation and stretch.
 
     Parameters
     ----------
@@ -35,7 +35,7 @@ def split(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     stretch : (3, 3) float
         Diagonal unless the matrix is sheared; of negative determinant where the matrix mirrors.
     """
-    (a, b, c, x), (d, e, f, y), (g, h, i, z), _ = matrix.tolist()  # one by one, a tenth of what arrays take
+    (a, b, c, x), (d, e, f, y), (g, h, i, z), _ = matrix.tolist()  # plain numbers take a tenth of the time of small arrays
     columns = (a, d, g), (b, e, h), (c, f, i)
     lengths = [math.sqrt(_dot(column, column)) for column in columns]
     u, v, w = ([value / length for value in column] for column, length in zip(columns, lengths, strict=True))
@@ -44,12 +44,13 @@ def split(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     else:  # polar decomposition: the rotation nearest to the matrix
         left, size, right = np.linalg.svd(matrix[:3, :3])
         rotation, stretch = (left @ right).tolist(), right.T @ np.diag(size) @ right
-    if _det(a, b, c, d, e, f, g, h, i) < 0:  # as Blender does: mirror all three axes
+    if _determinant(((a, b, c), (d, e, f), (g, h, i))) < 0:  # as Blender does: mirror all three axes
         rotation, stretch = [[-value for value in row] for row in rotation], -stretch
     return np.array([x, y, z]), np.array(_quaternion(rotation)), stretch
 
 
-def _det(a: float, b: float, c: float, d: float, e: float, f: float, g: float, h: float, i: float) -> float:
+def _determinant(rows) -> float:
+    (a, b, c), (d, e, f), (g, h, i) = rows
     return a * (e * i - f * h) + b * (f * g - d * i) + c * (d * h - e * g)
 
 
@@ -58,10 +59,10 @@ def _dot(one, other) -> float:
 
 
 def is_singular(matrix: np.ndarray) -> bool:
-    """Whether a matrix flattens what it moves."""
+    """Return True when a matrix maps space to a plane, a line or a point."""
     (a, b, c, _), (d, e, f, _), (g, h, i, _), _ = rows = matrix.tolist()
     squares = sum(_dot(row, row) for row in rows[:3])
-    if abs(_det(a, b, c, d, e, f, g, h, i)) > 1e-6 * squares**1.5:
+    if abs(_determinant(((a, b, c), (d, e, f), (g, h, i)))) > 1e-6 * squares**1.5:
         return False  # the smallest size is the determinant over the others, which are at most the root of `squares`
     size = np.linalg.svd(matrix[:3, :3], compute_uv=False)
     return not size[2] > 1e-6 * size[0]
@@ -88,7 +89,9 @@ def _quaternion(rotation) -> list[float]:
 
 def rotation(quaternion: np.ndarray) -> np.ndarray:
     """(3, 3) rotation matrix of a unit quaternion, or (n, 3, 3) of (n, 4)."""
-    w, x, y, z = quaternion.tolist() if quaternion.ndim == 1 else quaternion.T  # numbers, not arrays of one: ten times as fast
+    w, x, y, z = (
+        quaternion.tolist() if quaternion.ndim == 1 else quaternion.T
+    )  # plain numbers are ten times as fast as arrays of one element
     rows = np.array(
         [
             [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
@@ -99,8 +102,8 @@ def rotation(quaternion: np.ndarray) -> np.ndarray:
     return rows if rows.ndim == 2 else np.moveaxis(rows, 2, 0)
 
 
-def rigid(location: np.ndarray, quaternion: np.ndarray) -> np.ndarray:
-    """(4, 4) matrix of a pose."""
+def pose_matrix(location: np.ndarray, quaternion: np.ndarray) -> np.ndarray:
+    """Return the (4, 4) matrix of a pose."""
     matrix = np.eye(4)
     matrix[:3, :3] = rotation(quaternion)
     matrix[:3, 3] = location

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What playing has computed so far. One run per scene, in memory only; the same numbers as a bake, frame by frame.
+"""Live runs: what playing the timeline has computed so far. One run per scene, in memory only.
 
-A run begins at the first frame and can only go forward by one frame. It is dropped when anything that it was computed
-from has changed: settings (compared at every frame), geometry (compared when Blender reports a change), or the motion of
-a keyframed body (the poses of a remembered frame are compared with those that Blender has now).
+A run gives the same numbers as a bake, frame by frame. It starts at the first frame and advances one frame at a time. It is
+dropped when anything from which it was computed has changed: settings (compared at every frame), geometry (compared when
+Blender reports a change), or the motion of keyframed bodies (poses are compared at every frame that is shown again).
 """
 
 from __future__ import annotations
@@ -15,72 +15,62 @@ import numpy as np
 from ...core.errors import PalpateError
 from ...core.model.recording import Frame
 from ...core.model.scenario import Scenario
-from ...core.model.sensor_parameters import SENSOR_PARAMETERS
-from ..properties import effect_stack
-from ..scene import drives, meshes, moved_bodies, scene_reader, uv_layouts
-from ..session import clock, dependencies, session_state, units
-
-PAINTED = tuple(f"{key}_{part}" for key in meshes.PAINTED for part in ("map", "factor"))
-REGION = ("region", "vertex_group", "threshold", "material", "face_set")
-SETTINGS = (
-    *SENSOR_PARAMETERS,
-    *PAINTED,
-    *REGION,
-    *drives.SETTINGS,
-    *uv_layouts.SETTINGS,
-    "role",
-    "body",
-    "mass",
-    "contact_normals",
-    "presses",
-)
+from ..properties import start_transforms
+from ..scene import mesh_fingerprint, moved_bodies, participants, scene_fingerprint, scene_reader, scene_reading
+from ..session import animation_time, dependencies, session_state
 
 
 @dataclass
-class Run:
+class LiveRun:
     """A simulation that follows the timeline.
 
     Attributes
     ----------
-    scenario, binding, simulation
-        The simulation stands at the last frame computed.
-    placements : dict of int to Placement
-        Of free bodies.
+    reading : SceneReading
+        The scene at its first frame.
+    simulation : Simulation
+        It stands at the last frame computed.
+    placements : dict of int to BodyPlacement
+        Of the bodies that forces move, by body index.
     settings : tuple
-        What was set when it began.
-    geometry : dict of str to str
-        Fingerprint of each object that takes part.
+        :func:`.scene_fingerprint.settings_of` when the run started.
+    mesh_fingerprints : dict of str to str
+        By name of each object that takes part.
     frames : dict of int to Frame
-    moments : dict of int to what :func:`.scene_reader.sample_moment` found at that frame
-    written : dict of int to (14,) float
-        Where free bodies were last put, by body index.
-    loads : dict of int to dict
-        Kept by :meth:`load`.
+        What was computed.
+    samples : dict of int to FrameSample
+        What was read of the scene at those frames.
+    placed_channels : dict of int to (14,) float
+        Channels that bodies were last given, by body index.
     """
 
-    scenario: Scenario
-    binding: scene_reader.Binding
+    reading: scene_reading.SceneReading
     simulation: object
-    placements: dict[int, moved_bodies.Placement]
+    placements: dict[int, moved_bodies.BodyPlacement]
     settings: tuple
-    geometry: dict[str, str]
+    mesh_fingerprints: dict[str, str]
     frames: dict[int, Frame] = field(default_factory=dict)
-    moments: dict[int, scene_reader.Moment] = field(default_factory=dict)
-    written: dict[int, np.ndarray] = field(default_factory=dict)
-    loads: dict[int, dict[str, float]] = field(default_factory=dict)
+    samples: dict[int, scene_reading.FrameSample] = field(default_factory=dict)
+    placed_channels: dict[int, np.ndarray] = field(default_factory=dict)
+    _total_forces: dict[int, dict[str, float]] = field(default_factory=dict)
 
-    def load(self, number: int) -> dict[str, float]:
-        """Return the sums of the normal forces of a remembered frame by sensor, N."""
-        if number not in self.loads:
+    @property
+    def scenario(self) -> Scenario:
+        """The scenario that is simulated."""
+        return self.reading.scenario
+
+    def total_forces(self, number: int) -> dict[str, float]:
+        """Return the sum of the normal forces at a computed frame, by sensor, N."""
+        if number not in self._total_forces:
             sensors = self.frames[number].sensors
-            self.loads[number] = {name: float(felt.normal_force.sum()) for name, felt in sensors.items()}
-        return self.loads[number]
+            self._total_forces[number] = {name: float(felt.normal_force.sum()) for name, felt in sensors.items()}
+        return self._total_forces[number]
 
 
-_runs: dict[int, Run] = {}
+_runs: dict[int, LiveRun] = {}
 
 
-def get(scene) -> Run | None:
+def get(scene) -> LiveRun | None:
     """Return the run of a scene."""
     return _runs.get(scene.session_uid)
 
@@ -90,13 +80,13 @@ def drop(scene) -> None:
     _runs.pop(scene.session_uid, None)
 
 
-def clear() -> None:
+def drop_all() -> None:
     """Forget all runs."""
     _runs.clear()
 
 
-def begin(scene, depsgraph) -> Run:
-    """Start a run. Blender has to have evaluated the first frame.
+def start(scene, depsgraph) -> LiveRun:
+    """Start a run. Blender must have evaluated the first frame.
 
     Raises
     ------
@@ -104,113 +94,104 @@ def begin(scene, depsgraph) -> Run:
         The scene makes no run.
     """
     drop(scene)
-    scenario, binding = scene_reader.sample_start(scene, depsgraph)
-    objects = binding.objects(scene)
+    reading = scene_reader.read_start(scene, depsgraph)
+    objects, everyone = reading.objects(scene), reading.all_objects(scene)
     placements = {
-        index: moved_bodies.Placement.of(objects[index], matrix, binding.parents[index][0], binding.scale)
-        for index, matrix in binding.starts.items()
+        index: moved_bodies.BodyPlacement.of(objects[index], matrix, reading.parent_matrices[index][0], reading.metres_per_unit)
+        for index, matrix in reading.start_matrices.items()
     }
-    run = Run(
-        scenario=scenario,
-        binding=binding,
-        simulation=dependencies.solver().Simulation(scenario),
+    run = LiveRun(
+        reading=reading,
+        simulation=dependencies.load_solver().Simulation(reading.scenario),
         placements=placements,
-        settings=settings_of(scene, binding.everyone(scene)),
-        geometry={obj.name: meshes.fingerprint(obj, depsgraph) for obj in binding.everyone(scene)},
+        settings=scene_fingerprint.settings_of(scene, everyone),
+        mesh_fingerprints={obj.name: mesh_fingerprint.evaluated_fingerprint(obj, depsgraph) for obj in everyone},
     )
-    first = scenario.frame_start
+    first = reading.scenario.frame_start
     run.frames[first] = run.simulation.observe()
-    run.moments[first] = scene_reader.sample_moment(scene, depsgraph, binding)
-    session_state.session.changed_geometry.difference_update(run.geometry)
+    run.samples[first] = reading.sample(scene, depsgraph)
+    session_state.session.changed_geometry.difference_update(run.mesh_fingerprints)
     session_state.session.changed_motion.clear()
     _runs[scene.session_uid] = run
     return run
 
 
-def go_on(scene, depsgraph, run: Run) -> Run:
-    """Compute the frame where the scene stands, which is the one after the last computed."""
-    frame, _ = clock.moment(scene)
-    moment = run.moments[frame] = scene_reader.sample_moment(scene, depsgraph, run.binding)
+def advance(scene, depsgraph, run: LiveRun) -> LiveRun:
+    """Compute the frame at which the scene stands, which must be the frame after the last computed one."""
+    frame, _ = animation_time.current_frame(scene)
+    sample = run.samples[frame] = run.reading.sample(scene, depsgraph)
     if scene.palpate.subframes > 1:
-        _read_between(scene, run, frame)
-    run.simulation.extend(moment.poses, moment.targets, moment.vertices, moment.texels)
+        _sample_between_frames(scene, run, frame)
+    _extend(run, sample)
     run.frames[frame] = run.simulation.advance()
     return run
 
 
-def _read_between(scene, run: Run, frame: int) -> None:
-    """Read what a scene says between two frames, as a bake does, and come back to the second."""
+def _extend(run: LiveRun, sample: scene_reading.FrameSample, **share) -> None:
+    """Tell the simulation how animation goes on, up to the next frame or to a `share` of the way to it."""
+    run.simulation.extend(sample.poses, sample.drive_targets, sample.target_vertices, sample.texel_frames, **share)
+
+
+def _sample_between_frames(scene, run: LiveRun, frame: int) -> None:
+    """Read the scene between the last frame and this one, as a bake does, and return to this one."""
     before, parts = (scene.frame_current, scene.frame_subframe), scene.palpate.subframes
     with session_state.suspended():
         try:
-            with clock.unstretched(scene):
+            with animation_time.without_time_stretching(scene):
                 for part in range(1, parts):
                     scene.frame_set(frame - 1, subframe=part / parts)
-                    moment = scene_reader.sample_moment(scene, scene_reader.depsgraph_of(scene), run.binding)
-                    run.simulation.extend(moment.poses, moment.targets, moment.vertices, moment.texels, share=part / parts)
+                    sample = run.reading.sample(scene, participants.depsgraph_of(scene))
+                    _extend(run, sample, share=part / parts)
         finally:
             scene.frame_set(before[0], subframe=before[1])
 
 
-def is_stale(scene, depsgraph, run: Run) -> bool:
-    """Whether something that a run was computed from has changed."""
+def is_stale(scene, depsgraph, run: LiveRun) -> bool:
+    """Return True when something from which a run was computed has changed."""
     try:
-        objects = run.binding.objects(scene)
+        objects = run.reading.objects(scene)
     except PalpateError:
         return True
-    everyone = {obj.name: obj for obj in run.binding.everyone(scene)}
-    if settings_of(scene, everyone.values()) != run.settings:
+    everyone = {obj.name: obj for obj in run.reading.all_objects(scene)}
+    if scene_fingerprint.settings_of(scene, everyone.values()) != run.settings:
         return True
     names = {obj.name: index for index, obj in enumerate(objects)}
-    if any(names.get(name, -1) not in run.binding.starts for name in session_state.session.changed_motion if name in names):
+    moved_by_user = session_state.session.changed_motion & names.keys()
+    if any(names[name] not in run.reading.start_matrices for name in moved_by_user):
         return True
-    start = scene.frame_start
-    moved = any(not np.array_equal(moved_bodies.channels(objects[index]), put) for index, put in run.written.items())
-    if moved and all(not objects[index].palpate.has_start for index in run.written) and start in run.frames:
-        return True  # moved while it stood at the first frame: that is a new start
+    if _has_new_start(scene, run, objects):
+        return True
     touched = session_state.session.changed_geometry & everyone.keys()
     session_state.session.changed_geometry -= touched
-    bending = {skin.name for skin in run.binding.skins}
-    if any(meshes.fingerprint(everyone[name], depsgraph) != run.geometry[name] for name in touched - bending):
+    deforming = {surface.name for surface in run.reading.surfaces}
+    if any(
+        mesh_fingerprint.evaluated_fingerprint(everyone[name], depsgraph) != run.mesh_fingerprints[name]
+        for name in touched - deforming
+    ):
         return True
-    # What deforms looks different at every frame: it is compared with what it looked like at this one, if that is known.
-    return bool(touched & bending) and (clock.moment(scene)[0] not in run.moments or has_moved(scene, depsgraph, run))
+    # What deforms has another shape at every frame: it is compared with its shape at this frame, if that is known.
+    if not touched & deforming:
+        return False
+    return animation_time.current_frame(scene)[0] not in run.samples or has_moved(scene, depsgraph, run)
 
 
-def has_moved(scene, depsgraph, run: Run) -> bool:
-    """Whether keyframed bodies are elsewhere now than when the present frame was computed."""
-    before = run.moments[clock.moment(scene)[0]]
+def _has_new_start(scene, run: LiveRun, objects: list) -> bool:
+    """Return True when the user has moved a free or driven body while it stood at the first frame."""
+    placed = run.placed_channels
+    is_moved = any(not np.array_equal(start_transforms.transform_channels(objects[i]), put) for i, put in placed.items())
+    stand_at_start = all(not objects[index].palpate.has_start for index in placed)
+    return is_moved and stand_at_start and scene.frame_start in run.frames
+
+
+def has_moved(scene, depsgraph, run: LiveRun) -> bool:
+    """Return True when animation gives other poses, shapes or drive targets now than when the present frame was computed."""
+    before = run.samples[animation_time.current_frame(scene)[0]]
     try:
-        now = scene_reader.sample_moment(scene, depsgraph, run.binding)
+        now = run.reading.sample(scene, depsgraph)
     except PalpateError:
         return True
-    moved = any(not np.array_equal(now.poses[i][part], before.poses[i][part]) for i in before.poses for part in (0, 1))
-    bent = any(not np.array_equal(found, before.shapes[place]) for place, found in now.shapes.items())
-    return moved or bent or now.targets != before.targets
-
-
-def settings_of(scene, objects) -> tuple:
-    """Return everything that is set by a number or a choice, in a form that can be compared."""
-    own = scene.palpate
-    taking_part, hidden = scene_reader.participants(scene)
-    whole = (
-        scene.frame_start,
-        units.frames_per_second(scene),
-        units.metres_per_unit(scene),
-        tuple(units.gravity(scene)),
-        own.use_auto_dt or own.dt,
-        own.interpolation,
-        own.subframes,
-        tuple(hidden),
-        tuple(obj.name for obj in taking_part),
-    )
-    return whole + tuple(
-        (
-            obj.name,
-            *(getattr(obj.palpate, key) for key in SETTINGS),
-            *obj.palpate.velocity,
-            *obj.palpate.angular_velocity,
-            *effect_stack.settings(obj),
-        )
-        for obj in objects
+    return (
+        any(not np.array_equal(now.poses[i][part], before.poses[i][part]) for i in before.poses for part in (0, 1))
+        or any(not np.array_equal(found, before.shapes[place]) for place, found in now.shapes.items())
+        or now.drive_targets != before.drive_targets
     )

@@ -37,13 +37,7 @@ LIGHT_PACKAGES = {"", "addon", "operators", "panels"}
 # Breaches of the order of rooms that are still in the source, by room and rule. The list may only become shorter.
 # `python tools/import_graph.py` prints each breach with its file and line.
 KNOWN: dict[tuple[str, str], int] = {
-    ("addon", "circle"): 1,
-    ("addon.authoring", "package"): 2,
-    ("addon.events", "package"): 2,
     ("addon.measured", "package"): 2,
-    ("addon.scene", "package"): 2,
-    ("addon.session", "package"): 2,
-    ("addon.timeline", "package"): 2,
     ("core", "circle"): 1,
     ("core", "depth"): 1,
     ("core.compiled", "package"): 2,

@@ -91,9 +91,9 @@ def test_a_copy_gets_a_uid_of_its_own():
     bpy.context.scene.collection.objects.link(copy)
     assert copy.palpate.uid == pad.palpate.uid
     for obj in (copy, pad, copy):
-        identity.ensure(obj)
+        identity.ensure_uid(obj)
     assert copy.palpate.uid != pad.palpate.uid
-    found = identity.find(bpy.context.scene, [pad.palpate.uid, copy.palpate.uid])
+    found = identity.find_objects(bpy.context.scene, [pad.palpate.uid, copy.palpate.uid])
     assert found == {pad.palpate.uid: pad, copy.palpate.uid: copy}
 
 
@@ -138,10 +138,10 @@ def test_poll_says_no_without_a_mesh():
 def test_what_automatic_means():
     pad = grid()
     select(pad, ())
-    assert sensors.source_of(pad, "OBJECT") == "MESH"
-    assert sensors.source_of(pad, "WEIGHT_PAINT") == "MESH"
+    assert sensors.automatic_source(pad, "OBJECT") == "MESH"
+    assert sensors.automatic_source(pad, "WEIGHT_PAINT") == "MESH"
     pad.vertex_groups.new(name="A")
-    assert sensors.source_of(pad, "WEIGHT_PAINT") == "GROUP"
-    assert sensors.source_of(pad, "EDIT") == "MESH"
+    assert sensors.automatic_source(pad, "WEIGHT_PAINT") == "GROUP"
+    assert sensors.automatic_source(pad, "EDIT") == "MESH"
     select(pad, {0})
-    assert sensors.source_of(pad, "EDIT") == "SELECTION"
+    assert sensors.automatic_source(pad, "EDIT") == "SELECTION"

@@ -28,13 +28,13 @@ def sensor(**values):
 
 def test_openrave_there_and_back(tmp_path):
     pad = sensor(k=123.456, cn=1.5, mus=0.7, mud=0.3, max_penetration=0.004)
-    before = exchange.parameters(pad)
+    before = exchange.parameters_of(pad)
     assert bpy.ops.palpate.openrave_export(filepath=str(tmp_path / "pad.xml")) == {"FINISHED"}
     text = (tmp_path / "pad.xml").read_text(encoding="utf-8")
     assert "SimTactileSensor" in text and "123.456" in text
     pad.palpate.k, pad.palpate.mus = 1.0, 0.9
     assert bpy.ops.palpate.openrave_import(filepath=str(tmp_path / "pad.xml")) == {"FINISHED"}
-    assert exchange.parameters(pad) == before
+    assert exchange.parameters_of(pad) == before
 
 
 def test_of_several_openrave_sensors_the_one_of_this_name_is_taken(tmp_path):
@@ -59,7 +59,7 @@ def test_toml_there_and_back_with_effects_and_grid(tmp_path):
     pad = bpy.context.object
     pad.palpate.k, pad.palpate.unit, pad.palpate.gain = 77.7, "counts", 300.0
     bpy.ops.palpate.effect_add(effect="creep")
-    before = exchange.parameters(pad), len(pad.palpate.effects)
+    before = exchange.parameters_of(pad), len(pad.palpate.effects)
     assert bpy.ops.palpate.sensor_toml_export(filepath=path) == {"FINISHED"}
     with open(path, "rb") as file:
         table = tomllib.load(file)
@@ -68,12 +68,12 @@ def test_toml_there_and_back_with_effects_and_grid(tmp_path):
     pad.palpate.k = 1.0
     pad.palpate.effects.clear()
     assert bpy.ops.palpate.sensor_toml_import(filepath=path) == {"FINISHED"}
-    assert (exchange.parameters(pad), len(pad.palpate.effects)) == before
+    assert (exchange.parameters_of(pad), len(pad.palpate.effects)) == before
     bpy.context.view_layer.objects.active = None  # nothing active: a new pad
     assert bpy.ops.palpate.sensor_toml_import(filepath=path) == {"FINISHED"}
     new = bpy.context.object
     assert new != pad and new.palpate.role == "SENSOR"
-    assert exchange.parameters(new) == before[0]
+    assert exchange.parameters_of(new) == before[0]
     assert len(new.data.vertices) == 84
 
 

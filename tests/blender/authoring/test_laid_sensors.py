@@ -7,15 +7,15 @@ import pytest
 from blender_scenes import ball, changes, cube, dump, grid, select
 
 from palpate.addon.authoring import laid_sensors
-from palpate.addon.scene import scene_reader
+from palpate.addon.scene import participants, scene_reader
 from palpate.addon.session import transforms
 from palpate.core.jobs.job_runner import run_job
 from palpate.core.solver.simulation import run
 
 
 def texels_of(obj):
-    scenario, binding = scene_reader.sample_start(bpy.context.scene, scene_reader.depsgraph_of(bpy.context.scene))
-    return scenario.sensors[binding.sensor_objects(bpy.context.scene).index(obj)].texels
+    reading = scene_reader.read_start(bpy.context.scene, participants.depsgraph_of(bpy.context.scene))
+    return reading.scenario.sensors[reading.sensor_objects(bpy.context.scene).index(obj)].texels
 
 
 def finger(radius=0.01):
@@ -106,14 +106,14 @@ def test_one_object_carries_several_sensors_that_feel_on_their_own():
         bpy.ops.palpate.skin_add(source="SELECTION", method="NOISE", spacing=0.002)
         names.append(bpy.context.object.name)
     assert names == ["Finger Skin", "Finger Skin.001"]
-    assert laid_sensors.skins_of(obj) == [bpy.data.objects[name] for name in names]
+    assert laid_sensors.laid_on(obj) == [bpy.data.objects[name] for name in names]
     bpy.data.objects[names[1]].palpate.k = 117.0  # twice as stiff below
     scene = bpy.context.scene
     scene.frame_start, scene.frame_end = 1, 2
     for z in (0.0195, -0.0195):
         plate = cube("Plate", (0.0, 0.0, z), 0.02)
         plate.palpate.role = "TARGET"
-    recording = run(run_job(scene_reader.sample_scenario(scene))[0])
+    recording = run(run_job(scene_reader.read_scene(scene)).scenario)
     above, below = (recording.sensors[name].normal_force[-1].sum() for name in names)
     assert above > 0
     assert below == pytest.approx(2 * above, rel=0.15)  # other patterns of the same density
@@ -130,7 +130,7 @@ def test_spacing_is_in_metres_whatever_the_scale_of_the_object(scale):
     texels = texels_of(skin)
     apart = np.linalg.norm(texels.position[:, None] - texels.position, axis=2) + np.eye(len(texels))
     assert apart.min(axis=1) == pytest.approx(0.004, rel=1e-4)
-    frame = transforms.rotation(transforms.split(np.array(skin.matrix_world, float))[1])
+    frame = transforms.rotation(transforms.decompose(np.array(skin.matrix_world, float))[1])
     assert texels.normal @ frame.T == pytest.approx(np.tile([0, 0, 1.0], (len(texels), 1)), abs=1e-6)
 
 

@@ -11,7 +11,7 @@ from blender_scenes import ball, grid, press
 
 from palpate.addon.authoring import sensor_presets
 from palpate.addon.properties.parameter_properties import sensor_parameters
-from palpate.addon.scene import meshes, scene_reader
+from palpate.addon.scene import mesh_fingerprint, participants, scene_reader, sensor_regions
 from palpate.addon.timeline import live_cache
 from palpate.core.errors import SensorError
 from palpate.core.model.sensor_parameters import SensorParameters
@@ -110,7 +110,7 @@ def two_halves(pad):
     mesh.polygons.foreach_set("material_index", right.astype(np.int32))
     sets = mesh.attributes.new(".sculpt_face_set", "INT", "FACE")
     sets.data.foreach_set("value", np.where(right, 2, 1).astype(np.int32))
-    return meshes.corners_of(mesh, right)
+    return sensor_regions.vertices_of_faces(mesh, right)
 
 
 @pytest.mark.parametrize("source", ["MATERIAL", "FACE_SET"])
@@ -121,18 +121,18 @@ def test_a_material_or_face_set_becomes_the_region(source):
     pad.data.polygons.active = int(np.argmax([face.center.x > 0.01 for face in pad.data.polygons]))
     assert bpy.ops.palpate.sensor_add(source=source) == {"FINISHED"}
     assert pad.palpate.region == source
-    assert (meshes.region(pad, len(right)) == right).all()
+    assert (sensor_regions.region_vertices(pad, len(right)) == right).all()
     assert 0 < right.sum() < len(right)
     if source == "FACE_SET":
         assert bpy.ops.palpate.face_set_choose(face_set="1") == {"FINISHED"}
         assert pad.palpate.face_set == 1
         pad.palpate.face_set = 7
         with pytest.raises(SensorError, match="no face set 7: choose one of 1, 2"):
-            meshes.region(pad, len(right))
+            sensor_regions.region_vertices(pad, len(right))
     else:
         pad.palpate.material = "Gone"
         with pytest.raises(SensorError, match="wears no material 'Gone'"):
-            meshes.region(pad, len(right))
+            sensor_regions.region_vertices(pad, len(right))
 
 
 def test_a_region_by_material_survives_its_own_heat_map(tmp_path):
@@ -145,24 +145,24 @@ def test_a_region_by_material_survives_its_own_heat_map(tmp_path):
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "halves.blend"))
     for _ in range(2):
         run_job(bake(scene))
-        assert (meshes.region(pad, len(right)) == right).all()
+        assert (sensor_regions.region_vertices(pad, len(right)) == right).all()
 
 
 def test_a_changed_region_or_painted_map_is_noticed():
     scene, pad, _ = press(4)
     two_halves(pad)
     pad.palpate.region, pad.palpate.material = "MATERIAL", "Rubber"
-    depsgraph = scene_reader.depsgraph_of(scene)
-    run = live_cache.begin(scene, depsgraph)
+    depsgraph = participants.depsgraph_of(scene)
+    run = live_cache.start(scene, depsgraph)
     assert not live_cache.is_stale(scene, depsgraph, run)
-    first = meshes.fingerprint(pad, depsgraph)
+    first = mesh_fingerprint.evaluated_fingerprint(pad, depsgraph)
     pad.data.polygons.foreach_set("material_index", np.ones(len(pad.data.polygons), dtype=np.int32))
-    assert meshes.fingerprint(pad, depsgraph) != first
-    second = meshes.fingerprint(pad, depsgraph)
+    assert mesh_fingerprint.evaluated_fingerprint(pad, depsgraph) != first
+    second = mesh_fingerprint.evaluated_fingerprint(pad, depsgraph)
     group = pad.vertex_groups.new(name="Soft")
     pad.palpate.k_map = "Soft"
     group.add([0], 1.0, "REPLACE")
-    assert meshes.fingerprint(pad, depsgraph) != second
+    assert mesh_fingerprint.evaluated_fingerprint(pad, depsgraph) != second
     assert live_cache.is_stale(scene, depsgraph, run)
 
 
@@ -178,7 +178,7 @@ def test_painted_maps_reach_the_solver():
     rough = pad.data.attributes.new("Rough", "FLOAT", "POINT")
     rough.data.foreach_set("value", np.linspace(0.5, 2.0, 84).astype(np.float32))
     pad.palpate.friction_map = "Rough"
-    scenario, _ = scene_reader.sample_start(scene, scene_reader.depsgraph_of(scene))
+    scenario = scene_reader.read_start(scene, participants.depsgraph_of(scene)).scenario
     painted = scenario.sensors[0].painted
     assert painted.k[:5] == pytest.approx([0.2, 0.2, 0.2, 0.6, 1.0])
     assert painted.friction == pytest.approx(np.linspace(0.5, 2.0, 84), rel=1e-6)
@@ -194,7 +194,7 @@ def test_a_painted_map_that_cannot_be_used_says_so(name, value, text):
     bad.data.foreach_set("value", np.full(84, value, dtype=np.float32))
     pad.palpate.gain_map = name
     with pytest.raises(SensorError, match=text):
-        scene_reader.sample_start(scene, scene_reader.depsgraph_of(scene))
+        scene_reader.read_start(scene, participants.depsgraph_of(scene))
 
 
 def test_a_soft_tip_feels_less_under_the_same_ball():
@@ -207,5 +207,5 @@ def test_a_soft_tip_feels_less_under_the_same_ball():
         from palpate.core.jobs.job_runner import run_job
         from palpate.core.solver.simulation import run
 
-        forces.append(run(run_job(scene_reader.sample_scenario(scene))[0]).sensors["Pad"].normal_force[-1].sum())
+        forces.append(run(run_job(scene_reader.read_scene(scene)).scenario).sensors["Pad"].normal_force[-1].sum())
     assert forces[1] == pytest.approx(0.5 * forces[0], rel=1e-6)

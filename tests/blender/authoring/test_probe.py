@@ -21,7 +21,7 @@ def test_it_presses_as_deep_as_it_says_and_goes(shape):
     assert bpy.ops.palpate.probe_add(shape=shape, size=0.01, depth=0.002) == {"FINISHED"}
     assert bpy.context.object == pad  # the sensor stays active, so that its panel shows what it feels
     assert bpy.data.objects["Probe"].palpate.role == "TARGET"
-    felt = run(run_job(scene_reader.sample_scenario(scene))[0]).sensors["Pad"]
+    felt = run(run_job(scene_reader.read_scene(scene)).scenario).sensors["Pad"]
     assert felt.depth.max() == pytest.approx(0.002, rel=0.01)
     assert felt.contact.any(axis=1).sum() > 15
     assert not felt.contact[0].any() and not felt.contact[-1].any()
@@ -36,7 +36,7 @@ def test_a_probe_for_a_curved_sensor_of_any_size():
     finger = bpy.context.object
     bpy.context.scene.frame_end = 20
     bpy.ops.palpate.probe_add()
-    felt = run(run_job(scene_reader.sample_scenario(bpy.context.scene))[0]).sensors[finger.name]
+    felt = run(run_job(scene_reader.read_scene(bpy.context.scene)).scenario).sensors[finger.name]
     assert 0 < felt.depth.max() <= finger.palpate.max_penetration / 4 + 1e-6
 
 
@@ -51,7 +51,7 @@ def test_bumps_beside_the_middle_are_not_pressed_from_the_start():
     bpy.ops.palpate.sensor_add()
     pad.palpate.max_penetration = 0.004
     assert bpy.ops.palpate.probe_add(shape="BOX", size=0.02, depth=0.001) == {"FINISHED"}
-    felt = run(run_job(scene_reader.sample_scenario(scene))[0]).sensors["Pad"]
+    felt = run(run_job(scene_reader.read_scene(scene)).scenario).sensors["Pad"]
     assert not felt.contact[0].any()
     assert felt.depth.max() == pytest.approx(0.001, rel=0.2)  # along normals that lean
 

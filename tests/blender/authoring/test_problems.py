@@ -11,7 +11,7 @@ from palpate.addon.authoring import problems, sensor_report, texel_overlay
 
 def look(obj):
     bpy.context.view_layer.update()
-    return sensor_report.now(obj, bpy.context.scene)
+    return sensor_report.fresh_report(obj, bpy.context.scene)
 
 
 def kinds(obj):
@@ -40,12 +40,12 @@ def test_counts_area_and_density():
 
 
 def test_stability_limit_and_step_are_those_of_the_scene():
-    from palpate.addon.scene import scene_reader
+    from palpate.addon.scene import participants, scene_reader
     from palpate.core.solver.time_step_adviser import advise
 
     scene, pad, *_ = press_and_drop()
     report = look(pad)
-    expected = advise(scene_reader.sample_start(scene, scene_reader.depsgraph_of(scene))[0])
+    expected = advise(scene_reader.read_start(scene, participants.depsgraph_of(scene)).scenario)
     assert report.advice == expected
     assert 0 < report.advice.dt < report.advice.limit < 1.0
 

@@ -7,7 +7,7 @@ import pytest
 from blender_scenes import ball, grid, reopen, save
 
 from palpate.addon.authoring import laid_sensors, sensor_report, surface_binding
-from palpate.addon.scene import meshes, scene_reader
+from palpate.addon.scene import mesh_arrays, participants, scene_reader
 from palpate.core.jobs.job_runner import run_job
 
 
@@ -32,7 +32,7 @@ def shapes(obj):
     """(frames, n, 9) where the texels of a sensor are, as the solver gets it."""
     target = ball("Target", (0.0, 0.0, 1.0))
     target.palpate.role = "TARGET"
-    scenario, _ = run_job(scene_reader.sample_scenario(bpy.context.scene))
+    scenario = run_job(scene_reader.read_scene(bpy.context.scene)).scenario
     bpy.data.objects.remove(target)
     return next(s for s in scenario.sensors if s.name == obj.name).deformation.values
 
@@ -48,7 +48,7 @@ def test_laid_texels_move_as_the_vertices_under_them(laid_at):
     carrier = finger()
     bpy.context.scene.frame_set(laid_at)
     skin = lay(carrier, method="VERTICES")
-    assert surface_binding.clings(skin)
+    assert surface_binding.is_bound(skin)
     bpy.context.scene.frame_set(1)
     laid = shapes(skin)
     skin.palpate.role = "NONE"
@@ -66,8 +66,8 @@ def test_texels_between_vertices_keep_their_place_in_the_triangle_under_them(met
     carrier = finger()
     skin = lay(carrier, method=method, spacing=0.004, rows=6, columns=5, lift=lift)
     found = shapes(skin)
-    triangles = meshes.read(carrier.data).triangles
-    flat = meshes.vertices(carrier.data)
+    triangles = mesh_arrays.read_arrays(carrier.data).triangles
+    flat = mesh_arrays.vertices(carrier.data)
     bent = np.array([point.co for point in carrier.data.shape_keys.key_blocks["Bent"].data])
     for start, end in zip(found[0, :, :3], found[-1, :, :3], strict=True):
         a, b, c = (flat[triangles[:, i]] for i in range(3))
@@ -106,13 +106,13 @@ def test_a_rigid_surface_binds_nothing_and_one_that_bends_later_says_so(tmp_path
     assert not skin.modifiers
     carrier.modifiers.new("Wave", "WAVE")
     bpy.context.view_layer.objects.active = skin
-    report = sensor_report.now(skin, bpy.context.scene)
+    report = sensor_report.fresh_report(skin, bpy.context.scene)
     assert [problem.kind for problem in report.problems] == ["STILL"]
     assert bpy.ops.palpate.fix(kind="STILL") == {"FINISHED"}
-    assert surface_binding.clings(skin)
-    assert [problem.kind for problem in sensor_report.now(skin, bpy.context.scene).problems] == []
+    assert surface_binding.is_bound(skin)
+    assert [problem.kind for problem in sensor_report.fresh_report(skin, bpy.context.scene).problems] == []
     reopen(save(tmp_path))
-    assert surface_binding.clings(bpy.data.objects["Sheet Skin"])
+    assert surface_binding.is_bound(bpy.data.objects["Sheet Skin"])
 
 
 def test_what_is_painted_on_a_skin_stays_when_it_is_laid_anew():
@@ -145,6 +145,6 @@ def test_a_part_that_was_left_out_stays_out():
     skin.palpate.region, skin.palpate.vertex_group = "GROUP", "Half"
     bpy.ops.palpate.skin_update()
     ball("Target", (0.0, 0.0, 1.0)).palpate.role = "TARGET"
-    scenario, _ = scene_reader.sample_start(bpy.context.scene, scene_reader.depsgraph_of(bpy.context.scene))
+    scenario = scene_reader.read_start(bpy.context.scene, participants.depsgraph_of(bpy.context.scene)).scenario
     assert -0.003 < scenario.sensors[0].texels.position[:, 0].min() < 0.003
-    assert laid_sensors.is_skin(skin)
+    assert laid_sensors.is_laid(skin)

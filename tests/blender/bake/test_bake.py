@@ -12,8 +12,7 @@ from palpate.addon.bake import folder_swap
 from palpate.addon.bake.bake import bake
 from palpate.addon.display import heat_map, marker_meshes, materials
 from palpate.addon.scene import display_names, scene_reader
-from palpate.addon.session import fcurves, transforms
-from palpate.addon.timeline import playback
+from palpate.addon.session import fcurves, session_state, transforms
 from palpate.core.errors import FileError
 from palpate.core.io.bake_folder import read_manifest
 from palpate.core.io.recording_npz import load_recording
@@ -51,7 +50,7 @@ def test_progress_reaches_its_end(tmp_path):
     seen = []
     run_job(bake(scene), seen.append)
     assert [step.done for step in seen] == list(range(1, 9)) and {step.total for step in seen} == {8}
-    assert not playback.is_baking()
+    assert not session_state.is_baking()
 
 
 @pytest.mark.parametrize("mode", ["XYZ", "ZXY", "QUATERNION", "AXIS_ANGLE"])
@@ -74,14 +73,14 @@ def test_keyframes_put_free_bodies_where_the_solver_had_them(tmp_path, mode, par
     index = result.recording.body_names.index("Cube")
     for i, frame in enumerate(range(1, 7)):
         scene.frame_set(frame)
-        location, quaternion, _ = transforms.split(transforms.array(free.matrix_world))
+        location, quaternion, _ = transforms.decompose(transforms.as_array(free.matrix_world))
         assert location == pytest.approx(result.recording.poses[i, index, :3], abs=2e-7)
         turned = transforms.rotation(result.recording.poses[i, index, 3:])
         assert transforms.rotation(quaternion) == pytest.approx(turned, abs=2e-6)
     paths = fcurves.animated_paths(free)
     rotation = {"QUATERNION": "rotation_quaternion", "AXIS_ANGLE": "rotation_axis_angle"}.get(mode, "rotation_euler")
     assert paths == {"location", rotation}
-    assert {point.interpolation for curve in fcurves.of(free) for point in curve.keyframe_points} == {"LINEAR"}
+    assert {point.interpolation for curve in fcurves.of_object(free) for point in curve.keyframe_points} == {"LINEAR"}
 
 
 def test_the_arrow_is_the_reaction_at_the_centre_of_pressure(tmp_path):
@@ -98,7 +97,7 @@ def test_the_arrow_is_the_reaction_at_the_centre_of_pressure(tmp_path):
         size = np.linalg.norm(readings.net_force[i])
         assert list(arrow.scale) == pytest.approx([0.5 * size] * 3, rel=1e-5)
         if size > 0:
-            world = transforms.array(arrow.matrix_world)
+            world = transforms.as_array(arrow.matrix_world)
             rotation = transforms.rotation(result.recording.poses[i, 0, 3:])
             assert world[:3, 2] / 0.5 == pytest.approx(-rotation @ readings.net_force[i], rel=1e-4, abs=1e-6)
             foot = result.recording.poses[i, 0, :3] + rotation @ readings.centre_of_pressure[i]
@@ -198,7 +197,7 @@ def test_a_stopped_bake_leaves_the_old_one(tmp_path):
         work.cancel()
         assert {path: path.read_bytes() for path in (tmp_path / "palpate").rglob("*") if path.is_file()} == files
         assert [line for line in changes(before, dump()) if not line.startswith("Pad: settings")] == []
-        assert not playback.is_baking()
+        assert not session_state.is_baking()
 
 
 def test_a_kill_between_two_renames_is_put_right(tmp_path):
@@ -350,7 +349,7 @@ def test_a_sensor_all_around_has_a_heat_map_on_its_vertices(tmp_path):
         values = np.zeros(8, dtype=np.float32)
         mesh.attributes[materials.FORCE].data.foreach_get("value", values)
         assert values == pytest.approx(readings.normal_force[i], abs=1e-7)
-    scenario = run_job(scene_reader.sample_scenario(scene))[0]  # its own nodes do not change what is sampled
+    scenario = run_job(scene_reader.read_scene(scene)).scenario  # its own nodes do not change what is sampled
     assert scenario.digest() == run_job(bake(scene)).recording.digest
 
 

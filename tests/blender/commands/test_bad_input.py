@@ -200,7 +200,7 @@ def test_a_time_step_of_zero(pressed):
 def test_a_frame_range_that_runs_backwards():
     """Blender's own buttons keep it straight; a file or a command line need not."""
     with pytest.raises(SceneError, match=r"frame range of 'Shot' runs backwards \(9 to 3\): set the end frame after"):
-        scene_reader._check_range(SimpleNamespace(name="Shot", frame_start=9, frame_end=3))
+        scene_reader._check_frame_range(SimpleNamespace(name="Shot", frame_start=9, frame_end=3))
     scene = bpy.context.scene
     scene.frame_start, scene.frame_end = 9, 3
     assert scene.frame_start <= scene.frame_end

@@ -33,7 +33,7 @@ def instances(obj):
     """Return the matrices of the arrows that geometry nodes make on an object, by place."""
     depsgraph = bpy.context.evaluated_depsgraph_get()
     return [
-        transforms.array(found.matrix_world)
+        transforms.as_array(found.matrix_world)
         for found in depsgraph.object_instances
         if found.is_instance and found.parent is not None and found.parent.original == obj
     ]
@@ -81,7 +81,7 @@ def test_markers_stand_at_the_centre_of_pressure_and_show_moment_and_slip(baked)
         assert marker.scale.x == pytest.approx(share[i] * radius, abs=1e-7)  # SLIP
         arrow = markers.find_marker(scene.objects, pad.palpate.uid, "TORQUE")
         if readings.contact[i].any():
-            axis = transforms.array(arrow.matrix_world)[:3, 2] / arrow.scale.x
+            axis = transforms.as_array(arrow.matrix_world)[:3, 2] / arrow.scale.x
             assert axis == pytest.approx(-rotation @ moment[i] / np.linalg.norm(moment[i]), abs=1e-4)
 
 

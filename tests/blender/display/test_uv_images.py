@@ -8,8 +8,8 @@ from blender_scenes import ball, save
 
 from palpate.addon.bake.bake import bake
 from palpate.addon.display import materials
-from palpate.addon.scene import scene_reader, uv_layouts
-from palpate.addon.timeline import playback
+from palpate.addon.scene import participants, scene_reader, sensor_reader, uv_layouts
+from palpate.addon.session import frame_status
 from palpate.core.errors import SensorError
 from palpate.core.io.bake_folder import frame_file
 from palpate.core.io.tactile_exr import read_exr
@@ -43,13 +43,13 @@ def pixels_of(image):
 @pytest.fixture(autouse=True)
 def clean():
     yield
-    uv_layouts._kept.clear()
+    uv_layouts._cached_layouts.clear()
 
 
 @pytest.mark.parametrize("kind", ["uv_sphere", "ico_sphere", "cylinder", "cone", "torus", "cube", "monkey"])
 def test_the_maps_that_blender_makes_can_be_used(kind):
     scene, obj = tip(kind)
-    sensor, _ = scene_reader.sensor_alone(scene, obj, scene_reader.depsgraph_of(scene))
+    sensor, _ = sensor_reader.sensor_in_own_frame(scene, obj, participants.depsgraph_of(scene))
     assert sensor.texels.layout.map_name == "UVMap" and sensor.texels.layout.shape == (256, 256)
     assert sensor.texels.layout.mask().mean() > 0.2
 
@@ -106,8 +106,8 @@ def test_without_a_map_it_is_one_sentence(tmp_path):
 
 def test_too_coarse_an_image_is_said():
     scene, obj = tip(image_size=16)
-    _, binding = scene_reader.sample_start(scene, scene_reader.depsgraph_of(scene))
-    assert any("smaller than a pixel" in warning for warning in binding.warnings)
+    reading = scene_reader.read_start(scene, participants.depsgraph_of(scene))
+    assert any("smaller than a pixel" in warning for warning in reading.warnings)
 
 
 @pytest.mark.parametrize("change", ["image_size", "image_filter", "coordinates"])
@@ -116,7 +116,7 @@ def test_another_image_makes_the_bake_stale(tmp_path, change):
     save(tmp_path)
     run_job(bake(scene))
     scene.frame_set(2)
-    assert playback.status(scene).text == "Frame 2 of the bake."
+    assert frame_status.status_of(scene).text == "Frame 2 of the bake."
     if change == "coordinates":
         obj.data.uv_layers[0].uv[3].vector = (0.1, 0.1)
         obj.data.update()
@@ -124,4 +124,4 @@ def test_another_image_makes_the_bake_stale(tmp_path, change):
     else:
         setattr(obj.palpate, change, {"image_size": 128, "image_filter": "NEAREST"}[change])
     scene.frame_set(3)
-    assert "out of date" in playback.status(scene).text
+    assert "out of date" in frame_status.status_of(scene).text

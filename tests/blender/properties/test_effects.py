@@ -8,8 +8,9 @@ from blender_scenes import grid, press, reopen, save
 
 from palpate.addon.bake import bake
 from palpate.addon.properties import effect_stack
-from palpate.addon.scene import scene_reader
-from palpate.addon.timeline import live_cache, playback, staleness
+from palpate.addon.scene import scene_fingerprint, scene_reader, sensor_reader
+from palpate.addon.session import frame_status
+from palpate.addon.timeline import staleness
 from palpate.core.effects.engine.registry import effect, library
 from palpate.core.effects.engine.sensor_effects import check_scenario
 from palpate.core.errors import EffectError
@@ -51,12 +52,12 @@ def test_what_is_put_on_is_what_is_sampled(pad, name, form):
     (found,) = effect_stack.stack(pad)
     assert (found.name, found.form) == (name, form)
     assert found.values == pytest.approx(one.values, rel=1e-6)
-    sample_of = scene_reader._sensor(pad, 0, _mesh(pad))
+    sample_of = sensor_reader.read_sensor(pad, 0, _mesh(pad))
     assert sample_of.effects == (found,)
 
 
 def _mesh(obj):
-    return scene_reader.sensor_alone(bpy.context.scene, obj, bpy.context.evaluated_depsgraph_get())[1]
+    return sensor_reader.sensor_in_own_frame(bpy.context.scene, obj, bpy.context.evaluated_depsgraph_get())[1]
 
 
 def test_numbers_for_each_texel(pad):
@@ -108,7 +109,7 @@ def test_playing_gives_the_bakes_readings(tmp_path):
     played = []
     for frame in range(1, 7):
         scene.frame_set(frame)
-        played.append(playback.status(scene).frame.sensors["Pad"].reading)
+        played.append(frame_status.status_of(scene).frame.sensors["Pad"].reading)
     save(tmp_path)
     np.testing.assert_array_equal(np.array(played), baked(scene).reading)
 
@@ -126,13 +127,13 @@ def test_a_sensor_with_an_effect_out_of_bounds_says_where():
     bpy.ops.palpate.effect_add(effect="offset")
     pad.palpate.effects[0].offset_common_offset = 1e9
     with pytest.raises(EffectError, match="offset of effect 'offset' \\(common\\) of sensor 'Pad' is 1e\\+09 unit"):
-        check_scenario(run_job(scene_reader.sample_scenario(scene))[0])
+        check_scenario(run_job(scene_reader.read_scene(scene)).scenario)
 
 
 def test_settings_tell_stacks_apart(pad):
-    before = live_cache.settings_of(bpy.context.scene, [pad])
+    before = scene_fingerprint.settings_of(bpy.context.scene, [pad])
     bpy.ops.palpate.effect_add(effect="noise")
-    assert live_cache.settings_of(bpy.context.scene, [pad]) != before
+    assert scene_fingerprint.settings_of(bpy.context.scene, [pad]) != before
 
 
 def test_without_a_sensor_the_button_says_why():

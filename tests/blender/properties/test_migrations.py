@@ -43,9 +43,9 @@ def test_a_newer_file_is_left_alone_and_it_is_said(tmp_path):
     reopen(path)
     assert bpy.data.objects["Pad"].palpate.k == 77.0
     assert bpy.data.objects["Pad"].palpate.schema_version == VERSION + 5
-    assert session_state.session.notes["Pad"].startswith("The settings of 'Pad' were saved by a newer Palpate")
+    assert session_state.session.unreadable_settings["Pad"].startswith("The settings of 'Pad' were saved by a newer Palpate")
     bpy.ops.wm.read_homefile(use_empty=True)
-    assert session_state.session.notes == {}
+    assert session_state.session.unreadable_settings == {}
 
 
 def test_a_file_that_is_open_when_the_add_on_is_enabled_is_looked_through_as_well(tmp_path):
@@ -56,10 +56,10 @@ def test_a_file_that_is_open_when_the_add_on_is_enabled_is_looked_through_as_wel
     bpy.ops.preferences.addon_disable(module="palpate")
     reopen(path)
     bpy.ops.preferences.addon_enable(module="palpate")
-    assert session_state.session.notes == {}
+    assert session_state.session.unreadable_settings == {}
     bpy.data.objects["Pad"].location.x += 0.001
     bpy.context.view_layer.update()
-    assert "newer Palpate" in session_state.session.notes["Pad"]
+    assert "newer Palpate" in session_state.session.unreadable_settings["Pad"]
 
 
 def test_todays_settings_are_not_touched(tmp_path):

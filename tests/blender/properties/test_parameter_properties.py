@@ -6,7 +6,7 @@ import pytest
 
 from palpate.addon.authoring.sensor_presets import COPIED
 from palpate.addon.properties.parameter_properties import put_sensor_parameters, sensor_parameters
-from palpate.addon.timeline import live_cache
+from palpate.addon.scene import scene_fingerprint
 from palpate.core.model.drive import DRIVE_PARAMETERS
 from palpate.core.model.parameter import Parameter
 from palpate.core.model.sensor_parameters import CONTACT, FRICTION, READOUT, SENSOR_PARAMETERS, SensorParameters
@@ -34,7 +34,7 @@ def test_every_parameter_is_written_and_read(settings):
 
 
 def test_every_parameter_is_copied_shown_and_noticed_by_the_timeline():
-    assert set(SENSOR_PARAMETERS) <= set(COPIED) and set(SENSOR_PARAMETERS) <= set(live_cache.SETTINGS)
+    assert set(SENSOR_PARAMETERS) <= set(COPIED) and set(SENSOR_PARAMETERS) <= set(scene_fingerprint.OBJECT_PROPERTIES)
     assert {specification.group for specification in SENSOR_PARAMETERS.values()} == {CONTACT, FRICTION, READOUT}
 
 

@@ -7,7 +7,7 @@ import pytest
 from blender_scenes import ball, cube, grid
 
 from palpate.addon.bake import bake
-from palpate.addon.scene import scene_reader
+from palpate.addon.scene import participants, scene_reader
 from palpate.core.errors import SceneError
 from palpate.core.jobs.job_runner import run_job
 from palpate.core.solver.simulation import run
@@ -43,10 +43,11 @@ def box_on_soles(frames=24):
 
 def test_two_soles_carry_a_free_box():
     scene, box, soles, _ = box_on_soles()
-    scenario, binding = run_job(scene_reader.sample_scenario(scene))
+    reading = run_job(scene_reader.read_scene(scene))
+    scenario = reading.scenario
     assert [body.name for body in scenario.bodies] == ["Box", "Table"]
     assert [sensor.body for sensor in scenario.sensors] == [0, 0]
-    assert binding.sensor_objects(scene) == soles
+    assert reading.sensor_objects(scene) == soles
     recording = run(scenario)
     forces = [recording.sensors[sole.name].normal_force[-1].sum() for sole in soles]
     assert sum(forces) == pytest.approx(0.2 * 9.81, rel=1e-3)
@@ -58,7 +59,7 @@ def test_texels_of_a_part_are_where_blender_shows_them():
     box.location = (0.1, -0.2, 0.3)
     box.rotation_euler = (0.3, 0.5, -0.4)
     bpy.context.view_layer.update()
-    scenario, _ = scene_reader.sample_start(scene, scene_reader.depsgraph_of(scene))
+    scenario = scene_reader.read_start(scene, participants.depsgraph_of(scene)).scenario
     body = scenario.bodies[0].motion
     from palpate.addon.session import transforms
 
@@ -88,7 +89,7 @@ def test_a_part_of_something_that_takes_no_part_follows_it():
     stick.keyframe_insert("location", frame=10)
     scene = bpy.context.scene
     scene.frame_start, scene.frame_end = 1, 10
-    scenario, _ = run_job(scene_reader.sample_scenario(scene))
+    scenario = run_job(scene_reader.read_scene(scene)).scenario
     assert [body.name for body in scenario.bodies] == ["Pad", "Ball"]
     assert scenario.bodies[0].motion.positions[-1][2] - scenario.bodies[0].motion.positions[0][2] == pytest.approx(0.01)
 
@@ -97,7 +98,7 @@ def test_a_part_never_touches_its_own_body():
     scene, _, soles, table = box_on_soles(2)
     soles[0].location.z += 0.003  # into the box, facing outwards
     table.location.z = -1.0
-    recording = run(run_job(scene_reader.sample_scenario(scene))[0])
+    recording = run(run_job(scene_reader.read_scene(scene)).scenario)
     assert all(not recording.sensors[sole.name].contact.any() for sole in soles)
 
 
@@ -107,14 +108,14 @@ def test_a_part_that_moves_on_its_parent_is_refused():
     soles[0].location.z -= 0.01
     soles[0].keyframe_insert("location", frame=4)
     with pytest.raises(SceneError, match="'Sole 0' moves on its parent"):
-        run_job(scene_reader.sample_scenario(scene))
+        run_job(scene_reader.read_scene(scene))
 
 
 def test_a_child_of_a_free_body_says_what_to_do():
     scene, _, soles, _ = box_on_soles(4)
     soles[0].palpate.body = "KEYFRAMED"
     with pytest.raises(SceneError, match="Part of Parent"):
-        run_job(scene_reader.sample_scenario(scene))
+        run_job(scene_reader.read_scene(scene))
 
 
 def test_playing_a_free_body_moves_its_parts_and_does_not_start_anew(monkeypatch):

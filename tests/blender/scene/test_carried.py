@@ -7,7 +7,7 @@ import pytest
 from blender_scenes import ball, grid
 from mathutils import Matrix
 
-from palpate.addon.scene import scene_reader
+from palpate.addon.scene import participants, scene_reader
 from palpate.core.errors import SceneError
 from palpate.core.jobs.job_runner import run_job
 from palpate.core.solver.simulation import run
@@ -30,7 +30,7 @@ def raise_object(obj):
 def _straight(obj):
     from palpate.addon.session import fcurves
 
-    for curve in fcurves.of(obj):
+    for curve in fcurves.of_object(obj):
         for point in curve.keyframe_points:
             point.interpolation = "LINEAR"
 
@@ -123,11 +123,11 @@ def reference():
 @pytest.mark.parametrize("way", WAYS, ids=lambda way: way.__name__)
 def test_whatever_moves_a_sensor_gives_the_same_forces(way, reference):
     scene, pad = scene_with(way)
-    scenario, _ = run_job(scene_reader.sample_scenario(scene))
+    scenario = run_job(scene_reader.read_scene(scene)).scenario
     motion = scenario.bodies[0].motion
     for i, frame in enumerate(range(1, FRAMES + 1)):
         scene.frame_set(frame)
-        place = pad.evaluated_get(scene_reader.depsgraph_of(scene)).matrix_world
+        place = pad.evaluated_get(participants.depsgraph_of(scene)).matrix_world
         np.testing.assert_allclose(motion.positions[i], place.translation, atol=1e-9)
     assert motion.positions[-1, 2] == pytest.approx(RISE, abs=1e-6)
     force = run(scenario).sensors["Pad"].normal_force
@@ -147,9 +147,9 @@ def test_free_bodies_with_constraints_are_refused(constraint, says):
     free.palpate.body = "FREE"
     free.constraints.new(constraint)
     with pytest.raises(SceneError, match=says):
-        run_job(scene_reader.sample_scenario(scene))
+        run_job(scene_reader.read_scene(scene))
     free.constraints[0].enabled = False
-    run_job(scene_reader.sample_scenario(scene))
+    run_job(scene_reader.read_scene(scene))
 
 
 def test_motion_is_read_between_frames_where_that_is_asked_for():
@@ -158,7 +158,7 @@ def test_motion_is_read_between_frames_where_that_is_asked_for():
     pad.driver_add("location", 2).driver.expression = "0.001 * sin(2 * frame)"
     scene.palpate.subframes, scene.palpate.interpolation = 4, "SMOOTH"
     scene.frame_set(2, subframe=0.25)
-    scenario, binding = run_job(scene_reader.sample_scenario(scene))
+    scenario = run_job(scene_reader.read_scene(scene)).scenario
     assert (scene.frame_current, scene.frame_subframe) == (2, 0.25)
     assert scenario.interpolation == "smooth"
     motion = scenario.bodies[0].motion

@@ -9,15 +9,15 @@ import pytest
 from blender_scenes import press, press_and_drop
 
 from palpate.addon.bake.bake import bake
-from palpate.addon.scene import meshes, scene_reader
-from palpate.addon.session import transforms
+from palpate.addon.scene import mesh_fingerprint, participants, scene_reader
+from palpate.addon.session import frame_status, transforms
 from palpate.addon.timeline import playback
 from palpate.core.errors import SceneError
 from palpate.core.jobs.job_runner import run_job
 
 
 def sampled(scene):
-    return run_job(scene_reader.sample_scenario(scene))
+    return run_job(scene_reader.read_scene(scene))
 
 
 def world_of(scenario, values, body, frame):
@@ -77,7 +77,7 @@ def test_targets_are_sampled_as_they_look(how):
     scene, _, target = press(frames=6)
     how(target, 6)
     scene.frame_set(1)
-    scenario, _ = sampled(scene)
+    scenario = sampled(scene).scenario
     values = scenario.targets[0].deformation.values
     assert len(values) == 6
     for frame in (1, 3, 6):
@@ -95,13 +95,13 @@ def test_looks_are_the_fingerprints_of_every_frame(how):
     pad.modifiers.new("Bend", "SIMPLE_DEFORM").angle = math.radians(10)
     how(target, 4)  # and stays as it is at frames 5 and 6
     scene.frame_set(1)
-    _, binding = sampled(scene)
+    reading = sampled(scene)
     expected = {"Pad": [], "Ball": []}
     for frame in range(1, 7):
         scene.frame_set(frame)
         for name, found in expected.items():
-            found.append(meshes.fingerprint(scene.objects[name], scene_reader.depsgraph_of(scene)))
-    assert binding.looks == expected
+            found.append(mesh_fingerprint.evaluated_fingerprint(scene.objects[name], participants.depsgraph_of(scene)))
+    assert reading.mesh_fingerprints == expected
     assert len(set(expected["Ball"][:4])) > 2 and len(set(expected["Pad"])) == 1
 
 
@@ -110,7 +110,7 @@ def test_what_does_not_change_is_rigid():
     target.modifiers.new("More", "SUBSURF")
     target.shape_key_add(name="Basis")
     pad.modifiers.new("Bend", "SIMPLE_DEFORM").angle = math.radians(10)
-    scenario, _ = sampled(scene)
+    scenario = sampled(scene).scenario
     assert scenario.targets[0].deformation is None
     assert scenario.sensors[0].deformation is None
 
@@ -126,7 +126,7 @@ def test_a_bending_sensor_carries_its_texels():
     key.value = 1.0
     key.keyframe_insert("value", frame=5)
     scene.frame_set(1)
-    scenario, _ = sampled(scene)
+    scenario = sampled(scene).scenario
     sensor = scenario.sensors[0]
     frames = sensor.deformation.values
     scene.frame_set(5)
@@ -152,7 +152,7 @@ def test_played_and_baked_alike(tmp_path):
     played = []
     for frame in range(1, 7):
         scene.frame_set(frame)
-        played.append(playback.status(scene).frame.sensors["Pad"].normal_force)
+        played.append(frame_status.status_of(scene).frame.sensors["Pad"].normal_force)
     playback.reset(scene)
     recording = run_job(bake(scene)).recording
     assert recording.sensors["Pad"].contact[-1].any()
@@ -188,7 +188,7 @@ def test_sensors_that_are_felt_by_others_share_the_overlap():
     for obj in (pad, second):
         obj.palpate.presses, obj.palpate.k = True, 100.0
     scene.frame_set(1)
-    scenario, _ = sampled(scene)
+    scenario = sampled(scene).scenario
     assert [part.sensor for part in scenario.targets] == [0, 1]
     from palpate.core.solver.simulation import run
 
@@ -201,9 +201,9 @@ def test_only_a_free_body_that_does_deform_is_warned_of():
     """A modifier that rounds the edges changes nothing over time, and is nothing to warn of."""
     cube = press_and_drop(frames=4)[-1]
     cube.modifiers.new("Bevel", "BEVEL").width = 1e-3
-    _, binding = run_job(scene_reader.sample_scenario(bpy.context.scene))
-    assert not any("deforms" in warning for warning in binding.warnings)
+    reading = run_job(scene_reader.read_scene(bpy.context.scene))
+    assert not any("deforms" in warning for warning in reading.warnings)
     wave = cube.modifiers.new("Wave", "WAVE")
     wave.height, wave.speed = 1e-3, 1e-3
-    _, binding = run_job(scene_reader.sample_scenario(bpy.context.scene))
-    assert any("deforms while forces move it" in warning for warning in binding.warnings)
+    reading = run_job(scene_reader.read_scene(bpy.context.scene))
+    assert any("deforms while forces move it" in warning for warning in reading.warnings)

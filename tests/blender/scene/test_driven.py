@@ -8,7 +8,7 @@ from blender_scenes import cube, grid, save
 
 from palpate.addon.bake import bake
 from palpate.addon.scene import scene_reader
-from palpate.addon.timeline import playback
+from palpate.addon.session import frame_status
 from palpate.core.errors import SceneError
 from palpate.core.jobs.job_runner import run_job
 
@@ -81,7 +81,7 @@ def test_playing_gives_the_bake_s_numbers(tmp_path):
     frames = {}
     for frame in range(2, 31):
         scene.frame_set(frame)
-        frames[frame] = playback.status(scene).frame
+        frames[frame] = frame_status.status_of(scene).frame
     at_end = tuple(left.matrix_world.translation), tuple(box.matrix_world.translation)
     assert frames[30].sensors["Left"].normal_force.sum() == pytest.approx(4.0, rel=1e-3)
     recording = run_job(bake.bake(scene)).recording
@@ -98,19 +98,19 @@ def test_targets_are_keyframed_and_axes_belong_to_whom_they_are_said_to():
     left.palpate.keyframe_insert("drive_force", frame=1)
     left.palpate.drive_force = 8.0
     left.palpate.keyframe_insert("drive_force", frame=5)
-    scenario, _ = run_job(scene_reader.sample_scenario(scene))
+    scenario = run_job(scene_reader.read_scene(scene)).scenario
     body = {b.name: b for b in scenario.bodies}
     values = body["Left"].drive.target.values
     assert values[0] == 4.0 and values[-1] == 8.0 and np.all(np.diff(values) > 0)
     assert body["Left"].drive.axis.tolist() == [0.0, 0.0, 1.0]
     assert body["Right"].drive.leader == [b.name for b in scenario.bodies].index("Left")
     left.palpate.drive_axis, left.palpate.drive_space = "-X", "WORLD"
-    found = run_job(scene_reader.sample_scenario(scene))[0].bodies[0].drive
+    found = run_job(scene_reader.read_scene(scene)).scenario.bodies[0].drive
     assert found.axis.tolist() == [-1.0, 0.0, 0.0] and found.axis_in_world
     # The hand's +x is the world's +y, in which the left finger's own -y points after the hand's turn by a quarter: its y axis
     # was the hand's y before, and its z the hand's x.
     left.palpate.drive_axis, left.palpate.drive_space = "X", "PARENT"
-    found = run_job(scene_reader.sample_scenario(scene))[0].bodies[0].drive
+    found = run_job(scene_reader.read_scene(scene)).scenario.bodies[0].drive
     np.testing.assert_allclose(found.axis, [0.0, 0.0, 1.0], atol=1e-6)
     assert not found.axis_in_world
 
@@ -133,4 +133,4 @@ def test_a_driven_body_that_cannot_be_is_refused_in_one_sentence(spoil, says):
     scene, _, left, right, box = gripper(frames=3)
     spoil(left, right, box)
     with pytest.raises(SceneError, match=says):
-        run_job(scene_reader.sample_scenario(scene))
+        run_job(scene_reader.read_scene(scene))

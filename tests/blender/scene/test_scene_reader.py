@@ -17,7 +17,7 @@ from palpate.core.jobs.job_runner import run_job
 
 
 def sampled(scene):
-    return run_job(scene_reader.sample_scenario(scene))
+    return run_job(scene_reader.read_scene(scene))
 
 
 def of(scenario, name):
@@ -32,7 +32,8 @@ def test_roles_parameters_and_motion():
     pad.palpate.k, pad.palpate.cn, pad.palpate.unit = 1000.0, 10.0, "mV"
     scene.render.fps, scene.render.fps_base = 30, 1.001
     scene.frame_set(3)
-    scenario, binding = sampled(scene)
+    reading = sampled(scene)
+    scenario = reading.scenario
     assert scene.frame_current == 3
     assert [s.name for s in scenario.sensors] == ["Pad"] and [t.name for t in scenario.targets] == ["Ball"]
     parameters = scenario.sensors[0].parameters
@@ -47,19 +48,19 @@ def test_roles_parameters_and_motion():
         scene.frame_set(frame)
         heights.append(target.matrix_world.translation.z)
     assert body.motion.positions[:, 2].tolist() == heights
-    assert binding.objects(scene) == [pad, target]
+    assert reading.objects(scene) == [pad, target]
 
 
 def test_the_grid_of_the_pad_is_found():
     scene, *_ = press()
-    texels = sampled(scene)[0].sensors[0].texels
+    texels = sampled(scene).scenario.sensors[0].texels
     assert texels.layout.shape == (14, 6)
     assert texels.normal == pytest.approx(np.tile([0.0, 0.0, 1.0], (84, 1)))
 
 
 def test_unit_scale_makes_metres():
     scene, pad, target = press()
-    here, _ = sampled(scene)
+    here = sampled(scene).scenario
     for obj in (pad, target):
         obj.data.transform(Matrix.Scale(1000.0, 4))
     for curve in _curves(target):
@@ -68,8 +69,9 @@ def test_unit_scale_makes_metres():
             point.handle_left.y *= 1000.0
             point.handle_right.y *= 1000.0
     scene.unit_settings.scale_length = 0.001
-    there, binding = sampled(scene)
-    assert binding.scale == pytest.approx(0.001)
+    reading = sampled(scene)
+    there = reading.scenario
+    assert reading.metres_per_unit == pytest.approx(0.001)
     for one, other in zip(here.bodies, there.bodies, strict=True):
         assert other.motion.positions == pytest.approx(one.motion.positions, abs=1e-8)
     assert there.sensors[0].texels.position == pytest.approx(here.sensors[0].texels.position, abs=1e-8)
@@ -81,7 +83,7 @@ def test_unit_scale_makes_metres():
 def _curves(obj):
     from palpate.addon.session import fcurves
 
-    return fcurves.of(obj)
+    return fcurves.of_object(obj)
 
 
 @pytest.mark.parametrize("scale", [(2.0, 2.0, 2.0), (1.0, 2.0, 0.5), (-1.0, 1.0, 1.0), (1.0, -2.0, 3.0), (-1.0, -1.0, -1.0)])
@@ -92,7 +94,7 @@ def test_scale_is_in_the_vertices(scale):
     target.scale = scale
     target.rotation_euler = (0.3, -0.2, 0.9)
     scene.view_layers[0].update()
-    scenario, _ = sampled(scene)
+    scenario = sampled(scene).scenario
     body, found = of(scenario, "Ball")
     world = found.mesh.vertices @ transforms.rotation(body.motion.quaternions[0]).T + body.motion.positions[0]
     expected = np.array([target.matrix_world @ vertex.co for vertex in target.data.vertices])
@@ -104,7 +106,7 @@ def test_scale_is_in_the_vertices(scale):
 def test_a_mirrored_object_is_mentioned():
     scene, _, target = press()
     target.scale.x = -1.0
-    assert "mirrors" in " ".join(sampled(scene)[1].warnings)
+    assert "mirrors" in " ".join(sampled(scene).warnings)
 
 
 def test_shear_is_in_the_vertices_too():
@@ -116,7 +118,7 @@ def test_shear_is_in_the_vertices_too():
     target.parent = parent
     target.rotation_euler.z = 0.4
     scene.view_layers[0].update()
-    body, found = of(sampled(scene)[0], "Ball")
+    body, found = of(sampled(scene).scenario, "Ball")
     rotation = transforms.rotation(body.motion.quaternions[0])
     world = found.mesh.vertices @ rotation.T + body.motion.positions[0]
     expected = np.array([target.matrix_world @ vertex.co for vertex in target.data.vertices])
@@ -128,8 +130,8 @@ def test_quaternions_agree_with_blenders(seed):
     rng = np.random.default_rng(seed)
     q = rng.normal(size=4)
     q /= np.linalg.norm(q)
-    matrix = transforms.array(Quaternion(q).to_matrix().to_4x4())
-    location, found, stretch = transforms.split(matrix)
+    matrix = transforms.as_array(Quaternion(q).to_matrix().to_4x4())
+    location, found, stretch = transforms.decompose(matrix)
     assert found == pytest.approx(q if q[0] >= 0 else -q, abs=1e-6)
     assert stretch == pytest.approx(np.eye(3), abs=1e-6)
     assert transforms.rotation(found) == pytest.approx(matrix[:3, :3], abs=1e-6)
@@ -175,11 +177,12 @@ def test_hidden_objects_take_no_part_and_are_mentioned():
     other.palpate.role = "TARGET"
     for hide in (lambda on: other.hide_set(on), lambda on: setattr(other, "hide_viewport", on)):
         hide(True)
-        scenario, binding = sampled(scene)
+        reading = sampled(scene)
+        scenario = reading.scenario
         assert [t.name for t in scenario.targets] == ["Ball"]
-        assert binding.warnings == ("'Hidden' is hidden and takes no part.",)
+        assert reading.warnings == ("'Hidden' is hidden and takes no part.",)
         hide(False)
-    assert len(sampled(scene)[0].targets) == 2
+    assert len(sampled(scene).scenario.targets) == 2
 
 
 def test_modifiers_count():
@@ -187,14 +190,16 @@ def test_modifiers_count():
     target.modifiers.new("Half", "DECIMATE").ratio = 0.5
     wave = pad.modifiers.new("Bend", "SIMPLE_DEFORM")
     wave.deform_method, wave.deform_axis, wave.angle = "BEND", "Z", math.radians(30)
-    scenario, binding = sampled(scene)
+    reading = sampled(scene)
+    scenario = reading.scenario
     assert len(of(scenario, "Ball")[1].mesh.vertices) < len(target.data.vertices)
     assert np.ptp(scenario.sensors[0].texels.position[:, 2]) + np.ptp(scenario.sensors[0].texels.position[:, 1]) != 0.05
-    assert binding.warnings == ()
+    assert reading.warnings == ()
     pad.modifiers.new("More", "SUBSURF")
-    scenario, binding = sampled(scene)
+    reading = sampled(scene)
+    scenario = reading.scenario
     assert len(scenario.sensors[0].texels) == 84
-    assert "number of vertices of sensor 'Pad'" in binding.warnings[0]
+    assert "number of vertices of sensor 'Pad'" in reading.warnings[0]
 
 
 def test_a_text_can_press():
@@ -204,7 +209,7 @@ def test_a_text_can_press():
     text = bpy.context.object
     text.data.extrude = 0.01
     text.palpate.role = "TARGET"
-    mesh = sampled(scene)[0].targets[0].mesh
+    mesh = sampled(scene).scenario.targets[0].mesh
     assert len(mesh.triangles) > 100
 
 
@@ -213,7 +218,7 @@ def test_a_free_body_has_mass_and_inertia():
     box = cube(size=0.02)
     box.palpate.role, box.palpate.body, box.palpate.mass = "TARGET", "FREE", 3.0
     box.palpate.velocity = (0.0, 0.0, -1.0)
-    body, _ = of(sampled(scene)[0], "Cube")
+    body, _ = of(sampled(scene).scenario, "Cube")
     assert body.free and body.mass == 3.0
     assert body.inertia == pytest.approx(np.eye(3) * 3.0 * 0.02**2 / 6, rel=1e-6, abs=1e-12)
     assert body.velocity.tolist() == [0.0, 0.0, -1.0]
@@ -242,7 +247,7 @@ def test_two_scenes_are_sampled_apart():
     other = bpy.data.scenes.new("Other")
     with pytest.raises(SceneError, match="'Other' has no sensor"):
         sampled(other)
-    assert len(sampled(scene)[0].sensors) == 1
+    assert len(sampled(scene).scenario.sensors) == 1
 
 
 def test_the_region_is_the_vertex_group():
@@ -251,16 +256,16 @@ def test_the_region_is_the_vertex_group():
     group.add([0, 1, 2, 6, 7, 8], 1.0, "REPLACE")
     group.add([12, 13, 14], 0.4, "REPLACE")
     pad.palpate.region, pad.palpate.vertex_group = "GROUP", "Tip"
-    assert sampled(scene)[0].sensors[0].texels.vertex.tolist() == [0, 1, 2, 6, 7, 8]
+    assert sampled(scene).scenario.sensors[0].texels.vertex.tolist() == [0, 1, 2, 6, 7, 8]
     pad.palpate.threshold = 0.4
-    assert len(sampled(scene)[0].sensors[0].texels) == 9
+    assert len(sampled(scene).scenario.sensors[0].texels) == 9
 
 
 def test_a_pad_is_not_read_out():
     scene, *_ = press()
     table = grid("Table", (0.1, 0.0, 0.0))
     table.palpate.role = "PAD"
-    assert [(s.name, s.readout) for s in sampled(scene)[0].sensors] == [("Pad", True), ("Table", False)]
+    assert [(s.name, s.readout) for s in sampled(scene).scenario.sensors] == [("Pad", True), ("Table", False)]
 
 
 def test_contact_points_and_normal_law_go_there_and_back():
@@ -268,8 +273,8 @@ def test_contact_points_and_normal_law_go_there_and_back():
 
     scene, pad, _ = press()
     pad.palpate.points_per_texel, pad.palpate.normal_law, pad.palpate.exponent = "9", "hunt-crossley", 2.0
-    found = sampled(scene)[0].sensors[0].parameters
+    found = sampled(scene).scenario.sensors[0].parameters
     assert (found.points_per_texel, found.normal_law, found.exponent) == (9, "hunt-crossley", 2.0)
     pad.palpate.points_per_texel, pad.palpate.normal_law = "1", "linear"
     exchange.put_parameters(pad, found)
-    assert sampled(scene)[0].sensors[0].parameters == found
+    assert sampled(scene).scenario.sensors[0].parameters == found

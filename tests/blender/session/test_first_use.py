@@ -14,7 +14,7 @@ import bpy
 import pytest
 
 from palpate.addon.bake import bake as baking
-from palpate.addon.session import dependencies, first_use
+from palpate.addon.session import dependencies, first_use, frame_status
 from palpate.addon.timeline import playback
 from palpate.core.jobs.job_runner import run_job
 from palpate.core.solver import precompile, precompile_process
@@ -25,7 +25,7 @@ def window(monkeypatch, tmp_path):
     """As if there were a window, and nothing compiled; the compiler is replaced by a script that the test chooses."""
     monkeypatch.setattr(first_use, "has_window", lambda: True)
     monkeypatch.setattr(precompile, "_done", False)
-    monkeypatch.setattr(precompile, "folder", lambda: tmp_path)  # of the note that it is done; numba's own cache stays
+    monkeypatch.setattr(precompile, "cache_folder", lambda: tmp_path)  # of the note that it is done; numba's own cache stays
 
     def compiler(source):
         script = tmp_path / "compiler.py"
@@ -58,33 +58,33 @@ def is_gone(process):
 def test_the_first_sensor_starts_it_and_disabling_ends_it(window):
     assert first_use.progress() is None
     make_sensor()
-    process = first_use._work.process
-    log = first_use._work.log
+    process = first_use._compilation.process
+    log = first_use._compilation.log
     assert process.poll() is None and not first_use.is_ready()
     assert "first use" in first_use.progress().text
     bpy.ops.preferences.addon_disable(module="palpate")
     assert is_gone(process) and not log.exists()
-    assert not bpy.app.timers.is_registered(first_use._watch)
+    assert not bpy.app.timers.is_registered(first_use._poll)
     bpy.ops.preferences.addon_enable(module="palpate")
 
 
 def test_it_is_started_once(window):
     make_sensor()
-    process = first_use._work.process
+    process = first_use._compilation.process
     first_use.begin()
-    assert first_use._work.process is process
+    assert first_use._compilation.process is process
 
 
 def test_playing_waits_and_goes_on_when_it_is_ready(window):
     make_sensor()
     scene = bpy.context.scene
     scene.frame_set(2)
-    assert "solver is ready" in playback.status(scene).text
-    assert not playback._refused
+    assert "solver is ready" in frame_status.status_of(scene).text
+    assert not playback._errors
     precompile.completion_file().touch()
     assert first_use.is_ready() and first_use.progress() is None
     scene.frame_set(1)
-    assert playback.status(scene).frame is not None
+    assert frame_status.status_of(scene).frame is not None
 
 
 def test_a_bake_waits_with_progress_and_can_be_stopped(window, tmp_path):
@@ -127,11 +127,11 @@ def test_without_a_window_it_is_compiled_in_place_with_a_line_on_stderr(monkeypa
     monkeypatch.setattr(precompile, "_done", False)
     monkeypatch.setattr(precompile, "completion_file", lambda: tmp_path / "stamp")
     make_sensor()
-    assert first_use._work is None and first_use.is_ready()
-    dependencies.solver()
+    assert first_use._compilation is None and first_use.is_ready()
+    dependencies.load_solver()
     assert "first use only" in capfd.readouterr().err
     assert (tmp_path / "stamp").exists() and not precompile.is_needed()
-    dependencies.solver()
+    dependencies.load_solver()
     assert capfd.readouterr().err == ""
 
 

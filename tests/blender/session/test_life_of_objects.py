@@ -21,7 +21,7 @@ from palpate.core.solver.simulation import run
 def forces(scene=None):
     """Sum of the normal forces of every sensor at the last frame."""
     scene = scene or bpy.context.scene
-    recording = run(run_job(scene_reader.sample_scenario(scene))[0])
+    recording = run(run_job(scene_reader.read_scene(scene)).scenario)
     return {name: float(felt.normal_force[-1].sum()) for name, felt in recording.sensors.items()}
 
 
@@ -33,7 +33,7 @@ def choose(*objects):
 
 def kinds(obj):
     bpy.context.view_layer.update()
-    return [problem.kind for problem in sensor_report.now(obj, bpy.context.scene).problems]
+    return [problem.kind for problem in sensor_report.fresh_report(obj, bpy.context.scene).problems]
 
 
 @pytest.mark.parametrize("linked", [False, True])
@@ -90,8 +90,8 @@ def test_mirrored_upside_down_it_faces_down():
     scene, pad, _ = press(4)
     pad.scale.z = -1.0
     bpy.context.view_layer.update()
-    texels = sensor_report.now(pad, scene).texels
-    frame = transforms.rotation(transforms.split(np.array(pad.matrix_world, float))[1])
+    texels = sensor_report.fresh_report(pad, scene).texels
+    frame = transforms.rotation(transforms.decompose(np.array(pad.matrix_world, float))[1])
     assert texels.normal @ frame.T == pytest.approx(np.tile([0, 0, -1.0], (84, 1)), abs=1e-6)
 
 
@@ -99,7 +99,7 @@ def test_a_mirror_modifier_says_what_to_do():
     scene, pad, _ = press(2)
     pad.modifiers.new("Mirror", "MIRROR")
     assert kinds(pad) == ["MODIFIER"]
-    text = sensor_report.now(pad, scene).problems[0].text
+    text = sensor_report.fresh_report(pad, scene).problems[0].text
     assert "apply it" in text
     bpy.context.view_layer.objects.active = pad
     assert bpy.ops.palpate.fix(kind="MODIFIER") == {"FINISHED"}
@@ -116,7 +116,7 @@ def test_joined_by_region():
         bpy.ops.palpate.sensor_add(source="SELECTION")
     choose(other, pad)
     bpy.ops.object.join()
-    assert len(sensor_report.now(pad, scene).texels) == 24
+    assert len(sensor_report.fresh_report(pad, scene).texels) == 24
     assert kinds(pad) == []
 
 
@@ -143,7 +143,7 @@ def test_separated():
     parts = [obj for obj in scene.objects if obj.name.startswith("Pad")]
     assert len(parts) == 2
     assert {obj.palpate.k for obj in parts} == {99.0}
-    assert len({identity.key(obj) for obj in parts if identity.ensure(obj) is None}) == 2
+    assert len({identity.key(obj) for obj in parts if identity.ensure_uid(obj) is None}) == 2
     assert all("GROWN" in kinds(obj) for obj in parts)  # fewer vertices than were made a sensor: said, one click accepts it
     assert set(forces()) == {obj.name for obj in parts}
 
@@ -153,7 +153,7 @@ def test_separated_without_any_of_its_region_says_so():
     select(pad, range(12))
     bpy.ops.palpate.sensor_add(source="SELECTION")
     pad.vertex_groups.clear()
-    report = sensor_report.now(pad, bpy.context.scene)
+    report = sensor_report.fresh_report(pad, bpy.context.scene)
     assert "no vertex group 'Palpate Sensor'" in report.problems[0].text
 
 
@@ -252,11 +252,11 @@ def test_edited_while_it_is_a_sensor():
     pad = grid()
     select(pad, range(84))
     bpy.ops.palpate.sensor_add(source="SELECTION")
-    before = len(sensor_report.now(pad, bpy.context.scene).texels)
+    before = len(sensor_report.fresh_report(pad, bpy.context.scene).texels)
     bpy.ops.object.mode_set(mode="EDIT")
     bpy.ops.mesh.select_all(action="SELECT")
     bpy.ops.mesh.subdivide()
     bpy.ops.object.mode_set(mode="OBJECT")
     assert before == 84
-    assert len(sensor_report.now(pad, bpy.context.scene).texels) == 11 * 27
-    assert np.isfinite(sensor_report.now(pad, bpy.context.scene).density)
+    assert len(sensor_report.fresh_report(pad, bpy.context.scene).texels) == 11 * 27
+    assert np.isfinite(sensor_report.fresh_report(pad, bpy.context.scene).density)

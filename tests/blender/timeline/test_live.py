@@ -11,7 +11,7 @@ from blender_scenes import changes, dump, press, press_and_drop, reopen, save
 from palpate.addon.bake.bake import bake
 from palpate.addon.display import materials
 from palpate.addon.events import handlers as handlers_of_palpate
-from palpate.addon.session import session_state
+from palpate.addon.session import frame_status, session_state
 from palpate.addon.timeline import live_cache, playback
 from palpate.core.jobs.job_runner import run_job
 from palpate.core.model.recording import SensorFrame
@@ -54,10 +54,10 @@ def test_it_shows_forces_and_moves_free_bodies():
     play(scene, *range(1, 9))
     frame = live_cache.get(scene).frames[8]
     assert shown_force(pad) == pytest.approx(frame.sensors["Pad"].normal_force, abs=1e-7)
-    index = live_cache.get(scene).binding.names.index("Cube")
+    index = live_cache.get(scene).reading.object_names.index("Cube")
     assert list(free.location) == pytest.approx(frame.poses[index, :3], abs=1e-7)
     assert free.location.z < start
-    assert playback.status(scene).frame is frame
+    assert frame_status.status_of(scene).frame is frame
 
 
 def test_scrubbing_reads_what_was_computed():
@@ -77,21 +77,21 @@ def test_a_jump_shows_nothing_and_says_so():
     scene, *_ = press(frames=20)
     play(scene, 1, 2, 15)
     assert sorted(live_cache.get(scene).frames) == [1, 2]
-    status = playback.status(scene)
+    status = frame_status.status_of(scene)
     assert status.frame is None and status.text == "Frame 15 is not computed: play from frame 2, or use Compute to Here."
     play(scene, 3)
-    assert playback.status(scene).step == live_cache.get(scene).simulation.step_reason != ""
-    assert playback.status(scene).frame.frame == 3
+    assert frame_status.status_of(scene).step == live_cache.get(scene).simulation.step_reason != ""
+    assert frame_status.status_of(scene).frame.frame == 3
 
 
 def test_a_jump_ahead_is_computed_with_progress(tmp_path):
     scene, *_ = press_and_drop(frames=12)
     play(scene, 1, 2, 9)
     steps = []
-    run_job(playback.catch_up(scene), lambda step: steps.append((step.frame, step.done, step.total)))
+    run_job(playback.compute_to_present_frame(scene), lambda step: steps.append((step.frame, step.done, step.total)))
     assert steps == [(frame, frame - 2, 7) for frame in range(3, 10)] and scene.frame_current == 9
     jumped = live_cache.get(scene).frames[9]
-    assert playback.status(scene).frame is jumped
+    assert frame_status.status_of(scene).frame is jumped
     bpy.ops.palpate.reset()
     play(scene, 1, 11)
     assert bpy.ops.palpate.catch_up() == {"FINISHED"}
@@ -105,7 +105,7 @@ def test_a_jump_ahead_is_computed_with_progress(tmp_path):
 def test_a_stopped_jump_keeps_what_was_computed():
     scene, *_ = press(frames=12)
     play(scene, 1, 10)
-    job = playback.catch_up(scene)
+    job = playback.compute_to_present_frame(scene)
     next(job), next(job)
     job.close()
     assert sorted(live_cache.get(scene).frames) == [1, 2, 3] and scene.frame_current == 10
@@ -205,8 +205,8 @@ def test_time_stretching_shows_the_same_bake_slower(tmp_path):
     assert (scene.render.frame_map_old, scene.render.frame_map_new) == (100, 200)
     assert watched(scene, free, [(2 * number, 0.0) for number in range(1, 9)]) == pytest.approx(at_speed, abs=1e-6)
     scene.frame_set(16)
-    assert playback.status(scene).text == "Frame 8 of the bake."
-    assert playback.status(scene).step == plain.step_reason != ""
+    assert frame_status.status_of(scene).text == "Frame 8 of the bake."
+    assert frame_status.status_of(scene).step == plain.step_reason != ""
     arrows = {}
     for number in (2, 16):  # of the timeline; nothing touches at the animation's frame 1
         scene.frame_set(number)
@@ -222,17 +222,17 @@ def test_play_from_the_first_frame_starts_with_the_second():
     scene.palpate.use_live = False
     scene.frame_set(1)
     scene.palpate.use_live = True
-    live_cache.clear()
+    live_cache.drop_all()
     play(scene, 2, 3)
     assert sorted(live_cache.get(scene).frames) == [1, 2, 3]
 
 
 def test_a_start_in_the_middle_computes_nothing():
     scene, *_ = press(frames=8)
-    live_cache.clear()
+    live_cache.drop_all()
     play(scene, 5, 6)
     assert live_cache.get(scene) is None
-    assert "go to the first frame" in playback.status(scene).text
+    assert "go to the first frame" in frame_status.status_of(scene).text
 
 
 @pytest.mark.parametrize(
@@ -257,7 +257,7 @@ def test_a_change_makes_it_stale(change):
     bpy.context.view_layer.update()
     play(scene, 4)
     assert live_cache.get(scene) is None
-    assert playback.status(scene).frame is None
+    assert frame_status.status_of(scene).frame is None
 
 
 def test_its_own_writing_does_not_make_it_stale():
@@ -284,7 +284,7 @@ def test_a_free_body_moved_at_the_first_frame_starts_there():
     free.location.z = 0.05
     bpy.context.view_layer.update()
     play(scene, 2)
-    index = live_cache.get(scene).binding.names.index("Cube")
+    index = live_cache.get(scene).reading.object_names.index("Cube")
     assert live_cache.get(scene).frames[1].poses[index, 2] == pytest.approx(0.05)
 
 
@@ -292,7 +292,7 @@ def test_an_error_is_said_in_the_panel_and_not_at_every_frame(capfd):
     scene, pad, _ = press(frames=4)
     pad.palpate.mud = 0.9  # above mus
     play(scene, 1, 2, 3)
-    assert "mud of sensor 'Pad'" in playback.status(scene).text
+    assert "mud of sensor 'Pad'" in frame_status.status_of(scene).text
     assert "Traceback" not in capfd.readouterr().err
 
 
@@ -435,7 +435,7 @@ def test_the_numbers_of_a_bake_follow_a_file_saved_elsewhere(tmp_path):
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "there" / "scene.blend"), relative_remap=True)
     scene = reopen(tmp_path / "there" / "scene.blend")
     play(scene, 3)
-    assert playback.status(scene).frame.sensors["Pad"].normal_force.tolist() == felt.normal_force[2].tolist()
+    assert frame_status.status_of(scene).frame.sensors["Pad"].normal_force.tolist() == felt.normal_force[2].tolist()
 
 
 def test_rendering_never_simulates(tmp_path):
@@ -454,7 +454,7 @@ def test_rendering_never_simulates(tmp_path):
     run = live_cache.get(scene)
     assert sorted(run.frames) == [1, 2]
     assert [frame for frame, _ in seen] == [1, 2, 3, 4]
-    index = run.binding.names.index("Cube")
+    index = run.reading.object_names.index("Cube")
     assert seen[1][1] == pytest.approx(run.frames[2].poses[index, 2])  # remembered frames are shown
     assert not session_state.session.rendering
 
@@ -467,15 +467,17 @@ def test_a_baked_scene_is_not_simulated_again(tmp_path):
     play(scene, 1, 2, 3)
     assert live_cache.get(scene) is None
     assert (
-        playback.status(scene).frame.sensors["Pad"].normal_force.tolist() == recording.sensors["Pad"].normal_force[2].tolist()
+        frame_status.status_of(scene).frame.sensors["Pad"].normal_force.tolist()
+        == recording.sensors["Pad"].normal_force[2].tolist()
     )
     scene = reopen(path)
     play(scene, 4)
     assert (
-        playback.status(scene).frame.sensors["Pad"].normal_force.tolist() == recording.sensors["Pad"].normal_force[3].tolist()
+        frame_status.status_of(scene).frame.sensors["Pad"].normal_force.tolist()
+        == recording.sensors["Pad"].normal_force[3].tolist()
     )
     play(scene, 9)
-    assert playback.status(scene).frame is None
+    assert frame_status.status_of(scene).frame is None
 
 
 def test_a_scene_without_roles_costs_nothing(monkeypatch):
@@ -506,11 +508,11 @@ def test_a_bake_that_is_out_of_date_says_so(tmp_path, change):
     scene = reopen(path)
     for frame in (1, 2, 4, 3):
         scene.frame_set(frame)
-        assert playback.status(scene).text == f"Frame {frame} of the bake."
+        assert frame_status.status_of(scene).text == f"Frame {frame} of the bake."
     pad = bpy.data.objects["Pad"]
     change(scene, pad, bpy.data.objects["Ball"])
     pad.data.update()
     bpy.context.view_layer.update()
     play(scene, 2)
-    assert playback.status(scene).text.startswith("The bake is out of date")
-    assert playback.status(scene).frame is not None  # it is still shown
+    assert frame_status.status_of(scene).text.startswith("The bake is out of date")
+    assert frame_status.status_of(scene).frame is not None  # it is still shown

@@ -7,7 +7,8 @@ import pytest
 from blender_scenes import ball, press, press_and_drop, reopen, save
 
 from palpate.addon.bake.bake import bake
-from palpate.addon.timeline import live_cache, playback
+from palpate.addon.session import frame_status
+from palpate.addon.timeline import live_cache
 from palpate.core.jobs.job_runner import run_job
 
 FRESH, STALE = "Frame {} of the bake.", "The bake is out of date, something has changed since: bake again."
@@ -44,7 +45,7 @@ def texts(scene, frames):
     found = []
     for frame in frames:
         scene.frame_set(frame)
-        found.append(playback.status(scene).text)
+        found.append(frame_status.status_of(scene).text)
     return found
 
 
@@ -52,13 +53,13 @@ def test_nothing_changed_is_fresh_at_every_frame(baked):
     frames = (1, 2, 3, 4, 5, 6, 4, 2, 1)
     assert texts(baked, frames) == [FRESH.format(frame) for frame in frames]
     baked.frame_set(3, subframe=0.5)
-    assert playback.status(baked).text == FRESH.format(3)
+    assert frame_status.status_of(baked).text == FRESH.format(3)
 
 
 def curves_of(obj):
     from palpate.addon.session import fcurves
 
-    return fcurves.of(obj)
+    return fcurves.of_object(obj)
 
 
 def bow(curve):
@@ -89,7 +90,7 @@ def test_a_change_is_noticed_at_whatever_frame_is_shown_next(baked, change):
     CHANGES[change](pad, target)
     bpy.context.view_layer.update()
     assert texts(baked, [5, 2]) == [STALE, STALE]
-    assert playback.status(baked).frame is not None  # it is still shown
+    assert frame_status.status_of(baked).frame is not None  # it is still shown
 
 
 def keyed(owner, path, index=-1):

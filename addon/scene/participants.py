@@ -1,0 +1,40 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Which objects of a scene take part, and the dependency graph from which they are read.
+
+Every object with a role that the view layer shows takes part. Hidden and disabled objects are left out, with a warning.
+Instances of collections never take part.
+"""
+
+from __future__ import annotations
+
+OBJECT_TYPES = {"MESH", "CURVE", "SURFACE", "FONT", "META"}
+"""Types of objects that have a mesh or can be converted to one."""
+
+
+def view_layer_of(scene):
+    """Return the view layer that decides what takes part: the window's, else the scene's first."""
+    import bpy
+
+    context = bpy.context
+    return context.view_layer if context.scene == scene and context.view_layer else scene.view_layers[0]
+
+
+def depsgraph_of(scene):
+    """Return the up-to-date dependency graph of a scene's present frame."""
+    layer = view_layer_of(scene)
+    layer.update()
+    return layer.depsgraph
+
+
+def find_participants(scene) -> tuple[list, list[str]]:
+    """Return the objects that take part, in the scene's order, and a warning for each object that is hidden."""
+    layer = view_layer_of(scene)
+    found, warnings = [], []
+    for obj in scene.objects:
+        if obj.palpate.role == "NONE" or obj.type not in OBJECT_TYPES:
+            continue
+        if obj.visible_get(view_layer=layer):
+            found.append(obj)
+        else:
+            warnings.append(f"'{obj.name}' is hidden and takes no part.")
+    return found, warnings

@@ -1,0 +1,50 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What is known about the frame at which each scene stands. The timeline writes it; panels and overlays read it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ...core.model.recording import Frame
+
+
+@dataclass(frozen=True)
+class FrameStatus:
+    """What the panel says about the present frame.
+
+    Attributes
+    ----------
+    text : str
+        One or more sentences for the user.
+    frame : Frame or None
+        The numbers of this frame, where there are any.
+    step : str
+        Why the solver chose its substep.
+    """
+
+    text: str
+    frame: Frame | None = None
+    step: str = ""
+
+
+_statuses: dict[int, FrameStatus] = {}
+
+
+def status_of(scene) -> FrameStatus:
+    """Return what is known about a scene's present frame; fast enough to be called while drawing."""
+    return _statuses.get(scene.session_uid, FrameStatus("Not computed: go to the first frame and play."))
+
+
+def set_status(scene, text: str, frame: Frame | None = None, step: str = "") -> None:
+    """Replace what is known about a scene's present frame; see :class:`FrameStatus`."""
+    _statuses[scene.session_uid] = FrameStatus(text, frame, step)
+
+
+def forget(scene) -> None:
+    """Forget the status of one scene."""
+    _statuses.pop(scene.session_uid, None)
+
+
+def forget_all() -> None:
+    """Forget the status of every scene."""
+    _statuses.clear()
