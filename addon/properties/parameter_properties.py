@@ -66,10 +66,14 @@ class SensorParameterProperties:
     __annotations__ = {name: property_of(specification) for name, specification in SENSOR_PARAMETERS.items()}
 
 
-class DriveParameterProperties:
-    """The parameters of a drive that have a label, each under its name behind ``drive_``."""
+DRIVE_PARAMETER_PROPERTIES = {f"drive_{name}": name for name, item in DRIVE_PARAMETERS.items() if item.label}
+"""Properties that hold a drive's parameters, and the names of these. A parameter without a label has no property."""
 
-    __annotations__ = {f"drive_{name}": property_of(item) for name, item in DRIVE_PARAMETERS.items() if item.label}
+
+class DriveParameterProperties:
+    """The parameters of a drive."""
+
+    __annotations__ = {key: property_of(DRIVE_PARAMETERS[name]) for key, name in DRIVE_PARAMETER_PROPERTIES.items()}
 
 
 def sensor_parameters(settings) -> SensorParameters:
@@ -86,3 +90,8 @@ def put_sensor_parameters(settings, parameters: SensorParameters) -> None:
     for name, specification in SENSOR_PARAMETERS.items():
         value = getattr(parameters, name)
         setattr(settings, name, str(value) if isinstance(specification, ChoiceParameter) else value)
+
+
+def drive_parameters(settings) -> dict[str, float]:
+    """Return the values by name of those parameters of a drive that the settings of an object hold."""
+    return {name: units.as_typed(getattr(settings, key)) for key, name in DRIVE_PARAMETER_PROPERTIES.items()}

@@ -12,14 +12,12 @@ import numpy as np
 from ...core.errors import SceneError
 from ...core.model.drive import Drive
 from ...core.model.motion import Signal
+from ..properties.parameter_properties import DRIVE_PARAMETER_PROPERTIES, drive_parameters
 from ..session import transforms, units
 
 TARGET_PROPERTIES = {"POSITION": "drive_position", "VELOCITY": "drive_speed", "FORCE": "drive_force"}
 """Property that holds the target, by kind of control."""
-DRIVE_PROPERTIES = (
-    "drive_control", "drive_axis", "drive_space", "drive_stiffness", "drive_damping", "drive_max_force", "drive_max_speed",
-    "drive_settling", "drive_sensor", "drive_leader",
-)  # fmt: skip
+DRIVE_PROPERTIES = (*DRIVE_PARAMETER_PROPERTIES, "drive_control", "drive_axis", "drive_space", "drive_sensor", "drive_leader")
 """Properties of a drive that are constant during a run."""
 
 
@@ -49,11 +47,7 @@ def drive_of(obj, matrix: np.ndarray, depsgraph) -> Drive:
         target=Signal.constant(drive_target(obj, depsgraph)),
         axis=axis,
         axis_in_world=settings.drive_space == "WORLD",
-        stiffness=units.as_typed(settings.drive_stiffness),
-        damping=units.as_typed(settings.drive_damping),
-        max_force=units.as_typed(settings.drive_max_force),
-        max_speed=units.as_typed(settings.drive_max_speed),
-        settling=units.as_typed(settings.drive_settling),
+        **drive_parameters(settings),
     )
 
 
