@@ -52,7 +52,7 @@ lint: env
 	$(BIN)/mypy
 
 test: lint env50
-	$(BIN)/python -m pytest tests/core tests/blender $(PYTEST_ARGS)
+	$(BIN)/python -m pytest tests/core tests/tools tests/blender $(PYTEST_ARGS)
 	$(VENV50)/bin/python -m pytest tests/blender $(PYTEST_ARGS)
 
 test-ui: env

@@ -55,9 +55,9 @@ def count(root: Path = ROOT) -> Counts:
     for file, source in graph.sources.items():
         tree = ast.parse(source)
         _count_functions(file, tree, counts)
-        counts.normal_law += _places(file, tree, _is_damping_of_hunt_and_crossley)
-        counts.friction_step += _places(file, tree, _is_friction_step)
-        counts.parameter_tables += [f"{file.as_posix()}:{line}" for line in _parameter_tables(tree)]
+        counts.normal_law += _places(file, tree, is_normal_law)
+        counts.friction_step += _places(file, tree, is_friction_step)
+        counts.parameter_tables += [f"{file.as_posix()}:{line}" for line in parameter_tables(tree)]
     counts.untyped_modules = _untyped_modules(root, graph)
     return counts
 
@@ -99,7 +99,7 @@ def _factors(node: ast.AST) -> Iterator[ast.AST]:
         yield node
 
 
-def _is_damping_of_hunt_and_crossley(node: ast.AST) -> bool:
+def is_normal_law(node: ast.AST) -> bool:
     """True for a product with 3/2 and a dissipation: only who writes the normal law out needs it."""
     factors = list(_factors(node))
     constant = any(isinstance(f, ast.Constant) and f.value == 1.5 for f in factors) or any(
@@ -108,7 +108,7 @@ def _is_damping_of_hunt_and_crossley(node: ast.AST) -> bool:
     return constant and any("dissipation" in name.lower() for f in factors for name in _names(f))
 
 
-def _is_friction_step(node: ast.AST) -> bool:
+def is_friction_step(node: ast.AST) -> bool:
     """True for a sum ``keep · z + gain · v``: only who advances the friction state needs it."""
     if not (isinstance(node, ast.BinOp) and isinstance(node.op, ast.Add)):
         return False
@@ -124,7 +124,7 @@ def _places(file: Path, tree: ast.AST, is_formula) -> list[str]:
     return sorted(inside)
 
 
-def _parameter_tables(tree: ast.AST) -> Iterator[int]:
+def parameter_tables(tree: ast.AST) -> Iterator[int]:
     """Lines at which a literal or a class names most of the contact parameters."""
     for node in ast.walk(tree):
         names: list[str] = []

@@ -31,6 +31,7 @@ CAPTIONS = {
     "core.solver": "bodies and contacts over time",
     "core.io": "files in and out",
     "core.figures": "images, curves, strips",
+    "core.export": "a bake for other programs",
     "core.gap": "what a sensor's model lacks",
     "addon.session": "units, clock, identity, jobs",
     "addon.properties": "settings kept in the .blend",
@@ -208,7 +209,7 @@ def draw(rooms: Rooms, path: Path = PICTURE) -> None:
     towers = {p: layout(rooms.inside[p], ORDER[p]) for p in ("addon", "core")}
     wide = {p: max(sum(map(_width, layer)) for layer in tower.layers) + 0.5 for p, tower in towers.items()}
     tall = max(len(tower.layers) for tower in towers.values()) * ROW
-    width, height = sum(wide.values()) + 1.7, tall + 4.5
+    width, height = sum(wide.values()) + 1.7, tall + 3.95
     figure = Figure(figsize=(width, height))
     axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
     axes.set(xlim=(0, width), ylim=(0, height))
@@ -292,9 +293,9 @@ class _Canvas:
         """Draw the packages that drive addon and core."""
         step = (width - 0.8) / len(DRIVERS)
         for i, name in enumerate(DRIVERS):
-            self.box(name, 0.4 + step * (i + 0.5), y + 0.55, "drivers")
+            self.box(name, 0.4 + step * (i + 0.5), y + 0.72, "drivers")
         self.text(
-            width / 2, y - 0.02, "each uses addon and core; panels use operators, commands use paper and sample_blends", 9, PALE
+            width / 2, y + 0.03, "each uses addon and core; panels use operators, commands use paper and sample_blends", 9, PALE
         )
 
     def between(self, middle: Mapping[str, float], wide: Mapping[str, float], top: float) -> None:
