@@ -73,7 +73,7 @@ def uv_layer(obj):
 def layout_warnings(obj, texels: Texels) -> list[str]:
     """Return warnings about the layout of a sensor's texels."""
     layout = texels.layout
-    small = layout.too_small() if isinstance(layout, UVLayout) and layout.map_name else 0
+    small = layout.unresolved_texels() if isinstance(layout, UVLayout) and layout.map_name else 0
     if not small:
         return []
     return [

@@ -65,7 +65,7 @@ class FigureStyle:
 
     @property
     def quantity_label(self) -> tuple[str, str]:
-        """Label of the colour bar, in two parts that may stand on lines of their own."""
+        """Label of the colour bar, in two parts that may be on separate lines."""
         return ("normal force", "per texel (N)") if self.quantity == "force" else ("pressure", "on each texel (kPa)")
 
     def values(self, sensor: SensorRecording | SensorFrame, texels: Texels) -> np.ndarray:
@@ -82,7 +82,7 @@ class FigureStyle:
         return metrics.scale_limit(metrics.peak_pressure(recording, texels) / 1e3)
 
     def matplotlib_colormap(self) -> Any:
-        """Return the colour map as matplotlib has them."""
+        """Return the colour map as an object of matplotlib."""
         from matplotlib.colors import LinearSegmentedColormap
 
         stops = [tuple(color) for color in color_maps.STOPS[self.colour_map]]
@@ -90,5 +90,5 @@ class FigureStyle:
 
 
 def force_label(value: float) -> str:
-    """Return a force in words, small ones in millinewtons."""
+    """Return a force with its unit as text, small ones in millinewtons."""
     return f"{value * 1e3:g} mN" if value < 0.1 else f"{value:g} N"

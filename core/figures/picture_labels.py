@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What is put on or beside a rendered picture of the scene: colour bar, tactile images, labels."""
+"""Colour bar, tactile images and labels on a rendered picture of the scene."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ DPI = 160
 
 @dataclass(frozen=True)
 class Label:
-    """Words on a picture with a thin line to what they are about.
+    """Words on a picture, with a thin line to what they describe.
 
     Attributes
     ----------
@@ -70,7 +70,7 @@ def label_picture(
     background.imshow(picture, aspect="auto", interpolation="none")
     background.set_axis_off()
 
-    felt = recording.at(frame).sensors
+    sensors = recording.at(frame).sensors
     top, strongest = style.scale_limit(recording, texels), metrics.peak_shear(recording)
     views = [SensorView.of(texels[name], recording.sensors[name].normal_force.sum(axis=0)) for name in texels]
     image = None
@@ -88,9 +88,9 @@ def label_picture(
         )
         y -= each
         axes = figure.add_axes((x / width, y / height, column / width, each / height))
-        values = style.values(felt[name], texels[name])
+        values = style.values(sensors[name], texels[name])
         view = view.at_size(min(column / view.width, each / view.height))
-        image = view.draw(axes, values, felt[name].shear, strongest, top, style, edge="#ffffff80")
+        image = view.draw(axes, values, sensors[name].shear, strongest, top, style, edge="#ffffff80")
     if image is not None:
         bar = figure.add_axes(((width - bar_room) / width, y / height, 0.12 / width, (y_top - y) / height))
         draw_colour_bar(figure, image, bar, style, ink="white")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A rendered picture with what the sensors feel beside it: tactile images, colour bar, and the force so far."""
+"""A rendered picture with tactile images, a colour bar and the force up to the frame beside it."""
 
 from __future__ import annotations
 
@@ -87,13 +87,13 @@ def side_by_side(
     places = _placed(parts, room, _TALL - _CURVE - _BAR - _MARGIN)
     image, low = None, _TALL
     for number, ((name, own), part, (x, y, inches)) in enumerate(zip(shown.items(), parts, places, strict=True)):
-        felt, view = recording.sensors[name], part.view.at_size(inches)
+        sensor, view = recording.sensors[name], part.view.at_size(inches)
         x, y, across, up = left + x, _TALL - _MARGIN - y, inches * view.width, inches * view.height
         colour = SERIES[number] if len(shown) > 1 else INK
         words = name if len(name) * _LETTER < part.room else name[: int(part.room / _LETTER) - 1] + "…"
         figure.text(x / width, y / _TALL, words, fontsize=FONT, color=colour, weight="bold", va="top")
         place = axes_at(x, y - _NAME - up, across, up)
-        image = view.draw(place, style.values(felt, own)[i], felt.shear[i], strongest, top, style)
+        image = view.draw(place, style.values(sensor, own)[i], sensor.shear[i], strongest, top, style)
         draw_scale_key(figure, (x, y - _NAME - up - 0.1), view, part.strongest, inches, room=part.room)
         low = min(low, y - _NAME - up - part.below(inches))
     if image is not None:
@@ -112,9 +112,9 @@ class _Part:
     room: float = 0.0
 
     @classmethod
-    def of(cls, texels: Texels, felt: SensorRecording, strongest: float) -> _Part:
-        own = float(np.linalg.norm(felt.shear, axis=2).max(initial=0.0))
-        view = SensorView.of(texels, felt.normal_force.sum(axis=0))
+    def of(cls, texels: Texels, sensor: SensorRecording, strongest: float) -> _Part:
+        own = float(np.linalg.norm(sensor.shear, axis=2).max(initial=0.0))
+        view = SensorView.of(texels, sensor.normal_force.sum(axis=0))
         return cls(view, strongest if own > SMALLEST_ARROW * strongest else 0.0)
 
     def inches(self, across: float, up: float) -> float:

@@ -41,8 +41,8 @@ class SensorView:
     seen : (n,) bool
         Which of them are not on the far side.
     triangles : (m, 3) int or None
-        What is drawn instead of an image, where the image is an atlas of single triangles that nobody could read or a map
-        without true lengths: the side of the surface that bears most, as one sees it from outside.
+        Drawn instead of the image where that is an atlas of single triangles, or a map without true lengths: the most
+        loaded side of the surface, seen from outside.
     axes : (2, 3) float or None
         Of that view, in the frame of the sensor's body; elsewhere the texels' own axes are the image's.
     most : int
@@ -62,7 +62,7 @@ class SensorView:
     def of(cls, texels: Texels, load: np.ndarray | None = None) -> SensorView:
         """Return the view of a sensor; a flattened surface has true lengths where it lies across the view.
 
-        `load`, (n,) float, tells which side of a surface that cannot be flattened is worth seeing.
+        `load`, (n,) float, weights the texels: a surface that cannot be flattened is seen from its most loaded side.
         """
         layout = texels.layout
         rows, columns = layout.shape
@@ -261,13 +261,13 @@ def _arrow_scale(view: SensorView, strongest: float, inches: float) -> tuple[str
 
 
 def widest_scale_key(view: SensorView, strongest: float, inches: float) -> float:
-    """Return the room, in inches, that :func:`keys` needs on two lines."""
+    """Return the room, in inches, that :func:`draw_scale_key` needs on two lines."""
     alone = scale_key_width(view, 0.0, inches)
     return max(alone, scale_key_width(view, strongest, inches) - alone - 0.2)
 
 
 def scale_key_width(view: SensorView, strongest: float, inches: float) -> float:
-    """Return the room, in inches, that :func:`keys` needs."""
+    """Return the room, in inches, that :func:`draw_scale_key` needs."""
     width = view.bar * inches + 0.07 + _LETTER * len(f"{view.bar:g} mm") if view.bar > 0 else 0.0
     if strongest > 0:
         words, length = _arrow_scale(view, strongest, inches)
@@ -284,10 +284,10 @@ def draw_scale_key(
     ink: str = INK,
     room: float | None = None,
 ) -> None:
-    """Below a row of images, at (x, y) inches: how long some millimetres and some newtons of shear are drawn.
+    """Draw a scale bar for lengths and an arrow for shear below a row of images, at (x, y) inches.
 
-    `inches` is the size of a millimetre; without a `strongest` shear there is no arrow. Where both need more than `room`
-    inches, the arrow stands below the bar.
+    `inches` is the size of a millimetre. There is no arrow without a `strongest` shear. If both need more than `room` inches,
+    the arrow is below the bar.
     """
     from matplotlib.lines import Line2D
     from matplotlib.patches import FancyArrowPatch
@@ -322,7 +322,7 @@ def draw_scale_key(
 
 
 def draw_colour_bar(figure: Figure, image: Any, axes: Axes, style: FigureStyle, ink: str = INK) -> None:
-    """Fill `axes` with the colour bar of an image; it lies where the axes are wider than high."""
+    """Fill `axes` with the colour bar of an image; it is horizontal where the axes are wider than high."""
     from matplotlib.ticker import MaxNLocator
 
     place, (width, height) = axes.get_position(), figure.get_size_inches()

@@ -36,10 +36,10 @@ def texel_numbers(
     frame: int,
     style: FigureStyle | None = None,
 ) -> None:
-    """Write what every texel of one sensor feels at one frame, as numbers on the tactile image.
+    """Write the force or pressure of every texel of one sensor at one frame as numbers on its tactile image.
 
-    Small forces are in millinewtons, small pressures in pascals, so that three digits say what there is to say. The colours
-    are those of the sensor's other figures. The figure is as wide as its numbers need where a column is too narrow.
+    Small forces are in millinewtons, small pressures in pascals, so that three digits suffice. The colours
+    are those of the sensor's other figures. Where a journal's column is too narrow for the numbers, the figure is wider.
 
     Parameters
     ----------

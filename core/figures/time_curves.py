@@ -116,9 +116,9 @@ class _Pen:
 
 
 def _force(axes: Axes, recording: Recording, name: str, texels: Texels, _: SensorParameters, pen: _Pen) -> None:
-    felt = recording.sensors[name]
-    axes.plot(recording.times, felt.normal_force.sum(axis=1), **pen.solid)
-    axes.plot(recording.times, np.linalg.norm(metrics.net_shear(felt, texels), axis=1), **pen.dashed)
+    sensor = recording.sensors[name]
+    axes.plot(recording.times, sensor.normal_force.sum(axis=1), **pen.solid)
+    axes.plot(recording.times, np.linalg.norm(metrics.net_shear(sensor, texels), axis=1), **pen.dashed)
     axes.set_ylabel("force (N)")
 
 
@@ -129,10 +129,10 @@ def _slip(axes: Axes, recording: Recording, name: str, _: Texels, parameters: Se
 
 
 def _centre(axes: Axes, recording: Recording, name: str, texels: Texels, _: SensorParameters, pen: _Pen) -> None:
-    felt = recording.sensors[name]
-    load = felt.normal_force.sum(axis=1)
+    sensor = recording.sensors[name]
+    load = sensor.normal_force.sum(axis=1)
     touching = (load > _LOADED * load.max(initial=0.0))[:, None]
-    place = np.where(touching, 1e3 * felt.centre_of_pressure, np.nan) @ _plane(texels).T
+    place = np.where(touching, 1e3 * sensor.centre_of_pressure, np.nan) @ _plane(texels).T
     axes.plot(recording.times, place[:, 0], **pen.solid)
     axes.plot(recording.times, place[:, 1], **pen.dashed)
     axes.set_ylabel("centre of\npressure (mm)")

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Contact points: where in a texel's cell it feels.
+"""Contact points: where on a texel's cell its forces act.
 
-The paper has one contact point per texel, at its vertex (section 6 names several as future work). Several are spread evenly
-over the part of the surface that the texel stands for, and share out its stiffness. Every point is a fixed mixture of a few
-texels, so that it follows when the surface bends.
+The paper has one contact point per texel, at its vertex (section 6 names several as future work). Several points are spread
+evenly over the part of the surface that belongs to the texel, and share its stiffness. Every point is a fixed weighted mean of
+a few texels, so that it moves with them when the surface bends.
 """
 
 from __future__ import annotations
@@ -20,16 +20,16 @@ from .texels import Texels
 
 @dataclass(frozen=True)
 class ContactPoints:
-    """The contact points of one sensor, those of a texel behind one another.
+    """The contact points of one sensor, sorted by texel.
 
     Attributes
     ----------
     texel : (p,) int
-        Whose point it is.
+        The texel that each point belongs to.
     corner : (p, 4) int
-        Texels that it is mixed from.
+        Texels whose weighted mean the point is.
     weight : (p, 4) float
-        How much of each; the sum is 1, outside the rim of a grid some are negative.
+        Weights of these texels; they sum to 1. Outside the rim of a grid some are negative.
     """
 
     texel: np.ndarray
@@ -49,8 +49,8 @@ class ContactPoints:
 def contact_points(texels: Texels, per_texel: int) -> ContactPoints:
     """Spread contact points over the cells of the texels.
 
-    In a grid a cell reaches half-way to the neighbours, and as far beyond the rim, so that all texels stand for the same
-    area. On any other mesh it is the barycentric cell: a third of each adjoining triangle, the side at the vertex.
+    In a grid a cell reaches half-way to the neighbours, and as far beyond the rim, so that all cells have the same
+    area. On any other mesh it is the barycentric cell: the third of each adjoining triangle that is nearest to the vertex.
 
     Parameters
     ----------
@@ -70,7 +70,7 @@ def contact_points(texels: Texels, per_texel: int) -> ContactPoints:
 
 
 def _in_grid(layout: GridLayout, across: int) -> tuple[np.ndarray, np.ndarray]:
-    """Mix bilinearly towards the neighbours; beyond the rim by going on as the last cell went."""
+    """Interpolate bilinearly between neighbours; extrapolate from the last cell beyond the rim."""
     number = np.empty(layout.shape, int)
     number[layout.row, layout.column] = np.arange(len(layout.row))
     offset = (np.arange(across) + 0.5) / across - 0.5
@@ -108,7 +108,7 @@ def _neighbour(place: np.ndarray, count: int, offset: np.ndarray) -> tuple[np.nd
 
 
 def _in_fans(triangles: np.ndarray, position: np.ndarray, across: int) -> tuple[np.ndarray, np.ndarray]:
-    """Rings of equal area around each vertex, with as many points on each, every ring turned by the golden ratio."""
+    """Place the points on rings of equal area around each vertex; rings are turned by the golden ratio."""
     size = 0.5 * np.linalg.norm(
         np.cross(position[triangles[:, 1]] - position[triangles[:, 0]], position[triangles[:, 2]] - position[triangles[:, 0]]),
         axis=1,

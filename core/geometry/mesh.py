@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Triangle meshes: normals, areas, mass, and what is wrong with a mesh that somebody drew."""
+"""Triangle meshes: normals, areas, mass properties, and a check for defects."""
 
 from __future__ import annotations
 
@@ -30,10 +30,10 @@ class TriangleMesh:
 def checked_mesh(
     vertices: np.ndarray, triangles: np.ndarray, name: str, quads: np.ndarray | None = None
 ) -> tuple[TriangleMesh, list[str]]:
-    """Return a mesh that the solver can use, and what was repaired or is worth knowing.
+    """Return a mesh that the solver can use, and warnings about its defects.
 
-    Faces without area are left out, since they have no normal. Open or branching edges are allowed: a single sheet is a fair
-    target, only "inside" means nothing there.
+    Faces without area are left out, since they have no normal. Open or branching edges are allowed: a single sheet is a valid
+    target, although it has no inside.
 
     Parameters
     ----------
@@ -99,7 +99,7 @@ def edge_defects(triangles: np.ndarray) -> tuple[int, int, int]:
     edges = triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2).astype(np.int64)
     start, end = edges[:, 0], edges[:, 1]
     forward = start < end
-    # One number per edge, its direction the last bit, sorts ten times as fast as a pair.
+    # One integer per edge, with its direction in the last bit, sorts ten times as fast as a pair of integers.
     key = np.sort(np.minimum(start, end) << 32 | np.maximum(start, end) << 1 | forward)
     first = np.flatnonzero(np.diff(key >> 1, prepend=-1))
     count = np.diff(first, append=len(key))
@@ -109,7 +109,7 @@ def edge_defects(triangles: np.ndarray) -> tuple[int, int, int]:
 
 
 def is_closed(triangles: np.ndarray) -> bool:
-    """Whether every edge joins exactly two faces of one orientation, so that the surface has an inside."""
+    """True if every edge joins exactly two faces of one orientation, so that the surface has an inside."""
     return edge_defects(triangles) == (0, 0, 0)
 
 
@@ -131,14 +131,14 @@ def triangle_areas(mesh: TriangleMesh) -> np.ndarray:
 
 
 def have_area(mesh: TriangleMesh) -> np.ndarray:
-    """Whether each triangle has a direction that can be trusted, (nt,) bool.
+    """Return which triangles have a reliable normal, (nt,) bool.
 
-    A sliver whose height is lost in the rounding of its coordinates has none, whatever its corners' cross product says.
+    A sliver whose height is smaller than the rounding of its coordinates has none, whatever the cross product of its edges is.
     """
-    return _are_sure(mesh, triangle_areas(mesh))
+    return _exceed_rounding(mesh, triangle_areas(mesh))
 
 
-def _are_sure(mesh: TriangleMesh, area: np.ndarray) -> np.ndarray:
+def _exceed_rounding(mesh: TriangleMesh, area: np.ndarray) -> np.ndarray:
     longest = _longest_edges(mesh)
     scale = np.abs(mesh.vertices).max(initial=0.0) + longest.max(initial=0.0)
     return area > 1e-13 * scale * longest
@@ -149,7 +149,7 @@ def face_normals(mesh: TriangleMesh) -> np.ndarray:
     a, b, c = _corners(mesh)
     normal = np.cross(b - a, c - a)
     length = np.linalg.norm(normal, axis=1, keepdims=True)
-    return np.divide(normal, length, out=np.zeros_like(normal), where=_are_sure(mesh, 0.5 * length[:, 0])[:, None])
+    return np.divide(normal, length, out=np.zeros_like(normal), where=_exceed_rounding(mesh, 0.5 * length[:, 0])[:, None])
 
 
 def vertex_normals(mesh: TriangleMesh) -> np.ndarray:

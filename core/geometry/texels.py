@@ -29,7 +29,7 @@ class Texels:
     area : (n,) float, square metres
         A third of the area of the adjoining triangles of the region.
     layout : GridLayout or UVLayout
-        How the texels become a tactile image.
+        Arrangement of the texels in a tactile image.
     """
 
     vertex: np.ndarray
@@ -48,7 +48,7 @@ class Texels:
         return np.hstack([self.position, self.normal, self.tangent])
 
     def with_frames(self, frames: np.ndarray) -> Texels:
-        """Return the same texels elsewhere; `frames` as in :attr:`frames`, made orthonormal."""
+        """Return the same texels with other frames, given as in :attr:`frames`; they are made orthonormal."""
         normal = frames[:, 3:6] / np.linalg.norm(frames[:, 3:6], axis=1, keepdims=True)
         tangent = frames[:, 6:9] - np.einsum("ij,ij->i", frames[:, 6:9], normal)[:, None] * normal
         tangent /= np.linalg.norm(tangent, axis=1, keepdims=True)
@@ -140,9 +140,10 @@ def _tangents(along: np.ndarray, normals: np.ndarray) -> np.ndarray:
 
 
 class DeformedTexels:
-    """Texels that go with a mesh whose vertices move.
+    """Texels on a mesh whose vertices move.
 
-    Normals are computed anew; each texel's x axis keeps its angle to one edge of the mesh, the one nearest to its direction.
+    Normals follow from the moved vertices. Each texel's x axis keeps its angle to the edge of the mesh that is nearest to it in
+    direction.
 
     Parameters
     ----------
@@ -194,7 +195,7 @@ class DeformedTexels:
 
 
 def _across(vectors: np.ndarray, normal: np.ndarray) -> np.ndarray:
-    """Unit vectors of what of (n, 3) vectors lies across the normals; zero where nothing does."""
+    """Return unit vectors along the parts of (n, 3) vectors that are perpendicular to the normals; zero where there is none."""
     flat = vectors - np.einsum("ij,ij->i", vectors, normal)[:, None] * normal
     length = np.linalg.norm(flat, axis=1, keepdims=True)
     return np.divide(flat, length, out=np.zeros_like(flat), where=length > 0)

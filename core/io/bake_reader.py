@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A finished bake, read back from its folder: what figures and exports are made of, without Blender."""
+"""A finished bake, read from its folder without Blender; figures and exports are made from it."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from .sensor_npz import SENSOR_NAME, load_sensor
 
 @dataclass(frozen=True)
 class Bake:
-    """What some sensors felt, and what they are.
+    """The recordings and descriptions of some sensors.
 
     Attributes
     ----------
@@ -38,7 +38,7 @@ class Bake:
     manifests: dict[str, Manifest]
 
     def select(self, names: Sequence[str]) -> Bake:
-        """Return the part of some sensors, in the order of `names`.
+        """Return the bake of some of the sensors, in the order of `names`.
 
         Raises
         ------
@@ -64,25 +64,25 @@ def read_bake(folder: str | os.PathLike) -> Bake:
     folder = Path(folder)
     if not folder.is_dir():
         raise FileError(f"The folder '{folder}' does not exist: bake first, or choose another.")
-    places = [folder] if (folder / MANIFEST_NAME).is_file() else sorted(path for path in folder.iterdir() if _is_bake(path))
-    if not places:
+    folders = [folder] if (folder / MANIFEST_NAME).is_file() else sorted(path for path in folder.iterdir() if _is_bake(path))
+    if not folders:
         raise FileError(f"'{folder}' holds no bake: bake first, or choose the folder that Physics › Palpate › Bake names.")
-    return read_sensors(places)
+    return read_sensors(folders)
 
 
-def read_sensors(places: Sequence[Path]) -> Bake:
+def read_sensors(folders: Sequence[Path]) -> Bake:
     """Read the folders of some sensors of one bake; raises FileError as :func:`read_bake` does."""
-    manifests = {place: read_manifest(place) for place in places}
-    first = manifests[places[0]]
-    for place, manifest in manifests.items():
+    manifests = {folder: read_manifest(folder) for folder in folders}
+    first = manifests[folders[0]]
+    for folder, manifest in manifests.items():
         if manifest.digest != first.digest:
             raise FileError(
-                f"The sensors '{first.sensor}' and '{manifest.sensor}' in '{place.parent}' were baked from different scenes: "
+                f"The sensors '{first.sensor}' and '{manifest.sensor}' in '{folder.parent}' were baked from different scenes: "
                 "bake again, or choose the folder of one sensor."
             )
-    recordings = [load_recording(place / RECORDING_NAME) for place in places]
-    sensors = {name: felt for recording in recordings for name, felt in recording.sensors.items()}
-    read = {manifest.sensor: load_sensor(place / SENSOR_NAME) for place, manifest in manifests.items()}
+    recordings = [load_recording(folder / RECORDING_NAME) for folder in folders]
+    sensors = {name: sensor for recording in recordings for name, sensor in recording.sensors.items()}
+    read = {manifest.sensor: load_sensor(folder / SENSOR_NAME) for folder, manifest in manifests.items()}
     return Bake(
         recording=replace(recordings[0], sensors=sensors),
         texels={name: texels for name, (texels, _) in read.items()},
@@ -93,22 +93,22 @@ def read_sensors(places: Sequence[Path]) -> Bake:
             )
             for manifest in manifests.values()
         },
-        folders={manifest.sensor: place for place, manifest in manifests.items()},
+        folders={manifest.sensor: folder for folder, manifest in manifests.items()},
         manifests={manifest.sensor: manifest for manifest in manifests.values()},
     )
 
 
-def _is_bake(place: Path) -> bool:
-    return not place.name.endswith((".partial", ".old")) and (place / MANIFEST_NAME).is_file()
+def _is_bake(folder: Path) -> bool:
+    return not folder.name.endswith((".partial", ".old")) and (folder / MANIFEST_NAME).is_file()
 
 
 def frame_index(recording: Recording, frame: int) -> int:
-    """Return where a frame is in a recording.
+    """Return the index of a frame in a recording.
 
     Raises
     ------
     FileError
-        It was not baked.
+        The frame was not baked.
     """
     (found,) = np.nonzero(recording.frames == frame)
     if len(found) == 0:

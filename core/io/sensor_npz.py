@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a sensor is made of, beside its recording: with this file a bake can be drawn and exported where no Blender is."""
+"""A sensor's texels and painted values beside its recording, so that a bake can be drawn and exported without Blender."""
 
 from __future__ import annotations
 

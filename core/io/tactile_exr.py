@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Tactile images as OpenEXR: what Blender's image nodes read directly, and every other channel beside it.
+"""Tactile images in the OpenEXR format: three channels that Blender's image nodes read directly, and all others beside them.
 
 ``R`` is the normal force and ``G``, ``B`` the shear along the texel's x and y axes, all in newtons; ``reading`` is in
 the sensor's unit, ``depth`` in metres, ``slip`` in metres per second, ``contact`` 0 or 1. All are 32-bit floats; pixels
@@ -67,7 +67,7 @@ def _pictures(layout: GridLayout | UVLayout, frames: Sequence[SensorFrame], name
 
 
 def describe(sensor: Sensor, frame: Frame, digest: str) -> dict[str, str]:
-    """Return the metadata of a tactile image: whose it is, when, in which units, and what it was made from.
+    """Return the metadata of a tactile image: its sensor, time, units, and hashes of what it was computed from.
 
     ``unit.R``, ``unit.depth``, … are the units of the channels; ``parameters`` is a hash of the sensor's parameters, of what is
     painted on it and of its effects, ``digest`` one of everything that the forces depend on.
@@ -92,7 +92,7 @@ def write_exr(
     frame: SensorFrame,
     metadata: Mapping[str, str],
 ) -> None:
-    """Write one frame of one sensor, whole or not at all.
+    """Write one frame of one sensor atomically.
 
     Parameters
     ----------
@@ -120,7 +120,7 @@ def write_exrs(
     frames: Sequence[SensorFrame],
     metadata: Sequence[Mapping[str, str]],
 ) -> None:
-    """Write frames of one sensor where they are: what is interrupted leaves a half file, see :func:`.write_file`.
+    """Write frames of one sensor directly to their files: an interruption leaves an incomplete file, see :func:`.write_file`.
 
     Parameters
     ----------

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Numbers that are read off a recording: sums of forces, what slips, the free moment, ranges for a common scale."""
+"""Summaries of a recording: net forces, slip, the free moment, and ranges for common scales."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from ..model.recording import Recording, SensorFrame, SensorRecording
 from ..model.sensor_parameters import Painted, SensorParameters
 
 AT_LIMIT = 0.9
-"""Share of what friction can hold from which on a texel counts as slipping."""
+"""Share of the friction limit above which a moving texel counts as slipping."""
 CREEPING = 1e-6
 """Speed, m/s, up to which a texel at its limit still counts as sticking."""
 
@@ -35,7 +35,7 @@ def net_shear(sensor: SensorRecording, texels: Texels) -> np.ndarray:
 
 
 def mobilised_friction(sensor: SensorRecording, texels: Texels, mus: float) -> np.ndarray:
-    """Return how much of the static friction is used: ``|Σ shear| / (mus · Σ normal)``, zero while nothing touches.
+    """Return the mobilised share of static friction: ``|Σ shear| / (mus · Σ normal)``, zero without contact.
 
     Returns
     -------
@@ -47,14 +47,14 @@ def mobilised_friction(sensor: SensorRecording, texels: Texels, mus: float) -> n
 
 
 def slipping(sensor: SensorRecording | SensorFrame, parameters: SensorParameters, painted: Painted | None = None) -> np.ndarray:
-    """Return which texels slip: they touch, move, and carry (almost) what friction can hold at their speed (Eq. 10).
+    """Return which texels slip: they touch, move, and their friction is (almost) at its limit for their speed (Eq. 10).
 
     Parameters
     ----------
     sensor : SensorRecording or SensorFrame
     parameters : SensorParameters
     painted : Painted, optional
-        Its friction multiplies what each texel can hold.
+        Its friction scales the limit of each texel.
 
     Returns
     -------
@@ -71,7 +71,7 @@ def slipping(sensor: SensorRecording | SensorFrame, parameters: SensorParameters
 
 
 def slip_share(sensor: SensorRecording, parameters: SensorParameters, painted: Painted | None = None) -> np.ndarray:
-    """Return how much of the normal force rests on texels that slip, 0 to 1; zero while nothing touches.
+    """Return the share of the normal force that acts on slipping texels, 0 to 1; zero without contact.
 
     Returns
     -------
@@ -98,12 +98,12 @@ def pressure(normal_force: np.ndarray, texels: Texels) -> np.ndarray:
 
 
 def peak_force(recording: Recording) -> float:
-    """Return the largest normal force of any texel at any frame, N; one newton when nothing ever touched."""
+    """Return the largest normal force of any texel at any frame, N; one newton without any contact."""
     return _peak(sensor.normal_force for sensor in recording.sensors.values())
 
 
 def peak_pressure(recording: Recording, texels: Mapping[str, Texels]) -> float:
-    """Return the largest pressure on any texel at any frame, Pa; one pascal when nothing ever touched."""
+    """Return the largest pressure on any texel at any frame, Pa; one pascal without any contact."""
     return _peak(pressure(recording.sensors[name].normal_force, texels[name]) for name in texels)
 
 
@@ -113,7 +113,7 @@ def _peak(values: Iterable[np.ndarray]) -> float:
 
 
 def peak_shear(recording: Recording) -> float:
-    """Return the largest shear force of any texel at any frame, N; zero when nothing ever slid."""
+    """Return the largest shear force of any texel at any frame, N; zero without any."""
     return max((float(np.linalg.norm(s.shear, axis=2).max(initial=0.0)) for s in recording.sensors.values()), default=0.0)
 
 
@@ -127,7 +127,7 @@ def rounded_limit(value: float) -> float:
 
 
 def scale_limit(peak: float) -> float:
-    """Return the end of a scale: a round number with some room above the largest value."""
+    """Return the end of a scale: a round number at least 5 % above the largest value."""
     return rounded_limit(1.05 * peak)
 
 

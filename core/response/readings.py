@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Forces → readings: what the sensor would report, a linear conversion (paper, section 4) and its effects on readings."""
+"""Forces to readings: the linear conversion of the paper (section 4) and the effects that act on readings."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Texels in rows and columns: recognised by how their triangles hang together."""
+"""Texels in rows and columns, recognised by the topology of their triangles."""
 
 from __future__ import annotations
 
@@ -62,16 +62,16 @@ def grid_layout(
 ) -> tuple[GridLayout, np.ndarray] | tuple[None, None]:
     """Recognise a grid of rows and columns by its topology.
 
-    Two numbers tell what grid it could be: R·C vertices and 2(R−1)(C−1) triangles. The rim then holds the first row
-    and the first column, and cell after cell follows from them, whichever way its diagonal runs. Of several ways to
-    see a grid the one with the shortest edges (and the longest diagonals) is taken.
+    The numbers of vertices, R·C, and of triangles, 2(R−1)(C−1), determine the size of the grid. The rim then holds the first
+    row and the first column, from which cell after cell follows, whatever the direction of its diagonal. If there are several
+    solutions, the one with the shortest edges (and the longest diagonals) is taken.
 
     Parameters
     ----------
     position, normal : (n, 3) float
         Texels; every one is a corner of a triangle.
     triangles : (m, 3) int
-        Wound alike, anticlockwise seen from outside.
+        Anticlockwise seen from outside.
     quads : (q, 4) int, optional
         Faces with four corners whose halves are among `triangles`; −1 marks corners outside the region.
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Texture maps: a region flattened or cut up here, or laid out as its mesh's own map says."""
+"""Texture maps of a region: flattened, cut into an atlas of triangles, or taken from a UV map of its mesh."""
 
 from __future__ import annotations
 
@@ -91,8 +91,8 @@ class UVLayout:
         uv[texel] = self.corner_uv.reshape(-1, 2)[first]
         return uv
 
-    def too_small(self) -> int:
-        """Return how many texels no pixel is nearest to: the picture is too coarse to tell them from their neighbours."""
+    def unresolved_texels(self) -> int:
+        """Return the number of texels that are nearest to no pixel, because the picture is too coarse."""
         _, corner, weights, inside = self._stencil
         nearest = np.take_along_axis(corner, weights.argmax(axis=1)[:, None], axis=1)[inside]
         return len(np.unique(self.triangles)) - len(np.unique(nearest))
@@ -103,8 +103,8 @@ class UVLayout:
         pixel, triangle, weights, inside = self._pixels
         corner = self.triangles[triangle]
         if self.nearest:
-            # By weight and not by distance: so each texel has a third of its triangles, as its area has it, and both sides of
-            # an edge agree about who is nearest, which is what makes seams disappear.
+            # By weight and not by distance: each texel then covers a third of its triangles, like its area, and both sides of
+            # an edge agree on the nearest texel, which makes seams invisible.
             corner = np.take_along_axis(corner, weights.argmax(axis=1)[:, None], axis=1)
             weights = np.ones((len(corner), 1))
         return pixel, corner, weights, inside

@@ -3,7 +3,8 @@
 
 The region is cut into small triangles; their corners, in random order, become texels where no other is near; each texel then
 moves to the middle of the part of the region that is nearest to it, a few times (Lloyd 1982); parts that meet in a point are
-joined by a face. "Near" follows the surface, so that the two sides of a thin finger do not disturb one another.
+joined by a face. Distances are straight, but growth
+follows the surface, so that the two sides of a thin finger do not affect each other.
 """
 
 from __future__ import annotations
@@ -21,8 +22,9 @@ from .texel_arrays import TexelMesh
 FINENESS = 5.0
 """Small triangles per spacing."""
 RADIUS = 0.84
-"""Of the discs, as a share of the spacing: what they leave room for relaxes to about this distance between neighbours."""
+"""Radius of the discs as a share of the spacing. After relaxation, neighbours are then about one spacing apart."""
 ROUNDS = 6
+"""Of relaxation."""
 MOST = 60_000
 """Texels at the most; more would take minutes."""
 
@@ -37,12 +39,12 @@ def scatter(mesh: TriangleMesh, spacing: float, seed: int = 0) -> TexelMesh:
     spacing : float, metres
         Usual distance between neighbours.
     seed : int
-        Another pattern for each.
+        Each seed gives another pattern.
 
     Raises
     ------
     SensorError
-        The spacing is too large for three texels that make a face, or too small to be computed.
+        The spacing is too large for a single face, or so small that there would be more than :data:`MOST` texels.
     """
     if not spacing > 0:
         raise SensorError(f"The spacing of texels is {spacing * 1e3:g} mm: give a length above zero.")
@@ -73,7 +75,7 @@ def scatter(mesh: TriangleMesh, spacing: float, seed: int = 0) -> TexelMesh:
 
 
 def refined(mesh: TriangleMesh, longest: float) -> TriangleMesh:
-    """Cut the triangles of a mesh until no edge is longer than `longest`; neighbours are cut alike.
+    """Split the triangles of a mesh until no edge is longer than `longest`; triangles at an edge are split alike.
 
     Parameters
     ----------
@@ -97,7 +99,7 @@ def _split(triangles: np.ndarray, middle: np.ndarray) -> np.ndarray:
     """Cut triangles at the middles of their edges; −1 in `middle` (m, 3) is an edge that stays whole."""
     count = (middle >= 0).sum(axis=1)
     parts = [triangles[count == 0]]
-    for turn in range(3):  # bring the edge that decides to the front
+    for turn in range(3):  # rotate the corners so that the edge that decides comes first
         a, b, c = np.roll(triangles, -turn, axis=1).T
         ab, bc, ca = np.roll(middle, -turn, axis=1).T
         one = (count == 1) & (ab >= 0)

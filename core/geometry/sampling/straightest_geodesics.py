@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Straight lines on a triangulated surface: across an edge they go on as if both triangles lay in one plane."""
+"""Straightest geodesics on a triangulated surface (Polthier and Schmies 1998).
+
+A line crosses an edge as if both triangles lay in one plane.
+"""
 
 from __future__ import annotations
 
@@ -10,12 +13,12 @@ import numpy as np
 from ..mesh import TriangleMesh, face_normals
 
 NUDGE = 1e-9
-"""Share of an edge by which a line that meets a corner passes beside it."""
+"""Share of an edge by which a line that would meet a corner is moved aside."""
 
 
 @dataclass(frozen=True)
 class SurfacePose:
-    """A point on a surface and a direction along it.
+    """A point on a surface and a direction within the surface there.
 
     Attributes
     ----------
@@ -36,12 +39,12 @@ class SurfacePose:
 
 
 class GeodesicTracer:
-    """A surface to walk on.
+    """Follows straightest geodesics on a surface.
 
     Parameters
     ----------
     mesh : TriangleMesh
-        Wound alike. Lines end at edges that do not join two triangles.
+        All triangles have one orientation. Lines end at edges that do not join two triangles.
     """
 
     def __init__(self, mesh: TriangleMesh):
@@ -58,7 +61,7 @@ class GeodesicTracer:
             for edge in ((a, b), (b, c), (c, a)):
                 self._across.setdefault((min(edge), max(edge)), []).append(number)
 
-    def place(self, point: np.ndarray, heading: np.ndarray) -> SurfacePose:
+    def nearest_pose(self, point: np.ndarray, heading: np.ndarray) -> SurfacePose:
         """Return the point of the surface that is nearest to `point`, with the nearest direction along it.
 
         Parameters
@@ -72,8 +75,8 @@ class GeodesicTracer:
             along = np.cross(normal, np.eye(3)[np.abs(normal).argmin()])
         return SurfacePose(triangle, nearest, along / np.linalg.norm(along))
 
-    def walk(self, start: SurfacePose, length: float) -> SurfacePose | None:
-        """Go straight on; None when the surface ends before."""
+    def trace(self, start: SurfacePose, length: float) -> SurfacePose | None:
+        """Return the pose at the end of a line of this length (metres); None when the surface ends before."""
         here, left = start, length
         for _ in range(4 * len(self.mesh.triangles) + 16):
             step, edge = self._exit(here)
@@ -86,7 +89,7 @@ class GeodesicTracer:
         return None
 
     def _exit(self, here: SurfacePose) -> tuple[float, int]:
-        """How far it is to the rim of the triangle, and which edge is met there."""
+        """Return the distance to the border of the triangle and the edge that is met there."""
         outward = self._outward[here.triangle]
         speed = outward @ here.heading
         left = self._rim[here.triangle] - outward @ here.point
@@ -95,7 +98,7 @@ class GeodesicTracer:
         return float(distance[edge]), edge
 
     def _cross(self, here: SurfacePose, point: np.ndarray, edge: int) -> SurfacePose | None:
-        """Step over an edge; the heading keeps its angle to it."""
+        """Return the pose behind an edge; the heading keeps its angle to the edge. None where no triangle follows."""
         corners = self.mesh.triangles[here.triangle]
         a, b = int(corners[edge]), int(corners[(edge + 1) % 3])
         both = self._across[min(a, b), max(a, b)]

@@ -13,12 +13,12 @@ from ..mesh import TriangleMesh, face_normals, triangle_areas
 from .straightest_geodesics import GeodesicTracer, SurfacePose
 
 CROWDED = 0.5
-"""Texels nearer to one another than this share of the pitch are left out where the surface draws the ribs together."""
+"""Where the surface brings rows together, texels closer than this share of the spacing to another one are left out."""
 
 
 @dataclass(frozen=True)
 class TexelMesh:
-    """Texels laid onto a surface, with the faces between them.
+    """Texels on a surface and the faces between them, as vertices and faces of a mesh.
 
     Attributes
     ----------
@@ -84,9 +84,12 @@ def wrapped_array(
     middle: SurfacePose | None = None,
     angle: float = 0.0,
 ) -> TexelMesh:
-    """Lay a whole array onto a surface, its middle at a place: a spine of rows, and a rib of columns from each.
+    """Lay a whole array onto a surface.
 
-    Distances along spine and ribs are the pitch, measured on the surface; on what can be unrolled the array keeps its shape.
+    A line through the middle carries one point per row; a line across it from each point carries the columns.
+
+    Along these lines, neighbours are one pitch apart, measured on the surface. On a surface that can be unrolled the array
+    keeps its shape.
 
     Parameters
     ----------
@@ -106,16 +109,16 @@ def wrapped_array(
         The array reaches beyond the region.
     """
     _check_size(rows, columns, pitch)
-    surface = GeodesicTracer(mesh)
-    centre = _turned(surface, middle or region_middle(mesh), angle)
+    tracer = GeodesicTracer(mesh)
+    centre = _turned(tracer, middle or region_middle(mesh), angle)
     index = np.full((rows, columns), -1)
     points: list[np.ndarray] = []
     offsets_y = (np.arange(rows) - (rows - 1) / 2) * pitch[1]
     offsets_x = (np.arange(columns) - (columns - 1) / 2) * pitch[0]
     for row, y in enumerate(offsets_y):
-        spine = _along(surface, centre, y)
+        start = _along(tracer, centre, y)
         for column, x in enumerate(offsets_x):
-            found = None if spine is None else _along(surface, _turned(surface, spine, -math.pi / 2), x)
+            found = None if start is None else _along(tracer, _turned(tracer, start, -math.pi / 2), x)
             if found is None:
                 raise SensorError(
                     f"Texel ({row}, {column}) of the {rows} × {columns} array lies beyond the region: "
@@ -127,7 +130,7 @@ def wrapped_array(
 
 
 def filled_region(mesh: TriangleMesh, spacing: float, angle: float = 0.0) -> TexelMesh:
-    """Cover a region with rows and columns as far as it goes; the rim follows the region in steps.
+    """Cover a whole region with rows and columns; the rim of the array follows that of the region in steps.
 
     Parameters
     ----------
@@ -141,23 +144,23 @@ def filled_region(mesh: TriangleMesh, spacing: float, angle: float = 0.0) -> Tex
     Raises
     ------
     SensorError
-        Less than a face fits.
+        Not even one face fits.
     """
-    surface, most = GeodesicTracer(mesh), _most_steps(mesh, spacing)
-    spine = _both_ways(surface, _turned(surface, region_middle(mesh), angle), spacing, most)
-    ribs = [_both_ways(surface, _turned(surface, place, -math.pi / 2), spacing, most) for _, place in spine]
-    low = min(number for rib in ribs for number, _ in rib)
-    high = max(number for rib in ribs for number, _ in rib)
-    index = np.full((len(ribs), high - low + 1), -1)
+    tracer, most = GeodesicTracer(mesh), _most_steps(mesh, spacing)
+    middle_line = _both_ways(tracer, _turned(tracer, region_middle(mesh), angle), spacing, most)
+    row_lines = [_both_ways(tracer, _turned(tracer, pose, -math.pi / 2), spacing, most) for _, pose in middle_line]
+    low = min(number for row_line in row_lines for number, _ in row_line)
+    high = max(number for row_line in row_lines for number, _ in row_line)
+    index = np.full((len(row_lines), high - low + 1), -1)
     points: list[np.ndarray] = []
-    for row, rib in enumerate(ribs):
-        for column, place in rib:
+    for row, row_line in enumerate(row_lines):
+        for column, pose in row_line:
             below = index[row - 1] if row else []
             near = [points[i] for i in below if i >= 0]
-            if near and np.linalg.norm(np.array(near) - place.point, axis=1).min() < CROWDED * spacing:
+            if near and np.linalg.norm(np.array(near) - pose.point, axis=1).min() < CROWDED * spacing:
                 continue
             index[row, column - low] = len(points)
-            points.append(place.point)
+            points.append(pose.point)
     faces = _quads(index)
     if not faces:
         raise SensorError(f"No face of {spacing * 1e3:g} × {spacing * 1e3:g} mm fits into the region: use a smaller spacing.")
@@ -189,22 +192,22 @@ def region_middle(mesh: TriangleMesh) -> SurfacePose:
         heading /= np.linalg.norm(heading)
     if heading @ np.array([1e-3, 1.0, 1e-6]) < 0:
         heading = -heading
-    return GeodesicTracer(mesh).place(centre, heading)
+    return GeodesicTracer(mesh).nearest_pose(centre, heading)
 
 
-def shifted_pose(mesh: TriangleMesh, place: SurfacePose, shift: tuple[float, float]) -> SurfacePose:
-    """Return the place that lies (across, along) its heading from another, measured on the surface, metres.
+def shifted_pose(mesh: TriangleMesh, pose: SurfacePose, shift: tuple[float, float]) -> SurfacePose:
+    """Return the pose that lies `shift` (across and along the heading, metres, on the surface) from another.
 
     Raises
     ------
     SensorError
-        That is beyond the region.
+        It lies beyond the region.
     """
-    surface = GeodesicTracer(mesh)
-    found = _along(surface, place, shift[1])
+    tracer = GeodesicTracer(mesh)
+    found = _along(tracer, pose, shift[1])
     if found is not None and shift[0]:
-        side = _along(surface, _turned(surface, found, -math.pi / 2), shift[0])
-        found = None if side is None else _turned(surface, side, math.pi / 2)
+        side = _along(tracer, _turned(tracer, found, -math.pi / 2), shift[0])
+        found = None if side is None else _turned(tracer, side, math.pi / 2)
     if found is None:
         raise SensorError(
             f"Shifted by {shift[0] * 1e3:g} and {shift[1] * 1e3:g} mm the array's middle lies beyond the region: shift it less."
@@ -212,25 +215,25 @@ def shifted_pose(mesh: TriangleMesh, place: SurfacePose, shift: tuple[float, flo
     return found
 
 
-def _turned(surface: GeodesicTracer, place: SurfacePose, angle: float) -> SurfacePose:
-    return place.turned(surface.normals[place.triangle], angle)
+def _turned(tracer: GeodesicTracer, pose: SurfacePose, angle: float) -> SurfacePose:
+    return pose.turned(tracer.normals[pose.triangle], angle)
 
 
-def _along(surface: GeodesicTracer, place: SurfacePose, length: float) -> SurfacePose | None:
-    """Go straight on, backwards for a negative length; the heading at the end points forwards in either case."""
+def _along(tracer: GeodesicTracer, pose: SurfacePose, length: float) -> SurfacePose | None:
+    """Follow a straight line, backwards for a negative length. The heading at the end points forwards in both cases."""
     if length >= 0:
-        return surface.walk(place, length)
-    end = surface.walk(_turned(surface, place, math.pi), -length)
-    return None if end is None else _turned(surface, end, math.pi)
+        return tracer.trace(pose, length)
+    end = tracer.trace(_turned(tracer, pose, math.pi), -length)
+    return None if end is None else _turned(tracer, end, math.pi)
 
 
-def _both_ways(surface: GeodesicTracer, middle: SurfacePose, spacing: float, most: int) -> list[tuple[int, SurfacePose]]:
-    """Places at every multiple of the spacing before and behind the middle, as far as the surface goes, numbered."""
+def _both_ways(tracer: GeodesicTracer, middle: SurfacePose, spacing: float, most: int) -> list[tuple[int, SurfacePose]]:
+    """Return numbered poses at all multiples of the spacing in front of and behind the middle, up to the surface's rim."""
     found = [(0, middle)]
     for sign in (-1, 1):
         here: SurfacePose | None = middle
         for number in range(1, most):
-            here = _along(surface, here, sign * spacing) if here is not None else None
+            here = _along(tracer, here, sign * spacing) if here is not None else None
             if here is None or np.linalg.norm(here.point - middle.point) < CROWDED * spacing:  # off it, or once around it
                 break
             found.append((sign * number, here))
@@ -241,8 +244,8 @@ def _both_ways(surface: GeodesicTracer, middle: SurfacePose, spacing: float, mos
 
 
 def _meets(found: list[tuple[int, SurfacePose]], point: np.ndarray, distance: float) -> bool:
-    """Whether a line has come around a closed surface to where it was behind the middle."""
-    return any(number < 0 and np.linalg.norm(place.point - point) < distance for number, place in found)
+    """True if a line has gone around a closed surface and met its own part behind the middle."""
+    return any(number < 0 and np.linalg.norm(pose.point - point) < distance for number, pose in found)
 
 
 def _most_steps(mesh: TriangleMesh, spacing: float) -> int:
@@ -252,13 +255,13 @@ def _most_steps(mesh: TriangleMesh, spacing: float) -> int:
 
 
 def _quads(index: np.ndarray) -> list[tuple[int, ...]]:
-    """Faces between neighbours in a table of vertex numbers; −1 is an empty place."""
+    """Faces between neighbours in a table of vertex numbers; −1 marks an empty place."""
     corners = np.stack([index[:-1, :-1], index[:-1, 1:], index[1:, 1:], index[1:, :-1]], axis=-1).reshape(-1, 4)
     return [tuple(corner) for corner in corners[(corners >= 0).all(axis=1)].tolist()]
 
 
 def _used(points: np.ndarray, faces: list[tuple[int, ...]]) -> TexelMesh:
-    """Leave out the points without a face."""
+    """Return a mesh without the points that belong to no face."""
     used = np.unique([corner for face in faces for corner in face])
     number = np.full(len(points), -1)
     number[used] = np.arange(len(used))

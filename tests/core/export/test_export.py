@@ -4,13 +4,15 @@
 import csv
 import json
 from dataclasses import asdict
+from pathlib import Path
 
 import numpy as np
 import pytest
 from recordings import grid_texels, recording_of, round_texels
 
 from palpate.core.errors import FileError, PalpateError
-from palpate.core.export.registry import export
+from palpate.core.export import registry
+from palpate.core.export.registry import export, exporters
 from palpate.core.figures import color_maps
 from palpate.core.figures.figure_style import FigureStyle
 from palpate.core.io.bake_folder import Manifest, write_manifest
@@ -157,3 +159,12 @@ def test_png_has_one_scale_for_all_sensors(bake, tmp_path):
 def test_an_unknown_format_is_refused(bake, tmp_path):
     with pytest.raises(PalpateError, match="csv, npz, hdf5, png"):
         run_job(export(bake, "xls", tmp_path))
+
+
+def test_every_format_is_registered_once():
+    """A module of the package is a format; its position is its bit in a scene's choice, so positions have no gaps."""
+    found = exporters()
+    assert list(found) == ["csv", "npz", "hdf5", "png"]
+    assert [exporter.position for exporter in found.values()] == list(range(len(found)))
+    modules = {path.stem for path in Path(registry.__file__).parent.glob("formats/*.py")} - {"__init__"}
+    assert len(modules) == len(found)

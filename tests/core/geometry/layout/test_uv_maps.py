@@ -135,8 +135,8 @@ def test_around_an_island_its_edge_goes_on(nearest):
 
 def test_texels_that_no_pixel_can_show_are_counted():
     _, triangles, uv = tube()
-    assert mapped_layout(triangles, uv, 256, map_name="UVMap").too_small() == 0
-    assert mapped_layout(triangles, uv, 16, map_name="UVMap").too_small() > 50
+    assert mapped_layout(triangles, uv, 256, map_name="UVMap").unresolved_texels() == 0
+    assert mapped_layout(triangles, uv, 16, map_name="UVMap").unresolved_texels() > 50
 
 
 @pytest.mark.parametrize(

@@ -64,7 +64,7 @@ def test_a_walk_on_a_plane_is_straight_whatever_its_triangles():
     surface = GeodesicTracer(sheet())
     for degrees in range(0, 360, 15):
         heading = np.array([math.cos(math.radians(degrees)), math.sin(math.radians(degrees)), 0.0])
-        end = surface.walk(surface.place(np.array([0.001, 0.002, 0.0]), heading), 0.02)
+        end = surface.trace(surface.nearest_pose(np.array([0.001, 0.002, 0.0]), heading), 0.02)
         assert end.point == pytest.approx([0.001, 0.002, 0.0] + 0.02 * heading, abs=1e-12)
         assert end.heading == pytest.approx(heading, abs=1e-9)
 
@@ -72,9 +72,9 @@ def test_a_walk_on_a_plane_is_straight_whatever_its_triangles():
 def test_a_walk_on_a_cylinder_is_a_helix():
     radius = 0.01
     surface = GeodesicTracer(tube(radius))
-    start = surface.place(np.array([0.0, -0.02, radius]), np.array([1.0, 0.5, 0.0]))
+    start = surface.nearest_pose(np.array([0.0, -0.02, radius]), np.array([1.0, 0.5, 0.0]))
     length = 0.08
-    end = surface.walk(start, length)
+    end = surface.trace(start, length)
     around, along = length * 2 / math.sqrt(5), length / math.sqrt(5)
     angle = around / radius  # once around and more
     expected = [radius * math.sin(angle), -0.02 + along, radius * math.cos(angle)]
@@ -87,13 +87,13 @@ def test_a_walk_through_corners_does_not_get_lost():
     surface = GeodesicTracer(mesh)
     for vertex in range(0, 60, 7):  # a great circle leads back to where it began, from a corner and through corners
         point = mesh.vertices[vertex]
-        end = surface.walk(surface.place(point, np.cross(point, [0.3, 0.2, 1.0])), 2 * math.pi)
+        end = surface.trace(surface.nearest_pose(point, np.cross(point, [0.3, 0.2, 1.0])), 2 * math.pi)
         assert np.linalg.norm(end.point - point) < 0.15  # an edge: the polyhedron is not quite round
 
 
 def test_a_walk_ends_at_the_rim():
     surface = GeodesicTracer(sheet())
-    assert surface.walk(surface.place(np.zeros(3), np.array([1.0, 0, 0])), 0.0251) is None
+    assert surface.trace(surface.nearest_pose(np.zeros(3), np.array([1.0, 0, 0])), 0.0251) is None
 
 
 def test_nearest_point_is_trimesh_s():
