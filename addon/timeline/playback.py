@@ -102,7 +102,7 @@ def solver_is_ready() -> None:
     """Compute the frames that had to wait for the solver; a scene that plays starts again."""
     waiting = set(_waiting)
     _waiting.clear()
-    if is_baking() or session_state.session.catching_up:
+    if session_state.is_baking() or session_state.session.catching_up:
         return
     for window in bpy.context.window_manager.windows:
         scene = window.scene
@@ -151,7 +151,7 @@ def compute_to_present_frame(scene) -> Generator[Progress, None, None]:
 def _offer_to_compute() -> None:
     """Timer after a jump on the timeline: compute the missing frames with progress. The handler itself must return at once."""
     scene = bpy.context.scene
-    if scene is not None and not is_baking() and not session_state.session.catching_up and missing_frames(scene):
+    if scene is not None and not session_state.is_baking() and not session_state.session.catching_up and missing_frames(scene):
         bpy.ops.palpate.catch_up("INVOKE_DEFAULT")
 
 
