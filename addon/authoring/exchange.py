@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A sensor's parameters between an object and the files of other programs; which formats there are is told in core/formats."""
+"""Exchange of sensors between objects and files: parameters, effects and, for a new pad, the grid of texels."""
 
 from __future__ import annotations
 
@@ -15,19 +15,19 @@ from . import laid_sensors, sensors
 
 
 def parameters_of(obj) -> SensorParameters:
-    """Return the parameters of an object's panel."""
+    """Return the parameters of a sensor or pad."""
     return parameter_properties.sensor_parameters(obj.palpate)
 
 
 def put_parameters(obj, values: SensorParameters) -> None:
-    """Write parameters into an object's panel.
+    """Give a sensor or pad these parameters.
 
     Raises
     ------
     SceneError
         The object is linked from another file, or is no sensor and no pad.
     ParameterError
-        A value means nothing. Nothing was changed then.
+        A value is not valid. Nothing was changed then.
     """
     if obj.library is not None:
         raise SceneError(f"'{obj.name}' is linked from '{obj.library.filepath}': change it there, or make it local first.")
@@ -38,33 +38,33 @@ def put_parameters(obj, values: SensorParameters) -> None:
 
 
 def save_toml(context, obj, path) -> None:
-    """Write a sensor as TOML: parameters, effects and, where its texels are a flat grid, that.
+    """Write a sensor as TOML: parameters, effects and, if its texels form a flat grid, the grid.
 
     Raises
     ------
     PalpateError
-        The file cannot be written, or a value means nothing.
+        The file cannot be written, or a value is not valid.
     """
     from ...core.io.sensor_toml import SensorModel, write_sensor
 
     values = parameters_of(obj)
     values.check(obj.name)
-    write_sensor(path, SensorModel(obj.name, values, effect_stack.stack(obj), _grid_words(context, obj)))
+    write_sensor(path, SensorModel(obj.name, values, effect_stack.stack(obj), _grid_table(context, obj)))
 
 
 def load_toml(context, path) -> tuple:
-    """Put a sensor's file on the active sensor; with none active, on a new pad of its grid.
+    """Give the active sensor what a file says; if no sensor is active, make a new pad of the file's grid.
 
     Returns
     -------
     obj : Object
     effects : int
-        How many it has now.
+        Number of its effects.
 
     Raises
     ------
     PalpateError
-        The file is something else, or there is neither an active sensor nor a grid. Nothing was changed then.
+        The file is no sensor file, or there is neither an active sensor nor a grid. Nothing was changed then.
     """
     from ...core.io.sensor_toml import read_sensor
 
@@ -87,8 +87,8 @@ def _new_pad(context, model):
     return obj
 
 
-def _grid_words(context, obj) -> dict:
-    """Return ``{"grid": …}`` for texels in rows and columns of one pitch on a plane, else nothing."""
+def _grid_table(context, obj) -> dict:
+    """Return ``{"grid": …}`` for texels in a plane with rows and columns at a constant pitch, else an empty dict."""
     texels = sensor_reader.sensor_in_own_frame(context.scene, obj, participants.depsgraph_of(context.scene))[0].texels
     layout = texels.layout
     if not isinstance(layout, GridLayout):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What is wrong with a sensor as it stands, texel by texel, and how each fault is put right."""
+"""Problems of a sensor, texel by texel, and a fix for each kind of problem."""
 
 from __future__ import annotations
 
@@ -18,26 +18,26 @@ from ...core.geometry.texels import Texels
 from ..scene import sensor_regions
 from . import laid_sensors, surface_binding
 
-TOO_NEAR = 0.1
-"""Texels nearer than this share of the usual distance count as one upon another."""
-AHEAD = 0.02
-"""Share of the usual distance from texel to texel by which a point in front of a texel is looked at."""
-MARGIN = 0.9
-"""Share of the thickness that the maximum penetration is shortened to."""
+OVERLAP_DISTANCE = 0.1
+"""Texels that are nearer to each other than this part of the usual distance overlap."""
+TEST_DISTANCE = 0.02
+"""Distance of a test point from its texel, as a part of the usual distance from texel to texel."""
+THICKNESS_PART = 0.9
+"""A maximum penetration that is too large is set to this part of the thickness."""
 
 
 @dataclass(frozen=True)
 class Problem:
-    """One kind of fault.
+    """One kind of problem of a sensor.
 
     Attributes
     ----------
     kind : str
-        A key of :data:`FIXES`, where there is a button for it.
+        A key of :data:`FIXES`, if there is a button for it.
     text : str
-        One sentence: what and where.
+        One sentence for the user: what is wrong, and where.
     texels : (k,) int
-        Which texels it concerns; empty when it is the whole sensor.
+        Indices of the texels concerned; empty when it is the whole sensor.
     """
 
     kind: str
@@ -46,7 +46,7 @@ class Problem:
 
 
 def texel_problems(obj, mesh: TriangleMesh, texels: Texels, reach: float, around: TriangleMesh | None = None) -> list[Problem]:
-    """Return what is wrong with the texels of a sensor.
+    """Return the problems of a sensor's texels.
 
     Parameters
     ----------
@@ -55,7 +55,7 @@ def texel_problems(obj, mesh: TriangleMesh, texels: Texels, reach: float, around
     reach : float, metres
         Maximum penetration.
     around : TriangleMesh, optional
-        What a skin lies on, in the same frame.
+        Surface of a laid sensor's carrier, in the same frame.
     """
     found = []
     mixed = edge_defects(mesh.triangles)[2]
@@ -63,19 +63,21 @@ def texel_problems(obj, mesh: TriangleMesh, texels: Texels, reach: float, around
         found.append(Problem("NORMALS", f"{mixed} edges of '{obj.name}' join faces that point to opposite sides."))
     spacing = _spacing(texels)
     body = around if around is not None and is_closed(around.triangles) else mesh
-    # A skin stands on or above the surface; texels of the object's own mesh are corners of it.
-    inside = _inside(body, texels, AHEAD * spacing) if is_closed(body.triangles) and not mixed else np.zeros(len(texels), bool)
+    # A laid sensor stands on or above the surface; texels of the object's own mesh are its vertices.
+    inside = np.zeros(len(texels), bool)
+    if is_closed(body.triangles) and not mixed:
+        inside = _inside(body, texels, TEST_DISTANCE * spacing)
     if inside.sum() > 0.5 * len(texels):
         text = f"The texels of '{obj.name}' face inwards: its normals are flipped, nothing from outside is felt."
         found.append(Problem("FLIPPED", text, np.flatnonzero(inside)))
     elif inside.any():
         text = f"{inside.sum()} texels of '{obj.name}' lie inside the object and never touch anything."
         found.append(Problem("INSIDE", text, np.flatnonzero(inside)))
-    near = _too_near(texels, spacing)
+    near = _overlapping(texels, spacing)
     if len(near):
         found.append(Problem("OVERLAP", f"{len(near)} texels of '{obj.name}' lie upon another and feel the same twice.", near))
     if not inside.any() and not mixed:
-        thickness = _thickness(body, texels, AHEAD * spacing)
+        thickness = _thickness(body, texels, TEST_DISTANCE * spacing)
         thin = np.flatnonzero(thickness < reach)
         if len(thin):
             text = (
@@ -87,7 +89,7 @@ def texel_problems(obj, mesh: TriangleMesh, texels: Texels, reach: float, around
 
 
 def object_problems(obj, notes: list[str]) -> list[Problem]:
-    """Return what is wrong with a sensor as an object; `notes` come from :func:`.mesh_arrays.sensor_arrays`."""
+    """Return the problems of a sensor's object; `notes` are the warnings of :func:`.mesh_arrays.sensor_arrays`."""
     found = [Problem("MODIFIER", note) for note in notes]
     if laid_sensors.is_laid(obj):
         if obj.parent is None:
@@ -111,17 +113,22 @@ def object_problems(obj, notes: list[str]) -> list[Problem]:
 
 
 def _spacing(texels: Texels) -> float:
-    """Usual distance of neighbouring texels, metres."""
+    """Return the median distance of neighbouring texels, metres."""
     a, b, c = (texels.position[texels.layout.triangles[:, i]] for i in range(3))
     return float(np.median(np.linalg.norm(np.concatenate([b - a, c - b, a - c]), axis=1)))
 
 
 def _tree(mesh: TriangleMesh) -> BVHTree:
+    """Return a search tree of a mesh's triangles."""
     return BVHTree.FromPolygons(mesh.vertices.tolist(), mesh.triangles.tolist(), all_triangles=True)
 
 
 def _inside(mesh: TriangleMesh, texels: Texels, ahead: float) -> np.ndarray:
-    """(n,) bool: points just in front of the texels that are inside of a closed mesh; best of three rays."""
+    """Return which texels face the inside of a closed mesh, (n,) bool.
+
+    A point at the distance `ahead` in front of a texel is inside if at least two of three rays from it cross the mesh an odd
+    number of times.
+    """
     tree, size = _tree(mesh), float(np.linalg.norm(np.ptp(mesh.vertices, axis=0)))
     votes = np.zeros(len(texels), int)
     for tilt in ((0.0, 0.0), (0.11, 0.07), (-0.05, 0.13)):
@@ -132,6 +139,7 @@ def _inside(mesh: TriangleMesh, texels: Texels, ahead: float) -> np.ndarray:
 
 
 def _crossings(tree: BVHTree, start: np.ndarray, ray: np.ndarray, step: float) -> int:
+    """Return how often a ray crosses a mesh; `step` is the distance behind a crossing where the search continues."""
     here, direction, count = Vector(start), Vector(ray).normalized(), 0
     while count < 64:
         place, *_ = tree.ray_cast(here, direction)
@@ -143,7 +151,10 @@ def _crossings(tree: BVHTree, start: np.ndarray, ray: np.ndarray, step: float) -
 
 
 def _thickness(mesh: TriangleMesh, texels: Texels, behind: float) -> np.ndarray:
-    """(n,) float: how far it is behind each texel to where the mesh ends, metres; infinite where it does not."""
+    """Return the thickness of a mesh behind each texel, (n,) float, metres; infinite where the mesh has no back.
+
+    The rays start at the distance `behind` behind the texels.
+    """
     tree = _tree(mesh)
     result = np.full(len(texels), np.inf)
     for i, (point, normal) in enumerate(zip(texels.position, texels.normal, strict=True)):
@@ -154,9 +165,9 @@ def _thickness(mesh: TriangleMesh, texels: Texels, behind: float) -> np.ndarray:
     return result
 
 
-def _too_near(texels: Texels, spacing: float) -> np.ndarray:
-    """(k,) int: texels that have another one with a smaller number almost at the same place."""
-    cell = np.floor(texels.position / (TOO_NEAR * spacing)).astype(np.int64)
+def _overlapping(texels: Texels, spacing: float) -> np.ndarray:
+    """Return the texels that overlap a texel with a smaller index, (k,) int."""
+    cell = np.floor(texels.position / (OVERLAP_DISTANCE * spacing)).astype(np.int64)
     homes: dict[tuple[int, ...], list[int]] = {}
     near = []
     around = [(x, y, z) for x in (-1, 0, 1) for y in (-1, 0, 1) for z in (-1, 0, 1)]
@@ -164,17 +175,17 @@ def _too_near(texels: Texels, spacing: float) -> np.ndarray:
         others = np.array([other for dx, dy, dz in around for other in homes.get((x + dx, y + dy, z + dz), ())], int)
         apart = np.linalg.norm(texels.position[others] - texels.position[number], axis=1)
         alike = texels.normal[others] @ texels.normal[number] > 0.5  # not the two sides of a thin plate
-        if (alike & (apart < TOO_NEAR * spacing)).any():
+        if (alike & (apart < OVERLAP_DISTANCE * spacing)).any():
             near.append(number)
         homes.setdefault((x, y, z), []).append(number)
     return np.array(near, int)
 
 
-# --- putting it right
+# Fixes
 
 
 def _edit(obj, work: Callable) -> None:
-    """Change an object's own mesh."""
+    """Change an object's own mesh by `work`, which gets it as a BMesh."""
     mesh = bmesh.new()
     mesh.from_mesh(obj.data)
     work(mesh)
@@ -193,14 +204,14 @@ def _flip(obj, _problem, _report) -> None:
 
 def _merge(obj, _problem, report) -> None:
     scale = report.metres
-    distance = TOO_NEAR * _spacing(report.texels) / scale
+    distance = OVERLAP_DISTANCE * _spacing(report.texels) / scale
     _edit(obj, lambda mesh: bmesh.ops.remove_doubles(mesh, verts=mesh.verts, dist=distance))
     if obj.palpate.made_vertices:
         obj.palpate.made_vertices = len(obj.data.vertices)
 
 
 def _leave_out(obj, problem, report) -> None:
-    """Make the region a vertex group without some texels."""
+    """Make the region a vertex group that leaves out the texels concerned."""
     from .sensors import GROUP_NAME
 
     settings = obj.palpate
@@ -213,8 +224,8 @@ def _leave_out(obj, problem, report) -> None:
 
 
 def _shorten(obj, _problem, report) -> None:
-    thickness = _thickness(report.body, report.texels, AHEAD * _spacing(report.texels))
-    obj.palpate.max_penetration = MARGIN * float(thickness.min())
+    thickness = _thickness(report.body, report.texels, TEST_DISTANCE * _spacing(report.texels))
+    obj.palpate.max_penetration = THICKNESS_PART * float(thickness.min())
 
 
 def _apply_modifiers(obj, _problem, _report) -> None:
@@ -257,7 +268,7 @@ def _automatic_image(obj, _problem, _report) -> None:
 
 
 def _nothing_painted(obj, _problem, _report) -> None:
-    """Empty the fields for painted multipliers that cannot be read."""
+    """Clear the names of painted maps that cannot be read."""
     for key in ("k", "friction", "gain"):
         try:
             sensor_regions.painted_multipliers(obj, key)
@@ -285,11 +296,11 @@ FIXES: dict[str, tuple[str, Callable]] = {
     "IMAGE": ("Automatic Image", _automatic_image),
     "PAINTED": ("Empty the Field", _nothing_painted),
 }
-"""By kind: the name of the button, and what it does to (object, problem, report)."""
+"""By kind of problem: the label of the button, and the function that it calls with (object, problem, report)."""
 
 
 def fix(obj, kind: str, report) -> None:
-    """Put one kind of problem right.
+    """Fix one kind of problem.
 
     Raises
     ------
@@ -303,7 +314,7 @@ def fix(obj, kind: str, report) -> None:
 
 
 def problem_of_error(obj, error: PalpateError) -> Problem:
-    """Return the problem of a sensor that has no texels because of an error; some kinds have no button."""
+    """Return the problem of a sensor that has no texels because of an error; the kind OTHER has no button."""
     own = obj.palpate
     if isinstance(error, RegionError):
         lost = own.region == "GROUP" and own.vertex_group not in obj.vertex_groups and len(obj.vertex_groups) > 0

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What panels and the 3D view show of a sensor while it is being made: its texels, their numbers, and what is wrong.
+"""Reports that panels and the 3D view show of a sensor while it is made: its texels, their density, and its problems.
 
-Drawing only asks (:func:`known_report`); what has to be computed is computed a moment later, by a timer.
+Drawing calls :func:`known_report`, which never computes; a timer computes a new report a moment later.
 """
 
 from __future__ import annotations
@@ -21,25 +21,26 @@ from ..session import session_state, transforms, units
 from . import laid_sensors, problems
 
 DELAY = 0.2
-"""Seconds after a change before it is looked at, and three times the time that this took last."""
+"""Seconds from a change to the new report, besides three times the duration of the last computation."""
 
 
 @dataclass(frozen=True)
 class Report:
-    """A sensor as it stands.
+    """The present state of a sensor.
 
     Attributes
     ----------
     texels : Texels or None
         In the frame of the object: its location and rotation, metres.
     reach : float, metres
+        Maximum penetration.
     metres : float
-        Per Blender unit.
+        Metres per Blender unit.
     body : TriangleMesh or None
-        What the texels stand on, in the same frame.
+        The mesh on which the texels stand, in the same frame.
     problems : list of Problem
     advice : Advice or None
-        On the time step of the scene; None when the scene makes no run.
+        The advised time step of the scene; None when the scene makes no run.
     missing : str
         Why the scene makes no run, in one sentence.
     """
@@ -54,33 +55,33 @@ class Report:
 
     @property
     def area(self) -> float:
-        """Square metres of the region."""
+        """Area of the region, m²."""
         return float(self.texels.area.sum())
 
     @property
     def density(self) -> float:
-        """Texels per square centimetre."""
+        """Number of texels per square centimetre."""
         return len(self.texels) / (self.area * 1e4) if self.area > 0 else 0.0
 
 
 _reports: dict[int, tuple[tuple, Report]] = {}
-_wanted: set[int] = set()
-_last = 0.0
+_requested: set[int] = set()
+_last_duration = 0.0
 
 
 def known_report(obj, scene) -> Report | None:
-    """Return what is known of a sensor; looks at it anew soon if it may have changed. Cheap enough for drawing."""
+    """Return the last report of a sensor, and request a new one if the sensor may have changed; fast enough for drawing."""
     key = _key(obj, scene)
     known = _reports.get(obj.session_uid)
     if known is None or known[0] != key:
-        _ask(obj)
+        _request(obj)
     return known[1] if known else None
 
 
 def fresh_report(obj, scene) -> Report:
-    """Look at a sensor at once."""
+    """Compute the report of a sensor now."""
     key = _key(obj, scene)
-    report = _look(obj, scene)
+    report = _compute(obj, scene)
     _reports[obj.session_uid] = key, report
     return report
 
@@ -88,36 +89,37 @@ def fresh_report(obj, scene) -> Report:
 def forget() -> None:
     """Forget everything, because another file is open or undo has changed it."""
     _reports.clear()
-    _wanted.clear()
+    _requested.clear()
 
 
 def _key(obj, scene) -> tuple:
-    """Changes with everything that may change a report; that it changed need not mean that the report does."""
+    """Return a key that changes with everything that may change a report, perhaps also without such a change."""
     stretch = tuple(round(length, 6) for length in obj.matrix_world.to_scale())
-    lies_on = obj.parent.name if obj.parent else ""
-    return (*scene_fingerprint.settings_of(scene, [obj]), session_state.session.geometry_version, stretch, lies_on, obj.mode)
+    carrier = obj.parent.name if obj.parent else ""
+    return (*scene_fingerprint.settings_of(scene, [obj]), session_state.session.geometry_version, stretch, carrier, obj.mode)
 
 
-def _ask(obj) -> None:
+def _request(obj) -> None:
+    """Let the timer compute the report of a sensor."""
     if bpy.app.background:
         return
-    _wanted.add(obj.session_uid)
+    _requested.add(obj.session_uid)
     if not bpy.app.timers.is_registered(_work):
-        bpy.app.timers.register(_work, first_interval=DELAY + 3.0 * _last)
+        bpy.app.timers.register(_work, first_interval=DELAY + 3.0 * _last_duration)
 
 
 def _work() -> float | None:
-    """Compute what was asked for, when nothing plays or bakes."""
-    global _last
+    """Timer: compute the requested reports, unless something plays or bakes."""
+    global _last_duration
     window = bpy.context.window_manager.windows[0] if bpy.context.window_manager.windows else None
     if session_state.session.bake_progress is not None or (window and window.screen.is_animation_playing):
         return DELAY
-    scene, began = bpy.context.scene, time.perf_counter()
+    scene, start = bpy.context.scene, time.perf_counter()
     for obj in scene.objects:
-        if obj.session_uid in _wanted and obj.palpate.role in {"SENSOR", "PAD"}:
+        if obj.session_uid in _requested and obj.palpate.role in {"SENSOR", "PAD"}:
             fresh_report(obj, scene)
-    _wanted.clear()
-    _last = time.perf_counter() - began
+    _requested.clear()
+    _last_duration = time.perf_counter() - start
     for window in bpy.context.window_manager.windows:
         for area in window.screen.areas:
             if area.type in {"VIEW_3D", "PROPERTIES"}:
@@ -125,7 +127,7 @@ def _work() -> float | None:
     return None
 
 
-def _look(obj, scene) -> Report:
+def _compute(obj, scene) -> Report:
     depsgraph = participants.depsgraph_of(scene)
     advice, missing = _advice(scene, depsgraph)
     metres = units.metres_per_unit(scene)
@@ -141,7 +143,7 @@ def _look(obj, scene) -> Report:
 
 
 def _around(obj, depsgraph, metres: float) -> TriangleMesh | None:
-    """What a skin lies on, in the frame of the skin's own object, metres."""
+    """Return the surface of a laid sensor's carrier, in the frame of the sensor's own object, metres."""
     carrier = obj.parent
     if carrier.type not in participants.OBJECT_TYPES:
         return None
@@ -153,11 +155,11 @@ def _around(obj, depsgraph, metres: float) -> TriangleMesh | None:
 
 
 def _advice(scene, depsgraph) -> tuple[Advice | None, str]:
-    """The advised time step of the scene, or why there is none."""
+    """Return the advised time step of the scene, or why there is none."""
     try:
         scenario = scene_reader.read_start(scene, depsgraph).scenario
     except SceneError as error:
         return None, str(error)
-    except PalpateError:  # of some sensor: its own report says it
+    except PalpateError:  # a problem of some sensor: its own report names it
         return None, ""
     return advise(scenario), ""

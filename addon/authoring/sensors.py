@@ -13,7 +13,7 @@ GROUP_NAME = "Palpate Sensor"
 
 
 def automatic_source(obj, mode: str) -> str:
-    """Return what AUTO means in a mode: the selection in Edit Mode, the painted group in Weight Paint, else the whole mesh."""
+    """Return the source that AUTO stands for in a mode: selection in Edit Mode, group in Weight Paint, else the whole mesh."""
     if mode == "EDIT":
         obj.update_from_editmode()
         if selected_vertices(obj).any():
@@ -24,7 +24,7 @@ def automatic_source(obj, mode: str) -> str:
 
 
 def selected_vertices(obj) -> np.ndarray:
-    """(nv,) bool: vertices selected in Edit Mode, as far as the object knows of them."""
+    """Return which vertices were selected when the object was last updated from Edit Mode, (nv,) bool."""
     chosen = np.zeros(len(obj.data.vertices), dtype=bool)
     obj.data.vertices.foreach_get("select", chosen)
     return chosen
@@ -36,7 +36,7 @@ def make_sensor(obj, source: str, role: str = "SENSOR") -> int:
     Parameters
     ----------
     source : {"SELECTION", "GROUP", "MATERIAL", "FACE_SET", "MESH"}
-        SELECTION writes a vertex group; GROUP and MATERIAL take the active one, FACE_SET that of the active face.
+        SELECTION writes a vertex group; GROUP and MATERIAL take the active one, FACE_SET takes that of the active face.
 
     Returns
     -------
@@ -96,7 +96,7 @@ def describe_region(obj, source: str) -> dict:
     if source == "SELECTION":
         chosen = selected_vertices(obj)
         _check(obj, chosen, source)
-        group = obj.vertex_groups.new(name=GROUP_NAME)  # of its own: another skin may lie on another selection
+        group = obj.vertex_groups.new(name=GROUP_NAME)  # a new group, because another laid sensor may have another selection
         group.add(np.flatnonzero(chosen).tolist(), 1.0, "REPLACE")
         return {"region": "GROUP", "vertex_group": group.name}
     if source == "GROUP":
@@ -111,7 +111,7 @@ def describe_region(obj, source: str) -> dict:
 
 
 def _active_material(obj) -> tuple[np.ndarray, str]:
-    """Vertices of the faces that wear the active material, and its name."""
+    """Return the vertices of the faces that have the active material, and its name."""
     material = obj.active_material
     if material is None:
         raise SensorError(f"'{obj.name}' has no active material: give the sensor's faces one in the Material tab.")
@@ -121,14 +121,14 @@ def _active_material(obj) -> tuple[np.ndarray, str]:
 
 
 def _active_face_set(obj) -> tuple[np.ndarray, int]:
-    """Vertices of the face set that the active face is in, and its number."""
+    """Return the vertices of the face set of the active face, and its number."""
     sets, active = sensor_regions.face_sets(obj.data), obj.data.polygons.active
     number = int(sets[active]) if 0 <= active < len(sets) else obj.palpate.face_set
     return sensor_regions.vertices_of_faces(obj.data, sets == number), number
 
 
 def set_full_weight_brush(tools) -> None:
-    """Let the weight brush paint all of a region at once: weight and strength 1, no normalising against other groups."""
+    """Set weight and strength of the weight brush to 1, and switch normalising against other groups off."""
     tools.use_auto_normalize = False
     paint = tools.weight_paint
     brush = paint.brush if paint is not None else None
@@ -141,7 +141,8 @@ def set_full_weight_brush(tools) -> None:
 
 
 def _check(obj, chosen: np.ndarray, source: str) -> None:
-    what = {
+    """Raise SensorError when the chosen vertices make no sensor."""
+    reason = {
         "SELECTION": "Nothing is selected",
         "GROUP": f"No vertex has a weight of {obj.palpate.threshold:g} or more in the active vertex group",
         "MATERIAL": "No face wears the active material",
@@ -149,7 +150,7 @@ def _check(obj, chosen: np.ndarray, source: str) -> None:
         "MESH": "There are no vertices",
     }[source]
     if not chosen.any():
-        raise SensorError(f"{what} on '{obj.name}': a sensor needs at least one face.")
+        raise SensorError(f"{reason} on '{obj.name}': a sensor needs at least one face.")
     if not any(all(chosen[vertex] for vertex in face.vertices) for face in obj.data.polygons):
         raise SensorError(
             f"The {int(chosen.sum())} chosen vertices of '{obj.name}' span no face: choose all corners of at least one face."
@@ -157,14 +158,14 @@ def _check(obj, chosen: np.ndarray, source: str) -> None:
 
 
 def remove_role(scene, obj) -> None:
-    """Take an object out: its role, and its part of a bake. Parameters and vertex groups stay."""
+    """Remove an object's role and its part of a bake. Parameters and vertex groups stay."""
     if obj.palpate.is_baked:
         baked_scene.clear_object(scene, obj)
     obj.palpate.role = "NONE"
 
 
 def group_to_paint(obj):
-    """Return the vertex group to paint a sensor's region in: the one it has, else a new, empty one."""
+    """Return the vertex group in which a sensor's region is painted: its own, else a new, empty one."""
     settings = obj.palpate
     group = obj.vertex_groups.get(settings.vertex_group) if settings.vertex_group else None
     if group is None:

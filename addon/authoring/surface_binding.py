@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Laid texels go with a surface that changes its shape, and keep what was painted on them when they are laid anew.
+"""Bind the texels of a laid sensor to a surface that changes its shape, and transfer painted values to new texels.
 
-Each is bound to the triangle under it: to a place in it, and to an offset along its edge, across that and along its normal.
-Geometry nodes put it there, so that the 3D view shows what is computed and no add-on is needed to see it.
+Each texel is bound to the nearest triangle of the surface: to a point in the triangle, plus an offset along the triangle's
+first edge, across this edge, and along the normal. Geometry nodes move the texels, so that the 3D view shows what is computed,
+also in a Blender without Palpate.
 """
 
 from __future__ import annotations
@@ -20,89 +21,93 @@ from ..scene import deforming_objects, mesh_arrays, participants, sensor_regions
 from ..session import transforms
 
 MODIFIER = NODES = "Palpate Cling"
-CORNERS = ("palpate_corner_a", "palpate_corner_b", "palpate_corner_c")
-SHARES, OFFSET = "palpate_shares", "palpate_offset"
-"""Attributes of the texels: vertices of the surface, their shares in the place, and what is from there to the texel."""
+"""Name of the modifier and of its node group; stored in .blend files."""
+CORNER_ATTRIBUTES = ("palpate_corner_a", "palpate_corner_b", "palpate_corner_c")
+WEIGHTS, OFFSET = "palpate_shares", "palpate_offset"
+"""Attributes of the texels: the triangle's vertices, barycentric coordinates of a point in it, and the offset from that."""
 
 
 def is_needed(carrier) -> bool:
-    """Whether the surface may change its shape by itself; its scale reaches a child anyway."""
+    """Return True when a surface may change its shape other than by its scale, which its children follow anyway."""
     return deforming_objects.may_deform(carrier) and not (
-        deforming_objects.has_animated_scale(carrier) and not _has_own_cause(carrier)
+        deforming_objects.has_animated_scale(carrier) and not _deforms_without_scale(carrier)
     )
 
 
-def _has_own_cause(carrier) -> bool:
+def _deforms_without_scale(carrier) -> bool:
+    """Return True when anything but an animated scale may change the shape of a surface."""
     data = carrier.data
     keys = getattr(data, "shape_keys", None) is not None
     return bool(carrier.modifiers) or keys or data.animation_data is not None or carrier.parent_type in {"ARMATURE", "LATTICE"}
 
 
-def is_bound(skin) -> bool:
-    """Whether the texels go with the shape of what they lie on."""
-    modifier = skin.modifiers.get(MODIFIER)
-    return modifier is not None and modifier.node_group is not None and _carrier_of(modifier) == skin.parent
+def is_bound(sensor) -> bool:
+    """Return True when the texels of a laid sensor are bound to its carrier."""
+    modifier = sensor.modifiers.get(MODIFIER)
+    return modifier is not None and modifier.node_group is not None and _surface_of(modifier) == sensor.parent
 
 
-def bind(context, skin, carrier) -> None:
-    """Bind the texels to the surface in the shape that both have now, where it may change."""
-    unbind(skin)
+def bind(context, sensor, carrier) -> None:
+    """Bind the texels of a laid sensor to its carrier in their present shapes, if the carrier's shape may change."""
+    unbind(sensor)
     if is_needed(carrier):
-        _bind(context, skin, carrier)
-        modifier = skin.modifiers.new(MODIFIER, "NODES")
-        modifier.node_group = bpy.data.node_groups.get(NODES) or _nodes()
-        _hand(modifier, carrier)
+        _store_bound_positions(context, sensor, carrier)
+        modifier = sensor.modifiers.new(MODIFIER, "NODES")
+        modifier.node_group = bpy.data.node_groups.get(NODES) or _binding_nodes()
+        _set_surface(modifier, carrier)
         modifier.show_expanded = False
-        skin.update_tag()
+        sensor.update_tag()
 
 
-def unbind(skin) -> None:
-    """Leave the texels where they are on the object, whatever its surface does."""
-    modifier = skin.modifiers.get(MODIFIER)
+def unbind(sensor) -> None:
+    """Remove the binding: the texels keep their positions in the carrier's coordinates."""
+    modifier = sensor.modifiers.get(MODIFIER)
     if modifier is not None:
-        skin.modifiers.remove(modifier)
-    for name in (*CORNERS, SHARES, OFFSET):
-        attribute = skin.data.attributes.get(name)
+        sensor.modifiers.remove(modifier)
+    for name in (*CORNER_ATTRIBUTES, WEIGHTS, OFFSET):
+        attribute = sensor.data.attributes.get(name)
         if attribute is not None:
-            skin.data.attributes.remove(attribute)
+            sensor.data.attributes.remove(attribute)
 
 
-def _socket(modifier) -> str:
+def _surface_input(modifier) -> str:
+    """Return the identifier of the modifier's input for the surface."""
     items = modifier.node_group.interface.items_tree
     return next(item.identifier for item in items if item.in_out == "INPUT" and item.socket_type == "NodeSocketObject")
 
 
-def _hand(modifier, carrier) -> None:
-    """Give the nodes the surface. Newer Blenders (5.2) have properties for inputs, older ones custom properties."""
+def _set_surface(modifier, carrier) -> None:
+    """Set the surface of the nodes. Blender 5.2 and later has properties for inputs, older versions custom properties."""
     if hasattr(modifier, "properties"):
-        getattr(modifier.properties.inputs, _socket(modifier)).value = carrier
+        getattr(modifier.properties.inputs, _surface_input(modifier)).value = carrier
     else:
-        modifier[_socket(modifier)] = carrier
+        modifier[_surface_input(modifier)] = carrier
 
 
-def _carrier_of(modifier):
+def _surface_of(modifier):
+    """Return the surface of the nodes."""
     if hasattr(modifier, "properties"):
-        return getattr(modifier.properties.inputs, _socket(modifier)).value
-    return modifier.get(_socket(modifier))
+        return getattr(modifier.properties.inputs, _surface_input(modifier)).value
+    return modifier.get(_surface_input(modifier))
 
 
-def _bind(context, skin, carrier) -> None:
-    """Note for each texel where it is on the surface."""
+def _store_bound_positions(context, sensor, carrier) -> None:
+    """Store, in attributes of the texels, where each of them is on the surface."""
     arrays, _ = mesh_arrays.sensor_arrays(carrier, participants.depsgraph_of(context.scene))
-    into = np.linalg.inv(transforms.as_array(carrier.matrix_world)) @ transforms.as_array(skin.matrix_world)
-    points = mesh_arrays.vertices(skin.data) @ into[:3, :3].T + into[:3, 3]
+    to_carrier = np.linalg.inv(transforms.as_array(carrier.matrix_world)) @ transforms.as_array(sensor.matrix_world)
+    points = mesh_arrays.vertices(sensor.data) @ to_carrier[:3, :3].T + to_carrier[:3, 3]
     surface = PaintedMesh(arrays.vertices, arrays.triangles.tolist(), {}, {})
-    corners, shares = (np.array(part) for part in zip(*_nearest(surface, points), strict=True))
+    corners, weights = (np.array(part) for part in zip(*_nearest_points(surface, points), strict=True))
     a, b, c = (arrays.vertices[corners[:, i]] for i in range(3))
-    place = np.einsum("nk,nkj->nj", shares, np.stack([a, b, c], axis=1))
+    foot = np.einsum("nk,nkj->nj", weights, np.stack([a, b, c], axis=1))
     along = _unit(b - a)
     normal = _unit(np.cross(b - a, c - a))
     axes = np.stack([along, np.cross(normal, along), normal], axis=1)
-    offset = np.einsum("nij,nj->ni", axes, points - place)
-    for name, values in zip(CORNERS, corners.T, strict=True):
-        skin.data.attributes.new(name, "INT", "POINT").data.foreach_set("value", values.astype(np.int32))
-    for name, table in ((SHARES, shares), (OFFSET, offset)):
-        attribute = skin.data.attributes.new(name, "FLOAT_VECTOR", "POINT")
+    offset = np.einsum("nij,nj->ni", axes, points - foot)
+    for name, values in zip(CORNER_ATTRIBUTES, corners.T, strict=True):
+        sensor.data.attributes.new(name, "INT", "POINT").data.foreach_set("value", values.astype(np.int32))
+    for name, table in ((WEIGHTS, weights), (OFFSET, offset)):
+        attribute = sensor.data.attributes.new(name, "FLOAT_VECTOR", "POINT")
         attribute.data.foreach_set("vector", table.astype(np.float32).ravel())
 
 
@@ -110,117 +115,147 @@ def _unit(vectors: np.ndarray) -> np.ndarray:
     return vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
 
 
-def _nodes():
-    """Return geometry nodes that put points where :func:`_bind` has bound them."""
-    tree = bpy.data.node_groups.new(NODES, "GeometryNodeTree")
-    for name, kind, way in (
-        ("Geometry", "Geometry", "INPUT"),
-        ("Surface", "Object", "INPUT"),
-        ("Geometry", "Geometry", "OUTPUT"),
-    ):
-        tree.interface.new_socket(name, in_out=way, socket_type=f"NodeSocket{kind}")
+class _NodeBuilder:
+    """Adds nodes to a tree and links them. Its methods return the output socket of what they add."""
 
-    def node(kind, **settings):
-        made = tree.nodes.new(kind)
+    def __init__(self, tree):
+        self.tree = tree
+
+    def node(self, kind: str, **settings):
+        """Add a node and return it."""
+        made = self.tree.nodes.new(kind)
         for key, value in settings.items():
             setattr(made, key, value)
         return made
 
-    def vector(operation, *inputs):
-        made = node("ShaderNodeVectorMath", operation=operation)
+    def link(self, source, socket) -> None:
+        """Link an output to an input."""
+        self.tree.links.new(source, socket)
+
+    def vector(self, operation: str, *inputs):
+        """Add a vector operation."""
+        made = self.node("ShaderNodeVectorMath", operation=operation)
         for socket, source in zip([s for s in made.inputs if s.enabled], inputs, strict=False):
-            tree.links.new(source, socket)
+            self.link(source, socket)
         return made.outputs["Vector"]
 
-    def attribute(name, kind):
-        made = node("GeometryNodeInputNamedAttribute", data_type=kind)
+    def attribute(self, name: str, kind: str):
+        """Read an attribute of the texels."""
+        made = self.node("GeometryNodeInputNamedAttribute", data_type=kind)
         made.inputs["Name"].default_value = name
         return next(socket for socket in made.outputs if socket.enabled and socket.name == "Attribute")
 
-    def parts(source):
-        made = node("ShaderNodeSeparateXYZ")
-        tree.links.new(source, made.inputs[0])
+    def components(self, source):
+        """Separate a vector into its three components."""
+        made = self.node("ShaderNodeSeparateXYZ")
+        self.link(source, made.inputs[0])
         return made.outputs
 
-    given = node("NodeGroupInput")
-    surface = node("GeometryNodeObjectInfo", transform_space="RELATIVE")
-    tree.links.new(given.outputs["Surface"], surface.inputs["Object"])
-    position = node("GeometryNodeInputPosition")
-
-    def corner(name):
-        made = node("GeometryNodeSampleIndex", data_type="FLOAT_VECTOR", domain="POINT")
-        tree.links.new(surface.outputs["Geometry"], made.inputs["Geometry"])
-        tree.links.new(position.outputs[0], next(s for s in made.inputs if s.enabled and s.name == "Value"))
-        tree.links.new(attribute(name, "INT"), made.inputs["Index"])
+    def sampled_position(self, geometry, position, index):
+        """Read the position of the vertex with an index from a geometry."""
+        made = self.node("GeometryNodeSampleIndex", data_type="FLOAT_VECTOR", domain="POINT")
+        self.link(geometry, made.inputs["Geometry"])
+        self.link(position, next(s for s in made.inputs if s.enabled and s.name == "Value"))
+        self.link(index, made.inputs["Index"])
         return next(socket for socket in made.outputs if socket.enabled)
 
-    a, b, c = (corner(name) for name in CORNERS)
-    edge, other = vector("SUBTRACT", b, a), vector("SUBTRACT", c, a)
-    along, normal = vector("NORMALIZE", edge), vector("NORMALIZE", vector("CROSS_PRODUCT", edge, other))
-    axes = (along, vector("CROSS_PRODUCT", normal, along), normal)
-    shares, offset = parts(attribute(SHARES, "FLOAT_VECTOR")), parts(attribute(OFFSET, "FLOAT_VECTOR"))
-    total = None
-    for source, factor in zip((a, b, c, *axes), (*shares, *offset), strict=True):
-        scaled = vector("SCALE", source, factor)
-        total = scaled if total is None else vector("ADD", total, scaled)
-    put = node("GeometryNodeSetPosition")
-    tree.links.new(given.outputs["Geometry"], put.inputs["Geometry"])
-    tree.links.new(total, put.inputs["Position"])
-    end = node("NodeGroupOutput")
-    tree.links.new(put.outputs["Geometry"], end.inputs["Geometry"])
+
+def _binding_nodes():
+    """Return new geometry nodes that move points to where :func:`_store_bound_positions` has bound them."""
+    tree = bpy.data.node_groups.new(NODES, "GeometryNodeTree")
+    for name, kind, direction in (
+        ("Geometry", "Geometry", "INPUT"),
+        ("Surface", "Object", "INPUT"),
+        ("Geometry", "Geometry", "OUTPUT"),
+    ):
+        tree.interface.new_socket(name, in_out=direction, socket_type=f"NodeSocket{kind}")
+    add = _NodeBuilder(tree)
+    given = add.node("NodeGroupInput")
+    surface = add.node("GeometryNodeObjectInfo", transform_space="RELATIVE")
+    add.link(given.outputs["Surface"], surface.inputs["Object"])
+    position = add.node("GeometryNodeInputPosition").outputs[0]
+    geometry = surface.outputs["Geometry"]
+    corners = [add.sampled_position(geometry, position, add.attribute(name, "INT")) for name in CORNER_ATTRIBUTES]
+    moved = add.node("GeometryNodeSetPosition")
+    add.link(given.outputs["Geometry"], moved.inputs["Geometry"])
+    add.link(_bound_position(add, *corners), moved.inputs["Position"])
+    add.link(moved.outputs["Geometry"], add.node("NodeGroupOutput").inputs["Geometry"])
     return tree
+
+
+def _bound_position(add: _NodeBuilder, a, b, c):
+    """Return the socket of a texel's position: weighted corners of its triangle, plus the offset along the triangle's axes."""
+    edge, other = add.vector("SUBTRACT", b, a), add.vector("SUBTRACT", c, a)
+    along, normal = add.vector("NORMALIZE", edge), add.vector("NORMALIZE", add.vector("CROSS_PRODUCT", edge, other))
+    axes = (along, add.vector("CROSS_PRODUCT", normal, along), normal)
+    weights = add.components(add.attribute(WEIGHTS, "FLOAT_VECTOR"))
+    offset = add.components(add.attribute(OFFSET, "FLOAT_VECTOR"))
+    total = None
+    for source, factor in zip((a, b, c, *axes), (*weights, *offset), strict=True):
+        scaled = add.vector("SCALE", source, factor)
+        total = scaled if total is None else add.vector("ADD", total, scaled)
+    return total
 
 
 @dataclass(frozen=True)
 class PaintedMesh:
-    """What is painted on a mesh: corners, faces, and by name the values of its vertex groups and float attributes."""
+    """A mesh and the values that are painted on it.
 
-    corners: np.ndarray
+    Attributes
+    ----------
+    vertices : (n, 3) float
+    faces : list of list of int
+    groups, attributes : dict of str to (n,) float
+        Weights of vertex groups, and values of float attributes, by name.
+    """
+
+    vertices: np.ndarray
     faces: list[list[int]]
     groups: dict[str, np.ndarray]
     attributes: dict[str, np.ndarray]
 
 
-def painted_values(skin) -> PaintedMesh:
-    """Return what is painted on a skin."""
-    mesh = skin.data
+def painted_values(sensor) -> PaintedMesh:
+    """Return the painted values of a laid sensor, with its mesh."""
+    mesh = sensor.data
     return PaintedMesh(
         mesh_arrays.vertices(mesh),
         [list(face.vertices) for face in mesh.polygons],
-        {group.name: sensor_regions.vertex_weights(mesh, group.index) for group in skin.vertex_groups},
-        {item.name: _values(item) for item in mesh.attributes if painted_maps.is_map(item)},
+        {group.name: sensor_regions.vertex_weights(mesh, group.index) for group in sensor.vertex_groups},
+        {item.name: _attribute_values(item) for item in mesh.attributes if painted_maps.is_map(item)},
     )
 
 
-def transfer_painted_values(skin, before: PaintedMesh) -> None:
-    """Give the vertices of a skin's new mesh what was painted on the old one, at the nearest place on it."""
-    found = _nearest(before, mesh_arrays.vertices(skin.data))
+def transfer_painted_values(sensor, before: PaintedMesh) -> None:
+    """Paint the new mesh of a laid sensor: each vertex gets the values of the nearest point on the mesh before."""
+    found = _nearest_points(before, mesh_arrays.vertices(sensor.data))
 
-    def at_each(values: np.ndarray) -> np.ndarray:
-        return np.array([values[corners] @ shares for corners, shares in found], dtype=np.float32)
+    def interpolated(values: np.ndarray) -> np.ndarray:
+        return np.array([values[corners] @ weights for corners, weights in found], dtype=np.float32)
 
-    skin.vertex_groups.clear()
+    sensor.vertex_groups.clear()
     for name, values in before.groups.items():
-        group = skin.vertex_groups.new(name=name)
-        for vertex, weight in enumerate(at_each(values).tolist()):
+        group = sensor.vertex_groups.new(name=name)
+        for vertex, weight in enumerate(interpolated(values).tolist()):
             if weight > 1e-6:
                 group.add([vertex], weight, "REPLACE")
     for name, values in before.attributes.items():
-        skin.data.attributes.new(name, "FLOAT", "POINT").data.foreach_set("value", at_each(values))
+        sensor.data.attributes.new(name, "FLOAT", "POINT").data.foreach_set("value", interpolated(values))
 
 
-def _values(attribute) -> np.ndarray:
+def _attribute_values(attribute) -> np.ndarray:
+    """Return the values of a float attribute, (n,) float32."""
     values = np.empty(len(attribute.data), dtype=np.float32)
     attribute.data.foreach_get("value", values)
     return values
 
 
-def _nearest(before: PaintedMesh, points: np.ndarray) -> list[tuple[list[int], np.ndarray]]:
-    """For each point the corners of the nearest face and their shares in the place on it."""
-    tree = BVHTree.FromPolygons(before.corners.tolist(), before.faces)
+def _nearest_points(mesh: PaintedMesh, points: np.ndarray) -> list[tuple[list[int], np.ndarray]]:
+    """Return, for each point, the corners of the nearest face and the weights that give the nearest point on it."""
+    tree = BVHTree.FromPolygons(mesh.vertices.tolist(), mesh.faces)
     result = []
     for point in points:
-        place, _, index, _ = tree.find_nearest(Vector(point))
-        face = before.faces[index]
-        result.append((face, np.array(poly_3d_calc([Vector(before.corners[i]) for i in face], place))))
+        nearest, _, index, _ = tree.find_nearest(Vector(point))
+        face = mesh.faces[index]
+        result.append((face, np.array(poly_3d_calc([Vector(mesh.vertices[i]) for i in face], nearest))))
     return result
