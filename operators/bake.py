@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Bake, clear, reset."""
+"""Operators for bakes and for the live simulation: bake, clear, display, compute missing frames, reset."""
 
 import bpy
 
@@ -56,16 +56,16 @@ class PALPATE_OT_catch_up(modal_job.ModalJob, bpy.types.Operator):
     def job(self, context):
         self._was_playing = context.screen is not None and context.screen.is_animation_playing
         if self._was_playing:
-            bpy.ops.screen.animation_cancel(restore_frame=False)  # it would move the frame under the work
+            bpy.ops.screen.animation_cancel(restore_frame=False)  # playing would change the frame during the computation
         return playback.compute_to_present_frame(context.scene)
 
     def modal(self, context, event):
-        if event.type == "SPACE" and event.value == "PRESS":  # whoever wants to stop what seems to be playing
+        if event.type == "SPACE" and event.value == "PRESS":  # the user does not want to go on playing afterwards
             self._was_playing = False
         return super().modal(context, event)
 
     def done(self, result):
-        if self._was_playing:  # frames were dropped, or time is stretched so that whole ones are passed by
+        if self._was_playing:  # playing goes on; it was interrupted because it had skipped frames
             bpy.ops.screen.animation_play()
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Sensors from and to files: OpenRAVE's XML (paper, Table 2) and the sensor as TOML."""
+"""Operators that import and export sensors: OpenRAVE's XML (paper, Table 2) and Palpate's TOML."""
 
 from pathlib import Path
 

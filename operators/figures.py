@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Figures, strips, curves, numbers, videos and data of a bake, all with one button."""
+"""The operator that makes the figures, videos and data files of a bake."""
 
 import bpy
 

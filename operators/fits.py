@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Parameters of a sensor from measurements: stiffness of its foam, friction of its surface; the plot is shown."""
+"""Operators that fit a sensor's parameters to measurements: stiffness of its foam, friction of its surface."""
 
 from pathlib import Path
 
@@ -15,7 +15,7 @@ DAMPING = 0.01
 
 
 class MeasurementFit(support.ErrorReporting, support.FileChooser):
-    """What both fits share: a CSV is chosen, values are put on the active sensor, and a picture is shown."""
+    """What both fits share: choosing a CSV, drawing the settings, and showing the plot."""
 
     filename_ext = ".csv"
     filter_glob: StringProperty(default="*.csv;*.txt", options={"HIDDEN"})
@@ -32,14 +32,14 @@ class MeasurementFit(support.ErrorReporting, support.FileChooser):
 
     def draw(self, _context):
         layout = self.layout
-        layout.use_property_split = False  # beside their fields names would be cut off in the file browser
+        layout.use_property_split = False  # labels beside their fields would be cut off in the file browser
         for name in self.fields:
             layout.prop(self, name)
         layout.label(text="Also write the plot to:")
         layout.prop(self, "plot", text="")
 
     def picture(self, context, draw, fit, title: str) -> None:
-        """Draw a fit, keep it in the .blend as an image, and show it."""
+        """Plot a fit, store the plot in the .blend as an image, and show it."""
         path = Path(bpy.app.tempdir) / f"{title}.png"
         draw(path, fit)
         if self.plot:
@@ -48,7 +48,7 @@ class MeasurementFit(support.ErrorReporting, support.FileChooser):
 
 
 def show_image(context, path: Path, title: str) -> None:
-    """Put a picture into the file, and into an image editor: one that is open, else one in a window of its own."""
+    """Store a picture in the .blend and show it in an image editor; open a window with one if there is none."""
     old = bpy.data.images.get(title)
     if old is not None:
         bpy.data.images.remove(old)

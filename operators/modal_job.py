@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Long work beside the window: a slice at each tick of a timer, progress in the status bar, ESC stops it."""
+"""Operators that run a job beside the window: a slice at each tick of a timer, progress in the status bar, ESC to stop."""
 
 from __future__ import annotations
 
@@ -10,7 +10,11 @@ from . import support
 
 
 class ModalJob(support.ErrorReporting):
-    """Mixin: `job(context)` returns the generator, `done(result)` says what came of it, `stopped` is said after ESC."""
+    """Mixin for an operator that runs a job.
+
+    The operator defines `job(context)`, which returns the :class:`.Job`, and `done(result)`, which reports its result.
+    `stopped` is the message after ESC. Without a window the job runs in one go.
+    """
 
     stopped = "Stopped"
 
@@ -23,11 +27,12 @@ class ModalJob(support.ErrorReporting):
         self.done(run_job(self.job(context)))
 
     def done(self, result):
-        """Report what was done."""
+        """Report the result of the job."""
 
     def _start(self, context):
-        self._slice = SlicedJob(self.job(context))
-        self._slice.work(0.0)  # what is wrong from the beginning is said at once
+        """Begin the job and its timer."""
+        self._running = SlicedJob(self.job(context))
+        self._running.work(0.0)  # errors at the beginning are reported at once
         manager = context.window_manager
         self._timer = manager.event_timer_add(0.01, window=context.window)
         manager.progress_begin(0.0, 1.0)
@@ -36,39 +41,40 @@ class ModalJob(support.ErrorReporting):
 
     def modal(self, context, event):
         if event.type == "ESC" and event.value == "PRESS":
-            self._slice.cancel()
+            self._running.cancel()
             self._end(context)
             self.report({"WARNING"}, self.stopped)
             return {"CANCELLED"}
         if event.type != "TIMER":
-            return {"RUNNING_MODAL"}  # nothing may change under the work
+            return {"RUNNING_MODAL"}  # other events must not change the scene while the job runs
         result = None
         try:
             result = self.reporting(lambda: self._work(context))
-        finally:  # an error of ours, too, ends the operator: no timer and no progress may be left of it
+        finally:  # also after an unexpected error, timer and progress have to be removed
             if result != {"RUNNING_MODAL"}:
                 self._end(context)
         return result
 
     def _work(self, context):
-        self._slice.work()
-        if self._slice.is_done:
-            self.done(self._slice.result)
+        """Run a slice of the job and show its progress."""
+        self._running.work()
+        if self._running.is_done:
+            self.done(self._running.result)
             return {"FINISHED"}
-        progress = self._slice.progress
-        share = progress.share
-        context.window_manager.progress_update(share)
-        context.workspace.status_text_set(f"{progress.text}, {share:.0%}    ESC: stop")
+        progress = self._running.progress
+        context.window_manager.progress_update(progress.share)
+        context.workspace.status_text_set(f"{progress.text}, {progress.share:.0%}    ESC: stop")
         redraw_panels(context)
         return {"RUNNING_MODAL"}
 
     def cancel(self, context):
-        """Blender closes, or loads another file."""
-        self._slice.cancel()
+        """Stop the job, because Blender closes or loads another file."""
+        self._running.cancel()
         self._end(context)
 
     def _end(self, context):
-        self._slice.cancel()
+        """Remove timer and progress."""
+        self._running.cancel()
         context.window_manager.event_timer_remove(self._timer)
         context.window_manager.progress_end()
         context.workspace.status_text_set(None)
@@ -76,7 +82,7 @@ class ModalJob(support.ErrorReporting):
 
 
 def redraw_panels(context):
-    """Draw again what shows progress."""
+    """Redraw the areas that show the progress."""
     for area in context.screen.areas:
         if area.type in {"PROPERTIES", "VIEW_3D"}:
             area.tag_redraw()

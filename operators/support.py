@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What every operator shares: errors become one sentence in one place, and poll says why."""
+"""What operators share: errors are reported in one place, and polls say why a button is greyed out."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from ..core.errors import PalpateError
 
 
 class ErrorReporting:
-    """Mixin: `run(context)` does the work; a PalpateError becomes a red sentence and nothing else."""
+    """Mixin for an operator whose work is `run(context)`: a PalpateError is reported as an error message."""
 
     def execute(self, context):
         return self.reporting(lambda: self.run(context))
 
     def reporting(self, work):
-        """Do `work` and return its result, or report the user's error and return CANCELLED."""
+        """Call `work` and return its result or FINISHED; report a PalpateError and return CANCELLED."""
         try:
             return work() or {"FINISHED"}
         except PalpateError as error:
@@ -31,7 +31,7 @@ class ErrorReporting:
 
 
 def poll_idle(cls) -> bool:
-    """Poll: no frames are being computed, by a bake or after a jump on the timeline."""
+    """Poll: no bake and no computation of missing frames is running."""
     if session_state.is_baking() or session_state.session.catching_up:
         cls.poll_message_set("Frames are being computed")
         return False
@@ -39,7 +39,7 @@ def poll_idle(cls) -> bool:
 
 
 class FileChooser(ImportHelper):
-    """Mixin: a file is chosen beside the .blend; Blender by itself would fill in the name of the .blend."""
+    """Mixin: the file browser opens in the folder of the .blend, without the .blend's own name as the file."""
 
     def invoke(self, context, event):
         if not self.filepath and bpy.data.filepath:
@@ -48,7 +48,7 @@ class FileChooser(ImportHelper):
 
 
 def poll_surface_object(cls, context) -> bool:
-    """Poll: there is an active object that could take part."""
+    """Poll: the active object has a surface and can be changed."""
     obj = context.object
     if obj is None:
         cls.poll_message_set("Make an object active first")
@@ -62,7 +62,7 @@ def poll_surface_object(cls, context) -> bool:
 
 
 def poll_mesh_object(cls, context) -> bool:
-    """Poll: there is an active mesh object whose mesh is of this file."""
+    """Poll: the active object is a mesh object whose mesh belongs to this file."""
     if not poll_surface_object(cls, context):
         return False
     if context.object.type != "MESH":
@@ -78,12 +78,12 @@ def poll_mesh_object(cls, context) -> bool:
 
 
 def poll_editable_sensor(cls, context) -> bool:
-    """Poll: the active object is a sensor or a pad that can be changed."""
+    """Poll: the active object is a sensor or a pad, and can be changed."""
     return poll_surface_object(cls, context) and poll_sensor(cls, context)
 
 
 def poll_sensor(cls, context) -> bool:
-    """Poll: the active object is a sensor or a pad, perhaps of another file; enough for what does not change it."""
+    """Poll: the active object is a sensor or a pad. It may be linked from another file."""
     if context.object is None:
         cls.poll_message_set("Make an object active first")
         return False
@@ -94,16 +94,13 @@ def poll_sensor(cls, context) -> bool:
 
 
 def leave_edit_mode(context) -> None:
-    """Go to Object Mode.
-
-    In Edit Mode Blender's undo remembers the mesh being edited and no properties, so that undo could not take back a role.
-    """
+    """Switch to Object Mode: in Edit Mode, Blender's undo restores the edited mesh only and not the properties of objects."""
     if context.object is not None and context.object.mode != "OBJECT":
         bpy.ops.object.mode_set(mode="OBJECT")
 
 
 def poll_gap_found(cls, context) -> bool:
-    """Poll: something was found for the active sensor."""
+    """Poll: a gap was found for the active sensor."""
     if not poll_editable_sensor(cls, context):
         return False
     if gap_results.of(context.object) is None:

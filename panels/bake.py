@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Panels of what the scene does: bake, and how results look."""
+"""Panels of a scene: bake, display of results, figures."""
 
 from ..addon.display import baked_scene
 from ..addon.session import frame_status, session_state

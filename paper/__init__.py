@@ -1,2 +1,4 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The paper's experiments, run again: each module here is one of them, and :mod:`.page` puts our numbers beside the print."""
+"""The experiments of the paper, repeated: :mod:`.experiments` lists them, :mod:`.page` compares the numbers."""
+
+__all__ = ["experiments", "page"]

@@ -23,19 +23,20 @@ LOAD = 0.08  # N on a texel, Fig. 7
 
 
 def stiffness(folder: Path, progress: Callable) -> Chapter:
-    """Eq. 18 on the printed inputs, and both lines of Fig. 6 on a foam like the paper's."""
+    """Evaluate Eq. 18 on the printed inputs, and fit both lines of Fig. 6 to a foam like the paper's."""
     chapter = Chapter(
         "Stiffness from the compression of the foam",
         "Eq. 18, Fig. 6, section 3.4.1",
-        "Eq. 18 on the paper's printed inputs. Its measurements are only printed as a plot, so the picture fits twelve points "
-        "made up on a line like that of Fig. 6: as stiff as the reference point, carrying from 0.3 mm on, 150 Pa of noise.",
+        "Eq. 18 evaluated on the paper's printed inputs. The paper shows its measurements only as a plot, so the picture fits "
+        "twelve synthetic points on a line like that of Fig. 6: as stiff as the reference point, without force up to 0.3 mm, "
+        "with 150 Pa of noise.",
     )
     k = texel_stiffness(PRESSURE, AREA, TEXELS, COMPRESSION)
     chapter.rows += [
         compare("k of a texel, Eq. 18", "58.5 N/m", 58.392857, k, 1e-6, "N/m", "the print is 0.2 % off its own inputs"),
         compare(
             "pressure of 304.15 g on 804.25 mm²", "9810 Pa", 3708.7, WEIGHT * STANDARD_GRAVITY / WEIGHT_AREA, 0.1, "Pa",
-            "the print needs 804 g for its 9810 Pa",
+            "9810 Pa would need 804 g",
         ),
     ]  # fmt: skip
     x = np.linspace(0.5e-3, 3.8e-3, 12)
@@ -43,25 +44,25 @@ def stiffness(folder: Path, progress: Callable) -> Chapter:
     slope = PRESSURE / COMPRESSION
     fit = fit_stiffness(FoamData(x, slope * (x - 0.3e-3) + noise), AREA, TEXELS)
     chapter.rows += [
-        Row("line through zero, made-up foam", "—", "—", fit.k.text("N/m"), None, "the line that the model uses"),
-        compare("line with offset, made-up foam", "—", k, fit.k_offset.value, 0.05 * k, "N/m", "noise of 150 Pa"),
-        compare("compression before it carries", "—", 0.3, fit.dead_zone * 1e3, 0.05, "mm", "noise of 150 Pa"),
+        Row("line through zero, synthetic foam", "—", "—", fit.k.text("N/m"), None, "the line that the model uses"),
+        compare("line with offset, synthetic foam", "—", k, fit.k_offset.value, 0.05 * k, "N/m", "noise of 150 Pa"),
+        compare("compression without force", "—", 0.3, fit.dead_zone * 1e3, 0.05, "mm", "noise of 150 Pa"),
     ]
     for kind in ("pdf", "png"):
         plot_stiffness(folder / f"fig6-foam.{kind}", fit)
-    chapter.pictures.append(Picture(folder / "fig6-foam.png", "Foam compression with both straight lines (made-up points)."))
+    chapter.pictures.append(Picture(folder / "fig6-foam.png", "Foam compression with both straight lines (synthetic points)."))
     progress()
     return chapter
 
 
 def friction(folder: Path, progress: Callable) -> Chapter:
-    """The curve of Fig. 7 from its printed parameters, and a fit that finds them."""
+    """Compute the curve of Fig. 7 from its printed parameters, and recover these by a fit."""
     chapter = Chapter(
         "Friction from a force–velocity curve",
         "Eq. 9, 10, 13, Fig. 7, section 3.4.2",
-        "The paper fits its curve by hand. Here the printed parameters make a recording (velocity rising by 0.05 m/s every "
-        "second from rest, 0.3 mN of noise), and the fit has to find them again. Pre-sliding gives the rise at the left, which "
-        "steady sliding does not have.",
+        "The paper fits its curve by hand. Here a recording is computed from the printed parameters (velocity rising by "
+        "0.05 m/s every second from rest, 0.3 mN of noise), and the fit has to recover them. Presliding causes the rise at "
+        "the left, which steady sliding does not show.",
     )
     law = SensorParameters(sigma0=1.0, sigma1=0.1, x0=0.3, ct=0.01, mus=0.435, mud=0.23)
     time = np.linspace(0.0, 28.0, 560)
@@ -80,7 +81,12 @@ def friction(folder: Path, progress: Callable) -> Chapter:
         compare("friction at which sliding begins", "0.0348 N (mus · 0.08 N)", 0.0348, peak, 1e-12, "N"),
         compare("friction at 5 m/s", "—", 0.0184 + 0.05, floor, 1e-9, "N", "mud · fn + ct · v"),
         Row(
-            "g of Eq. 10 at 1 m/s", "negative", "0.0184 N", f"{fast - law.ct:.4f} N", None, "its exponential was lost in print"
+            "g of Eq. 10 at 1 m/s",
+            "negative",
+            "0.0184 N",
+            f"{fast - law.ct:.4f} N",
+            None,
+            "the printed formula lacks its exponential",
         ),
     ]
     for kind in ("pdf", "png"):
@@ -91,11 +97,11 @@ def friction(folder: Path, progress: Callable) -> Chapter:
 
 
 def definition(folder: Path, progress: Callable) -> Chapter:
-    """Table 2, written, read and written again."""
+    """Write Table 2 as XML, read it and write it again."""
     chapter = Chapter(
         "The definition in OpenRAVE's XML",
         "Table 2, section 4",
-        "The printed table has spaces inside its tags, which no XML reader takes; this writes what it means.",
+        "The printed table has spaces inside its tags, which no XML reader accepts; this is the table without them.",
     )
     path = folder / "table2.xml"
     text = openrave_xml([OpenRaveSensor("T1", "object1", SensorParameters())])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What an experiment hands over: rows that compare numbers, and pictures."""
+"""The result of an experiment: rows that compare numbers, and pictures."""
 
 from __future__ import annotations
 
@@ -10,19 +10,19 @@ from pathlib import Path
 
 @dataclass(frozen=True)
 class Row:
-    """One number beside the paper's.
+    """One number beside the paper's number.
 
     Attributes
     ----------
     what : str
     printed : str
-        The paper's own, or a dash.
+        The paper's number, or a dash.
     expected, measured : str
-        What has to come out by a closed form or by the errata, and what came out.
+        The number required by a closed form or by a correction of the paper, and the number computed here.
     kept : bool or None
-        The measured number is within its tolerance; None where there is nothing to keep.
+        True if the computed number is within its tolerance; None if it is not judged.
     note : str
-        The tolerance and its reason, or what is wrong with the print.
+        The tolerance and its reason, or an error in the printed number.
     """
 
     what: str
@@ -34,7 +34,7 @@ class Row:
 
 
 def compare(what: str, printed: str, expected: float, measured: float, tolerance: float, unit: str, note: str = "") -> Row:
-    """Return the row of a number that has to be `expected` within an absolute `tolerance`, shown to a tenth of that."""
+    """Return the row of a number that has to equal `expected` within the absolute `tolerance`; a tenth of it is displayed."""
     decimals = min(max(0, math.ceil(1 - math.log10(tolerance))), 9)
     kept = bool(abs(measured - expected) <= tolerance)
     words = f"within {tolerance:.2g} {unit}".rstrip() + (f"; {note}" if note else "")
@@ -50,7 +50,7 @@ def below(what: str, printed: str, measured: float, limit: float, unit: str, not
 
 @dataclass(frozen=True)
 class Picture:
-    """A figure: its PNG, and the PDF beside it where it is no render."""
+    """A figure: its PNG, and beside it a PDF unless it is a render."""
 
     path: Path
     caption: str
@@ -67,7 +67,7 @@ class Chapter:
     where : str
         Table, figure or section of the paper.
     text : str
-        What was done, in plain sentences.
+        What was done.
     rows : list of Row
     pictures : list of Picture
     """
@@ -80,5 +80,5 @@ class Chapter:
 
     @property
     def kept(self) -> bool:
-        """True when no row is outside its tolerance."""
+        """True if no row is outside its tolerance."""
         return all(row.kept is not False for row in self.rows)

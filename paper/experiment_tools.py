@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the experiments share: a built scene, its scenario, its bake, its render."""
+"""What the experiments share: building, sampling, baking and rendering a scene."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from ..core.model.recording import Recording
 from ..core.model.scenario import Scenario
 
 SAMPLES = 12
-"""Samples per pixel of the renders: soft light needs few, and the denoiser does the rest."""
+"""Samples per pixel of the renders: soft light needs few, because the result is denoised."""
 
 
 def new_scene(build: Callable) -> bpy.types.Scene:
@@ -29,13 +29,13 @@ def new_scene(build: Callable) -> bpy.types.Scene:
 
 
 def scenario_of(scene) -> Scenario:
-    """Return what the solver is given for a scene."""
+    """Return the scenario of a scene, the input of the solver."""
     scenario = run_job(scene_reader.read_scene(scene)).scenario
     return scenario
 
 
 def bake(scene, folder: Path, on_progress=None) -> Recording:
-    """Bake a scene into a folder, so that its heat maps show, and return the recording."""
+    """Bake a scene into a folder, put the heat maps into the scene, and return the recording."""
     scene.palpate.folder = str(folder)
     return run_job(baking.bake(scene), on_progress).recording
 
@@ -46,7 +46,7 @@ def picture(scene, path: Path, frame: int, size=(640, 480)) -> Path:
 
 
 def with_mass(scenario: Scenario, name: str, mass: float) -> Scenario:
-    """Return the scenario with a free body of another mass, its inertia in proportion."""
+    """Return the scenario with another mass of a free body; its inertia changes in proportion."""
     bodies = tuple(
         replace(body, mass=mass, inertia=np.asarray(body.inertia) * (mass / body.mass)) if body.name == name else body
         for body in scenario.bodies
@@ -55,5 +55,5 @@ def with_mass(scenario: Scenario, name: str, mass: float) -> Scenario:
 
 
 def path_of(recording: Recording, name: str) -> np.ndarray:
-    """(F, 3) float, metres: where a body was at every frame."""
+    """(F, 3) float, metres: position of a body at every frame."""
     return recording.poses[:, recording.body_names.index(name), :3]

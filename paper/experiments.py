@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The list of experiments, in the order of the paper. A new one is a function here and a module beside this."""
+"""The experiments in the order of the paper. A new one is a function in a module of this package, and a row here."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from .chapter import Chapter
 
 @dataclass(frozen=True)
 class Experiment:
-    """How an experiment is run: with the folder for its figures and a function to call after each of its `steps`."""
+    """An experiment: `run` takes the folder for its figures and a function that it calls after each of its `steps`."""
 
     run: Callable[[Path, Callable], Chapter]
     steps: int

@@ -14,12 +14,12 @@ from .chapter import Chapter, Picture, Row, below
 
 
 def sensors(folder: Path, progress: Callable) -> Chapter:
-    """One sensor of each kind, and how exact the normals are where a closed form tells them."""
+    """Build one sensor of each kind, and compare the normals with closed forms where there are any."""
     chapter = Chapter(
         "Sensors from any mesh",
         "Fig. 1 to 3, section 3.1",
         "Each vertex of a mesh is a texel; its normal is the normalised sum of the unit normals of the triangles around it. On "
-        "the grid and on the sphere the surface itself says what the normal should be.",
+        "the grid and on the sphere the exact normal is known.",
     )
     scene = experiment_tools.new_scene(geometries.build)
     scenario = experiment_tools.scenario_of(scene)
@@ -33,7 +33,7 @@ def sensors(folder: Path, progress: Callable) -> Chapter:
     chapter.rows.append(below("grid: angle of a normal from the vertical", "—", float(up), 1e-5, "°"))
     radial = sphere.position / np.linalg.norm(sphere.position, axis=1, keepdims=True)
     off = np.degrees(np.arccos(np.clip((sphere.normal * radial).sum(axis=1), -1, 1))).max()
-    note = "triangles of an icosphere are not all alike, and unit normals count them alike, as in the paper"
+    note = "the triangles of an icosphere differ in size, but unit normals weigh them equally, as in the paper"
     chapter.rows.append(below("sphere: angle of a normal from the radius", "—", float(off), 1.0, "°", note))
     progress()
     experiment_tools.bake(scene, folder / "bake-geometries")

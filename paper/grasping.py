@@ -21,23 +21,23 @@ from ..sample_blends import grasps, gripper, hand, pick_and_place
 from . import experiment_tools
 from .chapter import Chapter, Picture, Row, below, compare
 
-LOOK = FigureStyle(colour_map="PAPER", width="single")
-"""White is no force, black the largest, as in the paper."""
+STYLE = FigureStyle(colour_map="PAPER", width="single")
+"""White is no force and black the largest force, as in the paper."""
 HOLD, LAST = 60.0, 10.0
-"""Seconds that an object is held, and how many of them at the end it must not move in."""
+"""Seconds that an object is held, and seconds at the end during which it must not move."""
 STILL = 1e-6  # m
-HEAVY_KIND, LIGHT, HEAVY = "box", 0.16, 0.40  # kg: the box, and masses around the one that friction can just hold
+HEAVY_KIND, LIGHT, HEAVY = "box", 0.16, 0.40  # kg: masses of the box below and above the limit of friction
 FALLEN = 5e-3
-"""Metres of descent from which on a box is said to slip; what is held sinks by half a millimetre while the bristles bend."""
+"""Metres of descent from which on a box counts as slipping. A held box sinks by half a millimetre while the bristles bend."""
 
 
 def four_objects(folder: Path, progress: Callable) -> Chapter:
-    """Fig. 10: what two pads feel of a sphere, a box, a cylinder and a spray bottle, and whether they hold them."""
+    """Fig. 10: tactile images of a sphere, a box, a cylinder and a spray bottle between two pads, and whether these hold."""
     chapter = Chapter(
         "Four objects between two fingers",
         "Fig. 10, section 5.2.1",
-        "Two coupled fingers of a parallel gripper close on an object that stands on a table, until the left one feels 3 N; "
-        "the table sinks away and the object is held for a minute. For each object: the grasp, the tactile images of both "
+        "Two coupled fingers of a parallel gripper close on an object that stands on a table, until the left one measures 3 N; "
+        "then the table is lowered and the object is held for a minute. For each object: the grasp, the tactile images of both "
         "fingers (white 0, black the largest force), and the normal force of each texel of the right finger.",
     )
     for kind in grasps.OBJECTS:
@@ -46,6 +46,7 @@ def four_objects(folder: Path, progress: Callable) -> Chapter:
 
 
 def _one_object(chapter: Chapter, kind: str, folder: Path, progress: Callable) -> None:
+    """Add the pictures and rows of one object."""
     name = grasps.OBJECTS[kind].name
     scene = experiment_tools.new_scene(partial(grasps.build, kind=kind))
     scenario = experiment_tools.scenario_of(scene)
@@ -53,7 +54,7 @@ def _one_object(chapter: Chapter, kind: str, folder: Path, progress: Callable) -
     recording = experiment_tools.bake(scene, folder / f"bake-grasp-{kind}")
     last = int(recording.frames[-1])
     numbers = folder / f"fig10-{kind}-numbers"
-    _twice(numbers, lambda path: texel_numbers(path, recording, texels, gripper.RIGHT, last, LOOK))
+    _as_pdf_and_png(numbers, lambda path: texel_numbers(path, recording, texels, gripper.RIGHT, last, STYLE))
     chapter.pictures += [
         Picture(experiment_tools.picture(scene, folder / f"fig10-{kind}.png", last), f"{name}: the grasp."),
         _strip(folder / f"fig10-{kind}-images", recording, texels, [last], f"{name}: both pads."),
@@ -65,7 +66,7 @@ def _one_object(chapter: Chapter, kind: str, folder: Path, progress: Callable) -
 
 
 def held_rows(scenario: Scenario, name: str, controlled: str, force: float, seconds: float = HOLD) -> list[Row]:
-    """Rows of a long hold: the controlled sum, and how far the object moved in the last ten seconds."""
+    """Return the rows of a long hold: the controlled sum, and how far the object moved in the last ten seconds."""
     held = run(replace(scenario, frame_end=scenario.frame_start + round(seconds * scenario.fps)))
     path = experiment_tools.path_of(held, name)
     last = held.times >= held.times[-1] - LAST
@@ -73,19 +74,26 @@ def held_rows(scenario: Scenario, name: str, controlled: str, force: float, seco
     total = float(held.sensors[controlled].normal_force[-1].sum())
     return [
         compare(
-            f"{name.lower()}: sum of the {controlled.lower()}", "—", force, total, 1e-6, "N", "what the controller was told"
+            f"{name.lower()}: sum of the {controlled.lower()}", "—", force, total, 1e-6, "N", "the set point of the controller"
         ),
-        below(f"{name.lower()}: moved in the last 10 s of {seconds:g} s", "—", drift, STILL, "m", "no sleeping, no freezing"),
+        below(
+            f"{name.lower()}: moved in the last 10 s of {seconds:g} s",
+            "—",
+            drift,
+            STILL,
+            "m",
+            "bodies are not put to sleep or frozen",
+        ),
     ]
 
 
 def too_heavy(folder: Path, progress: Callable) -> Chapter:
-    """How much two pads hold, by bisection, against Coulomb's limit."""
+    """Find by bisection how much two pads hold, and compare it with Coulomb's limit."""
     chapter = Chapter(
-        "What is too heavy slips",
+        "The largest mass that friction holds",
         "section 5.2.1, with Eq. 11",
-        "The box again, in masses between which a bisection looks for the one that just slips out of the fingers. Coulomb: two "
-        "pads with 3 N each hold 2 · mus · 3 N.",
+        "The box again, with several masses: a bisection finds the one that just slips out of the fingers. By Coulomb's law, "
+        "two pads with 3 N each hold 2 · mus · 3 N.",
     )
     scene = experiment_tools.new_scene(partial(grasps.build, kind=HEAVY_KIND))
     scenario = slowly(experiment_tools.scenario_of(scene))
@@ -108,13 +116,13 @@ def too_heavy(folder: Path, progress: Callable) -> Chapter:
 
 
 def coulomb_limit(scenario: Scenario) -> float:
-    """Mass, kg, that two pads with the grasp's force can just hold."""
+    """Return the mass, kg, that two pads with the grasp's force can just hold by Coulomb's law."""
     mus = scenario.sensors[0].parameters.mus
     return 2 * mus * grasps.FORCE / float(np.linalg.norm(scenario.gravity))
 
 
 def slowly(scenario: Scenario, times: float = 3.0) -> Scenario:
-    """The same grasp with the table sinking several times as slowly, so that nothing but the weight pulls."""
+    """Return the same grasp with a table that is lowered more slowly, so that only the weight pulls on the object."""
     bodies = tuple(
         replace(body, motion=replace(body.motion, times=times * body.motion.times)) if not body.free else body
         for body in scenario.bodies
@@ -124,7 +132,7 @@ def slowly(scenario: Scenario, times: float = 3.0) -> Scenario:
 
 
 def slips(scenario: Scenario, name: str, mass: float) -> bool:
-    """Whether the object of a mass slides out of the fingers."""
+    """Return True if the object slips out of the fingers when it has this mass."""
     recording = run(experiment_tools.with_mass(scenario, name, mass))
     path = experiment_tools.path_of(recording, name)
     return bool(path[0, 2] - path[-1, 2] > FALLEN)
@@ -136,8 +144,8 @@ def work_cycle(folder: Path, progress: Callable) -> Chapter:
         "Pick and place",
         "Fig. 11 and 12, section 5.2.2",
         "The arm is keyframed; the fingers close at constant speed until they touch, then control the tactile sum "
-        "(3 N). The controller knows the array's size, its values and their sum, and nothing of the simulation. The cube "
-        "covers 30 % of each pad. The paper's simulated pads show equal values; so must ours.",
+        "(3 N). The controller uses only the size of the array, its values and their sum. The cube covers 30 % of each pad. "
+        "The paper's simulated pads show equal values, and ours have to as well.",
     )
     scene = experiment_tools.new_scene(pick_and_place.build)
     scenario = experiment_tools.scenario_of(scene)
@@ -151,7 +159,7 @@ def work_cycle(folder: Path, progress: Callable) -> Chapter:
     frames = list(pick_and_place.STAGES.values())
     chapter.pictures.append(_strip(folder / "fig12-images", recording, texels, frames, "Both pads at each stage."))
     parameters = {sensor.name: sensor.parameters for sensor in scenario.sensors if sensor.readout}
-    _twice(folder / "fig12-forces", lambda path: time_curves(path, recording, texels, parameters, ("force",), LOOK))
+    _as_pdf_and_png(folder / "fig12-forces", lambda path: time_curves(path, recording, texels, parameters, ("force",), STYLE))
     chapter.pictures.append(Picture(folder / "fig12-forces.png", "Forces over the work cycle."))
     chapter.rows += cycle_rows(recording)
     progress()
@@ -159,6 +167,7 @@ def work_cycle(folder: Path, progress: Callable) -> Chapter:
 
 
 def cycle_rows(recording: Recording) -> list[Row]:
+    """Return the rows of the work cycle: texels covered, forces while lifted, positions, and the release."""
     lifted = int(np.searchsorted(recording.frames, pick_and_place.STAGES["lift"]))
     left, right = (recording.sensors[name].normal_force[lifted] for name in (gripper.LEFT, gripper.RIGHT))
     path = experiment_tools.path_of(recording, pick_and_place.CUBE)
@@ -167,14 +176,14 @@ def cycle_rows(recording: Recording) -> list[Row]:
     raised, beside = float(path[lifted, 2] - path[0, 2]) * 1e3, float(np.linalg.norm(path[-1, :2] - path[0, :2]))
     released = float(recording.sensors[gripper.LEFT].normal_force[-1].sum())
     force, height = pick_and_place.FORCE, pick_and_place.LIFT
-    why_lit = "4 of 14 rows have their middle on the cube"
-    why_uneven = "the cube hangs below the grip, which presses its lower edge a little more"
+    why_lit = "the centres of 4 of 14 rows lie on the cube"
+    why_uneven = "the cube hangs below the grip, so its lower edge is pressed a little more"
     return [
         Row("texels covered", "30 % of the area", "24 of 84", f"{lit} of {len(left)}", lit == 24, why_lit),
         compare("tactile sum while lifted", "—", force, float(left.sum()), 1e-3, "N", "the arm has just come to rest"),
         compare("right sum like the left", "similar", float(left.sum()), float(right.sum()), 1e-3, "N", "mirror images"),
         Row("spread of the loaded texels", "none visible", "small", f"{100 * uneven:.2g} %", uneven < 0.5, why_uneven),
-        compare("lifted by", "—", height, raised, 2.0, "mm", "the bristles give"),
+        compare("lifted by", "—", height, raised, 2.0, "mm", "the bristles deflect"),
         below("set down beside where it was", "where it was", beside, 1e-4, "m"),
         Row("sum after the release", "0", "0 N", f"{released:.3g} N", released == 0.0),
     ]
@@ -201,11 +210,12 @@ def finger_and_thumb(folder: Path, progress: Callable) -> Chapter:
 
 
 def _strip(stem: Path, recording: Recording, texels, frames, caption: str) -> Picture:
-    _twice(stem, lambda path: tactile_strip(path, recording, texels, frames, LOOK))
+    """Draw the tactile images of some frames."""
+    _as_pdf_and_png(stem, lambda path: tactile_strip(path, recording, texels, frames, STYLE))
     return Picture(stem.with_suffix(".png"), caption)
 
 
-def _twice(stem: Path, draw: Callable[[Path], None]) -> None:
+def _as_pdf_and_png(stem: Path, draw: Callable[[Path], None]) -> None:
     """Draw a figure as PDF and as PNG."""
     for kind in (".pdf", ".png"):
         draw(stem.with_suffix(kind))

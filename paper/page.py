@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One HTML page of all experiments: our number beside the paper's, and the pictures."""
+"""The HTML page of all experiments: our numbers beside the paper's, and the pictures."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ TEMPLATE = Path(__file__).parent / "templates" / "paper.html"
 
 
 def write_page(path: Path, chapters: Sequence[Chapter], seconds: float) -> None:
-    """Write the page; pictures are linked relative to its folder."""
+    """Write the page. It links the pictures by paths relative to its folder."""
     folder = path.parent
     rows = [row for chapter in chapters for row in chapter.rows]
     pictures = [picture.path for chapter in chapters for picture in chapter.pictures]

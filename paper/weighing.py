@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Section 5.1: what the pad weighs (Table 3), and what friction holds on a slope for twenty minutes (Fig. 9)."""
+"""Section 5.1: weights measured by the pad (Table 3), and a cube held by friction on a slope for twenty minutes (Fig. 9)."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ from .chapter import Chapter, Picture, Row, below, compare
 
 PRINTED = {0.1: ("0.9800 N", 0.98), 1.0: ("9.7999 N", 9.8), 4.0: ("—", 39.2), 10.0: ("97.9899 N", 98.0)}
 PAPERS_GRAVITY = 9.8
-"""m/s²: what Table 3 takes for the required force."""
+"""m/s²: gravity with which Table 3 computes the required forces."""
 SETTLED, MINUTES = 10.0, 20.0  # s, min of Fig. 9
 FPS = 10
 
 
 def weigh(folder: Path, progress: Callable) -> Chapter:
-    """Table 3, and 4 kg."""
+    """Table 3, and additionally 4 kg."""
     chapter = Chapter(
         "Weighing",
         "Table 3, section 5.1.1",
@@ -47,7 +47,7 @@ def weigh(folder: Path, progress: Callable) -> Chapter:
     chapter.pictures.append(
         Picture(
             experiment_tools.picture(scene, folder / "weighing.png", scene.frame_end),
-            "1 kg at rest; colours are each texel's force.",
+            "1 kg at rest; the colours show each texel's force.",
         )
     )
     progress()
@@ -60,8 +60,9 @@ def hold(folder: Path, progress: Callable, minutes: float = MINUTES) -> Chapter:
         "Held on a slope",
         "Fig. 8b and 9, section 5.1.2",
         "1 kg on the pad tilted by 10 degrees. The paper's cube settles within ten seconds and keeps its place to ten decimals "
-        "for twenty minutes; so must ours, with no sleeping and no freezing of bodies. The bristles are as stiff as the foam "
-        "(1000 N/m): with Table 2's 1 N/m they would carry 1.7 N only after 20 mm, and the cube leaves the pad before.",
+        "for twenty minutes. Ours has to as well, without putting bodies to sleep or freezing them. The bristles are as stiff "
+        "as the foam (1000 N/m): with Table 2's 1 N/m they would carry 1.7 N only after 20 mm, and the cube would leave the "
+        "pad before.",
     )
     scene = experiment_tools.new_scene(tilt.build)
     sampled = experiment_tools.scenario_of(scene)
@@ -73,7 +74,7 @@ def hold(folder: Path, progress: Callable, minutes: float = MINUTES) -> Chapter:
     readings = recording.sensors[weighing.PAD]
     settled = times >= SETTLED
     wander = float(np.linalg.norm(path[settled] - path[settled][0], axis=1).max())
-    # Both components of the weight, and how exactly the texels have to show them
+    # Both components of the weight, and how exactly the texels have to measure them
     weight = tilt.MASS * float(np.linalg.norm(scenario.gravity))
     slope = math.radians(tilt.TILT)
     along = float(np.hypot(readings.net_force[-1, 0], readings.net_force[-1, 1]))
@@ -82,22 +83,24 @@ def hold(folder: Path, progress: Callable, minutes: float = MINUTES) -> Chapter:
         expected = weight * share
         chapter.rows.append(compare(f"force {name} the slope", "—", expected, force, 1e-4 * expected, "N", "relative 1e-4"))
     what = f"moved from 10 s to {60 * minutes:g} s"
-    chapter.rows.append(below(what, "constant to 10 decimals", wander, 1e-10, "m", "farthest from its place at 10 s"))
+    chapter.rows.append(
+        below(what, "constant to 10 decimals", wander, 1e-10, "m", "largest distance from its position at 10 s")
+    )
     chapter.rows.append(_with_table_2(sampled, weight * math.sin(slope)))
     progress()
     for kind in ("pdf", "png"):
-        _creep(folder / f"fig9-creep.{kind}", times, moved)
+        _draw_creep(folder / f"fig9-creep.{kind}", times, moved)
     experiment_tools.bake(scene, folder / "bake-tilt")
     chapter.pictures += [
         Picture(experiment_tools.picture(scene, folder / "tilt.png", scene.frame_end), "1 kg held at 10 degrees."),
-        Picture(folder / "fig9-creep.png", "How far the cube is from where it was put (Fig. 9)."),
+        Picture(folder / "fig9-creep.png", "Distance of the cube from its start (Fig. 9)."),
     ]
     progress()
     return chapter
 
 
 def _with_table_2(scenario: Scenario, force: float) -> Row:
-    """What happens on bristles of 1 N/m: they carry `force` only after a travel that takes the cube over the pad's edge."""
+    """Return the row for bristles of 1 N/m: before they carry `force`, the cube has travelled over the pad's edge."""
     (sensor,) = scenario.sensors
     law = replace(sensor.parameters, sigma0=1.0, sigma1=0.1)
     soft = replace(scenario, sensors=(replace(sensor, parameters=law),), fps=24.0, frame_end=scenario.frame_start + 48)
@@ -115,7 +118,8 @@ def _with_table_2(scenario: Scenario, force: float) -> Row:
     )
 
 
-def _creep(path: Path, times: np.ndarray, moved: np.ndarray) -> None:
+def _draw_creep(path: Path, times: np.ndarray, moved: np.ndarray) -> None:
+    """Draw the cube's distance from its start over time."""
     figure = new_figure(3.5, 2.5)
     axes = figure.add_axes((0.185, 0.18, 0.77, 0.77))
     axes.plot(times[1:], moved[1:] * 1e6, color=NORMAL_COLOUR, lw=1.3)

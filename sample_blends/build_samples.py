@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Builds the sample .blend files from their scripts: ``python -m palpate.sample_blends.build_samples [FOLDER]``.
 
-They are not baked: a bake lives in files of its own, beside wherever you put them.
+The files are not baked, because a bake is stored in a folder beside the .blend.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ SAMPLES = {
     "pick_and_place": ("pick_and_place", {}),
     "hand": ("hand", {}),
 }
-"""Name of the file → module of this folder with a function ``build(scene, …)``, and what else it is given."""
+"""Name of the file → module of this package, and further arguments of its function ``build(scene, …)``."""
 
 
 def build_one(name: str, folder: Path) -> Path:

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The demo: a steel ball that is pressed on one finger pad and slides until it slips, and 1 kg that comes to rest on another.
+"""The demo: a steel ball slides over one finger pad until it slips, and a cube of 1 kg comes to rest on another.
 
-Units are millimetres (``scale_length`` 0.001), so that view, snapping and clipping feel right at the size of a fingertip.
+Units are millimetres (``scale_length`` 0.001), so that view, snapping and clipping suit the size of a fingertip.
 """
 
 from __future__ import annotations
@@ -14,9 +14,9 @@ from . import scene_builder
 FPS = 24
 FRAME_END = 112
 PICTURE_FRAME = 78
-"""The frame that shows it best: the ball slips, the cube rests."""
+"""Frame of the picture: the ball slips, the cube is at rest."""
 STRIP_FRAMES = (1, 17, 35, 53, 71, 89)
-"""Frames of the tactile strip: nothing yet, pressed, four of the slide."""
+"""Frames of the tactile strip: before contact, pressed, and four while the ball slides."""
 
 PAD_ROWS, PAD_COLUMNS = 14, 6
 PITCH_A, PITCH_B = 3.4, 4.5  # mm; the paper's pad, and one a little longer than the cube
@@ -71,7 +71,7 @@ def build(scene) -> None:
 
 
 def _finger(scene, name: str, pitch: float, location, turn: float, rubber, black, screw):
-    """Return the pad of a gripper finger, whose texels are the vertex group "tactile"; its black base comes along."""
+    """Return the pad of a gripper finger, with its base as a child. The vertex group "tactile" holds the texels."""
     margin, thickness = 0.9 * pitch + 0.6, 6.0
     vertices, faces, texels = scene_builder.pad_mesh(PAD_ROWS, PAD_COLUMNS, pitch, margin, thickness)
     pad = scene_builder.mesh_object(scene, name, vertices, faces)
@@ -94,10 +94,10 @@ def _finger(scene, name: str, pitch: float, location, turn: float, rubber, black
 
 
 def _slide(ball, pad) -> None:
-    """Keyframe the ball: down, hold, along the rows while it turns against the slide, ease off, away.
+    """Keyframe the ball: down, hold, along the rows while it rotates against the slide, lift slowly, away.
 
-    One turn of the ball draws ten centimetres of steel over the texels while it travels along the pad. The bristles of the
-    paper's pad are soft (``sigma0`` = 1 N/m): a texel under 0.1 N holds on for ``mus · fn / sigma0`` ≈ 4 cm before it slips.
+    One rotation of the ball moves ten centimetres of steel over the texels while it travels along the pad. The bristles of the
+    paper's pad are soft (``sigma0`` = 1 N/m): a texel under 0.1 N sticks for ``mus · fn / sigma0`` ≈ 4 cm before it slips.
     """
     ball.rotation_mode = "XYZ"
     up = PAD_HEIGHT + BALL_RADIUS
@@ -118,7 +118,7 @@ def _slide(ball, pad) -> None:
 
 
 def _author(scene, pad_a, pad_b, ball, cube) -> None:
-    """Say what is a sensor and what presses on it, as the panel in the Physics tab would."""
+    """Give the objects their roles and parameters, as the panel in the Physics tab would."""
     for pad in (pad_a, pad_b):
         pad.palpate.role = "SENSOR"
         pad.palpate.region = "GROUP"
@@ -134,7 +134,7 @@ def _author(scene, pad_a, pad_b, ball, cube) -> None:
 
 
 def frame_picture(scene, size) -> None:
-    """Frame pads and objects for a picture of `size` pixels, with room for the tactile images on the right."""
+    """Frame pads and objects for a picture of `size` pixels, with space for the tactile images on the right."""
     scene.render.resolution_x, scene.render.resolution_y = size
     names = (PAD_A, PAD_B, BALL, CUBE, f"{PAD_A} base", f"{PAD_B} base")
     scene.frame_set(PICTURE_FRAME)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A curved fingertip, whose texels form no grid, that a thumb-sized cylinder rolls over: flattened tactile images."""
+"""A steel rod rolls over a curved fingertip, whose texels form no grid: flattened tactile images."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def build(scene) -> None:
     group.add([int(i) for i in np.flatnonzero((vertices[:, 2] > 0.5 * RADIUS) & (vertices[:, 1] > -LENGTH))], 1.0, "REPLACE")
     finger.location = (0.0, 0.0, 30.0)
 
-    finger.palpate.max_penetration = 0.006  # less than the radius, or segments would come out on the other side
+    finger.palpate.max_penetration = 0.006  # less than the radius, or the texels' segments would end on the other side
 
     rod = scene_builder.cylinder(scene, ROD, ROD_RADIUS, 40.0)
     rod.data.materials.append(scene_builder.see_through_steel("Steel, seen through", clear=0.8, edge=0.6))
@@ -44,7 +44,7 @@ def build(scene) -> None:
     top = 30.0 + RADIUS + ROD_RADIUS
     for frame, y, depth in ((1, -4.0, -2.0), (12, -4.0, 1.5), (36, 6.0, 1.5), (48, 6.0, -3.0)):
         rod.location = (0.0, y, top - depth)
-        # It lies across the finger and rolls without slipping over the part it travels.
+        # It lies across the finger and rolls without slipping.
         rod.rotation_euler = (-(y + 4.0) / ROD_RADIUS, math.pi / 2, 0.0)
         rod.keyframe_insert("location", frame=frame)
         rod.keyframe_insert("rotation_euler", frame=frame)
@@ -63,7 +63,7 @@ def build(scene) -> None:
 
 
 def capsule():
-    """Vertices and faces of a capsule along y, rounded at its far end, flat at the near one."""
+    """Return vertices and faces of a capsule along y, rounded at its far end and flat at the near one."""
     sides, caps, straight = 32, 8, 12
     profile = [(-LENGTH + LENGTH * i / straight, RADIUS) for i in range(straight + 1)]
     profile += [(RADIUS * math.sin(a), RADIUS * math.cos(a)) for a in np.linspace(0, math.pi / 2, caps + 1)[1:-1]]

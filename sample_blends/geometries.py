@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The paper's Fig. 1 to 3: sensors made from a grid, from a sphere and from a fingertip, with every texel's normal drawn."""
+"""The paper's Fig. 1 to 3: sensors from a grid, a sphere and a fingertip, with needles that show the texels' normals."""
 
 from __future__ import annotations
 

@@ -73,13 +73,13 @@ def build(scene) -> None:
 
 
 def _finger(scene, name: str, side: int, rubber, black) -> None:
-    """Add a finger at x < 0 (side −1) or x > 0 whose pad looks at the middle; it closes and lifts."""
+    """Add a finger at x < 0 (side −1) or x > 0 whose pad faces the middle; it closes and lifts."""
     vertices, faces, texels = scene_builder.pad_mesh(ROWS, COLUMNS, PITCH, 2.5, THICKNESS)
     pad = scene_builder.mesh_object(scene, name, vertices, faces)
     pad.data.materials.append(rubber)
     pad.vertex_groups.new(name="tactile").add(texels, 1.0, "REPLACE")
     pad.rotation_mode = "XYZ"
-    # the pad's normal (its z) looks at the middle, its rows (its y) run upwards
+    # the pad's normal (its z) points to the middle, its rows (its y) run upwards
     pad.rotation_euler = (math.pi / 2, 0.0, -side * math.pi / 2)
     closed = RADIUS - SQUEEZE
     for frame, gap, height in ((1, OPEN, 0.0), (14, 0.0, 0.0), (20, 0.0, 0.0), (46, 0.0, LIFT), (60, 0.0, LIFT)):

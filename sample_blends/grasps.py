@@ -24,7 +24,7 @@ START = 10.0  # mm, between object and pads at the first frame
 
 @dataclass(frozen=True)
 class Object:
-    """What is grasped: how it is made, its half width between the fingers and its lowest point, mm, and its mass, kg."""
+    """An object to grasp: how it is built, its half width between the fingers and its lowest point (mm), and its mass (kg)."""
 
     name: str
     make: Callable

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A parallel gripper in the manner of a Schunk PG70 with a 14 × 6 tactile pad on each finger, and what it grasps.
+"""A parallel gripper like a Schunk PG70 with a 14 × 6 tactile pad on each finger, and objects to grasp.
 
 The fingers close along x; the rows of the pads run upwards. Lengths are millimetres.
 """
@@ -15,14 +15,14 @@ from . import scene_builder
 ROWS, COLUMNS, PITCH = 14, 6, 3.4
 FINGER_MASS = 0.3  # kg
 FINGER_DAMPING = 60.0
-"""N·s/m: about 2 √(m k) of a finger on its foam, so that a grasp neither swings nor crawls to its force."""
+"""N·s/m: about 2 √(m k) of a finger on its foam, so that the force of a grasp settles quickly without oscillation."""
 PAD_WIDE, PAD_TALL = (COLUMNS - 1) * PITCH, (ROWS - 1) * PITCH
 MARGIN, THICKNESS = 0.5 * PITCH + 1.0, 6.0
 LEFT, RIGHT = "Left finger", "Right finger"
 
 K, CN, SIGMA0, SIGMA1 = 58.5, 0.585, 30.0, 0.3
-"""The paper's foam, with 1 % damping and bristles half as stiff as the foam: with Table 2's 1 N/m a grasped object would sag by
-a centimetre before friction holds it."""
+"""The paper's foam, with 1 % damping and bristles half as stiff as the foam: with Table 2's 1 N/m a grasped object would sink
+by a centimetre before friction holds it."""
 
 
 def materials() -> dict:
@@ -40,11 +40,11 @@ def finger(scene, side: int, gap: float, height: float, look: dict):
     Parameters
     ----------
     side : {-1, 1}
-        The left finger stands at x < 0 and looks towards +x.
+        The left finger stands at x < 0 and faces +x.
     gap : float, mm
-        From the pad's surface to the middle plane.
+        Distance from the pad's surface to the middle plane.
     height : float, mm
-        Of the pad's middle.
+        Height of the pad's centre.
     """
     from mathutils import Matrix
 
@@ -53,7 +53,7 @@ def finger(scene, side: int, gap: float, height: float, look: dict):
     pad = scene_builder.mesh_object(scene, name, vertices, faces)
     pad.data.materials.append(look["rubber"])
     pad.vertex_groups.new(name="tactile").add(texels, 1.0, "REPLACE")
-    # Columns of the rotation: the pad's own x, y and z axis in the world. It looks inwards, and its rows run upwards.
+    # Columns of the rotation: the pad's own x, y and z axis in the world. The pad faces inwards, and its rows run upwards.
     inwards = -float(side)
     turn = Matrix(((0.0, 0.0, inwards), (inwards, 0.0, 0.0), (0.0, 1.0, 0.0)))
     pad.rotation_euler = turn.to_euler()
@@ -74,7 +74,7 @@ def finger(scene, side: int, gap: float, height: float, look: dict):
 
 
 def housing(scene, height: float, look: dict):
-    """Return the gripper's body, which carries both fingers; `height` (mm) is that of the middle of the pads."""
+    """Return the gripper's body, which carries both fingers; `height` (mm) is the height of the pads' centres."""
     z = height + (PAD_TALL + 2 * MARGIN) / 2 + 27.0 + 7.0 + 21.0
     body = scene_builder.box(scene, "Gripper", (150.0, 56.0, 42.0), bevel=4.0)
     body.location = (0.0, 0.0, z)
@@ -88,7 +88,7 @@ def housing(scene, height: float, look: dict):
     return body
 
 
-def lathe(profile, sides: int = 64):
+def surface_of_revolution(profile, sides: int = 64):
     """Return vertices and faces of a body of revolution about z, closed at both ends.
 
     Parameters
@@ -110,14 +110,14 @@ def lathe(profile, sides: int = 64):
 
 
 def spray_bottle(scene, name: str):
-    """Return a spray bottle with a waist where fingers take it, its origin there; head and trigger are children."""
+    """Return a spray bottle; its origin is in its waist, where the fingers grasp it; head and trigger are children."""
     t = np.linspace(0.0, 1.0, 33)
     body = [(21.0, -48.0), (23.5, -46.5), (24.0, -44.0)]
     # From the belly through the waist to the shoulder: one smooth wave, then a quarter turn up to the neck.
     body += [(24.0 - 6.5 * math.sin(math.pi * s) ** 2 - 2.0 * s, -44.0 + 78.0 * s) for s in t[1:]]
     body += [(8.0 + 14.0 * math.cos(a), 34.0 + 10.0 * math.sin(a)) for a in np.linspace(0.0, math.pi / 2, 9)[1:]]
     body += [(8.0, 52.0)]
-    vertices, faces = lathe(body)
+    vertices, faces = surface_of_revolution(body)
     bottle = scene_builder.mesh_object(scene, name, vertices, faces)
     plastic = scene_builder.material("Blue plastic, seen through", (0.05, 0.22, 0.6), roughness=0.25)
     bottle.data.materials.append(plastic)
@@ -136,7 +136,7 @@ def spray_bottle(scene, name: str):
 
 
 def close(fingers, grip, speed: float, max_force: float) -> None:
-    """Let two coupled fingers close along their own z axes, by force control on what the first of them feels.
+    """Let two coupled fingers close along their own z axes, by control of the force on the first of them.
 
     Parameters
     ----------
@@ -180,7 +180,7 @@ def mount(arm, fingers) -> None:
 
 
 def table(scene, name: str, height: float):
-    """Return a table whose top is at `height` (mm): a pad that gives way under what stands on it, and is not read out."""
+    """Return a table with its top at `height` (mm): a compliant pad that is not read out."""
     vertices, faces, texels = scene_builder.pad_mesh(15, 15, 4.0, 8.0, 8.0, rounding=1.0)
     made = scene_builder.mesh_object(scene, name, vertices, faces)
     made.location = (0.0, 0.0, height)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Index finger and thumb of a hand, modelled by script, that take a cylinder between their tips (paper, section 5.3, Fig. 13).
+"""Index finger and thumb of a scripted hand hold a cylinder between their tips (paper, section 5.3, Fig. 13).
 
 The hand lies flat: palm at +y, finger tips at the origin, the cylinder upright between them.
 """
@@ -70,7 +70,7 @@ def build(scene) -> None:
 
 
 def bodies(scene):
-    """Model hand and cylinder; return the two fingers that feel, and the cylinder."""
+    """Model hand and cylinder; return the two fingers that are sensors, and the cylinder."""
     skin = scene_builder.material("Skin", (0.72, 0.42, 0.30), roughness=0.45)
     fingers = []
     for name, joints, side in ((INDEX, INDEX_JOINTS, 1.0), (THUMB, THUMB_JOINTS, -1.0)):
@@ -102,7 +102,7 @@ def sweep(spine: np.ndarray, inwards) -> tuple[np.ndarray, list, np.ndarray]:
     spine : (m, 4) float, mm
         Points and radii from the root to the centre of the tip's round end.
     inwards : (3,) float
-        Direction in which the tip's inner side looks.
+        Direction that the tip's inner side faces.
     """
     points, radii, along = _smooth(spine)
     frames = _frames(points, np.asarray(inwards, float))
@@ -133,7 +133,7 @@ def sweep(spine: np.ndarray, inwards) -> tuple[np.ndarray, list, np.ndarray]:
 
 
 def _smooth(spine: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Points, radii and arc lengths every `STEP` mm along a curve through the joints."""
+    """Return points, radii and arc lengths every `STEP` mm along a curve through the joints."""
     from scipy.interpolate import CubicSpline
 
     chord = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(spine[:, :3], axis=0), axis=1))])
@@ -146,7 +146,7 @@ def _smooth(spine: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def _frames(points: np.ndarray, inwards: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Heading and inner direction at each point, the latter carried along from the tip to the root without twist."""
+    """Return tangent and inner direction at each point; the latter is transported from the tip to the root without twist."""
     ahead = np.gradient(points, axis=0)
     ahead /= np.linalg.norm(ahead, axis=1, keepdims=True)
     frames, inner = [], inwards

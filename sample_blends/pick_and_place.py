@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The paper's Fig. 11 and 12: approach, grasp, lift, move down, release, with a gripper that controls the force it feels."""
+"""The paper's Fig. 11 and 12: approach, grasp, lift, move down, release, with a gripper under force control."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ STAGES = {"approach": 1, "grasp": 54, "lift": 90, "move down": 126, "release": 1
 ARM = ((1, ABOVE), (24, 0.0), (60, 0.0), (84, LIFT), (96, LIFT), (120, 0.0), (150, 0.0), (168, ABOVE))
 """Height of the gripper above its grasp over time: frame, mm."""
 GRIP = ((1, 0.0), (28, FORCE), (130, 0.0))
-"""Wanted tactile sum over time: frame, N; zero opens the fingers."""
+"""Set point of the tactile sum over time: frame, N; zero opens the fingers."""
 
 TEXT = """\
 Pick and place (paper, section 5.2.2, Fig. 11 and 12)

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the sample scenes are photographed in: a curved backdrop, soft lamps, materials, and shapes as plain meshes.
+"""What the sample scenes are built from: shapes as plain meshes, materials, a backdrop, soft lamps and a camera.
 
-Lengths in this room are Blender units of the sample scenes, which are millimetres.
+Lengths are Blender units of the sample scenes, which are millimetres.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import numpy as np
 
 
 def prepare(scene, frame_end: int, fps: int = 24) -> None:
-    """Empty `scene` and set it to millimetres, `fps`, and colours that come out of the render as they went in."""
+    """Empty `scene`, and set units to millimetres, the frame rate to `fps`, and a view transform that keeps colours."""
     for obj in list(scene.objects):
         bpy.data.objects.remove(obj)
     for collection in list(scene.collection.children):
@@ -135,7 +135,7 @@ def pad_mesh(rows: int, columns: int, pitch: float, margin: float, thickness: fl
 
 
 def _ring(rows: int, columns: int, ring: int) -> list[tuple[int, int]]:
-    """Grid cells of the ring number `ring` around the grid, counter-clockwise; ring 0 is the grid's own border."""
+    """Return the cells of ring number `ring` around the grid, counter-clockwise; ring 0 is the border of the grid."""
     low, right, top = -ring, columns - 1 + ring, rows - 1 + ring
     x, y = range(columns), range(rows)
     lower = [(i, low) for i in x]
@@ -148,10 +148,10 @@ def _ring(rows: int, columns: int, ring: int) -> list[tuple[int, int]]:
 
 
 def _bridge(inner: list[int], outer: list[int], cells_in, cells_out) -> list[tuple[int, ...]]:
-    """Faces between two rings; where the outer ring has a corner of its own and the inner has not, two quads meet there."""
+    """Return the faces between two rings; at a corner that only the outer ring has, two quads meet."""
     if len(inner) == len(outer):
         return [(inner[i - 1], outer[i - 1], outer[i], inner[i]) for i in range(len(inner))]
-    # The first ring outside the grid: each of its cells hangs on the nearest cell of the border.
+    # The first ring outside the grid: each of its cells is joined to the nearest cell of the border.
     x_max, y_max = max(c[0] for c in cells_in), max(c[1] for c in cells_in)
     at = dict(zip(cells_in, inner, strict=True))
     near = [at[min(max(i, 0), x_max), min(max(j, 0), y_max)] for i, j in cells_out]
@@ -181,11 +181,11 @@ STEEL = (0.62, 0.64, 0.67)
 
 
 def see_through_steel(name: str, clear: float, edge: float = 1.0, groove: float = 0.0):
-    """Return polished steel that one can look through.
+    """Return polished steel that is transparent in the middle.
 
-    The tactile image lies under the object that makes it, so an opaque object would hide exactly what the picture is about.
-    `clear` is how much passes face on, and `edge` how solid the object is at grazing angles. `groove` draws dark lines of that
-    half-width in the planes x = 0 and y = 0, so that one sees a ball turn.
+    The heat map lies under the object that presses, so an opaque object would hide it. `clear` is the transparency seen face
+    on, and `edge` the opacity at grazing angles. `groove` is the half-width of dark lines in the planes x = 0 and y = 0, which
+    show the rotation of a ball.
     """
     made = material(name, STEEL, metallic=1.0, roughness=0.16)
     nodes, links = made.node_tree.nodes, made.node_tree.links
@@ -221,7 +221,7 @@ def see_through_steel(name: str, clear: float, edge: float = 1.0, groove: float 
         a, b = [s for s in dark.inputs if s.type == "RGBA"]
         a.default_value, b.default_value = (*STEEL, 1.0), (0.03, 0.03, 0.035, 1.0)
         links.new(next(s for s in dark.outputs if s.type == "RGBA"), shader.inputs["Base Color"])
-    # The far side of the object would cover the pad a second time: only the near one is drawn.
+    # Only the near side of the object is drawn, because the far side would cover the pad a second time.
     geometry = nodes.new("ShaderNodeNewGeometry")
     front = nodes.new("ShaderNodeMath")
     front.operation = "SUBTRACT"
@@ -241,7 +241,7 @@ def see_through_steel(name: str, clear: float, edge: float = 1.0, groove: float 
 
 
 def backdrop(scene, width: float = 4000.0, front: float = -1500.0, back: float = 350.0, height: float = 1500.0):
-    """Return a floor that bends up into a wall behind the scene, as photographers use it."""
+    """Return a floor that curves upwards into a wall behind the scene."""
     radius = 400.0
     turn = np.linspace(0, math.pi / 2, 24)
     profile = [(front, 0.0), *((back + radius * math.sin(a), radius * (1 - math.cos(a))) for a in turn)]
@@ -252,7 +252,7 @@ def backdrop(scene, width: float = 4000.0, front: float = -1500.0, back: float =
 
 
 def area_lamp(scene, name: str, location, target, size: float, power: float, color=(1.0, 1.0, 1.0)):
-    """Return a square area lamp at `location` that looks at `target`; power in Blender's W at this scene's size."""
+    """Return a square area lamp at `location` that points at `target`; power in Blender's W at this scene's size."""
     lamp = bpy.data.lights.new(name, "AREA")
     lamp.shape, lamp.size, lamp.energy, lamp.color = "SQUARE", size, power, color
     obj = bpy.data.objects.new(name, lamp)
@@ -263,14 +263,14 @@ def area_lamp(scene, name: str, location, target, size: float, power: float, col
 
 
 def look_at(location, target):
-    """Return the Euler angles of a lamp or camera at `location` that looks at `target`, upright."""
+    """Return the Euler angles of an upright lamp or camera at `location` that points at `target`."""
     from mathutils import Vector
 
     return (Vector(target) - Vector(location)).to_track_quat("-Z", "Y").to_euler()
 
 
 def world(scene, color=(0.9, 0.92, 1.0), strength: float = 0.35) -> None:
-    """Give `scene` an even, faint light from all around."""
+    """Give `scene` a faint, even light from all directions."""
     made = bpy.data.worlds.new("Studio")
     made.use_nodes = True
     background = made.node_tree.nodes["Background"]
@@ -280,7 +280,7 @@ def world(scene, color=(0.9, 0.92, 1.0), strength: float = 0.35) -> None:
 
 
 def add_stage(scene, paper, aim, camera, size: float = 1.0) -> None:
-    """Put up backdrop, three soft lamps and a camera that looks at `aim`; `size` 1 suits things of 20 cm."""
+    """Add backdrop, world, three soft lamps and a camera that points at `aim`; `size` 1 suits objects of 20 cm."""
     backdrop(scene).data.materials.append(paper)
     world(scene)
     lamps = (
@@ -298,19 +298,19 @@ def add_stage(scene, paper, aim, camera, size: float = 1.0) -> None:
 
 
 def add_readme(text: str) -> None:
-    """Put a text into the file that says what it shows; the text editor shows it under "Read me"."""
+    """Store a text that explains the scene in the file; the text editor lists it as "Read me"."""
     made = bpy.data.texts.new("Read me")
     made.from_string(text)
 
 
 def frame_objects(scene, objects, region=(0.06, 0.06, 0.94, 0.94), size=(960, 720)) -> None:
-    """Set the size of the picture (pixels) and let the camera frame the objects where they are now."""
+    """Set the size of the picture (pixels) and let the camera frame the objects at the present frame."""
     from ..addon.render import render
 
     scene.render.resolution_x, scene.render.resolution_y = size
     bpy.context.view_layer.update()
     render.fit_camera(scene, render.bounding_box_corners(objects), region)
-    # To a tenth of a millimetre: the last digits are not the same in all Blenders.
+    # Rounded to a tenth of a millimetre, because the last digits differ between versions of Blender.
     scene.camera.location = [round(x, 1) for x in scene.camera.location]
 
 
@@ -341,7 +341,7 @@ def add_normal_needles(scene, sensor, length: float, look, radius: float = 0.26)
 
 
 def use_constant_interpolation(obj) -> None:
-    """Let the animated numbers of an object jump at their keyframes, since a command changes at once."""
+    """Make the animated properties of an object change at once at their keyframes, as set points do."""
     from ..addon.session import fcurves
 
     for curve in fcurves.of_object(obj) or ():
