@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Buttons: check the context, call one function, report."""
+"""Operators. Each checks the context, calls one function and reports."""
 
 
 def _classes():
-    from . import bake, debug, effects, exchange, figures, fits, fix, gap, presets, probe, sensor, skin
+    from . import bake, debug, effects, exchange, figures, fits, fix, gap, laid_sensor, presets, probe, sensor
 
-    rooms = (sensor, skin, presets, effects, fix, probe, fits, gap, exchange, bake, figures, debug)
-    return tuple(cls for room in rooms for cls in room.CLASSES)
+    modules = (sensor, laid_sensor, presets, effects, fix, probe, fits, gap, exchange, bake, figures, debug)
+    return tuple(cls for module in modules for cls in module.CLASSES)
 
 
 def register():

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Put right what the panel says is wrong with a sensor."""
+"""Fix a problem of a sensor that its panel shows."""
 
 import bpy
 from bpy.props import EnumProperty

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Try a sensor out."""
+"""Add a probe that presses on a sensor, to try the sensor out."""
 
 import bpy
 from bpy.props import EnumProperty, FloatProperty

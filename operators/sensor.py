@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Give objects their roles."""
+"""Operators that give objects their roles and sensors their regions."""
 
 import bpy
 import numpy as np
@@ -133,7 +133,7 @@ class PALPATE_OT_weight_paint(support.ErrorReporting, bpy.types.Operator):
 
 
 def _face_sets(_operator, context):
-    """Items for a menu; Blender needs them kept alive."""
+    """Return items of a menu. Blender needs the list to stay alive."""
     obj = context.object
     if obj is None or obj.type != "MESH":
         return []

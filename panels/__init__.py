@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Panels and menus: they draw what is there and compute nothing."""
+"""Panels and menus. They only draw; they compute nothing."""
 
 _panels: tuple = ()
 
@@ -7,10 +7,18 @@ _panels: tuple = ()
 def _classes():
     global _panels
     if not _panels:
-        from . import bake, body, check, effects, gap, places, sensor
+        from . import bake, body, effects, gap, sensor, subpanels, texels
 
-        parts = (sensor.Root, *check.PARTS, *sensor.PARTS, *effects.PARTS, *gap.PARTS, *body.PARTS, *bake.PARTS)
-        _panels = places.everywhere(*parts)
+        chosen = (
+            sensor.Root,
+            *texels.SUBPANELS,
+            *sensor.SUBPANELS,
+            *effects.SUBPANELS,
+            *gap.SUBPANELS,
+            *body.SUBPANELS,
+            *bake.SUBPANELS,
+        )
+        _panels = subpanels.in_all_places(*chosen)
     return _panels
 
 

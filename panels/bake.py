@@ -3,10 +3,10 @@
 
 from ..addon.display import baked_scene
 from ..addon.session import frame_status, session_state
-from .places import Part, named, sentences
+from .subpanels import Subpanel, draw_named, draw_sentences
 
 
-class Bake(Part):
+class Bake(Subpanel):
     name = "bake"
     bl_label = "Bake"
     bl_options = set()
@@ -17,7 +17,7 @@ class Bake(Part):
         own = scene.palpate
         layout.prop(own, "folder", text="")
         column = layout.column(align=True)
-        named(column, own, "interpolation", "Motion")
+        draw_named(column, own, "interpolation", "Motion")
         column.prop(own, "subframes")
         column.prop(own, "use_auto_dt")
         if not own.use_auto_dt:
@@ -37,12 +37,12 @@ class Bake(Part):
             row.operator("palpate.catch_up")
             row.operator("palpate.reset", text="Reset")
         status = frame_status.status_of(scene)
-        sentences(layout, status.text, "INFO", context)
+        draw_sentences(layout, status.text, "INFO", context)
         if status.step:
-            sentences(layout, status.step, "PREVIEW_RANGE", context)
+            draw_sentences(layout, status.step, "PREVIEW_RANGE", context)
 
 
-class Display(Part):
+class Display(Subpanel):
     name = "display"
     bl_label = "Display"
     split = False
@@ -51,8 +51,8 @@ class Display(Part):
         own = context.scene.palpate
         layout.prop(own, "show_overlay")
         layout.prop(own, "show_inset")
-        named(layout, own, "color_map", "Colours")
-        named(layout, own, "quantity")
+        draw_named(layout, own, "color_map", "Colours")
+        draw_named(layout, own, "quantity")
         column = layout.column(align=True)
         column.prop(own, "use_auto_range")
         if not own.use_auto_range:
@@ -68,7 +68,7 @@ class Display(Part):
             layout.operator("palpate.dress")
 
 
-class Figures(Part):
+class Figures(Subpanel):
     name = "figures"
     bl_label = "Figures"
 
@@ -97,4 +97,4 @@ class Figures(Part):
         layout.operator("palpate.figures_make", icon="RENDER_STILL")
 
 
-PARTS = (Bake, Display, Figures)
+SUBPANELS = (Bake, Display, Figures)

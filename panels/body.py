@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Panel of what moves an object."""
+"""Panel of an object's body: what moves it."""
 
 from ..addon.properties import start_transforms
 from ..addon.scene import drives
-from .places import Part, named, sentences
+from .subpanels import Subpanel, draw_named, draw_sentences
 
 
-class Body(Part):
+class Body(Subpanel):
     name = "body"
     bl_label = "Body"
     split = False
@@ -18,25 +18,25 @@ class Body(Part):
         if settings.role in {"SENSOR", "PAD"}:
             layout.prop(settings, "presses")
         if settings.role == "TARGET" or settings.presses:
-            named(layout, settings, "contact_normals", "Normals")
+            draw_named(layout, settings, "contact_normals", "Normals")
         if settings.body == "DRIVEN":
             _draw_drive(layout, settings)
         if settings.body == "FREE":
             layout.column().prop(settings, "velocity")
             layout.column().prop(settings, "angular_velocity")
         if settings.body == "PARENT" and context.object.parent is None:
-            sentences(
+            draw_sentences(
                 layout, "It has no parent: select the object it is fixed to last, and use Object › Parent.", "ERROR", context
             )
 
 
 def _draw_drive(layout, settings) -> None:
-    named(layout, settings, "drive_leader", "Coupled")
-    named(layout, settings, "drive_axis")
-    named(layout, settings, "drive_space")
+    draw_named(layout, settings, "drive_leader", "Coupled")
+    draw_named(layout, settings, "drive_axis")
+    draw_named(layout, settings, "drive_space")
     if settings.drive_leader is not None:
         return
-    named(layout, settings, "drive_control")
+    draw_named(layout, settings, "drive_control")
     column = layout.column(align=True)
     column.use_property_decorate = True
     column.prop(settings, drives.TARGET_PROPERTIES[settings.drive_control])
@@ -47,8 +47,8 @@ def _draw_drive(layout, settings) -> None:
     if settings.drive_control != "VELOCITY":
         column.prop(settings, "drive_stiffness")
     if settings.drive_control == "FORCE":
-        named(layout, settings, "drive_sensor")
+        draw_named(layout, settings, "drive_sensor")
         layout.prop(settings, "drive_settling")
 
 
-PARTS = (Body,)
+SUBPANELS = (Body,)

@@ -2,10 +2,10 @@
 """The stack of a sensor's effects, drawn like modifiers."""
 
 from ..addon.properties import effect_stack
-from .places import Part
+from .subpanels import Subpanel
 
 
-class Effects(Part):
+class Effects(Subpanel):
     """What real sensors do and the base model does not"""
 
     name = "effects"
@@ -40,4 +40,4 @@ class Effects(Part):
             column.prop(item, "seed")
 
 
-PARTS = (Effects,)
+SUBPANELS = (Effects,)

@@ -2,10 +2,10 @@
 """Measured data of the real sensor: what the model misses against them."""
 
 from ..addon.measured import gap_results
-from .places import Part, sentences
+from .subpanels import Subpanel, draw_sentences
 
 
-class Measured(Part):
+class Measured(Subpanel):
     """Measurements of the real sensor, and what the model misses against them"""
 
     name = "measured"
@@ -21,11 +21,11 @@ class Measured(Part):
         if result is None:
             return
         box = layout.box()
-        sentences(box, result.headline, "INFO", context)
+        draw_sentences(box, result.headline, "INFO", context)
         for line in result.lines:
-            sentences(box, line, "DOT", context)
+            draw_sentences(box, line, "DOT", context)
         if result.experiment:
-            sentences(box, result.experiment, "QUESTION", context)
+            draw_sentences(box, result.experiment, "QUESTION", context)
         if result.lines:
             layout.operator("palpate.gap_add", icon="ADD")
         layout.operator("palpate.gap_curves", icon="FCURVE")
@@ -35,4 +35,4 @@ class Measured(Part):
         layout.operator("palpate.gap_report", icon="EXPORT")
 
 
-PARTS = (Measured,)
+SUBPANELS = (Measured,)

@@ -5,10 +5,10 @@ from ..addon.authoring import laid_sensors
 from ..addon.session import first_use, frame_status, session_state
 from ..core.model.sensor_parameters import CONTACT, FRICTION, HUNT_CROSSLEY, LINEAR, READOUT, SENSOR_PARAMETERS
 from ..operators import presets
-from .places import ROOT, Part, named, sentences
+from .subpanels import ROOT, Subpanel, draw_named, draw_sentences
 
 
-class Root(Part):
+class Root(Subpanel):
     name = ROOT
     parent = None
     bl_label = "Palpate"
@@ -23,11 +23,11 @@ class Root(Part):
         obj = context.object
         for name in (obj.name, context.scene.name):
             if name in session_state.session.unreadable_settings:
-                sentences(layout, session_state.session.unreadable_settings[name], "ERROR", context)
+                draw_sentences(layout, session_state.session.unreadable_settings[name], "ERROR", context)
         coming = first_use.progress()
         if coming is not None:
             layout.progress(text="Preparing the solver", factor=coming.done / coming.total)
-            sentences(layout, f"{coming.text}. Only the first use of this version has to wait.", "SORTTIME", context)
+            draw_sentences(layout, f"{coming.text}. Only the first use of this version has to wait.", "SORTTIME", context)
         if settings.role == "NONE":
             column = layout.box().column()
             column.label(text=f"'{obj.name}' takes no part.")
@@ -46,7 +46,7 @@ class Root(Part):
             column.operator("palpate.parameters_copy", icon="COPYDOWN")
 
 
-class Skins(Part):
+class Skins(Subpanel):
     """Sensors that lie on this object, or what this sensor lies on"""
 
     name = "skins"
@@ -88,7 +88,7 @@ SKIN_FIELDS = {
 """Settings that each pattern is made from."""
 
 
-class Region(Part):
+class Region(Subpanel):
     name = "region"
     bl_label = "Region"
     bl_options = set()
@@ -136,7 +136,7 @@ class ParameterRows:
 
     def draw_named(self, layout, name: str, text: str = "") -> None:
         """Draw a parameter with its name beside it."""
-        named(layout, self._settings, name, text)
+        draw_named(layout, self._settings, name, text)
         self.leave_out(name)
 
     def leave_out(self, *names: str) -> None:
@@ -148,7 +148,7 @@ class ParameterRows:
         self.draw(layout, *self._left)
 
 
-class Contact(Part):
+class Contact(Subpanel):
     name = "contact"
     bl_label = "Contact"
     split = False
@@ -170,7 +170,7 @@ class Contact(Part):
         layout.operator("palpate.stiffness_fit", icon="FCURVE_SNAPSHOT")
 
 
-class Friction(Part):
+class Friction(Subpanel):
     name = "friction"
     bl_label = "Friction"
     split = False
@@ -187,7 +187,7 @@ class Friction(Part):
         layout.operator("palpate.friction_fit", icon="FCURVE_SNAPSHOT")
 
 
-class Readout(Part):
+class Readout(Subpanel):
     name = "readout"
     bl_label = "Readout"
     bl_options = set()
@@ -202,7 +202,7 @@ class Readout(Part):
         rows.draw_others(column)
         painted(layout, settings, "gain")
         column = layout.column()
-        named(column, settings, "image_layout", "Image")
+        draw_named(column, settings, "image_layout", "Image")
         if settings.image_layout == "UV":
             column.prop_search(settings, "image_map", context.object.data, "uv_layers", text="", icon="UV")
             column.prop(settings, "image_size")
@@ -211,7 +211,7 @@ class Readout(Part):
         readings = status.frame.sensors.get(context.object.name) if status.frame is not None else None
         box = layout.box().column()
         if readings is None:
-            sentences(box, status.text, "INFO", context)
+            draw_sentences(box, status.text, "INFO", context)
             return
         net = ", ".join(f"{round(value, 3) + 0.0:.3f}" for value in readings.net_force)  # adding zero turns -0.0 into 0.0
         box.label(text=f"Frame {status.frame.frame}: {int(readings.contact.sum())} of {len(readings.contact)} texels touch")
@@ -222,4 +222,4 @@ class Readout(Part):
         box.label(text=f"Reading: {readings.reading.min():.4g} to {readings.reading.max():.4g} {settings.unit}")
 
 
-PARTS = (Region, Skins, Contact, Friction, Readout)
+SUBPANELS = (Region, Skins, Contact, Friction, Readout)

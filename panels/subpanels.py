@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where panels are: in the Physics tab, and the same ones in the sidebar of the 3D view, under Palpate."""
+"""Subpanels: each is shown twice, in the Physics tab and in the sidebar of the 3D view under Palpate."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ PLACES = {
 ROOT = "physics"
 
 
-class Part:
-    """A subpanel for objects with certain roles; plain, :func:`everywhere` makes panels of it."""
+class Subpanel:
+    """A subpanel for objects with certain roles. :func:`in_all_places` makes Blender panels of its subclasses."""
 
     name: str
-    """Of the panel, as in PALPATE_PT_<name>."""
+    """Name of the panel, as in PALPATE_PT_<name>."""
     parent = ROOT
     bl_options = {"DEFAULT_CLOSED"}
     roles = {"SENSOR", "TARGET", "PAD"}
     split = True
-    """False puts names inside the number fields: units fit there, beside the fields of a narrow editor they are cut off."""
+    """False draws names inside the number fields. Beside the fields of a narrow editor, names with units would be cut off."""
 
     @classmethod
     def poll(cls, context):
@@ -39,28 +39,29 @@ class Part:
         self.draw_part(layout, context.object.palpate, context)
 
 
-def everywhere(*parts) -> tuple:
-    """Return panels that show the parts in all places, parents first."""
-    return tuple(_panel(part, prefix, where) for prefix, where in PLACES.items() for part in parts)
+def in_all_places(*subpanels) -> tuple:
+    """Return Blender panels that show the subpanels in all places, parents first."""
+    return tuple(_panel(subpanel, prefix, place) for prefix, place in PLACES.items() for subpanel in subpanels)
 
 
-def _panel(part, prefix: str, where: dict):
-    members = {**where, "__doc__": part.__doc__}
-    if part.parent is not None:
-        members["bl_parent_id"] = f"PALPATE_PT_{prefix}{part.parent}"
-    return type(f"PALPATE_PT_{prefix}{part.name}", (part, bpy.types.Panel), members)
+def _panel(subpanel, prefix: str, place: dict):
+    """Return the Blender panel of a subpanel in one place."""
+    members = {**place, "__doc__": subpanel.__doc__}
+    if subpanel.parent is not None:
+        members["bl_parent_id"] = f"PALPATE_PT_{prefix}{subpanel.parent}"
+    return type(f"PALPATE_PT_{prefix}{subpanel.name}", (subpanel, bpy.types.Panel), members)
 
 
-def named(layout, settings, key: str, text: str = "") -> None:
-    """Draw a list or a pointer with its name beside it, with room enough for the name in a narrow editor."""
+def draw_named(layout, settings, key: str, text: str = "") -> None:
+    """Draw a list or a pointer with its name beside it, so that the name also fits into a narrow editor."""
     name = text or settings.bl_rna.properties[key].name
     split = layout.split(factor=0.42)
     split.label(text=f"{name}:")
     split.prop(settings, key, text="")
 
 
-def sentences(layout, text: str, icon: str, context) -> None:
-    """Show text over as many lines as the panel's width asks for."""
+def draw_sentences(layout, text: str, icon: str, context) -> None:
+    """Draw text, wrapped to the width of the panel."""
     letters = int((context.region.width / context.preferences.system.ui_scale - 70) / 6.2)
     column = layout.column(align=True)
     column.scale_y = 0.8

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Panel of a sensor's texels: how many, how dense, how long a step may be, what is wrong and the button against it."""
+"""Panel of a sensor's texels: their number and density, the advised time step, and problems with a button that fixes each."""
 
 from ..addon.authoring import problems, sensor_report
 from ..core.geometry.layout.grid_layout import GridLayout
-from .places import Part, sentences
+from .subpanels import Subpanel, draw_sentences
 
 
-class Texels(Part):
+class Texels(Subpanel):
     name = "texels"
     bl_label = "Texels"
     bl_options = set()
@@ -34,12 +34,12 @@ class Texels(Part):
             box.label(text=f"Stability limit: {limit}")
             box.label(text=f"Advised step: {advice.dt * 1e3:.3g} ms")
         elif report.missing:
-            sentences(box, report.missing, "INFO", context)
+            draw_sentences(box, report.missing, "INFO", context)
         for problem in report.problems:
             box = layout.box().column()
-            sentences(box, problem.text, "ERROR", context)
+            draw_sentences(box, problem.text, "ERROR", context)
             if problem.kind in problems.FIXES:
                 box.operator("palpate.fix", text=problems.FIXES[problem.kind][0]).kind = problem.kind
 
 
-PARTS = (Texels,)
+SUBPANELS = (Texels,)

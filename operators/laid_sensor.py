@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Sensors with a mesh of their own: tactile pads, and texels laid onto the surface of another object."""
+"""Operators for sensors with their own mesh: tactile pads, and texels that are laid onto another object's surface."""
 
 import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty
@@ -127,10 +127,10 @@ class PALPATE_OT_skin_add(support.ErrorReporting, bpy.types.Operator):
         carrier = context.object
         source = self._source(carrier)
         support.leave_edit_mode(context)
-        recipe = {key: getattr(self, key) for key in laid_sensors.PATTERN_PROPERTIES}
-        recipe["spacing"] = recipe["spacing"] or laid_sensors.usual_spacing(carrier, context.scene)
+        pattern = {key: getattr(self, key) for key in laid_sensors.PATTERN_PROPERTIES}
+        pattern["spacing"] = pattern["spacing"] or laid_sensors.usual_spacing(carrier, context.scene)
         was_sensor = carrier.palpate.role == "SENSOR"
-        obj = laid_sensors.lay_texels(context, carrier, source, recipe)
+        obj = laid_sensors.lay_texels(context, carrier, source, pattern)
         text = f"'{obj.name}' has {len(obj.data.vertices)} texels"
         if was_sensor and source == "OWN":  # its own texels would feel the same load a second time
             carrier.palpate.role = "TARGET" if carrier.palpate.body == "FREE" else "NONE"
