@@ -1,1 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
+"""Fits of models to trials, and tests of their residuals.
+
+Least squares with parameters per texel, intervals of the parameters, the noise floor of the recordings, and three tests of a
+residual: for structure, for heteroscedastic noise, for spectral lines.
+"""
+
+__all__ = [
+    "heteroscedastic_noise",
+    "intervals",
+    "least_squares",
+    "noise_floor",
+    "regression",
+    "residual_tests",
+    "spectral_lines",
+]
