@@ -33,7 +33,8 @@ def stepwise(result: Any, most: int = 3) -> tuple[list[str], Any]:
     """Add the form that lowers the BIC on the fitted trials most, until none does."""
     from palpate.core.gap.fitting.least_squares import fit
     from palpate.core.gap.selection.candidates import candidates
-    from palpate.core.gap.selection.screening import ScoreTest, free_with, starting_points
+    from palpate.core.gap.selection.score_test import ScoreTest
+    from palpate.core.gap.selection.screening import free_with, starting_points
     from palpate.core.gap.selection.view_set import view_set_of
 
     view_set = view_set_of(result.of("fit"), (result.noise[0].deviation, result.noise[1].deviation))
@@ -43,12 +44,11 @@ def stepwise(result: Any, most: int = 3) -> tuple[list[str], Any]:
     for _ in range(most):
         best, best_bic = None, bic
         taken = {effect.name for effect in current.model.effects}
-        gain = abs(current.model.parameters.gain)
         score_test = ScoreTest(view_set.whole, current)
         for candidate in candidates(result.of("fit"), current.model):
             if candidate.name in taken:
                 continue
-            starts = starting_points(candidate, score_test, view_set.whole, current.model, result.scales, gain)
+            starts = starting_points(candidate, score_test, view_set.whole, result.scales)
             if not starts:
                 continue
             free = free_with(current.free, current.model, candidate, result.scales)

@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Noise that grows with the reading: what no fit can close, told by the squares of the residual.
+"""Heteroscedastic noise: noise whose standard deviation is proportional to the reading, which no fit can explain.
 
-It is named when the residual of loaded samples is larger than that of unloaded ones, the more so the larger the reading, and
-otherwise as noise is: new at every sample, and another one in each texel. What is left of a model that lacks something else is
-neither.
+It is found from the squares of a residual. They must grow with the reading, and otherwise the residual must be like white
+noise: uncorrelated in time and between texels. The residual of a model that lacks something else is correlated.
 """
 
 from __future__ import annotations
@@ -19,13 +18,33 @@ from .least_squares import TrialView
 
 LEAST_VARIANCE_RATIO = 1.5
 """Least mean square of the residual at large readings, in units of that at rest."""
+LEAST_GROWTH = 1.2
+"""Least ratio of the mean squares at large and at small readings."""
 MOST_CORRELATION = 0.15
-"""Largest correlation with the sample before, beyond that at rest, and between texels."""
+"""Largest correlation with the sample before, and between texels."""
+RESTING, LOADED = 1.0, 3.0
+"""Readings below and above which a sample counts as resting and as loaded, in standard deviations of the noise."""
+LEAST_RESTING, LEAST_LOADED, LEAST_IN_TRIAL = 100, 400, 100
+"""Least number of resting samples, of loaded ones, and of loaded ones in a trial for the trial to be judged by itself."""
+LARGE_QUANTILE, SMALL_QUANTILE = 0.67, 0.33
+"""Quantiles of the loaded readings that bound the large and the small ones."""
+STEADY = (0.3, 3.0)
+"""Bounds of each trial's coefficient, as multiples of that of all trials."""
 
 
 @dataclass(frozen=True)
 class _LoadedSamples:
-    """Loaded samples of one trial: size of the reading and squares of the residual, both in units of the noise."""
+    """Loaded samples of one trial.
+
+    Attributes
+    ----------
+    size : (m,) float
+        Magnitude of the predicted readings, in units of the noise.
+    square : (m,) float
+        Squares of the residual, in the same unit.
+    serial_correlation, texel_correlation : float
+        Of the residual: with the sample before, and between texels.
+    """
 
     size: np.ndarray
     square: np.ndarray
@@ -34,14 +53,14 @@ class _LoadedSamples:
 
 
 def proportional_noise(views: Sequence[TrialView], model: Model) -> Effect | None:
-    """Return noise in proportion to the reading where a model's residual is that; None where it is not.
+    """Return noise in proportion to the reading if a model's residual is like that, else None.
 
     Parameters
     ----------
-    shares : sequence of TrialView
-        Whole trials, with readings.
+    views : sequence of TrialView
+        Whole trials.
     model : Model
-        As it was fitted, without noise.
+        A fitted model without noise.
     """
     found, rest = [], []
     for view in views:
@@ -51,21 +70,21 @@ def proportional_noise(views: Sequence[TrialView], model: Model) -> Effect | Non
         residual = view.residual(model)[:, : reading.shape[1]]
         size = np.abs(view.predictor.predict(model).reading - model.parameters.zero) / view.noise[0]
         known = np.isfinite(reading)
-        rest.append(residual[known & (size < 1.0)])
-        found.append(_loaded_samples(size, residual, known & (size > 3.0)))
+        rest.append(residual[known & (size < RESTING)])
+        found.append(_loaded_samples(size, residual, known & (size > LOADED)))
     still = np.concatenate(rest) if rest else np.zeros(0)
-    if len(still) < 100 or sum(len(one.size) for one in found) < 400:
+    if len(still) < LEAST_RESTING or sum(len(one.size) for one in found) < LEAST_LOADED:
         return None
     floor = max(float(np.mean(still * still)), 1e-6)
     size, square = (np.concatenate([getattr(one, name) for one in found]) for name in ("size", "square"))
     each, pooled = (
-        [_variance_coefficient(one.size, one.square, floor) for one in found if len(one.size) > 100],
+        [_variance_coefficient(one.size, one.square, floor) for one in found if len(one.size) > LEAST_IN_TRIAL],
         _variance_coefficient(size, square, floor),
     )
-    large = square[size > np.quantile(size, 0.67)]
-    small = square[size < np.quantile(size, 0.33)]
-    grows = large.mean() > LEAST_VARIANCE_RATIO * floor and large.mean() > 1.2 * small.mean()
-    steady = pooled > 0.0 and min(each, default=0.0) > 0.3 * pooled and max(each, default=0.0) < 3.0 * pooled
+    large = square[size > np.quantile(size, LARGE_QUANTILE)]
+    small = square[size < np.quantile(size, SMALL_QUANTILE)]
+    grows = large.mean() > LEAST_VARIANCE_RATIO * floor and large.mean() > LEAST_GROWTH * small.mean()
+    steady = pooled > 0.0 and min(each, default=0.0) > STEADY[0] * pooled and max(each, default=0.0) < STEADY[1] * pooled
     weight = np.array([len(one.size) for one in found], float)
     serial_correlation = float(np.average([one.serial_correlation for one in found], weights=weight))
     texel_correlation = float(np.average([one.texel_correlation for one in found], weights=weight))
@@ -75,11 +94,12 @@ def proportional_noise(views: Sequence[TrialView], model: Model) -> Effect | Non
 
 
 def _loaded_samples(size: np.ndarray, residual: np.ndarray, loaded: np.ndarray) -> _LoadedSamples:
-    """Correlations are of residuals in units of their local size, so that few large ones do not decide.
+    """Loaded samples of a trial, with correlations of the large ones.
 
-    Only large readings count there: at small ones the noise that is always there hides what a model lacks.
+    Correlations are of residuals in units of the local reading, so that a few large ones do not decide. At small readings the
+    noise at rest would hide what a model lacks.
     """
-    large = loaded & (size > np.quantile(size[loaded], 0.67)) if loaded.any() else loaded
+    large = loaded & (size > np.quantile(size[loaded], LARGE_QUANTILE)) if loaded.any() else loaded
     unit = np.where(large, residual / np.maximum(size, 1.0), 0.0)
     both = large[1:] & large[:-1]
     square = float((unit * unit).sum())
@@ -93,7 +113,7 @@ def _loaded_samples(size: np.ndarray, residual: np.ndarray, loaded: np.ndarray) 
 
 
 def _variance_coefficient(size: np.ndarray, square: np.ndarray, floor: float) -> float:
-    """Square of the share of the reading that trembles: weighted least squares of the squares on those of the reading."""
+    """Variance of the noise divided by the squared reading, by weighted least squares."""
     squares, value = size**2, 0.0
     for _ in range(4):
         weight = 1.0 / (floor + value * squares) ** 2

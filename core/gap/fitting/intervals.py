@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How well recordings tell the numbers of a fitted model: 95 % intervals."""
+"""95 % intervals of the parameters of a fitted model."""
 
 from __future__ import annotations
 
@@ -11,23 +11,26 @@ from .least_squares import TEXEL_PRECISION, Fit, NormalEquations, all_equations,
 from .regression import student_quantile
 
 NORMAL_QUANTILE = 1.959964
-"""Standard deviations on either side that hold 95 % of a normal distribution."""
+"""97.5 % quantile of the standard normal distribution."""
 UNIDENTIFIED = 1e-8
-"""Eigenvalue of the normal equations, with a diagonal of ones, up to which they tell nothing of a direction: as of two drags
-that only act as their sum."""
+"""Eigenvalue of the normal equations, scaled to a diagonal of ones, up to which a direction is unidentified: two drags that
+only act as their sum, for example."""
+UNIDENTIFIED_EIGENVALUE = 1e-4 * UNIDENTIFIED
+"""Eigenvalue that unidentified directions get instead, so that their variance is very large."""
+TOUCHED_SHARE = 1e-9
+"""A texel counts as touched if its information is above this share of the largest."""
 
 
 @dataclass(frozen=True)
 class ParameterInterval:
-    """A fitted number.
+    """A fitted parameter with its 95 % interval.
 
     Attributes
     ----------
     effect : int
-        Index in the model's stack; -1 for the base model.
+        Index of the effect in the model's stack; -1 for the base model.
     name : str
     value, low, high : float
-        With its 95 % interval.
     """
 
     effect: int
@@ -38,13 +41,23 @@ class ParameterInterval:
 
 
 def parameter_intervals(found: Fit) -> list[ParameterInterval]:
-    """Return the numbers of the amended model that are not one per texel.
+    """Return intervals of the fitted parameters that all texels share.
 
-    Each has the widest of four intervals: of noise as it is where nothing touches; from the scatter of the gradients of
-    channels within about a second, which holds for coloured noise and for residuals of unequal size; of texels within whole
-    trials, which holds for colour of any length; and of whole trials, as when the formula is not quite the sensor's. A number
-    that few channels or trials tell, as those of friction, has too few gradients for the last two: they sum to zero where the
-    fit ends, and hold for the others only.
+    Each interval is the widest of four:
+
+    - of white noise with the variance that was measured without load;
+    - from the scatter of the gradients of channels within about a second, which holds for coloured noise and for residuals of
+      unequal size;
+    - from the scatter of the gradients of texels over whole trials, which holds for noise of any colour;
+    - from the scatter of the gradients of whole trials, which holds if the formula is not quite the sensor's.
+
+    If few channels or trials inform about a parameter, as about friction, the last two have too few gradients: they sum to zero
+    at the end of the fit. Then they hold for the other parameters only.
+
+    Parameters
+    ----------
+    found : Fit
+        With normal equations.
     """
     common = [item for item in found.free if not item.per_texel]
     kinds = _covariances(found)
@@ -58,9 +71,7 @@ def parameter_intervals(found: Fit) -> list[ParameterInterval]:
 
 
 def _covariances(found: Fit) -> tuple[np.ndarray, ...]:
-    """Covariances of the common numbers in their coordinates, (p, p) each: of noise alone, and by groups (see
-    :func:`parameter_intervals`).
-    """
+    """Covariances (p, p) of the common parameters in their coordinates, four of them (see :func:`parameter_intervals`)."""
     assert found.equations is not None
     total = summed_equations(all_equations(found.equations))
     m = total.texel_gradient.shape[1]
@@ -70,7 +81,7 @@ def _covariances(found: Fit) -> tuple[np.ndarray, ...]:
     blocks, texels, trials = [], [], []
     for trial in found.equations:
         gradient = np.concatenate([one.gradients for one in trial])
-        if m:  # what the numbers per texel take up of it; of which block that is, is not known
+        if m:  # less the part that parameters of single texels take over, spread evenly over the blocks
             own = np.einsum("nmp,nm->np", shift, np.sum([one.texel_gradient for one in trial], axis=0))
             gradient[:, : len(shift)] -= own / len(gradient)
         blocks.append(gradient.reshape(-1, len(a)))
@@ -80,14 +91,15 @@ def _covariances(found: Fit) -> tuple[np.ndarray, ...]:
 
 
 def _texel_response(total: NormalEquations) -> np.ndarray:
-    """How numbers per texel give way to the common ones, (n, m, p), while their mean over the texels that were touched stays.
+    """How parameters of single texels follow the common ones, (n, m, p), while their mean over touched texels is constant.
 
-    What all texels have in common is a common number's: each texel's gain times two is the sensor's.
+    A change that all texels share is a change of the common parameter: gains of two on all texels are a gain of two of the
+    sensor.
     """
     m = total.texel_gradient.shape[1]
     inverse = np.linalg.inv(total.texel + TEXEL_PRECISION * np.eye(m))
     informed = np.einsum("nmm->nm", total.texel)
-    informed = (informed > 1e-9 * informed.max(initial=1e-300)).astype(float)
+    informed = (informed > TOUCHED_SHARE * informed.max(initial=1e-300)).astype(float)
     follow = inverse @ total.coupling
     pulled = np.einsum("nmk,nk->nmk", inverse, informed)
     stiffness, drift = np.einsum("nm,nmk->mk", informed, pulled), np.einsum("nm,nmp->mp", informed, follow)
@@ -96,23 +108,23 @@ def _texel_response(total: NormalEquations) -> np.ndarray:
 
 
 def _inverse(a: np.ndarray) -> np.ndarray:
-    """Inverse of normal equations (p, p), next to infinite along what they do not tell."""
+    """Inverse of normal equations (p, p), with very large variances in unidentified directions."""
     squares = np.diag(a)
-    size = np.sqrt(np.where(squares > 1e-30 * squares.max(initial=0.0), squares, 1.0))  # one without any effect stays so
+    # A parameter without any effect keeps its zero.
+    size = np.sqrt(np.where(squares > 1e-30 * squares.max(initial=0.0), squares, 1.0))
     informed, along = np.linalg.eigh(a / np.outer(size, size))
-    inverse: np.ndarray = (
-        (along / np.where(informed > UNIDENTIFIED, informed, 1e-4 * UNIDENTIFIED)) @ along.T / np.outer(size, size)
-    )
+    eigenvalue = np.where(informed > UNIDENTIFIED, informed, UNIDENTIFIED_EIGENVALUE)
+    inverse: np.ndarray = (along / eigenvalue) @ along.T / np.outer(size, size)
     return inverse
 
 
 def _sandwich(bread: np.ndarray, gradients: np.ndarray) -> np.ndarray:
-    """Covariance (p, p) from the scatter of groups' gradients (g, p), so wide that normal intervals hold what Student's do.
+    """Covariance (p, p) from the scatter of the gradients of groups (g, p) (sandwich estimator).
 
-    Noise may be as coloured as it likes within a group (Liang and Zeger, Biometrika 73, 1986). Where few groups tell most of a
-    number their scatter is itself uncertain: as of so many equal groups as the fourth moment of normal influences says, which
-    is three times the square of the second (effective number of clusters; Carter, Schnepel and Steigerwald, Rev. Econ. Stat.
-    99, 2017).
+    Noise may have any colour within a group (Liang and Zeger, Biometrika 73, 1986). With few groups the scatter itself is
+    uncertain, so the covariance is widened until normal intervals are as wide as Student's. Their degrees of freedom are the
+    number of equal groups that would have the same fourth moment: that of normal influences is three times the square of the
+    second (effective number of clusters; Carter, Schnepel and Steigerwald, Rev. Econ. Stat. 99, 2017).
     """
     groups = int((np.abs(gradients).sum(axis=1) > 0).sum())
     influence = gradients @ bread

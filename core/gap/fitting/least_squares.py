@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Least squares for a model on several trials at once, with as many numbers per texel as it needs, and on trials left out.
+"""Nonlinear least squares on several trials at once, with common parameters and parameters of single texels.
 
-The normal equations are summed per trial. A number per texel acts on its own texel only, so its column of the Jacobian for all
-texels together costs one evaluation, and its block of the equations is diagonal: the common numbers are solved for first (Schur
-complement). Leaving a trial out takes its share out of the sums; one Newton step from the common fit then gives the fit without
-it (Beirami et al., "On optimal generalizability in parametric learning", NeurIPS 2017), and only the trial left out is
-predicted anew.
+The fit takes Levenberg–Marquardt steps on normal equations that are summed per trial. A parameter of single texels acts on its
+own texel only. Its column of the Jacobian therefore costs one evaluation for all texels together, and its block of the
+equations is block-diagonal: the common parameters are solved for first (Schur complement).
+
+For cross-validation a trial is left out by taking its equations out of the sum. One Newton step from the common fit gives the
+fit without that trial (Beirami et al., "On optimal generalizability in parametric learning", NeurIPS 2017), and only the trial
+left out has to be predicted again.
 """
 
 from __future__ import annotations
@@ -21,39 +23,49 @@ from ...model.sensor_parameters import SensorParameters
 from ..forward.predictor import Model, Predictor
 
 DIFFERENCE_STEP = 1e-3
-"""Of the finite differences: in the logarithm of a number, or as a share of the size of one that is not on a log scale."""
-
-
+"""Step of finite differences in the coordinate of a parameter (see :meth:`FreeParameter.to_coordinate`)."""
 QUANTIZED_DIFFERENCE_STEP = 0.03
-"""The same for models whose readings come in steps: a staircase has no slope but across its edges."""
+"""The same for models with quantised readings: a staircase has a slope only over distances that cross its edges."""
 TEXEL_PRECISION = 10.0
-"""Inverse variance of a number per texel about its resting value, in its coordinate: a gain is within ± 0.3 unseen."""
+"""Prior precision (inverse variance) of a parameter of single texels about its resting value, in its coordinate.
+
+It lets the gain of a texel without data vary by ± 0.3.
+"""
 FRICTION_PARAMETERS = ("mus", "mud", "sigma0", "x0", "ct")
-"""Parameters of the base model that show in net forces alone."""
+"""Parameters of the base model that show only in net forces."""
 FRICTION_LEVEL = "mus and mud"
-"""Both friction coefficients as one number, by which they grow alike."""
+"""Both friction coefficients as one free parameter that scales them alike."""
 GRADIENT_BLOCKS = 12
-"""Blocks of time of each stretch in which gradients are summed, each long against the memory of the noise."""
+"""Number of blocks of time per stretch in which gradients are summed; a block is long against the correlation of the noise."""
 LEAST_INFORMATION = 0.1
-"""Least share of what all recordings tell of a number that some of them must tell, to find it from them."""
+"""Least share of a parameter's information in all trials that some trials must have for the parameter to be fitted to them."""
+FIRST_DAMPING, LEAST_DAMPING = 1e-3, 1e-9
+"""Levenberg–Marquardt damping at the start, and its lower bound."""
+DAMPING_UP, DAMPING_DOWN, RAISED_DAMPING = 10.0, 0.2, 1e-4
+"""Factors after a step that fails and after one that succeeds, and the least damping after one that fails."""
+TRIES_PER_STEP = 6
+LARGEST_LOG_STEP = 2.0
+"""Largest step of a parameter on a logarithmic scale: a factor of e²."""
 
 
 @dataclass(frozen=True)
 class FreeParameter:
-    """One number that is fitted, or one per texel.
+    """A parameter that is fitted: one number, or one for each texel.
 
     Attributes
     ----------
     effect : int
-        Index in the model's stack; -1 for a parameter of the base model.
+        Index of the effect in the model's stack; -1 for a parameter of the base model.
     name : str
     low, high : float
+        Bounds.
     log : bool
+        Whether it is fitted on a logarithmic scale.
     scale : float
-        A change that matters, for numbers that are not on a log scale.
+        A change that matters, for parameters that are not on a logarithmic scale.
     per_texel : bool
     resting_value : float
-        Value from which a number per texel departs only as far as the recording says so (see :data:`TEXEL_PRECISION`).
+        Mean of the prior of a parameter of single texels (see :data:`TEXEL_PRECISION`).
     tied : tuple of str
         Other parameters of the base model that keep their ratio to it.
     """
@@ -69,25 +81,28 @@ class FreeParameter:
     tied: tuple[str, ...] = ()
 
     def to_coordinate(self, value: np.ndarray | float) -> np.ndarray:
-        """Value → coordinate of the fit."""
+        """Return the coordinate of a value in the fit: its logarithm, or its ratio to the scale."""
         value = np.clip(np.asarray(value, float), self.low, self.high)
         return np.log(value) if self.log else value / self.scale
 
     def from_coordinate(self, coordinate: np.ndarray | float) -> np.ndarray:
-        """Coordinate → value, inside the bounds."""
+        """Return the value at a coordinate, inside the bounds."""
         value = np.exp(np.clip(coordinate, -700, 700)) if self.log else np.asarray(coordinate) * self.scale
         return np.clip(value, self.low, self.high)
 
 
 def value_of(model: Model, free: FreeParameter) -> np.ndarray | float:
-    """Return what a model has for a free number."""
+    """Return the value of a free parameter in a model: a number, or (n,) float for a parameter of single texels."""
     if free.effect < 0:
         return float(getattr(model.parameters, free.name))
     return np.asarray(model.effects[free.effect].values[free.name], float)
 
 
 def with_values(model: Model, free: Sequence[FreeParameter], values: Sequence[np.ndarray | float]) -> Model:
-    """Return a model with other values for its free numbers."""
+    """Return a model with other values of its free parameters.
+
+    Tied parameters follow. `mud` is lowered to `mus` if it would exceed it.
+    """
     base: dict[str, Any] = {}
     stacks: dict[int, dict[str, float | tuple[float, ...]]] = {}
     for item, value in zip(free, values, strict=True):
@@ -109,20 +124,20 @@ def with_values(model: Model, free: Sequence[FreeParameter], values: Sequence[np
 
 @dataclass(frozen=True)
 class TrialView:
-    """The part of a trial that is looked at: texels and samples, with weights that are zero where a value is missing.
+    """A part of a trial: some texels and samples, with the residual of any model on them.
 
     Attributes
     ----------
     predictor : Predictor
     subset : (c,) int or None
-        Texels; None: all, also to the effects that let texels feel their neighbours.
+        Texels; None for all. Only the whole set is right for effects that couple texels.
     samples : slice
     noise : (float, float)
         Standard deviation of readings and of forces, in their units.
     stretch_count : int
-        Into how many stretches of time the trial is cut for judging on what was not seen.
+        Number of stretches of time into which the trial is cut if a part of it has to be left out of a fit.
     with_forces : bool
-        Whether net forces count where they were measured.
+        Whether measured net forces are part of the residual.
     """
 
     predictor: Predictor
@@ -133,18 +148,18 @@ class TrialView:
     with_forces: bool = True
 
     def stretches(self, residual: np.ndarray) -> list[slice]:
-        """Return the stretches of time that are left out in turn, as rows of a residual."""
+        """Return the stretches of time that are left out one after the other, as rows of a residual."""
         edges = np.linspace(0, len(residual), self.stretch_count + 1).astype(int)
         return [slice(a, b) for a, b in zip(edges[:-1], edges[1:], strict=True)]
 
     @property
     def texels(self) -> np.ndarray:
-        """(c,) int."""
+        """Indices of the texels, (c,) int."""
         return np.arange(len(self.predictor.rig.texels)) if self.subset is None else self.subset
 
     @cached_property
     def _measured(self) -> tuple[np.ndarray | None, np.ndarray | None]:
-        """Readings of the texels, and where they are missing if any is."""
+        """Measured readings of the texels, and a mask of missing values or None if there are none."""
         reading = self.predictor.trial.reading
         if reading is None:
             return None, None
@@ -153,7 +168,10 @@ class TrialView:
         return reading, missing if missing.any() else None
 
     def residual(self, model: Model) -> np.ndarray:
-        """Measured minus predicted in units of the noise, (T, c + 3); zero where nothing was measured."""
+        """Return measured minus predicted values in units of the noise, (T, c + 3); zero if a value is missing.
+
+        The first c columns are readings of the texels, the last three components of the net force.
+        """
         trial = self.predictor.trial
         predicted = self.predictor.predict(model, self.subset, self.with_forces)
         reading, missing = self._measured
@@ -170,7 +188,7 @@ class TrialView:
 
     @cached_property
     def counts(self) -> np.ndarray:
-        """How many values were measured, (2,) int: of readings, and of forces."""
+        """Number of measured values of readings and of forces, (2,) int."""
         trial, number = self.predictor.trial, np.zeros(2, int)
         if trial.reading is not None:
             number[0] = np.isfinite(trial.reading[self.samples][:, self.texels]).sum()
@@ -179,23 +197,27 @@ class TrialView:
         return number
 
     def squares(self, residual: np.ndarray) -> np.ndarray:
-        """Sum of squares of (some samples of) a residual, (2,) float: of readings, and of forces."""
+        """Return the sum of squares of readings and of forces in a residual or a part of it, (2,) float."""
         width = len(self.texels)
         return np.array([_sum_of_squares(residual[:, :width]), _sum_of_squares(residual[:, width:])])
 
 
 @dataclass
 class NormalEquations:
-    """Normal equations of one trial: p common numbers, m per texel on n texels.
+    """Normal equations ``A x = g`` of one stretch of a trial, for p common parameters and m parameters of each of n texels.
 
     Attributes
     ----------
-    common, common_gradient : (p, p), (p,)
-    coupling : (n, m, p)
-    texel, texel_gradient : (n, m, m), (n, m)
+    common, common_gradient : (p, p), (p,) float
+        Block of A of the common parameters, and their part of g.
+    coupling : (n, m, p) float
+        Blocks of A between the parameters of each texel and the common ones.
+    texel, texel_gradient : (n, m, m), (n, m) float
+        Blocks of A of each texel's own parameters, and their part of g.
     sse : float
-    gradients : (blocks, n + 3, p)
-        Share in `g` of each texel, and of each component of the force, by blocks of time.
+        Sum of squares of the residual.
+    gradients : (blocks, n + 3, p) float
+        Parts of `common_gradient` from each texel and each component of the force, by blocks of time.
     """
 
     common: np.ndarray
@@ -216,10 +238,11 @@ class Fit:
     model : Model
     free : tuple of FreeParameter
     sse : (trials, 2) float
-        Sum of squares per trial, of readings and of forces, in units of the noise.
+        Sum of squares of the residuals of each trial, of readings and of forces, in units of the noise.
     count : (trials, 2) int
+        Number of measured values.
     equations : list of list of NormalEquations, or None
-        By trial and stretch.
+        At the end of the fit, by trial and stretch.
     """
 
     model: Model
@@ -244,78 +267,102 @@ def fit(
     with_equations: bool = True,
     initial_derivatives: Sequence[np.ndarray] | None = None,
 ) -> Fit:
-    """Fit a model's free numbers by Levenberg–Marquardt steps.
+    """Fit the free parameters of a model by Levenberg–Marquardt steps.
 
     Parameters
     ----------
-    shares : sequence of TrialView
+    views : sequence of TrialView
     model : Model
-        Where to start.
+        Where the fit starts.
     free : sequence of FreeParameter
-    turns : int
-        Most steps.
+    max_steps : int
     tolerance : float
-        Relative decrease of the sum of squares below which it ends.
-    held : int
-        Derivatives by so many of the first numbers are computed once and held for all steps, unless none leads down. It only
-        takes more steps; where they end is the same.
-    judged : bool
+        The fit ends when the sum of squares decreases by less than this share of it.
+    frozen : int
+        Derivatives by the first `frozen` parameters are computed once and kept for all steps, unless no step with them leads
+        down. This takes more steps and ends at the same place.
+    with_equations : bool
         Whether the normal equations at the end are wanted as well.
-    begun : sequence of (held or more, T, c + 3) float, optional
-        Derivatives by the first numbers, of each share, near where it starts.
+    initial_derivatives : sequence of (frozen or more, T, c + 3) float, optional
+        Derivatives by the first parameters, for each view, near the start.
     """
     free = tuple(free)
-    counts = np.array([view.counts for view in views])
     at = [item.to_coordinate(value_of(model, item)) for item in free]
-    model = with_values(model, free, [item.from_coordinate(x) for item, x in zip(free, at, strict=True)])
-    residuals = [view.residual(model) for view in views]
-    best = sum(map(_sum_of_squares, residuals)) + _prior_penalty(free, at)
-    tables = [np.empty((len(free), *residual.shape)) for residual in residuals]
-    damping, known, turn = 1e-3, 0, 0
+    start = with_values(model, free, [item.from_coordinate(x) for item, x in zip(free, at, strict=True)])
+    point = _Point.at_model(views, start, free, at)
+    tables = [np.empty((len(free), *residual.shape)) for residual in point.residuals]
+    damping, known = FIRST_DAMPING, 0
     if initial_derivatives is not None:
         known = frozen
         for table, first in zip(tables, initial_derivatives, strict=True):
             table[:frozen] = first[:frozen]
-    while turn < max_steps:
-        turn += 1
-        for view, residual, table in zip(views, residuals, tables, strict=True):
-            derivatives(view, model, free, at, residual, table, known)
-        parts = zip(views, residuals, tables, strict=True)
+    for _ in range(max_steps):
+        parts = list(zip(views, point.residuals, tables, strict=True))
+        for view, residual, table in parts:
+            derivatives(view, point.model, free, point.at, residual, table, known)
         total = summed_equations([_equations_of(view, free, table, residual) for view, residual, table in parts])
-        improved = False
-        for _ in range(6):
-            moved = _point_after(at, free, _solved_step([total], free, at, damping))
-            trial = with_values(model, free, [item.from_coordinate(x) for item, x in zip(free, moved, strict=True)])
-            fresh = [view.residual(trial) for view in views]
-            found = sum(map(_sum_of_squares, fresh)) + _prior_penalty(free, moved)
-            if np.isfinite(found) and found < best:
-                improved = True
-                break
-            damping = max(damping * 10.0, 1e-4)
-        if not improved:
+        better, damping = _better_point(views, free, point, total, damping)
+        if better is None:
             if known == 0:
                 break
-            known, damping = 0, 1e-3
+            known, damping = 0, FIRST_DAMPING
             continue
-        gained = best - found
-        at, model, residuals, best = moved, trial, fresh, found
-        damping, little = max(damping * 0.2, 1e-9), gained < tolerance * best
+        little = point.objective - better.objective < tolerance * better.objective
+        point, damping = better, max(damping * DAMPING_DOWN, LEAST_DAMPING)
         if little and (known == 0 or not with_equations):
             break
-        known = 0 if little else frozen  # held derivatives may lead nowhere long before the end
-    sums = None
-    if with_equations:
-        sums = []
-        for view, residual, table in zip(views, residuals, tables, strict=True):
-            derivatives(view, model, free, at, residual, table, 0)
-            rows = view.stretches(residual)
-            sums.append([_equations_of(view, free, table[:, part], residual[part]) for part in rows])
-    squares = np.array([view.squares(r) for view, r in zip(views, residuals, strict=True)])
-    return Fit(model, free, squares, counts, sums)
+        known = 0 if little else frozen  # with frozen derivatives steps may become small long before the minimum
+    equations = _final_equations(views, free, point, tables) if with_equations else None
+    squares = np.array([view.squares(r) for view, r in zip(views, point.residuals, strict=True)])
+    return Fit(point.model, free, squares, np.array([view.counts for view in views]), equations)
+
+
+@dataclass
+class _Point:
+    """A point of a fit: coordinates of the free parameters, the model there, its residuals and the objective."""
+
+    at: list[np.ndarray]
+    model: Model
+    residuals: list[np.ndarray]
+    objective: float
+
+    @classmethod
+    def at_model(
+        cls, views: Sequence[TrialView], model: Model, free: tuple[FreeParameter, ...], at: list[np.ndarray]
+    ) -> _Point:
+        """The point of a model whose free parameters have the coordinates `at`."""
+        residuals = [view.residual(model) for view in views]
+        return cls(at, model, residuals, sum(map(_sum_of_squares, residuals)) + _prior_penalty(free, at))
+
+
+def _better_point(
+    views: Sequence[TrialView], free: tuple[FreeParameter, ...], point: _Point, total: NormalEquations, damping: float
+) -> tuple[_Point | None, float]:
+    """Raise the damping until a step leads down; the point after that step and the damping, or None if no step does."""
+    for _ in range(TRIES_PER_STEP):
+        moved = _point_after(point.at, free, _solved_step([total], free, point.at, damping))
+        model = with_values(point.model, free, [item.from_coordinate(x) for item, x in zip(free, moved, strict=True)])
+        tried = _Point.at_model(views, model, free, moved)
+        if np.isfinite(tried.objective) and tried.objective < point.objective:
+            return tried, damping
+        damping = max(damping * DAMPING_UP, RAISED_DAMPING)
+    return None, damping
+
+
+def _final_equations(
+    views: Sequence[TrialView], free: tuple[FreeParameter, ...], point: _Point, tables: list[np.ndarray]
+) -> list[list[NormalEquations]]:
+    """Normal equations of each stretch of each trial at a point; the tables are overwritten."""
+    equations = []
+    for view, residual, table in zip(views, point.residuals, tables, strict=True):
+        derivatives(view, point.model, free, point.at, residual, table, 0)
+        rows = view.stretches(residual)
+        equations.append([_equations_of(view, free, table[:, part], residual[part]) for part in rows])
+    return equations
 
 
 def _prior_penalty(free: tuple[FreeParameter, ...], at: list[np.ndarray]) -> float:
-    """What numbers per texel pay for leaving their resting value."""
+    """Squares that the prior adds for parameters of single texels away from their resting values."""
     return sum(
         TEXEL_PRECISION * float(np.sum((x - item.to_coordinate(item.resting_value)) ** 2))
         for item, x in zip(free, at, strict=True)
@@ -324,16 +371,16 @@ def _prior_penalty(free: tuple[FreeParameter, ...], at: list[np.ndarray]) -> flo
 
 
 def all_equations(sums: Sequence[Sequence[NormalEquations]]) -> list[NormalEquations]:
-    """Return the equations of all stretches of all trials in one list."""
+    """Return the normal equations of all stretches of all trials in one list."""
     return [one for trial in sums for one in trial]
 
 
 def _point_after(at: list[np.ndarray], free: tuple[FreeParameter, ...], step: list[np.ndarray]) -> list[np.ndarray]:
-    """The next point: no number on a log scale by more than a factor of e², all inside their bounds."""
+    """Coordinates after a step, inside the bounds; steps on a logarithmic scale are limited."""
     moved = []
     for x, item, change in zip(at, free, step, strict=True):
         if item.log:
-            change = np.clip(change, -2.0, 2.0)
+            change = np.clip(change, -LARGEST_LOG_STEP, LARGEST_LOG_STEP)
         moved.append(item.to_coordinate(item.from_coordinate(x + change)))
     return moved
 
@@ -347,7 +394,22 @@ def derivatives(
     table: np.ndarray,
     known: int,
 ) -> None:
-    """Write what a step along each free number takes off the residual into `table` (p, T, c + 3), but the first `known`."""
+    """Write by how much a step along each free parameter lowers the residual into a table.
+
+    Parameters
+    ----------
+    view : TrialView
+    model : Model
+    free : tuple of FreeParameter
+    at : list of float or (n,) float
+        Coordinates of the free parameters in the model.
+    residual : (T, c + 3) float
+        Of the model.
+    table : (p, T, c + 3) float
+        Written to; for a parameter of single texels each column is the derivative by that of its own texel.
+    known : int
+        The first `known` derivatives are in the table already.
+    """
     step = QUANTIZED_DIFFERENCE_STEP if any(effect.name == "quantization" for effect in model.effects) else DIFFERENCE_STEP
     for i, item in list(enumerate(free))[known:]:
         ahead = item.to_coordinate(item.from_coordinate(at[i] + step))
@@ -385,7 +447,7 @@ def _equations_of(view: TrialView, free: tuple[FreeParameter, ...], table: np.nd
 
 
 def summed_equations(sums: Sequence[NormalEquations]) -> NormalEquations:
-    """Add equations up, all but their gradients by blocks."""
+    """Return the sum of normal equations; the gradients by blocks are those of the first."""
     first = sums[0]
     names = ("common", "common_gradient", "coupling", "texel", "texel_gradient", "sse")
     return replace(first, **{name: sum(getattr(s, name) for s in sums) for name in names})
@@ -394,7 +456,11 @@ def summed_equations(sums: Sequence[NormalEquations]) -> NormalEquations:
 def _reduced_equations(
     sums: Sequence[NormalEquations], free: tuple[FreeParameter, ...], at: list[np.ndarray], damping: float
 ) -> tuple[np.ndarray, ...]:
-    """The damped normal equations of the common numbers, a (p, p) and rhs (p,), and how those per texel follow from them."""
+    """Eliminate the parameters of single texels from damped normal equations (Schur complement).
+
+    Returns the matrix (p, p) and right-hand side (p,) of the common parameters. Of the parameters of single texels it returns
+    how they follow the common ones (n, m, p), and their step if these stay (n, m).
+    """
     t = summed_equations(sums)
     m = t.texel_gradient.shape[1]
     a = t.common + damping * np.diag(np.diag(t.common)) + 1e-12 * (1.0 + np.trace(t.common)) * np.eye(len(t.common))
@@ -420,9 +486,10 @@ def _solved_step(
     damping: float,
     known: np.ndarray | None = None,
 ) -> list[np.ndarray]:
-    """Solve the damped normal equations; a step per free number, in its coordinate.
+    """Solve damped normal equations; a step for each free parameter, in its coordinate.
 
-    With `known` (p, p), the matrix of all recordings, there is no step along what these sums tell too little of.
+    With `known` (p, p), the matrix of all trials, there is no step in directions about which these equations have too little
+    information.
     """
     a, rhs, follow, alone = _reduced_equations(sums, free, at, damping)
     if known is None:
@@ -445,18 +512,22 @@ def _solved_step(
 
 
 def _information_shares(a: np.ndarray, known: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Of each of some directions (columns), which share of what is known of it is in `a`; ``known`` is one along them."""
+    """Share of the information of all trials, `known`, that `a` has in each of p directions, and the directions as columns.
+
+    `known` is one in each direction.
+    """
     inverse = np.linalg.inv(np.linalg.cholesky(known + 1e-10 * np.diag(np.diag(known)) + 1e-300 * np.eye(len(known))))
     share, turned = np.linalg.eigh(inverse @ a @ inverse.T)
     return share, inverse.T @ turned
 
 
 def held_out_squares(views: Sequence[TrialView], found: Fit) -> np.ndarray:
-    """Sum of squares of each trial, of readings and of forces, predicted by a fit that has not seen it, (trials, 2) float.
+    """Return the sum of squares of each trial, of readings and of forces, under fits that have not seen it, (trials, 2) float.
 
-    A whole trial is left out at a time. Where the others tell too little of some number (those of friction, where only one
-    trial slides; those per texel), or there is one trial only, it is a stretch of a trial; what the rest does not tell even
-    then stays as it is. A step that would not even fit the others better is shortened, at last to nothing.
+    Whole trials are left out one after the other. If the other trials have too little information about a parameter (about
+    friction if only one trial slides, or about single texels), or if there is only one trial, stretches of a trial are left out
+    instead. Parameters about which the rest still has too little information keep their values. If the Newton step does not
+    even fit the rest better, it is shortened, at last to nothing.
     """
     if found.equations is None:
         return found.sse.copy()
@@ -477,7 +548,7 @@ def held_out_squares(views: Sequence[TrialView], found: Fit) -> np.ndarray:
 
 
 def _squares_left_out(views: Sequence[TrialView], found: Fit, left: int, parts: list[int], known: np.ndarray) -> np.ndarray:
-    """Squares of some stretches of one trial under the fit to everything else."""
+    """Sum of squares of some stretches of one trial under the fit to everything else, (2,) float."""
     assert found.equations is not None
     free, at = found.free, [item.to_coordinate(value_of(found.model, item)) for item in found.free]
 
@@ -506,13 +577,14 @@ def _sum_of_squares(residual: np.ndarray) -> float:
 
 
 def free_base_parameters(parameters: SensorParameters, wanted: Sequence[str], full: float) -> list[FreeParameter]:
-    """Return the free numbers of the base model.
+    """Return free parameters of the base model.
 
     Parameters
     ----------
     parameters : SensorParameters
         Where they start.
     wanted : sequence of str
+        Their names; :data:`FRICTION_LEVEL` is one parameter for both friction coefficients.
     full : float
         Range of the readings, in the sensor's unit.
     """

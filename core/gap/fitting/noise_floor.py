@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a recording can tell: its noise floor, and which of the things that betray an effect were done to the sensor."""
+"""The noise of the recordings, and their coverage: which signatures of effects the trials can contain."""
 
 from __future__ import annotations
 
@@ -12,21 +12,38 @@ from ..forward.contact_phases import hold_rate_limit
 from ..forward.predictor import Predictor
 
 UNLOADED_SHARE = 0.03
-"""Share of the largest load of a trial up to which a texel counts as carrying nothing: zeros of load cells wander."""
+"""Share of the largest load of a trial up to which a texel counts as unloaded: the zero of load cells drifts."""
 SHORTEST_STRETCH = 8
-"""Samples of a stretch without load that say something about noise."""
+"""Least number of samples of an unloaded stretch from which noise is measured, and of a hold whose load is compared."""
+SMALLEST_NOISE = 1e-4
+"""Least standard deviation of the noise, as a share of the range."""
+AUTOCOVARIANCE_LAGS = 64
+MANY_TEXELS = 8
+"""Number of texels from which on their common mode is removed before their noise is measured."""
+OUTLIER_VARIANCE = 2.0
+"""Texels with more than this many times the median variance do not count in the autocovariance."""
+WHITE_CORRELATION = 0.05
+"""Autocorrelation below which samples count as uncorrelated."""
+MAD_TO_DEVIATION = 1.4826
+"""Standard deviation of a normal distribution divided by its median absolute deviation."""
+PRESSED_SHARE, UNLOADING_SHARE = 0.05, 0.1
+"""Shares of the largest load: above the first the sensor counts as pressed; a decrease by the second is an unloading."""
+LEAST_SLIDING_SPEED = 1e-5
+"""Metres per second above which a surface slides."""
+MOST_OF_THE_TEXELS = 0.5
+"""If more than this share of the texels is touched, the load need not move to touch different ones."""
 
 
 @dataclass(frozen=True)
 class ChannelNoise:
-    """Noise of one channel.
+    """Noise of a channel.
 
     Attributes
     ----------
     deviation : float
         Standard deviation, in the channel's unit.
     correlation_time : float
-        Samples after which noise is new: 1 for white noise (the integral of its autocorrelation).
+        Integral of the autocorrelation, in samples: 1 for white noise.
     source : str
         Where it was measured, in words.
     """
@@ -37,16 +54,17 @@ class ChannelNoise:
 
 
 def reading_noise(predictors: Sequence[Predictor], full: float) -> ChannelNoise:
-    """Measure the noise of the readings where the texels carry nothing.
+    """Measure the noise of the readings without load.
 
-    Each stretch without load of each texel is a sample; what all texels do together and what drifts linearly is not noise. The
-    median over the samples is taken, so that a few texels that answer to their neighbours do not count. Where no stretch is
-    long enough, second differences of the readings are used, which only white noise survives.
+    Every unloaded stretch of every texel is a sample of the variance, without the texels' common mode and a linear drift. The
+    result is the weighted median of these samples, so that a few texels that respond to their neighbours do not matter. If no
+    stretch is long enough, second differences of the readings are used, which assumes white noise.
 
     Parameters
     ----------
+    predictors : sequence of Predictor
     full : float
-        Range of the readings; noise below a ten-thousandth of it is taken as that.
+        Range of the readings; smaller noise than a ten-thousandth of it is taken as that.
     """
     variances: list[float] = []
     weights: list[float] = []
@@ -64,7 +82,7 @@ def reading_noise(predictors: Sequence[Predictor], full: float) -> ChannelNoise:
                     variances += list(variance)
                     weights += [float(stop - start)] * len(variance)
                     curves.append(curve * (stop - start) * part.shape[1])
-    smallest = 1e-4 * full
+    smallest = SMALLEST_NOISE * full
     alive = np.array(variances) > smallest**2
     if alive.sum() >= 1:
         values, weight = np.array(variances)[alive], np.array(weights)[alive]
@@ -78,14 +96,15 @@ def reading_noise(predictors: Sequence[Predictor], full: float) -> ChannelNoise:
 
 
 def force_noise(predictors: Sequence[Predictor], full: float) -> ChannelNoise:
-    """Measure the noise of the force sensor, from second differences: there is no texel beside it to compare with."""
+    """Measure the noise of the force sensor from second differences: there is no other channel to compare with."""
     second = [_white_noise_deviation(p.trial.force) for p in predictors if p.trial.force is not None]
     deviation = float(np.nanmedian(np.concatenate(second))) if second else 0.0
-    return ChannelNoise(max(deviation if np.isfinite(deviation) else 0.0, 1e-4 * full), 1.0, "differences between samples")
+    smallest = SMALLEST_NOISE * full
+    return ChannelNoise(max(deviation if np.isfinite(deviation) else 0.0, smallest), 1.0, "differences between samples")
 
 
 def _unloaded_stretches(predictor: Predictor) -> list[tuple[int, int]]:
-    """Stretches of samples in which nothing touches at all, and the whole trial for texels that are never touched."""
+    """Stretches of samples without any contact, and the whole trial for texels that are never touched."""
     stimulus = predictor.stimulus
     load = stimulus.load
     free = ~(load > 0).any(axis=1)
@@ -94,7 +113,7 @@ def _unloaded_stretches(predictor: Predictor) -> list[tuple[int, int]]:
 
 
 def _unloaded_texels(predictor: Predictor, start: int, stop: int) -> list[np.ndarray]:
-    """Texels that carry nothing in a stretch."""
+    """Texels without load in a stretch, as a list of at most one array."""
     stimulus = predictor.stimulus
     load = stimulus.load
     (texels,) = np.nonzero(~(load[start:stop] > 0).any(axis=0))
@@ -102,62 +121,67 @@ def _unloaded_texels(predictor: Predictor, start: int, stop: int) -> list[np.nda
 
 
 def _variance_and_autocovariance(part: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Variance of each column (c,) about a line and the common mode, and the mean autocovariance at lags up to a quarter."""
+    """Variance of each column (c,) about a line and the common mode, and the mean autocovariance (64,).
+
+    The autocovariance is computed up to lags of a quarter of the samples.
+    """
     samples, columns = part.shape
-    if columns >= 8:
+    if columns >= MANY_TEXELS:
         part = part - np.median(part, axis=1, keepdims=True)
     t = np.linspace(-1.0, 1.0, samples)[:, None]
     part = part - part.mean(axis=0) - t * (t * part).sum(axis=0) / (t * t).sum()
     variance = (part * part).sum(axis=0) / (samples - 2)
-    lags = np.arange(64)
+    lags = np.arange(AUTOCOVARIANCE_LAGS)
     curve = np.zeros(len(lags))
-    kept = variance <= np.median(variance) * 2.0 + 1e-300
+    kept = variance <= np.median(variance) * OUTLIER_VARIANCE + 1e-300
     for lag in lags[: samples // 4 + 1]:
         curve[lag] = float((part[: samples - lag, kept] * part[lag:, kept]).sum() / max(samples - lag, 1)) / max(kept.sum(), 1)
     return variance, curve
 
 
 def _correlation_time(curves: list[np.ndarray]) -> float:
-    total = sum(curves, np.zeros(64))
+    """Integral of the autocorrelation up to where it vanishes, in samples."""
+    total = sum(curves, np.zeros(AUTOCOVARIANCE_LAGS))
     if total[0] <= 0:
         return 1.0
     correlation = total / total[0]
-    below = np.flatnonzero(correlation < 0.05)
+    below = np.flatnonzero(correlation < WHITE_CORRELATION)
     last = below[0] if len(below) else len(correlation)
     return float(max(1.0, 1.0 + 2.0 * correlation[1:last].sum()))
 
 
 def _white_noise_deviation(values: np.ndarray) -> np.ndarray:
-    """Standard deviation of white noise in each column (c,), whatever smooth signal is under it."""
+    """Standard deviation of white noise in each column (c,), on top of any smooth signal."""
     values = values[np.isfinite(values).all(axis=1)]
     if len(values) < 5:
         return np.zeros(values.shape[1])
     second = values[2:] - 2.0 * values[1:-1] + values[:-2]
-    return 1.4826 * np.median(np.abs(second), axis=0) / np.sqrt(6.0)
+    return MAD_TO_DEVIATION * np.median(np.abs(second), axis=0) / np.sqrt(6.0)
 
 
 @dataclass(frozen=True)
 class Coverage:
-    """What the trials do to the sensor, as far as it matters for telling effects apart.
+    """What the trials do to the sensor, as far as it helps to distinguish effects.
 
     Attributes
     ----------
     touched_share : float
         Share of the texels that are ever touched.
     speed_ratio : float
-        Ratio of fast to slow loading (90th to 10th percentile of the speed while loading).
+        Ratio of fast to slow loading: 90th to 10th percentile of the speed during loading.
     longest_hold : float, s
     unloading : bool
-        Whether a load was ever taken back by more than a tenth of the largest, while it was recorded.
+        Whether a load ever decreased by more than a tenth of the largest.
     cycles : int
-        Times that contact began, in the trial that has most.
+        Number of times that contact began, in the trial with most.
     slides : bool
+        Whether a surface slid over the sensor.
     unloaded_share : float
-        Share of a trial between the first and the last moment at which a texel carries nothing; the largest of all trials.
+        Share of a trial between the first and the last time that a texel was unloaded; the largest of all trials.
     load_moves : bool
-        Whether what presses part of the texels did so at more than one place.
+        Whether the load moved over the texels, or touched most of them.
     held_load_ratio : float
-        Largest of the loads that were held for a while, by the smallest.
+        Ratio of the largest to the smallest load that was held.
     """
 
     touched_share: float
@@ -172,9 +196,9 @@ class Coverage:
 
 
 def coverage(predictors: Sequence[Predictor]) -> Coverage:
-    """Look at what trials cover."""
+    """Return the coverage of the trials of some predictors."""
     texels = predictors[0].rig.texels
-    touched, middles = np.zeros(len(texels), bool), []
+    touched, centres = np.zeros(len(texels), bool), []
     speeds: list[np.ndarray] = []
     levels: list[float] = []
     hold, unloading, cycles, slides, rest = 0.0, False, 0, False, 0.0
@@ -183,15 +207,15 @@ def coverage(predictors: Sequence[Predictor]) -> Coverage:
         load = s.load
         touched |= (load > 0).any(axis=0)
         pressed = load.sum(axis=1)
-        at = pressed > 0.05 * max(float(pressed.max(initial=0.0)), 1e-300)
-        middles.append(load[at] @ texels.position / pressed[at, None])
+        at = pressed > PRESSED_SHARE * max(float(pressed.max(initial=0.0)), 1e-300)
+        centres.append(load[at] @ texels.position / pressed[at, None])
         total = load.max(axis=1)
         full = max(total.max(initial=0.0), 1e-300)
         rate = np.gradient(total, s.time) / full
         pace = hold_rate_limit(rate[total > 0])
         speeds.append(rate[rate > pace])
-        unloading |= bool((np.maximum.accumulate(total) - total).max() > 0.1 * full)
-        still = (np.abs(rate) < pace) & (total > 0.05 * full)
+        unloading |= bool((np.maximum.accumulate(total) - total).max() > UNLOADING_SHARE * full)
+        still = (np.abs(rate) < pace) & (total > PRESSED_SHARE * full)
         holds = _runs(still)
         hold = max([hold, *(float(s.time[min(b, len(total) - 1)] - s.time[a]) for a, b in holds)])
         levels += [float(total[a:b].mean()) for a, b in holds if b - a >= SHORTEST_STRETCH]
@@ -199,7 +223,7 @@ def coverage(predictors: Sequence[Predictor]) -> Coverage:
         rest = max(rest, float(np.ptp(idle)) / float(np.ptp(s.time)) if len(idle) else 0.0)
         starts = np.flatnonzero((total > 0) & (np.concatenate([[0.0], total[:-1]]) <= 0))
         cycles = max(cycles, len(starts))
-        slides |= bool(s.slide.max(initial=0.0) > 1e-5)
+        slides |= bool(s.slide.max(initial=0.0) > LEAST_SLIDING_SPEED)
     quick = np.concatenate(speeds) if speeds else np.zeros(0)
     spread = float(np.quantile(quick, 0.9) / np.quantile(quick, 0.1)) if len(quick) > 4 else 1.0
     return Coverage(
@@ -210,19 +234,19 @@ def coverage(predictors: Sequence[Predictor]) -> Coverage:
         cycles=cycles,
         slides=slides,
         unloaded_share=rest,
-        load_moves=_load_moves(np.concatenate(middles), texels.area, touched),
+        load_moves=_load_moves(np.concatenate(centres), texels.area, touched),
         held_load_ratio=max(levels) / min(levels) if levels else 1.0,
     )
 
 
-def _load_moves(middle: np.ndarray, area: np.ndarray, touched: np.ndarray) -> bool:
-    """Whether the middle of the load (T, 3) moved by more than a texel's width; where most texels are touched it need not."""
-    if len(middle) == 0 or touched.mean() > 0.5:
+def _load_moves(centre: np.ndarray, area: np.ndarray, touched: np.ndarray) -> bool:
+    """Whether the centre of the load (T, 3) moved by more than the width of a texel, or most texels are touched."""
+    if len(centre) == 0 or touched.mean() > MOST_OF_THE_TEXELS:
         return True
-    return float(np.ptp(middle, axis=0).max()) > float(np.sqrt(np.median(area)))
+    return float(np.ptp(centre, axis=0).max()) > float(np.sqrt(np.median(area)))
 
 
 def _runs(flag: np.ndarray) -> list[tuple[int, int]]:
-    """First sample of each stretch for which a flag is set, and the one behind it."""
+    """First sample of each run in which a flag is set, and the sample after its end."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], flag, [False]]).astype(int))).reshape(-1, 2)
     return [(int(a), int(b)) for a, b in edges]

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Whether a residual is more than noise, and what it varies with: regressions that are judged on trials they have not seen.
+"""Tests for structure in a residual: does it contain more than noise, and what does it depend on?
 
-Noise cannot be predicted from trials it was not in, however coloured it is, as long as each texel has its own; so a share that
-can be predicted is structure.
+Regressions on features of the trials are fitted to some trials and judged on the others. Noise of other trials cannot be
+predicted, however coloured it is, as long as each texel has its own. A share of the residual that can be predicted is
+structure.
 """
 
 from __future__ import annotations
@@ -18,12 +19,12 @@ from ..forward.predictor import Predictor
 
 @dataclass(frozen=True)
 class ResidualStructure:
-    """How much of a residual's mean square can be predicted.
+    """Share of a residual's mean square that can be predicted.
 
     Attributes
     ----------
     total : float
-        Share, by all that is looked at together.
+        By all features together.
     shares : dict of str to float
         By each group of :data:`~.contact_phases.FEATURES` alone.
     """
@@ -33,21 +34,21 @@ class ResidualStructure:
 
     @property
     def strongest(self) -> str:
-        """The group that predicts most."""
+        """The group of features that predicts most."""
         return max(self.shares, key=lambda name: self.shares[name]) if self.shares else ""
 
 
 def residual_structure(predictors: Sequence[Predictor], residuals: Sequence[np.ndarray]) -> ResidualStructure:
-    """Find out what residuals vary with.
+    """Find out on which features residuals depend.
 
     Parameters
     ----------
     predictors : sequence of Predictor
         Of the trials.
     residuals : sequence of (T, n) float
-        In units of the noise; zero where a value is missing.
+        In units of the noise; zero if a value is missing.
     """
-    if len(predictors) == 1:  # halves of the only trial stand in for trials
+    if len(predictors) == 1:  # the halves of a single trial serve as two trials
         predictors, residuals, halves = [predictors[0]] * 2, [residuals[0]] * 2, True
     else:
         halves = False
@@ -79,7 +80,7 @@ def residual_structure(predictors: Sequence[Predictor], residuals: Sequence[np.n
 def _share_predicted(
     folds: list[tuple[np.ndarray, np.ndarray]], sums: list[tuple[np.ndarray, np.ndarray]], use: np.ndarray, total: float
 ) -> float:
-    """Share of the squares that a regression on some features predicts on the folds it has not seen."""
+    """Share of the squares that a ridge regression on some features predicts in folds that it has not seen."""
     left = 0.0
     for i, (x, r) in enumerate(folds):
         a = sum((s[0] for j, s in enumerate(sums) if j != i), np.zeros(sums[0][0].shape))[np.ix_(use, use)]
@@ -100,7 +101,7 @@ def _share_predicted_by_texel(predictors: Sequence[Predictor], residuals: Sequen
     left = 0.0
     for i, (predictor, r) in enumerate(zip(predictors, residuals, strict=True)):
         one, d1, d2, r1, rd = sum(p for j, p in enumerate(parts) if j != i)
-        # A little of a second trial without residual: texels that were hardly loaded say nothing.
+        # Ridge regression: texels that were hardly loaded get small coefficients.
         one, d2 = one * 1.01 + 1.0, d2 * 1.01 + 1.0
         det = one * d2 - d1 * d1
         offset, gain = (d2 * r1 - d1 * rd) / det, (one * rd - d1 * r1) / det

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A spectral line in what is left where nothing is loaded: hum, a fan, a pump.
+"""Spectral lines in the residual without load: mains hum, a fan, a pump.
 
-No effect explains it, and no fit shows it, since it is in the noise at rest as well. Fisher's test for a periodicity (Proc. R.
-Soc. A 125, 1929), with the level of the noise taken from the frequencies around, so that noise may be coloured. Texels may
-share all of their noise: only trials count as independent.
+No effect explains a periodic disturbance, and a fit does not show it, because it is part of the noise at rest. Fisher's test
+for a periodicity (Proc. R. Soc. A 125, 1929) is used with the local level of the spectrum, so that noise may be coloured.
+Texels may share all of their noise; only trials count as independent.
 """
 
 from __future__ import annotations
@@ -18,27 +18,29 @@ from ..forward.predictor import Model
 from .least_squares import TrialView
 
 FALSE_ALARM = 1e-4
-"""Chance that noise alone is taken for a line."""
+"""Probability of finding a line in pure noise."""
 LEAST_LINE_SHARE = 0.2
-"""Least share of the squares at rest that a line carries to be worth a word: beneath it is noise like any other."""
+"""Least share of the squares at rest that a line must have to be reported."""
 NEIGHBOUR_FREQUENCIES, LINE_HALF_WIDTH = 16, 3
-"""Frequencies on either side that tell the level of the noise, and those of them that the line itself may smear over."""
+"""Number of frequencies on either side that give the level of the noise, and how many of these the line itself may cover."""
 LEAST_PROMINENCE = 3.0
-"""How far it must stand out of that level in every trial."""
+"""Least ratio of a line to the level of the noise in every trial."""
+SEARCH_WIDTH, SEARCH_POINTS = 0.6, 13
+"""The frequency of a line is refined within this many frequency steps on either side, at so many points."""
 
 
 @dataclass(frozen=True)
 class SpectralLine:
-    """A line.
+    """A spectral line.
 
     Attributes
     ----------
     frequency : float, Hz
-        As it was sampled: one above half the rate shows at another place.
+        As sampled: a line above half the sampling rate appears at another frequency.
     amplitude : float
         Of a texel's reading, root mean square over the texels, in the sensor's unit.
     share : float
-        Of the squares of what is left at rest.
+        Share of the line in the squares of the residual at rest.
     """
 
     frequency: float
@@ -47,11 +49,11 @@ class SpectralLine:
 
 
 def strongest_line(views: Sequence[TrialView], model: Model) -> SpectralLine | None:
-    """Return the strongest line that all trials have at rest; None where there is none.
+    """Return the strongest line that all trials have without load; None without a line.
 
     Parameters
     ----------
-    shares : sequence of TrialView
+    views : sequence of TrialView
         Whole trials.
     model : Model
     """
@@ -76,13 +78,15 @@ def strongest_line(views: Sequence[TrialView], model: Model) -> SpectralLine | N
     everywhere = all(float((p[beside] / q[beside]).max()) > LEAST_PROMINENCE for p, q in zip(powers, levels, strict=True))
     if not everywhere or _false_alarm_probability(float(ratio.max()), len(powers)) * len(ratio) > FALSE_ALARM:
         return None
-    near = (at + np.linspace(-0.6, 0.6, 13)) / (length * step)
+    near = (at + np.linspace(-SEARCH_WIDTH, SEARCH_WIDTH, SEARCH_POINTS)) / (length * step)
     best = max((_line_at(resting, float(f), views[0].noise[0]) for f in near), key=lambda line: line.share)
     return best if best.share > LEAST_LINE_SHARE else None
 
 
 def _unloaded_residual(view: TrialView, model: Model) -> tuple[float, np.ndarray, np.ndarray, np.ndarray] | None:
-    """Step, times, the residual of texels while nothing touches them (about its mean, zero elsewhere), and where that is."""
+    """Median time step, times, and the residual of texels without load about its mean (zero elsewhere), with a mask of its
+    values.
+    """
     reading = view.predictor.trial.reading
     time = view.predictor.stimulus.time
     if reading is None or len(time) < 4 * NEIGHBOUR_FREQUENCIES:
@@ -97,7 +101,7 @@ def _unloaded_residual(view: TrialView, model: Model) -> tuple[float, np.ndarray
 
 
 def _noise_level(power: np.ndarray) -> np.ndarray:
-    """Mean of the noise around each frequency, told by the median (that of exponential values is ln 2 of their mean)."""
+    """Level of the noise around each frequency, from the median: that of exponential values is ln 2 times their mean."""
     wide = np.pad(power, NEIGHBOUR_FREQUENCIES, mode="reflect")
     windows = np.lib.stride_tricks.sliding_window_view(wide, 2 * NEIGHBOUR_FREQUENCIES + 1)
     kept = np.abs(np.arange(-NEIGHBOUR_FREQUENCIES, NEIGHBOUR_FREQUENCIES + 1)) > LINE_HALF_WIDTH
@@ -106,14 +110,14 @@ def _noise_level(power: np.ndarray) -> np.ndarray:
 
 
 def _false_alarm_probability(total: float, trials: int) -> float:
-    """Chance that the sum of so many exponential values of mean one is larger."""
+    """Probability that the sum of so many exponential values of mean one is larger than `total`."""
     from scipy.special import gammaincc
 
     return float(gammaincc(trials, total))
 
 
 def _line_at(resting: list[tuple[float, np.ndarray, np.ndarray, np.ndarray]], frequency: float, noise: float) -> SpectralLine:
-    """Amplitude by least squares at a frequency, texel by texel."""
+    """Amplitude and share of a line at a frequency, by least squares for each texel."""
     line = total = channels = 0.0
     for _, time, values, known in resting:
         wave = np.exp(-2j * np.pi * frequency * (time - time[0]))

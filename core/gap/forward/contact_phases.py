@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a texel goes through: phases of contact, and the quantities that a residual may depend on."""
+"""Phases of contact, and the features of a trial on which a residual may depend."""
 
 from __future__ import annotations
 
@@ -9,28 +9,30 @@ from .predictor import Predictor
 from .stimulus import Stimulus
 
 PHASES = ("approach", "loading", "hold", "unloading", "released", "sliding")
-HOLD_RATE, HOLD_RATE_SHARE = 0.02, 0.2
-"""Share of the largest load per second below which a texel counts as held; in a slow trial so much of the trial's own pace."""
+HOLD_RATE = 0.02
+"""Rate, in shares of the largest load per second, below which a texel counts as held."""
+HOLD_RATE_SHARE = 0.2
+"""In a slow trial the limit is this share of the trial's own fastest rates (their 99 % quantile)."""
 ROUNDING_RATE = 1e-6
-"""Share of the largest load per second below which nothing but rounding moves."""
+"""Least limit: smaller rates are rounding errors."""
 SLIDING_SPEED = 2e-4
 """Metres per second above which a held surface counts as sliding."""
 
 
 def relative_load(stimulus: Stimulus) -> np.ndarray:
-    """Depth of a texel, or its share of a known force, as a share of the largest in the trial, (T, n) float."""
+    """Return the load of each texel, depth or force, as a share of the largest in the trial, (T, n) float."""
     load = stimulus.load
     shares: np.ndarray = load / max(float(load.max(initial=0.0)), 1e-300)
     return shares
 
 
 def hold_rate_limit(rate: np.ndarray) -> float:
-    """Rate below which a load is held: a fixed one, or where all of a trial is slow, one that its fastest parts exceed by far.
+    """Return the rate below which a load counts as held.
 
     Parameters
     ----------
     rate : float, 1/s
-        Of the load, as a share of the largest.
+        Rates of the load, as a share of the largest load.
     """
     return (
         float(np.clip(HOLD_RATE_SHARE * np.quantile(np.abs(rate), 0.99), ROUNDING_RATE, HOLD_RATE)) if rate.size else HOLD_RATE
@@ -38,7 +40,7 @@ def hold_rate_limit(rate: np.ndarray) -> float:
 
 
 def phase_indices(stimulus: Stimulus) -> np.ndarray:
-    """Return which of :data:`PHASES` each texel is in at each sample, (T, n) int."""
+    """Return the phase of each texel at each sample as index into :data:`PHASES`, (T, n) int."""
     load = relative_load(stimulus)
     rate = np.gradient(load, stimulus.time, axis=0)
     still = hold_rate_limit(rate[load > 0]) * np.maximum(load.max(axis=0, keepdims=True), 1e-12)
@@ -54,9 +56,20 @@ def phase_indices(stimulus: Stimulus) -> np.ndarray:
 
 
 CONSTANT_LOAD = 1e-9
-"""Share of the largest load within which a load never changes, and nothing can vary with it."""
+"""Largest change, as a share of the largest load, of a load that counts as constant. Nothing can depend on it."""
 TRAVEL_BANDS = (0.0, 0.02, 0.04, 0.06, 0.09, 0.12, 0.16, 0.2, 0.25, 0.32, 0.4, 1.01)
-"""Bands of the way since the surface turned back, as shares of the longest."""
+"""Bands of the travel since the surface turned back, as shares of the longest."""
+UNLOADING_RATE = -0.005
+"""Rate, as a share of the largest, below which a texel is unloaded."""
+RELAXATION_TIMES = (0.1, 1.0, 8.0)
+"""Seconds: times of the exponentials by which a residual may depend on the time since contact."""
+NEAREST = 4
+"""Number of nearest texels whose load counts as that of the neighbours."""
+MANY_TEXELS = 2000
+"""Number of texels above which the mean load stands for that of the neighbours: distances of all pairs would fill the
+memory."""
+LEAST_OTHERS = 0.05
+"""Least sum of squares of the others' loads from which the pattern that they share is estimated."""
 
 
 FEATURES: dict[str, str] = {
@@ -75,12 +88,13 @@ FEATURES: dict[str, str] = {
 
 
 def features(predictor: Predictor, residual: np.ndarray) -> dict[str, np.ndarray]:
-    """What the residual of each texel at each sample may vary with: arrays (f, T, n) by group of :data:`FEATURES`.
+    """Return features of each texel at each sample, arrays (f, T, n) by group of :data:`FEATURES`.
 
     Parameters
     ----------
+    predictor : Predictor
     residual : (T, n) float
-        Only the last two groups look at it, and then at the other texels'.
+        Used for the last two groups, which contain the residual of the other texels.
     """
     s = predictor.stimulus
     d = relative_load(s)
@@ -93,15 +107,13 @@ def features(predictor: Predictor, residual: np.ndarray) -> dict[str, np.ndarray
     step = np.diff(time, prepend=time[0])[:, None]
     done = np.cumsum(d * step, axis=0)
     done /= max(float(done.max(initial=0.0)), 1e-300)
-    falling = rate < -0.005
+    falling = rate < UNLOADING_RATE
     clock = np.broadcast_to(((time - time[0]) / max(time[-1] - time[0], 1e-300))[:, None], d.shape)
     groups = {
         "depth": [d, d**2, d**3, touching.astype(float)],
         "rate and direction": [rate, np.abs(rate), d * falling, d**2 * falling, np.abs(rate) ** 0.3 * np.sign(rate)],
         "time since contact": [
-            d * np.exp(-since / 0.1),
-            d * np.exp(-since),
-            d * np.exp(-since / 8.0),
+            *(d * np.exp(-since / tau) for tau in RELAXATION_TIMES),
             np.exp(-since) * touching,
         ],
         "history": [top - d, (top - d) * touching, top**2 - d**2, done * d, done],
@@ -123,13 +135,14 @@ def features(predictor: Predictor, residual: np.ndarray) -> dict[str, np.ndarray
 
 
 def _sliding_features(slip: np.ndarray, time: np.ndarray, shape: tuple[int, ...]) -> dict[str, list[np.ndarray]]:
-    """Speed along the direction in which the surface slides most, and the way since that speed last changed its sign.
+    """Speed in the main direction of sliding, and travel since that speed last changed its sign.
 
     Parameters
     ----------
     slip : (T, n, 3) float, m/s
+    time : (T,) float, s
     shape : (int, int)
-        Of what is returned.
+        Of the features, (T, n).
     """
     mean = slip.mean(axis=1)
     _, _, axes = np.linalg.svd(mean, full_matrices=False)
@@ -147,7 +160,7 @@ def _sliding_features(slip: np.ndarray, time: np.ndarray, shape: tuple[int, ...]
 
 
 def _time_since_contact(touching: np.ndarray, time: np.ndarray) -> np.ndarray:
-    """Seconds since each texel was last touched anew, (T, n); zero where nothing touches."""
+    """Seconds since the current contact of each texel began, (T, n); zero without contact."""
     began = touching.copy()
     began[1:] &= ~touching[:-1]
     start = np.maximum.accumulate(np.where(began, time[:, None], -np.inf), axis=0)
@@ -155,10 +168,13 @@ def _time_since_contact(touching: np.ndarray, time: np.ndarray) -> np.ndarray:
 
 
 def _neighbour_load(predictor: Predictor, d: np.ndarray) -> np.ndarray:
-    """Mean load of the four nearest texels."""
+    """Mean load of the four nearest texels, (T, n).
+
+    Ties of the distance are common on a grid; the sorted table of all distances breaks them in the same way everywhere.
+    """
     p = predictor.rig.texels.position
-    count = min(4, len(p) - 1)
-    if len(p) > 2000:  # the distances of all pairs would fill the memory
+    count = min(NEAREST, len(p) - 1)
+    if len(p) > MANY_TEXELS:
         return np.broadcast_to(d.mean(axis=1, keepdims=True), d.shape)
     distance = np.linalg.norm(p[:, None] - p[None], axis=2)
     nearest = np.argsort(distance, axis=1)[:, 1 : count + 1]
@@ -169,9 +185,9 @@ def _neighbour_load(predictor: Predictor, d: np.ndarray) -> np.ndarray:
 
 
 def _pattern_of_others(residual: np.ndarray, shape: np.ndarray) -> np.ndarray:
-    """The residual that a texel would have if all followed `shape` with one amplitude per sample, found from the others."""
+    """Residual that each texel would have if all followed `shape` with one amplitude per sample, found from the others."""
     top = (residual * shape).sum(axis=1, keepdims=True) - residual * shape
     square = (shape * shape).sum(axis=1, keepdims=True) - shape * shape
-    # A texel that is nearly alone says nothing about the others.
-    amplitude = np.where(square > 0.05, top / np.maximum(square, 0.05), 0.0)
+    # A texel that is nearly alone under load has no others to compare with.
+    amplitude = np.where(square > LEAST_OTHERS, top / np.maximum(square, LEAST_OTHERS), 0.0)
     return amplitude * shape

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""From what texels meet to the forces on them: laid out so that a fit can ask for it ten thousand times.
+"""Forces on the texels from their contact histories, arranged so that a fit can evaluate them ten thousand times.
 
-Only samples in contact are kept, texel after texel. Texels that meet the same at all times, as under a flat end, are computed
-once. What is asked of each sample by itself is computed for all samples in one loop, without looking back.
+Only samples in contact are stored, texel after texel. Texels with equal histories, as under a flat indenter, are computed once.
+Whatever depends on one sample alone is computed for all samples in one loop; only the bristle state is integrated in order.
 """
 
 from __future__ import annotations
@@ -24,25 +24,26 @@ if TYPE_CHECKING:
     from .stimulus import Stimulus
 
 EQUAL_WITHIN = 1e-9
-"""Share of the largest value to which two texels must agree to be computed as one."""
+"""Largest difference, as a share of the largest value, up to which two texels have equal histories."""
 
 
 class ContactSamples(NamedTuple):
-    """All samples of all texels (or groups of texels that are alike) in contact, texel after texel, m in number.
+    """All samples in contact of all texels, or groups of equal texels, texel after texel; m in number.
 
     Attributes
     ----------
     sample, texel : (m,) int
+        Index of the sample in the trial, and of the texel or group.
     continues : (m,) bool
-        It was in contact at the sample before as well.
+        Whether the sample before was in contact too.
     weight : (m,) float
-        How many texels it stands for.
+        Number of equal texels.
     normal : (m, 3) float
         Direction of the normal force on the sensor.
     slip, mean_slip : (m, 3) float, m/s
-        Now, and the mean of now and the sample before.
+        Sliding velocity, and its mean with the sample before.
     slip_squared, mean_slip_squared : (m,) float, m²/s²
-        Of these speeds.
+        Squares of their magnitudes.
     time_step : (m,) float, s
         Since the sample before.
     """
@@ -61,17 +62,19 @@ class ContactSamples(NamedTuple):
 
 @dataclass(frozen=True)
 class ContactHistory:
-    """What some texels meet during a trial of T samples, those that are alike as one.
+    """Contact of some texels during a trial of T samples; equal texels form a group.
 
     Attributes
     ----------
     time : (T,) float, s
     texel_count : int
-        Number of texels.
     touched, group : (p,) int
-        Which texels are touched at all, and which column of the arrays below each belongs to.
-    depth, slide_step, rate : (T, g) float
-        See :func:`.bound.forces`.
+        Indices of the texels that are ever touched, and the column below to which each of them belongs.
+    depth : (T, g) float, m
+    slide_step : (T, g) float, m
+        Distance of sliding since the sample before.
+    rate : (T, g) float, m/s
+        Rate of the depth.
     samples : ContactSamples
     """
 
@@ -86,7 +89,7 @@ class ContactHistory:
 
     @classmethod
     def of(cls, stimulus: Stimulus, subset: np.ndarray | None, rig: Rig) -> ContactHistory:
-        """Lay out what some texels of a rig meet (all of them: None)."""
+        """Return the contact history of some texels of a rig, or of all (`subset` None)."""
         load = stimulus.load
         chosen = np.arange(load.shape[1]) if subset is None else subset
         (touched,) = np.nonzero(load[:, chosen].any(axis=0))
@@ -103,9 +106,9 @@ class ContactHistory:
         return cls(stimulus.time, len(chosen), touched, group, depth, slide * step[:, None], rate, samples)
 
     def force(self, p: SensorParameters, force_effects: Sequence[Effect]) -> np.ndarray:
-        """Normal force of the texels under a law of contact and the effects on it, zero where nothing touches, (T, c) N.
+        """Return normal forces under the contact law and effects on it, (T, c) N; zero without contact.
 
-        None of the effects may have a number for each texel.
+        None of the effects may have parameters of single texels.
         """
         force = np.zeros((len(self.time), self.texel_count))
         found = contact_forces.normal_forces(force_effects, p, self.time, self.depth, self.slide_step, self.rate)
@@ -113,13 +116,12 @@ class ContactHistory:
         return force
 
     def total_force(self, p: SensorParameters, friction_effects: Sequence[Effect], force: np.ndarray) -> np.ndarray:
-        """Sum over all texels of their normal and friction forces on the sensor, (T, 3) N.
+        """Return the sum of normal and friction forces of all texels on the sensor, (T, 3) N.
 
         Parameters
         ----------
         p : SensorParameters
         friction_effects : sequence of Effect
-            Those on friction.
         force : (T, c) float, N
             Normal force of each texel.
         """
@@ -137,7 +139,7 @@ class ContactHistory:
 
 
 def _equal_columns(arrays: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
-    """First of each group of columns that are the same in all arrays (g,), and each column's group (p,)."""
+    """First column of each group of columns that are equal in all arrays (g,), and the group of each column (p,)."""
     words = []
     for values in arrays:
         size = max(float(np.abs(values).max(initial=0.0)), 1e-300)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a sensor with given parameters and effects would have recorded in a trial."""
+"""Predictions of what a sensor with given parameters and effects records in a trial."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from .force_model import ContactHistory
 from .stimulus import Stimulus, stimulus_of
 
 CACHE_SIZE = 4
-"""Placements, forces and readings that are remembered per trial: a derivative by one number asks for the others again."""
+"""Number of placements, forces and readings that are kept per trial: a derivative by one parameter needs the others again."""
 
 
 @dataclass(frozen=True)
 class Model:
-    """A sensor in words: the base model's parameters and the effects on top of it."""
+    """A model of a sensor: parameters of the base model, and effects on top of it."""
 
     parameters: SensorParameters
     effects: tuple[Effect, ...] = ()
@@ -39,14 +39,21 @@ class Model:
 
 @dataclass(frozen=True)
 class Prediction:
-    """What a model says a trial recorded: `reading` (T, n) in the sensor's unit, `force` (T, 3) N where it was measured."""
+    """What a model predicts for a trial.
+
+    Attributes
+    ----------
+    reading : (T, n) float, the sensor's unit
+    force : (T, 3) float or None, newtons
+        Net force; None if it is not wanted or was not measured.
+    """
 
     reading: np.ndarray
     force: np.ndarray | None
 
 
 class Predictor:
-    """Predicts one trial for any model; what only some of its numbers change is computed once.
+    """Predicts a trial for any model. Intermediate results are kept, so that a changed parameter costs little.
 
     Parameters
     ----------
@@ -64,22 +71,23 @@ class Predictor:
         self._readings: dict[object, np.ndarray] = {}
 
     def predict(self, model: Model, subset: np.ndarray | None = None, with_forces: bool = True) -> Prediction:
-        """Return the prediction of a model; its arrays are kept and not to be written to.
+        """Return the prediction of a model. Its arrays are kept and must not be written to.
 
         Parameters
         ----------
         model : Model
-        columns : (c,) int, optional
-            Only these texels; right as long as no effect lets texels feel their neighbours.
-        forces : bool
-            Whether the net force is wanted, where it was measured.
+        subset : (c,) int, optional
+            Only these texels. This is right only if no effect couples texels.
+        with_forces : bool
+            Whether the net force is wanted, if it was measured.
         """
         wanted = with_forces and self.trial.force is not None
         return Prediction(self._reading(model, subset), self._total(model) if wanted else None)
 
     def _reading(self, model: Model, subset: np.ndarray | None) -> np.ndarray:
+        """Readings, (T, n) in the sensor's unit."""
         p = model.parameters
-        # Noise is left out: what is predicted is what is to be expected.
+        # Without noise: the prediction is the expected value.
         reading = tuple(e for e in model.effects if site_of_action(e) == "readout" and e.name != "noise")
         key = (self._force_key(model, subset), p.gain, p.zero, _effects_key(reading))
         if key not in self._readings:
@@ -112,7 +120,7 @@ class Predictor:
         return self._totals[key]
 
     def placed(self, model: Model) -> Stimulus:
-        """Return what the texels meet with the effects that move them."""
+        """Return the stimulus of the texels at the places where effects move them."""
         moving = tuple(effect for effect in model.effects if _acts_through(effect, "placement"))
         if not moving or self.trial.stimulus != "pose":
             return self.stimulus
@@ -125,7 +133,7 @@ class Predictor:
         return self._placed[key]
 
     def normal_force(self, model: Model, subset: np.ndarray | None = None) -> np.ndarray:
-        """Normal force of each texel (or of some), (T, n) N: from the law of contact with its effects, or known."""
+        """Return the normal force of each texel, or of some, (T, n) N: known, or from the contact law with its effects."""
         stimulus = self.placed(model)
         if stimulus.force_share is not None:
             return stimulus.force_share if subset is None else stimulus.force_share[:, subset]
@@ -155,7 +163,7 @@ class Predictor:
 
 
 def _effects_on_normal_force(model: Model) -> tuple[Effect, ...]:
-    """The effects on normal forces, and those that move the texels."""
+    """Effects on normal forces, and effects that move the texels."""
     return tuple(e for e in model.effects if site_of_action(e) != "readout" and not _acts_through(e, "friction_law"))
 
 
@@ -164,7 +172,7 @@ def _acts_through(effect: Effect, mechanism: str) -> bool:
 
 
 def _remember(memory: dict, key: object, value: object, most: int) -> None:
-    """Remember something, and forget the oldest where there is too much."""
+    """Store something, and drop the oldest entries if there are too many."""
     while len(memory) >= most:
         del memory[next(iter(memory))]
     memory[key] = value

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What each texel meets during a trial: depth, its rate, the direction of the push, and sliding.
+"""The stimulus of each texel during a trial: depth, its rate, the direction of the normal force, and sliding.
 
-None of it depends on the parameters that are fitted, so it is computed once per trial. A ball is computed in closed form, so
-that facets are not taken for an effect, and a box, whose flat end is common, so that texels can be tried at many places; every
-other indenter goes through the solver's own contact search.
+It does not depend on fitted parameters, so it is computed once per trial. Spheres and boxes are computed in closed form: for a
+sphere so that facets do not look like an effect, for a box so that texels can quickly be tried at many places. Every other
+indenter goes through the solver's contact search.
 """
 
 from __future__ import annotations
@@ -26,25 +26,25 @@ from ..dataset.rig import Rig, Trial
 
 @dataclass(frozen=True)
 class Stimulus:
-    """A trial as the texels see it.
+    """The stimulus of all texels during a trial.
 
     Attributes
     ----------
     trial : Trial
     depth : (T, n) float, metres
-        Perpendicular penetration; zero where nothing touches. Of a force trial: zeros.
+        Perpendicular penetration; zero without contact, and in force trials.
     rate : (T, n) float, m/s
-        Speed at which the surface comes closer along its normal; zero where nothing touches.
+        Rate of the depth; zero without contact.
     force_share : (T, n) float or None, newtons
-        Each texel's share of the force in a force trial.
+        Each texel's share of the known force, in force trials.
     normal : (T, n, 3) float or None
-        Outward normal of what presses, in the sensor's frame: the direction of the normal force on the sensor. None: straight
-        into each texel.
+        Direction of the normal force on the sensor: the indenter's outward normal in the sensor's frame. None: straight into
+        each texel.
     slide : (T, n) float, m/s
-        Speed at which the surface slides over the sensor, where they touch.
+        Speed of sliding over the sensor in contact.
     slip : (T, n, 3) float, m/s, or None
-        The same as a vector in the sensor's frame; None where no friction force was measured.
-    sunk : int
+        The same as a vector in the sensor's frame; None if no net force was measured.
+    overpressed : int
         Most texels at once that were pressed past their maximum penetration.
     """
 
@@ -59,7 +59,7 @@ class Stimulus:
 
     @property
     def load(self) -> np.ndarray:
-        """What presses each texel, (T, n) float: the depth, or its share of a known force."""
+        """Load of each texel, (T, n) float: depth in metres, or its share of a known force in newtons."""
         return self.depth if self.force_share is None else self.force_share
 
     @property
@@ -69,14 +69,14 @@ class Stimulus:
 
 
 def stimulus_of(trial: Trial, rig: Rig, texels: Texels | None = None) -> Stimulus:
-    """Compute what the texels meet in a trial of a rig.
+    """Return the stimulus of the texels in a trial of a rig.
 
     Parameters
     ----------
     trial : Trial
     rig : Rig
     texels : Texels, optional
-        Where the texels really are, if not where the rig has them.
+        Texels at other places than the rig's.
     """
     texels = rig.texels if texels is None else texels
     n = len(texels)
@@ -98,6 +98,7 @@ def stimulus_of(trial: Trial, rig: Rig, texels: Texels | None = None) -> Stimulu
 
 
 def _posed(trial: Trial, rig: Rig, texels: Texels, along: np.ndarray | None) -> Stimulus:
+    """Stimulus of a trial with a known pose; `along` (T, n, 3) is the velocity of a surface that slides by itself."""
     assert trial.position is not None and trial.quaternion is not None and rig.indenter is not None
     reach, radius = rig.parameters.max_penetration, rig.indenter.radius
     limit, deep = reach, 0
@@ -111,7 +112,7 @@ def _posed(trial: Trial, rig: Rig, texels: Texels, along: np.ndarray | None) -> 
             depth, normal, point, deep = _mesh_contact(trial, rig, texels, reach)
         if not deep:
             break
-        reach *= 2.0  # a real sensor does not go limp where the model's reach ends: look from further behind
+        reach *= 2.0  # a real sensor goes on acting where the model's penetration ends: search from further behind
     else:
         raise SceneError(
             f"The indenter of '{trial.name}.csv' goes right through the sensor (by more than {0.5e3 * reach:.3g} mm): "
@@ -139,7 +140,7 @@ def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 def _spin(quaternion: np.ndarray, time: np.ndarray) -> np.ndarray:
-    """Angular velocity (T, 3) rad/s in the sensor's frame, by central differences."""
+    """Angular velocity in the sensor's frame by central differences, (T, 3) rad/s."""
     turned = np.diff(quaternion, axis=0)
     if not turned.any():
         return np.zeros((len(time), 3))
@@ -152,22 +153,25 @@ def _spin(quaternion: np.ndarray, time: np.ndarray) -> np.ndarray:
 def sphere_contact(
     center: np.ndarray, radius: float, position: np.ndarray, outward: np.ndarray, reach: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, int]:
-    """Contact of texels with a true sphere, in closed form (paper, Eq. 4: the segment against the surface).
+    """Return the contact of texels with a sphere, in closed form (paper, Eq. 4: intersection of a segment with the surface).
 
     Parameters
     ----------
     center : (T, 3) float, metres
-    radius, reach : float, metres
+    radius : float, metres
     position, outward : (n, 3) float
         Texels and their unit normals.
+    reach : float, metres
+        Length of the segment behind each texel: the maximum penetration.
 
     Returns
     -------
     depth : (T, n) float, metres
     normal : (T, n, 3) float
-        The sphere's outward normal where the segment enters it; minus the texel's normal where it does not.
+        The sphere's outward normal where the segment enters it; minus the texel's normal without contact.
     point : (T, n, 3) float, metres
-    sunk : int
+        Where the segment enters the sphere; the texel without contact.
+    overpressed : int
         Most texels at once whose segment begins inside the sphere.
     """
     # From the segment's base, along the texel's normal: |base + s·n - c| = radius, the smaller root.
@@ -188,9 +192,17 @@ def sphere_contact(
 def box_contact(
     center: np.ndarray, quaternion: np.ndarray, edges: np.ndarray, position: np.ndarray, outward: np.ndarray, reach: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, int]:
-    """The same for a box of full sizes `edges` (3,), turned by `quaternion` (T, 4): the segment against three pairs of planes.
+    """Return the contact of texels with a box, in closed form: intersection of a segment with three pairs of planes.
 
-    Its returns are those of :func:`sphere_contact`.
+    Parameters
+    ----------
+    center : (T, 3) float, metres
+    quaternion : (T, 4) float
+        Orientation of the box, (w, x, y, z).
+    edges : (3,) float, metres
+        Full sizes of the box.
+    position, outward, reach
+        As in :func:`sphere_contact`, like the returns.
     """
     frame = rotation_matrices(quaternion)  # box → sensor
     base = position - reach * outward - center[:, None, :]

@@ -1,4 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The result of a diagnosis for a reader: gap.json, sensor.toml, report.html, pictures and sentences. Nothing is fitted here."""
+"""The result of a diagnosis for a reader: gap.json, sensor.toml, report.html, pictures and sentences.
+
+Nothing is fitted here.
+"""
 
 __all__ = ["amended_sensor", "comparison", "experiments", "plots", "sentences", "summary"]

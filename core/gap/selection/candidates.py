@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What may be missing: every form of every effect, with bounds that fit the recording, and where to begin looking."""
+"""Candidates: every form of every effect, with bounds that suit the recordings and starting values for a fit."""
 
 from __future__ import annotations
 
@@ -25,33 +25,38 @@ TIGHTER_BOUNDS = {
     ("hysteresis", "duhem", "width"): 0.5,
     ("hysteresis", "trailing", "width"): 0.5,
 }
-"""Tighter bounds than the effects' own: past them a formula is still sound, but it is another effect that it then describes (a
-reading that rises fivefold is a lag, a softening that leaves nothing is wear)."""
-
+"""Upper bounds below the effects' own. Beyond them a formula is still valid but describes another effect: a reading that rises
+fivefold is a lag, a softening that leaves nothing is wear."""
 NOT_FITTED = ("noise",)
-"""Kinds that are not found by fitting but by what is left in the end (see :mod:`.heteroscedastic_noise`)."""
+"""Kinds that are not fitted but found in the final residual (see :mod:`.heteroscedastic_noise`)."""
 DIRECTLY_ESTIMATED = ("dead-texels", "quantization")
-"""Kinds whose numbers are read off the recordings, since a texel is dead or is not, and a step is there or is not."""
-
-
-_HALTON_DIMENSIONS = 5
-"""Parameters of a form whose starting values are independent of each other; further ones repeat those of the first."""
+"""Kinds whose parameters are estimated directly from the readings (see :mod:`.direct_estimates`)."""
+SMALL, LARGE = 0.02, 4.0
+"""A parameter shows between these multiples of the quantity that it is compared with."""
+SIGNED_SHARE = 0.25
+"""Bounds of a parameter that may have either sign, as a share of the upper bound of its magnitude."""
+LOG_RATIO = 30.0
+"""A range is searched on a logarithmic scale if its ends differ by more than this ratio."""
+START_COUNT = 8
+"""Number of starting points of a candidate."""
+COUPLING_PITCH, COUPLING_LOAD = 0.003, 0.05
+"""Distance (m) and load (N) of the texels on which :func:`is_spatial` tests a form."""
 
 
 @dataclass(frozen=True)
 class Scales:
-    """How large things are in a recording.
+    """Magnitudes in a set of recordings.
 
     Attributes
     ----------
     depth, force, reading : float
         Largest of a texel: m, N, the sensor's unit.
     pitch, size : float, m
-        Distance of neighbouring texels, and the sensor's own extent.
+        Distance between neighbouring texels, and extent of the sensor.
     step, seconds : float, s
-        Between samples, and of the longest trial.
+        Median time between samples, and length of the longest trial.
     speed : float, m/s
-        Largest of sliding.
+        Largest speed of sliding.
     texels : int
     """
 
@@ -67,7 +72,7 @@ class Scales:
 
 
 def scales_of(predictors: Sequence[Predictor], model: Model) -> Scales:
-    """Measure a recording."""
+    """Return the magnitudes in the trials of some predictors; forces are those of a model."""
     p = predictors[0].rig.texels.position
     forces = [predictor.normal_force(model) for predictor in predictors]
     readings = [np.nanmax(np.abs(t.reading)) for t in (q.trial for q in predictors) if t.reading is not None]
@@ -88,10 +93,10 @@ def scales_of(predictors: Sequence[Predictor], model: Model) -> Scales:
 
 
 def search_range(parameter: Parameter, scales: Scales) -> tuple[float, float]:
-    """Return between which values a parameter would show in a recording of these scales, inside its own bounds."""
+    """Return the range of values in which a parameter would show in recordings of these scales, inside its bounds."""
     known = {
-        "N": (0.02 * scales.force, 4.0 * scales.force),
-        "unit": (0.02 * scales.reading, 4.0 * scales.reading),
+        "N": (SMALL * scales.force, LARGE * scales.force),
+        "unit": (SMALL * scales.reading, LARGE * scales.reading),
         "m": (min(0.05 * scales.depth, 0.3 * scales.pitch), max(5.0 * scales.depth, 2.0 * scales.pitch)),
         "s": (0.5 * scales.step, 2.0 * scales.seconds),
         "m/s": (0.02 * scales.speed, 2.0 * scales.speed),
@@ -104,8 +109,8 @@ def search_range(parameter: Parameter, scales: Scales) -> tuple[float, float]:
         "N·s/m": (0.02 * scales.force / scales.speed, 2.0 * scales.force / scales.speed),
     }
     low, high = known.get(parameter.unit, (parameter.low, parameter.high))
-    if parameter.low < 0.0 < low:  # one that may have either sign
-        low, high = -0.25 * high, 0.25 * high
+    if parameter.low < 0.0 < low:  # either sign is possible
+        low, high = -SIGNED_SHARE * high, SIGNED_SHARE * high
     if parameter.unit == "1":
         high = min(high, max(1.0, 4.0 * parameter.default))
     low, high = max(low, parameter.low), min(high, parameter.high)
@@ -116,7 +121,7 @@ def search_range(parameter: Parameter, scales: Scales) -> tuple[float, float]:
 
 @dataclass(frozen=True)
 class Candidate:
-    """A form that may be missing."""
+    """A form of an effect that may be missing in the model."""
 
     kind: Kind
     form: Form
@@ -133,11 +138,11 @@ class Candidate:
 
     @property
     def has_texel_parameters(self) -> bool:
-        """Whether it has a number for each texel."""
+        """Whether it has parameters of single texels."""
         return any(p.per_texel for p in self.form.parameters)
 
     def free_parameters(self, index: int, scales: Scales, gain: float) -> list[FreeParameter]:
-        """Return its numbers as those of the `index`-th effect of a stack."""
+        """Return its free parameters as those of the effect number `index` of a stack."""
         made = []
         for raw in self.form.parameters:
             p = raw.scaled(gain)
@@ -149,7 +154,7 @@ class Candidate:
         return made
 
     def effect(self, values: dict[str, float], texels: int, gain: float) -> Effect:
-        """Return it with these values and defaults for the others; numbers per texel are all alike at first."""
+        """Return the effect with some values and defaults for the others; parameters of single texels start equal."""
         complete = {**self.form.defaults(gain), **values}
         spread = {
             p.name: tuple([float(complete[p.name])] * texels)  # type: ignore[arg-type]
@@ -158,33 +163,32 @@ class Candidate:
         }
         return Effect(self.kind.name, self.form.name, {**complete, **spread})
 
-    def starting_values(self, scales: Scales, gain: float, count: int = 8) -> Iterator[dict[str, float]]:
-        """Yield values to start a search from, spread evenly over the search ranges (Halton's sequence)."""
+    def starting_values(self, scales: Scales, gain: float, count: int = START_COUNT) -> Iterator[dict[str, float]]:
+        """Yield starting values, spread evenly over the search ranges (Halton sequence)."""
         from scipy.stats import qmc
 
-        sequence = qmc.Halton(_HALTON_DIMENSIONS, scramble=False)
-        sequence.fast_forward(1)  # the first point is the corner of all ranges
-        for shares in sequence.random(count):
+        sequence = qmc.Halton(len(self.form.parameters), scramble=False)
+        sequence.fast_forward(1)  # the first point is the corner of the ranges
+        for point in sequence.random(count):
             values = {}
-            for k, raw in enumerate(self.form.parameters):
+            for share, raw in zip(point, self.form.parameters, strict=True):
                 p = raw.scaled(gain)
                 low, high = search_range(p, scales)
-                share = shares[k % _HALTON_DIMENSIONS]
-                if low > 0 and (p.log or high > 30.0 * low):
+                if low > 0 and (p.log or high > LOG_RATIO * low):
                     values[p.name] = float(np.exp(np.log(low) + share * (np.log(high) - np.log(low))))
                 else:
                     values[p.name] = float(low + share * (high - low))
             yield values
 
     def strength_parameter(self) -> str | None:
-        """The parameter that is zero when the effect is not there, if there is one."""
+        """Return the parameter that is zero if the effect is absent, or None."""
         for name, value in self.form.neutral.items():
             if value == 0.0:
                 return name
         return None
 
     def inverse_strength_parameter(self) -> str | None:
-        """The parameter that is infinite when the effect is not there, if there is one: its inverse is the strength."""
+        """Return the parameter that is infinite if the effect is absent, or None; its inverse is the strength."""
         for name, value in self.form.neutral.items():
             if np.isinf(value):
                 return name
@@ -193,14 +197,14 @@ class Candidate:
 
 @dataclass
 class FittedCandidate:
-    """A candidate fitted on top of a model.
+    """A candidate that was fitted on top of a model.
 
     Attributes
     ----------
     candidate : Candidate
     fit : Fit
     held_out : (trials, 2) float
-        Squares of each trial, of readings and of forces, as predicted by a fit that has not seen it, in units of the noise.
+        Sum of squares of each trial, of readings and of forces, under fits that have not seen it, in units of the noise.
     """
 
     candidate: Candidate
@@ -209,19 +213,19 @@ class FittedCandidate:
 
     @property
     def mean(self) -> float:
-        """Mean square on unseen trials."""
+        """Mean square on unseen stretches."""
         return float(self.held_out.sum() / self.fit.count.sum())
 
     @property
     def parameter_count(self) -> int:
-        """How many numbers it takes."""
+        """Number of parameters of the candidate."""
         n = len(self.fit.model.effects)
         values = self.fit.model.effects[n - 1].values
         return sum(len(v) if isinstance(v, tuple) else 1 for v in values.values())
 
 
 def candidates(predictors: Sequence[Predictor], model: Model) -> list[Candidate]:
-    """Return the forms that these recordings could show at all."""
+    """Return the candidates that could show in these recordings at all."""
     posed = any(p.trial.stimulus == "pose" for p in predictors)
     dragged = any(p.trial.force is not None and p.stimulus.slide.any() for p in predictors)
     read = any(p.trial.reading is not None for p in predictors)
@@ -242,7 +246,7 @@ def candidates(predictors: Sequence[Predictor], model: Model) -> list[Candidate]
             ):
                 continue
             if form.friction_law is None and acts_on_force and loaded:
-                continue  # known loads leave a law of contact nothing to say
+                continue  # with known loads the contact law does not matter
             if not acts_on_force and not read:
                 continue
             one = Candidate(kind, form)
@@ -253,17 +257,17 @@ def candidates(predictors: Sequence[Predictor], model: Model) -> list[Candidate]
 
 
 def is_spatial(form: Form) -> bool:
-    """Whether a form lets texels feel their neighbours: found out by loading one of three."""
+    """Return whether a form couples texels: it is tested by loading one of three."""
     if form.coupling is not None:
         return True
     if form.memoryless is None:
         return False
-    position = np.array([[0.0, 0.0, 0.0], [0.003, 0.0, 0.0], [0.006, 0.0, 0.0]])
+    position = np.array([[0.0, 0.0, 0.0], [COUPLING_PITCH, 0.0, 0.0], [2 * COUPLING_PITCH, 0.0, 0.0]])
     site = TransducerArray(position, np.full(3, 9e-6), np.zeros(3, int), np.arange(3))
     values = form.defaults()
     for p in form.parameters:
         if p.per_texel:
             values[p.name] = tuple([float(values[p.name])] * 3)  # type: ignore[arg-type]
     time = np.zeros(2)
-    alone, loaded = (form.memoryless(np.array([[0.0, x, 0.0]] * 2), time, values, site, 0)[0] for x in (0.0, 0.05))
+    alone, loaded = (form.memoryless(np.array([[0.0, x, 0.0]] * 2), time, values, site, 0)[0] for x in (0.0, COUPLING_LOAD))
     return bool(np.abs(loaded - alone)[[0, 2]].max() > 1e-9)

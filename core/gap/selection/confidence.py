@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What makes a name no sure one, although the effect is in the model: it may be what the formulas of others lack, or lie within
-what these recordings do not tell.
+"""Reasons to lower an effect's confidence: model misfit or uninformative recordings.
+
+An effect may be in the model only because the formula of another one does not quite fit, or because the recordings contain too
+little to distinguish it. The thresholds were set on simulated sensors whose hidden effects follow other formulas than the
+library's (benchmarks/_hidden, cases below number 1000).
 """
 
 from __future__ import annotations
@@ -27,25 +30,34 @@ from .identifiability import (
 from .view_set import ViewSet
 
 EXPLAINED = 0.5
-"""Share of the gap that must be closed for the verdict "explained", and for a sure name."""
+"""Share of the gap that must be closed for the verdict "explained", and for a sure effect."""
 PARTLY_EXPLAINED, DISTINCT_RATIO = 0.35, 1.5
-"""Share from which on an effect is a sure name although much is left, where all others leave so many times as much."""
+"""Share of the gap that suffices for a sure effect if all other kinds leave at least `DISTINCT_RATIO` times as much."""
 REPEATED_RATIO = 1.75
-"""So many times as bad more freedom for the formulas that are there must be, for a further effect to be more than that."""
+"""A further effect is sure only if a second effect of a kind in the model is at least this many times as bad."""
 SMALL_SHARE, NEARLY_ALL = 0.1, 0.65
-"""One of several that closes a smaller share of the whole gap may be what the others' formulas lack: it is no sure name, unless
-it closes so much of what they leave, as what a formula lacks seldom looks like another effect."""
+"""An effect that closes less than `SMALL_SHARE` of the whole gap is not sure, unless it closes at least `NEARLY_ALL` of what
+the others leave: the misfit of a formula seldom looks just like another effect."""
 UNSURE_CONFIDENCE = 0.45
-"""Highest confidence of a name that is not meant as sure."""
+"""Highest confidence of an effect that is not sure."""
 SAME_PATTERN = 0.8
-"""Correlation over the texels from which on two effects with a number for each are one: an offset that fades under load takes
-off everywhere what it has put on."""
+"""Correlation over the texels from which on two effects with parameters of single texels count as one. An offset that fades
+under load, for example, takes off everywhere what it has put on."""
+DEAD_TEXEL_SHARE = 0.5
+"""Share of an effect's variance over the texels that is on dead texels, from which on it only describes these."""
 
 
 def least_share(name: str, leaves: dict[str, float]) -> float:
-    """Least share of the gap to be closed for a sure name, by how many times as much the other kinds leave.
+    """Return the least share of the gap that an effect must close to be sure.
 
-    Steps are seen in the readings themselves. Friction has but one other kind, and to be ahead of that says little.
+    Quantization steps are seen in the readings themselves, so nothing is asked of them. There are only two effects on friction,
+    so a lead over the other one says little.
+
+    Parameters
+    ----------
+    name : str
+    leaves : dict of str to float
+        How many times as much of the gap each other kind leaves in its place.
     """
     if name == "quantization":
         return 0.0
@@ -54,7 +66,7 @@ def least_share(name: str, leaves: dict[str, float]) -> float:
 
 
 def is_doubtful(effect: Effect, state: SelectionState, fitted: Sequence[Effect], floor: NoiseFloor) -> bool:
-    """Whether one of several effects may only be what the formula of another lacks."""
+    """Return whether one of several effects may only be the misfit of another one's formula."""
     improvement, step = state.improvements.get(effect.name), state.steps.get(effect.name)
     if _describes_dead_texels(effect, fitted) or _larger_effect_of_same_kind(effect, state, fitted, floor):
         return True
@@ -66,16 +78,16 @@ def is_doubtful(effect: Effect, state: SelectionState, fitted: Sequence[Effect],
         return True
     own = [np.asarray(value) for value in effect.values.values() if isinstance(value, tuple)]
     if own and any(is_spatial(form_of(other.name, other.form)) for other in fitted if other is not effect):
-        return True  # at the rim a texel has fewer neighbours: a formula that is off there looks like numbers per texel
+        return True  # texels at the rim have fewer neighbours: a misfit there looks like parameters of single texels
     others = [np.asarray(v) for other in fitted if other is not effect for v in other.values.values() if isinstance(v, tuple)]
     pairs = [np.corrcoef(a, b)[0, 1] for a in own for b in others if np.ptp(a) > 0 and np.ptp(b) > 0]
     return any(abs(r) > SAME_PATTERN for r in pairs)
 
 
 def may_absorb_misfit(effect: Effect, state: SelectionState) -> bool:
-    """Whether something larger was found beside an effect with a number for each texel.
+    """Return whether parameters of single texels may have absorbed what is left unexplained.
 
-    Where much is left that nothing explains, such numbers bend to that.
+    They may if a larger effect was found beside them and much of the gap is left.
     """
     mine = state.improvements[effect.name].of_gap if effect.name in state.improvements else 0.0
     larger = any(improvement.of_gap > mine for name, improvement in state.improvements.items() if name != effect.name)
@@ -85,10 +97,10 @@ def may_absorb_misfit(effect: Effect, state: SelectionState) -> bool:
 
 
 def _larger_effect_of_same_kind(effect: Effect, state: SelectionState, fitted: Sequence[Effect], floor: NoiseFloor) -> bool:
-    """Whether one that does the same closes more already, so that this may be what its formula lacks.
+    """Whether a similar effect closes more already, so that this one may be the misfit of its formula.
 
-    Load spreading and crosstalk both pass something on to the neighbours. A law of contact and a readout that bend, in turn,
-    bend the reading like one; the law alone bends the net force.
+    Load spreading and crosstalk both pass load on to neighbours. A nonlinear contact law and a nonlinear readout both bend the
+    readings, but only the contact law bends the net force.
     """
 
     def share(name: str) -> float:
@@ -99,24 +111,25 @@ def _larger_effect_of_same_kind(effect: Effect, state: SelectionState, fitted: S
 
 
 def _describes_dead_texels(effect: Effect, fitted: Sequence[Effect]) -> bool:
-    """Whether what an effect says of each texel is mostly said of dead ones: a little that they still answer."""
+    """Whether the variation of an effect over the texels is mostly on dead texels, which still answer a little."""
     for other in fitted:
         dead = np.asarray(other.values.get("dead", 0.0))
         for value in effect.values.values():
             if other is not effect and isinstance(value, tuple) and dead.shape:
                 moved = (np.asarray(value) - np.median(value)) ** 2
-                if float(moved[dead > 0.5].sum()) > 0.5 * float(moved.sum()):
+                if float(moved[dead > 0.5].sum()) > DEAD_TEXEL_SHARE * float(moved.sum()):
                     return True
     return False
 
 
 def unsure_names(result: Diagnosis, view_set: ViewSet, state: SelectionState, floor: NoiseFloor) -> set[str]:
-    """Names that are not sure for what else there is, or is not, in the model.
+    """Return the names of effects that are not sure because of other effects, or of gaps in the recordings.
 
-    What is named beside what is unclear may be a part of that: all of it where the recordings cannot tell, since any curve
-    that they bring out could be either's; else what is small. What closes less than a step of the readings may lie within it.
-    Friction goes with the load: where the normal force is off by more than what a law of friction closes, that may be why.
-    Without rest, what moves by itself may be a part of what settles, where that is unclear.
+    - Effects that close little of the gap, if the recordings leave rivals.
+    - All effects, if the recordings cannot distinguish some effect from another; any measured curve could belong to either.
+    - Drift and creep, if one of them has a rival and the recordings contain no rest.
+    - Effects that change the readings by less than a quantization step.
+    - Effects on friction, if the normal force is off by more than they close: friction is proportional to it.
     """
     small = {name for name, improvement in state.improvements.items() if improvement.of_gap < SMALL_SHARE}
     unsure = small if result.ambiguous else set()
@@ -140,7 +153,7 @@ def unsure_names(result: Diagnosis, view_set: ViewSet, state: SelectionState, fl
 
 
 def _normal_squares(view_set: ViewSet, found: Fit, floor: float) -> float:
-    """Squares of the residual of the net normal force, beyond those of noise (`floor` of each value)."""
+    """Sum of squares of the residual of the net normal force, less that of noise (`floor` for each value)."""
     normal = view_set.whole[0].predictor.rig.texels.normal.mean(axis=0)
     residual = np.concatenate([share.residual(found.model)[:, -3:] @ normal for share in view_set.whole])
     return max(float(residual @ residual) - floor * len(residual), 0.0)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What is read off the recordings rather than fitted to them: which texels are dead, and in which steps readings come."""
+"""Effects that are estimated directly from the readings and not fitted: dead texels, and quantization steps."""
 
 from __future__ import annotations
 
@@ -14,13 +14,45 @@ from ..forward.predictor import Model
 from .candidates import Candidate
 
 MOST_LEVELS = 48
-"""Values of all readings together up to which they are steps: noise alone makes thousands."""
+"""Most distinct values of all readings for them to be quantization levels; noise alone makes thousands."""
+SAMPLES_PER_LEVEL = 20
+"""Least number of readings for each of these values."""
+LEAST_LOADED_SQUARE = 200.0
+"""Sum of squares of the predicted reading, in units of the noise, from which on a texel is loaded enough to be judged."""
+LEAST_LOADED_TEXELS = 4
+LEAST_SLOPE = 0.15
+"""A texel is dead if its slope of measured over predicted readings is below this share of the median slope."""
+PRESSED_SHARE = 0.5
+"""A texel counts as pressed above this share of its largest predicted reading."""
+LEAST_SPREAD, LEAST_SPREAD_SHARE, RAIL_DISTANCE = 20.0, 0.15, 3.0
+"""A pressed texel is stuck at a rail if its predicted reading spreads by more than `LEAST_SPREAD` standard deviations of the
+noise, its measured reading by less than `LEAST_SPREAD_SHARE` of that, and if it is `RAIL_DISTANCE` times as large as
+predicted."""
+MOST_DEAD_SHARE = 0.4
+"""If a larger share of the loaded texels seems dead, the model is wrong and not the texels."""
+LEAST_READINGS, MOST_READINGS = 400, 6000
+"""Number of changing readings from which on steps are looked for, and to which they are thinned."""
+COARSEST_FREQUENCY, FREQUENCY_STEP, STEP_IN_NOISE = 5.0, 0.12, 2.5
+"""Frequencies of the search for fine steps, in units of one over the range: from a fifth of the range (coarser steps are seen
+as levels) to steps of 2.5 standard deviations of the noise."""
+MOST_FREQUENCIES = 20000
+LEAST_CHARACTERISTIC, CHARACTERISTIC_NOISE = 0.2, 5.0
+"""Least magnitude of the characteristic function at the frequency of the steps: 0.2 + 5 / √(number of readings)."""
 
 
 def unresponsive_texels(views: Sequence[TrialView], model: Model, candidate: Candidate, texels: int) -> Effect | None:
-    """Return the effect with those texels dead that hardly follow the model although it loads them; None when all follow.
+    """Return the effect for texels that hardly follow the model although they are loaded; None if all follow.
 
-    One that goes to a rail as soon as it is touched is as dead: loaded it reads the same always, and far from what it should.
+    A texel that goes to a rail at the first touch is dead too: loaded it always reads the same, far from what it should.
+
+    Parameters
+    ----------
+    views : sequence of TrialView
+    model : Model
+    candidate : Candidate
+        The form of the effect.
+    texels : int
+        Number of texels.
     """
     pairs = [(view.predictor.predict(model).reading, view.predictor.trial.reading) for view in views]
     known = [(a, b) for a, b in pairs if b is not None]
@@ -29,19 +61,23 @@ def unresponsive_texels(views: Sequence[TrialView], model: Model, candidate: Can
     noise = views[0].noise[0]
     predicted, measured = ((np.concatenate(side) - model.parameters.zero) / noise for side in zip(*known, strict=True))
     good = np.isfinite(measured)
-    loaded = (predicted**2 * good).sum(axis=0) > 200.0  # by so much that the noise cannot hide whether it answers
-    if loaded.sum() < 4:
+    loaded = (predicted**2 * good).sum(axis=0) > LEAST_LOADED_SQUARE
+    if loaded.sum() < LEAST_LOADED_TEXELS:
         return None
     slope, level, railed = np.full(texels, np.nan), np.zeros(texels), np.zeros(texels, bool)
     for i in np.flatnonzero(loaded):
         x, y = predicted[good[:, i], i], measured[good[:, i], i]
         slope[i] = (x - x.mean()) @ (y - y.mean()) / max(float((x - x.mean()) @ (x - x.mean())), 1e-12)
-        pressed = np.abs(x) > 0.5 * np.abs(x).max()
+        pressed = np.abs(x) > PRESSED_SHARE * np.abs(x).max()
         level[i] = np.median(y[pressed])
         should, does = (float(np.subtract(*np.quantile(a[pressed], (0.75, 0.25)))) for a in (x, y))
-        railed[i] = should > 20.0 and does < 0.15 * should and abs(level[i]) > 3.0 * float(np.abs(x[pressed]).max())
-    silent = railed | (loaded & (slope < 0.15 * np.nanmedian(slope[~railed])))
-    if not silent.any() or silent.sum() > 0.4 * loaded.sum():
+        railed[i] = (
+            should > LEAST_SPREAD
+            and does < LEAST_SPREAD_SHARE * should
+            and abs(level[i]) > RAIL_DISTANCE * float(np.abs(x[pressed]).max())
+        )
+    silent = railed | (loaded & (slope < LEAST_SLOPE * np.nanmedian(slope[~railed])))
+    if not silent.any() or silent.sum() > MOST_DEAD_SHARE * loaded.sum():
         return None
     values = {"dead": silent.astype(float), "level": np.where(silent, level * noise + model.parameters.zero, 0.0)}
     own = [q.name for q in candidate.form.parameters]
@@ -49,14 +85,14 @@ def unresponsive_texels(views: Sequence[TrialView], model: Model, candidate: Can
 
 
 def quantization_starts(views: Sequence[TrialView], model: Model, candidate: Candidate) -> list[Effect]:
-    """Return the effect with each step in which the readings may come, if they do.
+    """Return the effect with each step in which the readings may be quantised; empty if they seem not to be.
 
-    A handful of values that all samples share is seen at once; uneven steps stand for several even ones. Readings in finer
-    steps of q have a characteristic function that is large at the frequency 1/q, however they are spread otherwise (Widrow and
-    Kollár, Quantization Noise, 2008). Held values would look alike: only samples that change are taken.
+    Few levels that all samples share are seen at once; uneven steps stand for several even ones. Readings with finer steps q
+    have a characteristic function that is large at the frequency 1/q, whatever their distribution (Widrow and Kollár,
+    Quantization Noise, 2008). Constant readings would look the same, so only changing samples are used.
     """
     values = moving_readings(views, model)
-    if len(values) < 400:
+    if len(values) < LEAST_READINGS:
         return []
     levels = few_levels(values)
     if candidate.form.name == "companding":
@@ -66,20 +102,22 @@ def quantization_starts(views: Sequence[TrialView], model: Model, candidate: Can
         tried = np.unique([np.median(apart), apart.mean(), apart.max(), float(np.average(apart, weights=apart))])
         return [Effect(candidate.name, candidate.form.name, {"step": float(step)}) for step in tried]
     noise, full = views[0].noise[0], float(np.ptp(values))
-    frequency = np.arange(5.0 / full, 1.0 / (2.5 * noise), 0.12 / full)  # coarser steps than a fifth are seen by eye
-    if not 2 < len(frequency) < 20000:
+    frequency = np.arange(COARSEST_FREQUENCY / full, 1.0 / (STEP_IN_NOISE * noise), FREQUENCY_STEP / full)
+    if not 2 < len(frequency) < MOST_FREQUENCIES:
         return []
     size = np.array([abs(np.exp(2j * np.pi * f * values).mean()) for f in frequency])
-    if size.max() < 0.2 + 5.0 / np.sqrt(len(values)):
+    if size.max() < LEAST_CHARACTERISTIC + CHARACTERISTIC_NOISE / np.sqrt(len(values)):
         return []
-    best = frequency[int(np.argmax(size))]  # harmonics are smaller: noise blurs them more
-    fine = best + np.linspace(-0.12, 0.12, 49) / full
+    best = frequency[int(np.argmax(size))]  # harmonics are smaller, because noise blurs them more
+    fine = best + np.linspace(-FREQUENCY_STEP, FREQUENCY_STEP, 49) / full
     top = fine[int(np.argmax([abs(np.exp(2j * np.pi * f * values).mean()) for f in fine]))]
     return [Effect(candidate.name, candidate.form.name, {"step": float(1.0 / top)})]
 
 
 def companding_starts(levels: np.ndarray, rest: float, candidate: Candidate) -> list[Effect]:
-    """Return the effect whose steps are those between some levels above the one at rest: ``A (exp(b k) - 1)`` for the k-th."""
+    """Return the effect with the growing steps that fit some levels best: ``A (exp(b k) - 1)`` for the k-th level above
+    rest.
+    """
     above = levels[levels > rest + 1e-9] - rest
     if len(above) < 3:
         return []
@@ -91,7 +129,7 @@ def companding_starts(levels: np.ndarray, rest: float, candidate: Candidate) -> 
 
 
 def coarsest_step(views: Sequence[TrialView], model: Model) -> float:
-    """Return the largest step in which readings come, in the sensor's unit; 0 where there are none that can be seen."""
+    """Return the largest quantization step, in the sensor's unit; 0 if none is seen."""
     levels = few_levels(moving_readings(views, model))
     return 0.0 if levels is None else float(np.diff(levels).max())
 
@@ -105,11 +143,11 @@ def moving_readings(views: Sequence[TrialView], model: Model) -> np.ndarray:
             change = np.abs(np.gradient(view.predictor.predict(model).reading, axis=0))
             moving.append(reading[(change > 0.5 * view.noise[0]) & np.isfinite(reading)])
     values = np.concatenate(moving) - model.parameters.zero
-    return values[:: max(1, len(values) // 6000)]
+    return values[:: max(1, len(values) // MOST_READINGS)]
 
 
 def unloaded_reading(views: Sequence[TrialView]) -> float:
-    """Return the median of what is read while nothing touches."""
+    """Return the median reading without load."""
     found = []
     for view in views:
         reading = view.predictor.trial.reading
@@ -119,6 +157,6 @@ def unloaded_reading(views: Sequence[TrialView]) -> float:
 
 
 def few_levels(values: np.ndarray) -> np.ndarray | None:
-    """Return the values between which readings jump, in order, if they have so few that noise did not make them; else None."""
+    """Return the distinct values of readings, in order, if they are so few that noise did not make them; else None."""
     levels = np.unique(np.round(values, 12))
-    return levels if 3 <= len(levels) <= MOST_LEVELS and len(values) >= 20 * len(levels) else None
+    return levels if 3 <= len(levels) <= MOST_LEVELS and len(values) >= SAMPLES_PER_LEVEL * len(levels) else None

@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One effect after the other joins the model as long as it earns its place.
+"""Forward selection: effects join the model one after the other while each improves it enough.
 
-All judgements are made on stretches of the recordings that a fit has not seen, in units of the noise's variance. With M₀ the
-mean square of the base model and F that of the noise, ``M₀ - F`` is the gap; an effect closes a share of it. Readings and net
-forces have a gap each: friction shows in forces alone and is judged by them, all else by the readings where there are any. How
-large a share is large enough is told by the constants below; they were set on simulated sensors whose hidden effects follow
-other formulas than the library's.
+All judgements are made on stretches of the recordings that a fit has not seen, in units of the noise's variance. With the mean
+squares M₀ of the base model's residual and F of the noise, ``M₀ - F`` is the gap, and an effect closes a share of it. Readings
+and net forces have a gap each. Effects on friction show in net forces only and are judged by them; all others are judged by the
+readings, if there are any.
+
+The thresholds below were set on simulated sensors whose hidden effects follow other formulas than the library's
+(benchmarks/_hidden, cases below number 1000).
 """
 
 from __future__ import annotations
@@ -26,41 +28,62 @@ from .plausibility import is_plausible
 from .screening import screen
 from .view_set import ViewSet
 
-FIRST_LEAST_SHARE, NEXT_LEAST_SHARE, NEXT_LEAST_SHARE_OF_GAP = 0.25, 0.2, 0.01
-"""Least share of the gap that the first effect closes; of what is left that a further one closes; and of the whole gap."""
+FIRST_LEAST_SHARE = 0.25
+"""Least share of the gap that the first effect must close."""
+NEXT_LEAST_SHARE = 0.2
+"""Least share of the remaining gap that each further effect must close."""
+NEXT_LEAST_SHARE_OF_GAP = 0.01
+"""Least share of the whole gap that each further effect must close."""
 LEAST_IMPROVEMENT = 0.02
-"""Least decrease of the mean square on unseen trials, in units of the noise's variance."""
+"""Least decrease of the mean square on unseen stretches, in units of the noise's variance."""
 LEAST_FORCE_IMPROVEMENT = 0.25
-"""The same for friction, in units of what forces tremble at rest, which coloured noise does by more than it changes from sample
-to sample. Sliding between two samples is integrated, and not quite as the world does it."""
+"""The same for effects on friction, in units of the forces' mean square without load.
+
+That noise is coloured, and larger than the differences between neighbouring samples say. Besides, the forward model integrates
+sliding between two samples, which is not quite what the sensor does.
+"""
 LEAST_CONSISTENCY = 0.8
-"""Least share that what is better in some trials has in all that changes: one trial may alone have what tells."""
+"""Least share of the improvements in all changes of the trials' squares: a single trial may be the one that is informative."""
 LEAST_STRUCTURE = 0.03
-"""Share of a residual that can be predicted, below which it is noise."""
+"""Share of a residual that can be predicted, below which the residual is noise."""
 MOST_EFFECTS = 3
-"""Most effects that are looked for beside friction."""
+"""Most effects that are searched for, not counting effects on friction."""
 BEAM_RATIO, BEAM_WIDTH = 3.0, 2
-"""The first effect may be a compromise of two: others that leave at most so many times as much are tried as the first as well,
-up to so many kinds in all."""
+"""The first effect may be a compromise between two. Others that leave at most `BEAM_RATIO` times as much of the gap are tried
+as the first effect too, up to `BEAM_WIDTH` kinds in all."""
 PAIR_ADVANTAGE = 0.8
-"""Least by which a pair that does not begin with the best first effect must leave less, as a share."""
+"""A pair that does not begin with the best first effect must leave less than this share of what the other pair leaves."""
+UNRESOLVED_SHARE, UNRESOLVED_SQUARE = 0.004, 0.01
+"""What no fit can resolve of a gap: a share of it, and a mean square in units of the noise's variance."""
+OPEN_MEAN_SQUARE = 1.5
+"""Mean square, in units of the noise's variance, from which on a residual may contain another effect even without structure."""
+SIMPLER_RATIO, SIMPLER_SIZE = 1.15, 0.5
+"""A form with less than `SIMPLER_SIZE` times as many parameters is preferred if it leaves at most `SIMPLER_RATIO` times as
+much."""
+DEAD_TEXELS_RATIO = 1.5
+"""Dead texels are preferred to parameters of single texels if they leave at most this many times as much."""
+UNNEEDED_SHARE = 0.02
+"""The first effect is dropped if the squares rise by less than this share of the gap without it."""
+REPLACED_SHARE = 0.98
+"""Another first effect must leave less than this share of what the present one leaves."""
 
 READINGS, FORCES = 0, 1
+"""Columns of arrays that hold a value for readings and one for net forces."""
 StepSearch = Generator[tuple[str, float], None, "SelectionStep"]
 StructureOfFit = Callable[[Fit], ResidualStructure]
-"""Says what structure is in the residual of a fit."""
+"""A function that tests the residual of a fit for structure."""
 
 
 @dataclass
 class NoiseFloor:
-    """What effects are judged against.
+    """The gaps of readings and of net forces: mean squares of the base model and of noise alone.
 
     Attributes
     ----------
     base, noise : (2,) float
-        Mean square of the base model, and that of noise, for readings and forces.
+        Mean squares of the base model's residual and of the noise, for readings and forces, in units of the noise's variance.
     count : (2,) float
-        How many values were measured.
+        Number of measured values.
     """
 
     base: np.ndarray
@@ -69,61 +92,61 @@ class NoiseFloor:
 
     @property
     def both(self) -> bool:
-        """Whether readings and forces were measured."""
+        """Whether readings and net forces were measured."""
         return bool((self.count > 0).all())
 
     @property
     def main_quantity(self) -> int:
-        """What effects other than friction are judged by."""
+        """READINGS if there are any, else FORCES: what effects other than friction are judged by."""
         return READINGS if self.count[READINGS] > 0 else FORCES
 
     def quantity_for(self, name: str) -> int:
-        """What an effect is judged by."""
+        """Return READINGS or FORCES: what an effect of this name is judged by."""
         return FORCES if self.both and name in friction_kinds() else self.main_quantity
 
     def gap(self, quantity: int) -> float:
-        """Whole gap of one side."""
+        """Return the whole gap of readings or of forces."""
         return float(max(self.base[quantity] - self.noise[quantity], 1e-12))
 
     def closed_share(self, means: np.ndarray, quantity: int) -> float:
-        """Share of a side's gap that is closed at these mean squares."""
+        """Return the share of a gap that is closed at these mean squares."""
         return float(np.clip((self.base[quantity] - means[quantity]) / self.gap(quantity), 0.0, 1.0))
 
     def improvement(self, before: np.ndarray, after: np.ndarray, quantity: int) -> Improvement:
-        """What is closed on the way from some mean squares to others."""
+        """Return by how much a gap closes between two pairs of mean squares."""
         closed = float(before[quantity] - after[quantity])
         return Improvement(closed / self.gap(quantity), closed / float(max(before[quantity] - self.noise[quantity], 1e-12)))
 
     def unresolved(self, quantity: int) -> float:
-        """What no fit can tell of what is left of a side's gap."""
-        return 0.004 * self.gap(quantity) + 0.01
+        """Return how much of a gap no fit can resolve."""
+        return UNRESOLVED_SHARE * self.gap(quantity) + UNRESOLVED_SQUARE
 
     def has_gap(self, quantity: int) -> bool:
-        """Whether a side has a gap that is worth speaking of."""
+        """Return whether there is a gap that matters."""
         return bool(self.count[quantity] > 0) and self.gap(quantity) > (
             LEAST_IMPROVEMENT if quantity == self.main_quantity else float(self.noise[quantity])
         )
 
 
 def friction_kinds() -> list[str]:
-    """Names of the effects that act on friction alone."""
+    """Return the names of the effects that act on friction alone."""
     return [kind.name for kind in library().values() if all(form.friction_law is not None for form in kind.forms)]
 
 
 @dataclass
 class SelectionStep:
-    """What came of looking for one effect more.
+    """Outcome of one search for a further effect.
 
     Attributes
     ----------
     ranked : list of FittedCandidate
-        Those that were judged and that the recordings do not refute, best first.
+        Plausible candidates, best first.
     remaining : list of float
-        What each leaves of the gap, with a little for what no fit can tell.
+        What each of them leaves of the gap, plus what no fit can resolve.
     remaining_before : float
-        What was left without any of them.
+        What is left of the gap without any of them.
     remaining_repeated : float
-        What the best second effect of a kind that is in the model already leaves: more freedom for its formula.
+        What is left with the best second effect of a kind that the model has already, which gives that formula more freedom.
     """
 
     ranked: list[FittedCandidate]
@@ -132,14 +155,15 @@ class SelectionStep:
     remaining_repeated: float = np.inf
 
     def of(self, name: str) -> float:
-        """What the best form of a kind leaves; infinite if it was not judged."""
+        """Return what the best form of a kind leaves; infinite if it was not judged."""
         own = [left for one, left in zip(self.ranked, self.remaining, strict=True) if one.candidate.name == name]
         return min(own, default=np.inf)
 
     def times_worse(self, left: float, name: str) -> float:
-        """How many times as bad one is that leaves so much as the kind of this name: by what it leaves or by what it closes.
+        """Return how many times as bad an effect is that leaves `left` as the kind of this name.
 
-        The two are one where hardly anything is left. Where much is left whatever is taken, what they close tells more.
+        The larger of two ratios: of what they leave, and of what they close. If hardly anything is left, what they leave
+        distinguishes them; if much is left by all, what they close does.
         """
         own = self.of(name)
         return (
@@ -151,7 +175,7 @@ class SelectionStep:
 
 @dataclass(frozen=True)
 class Improvement:
-    """What an effect closed: as a share of the whole gap, and of what the others had left."""
+    """What an effect closed: as a share of the whole gap, and of what was left of it before."""
 
     of_gap: float
     of_remaining: float
@@ -159,20 +183,19 @@ class Improvement:
 
 @dataclass
 class SelectionState:
-    """How a model was found: the effects in its order.
+    """A model and how it was found.
 
     Attributes
     ----------
     fit : Fit
-    means : (2,) float
-        Mean squares on unseen trials.
     held_out : (trials, 2) float
-    steps : dict of str to Step
-        In which each effect was chosen.
+        Sum of squares of each trial under fits that have not seen it (see :func:`.least_squares.held_out_squares`).
+    steps : dict of str to SelectionStep
+        The search in which each effect was chosen.
     improvements : dict of str to Improvement
-        What each closed when it joined.
+        What each effect closed when it joined.
     first : SelectionStep
-        What was judged on top of the base model.
+        The search on top of the base model.
     """
 
     fit: Fit
@@ -183,19 +206,19 @@ class SelectionState:
 
     @property
     def means(self) -> np.ndarray:
-        """Mean squares on unseen trials."""
+        """Mean squares on unseen stretches, (2,) float."""
         return means_of(self.held_out, self.fit)
 
 
 def means_of(unseen: np.ndarray, found: Fit) -> np.ndarray:
-    """Mean squares of readings and of forces, (2,) float; zero where there are none."""
+    """Return mean squares of readings and of forces, (2,) float; zero without values."""
     means: np.ndarray = unseen.sum(axis=0) / np.maximum(found.count.sum(axis=0), 1)
     return means
 
 
 @dataclass
 class ForwardSelection:
-    """Looks for effects on one set of recordings."""
+    """Forward selection on one set of recordings."""
 
     view_set: ViewSet
     scales: Scales
@@ -206,13 +229,26 @@ class ForwardSelection:
         self.confounded_kinds = confounded(self.coverage)
 
     def run(self, base: SelectionState, structure: StructureOfFit) -> Generator[tuple[str, float], None, SelectionState]:
-        """Explain what a base model lacks.
+        """Add effects to a base model.
 
         Parameters
         ----------
         base : SelectionState
+            The base model, fitted.
         structure : callable
-            Of a fit's residual.
+            Tests the residual of a fit for structure.
+
+        Yields
+        ------
+        what : str
+            What is being done.
+        share : float
+            How much of the whole is done.
+
+        Returns
+        -------
+        SelectionState
+            `base` itself if no effect joins.
         """
         state = base
         lone = yield from self._best_next(base, 0.0, 0.25, first=True)
@@ -242,7 +278,7 @@ class ForwardSelection:
     def _best_next(
         self, state: SelectionState, start: float, share: float, first: bool = False, friction: bool = False
     ) -> StepSearch:
-        """Judge every effect that the model has not yet on top of it."""
+        """Judge every effect that is not in the model yet on top of it."""
         taken = {effect.name for effect in state.fit.model.effects}
         forms = candidates([s.predictor for s in self.view_set.whole], state.fit.model)
         forms = [c for c in forms if c.name not in taken or may_repeat(c)]
@@ -256,7 +292,7 @@ class ForwardSelection:
         return self._ranked([one for one in ranked if is_plausible(one, self.view_set)], state)
 
     def _ranked(self, judged: list[FittedCandidate], state: SelectionState) -> SelectionStep:
-        """Put what was judged in order of what it leaves."""
+        """Candidates in order of what they leave of the gap."""
         if not judged:
             return SelectionStep([], [])
         means = [*(means_of(one.held_out, one.fit) for one in judged), state.means]
@@ -271,7 +307,8 @@ class ForwardSelection:
     def _remaining(self, means: Sequence[np.ndarray], quantity: int) -> list[float]:
         """What each of some models leaves of the gap.
 
-        Forces count beside readings, as far as others of these models do better there: friction has a share in them.
+        For readings the forces count too, as far as another of these models does better there: friction takes its part in
+        them.
         """
         g = self.floor
         left = [max(float(m[quantity] - g.noise[quantity]), 0.0) for m in means]
@@ -282,7 +319,7 @@ class ForwardSelection:
         return left
 
     def simplest(self, step: SelectionStep) -> FittedCandidate:
-        """The best, or one with far fewer numbers that leaves hardly more."""
+        """Return the best candidate, or one with far fewer parameters that leaves hardly more."""
         pairs = [
             (one, left)
             for one, left in zip(step.ranked, step.remaining, strict=True)
@@ -290,16 +327,20 @@ class ForwardSelection:
         ]
         pairs = pairs or list(zip(step.ranked, step.remaining, strict=True))
         best, least = pairs[0]
-        listed = [one for one, left in pairs if one.candidate.name == "dead-texels" and left < 1.5 * least]
+        listed = [one for one, left in pairs if one.candidate.name == "dead-texels" and left < DEAD_TEXELS_RATIO * least]
         if best.candidate.has_texel_parameters and listed:
             return listed[0]
-        near = [one for one, left in pairs if left < 1.15 * least and one.parameter_count < 0.5 * best.parameter_count]
+        near = [
+            one
+            for one, left in pairs
+            if left < SIMPLER_RATIO * least and one.parameter_count < SIMPLER_SIZE * best.parameter_count
+        ]
         return near[0] if near else best
 
     def _extended(
         self, state: SelectionState, step: SelectionStep, first: bool = False, choice: FittedCandidate | None = None
     ) -> SelectionState:
-        """The account with the best of a step, or the same one if it does not earn its place."""
+        """The state with the best candidate of a step, or the same state if the candidate does not improve it enough."""
         if not step.ranked:
             return state
         best = choice or self.simplest(step)
@@ -310,7 +351,7 @@ class ForwardSelection:
         return SelectionState(best.fit, best.held_out, {**state.steps, name: step}, {**state.improvements, name: improvement})
 
     def _earns_its_place(self, one: FittedCandidate, state: SelectionState, first: bool) -> bool:
-        """Whether a candidate closes enough of the gap, and hardly anywhere does worse."""
+        """Whether a candidate closes enough of the gap, and does worse in hardly any trial."""
         g, quantity = self.floor, self.floor.quantity_for(one.candidate.name)
         before, after = state.means[quantity], means_of(one.held_out, one.fit)[quantity]
         gained, left = float(before - after), max(float(before - g.noise[quantity]), 1e-12)
@@ -322,7 +363,7 @@ class ForwardSelection:
         if gained < LEAST_IMPROVEMENT:
             return False
         if one.candidate.name == "quantization":
-            return True  # no more than the steps that are seen in the readings: it need not be what errs most
+            return True  # the steps are seen in the readings, however small a part of the gap they are
         return gained >= (
             FIRST_LEAST_SHARE if first else NEXT_LEAST_SHARE
         ) * left and gained >= NEXT_LEAST_SHARE_OF_GAP * g.gap(quantity)
@@ -333,18 +374,18 @@ class ForwardSelection:
         return len(state.fit.model.effects)
 
     def _is_gap_open(self, state: SelectionState, structure: StructureOfFit) -> bool:
-        """Whether enough is left that a further effect could earn its place."""
+        """Whether enough is left that a further effect could improve the model."""
         g, mean = self.floor, float(state.means[self.floor.main_quantity])
         if any(effect.name == "quantization" for effect in state.fit.model.effects):
-            return False  # what is left lies within a step
+            return False  # the rest lies within a quantization step
         if mean - g.noise[g.main_quantity] < max(LEAST_IMPROVEMENT, NEXT_LEAST_SHARE_OF_GAP * g.gap(g.main_quantity)):
             return False
-        return structure(state.fit).total >= LEAST_STRUCTURE or mean >= 1.5
+        return structure(state.fit).total >= LEAST_STRUCTURE or mean >= OPEN_MEAN_SQUARE
 
     def _best_pair(
         self, base: SelectionState, lone: SelectionStep, single: SelectionState, structure: StructureOfFit
     ) -> Generator[tuple[str, float], None, SelectionState]:
-        """The best of those pairs of effects that begin with one of the best first ones; or the first alone."""
+        """The best pair of effects that begins with one of the best first effects, or the first effect alone."""
         if not self._is_gap_open(single, structure):
             return single
         chosen = next(iter(single.improvements))
@@ -359,13 +400,13 @@ class ForwardSelection:
         for number, state in enumerate(firsts):
             step = yield from self._best_next(state, 0.25 + 0.35 * number / len(firsts), 0.35 / len(firsts))
             longer = self._extended(state, step)
-            ends += [longer] if longer is not state or state is single else []  # alone, the first one was the better choice
+            ends += [longer] if longer is not state or state is single else []  # another first effect counts only in a pair
         remaining = self._remaining([end.means for end in ends], self.floor.main_quantity)
         best = int(np.argmin(remaining))
         return ends[best] if best == 0 or remaining[best] < PAIR_ADVANTAGE * remaining[0] else ends[0]
 
     def _first_reconsidered(self, state: SelectionState) -> Generator[tuple[str, float], None, SelectionState]:
-        """The first effect was chosen without the others: look whether another does better beside them, or none is needed."""
+        """Replace or drop the first effect, which was chosen without the others, if that is better beside them."""
         model = state.fit.model
         first, quantity = model.effects[0].name, self.floor.main_quantity
         rest = tuple(
@@ -377,13 +418,13 @@ class ForwardSelection:
         without = SelectionState(other, held_out_squares(self.view_set.whole, other), steps, improvements)
         step = yield from self._best_next(without, 0.8, 0.1)
         lost = float(without.means[quantity] - state.means[quantity])
-        if lost < max(LEAST_IMPROVEMENT, 0.02 * self.floor.gap(quantity)):  # what came later does it all
+        if lost < max(LEAST_IMPROVEMENT, UNNEEDED_SHARE * self.floor.gap(quantity)):  # the later effects do all of its work
             return without
         if not step.ranked:
             return state
         best = self.simplest(step)
         before, after = self._remaining([state.means, means_of(best.held_out, best.fit)], quantity)
-        if after < (1.0 if best.candidate.name == first else 0.98) * before - 1e-6:
+        if after < (1.0 if best.candidate.name == first else REPLACED_SHARE) * before - 1e-6:
             name, improvement = (
                 best.candidate.name,
                 self.floor.improvement(without.means, means_of(best.held_out, best.fit), quantity),
@@ -391,12 +432,12 @@ class ForwardSelection:
             return SelectionState(
                 last_effect_first(best.fit), best.held_out, {name: step, **steps}, {name: improvement, **improvements}
             )
-        told = step if np.isfinite(step.of(first)) else state.steps[first]  # its rivals are those beside the others
+        told = step if np.isfinite(step.of(first)) else state.steps[first]  # its rivals are judged beside the later effects
         improvements = {**state.improvements, first: self.floor.improvement(without.means, state.means, quantity)}
         return replace(state, steps={**state.steps, first: told}, improvements=improvements)
 
     def _friction(self, state: SelectionState) -> Generator[tuple[str, float], None, SelectionState]:
-        """Effects on friction, judged by forces alone, on top of all else."""
+        """Add effects on friction, judged by forces alone."""
         for _ in friction_kinds():
             if state.means[FORCES] < (1.0 + LEAST_FORCE_IMPROVEMENT) * self.floor.noise[FORCES]:
                 break
@@ -409,17 +450,17 @@ class ForwardSelection:
 
 
 def may_repeat(candidate: Candidate) -> bool:
-    """Whether a second effect of the kind would be more than the first with other numbers."""
+    """Return whether a second effect of this kind does more than the first with other parameters."""
     return not candidate.has_texel_parameters and candidate.name not in DIRECTLY_ESTIMATED and candidate.form.placement is None
 
 
 def is_free_already(candidate: Candidate, free: Sequence[FreeParameter]) -> bool:
-    """A common offset is the sensor's `zero` where that is fitted."""
+    """Return whether the base model has a candidate as a free parameter: a common offset is its `zero`."""
     return candidate.label == "offset/common" and any(item.effect < 0 and item.name == "zero" for item in free)
 
 
 def last_effect_first(found: Fit) -> Fit:
-    """The same fit with the effect that joined last at the head of the stack, where it was in the order of finding."""
+    """Return the same fit with the last effect at the head of the stack."""
     last = len(found.model.effects) - 1
     effects = (found.model.effects[last], *found.model.effects[:last])
     free = tuple(

@@ -1,5 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a recording cannot tell, whatever is fitted to it: effects whose mark was never brought out."""
+"""Identifiability: which effects cannot be found in some recordings, or not be distinguished from another one, whatever is
+fitted.
+
+An effect is known by a signature, as by what is different after unloading. Recordings without that signature do not identify
+the effect, however well its formula fits.
+"""
 
 from __future__ import annotations
 
@@ -12,45 +17,44 @@ from ..forward.predictor import Model, Predictor
 
 NEVER_UNLOADED = "nothing was ever unloaded, so that what it leaves behind cannot show"
 KNOWN_FROM_UNLOADING = ("hysteresis", "softening", "adhesion", "wear")
-"""Known by what is different after the load was taken back. A formula of theirs also bends the way up, and there it is no more
-than a spring that is not straight."""
-
-
+"""Effects that are known by what is different after unloading. Their formulas also bend the loading curve, but there they
+cannot be distinguished from a nonlinear spring."""
 KNOWN_FROM_TIMING = ("creep", "lag", "drift")
-"""Known by what happens at one depth at different times, or at one time after different speeds."""
+"""Effects that are known by what happens at one depth at different times, or at one time after different speeds."""
 SINGLE_SPEED_RATIO = 1.5
-"""Ratio of fast to slow loading below which all of it was done at one speed."""
-
-
+"""Ratio of fast to slow loading below which all loading was at one speed."""
 NEVER_AT_REST = (
     "nothing was left without load for long, nor held at unlike loads, so that moving by itself and settling under load are one"
 )
 LEAST_UNLOADED_SHARE = 0.1
-"""Share of a trial from the first to the last time that a texel carries nothing, from which on a drift would show there."""
+"""Share of a trial, from the first to the last time that a texel is unloaded, from which on a drift would show there."""
 MOVING_BY_THEMSELVES = ("creep", "drift")
-"""Both make a reading move while nothing else does."""
+"""Effects that let a reading move while nothing else does."""
 DISTINCT_LOAD_RATIO = 1.5
-"""Largest by smallest of the loads that were held, from which on settling, which goes with the load, is told from a drift."""
-
-
+"""Ratio of the largest to the smallest load that was held, from which on creep, which is proportional to the load, differs from
+drift."""
 KNOWN_FROM_PLACES = ("load-spreading", "crosstalk", "gain-mismatch", "misalignment")
-"""Known by how neighbours differ as the load moves on: at one place each is some pattern of texels that grows with the load."""
+"""Effects that are known by how neighbours differ as the load moves. At one place each is some pattern of texels that grows
+with the load."""
 KNOWN_FROM_CYCLES = ("hysteresis", "softening", "wear")
-"""Known by how a second cycle differs from the first: in one alone, each makes the way back lie below the way in."""
+"""Effects that are known by how a second cycle differs from the first. In a single cycle each lowers the unloading curve."""
+LEAST_CYCLES = 2
 SPREADING = ("load-spreading", "crosstalk")
-"""Both pass a part of what a texel carries on to those around it. A sensor does so in its own pattern, and which formula comes
-nearer to that says little about which it is."""
+"""Effects that pass a part of a texel's load on to its neighbours. A sensor has a pattern of its own, so that it says little
+which of their formulas is nearer to it."""
 NONLINEAR = ("stiffening", "saturation", "dead-zone")
-"""A curve that is not straight: so is the way in of whatever has a loop."""
+"""Effects that bend the curve of reading over load, as the loading curve of a hysteresis loop is bent."""
 LOOP_CURVATURE = 3.0
-"""Ratio of a curve's steepest to its flattest eighth up to which it may be the way in of a loop that takes two thirds of the
-force."""
+"""Ratio of a curve's steepest to its flattest eighth up to which it may be the loading curve of a hysteresis loop that takes
+two thirds of the force."""
 SHORT_HOLD = 0.5
-"""Seconds of a hold below which it tells nothing of settling."""
+"""Seconds of a hold below which creep does not show in it."""
+CURVE_PARTS = 8
+"""Number of equal parts of the load over which the slopes of a curve are compared."""
 
 
 def unidentifiable(coverage: Coverage) -> dict[str, str]:
-    """Return the kinds of effects that recordings cannot tell, each with the reason."""
+    """Return the kinds of effects that recordings cannot identify, each with the reason."""
     said = {} if coverage.unloading else dict.fromkeys(KNOWN_FROM_UNLOADING, NEVER_UNLOADED)
     if coverage.unloaded_share < LEAST_UNLOADED_SHARE and coverage.held_load_ratio < DISTINCT_LOAD_RATIO:
         said["drift"] = NEVER_AT_REST
@@ -58,54 +62,62 @@ def unidentifiable(coverage: Coverage) -> dict[str, str]:
 
 
 def confounded(coverage: Coverage) -> tuple[str, ...]:
-    """Return the kinds that recordings cannot tell from a spring that is not straight.
+    """Return the kinds that recordings cannot distinguish from a nonlinear spring.
 
-    Where a load only ever grew, at one speed and without a hold, time and depth are one. What is counted in time may be the
-    reason for a bend, and is weighed as a rival; the bend alone is the simpler explanation, and nothing in time joins it.
+    If the load only ever grew, at one speed and without a hold, time and depth are proportional. Effects of time may then be
+    the reason for a bent curve, and count as rivals of a nonlinear spring. The spring is the simpler explanation, so they do
+    not join a model beside it.
     """
     one = not coverage.unloading and coverage.speed_ratio < SINGLE_SPEED_RATIO and coverage.longest_hold == 0.0
     return KNOWN_FROM_TIMING if one else ()
 
 
 def indistinguishable(coverage: Coverage, name: str, curvature: float = np.inf) -> tuple[str, ...]:
-    """Return the kinds that recordings cannot tell from one of this name, however much better one of them fits.
+    """Return the kinds that recordings cannot distinguish from one of this name, however much better one of them fits.
 
-    The sensor need follow none of the formulas: a better fit is no evidence where the mark of the effect was not brought out.
+    A sensor need not follow any of the formulas, so a better fit is no evidence if the signature of the effect is not recorded.
 
     Parameters
     ----------
     coverage : Coverage
     name : str
-    bend : float
-        How many times as steep as its flattest eighth the steepest of the fitted curve is (see :func:`curvature_ratio`).
+    curvature : float
+        Of the fitted curve (see :func:`curvature_ratio`).
     """
     groups: list[tuple[str, ...]] = []
     if not coverage.unloading and name in NONLINEAR and curvature < LOOP_CURVATURE:
         groups.append((name, "hysteresis"))
     if not coverage.load_moves:
         groups.append(KNOWN_FROM_PLACES)
-    if coverage.unloading and coverage.cycles < 2:
+    if coverage.unloading and coverage.cycles < LEAST_CYCLES:
         still = coverage.speed_ratio < SINGLE_SPEED_RATIO and coverage.longest_hold < SHORT_HOLD
         groups.append((*KNOWN_FROM_CYCLES, "creep", "lag") if still else KNOWN_FROM_CYCLES)
     return tuple(dict.fromkeys(other for group in groups if name in group for other in group if other != name))
 
 
 def hardly_distinguishable(coverage: Coverage, name: str) -> tuple[str, ...]:
-    """Return the kinds that must fit far worse than one of this name to be told from it.
+    """Return the kinds that must fit far worse than one of this name to be distinguished from it.
 
-    Load spreading and crosstalk both pass something on to the neighbours. Without rest, settling and moving by itself differ
-    only in how they go with the load.
+    Load spreading and crosstalk both pass load on to neighbours. Without rest, creep and drift differ only in how they depend
+    on the load.
     """
     groups = [SPREADING, *([MOVING_BY_THEMSELVES] if coverage.unloaded_share < LEAST_UNLOADED_SHARE else [])]
     return tuple(other for group in groups if name in group for other in group if other != name)
 
 
 def curvature_ratio(predictors: Sequence[Predictor], model: Model) -> float:
-    """Return how many times as steep as its flattest eighth the steepest of a model's curve is, of the texel pressed most."""
+    """Return the ratio of the steepest to the flattest eighth of a model's curve of reading over load.
+
+    Parameters
+    ----------
+    predictors : sequence of Predictor
+        The curve is that of the texel with the largest load in these trials.
+    model : Model
+    """
     deepest = max(predictors, key=lambda one: float(one.stimulus.load.max(initial=0.0)))
     texel = int(np.argmax(deepest.stimulus.load.max(axis=0)))
     load, reading = deepest.stimulus.load[:, texel], deepest.predict(model).reading[:, texel]
     order = np.argsort(load)
-    slopes = np.diff(np.interp(np.linspace(0.0, load.max(), 9), load[order], reading[order]))
+    slopes = np.diff(np.interp(np.linspace(0.0, load.max(), CURVE_PARTS + 1), load[order], reading[order]))
     steep = np.abs(slopes)
     return float(steep.max() / max(float(steep.min()), 1e-9 * float(steep.max()), 1e-300))

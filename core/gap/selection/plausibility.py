@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Whether a fitted effect does what its name says where the recordings show it plainly.
+"""Plausibility: does a fitted effect show its characteristic signature in the recordings?
 
-A formula that fits well over all may still be refuted by the part of the recordings that is the effect's own: where the load is
-taken off, or where nothing is loaded at all. Then it stands for something else and must not lend it its name.
+A formula that fits well on the whole may still be refuted where its effect would show most clearly: during unloading, or
+without load. Then it stands for something else, and is not reported under its name.
 """
 
 from __future__ import annotations
@@ -15,17 +15,19 @@ from .candidates import FittedCandidate
 from .view_set import ViewSet
 
 PULL_LEVEL = -0.5
-"""Standard deviations of the noise below which a reading pulls."""
+"""Readings below this many standard deviations of the noise are pulls."""
+LEAST_MEAN_PULL = -0.3
+"""The predicted pulls must be at least this strong on average, in the same unit."""
 ENOUGH_SAMPLES = 20
-"""Samples without load from which on a texel's rest says something."""
+"""Number of unloaded samples from which on the mean of a texel is used."""
 BEGINNING_SHARE = 0.1
-"""Share of a trial that is its beginning: what is an offset is there from the first samples on."""
+"""Share of a trial that counts as its beginning: an offset is there from the first samples on."""
 LEAST_PRESENT_SHARE = 0.4
-"""Least share of what is claimed that must be seen there."""
+"""Least share of the predicted signature that must be measured."""
 
 
 def is_plausible(found: FittedCandidate, view_set: ViewSet) -> bool:
-    """Tell whether the recordings bear out a fitted effect where it is its own; True where they do not say."""
+    """Return whether the recordings bear out a fitted effect; True if they do not contain its signature."""
     if found.candidate.name == "adhesion":
         return _adhesion_pulls(found, view_set)
     if found.candidate.name == "offset":
@@ -34,7 +36,7 @@ def is_plausible(found: FittedCandidate, view_set: ViewSet) -> bool:
 
 
 def _adhesion_pulls(found: FittedCandidate, view_set: ViewSet) -> bool:
-    """Adhesion is what pulls: a fit that never does, or does where the readings do not, describes something else."""
+    """Whether readings are negative where fitted adhesion predicts a pull, and there is such a place."""
     predicted, measured = [], []
     for view in view_set.whole:
         p = found.fit.model.parameters
@@ -45,12 +47,13 @@ def _adhesion_pulls(found: FittedCandidate, view_set: ViewSet) -> bool:
             predicted.append(reading[pulled])
             measured.append(own[pulled])
     pull, seen = np.concatenate(predicted), np.concatenate(measured)
-    return len(pull) > ENOUGH_SAMPLES and float(np.nanmean(seen)) < LEAST_PRESENT_SHARE * float(pull.mean()) < -0.3
+    return len(pull) > ENOUGH_SAMPLES and float(np.nanmean(seen)) < LEAST_PRESENT_SHARE * float(pull.mean()) < LEAST_MEAN_PULL
 
 
 def _offset_is_present_unloaded(found: FittedCandidate, view_set: ViewSet) -> bool:
-    """An offset is what a texel reads without load, from the first moment on: what is only there under load, or comes with time
-    (as the part of a drift does that its formula lacks), is something else.
+    """Whether a fitted offset is measured without load, from the beginning of the trials on.
+
+    What appears only under load, or with time (as the misfit of a drift's formula does), is something else.
     """
     model = found.fit.model
     index = len(model.effects) - 1
@@ -67,16 +70,16 @@ def _offset_is_present_unloaded(found: FittedCandidate, view_set: ViewSet) -> bo
         early = rest & (np.cumsum(rest, axis=0) <= ENOUGH_SAMPLES) & begins[:, None]
         always += [miss.sum(axis=0), rest.sum(axis=0)]
         first += [np.where(early, miss, 0.0).sum(axis=0), early.sum(axis=0)]
-    alike = not found.candidate.has_texel_parameters
-    return all(_is_borne_out(claimed, total, count, alike) for total, count in (always, first))
+    is_common = not found.candidate.has_texel_parameters
+    return all(_is_borne_out(claimed, total, count, is_common) for total, count in (always, first))
 
 
-def _is_borne_out(claimed: np.ndarray, total: np.ndarray, count: np.ndarray, alike: bool) -> bool:
-    """Whether the means of some samples of each texel bear out what is claimed; True where there are too few."""
+def _is_borne_out(claimed: np.ndarray, total: np.ndarray, count: np.ndarray, is_common: bool) -> bool:
+    """Whether the mean of each texel's samples agrees with the claimed offsets; True if there are too few samples."""
     resting = count >= ENOUGH_SAMPLES
     if resting.sum() < 2:
         return True
     seen, claimed = total[resting] / count[resting], claimed[resting]
-    if not alike:  # what all share is the sensor's zero
+    if not is_common:  # a common offset is the sensor's zero
         seen, claimed = seen - seen.mean(), claimed - claimed.mean()
     return float(claimed @ seen) >= LEAST_PRESENT_SHARE * float(claimed @ claimed)

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Looking for one effect more: a quick look at every form, a fit of those that promise something, a judgement on unseen trials.
+"""Screening: which effects improve a fit most?
 
-The quick look asks how much of the residual lies along what the effect would change, beside what the numbers that are free
-already can change (a score test). It and the first fits see a part of the texels, or of the samples where texels feel their
-neighbours; the last ones see everything.
+Each candidate goes through three sieves. A score test says how much it could explain beside the free parameters. Those that
+promise most are fitted to a part of the data (see :mod:`.view_set`). The best of these are fitted to everything and judged on
+stretches of the recordings that the fit has not seen.
 """
 
 from __future__ import annotations
@@ -13,287 +13,85 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...effects.engine.registry import form_of
 from ...model.effect import Effect
-from ..fitting.least_squares import (
-    FRICTION_PARAMETERS,
-    Fit,
-    FreeParameter,
-    TrialView,
-    derivatives,
-    fit,
-    held_out_squares,
-    value_of,
-)
+from ..fitting.least_squares import FRICTION_PARAMETERS, Fit, FreeParameter, TrialView, fit, held_out_squares
 from ..forward.predictor import Model
 from .candidates import DIRECTLY_ESTIMATED, Candidate, FittedCandidate, Scales
 from .direct_estimates import few_levels, moving_readings, quantization_starts, unresponsive_texels
+from .score_test import ScoreTest
 from .view_set import ViewSet
 
-MOST_TIMES_THE_BEST = 3.0
-"""A candidate that leaves so many times as much of the gap as the best, after a first fit, is not fitted to everything."""
 SMALL_RECORDING = 20_000
-"""Measured values up to which a recording is so quick to fit that candidates are begun from several places and more of them are
-judged, in more of their forms: a quick look from one place loses those whose numbers bend most."""
+"""Number of measured values up to which a fit is so quick that the search is thorough (see :data:`THOROUGH`)."""
+MOST_TIMES_THE_BEST, FLOOR_SHARE = 3.0, 0.04
+"""After the first fits, a candidate is dropped if what it leaves of the gap is more than this many times what the best one
+leaves plus a small share of the gap."""
+BEST_KINDS = 3
+LEAST_PROMISE = {"best kinds": 0.02, "best form": 0.05, "others": 0.4}
+"""Least promise for a first fit, as a share of the largest: of the forms of the three most promising kinds, of the best form of
+another kind, and of its further forms."""
+VISIBLE_STEPS_PROMISE = 0.5
+"""Promise of quantization whose steps are seen in the readings, as a share of the squares: it is always fitted."""
+LONGEST_STEP = 20.0
+"""A starting point is moved along a candidate's strength by at most this factor."""
+SHORTEST_STEP = 0.01
+SMALL_SHIFT, SMALL_TURN = 0.02, 2e-3
+"""Test steps of displaced texels: a share of the pitch, and an angle in rad."""
+LARGEST_SHIFT, LARGEST_TURN = 0.5, 0.1
+"""Bounds of their starting points, in the same units."""
+LARGE_SHIFTS = (0.3, 0.7)
+"""Shifts, as shares of the pitch, that are tried as they are under a flat indenter."""
+DIRECTIONS = ((1, 0), (-1, 0), (0, 1), (0, -1), (1, 1), (1, -1), (-1, 1), (-1, -1))
+TEXEL_STEP = 0.01
+"""Test step of parameters of single texels, as a share of their scale."""
 
 
-def visible_parameters(views: Sequence[TrialView], found: Fit) -> tuple[FreeParameter, ...]:
-    """Return the free numbers of a fit that act on what shares look at: without net forces, friction does not show."""
-    if any(view.with_forces for view in views):
-        return found.free
+@dataclass(frozen=True)
+class Effort:
+    """How thorough a search is.
 
-    def rubs(item: FreeParameter) -> bool:
-        if item.effect < 0:
-            return item.name in FRICTION_PARAMETERS
-        effect = found.model.effects[item.effect]
-        return form_of(effect.name, effect.form).friction_law is not None
-
-    return tuple(item for item in found.free if not rubs(item))
-
-
-class ScoreTest:
-    """What the free numbers of a fit can already change about its residual, on one view."""
-
-    def __init__(self, views: Sequence[TrialView], found: Fit):
-        self.views, self.model, self.free = views, found.model, visible_parameters(views, found)
-        common = tuple(item for item in self.free if not item.per_texel)
-        at = [item.to_coordinate(value_of(found.model, item)) for item in common]
-        self.residual = [view.residual(found.model) for view in views]
-        self.tables = [np.empty((len(common), *r.shape)) for r in self.residual]
-        for view, r, table in zip(views, self.residual, self.tables, strict=True):
-            derivatives(view, found.model, common, at, r, table, 0)
-        self.derivatives = [table.reshape(len(common), -1) for table in self.tables]
-        gram = np.sum([c @ c.T for c in self.derivatives], axis=0)
-        self.gram = gram + 1e-10 * (1.0 + np.trace(gram)) * np.eye(len(gram))
-        self.along = sum(c @ r.ravel() for c, r in zip(self.derivatives, self.residual, strict=True))
-
-    @property
-    def initial_derivatives(self) -> list[np.ndarray] | None:
-        """Derivatives with which a fit of these numbers and more may begin."""
-        return None if any(item.per_texel for item in self.free) else self.tables
-
-    @property
-    def total(self) -> float:
-        """Sum of squares of the residual."""
-        return sum(float(np.vdot(r, r)) for r in self.residual)
-
-    def score(self, model: Model) -> tuple[float, float]:
-        """Return by how much the squares could fall along the change to another model, and the best length along it."""
-        cross, square, dot = np.zeros(len(self.gram)), 0.0, 0.0
-        for view, r, c in zip(self.views, self.residual, self.derivatives, strict=True):
-            change = (r - view.residual(model)).ravel()
-            cross += c @ change
-            square += float(np.vdot(change, change))
-            dot += float(np.vdot(change, r.ravel()))
-        if not np.isfinite(square):
-            return 0.0, 0.0
-        weights = np.linalg.solve(self.gram, cross)
-        free_square, free_dot = square - float(weights @ cross), dot - float(weights @ self.along)
-        if free_square <= 1e-9 * square or free_square <= 0:
-            return 0.0, 0.0
-        return free_dot**2 / free_square, free_dot / free_square
-
-
-def starting_points(
-    candidate: Candidate, score_test: ScoreTest, whole: Sequence[TrialView], model: Model, scales: Scales, gain: float
-) -> list[tuple[float, Effect]]:
-    """Return places to begin the fit of a candidate, best first, each with what it promises."""
-    n, form = scales.texels, candidate.form
-    if candidate.name == "dead-texels":
-        effect = unresponsive_texels(whole, model, candidate, n)
-        return [] if effect is None else [(score_test.score(model.with_effect(effect))[0], effect)]
-    if candidate.name == "quantization":
-        least = (
-            0.5 * score_test.total if few_levels(moving_readings(whole, model)) is not None else 0.0
-        )  # they are seen to be there
-        steps = [
-            (_decrease(score_test, model.with_effect(effect)), effect)
-            for effect in quantization_starts(whole, model, candidate)
-        ]
-        return [(max(fall, least), effect) for fall, effect in sorted(steps, key=lambda entry: -entry[0])]
-    if candidate.has_texel_parameters:
-        parameter = next(q.scaled(gain) for q in form.parameters if q.per_texel)
-        moved = candidate.effect(
-            {parameter.name: float(parameter.default) + 0.01 * _texel_parameter_scale(parameter, scales)}, n, gain
-        )
-        return [(_texel_parameter_score(score_test, model.with_effect(moved)), candidate.effect({}, n, gain))]
-    if form.placement is not None:
-        return sorted(
-            [
-                _displacement_score(candidate, score_test, model, scales, gain),
-                *_large_displacements(candidate, score_test, model, scales, gain),
-            ],
-            key=lambda entry: -entry[0],
-        )
-    strength, reach, tried = candidate.strength_parameter(), candidate.inverse_strength_parameter(), []
-    for values in candidate.starting_values(scales, gain):
-        effect = candidate.effect(values, n, gain)
-        promise, length = score_test.score(model.with_effect(effect))
-        if strength is not None:
-            parameter = next(q.scaled(gain) for q in form.parameters if q.name == strength)
-            if parameter.low >= 0.0 and length <= 0.0:
-                continue
-            scaled = float(np.clip(values[strength] * np.clip(length, -20.0, 20.0), parameter.low, parameter.high))
-            effect = candidate.effect({**values, strength: scaled}, n, gain)
-        elif length <= 0.0:
-            continue
-        elif reach is not None:
-            parameter = next(q.scaled(gain) for q in form.parameters if q.name == reach)
-            far = float(np.clip(values[reach] / np.clip(length, 0.01, 20.0), parameter.low, parameter.high))
-            effect = _better_start(score_test, effect, candidate.effect({**values, reach: far}, n, gain))
-        tried.append((promise, effect))
-    return sorted(tried, key=lambda entry: -entry[0])
-
-
-def _better_start(score_test: ScoreTest, one: Effect, other: Effect) -> Effect:
-    """The one of two that fits better as it is: far from the best length along it, an effect is a bad place to begin."""
-    return max((one, other), key=lambda effect: _decrease(score_test, score_test.model.with_effect(effect)))
-
-
-def _texel_parameter_scale(parameter, scales: Scales) -> float:  # type: ignore[no-untyped-def]
-    return scales.reading if parameter.unit == "unit" else 1.0
-
-
-def _texel_parameter_score(score_test: ScoreTest, model: Model) -> float:
-    """What a number per texel promises, less what it would take from noise alone."""
-    n = len(score_test.views[0].predictor.rig.texels)
-    dot, square = np.zeros(n), np.zeros(n)
-    for view, r in zip(score_test.views, score_test.residual, strict=True):
-        change = (r - view.residual(model))[:, : len(view.texels)]
-        dot[view.texels] += (change * r[:, : len(view.texels)]).sum(axis=0)
-        square[view.texels] += (change * change).sum(axis=0)
-    seen = square > 1e-12 * max(square.max(initial=0.0), 1e-300)
-    return max(float((dot[seen] ** 2 / square[seen]).sum()) - seen.sum(), 0.0)
-
-
-def _displacement_score(
-    candidate: Candidate, score_test: ScoreTest, model: Model, scales: Scales, gain: float
-) -> tuple[float, Effect]:
-    """The same for a form that moves the texels: all its numbers at once, each by a small step from where texels should be."""
-    off = {name: 0.0 for name in candidate.form.neutral}
-    steps = [0.02 * scales.pitch if q.unit == "m" else 2e-3 for q in candidate.form.parameters]
-    changes = []
-    for q, step in zip(candidate.form.parameters, steps, strict=True):
-        other = model.with_effect(candidate.effect({**off, q.name: step}, scales.texels, gain))
-        changes.append([(r - s.residual(other)).ravel() for s, r in zip(score_test.views, score_test.residual, strict=True)])
-    size = len(score_test.gram)
-    gram, along = np.zeros((size + len(changes),) * 2), np.zeros(size + len(changes))
-    for i, r in enumerate(score_test.residual):
-        x = np.vstack([score_test.derivatives[i], *(c[i] for c in changes)])
-        gram += x @ x.T
-        along += x @ r.ravel()
-    gram += 1e-10 * (1.0 + np.trace(gram)) * np.eye(len(gram))
-    best = np.linalg.solve(gram, along)
-    promise = float(along @ best) - float(score_test.along @ np.linalg.solve(score_test.gram, score_test.along))
-    limits = [0.5 * scales.pitch if q.unit == "m" else 0.1 for q in candidate.form.parameters]
-    lengths = [float(np.clip(b * s, -m, m)) for b, s, m in zip(best[size:], steps, limits, strict=True)]
-    values = {q.name: length for q, length in zip(candidate.form.parameters, lengths, strict=True)}
-    return promise, candidate.effect(values, scales.texels, gain)
-
-
-def _large_displacements(
-    candidate: Candidate, score_test: ScoreTest, model: Model, scales: Scales, gain: float
-) -> list[tuple[float, Effect]]:
-    """Shifts by a good part of the pitch: under a flat end small ones change nothing, larger ones add and take texels."""
-    names = {q.name for q in candidate.form.parameters}
-    if not {"x", "y"} <= names or score_test.views[0].predictor.rig.indenter is None:
-        return []
-    if score_test.views[0].predictor.rig.indenter.radius is not None:  # a ball tells small shifts
-        return []
-    tried = []
-    for step in (0.3, 0.7):
-        for x, y in ((1, 0), (-1, 0), (0, 1), (0, -1), (1, 1), (1, -1), (-1, 1), (-1, -1)):
-            values = {**dict.fromkeys(names, 0.0), "x": step * x * scales.pitch, "y": step * y * scales.pitch}
-            effect = candidate.effect(values, scales.texels, gain)
-            tried.append((_decrease(score_test, model.with_effect(effect)), effect))
-    return tried
-
-
-def _decrease(score_test: ScoreTest, model: Model) -> float:
-    """By how much another model lowers the squares as it is."""
-    before = sum(float(np.vdot(r, r)) for r in score_test.residual)
-    after = sum(float(np.vdot(r, r)) for r in (view.residual(model) for view in score_test.views))
-    return before - after
-
-
-def free_with(free: Sequence[FreeParameter], model: Model, candidate: Candidate, scales: Scales) -> tuple[FreeParameter, ...]:
-    """Return some free numbers of a model and those of one effect more on top of it."""
-    if candidate.name in DIRECTLY_ESTIMATED:
-        return tuple(free)
-    return (*free, *candidate.free_parameters(len(model.effects), scales, abs(model.parameters.gain)))
-
-
-def screen(
-    view_set: ViewSet, found: Fit, forms: Sequence[Candidate], scales: Scales, finalists: int = 4
-) -> Iterator[tuple[str, float, list[FittedCandidate]]]:
-    """Look for one effect more on top of a fit.
-
-    Yields
-    ------
-    what : str
-        What is being done.
-    share : float
-        How much of it is done.
-    found : list of FittedCandidate
-        Best first; complete at the last step.
+    Attributes
+    ----------
+    most_first_fits : int or None
+        Candidates that are fitted to a part of the data; None: all that promise anything.
+    starts : int
+        Starting points of each first fit.
+    max_steps, tolerance : int, float
+        Of the fits (see :func:`.least_squares.fit`).
+    kinds, forms : int
+        Kinds that are fitted to everything, and forms of the best kind among them.
     """
-    gain = abs(found.model.parameters.gain)
-    score_tests: dict[int, ScoreTest] = {}
-    promising: list[tuple[float, Candidate, list[tuple[float, Effect]]]] = []
-    for number, candidate in enumerate(forms):
-        views = view_set.quick(candidate, found.model)
-        if id(views) not in score_tests:
-            score_tests[id(views)] = ScoreTest(views, found)
-        score_test = score_tests[id(views)]
-        starts = starting_points(candidate, score_test, view_set.whole, found.model, scales, gain)
-        if starts and starts[0][0] > 0:
-            promising.append((starts[0][0] / max(score_test.total, 1e-300), candidate, starts))
-        yield "looking at every effect", 0.35 * (number + 1) / len(forms), []
-    little = sum(int(view.counts.sum()) for view in view_set.whole) < SMALL_RECORDING
-    kept = _worth_a_fit(promising, len(promising)) if little else _worth_a_fit(promising)
-    turns, tolerance = (40, 1e-6) if little else (14, 1e-4)
-    if not kept:
-        yield "nothing promises anything", 1.0, []
-        return
-    quick: list[ScreenedCandidate] = []
-    for number, (_, candidate, starts) in enumerate(kept):
-        score_test = score_tests[id(view_set.quick(candidate, found.model))]
-        tries = [_first_fit(candidate, start, score_test, scales, turns) for _, start in starts[: 4 if little else 1]]
-        quick.append(min(tries, key=lambda one: one.left))
-        yield "fitting those that promise most", 0.35 + 0.35 * (number + 1) / len(kept), []
-    last, whole = _finalists(quick, *(2 * finalists, 4) if little else (finalists, 2)), ScoreTest(view_set.whole, found)
-    results: list[FittedCandidate] = []
-    for number, one in enumerate(last):
-        free = free_with(found.free, found.model, one.candidate, scales)
-        # Friction is far from linear, and cheap: its derivatives are not held.
-        held = next((i for i, item in enumerate(found.free) if item.name in FRICTION_PARAMETERS), len(found.free))
-        best = fit(
-            view_set.whole,
-            one.fit.model,
-            free,
-            max_steps=turns,
-            tolerance=tolerance,
-            frozen=held,
-            initial_derivatives=whole.initial_derivatives,
-        )
-        results.append(FittedCandidate(one.candidate, best, held_out_squares(view_set.whole, best)))
-        results.sort(key=lambda one: one.mean)
-        yield "judging the best on trials they have not seen", 0.7 + 0.3 * (number + 1) / len(last), results
+
+    most_first_fits: int | None
+    starts: int
+    max_steps: int
+    tolerance: float
+    kinds: int
+    forms: int
 
 
-def _worth_a_fit(
-    promising: list[tuple[float, Candidate, list[tuple[float, Effect]]]], most: int = 14
-) -> list[tuple[float, Candidate, list[tuple[float, Effect]]]]:
-    """Those worth a fit after the quick look: forms of the best kinds, the best form of others, all that are near the best."""
-    promising = sorted(promising, key=lambda entry: -entry[0])
-    best_kinds = list(dict.fromkeys(candidate.name for _, candidate, _ in promising))[:3]
-    kept: list[tuple[float, Candidate, list[tuple[float, Effect]]]] = []
-    for i, entry in enumerate(promising):
-        leads = all(other[1].name != entry[1].name for other in promising[:i])
-        least = 0.02 if entry[1].name in best_kinds else 0.05 if leads else 0.4
-        if entry[0] > least * promising[0][0] and len(kept) < most:
-            kept.append(entry)
-    return kept
+QUICK = Effort(most_first_fits=14, starts=1, max_steps=14, tolerance=1e-4, kinds=4, forms=2)
+THOROUGH = Effort(most_first_fits=None, starts=4, max_steps=40, tolerance=1e-6, kinds=8, forms=4)
+"""For small recordings: a single starting point loses candidates that depend strongly on their parameters."""
+FIRST_FIT_TOLERANCE = 1e-3
+
+
+@dataclass(frozen=True)
+class Promise:
+    """A candidate after its score test.
+
+    Attributes
+    ----------
+    share : float
+        By how much it could lower the squares, as a share of them.
+    candidate : Candidate
+    starts : list of Effect
+        Starting points of a fit, best first.
+    """
+
+    share: float
+    candidate: Candidate
+    starts: list[Effect]
 
 
 @dataclass(frozen=True)
@@ -305,16 +103,82 @@ class ScreenedCandidate:
     fit: Fit
 
 
-def _first_fit(candidate: Candidate, start: Effect, score_test: ScoreTest, scales: Scales, turns: int) -> ScreenedCandidate:
-    model, free = score_test.model, free_with(score_test.free, score_test.model, candidate, scales)
-    held = len(score_test.free)
+def screen(
+    view_set: ViewSet, found: Fit, forms: Sequence[Candidate], scales: Scales
+) -> Iterator[tuple[str, float, list[FittedCandidate]]]:
+    """Look for one more effect on top of a fit.
+
+    Parameters
+    ----------
+    view_set : ViewSet
+    found : Fit
+    forms : sequence of Candidate
+    scales : Scales
+
+    Yields
+    ------
+    what : str
+        What is being done.
+    share : float
+        How much of it is done.
+    found : list of FittedCandidate
+        Best first; complete at the last step.
+    """
+    score_tests: dict[int, ScoreTest] = {}
+    promises: list[Promise] = []
+    for number, candidate in enumerate(forms):
+        views = view_set.quick(candidate, found.model)
+        if id(views) not in score_tests:
+            score_tests[id(views)] = ScoreTest(views, found)
+        score_test = score_tests[id(views)]
+        starts = starting_points(candidate, score_test, view_set.whole, scales)
+        if starts and starts[0][0] > 0:
+            share = starts[0][0] / max(score_test.total, 1e-300)
+            promises.append(Promise(share, candidate, [effect for _, effect in starts]))
+        yield "looking at every effect", 0.35 * (number + 1) / len(forms), []
+    small = sum(int(view.counts.sum()) for view in view_set.whole) < SMALL_RECORDING
+    effort = THOROUGH if small else QUICK
+    kept = _worth_a_fit(promises, effort)
+    if not kept:
+        yield "nothing promises anything", 1.0, []
+        return
+    screened: list[ScreenedCandidate] = []
+    for number, one in enumerate(kept):
+        score_test = score_tests[id(view_set.quick(one.candidate, found.model))]
+        tries = [_first_fit(one.candidate, start, score_test, scales, effort) for start in one.starts[: effort.starts]]
+        screened.append(min(tries, key=lambda tried: tried.left))
+        yield "fitting those that promise most", 0.35 + 0.35 * (number + 1) / len(kept), []
+    last, whole = _finalists(screened, effort), ScoreTest(view_set.whole, found)
+    results: list[FittedCandidate] = []
+    for number, finalist in enumerate(last):
+        results.append(_final_fit(finalist, view_set.whole, found, whole, scales, effort))
+        results.sort(key=lambda result: result.mean)
+        yield "judging the best on trials they have not seen", 0.7 + 0.3 * (number + 1) / len(last), results
+
+
+def _worth_a_fit(promises: list[Promise], effort: Effort) -> list[Promise]:
+    """Candidates worth a first fit: forms of the best kinds, the best form of others, and all that promise about as much."""
+    promises = sorted(promises, key=lambda one: -one.share)
+    most = len(promises) if effort.most_first_fits is None else effort.most_first_fits
+    best_kinds = list(dict.fromkeys(one.candidate.name for one in promises))[:BEST_KINDS]
+    kept: list[Promise] = []
+    for i, one in enumerate(promises):
+        is_best_form = all(other.candidate.name != one.candidate.name for other in promises[:i])
+        group = "best kinds" if one.candidate.name in best_kinds else "best form" if is_best_form else "others"
+        if one.share > LEAST_PROMISE[group] * promises[0].share and len(kept) < most:
+            kept.append(one)
+    return kept
+
+
+def _first_fit(candidate: Candidate, start: Effect, score_test: ScoreTest, scales: Scales, effort: Effort) -> ScreenedCandidate:
+    """Fit a candidate and the free parameters to the views of a score test."""
     best = fit(
         score_test.views,
-        model.with_effect(start),
-        free,
-        max_steps=turns,
-        tolerance=1e-3,
-        frozen=held,
+        score_test.model.with_effect(start),
+        free_with(score_test.free, score_test.model, candidate, scales),
+        max_steps=effort.max_steps,
+        tolerance=FIRST_FIT_TOLERANCE,
+        frozen=len(score_test.free),
         with_equations=False,
         initial_derivatives=score_test.initial_derivatives,
     )
@@ -322,15 +186,154 @@ def _first_fit(candidate: Candidate, start: Effect, score_test: ScoreTest, scale
     return ScreenedCandidate(max(square - count, 0.0) / max(score_test.total - count, 0.01 * count), candidate, best)
 
 
-def _finalists(quick: list[ScreenedCandidate], count: int, forms: int) -> list[ScreenedCandidate]:
-    """The best form of each of the best kinds, and some more forms of the best kind; none that is far behind."""
-    quick = sorted(quick, key=lambda one: one.left)
+def _finalists(screened: list[ScreenedCandidate], effort: Effort) -> list[ScreenedCandidate]:
+    """The best form of each of the best kinds, and more forms of the best kind; none that leaves far more than the best."""
+    screened = sorted(screened, key=lambda one: one.left)
     chosen: list[ScreenedCandidate] = []
-    for entry in quick:
-        own = sum(1 for other in chosen if other.candidate.name == entry.candidate.name)
-        near = entry.left < MOST_TIMES_THE_BEST * (quick[0].left + 0.04) or len(chosen) < 2
-        if near and (own == 0 or (own < forms and entry.candidate.name == chosen[0].candidate.name)):
-            chosen.append(entry)
-        if len({other.candidate.name for other in chosen}) >= count and len(chosen) > count:
+    for one in screened:
+        own = sum(1 for other in chosen if other.candidate.name == one.candidate.name)
+        near = one.left < MOST_TIMES_THE_BEST * (screened[0].left + FLOOR_SHARE) or len(chosen) < 2
+        if near and (own == 0 or (own < effort.forms and one.candidate.name == chosen[0].candidate.name)):
+            chosen.append(one)
+        if len({other.candidate.name for other in chosen}) >= effort.kinds and len(chosen) > effort.kinds:
             break
-    return chosen[: count + forms - 1]
+    return chosen[: effort.kinds + effort.forms - 1]
+
+
+def _final_fit(
+    one: ScreenedCandidate, whole: Sequence[TrialView], found: Fit, score_test: ScoreTest, scales: Scales, effort: Effort
+) -> FittedCandidate:
+    """Fit a candidate and the free parameters to everything, and judge it on stretches that the fit has not seen."""
+    # Friction is far from linear, and its derivatives are cheap, so they are not frozen.
+    frozen = next((i for i, item in enumerate(found.free) if item.name in FRICTION_PARAMETERS), len(found.free))
+    best = fit(
+        whole,
+        one.fit.model,
+        free_with(found.free, found.model, one.candidate, scales),
+        max_steps=effort.max_steps,
+        tolerance=effort.tolerance,
+        frozen=frozen,
+        initial_derivatives=score_test.initial_derivatives,
+    )
+    return FittedCandidate(one.candidate, best, held_out_squares(whole, best))
+
+
+def free_with(free: Sequence[FreeParameter], model: Model, candidate: Candidate, scales: Scales) -> tuple[FreeParameter, ...]:
+    """Return free parameters of a model and those of a candidate on top of it."""
+    if candidate.name in DIRECTLY_ESTIMATED:
+        return tuple(free)
+    return (*free, *candidate.free_parameters(len(model.effects), scales, abs(model.parameters.gain)))
+
+
+# --- where a fit starts
+
+
+def starting_points(
+    candidate: Candidate, score_test: ScoreTest, whole: Sequence[TrialView], scales: Scales
+) -> list[tuple[float, Effect]]:
+    """Return starting points of a candidate's fit, best first, each with the decrease of the squares that it promises.
+
+    Parameters
+    ----------
+    candidate : Candidate
+    score_test : ScoreTest
+        Of the fit to which the candidate is added.
+    whole : sequence of TrialView
+        All texels and samples, for direct estimates.
+    scales : Scales
+    """
+    if candidate.name == "dead-texels":
+        effect = unresponsive_texels(whole, score_test.model, candidate, scales.texels)
+        return [] if effect is None else [(score_test.score(score_test.model.with_effect(effect))[0], effect)]
+    if candidate.name == "quantization":
+        return _quantization_starts(candidate, score_test, whole)
+    if candidate.has_texel_parameters:
+        return _texel_parameter_starts(candidate, score_test, scales)
+    if candidate.form.placement is not None:
+        starts = [_displacement_start(candidate, score_test, scales), *_large_displacements(candidate, score_test, scales)]
+        return sorted(starts, key=lambda entry: -entry[0])
+    return _scaled_starts(candidate, score_test, scales)
+
+
+def _scaled_starts(candidate: Candidate, score_test: ScoreTest, scales: Scales) -> list[tuple[float, Effect]]:
+    """Points of the search ranges, each scaled along the candidate's strength to the best length of its score test."""
+    model, gain = score_test.model, abs(score_test.model.parameters.gain)
+    strength, inverse, tried = candidate.strength_parameter(), candidate.inverse_strength_parameter(), []
+    for values in candidate.starting_values(scales, gain):
+        effect = candidate.effect(values, scales.texels, gain)
+        promise, length = score_test.score(model.with_effect(effect))
+        if strength is not None:
+            parameter = next(q.scaled(gain) for q in candidate.form.parameters if q.name == strength)
+            if parameter.low >= 0.0 and length <= 0.0:
+                continue
+            longer = values[strength] * np.clip(length, -LONGEST_STEP, LONGEST_STEP)
+            scaled = float(np.clip(longer, parameter.low, parameter.high))
+            effect = candidate.effect({**values, strength: scaled}, scales.texels, gain)
+        elif length <= 0.0:
+            continue
+        elif inverse is not None:
+            parameter = next(q.scaled(gain) for q in candidate.form.parameters if q.name == inverse)
+            nearer = values[inverse] / np.clip(length, SHORTEST_STEP, LONGEST_STEP)
+            scaled = float(np.clip(nearer, parameter.low, parameter.high))
+            other = candidate.effect({**values, inverse: scaled}, scales.texels, gain)
+            # The score test is linear and the inverse strength is not: take the one that fits better as it is.
+            effect = max((effect, other), key=lambda one: score_test.decrease(model.with_effect(one)))
+        tried.append((promise, effect))
+    return sorted(tried, key=lambda entry: -entry[0])
+
+
+def _quantization_starts(candidate: Candidate, score_test: ScoreTest, whole: Sequence[TrialView]) -> list[tuple[float, Effect]]:
+    """Steps that are estimated from the readings. If they are seen in the readings, they promise enough to be fitted."""
+    model = score_test.model
+    visible = few_levels(moving_readings(whole, model)) is not None
+    least = VISIBLE_STEPS_PROMISE * score_test.total if visible else 0.0
+    starts = quantization_starts(whole, model, candidate)
+    decreases = [(score_test.decrease(model.with_effect(effect)), effect) for effect in starts]
+    return [(max(decrease, least), effect) for decrease, effect in sorted(decreases, key=lambda entry: -entry[0])]
+
+
+def _texel_parameter_starts(candidate: Candidate, score_test: ScoreTest, scales: Scales) -> list[tuple[float, Effect]]:
+    """The neutral values, with the promise of a small step of each texel by a length of its own."""
+    gain = abs(score_test.model.parameters.gain)
+    parameter = next(q.scaled(gain) for q in candidate.form.parameters if q.per_texel)
+    scale = scales.reading if parameter.unit == "unit" else 1.0
+    step = float(parameter.default) + TEXEL_STEP * scale
+    moved = candidate.effect({parameter.name: step}, scales.texels, gain)
+    promise = score_test.score_of_texels(score_test.model.with_effect(moved))
+    return [(promise, candidate.effect({}, scales.texels, gain))]
+
+
+def _displacement_start(candidate: Candidate, score_test: ScoreTest, scales: Scales) -> tuple[float, Effect]:
+    """The best small displacement of the texels: a joint score test of a small step of each parameter."""
+    gain = abs(score_test.model.parameters.gain)
+    parameters = candidate.form.parameters
+    neutral = {name: 0.0 for name in candidate.form.neutral}
+    steps = [SMALL_SHIFT * scales.pitch if q.unit == "m" else SMALL_TURN for q in parameters]
+    models = [
+        score_test.model.with_effect(candidate.effect({**neutral, q.name: step}, scales.texels, gain))
+        for q, step in zip(parameters, steps, strict=True)
+    ]
+    promise, best = score_test.joint_score(models)
+    limits = [LARGEST_SHIFT * scales.pitch if q.unit == "m" else LARGEST_TURN for q in parameters]
+    lengths = [float(np.clip(b * s, -m, m)) for b, s, m in zip(best, steps, limits, strict=True)]
+    values = {q.name: length for q, length in zip(parameters, lengths, strict=True)}
+    return promise, candidate.effect(values, scales.texels, gain)
+
+
+def _large_displacements(candidate: Candidate, score_test: ScoreTest, scales: Scales) -> list[tuple[float, Effect]]:
+    """Shifts by a good part of the pitch, for indenters other than spheres.
+
+    Under a flat indenter small shifts change nothing, and large ones add and remove texels.
+    """
+    gain = abs(score_test.model.parameters.gain)
+    names = {q.name for q in candidate.form.parameters}
+    indenter = score_test.views[0].predictor.rig.indenter
+    if not {"x", "y"} <= names or indenter is None or indenter.radius is not None:
+        return []
+    tried = []
+    for step in LARGE_SHIFTS:
+        for x, y in DIRECTIONS:
+            values = {**dict.fromkeys(names, 0.0), "x": step * x * scales.pitch, "y": step * y * scales.pitch}
+            effect = candidate.effect(values, scales.texels, gain)
+            tried.append((score_test.decrease(score_test.model.with_effect(effect)), effect))
+    return tried

@@ -1,0 +1,157 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Score tests: by how much could the squares of a fit fall if its model also changed in some direction?"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ...effects.engine.registry import form_of
+from ..fitting.least_squares import FRICTION_PARAMETERS, Fit, FreeParameter, TrialView, derivatives, value_of
+from ..forward.predictor import Model
+
+RIDGE = 1e-10
+"""Added to the diagonal of a Gram matrix, as a share of one plus its trace."""
+LEAST_OWN_SHARE = 1e-9
+"""Least share of a change that the free parameters cannot make themselves; below it the change counts as theirs."""
+LEAST_SENSITIVITY = 1e-12
+"""Least squared change of a texel's residual, as a share of the largest, for the texel to count."""
+
+
+def visible_parameters(views: Sequence[TrialView], found: Fit) -> tuple[FreeParameter, ...]:
+    """Return the free parameters of a fit that act on some views: without net forces, friction does not show."""
+    if any(view.with_forces for view in views):
+        return found.free
+
+    def acts_on_friction(item: FreeParameter) -> bool:
+        if item.effect < 0:
+            return item.name in FRICTION_PARAMETERS
+        effect = found.model.effects[item.effect]
+        return form_of(effect.name, effect.form).friction_law is not None
+
+    return tuple(item for item in found.free if not acts_on_friction(item))
+
+
+def ridged(gram: np.ndarray) -> np.ndarray:
+    """Return a Gram matrix with a small ridge, so that it can be inverted."""
+    return gram + RIDGE * (1.0 + np.trace(gram)) * np.eye(len(gram))
+
+
+class ScoreTest:
+    """Residual of a fit on some views, and its derivatives by the common free parameters.
+
+    Parameters
+    ----------
+    views : sequence of TrialView
+    found : Fit
+
+    Attributes
+    ----------
+    model : Model
+        Of the fit.
+    free : tuple of FreeParameter
+        Those that act on the views.
+    residual : list of (T, c + 3) float
+        For each view.
+    tables : list of (p, T, c + 3) float
+        By how much a step along each of the p common parameters lowers the residual, for each view.
+    derivatives : list of (p, T (c + 3)) float
+        The same as rows.
+    gram : (p, p) float
+        Their scalar products.
+    along : (p,) float
+        Their scalar products with the residual.
+    """
+
+    def __init__(self, views: Sequence[TrialView], found: Fit):
+        self.views, self.model, self.free = views, found.model, visible_parameters(views, found)
+        common = tuple(item for item in self.free if not item.per_texel)
+        at = [item.to_coordinate(value_of(found.model, item)) for item in common]
+        self.residual = [view.residual(found.model) for view in views]
+        self.tables = [np.empty((len(common), *r.shape)) for r in self.residual]
+        for view, r, table in zip(views, self.residual, self.tables, strict=True):
+            derivatives(view, found.model, common, at, r, table, 0)
+        self.derivatives = [table.reshape(len(common), -1) for table in self.tables]
+        self.gram = ridged(np.sum([c @ c.T for c in self.derivatives], axis=0))
+        self.along = sum(c @ r.ravel() for c, r in zip(self.derivatives, self.residual, strict=True))
+
+    @property
+    def initial_derivatives(self) -> list[np.ndarray] | None:
+        """Derivatives with which a fit of these parameters and more may begin; None if some belong to single texels."""
+        return None if any(item.per_texel for item in self.free) else self.tables
+
+    @property
+    def total(self) -> float:
+        """Sum of squares of the residual."""
+        return sum(float(np.vdot(r, r)) for r in self.residual)
+
+    def score(self, model: Model) -> tuple[float, float]:
+        """Test the change from the fit's model to another one.
+
+        Returns
+        -------
+        decrease : float
+            By how much the squares fall at best along the change, to first order, if the free parameters follow.
+        length : float
+            The best length along the change; 1 is the other model.
+        """
+        cross, square, dot = np.zeros(len(self.gram)), 0.0, 0.0
+        for view, r, c in zip(self.views, self.residual, self.derivatives, strict=True):
+            change = (r - view.residual(model)).ravel()
+            cross += c @ change
+            square += float(np.vdot(change, change))
+            dot += float(np.vdot(change, r.ravel()))
+        if not np.isfinite(square):
+            return 0.0, 0.0
+        weights = np.linalg.solve(self.gram, cross)
+        own_square, own_dot = square - float(weights @ cross), dot - float(weights @ self.along)
+        if own_square <= LEAST_OWN_SHARE * square or own_square <= 0:
+            return 0.0, 0.0
+        return own_dot**2 / own_square, own_dot / own_square
+
+    def score_of_texels(self, model: Model) -> float:
+        """Return by how much the squares fall at best if each texel has a length of its own, less what noise alone gives.
+
+        Parameters
+        ----------
+        model : Model
+            In which all texels change.
+        """
+        n = len(self.views[0].predictor.rig.texels)
+        dot, square = np.zeros(n), np.zeros(n)
+        for view, r in zip(self.views, self.residual, strict=True):
+            change = (r - view.residual(model))[:, : len(view.texels)]
+            dot[view.texels] += (change * r[:, : len(view.texels)]).sum(axis=0)
+            square[view.texels] += (change * change).sum(axis=0)
+        seen = square > LEAST_SENSITIVITY * max(square.max(initial=0.0), 1e-300)
+        return max(float((dot[seen] ** 2 / square[seen]).sum()) - seen.sum(), 0.0)
+
+    def joint_score(self, models: Sequence[Model]) -> tuple[float, np.ndarray]:
+        """Test the changes to several models at once.
+
+        Returns
+        -------
+        decrease : float
+            By how much the squares fall at best, to first order, beyond what the free parameters can do.
+        lengths : (len(models),) float
+            The best lengths along the changes.
+        """
+        changes = [
+            [(r - view.residual(model)).ravel() for view, r in zip(self.views, self.residual, strict=True)] for model in models
+        ]
+        size = len(self.gram)
+        gram, along = np.zeros((size + len(changes),) * 2), np.zeros(size + len(changes))
+        for i, r in enumerate(self.residual):
+            x = np.vstack([self.derivatives[i], *(change[i] for change in changes)])
+            gram += x @ x.T
+            along += x @ r.ravel()
+        best = np.linalg.solve(ridged(gram), along)
+        decrease = float(along @ best) - float(self.along @ np.linalg.solve(self.gram, self.along))
+        return decrease, best[size:]
+
+    def decrease(self, model: Model) -> float:
+        """Return by how much another model lowers the squares as it is."""
+        before = sum(float(np.vdot(r, r)) for r in self.residual)
+        after = sum(float(np.vdot(r, r)) for r in (view.residual(model) for view in self.views))
+        return before - after
