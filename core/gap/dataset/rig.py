@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Rigs: a TOML file that says what was measured, beside CSV files with the measurements (docs/gap.md describes both).
+"""Rigs: a TOML file that describes a measurement, and one CSV file for each trial (docs/gap.md describes both).
 
-Everything a rig can get wrong is said here, in one sentence, before anything is computed.
+Every mistake in a rig raises an error here, in one sentence, before anything is computed.
 """
 
 from __future__ import annotations
@@ -26,22 +26,22 @@ POSE, TURN, SLIDE = ("x", "y", "z"), ("qw", "qx", "qy", "qz"), ("slide_x", "slid
 FORCE = ("force_x", "force_y", "force_z")
 MOST_TEXELS = 65536
 LONGEST_STEP = 5.0
-"""Seconds between samples above which the clock is taken for one in milliseconds."""
+"""Seconds between samples above which the clock must be in milliseconds."""
 
 
 @dataclass(frozen=True)
 class Indenter:
-    """What presses on the sensor.
+    """The body that presses on the sensor.
 
     Attributes
     ----------
     mesh : TriangleMesh
-        In the indenter's own frame, whose origin is the pose's point, metres.
+        In metres, in the indenter's own frame. Its origin is the point whose position a pose gives.
     radius : float or None, metres
-        Of a ball; then contact is computed from the true sphere.
+        Of a sphere; then contact is computed with the exact sphere.
     name : str
     edges : (3,) float or None, metres
-        Full sizes of a box about the pose's point; then contact is computed from them.
+        Full sizes of a box about the origin; then contact is computed with the exact box.
     """
 
     mesh: TriangleMesh
@@ -65,13 +65,13 @@ class Trial:
     position, quaternion : (T, 3), (T, 4) float, or None
         Of the indenter in the sensor's frame.
     level : (T,) float or None
-        Depth (m, every texel alike) or force (N, shared by all texels).
+        Depth of all texels (m), or force that all texels share (N).
     slide : (T, 2) float, metres
-        Travel of the surface along the sensor's x and y; zero where none was recorded.
+        Travel of the surface along the sensor's x and y; zero if none was recorded.
     reading : (T, n) float or None, the sensor's unit
-        NaN where a value is missing.
+        NaN if a value is missing.
     force : (T, 3) float or None, newtons
-        On the sensor; NaN where missing or not recorded.
+        Net force on the sensor; NaN if a component is missing.
     """
 
     name: str
@@ -93,23 +93,23 @@ class Trial:
 
 @dataclass(frozen=True)
 class Rig:
-    """A sensor, what pressed on it, and what was recorded.
+    """A sensor, the indenter, and what was recorded.
 
     Attributes
     ----------
     name : str
     texels : Texels
     parameters : SensorParameters
-        The sensor's own words, defaults for what it leaves out.
+        Those that the rig states, and defaults for the others.
     given : frozenset of str
-        Parameters that the rig states.
+        Names of the parameters that the rig states.
     thickness : float or None, metres
     grid : (int, int, (float, float)) or None
-        Rows, columns and pitch, when the sensor was given as a grid.
+        Rows, columns and pitch, if the sensor is given as a grid.
     indenter : Indenter or None
     trials : tuple of Trial
     words : mapping
-        The `[sensor]` table as it was written.
+        The `[sensor]` table of the file.
     warnings : tuple of str
     """
 
@@ -125,7 +125,7 @@ class Rig:
     warnings: tuple[str, ...] = ()
 
     def of(self, use: str) -> tuple[Trial, ...]:
-        """Return the trials for one use."""
+        """Return the trials of one use, "fit" or "check"."""
         return tuple(trial for trial in self.trials if trial.use == use)
 
 
@@ -159,7 +159,7 @@ def read_rig(path: str | Path) -> Rig:
         trial, said = _trial(entry, number, folder, path, len(texels), indenter is not None)
         trials.append(trial)
         warnings += said
-    began = min(float(trial.time[0]) for trial in trials)  # recordings of one clock keep their order on it
+    began = min(float(trial.time[0]) for trial in trials)  # recordings keep their order on a common clock
     trials = [replace(trial, time=trial.time - began) for trial in trials]
     names = [trial.name for trial in trials]
     for name in names:
@@ -189,6 +189,7 @@ def read_rig(path: str | Path) -> Rig:
 
 
 def _toml(path: Path) -> dict[str, Any]:
+    """Contents of the TOML file."""
     try:
         with path.open("rb") as file:
             return tomllib.load(file)
@@ -201,12 +202,14 @@ def _toml(path: Path) -> dict[str, Any]:
 
 
 def _known(table: Mapping[str, Any], keys: set[str], where: str) -> None:
+    """Refuse unknown keys of a table."""
     for key in table:
         if key not in keys:
             raise FileError(f"{where} has '{key}', which means nothing there: use one of {', '.join(sorted(keys))}.")
 
 
 def _table(words: Mapping[str, Any], key: str, path: Path) -> dict[str, Any]:
+    """A table of the file that must be there."""
     table = words.get(key)
     if not isinstance(table, dict):
         raise FileError(f"'{path.name}' has no [{key}]: describe it there.")
@@ -214,7 +217,7 @@ def _table(words: Mapping[str, Any], key: str, path: Path) -> dict[str, Any]:
 
 
 def _inside(name: Any, folder: Path, what: str, path: Path) -> Path:
-    """Return the path of a file beside the rig; anything that leads out of its folder is refused."""
+    """Path of a file beside the rig; a path that leads out of its folder is refused."""
     if not isinstance(name, str) or not name.strip():
         raise FileError(f"{what} of '{path.name}' names no file: write the name of one beside the rig.")
     found = (folder / name).resolve()
@@ -228,6 +231,7 @@ def _inside(name: Any, folder: Path, what: str, path: Path) -> Path:
 
 
 def _numbers(value: Any, count: int, what: str, path: Path) -> tuple[float, ...]:
+    """A number of positive numbers, in metres."""
     items = value if isinstance(value, list) else [value]
     good = len(items) == count and all(isinstance(v, int | float) and not isinstance(v, bool) for v in items)
     if not good or not all(np.isfinite(v) and v > 0 for v in items):
@@ -240,6 +244,7 @@ def _numbers(value: Any, count: int, what: str, path: Path) -> tuple[float, ...]
 
 
 def _texels(sensor: dict[str, Any], folder: Path, path: Path) -> tuple[Texels, tuple | None]:
+    """Texels of the sensor, and its grid if it is given as one."""
     if ("grid" in sensor) == ("mesh" in sensor):
         raise FileError(f"[sensor] of '{path.name}' needs either grid = {{ rows, columns, pitch }} or mesh = \"….ply\".")
     if "mesh" in sensor:
@@ -295,6 +300,7 @@ def grid_texels(rows: int, columns: int, pitch_x: float, pitch_y: float) -> Texe
 
 
 def _mesh(path: Path, name: str) -> tuple[TriangleMesh, list[str]]:
+    """A triangle mesh from a file, and remarks about it."""
     import trimesh
 
     try:
@@ -307,6 +313,7 @@ def _mesh(path: Path, name: str) -> tuple[TriangleMesh, list[str]]:
 
 
 def _parameters(sensor: dict[str, Any], path: Path) -> tuple[SensorParameters, float | None]:
+    """Parameters of the sensor, and its thickness."""
     where = f"[sensor] of '{path.name}'"
     _known(sensor, {*SENSOR_PARAMETERS, *SHAPE_WORDS, "name"}, where)
     thickness = None
@@ -334,6 +341,7 @@ def _parameters(sensor: dict[str, Any], path: Path) -> tuple[SensorParameters, f
 
 
 def _indenter(words: dict[str, Any], folder: Path, path: Path) -> Indenter:
+    """The indenter."""
     _known(words, {"shape", "mesh", "name"}, f"[indenter] of '{path.name}'")
     if ("shape" in words) == ("mesh" in words):
         raise FileError(f"[indenter] of '{path.name}' needs either a shape or a mesh, and not both.")
@@ -370,6 +378,7 @@ def _indenter(words: dict[str, Any], folder: Path, path: Path) -> Indenter:
 
 
 def _trial(entry: Any, number: int, folder: Path, path: Path, texels: int, has_indenter: bool) -> tuple[Trial, list[str]]:
+    """A trial from its entry in the rig and its CSV file, and remarks about it."""
     where = f"Trial {number}"
     if not isinstance(entry, dict):
         raise FileError(f"{where} of '{path.name}' is not a table: write [[trial]] above its file.")
@@ -420,10 +429,12 @@ def _trial(entry: Any, number: int, folder: Path, path: Path, texels: int, has_i
 
 
 def _meaning(name: str) -> bool:
+    """Whether a column of this name is used."""
     return name in ("time", "depth", "force", *POSE, *TURN, *SLIDE, *FORCE) or name.startswith("texel_")
 
 
 def _clock(columns: Mapping[str, np.ndarray], file: Path) -> np.ndarray:
+    """Times of the samples."""
     if "time" not in columns:
         raise FileError(f"'{file.name}' has no column `time`: add one, in seconds.")
     time = columns["time"]
@@ -450,6 +461,7 @@ def _clock(columns: Mapping[str, np.ndarray], file: Path) -> np.ndarray:
 
 
 def _stimulus_kind(columns: Mapping[str, np.ndarray], file: Path, has_indenter: bool) -> str:
+    """What drove the rig: "pose", "depth" or "force"."""
     some_pose = [name for name in POSE if name in columns]
     kinds = [kind for kind in ("depth", "force") if kind in columns]
     if some_pose and len(some_pose) < 3:
@@ -468,6 +480,7 @@ def _stimulus_kind(columns: Mapping[str, np.ndarray], file: Path, has_indenter: 
 
 
 def _readings(columns: Mapping[str, np.ndarray], texels: int, file: Path) -> np.ndarray | None:
+    """Readings of all texels, (T, n); None without any."""
     names = [name for name in columns if name.startswith("texel_")]
     if not names:
         return None
@@ -487,6 +500,7 @@ def _readings(columns: Mapping[str, np.ndarray], texels: int, file: Path) -> np.
 
 
 def _vector(columns: Mapping[str, np.ndarray], names: tuple[str, ...], partial: bool) -> np.ndarray | None:
+    """Columns of a vector, (T, c); None if they are missing."""
     found = [name for name in names if name in columns]
     if not found or (len(found) < len(names) and not partial and names is not SLIDE):
         return None
@@ -496,6 +510,7 @@ def _vector(columns: Mapping[str, np.ndarray], names: tuple[str, ...], partial: 
 
 
 def _turns(columns: Mapping[str, np.ndarray], file: Path) -> np.ndarray:
+    """Orientations of the indenter, (T, 4)."""
     found = [name for name in TURN if name in columns]
     if not found:
         return np.tile([1.0, 0.0, 0.0, 0.0], (len(columns["x"]), 1))
@@ -509,14 +524,14 @@ def _turns(columns: Mapping[str, np.ndarray], file: Path) -> np.ndarray:
         raise FileError(
             f"Line {bad[0] + 2} of '{file.name}': qw qx qy qz have length {length[bad[0]]:.3g}, a rotation has length 1."
         )
-    for i in range(1, len(turns)):  # the same rotation has two quaternions: take the one near the last
+    for i in range(1, len(turns)):  # of the two quaternions of a rotation take the one near the previous
         if turns[i] @ turns[i - 1] < 0:
             turns[i] *= -1.0
     return turns
 
 
 def _gaps_filled(stimuli: list[np.ndarray | None], time: np.ndarray, file: Path) -> list[str]:
-    """Interpolate missing stimulus values in place."""
+    """Interpolate missing values of the stimulus in place; return a remark if there were any."""
     said, total = [], 0
     for values in stimuli:
         if values is None:
@@ -536,6 +551,7 @@ def _gaps_filled(stimuli: list[np.ndarray | None], time: np.ndarray, file: Path)
 
 
 def _responds(trial: Trial) -> bool:
+    """Whether a trial has any response other than zero."""
     parts = [part for part in (trial.reading, trial.force) if part is not None]
     return any(np.nanmax(np.abs(part), initial=0.0) > 0 for part in parts if not np.isnan(part).all())
 
@@ -548,7 +564,7 @@ def _check_units(
     thickness: float | None,
     path: Path,
 ) -> None:
-    """Refuse lengths that can only be millimetres: a stimulus past the sensor's back, or one that never comes near it."""
+    """Refuse lengths that must be millimetres: a depth far beyond the sensor's back, or a pose far away from it."""
     deepest = parameters.max_penetration
     for trial in trials:
         if trial.stimulus == "depth":

@@ -1,16 +1,19 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What earns a place and what is a sure name: gaps of readings and of forces, steps that are seen, and what a formula lacks."""
 
+from dataclasses import replace
+
+import gap_cases as cases
 import numpy as np
 import pytest
 
 from palpate.core.effects.engine.registry import effect, form_of, kind_of
 from palpate.core.gap.dataset.rig import Rig, grid_texels
 from palpate.core.gap.fitting.least_squares import FRICTION_LEVEL, free_base_parameters, with_values
-from palpate.core.gap.forward.predictor import Model
+from palpate.core.gap.forward.predictor import Model, Predictor
 from palpate.core.gap.selection.base_model import friction_parameters_to_search
-from palpate.core.gap.selection.candidates import Candidate
-from palpate.core.gap.selection.confidence import is_doubtful, least_share, may_absorb_misfit
+from palpate.core.gap.selection.candidates import Candidate, FittedCandidate
+from palpate.core.gap.selection.confidence import EXPLAINED, REPEATED_RATIO, is_doubtful, least_share, may_absorb_misfit
 from palpate.core.gap.selection.direct_estimates import companding_starts, few_levels
 from palpate.core.gap.selection.forward_selection import (
     FORCES,
@@ -21,7 +24,7 @@ from palpate.core.gap.selection.forward_selection import (
     SelectionStep,
     friction_kinds,
 )
-from palpate.core.gap.selection.view_set import ViewSet
+from palpate.core.gap.selection.view_set import view_set_of
 from palpate.core.model.sensor_parameters import SensorParameters
 
 WITH_FORCES, READ_ALONE = (NoiseFloor(np.full(2, 9.0), np.ones(2), np.array([900.0, count])) for count in (300.0, 0.0))
@@ -96,15 +99,19 @@ def test_without_net_forces_a_law_of_contact_and_a_readout_bend_one_curve():
     assert [is_doubtful(one, state, both, READ_ALONE) for one in both] == [False, True]
 
 
-def doubtful(second, gain, remaining_repeated=np.inf, first=None, **values):
+def step(left, **values):
+    """A step in which one form of each kind was judged, with what each leaves of the gap."""
+    kinds = [kind_of(name) for name in left]
+    judged = [FittedCandidate(Candidate(kind, kind.forms[0]), None, None) for kind in kinds]
+    return SelectionStep(judged, list(left.values()), **values)
+
+
+def doubtful(second, improvement, repeated=np.inf, first=None, **values):
+    """Whether a second effect is doubtful that leaves 1, beside a first one of which a repetition leaves `repeated`."""
     first = first or effect("offset", "listed", offset=(0.1, 0.2, 0.4, 0.3))
     other = effect(*second, **values)
-
-    class Alone(SelectionStep):
-        def of(self, name):
-            return 1.0
-
-    state = SelectionState(None, None, {other.name: Alone([], [], remaining_repeated=remaining_repeated)}, {other.name: gain})
+    found = step({other.name: 1.0}, remaining_repeated=repeated)
+    state = SelectionState(None, None, {other.name: found}, {other.name: improvement})
     return is_doubtful(other, state, [first, other], WITH_FORCES)
 
 
@@ -112,7 +119,9 @@ def test_a_small_effect_is_sure_where_it_closes_nearly_all_that_is_left():
     creep = ("creep", "exponential")
     assert not doubtful(creep, Improvement(0.2, 0.3)) and not doubtful(creep, Improvement(0.05, 0.9))
     assert doubtful(creep, Improvement(0.05, 0.5))
-    assert doubtful(creep, Improvement(0.2, 0.9), remaining_repeated=1.6)  # more of what is there already would do as well
+    assert doubtful(
+        creep, Improvement(0.2, 0.9), repeated=0.95 * REPEATED_RATIO
+    )
 
 
 def test_an_offset_that_fades_is_no_gain():
@@ -132,14 +141,10 @@ def test_what_a_kernel_lacks_at_the_rim_is_no_gain():
 def test_a_rival_closes_nearly_as_much():
     """Of a gap of which most is left whatever is taken, what two leave is much alike and what they close is not."""
 
-    class Two(SelectionStep):
-        def of(self, name):
-            return {"gain-mismatch": 8.0}[name]
-
-    step = Two([], [], remaining_before=12.0)
-    assert step.times_worse(10.4, "gain-mismatch") == pytest.approx(4.0 / 1.6)
-    assert step.times_worse(16.0, "gain-mismatch") == pytest.approx(4.0 / 1e-12)  # closes nothing
-    assert Two([], [], remaining_before=1000.0).times_worse(10.4, "gain-mismatch") == pytest.approx(1.3)
+    much, most = (step({"gain-mismatch": 8.0}, remaining_before=before) for before in (12.0, 1000.0))
+    assert much.times_worse(10.4, "gain-mismatch") == pytest.approx(4.0 / 1.6)
+    assert much.times_worse(16.0, "gain-mismatch") > 1e9  # closes nothing
+    assert most.times_worse(10.4, "gain-mismatch") == pytest.approx(1.3)
 
 
 @pytest.mark.parametrize(
@@ -147,13 +152,19 @@ def test_a_rival_closes_nearly_as_much():
 )
 def test_friction_is_looked_for_where_forces_are(beside):
     """What texels feel of each other is looked at without net forces, in which alone friction shows."""
-    view_set = ViewSet(["whole"], ["narrow"], ["rubbed"], ["thin"])
+    rig = cases.rig(trials=2, seconds=4.0)
+    trials = [replace(trial, force=np.zeros((len(trial.time), 3))) for trial in rig.trials]
+    views = view_set_of([Predictor(trial, rig) for trial in trials], (1.0, 1.0))
     model = Model(SensorParameters(), (effect(*beside),) if beside else ())
     for name in friction_kinds():
         kind = kind_of(name)
-        assert view_set.quick(Candidate(kind, kind.forms[0]), model) == (["whole"] if beside else ["rubbed"])
+        seen = views.quick(Candidate(kind, kind.forms[0]), model)
+        assert seen is (views.whole if beside else views.few_texels_with_forces)
+        assert all(view.with_forces for view in seen)
     creep = kind_of("creep")
-    assert view_set.quick(Candidate(creep, creep.forms[0]), model) == (["thin"] if beside else ["narrow"])
+    seen = views.quick(Candidate(creep, creep.forms[0]), model)
+    assert seen is (views.few_samples if beside else views.few_texels)
+    assert not any(view.with_forces for view in seen)
 
 
 def test_what_makes_a_sure_name():
@@ -161,7 +172,7 @@ def test_what_makes_a_sure_name():
     far, near = {"creep": 3.0}, {"creep": 1.2}
     assert least_share("quantization", near) == 0.0
     friction = least_share("stribeck", {"viscous-friction": 3.0})
-    assert least_share("hysteresis", far) < least_share("hysteresis", near) == friction == 0.5
+    assert least_share("hysteresis", far) < least_share("hysteresis", near) == friction == EXPLAINED
 
 
 def test_numbers_per_texel_bend_to_what_is_not_explained():
