@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A known effect, in a formula that the library does not have, put on top of real recordings.
+"""Known effects on top of real recordings, by formulas that the library does not have.
 
-The recordings keep their stimulus, their noise and all that no effect of the library explains; what the workflow did find in
-them is taken out first, since the question is about one effect more. How large that one is, is counted in units of what was
-left unexplained (root mean squares), without what a refitted gain, zero or damping takes up of it.
+The recordings keep their stimulus, their noise and everything that no effect of the library explains. Effects that the workflow
+found in them are taken out first, because the question is about one further effect. Its size is the root mean square of what it
+adds, less what a refitted gain, zero or damping takes up, in units of the root mean square of the unexplained residual.
 """
 
 from __future__ import annotations
@@ -19,11 +19,15 @@ from ._recordings import Columns, Recording
 
 SIZES = (1.0, 2.0, 4.0)
 """How many times as large as what was left unexplained."""
-LARGEST, STRONGEST = 0.3, 6.0
-"""Share of the range, and strength: beyond them it is no effect on a sensor but another sensor."""
+LARGEST_SHARE, LARGEST_STRENGTH = 0.3, 6.0
+"""Share of the range, and strength, beyond which an effect makes another sensor."""
 Change = Callable[[np.ndarray, np.ndarray, np.ndarray, float], np.ndarray]
-"""From times (T,) since a recording began, in shares of the longest one's length, loads (T, 1) and readings (T, n), both in
-shares of the largest, with a strength, to what a sensor with the effect reads: one sensor, in long recordings and short."""
+"""How an effect changes readings.
+
+Arguments are times (T,) since the recording began, as shares of the length of the longest recording; loads (T, 1) and readings
+(T, n), both as shares of the largest; and a strength. The result is the changed readings (T, n). One sensor has one effect, in
+long recordings and in short ones.
+"""
 
 
 def _low_pass(time: np.ndarray, x: np.ndarray, tau: float) -> np.ndarray:
@@ -90,29 +94,29 @@ CHANGES: dict[str, Change] = {
     "gain-mismatch": gain_mismatch,
     "offset": offset,
 }
-BETWEEN_TEXELS = ("gain-mismatch", "offset")
+TEXEL_EFFECTS = ("gain-mismatch", "offset")
 
 
 @dataclass(frozen=True)
-class Ground:
-    """Recordings without what was found in them.
+class CleanedRecordings:
+    """Recordings without the effects that were found in them.
 
     Attributes
     ----------
     recording : Recording
-    rest : float
-        Root mean square of what was left unexplained, in the sensor's unit, and
-    share : float
-        the same as a share of the range.
+    residual_rms : float
+        Root mean square of the unexplained residual, in the sensor's unit.
+    residual_share : float
+        The same as a share of the range.
     """
 
     recording: Recording
-    rest: float
-    share: float
+    residual_rms: float
+    residual_share: float
 
 
-def without_what_was_found(recording: Recording, result: Any) -> Ground:
-    """Take what the effects that were found change in the model off the readings."""
+def without_found_effects(recording: Recording, result: Any) -> CleanedRecordings:
+    """Subtract from the readings what the effects that were found change in the model."""
     trials, left = [], []
     for predictor, (name, use, columns) in zip(result.predictors, recording.trials, strict=True):
         best, base = (predictor.predict(model).reading for model in (result.best.model, result.base.model))
@@ -120,11 +124,11 @@ def without_what_was_found(recording: Recording, result: Any) -> Ground:
         left.append((predictor.trial.reading - best).ravel())
         trials.append((name, use, columns | {f"texel_{i}": texel for i, texel in enumerate(freed.T)}))
     rest = float(np.sqrt(np.nanmean(np.concatenate(left) ** 2)))
-    return Ground(replace(recording, trials=trials), rest, rest / result.full[0])
+    return CleanedRecordings(replace(recording, trials=trials), rest, rest / result.full[0])
 
 
-def every(recording: Recording, step: int) -> Recording:
-    """The same recordings of each `step`-th texel under a force that all share."""
+def thinned_texels(recording: Recording, step: int) -> Recording:
+    """Return the recordings of each `step`-th texel; a force that all texels share is reduced accordingly."""
     trials: list[tuple[str, str, Columns]] = []
     for name, use, columns in recording.trials:
         texels = [value for key, value in columns.items() if key.startswith("texel_")]
@@ -134,20 +138,23 @@ def every(recording: Recording, step: int) -> Recording:
     return replace(recording, sensor=re.sub(r"columns = \d+", f"columns = {len(kept)}", recording.sensor), trials=trials)
 
 
-def read_in_turn(recording: Recording) -> bool:
-    """Whether channels are read one after the other: a number for each does then all that a drift does, and not the reverse."""
+def is_multiplexed(recording: Recording) -> bool:
+    """Return whether channels are read one after the other.
+
+    Then parameters of single texels can do all that a drift does, and not the other way round.
+    """
     tables = [np.stack([v for k, v in columns.items() if k.startswith("texel_")], axis=1) for _, _, columns in recording.trials]
     return all(table.shape[1] > 1 and (np.isfinite(table).sum(axis=1) <= 1).all() for table in tables)
 
 
-def with_effect(ground: Ground, name: str, size: float) -> Recording | None:
-    """Return recordings with an effect of a size in units of what was left unexplained; None where it does not get so large."""
-    trials = ground.recording.trials
+def with_effect(cleaned: CleanedRecordings, name: str, size: float) -> Recording | None:
+    """Return recordings with an effect of a size in units of the unexplained residual; None if it cannot be so large."""
+    trials = cleaned.recording.trials
     texels = [key for key in trials[0][2] if key.startswith("texel_")]
-    if name in BETWEEN_TEXELS and len(texels) == 1:
+    if name in TEXEL_EFFECTS and len(texels) == 1:
         return None
     readings = [np.stack([columns[key] for key in texels], axis=1) for _, _, columns in trials]
-    zero = np.array([_first(channel) for channel in np.concatenate(readings).T])
+    zero = np.array([_resting_value(channel) for channel in np.concatenate(readings).T])
     full = max(float(np.nanmax(np.abs(r - zero))) for r in readings)
     plain = [np.nan_to_num((r - zero) / full) for r in readings]  # a channel that is not read out is at rest
 
@@ -164,29 +171,29 @@ def with_effect(ground: Ground, name: str, size: float) -> Recording | None:
         return made
 
     def size_of(made: list[np.ndarray]) -> float:
-        return _beyond_refitting(made, readings, times)
+        return _rms_beyond_refitting(made, readings, times)
 
-    strengths = np.geomspace(1e-3, STRONGEST, 14)
-    enough = [float(s) for s in strengths if size_of(changes(float(s))) >= size * ground.rest]
-    if not enough or size * ground.share > LARGEST:
+    strengths = np.geomspace(1e-3, LARGEST_STRENGTH, 14)
+    enough = [float(s) for s in strengths if size_of(changes(float(s))) >= size * cleaned.residual_rms]
+    if not enough or size * cleaned.residual_share > LARGEST_SHARE:
         return None
     low, high = enough[0] * float(strengths[0] / strengths[1]), enough[0]
     for _ in range(12):
         middle = float(np.sqrt(low * high))
-        low, high = (middle, high) if size_of(changes(middle)) < size * ground.rest else (low, middle)
+        low, high = (middle, high) if size_of(changes(middle)) < size * cleaned.residual_rms else (low, middle)
     changed = []
     for (trial, use, columns), reading, change in zip(trials, readings, changes(high), strict=True):
         changed.append((trial, use, columns | {key: (reading + change)[:, i] for i, key in enumerate(texels)}))
-    return replace(ground.recording, name=f"{ground.recording.name} with {name}", trials=changed)
+    return replace(cleaned.recording, name=f"{cleaned.recording.name} with {name}", trials=changed)
 
 
-def _first(channel: np.ndarray) -> float:
+def _resting_value(channel: np.ndarray) -> float:
     """Median of the first five values that were measured."""
     return float(np.median(channel[np.isfinite(channel)][:5]))
 
 
-def _beyond_refitting(changes: list[np.ndarray], readings: list[np.ndarray], times: list[np.ndarray]) -> float:
-    """Root mean square of what a common gain, zero and damping cannot make of the readings."""
+def _rms_beyond_refitting(changes: list[np.ndarray], readings: list[np.ndarray], times: list[np.ndarray]) -> float:
+    """Root mean square of changes, less what a common gain, zero and damping make of the readings."""
     rates = [np.gradient(r, t, axis=0) for r, t in zip(readings, times, strict=True)]
     change, reading, rate = (np.concatenate([a.ravel() for a in arrays]) for arrays in (changes, readings, rates))
     good = np.isfinite(change) & np.isfinite(reading) & np.isfinite(rate)

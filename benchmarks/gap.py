@@ -37,8 +37,6 @@ from ._hidden import cases
 HOUSE = Path(__file__).resolve().parent.parent
 MIX = {"own": 60, "other": 60, "none": 30, "two": 40, "outside": 30, "poor": 20}
 """Cases of each kind in a whole run."""
-SURE = 0.5
-"""Confidence from which a name is meant as one; see docs/gap.md."""
 FAILED: dict[str, Any] = {"outcome": "failed", "sure": [], "said": [], "verdict": "failed", "ambiguous": [], "experiment": ""}
 FAILED |= {"closed": None, "inside": []}
 """The score of a case that raised."""
@@ -153,6 +151,7 @@ def score(case: cases.Case, result: Any) -> dict[str, Any]:
     """Return what was said of a case and how right it is."""
     from palpate.core.gap.report.amended_sensor import with_mean_gain_moved
     from palpate.core.gap.report.experiments import next_experiment
+    from palpate.core.gap.report.sentences import SURE
 
     model = with_mean_gain_moved(result)
     sure = [named.name for named in result.findings if named.confidence >= SURE]

@@ -14,7 +14,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-from ._injected import CHANGES, SIZES, every, read_in_turn, with_effect, without_what_was_found
+from ._injected import CHANGES, SIZES, is_multiplexed, thinned_texels, with_effect, without_found_effects
 from ._recordings import LAST, SETS, Recording
 
 HOUSE = Path(__file__).resolve().parent.parent
@@ -33,7 +33,7 @@ GOALS = {
 INJECTED: dict[str, Callable[[Path], Recording]] = {
     "adhesive": SETS["adhesive"],
     "tube-by-place": SETS["tube-by-place"],
-    "insole": lambda data: every(SETS["insole"](data), 12),
+    "insole": lambda data: thinned_texels(SETS["insole"](data), 12),
 }
 """Recordings on top of which known effects are put."""
 
@@ -49,12 +49,12 @@ def run() -> Iterator[dict]:
     chosen = os.environ.get("PALPATE_REAL_SETS", ",".join([*SETS, "injected"])).split(",")
     for name in chosen:
         if name != "injected":
-            yield from _found_in(name, SETS[name](data))
+            yield from _figures_of(name, SETS[name](data))
     if "injected" in chosen:
-        yield from _recall(data)
+        yield from _recall_figures(data)
 
 
-def _found_in(name: str, recording: Recording) -> Iterator[dict]:
+def _figures_of(name: str, recording: Recording) -> Iterator[dict]:
     from palpate.core.gap.report import sentences, summary
     from palpate.core.gap.report.comparison import gap_errors, nrmse
 
@@ -77,11 +77,11 @@ def _found_in(name: str, recording: Recording) -> Iterator[dict]:
             print(f"{name}, {use}: {before:.2%} -> {after:.2%} of the range", file=sys.stderr, flush=True)
             figure = {"name": f"real.{name}.{found}.{use}", "value": after / before, "unit": "gap after / before"}
             yield figure | ({"goal": GOALS[name]} if use != "fit" and GOALS[name] else {})
-    yield from _friction(name, result)
+    yield from _friction_figures(name, result)
 
 
-def _friction(name: str, result: Any) -> Iterator[dict]:
-    """What the base model's own friction closes, of the error of a sensor without any: it is in every base, and no effect."""
+def _friction_figures(name: str, result: Any) -> Iterator[dict]:
+    """Error with the base model's own friction, as a share of the error without: friction is in every base model."""
     from palpate.core.gap.report.comparison import frictionless_nrmse, nrmse
 
     for use, without in (frictionless_nrmse(result) or {}).items():
@@ -90,29 +90,29 @@ def _friction(name: str, result: Any) -> Iterator[dict]:
         yield figure | ({"goal": GOALS[name]} if use == "check" else {})
 
 
-def _recall(data: Path) -> Iterator[dict]:
-    """How many of the effects that were put on top of real recordings are named for sure, and how many others are.
+def _recall_figures(data: Path) -> Iterator[dict]:
+    """How many of the injected effects are found for sure, and how many others are.
 
-    All of them count, and once more those alone that the recordings can tell by what was done to the sensor.
+    Once of all of them, and once of those that the recordings can identify.
     """
     outcomes: dict[tuple[float, str], Counter[str]] = {(size, of): Counter() for size in SIZES for of in ("all", "told")}
     alarms = 0
     for name, read in INJECTED.items():
         plain = read(data)
-        ground = without_what_was_found(plain, _diagnosed(plain, HOUSE / "build" / "real" / f"{name}-plain"))
-        alarms += bool(_sure(_diagnosed(ground.recording, HOUSE / "build" / "real" / f"{name}-freed")))
-        print(f"{name}: what was left unexplained is {ground.share:.2%} of the range", file=sys.stderr, flush=True)
+        cleaned = without_found_effects(plain, _diagnosed(plain, HOUSE / "build" / "real" / f"{name}-plain"))
+        alarms += bool(_sure_names(_diagnosed(cleaned.recording, HOUSE / "build" / "real" / f"{name}-freed")))
+        print(f"{name}: what was left unexplained is {cleaned.residual_share:.2%} of the range", file=sys.stderr, flush=True)
         for effect in CHANGES:
             for size in SIZES:
-                changed = with_effect(ground, effect, size)
+                changed = with_effect(cleaned, effect, size)
                 if changed is None:
                     continue
                 result = _diagnosed(changed, HOUSE / "build" / "real" / f"{name}-{effect}")
-                outcome, told = _outcome(effect, result), _is_told(effect, changed, result)
-                for of in ("all", "told") if told else ("all",):
+                outcome, identifiable = _outcome(effect, result), _is_identifiable(effect, changed, result)
+                for of in ("all", "told") if identifiable else ("all",):
                     outcomes[size, of][outcome] += 1
                 said = ", ".join(f"{one.name} {one.confidence}" for one in result.findings) or result.verdict
-                note = "" if told else " (these recordings cannot tell it)"
+                note = "" if identifiable else " (these recordings cannot tell it)"
                 print(f"{name} with {size:g} x {effect}: {outcome}: {said}{note}", file=sys.stderr, flush=True)
     for (size, of), count in outcomes.items():
         for what, key, goal in (("recall", "right", 0.85), ("wrong", "wrong", 0.0)):
@@ -122,7 +122,7 @@ def _recall(data: Path) -> Iterator[dict]:
     yield {"name": "real.injected.false_alarms", "value": alarms, "unit": f"of {len(INJECTED)}", "goal": 0}
 
 
-def _sure(result: Any) -> list[str]:
+def _sure_names(result: Any) -> list[str]:
     from palpate.core.gap.report.sentences import SURE
 
     return [one.name for one in result.findings if one.confidence >= SURE]
@@ -130,17 +130,17 @@ def _sure(result: Any) -> list[str]:
 
 def _outcome(effect: str, result: Any) -> str:
     """One word: right, wrong (another name for sure), ambiguous or missed."""
-    sure = _sure(result)
+    sure = _sure_names(result)
     if sure:
         return "right" if effect in sure and len(sure) == 1 else "wrong"
     return "ambiguous" if any(effect in (one.name, *one.rivals) for one in result.findings) else "missed"
 
 
-def _is_told(effect: str, recording: Recording, result: Any) -> bool:
-    """Whether recordings could tell an effect by what was done to the sensor in them, whatever came out."""
+def _is_identifiable(effect: str, recording: Recording, result: Any) -> bool:
+    """Whether recordings can identify an effect by what was done to the sensor, whatever was found."""
     from palpate.core.gap.selection.identifiability import curvature_ratio, indistinguishable, unidentifiable
 
-    if effect == "drift" and read_in_turn(recording):
+    if effect == "drift" and is_multiplexed(recording):
         return False
     curvature = curvature_ratio(result.of("fit"), result.best.model)
     return effect not in unidentifiable(result.coverage) and not indistinguishable(result.coverage, effect, curvature)

@@ -119,9 +119,7 @@ def test_a_small_effect_is_sure_where_it_closes_nearly_all_that_is_left():
     creep = ("creep", "exponential")
     assert not doubtful(creep, Improvement(0.2, 0.3)) and not doubtful(creep, Improvement(0.05, 0.9))
     assert doubtful(creep, Improvement(0.05, 0.5))
-    assert doubtful(
-        creep, Improvement(0.2, 0.9), repeated=0.95 * REPEATED_RATIO
-    )
+    assert doubtful(creep, Improvement(0.2, 0.9), repeated=0.95 * REPEATED_RATIO)
 
 
 def test_an_offset_that_fades_is_no_gain():
