@@ -6,7 +6,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from ..core.model.sensor_parameters import SensorParameters, unit_of
+from ..core.model.sensor_parameters import DAMPING_PER_STIFFNESS, SensorParameters, unit_of
 from . import console
 
 
@@ -61,7 +61,7 @@ def _stiffness(arguments: argparse.Namespace) -> None:
     if fit.offset_is_significant and fit.offset.value < 0:
         print(f"\nThe foam gives way by {fit.dead_zone * 1e3:.3g} mm before it carries: a dead zone, which the model's line")
         print("through zero does not have; add the effect dead-zone to the sensor for it.")
-    print(f"\nSuggested: k = {fit.k.value:.4g} N/m, cn = {0.01 * fit.k.value:.3g} N·s/m (1 % of k)")
+    print(f"\nSuggested: k = {fit.k.value:.4g} N/m, cn = {DAMPING_PER_STIFFNESS * fit.k.value:.3g} N·s/m (1 % of k)")
     if arguments.plot:
         from ..core.gap.calibration.plots import plot_stiffness
 

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from ..core.errors import SceneError
 from ..core.io.openrave import NUMBERS, OpenRaveSensor, openrave_xml, read_openrave, write_openrave
+from ..core.model.sensor_parameters import DEPTH_PER_THICKNESS
 from . import blender, console
 
 
@@ -41,7 +42,14 @@ def _show(arguments: argparse.Namespace) -> None:
     rows = [("sensor", "link", "thickness", *NUMBERS)]
     for sensor in sensors:
         values = [getattr(sensor.parameters, key) for key in NUMBERS]
-        rows.append((sensor.name, sensor.link, f"{sensor.parameters.max_penetration / 2:g}", *(f"{v:g}" for v in values)))
+        rows.append(
+            (
+                sensor.name,
+                sensor.link,
+                f"{sensor.parameters.max_penetration / DEPTH_PER_THICKNESS:g}",
+                *(f"{v:g}" for v in values),
+            )
+        )
     print(console.text_table(rows, "<<" + ">" * (1 + len(NUMBERS))))
     for sensor in sensors:
         _say_missing(sensor)

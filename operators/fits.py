@@ -8,10 +8,8 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, St
 
 from ..addon.authoring import exchange, sensor_report
 from ..core.errors import SensorError
+from ..core.model.sensor_parameters import DAMPING_PER_STIFFNESS
 from . import support
-
-DAMPING = 0.01
-"""Damping suggested for a stiffness, as a share of it in number (paper, section 3.4.1)."""
 
 
 class MeasurementFit(support.ErrorReporting, support.FileChooser):
@@ -102,7 +100,7 @@ class PALPATE_OT_stiffness_fit(MeasurementFit, bpy.types.Operator):
         chosen = fit.k if self.line == "ZERO" else fit.k_offset
         obj.palpate.k = chosen.value
         if self.with_damping:
-            obj.palpate.cn = DAMPING * chosen.value
+            obj.palpate.cn = DAMPING_PER_STIFFNESS * chosen.value
         self.picture(context, plot_stiffness, fit, "Palpate Stiffness Fit")
         text = f"k = {chosen.value:.4g} N/m (95 %: {chosen.low:.4g} to {chosen.high:.4g}) for {len(report.texels)} texels"
         if fit.offset_is_significant and fit.dead_zone > 0:

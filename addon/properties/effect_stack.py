@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The stack of effects of a sensor, `Object.palpate.effects`: properties made from the library, to and from plain data.
 
-A file that joins :mod:`..core.effects` shows up here by itself. Enums carry numbers of their own, made from the names, so that
-a saved file does not depend on what else the library has.
+A new file in the library of effects appears here by itself. The numbers of enum items are made from their names, so that a
+saved file does not depend on what else is in the library.
 """
 
 from __future__ import annotations
@@ -70,15 +70,17 @@ def _property(form: Form, parameter: Parameter):
 
 def _annotations() -> dict:
     made = {
-        "use": BoolProperty(name="Use", description="Take part", default=True, **FIXED),
+        "use": BoolProperty(name="Use", description="Use this effect", default=True, **FIXED),
         "show": BoolProperty(name="Show", description="Show its parameters", default=True, options=set()),
-        "kind": EnumProperty(name="Effect", description="What real sensors do", items=kind_items(), **FIXED),
-        "seed": IntProperty(name="Seed", description="Other random numbers for each", min=0, **FIXED),
+        "kind": EnumProperty(
+            name="Effect", description="Effect of a real sensor that the base model leaves out", items=kind_items(), **FIXED
+        ),
+        "seed": IntProperty(name="Seed", description="Seed of the random numbers", min=0, **FIXED),
     }
     for kind in registry.library().values():
         forms = _items((form.name, title(form.name), form.formula, "NONE") for form in kind.forms)
         made[form_key(kind)] = EnumProperty(
-            name="Form", description="Which formula", items=forms, default=kind.forms[0].name, **FIXED
+            name="Form", description="Formula of the effect", items=forms, default=kind.forms[0].name, **FIXED
         )
         for form in kind.forms:
             for parameter in form.parameters:
@@ -121,7 +123,7 @@ def stack(obj) -> tuple[Effect, ...]:
 
 
 def settings(obj) -> list[tuple]:
-    """Return everything that is set in a sensor's stack, in a form that can be compared."""
+    """Return all settings of a sensor's stack of effects as tuples that can be compared."""
     return [
         (item.kind, form_of(item).name, item.seed, *(getattr(item, key) for _, key in parameters(item)))
         for item in obj.palpate.effects
@@ -135,7 +137,7 @@ def put_stack(obj, effects) -> None:
     Raises
     ------
     EffectError
-        One of them means nothing; the sensor keeps what it has.
+        An effect is not valid; the sensor keeps the effects that it has.
     """
     gain = units.as_typed(obj.palpate.gain)
     registry.check(effects, obj.name, gain=gain)

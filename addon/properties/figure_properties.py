@@ -17,11 +17,11 @@ KINDS = (
 )
 FORMATS = (
     ("PNG", "PNG", "Pixels"),
-    ("PDF", "PDF", "Lines and text that stay lines and text"),
-    ("SVG", "SVG", "The same for web pages"),
+    ("PDF", "PDF", "Vector graphics with text as text"),
+    ("SVG", "SVG", "Vector graphics for web pages"),
 )
 EXPORTS = tuple((exporter.name.upper(), exporter.title, exporter.description) for exporter in exporters().values())
-_plain: dict = {"options": set()}
+_plain: dict = {"options": set()}  # a setting has no keyframes
 
 
 class PALPATE_PG_figures(bpy.types.PropertyGroup):
@@ -29,46 +29,46 @@ class PALPATE_PG_figures(bpy.types.PropertyGroup):
 
     folder: StringProperty(
         name="Folder",
-        description="Figures go here; // is the folder of the .blend",
+        description="Folder of the figures; // is the folder of the .blend",
         default="//figures",
         subtype="DIR_PATH",
         **_plain,
     )
     kinds: EnumProperty(
         name="Figures",
-        description="What is made; Shift-click adds one to those chosen",
+        description="Figures to make; Shift-click adds one to those chosen",
         items=KINDS,
         default={"SCENE", "STRIP", "CURVES", "NUMBERS"},
         options={"ENUM_FLAG"},
     )
     exports: EnumProperty(
         name="Data",
-        description="What is written beside them; Shift-click adds one to those chosen",
+        description="Data to write beside the figures; Shift-click adds one to those chosen",
         items=EXPORTS,
         options={"ENUM_FLAG"},
     )
     formats: EnumProperty(
         name="Files",
-        description="Of figures that are no renders; Shift-click adds one to those chosen",
+        description="File formats of figures that are not renders; Shift-click adds one to those chosen",
         items=FORMATS,
         default={"PNG", "PDF"},
         options={"ENUM_FLAG"},
     )
     sensors: EnumProperty(
         name="Sensors",
-        description="Whose figures",
-        items=(("ALL", "All Sensors", "Of the scene"), ("ACTIVE", "Active Object", "Only the active object's")),
+        description="Sensors that figures are made of",
+        items=(("ALL", "All Sensors", "Every sensor of the scene"), ("ACTIVE", "Active Object", "Only the active object")),
         **_plain,
     )
     frames: StringProperty(
         name="Frames",
-        description="Of scene and numbers, and where there are two or more of the strip, as in 12, 40-44; "
-        "empty: with the largest force",
+        description="Frames of the scene and the numbers, as in 12, 40-44; two or more are also the frames of the strip. "
+        "Empty: the frame with the largest force",
         **_plain,
     )
     width: EnumProperty(
         name="Width",
-        description="Column of a journal that figures fill",
+        description="Width of figures: a column of a journal",
         items=(
             ("SINGLE", "Single, 89 mm", "One column"),
             ("MIDDLE", "Middle, 140 mm", "One and a half columns"),
@@ -77,41 +77,41 @@ class PALPATE_PG_figures(bpy.types.PropertyGroup):
         default="DOUBLE",
         **_plain,
     )
-    dpi: IntProperty(name="Dots per Inch", description="Of PNG figures", default=300, min=50, max=1200, **_plain)
+    dpi: IntProperty(name="Dots per Inch", description="Resolution of PNG figures", default=300, min=50, max=1200, **_plain)
     engine: EnumProperty(
         name="Engine",
-        description="That renders",
+        description="Engine that renders the scene",
         items=(
             ("SCENE", "The Scene's", "As chosen in the render properties"),
-            ("CYCLES", "Cycles", "Light as it is"),
-            ("EEVEE", "EEVEE", "Quick light"),
-            ("WORKBENCH", "Workbench", "Plain and at once"),
+            ("CYCLES", "Cycles", "Path tracing: physically correct light"),
+            ("EEVEE", "EEVEE", "Fast, approximate light"),
+            ("WORKBENCH", "Workbench", "Plain colours, immediately"),
         ),
         **_plain,
     )
     camera: EnumProperty(
         name="Camera",
-        description="From where the scene is seen",
+        description="Where the camera stands",
         items=(
-            ("FRAMED", "Framed", "In the direction of the scene's camera, as near as all fits"),
-            ("VIEW", "Direction", "From a direction of choice, as near as all fits"),
-            ("OWN", "As It Is", "The scene's camera stays where it is"),
+            ("FRAMED", "Framed", "In the direction of the scene's camera, as near as everything fits"),
+            ("VIEW", "Direction", "In the direction given below, as near as everything fits"),
+            ("OWN", "As It Is", "The scene's camera, unchanged"),
         ),
         **_plain,
     )
     view: FloatVectorProperty(
         name="Azimuth and Elevation",
-        description="Of the camera, from +x towards +y and upwards, degrees",
+        description="Direction from the scene to the camera, degrees: from +x towards +y, and upwards",
         size=2,
         default=(-55.0, 30.0),
         min=-360.0,
         max=360.0,
         **_plain,
     )
-    transparent: BoolProperty(name="Transparent", description="No background", **_plain)
+    transparent: BoolProperty(name="Transparent", description="Render without a background", **_plain)
     size: IntVectorProperty(
-        name="Size", description="Of renders, pixels", size=2, default=(1280, 960), min=16, max=16384, **_plain
+        name="Size", description="Width and height of renders, pixels", size=2, default=(1280, 960), min=16, max=16384, **_plain
     )
     samples: IntProperty(
-        name="Samples", description="Per pixel of renders; 0: as in the render properties", min=0, max=65536, **_plain
+        name="Samples", description="Samples per pixel of renders; 0: as in the render properties", min=0, max=65536, **_plain
     )

@@ -19,7 +19,7 @@ def _length(name: str, text: str, **more):
 
 
 class PALPATE_PG_skin(bpy.types.PropertyGroup):
-    """How the texels of a sensor were laid onto its parent's surface; `Object.palpate.skin`"""
+    """How the texels of a sensor were laid onto the surface of its parent: `Object.palpate.skin`"""
 
     method: EnumProperty(
         name="Pattern",
@@ -28,18 +28,18 @@ class PALPATE_PG_skin(bpy.types.PropertyGroup):
         options=set(),
         override={"LIBRARY_OVERRIDABLE"},
     )
-    rows: IntProperty(name="Rows", description="Of the array", default=14, min=2, options=set())
-    columns: IntProperty(name="Columns", description="Of the array", default=6, min=2, options=set())
-    pitch_x: _length("Column Pitch (m)", "From column to column, m", default=0.0034, min=1e-6)
-    pitch_y: _length("Row Pitch (m)", "From row to row, m", default=0.0034, min=1e-6)
-    shift_x: _length("Shift Across (m)", "Of the array's middle, along its rows, m")
-    shift_y: _length("Shift Along (m)", "Of the array's middle, from row to row, m")
+    rows: IntProperty(name="Rows", description="Number of rows of the array", default=14, min=2, options=set())
+    columns: IntProperty(name="Columns", description="Number of columns of the array", default=6, min=2, options=set())
+    pitch_x: _length("Column Pitch (m)", "Distance between columns, m", default=0.0034, min=1e-6)
+    pitch_y: _length("Row Pitch (m)", "Distance between rows, m", default=0.0034, min=1e-6)
+    shift_x: _length("Shift Across (m)", "Displacement of the middle of the array along its rows, m")
+    shift_y: _length("Shift Along (m)", "Displacement of the middle of the array across its rows, m")
     angle: FloatProperty(
-        name="Turn", description="Of the rows, anticlockwise seen from outside", subtype="ANGLE", options=set()
+        name="Turn", description="Angle of the rows, anticlockwise seen from outside", subtype="ANGLE", options=set()
     )
-    spacing: _length("Spacing (m)", "From texel to texel, m", default=0.002, min=1e-6)
-    seed: IntProperty(name="Seed", description="Another pattern for each", min=0, options=set())
-    lift: _length("Lift (m)", "How far above the surface the texels are, m: so much earlier they are touched", min=0.0)
+    spacing: _length("Spacing (m)", "Distance between texels, m", default=0.002, min=1e-6)
+    seed: IntProperty(name="Seed", description="Seed of the random pattern", min=0, options=set())
+    lift: _length("Lift (m)", "Height of the texels above the surface, m; they are touched so much earlier", min=0.0)
     region: StringProperty(options={"HIDDEN"})
     region_name: StringProperty(options={"HIDDEN"})
     region_number: IntProperty(options={"HIDDEN"})

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Settings in files of an older Palpate are brought forward when the file is opened; see :mod:`.settings_migration`."""
+"""Settings in files of an older Palpate are updated when the file is opened; see :mod:`.settings_migration`."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from ..session import session_state
 
 
 def apply(version: int = VERSION, steps=None) -> None:
-    """Bring the settings of all objects and scenes of the file forward; other versions and steps are for tests."""
+    """Update the settings of all objects and scenes of the file; other versions and steps are for tests."""
     for kind, blocks in (("object", bpy.data.objects), ("scene", bpy.data.scenes)):
         for block in blocks:
             if block.palpate.schema_version not in (0, version):
-                _bring_forward(block, kind, version, steps)
+                _update(block, kind, version, steps)
 
 
-def _bring_forward(block, kind: str, version: int, steps) -> None:
+def _update(block, kind: str, version: int, steps) -> None:
     before = stored(block)
     try:
         after = migrate(before, kind, block.name, steps, version)
@@ -31,7 +31,7 @@ def _bring_forward(block, kind: str, version: int, steps) -> None:
 
 
 def stored(block) -> dict:
-    """Return what is saved of a block's settings, also under names that this version no longer knows."""
+    """Return the settings of a data-block as they were saved, including names that this version no longer knows."""
     if hasattr(block, "bl_system_properties_get"):  # Blender 5.0 keeps it apart from custom properties
         system = block.bl_system_properties_get()
         group = system.get("palpate") if system is not None else None

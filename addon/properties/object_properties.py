@@ -20,15 +20,15 @@ from .painted_maps import PaintedProperties
 from .parameter_properties import FIXED, DriveParameterProperties, SensorParameterProperties
 
 ROLES = (
-    ("NONE", "None", "Takes no part"),
-    ("SENSOR", "Sensor", "Feels what touches it, in every texel"),
+    ("NONE", "None", "Not part of the simulation"),
+    ("SENSOR", "Sensor", "Reports the forces on its texels"),
     ("TARGET", "Target", "Presses on sensors and pads"),
-    ("PAD", "Pad", "Gives way like a sensor, but is not read out: a table, the back of a finger"),
+    ("PAD", "Pad", "Soft like a sensor, but not read out: a table, the back of a finger"),
 )
 
 
 def _role_changed(settings, context):
-    """Also a script that only sets the role gets an object that can be found again."""
+    """Prepare an object that has got a role, also when a script has only set the property."""
     settings.schema_version = VERSION
     identity.ensure_uid(settings.id_data)
     session_state.participants_changed()
@@ -46,7 +46,9 @@ class PALPATE_PG_object(SensorParameterProperties, PaintedProperties, DriveParam
 
     schema_version: IntProperty(options={"HIDDEN"})
     uid: StringProperty(options={"HIDDEN"})
-    role: EnumProperty(name="Role", description="Part of this object", items=ROLES, update=_role_changed, **FIXED)
+    role: EnumProperty(
+        name="Role", description="What this object does in the simulation", items=ROLES, update=_role_changed, **FIXED
+    )
 
     region: EnumProperty(
         name="Region",
@@ -54,12 +56,12 @@ class PALPATE_PG_object(SensorParameterProperties, PaintedProperties, DriveParam
         items=(
             ("MESH", "Whole Mesh", "Every vertex"),
             ("GROUP", "Vertex Group", "Vertices whose weight reaches the threshold"),
-            ("MATERIAL", "Material", "Faces that wear a material"),
-            ("FACE_SET", "Face Set", "Faces of one of Sculpt Mode's face sets"),
+            ("MATERIAL", "Material", "Faces with a material"),
+            ("FACE_SET", "Face Set", "Faces of a face set of Sculpt Mode"),
         ),
         **FIXED,
     )
-    material: StringProperty(name="Material", description="Of the faces that belong to the sensor", **FIXED)
+    material: StringProperty(name="Material", description="Material of the faces that belong to the sensor", **FIXED)
     face_set: IntProperty(name="Face Set", description="Number of the face set that is the sensor", default=1, **FIXED)
     vertex_group: StringProperty(name="Vertex Group", description="Painted or assigned region of the sensor", **FIXED)
     threshold: FloatProperty(
@@ -81,7 +83,9 @@ class PALPATE_PG_object(SensorParameterProperties, PaintedProperties, DriveParam
         ),
         **FIXED,
     )
-    image_map: StringProperty(name="UV Map", description="Of the tactile image; empty: the one that renders use", **FIXED)
+    image_map: StringProperty(
+        name="UV Map", description="UV map of the tactile image; empty: the one that renders use", **FIXED
+    )
     image_size: IntProperty(
         name="Resolution", description="Side of the tactile image, pixels", default=256, min=16, max=4096, **FIXED
     )
@@ -97,7 +101,8 @@ class PALPATE_PG_object(SensorParameterProperties, PaintedProperties, DriveParam
 
     presses: BoolProperty(
         name="Felt by Other Sensors",
-        description="Other sensors and pads feel this one's surface too; both skins share the overlap as springs in series",
+        description="Other sensors and pads also touch the surface of this one; "
+        "the two soft layers share the overlap as springs in series",
         **FIXED,
     )
     contact_normals: EnumProperty(
@@ -117,9 +122,9 @@ class PALPATE_PG_object(SensorParameterProperties, PaintedProperties, DriveParam
         name="Body",
         description="What moves this object",
         items=(
-            ("KEYFRAMED", "Keyframed", "Its animation, parents and constraints; forces do not move it"),
-            ("FREE", "Free", "Gravity and the sensors' forces, from where it is at the first frame"),
-            ("DRIVEN", "Driven", "A servo of limited force along one axis; its parent carries it. A gripper's finger"),
+            ("KEYFRAMED", "Keyframed", "Animation, parents and constraints move it; forces do not"),
+            ("FREE", "Free", "Gravity and contact forces move it, from where it is at the first frame"),
+            ("DRIVEN", "Driven", "An actuator of limited force along one axis; its parent carries it. A finger of a gripper"),
             ("PARENT", "Part of Parent", "It is fixed to its parent: what presses on it moves the parent's body"),
         ),
         update=_body_changed,
@@ -127,7 +132,7 @@ class PALPATE_PG_object(SensorParameterProperties, PaintedProperties, DriveParam
     )
     mass: FloatProperty(
         name="Mass (kg)",
-        description="Of a free or driven body, kg; inertia follows from the mesh, taken as a solid of uniform density",
+        description="Mass of a free or driven body, kg; the inertia is that of a solid of uniform density",
         default=1.0,
         min=0.0,
         precision=4,
@@ -135,7 +140,7 @@ class PALPATE_PG_object(SensorParameterProperties, PaintedProperties, DriveParam
     )
     velocity: FloatVectorProperty(
         name="Velocity (m/s)",
-        description="Of a free body at the first frame, m/s, world axes",
+        description="Velocity of a free body at the first frame, m/s, world axes",
         size=3,
         subtype="XYZ",
         precision=4,
@@ -143,7 +148,7 @@ class PALPATE_PG_object(SensorParameterProperties, PaintedProperties, DriveParam
     )
     angular_velocity: FloatVectorProperty(
         name="Spin (rad/s)",
-        description="Of a free body at the first frame, rad/s, world axes",
+        description="Angular velocity of a free body at the first frame, rad/s, world axes",
         size=3,
         subtype="XYZ",
         precision=4,
@@ -164,15 +169,15 @@ class PALPATE_PG_object(SensorParameterProperties, PaintedProperties, DriveParam
     made_vertices: IntProperty(options={"HIDDEN"})
     skin: PointerProperty(
         type=laid_sensor_properties.PALPATE_PG_skin,
-        description="How it was laid onto its parent's surface",
+        description="How the texels were laid onto the surface of the parent",
         override={"LIBRARY_OVERRIDABLE"},
     )
 
     drive_control: EnumProperty(
         name="Control",
-        description="What the drive aims at",
+        description="Quantity that the drive controls",
         items=(
-            ("POSITION", "Position", "A way along its axis, from where the object starts on its parent"),
+            ("POSITION", "Position", "A distance along its axis, from where the object starts on its parent"),
             ("VELOCITY", "Velocity", "A speed along its axis"),
             (
                 "FORCE",
@@ -184,24 +189,24 @@ class PALPATE_PG_object(SensorParameterProperties, PaintedProperties, DriveParam
     )
     drive_axis: EnumProperty(
         name="Axis",
-        description="Direction in which the drive moves it; a finger closes this way",
+        description="Direction in which the drive moves the object; a finger closes in this direction",
         items=tuple((key, key, f"Along {key}") for key in ("X", "Y", "Z", "-X", "-Y", "-Z")),
         default="Z",
         **FIXED,
     )
     drive_space: EnumProperty(
         name="Axis of",
-        description="Whose axis it is",
+        description="Frame in which the axis is fixed",
         items=(
-            ("LOCAL", "Object", "The object's own; turns along with what carries it"),
-            ("PARENT", "Parent", "Its parent's at the first frame; turns along with what carries it"),
-            ("WORLD", "World", "Stands still"),
+            ("LOCAL", "Object", "The frame of the object; it turns with its carrier"),
+            ("PARENT", "Parent", "The frame of the parent at the first frame; it turns with the carrier"),
+            ("WORLD", "World", "The axis never turns"),
         ),
         **FIXED,
     )
     drive_position: FloatProperty(
         name="Way (m)",
-        description="Target of position control, m from where the object starts; can be keyframed",
+        description="Target of position control, m from the start; can be keyframed",
         precision=5,
         step=0.1,
     )
@@ -227,7 +232,7 @@ class PALPATE_PG_object(SensorParameterProperties, PaintedProperties, DriveParam
         **FIXED,
     )
 
-    # Bookkeeping of a free body that was moved, and of a bake. Saved, so that a reopened file can be put right.
+    # The start of a free body that was moved, and what a bake left. They are saved, so that a reopened file can be restored.
     has_start: BoolProperty(options={"HIDDEN"})
     start_matrix: FloatVectorProperty(size=16, options={"HIDDEN"})
     start_channels: FloatVectorProperty(size=14, options={"HIDDEN"})

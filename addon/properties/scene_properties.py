@@ -9,12 +9,12 @@ from . import figure_properties
 
 COLOR_MAPS = tuple((name, *words) for name, words in color_maps.NAMES.items())
 OVERLAYS = (
-    ("FORCE", "Net Force", "Arrow at the centre of pressure: what the sensor pushes back with"),
-    ("TORQUE", "Free Moment", "Double arrow: the net torque about the centre of pressure, as the sensor pushes back"),
+    ("FORCE", "Net Force", "Arrow at the centre of pressure: the force of the sensor on the target"),
+    ("TORQUE", "Free Moment", "Double arrow: the torque of the sensor on the target about the centre of pressure"),
     ("CENTRE", "Centre of Pressure", "Ball at the centre of pressure"),
-    ("SLIP", "Slip", "Ring around it, as wide as the share of the load on slipping texels"),
+    ("SLIP", "Slip", "Ring around the centre of pressure, as wide as the share of the load on slipping texels"),
     ("NORMALS", "Texel Normals", "Arrow at each texel, as long as its normal force"),
-    ("SHEARS", "Texel Shear", "Arrow at each texel, along the shear with which it pushes back"),
+    ("SHEARS", "Texel Shear", "Arrow at each texel, along its shear force on the target"),
 )
 
 
@@ -69,7 +69,7 @@ class PALPATE_PG_scene(bpy.types.PropertyGroup):
         options=set(),
     )
     show_normals: BoolProperty(
-        name="Normals", description="Show which way the texels of the active sensor feel", default=True, options=set()
+        name="Normals", description="Show the normals of the texels of the active sensor", default=True, options=set()
     )
     show_numbers: BoolProperty(
         name="Numbers",
@@ -116,7 +116,7 @@ class PALPATE_PG_scene(bpy.types.PropertyGroup):
     )
     overlays: EnumProperty(
         name="On Baked Sensors",
-        description="What a bake puts on its sensors, besides the heat map; Shift-click adds one to those chosen",
+        description="Overlays that a bake adds to its sensors, besides the heat map; Shift-click adds one to those chosen",
         items=OVERLAYS,
         default={"FORCE"},
         options={"ENUM_FLAG"},

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """OpenRAVE's XML definition of a tactile sensor (paper, Table 2): ``<AttachedSensor>`` with a ``SimTactileSensor``.
 
-The print of Table 2 has spaces inside its tags and is no XML; this reads and writes what it means. The XML holds the foam's
-thickness where the model holds the maximum penetration, which is twice that (paper, section 3.3.3).
+Table 2 is printed with spaces inside its tags, which is not XML; this module reads and writes valid XML. The XML holds the
+thickness of the foam, and the model holds the maximum penetration, which is twice the thickness (paper, section 3.3.3).
 """
 
 from __future__ import annotations
@@ -15,14 +15,13 @@ from typing import Any
 from xml.etree import ElementTree
 
 from ..errors import FileError, PalpateError
-from ..model.sensor_parameters import SensorParameters
+from ..model.sensor_parameters import DEPTH_PER_THICKNESS, SensorParameters
 from .file_writing import atomic_write
 
 SENSOR_TYPE = "SimTactileSensor"
 NUMBERS = ("k", "cn", "sigma0", "sigma1", "x0", "ct", "mus", "mud")
-"""Elements of Table 2 behind the thickness, in its order."""
+"""Elements after the thickness, in the order of Table 2; :class:`.SensorParameters` has the same names."""
 THICKNESS = "thickness"
-DEPTH_PER_THICKNESS = 2.0
 
 
 @dataclass(frozen=True)
@@ -33,11 +32,11 @@ class OpenRaveSensor:
     ----------
     name : str
     link : str
-        The link, that is the object, that the sensor is attached to.
+        Name of the link, which is the object that the sensor is attached to.
     parameters : SensorParameters
-        What the XML does not hold (gain, unit, …) has its default.
+        Parameters that the XML does not hold (gain, unit, …) have their defaults.
     missing : tuple of str
-        Elements that the definition left out; they have their defaults too.
+        Elements that the definition leaves out; they have their defaults as well.
     """
 
     name: str
@@ -47,12 +46,12 @@ class OpenRaveSensor:
 
 
 def read_openrave(path: str | os.PathLike) -> list[OpenRaveSensor]:
-    """Read every tactile sensor of an OpenRAVE file, whatever surrounds it.
+    """Read every tactile sensor of an OpenRAVE file; anything else in the file is ignored.
 
     Raises
     ------
     FileError
-        There is no such file, it is no XML, it holds no tactile sensor, or a value is no number or out of range.
+        There is no such file, it is not XML, it holds no tactile sensor, or a value is not a number or out of bounds.
     """
     try:
         text = Path(path).read_bytes()
@@ -60,10 +59,10 @@ def read_openrave(path: str | os.PathLike) -> list[OpenRaveSensor]:
         raise FileError(f"There is no file '{path}': check its name and folder.") from error
     except OSError as error:
         raise FileError(f"'{path}' cannot be read ({error.strerror}): check its name and permissions.") from error
-    if b"<!ENTITY" in text:  # entities can multiply without end, and a sensor needs none
+    if b"<!ENTITY" in text:  # nested entities can grow without limit
         raise FileError(f"'{path}' declares XML entities: write them out, a sensor definition needs none.")
     try:
-        # A fragment with several definitions side by side, as in a robot file's middle, has no root of its own.
+        # A fragment of a robot file with several definitions side by side has no root element.
         body = text[text.index(b"?>") + 2 :] if text.lstrip().startswith(b"<?xml") else text
         root = ElementTree.fromstring(b"<palpate>" + body + b"</palpate>")
     except (ElementTree.ParseError, ValueError) as error:
@@ -78,11 +77,13 @@ def read_openrave(path: str | os.PathLike) -> list[OpenRaveSensor]:
 
 
 def _tactile(attached: ElementTree.Element) -> ElementTree.Element | None:
+    """Return the tactile sensor of an <AttachedSensor>, None when it has another kind of sensor."""
     sensors = (child for child in attached if child.tag.lower() == "sensor")
     return next((s for s in sensors if s.get("type", "").lower() == SENSOR_TYPE.lower()), None)
 
 
 def _sensor(path: str | os.PathLike, attached: ElementTree.Element) -> OpenRaveSensor:
+    """Return the definition in an <AttachedSensor> that has a tactile sensor."""
     element = _tactile(attached)
     assert element is not None
     name = element.get("name") or attached.get("name") or "sensor"
@@ -111,13 +112,13 @@ def _sensor(path: str | os.PathLike, attached: ElementTree.Element) -> OpenRaveS
 
 
 def openrave_xml(sensors: Iterable[OpenRaveSensor], robot: str | None = None) -> str:
-    """Return definitions as XML; numbers are written so that reading them gives the same bits.
+    """Return definitions as XML. Reading it gives exactly the same numbers.
 
     Parameters
     ----------
     sensors : iterable of OpenRaveSensor
     robot : str, optional
-        Name of a ``<Robot>`` around them. Without it they stand side by side, to be pasted into a robot's file.
+        Name of a ``<Robot>`` around the definitions. Without it they stand side by side, for pasting into a robot file.
     """
     from xml.sax.saxutils import escape, quoteattr
 
@@ -137,7 +138,7 @@ def openrave_xml(sensors: Iterable[OpenRaveSensor], robot: str | None = None) ->
 
 
 def write_openrave(path: str | os.PathLike, sensors: Iterable[OpenRaveSensor], robot: str | None = None) -> None:
-    """Write :func:`openrave_xml` to a file, whole or not at all."""
+    """Write :func:`openrave_xml` to a file, completely or not at all."""
     text = openrave_xml(sensors, robot)
     with atomic_write(path) as temporary:
         temporary.write_text(text, encoding="utf-8")

@@ -1,23 +1,23 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A sensor as a text file: its parameters, its effects and, where it has them, the rig's words for its shape.
+"""A sensor as a text file: its parameters, its effects and, for a sensor of a rig, the keys for its shape.
 
 ::
 
     format = "palpate-sensor-toml/1"
     name = "pad"
 
-    [sensor]                       # the words of a rig's [sensor]; what is left out has its default
+    [sensor]                       # the keys of a rig's [sensor]; parameters without a value have their default
     k = 58.4
     unit = "N"
     grid = { rows = 14, columns = 6, pitch = [0.0034, 0.0034] }
 
-    [[effect]]                     # as many as there are; their parameters are in docs/effects.md
+    [[effect]]                     # one for each effect; docs/effects.md lists their parameters
     name = "creep"
     form = "exponential"
     amount = 0.21
     time = 1.7
 
-What was written is read back exactly, to the last bit.
+Reading a file gives exactly the numbers that were written.
 """
 
 from __future__ import annotations
@@ -37,12 +37,12 @@ from .file_writing import atomic_write
 
 FORMAT = "palpate-sensor-toml/1"
 SHAPE_WORDS = ("grid", "mesh", "thickness")
-"""Words of a rig's [sensor] that say where its texels are; they are kept as they are and mean nothing here."""
+"""Keys of a rig's [sensor] that say where its texels are. They are kept as they are."""
 
 
 @dataclass(frozen=True)
 class SensorModel:
-    """What one sensor is made of, apart from its texels.
+    """A sensor without its texels.
 
     Attributes
     ----------
@@ -50,7 +50,7 @@ class SensorModel:
     parameters : SensorParameters
     effects : tuple of Effect
     shape : mapping
-        Words of a rig's [sensor] for its shape (:data:`SHAPE_WORDS`), empty where the sensor is a mesh of a scene.
+        Keys of a rig's [sensor] for its shape (:data:`SHAPE_WORDS`); empty when the sensor is a mesh of a scene.
     """
 
     name: str
@@ -60,7 +60,7 @@ class SensorModel:
 
 
 def write_sensor(path: str | os.PathLike, model: SensorModel) -> None:
-    """Write a sensor as TOML, whole or not at all; raises :class:`FileError` when that is not possible."""
+    """Write a sensor as TOML, completely or not at all; raise :class:`FileError` when that is not possible."""
     text = sensor_text(model)
     with atomic_write(path) as fresh:
         fresh.write_text(text, encoding="utf-8", newline="\n")
@@ -78,14 +78,14 @@ def sensor_text(model: SensorModel) -> str:
 
 
 def read_sensor(path: str | os.PathLike) -> SensorModel:
-    """Read what :func:`write_sensor` wrote, or a person did.
+    """Read the file of a sensor.
 
     Raises
     ------
     FileError
-        There is no such file, or it is something else.
+        There is no such file, or it is not a sensor's file.
     EffectError, ParameterError
-        It says what means nothing.
+        A value is not valid.
     """
     try:
         text = Path(path).read_text(encoding="utf-8")
@@ -104,7 +104,7 @@ def read_sensor(path: str | os.PathLike) -> SensorModel:
 
 
 def sensor_of(table: Mapping[str, Any]) -> SensorModel:
-    """Return the sensor that the tables of a file describe; the errors are those of :func:`read_sensor`."""
+    """Return the sensor that the tables of a file describe; raise the same errors as :func:`read_sensor`."""
     if table.get("format") != FORMAT:
         raise FileError(f'Its format is {table.get("format")!r}: a sensor\'s file begins with format = "{FORMAT}".')
     known_words(table, {"format", "name", "sensor", "effect"}, "the file")

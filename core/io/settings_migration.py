@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Settings saved by an older Palpate become today's: plain dictionary in, plain dictionary out.
+"""Update settings that an older Palpate has saved: plain dictionary in, plain dictionary out.
 
-Each step in :data:`STEPS` brings the settings of one kind from its version to the next. A saved version of 0 means that
-nothing was ever set. Settings of a newer Palpate are not touched.
+Each step in :data:`STEPS` updates the settings of one kind from its version to the next. A saved version of 0 means that
+nothing was ever set.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ Settings = dict[str, Any]
 Step = Callable[[Settings], Settings]
 
 STEPS: dict[tuple[str, int], Step] = {}
-"""(kind, version) → what brings settings of that version to the next; kinds are "object" and "scene"."""
+"""(kind, version) → function that updates settings of that version to the next; kinds are "object" and "scene"."""
 
 
 def migrate(
@@ -29,18 +29,18 @@ def migrate(
     steps: Mapping[tuple[str, int], Step] | None = None,
     version: int = VERSION,
 ) -> Settings:
-    """Return settings as this version has them, with ``schema_version`` set.
+    """Return the settings as they are in this version, with ``schema_version`` set.
 
     Parameters
     ----------
     settings : mapping
-        With ``schema_version``; not changed.
+        Settings with ``schema_version``; they are not changed.
     kind : str
         "object" or "scene".
     name : str
-        Whose settings, for the message.
+        Name of the object or scene, for the message.
     steps, version
-        Others than this version's, for tests.
+        Steps and version for tests; by default those of this version.
 
     Raises
     ------

@@ -23,6 +23,11 @@ CONTACT_POINTS = (
     *(Choice(n * n, f"{n} × {n}", f"{n * n} points in the cell of each texel") for n in range(2, 11)),
 )
 
+DEPTH_PER_THICKNESS = 2.0
+"""Maximum penetration per thickness of the foam (paper, section 3.3.3)."""
+DAMPING_PER_STIFFNESS = 0.01
+"""Suggested normal damping per normal stiffness, seconds (paper, section 3.4.1)."""
+
 CONTACT, FRICTION, READOUT = "contact", "friction", "readout"
 """The groups of parameters: each is a panel."""
 
@@ -78,7 +83,7 @@ class SensorParameters:
         note="A slow impact at v m/s leaves with the share 1 - α v"))
     points_per_texel: int = specified(ChoiceParameter(
         "points_per_texel", 1, CONTACT_POINTS,
-        "Per texel, spread over its cell; they share out its stiffness. More of them are slower and make force and "
+        "Points per texel, spread over its cell; they share its stiffness. More points are slower, and make the force and "
         "contact area of small or curved objects exact on coarser pads",
         label="Contact Points", group=CONTACT))
     gain: float = specified(Parameter(
@@ -88,7 +93,7 @@ class SensorParameters:
         "zero", "unit", 0.0, -inf, inf, "Reading without load",
         label="Zero", group=READOUT))
     unit: str = specified(TextParameter(
-        "unit", "N", "Of the reading, as in N, V or counts",
+        "unit", "N", "Unit of the reading, as in N, V or counts",
         label="Unit", group=READOUT))
     # fmt: on
 

@@ -19,7 +19,7 @@ from ...geometry.mesh import TriangleMesh, checked_mesh
 from ...geometry.texels import Texels, texels_from_region
 from ...io.csv_table import read_table
 from ...io.sensor_toml import SHAPE_WORDS, stated_parameters
-from ...model.sensor_parameters import SENSOR_PARAMETERS, SensorParameters
+from ...model.sensor_parameters import DAMPING_PER_STIFFNESS, DEPTH_PER_THICKNESS, SENSOR_PARAMETERS, SensorParameters
 
 FORMAT = "palpate-rig/1"
 POSE, TURN, SLIDE = ("x", "y", "z"), ("qw", "qx", "qy", "qz"), ("slide_x", "slide_y")
@@ -325,9 +325,9 @@ def _parameters(sensor: dict[str, Any], path: Path) -> tuple[SensorParameters, f
     if not values.get("unit", "N").strip():
         raise ParameterError(f"unit of '{path.name}' is empty: write the unit's name, \"N\" for newtons.")
     if "k" in values and "cn" not in values:
-        values["cn"] = 0.01 * values["k"]
+        values["cn"] = DAMPING_PER_STIFFNESS * values["k"]
     if thickness is not None and "max_penetration" not in values:
-        values["max_penetration"] = 2.0 * thickness  # section 3.3.3
+        values["max_penetration"] = DEPTH_PER_THICKNESS * thickness
     if "mus" in values and "mud" not in values:
         values["mud"] = min(SensorParameters.mud, values["mus"])
     if "mud" in values and "mus" not in values:
