@@ -15,11 +15,16 @@ from typing import Any
 from xml.etree import ElementTree
 
 from ..errors import FileError, PalpateError
-from ..model.sensor_parameters import DEPTH_PER_THICKNESS, SensorParameters
+from ..model.parameter import numbers_of
+from ..model.sensor_parameters import DEPTH_PER_THICKNESS, SENSOR_PARAMETERS, SensorParameters
 from .file_writing import atomic_write
 
 SENSOR_TYPE = "SimTactileSensor"
-NUMBERS = ("k", "cn", "sigma0", "sigma1", "x0", "ct", "mus", "mud")
+NUMBERS = tuple(
+    parameter.name
+    for parameter in sorted(numbers_of(SENSOR_PARAMETERS), key=lambda parameter: parameter.xml_place)
+    if parameter.xml_place
+)
 """Elements after the thickness, in the order of Table 2; :class:`.SensorParameters` has the same names."""
 THICKNESS = "thickness"
 

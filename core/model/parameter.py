@@ -47,6 +47,8 @@ class Parameter:
         Typical values and how to find one, for panels.
     group : str
         Panel that shows the parameter.
+    xml_place : int
+        Place among the elements of OpenRAVE's XML (paper, Table 2), counted from one; zero when the XML does not have it.
     """
 
     name: str
@@ -63,6 +65,7 @@ class Parameter:
     source: str = ""
     note: str = ""
     group: str = ""
+    xml_place: int = 0
 
     def scaled(self, gain: float) -> Parameter:
         """Return the parameter as it is for a sensor with this gain."""
@@ -175,3 +178,8 @@ def specifications(owner: type) -> Mapping[str, Specification]:
         A dataclass whose parameters are :func:`specified`.
     """
     return {item.name: item.metadata[SPECIFICATION] for item in fields(owner) if SPECIFICATION in item.metadata}
+
+
+def numbers_of(specified_parameters: Mapping[str, Specification]) -> list[Parameter]:
+    """Return the specifications of those parameters that are numbers."""
+    return [specification for specification in specified_parameters.values() if isinstance(specification, Parameter)]
