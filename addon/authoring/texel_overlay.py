@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Texels of the active sensor in the 3D view: where they are, which way they feel, how deep they reach, and their numbers."""
+"""Draw the texels of the active sensor in the 3D view: positions, normals, maximum penetration and numbers."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ _drawing: Drawing | None = None
 
 
 def drawing_of(report) -> Drawing:
-    """Return triangles, lines and labels of a report."""
+    """Return the triangles, lines and labels that show a report."""
     texels, unit = report.texels, report.metres
     a, b, _ = texels.layout.triangles.T
     spacing = float(np.median(np.linalg.norm(texels.position[a] - texels.position[b], axis=1)))
@@ -61,18 +61,18 @@ def drawing_of(report) -> Drawing:
     )
 
 
-def _labels(texels, places: np.ndarray) -> list[tuple[str, np.ndarray]]:
-    """Row and column where texels form a grid, else their number; along the rim only where there are many."""
+def _labels(texels, positions: np.ndarray) -> list[tuple[str, np.ndarray]]:
+    """Return labels and their positions: row and column of texels in a grid, else the index; of a large grid only the rim."""
     layout = texels.layout
     if not isinstance(layout, GridLayout):
-        return [(str(i), places[i]) for i in range(len(places))] if len(places) <= MAX_LABELS else []
+        return [(str(i), positions[i]) for i in range(len(positions))] if len(positions) <= MAX_LABELS else []
     rim = (layout.row == 0) | (layout.column == 0)
-    shown = np.flatnonzero(rim if len(places) > MAX_LABELS else np.ones(len(places), bool))
-    return [(f"{layout.row[i]},{layout.column[i]}", places[i]) for i in shown]
+    shown = np.flatnonzero(rim if len(positions) > MAX_LABELS else np.ones(len(positions), bool))
+    return [(f"{layout.row[i]},{layout.column[i]}", positions[i]) for i in shown]
 
 
 def _present():
-    """The active sensor, its report and what is shown of it; None when there is nothing to draw."""
+    """Return the active sensor, the scene's settings and the sensor's report; None when there is nothing to draw."""
     context = bpy.context
     obj, own = context.object, context.scene.palpate
     wanted = own.show_texels or own.show_normals or own.show_numbers or own.show_reach
@@ -99,7 +99,7 @@ def _current(report) -> Drawing:
 
 
 def _draw() -> None:
-    """Called by each 3D view after the scene's own geometry."""
+    """Draw in a 3D view, after the scene's own geometry."""
     found = _present()
     if found is None:
         return
@@ -154,7 +154,7 @@ def _lines(drawing: Drawing, name: str, color) -> None:
 
 
 def _draw_numbers() -> None:
-    """Called by each 3D view last, in pixels."""
+    """Draw the labels in a 3D view, in pixels, after everything else."""
     found = _present()
     if found is None or not found[1].show_numbers:
         return

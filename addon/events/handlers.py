@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Blender's events, each handed on to the one place that deals with it."""
+"""Handlers of Blender's events. Each calls the modules that act on the event."""
 
 from __future__ import annotations
 
@@ -14,22 +14,22 @@ from ..session import first_use, identity, session_state
 from ..timeline import playback
 
 
-def _settle() -> None:
-    """Look through the file once: after it was opened, or at the first event after the add-on was enabled on an open one."""
+def _examine_file() -> None:
+    """Examine the objects of a file once: after it was opened, or at the first event after the add-on was enabled."""
     if session_state.session.file_examined or session_state.session.rendering:
         return
     session_state.session.file_examined = True
     identity.register_owners(bpy.data.objects)
     migrations.apply()
     for scene in bpy.data.scenes:
-        playback.hide(scene)  # a file that was written without save_pre, as by a crash
+        playback.hide(scene)  # the file may have been written without save_pre, as after a crash
     if any(obj.palpate.role != "NONE" for obj in bpy.data.objects):
         first_use.begin()
 
 
 @persistent
 def palpate_frame_change_pre(scene, _depsgraph=None):
-    _settle()
+    _examine_file()
     playback.before_frame(scene)
 
 
@@ -41,8 +41,8 @@ def palpate_frame_change_post(scene, depsgraph):
 
 @persistent
 def palpate_depsgraph_update_post(_scene, depsgraph):
-    """Only note what was touched; whether it really changed is found out at the next frame."""
-    _settle()
+    """Note which objects Blender reports as changed; they are compared at the next frame."""
+    _examine_file()
     session = session_state.session
     for update in depsgraph.updates:
         block = update.id
@@ -60,7 +60,7 @@ def palpate_load_post(_path):
     identity.forget()
     playback.forget()
     sensor_report.forget()
-    _settle()
+    _examine_file()
 
 
 @persistent

@@ -69,15 +69,10 @@ def on_frame(scene, depsgraph) -> None:
         return
     if not _is_on(scene) or _waits_for_solver(scene):
         return
-    (frame, share), run = animation_time.current_frame(scene), live_cache.get(scene)
-    if not session_state.session.rendering and not share:
-        if run is not None and (live_cache.is_stale(scene, depsgraph, run) or _has_moved(scene, depsgraph, run)):
-            live_cache.drop(scene)
-            run = None
-        if run is None and frame == scene.frame_start:
-            run = _start(scene, depsgraph)
-        elif run is not None and frame == run.simulation.frame + 1:
-            run = _attempt(scene, lambda: live_cache.advance(scene, depsgraph, run))
+    run = live_cache.get(scene)
+    frame, part = animation_time.current_frame(scene)
+    if not session_state.session.rendering and not part:
+        run = _updated_run(scene, depsgraph, run, frame)
     if run is not None and frame in run.frames:
         show(scene, run)
     else:
@@ -85,6 +80,18 @@ def on_frame(scene, depsgraph) -> None:
         frame_status.set_status(scene, _not_computed(scene, run))
         if not bpy.app.background and not session_state.session.rendering and missing_frames(scene):
             bpy.app.timers.register(_offer_to_compute, first_interval=0.0)
+
+
+def _updated_run(scene, depsgraph, run, frame: int):
+    """Return the run of a scene after its arrival at a frame: started, advanced, as it was, or None if it was dropped."""
+    if run is not None and (live_cache.is_stale(scene, depsgraph, run) or _has_moved(scene, depsgraph, run)):
+        live_cache.drop(scene)
+        run = None
+    if run is None and frame == scene.frame_start:
+        return _start(scene, depsgraph)
+    if run is not None and frame == run.simulation.frame + 1:
+        return _attempt(scene, lambda: live_cache.advance(scene, depsgraph, run))
+    return run
 
 
 def _waits_for_solver(scene) -> bool:
@@ -124,9 +131,9 @@ def missing_frames(scene) -> range:
     """Return the frames that have to be computed to show the present one; empty when they cannot be computed."""
     if not _is_on(scene) or scene.session_uid in _errors:
         return range(0)
-    (frame, share), run = animation_time.current_frame(scene), live_cache.get(scene)
+    (frame, part), run = animation_time.current_frame(scene), live_cache.get(scene)
     first = scene.frame_start if run is None else run.simulation.frame + 1
-    return range(first, min(frame + bool(share), scene.frame_end) + 1)
+    return range(first, min(frame + bool(part), scene.frame_end) + 1)
 
 
 def compute_to_present_frame(scene) -> Generator[Progress, None, None]:
@@ -193,14 +200,14 @@ def _attempt(scene, work):
 
 def show(scene, run) -> None:
     """Show bodies and heat maps as a run has computed them at the present frame."""
-    number, share = animation_time.current_frame(scene)
+    number, part = animation_time.current_frame(scene)
     frame = run.frames[number]
     objects = run.reading.objects(scene)
     for index, placement in run.placements.items():
-        if number == run.scenario.frame_start and not share:
+        if number == run.scenario.frame_start and not part:
             start_transforms.restore_start(objects[index])
         else:
-            _place(run, objects[index], placement, index, number, share)
+            _place(run, objects[index], placement, index, number, part)
         run.placed_channels[index] = start_transforms.transform_channels(objects[index])
     for sensor, obj in zip(run.scenario.sensors, run.reading.sensor_objects(scene), strict=True):
         if sensor.readout and obj is not None:
@@ -210,7 +217,7 @@ def show(scene, run) -> None:
     frame_status.set_status(scene, " ".join(warnings) or f"Frame {number} computed.", frame, run.simulation.step_reason)
 
 
-def _place(run, obj, placement, index: int, number: int, share: float) -> None:
+def _place(run, obj, placement, index: int, number: int, part: float) -> None:
     """Move a body to its pose at a frame, or between it and the next one, as keyframes of a bake would."""
 
     def channels(frame: int, before=None) -> np.ndarray:
@@ -218,8 +225,8 @@ def _place(run, obj, placement, index: int, number: int, share: float) -> None:
 
     first = number == run.scenario.frame_start
     here = placement.channels if first else channels(number)
-    if share and number + 1 in run.frames:
-        here = here + share * (channels(number + 1, here) - here)
+    if part and number + 1 in run.frames:
+        here = here + part * (channels(number + 1, here) - here)
     placement.move(obj, here)
 
 
