@@ -17,8 +17,9 @@ from collections.abc import Callable, Iterator
 import numba
 import numpy as np
 
+from palpate.core.laws.contact_law import read_law
 from palpate.core.solver import parallel_loops
-from palpate.core.solver.detection import narrow_phase
+from palpate.core.solver.detection import surface_kinematics
 from palpate.core.solver.dynamics import contact_assembly, friction_state, relative_kinematics
 from palpate.core.solver.simulation import Simulation
 
@@ -39,9 +40,9 @@ BYTES = {
 
 
 @numba.njit(nogil=True)
-def _repeat(times, phase, model, tree, neighbour_lists, surfaces, state, workspace):
+def _repeat(times, loop, model, detection, state, workspace):
     for _ in range(times):
-        parallel_loops.run_parallel_loop(phase, model, tree, neighbour_lists, surfaces, state, workspace)
+        parallel_loops.run_parallel_loop(loop, model, detection, state, workspace)
 
 
 @numba.njit(nogil=True)
@@ -105,26 +106,20 @@ def run() -> Iterator[dict]:
         arrays, times, total = simulation.arrays, max(10, 100_000 // texels), 0.0
         model, workspace = arrays[0], arrays[-1]
         workspace.step[0] = simulation.dt
+        state, law = arrays[2], read_law(model.pairs.law, 0)
+        motion = relative_kinematics.motion_values(workspace.pairs.known_motion[0])
+        in_plane = surface_kinematics._rotate_bristles_into_plane
         flops = {
             "linearise and sum": operations(
-                contact_assembly._sum_contacts,
-                0,
-                0,
-                simulation.dt,
-                relative_kinematics.pair_law(model.parameters, 0),
-                model,
-                arrays[-2].memory,
-                workspace,
+                contact_assembly._sum_contacts, 0, simulation.dt, law, model, state.effect_memory, workspace
             ),
-            "bend bristles": operations(
-                friction_state._update_bristles, 0, relative_kinematics.motion_values(workspace.part[0]), arrays[-2], workspace
-            ),
+            "bend bristles": operations(friction_state._update_bristles, 0, motion, state, workspace),
             "find contacts": 90  # counted by hand
-            + operations(narrow_phase._rotate_bristles_into_plane, 0, int(workspace.contacts[0]), workspace.rows),
+            + operations(in_plane, 0, int(workspace.contacts.number[0]), workspace.contacts.rows),
         }
-        for name, phase in LOOPS.items():
-            _repeat(1, phase, *arrays)
-            taken = best(functools.partial(_repeat, times, phase, *arrays)) / times / texels
+        for name, loop in LOOPS.items():
+            _repeat(1, loop, *arrays)
+            taken = best(functools.partial(_repeat, times, loop, *arrays)) / times / texels
             total += taken
             least = max(BYTES[name] / copied, flops[name] / computed)
             yield {

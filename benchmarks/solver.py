@@ -104,9 +104,13 @@ def palpate_step(
 def memory(texels: int, solid: trimesh.Trimesh) -> int:
     """Return the bytes of all arrays that the inner loop works on, but for the object's own triangles."""
     simulation = Simulation(weighing(texels, solid))
-    model, _, neighbour_lists, _, state, workspace = simulation.arrays
-    parts = (model, neighbour_lists, state, workspace)
-    return sum(array.nbytes for part in parts for array in part if isinstance(array, np.ndarray))
+    model, detection, state, workspace = simulation.arrays
+    return sum(map(_bytes, (model, detection.neighbours, state, workspace)))
+
+
+def _bytes(part: object) -> int:
+    """Return the bytes of an array, or of all arrays in a tuple."""
+    return part.nbytes if isinstance(part, np.ndarray) else sum(map(_bytes, part)) if isinstance(part, tuple) else 0
 
 
 def mujoco_model(texels: int, solid: trimesh.Trimesh, slope: float = 0.0, gap: float = 0.0):

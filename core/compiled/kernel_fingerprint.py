@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which kernels these are. Found without numba, so that the panel can ask whether they were compiled before."""
+"""Fingerprint of all kernels. It is found without numba, so that the panel can ask whether they were compiled before."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ import hashlib
 from functools import cache
 from pathlib import Path
 
-KERNEL_MARKS = (b"@kernel", b"@inlined", b"@allocating", b"KIND = Kind(", b"from numba")
-"""What files hold that have a say in what is compiled; the laws of effects are compiled as well."""
+KERNEL_MARKS = (b"@kernel", b"@inlined", b"@allocating_kernel", b"@by_reference", b"KIND = Kind(", b"from numba")
+"""A file that holds one of these takes part in what is compiled; the laws of effects are compiled as well."""
 
 
 CORE = Path(__file__).resolve().parents[1]
@@ -18,8 +18,8 @@ CORE = Path(__file__).resolve().parents[1]
 def fingerprint() -> str:
     """Return a hash of all files with kernels in core.
 
-    A compiled kernel holds the machine code of those it calls, but numba looks only at a kernel's own file to see whether what
-    it kept is still good: after a change in another file, or an upgrade, the old code would go on running.
+    A compiled kernel contains the machine code of the kernels that it calls, but numba looks only at a kernel's own file to
+    see whether its cached result is still good. After a change in another file, or an upgrade, old code would go on running.
     """
     digest = hashlib.sha256()
     for path in sorted(CORE.rglob("*.py")):

@@ -1,44 +1,45 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""``@kernel``: compiled by numba where numba is, plain Python where it is not.
+"""``@kernel``: a function that numba compiles where it can, and that runs as plain Python elsewhere.
 
-``PALPATE_NUMBA=0`` switches compilation off; the numbers are the same to rounding (a test holds them to 1e-12). Nothing here
-lets the compiler reorder arithmetic: no fastmath, because "same seed, same bits" is worth more than a few per cent.
+``PALPATE_NUMBA=0`` switches compilation off; the numbers are the same to rounding (a test holds them to 1e-12). The compiler
+may not reorder arithmetic: there is no fastmath, because "same seed, same bits" is worth more than a few per cent.
 """
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable
 from typing import Any
 
 from .kernel_fingerprint import fingerprint
+from .numba_internals import COMPILED, carray, intrinsic, ir, known_options, numba, types
 
-COMPILED = False
-
-if os.environ.get("PALPATE_NUMBA", "1") != "0":
-    try:
-        import numba
-
-        COMPILED = True
-    except ImportError:
-        COMPILED = False
-
+__all__ = [
+    "COMPILED",
+    "KERNELS",
+    "allocating_kernel",
+    "call_address",
+    "carray",
+    "compiled_callback",
+    "inlined",
+    "kernel",
+    "plain",
+]
 
 FINGERPRINT = fingerprint() if COMPILED else ""
 
 KERNELS: list[Any] = []
-"""All that numba compiles when it is first called; for saying how far that is."""
+"""All functions that numba compiles when they are first called; their signatures tell how far that is."""
 
 
 def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
     """Compile `function` for the types it is first called with, and keep the result in numba's cache.
 
-    What is so compiled allocates nothing: numba counts no references in it (which would take more time in a small step than
-    all the arithmetic, since every function counts for each of a hundred arrays) and refuses what would make an array.
+    Such a function allocates nothing. Numba then counts no references in it, which in a small step would take more time than
+    all the arithmetic, and it refuses whatever would make an array.
     """
     if not COMPILED:
         return function
-    return _compiled(function, _nrt=False)
+    return _compiled(function, **known_options(_nrt=False))
 
 
 def allocating_kernel(function: Callable[..., Any]) -> Callable[..., Any]:
@@ -49,14 +50,19 @@ def allocating_kernel(function: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def inlined(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Do as :func:`kernel`, and become part of every caller, so that the caller's loops can run in vector registers.
+    """Do as :func:`kernel`, and insert the machine code into every caller, whose loops can then run in vector registers.
 
-    A loop that calls is not vectorised. Such a function takes and returns numbers, and chooses with ``a if c else b`` where a
-    branch would do something.
+    A loop with a call is not vectorised. Such a function takes and returns numbers, and selects with ``a if c else b`` instead
+    of branching.
     """
     if not COMPILED:
         return function
-    return _compiled(function, forceinline=True, _nrt=False)
+    return _compiled(function, **known_options(_nrt=False, forceinline=True))
+
+
+def plain(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Return the Python function that a kernel was made from: a formula without branches on its numbers also takes arrays."""
+    return getattr(function, "py_func", function)
 
 
 def _compiled(function: Callable[..., Any], **options: bool) -> Callable[..., Any]:
@@ -68,13 +74,9 @@ def _compiled(function: Callable[..., Any], **options: bool) -> Callable[..., An
     return compiled
 
 
-# --- functions that compiled code finds by an address, so that it need not be compiled anew for each
+# --- functions that kernels call by their address, so that the kernel need not be compiled anew for each of them
 
 if COMPILED:
-    from llvmlite import ir
-    from numba import carray, types
-    from numba.extending import intrinsic
-
     _POINTERS, _INTEGER_POINTERS, _NUMBERS = range(7), (6,), 13
     """Which arguments of such a function are addresses of arrays, which of those arrays hold integers, and how many arguments
     there are."""
@@ -88,7 +90,7 @@ if COMPILED:
 
     @intrinsic
     def call_address(_context, address, *numbers):  # type: ignore[no-untyped-def]
-        """Call what :func:`compiled_callback` made, from a kernel."""
+        """Call a function that :func:`compiled_callback` made, from a kernel."""
         signature = types.void(types.int64, types.StarArgTuple.from_types([types.int64] * _NUMBERS))
 
         def codegen(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
@@ -106,7 +108,7 @@ if COMPILED:
 else:
 
     def compiled_callback(function: Callable[..., Any]) -> Any:
-        """Only compiled code has addresses."""
+        """Raise: only compiled code has addresses."""
         raise NotImplementedError
 
-    carray = call_address = compiled_callback
+    call_address = compiled_callback

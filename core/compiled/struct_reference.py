@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """``@by_reference``: a NamedTuple of arrays that kernels take as one pointer.
 
-Numba takes a tuple apart wherever it is handed on: seven words for every array, so a kernel that is given the solver's hundred
-arrays has seven hundred arguments. Compiling those takes minutes, and calling takes longer than all the arithmetic of a small
-step. Here each tuple has written down once where its arrays are, and kernels hand on the address of that. For Python code and
-plain Python mode nothing changes.
+Numba unpacks a tuple wherever it is passed on, into seven words for every array, so a kernel that takes the solver's hundred
+arrays would have seven hundred arguments. Compiling those takes minutes, and calling takes longer than all the arithmetic of a
+small step. Here each tuple writes down once where its arrays are, and kernels pass on the address of that. A field may be such
+a tuple again, which costs one more load. For Python code and plain Python mode nothing changes.
 
-Loads are marked as invariant: kernels write into the arrays, never over what says where those are, so the compiler may keep
-that in registers whatever is written.
+Loads are marked as invariant: kernels write into the arrays, never over their addresses, so the compiler may keep those in
+registers.
 """
 
 from __future__ import annotations
@@ -19,28 +19,35 @@ from typing import Any, TypeVar, cast
 
 import numpy as np
 
-from .kernels import COMPILED
+from .numba_internals import (
+    COMPILED,
+    AttributeTemplate,
+    NativeValue,
+    cgutils,
+    impl_ret_borrowed,
+    infer_getattr,
+    ir,
+    lower_getattr_generic,
+    models,
+    register_model,
+    typeof,
+    typeof_impl,
+    types,
+    unbox,
+)
 
 Class = TypeVar("Class", bound=type)
 
 if not COMPILED:
 
     def by_reference(cls: Class) -> Class:
-        """Leave the class as it is: only compiled code would take its instances apart."""
+        """Return the class as it is: only compiled code would unpack its instances."""
         return cls
 
 else:
-    from llvmlite import ir
-    from numba import typeof
-    from numba.core import cgutils, types
-    from numba.core.datamodel import models
-    from numba.core.imputils import impl_ret_borrowed, lower_getattr_generic
-    from numba.core.typing.templates import AttributeTemplate, infer_getattr
-    from numba.extending import NativeValue, register_model, typeof_impl, unbox
-
     _BYTES = cgutils.voidptr_t
     _OWNERS = 2
-    """How many words of a compiled array say who owns it; they come first."""
+    """Number of words of a compiled array that are for its owner; they come first."""
 
     class Reference(types.Type):
         """Numba's type of such a tuple: its class, and the types of its fields."""
@@ -52,7 +59,7 @@ else:
 
         @property
         def key(self) -> Any:
-            """What tells one type from another."""
+            """What distinguishes one type from another."""
             return self.cls, self.fields
 
     @register_model(Reference)
@@ -84,11 +91,11 @@ else:
     def _get(context: Any, builder: Any, kind: Reference, pointer: Any, name: str) -> Any:
         at = kind.cls._fields.index(name)
         field, place = kind.fields[at], _field(context, builder, kind, pointer, at)
-        owned = isinstance(field, types.Array) and not context.enable_nrt  # nobody asks for the owner where none is counted
+        owned = isinstance(field, types.Array) and not context.enable_nrt  # without reference counts nobody needs the owner
         return impl_ret_borrowed(context, builder, field, _load(builder, place, _OWNERS if owned else 0))
 
     def _load(builder: Any, place: Any, skip: int = 0) -> Any:
-        """Load a value number by number: the mark of a load of many would be lost when the compiler takes it apart."""
+        """Load a value number by number: the mark of a whole tuple's load would be lost when the compiler splits it."""
         kind = place.type.pointee
         if isinstance(kind, (ir.LiteralStructType, ir.ArrayType)):
             value = ir.Constant(kind, ir.Undefined)
@@ -101,7 +108,7 @@ else:
 
     @unbox(Reference)
     def _unbox(kind: Reference, instance: Any, c: Any) -> Any:
-        """Ask the instance where its fields are written down."""
+        """Get the address at which the instance has written down its fields."""
         builder = c.builder
         answer = c.pyapi.object_getattr_string(instance, "address")
         failed = cgutils.is_null(builder, answer)
@@ -120,10 +127,10 @@ else:
         return [operator.index(value)]
 
     def by_reference(cls: Class) -> Class:
-        """Have kernels take instances of a NamedTuple as one pointer; fields are arrays, integers, or such tuples again."""
+        """Make kernels take instances of a NamedTuple as one pointer; its fields are arrays, integers, or such tuples again."""
 
         class Referred(cls):  # type: ignore[misc, valid-type]
-            """With room to keep what compiled code asks for."""
+            """The class with what compiled code needs of it."""
 
             @cached_property
             def numba_type(self) -> Reference:
@@ -136,7 +143,7 @@ else:
 
             @cached_property
             def address(self) -> int:
-                """Where the fields are written down, for as long as this instance lives."""
+                """Address at which the fields are written down; valid as long as this instance lives."""
                 return int(self._words.ctypes.data)
 
         hidden = [name for name in Referred._fields if getattr(Referred, name) is not getattr(cls, name)]

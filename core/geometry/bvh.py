@@ -116,14 +116,21 @@ def _adjacent_triangles(triangles: np.ndarray) -> np.ndarray:
 
 
 @kernel
-def is_interior(i, normals, first, adjacent):
+def is_interior(i: int, normals: np.ndarray, first: int, adjacent: np.ndarray) -> bool:
     """Whether a triangle has a normal, whose column is `first`, and a neighbour on each side."""
     square = normals[i, first] ** 2 + normals[i, first + 1] ** 2 + normals[i, first + 2] ** 2
     return square > 0.5 and adjacent[i, 0] >= 0 and adjacent[i, 1] >= 0 and adjacent[i, 2] >= 0
 
 
 @kernel
-def _fit_normal_bounds(normals, adjacent, skip, first, number, normal_bounds):
+def _fit_normal_bounds(
+    normals: np.ndarray,
+    adjacent: np.ndarray,
+    skip: np.ndarray,
+    first: np.ndarray,
+    number: np.ndarray,
+    normal_bounds: np.ndarray,
+) -> None:
     """Fill in :attr:`Tree.facing`; rounded away from what is inside, since it is kept in single precision."""
     for node in range(len(normal_bounds) - 1, -1, -1):
         for axis in range(3):
@@ -141,7 +148,7 @@ def _fit_normal_bounds(normals, adjacent, skip, first, number, normal_bounds):
 
 
 @kernel
-def _select(order, centroid, axis, lo, hi, middle):
+def _select(order: np.ndarray, centroid: np.ndarray, axis: int, lo: int, hi: int, middle: int) -> None:
     """Hoare's selection: afterwards order[lo:middle] lie below order[middle:hi] along `axis`."""
     hi -= 1
     while lo < hi:
@@ -165,7 +172,16 @@ def _select(order, centroid, axis, lo, hi, middle):
 
 
 @allocating_kernel
-def _build(corners, centroid, order, leaf_size, bounds, skip, first, number):
+def _build(
+    corners: np.ndarray,
+    centroid: np.ndarray,
+    order: np.ndarray,
+    leaf_size: int,
+    bounds: np.ndarray,
+    skip: np.ndarray,
+    first: np.ndarray,
+    number: np.ndarray,
+) -> int:
     """Split at the median of the longest axis until leaves are small; returns the number of nodes."""
     stack = np.empty((128, 3), np.int64)  # range of triangles, and the node whose skip the range's end decides
     stack[0, 0], stack[0, 1] = 0, len(order)
@@ -204,7 +220,7 @@ def _build(corners, centroid, order, leaf_size, bounds, skip, first, number):
 
 
 @kernel
-def _node_count(n, leaf_size):
+def _node_count(n: int, leaf_size: int) -> int:
     """Nodes of a subtree over `n` triangles. Halving gives at most two sizes per level, so two counters walk down."""
     total = 0
     small, small_many, large_many = n, 1, 0  # ranges of length `small` and of length `small + 1` on this level
@@ -221,48 +237,106 @@ def _node_count(n, leaf_size):
     return total
 
 
+class Segment(NamedTuple):
+    """A segment from its base O to O + D.
+
+    Attributes
+    ----------
+    ox, oy, oz : float, metres
+        Its base.
+    dx, dy, dz : float, metres
+        The vector to its tip.
+    """
+
+    ox: float
+    oy: float
+    oz: float
+    dx: float
+    dy: float
+    dz: float
+
+
+class Shear(NamedTuple):
+    """The shear that lays a segment onto the axis along which it is longest.
+
+    Attributes
+    ----------
+    axis : int
+    x, y : float
+        Factors for the other two axes, in cyclic order.
+    """
+
+    axis: int
+    x: float
+    y: float
+
+
+class Box(NamedTuple):
+    """An axis-aligned box, from (x0, y0, z0) to (x1, y1, z1), metres."""
+
+    x0: float
+    x1: float
+    y0: float
+    y1: float
+    z0: float
+    z1: float
+
+
 @kernel
-def shear_to_axis(dx, dy, dz):
-    """Axis along which a vector is longest, and the shear of the other two (in cyclic order) that lays it onto that axis."""
+def shear_to_axis(segment: Segment) -> Shear:
+    """Return the :class:`Shear` of a segment."""
+    dx, dy, dz = segment.dx, segment.dy, segment.dz
     if abs(dx) >= abs(dy) and abs(dx) >= abs(dz):
-        return 0, dy / dx, dz / dx
+        return Shear(0, dy / dx, dz / dx)
     if abs(dy) >= abs(dz):
-        return 1, dz / dy, dx / dy
-    return 2, dx / dz, dy / dz
+        return Shear(1, dz / dy, dx / dy)
+    return Shear(2, dx / dz, dy / dz)
 
 
 @kernel
-def project_sheared(x, y, z, axis, shear_x, shear_y):
-    """Project a point along the line of sight."""
-    if axis == 0:
-        return y - shear_x * x, z - shear_y * x
-    if axis == 1:
-        return z - shear_x * y, x - shear_y * y
-    return x - shear_x * z, y - shear_y * z
+def project_sheared(x: float, y: float, z: float, shear: Shear) -> tuple[float, float]:
+    """Project a point along the segment of a shear; two coordinates."""
+    if shear.axis == 0:
+        return y - shear.x * x, z - shear.y * x
+    if shear.axis == 1:
+        return z - shear.x * y, x - shear.y * y
+    return x - shear.x * z, y - shear.y * z
 
 
 @kernel
-def boxes_disjoint(bounds, node, x0, x1, y0, y1, z0, z1):
-    """Whether a node's box and the box from (x0, y0, z0) to (x1, y1, z1) have no point in common."""
+def is_outside(bounds: np.ndarray, node: int, box: Box) -> bool:
+    """Whether a node's box and another box have no point in common."""
     return (
-        bounds[node, 0] > x1 or bounds[node, 3] < x0
-        or bounds[node, 1] > y1 or bounds[node, 4] < y0
-        or bounds[node, 2] > z1 or bounds[node, 5] < z0
+        bounds[node, 0] > box.x1 or bounds[node, 3] < box.x0
+        or bounds[node, 1] > box.y1 or bounds[node, 4] < box.y0
+        or bounds[node, 2] > box.z1 or bounds[node, 5] < box.z0
     )  # fmt: skip
 
 
 @kernel
-def segment_entry(ox, oy, oz, dx, dy, dz, mesh, hint, tree):
-    """Find where the segment from O to O + D first enters a surface from outside.
+def box_of(segment: Segment, part: float) -> Box:
+    """Box around the first part of a segment, `part` being its share."""
+    ox, oy, oz, dx, dy, dz = segment
+    return Box(
+        min(ox, ox + part * dx), max(ox, ox + part * dx),
+        min(oy, oy + part * dy), max(oy, oy + part * dy),
+        min(oz, oz + part * dz), max(oz, oz + part * dz),
+    )  # fmt: skip
+
+
+@kernel
+def segment_entry(segment: Segment, mesh: int, hint: int, tree: Tree) -> tuple[float, int, float]:
+    """Find where a segment first enters a surface from outside.
 
     Parameters
     ----------
-    ox … dz : float
-        Base of the segment and the vector to its tip (not zero), in the mesh's frame.
+    segment : Segment
+        Not of length zero, in the mesh's frame.
     mesh : int
         Which of the tree's meshes.
     hint : int
         Triangle to try first, -1 for none; it changes the speed and never the answer.
+    tree : Tree
 
     Returns
     -------
@@ -275,29 +349,24 @@ def segment_entry(ox, oy, oz, dx, dy, dz, mesh, hint, tree):
         object. Beyond `t` it may be any such intersection; 2 when none was met.
     """
     t, triangle, leaving = 2.0, -1, 2.0
-    axis, shear_x, shear_y = shear_to_axis(dx, dy, dz)
+    shear = shear_to_axis(segment)
     if hint >= 0:
-        u = intersect_triangle(ox, oy, oz, dx, dy, dz, axis, shear_x, shear_y, tree.faces, hint)
+        u = intersect_triangle(segment, shear, tree.faces, hint)
         if 0.0 <= u <= 1.0:
             t, triangle = u, hint
-    reach = min(t, 1.0)
-    x0, x1 = min(ox, ox + reach * dx), max(ox, ox + reach * dx)
-    y0, y1 = min(oy, oy + reach * dy), max(oy, oy + reach * dy)
-    z0, z1 = min(oz, oz + reach * dz), max(oz, oz + reach * dz)
+    box = box_of(segment, min(t, 1.0))
     bounds, node, stop = tree.bounds, tree.roots[mesh], tree.roots[mesh + 1]
     while node < stop:
-        if boxes_disjoint(bounds, node, x0, x1, y0, y1, z0, z1):
+        if is_outside(bounds, node, box):
             node = tree.skip[node]
             continue
         for i in range(tree.first[node], tree.first[node] + tree.number[node]):
-            u = intersect_triangle(ox, oy, oz, dx, dy, dz, axis, shear_x, shear_y, tree.faces, i)
+            u = intersect_triangle(segment, shear, tree.faces, i)
             if 0.0 <= u <= 1.0:
                 # Of two triangles met at the very same point (a shared edge) the first in the list answers, hint or not.
                 if u < t or (u == t and i < triangle):
                     t, triangle = u, i
-                    x0, x1 = min(ox, ox + u * dx), max(ox, ox + u * dx)
-                    y0, y1 = min(oy, oy + u * dy), max(oy, oy + u * dy)
-                    z0, z1 = min(oz, oz + u * dz), max(oz, oz + u * dz)
+                    box = box_of(segment, u)
             elif u < 0.0:
                 leaving = min(leaving, -3.0 - u)
         node += 1
@@ -305,20 +374,21 @@ def segment_entry(ox, oy, oz, dx, dy, dz, mesh, hint, tree):
 
 
 @kernel
-def intersect_triangle(ox, oy, oz, dx, dy, dz, axis, shear_x, shear_y, faces, i):
+def intersect_triangle(segment: Segment, shear: Shear, faces: np.ndarray, i: int) -> float:
     """Position on the segment where it crosses a triangle: t in 0…1 entering, -3 - t leaving, 9 when it misses.
 
-    The corners are seen along the segment as points of a plane, each computed from the corner alone, and the origin must lie on
+    The corners are projected along the segment into a plane, each computed from the corner alone, and the origin must lie on
     one side of all three edges. Rounding may turn the sign of an edge into zero, which counts as inside on both sides, but
     never into its opposite: nothing leaks between neighbours.
     """
+    ox, oy, oz, dx, dy, dz = segment
     ax, ay, az = faces[i, 0] - ox, faces[i, 1] - oy, faces[i, 2] - oz
     bx, by, bz = faces[i, 3] - ox, faces[i, 4] - oy, faces[i, 5] - oz
     cx, cy, cz = faces[i, 6] - ox, faces[i, 7] - oy, faces[i, 8] - oz
     height = faces[i, 9] * ax + faces[i, 10] * ay + faces[i, 11] * az
-    ax, ay = project_sheared(ax, ay, az, axis, shear_x, shear_y)
-    bx, by = project_sheared(bx, by, bz, axis, shear_x, shear_y)
-    cx, cy = project_sheared(cx, cy, cz, axis, shear_x, shear_y)
+    ax, ay = project_sheared(ax, ay, az, shear)
+    bx, by = project_sheared(bx, by, bz, shear)
+    cx, cy = project_sheared(cx, cy, cz, shear)
     u, v, w = ax * by - ay * bx, bx * cy - by * cx, cx * ay - cy * ax
     low, high = min(u, v, w), max(u, v, w)
     if (low < 0.0 and high > 0.0) or (low == 0.0 and high == 0.0):
@@ -333,8 +403,9 @@ def intersect_triangle(ox, oy, oz, dx, dy, dz, axis, shear_x, shear_y, faces, i)
 
 
 @kernel
-def intersect_plane(ox, oy, oz, dx, dy, dz, faces, i):
+def intersect_plane(segment: Segment, faces: np.ndarray, i: int) -> float:
     """Position on the segment where it crosses a triangle's plane, the same bits as :func:`intersect_triangle` has for it."""
+    ox, oy, oz, dx, dy, dz = segment
     ax, ay, az = faces[i, 0] - ox, faces[i, 1] - oy, faces[i, 2] - oz
     height = faces[i, 9] * ax + faces[i, 10] * ay + faces[i, 11] * az
     return height / (faces[i, 9] * dx + faces[i, 10] * dy + faces[i, 11] * dz)

@@ -9,9 +9,6 @@ import numpy as np
 
 from ..compiled.kernels import kernel
 
-KEYFRAMED, FREE, DRIVEN = 0, 1, 2
-"""What moves a body: its motion, forces, or its motion and a drive."""
-
 
 def rotation_matrices(quaternions: np.ndarray) -> np.ndarray:
     """(…, 4) unit quaternions (w, x, y, z) to (…, 3, 3) rotation matrices."""
@@ -57,7 +54,7 @@ def quaternions_from_vectors(vectors: np.ndarray) -> np.ndarray:
 
 
 @kernel
-def rotate(quaternion, vx, vy, vz):
+def rotate(quaternion: np.ndarray, vx: float, vy: float, vz: float) -> tuple[float, float, float]:
     """Turn a vector by a unit quaternion."""
     w, x, y, z = quaternion[0], quaternion[1], quaternion[2], quaternion[3]
     tx, ty, tz = 2.0 * (y * vz - z * vy), 2.0 * (z * vx - x * vz), 2.0 * (x * vy - y * vx)
@@ -65,7 +62,7 @@ def rotate(quaternion, vx, vy, vz):
 
 
 @kernel
-def write_rotation(quaternion, rotation):
+def write_rotation(quaternion: np.ndarray, rotation: np.ndarray) -> None:
     """Write the rotation matrix of a unit quaternion into `rotation` (3, 3)."""
     w, x, y, z = quaternion[0], quaternion[1], quaternion[2], quaternion[3]
     rotation[0, 0], rotation[0, 1], rotation[0, 2] = 1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)
@@ -74,7 +71,7 @@ def write_rotation(quaternion, rotation):
 
 
 @kernel
-def rotate_quaternion(quaternion, wx, wy, wz):
+def rotate_quaternion(quaternion: np.ndarray, wx: float, wy: float, wz: float) -> None:
     """Turn `quaternion` in place by the rotation vector `w` (radians, world axes) and keep it of unit length."""
     angle = math.sqrt(wx * wx + wy * wy + wz * wz)
     c = math.cos(0.5 * angle)
@@ -88,7 +85,7 @@ def rotate_quaternion(quaternion, wx, wy, wz):
 
 
 @kernel
-def write_twist(velocity, dt, twist):
+def write_twist(velocity: np.ndarray, dt: float, twist: np.ndarray) -> None:
     """How the points of a body move over a step that turns it by the angle ``|ω| dt``.
 
     The point at arm r, seen from the step's beginning, moves by ``dt (V + W r)`` with ``W = (exp([ω dt]×) - 1) / dt``: the
@@ -115,13 +112,13 @@ def write_twist(velocity, dt, twist):
 
 
 @kernel
-def write_backward_twist(velocity, dt, twist):
+def write_backward_twist(velocity: np.ndarray, dt: float, twist: np.ndarray) -> None:
     """Write the twist of the step that has just ended, as seen from its end: ``W = (1 - exp(-[ω dt]×)) / dt``."""
     write_twist(velocity, -dt, twist)
 
 
 @kernel
-def write_world_inertia(rotation, inertia, out):
+def write_world_inertia(rotation: np.ndarray, inertia: np.ndarray, out: np.ndarray) -> None:
     """R I Rᵀ into `out` (3, 3)."""
     for i in range(3):
         for j in range(3):
@@ -133,7 +130,7 @@ def write_world_inertia(rotation, inertia, out):
 
 
 @kernel
-def write_twist_map(rotation, gx, gy, gz, sign, out):
+def write_twist_map(rotation: np.ndarray, gx: float, gy: float, gz: float, sign: float, out: np.ndarray) -> None:
     """Matrix (6, 6) from a body's twist in world axes to velocities near a sensor, in the axes of the sensor's body.
 
     Parameters
@@ -156,14 +153,24 @@ def write_twist_map(rotation, gx, gy, gz, sign, out):
 
 
 @kernel
-def project_on_axis(axis, out):
+def project_on_axis(axis: np.ndarray, out: np.ndarray) -> None:
     """Leave in the first column of a twist map what a body's speed along `axis` (3,) does."""
     for i in range(6):
         out[i, 0] = axis[0] * out[i, 0] + axis[1] * out[i, 1] + axis[2] * out[i, 2]
 
 
 @kernel
-def add_triple_product(matrix, row, column, left, left_width, middle, right, right_width, scale):
+def add_triple_product(
+    matrix: np.ndarray,
+    row: int,
+    column: int,
+    left: np.ndarray,
+    left_width: int,
+    middle: np.ndarray,
+    right: np.ndarray,
+    right_width: int,
+    scale: float,
+) -> None:
     """Add ``scale · leftᵀ middle right`` into `matrix`.
 
     `middle` is symmetric, 6 × 6, and its lower triangle is read; of `left` and `right` the first columns are used.
@@ -178,7 +185,7 @@ def add_triple_product(matrix, row, column, left, left_width, middle, right, rig
 
 
 @kernel
-def solve_positive_definite(matrix, vector, n):
+def solve_positive_definite(matrix: np.ndarray, vector: np.ndarray, n: int) -> None:
     """Solve the symmetric positive definite system in place (Cholesky; the lower triangle is read and overwritten)."""
     for j in range(n):
         total = matrix[j, j]

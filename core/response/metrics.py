@@ -60,7 +60,7 @@ def slipping(sensor: SensorRecording | SensorFrame, parameters: SensorParameters
     -------
     (F, n) or (n,) bool
     """
-    from ..laws.contact import stribeck_force
+    from ..laws.friction import stribeck_force
 
     found = np.asarray(sensor.contact, bool) & (sensor.slip > CREEPING)
     limit = stribeck_force(sensor.normal_force[found], sensor.slip[found], parameters)

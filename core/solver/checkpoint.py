@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-_FIXED = {"scenario", "_model", "_tree", "_closed", "_center", "_motions"}
+_FIXED = {"scenario", "_model", "_tree", "_closed", "_center", "_motions", "_detection"}
 """What a new simulation of the same scenario has already."""
 _LEFT_OUT = {"left": "out"}
 

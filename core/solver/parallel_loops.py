@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The phases of a step whose pairs are shared out among threads (kernels)."""
+"""The loops over pairs in a step, whose pairs are divided among threads (kernels)."""
 
 from __future__ import annotations
 
@@ -15,38 +15,48 @@ from ..compiled.thread_team import (
     wait_briefly,
 )
 from ..geometry.rotations import write_rotation
+from .detection.detection_data import DetectionData
 from .detection.narrow_phase import find_contacts
+from .detection.surface_kinematics import finish_contacts
 from .dynamics.contact_assembly import sum_pair_contacts
 from .dynamics.friction_state import update_pair_friction
+from .solver_model import SolverModel, State
+from .workspace import Workspace
 
 FIND_CONTACTS, SUM_CONTACTS, UPDATE_FRICTION = 2, 3, 4
-"""Phases of a step whose pairs are shared out: find the contacts, sum them up, bend the bristles."""
+"""Numbers of the loops; :mod:`.thread_team` uses 0 and 1 itself."""
 
 
 @inlined
-def find_all_contacts(dt, model, tree, neighbour_lists, surfaces, state, workspace):
-    """Contacts of all pairs of sensor and target where the bodies are now. Returns how many points are sunk too deep to act."""
+def find_all_contacts(dt: float, model: SolverModel, detection: DetectionData, state: State, workspace: Workspace) -> int:
+    """Find the contacts of all pairs where the bodies are now, and return how many points are pressed too deep to act.
+
+    `dt` is the step that begins, or minus the step that has ended (see :func:`.finish_contacts`).
+    """
     for body in range(len(state.position)):
-        write_rotation(state.quaternion[body], workspace.rotation[body])
+        write_rotation(state.quaternion[body], workspace.bodies.rotation[body])
     workspace.step[0] = dt
-    run_parallel_loop(FIND_CONTACTS, model, tree, neighbour_lists, surfaces, state, workspace)
-    return workspace.too_deep.sum()
+    run_parallel_loop(FIND_CONTACTS, model, detection, state, workspace)
+    return workspace.contacts.too_deep.sum()
 
 
 @inlined
-def run_parallel_loop(phase, model, tree, neighbour_lists, surfaces, state, workspace):
-    """Do a phase for all pairs, alone or with helpers; surfaces that deform are moved on when first asked for, so alone."""
-    queue, pairs = workspace.queue, len(model.pairs)
-    if len(queue) == 0 or pairs == 1 or surfaces.moves[0]:
+def run_parallel_loop(loop: int, model: SolverModel, detection: DetectionData, state: State, workspace: Workspace) -> None:
+    """Run a loop over all pairs, alone or with helper threads.
+
+    Surfaces that deform are brought to the present moment when they are first asked for, so then one thread works alone.
+    """
+    queue, pairs = workspace.queue, len(model.pairs.sensor)
+    if len(queue) == 0 or pairs == 1 or detection.surfaces.any_deforms[0]:
         for pair in range(pairs):
-            _run_item(phase, pair, model, tree, neighbour_lists, surfaces, state, workspace)
+            _run_item(loop, pair, model, detection, state, workspace)
         return
-    begin_loop(queue, phase)
+    begin_loop(queue, loop)
     pair = 0
     while pair < pairs:
         _, pair = claim_item(queue, pairs)
         if pair < pairs:
-            _run_item(phase, pair, model, tree, neighbour_lists, surfaces, state, workspace)
+            _run_item(loop, pair, model, detection, state, workspace)
             finish_item(queue)
     turn = 0
     while not all_items_done(queue, pairs):
@@ -57,13 +67,13 @@ def run_parallel_loop(phase, model, tree, neighbour_lists, surfaces, state, work
 
 
 @kernel
-def help_with_loops(model, tree, neighbour_lists, surfaces, state, workspace):
-    """Do what :func:`run_parallel_loop` puts on the board, until it says that the helpers may go home."""
-    queue, pairs, turn = workspace.queue, len(model.pairs), 0
+def help_with_loops(model: SolverModel, detection: DetectionData, state: State, workspace: Workspace) -> None:
+    """Work on the loops that :func:`run_parallel_loop` puts into the queue, until the queue says stop."""
+    queue, pairs, turn = workspace.queue, len(model.pairs.sensor), 0
     while not is_stopped(queue):
-        phase, pair = claim_item(queue, pairs)
+        loop, pair = claim_item(queue, pairs)
         if pair < pairs:
-            _run_item(phase, pair, model, tree, neighbour_lists, surfaces, state, workspace)
+            _run_item(loop, pair, model, detection, state, workspace)
             finish_item(queue)
             turn = 0
         else:
@@ -72,13 +82,15 @@ def help_with_loops(model, tree, neighbour_lists, surfaces, state, workspace):
 
 
 @inlined
-def _run_item(phase, pair, model, tree, neighbour_lists, surfaces, state, workspace):
-    """One phase of one pair. What it writes belongs to this pair alone."""
+def _run_item(loop: int, pair: int, model: SolverModel, detection: DetectionData, state: State, workspace: Workspace) -> None:
+    """Run one pair of a loop. What it writes belongs to this pair alone."""
     dt = workspace.step[0]
-    if phase == FIND_CONTACTS:
-        find_contacts(pair, dt, model, tree, neighbour_lists, surfaces, state, workspace)
-    elif workspace.contacts[pair] > 0:
-        if phase == SUM_CONTACTS:
+    if loop == FIND_CONTACTS:
+        find_contacts(pair, model, detection, state, workspace)
+        if workspace.contacts.number[pair] > 0:
+            finish_contacts(pair, dt, model, detection, state, workspace)
+    elif workspace.contacts.number[pair] > 0:
+        if loop == SUM_CONTACTS:
             sum_pair_contacts(pair, dt, model, state, workspace)
         else:
-            update_pair_friction(pair, dt, model, surfaces, state, workspace)
+            update_pair_friction(pair, dt, model, detection.surfaces, state, workspace)

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..laws.normal_force import largest_stiffness_and_damping
 from ..model.scenario import Scenario
 from ..model.sensor import Sensor
-from ..model.sensor_parameters import HUNT_CROSSLEY
 
 SHARE_OF_LIMIT = 0.2
 """Share of the explicit stability limit that is used: about thirty steps per period of the stiffest contact."""
@@ -116,9 +116,6 @@ def plan(scenario: Scenario) -> Plan:
 def _tangent_or_normal(sensor: Sensor) -> tuple[float, float]:
     """Stiffness and damping of all texels together, in the direction in which they are stiffer."""
     p, factor = sensor.parameters, np.ones(len(sensor.texels)) if sensor.painted.k is None else sensor.painted.k
-    k, cn = p.k, p.cn
-    if p.normal_law == HUNT_CROSSLEY:  # where it is stiffest: pressed in as far as it acts
-        k = p.k * p.exponent * p.max_penetration ** (p.exponent - 1.0)
-        cn = 1.5 * p.dissipation * p.k * p.max_penetration**p.exponent
+    k, cn = largest_stiffness_and_damping(p)
     stiffness, damping = np.maximum(factor * k, p.sigma0), np.maximum(factor * cn, p.sigma1 + p.ct)
     return float(stiffness.sum()), float(damping.sum())

@@ -53,13 +53,17 @@ def step_time(steps: int = 40) -> float:
     return (time.perf_counter() - start) / steps
 
 
-def without_numba() -> tuple[dict[str, np.ndarray], float]:
-    """Numbers of all scenes, and seconds per step on a small pad, in plain Python."""
+def without_numba(missing: str = "") -> tuple[dict[str, np.ndarray], float]:
+    """Numbers of all scenes, and seconds per step on a small pad, in plain Python.
+
+    Compilation is switched off, or, if it is given, a module of numba is `missing`.
+    """
     folder = Path(__file__).resolve().parents[1]
     with tempfile.TemporaryDirectory() as place:
         path = Path(place) / "plain.npz"
-        code = f"import sys; sys.path.insert(0, {str(folder)!r}); from oracles import plain; plain.write({str(path)!r})"
-        environment = {**os.environ, "PALPATE_NUMBA": "0"}
+        hide = f"sys.modules[{missing!r}] = None; " if missing else ""
+        code = f"import sys; {hide}sys.path.insert(0, {str(folder)!r}); from oracles import plain; plain.write({str(path)!r})"
+        environment = {**os.environ, "PALPATE_NUMBA": "1" if missing else "0"}
         done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True)
         if done.returncode != 0:
             raise RuntimeError(done.stderr)

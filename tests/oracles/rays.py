@@ -23,9 +23,8 @@ NONE = 2.0
 @kernel
 def _entries(origins, vectors, tree, t, triangle):
     for i in range(len(origins)):
-        t[i], triangle[i], _ = bvh.segment_entry(
-            origins[i, 0], origins[i, 1], origins[i, 2], vectors[i, 0], vectors[i, 1], vectors[i, 2], 0, -1, tree
-        )
+        o, d = origins[i], vectors[i]
+        t[i], triangle[i], _ = bvh.segment_entry(bvh.Segment(o[0], o[1], o[2], d[0], d[1], d[2]), 0, -1, tree)
 
 
 def entries(mesh: TriangleMesh, origins: np.ndarray, vectors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -122,14 +122,14 @@ class Energies:
 
 def stored(simulation: Simulation, frame) -> float:
     """Energy in the springs and bristles of all contacts, joules."""
-    total, state, world = 0.0, simulation._state, simulation._model
+    total, state, pairs = 0.0, simulation._state, simulation._model.pairs
     for index, sensor in enumerate(simulation.scenario.sensors):
         p = sensor.parameters
         if sensor.readout:
             total += 0.5 * p.k * (frame.sensors[sensor.name].depth ** 2).sum()
-        for pair in np.flatnonzero(world.pairs[:, 0] == index):
-            own = slice(world.slot_start[pair], world.slot_start[pair] + len(sensor.texels))
-            total += 0.5 * p.sigma0 * (state.bristles[own, :3] ** 2).sum()
+        for pair in np.flatnonzero(pairs.sensor == index):
+            own = slice(pairs.first_slot[pair], pairs.first_slot[pair] + len(sensor.texels))
+            total += 0.5 * p.sigma0 * (state.bristle[own] ** 2).sum()
     return total
 
 
@@ -162,7 +162,7 @@ def energies(scenario: Scenario, steps: int, scale: float) -> Energies:
         frame = simulation.advance() if step else simulation.observe()
         mechanical.append(moving(scenario, frame))
         held.append(stored(simulation, frame))
-        paid.append(float(simulation._state.tank.sum()) + lag(simulation) if step else held[0])
+        paid.append(float(simulation._state.stored_energy.sum()) + lag(simulation) if step else held[0])
     motion, springs = np.array(mechanical), np.array(held)
     back = np.minimum(springs, paid)
     return Energies(motion + back, motion, springs - back, scale)

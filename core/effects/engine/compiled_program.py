@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike
 
 from ...compiled.kernels import COMPILED, call_address, carray, compiled_callback, kernel
 from ...compiled.struct_reference import by_reference
+from ...laws.normal_force import damped_force_derivatives, damping_coefficient, elastic_force, elastic_stiffness
 from ...model.effect import Effect
 from .registry import complete_values, in_signal_order
 from .specification import Form, TexelInput
@@ -265,7 +266,7 @@ COLUMNS = 9
 
 
 @kernel
-def press(work, block, stride, i, depth, rate, slide, speed, k, cn, exponent, dissipation):
+def press(work, block, stride, i, depth, rate, slide, speed, law):
     """Write what the base law makes of a point.
 
     Parameters
@@ -277,17 +278,13 @@ def press(work, block, stride, i, depth, rate, slide, speed, k, cn, exponent, di
         Depth at the step's end, zero or less where nothing touches; its rate during the step.
     slide, speed : float, m and m/s
         Distance slid in the step, and speed of it.
-    k, cn, exponent, dissipation : float
-        As in :class:`.SensorParameters`; an exponent of zero is Eq. 8.
+    law : ContactLaw
+        Of a whole texel.
     """
-    force, slope, damping = 0.0, 0.0, cn
+    force, slope, damping = 0.0, 0.0, damping_coefficient(law)
     if depth > 0.0:
-        force, slope = k * depth, k
-        if exponent != 0.0:
-            force = k * depth**exponent
-            slope = exponent * force / depth
-    if exponent != 0.0:
-        damping = 1.5 * dissipation
+        force = elastic_force(depth, law)
+        slope = elastic_stiffness(depth, force, law)
     work[block, DEPTH * stride + i], work[block, RATE * stride + i] = max(depth, 0.0), rate
     work[block, SLIDE * stride + i], work[block, SPEED * stride + i] = slide, speed
     work[block, FORCE * stride + i], work[block, SLOPE * stride + i] = force, slope
@@ -326,10 +323,9 @@ def apply_force_laws(sensor, step, work, block, stride, begin, count, slots, slo
             program.numbers, program.row[e] + step, memory, program.at[e], commit,
         )  # fmt: skip
     for i in range(count):
-        if not linear:
-            work[block, slope + i] *= 1.0 + work[block, damping + i] * work[block, rate + i]
-            work[block, damping + i] *= work[block, force + i]
-        work[block, force + i] += work[block, damping + i] * work[block, rate + i]
+        work[block, force + i], work[block, slope + i], work[block, damping + i] = damped_force_derivatives(
+            work[block, force + i], work[block, slope + i], work[block, damping + i], work[block, rate + i], linear
+        )
         if work[block, force + i] <= 0.0 or work[block, depth + i] <= 0.0:
             work[block, force + i] = work[block, slope + i] = work[block, damping + i] = 0.0
     for e in range(program.clip[sensor], program.start[sensor + 1]):

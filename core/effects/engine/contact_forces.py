@@ -9,8 +9,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ...compiled.kernels import plain
+from ...laws.contact_law import LINEAR_EXPONENT, ContactLaw, contact_law
+from ...laws.normal_force import damped_force, elastic_force
 from ...model.effect import Effect
-from ...model.sensor_parameters import LINEAR
 from .compiled_program import (
     COLUMNS,
     DAMPING,
@@ -62,24 +64,22 @@ def normal_forces(
         rate[1:] = np.diff(depth, axis=0) / np.diff(time)[:, None]
     lengths, step = steps_of(time)
     inside = np.maximum(depth, 0.0)
-    linear = parameters.normal_law == LINEAR
-    force = parameters.k * (inside if linear else inside**parameters.exponent)
-    damping = parameters.cn * rate if linear else 1.5 * parameters.dissipation * rate
+    law = contact_law(parameters)
+    force = plain(elastic_force)(inside, law)
     clipped = False
     for item, form in in_signal_order(effects, readout=False):
         if form.law is None or form.constants is None:
             continue
         if form.after_clip and not clipped:
-            force, clipped = _damped_and_clipped(force, inside, damping, linear), True
+            force, clipped = _damped_and_clipped(force, inside, rate, law), True
         memory = np.zeros((depth.shape[1], form.state_size))
         force = law_over_time(form, force, step, form.constants(complete_values(item), lengths), memory, inside, slide)
-    return force if clipped else _damped_and_clipped(force, inside, damping, linear)
+    return force if clipped else _damped_and_clipped(force, inside, rate, law)
 
 
-def _damped_and_clipped(elastic: np.ndarray, depth: np.ndarray, damping: np.ndarray, linear: bool) -> np.ndarray:
+def _damped_and_clipped(elastic: np.ndarray, depth: np.ndarray, rate: np.ndarray, law: ContactLaw) -> np.ndarray:
     """Return elastic force and damping together, clipped at zero (Eq. 8, or Hunt and Crossley's law)."""
-    total = elastic + damping if linear else elastic * (1.0 + damping)
-    return np.where(depth > 0.0, np.maximum(total, 0.0), 0.0)
+    return np.where(depth > 0.0, np.maximum(plain(damped_force)(elastic, rate, law), 0.0), 0.0)
 
 
 def friction_factors(effects: Sequence[Effect], speed: np.ndarray, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -147,11 +147,11 @@ class StepwiseNormalForces:
         by_depth, by_rate : (n,) float, N/m and N·s/m
             Derivatives of the force.
         """
-        p, n = self.parameters, len(depth)
+        law, n = contact_law(self.parameters), len(depth)
         slide = np.zeros(n) if slide is None else slide
-        linear = p.normal_law == LINEAR
+        linear = law.exponent == LINEAR_EXPONENT
         work = self._work.reshape(1, -1)
         for i in range(n):
-            press(work, 0, n, i, depth[i], rate[i], slide[i], 0.0, p.k, p.cn, 0.0 if linear else p.exponent, p.dissipation)
+            press(work, 0, n, i, depth[i], rate[i], slide[i], 0.0, law)
         apply_force_laws(0, length, work, 0, n, 0, n, self._every, 0, 0, linear, self.program, self.memory, commit)
         return self._work[FORCE].copy(), self._work[SLOPE].copy(), self._work[DAMPING].copy()

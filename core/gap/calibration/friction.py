@@ -19,7 +19,8 @@ import numpy as np
 
 from ...errors import FileError, ParameterError
 from ...io.csv_table import read_columns
-from ...laws.contact import friction_along_path, parameter_row, stribeck_force
+from ...laws.contact_law import contact_law
+from ...laws.friction import friction_along_path, stribeck_force
 from ...model.sensor_parameters import SensorParameters
 from ..fitting.regression import Estimate, linearised_estimates
 
@@ -104,7 +105,7 @@ def friction_over_time(time: np.ndarray, velocity: np.ndarray, normal_force: flo
     """
     force = np.empty(len(time))
     friction_along_path(
-        np.ascontiguousarray(time, float), np.ascontiguousarray(velocity, float), normal_force, parameter_row(parameters), force
+        np.ascontiguousarray(time, float), np.ascontiguousarray(velocity, float), normal_force, contact_law(parameters), force
     )
     return force
 

@@ -15,7 +15,8 @@ import numpy as np
 
 from ...compiled.kernels import kernel
 from ...effects.engine import contact_forces
-from ...laws.contact import bristle_rate, bristle_step, friction_force, max_bristle_deflection, parameter_row
+from ...laws.contact_law import contact_law
+from ...laws.friction import bristle_rate, bristle_step, friction_force, max_bristle_deflection
 from ...model.effect import Effect
 from ...model.sensor_parameters import SensorParameters
 
@@ -134,7 +135,7 @@ class ContactHistory:
         if friction_effects:
             factor, viscous = contact_forces.friction_factors(friction_effects, np.sqrt(t.slip_squared), pressed)
         work = np.empty((5, len(pressed)))
-        sum_forces(t, pressed, factor, viscous, parameter_row(p), work, total)
+        sum_forces(t, pressed, factor, viscous, contact_law(p), work, total)
         return total
 
 
@@ -177,7 +178,7 @@ def sum_forces(samples, force, factor, viscous, parameters, work, total):  # typ
         Normal force of one texel.
     factor, viscous : (m,) or (1,) float
         What effects do: to the friction coefficient, and N·s/m beside `ct`.
-    parameters : (8,) float
+    parameters : ContactLaw
     work : (5, m) float
         Room for what the bristles keep and gain over the step, the rate of Eq. 9 as ``own · v - fade · z``, and force · factor.
     total : (T, 3) float, N

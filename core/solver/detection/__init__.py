@@ -1,1 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
+"""Contact detection: narrow phase, neighbour lists, and surfaces that deform."""
+
+__all__ = [
+    "deformation",
+    "deforming_surfaces",
+    "detection_data",
+    "narrow_phase",
+    "neighbour_lists",
+    "surface_kinematics",
+]

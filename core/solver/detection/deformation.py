@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Surfaces that change their shape: targets and sensors whose vertices move in their body's frame, linearly between samples.
+"""Deforming surfaces: targets and sensors whose vertices move in their body's frame, linearly between samples (kernels).
 
 Once a frame the boxes of a target's tree are refitted around all that its triangles sweep over; the tree itself stays. Within
-the frame a triangle is brought to the moment of the step only when a segment may meet it.
+the frame a triangle is brought to the moment of a step only when a segment may meet it.
 """
 
 from __future__ import annotations
@@ -14,11 +14,12 @@ from typing import NamedTuple
 import numpy as np
 
 from ...compiled.kernels import kernel
-from ...compiled.struct_reference import by_reference
 from ...geometry.bvh import Tree
+from ..solver_model import SolverModel
+from .detection_data import MOMENTS, OTHER, PRESENT, NeighbourLists, SampleTrack, SurfaceMotion
 
 FLAT = 1e-13
-"""Twice the area over the square of the longest edge below which a triangle has no normal, and so never answers."""
+"""A triangle whose doubled area is below this share of its longest edge squared has no normal and is never met."""
 
 
 class SampleWindow(NamedTuple):
@@ -41,7 +42,7 @@ class SampleWindow(NamedTuple):
 
 
 def window(times: np.ndarray, samples: np.ndarray, moments: np.ndarray) -> SampleWindow:
-    """Cut out of a series of samples what the given moments lie between; the first and the last sample are held.
+    """Return the part of a series of samples that the given moments lie in; the first and the last sample are held.
 
     Parameters
     ----------
@@ -58,28 +59,8 @@ def window(times: np.ndarray, samples: np.ndarray, moments: np.ndarray) -> Sampl
     return SampleWindow(samples[first : last + 1], right - 1 - first, share, np.diff(times[first : last + 1]))
 
 
-@by_reference
-class SampleTrack(NamedTuple):
-    """The windows of several things behind one another, for the kernels. A *moment* is the beginning of a step or the last end.
-
-    Attributes
-    ----------
-    values : (V, c) float
-    stride : (T,) int
-        From a row in one sample to the same row in the next; zero where there is only one.
-    row : (steps + 1, T) int
-        Where the sample before each moment begins.
-    share : (steps + 1, T) float
-    """
-
-    values: np.ndarray
-    stride: np.ndarray
-    row: np.ndarray
-    share: np.ndarray
-
-
 def stack_windows(windows: Sequence[SampleWindow | None], columns: int, moments: int) -> SampleTrack:
-    """Lay windows behind one another; None is for a thing that has no values."""
+    """Lay the windows of several surfaces behind one another; None is for a surface that has no values."""
     values, at = [np.zeros((0, columns))], 0
     stride = np.zeros(len(windows), np.int64)
     row, share = np.zeros((moments, len(windows)), np.int64), np.zeros((moments, len(windows)))
@@ -92,51 +73,6 @@ def stack_windows(windows: Sequence[SampleWindow | None], columns: int, moments:
         row[:, i], share[:, i] = at + found.left * size, found.share
         at += samples * size
     return SampleTrack(np.ascontiguousarray(np.concatenate(values), dtype=float), stride, row, share)
-
-
-@by_reference
-class SurfaceMotion(NamedTuple):
-    """What surfaces look like at the steps of one frame: T targets, m sensors.
-
-    Attributes
-    ----------
-    moves : (1,) bool
-        Whether anything deforms at all.
-    deforms, smooth : (T,) bool
-        Targets whose vertices move, and those whose contact normals are interpolated between their vertices.
-    bends : (m,) bool
-        Sensors whose contact points move in their body's frame.
-    targets : SampleTrack
-        Vertices (m, relative to the body's reference point) and vertex normals of targets that deform or are smooth.
-    sensors : SampleTrack
-        Rows of :attr:`.SolverModel.points` of sensors that bend.
-    corner : (nt, 3) int
-        Vertices of each triangle of the tree, counted within its target; without rows when nothing needs them.
-    triangle_start : (T + 1,) int
-    pace, point_pace : (T,), (m,) float, m/s
-        Bound on how fast any vertex, or any end of a segment, moves.
-    travelled, point_travelled : (T,), (m,) float, metres
-        Bound on how far they have moved in the whole run.
-    stamp : (nt,) int
-        Number of the moment to which each triangle was brought last.
-    clock : (3,) int
-        Number of the present moment in the whole run; its index, and that of the one velocities are taken from or to.
-    """
-
-    moves: np.ndarray
-    deforms: np.ndarray
-    smooth: np.ndarray
-    bends: np.ndarray
-    targets: SampleTrack
-    sensors: SampleTrack
-    corner: np.ndarray
-    triangle_start: np.ndarray
-    pace: np.ndarray
-    point_pace: np.ndarray
-    travelled: np.ndarray
-    point_travelled: np.ndarray
-    stamp: np.ndarray
-    clock: np.ndarray
 
 
 def vertex_speed_bound(found: SampleWindow | None) -> float:
@@ -161,24 +97,24 @@ def point_speed_bound(found: SampleWindow | None, reach: float) -> float:
 
 
 @kernel
-def at_moment(found, moment, thing, i, column):
+def at_moment(found: SampleTrack, moment: int, surface: int, i: int, column: int) -> float:
     """One value of a track at a moment; exact at the samples, and where two samples are the same."""
-    row, share = found.row[moment, thing] + i, found.share[moment, thing]
+    row, share = found.row[moment, surface] + i, found.share[moment, surface]
     before = found.values[row, column]
     if share == 0.0:
         return before
-    after = found.values[row + found.stride[thing], column]
+    after = found.values[row + found.stride[surface], column]
     if share == 1.0:
         return after
     return before + share * (after - before)
 
 
 @kernel
-def refit_boxes(surfaces, tree):
+def refit_boxes(surfaces: SurfaceMotion, tree: Tree) -> None:
     """Fit the boxes of deforming targets around all places of their triangles in this frame."""
     bounds, found = tree.bounds, surfaces.targets
-    for target in range(len(surfaces.deforms)):
-        if not surfaces.deforms[target]:
+    for target in range(len(surfaces.target_deforms)):
+        if not surfaces.target_deforms[target]:
             continue
         moments = len(found.row)
         begin, step = found.row[0, target], found.stride[target]
@@ -203,12 +139,12 @@ def refit_boxes(surfaces, tree):
 
 
 @kernel
-def place_triangle(i, target, surfaces, tree):
+def place_triangle(i: int, target: int, surfaces: SurfaceMotion, tree: Tree) -> None:
     """Bring a triangle of a deforming target to the present moment: corners and normal."""
-    if surfaces.stamp[i] == surfaces.clock[0]:
+    if surfaces.triangle_moment[i] == surfaces.clock[MOMENTS]:
         return
-    surfaces.stamp[i] = surfaces.clock[0]
-    faces, moment = tree.faces, surfaces.clock[1]
+    surfaces.triangle_moment[i] = surfaces.clock[MOMENTS]
+    faces, moment = tree.faces, surfaces.clock[PRESENT]
     for corner in range(3):
         for axis in range(3):
             faces[i, 3 * corner + axis] = at_moment(surfaces.targets, moment, target, surfaces.corner[i, corner], axis)
@@ -225,24 +161,26 @@ def place_triangle(i, target, surfaces, tree):
 
 
 @kernel
-def place_all_triangles(target, surfaces, tree):
+def place_all_triangles(target: int, surfaces: SurfaceMotion, tree: Tree) -> None:
     """Bring all triangles of a target to the present moment."""
-    if surfaces.deforms[target]:
+    if surfaces.target_deforms[target]:
         for i in range(surfaces.triangle_start[target], surfaces.triangle_start[target + 1]):
             place_triangle(i, target, surfaces, tree)
 
 
 @kernel
-def place_listed_triangles(target, first, stop, near, number, surfaces, tree):
-    """Bring the triangles that contact points can meet to the present moment: the lists from slot `first` to `stop`."""
-    if not surfaces.deforms[target]:
+def place_listed_triangles(
+    target: int, first: int, stop: int, lists: NeighbourLists, surfaces: SurfaceMotion, tree: Tree
+) -> None:
+    """Bring the triangles that contact points can meet to the present moment: the lists of slots `first` to `stop`."""
+    if not surfaces.target_deforms[target]:
         return
     for slot in range(first, stop):
-        if number[slot] < 0:
+        if lists.length[slot] < 0:
             place_all_triangles(target, surfaces, tree)
             return
-        for j in range(number[slot]):
-            place_triangle(near[slot, j], target, surfaces, tree)
+        for j in range(lists.length[slot]):
+            place_triangle(lists.triangles[slot, j], target, surfaces, tree)
 
 
 def corners_of(meshes: Sequence, tree: Tree) -> tuple[np.ndarray, np.ndarray]:
@@ -253,8 +191,8 @@ def corners_of(meshes: Sequence, tree: Tree) -> tuple[np.ndarray, np.ndarray]:
 
 
 @kernel
-def point_at(surfaces, moment, sensor, i):
-    """Position and unit normal of a contact point of a bending sensor."""
+def point_at(surfaces: SurfaceMotion, moment: int, sensor: int, i: int) -> tuple[float, ...]:
+    """Position and unit normal of a contact point of a deforming sensor."""
     found = surfaces.sensors
     x, y, z = (
         at_moment(found, moment, sensor, i, 0),
@@ -271,8 +209,8 @@ def point_at(surfaces, moment, sensor, i):
 
 
 @kernel
-def frame_at(surfaces, moment, sensor, i):
-    """Position of a contact point of a bending sensor, and normal, x axis and y axis of its texel there: twelve numbers."""
+def frame_at(surfaces: SurfaceMotion, moment: int, sensor: int, i: int) -> tuple[float, ...]:
+    """Position of a contact point of a deforming sensor, and normal, x axis and y axis of its texel there: twelve numbers."""
     found = surfaces.sensors
     x, y, z, nx, ny, nz = point_at(surfaces, moment, sensor, i)
     tx, ty, tz = (
@@ -288,25 +226,27 @@ def frame_at(surfaces, moment, sensor, i):
 
 
 @kernel
-def set_moment(now, other, dt, model, surfaces):
-    """Go on to another moment; the contact points of bending sensors move there.
+def set_moment(now: int, other: int, dt: float, model: SolverModel, surfaces: SurfaceMotion) -> None:
+    """Go on to another moment, and move the contact points of deforming sensors there.
 
     Parameters
     ----------
     now, other : int
-        The moment, and the next or the last one, by which velocities are told.
+        The moment, and the next or the previous one, to which velocities are differences.
     dt : float, seconds
-        Since the moment before, at the most.
+        Upper bound on the time since the moment before.
+    model : SolverModel
+    surfaces : SurfaceMotion
     """
-    surfaces.clock[0] += 1
-    surfaces.clock[1], surfaces.clock[2] = now, other
-    for target in range(len(surfaces.deforms)):
-        surfaces.travelled[target] += dt * surfaces.pace[target]
-    for sensor in range(len(surfaces.bends)):
-        if surfaces.bends[sensor]:
-            surfaces.point_travelled[sensor] += dt * surfaces.point_pace[sensor]
-            start = model.point_start[sensor]
-            for i in range(model.point_start[sensor + 1] - start):
+    surfaces.clock[MOMENTS] += 1
+    surfaces.clock[PRESENT], surfaces.clock[OTHER] = now, other
+    for target in range(len(surfaces.target_deforms)):
+        surfaces.target_travel[target] += dt * surfaces.target_speed[target]
+    for sensor in range(len(surfaces.sensor_deforms)):
+        if surfaces.sensor_deforms[sensor]:
+            surfaces.sensor_travel[sensor] += dt * surfaces.sensor_speed[sensor]
+            start = model.sensors.first_point[sensor]
+            for i in range(model.sensors.first_point[sensor + 1] - start):
                 frame = frame_at(surfaces, now, sensor, i)
                 for column in range(12):
-                    model.points[start + i, column] = frame[column]
+                    model.points.frame[start + i, column] = frame[column]

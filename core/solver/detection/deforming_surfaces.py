@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What deforms in a scenario, frame by frame, for the kernels of :mod:`.deformation`."""
+"""The deforming targets and sensors of a scenario, frame by frame, for the kernels of :mod:`.deformation`."""
 
 from __future__ import annotations
 
@@ -13,14 +13,15 @@ from ...geometry.bvh import Tree
 from ...geometry.contact_points import ContactPoints
 from ...geometry.mesh import TriangleMesh, vertex_normals
 from ...geometry.texels import Texels
-from ...laws.contact import SolverModel
 from ...model.deformation import Deformation
 from ...model.scenario import Scenario
-from .deformation import SampleWindow, SurfaceMotion, corners_of, point_speed_bound, stack_windows, vertex_speed_bound, window
+from ..solver_model import SolverModel
+from .deformation import SampleWindow, corners_of, point_speed_bound, stack_windows, vertex_speed_bound, window
+from .detection_data import SurfaceMotion
 
 
 def point_rows(texels: Texels, points: ContactPoints, reference: np.ndarray) -> np.ndarray:
-    """Rows of :attr:`.SolverModel.points`.
+    """Rows of :attr:`.Points.frame`.
 
     Parameters
     ----------
@@ -44,8 +45,8 @@ class DeformingSurfaces:
     points : list of ContactPoints
         Of each sensor.
     tree : Tree
-    world : SolverModel
-        The extents of sensors that bend are kept up to date in it.
+    model : SolverModel
+        The bounding spheres of sensors that deform are kept up to date in it.
     """
 
     def __init__(self, scenario: Scenario, center: np.ndarray, points: list[ContactPoints], tree: Tree, model: SolverModel):
@@ -60,17 +61,17 @@ class DeformingSurfaces:
         wanted = any(target.smooth or target.deformation is not None for target in scenario.targets)
         corner, self._triangle_start = corners_of(meshes, tree)
         self._corner = corner if wanted else np.zeros((0, 3), np.int64)
-        self._stamp = np.full(count if wanted else 0, -1)
+        self._triangle_moment = np.full(count if wanted else 0, -1)
         self._clock = np.zeros(3, np.int64)
-        self._travelled = np.zeros(len(scenario.targets)), np.zeros(len(scenario.sensors))
+        self._travel = np.zeros(len(scenario.targets)), np.zeros(len(scenario.sensors))
 
     @property
-    def moves(self) -> bool:
+    def any_deforms(self) -> bool:
         """Whether anything deforms."""
         return any(found is not None for found in (*self._vertices, *self._texels))
 
     def extend(self, time: float, vertices: Mapping[int, np.ndarray], texels: Mapping[int, np.ndarray]) -> None:
-        """Append the next shapes.
+        """Append the next shapes of some targets and sensors.
 
         Parameters
         ----------
@@ -88,7 +89,7 @@ class DeformingSurfaces:
                     known[index] = before.extended(time, values)
 
     def at(self, moments: np.ndarray) -> SurfaceMotion:
-        """Lay out the shapes between the first and the last of some moments.
+        """Return the shapes between the first and the last of some moments, for the kernels.
 
         Parameters
         ----------
@@ -96,22 +97,22 @@ class DeformingSurfaces:
         """
         vertices = [self._target_window(i, moments) for i in range(len(self._targets))]
         rows = [self._sensor_window(i, moments) for i in range(len(self._sensors))]
-        reach = self._model.reach
-        self._fit_extents(rows)
+        reach = self._model.sensors.max_penetration
+        self._fit_spheres(rows)
         return SurfaceMotion(
-            moves=np.array([self.moves]),
-            deforms=np.array([found is not None for found in self._vertices], dtype=np.bool_),
-            smooth=np.array([target.smooth for target in self._targets], dtype=np.bool_),
-            bends=np.array([found is not None for found in self._texels], dtype=np.bool_),
+            any_deforms=np.array([self.any_deforms]),
+            target_deforms=np.array([found is not None for found in self._vertices], dtype=np.bool_),
+            target_smooth=np.array([target.smooth for target in self._targets], dtype=np.bool_),
+            sensor_deforms=np.array([found is not None for found in self._texels], dtype=np.bool_),
             targets=stack_windows(vertices, 6, len(moments)),
             sensors=stack_windows(rows, 12, len(moments)),
             corner=self._corner,
             triangle_start=self._triangle_start,
-            pace=np.array([vertex_speed_bound(found) for found in vertices]),
-            point_pace=np.array([point_speed_bound(found, reach[i]) for i, found in enumerate(rows)]),
-            travelled=self._travelled[0],
-            point_travelled=self._travelled[1],
-            stamp=self._stamp,
+            target_speed=np.array([vertex_speed_bound(found) for found in vertices]),
+            sensor_speed=np.array([point_speed_bound(found, reach[i]) for i, found in enumerate(rows)]),
+            target_travel=self._travel[0],
+            sensor_travel=self._travel[1],
+            triangle_moment=self._triangle_moment,
             clock=self._clock,
         )
 
@@ -139,19 +140,19 @@ class DeformingSurfaces:
         rows = [point_rows(texels, self._points[index], center) for texels in bent]
         return found._replace(samples=np.stack(rows))
 
-    def _fit_extents(self, rows: list[SampleWindow | None]) -> None:
-        """Where the segments of bending sensors are during the frame; between samples a turning segment's end bulges out."""
+    def _fit_spheres(self, rows: list[SampleWindow | None]) -> None:
+        """Fit the spheres around deforming sensors; between two samples the end of a turning segment bulges out."""
         for index, found in enumerate(rows):
             if found is not None:
-                reach = self._model.reach[index]
+                reach = self._model.sensors.max_penetration[index]
                 turn = np.linalg.norm(np.diff(found.samples[:, :, 3:6], axis=0), axis=2).max(initial=0.0)
                 bulge = reach * (1.0 - np.sqrt(max(1.0 - 0.25 * turn**2, 0.0)))
                 middle, radius = bounding_sphere(found.samples.reshape(-1, 12), reach)
-                self._model.center[index], self._model.radius[index] = middle, radius + bulge
+                self._model.sensors.center[index], self._model.sensors.radius[index] = middle, radius + bulge
 
 
 def bounding_sphere(points: np.ndarray, reach: float) -> tuple[np.ndarray, float]:
-    """Middle and radius of contact points (rows of :attr:`.SolverModel.points`) and the segments behind them."""
+    """Centre and radius of a sphere around contact points (rows of :attr:`.Points.frame`) and the segments behind them."""
     ends = np.vstack([points[:, :3], points[:, :3] - reach * points[:, 3:6]])
     middle = 0.5 * (ends.min(axis=0) + ends.max(axis=0))
     return middle, float(np.linalg.norm(ends - middle, axis=1).max())

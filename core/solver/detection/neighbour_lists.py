@@ -1,114 +1,102 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a contact point's segment can meet while it moves little, so that the tree is asked seldom (kernels).
+"""What a contact point's segment can meet while it moves little, so that the tree is searched seldom (kernels).
 
-Neighbour lists as in molecular dynamics (Verlet 1967), with what surfaces have and atoms lack. Around each segment a tube is
-looked through, and what is found holds until some point of the segment has moved by more than the tube's radius:
+These are neighbour lists as in molecular dynamics (Verlet 1967), extended for surfaces. A tube around each segment is searched,
+and the result is valid until some point of the segment has moved by more than the tube's radius. It is one of these:
 
 * nothing;
 * one sheet: all triangles in the tube face the segment's base, none leans by more than 56° and none lacks a neighbour, and the
-  segment's line, drawn out at both ends, goes through one of them only. Then the segment meets this sheet or none, and the
+  segment's line, extended at both ends, goes through one of them only. Then the segment meets this sheet or none, and the
   triangle is found by walking across edges from the one met last. This holds however many triangles there are;
-* a list of triangles, or too many for one: then the tree is asked.
+* a list of triangles, or too many for one: then the tree is searched.
 
-Why one sheet is met once: where all triangles face the base and each has its neighbours, as many of them lie over one place of
-the plane across the segment as over the next, since an edge is left by one triangle and entered by the other. A point of the
-surface in the tube can be followed to the segment's line; it rises on the way by no more than the lean allows, and by so much
-the line was drawn out. So a second sheet would have been met by the line too; and no segment in the tube leans enough to meet
-the same sheet twice.
+Why a sheet is met only once: where all triangles face the base and each has its neighbours, as many of them lie over one place
+of the plane across the segment as over the next, since an edge is left by one triangle and entered by the other. Any point of
+the surface in the tube can be followed to the segment's line; it rises on the way by no more than the lean allows, and the line
+was extended by that much. So the line would have met a second sheet too; and no segment in the tube leans enough to meet the
+same sheet twice.
 """
 
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 
 from ...compiled.kernels import inlined, kernel
-from ...compiled.struct_reference import by_reference
 from ...geometry.bvh import (
-    boxes_disjoint,
+    Box,
+    Segment,
+    Shear,
+    Tree,
+    box_of,
     intersect_plane,
     intersect_triangle,
     is_interior,
+    is_outside,
     project_sheared,
     segment_entry,
     shear_to_axis,
 )
+from .detection_data import NeighbourLists
 
 LIST_LENGTH = 12
-"""Most triangles that are remembered as near a segment; where there are more, the tree is asked every time."""
+"""Most triangles in a list; where there are more, the tree is searched every time."""
 ASK_TREE, ONE_SHEET = -1, -2
-"""In the place of a list's length: ask the tree; one sheet."""
+"""In the place of a list's length: search the tree; the tube holds one sheet."""
 MIN_FACING = 0.5547
-"""Cosine of the angle by which the triangles of a sheet lean at the most: their slope is 1.5 then."""
+"""Cosine of the largest angle by which the triangles of a sheet lean: their slope is 1.5 then."""
 EXTENSION = 3.0
 """By how many radii a tube is longer than its segment at each end: twice that slope."""
 MAX_RADIUS_SHARE = 0.25
-"""Largest radius of a tube by the length of its segment; segments in the tube lean by no more than 30° then."""
+"""Largest radius of a tube as a share of its segment's length; segments in the tube lean by no more than 30° then."""
 MAX_WALK = 16
-"""Most triangles that a walk goes through; then the tree is asked."""
-
-
-@by_reference
-class NeighbourLists(NamedTuple):
-    """What each contact point can meet; a cache that changes the speed and never the numbers.
-
-    Attributes
-    ----------
-    near : (s, LISTED) int
-    number : (s,) int
-        Length of each list, ASK or ONE_SHEET.
-    only : (s,) int
-        The triangle that a texel's line goes through for certain and alone; of a sheet, the triangle met last; else -1.
-    until : (s,) float, metres
-        How far any point of the sensor may be from where it was at the pair's `pose` for this to hold.
-    pose : (q, 16) float
-        Rotation (row by row) and position of each pair's sensor in the target's frame, from which distances are reckoned; the
-        least of `until`; how many steps ago the pose was taken; how far deformation had moved either until then; and the
-        radius of the widest tube in use.
-    """
-
-    near: np.ndarray
-    number: np.ndarray
-    only: np.ndarray
-    until: np.ndarray
-    pose: np.ndarray
+"""Most triangles that a walk goes through; then the tree is searched."""
 
 
 def neighbour_lists_for(slots: int, pairs: int) -> NeighbourLists:
-    """Make room; what is near is looked for when it is first asked for."""
-    near, pose = np.zeros((slots, LIST_LENGTH), np.int32), np.zeros((pairs, 16))
-    pose[:, 12] = -1.0
-    return NeighbourLists(near, np.zeros(slots, np.int32), np.full(slots, -1, np.int32), np.full(slots, -1.0), pose)
+    """Allocate the lists; they are made when they are first asked for."""
+    return NeighbourLists(
+        triangles=np.zeros((slots, LIST_LENGTH), np.int32),
+        length=np.zeros(slots, np.int32),
+        known_triangle=np.full(slots, -1, np.int32),
+        valid_distance=np.full(slots, -1.0),
+        pose=np.zeros((pairs, 12)),
+        shortest_distance=np.full(pairs, -1.0),
+        steps=np.zeros(pairs),
+        deformation=np.zeros(pairs),
+        tube_radius=np.zeros(pairs),
+    )
 
 
 @inlined
-def find_entry(ox, oy, oz, dx, dy, dz, slot, target, hint, neighbour_lists, tree):
-    """Answer like :func:`.segment_entry`, from what is known to be near."""
-    number, only = neighbour_lists.number[slot], neighbour_lists.only[slot]
-    if number == ONE_SHEET:
-        triangle, t = _walk_to_triangle(ox, oy, oz, dx, dy, dz, only, tree)
+def find_entry(
+    segment: Segment, slot: int, target: int, hint: int, lists: NeighbourLists, tree: Tree
+) -> tuple[float, int, float]:
+    """Return the same as :func:`.segment_entry`, from the list of a slot where that is possible."""
+    count, known = lists.length[slot], lists.known_triangle[slot]
+    if count == ONE_SHEET:
+        triangle, t = _walk_to_triangle(segment, known, tree)
         if triangle >= 0:
-            neighbour_lists.only[slot] = triangle
+            lists.known_triangle[slot] = triangle
             return t, triangle if 0.0 <= t <= 1.0 else -1, 2.0
-        return segment_entry(ox, oy, oz, dx, dy, dz, target, hint, tree)
-    if only >= 0:
-        t = intersect_plane(ox, oy, oz, dx, dy, dz, tree.faces, only)
-        return t, only if 0.0 <= t <= 1.0 else -1, 2.0
-    if number >= 0:
-        return _entry_from_list(ox, oy, oz, dx, dy, dz, neighbour_lists.near, slot, number, tree.faces)
-    return segment_entry(ox, oy, oz, dx, dy, dz, target, hint, tree)
+        return segment_entry(segment, target, hint, tree)
+    if known >= 0:
+        t = intersect_plane(segment, tree.faces, known)
+        return t, known if 0.0 <= t <= 1.0 else -1, 2.0
+    if count >= 0:
+        return _entry_from_list(segment, slot, lists, tree.faces)
+    return segment_entry(segment, target, hint, tree)
 
 
 @kernel
-def _entry_from_list(ox, oy, oz, dx, dy, dz, near, slot, number, faces):
-    """Answer like :func:`.segment_entry`, from a list of all triangles that the segment can meet."""
+def _entry_from_list(segment: Segment, slot: int, lists: NeighbourLists, faces: np.ndarray) -> tuple[float, int, float]:
+    """Return the same as :func:`.segment_entry`, from a list of all triangles that the segment can meet."""
     t, triangle, leaving = 2.0, -1, 2.0
-    axis, shear_x, shear_y = shear_to_axis(dx, dy, dz)
-    for j in range(number):
-        i = near[slot, j]
-        u = intersect_triangle(ox, oy, oz, dx, dy, dz, axis, shear_x, shear_y, faces, i)
+    shear = shear_to_axis(segment)
+    for j in range(lists.length[slot]):
+        i = lists.triangles[slot, j]
+        u = intersect_triangle(segment, shear, faces, i)
         if 0.0 <= u <= 1.0:
             if u < t:
                 t, triangle = u, i
@@ -118,27 +106,31 @@ def _entry_from_list(ox, oy, oz, dx, dy, dz, near, slot, number, faces):
 
 
 @inlined
-def _corners_seen(ox, oy, oz, axis, shear_x, shear_y, f, i):
-    """A triangle's corners seen along the segment, its base being the origin: ax, ay, bx, by, cx, cy."""
-    ax, ay = project_sheared(f[i, 0] - ox, f[i, 1] - oy, f[i, 2] - oz, axis, shear_x, shear_y)
-    bx, by = project_sheared(f[i, 3] - ox, f[i, 4] - oy, f[i, 5] - oz, axis, shear_x, shear_y)
-    cx, cy = project_sheared(f[i, 6] - ox, f[i, 7] - oy, f[i, 8] - oz, axis, shear_x, shear_y)
+def _projected_corners(
+    segment: Segment, shear: Shear, f: np.ndarray, i: int
+) -> tuple[float, float, float, float, float, float]:
+    """A triangle's corners projected along the segment, its base being the origin: ax, ay, bx, by, cx, cy."""
+    ox, oy, oz = segment.ox, segment.oy, segment.oz
+    ax, ay = project_sheared(f[i, 0] - ox, f[i, 1] - oy, f[i, 2] - oz, shear)
+    bx, by = project_sheared(f[i, 3] - ox, f[i, 4] - oy, f[i, 5] - oz, shear)
+    cx, cy = project_sheared(f[i, 6] - ox, f[i, 7] - oy, f[i, 8] - oz, shear)
     return ax, ay, bx, by, cx, cy
 
 
 @inlined
-def _lateral_margin(skin, ox, oy, oz, dx, dy, dz, shear_x, shear_y):
-    """How far aside of the origin, seen along the segment, something may lie that a motion by `skin` brings onto it.
+def _lateral_margin(radius: float, segment: Segment, shear: Shear) -> float:
+    """Largest projected distance from the origin of something that a motion by `radius` brings onto it.
 
     The last term is the rounding of what is compared with it, which must not leave out a triangle that is only just met.
     """
+    ox, oy, oz, dx, dy, dz = segment
     rounding = 1e-13 * (abs(ox) + abs(oy) + abs(oz) + abs(dx) + abs(dy) + abs(dz))
-    return skin * math.sqrt(1.0 + shear_x * shear_x + shear_y * shear_y) + rounding
+    return radius * math.sqrt(1.0 + shear.x * shear.x + shear.y * shear.y) + rounding
 
 
 @kernel
-def _walk_to_triangle(ox, oy, oz, dx, dy, dz, triangle, tree):
-    """Go across edges from `triangle` to the one that a segment's line goes through, no edge of it touched.
+def _walk_to_triangle(segment: Segment, triangle: int, tree: Tree) -> tuple[int, float]:
+    """Walk across edges from `triangle` to the one that a segment's line goes through, no edge of it touched.
 
     Returns
     -------
@@ -147,15 +139,15 @@ def _walk_to_triangle(ox, oy, oz, dx, dy, dz, triangle, tree):
     t : float
         Position on the segment, the same bits as :func:`.segment_entry` has for it.
     """
-    axis, shear_x, shear_y = shear_to_axis(dx, dy, dz)
+    shear = shear_to_axis(segment)
     for _ in range(MAX_WALK):
-        ax, ay, bx, by, cx, cy = _corners_seen(ox, oy, oz, axis, shear_x, shear_y, tree.faces, triangle)
+        ax, ay, bx, by, cx, cy = _projected_corners(segment, shear, tree.faces, triangle)
         u, v, w = ax * by - ay * bx, bx * cy - by * cx, cx * ay - cy * ax
         if u + v + w < 0.0:
             u, v, w = -u, -v, -w
         least = min(u, v, w)
         if least > 0.0:
-            return triangle, intersect_plane(ox, oy, oz, dx, dy, dz, tree.faces, triangle)
+            return triangle, intersect_plane(segment, tree.faces, triangle)
         if not least < 0.0:
             return -1, 2.0
         triangle = tree.adjacent[triangle, 0 if u == least else (1 if v == least else 2)]
@@ -165,66 +157,72 @@ def _walk_to_triangle(ox, oy, oz, dx, dy, dz, triangle, tree):
 
 
 @kernel
-def rebuild_list(slot, ox, oy, oz, dx, dy, dz, target, radius, listed, travel, empty, sheets, neighbour_lists, tree):
-    """Find out anew what a segment can meet.
+def rebuild_list(
+    slot: int,
+    segment: Segment,
+    target: int,
+    lengths: tuple[float, float, float],
+    expected: tuple[bool, bool],
+    lists: NeighbourLists,
+    tree: Tree,
+) -> None:
+    """Search anew what a segment can meet.
 
     Parameters
     ----------
     slot : int
         Where to write it.
-    ox … dz : float
-        Base of the segment and the vector to its tip, in the target's frame.
+    segment : Segment
+        In the target's frame.
     target : int
-    radius : float, metres
-        Of the tube to look through, if that can be.
-    listed : float, metres
-        Most for a list of triangles.
-    travel : float, metres
-        How far the sensor is expected to move in a step.
-    empty : bool
-        Whether nothing is expected to be near.
-    sheets : bool
-        Whether the target's triangles keep their normals.
-    neighbours : NeighbourLists
+    lengths : (float, float, float), metres
+        Radius of the tube to search, if that can be; the largest radius for a list of triangles; how far the sensor is
+        expected to move in a step.
+    expected : (bool, bool)
+        Whether nothing is expected to be near, and whether the target's triangles keep their normals, so that there may be
+        sheets.
+    lists : NeighbourLists
     tree : Tree
     """
-    length = math.sqrt(dx * dx + dy * dy + dz * dz)
+    radius, list_radius, travel = lengths
+    empty, sheets = expected
+    length = math.sqrt(segment.dx * segment.dx + segment.dy * segment.dy + segment.dz * segment.dz)
     radius = min(radius, MAX_RADIUS_SHARE * length)
-    neighbour_lists.only[slot] = -1
+    count, valid = lists.length, lists.valid_distance
+    lists.known_triangle[slot] = -1
     if empty and radius > 0.0:
-        free = _clearance(ox, oy, oz, dx, dy, dz, target, 2.0 * radius, 0.25 * radius, tree)
+        free = _clearance(segment, target, 2.0 * radius, 0.25 * radius, tree)
         if free > 0.0:
-            neighbour_lists.number[slot], neighbour_lists.until[slot] = 0, free
+            count[slot], valid[slot] = 0, free
             return
     for attempt in range(2):
         tube = radius if attempt == 0 else 0.125 * radius
         if not sheets or tube <= 2.0 * travel:
             break
-        count, triangle, margin, free = _count_sheets(ox, oy, oz, dx, dy, dz, target, tube, tree)
-        if count == 0 or (count == 1 and free > 0.25 * tube):
-            neighbour_lists.number[slot], neighbour_lists.until[slot] = 0, tube if count == 0 else min(free, tube)
+        found, triangle, margin, free = _count_sheets(segment, target, tube, tree)
+        if found == 0 or (found == 1 and free > 0.25 * tube):
+            count[slot], valid[slot] = 0, tube if found == 0 else min(free, tube)
             return
-        if count == 1:
+        if found == 1:
             certain = margin > 0.25 * tube
-            neighbour_lists.number[slot], neighbour_lists.only[slot] = 1 if certain else ONE_SHEET, triangle
-            neighbour_lists.until[slot] = min(margin, tube) if certain else tube
+            count[slot], lists.known_triangle[slot] = 1 if certain else ONE_SHEET, triangle
+            valid[slot] = min(margin, tube) if certain else tube
             return
-    listed = min(listed, radius)
-    neighbour_lists.number[slot], neighbour_lists.until[slot] = ASK_TREE, max(radius, 8.0 * travel)
-    if listed > 2.0 * travel:
-        number, only = _list_triangles(ox, oy, oz, dx, dy, dz, target, listed, neighbour_lists.near, slot, tree)
-        neighbour_lists.number[slot], neighbour_lists.only[slot], neighbour_lists.until[slot] = number, only, listed
+    list_radius = min(list_radius, radius)
+    count[slot], valid[slot] = ASK_TREE, max(radius, 8.0 * travel)
+    if list_radius > 2.0 * travel:
+        count[slot], lists.known_triangle[slot] = _list_triangles(segment, target, list_radius, slot, lists, tree)
+        valid[slot] = list_radius
 
 
 @kernel
-def _clearance(ox, oy, oz, dx, dy, dz, mesh, far, least, tree):
+def _clearance(segment: Segment, mesh: int, far: float, least: float, tree: Tree) -> float:
     """How far, up to `far`, any point of a segment can move without meeting a leaf's box, metres; zero if not `least`.
 
-    Boxes that are small beside their distance are taken for what is in them.
+    Boxes that are small compared with their distance stand for what is in them.
     """
-    x0, x1 = min(ox, ox + dx), max(ox, ox + dx)
-    y0, y1 = min(oy, oy + dy), max(oy, oy + dy)
-    z0, z1 = min(oz, oz + dz), max(oz, oz + dz)
+    ox, oy, oz, dx, dy, dz = segment
+    box = box_of(segment, 1.0)
     length = math.sqrt(dx * dx + dy * dy + dz * dz)
     ax, ay, az = dx / length, dy / length, dz / length
     tip = (ox + dx) * ax + (oy + dy) * ay + (oz + dz) * az
@@ -234,8 +232,8 @@ def _clearance(ox, oy, oz, dx, dy, dz, mesh, far, least, tree):
         low = min(ax * bounds[node, 0], ax * bounds[node, 3]) + min(ay * bounds[node, 1], ay * bounds[node, 4])
         low += min(az * bounds[node, 2], az * bounds[node, 5])
         gap = max(
-            low - tip, bounds[node, 0] - x1, x0 - bounds[node, 3], bounds[node, 1] - y1,
-            y0 - bounds[node, 4], bounds[node, 2] - z1, z0 - bounds[node, 5],
+            low - tip, bounds[node, 0] - box.x1, box.x0 - bounds[node, 3], bounds[node, 1] - box.y1,
+            box.y0 - bounds[node, 4], bounds[node, 2] - box.z1, box.z0 - bounds[node, 5],
         )  # fmt: skip
         if gap >= far:
             node = tree.skip[node]
@@ -252,17 +250,20 @@ def _clearance(ox, oy, oz, dx, dy, dz, mesh, far, least, tree):
 
 
 @kernel
-def _box_beside_line(ox, oy, oz, axis, shear_x, shear_y, aside, bounds, node):
-    """Whether a box, seen along the segment, lies further than `aside` from its line, by the rectangle around what is seen."""
+def _is_box_beside(segment: Segment, shear: Shear, aside: float, bounds: np.ndarray, node: int) -> bool:
+    """Whether the rectangle around a box, projected along the segment, lies further than `aside` from the line."""
+    ox, oy, oz = segment.ox, segment.oy, segment.oz
     x0, y0, z0 = bounds[node, 0] - ox, bounds[node, 1] - oy, bounds[node, 2] - oz
     x1, y1, z1 = bounds[node, 3] - ox, bounds[node, 4] - oy, bounds[node, 5] - oz
-    x, y = project_sheared(0.5 * (x0 + x1), 0.5 * (y0 + y1), 0.5 * (z0 + z1), axis, shear_x, shear_y)
-    wide, high = project_sheared(0.5 * (x1 - x0), 0.5 * (y1 - y0), 0.5 * (z1 - z0), axis, -abs(shear_x), -abs(shear_y))
+    x, y = project_sheared(0.5 * (x0 + x1), 0.5 * (y0 + y1), 0.5 * (z0 + z1), shear)
+    wide, high = project_sheared(
+        0.5 * (x1 - x0), 0.5 * (y1 - y0), 0.5 * (z1 - z0), Shear(shear.axis, -abs(shear.x), -abs(shear.y))
+    )
     return abs(x) > wide + aside or abs(y) > high + aside
 
 
 @kernel
-def _count_sheets(ox, oy, oz, dx, dy, dz, mesh, skin, tree):
+def _count_sheets(segment: Segment, mesh: int, radius: float, tree: Tree) -> tuple[int, int, float, float]:
     """Count the sheets in the tube around a segment, if it holds nothing else.
 
     Returns
@@ -277,35 +278,36 @@ def _count_sheets(ox, oy, oz, dx, dy, dz, mesh, skin, tree):
         How far the segment's tip may come nearer without reaching it, less than zero where it does. Of this distance along the
         segment a sheet that leans takes up one and a half parts where the tip moves aside, and one where it moves ahead.
     """
+    ox, oy, oz, dx, dy, dz = segment
     length = math.sqrt(dx * dx + dy * dy + dz * dz)
-    more = EXTENSION * skin / length
-    axis, shear_x, shear_y = shear_to_axis(dx, dy, dz)
-    aside = _lateral_margin(skin, ox, oy, oz, dx, dy, dz, shear_x, shear_y)
-    rounding = _lateral_margin(0.0, ox, oy, oz, dx, dy, dz, shear_x, shear_y)
+    more = EXTENSION * radius / length
+    shear = shear_to_axis(segment)
+    aside = _lateral_margin(radius, segment, shear)
+    rounding = _lateral_margin(0.0, segment, shear)
     fx, fy, fz = ox - more * dx, oy - more * dy, oz - more * dz
     tx, ty, tz = ox + (1.0 + more) * dx, oy + (1.0 + more) * dy, oz + (1.0 + more) * dz
-    x0, x1 = min(fx, tx) - skin, max(fx, tx) + skin
-    y0, y1 = min(fy, ty) - skin, max(fy, ty) + skin
-    z0, z1 = min(fz, tz) - skin, max(fz, tz) + skin
+    box = Box(
+        min(fx, tx) - radius, max(fx, tx) + radius, min(fy, ty) - radius, max(fy, ty) + radius,
+        min(fz, tz) - radius, max(fz, tz) + radius,
+    )  # fmt: skip
     leaning = -MIN_FACING * length
     count, triangle, margin, free = 0, -1, 0.0, 0.0
     faces, normal_bounds = tree.faces, tree.normal_bounds
     node, stop = tree.roots[mesh], tree.roots[mesh + 1]
     while node < stop:
-        if boxes_disjoint(tree.bounds, node, x0, x1, y0, y1, z0, z1):
+        if is_outside(tree.bounds, node, box):
             node = tree.skip[node]
             continue
         slope = max(normal_bounds[node, 0] * dx, normal_bounds[node, 3] * dx)
-        slope += max(normal_bounds[node, 1] * dy, normal_bounds[node, 4] * dy) + max(
-            normal_bounds[node, 2] * dz, normal_bounds[node, 5] * dz
-        )
+        along_y = max(normal_bounds[node, 1] * dy, normal_bounds[node, 4] * dy)
+        slope += along_y + max(normal_bounds[node, 2] * dz, normal_bounds[node, 5] * dz)
         # What faces the base matters only where the line itself may go through it.
         within = rounding if slope < leaning else aside
-        if _box_beside_line(ox, oy, oz, axis, shear_x, shear_y, within, tree.bounds, node):
+        if _is_box_beside(segment, shear, within, tree.bounds, node):
             node = tree.skip[node]
             continue
         for i in range(tree.first[node], tree.first[node] + tree.number[node]):
-            ax, ay, bx, by, cx, cy = _corners_seen(ox, oy, oz, axis, shear_x, shear_y, faces, i)
+            ax, ay, bx, by, cx, cy = _projected_corners(segment, shear, faces, i)
             if min(ax, bx, cx) > aside or max(ax, bx, cx) < -aside or min(ay, by, cy) > aside or max(ay, by, cy) < -aside:
                 continue
             slope = faces[i, 9] * dx + faces[i, 10] * dy + faces[i, 11] * dz
@@ -314,7 +316,7 @@ def _count_sheets(ox, oy, oz, dx, dy, dz, mesh, skin, tree):
             u, v, w = ax * by - ay * bx, bx * cy - by * cx, cx * ay - cy * ax
             if min(u, v, w) < 0.0 and max(u, v, w) > 0.0:
                 continue
-            t = intersect_plane(ox, oy, oz, dx, dy, dz, faces, i)
+            t = intersect_plane(segment, faces, i)
             if -more <= t <= 1.0 + more:
                 if count == 1:
                     return -1, -1, 0.0, 0.0
@@ -322,61 +324,58 @@ def _count_sheets(ox, oy, oz, dx, dy, dz, mesh, skin, tree):
                 margin = abs(u) / math.hypot(bx - ax, by - ay)
                 margin = min(margin, abs(v) / math.hypot(cx - bx, cy - by), abs(w) / math.hypot(ax - cx, ay - cy))
         node += 1
-    return count, triangle, margin * skin / aside, free
+    return count, triangle, margin * radius / aside, free
 
 
 @kernel
-def _list_triangles(ox, oy, oz, dx, dy, dz, mesh, skin, near, slot, tree):
-    """Write the triangles that a segment can meet as long as none of its points has moved by more than `skin`.
+def _list_triangles(
+    segment: Segment, mesh: int, radius: float, slot: int, lists: NeighbourLists, tree: Tree
+) -> tuple[int, int]:
+    """Write the triangles that a segment can meet as long as none of its points has moved by more than `radius` (m).
 
-    Parameters
-    ----------
-    skin : float, metres
-    near : (s, LISTED) int
-        Written at `slot`, in the order of the tree.
+    They are written at `slot` of `lists`, in the order of the tree.
 
     Returns
     -------
-    number : int
+    count : int
         How many there are; -1 when there is no room for them.
-    only : int
-        The triangle, where there is but one and the segment's line goes through it for certain, from outside; else -1.
+    known_triangle : int
+        The triangle, where there is only one and the segment's line goes through it for certain, from outside; else -1.
     """
-    axis, shear_x, shear_y = shear_to_axis(dx, dy, dz)
-    aside = _lateral_margin(skin, ox, oy, oz, dx, dy, dz, shear_x, shear_y)
-    x0, x1 = min(ox, ox + dx) - skin, max(ox, ox + dx) + skin
-    y0, y1 = min(oy, oy + dy) - skin, max(oy, oy + dy) + skin
-    z0, z1 = min(oz, oz + dz) - skin, max(oz, oz + dz) + skin
-    number, only = 0, -1
-    bounds, node, stop = tree.bounds, tree.roots[mesh], tree.roots[mesh + 1]
+    dx, dy, dz, near = segment.dx, segment.dy, segment.dz, lists.triangles
+    shear = shear_to_axis(segment)
+    aside = _lateral_margin(radius, segment, shear)
+    around = box_of(segment, 1.0)
+    box = Box(
+        around.x0 - radius, around.x1 + radius, around.y0 - radius, around.y1 + radius, around.z0 - radius, around.z1 + radius
+    )
+    count, known = 0, -1
+    node, stop, f = tree.roots[mesh], tree.roots[mesh + 1], tree.faces
     while node < stop:
-        if boxes_disjoint(bounds, node, x0, x1, y0, y1, z0, z1):
+        if is_outside(tree.bounds, node, box):
             node = tree.skip[node]
             continue
         for i in range(tree.first[node], tree.first[node] + tree.number[node]):
-            # Seen along the segment, the triangle must come within the skin of the origin.
-            f = tree.faces
-            ax, ay = project_sheared(f[i, 0] - ox, f[i, 1] - oy, f[i, 2] - oz, axis, shear_x, shear_y)
-            bx, by = project_sheared(f[i, 3] - ox, f[i, 4] - oy, f[i, 5] - oz, axis, shear_x, shear_y)
-            cx, cy = project_sheared(f[i, 6] - ox, f[i, 7] - oy, f[i, 8] - oz, axis, shear_x, shear_y)
+            # Projected along the segment, the triangle must come within the radius of the origin.
+            ax, ay, bx, by, cx, cy = _projected_corners(segment, shear, f, i)
             beside = min(ax, bx, cx) > aside or max(ax, bx, cx) < -aside or min(ay, by, cy) > aside or max(ay, by, cy) < -aside
             u, v, w = ax * by - ay * bx, bx * cy - by * cx, cx * ay - cy * ax
             side = 1.0 if u + v + w > 0.0 else -1.0
             if beside:
                 continue
-            # How far inside of each edge the origin is seen, times the edge's length.
+            # How far inside of each edge the origin is projected, times the edge's length.
             margin_u = aside * math.hypot(bx - ax, by - ay)
             margin_v = aside * math.hypot(cx - bx, cy - by)
             margin_w = aside * math.hypot(ax - cx, ay - cy)
             u, v, w = side * u, side * v, side * w
             if u < -margin_u or v < -margin_v or w < -margin_w:
                 continue
-            if number == near.shape[1]:
+            if count == near.shape[1]:
                 return -1, -1
             slope = f[i, 9] * dx + f[i, 10] * dy + f[i, 11] * dz
-            through = u > margin_u and v > margin_v and w > margin_w and slope < -2.0 * skin
-            only = i if number == 0 and through else -1
-            near[slot, number] = i
-            number += 1
+            through = u > margin_u and v > margin_v and w > margin_w and slope < -2.0 * radius
+            known = i if count == 0 and through else -1
+            near[slot, count] = i
+            count += 1
         node += 1
-    return number, only
+    return count, known

@@ -1,20 +1,22 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What smooth and deforming surfaces change in the contact rows (kernels): the normal, the depth, the velocity of the skin."""
+"""How smooth and deforming surfaces change the contact rows (kernels): the normal, the depth, the surface's own velocity."""
 
 from __future__ import annotations
 
 import math
 
-from ...compiled.kernels import kernel
-from ...laws.contact import DEPTH, LANES, NX, NY, NZ, PX, PY, PZ, ZX
-from .deformation import at_moment, frame_at, point_at
+import numpy as np
 
-SURFACE_VX, SURFACE_VY, SURFACE_VZ = 0, LANES, 2 * LANES
-"""Columns of the velocity that deformation adds, in rows of their own (see :class:`.Workspace`)."""
+from ...compiled.kernels import kernel
+from ..contact_rows import BRISTLE, DEPTH, LANES, NORMAL, POINT, read_vector, write_vector
+from ..solver_model import SolverModel, State
+from ..workspace import Workspace
+from .deformation import at_moment, point_at
+from .detection_data import OTHER, PRESENT, DetectionData, SurfaceMotion
 
 
 @kernel
-def _barycentric(x, y, z, faces, i):
+def _barycentric(x: float, y: float, z: float, faces: np.ndarray, i: int) -> tuple[float, float, float]:
     """Weights of a triangle's corners at a point of its plane."""
     ax, ay, az = faces[i, 0] - x, faces[i, 1] - y, faces[i, 2] - z
     bx, by, bz = faces[i, 3] - x, faces[i, 4] - y, faces[i, 5] - z
@@ -28,9 +30,11 @@ def _barycentric(x, y, z, faces, i):
 
 
 @kernel
-def _smooth_normal(target, triangle, weights, surfaces):
+def _smooth_normal(
+    target: int, triangle: int, weights: tuple[float, float, float], surfaces: SurfaceMotion
+) -> tuple[float, float, float]:
     """Unit normal interpolated between a triangle's corners; zero where the corners' normals cancel out."""
-    moment, found, corner = surfaces.clock[1], surfaces.targets, surfaces.corner
+    moment, found, corner = surfaces.clock[PRESENT], surfaces.targets, surfaces.corner
     nx, ny, nz = 0.0, 0.0, 0.0
     for k in range(3):
         nx += weights[k] * at_moment(found, moment, target, corner[triangle, k], 3)
@@ -42,11 +46,14 @@ def _smooth_normal(target, triangle, weights, surfaces):
 
 
 @kernel
-def _write_relative_rotation(axes, of, velocity, dt, rotation, out):
-    """Write ``Rₐᵀ exp(ω dt) R_b``: from the frame of body `of` at the step's other end to the axes of body `axes` now.
+def _write_relative_rotation(
+    bodies: tuple[int, int], velocity: np.ndarray, dt: float, rotation: np.ndarray, out: np.ndarray
+) -> None:
+    """Write ``Rₐᵀ exp(ω dt) R_b`` for bodies (a, b): from the frame of b at the step's other end to the axes of a now.
 
-    A point that moves in its body's frame while the body turns goes by ``(R' - R) x + R' (x' - x)``.
+    A point that moves in its body's frame while the body rotates is displaced by ``(R' - R) x + R' (x' - x)``.
     """
+    axes, of = bodies
     w = velocity[of, 3], velocity[of, 4], velocity[of, 5]
     angle = math.sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2]) * dt
     half = 0.5 * angle
@@ -65,9 +72,11 @@ def _write_relative_rotation(axes, of, velocity, dt, rotation, out):
 
 
 @kernel
-def _target_velocity(target, triangle, weights, dt, surfaces):
-    """How fast a place on a target's skin moves in its body's frame, m/s."""
-    now, other = surfaces.clock[1], surfaces.clock[2]
+def _target_velocity(
+    target: int, triangle: int, weights: tuple[float, float, float], dt: float, surfaces: SurfaceMotion
+) -> tuple[float, float, float]:
+    """Velocity of a point on a target's surface in its body's frame, m/s."""
+    now, other = surfaces.clock[PRESENT], surfaces.clock[OTHER]
     found, corner = surfaces.targets, surfaces.corner
     x, y, z = 0.0, 0.0, 0.0
     for k in range(3):
@@ -79,48 +88,51 @@ def _target_velocity(target, triangle, weights, dt, surfaces):
 
 
 @kernel
-def _sensor_velocity(sensor, i, along, dt, surfaces):
-    """How fast the place `along` (m) behind a contact point moves in the sensor's body, m/s."""
-    x, y, z, nx, ny, nz = point_at(surfaces, surfaces.clock[1], sensor, i)
-    ox, oy, oz, mx, my, mz = point_at(surfaces, surfaces.clock[2], sensor, i)
+def _sensor_velocity(sensor: int, i: int, along: float, dt: float, surfaces: SurfaceMotion) -> tuple[float, float, float]:
+    """Velocity of the place `along` (m) behind a contact point in the frame of the sensor's body, m/s."""
+    x, y, z, nx, ny, nz = point_at(surfaces, surfaces.clock[PRESENT], sensor, i)
+    ox, oy, oz, mx, my, mz = point_at(surfaces, surfaces.clock[OTHER], sensor, i)
     return (ox - x - along * (mx - nx)) / dt, (oy - y - along * (my - ny)) / dt, (oz - z - along * (mz - nz)) / dt
 
 
 @kernel
-def apply_surface_motion(pair, first, count, dt, model, tree, surfaces, state, workspace):
-    """Put smooth normals into the rows of a pair, and beside them the velocities that deformation adds.
+def _apply_surface_motion(
+    pair: int, dt: float, model: SolverModel, detection: DetectionData, state: State, workspace: Workspace
+) -> None:
+    """Write smooth normals into the rows of a pair, and beside the rows the velocities that deformation adds.
 
     Where the smooth normal no longer faces the segment's base (at a silhouette) the depth is zero: ``d = max(-s · n, 0)``.
-    Arguments as of :func:`.narrow_phase`; `count` rows begin in block `first`.
+    Arguments as of :func:`finish_contacts`.
     """
-    sensor, target = model.pairs[pair, 0], model.pairs[pair, 1]
-    a, b = model.sensor_body[sensor], model.target_body[target]
-    rows, own, pose, turn = workspace.rows, workspace.own, workspace.pose[pair], workspace.turn[pair]
-    smooth, deforms, bends = surfaces.smooth[target], surfaces.deforms[target], surfaces.bends[sensor]
-    still = surfaces.clock[1] == surfaces.clock[2]
+    sensor, target = model.pairs.sensor[pair], model.pairs.target[pair]
+    a, b = model.pairs.sensor_body[pair], model.pairs.target_body[pair]
+    contacts, frame, surfaces = workspace.contacts, model.points.frame, detection.surfaces
+    rows, pose, turn = contacts.rows, workspace.pairs.pose[pair], workspace.pairs.rotations[pair]
+    smooth, deforms, bends = surfaces.target_smooth[target], surfaces.target_deforms[target], surfaces.sensor_deforms[sensor]
+    still = surfaces.clock[PRESENT] == surfaces.clock[OTHER]
     if deforms:
-        _write_relative_rotation(a, b, state.velocity, dt, workspace.rotation, turn[1])
+        _write_relative_rotation((a, b), state.velocity, dt, workspace.bodies.rotation, turn[1])
     if bends:
-        _write_relative_rotation(a, a, state.velocity, dt, workspace.rotation, turn[2])
-    for r in range(count):
-        block, lane = first + r // LANES, r % LANES
-        slot = workspace.slots[block, lane]
-        triangle, point = state.hint[slot], model.point_first[pair] + slot - model.slot_start[pair]
-        i, along = point - model.point_start[sensor], state.bristles[slot, 3] * model.reach[sensor]
-        px, py, pz = rows[block, PX + lane], rows[block, PY + lane], rows[block, PZ + lane]
+        _write_relative_rotation((a, a), state.velocity, dt, workspace.bodies.rotation, turn[2])
+    for r in range(contacts.number[pair]):
+        block, lane = contacts.first_block[pair] + r // LANES, r % LANES
+        slot = contacts.slots[block, lane]
+        triangle, point = state.triangle[slot], model.pairs.first_point[pair] + slot - model.pairs.first_slot[pair]
+        i, along = point - model.sensors.first_point[sensor], state.pressed_share[slot] * model.sensors.max_penetration[sensor]
+        px, py, pz = read_vector(rows, block, POINT, lane)
         x = pose[9] + pose[0] * px + pose[1] * py + pose[2] * pz
         y = pose[10] + pose[3] * px + pose[4] * py + pose[5] * pz
         z = pose[11] + pose[6] * px + pose[7] * py + pose[8] * pz
-        weights = _barycentric(x, y, z, tree.faces, triangle)
+        weights = _barycentric(x, y, z, detection.tree.faces, triangle)
         if smooth:
             fx, fy, fz = _smooth_normal(target, triangle, weights, surfaces)
             if fx != 0.0 or fy != 0.0 or fz != 0.0:
                 nx = pose[0] * fx + pose[3] * fy + pose[6] * fz
                 ny = pose[1] * fx + pose[4] * fy + pose[7] * fz
                 nz = pose[2] * fx + pose[5] * fy + pose[8] * fz
-                normal_bounds = nx * model.points[point, 3] + ny * model.points[point, 4] + nz * model.points[point, 5]
-                rows[block, NX + lane], rows[block, NY + lane], rows[block, NZ + lane] = nx, ny, nz
-                rows[block, DEPTH + lane] = along * max(-normal_bounds, 0.0)
+                facing = nx * frame[point, 3] + ny * frame[point, 4] + nz * frame[point, 5]
+                write_vector(rows, block, NORMAL, lane, nx, ny, nz)
+                rows[block, DEPTH + lane] = along * max(-facing, 0.0)
         if deforms or bends:
             vx, vy, vz = 0.0, 0.0, 0.0
             if deforms and not still:
@@ -133,26 +145,42 @@ def apply_surface_motion(pair, first, count, dt, model, tree, surfaces, state, w
                 vx -= turn[2, 0, 0] * ux + turn[2, 0, 1] * uy + turn[2, 0, 2] * uz
                 vy -= turn[2, 1, 0] * ux + turn[2, 1, 1] * uy + turn[2, 1, 2] * uz
                 vz -= turn[2, 2, 0] * ux + turn[2, 2, 1] * uy + turn[2, 2, 2] * uz
-            own[block, SURFACE_VX + lane], own[block, SURFACE_VY + lane], own[block, SURFACE_VZ + lane] = vx, vy, vz
+            write_vector(contacts.surface_velocity, block, 0, lane, vx, vy, vz)
 
 
 @kernel
-def rotate_rows(pair, model, surfaces, workspace):
-    """Turn normals and bristles of a pair's rows as the texels of its bending sensor turn during the step.
+def finish_contacts(
+    pair: int, dt: float, model: SolverModel, detection: DetectionData, state: State, workspace: Workspace
+) -> None:
+    """Complete the rows that :func:`.find_contacts` wrote: smooth and deforming surfaces, and bristles in the surface.
 
-    A bristle is carried along with its texel, as a rigid sensor carries all of its own.
+    Parameters
+    ----------
+    pair : int
+    dt : float, seconds
+        Time that velocities of surfaces are differences over: the step that begins, or minus the step that has ended.
+    model : SolverModel
+    detection : DetectionData
+    state : State
+    workspace : Workspace
     """
-    sensor, rows, turn = model.pairs[pair, 0], workspace.rows, workspace.turn[pair]
-    for r in range(workspace.contacts[pair]):
-        block, lane = workspace.first_block[pair] + r // LANES, r % LANES
-        point = model.point_first[pair] + workspace.slots[block, lane] - model.slot_start[pair]
-        after = frame_at(surfaces, surfaces.clock[2], sensor, point - model.point_start[sensor])
-        for row in range(3):
-            for column in range(3):
-                turn[1, row, column] = 0.0
-                for axis in range(3):
-                    turn[1, row, column] += after[3 + 3 * axis + row] * model.points[point, 3 + 3 * axis + column]
-        for first in (NX, ZX):
-            x, y, z = rows[block, first + lane], rows[block, first + LANES + lane], rows[block, first + 2 * LANES + lane]
-            for k in range(3):
-                rows[block, first + k * LANES + lane] = turn[1, k, 0] * x + turn[1, k, 1] * y + turn[1, k, 2] * z
+    sensor, target, surfaces = model.pairs.sensor[pair], model.pairs.target[pair], detection.surfaces
+    if surfaces.target_smooth[target] or surfaces.target_deforms[target] or surfaces.sensor_deforms[sensor]:
+        _apply_surface_motion(pair, dt, model, detection, state, workspace)
+    contacts = workspace.contacts
+    _rotate_bristles_into_plane(contacts.first_block[pair], contacts.number[pair], contacts.rows)
+
+
+@kernel
+def _rotate_bristles_into_plane(first: int, count: int, rows: np.ndarray) -> None:
+    """Rotate bristles back into the surface, out of which its turning lifts them; their lengths stay."""
+    for block in range(first, first + (count + LANES - 1) // LANES):
+        for lane in range(LANES):  # runs in vector registers: no branches, no calls
+            nx, ny, nz = read_vector(rows, block, NORMAL, lane)
+            zx, zy, zz = read_vector(rows, block, BRISTLE, lane)
+            out_of_plane = zx * nx + zy * ny + zz * nz
+            length = zx * zx + zy * zy + zz * zz
+            flat_x, flat_y, flat_z = zx - out_of_plane * nx, zy - out_of_plane * ny, zz - out_of_plane * nz
+            flat = flat_x * flat_x + flat_y * flat_y + flat_z * flat_z
+            scale = math.sqrt(length / flat) if flat > 0.0 and out_of_plane != 0.0 else 1.0
+            write_vector(rows, block, BRISTLE, lane, scale * flat_x, scale * flat_y, scale * flat_z)

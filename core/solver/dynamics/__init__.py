@@ -1,1 +1,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
+"""Dynamics of a step: contacts linearised and summed, implicit velocities, passivity, actuators and free rotation."""
+
+__all__ = [
+    "actuators",
+    "contact_assembly",
+    "drive_commands",
+    "effect_kernels",
+    "effect_memory",
+    "free_rotation",
+    "friction_state",
+    "grip_controller",
+    "implicit_velocities",
+    "linear_system",
+    "passivity",
+    "relative_kinematics",
+]

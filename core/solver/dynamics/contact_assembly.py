@@ -4,129 +4,235 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
+
+import numpy as np
 
 from ...compiled.kernels import inlined, kernel
-from ...laws.contact import (
-    CN,
+from ...laws.contact_law import LINEAR_EXPONENT, ContactLaw, read_law
+from ...laws.friction import bristle_step, deflection_scale, friction_tangent, max_bristle_deflection
+from ...laws.normal_force import linear_tangent, normal_tangent
+from ..contact_rows import (
+    BRISTLE,
     DEPTH,
-    EXPONENT,
     EXTRA_VISCOSITY,
     FRICTION_SCALE,
     GAIN,
     KEEP,
     LANES,
     LIMIT,
-    LINEAR,
+    NORMAL,
     NORMAL_BIAS,
     NORMAL_SLOPE,
-    NX,
-    NY,
-    NZ,
-    PX,
-    PY,
-    PZ,
-    ZX,
-    ZY,
-    ZZ,
-    K,
-    linearise_contact,
-    normal_tangent,
+    POINT,
+    read_vector,
 )
-from ..detection.surface_kinematics import SURFACE_VX, SURFACE_VY, SURFACE_VZ
-from ..workspace import SUMS
-from .effect_kernels import STEP, apply_effects, has_effects, may_pull, press_texel, write_tangent
-from .relative_kinematics import motion_values, pair_law, point_law, relative_motion, velocity_at
+from ..solver_model import SolverModel, State
+from ..workspace import SUMS, Workspace
+from .effect_kernels import (
+    STEP,
+    ColumnPlace,
+    PointMotion,
+    apply_effects,
+    has_effects,
+    may_pull,
+    press_texel,
+    write_tangent,
+)
+from .relative_kinematics import motion_values, point_law, relative_motion, row_of, row_velocity, velocity_at
+
+
+class Tangent(NamedTuple):
+    """The normal law of one contact at the step's end, and how effects and paint change its friction.
+
+    Attributes
+    ----------
+    bias, slope : float, N and N·s/m
+        Tangent of the normal law (see :func:`.normal_tangent`).
+    friction_scale : float
+        Multiplier of the friction coefficients.
+    extra_viscosity : float, N·s/m
+        Added to `ct`.
+    may_pull : bool
+        The normal force may be negative; friction is zero then.
+    """
+
+    bias: float
+    slope: float
+    friction_scale: float
+    extra_viscosity: float
+    may_pull: bool
+
+
+class LinearContact(NamedTuple):
+    """Force of a contact on the target, ``-(push + stiff_n ḋ) n - (bias z + stiff_t v_t)``, and the step of its bristles.
+
+    Attributes
+    ----------
+    limit : float, metres
+        Largest bristle deflection under the normal force at the step's end.
+    push, stiff_n : float, N and N·s/m
+    bias, stiff_t : float, N/m and N·s/m
+    keep, gain : float
+        ``z(t + dt) = keep z + gain v_t``.
+    """
+
+    limit: float
+    push: float
+    stiff_n: float
+    bias: float
+    stiff_t: float
+    keep: float
+    gain: float
 
 
 @inlined
-def sum_pair_contacts(pair, dt, model, state, workspace):
-    """Sum up the contacts of a pair at the velocities that are guessed."""
-    a, b = model.sensor_body[model.pairs[pair, 0]], model.target_body[model.pairs[pair, 1]]
-    relative_motion(a, b, workspace.twist, state.position, workspace.rotation, workspace.motion[pair])
-    relative_motion(a, b, workspace.known, state.position, workspace.rotation, workspace.part[pair])
-    first = model.point_first[pair] - model.slot_start[pair]
-    _sum_contacts(pair, first, dt, pair_law(model.parameters, pair), model, state.memory, workspace)
+def linearise_contact(
+    normal: tuple[float, float, float],
+    bristle: tuple[float, float, float],
+    velocity: tuple[float, float, float],
+    tangent: Tangent,
+    dt: float,
+    law: ContactLaw,
+) -> LinearContact:
+    """Linearise a contact's force in the relative velocity at the step's end.
+
+    All is zero where the contact separates within the step.
+
+    Parameters
+    ----------
+    normal, bristle : (x, y, z)
+        Normal, and bristle deflection at the step's beginning (m).
+    velocity : (x, y, z)
+        Of the target relative to the sensor where the force is linearised, m/s.
+    tangent : Tangent
+    dt : float, seconds
+    law : ContactLaw
+
+    Returns
+    -------
+    LinearContact
+    """
+    nx, ny, nz = normal
+    zx, zy, zz = bristle
+    vx, vy, vz = velocity
+    rate = vx * nx + vy * ny + vz * nz
+    tx, ty, tz = vx - rate * nx, vy - rate * ny, vz - rate * nz
+    force = max(tangent.bias + tangent.slope * rate, 0.0)
+    load = tangent.friction_scale * force
+    limit = max_bristle_deflection(load, law)
+    held = deflection_scale(zx * zx + zy * zy + zz * zz, limit)  # the load fell: the rest has slipped already
+    keep, gain = bristle_step(tx * tx + ty * ty + tz * tz, load, dt, law)
+    keep *= held
+    zx, zy, zz = keep * zx + gain * tx, keep * zy + gain * ty, keep * zz + gain * tz
+    # The closed solution for constant velocity may exceed the limit: then the contact slides at the limit.
+    scale = deflection_scale(zx * zx + zy * zy + zz * zz, limit)
+    keep, gain = scale * keep, scale * gain
+    bias, stiff_t = friction_tangent(keep, gain, held, dt, law)
+    stiff_t += tangent.extra_viscosity
+    on = force > 0.0
+    acts = on or tangent.may_pull
+    return LinearContact(
+        limit, tangent.bias if acts else 0.0, tangent.slope if acts else 0.0, bias if on else 0.0, stiff_t if on else 0.0,
+        keep if on else 0.0, gain if on else 0.0,
+    )  # fmt: skip
+
+
+@inlined
+def sum_pair_contacts(pair: int, dt: float, model: SolverModel, state: State, workspace: Workspace) -> None:
+    """Sum up the contacts of a pair, linearised at the velocities that are guessed."""
+    a, b = model.pairs.sensor_body[pair], model.pairs.target_body[pair]
+    bodies, pairs = workspace.bodies, workspace.pairs
+    relative_motion(a, b, bodies.twist, state.position, bodies.rotation, pairs.motion[pair])
+    relative_motion(a, b, bodies.known_twist, state.position, bodies.rotation, pairs.known_motion[pair])
+    _sum_contacts(pair, dt, read_law(model.pairs.law, pair), model, state.effect_memory, workspace)
 
 
 @kernel
-def _write_tangents(pair, first_point, dt, motion, law, model, memory, workspace):
-    """Write what is not the same for all contacts of a pair, for the loop that must not call it itself.
+def _write_tangents(
+    pair: int, dt: float, law: ContactLaw, model: SolverModel, memory: np.ndarray, workspace: Workspace
+) -> None:
+    """Write what differs between the contacts of a pair, for the vectorised loop, which must not call it itself.
 
-    The tangents of a curved normal law at the velocities of `motion`, what effects make of them, and what was painted.
+    These are the tangents of a curved normal law at the guessed velocities, what effects make of them, and paint.
     """
-    rows, painted, sensor = workspace.rows, model.painted, model.pairs[pair, 0]
-    effects = has_effects(sensor, model.program)
-    for r in range(workspace.contacts[pair]):
-        b, lane = workspace.first_block[pair] + r // LANES, r % LANES
-        point = first_point + workspace.slots[b, lane]
-        vx, vy, vz = velocity_at(rows[b, PX + lane], rows[b, PY + lane], rows[b, PZ + lane], motion)
-        if workspace.moving[pair]:
-            vx, vy, vz = (
-                vx + workspace.own[b, SURFACE_VX + lane],
-                vy + workspace.own[b, SURFACE_VY + lane],
-                vz + workspace.own[b, SURFACE_VZ + lane],
-            )
-        rate = vx * rows[b, NX + lane] + vy * rows[b, NY + lane] + vz * rows[b, NZ + lane]
-        p = point_law(law, painted, point)
-        rows[b, FRICTION_SCALE + lane], rows[b, EXTRA_VISCOSITY + lane] = painted[point, 1] if len(painted) > 0 else 1.0, 0.0
+    contacts, rows, multipliers, sensor = (
+        workspace.contacts,
+        workspace.contacts.rows,
+        model.points.multipliers,
+        model.pairs.sensor[pair],
+    )
+    effects, felt = has_effects(sensor, model.effects), workspace.effects.contacts
+    motion = motion_values(workspace.pairs.motion[pair])
+    first_point = model.pairs.first_point[pair] - model.pairs.first_slot[pair]
+    for r in range(contacts.number[pair]):
+        b, lane = row_of(r, pair, contacts)
+        point = first_point + contacts.slots[b, lane]
+        vx, vy, vz, rate = row_velocity(b, lane, motion, contacts.deforming[pair], contacts)
+        p = point_law(law, multipliers, point)
+        rows[b, FRICTION_SCALE + lane] = multipliers[point, 1] if len(multipliers) > 0 else 1.0
+        rows[b, EXTRA_VISCOSITY + lane] = 0.0
+        depth = rows[b, DEPTH + lane]
         if effects:
             speed = math.sqrt(max(vx * vx + vy * vy + vz * vz - rate * rate, 0.0))
-            press_texel(workspace.felt, b, LANES, lane, pair, rows[b, DEPTH + lane] + dt * rate, rate, 0.0, speed, p, model)
+            press_texel(felt, ColumnPlace(b, LANES, lane), pair, PointMotion(depth + dt * rate, rate, 0.0, speed), p, model)
         else:
-            rows[b, NORMAL_BIAS + lane], rows[b, NORMAL_SLOPE + lane] = normal_tangent(rows[b, DEPTH + lane], rate, dt, p)
+            rows[b, NORMAL_BIAS + lane], rows[b, NORMAL_SLOPE + lane] = normal_tangent(depth, rate, dt, p)
     if effects:
-        first, left = workspace.first_block[pair], workspace.contacts[pair]
+        first, left = contacts.first_block[pair], contacts.number[pair]
         for b in range(first, first + (left + LANES - 1) // LANES):
             count = min(left, LANES)
-            apply_effects(sensor, STEP, b, 0, count, first_point, law, model, memory, workspace.slots, workspace.felt)
+            apply_effects(pair, STEP, ColumnPlace(b, LANES, 0), count, law, model, memory, workspace)
             for lane in range(count):
-                write_tangent(pair, b, lane, dt, rows[b, FRICTION_SCALE + lane], model, workspace.felt, rows)
+                write_tangent(pair, b, lane, dt, model, felt, rows)
             left -= LANES
 
 
 @kernel
-def _sum_contacts(pair, first_point, dt, p, model, memory, workspace):
+def _sum_contacts(pair: int, dt: float, law: ContactLaw, model: SolverModel, memory: np.ndarray, workspace: Workspace) -> None:
     """Linearise the contacts of a pair, and sum their forces on the target and what they resist.
-
-    The contact point of a row is `first_point` plus its slot.
 
     With a contact's damping tensor ``C = ct 1 + (cn - ct) n nᵀ`` and velocities ``v + ω × p`` the block is the sum of
     ``Jᵀ C J``, its lower triangle; the wrench is what the springs and the known part of the motion do.
     """
-    rows, sums = workspace.rows, workspace.sums[pair]
-    motion, part = motion_values(workspace.motion[pair]), motion_values(workspace.part[pair])
+    contacts = workspace.contacts
+    rows, sums = contacts.rows, workspace.pairs.sums[pair]
+    motion, known = motion_values(workspace.pairs.motion[pair]), motion_values(workspace.pairs.known_motion[pair])
     for i in range(SUMS * LANES):
         sums[i] = 0.0
-    own, moving = workspace.own, workspace.moving[pair]
-    sensor = model.pairs[pair, 0]
-    vary = p[EXPONENT] != LINEAR or len(model.painted) > 0 or has_effects(sensor, model.program)
-    sticks = may_pull(sensor, model.program)
+    surface_velocity, moving = contacts.surface_velocity, contacts.deforming[pair]
+    sensor = model.pairs.sensor[pair]
+    vary = law.exponent != LINEAR_EXPONENT or len(model.points.multipliers) > 0 or has_effects(sensor, model.effects)
+    pulls = may_pull(sensor, model.effects)
     if vary:
-        _write_tangents(pair, first_point, dt, motion, p, model, memory, workspace)
-    first = workspace.first_block[pair]
-    for b in range(first, first + (workspace.contacts[pair] + LANES - 1) // LANES):
+        _write_tangents(pair, dt, law, model, memory, workspace)
+    first = contacts.first_block[pair]
+    for b in range(first, first + (contacts.number[pair] + LANES - 1) // LANES):
         for lane in range(LANES):  # runs in vector registers: no branches, no calls
-            nx, ny, nz = rows[b, NX + lane], rows[b, NY + lane], rows[b, NZ + lane]
-            px, py, pz = rows[b, PX + lane], rows[b, PY + lane], rows[b, PZ + lane]
-            zx, zy, zz = rows[b, ZX + lane], rows[b, ZY + lane], rows[b, ZZ + lane]
-            vx, vy, vz = velocity_at(px, py, pz, motion)
-            ux, uy, uz = velocity_at(px, py, pz, part)
+            nx, ny, nz = read_vector(rows, b, NORMAL, lane)
+            px, py, pz = read_vector(rows, b, POINT, lane)
+            zx, zy, zz = read_vector(rows, b, BRISTLE, lane)
+            vx, vy, vz = velocity_at((px, py, pz), motion)
+            ux, uy, uz = velocity_at((px, py, pz), known)
             if moving:
-                vx, vy, vz = vx + own[b, SURFACE_VX + lane], vy + own[b, SURFACE_VY + lane], vz + own[b, SURFACE_VZ + lane]
-                ux, uy, uz = ux + own[b, SURFACE_VX + lane], uy + own[b, SURFACE_VY + lane], uz + own[b, SURFACE_VZ + lane]
-            push, slope, grip, drag = p[K] * rows[b, DEPTH + lane], p[K] * dt + p[CN], 1.0, 0.0
+                sx, sy, sz = read_vector(surface_velocity, b, 0, lane)
+                vx, vy, vz = vx + sx, vy + sy, vz + sz
+                ux, uy, uz = ux + sx, uy + sy, uz + sz
+            bias, slope = linear_tangent(rows[b, DEPTH + lane], dt, law)
+            scale, viscosity = 1.0, 0.0
             if vary:
-                push, slope, grip = rows[b, NORMAL_BIAS + lane], rows[b, NORMAL_SLOPE + lane], rows[b, FRICTION_SCALE + lane]
-                drag = rows[b, EXTRA_VISCOSITY + lane]
-            limit, push, stiff_n, bias, t, keep, gain = linearise_contact(
-                nx, ny, nz, zx, zy, zz, push, slope, grip, drag, sticks, vx, vy, vz, dt, p
+                bias, slope = rows[b, NORMAL_BIAS + lane], rows[b, NORMAL_SLOPE + lane]
+                scale, viscosity = rows[b, FRICTION_SCALE + lane], rows[b, EXTRA_VISCOSITY + lane]
+            contact = linearise_contact(
+                (nx, ny, nz), (zx, zy, zz), (vx, vy, vz), Tangent(bias, slope, scale, viscosity, pulls), dt, law
             )
-            rows[b, LIMIT + lane], rows[b, KEEP + lane], rows[b, GAIN + lane] = limit, keep, gain
-            e = stiff_n - t
-            push += e * (ux * nx + uy * ny + uz * nz)
-            fx = -push * nx - bias * zx - t * ux
-            fy = -push * ny - bias * zy - t * uy
-            fz = -push * nz - bias * zz - t * uz
+            rows[b, LIMIT + lane], rows[b, KEEP + lane], rows[b, GAIN + lane] = contact.limit, contact.keep, contact.gain
+            t = contact.stiff_t
+            e = contact.stiff_n - t
+            push = contact.push + e * (ux * nx + uy * ny + uz * nz)
+            fx = -push * nx - contact.bias * zx - t * ux
+            fy = -push * ny - contact.bias * zy - t * uy
+            fz = -push * nz - contact.bias * zz - t * uz
             mx, my, mz = py * nz - pz * ny, pz * nx - px * nz, px * ny - py * nx
             ex, ey, ez = e * nx, e * ny, e * nz
             gx, gy, gz = e * mx, e * my, e * mz

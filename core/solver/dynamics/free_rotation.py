@@ -11,6 +11,8 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from ...compiled.kernels import kernel
 
 LARGEST_TURN = 0.25
@@ -18,7 +20,7 @@ LARGEST_TURN = 0.25
 
 
 @kernel
-def matrix_times_vector(matrix, x, y, z):
+def matrix_times_vector(matrix: np.ndarray, x: float, y: float, z: float) -> tuple[float, float, float]:
     """Return a (3, 3) matrix times a vector."""
     return (
         matrix[0, 0] * x + matrix[0, 1] * y + matrix[0, 2] * z,
@@ -28,7 +30,7 @@ def matrix_times_vector(matrix, x, y, z):
 
 
 @kernel
-def to_body_axes(rotation, x, y, z):
+def to_body_axes(rotation: np.ndarray, x: float, y: float, z: float) -> tuple[float, float, float]:
     """A vector of the world in the axes of a body with the given rotation."""
     return (
         rotation[0, 0] * x + rotation[1, 0] * y + rotation[2, 0] * z,
@@ -38,7 +40,7 @@ def to_body_axes(rotation, x, y, z):
 
 
 @kernel
-def _inverse_cayley_rotation(vx, vy, vz, jx, jy, jz):
+def _inverse_cayley_rotation(vx: float, vy: float, vz: float, jx: float, jy: float, jz: float) -> tuple[float, float, float]:
     """Turn `v` back by the Cayley map of 2 `j`: the length of `j` is the tangent of half the angle."""
     cx, cy, cz = vy * jz - vz * jy, vz * jx - vx * jz, vx * jy - vy * jx
     scale = 2.0 / (1.0 + jx * jx + jy * jy + jz * jz)
@@ -50,7 +52,7 @@ def _inverse_cayley_rotation(vx, vy, vz, jx, jy, jz):
 
 
 @kernel
-def _half_rotation(lx, ly, lz, dt, inverse):
+def _half_rotation(lx: float, ly: float, lz: float, dt: float, inverse: np.ndarray) -> tuple[float, float, float]:
     """Turn over a short step, as the tangent of half the angle along its axis; `l` is the angular momentum. Body axes."""
     wx, wy, wz = matrix_times_vector(inverse, lx, ly, lz)
     jx, jy, jz = 0.5 * dt * wx, 0.5 * dt * wy, 0.5 * dt * wz
@@ -66,7 +68,9 @@ def _half_rotation(lx, ly, lz, dt, inverse):
 
 
 @kernel
-def mean_angular_velocity(rotation, inverse, lx, ly, lz, dt):
+def mean_angular_velocity(
+    rotation: np.ndarray, inverse: np.ndarray, lx: float, ly: float, lz: float, dt: float
+) -> tuple[float, float, float]:
     """Angular velocity that turns a body over a step as it tumbles when nothing acts.
 
     Parameters
@@ -105,7 +109,9 @@ def mean_angular_velocity(rotation, inverse, lx, ly, lz, dt):
 
 
 @kernel
-def angular_velocity_of(rotation, inverse, lx, ly, lz):
+def angular_velocity_of(
+    rotation: np.ndarray, inverse: np.ndarray, lx: float, ly: float, lz: float
+) -> tuple[float, float, float]:
     """Angular velocity (rad/s) of a body whose angular momentum is `l` (kg·m²/s), both in world axes."""
     bx, by, bz = to_body_axes(rotation, lx, ly, lz)
     wx, wy, wz = matrix_times_vector(inverse, bx, by, bz)

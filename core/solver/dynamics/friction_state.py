@@ -1,83 +1,114 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How the bristles of a pair bend in a step (kernels)."""
+"""Bring the bristles of a pair's contacts to the end of a step (kernels)."""
 
 from __future__ import annotations
 
-import math
-
 from ...compiled.kernels import inlined, kernel
-from ...laws.contact import GAIN, KEEP, LANES, LIMIT, NX, NY, NZ, PX, PY, PZ, ZX, ZY, ZZ
-from ..detection.surface_kinematics import SURFACE_VX, SURFACE_VY, SURFACE_VZ, rotate_rows
-from .relative_kinematics import motion_values, relative_motion, velocity_at
+from ...laws.friction import deflection_scale
+from ..contact_rows import BRISTLE, GAIN, KEEP, LANES, LIMIT, NORMAL, POINT, read_vector, write_vector
+from ..detection.deformation import frame_at
+from ..detection.detection_data import OTHER, SurfaceMotion
+from ..solver_model import SolverModel, State
+from ..workspace import Workspace
+from .relative_kinematics import motion_values, row_of, velocity_at, write_pair_motion
 
 
 @inlined
-def update_pair_friction(pair, dt, model, surfaces, state, workspace):
-    """Bristle deflections at the step's end, as the sensor sees them then."""
-    a, b = model.sensor_body[model.pairs[pair, 0]], model.target_body[model.pairs[pair, 1]]
-    motion, part = workspace.motion[pair], workspace.part[pair]
-    relative_motion(a, b, workspace.twist, state.position, workspace.rotation, motion)
-    _motion_at_step_end(a, dt, workspace.twist, workspace.rotation, motion, part, workspace.turn[pair])
-    if workspace.moving[pair]:
+def update_pair_friction(
+    pair: int, dt: float, model: SolverModel, surfaces: SurfaceMotion, state: State, workspace: Workspace
+) -> None:
+    """Bring the bristle deflections of a pair to the step's end, in the sensor's axes at that time."""
+    write_pair_motion(pair, model, state, workspace)
+    _write_motion_at_step_end(pair, dt, model, workspace)
+    if workspace.contacts.deforming[pair]:
         _rotate_surface_velocities(pair, workspace)
-    if surfaces.bends[model.pairs[pair, 0]]:
-        rotate_rows(pair, model, surfaces, workspace)
-    _update_bristles(pair, motion_values(part), state, workspace)
+    if surfaces.sensor_deforms[model.pairs.sensor[pair]]:
+        _rotate_rows(pair, model, surfaces, workspace)
+    _update_bristles(pair, motion_values(workspace.pairs.known_motion[pair]), state, workspace)
 
 
 @kernel
-def _rotate_surface_velocities(pair, workspace):
-    """Turn the velocities that deformation adds by what the sensor turns during the step."""
-    own, turn = workspace.own, workspace.turn[pair]
-    for r in range(workspace.contacts[pair]):
-        b, lane = workspace.first_block[pair] + r // LANES, r % LANES
-        u = own[b, SURFACE_VX + lane], own[b, SURFACE_VY + lane], own[b, SURFACE_VZ + lane]
+def _rotate_surface_velocities(pair: int, workspace: Workspace) -> None:
+    """Rotate the velocities that deformation adds by the sensor's rotation during the step."""
+    contacts, rotation = workspace.contacts, workspace.pairs.rotations[pair, 0]
+    for r in range(contacts.number[pair]):
+        b, lane = row_of(r, pair, contacts)
+        u = read_vector(contacts.surface_velocity, b, 0, lane)
         for k in range(3):
-            own[b, k * LANES + lane] = turn[0, k, 0] * u[0] + turn[0, k, 1] * u[1] + turn[0, k, 2] * u[2]
+            contacts.surface_velocity[b, k * LANES + lane] = (
+                rotation[k, 0] * u[0] + rotation[k, 1] * u[1] + rotation[k, 2] * u[2]
+            )
 
 
 @kernel
-def _update_bristles(pair, motion, state, workspace):
+def _update_bristles(pair: int, motion: tuple[float, ...], state: State, workspace: Workspace) -> None:
     """Bring the bristles of a pair's contacts to the step's end, at the velocities of `motion`."""
-    rows, slots, bristles = workspace.rows, workspace.slots, state.bristles
-    own, moving = workspace.own, workspace.moving[pair]
-    first, left = workspace.first_block[pair], workspace.contacts[pair]
+    contacts, bristle = workspace.contacts, state.bristle
+    rows, slots = contacts.rows, contacts.slots
+    surface_velocity, moving = contacts.surface_velocity, contacts.deforming[pair]
+    first, left = contacts.first_block[pair], contacts.number[pair]
     for b in range(first, first + (left + LANES - 1) // LANES):
-        for lane in range(LANES):
-            nx, ny, nz = rows[b, NX + lane], rows[b, NY + lane], rows[b, NZ + lane]
-            vx, vy, vz = velocity_at(rows[b, PX + lane], rows[b, PY + lane], rows[b, PZ + lane], motion)
+        for lane in range(LANES):  # runs in vector registers: no branches, no calls
+            nx, ny, nz = read_vector(rows, b, NORMAL, lane)
+            vx, vy, vz = velocity_at(read_vector(rows, b, POINT, lane), motion)
             if moving:
-                vx, vy, vz = vx + own[b, SURFACE_VX + lane], vy + own[b, SURFACE_VY + lane], vz + own[b, SURFACE_VZ + lane]
-            keep, gain, limit = rows[b, KEEP + lane], rows[b, GAIN + lane], rows[b, LIMIT + lane]
-            out = vx * nx + vy * ny + vz * nz
-            zx = keep * rows[b, ZX + lane] + gain * (vx - out * nx)
-            zy = keep * rows[b, ZY + lane] + gain * (vy - out * ny)
-            zz = keep * rows[b, ZZ + lane] + gain * (vz - out * nz)
-            square = zx * zx + zy * zy + zz * zz
-            scale = limit / math.sqrt(square) if square > limit * limit else 1.0
-            rows[b, ZX + lane], rows[b, ZY + lane], rows[b, ZZ + lane] = scale * zx, scale * zy, scale * zz
+                ux, uy, uz = read_vector(surface_velocity, b, 0, lane)
+                vx, vy, vz = vx + ux, vy + uy, vz + uz
+            keep, gain = rows[b, KEEP + lane], rows[b, GAIN + lane]
+            rate = vx * nx + vy * ny + vz * nz
+            zx, zy, zz = read_vector(rows, b, BRISTLE, lane)
+            zx = keep * zx + gain * (vx - rate * nx)
+            zy = keep * zy + gain * (vy - rate * ny)
+            zz = keep * zz + gain * (vz - rate * nz)
+            scale = deflection_scale(zx * zx + zy * zy + zz * zz, rows[b, LIMIT + lane])
+            write_vector(rows, b, BRISTLE, lane, scale * zx, scale * zy, scale * zz)
         for lane in range(min(left, LANES)):
             slot = slots[b, lane]
-            bristles[slot, 0], bristles[slot, 1] = rows[b, ZX + lane], rows[b, ZY + lane]
-            bristles[slot, 2] = rows[b, ZZ + lane]
+            bristle[slot, 0], bristle[slot, 1], bristle[slot, 2] = read_vector(rows, b, BRISTLE, lane)
         left -= LANES
 
 
 @kernel
-def _motion_at_step_end(a, dt, twist, rotation, motion, seen, turned):
-    """Turn a relative motion by what the sensor itself turns during the step, ``(1 + dt W)ᵀ`` in its own axes.
+def _write_motion_at_step_end(pair: int, dt: float, model: SolverModel, workspace: Workspace) -> None:
+    """Rotate a pair's relative motion by the sensor's rotation during the step, ``(1 + dt W)ᵀ`` in its own axes.
 
-    That matrix is left in the first of `turned` (3, 3, 3).
+    The result is written over the pair's known motion, and the rotation into the first of the pair's rotations.
     """
+    a, twist, rotation = model.pairs.sensor_body[pair], workspace.bodies.twist, workspace.bodies.rotation
+    motion, result = workspace.pairs.motion[pair], workspace.pairs.known_motion[pair]
+    turned = workspace.pairs.rotations[pair, 0]
     for i in range(12):
-        seen[i] = motion[i]
+        result[i] = motion[i]
     for k in range(3):
         for m in range(3):
             turn = 0.0  # entry (m, k) of the sensor's W in its own axes
             for i in range(3):
                 for j in range(3):
                     turn += rotation[a, i, m] * twist[a, 3 + 3 * i + j] * rotation[a, j, k]
-            turned[0, k, m] = dt * turn + (1.0 if k == m else 0.0)
-            seen[k] += dt * turn * motion[m]
+            turned[k, m] = dt * turn + (1.0 if k == m else 0.0)
+            result[k] += dt * turn * motion[m]
             for j in range(3):
-                seen[3 + 3 * k + j] += dt * turn * motion[3 + 3 * m + j]
+                result[3 + 3 * k + j] += dt * turn * motion[3 + 3 * m + j]
+
+
+@kernel
+def _rotate_rows(pair: int, model: SolverModel, surfaces: SurfaceMotion, workspace: Workspace) -> None:
+    """Rotate normals and bristles of a pair's rows as the texels of its deforming sensor rotate during the step.
+
+    A bristle is carried along with its texel, as a rigid sensor carries all of its own.
+    """
+    sensor, contacts, frame = model.pairs.sensor[pair], workspace.contacts, model.points.frame
+    rows, turn = contacts.rows, workspace.pairs.rotations[pair, 1]
+    for r in range(contacts.number[pair]):
+        block, lane = contacts.first_block[pair] + r // LANES, r % LANES
+        point = model.pairs.first_point[pair] + contacts.slots[block, lane] - model.pairs.first_slot[pair]
+        after = frame_at(surfaces, surfaces.clock[OTHER], sensor, point - model.sensors.first_point[sensor])
+        for row in range(3):
+            for column in range(3):
+                turn[row, column] = 0.0
+                for axis in range(3):
+                    turn[row, column] += after[3 + 3 * axis + row] * frame[point, 3 + 3 * axis + column]
+        for first in (NORMAL, BRISTLE):
+            x, y, z = read_vector(rows, block, first, lane)
+            for k in range(3):
+                rows[block, first + k * LANES + lane] = turn[k, 0] * x + turn[k, 1] * y + turn[k, 2] * z

@@ -9,77 +9,82 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from ...compiled.kernels import inlined, kernel
-from ...geometry.rotations import DRIVEN, FREE, KEYFRAMED, solve_positive_definite, write_twist
+from ...geometry.rotations import solve_positive_definite, write_twist
+from ..detection.detection_data import DetectionData
 from ..parallel_loops import SUM_CONTACTS, run_parallel_loop
+from ..solver_model import DRIVEN, FREE, KEYFRAMED, SolverModel, State
+from ..workspace import Workspace
 from .actuators import SPEED, add_actuators
 from .free_rotation import matrix_times_vector, mean_angular_velocity
 from .linear_system import add_pair_to_system, write_pair_forces
 from .passivity import MAX_BISECTIONS, check_energy, reset_force_scales
 
 MAX_ITERATIONS = 40
-"""Most rounds in which contacts are linearised anew within a substep; four or five are usual, one at rest."""
+"""Most iterations, in which contacts are linearised anew, within a substep; four or five are usual, one at rest."""
 
 CONVERGED = 1e-9
-"""What a round may still change to be the last, as a share of the velocity that contacts give in the step."""
+"""The iterations end when one changes less than this share of the velocity that contacts give in the step."""
 
 
 @inlined
-def solve_velocities(dt, commands, model, tree, neighbour_lists, surfaces, state, workspace):
-    """Velocities of free and driven bodies at the step's end, written into the state.
+def solve_velocities(
+    dt: float, commands: np.ndarray, model: SolverModel, detection: DetectionData, state: State, workspace: Workspace
+) -> None:
+    """Solve for the velocities of free and driven bodies at the step's end, and write them into the state.
 
-    Contacts and drives are linearised at the current guess and the linear system solved, until the guess no longer moves; a
-    contact that would pull is left out of the next round. Rounds that close in are cut short by a secant. Where they go in
-    circles (friction that was guessed for too much load throws the contact off, without the contact there is no friction), the
-    guess moves by a share of the way only. All that is mixed keeps the momentum. With nothing to solve for one round only
-    linearises. Where contacts would give more than they were given (see :mod:`.passivity`), less of their forces acts.
+    Contacts and drives are linearised at the current guess and the linear system is solved, until the guess no longer moves; a
+    contact that would pull is left out of the next iteration. A converging sequence is accelerated by a secant. Where the
+    iterations cycle (friction that was guessed for too large a load separates the contact, and without the contact there is no
+    friction), the guess moves by a share of the way only. Every mixture of iterates keeps the momentum. With nothing to solve
+    for, a single iteration only linearises. Where contacts would give more energy than was put into them
+    (see :mod:`.passivity`), their forces are scaled down.
     """
-    _initial_guess(dt, model, state, workspace)
+    _write_initial_guess(dt, model, state, workspace)
     reset_force_scales(model, state, workspace)
     for bisection in range(MAX_BISECTIONS):
-        _iterate(dt, commands, model, tree, neighbour_lists, surfaces, state, workspace)
-        if model.unknowns == 0 or check_energy(bisection, dt, model, state, workspace):
+        _iterate(dt, commands, model, detection, state, workspace)
+        if model.bodies.unknowns == 0 or check_energy(bisection, dt, model, state, workspace):
             break
 
 
 @inlined
-def _iterate(dt, commands, model, tree, neighbour_lists, surfaces, state, workspace):
-    """Solve for the velocities with what is held back of the pairs' forces, from the present guess on."""
-    matrix, vector, guess, n = workspace.matrix, workspace.vector, workspace.guess, model.unknowns
+def _iterate(
+    dt: float, commands: np.ndarray, model: SolverModel, detection: DetectionData, state: State, workspace: Workspace
+) -> None:
+    """Solve for the velocities with the present factors on the pairs' forces, starting from the present guess."""
+    system, bodies, pairs = workspace.system, model.bodies, model.pairs
+    vector, guess, n = system.vector, system.guess, bodies.unknowns
     last_change, share = 0.0, 1.0
-    for turn in range(MAX_ITERATIONS):
+    for iteration in range(MAX_ITERATIONS):
         _write_twists(dt, model, state, workspace)
         for i in range(n):
-            vector[i] = workspace.momentum[i]
+            vector[i] = system.momentum[i]
             for j in range(n):
-                matrix[i, j] = 0.0
-        run_parallel_loop(SUM_CONTACTS, model, tree, neighbour_lists, surfaces, state, workspace)
-        for pair in range(len(model.pairs)):
-            a, b = model.sensor_body[model.pairs[pair, 0]], model.target_body[model.pairs[pair, 1]]
-            if model.at[a] >= 0 or model.at[b] >= 0:
-                add_pair_to_system(pair, a, b, dt, model, state, workspace)
+                system.matrix[i, j] = 0.0
+        run_parallel_loop(SUM_CONTACTS, model, detection, state, workspace)
+        for pair in range(len(pairs.sensor)):
+            a, b = pairs.sensor_body[pair], pairs.target_body[pair]
+            if bodies.first_unknown[a] >= 0 or bodies.first_unknown[b] >= 0:
+                add_pair_to_system(pair, dt, model, state, workspace)
         if n == 0:
             return
-        for body in range(len(model.kind)):
-            if model.kind[body] == FREE:
-                at = model.at[body]
-                for i in range(3):
-                    matrix[at + i, at + i] += model.mass[body]
-                    for j in range(i + 1):
-                        matrix[at + 3 + i, at + 3 + j] += workspace.inertia[body, i, j]
-        if len(model.drives) > 0:
-            add_actuators(dt, turn > 0, commands, model, state, workspace)
-        solve_positive_definite(matrix, vector, n)
-        change, given = 0.0, 0.0  # lengths, so that a scene that is turned as a whole takes the same rounds
+        _add_masses(model, workspace)
+        if len(model.drives.gains) > 0:
+            add_actuators(dt, iteration > 0, commands, model, state, workspace)
+        solve_positive_definite(system.matrix, vector, n)
+        change, given = 0.0, 0.0  # Euclidean lengths, so that a scene that is rotated as a whole takes the same iterations
         for i in range(n):
             change += (vector[i] - guess[i]) ** 2
-            given += (vector[i] - workspace.alone[i]) ** 2
+            given += (vector[i] - system.free_solution[i]) ** 2
         change, given = math.sqrt(change), math.sqrt(given)
-        # Contacts that come on and off in the first rounds find their own way; later ones shrink by 1 - share if all is well.
-        if turn > 3 and change > (1.0 - 0.25 * share) * last_change:
+        # In the first iterations contacts open and close; later changes should shrink by the factor 1 - share.
+        if iteration > 3 and change > (1.0 - 0.25 * share) * last_change:
             share *= 0.5
-        # Drives are without limits in the first round: what it changes says nothing yet.
-        last = (turn > 0 or len(model.drives) == 0) and (change <= CONVERGED * given or change < 1e-13)
+        # Drives are without limits in the first iteration: its change is no criterion.
+        last = (iteration > 0 or len(model.drives.gains) == 0) and (change <= CONVERGED * given or change < 1e-13)
         write_pair_forces(model, state, workspace)
         _update_guess(share, not last and share == 1.0 and change < 0.9 * last_change, n, workspace)
         if last:
@@ -89,69 +94,85 @@ def _iterate(dt, commands, model, tree, neighbour_lists, surfaces, state, worksp
 
 
 @kernel
-def _update_guess(share, ahead, n, workspace):
-    """Guess anew from what a round has found (`vector`): a share of the way there, or further `ahead`.
-
-    Rounds that close in on the solution do so by about the same factor each, most of all friction's. From the last two the
-    secant tells where they will end (Anderson, J. ACM 12, 1965, with one earlier round).
-    """
-    vector, guess, earlier = workspace.vector, workspace.guess, workspace.earlier
-    along, square = 0.0, 0.0
-    for i in range(n):
-        change = vector[i] - guess[i]
-        bend = change - earlier[1, i]
-        along += change * bend
-        square += bend * bend
-    further = along / square if ahead and square > 0.0 else 0.0
-    for i in range(n):
-        found, change = vector[i], vector[i] - guess[i]
-        guess[i] = share * (found - further * (found - earlier[0, i])) + (1.0 - share) * guess[i]
-        earlier[0, i], earlier[1, i] = found, change
-    for pair in range(len(workspace.counted)):  # forces are mixed as velocities are, so that both belong together
-        for i in range(6):
-            found, before = workspace.found[pair, i], workspace.found_before[pair, i]
-            workspace.force[pair, i] = share * (found - further * (found - before)) + (1.0 - share) * workspace.force[pair, i]
-            workspace.found_before[pair, i] = found
-
-
-@inlined
-def _initial_guess(dt, model, state, workspace):
-    """Velocities as they are for a first guess, and what momentum the bodies would have without contacts and drives."""
-    momentum, guess, alone, velocity = workspace.momentum, workspace.guess, workspace.alone, state.velocity
-    for body in range(len(model.kind)):
-        at = model.at[body]
-        if model.kind[body] == FREE:
-            inertia, spin = workspace.inertia[body], velocity[body, 3:]
-            lx, ly, lz = matrix_times_vector(inertia, spin[0], spin[1], spin[2])
-            mean = mean_angular_velocity(workspace.rotation[body], model.inverse_inertia[body], lx, ly, lz, dt)
-            # The spin that is solved for is the mean over the step, so that a body tumbles as it should.
+def _add_masses(model: SolverModel, workspace: Workspace) -> None:
+    """Add the masses and inertias of free bodies to the matrix."""
+    bodies, matrix = model.bodies, workspace.system.matrix
+    for body in range(len(bodies.kind)):
+        if bodies.kind[body] == FREE:
+            at = bodies.first_unknown[body]
             for i in range(3):
-                guess[at + i] = velocity[body, i]
-                alone[at + i] = velocity[body, i] + dt * model.gravity[i]
-                momentum[at + i] = model.mass[body] * alone[at + i]
-                guess[at + 3 + i] = alone[at + 3 + i] = workspace.before[body, 3 + i] = mean[i]
-                workspace.tumbling[body, i] = mean[i] - spin[i]
-            momentum[at + 3], momentum[at + 4], momentum[at + 5] = matrix_times_vector(inertia, mean[0], mean[1], mean[2])
-        elif model.kind[body] == KEYFRAMED:
-            write_twist(velocity[body], dt, workspace.twist[body])
-            for i in range(12):
-                workspace.known[body, i] = workspace.twist[body, i]
-    for drive in range(len(model.drives)):
-        at = model.drive_at[drive]
-        guess[at] = alone[at] = state.drives[drive, SPEED]
-        momentum[at] = workspace.drive_mass[drive] * guess[at] - workspace.drive_load[drive]
+                matrix[at + i, at + i] += bodies.mass[body]
+                for j in range(i + 1):
+                    matrix[at + 3 + i, at + 3 + j] += workspace.bodies.inertia[body, i, j]
 
 
 @kernel
-def _write_twists(dt, model, state, workspace):
-    """Velocities and twists that follow from the guess, and the part of the twists that is not solved for.
+def _update_guess(share: float, accelerate: bool, n: int, workspace: Workspace) -> None:
+    """Make a new guess from the solution of an iteration: a share of the way there, or beyond it where `accelerate` is true.
 
-    That is a finite turn's excess over ``ω × r`` of a free body, and what its carrier does of a driven one.
+    A converging sequence shrinks by about the same factor in each iteration. The secant through the last two tells where it
+    will end (Anderson, J. ACM 12, 1965, with one earlier iterate).
     """
-    guess, velocity, twist, known = workspace.guess, state.velocity, workspace.twist, workspace.known
-    for body in range(len(model.kind)):
-        at = model.at[body]
-        if model.kind[body] == FREE:
+    energy, system = workspace.energy, workspace.system
+    vector, guess, previous = system.vector, system.guess, system.previous
+    along, square = 0.0, 0.0
+    for i in range(n):
+        change = vector[i] - guess[i]
+        difference = change - previous[1, i]
+        along += change * difference
+        square += difference * difference
+    further = along / square if accelerate and square > 0.0 else 0.0
+    for i in range(n):
+        found, change = vector[i], vector[i] - guess[i]
+        guess[i] = share * (found - further * (found - previous[0, i])) + (1.0 - share) * guess[i]
+        previous[0, i], previous[1, i] = found, change
+    for pair in range(len(energy.tracked)):  # forces are mixed as velocities are, so that both belong together
+        for i in range(6):
+            found, before = energy.new_force[pair, i], energy.previous_force[pair, i]
+            energy.force[pair, i] = share * (found - further * (found - before)) + (1.0 - share) * energy.force[pair, i]
+            energy.previous_force[pair, i] = found
+
+
+@inlined
+def _write_initial_guess(dt: float, model: SolverModel, state: State, workspace: Workspace) -> None:
+    """Write the present velocities as the first guess, and the bodies' momentum without contacts and drives."""
+    bodies, work, system, velocity = model.bodies, workspace.bodies, workspace.system, state.velocity
+    momentum, guess, free = system.momentum, system.guess, system.free_solution
+    for body in range(len(bodies.kind)):
+        at = bodies.first_unknown[body]
+        if bodies.kind[body] == FREE:
+            inertia, spin = work.inertia[body], velocity[body, 3:]
+            lx, ly, lz = matrix_times_vector(inertia, spin[0], spin[1], spin[2])
+            mean = mean_angular_velocity(work.rotation[body], bodies.inverse_inertia[body], lx, ly, lz, dt)
+            # The spin that is solved for is the mean over the step, which makes a body tumble as it should.
+            for i in range(3):
+                guess[at + i] = velocity[body, i]
+                free[at + i] = velocity[body, i] + dt * bodies.gravity[i]
+                momentum[at + i] = bodies.mass[body] * free[at + i]
+                guess[at + 3 + i] = free[at + 3 + i] = work.velocity_before[body, 3 + i] = mean[i]
+                work.spin_correction[body, i] = mean[i] - spin[i]
+            momentum[at + 3], momentum[at + 4], momentum[at + 5] = matrix_times_vector(inertia, mean[0], mean[1], mean[2])
+        elif bodies.kind[body] == KEYFRAMED:
+            write_twist(velocity[body], dt, work.twist[body])
+            for i in range(12):
+                work.known_twist[body, i] = work.twist[body, i]
+    for drive in range(len(model.drives.gains)):
+        at = model.drives.unknown[drive]
+        guess[at] = free[at] = state.drives[drive, SPEED]
+        momentum[at] = workspace.drives.mass[drive] * guess[at] - workspace.drives.load[drive]
+
+
+@kernel
+def _write_twists(dt: float, model: SolverModel, state: State, workspace: Workspace) -> None:
+    """Write the velocities and twists that follow from the guess, and the part of the twists that is not solved for.
+
+    Of a free body that part is by how much a finite rotation exceeds ``ω × r``; of a driven one it is its carrier's motion.
+    """
+    bodies, work = model.bodies, workspace.bodies
+    guess, velocity, twist, known = workspace.system.guess, state.velocity, work.twist, work.known_twist
+    for body in range(len(bodies.kind)):
+        at = bodies.first_unknown[body]
+        if bodies.kind[body] == FREE:
             for i in range(6):
                 velocity[body, i] = guess[at + i]
             write_twist(velocity[body], dt, twist[body])
@@ -165,10 +186,10 @@ def _write_twists(dt, model, state, workspace):
             known[body, 8] += velocity[body, 3]
             known[body, 9] += velocity[body, 4]
             known[body, 10] -= velocity[body, 3]
-        elif model.kind[body] == DRIVEN:
+        elif bodies.kind[body] == DRIVEN:
             for i in range(6):
-                velocity[body, i] = workspace.carried[body, i]
+                velocity[body, i] = work.carrier_velocity[body, i]
             write_twist(velocity[body], dt, known[body])
             for i in range(3):
-                velocity[body, i] += guess[at] * workspace.axis[body, i]
+                velocity[body, i] += guess[at] * workspace.drives.axis[body, i]
             write_twist(velocity[body], dt, twist[body])

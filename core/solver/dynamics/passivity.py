@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Contacts store and dissipate energy, and never make any (kernels).
+"""Passivity of contacts: they store and dissipate energy, and never generate any (kernels).
 
-Each pair of sensor and target has a tank: all the work that was done on its contacts, less all that they have done. Springs
-whose depth jumps, where an edge passes from face to face or a fast body has come too deep within one step, would give more than
-they were given. Where that would leave less than nothing in the tank, only a share of the pair's forces acts in that step, on
-both bodies. Hannaford and Ryu (IEEE Trans. Robot. Autom. 18, 2002) make hands that feel forces passive in the same way. Nothing
-at rest is concerned, which asks for no work, nor what has lost energy before. Where animation moves one of the bodies it may
-bring any energy: from then on nothing is held.
+Each pair of sensor and target has an energy account: all the work that was done on its contacts, less all the work that they
+have done. Springs whose depth jumps, where an edge passes from face to face or a fast body has come too deep within one step,
+would give back more than was put in. Where that would leave less than nothing in the account, the pair's forces on both bodies
+are scaled down in that step. This is the passivity controller of Hannaford and Ryu (IEEE Trans. Robot. Autom. 18, 2002) for
+haptic displays. Resting contacts do no work, and contacts that have lost energy before have some in their account, so neither
+is scaled. Where animation moves one of the bodies it may bring any energy: from then on the pair's forces are never scaled.
 """
 
 from __future__ import annotations
@@ -16,104 +16,109 @@ import math
 import numpy as np
 
 from ...compiled.kernels import inlined, kernel
-from ...geometry.rotations import FREE, KEYFRAMED
-from ...laws.contact import EXPONENT, LINEAR, K, SolverModel, State
-from ..workspace import Workspace, contacts_of
+from ...laws.contact_law import ContactLaw
+from ...laws.normal_force import elastic_energy
+from ..found_contacts import contacts_of
+from ..solver_model import FREE, KEYFRAMED, SolverModel, State
+from ..workspace import Workspace
 from .linear_system import is_last_part
 
 MAX_BISECTIONS = 24
-"""How often the share of its forces that a pair can pay for is looked for, by halves."""
+"""Bisections for the factor on its forces that a pair can pay for."""
 
 
 def credit_initial_contacts(model: SolverModel, state: State, workspace: Workspace) -> None:
-    """Credit contacts that are there at the very start, freshly gathered, with what their springs hold."""
-    held = 0.0
-    for pair, p in enumerate(model.parameters):
-        slots, _, _, depth = contacts_of(pair, workspace)
-        points = model.point_first[pair] + slots - model.slot_start[pair]
-        power = 1.0 if p[EXPONENT] == LINEAR else p[EXPONENT]
-        k = p[K] * (model.painted[points, 0] if len(model.painted) else 1.0)
-        held += float(np.sum(k * depth ** (power + 1.0))) / (power + 1.0)
+    """Credit contacts that exist at the very start, and were just found, with the energy of their springs."""
+    multipliers, energy = model.points.multipliers, 0.0
+    for pair, row in enumerate(model.pairs.law):
+        law, contacts = ContactLaw(*row), contacts_of(pair, workspace)
+        points = model.pairs.first_point[pair] + contacts.slots - model.pairs.first_slot[pair]
+        stiffness = law.k * (multipliers[points, 0] if len(multipliers) else np.ones(len(points)))
+        energy += elastic_energy(stiffness, contacts.depth, law.exponent)
         if is_last_part(pair, model.pairs):
-            state.tank[pair], held = held, 0.0
+            state.stored_energy[pair], energy = energy, 0.0
 
 
 @kernel
-def reset_force_scales(model, state, workspace):
-    """All forces act in full, to begin with; and what animation has moved may draw from it without end."""
-    for pair in range(len(workspace.hold)):
-        workspace.hold[pair] = workspace.too_much[pair] = 1.0
-        workspace.enough[pair] = 0.0
-        for body in (model.sensor_body[model.pairs[pair, 0]], model.target_body[model.pairs[pair, 1]]):
-            if model.kind[body] == KEYFRAMED:
+def reset_force_scales(model: SolverModel, state: State, workspace: Workspace) -> None:
+    """Let all forces act in full at first; a pair that animation has moved may draw any energy."""
+    energy = workspace.energy
+    for pair in range(len(energy.scale)):
+        energy.scale[pair] = energy.scale_high[pair] = 1.0
+        energy.scale_low[pair] = 0.0
+        for body in (model.pairs.sensor_body[pair], model.pairs.target_body[pair]):
+            if model.bodies.kind[body] == KEYFRAMED:
                 for i in range(6):
                     if state.velocity[body, i] != 0.0:
-                        state.tank[pair] = math.inf
+                        state.stored_energy[pair] = math.inf
 
 
 @kernel
-def check_energy(bisection, dt, model, state, workspace):
-    """Whether no pair gives more than its tank holds; then the tanks are brought to the step's end.
+def check_energy(bisection: int, dt: float, model: SolverModel, state: State, workspace: Workspace) -> bool:
+    """True when no pair gives more energy than its account holds; then the accounts are brought to the step's end.
 
-    Else the largest share of their forces that those pairs can pay for is narrowed down; none at all costs nothing.
+    Otherwise the bisection for the factors on the forces of those pairs goes on. A factor of zero costs nothing.
     """
-    hold, paid = workspace.hold, True
-    for pair in range(len(model.pairs)):
-        workspace.work[pair] = _contact_work(pair, dt, model, state, workspace)
-        workspace.left[pair] = max(state.tank[pair] + _integration_energy(pair, dt, model, state), 0.0)
-        if workspace.work[pair] > workspace.left[pair]:
-            workspace.too_much[pair], paid = hold[pair], False
-        elif hold[pair] < 1.0:
-            workspace.enough[pair] = hold[pair]
-    if (paid and bisection == 0) or bisection == MAX_BISECTIONS - 1:
-        for pair in range(len(model.pairs)):
-            state.tank[pair] -= workspace.work[pair]
+    energy, within_account = workspace.energy, True
+    scale = energy.scale
+    for pair in range(len(model.pairs.sensor)):
+        energy.work[pair] = _contact_work(pair, dt, model, state, workspace)
+        energy.available[pair] = max(state.stored_energy[pair] + _integration_energy(pair, dt, model, state), 0.0)
+        if energy.work[pair] > energy.available[pair]:
+            energy.scale_high[pair], within_account = scale[pair], False
+        elif scale[pair] < 1.0:
+            energy.scale_low[pair] = scale[pair]
+    if (within_account and bisection == 0) or bisection == MAX_BISECTIONS - 1:
+        for pair in range(len(model.pairs.sensor)):
+            state.stored_energy[pair] -= energy.work[pair]
         return True
-    for pair in range(len(model.pairs)):
-        if workspace.too_much[pair] < 1.0 or workspace.work[pair] > workspace.left[pair]:
-            middle = 0.5 * (workspace.enough[pair] + workspace.too_much[pair])
-            hold[pair] = middle if bisection < MAX_BISECTIONS - 2 else workspace.enough[pair]
+    for pair in range(len(model.pairs.sensor)):
+        if energy.scale_high[pair] < 1.0 or energy.work[pair] > energy.available[pair]:
+            middle = 0.5 * (energy.scale_low[pair] + energy.scale_high[pair])
+            scale[pair] = middle if bisection < MAX_BISECTIONS - 2 else energy.scale_low[pair]
     return False
 
 
 @kernel
-def _contact_work(pair, dt, model, state, workspace):
+def _contact_work(pair: int, dt: float, model: SolverModel, state: State, workspace: Workspace) -> float:
     """Work that a pair's forces do in a step on both bodies together, joules.
 
-    What is put in counts by the mean of the velocities at both ends, so that all that a body loses is found; what comes out by
-    the velocity at the end if that is more.
+    Work that is put in is reckoned with the mean of the velocities at both ends, so that all that a body loses is found; work
+    that comes out with the velocity at the end if that is more.
     """
-    force, touches = workspace.force[pair], False
+    force, touches = workspace.energy.force[pair], False
     for i in range(6):
         touches = touches or force[i] != 0.0
     if not touches:
         return 0.0
-    a, b = model.sensor_body[model.pairs[pair, 0]], model.target_body[model.pairs[pair, 1]]
-    early = _relative_velocity(a, b, workspace.before, state.position, workspace.rotation)
-    late = _relative_velocity(a, b, state.velocity, state.position, workspace.rotation)
+    a, b, rotation = model.pairs.sensor_body[pair], model.pairs.target_body[pair], workspace.bodies.rotation
+    before = _relative_velocity(a, b, workspace.bodies.velocity_before, state.position, rotation)
+    after = _relative_velocity(a, b, state.velocity, state.position, rotation)
     mean, end = 0.0, 0.0
     for i in range(6):
-        mean += 0.5 * dt * force[i] * (early[i] + late[i])
-        end += dt * force[i] * late[i]
+        mean += 0.5 * dt * force[i] * (before[i] + after[i])
+        end += dt * force[i] * after[i]
     return mean if mean < 0.0 else max(mean, end)
 
 
 @kernel
-def _integration_energy(pair, dt, model, state):
+def _integration_energy(pair: int, dt: float, model: SolverModel, state: State) -> float:
     """Energy that a pair's free bodies have lost since the start by being moved with the velocity of each step's end, joules.
 
-    Gravity speeds a body up by the mean velocity and lowers it by the last: falling it loses in each step what it gains rising.
+    Gravity accelerates a body by the mean velocity and lowers it by the last: a falling body loses in each step what a rising
+    one gains.
     """
-    lag = 0.0
-    for body in (model.sensor_body[model.pairs[pair, 0]], model.target_body[model.pairs[pair, 1]]):
-        if model.kind[body] == FREE:
+    lost, bodies = 0.0, model.bodies
+    for body in (model.pairs.sensor_body[pair], model.pairs.target_body[pair]):
+        if bodies.kind[body] == FREE:
             for i in range(3):
-                lag += 0.5 * dt * model.mass[body] * model.gravity[i] * (state.velocity[body, i] - model.thrown[body, i])
-    return lag
+                gained = state.velocity[body, i] - bodies.initial_velocity[body, i]
+                lost += 0.5 * dt * bodies.mass[body] * bodies.gravity[i] * gained
+    return lost
 
 
 @inlined
-def _relative_velocity(a, b, velocity, position, rotation):
+def _relative_velocity(a: int, b: int, velocity: np.ndarray, position: np.ndarray, rotation: np.ndarray) -> tuple[float, ...]:
     """Velocity of body `b` relative to body `a`, at the reference point of `a` and in its axes, and angular velocity."""
     gx, gy, gz = position[a, 0] - position[b, 0], position[a, 1] - position[b, 1], position[a, 2] - position[b, 2]
     wx, wy, wz = velocity[b, 3], velocity[b, 4], velocity[b, 5]

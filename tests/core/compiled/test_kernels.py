@@ -13,8 +13,9 @@ import numpy as np
 import pytest
 from solver_scenes import cube_on_pad
 
-from palpate.core.compiled import kernel_fingerprint, kernels
+from palpate.core.compiled import kernel_fingerprint, kernels, numba_internals
 from palpate.core.compiled.struct_reference import by_reference
+from palpate.core.laws.contact_law import read_law
 from palpate.core.solver.dynamics import contact_assembly, friction_state, relative_kinematics
 from palpate.core.solver.simulation import Simulation
 
@@ -64,7 +65,7 @@ def test_a_kernel_is_compiled_anew_when_one_that_it_calls_has_changed(tmp_path):
     package = tmp_path / "kernels"
     package.mkdir()
     (package / "__init__.py").touch()
-    for module in (kernels, kernel_fingerprint):
+    for module in (kernels, kernel_fingerprint, numba_internals):
         shutil.copy(module.__file__, package)
     (package / "caller.py").write_text(CALLER)
     answers = []
@@ -87,14 +88,14 @@ def test_a_kernel_is_compiled_anew_when_one_that_it_calls_has_changed(tmp_path):
 def test_loops_over_contacts_run_in_vector_registers(name):
     """A call or a branch in such a loop changes no number and only makes it five times slower. Its root shows it."""
     simulation = Simulation(cube_on_pad(1.0, frames=1, dt=1e-3))
-    workspace, law = simulation._workspace, relative_kinematics.pair_law(simulation._model.parameters, 0)
+    workspace, law = simulation._workspace, read_law(simulation._model.pairs.law, 0)
     compiled = numba.njit(error_model="numpy")(
         getattr(contact_assembly if name == "_sum_contacts" else friction_state, name).py_func
     )
     if name == "_sum_contacts":
-        compiled(0, 0, 1e-3, law, simulation._model, simulation._state.memory, workspace)
+        compiled(0, 1e-3, law, simulation._model, simulation._state.effect_memory, workspace)
     else:
-        compiled(0, relative_kinematics.motion_values(workspace.part[0]), simulation._state, workspace)
+        compiled(0, relative_kinematics.motion_values(workspace.pairs.known_motion[0]), simulation._state, workspace)
     (code,) = compiled.inspect_asm().values()
     assert re.search(r"^\s+v?sqrtpd\s", code, re.MULTILINE), "the square root is taken of one number at a time"
 

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Every line also runs in plain Python, and says the same."""
 
+import numpy as np
 import pytest
 from oracles.plain import numbers, scenes, without_numba
 
@@ -11,3 +12,12 @@ def test_plain_python_gives_the_same_numbers():
     assert seconds > 0.0
     for name, scene in scenes().items():
         assert plain[name] == pytest.approx(numbers(scene), rel=0.0, abs=1e-12), name
+
+
+def test_without_the_internals_of_numba_everything_runs_as_plain_python():
+    """As if a later release of numba had moved a part that is not documented."""
+    plain, _ = without_numba()
+    fallback, _ = without_numba("numba.core.datamodel")
+    assert set(fallback) == set(plain)
+    for name, values in plain.items():
+        assert np.array_equal(fallback[name], values), name

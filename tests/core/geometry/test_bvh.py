@@ -15,7 +15,7 @@ NONE = 2.0
 def entries(mesh, origins, vectors, hints=None):
     tree = bvh.build_tree([mesh])
     hints = np.full(len(origins), -1) if hints is None else hints
-    found = [bvh.segment_entry(*o, *d, 0, hint, tree) for o, d, hint in zip(origins, vectors, hints, strict=True)]
+    found = [bvh.segment_entry(bvh.Segment(*o, *d), 0, hint, tree) for o, d, hint in zip(origins, vectors, hints, strict=True)]
     t = np.array([t for t, _, _ in found])
     triangle = np.array([triangle for _, triangle, _ in found])
     return t, np.where(triangle >= 0, tree.source[triangle], -1)

@@ -5,11 +5,12 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from palpate.core.laws import contact
+from palpate.core.laws import friction, normal_force
+from palpate.core.laws.contact_law import contact_law
 from palpate.core.model.sensor_parameters import SensorParameters
 
 PAPER = SensorParameters()  # Table 2; Fig. 7 was drawn with these and fn = 0.08 N
-ROW = contact.parameter_row(PAPER)
+LAW = contact_law(PAPER)
 
 
 def g(speed, fn, p=PAPER):
@@ -18,24 +19,24 @@ def g(speed, fn, p=PAPER):
 
 
 def test_normal_force_never_pulls():
-    assert contact.normal_force(1e-3, 0.0, ROW) == pytest.approx(PAPER.k * 1e-3, rel=1e-15)
-    assert contact.normal_force(1e-3, 0.5, ROW) == pytest.approx(PAPER.k * 1e-3 + PAPER.cn * 0.5, rel=1e-15)
-    assert contact.normal_force(1e-3, -100.0, ROW) == 0.0
+    assert normal_force.normal_force(1e-3, 0.0, LAW) == pytest.approx(PAPER.k * 1e-3, rel=1e-15)
+    assert normal_force.normal_force(1e-3, 0.5, LAW) == pytest.approx(PAPER.k * 1e-3 + PAPER.cn * 0.5, rel=1e-15)
+    assert normal_force.normal_force(1e-3, -100.0, LAW) == 0.0
 
 
 @pytest.mark.parametrize("speed", [0.0, 1e-3, 0.05, 0.3, 1.0, 5.0])
 def test_steady_state_is_the_friction_curve_of_fig_7(speed):
     """At steady sliding ż = 0, so ft = g(v) sign(v) + ct v (Eq. 9 and 13); reached by the step itself to 1e-9."""
     fn = 0.08
-    assert contact.stribeck_coefficient(speed**2, ROW) * fn == pytest.approx(g(speed, fn), rel=1e-14)
+    assert friction.stribeck_coefficient(speed**2, LAW) * fn == pytest.approx(g(speed, fn), rel=1e-14)
     z = 0.0
     for _ in range(400):
-        keep, gain = contact.bristle_step(speed**2, fn, 0.1, ROW)
+        keep, gain = friction.bristle_step(speed**2, fn, 0.1, LAW)
         z = keep * z + gain * speed
     if speed > 0:
-        rate = contact.bristle_rate(z, speed, speed**2, fn, ROW)
+        rate = friction.bristle_rate(z, speed, speed**2, fn, LAW)
         expected = g(speed, fn) + PAPER.ct * speed
-        assert contact.friction_force(z, rate, speed, ROW) == pytest.approx(expected, rel=1e-9 if speed > 0.01 else 0.6)
+        assert friction.friction_force(z, rate, speed, LAW) == pytest.approx(expected, rel=1e-9 if speed > 0.01 else 0.6)
     else:
         assert z == 0.0
 
@@ -47,21 +48,20 @@ def test_bristle_step_is_the_exact_solution_at_constant_velocity(dt):
     exact = solve_ivp(
         lambda _, z: speed - PAPER.sigma0 * speed / g(speed, fn) * z, (0, dt), [z0], method="Radau", rtol=1e-11, atol=1e-15
     )
-    keep, gain = contact.bristle_step(speed**2, fn, dt, ROW)
+    keep, gain = friction.bristle_step(speed**2, fn, dt, LAW)
     assert keep * z0 + gain * speed == pytest.approx(exact.y[0, -1], rel=1e-8)
 
 
 def test_bristles_hold_nothing_without_normal_force_or_friction():
-    assert contact.bristle_step(1.0, 0.0, 1e-3, ROW) == (0.0, 0.0)
-    slippery = ROW.copy()
-    slippery[contact.MUS] = slippery[contact.MUD] = 0.0
-    assert contact.bristle_step(1.0, 1.0, 1e-3, slippery) == (0.0, 0.0)
-    assert contact.max_bristle_deflection(1.0, slippery) == 0.0
+    assert friction.bristle_step(1.0, 0.0, 1e-3, LAW) == (0.0, 0.0)
+    slippery = LAW._replace(mus=0.0, mud=0.0)
+    assert friction.bristle_step(1.0, 1.0, 1e-3, slippery) == (0.0, 0.0)
+    assert friction.max_bristle_deflection(1.0, slippery) == 0.0
 
 
 def test_sticking_is_for_ever():
     """At zero velocity the bristle keeps every bit, whatever the step: no creep can come from the law itself."""
-    keep, gain = contact.bristle_step(0.0, 0.5, 1e-3, ROW)
+    keep, gain = friction.bristle_step(0.0, 0.5, 1e-3, LAW)
     assert keep == 1.0
     assert gain == 1e-3
 
@@ -69,7 +69,7 @@ def test_sticking_is_for_ever():
 def test_relaxation_is_exp_to_rounding():
     """Against numpy's exp and expm1, from nothing to far beyond what doubles tell from zero."""
     for x in [0.0, 5e-324, 1e-300, *np.logspace(-20, 6, 521)]:
-        left, mean = contact.decay_and_mean(x)
+        left, mean = friction.decay_and_mean(x)
         assert left == pytest.approx(np.exp(-x), rel=0, abs=5e-16)
         assert mean == pytest.approx(-np.expm1(-x) / x if x else 1.0, rel=2e-15)
         assert 0.0 <= left <= 1.0

@@ -10,7 +10,8 @@ from scipy.optimize import brentq
 from solver_scenes import GRAVITY, cube_on_pad, pad
 
 from palpate.core.errors import ParameterError
-from palpate.core.laws import contact
+from palpate.core.laws import normal_force
+from palpate.core.laws.contact_law import contact_law
 from palpate.core.model.sensor_parameters import SensorParameters
 from palpate.core.solver.simulation import run
 from palpate.core.solver.time_step_adviser import advise
@@ -88,13 +89,13 @@ def test_a_step_solves_its_implicit_equation(dt):
 
 def test_the_tangent_touches_the_law():
     rng = np.random.default_rng(1)
-    row = contact.parameter_row(SensorParameters(normal_law="hunt-crossley", exponent=1.7, dissipation=0.3, k=1e4))
+    row = contact_law(SensorParameters(normal_law="hunt-crossley", exponent=1.7, dissipation=0.3, k=1e4))
     for depth, v, dt in zip(rng.uniform(0, 1e-2, 50), rng.normal(size=50), 10 ** rng.uniform(-6, -2, 50), strict=True):
-        push, slope = contact.normal_tangent(depth, v, dt, row)
+        push, slope = normal_force.normal_tangent(depth, v, dt, row)
         assert slope >= 0.0
-        assert push + slope * v == pytest.approx(contact.normal_force(depth + dt * v, v, row), rel=1e-12, abs=1e-15)
+        assert push + slope * v == pytest.approx(normal_force.normal_force(depth + dt * v, v, row), rel=1e-12, abs=1e-15)
         h = 1e-6
-        up, down = (contact.normal_force(depth + dt * x, x, row) for x in (v + h, v - h))
+        up, down = (normal_force.normal_force(depth + dt * x, x, row) for x in (v + h, v - h))
         assert slope == pytest.approx((up - down) / (2 * h), rel=1e-5, abs=1e-8)
 
 

@@ -122,7 +122,7 @@ def test_texels_that_come_out_in_a_hole_are_no_longer_sunk():
         simulation.advance()
         counts.append(simulation._count_too_deep(0))
     assert counts[1:] == [9, 0]
-    assert not (simulation._state.hint == -2).any()
+    assert not (simulation._state.triangle == -2).any()
 
 
 def test_texels_that_slide_from_a_deep_touch_into_a_hole_were_never_sunk():

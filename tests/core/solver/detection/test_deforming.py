@@ -195,8 +195,8 @@ def test_neighbour_lists_change_nothing():
     expected = run(scenario).sensors["pad"]
     simulation = Simulation(scenario)
     lists = simulation._neighbour_lists
-    simulation._neighbour_lists = lists._replace(near=np.zeros((len(lists.near), 0), np.int32))
-    simulation._neighbour_lists.pose[:, 12] = -1.0  # what was made already had room
+    simulation._neighbour_lists = lists._replace(triangles=np.zeros((len(lists.triangles), 0), np.int32))
+    simulation._neighbour_lists.shortest_distance[:] = -1.0  # what was made already had room
     for i in range(10):
         frame = simulation.advance() if i else simulation.observe()
         assert np.array_equal(frame.sensors["pad"].normal_force, expected.normal_force[i])

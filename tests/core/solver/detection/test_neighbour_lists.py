@@ -8,7 +8,7 @@ import pytest
 import trimesh
 from solver_scenes import grid_mesh, shape
 
-from palpate.core.geometry.bvh import build_tree, segment_entry
+from palpate.core.geometry.bvh import Segment, build_tree, segment_entry
 from palpate.core.geometry.mesh import TriangleMesh
 from palpate.core.solver.detection import neighbour_lists
 
@@ -71,18 +71,19 @@ def test_what_is_near_answers_like_the_tree(name):
         base, vector = bases[slot], tips[slot] - bases[slot]
         radius = REACH * rng.choice([0.25, 0.05, 0.01, 1e-4])
         empty = bool(slot % 2)
-        neighbour_lists.rebuild_list(slot, *base, *vector, 0, radius, 0.02, 0.01 * radius, empty, True, known, tree)
-        until = known.until[slot]
+        lengths = (radius, 0.02, 0.01 * radius)
+        neighbour_lists.rebuild_list(slot, Segment(*base, *vector), 0, lengths, (empty, True), known, tree)
+        until = known.valid_distance[slot]
         assert until > 0.0
-        kinds.append(known.number[slot])
+        kinds.append(known.length[slot])
         hint = -1
         for _ in range(12):
             ends = rng.normal(size=(2, 3))
             ends *= until * np.minimum(rng.uniform(0, 3, (2, 1)), 1.0) / np.linalg.norm(ends, axis=1)[:, None]
             start = base + ends[0]
             direction = tips[slot] + ends[1] - start
-            t, triangle, leaving = neighbour_lists.find_entry(*start, *direction, slot, 0, hint, known, tree)
-            expected = segment_entry(*start, *direction, 0, -1, tree)
+            t, triangle, leaving = neighbour_lists.find_entry(Segment(*start, *direction), slot, 0, hint, known, tree)
+            expected = segment_entry(Segment(*start, *direction), 0, -1, tree)
             assert triangle == expected[1]
             if triangle >= 0:
                 assert t == expected[0]
@@ -100,7 +101,8 @@ def test_what_is_near_answers_like_the_tree(name):
 def test_a_target_that_deforms_has_no_sheets():
     """Its normals are not those that the tree knows."""
     tree, known = build_tree([BALL]), neighbour_lists.neighbour_lists_for(1, 1)
-    neighbour_lists.rebuild_list(0, 0.01, 0.02, 1.1, 0.0, 0.0, -0.2, 0, 0.05, 0.02, 0.0, False, False, known, tree)
-    assert known.number[0] >= 0 or known.number[0] == neighbour_lists.ASK_TREE
-    neighbour_lists.rebuild_list(0, 0.01, 0.02, 1.1, 0.0, 0.0, -0.2, 0, 0.05, 0.02, 0.0, False, True, known, tree)
-    assert known.number[0] == neighbour_lists.ONE_SHEET
+    segment, lengths = Segment(0.01, 0.02, 1.1, 0.0, 0.0, -0.2), (0.05, 0.02, 0.0)
+    neighbour_lists.rebuild_list(0, segment, 0, lengths, (False, False), known, tree)
+    assert known.length[0] >= 0 or known.length[0] == neighbour_lists.ASK_TREE
+    neighbour_lists.rebuild_list(0, segment, 0, lengths, (False, True), known, tree)
+    assert known.length[0] == neighbour_lists.ONE_SHEET

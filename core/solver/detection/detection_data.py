@@ -1,0 +1,136 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The arrays of contact detection: the targets' surfaces, and what is known to be near each contact point."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ...compiled.struct_reference import by_reference
+from ...geometry.bvh import Tree
+
+MOMENTS, PRESENT, OTHER = range(3)
+"""Places in :attr:`SurfaceMotion.clock`."""
+
+
+@by_reference
+class SampleTrack(NamedTuple):
+    """The windows of T surfaces behind one another, for the kernels.
+
+    A *moment* is the beginning of a step, or the end of the last one.
+
+    Attributes
+    ----------
+    values : (V, c) float
+    stride : (T,) int
+        From a row in one sample to the same row in the next; zero where there is only one.
+    row : (steps + 1, T) int
+        Where the sample before each moment begins.
+    share : (steps + 1, T) float
+    """
+
+    values: np.ndarray
+    stride: np.ndarray
+    row: np.ndarray
+    share: np.ndarray
+
+
+@by_reference
+class SurfaceMotion(NamedTuple):
+    """The surfaces of T targets and m sensors at the steps of one frame.
+
+    Attributes
+    ----------
+    any_deforms : (1,) bool
+        Whether anything deforms at all.
+    target_deforms, target_smooth : (T,) bool
+        Targets whose vertices move, and those whose contact normals are interpolated between their vertices.
+    sensor_deforms : (m,) bool
+        Sensors whose contact points move in their body's frame.
+    targets : SampleTrack
+        Vertices (m, relative to the body's reference point) and vertex normals of targets that deform or are smooth.
+    sensors : SampleTrack
+        Rows of :attr:`.Points.frame` of sensors that deform.
+    corner : (nt, 3) int
+        Vertices of each triangle of the tree, counted within its target; without rows when nothing needs them.
+    triangle_start : (T + 1,) int
+    target_speed, sensor_speed : (T,), (m,) float, m/s
+        Bound on how fast any vertex, or any end of a segment, moves.
+    target_travel, sensor_travel : (T,), (m,) float, metres
+        Bound on how far they have moved in the whole run.
+    triangle_moment : (nt,) int
+        Number of the moment to which each triangle was brought last.
+    clock : (3,) int
+        At MOMENTS the number of the present moment in the whole run; at PRESENT its index in the frame, and at OTHER the index
+        of the moment that velocities are differences to.
+    """
+
+    any_deforms: np.ndarray
+    target_deforms: np.ndarray
+    target_smooth: np.ndarray
+    sensor_deforms: np.ndarray
+    targets: SampleTrack
+    sensors: SampleTrack
+    corner: np.ndarray
+    triangle_start: np.ndarray
+    target_speed: np.ndarray
+    sensor_speed: np.ndarray
+    target_travel: np.ndarray
+    sensor_travel: np.ndarray
+    triangle_moment: np.ndarray
+    clock: np.ndarray
+
+
+@by_reference
+class NeighbourLists(NamedTuple):
+    """What the contact point of each slot can meet; a cache that changes the speed and never the numbers.
+
+    Attributes
+    ----------
+    triangles : (s, LIST_LENGTH) int
+    length : (s,) int
+        Length of each list, ASK_TREE or ONE_SHEET (see :mod:`.neighbour_lists`).
+    known_triangle : (s,) int
+        The triangle that a texel's line goes through for certain and alone; of a sheet, the triangle met last; else -1.
+    valid_distance : (s,) float, metres
+        How far any point of the sensor may be from where it was at the pair's `pose` for this to be valid.
+    pose : (q, 12) float
+        Rotation (row by row) and position of each pair's sensor in the target's frame, from which distances are reckoned.
+    shortest_distance : (q,) float, metres
+        The least of the pair's `valid_distance`; -1 before the first lists are made.
+    steps : (q,) float
+        How many steps ago the pose was taken.
+    deformation : (q,) float, metres
+        How far deformation had moved target or sensor until then.
+    tube_radius : (q,) float, metres
+        Radius of the widest tube in use.
+    """
+
+    triangles: np.ndarray
+    length: np.ndarray
+    known_triangle: np.ndarray
+    valid_distance: np.ndarray
+    pose: np.ndarray
+    shortest_distance: np.ndarray
+    steps: np.ndarray
+    deformation: np.ndarray
+    tube_radius: np.ndarray
+
+
+@by_reference
+class DetectionData(NamedTuple):
+    """The arrays of contact detection.
+
+    Attributes
+    ----------
+    tree : Tree
+        Of the targets' triangles.
+    neighbours : NeighbourLists
+    surfaces : SurfaceMotion
+        How targets and sensors deform in the present frame.
+    """
+
+    tree: Tree
+    neighbours: NeighbourLists
+    surfaces: SurfaceMotion

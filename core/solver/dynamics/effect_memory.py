@@ -1,0 +1,70 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Bring the memory of the sensors' effects to the end of a step (kernels).
+
+Each contact point has a memory of its own, whatever presses on it; of several targets at one point the deepest counts.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ...compiled.kernels import kernel
+from ...effects.engine import compiled_program
+from ...effects.engine.compiled_program import COLUMNS, apply_force_laws
+from ...laws.contact_law import LINEAR_EXPONENT, ContactLaw, read_law
+from ..contact_rows import DEPTH
+from ..solver_model import SolverModel, State
+from ..workspace import EffectWork, Workspace
+from .effect_kernels import STEP, ColumnPlace, PointMotion, has_effects, press_texel
+from .relative_kinematics import motion_values, point_law, row_of, row_velocity, write_pair_motion
+
+
+@kernel
+def commit_effect_memory(dt: float, model: SolverModel, state: State, workspace: Workspace) -> None:
+    """Bring the memory of all effects to the step's end, at the velocities of its end."""
+    for pair in range(len(model.pairs.sensor)):
+        if workspace.contacts.number[pair] > 0 and has_effects(model.pairs.sensor[pair], model.effects):
+            write_pair_motion(pair, model, state, workspace)
+            _record_pair(pair, dt, model, workspace)
+    for pair in range(len(model.pairs.sensor)):
+        sensor = model.pairs.sensor[pair]
+        if (pair == 0 or model.pairs.sensor[pair - 1] != sensor) and has_effects(sensor, model.effects):
+            _commit_sensor(sensor, read_law(model.pairs.law, pair), model, workspace.effects, state.effect_memory)
+
+
+@kernel
+def _record_pair(pair: int, dt: float, model: SolverModel, workspace: Workspace) -> None:
+    """Record what presses on the points of a pair's sensor at the step's end."""
+    contacts, law = workspace.contacts, read_law(model.pairs.law, pair)
+    motion = motion_values(workspace.pairs.motion[pair])
+    for r in range(contacts.number[pair]):
+        b, lane = row_of(r, pair, contacts)
+        point = model.pairs.first_point[pair] + contacts.slots[b, lane] - model.pairs.first_slot[pair]
+        vx, vy, vz, rate = row_velocity(b, lane, motion, contacts.deforming[pair], contacts)
+        slide = dt * math.sqrt(max(vx * vx + vy * vy + vz * vz - rate * rate, 0.0))
+        p, end = point_law(law, model.points.multipliers, point), contacts.rows[b, DEPTH + lane] + dt * rate
+        _record_deepest(point, pair, PointMotion(end, rate, slide, 0.0), p, model, workspace.effects.points)
+
+
+@kernel
+def _record_deepest(
+    point: int, pair: int, motion: PointMotion, law: ContactLaw, model: SolverModel, columns: np.ndarray
+) -> None:
+    """Record what presses on a point, if nothing presses deeper."""
+    points = columns.shape[1] // COLUMNS
+    if model.pairs.overlap_share[pair] * motion.depth > columns[0, compiled_program.DEPTH * points + point]:
+        press_texel(columns, ColumnPlace(0, points, point), pair, motion, law, model)
+
+
+@kernel
+def _commit_sensor(sensor: int, law: ContactLaw, model: SolverModel, work: EffectWork, memory: np.ndarray) -> None:
+    """Bring the memory of a sensor's points to the step's end, and clear what was recorded of them."""
+    points, first = len(model.points.frame), model.sensors.first_point[sensor]
+    count, linear = model.sensors.first_point[sensor + 1] - first, law.exponent == LINEAR_EXPONENT
+    columns, numbers = work.points, work.point_numbers
+    apply_force_laws(sensor, STEP, columns, 0, points, first, count, numbers, first, 0, linear, model.effects, memory, True)
+    for column in range(COLUMNS):
+        for i in range(count):
+            columns[0, column * points + first + i] = 0.0

@@ -1,0 +1,100 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Allocation of the kernels' working memory."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..effects.engine.compiled_program import COLUMNS
+from ..geometry.rotations import write_backward_twist
+from .contact_rows import LANES, ROW
+from .detection.detection_data import SurfaceMotion
+from .solver_model import DRIVEN, FREE, SolverModel, State
+from .workspace import SUMS, BodyWork, ContactWork, DriveWork, EffectWork, EnergyWork, LinearSystem, PairWork, Workspace
+
+
+def workspace_for(model: SolverModel, state: State, surfaces: SurfaceMotion, queue: np.ndarray) -> Workspace:
+    """Allocate the working memory of a run."""
+    b, q, n = len(state.position), len(model.pairs.sensor), max(6, model.bodies.unknowns)
+    slots = np.diff(model.pairs.first_slot, append=len(state.triangle))
+    blocks = np.cumsum([0, *(-(-slots // LANES))])
+    deforming = surfaces.sensor_deforms[model.pairs.sensor] | surfaces.target_deforms[model.pairs.target]
+    effect_blocks, effect_points = (0, 0) if model.effects.is_empty else (blocks[-1], len(model.points.frame))
+    return Workspace(
+        bodies=_body_work(state),
+        contacts=ContactWork(
+            rows=np.zeros((blocks[-1], ROW)),
+            slots=np.zeros((blocks[-1], LANES), np.int64),
+            surface_velocity=np.zeros((blocks[-1] if deforming.any() else 0, 3 * LANES)),
+            deforming=deforming,
+            first_block=blocks[:-1],
+            number=np.zeros(q, np.int64),
+            too_deep=np.zeros(q, np.int64),
+        ),
+        pairs=PairWork(
+            sums=np.zeros((q, SUMS * LANES)),
+            pose=np.zeros((q, 12)),
+            rotations=np.zeros((q, 3, 3, 3)),
+            motion=np.zeros((q, 12)),
+            known_motion=np.zeros((q, 12)),
+        ),
+        system=_linear_system(n),
+        drives=DriveWork(np.zeros((b, 3)), np.zeros(len(model.drives.gains)), np.zeros(len(model.drives.gains))),
+        effects=EffectWork(
+            contacts=np.zeros((effect_blocks, COLUMNS * LANES)),
+            points=np.zeros((1, COLUMNS * effect_points)),
+            point_numbers=np.arange(len(model.points.frame)),
+        ),
+        energy=_energy_work(model, deforming),
+        step=np.zeros(1),
+        queue=queue,
+    )
+
+
+def _body_work(state: State) -> BodyWork:
+    b = len(state.position)
+    twist = np.zeros((b, 12))
+    for body in range(b):
+        write_backward_twist(state.velocity[body], 1e-9, twist[body])
+    return BodyWork(
+        rotation=np.zeros((b, 3, 3)),
+        inertia=np.zeros((b, 3, 3)),
+        twist=twist,
+        known_twist=np.zeros((b, 12)),
+        spin_correction=np.zeros((b, 3)),
+        velocity_before=np.zeros((b, 6)),
+        carrier_velocity=np.zeros((b, 6)),
+    )
+
+
+def _linear_system(n: int) -> LinearSystem:
+    return LinearSystem(
+        matrix=np.zeros((n, n)),
+        vector=np.zeros(n),
+        momentum=np.zeros(n),
+        guess=np.zeros(n),
+        free_solution=np.zeros(n),
+        previous=np.zeros((2, n)),
+        block=np.zeros((6, 6)),
+        wrench=np.zeros(6),
+        map_a=np.zeros((6, 6)),
+        map_b=np.zeros((6, 6)),
+    )
+
+
+def _energy_work(model: SolverModel, deforming: np.ndarray) -> EnergyWork:
+    pairs, q = model.pairs, len(model.pairs.sensor)
+    kinds = model.bodies.kind[np.stack([pairs.sensor_body, pairs.target_body])]
+    moved = (kinds == FREE).any(axis=0) & (kinds != DRIVEN).all(axis=0)
+    pulls = model.effects.clip[pairs.sensor] < model.effects.start[pairs.sensor + 1]  # as effect_kernels.may_pull
+    return EnergyWork(
+        tracked=moved & ~deforming & ~pulls,
+        force=np.zeros((q, 6)),
+        new_force=np.zeros((q, 6)),
+        previous_force=np.zeros((q, 6)),
+        work=np.zeros(q),
+        available=np.zeros(q),
+        scale=np.ones(q),
+        scale_low=np.zeros(q),
+        scale_high=np.ones(q),
+    )
