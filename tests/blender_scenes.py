@@ -74,6 +74,11 @@ def reopen(path):
     return bpy.context.scene
 
 
+def contents(folder) -> dict[str, bytes]:
+    """Return the content of all files in a folder by their paths in it."""
+    return {str(path.relative_to(folder)): path.read_bytes() for path in sorted(folder.rglob("*")) if path.is_file()}
+
+
 def dump(uids=True) -> dict[str, str]:
     """Return everything about the file's data that the add-on could have changed, by a name for each piece."""
     pieces = {kind: str(sorted(block.name for block in getattr(bpy.data, kind))) for kind in KINDS}

@@ -117,15 +117,40 @@ def render_frame(scene, path: str | os.PathLike, frame: int, *, samples: int | N
     if path.suffix.lower() != ".png":
         path = path.with_name(path.name + ".png")
     with atomic_write(path) as temporary, _settings(scene, temporary, frame, samples, size):
-        temporary.unlink()  # so that a render that writes no file is noticed
-        try:
-            bpy.ops.render.render(write_still=True, scene=scene.name)
-        except RuntimeError as error:
-            reason = " ".join(str(error).removeprefix("Error:").split()).rstrip(".")
-            raise SceneError(f"Frame {frame} of '{scene.name}' could not be rendered: {reason}.") from error
-        if not temporary.exists():
-            raise FileError(f"The render of frame {frame} was not written to '{path}': check the space left on the disk.")
+        run_render(
+            scene,
+            temporary,
+            failed=f"Frame {frame} of '{scene.name}' could not be rendered",
+            not_written=f"The render of frame {frame} was not written to '{path}'",
+        )
     return path
+
+
+def run_render(scene, file: Path, failed: str, not_written: str, animation: bool = False) -> None:
+    """Run Blender's render operator, which writes `file` as the scene's settings say.
+
+    Parameters
+    ----------
+    failed, not_written : str
+        Beginning of the message if Blender cannot render, and if it writes no file.
+    animation : bool
+        Render the whole frame range instead of the present frame.
+
+    Raises
+    ------
+    SceneError
+        Blender cannot render the scene.
+    FileError
+        Blender has not written the file.
+    """
+    file.unlink(missing_ok=True)  # so that a render that writes no file is noticed
+    try:
+        bpy.ops.render.render(animation=animation, write_still=not animation, scene=scene.name)
+    except RuntimeError as error:
+        reason = " ".join(str(error).removeprefix("Error:").split()).rstrip(".")
+        raise SceneError(f"{failed}: {reason}.") from error
+    if not file.exists():
+        raise FileError(f"{not_written}: check the space left on the disk.")
 
 
 @lru_cache

@@ -9,8 +9,9 @@ from pathlib import Path
 
 import bpy
 
-from ...core.errors import FileError, SceneError
+from ...core.errors import SceneError
 from ...core.io.file_writing import atomic_write
+from . import render
 
 
 def encode_video(pictures: Sequence[str | os.PathLike], path: str | os.PathLike, fps: float) -> Path:
@@ -39,21 +40,21 @@ def encode_video(pictures: Sequence[str | os.PathLike], path: str | os.PathLike,
         _strip(scene, [Path(picture) for picture in pictures])
         _settings(scene, len(pictures), fps)
         with atomic_write(path) as temporary:
-            temporary.unlink()
             scene.render.filepath = str(temporary)
-            try:
-                bpy.ops.render.render(animation=True, scene=scene.name)
-            except RuntimeError as error:
-                reason = " ".join(str(error).removeprefix("Error:").split()).rstrip(".")
-                raise SceneError(f"The video could not be made: {reason}.") from error
-            if not temporary.exists():
-                raise FileError(f"The video was not written to '{path}': check the space left on the disk.")
+            render.run_render(
+                scene,
+                temporary,
+                failed="The video could not be made",
+                not_written=f"The video was not written to '{path}'",
+                animation=True,
+            )
     finally:
         bpy.data.scenes.remove(scene)
     return path
 
 
 def _strip(scene, pictures: list[Path]) -> None:
+    """Add the pictures to the scene's sequencer and take over their size."""
     editor = scene.sequence_editor_create()
     strips = editor.strips if hasattr(editor, "strips") else editor.sequences  # 4.4 renamed them
     strip = strips.new_image("Pictures", str(pictures[0]), channel=1, frame_start=1)
@@ -66,19 +67,20 @@ def _strip(scene, pictures: list[Path]) -> None:
 
 
 def _settings(scene, count: int, fps: float) -> None:
-    render = scene.render
+    """Set the output of the temporary scene to MP4 (H.264)."""
+    output = scene.render
     scene.frame_start, scene.frame_end = 1, count
-    render.fps = max(1, round(fps))
-    render.fps_base = render.fps / fps
-    render.resolution_percentage = 100
-    render.use_sequencer, render.use_compositing = True, False
-    render.use_file_extension = False
+    output.fps = max(1, round(fps))
+    output.fps_base = output.fps / fps
+    output.resolution_percentage = 100
+    output.use_sequencer, output.use_compositing = True, False
+    output.use_file_extension = False
     scene.view_settings.view_transform = "Standard"
-    image = render.image_settings
+    image = output.image_settings
     if hasattr(image, "media_type"):  # Blender 5.0
         image.media_type = "VIDEO"
     image.file_format = "FFMPEG"
     image.color_mode = "RGB"
-    render.ffmpeg.format, render.ffmpeg.codec = "MPEG4", "H264"
-    render.ffmpeg.constant_rate_factor = "HIGH"
-    render.ffmpeg.gopsize = 12
+    output.ffmpeg.format, output.ffmpeg.codec = "MPEG4", "H264"
+    output.ffmpeg.constant_rate_factor = "HIGH"
+    output.ffmpeg.gopsize = 12

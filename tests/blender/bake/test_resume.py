@@ -10,7 +10,7 @@ import time
 from pathlib import Path
 
 import pytest
-from blender_scenes import press_and_drop, save
+from blender_scenes import contents, press_and_drop, save
 
 from palpate.addon.bake import bake_checkpoint, bake_files, folder_lock, folder_swap
 from palpate.addon.bake.bake import bake
@@ -20,10 +20,6 @@ from palpate.core.jobs.job_runner import SlicedJob, run_job
 
 SCRIPT = Path(__file__).with_name("killed_bake.py")
 FRAMES = 60
-
-
-def contents(folder):
-    return {str(path.relative_to(folder)): path.read_bytes() for path in sorted(folder.rglob("*")) if path.is_file()}
 
 
 def start(path, report):

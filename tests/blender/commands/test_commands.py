@@ -11,7 +11,7 @@ from types import SimpleNamespace
 import bpy
 import numpy as np
 import pytest
-from blender_scenes import press, reopen, save
+from blender_scenes import contents, press, reopen, save
 
 from palpate.addon.bake.bake import bake
 from palpate.commands import COMMANDS, READY, blender, console, main
@@ -29,10 +29,6 @@ def demo_blend(repository):
 def lines_of(capfd):
     out, err = capfd.readouterr()
     return out.splitlines(), err.splitlines()
-
-
-def contents(folder):
-    return {str(path.relative_to(folder)): path.read_bytes() for path in sorted(folder.rglob("*")) if path.is_file()}
 
 
 # --- usage
