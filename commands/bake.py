@@ -36,8 +36,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="[NAME=]SENSOR.toml",
         action="append",
         default=[],
-        help="parameters and effects of the sensor, or of the one with this name; may be given again. A scene that is saved "
-        "keeps them.",
+        help="parameters and effects for the only sensor, or for the one of this name; may be given again. A scene that is "
+        "saved keeps them.",
     )
     where = parser.add_mutually_exclusive_group()
     where.add_argument("--save", action="store_true", help="save motion, heat maps and arrows into SCENE.blend itself")

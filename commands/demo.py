@@ -20,21 +20,23 @@ from .bake import bake_with_progress, report
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "--out", metavar="DIR", default="palpate-demo", help="folder for all that is made (default: %(default)s)"
-    )
+    parser.add_argument("--out", metavar="DIR", default="palpate-demo", help="folder for all files (default: %(default)s)")
     parser.add_argument(
         "--size",
         metavar=("W", "H"),
         nargs=2,
         type=figure_options.pixels,
         default=(1280, 720),
-        help="of the picture, pixels (1280 720)",
+        help="size of the picture, pixels (default: 1280 720)",
     )
     parser.add_argument(
-        "--samples", metavar="N", type=figure_options.pixels, default=16, help="per pixel of the picture (default: %(default)s)"
+        "--samples",
+        metavar="N",
+        type=figure_options.pixels,
+        default=16,
+        help="samples per pixel of the picture (default: %(default)s)",
     )
-    parser.add_argument("--no-render", action="store_true", help="leave the picture out, everything else takes seconds")
+    parser.add_argument("--no-render", action="store_true", help="do not render the picture; everything else takes seconds")
 
 
 def run(arguments: argparse.Namespace) -> int:

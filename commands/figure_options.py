@@ -15,11 +15,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     names = [name.lower() for name in color_maps.STOPS]
     parser.add_argument("--colour-map", metavar="NAME", choices=names, help=f"{', '.join(names)} (default: the scene's)")
     parser.add_argument(
-        "--quantity", choices=("force", "pressure"), help="what colours show: N per texel, or kPa (default: the scene's)"
+        "--quantity",
+        choices=("force", "pressure"),
+        help="what the colours show: force per texel (N) or pressure (kPa) (default: the scene's)",
     )
-    parser.add_argument("--limit", metavar="VALUE", type=float, help="end of the colour scale, N or kPa (default: a round one)")
-    parser.add_argument("--width", choices=WIDTHS, help="journal column that figures fill (default: double)")
-    parser.add_argument("--dpi", metavar="N", type=int, help="of PNG figures (default: 300)")
+    parser.add_argument(
+        "--limit", metavar="VALUE", type=float, help="end of the colour scale, N or kPa (default: a round number)"
+    )
+    parser.add_argument("--width", choices=WIDTHS, help="width of figures, as columns of a journal (default: double)")
+    parser.add_argument("--dpi", metavar="N", type=int, help="resolution of PNG figures (default: 300)")
 
 
 def pixels(text: str) -> int:

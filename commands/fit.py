@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""``palpate fit``: parameters of a sensor from measurements of its foam and of its friction."""
+"""``palpate fit``: fits parameters of a sensor to measurements of its foam and of its friction."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     foam.add_argument("file", metavar="FOAM.csv")
     foam.add_argument("--area", type=float, required=True, metavar="M2", help="area of the whole sensor, m²")
     foam.add_argument("--texels", type=int, required=True, metavar="N", help="number of texels on it")
-    foam.add_argument("--weight-area", type=float, metavar="M2", help="what forces or masses rested on, m²")
+    foam.add_argument("--weight-area", type=float, metavar="M2", help="area on which the forces or masses rested, m²")
     foam.set_defaults(action=_stiffness)
     slide = kinds.add_parser(
         "friction",
@@ -30,13 +30,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "sliding, or with a column time (s) as well, recorded from rest.",
     )
     slide.add_argument("file", metavar="FRICTION.csv")
-    slide.add_argument("--normal-force", type=float, required=True, metavar="N", help="on one texel, N")
+    slide.add_argument("--normal-force", type=float, required=True, metavar="N", help="normal force on one texel, N")
     slide.add_argument(
-        "--texels", type=int, default=1, metavar="N", help="how many texels shared the measured force (default: 1)"
+        "--texels", type=int, default=1, metavar="N", help="number of texels that shared the measured force (default: 1)"
     )
     slide.set_defaults(action=_friction)
     for kind in (foam, slide):
-        kind.add_argument("--plot", metavar="FILE", help="picture of measurements and fit: .png, .pdf or .svg")
+        kind.add_argument("--plot", metavar="FILE", help="write a plot of measurements and fit: .png, .pdf or .svg")
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -20,15 +20,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     load = kinds.add_parser("import", help="put the parameters of an XML file on the sensors of a .blend")
     load.add_argument("file", metavar="ROBOT.xml")
     load.add_argument("scene", metavar="SCENE.blend")
-    load.add_argument("--from", dest="name", metavar="NAME", help="which sensor of the XML (default: the one there is)")
-    load.add_argument("--sensor", metavar="OBJECT", help="object that gets them (default: the one that <link> names)")
+    load.add_argument("--from", dest="name", metavar="NAME", help="name of the sensor in the XML (default: the only one)")
+    load.add_argument("--sensor", metavar="OBJECT", help="object that gets the parameters (default: the one that <link> names)")
     load.add_argument("--save-as", metavar="FILE", help="save into another .blend (default: SCENE.blend itself)")
     load.set_defaults(action=_import)
     save = kinds.add_parser("export", help="write the sensors of a .blend as XML")
     save.add_argument("scene", metavar="SCENE.blend")
-    save.add_argument("--sensor", metavar="OBJECT", action="append", help="only this one; may be given again")
-    save.add_argument("--robot", metavar="NAME", help="put a <Robot> of this name around them")
-    save.add_argument("--out", metavar="FILE", help="where to write (default: print)")
+    save.add_argument("--sensor", metavar="OBJECT", action="append", help="only this sensor; may be given again")
+    save.add_argument("--robot", metavar="NAME", help="enclose the sensors in a <Robot> of this name")
+    save.add_argument("--out", metavar="FILE", help="file to write (default: print)")
     save.set_defaults(action=_export)
 
 
@@ -52,16 +52,17 @@ def _show(arguments: argparse.Namespace) -> None:
         )
     print(console.text_table(rows, "<<" + ">" * (1 + len(NUMBERS))))
     for sensor in sensors:
-        _say_missing(sensor)
+        _note_missing(sensor)
 
 
-def _say_missing(sensor: OpenRaveSensor) -> None:
+def _note_missing(sensor: OpenRaveSensor) -> None:
+    """Print which values the file leaves out."""
     if sensor.missing:
         print(f"note: '{sensor.name}' leaves out {', '.join(sensor.missing)}: the defaults are used")
 
 
 def _import(arguments: argparse.Namespace) -> None:
-    sensor = _chosen(read_openrave(arguments.file), arguments.name, arguments.file)
+    sensor = _choose_sensor(read_openrave(arguments.file), arguments.name, arguments.file)
     with console.blender_output_hidden():
         scene = blender.open_scene(arguments.scene)
         from ..addon.authoring import exchange
@@ -73,11 +74,11 @@ def _import(arguments: argparse.Namespace) -> None:
         exchange.put_parameters(obj, sensor.parameters)
         path = Path(arguments.save_as or arguments.scene)
         blender.save_blend(path)
-    _say_missing(sensor)
+    _note_missing(sensor)
     print(f"'{sensor.name}' of '{arguments.file}' is now on '{obj.name}'; saved: {path}")
 
 
-def _chosen(sensors: list[OpenRaveSensor], name: str | None, file: str) -> OpenRaveSensor:
+def _choose_sensor(sensors: list[OpenRaveSensor], name: str | None, file: str) -> OpenRaveSensor:
     names = [sensor.name for sensor in sensors]
     if name is None and len(sensors) == 1:
         return sensors[0]

@@ -21,22 +21,37 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     parser.add_argument("--sensor", metavar="NAME", action="append", help="only this sensor; may be given again")
     parser.add_argument(
-        "--frame", metavar="N", type=int, action="append",
-        help="frame of scene and numbers, two or more also of the strip; may be given again (default: with the largest force)",
-    )  # fmt: skip
-    parser.add_argument(
-        "--format", metavar="KIND", action="append", choices=FORMATS, help="of figures: png, pdf, svg (default: png and pdf)"
-    )
-    parser.add_argument("--engine", choices=("cycles", "eevee", "workbench"), help="default: the scene's")
-    parser.add_argument(
-        "--size", metavar=("W", "H"), nargs=2, type=figure_options.pixels, default=(1280, 960), help="of renders, pixels"
+        "--frame",
+        metavar="N",
+        type=int,
+        action="append",
+        help="frame of pictures and numbers, two or more also of the strip; may be given again "
+        "(default: the frame with the largest force)",
     )
     parser.add_argument(
-        "--samples", metavar="N", type=figure_options.pixels, help="per pixel of renders (default: the scene's)"
+        "--format",
+        metavar="KIND",
+        action="append",
+        choices=FORMATS,
+        help="file format of figures: png, pdf, svg (default: png and pdf)",
     )
-    parser.add_argument("--view", metavar=("AZIMUTH", "ELEVATION"), nargs=2, type=float, help="of the camera, degrees")
+    parser.add_argument("--engine", choices=("cycles", "eevee", "workbench"), help="render engine (default: the scene's)")
+    parser.add_argument(
+        "--size",
+        metavar=("W", "H"),
+        nargs=2,
+        type=figure_options.pixels,
+        default=(1280, 960),
+        help="size of renders, pixels (default: 1280 960)",
+    )
+    parser.add_argument(
+        "--samples", metavar="N", type=figure_options.pixels, help="samples per pixel of renders (default: the scene's)"
+    )
+    parser.add_argument(
+        "--view", metavar=("AZIMUTH", "ELEVATION"), nargs=2, type=float, help="direction of the camera, degrees"
+    )
     parser.add_argument("--own-camera", action="store_true", help="leave the scene's camera where it is")
-    parser.add_argument("--transparent", action="store_true", help="no background")
+    parser.add_argument("--transparent", action="store_true", help="render without background")
     figure_options.add_arguments(parser)
 
 

@@ -94,7 +94,7 @@ def area_image(uid: str, name: str, area: np.ndarray):
 
 @dataclass(frozen=True)
 class ImageMapping:
-    """Where an image lies on a sensor: by which UV map, and whether its pixels are blended."""
+    """Mapping of an image onto a sensor: its UV map, and if its pixels are blended."""
 
     uv_map: str = UV_MAP
     smooth: bool = False
@@ -122,7 +122,7 @@ class ColorScale:
 def heat_map_material(
     uid: str, name: str, image, frames: tuple[int, int], scale: ColorScale, area=None, mapping: ImageMapping = ImageMapping()
 ):
-    """Create a sensor's heat-map material, or build the nodes of the existing one anew.
+    """Create a sensor's heat-map material, or rebuild the nodes of the existing one.
 
     Parameters
     ----------

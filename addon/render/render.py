@@ -171,7 +171,7 @@ def has_opengl() -> bool:
 
 
 def can_denoise() -> bool:
-    """Whether Cycles was built with its denoiser; some distributions' is not, and would refuse to render."""
+    """Return True if Cycles was built with its denoiser. In some distributions it is not, and refuses to render with it."""
     try:
         import _cycles
     except ImportError:
