@@ -13,6 +13,19 @@ ROWS, COLUMNS, PITCH, RADIUS, RATE = 6, 4, 0.0034, 0.010, 40.0
 TOP = 0.0015
 
 
+def depth_trial(time, level, slide=None, reading=None, force=None, name="t", use="fit"):
+    """A trial in which all texels have one depth, `level` (T,) m; `slide` (T,) m is the travel along x."""
+    travel = np.column_stack([np.zeros(len(time)) if slide is None else slide, np.zeros(len(time))])
+    return Trial(name, use, time, "depth", None, None, level, travel, reading, force)
+
+
+def grid_rig(rows, columns, pitch, parameters, trials=(), given=()):
+    """A rig with a grid of texels and no indenter."""
+    texels = grid_texels(rows, columns, pitch, pitch)
+    grid = (rows, columns, (pitch, pitch))
+    return Rig("small", texels, parameters, frozenset(given), None, grid, None, tuple(trials))
+
+
 def path(rng, seconds):
     """Lowest point of the ball over time: cycles of press, hold and release, unequal in depth, speed and length."""
     parts, dt = [np.full(int(0.8 * RATE), 0.001)], 1.0 / RATE

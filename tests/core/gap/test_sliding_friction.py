@@ -3,9 +3,9 @@
 
 from dataclasses import replace
 
+import gap_cases as cases
 import numpy as np
 
-from palpate.core.gap.dataset.rig import Rig, Trial, grid_texels
 from palpate.core.gap.forward.contact_phases import TRAVEL_BANDS, features
 from palpate.core.gap.forward.predictor import Model, Predictor
 from palpate.core.gap.report import sentences, summary
@@ -20,18 +20,17 @@ PARAMETERS = SensorParameters(k=1e4, cn=0.0, sigma0=5e3, sigma1=1.0, mus=0.6, mu
 def brake(backlash):
     """Two recordings of 8 s; what hides in them pulls against the slide for the first tenth of the way after each turn."""
     time = np.linspace(0.0, 8.0, 801)
-    texels, trials = grid_texels(1, 1, 0.01, 0.01), []
+    trials = []
     rng = np.random.default_rng(0)
     for i, beat in enumerate((0.5, 0.8)):
-        slide = np.column_stack([0.02 * np.sin(2 * np.pi * beat * time), np.zeros(len(time))])
-        empty = Trial(f"t{i}", "check" if i else "fit", time, "depth", None, None, np.full(len(time), 1e-3), slide, None, None)
-        rig = Rig("brake", texels, PARAMETERS, frozenset(), None, None, None, (empty,))
-        sensed = replace(empty, force=np.zeros((len(time), 3)))
-        force = Predictor(sensed, rig).predict(Model(PARAMETERS)).force.copy()
+        slide, level = 0.02 * np.sin(2 * np.pi * beat * time), np.full(len(time), 1e-3)
+        use, nothing = "check" if i else "fit", np.zeros((len(time), 3))
+        sensed = cases.depth_trial(time, level, slide=slide, force=nothing, name=f"t{i}", use=use)
+        force = Predictor(sensed, cases.grid_rig(1, 1, 0.01, PARAMETERS, [sensed])).predict(Model(PARAMETERS)).force.copy()
         phase = (beat * time + 0.25) % 0.5
         force[:, 0] -= backlash * np.sign(force[:, 0]) * (phase < 0.1)
         trials.append(replace(sensed, force=force + 0.01 * rng.normal(size=force.shape)))
-    return Rig("brake", texels, PARAMETERS, frozenset(), None, None, None, tuple(trials))
+    return cases.grid_rig(1, 1, 0.01, PARAMETERS, trials)
 
 
 def test_the_report_says_what_friction_does_and_what_is_left(tmp_path):

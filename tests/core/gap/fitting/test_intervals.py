@@ -1,12 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Intervals of fitted numbers: coloured noise that few groups tell of, and numbers that only act as their sum."""
 
-from dataclasses import replace
-
+import gap_cases as cases
 import numpy as np
 import pytest
 
-from palpate.core.gap.dataset.rig import Rig, Trial, grid_texels
 from palpate.core.gap.fitting.intervals import NORMAL_QUANTILE, _inverse, _sandwich
 from palpate.core.gap.forward.predictor import Model, Predictor
 from palpate.core.model.sensor_parameters import SensorParameters
@@ -48,17 +46,15 @@ def test_friction_at_fifty_samples_a_second_is_that_of_five_hundred():
 
     The load at a step's end instead of its mean would be off by 0.6 %.
     """
-    texels = grid_texels(1, 1, 0.01, 0.01)
     parameters = SensorParameters(k=1e3, cn=0.0, sigma0=50.0, sigma1=0.0, x0=0.02, ct=0.0)
 
     def pulled(rate):
         time = np.linspace(0.0, 4.0, 4 * rate + 1)
         level = 1e-3 * (1.0 + 0.5 * np.sin(7.0 * time))
-        slide = np.column_stack([0.05 * np.sin(3.0 * time), np.zeros(len(time))])
-        trial = Trial("t", "fit", time, "depth", None, None, level, slide, None, None)
-        rig = Rig("one", texels, parameters, frozenset(), None, None, None, (trial,))
-        sensed = replace(trial, force=np.zeros((len(time), 3)))
-        return Predictor(sensed, rig).predict(Model(parameters)).force[:: rate // 50, 0]
+        trial = cases.depth_trial(time, level, slide=0.05 * np.sin(3.0 * time), force=np.zeros((len(time), 3)))
+        return (
+            Predictor(trial, cases.grid_rig(1, 1, 0.01, parameters, [trial])).predict(Model(parameters)).force[:: rate // 50, 0]
+        )
 
     coarse, fine = pulled(50), pulled(500)
     assert np.sqrt(np.mean((coarse - fine) ** 2)) < 1e-3 * np.ptp(fine)

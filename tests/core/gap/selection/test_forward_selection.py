@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from palpate.core.effects.engine.registry import effect, form_of, kind_of
-from palpate.core.gap.dataset.rig import Rig, grid_texels
 from palpate.core.gap.fitting.least_squares import FRICTION_LEVEL, free_base_parameters, with_values
 from palpate.core.gap.forward.predictor import Model, Predictor
 from palpate.core.gap.selection.base_model import friction_parameters_to_search
@@ -65,10 +64,9 @@ def test_steps_that_grow_are_read_off():
 
 def test_a_stated_fall_of_friction_is_held_and_its_level_free():
     parameters = SensorParameters(k=50.0, mus=0.6, mud=0.45, x0=0.02, ct=0.01)
-    texels = grid_texels(1, 2, 3e-3, 3e-3)
 
     def stating(*names):
-        return Rig("two", texels, parameters, frozenset(names), None, (1, 2, (3e-3, 3e-3)), None, ())
+        return cases.grid_rig(1, 2, 3e-3, parameters, given=names)
 
     assert friction_parameters_to_search(stating("k", "mus", "mud", "x0", "ct")) == [FRICTION_LEVEL, "sigma0"]
     assert set(friction_parameters_to_search(stating("k", "mus", "mud", "ct"))) == {"mus", "mud", "sigma0", "x0"}

@@ -3,11 +3,11 @@
 
 from dataclasses import replace
 
+import gap_cases as cases
 import numpy as np
 import pytest
 
 from palpate.core.effects.engine.registry import effect
-from palpate.core.gap.dataset.rig import Rig, Trial, grid_texels
 from palpate.core.gap.fitting.noise_floor import coverage
 from palpate.core.gap.forward.contact_phases import PHASES, phase_indices
 from palpate.core.gap.forward.predictor import Model, Predictor
@@ -40,10 +40,8 @@ def predictor(programme, seconds):
     time = np.linspace(0, seconds, 600)
     level = 1e-3 * np.interp(time / seconds * at[-1], at, depth)
     reading = 50.0 * level[:, None] * np.ones(2)
-    trial = Trial("t", "fit", time, "depth", None, None, level, np.zeros((600, 2)), reading, None)
-    texels = grid_texels(1, 2, 3e-3, 3e-3)
-    rig = Rig("two", texels, SensorParameters(k=50.0), frozenset({"k"}), None, (1, 2, (3e-3, 3e-3)), None, (trial,))
-    return Predictor(trial, rig)
+    trial = cases.depth_trial(time, level, reading=reading)
+    return Predictor(trial, cases.grid_rig(1, 2, 3e-3, SensorParameters(k=50.0), [trial], ["k"]))
 
 
 @pytest.mark.parametrize("seconds", [1.0, 20.0, 4000.0])
@@ -110,13 +108,11 @@ def test_the_way_in_alone_may_be_that_of_a_loop(depth):
 @pytest.mark.parametrize(("stays", "told"), [(True, False), (False, True)])
 def test_one_place_does_not_tell_neighbours_from_gains(stays, told):
     """A ball on one of six rows of texels, or on one after the other."""
-    texels = grid_texels(6, 2, 3e-3, 3e-3)
-    rig = Rig("six", texels, SensorParameters(k=50.0), frozenset({"k"}), None, (6, 2, (3e-3, 3e-3)), None, ())
+    rig = cases.grid_rig(6, 2, 3e-3, SensorParameters(k=50.0), given=["k"])
     time = np.linspace(0, 6, 600)
     row = np.zeros(600, int) if stays else np.minimum(time, 1.9).astype(int)
     depth = 1e-3 * np.abs(np.sin(np.pi * time))[:, None] * (np.repeat(np.arange(6), 2) == row[:, None])
-    trial = Trial("t", "fit", time, "depth", None, None, depth.max(axis=1), np.zeros((600, 2)), 50.0 * depth, None)
-    one = Predictor(trial, rig)
+    one = Predictor(cases.depth_trial(time, depth.max(axis=1), reading=50.0 * depth), rig)
     one.stimulus = replace(one.stimulus, depth=depth)
     assert (indistinguishable(coverage([one]), "crosstalk") == ()) == told
     assert told or set(indistinguishable(coverage([one]), "crosstalk")) == set(KNOWN_FROM_PLACES) - {"crosstalk"}
