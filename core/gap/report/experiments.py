@@ -39,7 +39,7 @@ EXPERIMENTS = {
 }
 """The recording that shows each effect most clearly."""
 
-REPEAT = "repeat one trial exactly, to see what of the difference comes again"
+REPEAT = "repeat one trial exactly, to see which part of the difference repeats"
 HINTS = {
     "common mode": "record the same seconds without touching the sensor, to see whether it is there as well",
     "shared by loaded texels": "hold one constant load for as long as a trial, to see how the reading moves by itself",
@@ -88,8 +88,9 @@ def _hint(result: Diagnosis) -> str:
     """What to record to find the cause of an unexplained gap."""
     if result.line is not None:
         return (
-            f"record the same seconds without touching the sensor, with mains, motors and fans off in turn: what hums at "
-            f"{result.line.frequency:.3g} Hz (or was folded down to that by the sampling) is there without any load"
+            "record the same seconds without touching the sensor, with mains, motors and fans off in turn: the source of the "
+            f"line at {result.line.frequency:.3g} Hz (or at a higher frequency that the sampling folds to it) "
+            "acts without any load"
         )
     return HINTS.get(result.structure.strongest, REPEAT)
 

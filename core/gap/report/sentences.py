@@ -43,7 +43,7 @@ def _unexplained(result: Diagnosis, errors: GapErrors, sure: list[str]) -> str:
     if result.line is not None:
         line, unit = result.line, result.rig.parameters.unit
         said = f"a line at {line.frequency:.3g} Hz of {line.amplitude:.3g} {unit}, there without load too"
-        return f"Unexplained: {said}, is {line.share:.0%} of what trembles at rest.{part}"
+        return f"Unexplained: {said}, is {line.share:.0%} of the noise without load.{part}"
     strongest = FEATURES.get(result.structure.strongest, "nothing that was looked at")
     after = errors.amended["fit"] or 0.0
     return f"Unexplained: what is left ({after:.2%} of the range) varies most with {strongest}.{part}{_friction(errors)}"
@@ -86,7 +86,7 @@ def warnings(result: Diagnosis) -> list[str]:
     if not result.of("check"):
         said.append('No trial is for checking only: give one use = "check", so that the result can be judged on it.')
     if len(result.of("fit")) == 1:
-        said.append("Only one trial was fitted: halves of it had to judge each other.")
+        said.append("Only one trial was fitted: its halves were judged against each other.")
     return said
 
 

@@ -15,7 +15,7 @@ import numpy as np
 from ..fitting.noise_floor import Coverage
 from ..forward.predictor import Model, Predictor
 
-NEVER_UNLOADED = "nothing was ever unloaded, so that what it leaves behind cannot show"
+NEVER_UNLOADED = "no load was ever taken back, and this effect shows after unloading"
 KNOWN_FROM_UNLOADING = ("hysteresis", "softening", "adhesion", "wear")
 """Effects that are known by what is different after unloading. Their formulas also bend the loading curve, but there they
 cannot be distinguished from a nonlinear spring."""
@@ -23,9 +23,7 @@ KNOWN_FROM_TIMING = ("creep", "lag", "drift")
 """Effects that are known by what happens at one depth at different times, or at one time after different speeds."""
 SINGLE_SPEED_RATIO = 1.5
 """Ratio of fast to slow loading below which all loading was at one speed."""
-NEVER_AT_REST = (
-    "nothing was left without load for long, nor held at unlike loads, so that moving by itself and settling under load are one"
-)
+NEVER_AT_REST = "no texel was long without load, and no two different loads were held, so that drift and creep look the same"
 LEAST_UNLOADED_SHARE = 0.1
 """Share of a trial, from the first to the last time that a texel is unloaded, from which on a drift would show there."""
 MOVING_BY_THEMSELVES = ("creep", "drift")
