@@ -87,7 +87,7 @@ def advance_steps(
             if model.bodies.kind[body] == FREE:
                 write_world_inertia(workspace.bodies.rotation[body], model.bodies.inertia[body], workspace.bodies.inertia[body])
         solve_velocities(dt, path.commands[step], model, detection, state, workspace)
-        if len(workspace.effects.contacts) > 0:
+        if len(workspace.effects.contacts.force) > 0:
             commit_effect_memory(dt, model, state, workspace)
         run_parallel_loop(UPDATE_FRICTION, model, detection, state, workspace)
         if len(model.drives.gains) > 0:

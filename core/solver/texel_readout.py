@@ -9,19 +9,12 @@ from typing import NamedTuple
 import numpy as np
 
 from ..compiled.kernels import inlined, kernel
+from ..effects.engine.compiled_program import TexelMotion, has_effects
 from ..laws.contact_law import ContactLaw, read_law
 from ..laws.friction import bristle_rate, friction_force, max_bristle_deflection
 from ..laws.normal_force import normal_force
-from .contact_rows import BRISTLE, DEPTH, LANES, NORMAL, POINT, read_vector
-from .dynamics.effect_kernels import (
-    NOW,
-    ColumnPlace,
-    PointMotion,
-    apply_effects,
-    force_and_friction_law,
-    has_effects,
-    press_texel,
-)
+from .contact_rows import BRISTLE, DEPTH, NORMAL, POINT, read_vector
+from .dynamics.effect_kernels import NOW, apply_effects, force_and_friction_law, lane_range, press_texel
 from .dynamics.relative_kinematics import motion_values, point_law, row_of, row_velocity, write_pair_motion
 from .solver_model import SolverModel, State
 from .workspace import Workspace
@@ -115,10 +108,11 @@ def _read_contact(
     square = tx * tx + ty * ty + tz * tz
     fn = normal_force(depth, rate, p)
     if has_effects(sensor, model.effects):
-        columns, place = workspace.effects.contacts, ColumnPlace(block, LANES, lane)
-        press_texel(columns, place, pair, PointMotion(depth, rate, 0.0, math.sqrt(square)), p, model)
-        apply_effects(pair, NOW, place, 1, p, model, state.effect_memory, workspace)
-        fn, p = force_and_friction_law(pair, block, lane, p, model, columns)
+        texels = workspace.effects.contacts
+        press_texel(texels, block, lane, pair, TexelMotion(depth, rate, 0.0, math.sqrt(square)), p, model)
+        points = lane_range(pair, block, lane, 1, model, workspace)
+        apply_effects(pair, NOW, points, p, model, state.effect_memory, workspace)
+        fn, p = force_and_friction_law(pair, block, lane, p, model, texels)
     zx, zy, zz = read_vector(rows, block, BRISTLE, lane)
     length, limit = math.sqrt(zx * zx + zy * zy + zz * zz), max_bristle_deflection(fn, p)
     held = limit / length if length > limit else 1.0

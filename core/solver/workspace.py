@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..compiled.struct_reference import by_reference
+from ..effects.engine.compiled_program import TexelContacts
 
 SUMS = 27
 """Numbers that the contacts of a pair are summed up in: a symmetric (6, 6) block by its lower triangle, and a wrench."""
@@ -151,16 +152,16 @@ class EffectWork(NamedTuple):
 
     Attributes
     ----------
-    contacts : (blocks, COLUMNS · LANES) float
-        What effects make of each contact (:mod:`.compiled_program`); without rows when none acts on forces.
-    points : (1, COLUMNS · N) float
-        What presses on each contact point at the step's end, in the same columns.
+    contacts : TexelContacts, (blocks, LANES)
+        What effects make of each contact; without blocks when none acts on forces.
+    points : TexelContacts, (1, N)
+        What presses on each contact point at the step's end; without points when no effect acts on forces.
     point_numbers : (N,) int
         0, 1, 2 …
     """
 
-    contacts: np.ndarray
-    points: np.ndarray
+    contacts: TexelContacts
+    points: TexelContacts
     point_numbers: np.ndarray
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..effects.engine.compiled_program import COLUMNS
+from ..effects.engine.compiled_program import TexelContacts
 from ..geometry.rotations import write_backward_twist
 from .contact_rows import LANES, ROW
 from .detection.detection_data import SurfaceMotion
@@ -41,8 +41,8 @@ def workspace_for(model: SolverModel, state: State, surfaces: SurfaceMotion, que
         system=_linear_system(n),
         drives=DriveWork(np.zeros((b, 3)), np.zeros(len(model.drives.gains)), np.zeros(len(model.drives.gains))),
         effects=EffectWork(
-            contacts=np.zeros((effect_blocks, COLUMNS * LANES)),
-            points=np.zeros((1, COLUMNS * effect_points)),
+            contacts=TexelContacts.zeros(effect_blocks, LANES),
+            points=TexelContacts.zeros(1, effect_points),
             point_numbers=np.arange(len(model.points.frame)),
         ),
         energy=_energy_work(model, deforming),
@@ -86,7 +86,8 @@ def _energy_work(model: SolverModel, deforming: np.ndarray) -> EnergyWork:
     pairs, q = model.pairs, len(model.pairs.sensor)
     kinds = model.bodies.kind[np.stack([pairs.sensor_body, pairs.target_body])]
     moved = (kinds == FREE).any(axis=0) & (kinds != DRIVEN).all(axis=0)
-    pulls = model.effects.clip[pairs.sensor] < model.effects.start[pairs.sensor + 1]  # as effect_kernels.may_pull
+    effects = model.effects
+    pulls = effects.first_unclipped[pairs.sensor] < effects.first_law[pairs.sensor + 1]  # as compiled_program.may_pull
     return EnergyWork(
         tracked=moved & ~deforming & ~pulls,
         force=np.zeros((q, 6)),

@@ -1,10 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Compiled: what the solver asks of a sensor's effects in every step, and the same over a whole signal (kernels).
+"""The effects of sensors on contact forces, compiled for the solver, and single laws over whole signals (kernels).
 
-A texel is one spring with one past, whatever presses on it. Per contact point of a sensor there is one row of memory, zero at
-first. In each step the solver may ask :func:`apply_force_laws` as often as it likes with ``commit=False``; at the step's end it
-asks once with ``commit=True`` for *every* point of the sensor, with depth, rate and slide zero where nothing touches, because
-what was pressed recovers. Where several targets press on one point, the deepest is the one that is remembered.
+Every texel is one spring with one history, whatever presses on it. Each contact point of a sensor has one row of memory, zero
+at the start. During a step the solver may call :func:`apply_force_laws` any number of times with ``commit=False``. At the end
+of the step it calls it once with ``commit=True`` for *every* point of the sensor, with depth, rate and slide zero where nothing
+touches, because what was pressed recovers. If several targets press on one point, the deepest is remembered.
+
+Which laws a sensor has is known only at run time, but the solver's kernels are compiled once and for all. So each law is
+compiled into a loop over points with a fixed signature of its own, and the solver calls it by the address of its machine code.
 """
 
 from __future__ import annotations
@@ -110,20 +113,38 @@ def _number_of(law: Callable[..., Any], loop: Any) -> int:
 if COMPILED:
 
     @kernel
-    def call_law(number, work, block, a, b, c, d, count, slots, slot, offset, numbers, row, memory, at, commit):
-        """Let a law act on `count` points; see :func:`apply_force_laws`."""
-        start = work.ctypes.data + 8 * block * work.shape[1]
+    def call_law(number, columns, points, constants, row, memory, first_state, commit):
+        """Let a law act on a range of points.
+
+        Parameters
+        ----------
+        number : int
+            Of the law, see :func:`_number_of`.
+        columns : tuple of four (blocks, n) float
+            Inputs and outputs of the loop over points, of :class:`TexelContacts`.
+        points : PointRange
+        constants, row : (rows, c) float, int
+            The constants of the law are ``constants[row]``.
+        memory, first_state : (N, state_size) float, int
+            The state of the law begins in this column.
+        commit : bool
+        """
+        a, b, c, d = columns
+        start = 8 * (points.block * a.shape[1] + points.first)
         call_address(
-            number, start + 8 * a, start + 8 * b, start + 8 * c, start + 8 * d,
-            numbers.ctypes.data + 8 * row * numbers.shape[1], memory.ctypes.data + 8 * at, slots.ctypes.data + 8 * slot,
-            count, numbers.shape[1], memory.shape[0], memory.shape[1], offset, 1 if commit else 0,
+            number, a.ctypes.data + start, b.ctypes.data + start, c.ctypes.data + start, d.ctypes.data + start,
+            constants.ctypes.data + 8 * row * constants.shape[1], memory.ctypes.data + 8 * first_state,
+            points.rows.ctypes.data + 8 * points.first_row, points.number, constants.shape[1], memory.shape[0], memory.shape[1],
+            points.offset, 1 if commit else 0,
         )  # fmt: skip
 else:
 
-    def call_law(number, work, block, a, b, c, d, count, slots, slot, offset, numbers, row, memory, at, commit):
-        """Let a law act on `count` points; see :func:`apply_force_laws`."""
-        columns = tuple(work[block, first : first + count] for first in (a, b, c, d))
-        _UNCOMPILED[number](columns, numbers[row], memory[:, at:], slots.reshape(-1)[slot : slot + count], offset, commit)
+    def call_law(number, columns, points, constants, row, memory, first_state, commit):
+        """Let a law act on a range of points, without compilation."""
+        these = slice(points.first, points.first + points.number)
+        rows = points.rows.reshape(-1)[points.first_row : points.first_row + points.number]
+        parts = tuple(column[points.block, these] for column in columns)
+        _UNCOMPILED[number](parts, constants[row], memory[:, first_state:], rows, points.offset, commit)
 
 
 def law_over_time(
@@ -162,191 +183,268 @@ def law_over_time(
 
 @by_reference
 class EffectProgram(NamedTuple):
-    """The laws of m sensors as arrays; of sensor s those with index ``start[s]`` to ``start[s + 1]``.
+    """The laws of m sensors as arrays. Those of sensor s have the indices ``first_law[s]`` to ``first_law[s + 1]``.
 
     Attributes
     ----------
-    start : (m + 1,) int
-    clip : (m,) int
-        From this index on laws act after the force was cut off at zero.
-    code, at, row : (laws,) int
-        Which law, for :func:`call_law`; the first column of its memory; its row of constants for the first length of step,
-        others follow.
-    friction_start : (m + 1,) int
-    friction_code, friction_row : (friction laws,) int
-    numbers : (rows, c) float
-    columns : int
-        Columns of memory that a point needs.
+    first_law : (m + 1,) int
+    first_unclipped : (m,) int
+        From this index on, laws act after the normal force was clipped at zero.
+    law : (laws,) int
+        Number of the law, for :func:`call_law`.
+    state : (laws,) int
+        First column of its state in the memory.
+    row : (laws,) int
+        Row of its constants for the first length of step; those for the other lengths follow.
+    first_friction_law : (m + 1,) int
+    friction_law, friction_row : (friction laws,) int
+    constants : (rows, c) float
+    state_size : int
+        Number of columns that the memory of a point needs.
     """
 
-    start: np.ndarray
-    clip: np.ndarray
-    code: np.ndarray
-    at: np.ndarray
+    first_law: np.ndarray
+    first_unclipped: np.ndarray
+    law: np.ndarray
+    state: np.ndarray
     row: np.ndarray
-    friction_start: np.ndarray
-    friction_code: np.ndarray
+    first_friction_law: np.ndarray
+    friction_law: np.ndarray
     friction_row: np.ndarray
-    numbers: np.ndarray
-    columns: int
+    constants: np.ndarray
+    state_size: int
 
     @property
     def is_empty(self) -> bool:
-        """True when no sensor has an effect that acts on forces."""
-        return len(self.code) == 0 and len(self.friction_code) == 0
+        """True if no sensor has an effect that acts on forces."""
+        return len(self.law) == 0 and len(self.friction_law) == 0
 
     def memory(self, points: int) -> np.ndarray:
-        """Return the memory of that many untouched points, (points, columns) float."""
-        return np.zeros((points, self.columns))
+        """Return the memory of untouched points, (points, state_size) float."""
+        return np.zeros((points, self.state_size))
+
+
+class _Tables:
+    """Collects the constants of laws, which have different numbers of columns, in one array."""
+
+    def __init__(self) -> None:
+        self._tables: list[np.ndarray] = []
+        self._rows = 0
+
+    def add(self, table: np.ndarray) -> int:
+        """Add the constants of a law for all lengths of step, (m, c) float, and return its first row."""
+        first = self._rows
+        self._tables.append(table)
+        self._rows += len(table)
+        return first
+
+    def joined(self) -> np.ndarray:
+        """Return all constants, (rows, c) float, padded with zeros."""
+        joined = np.zeros((self._rows, max((table.shape[1] for table in self._tables), default=1)))
+        first = 0
+        for table in self._tables:
+            joined[first : first + len(table), : table.shape[1]] = table
+            first += len(table)
+        return joined
 
 
 def compile_program(stacks: Sequence[Sequence[Effect]], dt: ArrayLike) -> EffectProgram:
-    """Return what acts on the forces of several sensors, for steps of the given lengths.
+    """Return the laws that act on the forces of several sensors.
 
     Parameters
     ----------
     stacks : sequence of sequences of Effect
-        The effects of each sensor; those on readings are left out.
+        The effects of each sensor; effects on readings are ignored.
     dt : (m,) float, s
-        Lengths of step that will occur; the argument `step` of the kernels counts them.
+        Lengths of step that will occur. The argument `length` of :func:`apply_force_laws` is an index of these.
     """
     lengths = np.atleast_1d(np.asarray(dt, dtype=float))
-    start, clip, friction_start = [0], [], [0]
-    code: list[int] = []
-    at: list[int] = []
-    row: list[int] = []
-    friction_code: list[int] = []
-    friction_row: list[int] = []
-    tables: list[np.ndarray] = []
-    columns = 0
+    tables = _Tables()
+    first_law, first_unclipped, first_friction_law = [0], [], [0]
+    laws: list[tuple[int, int, int]] = []
+    friction_laws: list[tuple[int, int]] = []
+    state_size = 0
     for stack in stacks:
-        column, after = 0, 0
+        state, unclipped = 0, 0
         for item, form in in_signal_order(stack, readout=False):
             if form.constants is None:
                 continue
-            first = sum(len(table) for table in tables)
+            row = tables.add(form.constants(complete_values(item), lengths))
             if form.law is not None:
-                code.append(_number_of(form.law, _law_over_points))
-                at.append(column)
-                row.append(first)
-                column += form.state_size
-                after += form.after_clip
+                laws.append((_number_of(form.law, _law_over_points), state, row))
+                state += form.state_size
+                unclipped += form.after_clip
             else:
                 assert form.friction_law is not None
-                friction_code.append(_number_of(form.friction_law, _friction_law_over_points))
-                friction_row.append(first)
-            tables.append(form.constants(complete_values(item), lengths))
-        start.append(len(code))
-        clip.append(len(code) - after)
-        friction_start.append(len(friction_code))
-        columns = max(columns, column)
-    width = max((table.shape[1] for table in tables), default=1)
-    numbers = np.zeros((sum(len(table) for table in tables), width))
-    first = 0
-    for table in tables:
-        numbers[first : first + len(table), : table.shape[1]] = table
-        first += len(table)
+                friction_laws.append((_number_of(form.friction_law, _friction_law_over_points), row))
+        first_law.append(len(laws))
+        first_unclipped.append(len(laws) - unclipped)
+        first_friction_law.append(len(friction_laws))
+        state_size = max(state_size, state)
+    law, law_state, law_row = np.array(laws, dtype=np.int64).reshape(-1, 3).T.copy()
+    friction_law, friction_row = np.array(friction_laws, dtype=np.int64).reshape(-1, 2).T.copy()
     return EffectProgram(
-        start=np.array(start, dtype=np.int64),
-        clip=np.array(clip, dtype=np.int64),
-        code=np.array(code, dtype=np.int64),
-        at=np.array(at, dtype=np.int64),
-        row=np.array(row, dtype=np.int64),
-        friction_start=np.array(friction_start, dtype=np.int64),
-        friction_code=np.array(friction_code, dtype=np.int64),
-        friction_row=np.array(friction_row, dtype=np.int64),
-        numbers=numbers,
-        columns=columns,
+        first_law=np.array(first_law, dtype=np.int64),
+        first_unclipped=np.array(first_unclipped, dtype=np.int64),
+        law=law,
+        state=law_state,
+        row=law_row,
+        first_friction_law=np.array(first_friction_law, dtype=np.int64),
+        friction_law=friction_law,
+        friction_row=friction_row,
+        constants=tables.joined(),
+        state_size=state_size,
     )
 
 
-# What presses on points, in blocks with the points of each column side by side; the first five are given, the others found.
-DEPTH, RATE, SLIDE, SPEED, DAMPING, FORCE, SLOPE, FACTOR, VISCOUS = range(9)
-COLUMNS = 9
+class TexelMotion(NamedTuple):
+    """How a texel is pressed.
+
+    Attributes
+    ----------
+    depth : float, m
+        At the end of the step, zero or less where nothing touches.
+    rate : float, m/s
+        Of the depth, during the step.
+    slide : float, m
+        Distance slid in the step.
+    speed : float, m/s
+        Of sliding.
+    """
+
+    depth: float
+    rate: float
+    slide: float
+    speed: float
+
+
+@by_reference
+class TexelContacts(NamedTuple):
+    """What presses on texels, and what follows from it; arrays in blocks of n points.
+
+    Attributes
+    ----------
+    depth, rate, slide, speed : (blocks, n) float
+        See :class:`TexelMotion`; the depth is never negative.
+    force : (blocks, n) float, N
+        Normal force.
+    by_depth, by_rate : (blocks, n) float, N/m and N·s/m
+        Its derivatives by the depth at the end of the step and by the rate. Before :func:`apply_force_laws`, `by_rate` is the
+        coefficient of damping (see :func:`.damping_coefficient`).
+    friction_factor : (blocks, n) float
+        Factor on the friction coefficients of Eq. 10–12; at speed zero also on what static friction can hold.
+    extra_viscosity : (blocks, n) float, N·s/m
+        Is added to `ct`.
+    """
+
+    depth: np.ndarray
+    rate: np.ndarray
+    slide: np.ndarray
+    speed: np.ndarray
+    force: np.ndarray
+    by_depth: np.ndarray
+    by_rate: np.ndarray
+    friction_factor: np.ndarray
+    extra_viscosity: np.ndarray
+
+    @classmethod
+    def zeros(cls, blocks: int, points: int) -> TexelContacts:
+        """Return arrays for so many blocks of so many points each."""
+        return cls(*(np.zeros((blocks, points)) for _ in cls._fields))
+
+
+class PointRange(NamedTuple):
+    """Some neighbouring points of one block of :class:`TexelContacts`, and the rows of memory that belong to them.
+
+    Attributes
+    ----------
+    block, first, number : int
+    rows, first_row, offset : (…) int, int, int
+        The memory of the i-th point is in row ``offset + rows.ravel()[first_row + i]``.
+    """
+
+    block: int
+    first: int
+    number: int
+    rows: np.ndarray
+    first_row: int
+    offset: int
 
 
 @kernel
-def press(work, block, stride, i, depth, rate, slide, speed, law):
-    """Write what the base law makes of a point.
+def write_base_law(contacts, block, point, motion, law):
+    """Write the elastic force of a texel without effects, its tangent, and the coefficient of damping.
 
     Parameters
     ----------
-    work : (blocks, COLUMNS · stride) float
-        Column c of point i is at ``work[block, c * stride + i]``.
-    block, stride, i : int
-    depth, rate : float, m and m/s
-        Depth at the step's end, zero or less where nothing touches; its rate during the step.
-    slide, speed : float, m and m/s
-        Distance slid in the step, and speed of it.
+    contacts : TexelContacts
+    block, point : int
+    motion : TexelMotion
     law : ContactLaw
         Of a whole texel.
     """
-    force, slope, damping = 0.0, 0.0, damping_coefficient(law)
+    depth, force, by_depth = motion.depth, 0.0, 0.0
     if depth > 0.0:
         force = elastic_force(depth, law)
-        slope = elastic_stiffness(depth, force, law)
-    work[block, DEPTH * stride + i], work[block, RATE * stride + i] = max(depth, 0.0), rate
-    work[block, SLIDE * stride + i], work[block, SPEED * stride + i] = slide, speed
-    work[block, FORCE * stride + i], work[block, SLOPE * stride + i] = force, slope
-    work[block, DAMPING * stride + i] = damping
+        by_depth = elastic_stiffness(depth, force, law)
+    contacts.depth[block, point], contacts.rate[block, point] = max(depth, 0.0), motion.rate
+    contacts.slide[block, point], contacts.speed[block, point] = motion.slide, motion.speed
+    contacts.force[block, point], contacts.by_depth[block, point] = force, by_depth
+    contacts.by_rate[block, point] = damping_coefficient(law)
 
 
 @kernel
-def apply_force_laws(sensor, step, work, block, stride, begin, count, slots, slot, offset, linear, program, memory, commit):
-    """Let the effects act on what :func:`press` wrote.
-
-    FORCE is then the normal force (N), SLOPE and DAMPING its derivatives by the depth at the step's end (N/m) and by the rate
-    (N·s/m).
+def apply_force_laws(sensor, length, contacts, points, linear, program, memory, commit):
+    """Turn what :func:`write_base_law` wrote into normal forces and their derivatives, with effects and damping.
 
     Parameters
     ----------
-    sensor, step : int
-        Step counts the lengths of step that the program was compiled for.
-    work, block, stride
-        See :func:`press`.
-    begin, count : int
-        The first of the points in the block, and how many.
-    slots, slot, offset : (…) int, int, int
-        The memory of the i-th of them is row ``offset + slots.ravel()[slot + i]``.
+    sensor : int
+    length : int
+        Index of the length of the step, see :func:`compile_program`.
+    contacts : TexelContacts
+    points : PointRange
     linear : bool
         The base law is Eq. 8.
     program : EffectProgram
-    memory : (points, columns) float
+    memory : (N, state_size) float
     commit : bool
-        Write the memory: once per step and point, at the step's end.
+        Update the memory: once per step and point, at the end of the step.
     """
-    force, slope, damping = FORCE * stride + begin, SLOPE * stride + begin, DAMPING * stride + begin
-    depth, slide, rate = DEPTH * stride + begin, SLIDE * stride + begin, RATE * stride + begin
-    for e in range(program.start[sensor], program.clip[sensor]):
-        call_law(
-            program.code[e], work, block, force, slope, depth, slide, count, slots, slot, offset,
-            program.numbers, program.row[e] + step, memory, program.at[e], commit,
-        )  # fmt: skip
-    for i in range(count):
-        work[block, force + i], work[block, slope + i], work[block, damping + i] = damped_force_derivatives(
-            work[block, force + i], work[block, slope + i], work[block, damping + i], work[block, rate + i], linear
+    columns, block = (contacts.force, contacts.by_depth, contacts.depth, contacts.slide), points.block
+    for i in range(program.first_law[sensor], program.first_unclipped[sensor]):
+        row = program.row[i] + length
+        call_law(program.law[i], columns, points, program.constants, row, memory, program.state[i], commit)
+    for i in range(points.first, points.first + points.number):
+        force, by_depth, by_rate = damped_force_derivatives(
+            contacts.force[block, i], contacts.by_depth[block, i], contacts.by_rate[block, i], contacts.rate[block, i], linear
         )
-        if work[block, force + i] <= 0.0 or work[block, depth + i] <= 0.0:
-            work[block, force + i] = work[block, slope + i] = work[block, damping + i] = 0.0
-    for e in range(program.clip[sensor], program.start[sensor + 1]):
-        call_law(
-            program.code[e], work, block, force, slope, depth, slide, count, slots, slot, offset,
-            program.numbers, program.row[e] + step, memory, program.at[e], commit,
-        )  # fmt: skip
+        if force <= 0.0 or contacts.depth[block, i] <= 0.0:
+            force = by_depth = by_rate = 0.0
+        contacts.force[block, i], contacts.by_depth[block, i], contacts.by_rate[block, i] = force, by_depth, by_rate
+    for i in range(program.first_unclipped[sensor], program.first_law[sensor + 1]):
+        row = program.row[i] + length
+        call_law(program.law[i], columns, points, program.constants, row, memory, program.state[i], commit)
 
 
 @kernel
-def apply_friction_laws(sensor, work, block, stride, begin, count, slots, program, memory):
-    """How the effects change friction at SPEED under FORCE: written into FACTOR and VISCOUS.
+def apply_friction_laws(sensor, contacts, points, program, memory):
+    """Write how the effects change friction, given speed and normal force; arguments as in :func:`apply_force_laws`."""
+    for i in range(points.first, points.first + points.number):
+        contacts.friction_factor[points.block, i], contacts.extra_viscosity[points.block, i] = 1.0, 0.0
+    columns = contacts.speed, contacts.force, contacts.friction_factor, contacts.extra_viscosity
+    for i in range(program.first_friction_law[sensor], program.first_friction_law[sensor + 1]):
+        call_law(program.friction_law[i], columns, points, program.constants, program.friction_row[i], memory, 0, False)
 
-    FACTOR is on the friction coefficient of Eq. 10–12, at speed zero also on what static friction can hold; VISCOUS is to be
-    added to `ct`, N·s/m.
-    """
-    factor, viscous = FACTOR * stride + begin, VISCOUS * stride + begin
-    for i in range(count):
-        work[block, factor + i], work[block, viscous + i] = 1.0, 0.0
-    for e in range(program.friction_start[sensor], program.friction_start[sensor + 1]):
-        call_law(
-            program.friction_code[e], work, block, SPEED * stride + begin, FORCE * stride + begin, factor, viscous, count,
-            slots, 0, 0, program.numbers, program.friction_row[e], memory, 0, False,
-        )  # fmt: skip
+
+@kernel
+def has_effects(sensor, program):
+    """Return whether any effect acts on the forces of a sensor."""
+    laws = program.first_law[sensor] < program.first_law[sensor + 1]
+    return laws or program.first_friction_law[sensor] < program.first_friction_law[sensor + 1]
+
+
+@kernel
+def may_pull(sensor, program):
+    """Return whether the normal force of a sensor can be negative."""
+    return program.first_unclipped[sensor] < program.first_law[sensor + 1]

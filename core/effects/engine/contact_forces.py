@@ -14,18 +14,14 @@ from ...laws.contact_law import LINEAR_EXPONENT, ContactLaw, contact_law
 from ...laws.normal_force import damped_force, elastic_force
 from ...model.effect import Effect
 from .compiled_program import (
-    COLUMNS,
-    DAMPING,
-    FACTOR,
-    FORCE,
-    SLOPE,
-    SPEED,
-    VISCOUS,
+    PointRange,
+    TexelContacts,
+    TexelMotion,
     apply_force_laws,
     apply_friction_laws,
     compile_program,
     law_over_time,
-    press,
+    write_base_law,
 )
 from .registry import complete_values, in_signal_order
 from .step_lengths import steps_of
@@ -100,10 +96,10 @@ def friction_factors(effects: Sequence[Effect], speed: np.ndarray, force: np.nda
     """
     speed, force = np.broadcast_arrays(np.asarray(speed, float), np.asarray(force, float))
     program, n = compile_program([effects], 0.0), speed.size
-    work = np.zeros((COLUMNS, n))
-    work[SPEED], work[FORCE] = speed.ravel(), force.ravel()
-    apply_friction_laws(0, work.reshape(1, -1), 0, n, 0, n, np.arange(n), program, program.memory(n))
-    return work[FACTOR].reshape(speed.shape), work[VISCOUS].reshape(speed.shape)
+    contacts = TexelContacts.zeros(1, n)
+    contacts.speed[0], contacts.force[0] = speed.ravel(), force.ravel()
+    apply_friction_laws(0, contacts, PointRange(0, 0, n, np.arange(n), 0, 0), program, program.memory(n))
+    return contacts.friction_factor.reshape(speed.shape), contacts.extra_viscosity.reshape(speed.shape)
 
 
 class StepwiseNormalForces:
@@ -124,8 +120,8 @@ class StepwiseNormalForces:
         self.parameters = parameters
         self.program = compile_program([effects], dt)
         self.memory = self.program.memory(points)
-        self._work = np.zeros((COLUMNS, points))
-        self._every = np.arange(points)
+        self._contacts = TexelContacts.zeros(1, points)
+        self._points = PointRange(0, 0, points, np.arange(points), 0, 0)
 
     def step(
         self, length: int, depth: np.ndarray, rate: np.ndarray, slide: np.ndarray | None = None, commit: bool = True
@@ -147,11 +143,10 @@ class StepwiseNormalForces:
         by_depth, by_rate : (n,) float, N/m and N·s/m
             Derivatives of the force.
         """
-        law, n = contact_law(self.parameters), len(depth)
-        slide = np.zeros(n) if slide is None else slide
+        law, contacts = contact_law(self.parameters), self._contacts
+        slide = np.zeros(len(depth)) if slide is None else slide
+        for i in range(len(depth)):
+            write_base_law(contacts, 0, i, TexelMotion(depth[i], rate[i], slide[i], 0.0), law)
         linear = law.exponent == LINEAR_EXPONENT
-        work = self._work.reshape(1, -1)
-        for i in range(n):
-            press(work, 0, n, i, depth[i], rate[i], slide[i], 0.0, law)
-        apply_force_laws(0, length, work, 0, n, 0, n, self._every, 0, 0, linear, self.program, self.memory, commit)
-        return self._work[FORCE].copy(), self._work[SLOPE].copy(), self._work[DAMPING].copy()
+        apply_force_laws(0, length, contacts, self._points, linear, self.program, self.memory, commit)
+        return contacts.force[0].copy(), contacts.by_depth[0].copy(), contacts.by_rate[0].copy()

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...compiled.kernels import inlined, kernel
+from ...effects.engine.compiled_program import TexelMotion, has_effects, may_pull
 from ...laws.contact_law import LINEAR_EXPONENT, ContactLaw, read_law
 from ...laws.friction import bristle_step, deflection_scale, friction_tangent, max_bristle_deflection
 from ...laws.normal_force import linear_tangent, normal_tangent
@@ -29,16 +30,7 @@ from ..contact_rows import (
 )
 from ..solver_model import SolverModel, State
 from ..workspace import SUMS, Workspace
-from .effect_kernels import (
-    STEP,
-    ColumnPlace,
-    PointMotion,
-    apply_effects,
-    has_effects,
-    may_pull,
-    press_texel,
-    write_tangent,
-)
+from .effect_kernels import STEP, apply_effects, lane_range, press_texel, write_tangent
 from .relative_kinematics import motion_values, point_law, relative_motion, row_of, row_velocity, velocity_at
 
 
@@ -162,7 +154,7 @@ def _write_tangents(
         model.points.multipliers,
         model.pairs.sensor[pair],
     )
-    effects, felt = has_effects(sensor, model.effects), workspace.effects.contacts
+    effects, texels = has_effects(sensor, model.effects), workspace.effects.contacts
     motion = motion_values(workspace.pairs.motion[pair])
     first_point = model.pairs.first_point[pair] - model.pairs.first_slot[pair]
     for r in range(contacts.number[pair]):
@@ -175,16 +167,16 @@ def _write_tangents(
         depth = rows[b, DEPTH + lane]
         if effects:
             speed = math.sqrt(max(vx * vx + vy * vy + vz * vz - rate * rate, 0.0))
-            press_texel(felt, ColumnPlace(b, LANES, lane), pair, PointMotion(depth + dt * rate, rate, 0.0, speed), p, model)
+            press_texel(texels, b, lane, pair, TexelMotion(depth + dt * rate, rate, 0.0, speed), p, model)
         else:
             rows[b, NORMAL_BIAS + lane], rows[b, NORMAL_SLOPE + lane] = normal_tangent(depth, rate, dt, p)
     if effects:
         first, left = contacts.first_block[pair], contacts.number[pair]
         for b in range(first, first + (left + LANES - 1) // LANES):
             count = min(left, LANES)
-            apply_effects(pair, STEP, ColumnPlace(b, LANES, 0), count, law, model, memory, workspace)
+            apply_effects(pair, STEP, lane_range(pair, b, 0, count, model, workspace), law, model, memory, workspace)
             for lane in range(count):
-                write_tangent(pair, b, lane, dt, model, felt, rows)
+                write_tangent(pair, b, lane, dt, model, texels, rows)
             left -= LANES
 
 

@@ -11,13 +11,12 @@ import math
 import numpy as np
 
 from ...compiled.kernels import kernel
-from ...effects.engine import compiled_program
-from ...effects.engine.compiled_program import COLUMNS, apply_force_laws
+from ...effects.engine.compiled_program import PointRange, TexelContacts, TexelMotion, apply_force_laws, has_effects
 from ...laws.contact_law import LINEAR_EXPONENT, ContactLaw, read_law
 from ..contact_rows import DEPTH
 from ..solver_model import SolverModel, State
 from ..workspace import EffectWork, Workspace
-from .effect_kernels import STEP, ColumnPlace, PointMotion, has_effects, press_texel
+from .effect_kernels import STEP, press_texel
 from .relative_kinematics import motion_values, point_law, row_of, row_velocity, write_pair_motion
 
 
@@ -45,26 +44,24 @@ def _record_pair(pair: int, dt: float, model: SolverModel, workspace: Workspace)
         vx, vy, vz, rate = row_velocity(b, lane, motion, contacts.deforming[pair], contacts)
         slide = dt * math.sqrt(max(vx * vx + vy * vy + vz * vz - rate * rate, 0.0))
         p, end = point_law(law, model.points.multipliers, point), contacts.rows[b, DEPTH + lane] + dt * rate
-        _record_deepest(point, pair, PointMotion(end, rate, slide, 0.0), p, model, workspace.effects.points)
+        _record_deepest(point, pair, TexelMotion(end, rate, slide, 0.0), p, model, workspace.effects.points)
 
 
 @kernel
 def _record_deepest(
-    point: int, pair: int, motion: PointMotion, law: ContactLaw, model: SolverModel, columns: np.ndarray
+    point: int, pair: int, motion: TexelMotion, law: ContactLaw, model: SolverModel, recorded: TexelContacts
 ) -> None:
     """Record what presses on a point, if nothing presses deeper."""
-    points = columns.shape[1] // COLUMNS
-    if model.pairs.overlap_share[pair] * motion.depth > columns[0, compiled_program.DEPTH * points + point]:
-        press_texel(columns, ColumnPlace(0, points, point), pair, motion, law, model)
+    if model.pairs.overlap_share[pair] * motion.depth > recorded.depth[0, point]:
+        press_texel(recorded, 0, point, pair, motion, law, model)
 
 
 @kernel
 def _commit_sensor(sensor: int, law: ContactLaw, model: SolverModel, work: EffectWork, memory: np.ndarray) -> None:
     """Bring the memory of a sensor's points to the step's end, and clear what was recorded of them."""
-    points, first = len(model.points.frame), model.sensors.first_point[sensor]
-    count, linear = model.sensors.first_point[sensor + 1] - first, law.exponent == LINEAR_EXPONENT
-    columns, numbers = work.points, work.point_numbers
-    apply_force_laws(sensor, STEP, columns, 0, points, first, count, numbers, first, 0, linear, model.effects, memory, True)
-    for column in range(COLUMNS):
-        for i in range(count):
-            columns[0, column * points + first + i] = 0.0
+    first, stop = model.sensors.first_point[sensor], model.sensors.first_point[sensor + 1]
+    recorded, points = work.points, PointRange(0, first, stop - first, work.point_numbers, first, 0)
+    apply_force_laws(sensor, STEP, recorded, points, law.exponent == LINEAR_EXPONENT, model.effects, memory, True)
+    for i in range(first, stop):
+        recorded.depth[0, i] = recorded.rate[0, i] = recorded.slide[0, i] = recorded.speed[0, i] = 0.0
+        recorded.force[0, i] = recorded.by_depth[0, i] = recorded.by_rate[0, i] = 0.0
