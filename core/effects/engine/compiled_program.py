@@ -22,10 +22,13 @@ from numpy.typing import ArrayLike
 
 from ...compiled.kernels import COMPILED, call_address, carray, compiled_callback, kernel
 from ...compiled.struct_reference import by_reference
+from ...laws.contact_law import ContactLaw
 from ...laws.normal_force import damped_force_derivatives, damping_coefficient, elastic_force, elastic_stiffness
 from ...model.effect import Effect
 from .registry import complete_values, in_signal_order
 from .specification import Form, TexelInput
+
+Columns = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
 
 # The loops below are compiled once for each law: `_specialised` copies them with LAW standing for that law.
 LAW: Any = None
@@ -37,7 +40,15 @@ def kernel_template(function: Callable[..., Any]) -> Callable[..., Any]:
 
 
 @kernel_template
-def _law_over_time(force, depth, slide, step, constants, memory, result):
+def _law_over_time(
+    force: np.ndarray,
+    depth: np.ndarray,
+    slide: np.ndarray,
+    step: np.ndarray,
+    constants: np.ndarray,
+    memory: np.ndarray,
+    result: np.ndarray,
+) -> None:
     for i in range(force.shape[0]):
         row = constants[step[i]]
         for point in range(force.shape[1]):
@@ -46,7 +57,9 @@ def _law_over_time(force, depth, slide, step, constants, memory, result):
 
 
 @kernel_template
-def _law_over_points(columns, constants, memory, rows, offset, commit):
+def _law_over_points(
+    columns: Columns, constants: np.ndarray, memory: np.ndarray, rows: np.ndarray, offset: int, commit: bool
+) -> None:
     force, slope, depth, slide = columns
     for i in range(len(rows)):
         texel = TexelInput(force[i], slope[i], depth[i], slide[i])
@@ -54,7 +67,9 @@ def _law_over_points(columns, constants, memory, rows, offset, commit):
 
 
 @kernel_template
-def _friction_law_over_points(columns, constants, memory, rows, offset, commit):
+def _friction_law_over_points(
+    columns: Columns, constants: np.ndarray, memory: np.ndarray, rows: np.ndarray, offset: int, commit: bool
+) -> None:
     speed, force, factor, viscous = columns
     for i in range(len(rows)):
         factor_here, viscous_here = LAW(speed[i], force[i], constants)
@@ -63,7 +78,9 @@ def _friction_law_over_points(columns, constants, memory, rows, offset, commit):
 
 
 @kernel_template
-def _entry(a, b, c, d, constants, memory, rows, count, width, points, state_size, offset, commit):
+def _entry(  # type: ignore[no-untyped-def]  # addresses and numbers, as compiled_callback gives them
+    a, b, c, d, constants, memory, rows, count, width, points, state_size, offset, commit
+):  # fmt: skip
     """Make arrays of the addresses and numbers that :func:`call_address` hands over; `LAW` is one of the loops over points."""
     columns = carray(a, (count,)), carray(b, (count,)), carray(c, (count,)), carray(d, (count,))
     LAW(columns, carray(constants, (width,)), carray(memory, (points, state_size)), carray(rows, (count,)), offset, commit != 0)
@@ -113,7 +130,16 @@ def _number_of(law: Callable[..., Any], loop: Any) -> int:
 if COMPILED:
 
     @kernel
-    def call_law(number, columns, points, constants, row, memory, first_state, commit):
+    def call_law(
+        number: int,
+        columns: Columns,
+        points: PointRange,
+        constants: np.ndarray,
+        row: int,
+        memory: np.ndarray,
+        first_state: int,
+        commit: bool,
+    ) -> None:
         """Let a law act on a range of points.
 
         Parameters
@@ -139,7 +165,16 @@ if COMPILED:
         )  # fmt: skip
 else:
 
-    def call_law(number, columns, points, constants, row, memory, first_state, commit):
+    def call_law(
+        number: int,
+        columns: Columns,
+        points: PointRange,
+        constants: np.ndarray,
+        row: int,
+        memory: np.ndarray,
+        first_state: int,
+        commit: bool,
+    ) -> None:
         """Let a law act on a range of points, without compilation."""
         these = slice(points.first, points.first + points.number)
         rows = points.rows.reshape(-1)[points.first_row : points.first_row + points.number]
@@ -372,7 +407,7 @@ class PointRange(NamedTuple):
 
 
 @kernel
-def write_base_law(contacts, block, point, motion, law):
+def write_base_law(contacts: TexelContacts, block: int, point: int, motion: TexelMotion, law: ContactLaw) -> None:
     """Write the elastic force of a texel without effects, its tangent, and the coefficient of damping.
 
     Parameters
@@ -394,7 +429,16 @@ def write_base_law(contacts, block, point, motion, law):
 
 
 @kernel
-def apply_force_laws(sensor, length, contacts, points, linear, program, memory, commit):
+def apply_force_laws(
+    sensor: int,
+    length: int,
+    contacts: TexelContacts,
+    points: PointRange,
+    linear: bool,
+    program: EffectProgram,
+    memory: np.ndarray,
+    commit: bool,
+) -> None:
     """Turn what :func:`write_base_law` wrote into normal forces and their derivatives, with effects and damping.
 
     Parameters
@@ -428,7 +472,9 @@ def apply_force_laws(sensor, length, contacts, points, linear, program, memory, 
 
 
 @kernel
-def apply_friction_laws(sensor, contacts, points, program, memory):
+def apply_friction_laws(
+    sensor: int, contacts: TexelContacts, points: PointRange, program: EffectProgram, memory: np.ndarray
+) -> None:
     """Write how the effects change friction, given speed and normal force; arguments as in :func:`apply_force_laws`."""
     for i in range(points.first, points.first + points.number):
         contacts.friction_factor[points.block, i], contacts.extra_viscosity[points.block, i] = 1.0, 0.0
@@ -438,13 +484,13 @@ def apply_friction_laws(sensor, contacts, points, program, memory):
 
 
 @kernel
-def has_effects(sensor, program):
+def has_effects(sensor: int, program: EffectProgram) -> bool:
     """Return whether any effect acts on the forces of a sensor."""
     laws = program.first_law[sensor] < program.first_law[sensor + 1]
     return laws or program.first_friction_law[sensor] < program.first_friction_law[sensor + 1]
 
 
 @kernel
-def may_pull(sensor, program):
+def may_pull(sensor: int, program: EffectProgram) -> bool:
     """Return whether the normal force of a sensor can be negative."""
     return program.first_unclipped[sensor] < program.first_law[sensor + 1]
