@@ -117,7 +117,7 @@ class DeformingSurface:
         if np.linalg.det(linear) * np.linalg.det(self.linear) < 0:
             raise SceneError(f"The scale of '{self.name}' turns it inside out at frame {frame}: keep the signs of its scale.")
         values = vertices @ linear.T + offset
-        return values if self.follower is None else self.follower.frames(values, self.name)
+        return values if self.follower is None else self.follower.local_frames(values, self.name)
 
 
 def deforming_surface_of(
@@ -158,7 +158,9 @@ def with_first_shapes(scenario: Scenario, surfaces) -> tuple[tuple[Sensor, ...],
         group = targets if surface.follower is None else sensors
         part = group[surface.index]
         first = (
-            part.mesh.vertices if surface.follower is None else surface.follower.frames(surface.follower.start, surface.name)
+            part.mesh.vertices
+            if surface.follower is None
+            else surface.follower.local_frames(surface.follower.rest_vertices, surface.name)
         )
         group[surface.index] = replace(part, deformation=Deformation(np.zeros(1), first[None]))
     return tuple(sensors), tuple(targets)

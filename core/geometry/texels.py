@@ -12,6 +12,9 @@ from .layout.grid_layout import GridLayout, grid_layout
 from .layout.texture_maps import UVLayout, uv_layout
 from .mesh import TriangleMesh, vertex_areas, vertex_normals
 
+FRAME_POSITION, FRAME_NORMAL, FRAME_TANGENT = slice(0, 3), slice(3, 6), slice(6, 9)
+"""Columns of :attr:`Texels.local_frames`."""
+
 
 @dataclass(frozen=True)
 class Texels:
@@ -43,16 +46,16 @@ class Texels:
         return len(self.position)
 
     @property
-    def frames(self) -> np.ndarray:
+    def local_frames(self) -> np.ndarray:
         """(n, 9) position (m), normal and tangent of each texel."""
         return np.hstack([self.position, self.normal, self.tangent])
 
-    def with_frames(self, frames: np.ndarray) -> Texels:
-        """Return the same texels with other frames, given as in :attr:`frames`; they are made orthonormal."""
-        normal = frames[:, 3:6] / np.linalg.norm(frames[:, 3:6], axis=1, keepdims=True)
-        tangent = frames[:, 6:9] - np.einsum("ij,ij->i", frames[:, 6:9], normal)[:, None] * normal
+    def with_local_frames(self, frames: np.ndarray) -> Texels:
+        """Return the same texels with other frames, given as in :attr:`local_frames`; they are made orthonormal."""
+        normal = frames[:, FRAME_NORMAL] / np.linalg.norm(frames[:, FRAME_NORMAL], axis=1, keepdims=True)
+        tangent = frames[:, FRAME_TANGENT] - np.einsum("ij,ij->i", frames[:, FRAME_TANGENT], normal)[:, None] * normal
         tangent /= np.linalg.norm(tangent, axis=1, keepdims=True)
-        return replace(self, position=frames[:, :3], normal=normal, tangent=tangent)
+        return replace(self, position=frames[:, FRAME_POSITION], normal=normal, tangent=tangent)
 
     @property
     def bitangent(self) -> np.ndarray:
@@ -153,7 +156,7 @@ class DeformedTexels:
     """
 
     def __init__(self, texels: Texels, mesh: TriangleMesh):
-        self._mesh, self._vertex, self.start = mesh, texels.vertex, mesh.vertices
+        self._mesh, self._vertex, self.rest_vertices = mesh, texels.vertex, mesh.vertices
         edges = mesh.triangles[:, [0, 1, 1, 2, 2, 0, 1, 0, 2, 1, 0, 2]].reshape(-1, 2)
         number = np.full(len(mesh.vertices), -1)
         number[texels.vertex] = np.arange(len(texels))
@@ -168,8 +171,8 @@ class DeformedTexels:
         self._cosine = along[chosen]
         self._sine = np.einsum("ij,ij->i", np.cross(texels.normal, across[chosen]), texels.tangent)
 
-    def frames(self, vertices: np.ndarray, name: str) -> np.ndarray:
-        """Return :attr:`Texels.frames` on the mesh in another shape.
+    def local_frames(self, vertices: np.ndarray, name: str) -> np.ndarray:
+        """Return :attr:`Texels.local_frames` on the mesh in another shape.
 
         Parameters
         ----------

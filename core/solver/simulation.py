@@ -125,7 +125,7 @@ class Simulation:
             Of their drives.
         vertices : mapping of target index to (nv, 3) float, metres, in the body's frame, optional
         texels : mapping of sensor index to (n, 9) float, optional
-            See :attr:`.Texels.frames`.
+            See :attr:`.Texels.local_frames`.
         share : float
             Of the way to the next frame, for what is known in between: these come first, in order.
         """

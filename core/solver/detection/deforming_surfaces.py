@@ -136,7 +136,7 @@ class DeformingSurfaces:
             return None
         found = window(known.times, known.values, moments)
         sensor, center = self._sensors[index], self._sensor_center[index]
-        bent = [mounted_texels(replace(sensor, texels=sensor.texels.with_frames(frames))) for frames in found.samples]
+        bent = [mounted_texels(replace(sensor, texels=sensor.texels.with_local_frames(frames))) for frames in found.samples]
         rows = [point_rows(texels, self._points[index], center) for texels in bent]
         return found._replace(samples=np.stack(rows))
 

@@ -85,7 +85,7 @@ def test_a_sensor_that_bends_as_if_it_moved_feels_as_if_it_moved():
     turned = np.einsum("tij,qvj->tqvi", rotations, frames)
     turned[:, 0] += shift[:, None]
     values = np.concatenate([turned[:, 0], turned[:, 1], turned[:, 2]], axis=2)
-    bent = replace(sensor, texels=sensor.texels.with_frames(values[0]), deformation=Deformation(times, values))
+    bent = replace(sensor, texels=sensor.texels.with_local_frames(values[0]), deformation=Deformation(times, values))
     found, expected = run(replace(moving, bodies=(Body("pad", Motion.at_rest()), resting), sensors=(bent,))), run(moving)
     a, b = found.sensors["pad"], expected.sensors["pad"]
     assert b.contact.any(axis=1).all()
@@ -152,7 +152,7 @@ def test_a_free_cube_rests_on_a_pad_that_heaves():
     """A pad whose texels rise by 2 mm within 0.5 s carries the cube up with them; then the weight is what it was."""
     scenario = cube_on_pad(1.0, dt=1e-3, frames=48)
     sensor = scenario.sensors[0]
-    frames = np.tile(sensor.texels.frames, (3, 1, 1))
+    frames = np.tile(sensor.texels.local_frames, (3, 1, 1))
     frames[1:, :, 2] += 0.002
     bent = replace(sensor, deformation=Deformation(np.array([0.0, 0.5, 2.0]), frames))
     lifted, rested = run(replace(scenario, sensors=(bent,))), run(scenario)
@@ -170,7 +170,7 @@ def test_learning_shapes_frame_by_frame_gives_the_same_bits():
 
     def known(n):
         target = replace(scenario.targets[0], deformation=Deformation(times[:n], values[:n]))
-        texels = scenario.sensors[0].texels.with_frames(frames[0])
+        texels = scenario.sensors[0].texels.with_local_frames(frames[0])
         sensor = replace(scenario.sensors[0], texels=texels, deformation=Deformation(times[:n], frames[:n]))
         return replace(scenario, targets=(target,), sensors=(sensor,), frame_end=8)
 
