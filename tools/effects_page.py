@@ -98,10 +98,14 @@ def picture(path: Path) -> None:
     from palpate.core.effects.engine.registry import library
     from palpate.core.figures.figure_canvas import new_figure, save_figure
 
-    figure = new_figure(10.0, 11.6)
-    grid = figure.subplots(5, 4)
-    for axes, kind in zip(grid.ravel(), library().values(), strict=True):
-        DRAWN[kind.name](axes, kind)
+    kinds = list(library().values())
+    rows = -(-len(kinds) // 4)
+    figure = new_figure(10.0, 2.32 * rows)
+    grid = figure.subplots(rows, 4)
+    for axes in grid.ravel()[len(kinds) :]:
+        axes.set_axis_off()
+    for axes, kind in zip(grid.ravel(), kinds, strict=False):
+        DRAWN.get(kind.name, _over_time(_LONG, _HOLD))(axes, kind)
         axes.set_title(kind.title, fontsize=9.5, loc="left", color="#1c2430")
     figure.subplots_adjust(left=0.055, right=0.985, top=0.972, bottom=0.04, wspace=0.34, hspace=0.5)
     save_figure(figure, path, 110)
