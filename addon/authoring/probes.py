@@ -47,46 +47,51 @@ def add_probe(context, obj, shape: str, size: float, depth: float):
     texels, unit = report.texels, report.metres
     extent = float(np.ptp(texels.position, axis=0).max())
     size, depth = size or extent / 3, depth or report.reach / 4
-    weights = texels.area / texels.area.sum()
-    mean = weights @ texels.normal
-    mean = mean / np.linalg.norm(mean) if np.linalg.norm(mean) > 0.1 else texels.normal[0]
-    flat = np.eye(3) - np.outer(mean, mean)
-    across = np.linalg.norm((texels.position - weights @ texels.position) @ flat, axis=1)
-    facing = texels.normal @ mean > 0.5 * (texels.normal @ mean).max()  # not those on the back of a closed sensor
-    foot = texels.position[np.argmin(np.where(facing, across, np.inf))]
+    foot, mean_normal = _middle(texels)
     location, quaternion, _ = transforms.decompose(transforms.as_array(obj.matrix_world))
     rotation = transforms.rotation(quaternion)
-    normal, ground = rotation @ mean, location + rotation @ foot / unit
+    normal, ground = rotation @ mean_normal, location + rotation @ foot / unit
     probe = bpy.data.objects.new("Probe", _mesh(shape, size / unit))
-    _home(context.scene, obj).objects.link(probe)
+    _collection_of(context.scene, obj).objects.link(probe)
     turn = Vector(normal).to_track_quat("Z", "Y")
     probe.rotation_euler = turn.to_euler()
     around = (texels.position - foot) / unit @ rotation.T @ transforms.as_array(turn.to_matrix())
-    ground = ground + _meeting(probe.data, around, size / unit) * normal
+    ground = ground + _first_contact(probe.data, around, size / unit) * normal
     _animate(context.scene, probe, ground, normal, size / unit, depth / unit)
     probe.display_type = "WIRE"  # the texels under it are what one wants to see
     probe.palpate.role = "TARGET"
     return probe
 
 
-def _home(scene, obj):
-    """The collection that the sensor is in: the probe is shown, and bakes, where the sensor does."""
+def _middle(texels) -> tuple[np.ndarray, np.ndarray]:
+    """Return the position of the texel in the middle of a sensor (3,), metres, and the mean normal of all texels (3,)."""
+    weights = texels.area / texels.area.sum()
+    mean = weights @ texels.normal
+    mean = mean / np.linalg.norm(mean) if np.linalg.norm(mean) > 0.1 else texels.normal[0]
+    flat = np.eye(3) - np.outer(mean, mean)
+    across = np.linalg.norm((texels.position - weights @ texels.position) @ flat, axis=1)
+    facing = texels.normal @ mean > 0.5 * (texels.normal @ mean).max()  # not those on the back of a closed sensor
+    return texels.position[np.argmin(np.where(facing, across, np.inf))], mean
+
+
+def _collection_of(scene, obj):
+    """Return the collection of the sensor, so that the probe is shown and baked where the sensor is."""
     return next((found for found in obj.users_collection if found.is_editable), scene.collection)
 
 
-def _meeting(mesh, points: np.ndarray, size: float) -> float:
-    """How much higher than `size` above the foot the probe's middle is when it first touches one of the texels.
+def _first_contact(mesh, points: np.ndarray, size: float) -> float:
+    """Return how much higher than `size` the probe's middle is above the foot when the probe first touches a texel.
 
     Parameters
     ----------
     mesh : Mesh
-        Of the probe, which comes down along its own z.
+        Mesh of the probe, which moves down along its own z axis.
     points : (n, 3) float
-        Texels relative to the foot, along the probe's axes.
+        Positions of texels relative to the foot, along the probe's axes.
     """
     tree = BVHTree.FromPolygons([vertex.co for vertex in mesh.vertices], [face.vertices for face in mesh.polygons])
     under = Vector((0.0, 0.0, -10.0 * size))
-    heights = [0.0]  # above the foot itself
+    heights = [0.0]  # the foot itself
     for x, y, z in points:
         place = tree.ray_cast(under + Vector((x, y, 0.0)), Vector((0.0, 0.0, 1.0)))[0]
         if place is not None:
@@ -95,6 +100,7 @@ def _meeting(mesh, points: np.ndarray, size: float) -> float:
 
 
 def _animate(scene, probe, ground: np.ndarray, normal: np.ndarray, size: float, depth: float) -> None:
+    """Keyframe the probe: it approaches the ground point along the normal, presses, holds and leaves; Blender units."""
     first, length = scene.frame_start, scene.frame_end - scene.frame_start
     clear = max(2.0 * depth, 0.2 * size)
     for share, height in ((0.0, clear), (APPROACH, 0.1 * depth), (PRESS, -depth), (HOLD, -depth), (1.0, clear)):
@@ -103,6 +109,7 @@ def _animate(scene, probe, ground: np.ndarray, normal: np.ndarray, size: float, 
 
 
 def _mesh(shape: str, size: float):
+    """Return the mesh of a probe, Blender units."""
     mesh, data = bmesh.new(), bpy.data.meshes.new("Probe")
     if shape == "BOX":
         bmesh.ops.create_cube(mesh, size=2 * size)

@@ -63,7 +63,7 @@ class LiveRun:
         """Return the sum of the normal forces at a computed frame, by sensor, N."""
         if number not in self._total_forces:
             sensors = self.frames[number].sensors
-            self._total_forces[number] = {name: float(felt.normal_force.sum()) for name, felt in sensors.items()}
+            self._total_forces[number] = {name: float(readings.normal_force.sum()) for name, readings in sensors.items()}
         return self._total_forces[number]
 
 
