@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Bounding-volume tree over triangles, and the one question it answers: where does a texel's segment enter an object?
+"""Bounding-volume tree over triangles, which answers one query: where does a texel's segment enter an object?
 
 The tree is a list in depth-first order: child follows parent, and `skip` says where to go on when a box is missed, so that a
 query needs no stack and allocates nothing. Boxes are tested against the box of what is left of the segment, which is

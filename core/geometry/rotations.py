@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Rigid bodies: poses over time, rotations, twists, and the linear algebra that moves the free ones."""
+"""Rotations and twists of rigid bodies, and the small linear algebra of their dynamics."""
 
 from __future__ import annotations
 
@@ -86,11 +86,11 @@ def rotate_quaternion(quaternion: np.ndarray, wx: float, wy: float, wz: float) -
 
 @kernel
 def write_twist(velocity: np.ndarray, dt: float, twist: np.ndarray) -> None:
-    """How the points of a body move over a step that turns it by the angle ``|ω| dt``.
+    """Write how the points of a body move over a step that rotates it by the angle ``|ω| dt``.
 
     The point at arm r, seen from the step's beginning, moves by ``dt (V + W r)`` with ``W = (exp([ω dt]×) - 1) / dt``: the
-    chord of its arc, to rounding. With ``ω × r`` in its place two bodies turning as one would drift apart by the square of the
-    angle, and their bristles with them.
+    chord of its arc, to rounding. With ``ω × r`` instead, two bodies that rotate together would drift apart by the square of
+    the angle, and their bristles with them.
 
     Parameters
     ----------
@@ -154,7 +154,7 @@ def write_twist_map(rotation: np.ndarray, gx: float, gy: float, gz: float, sign:
 
 @kernel
 def project_on_axis(axis: np.ndarray, out: np.ndarray) -> None:
-    """Leave in the first column of a twist map what a body's speed along `axis` (3,) does."""
+    """Replace the first column of a twist map by its product with a body's `axis` (3,), for the speed along that axis."""
     for i in range(6):
         out[i, 0] = axis[0] * out[i, 0] + axis[1] * out[i, 1] + axis[2] * out[i, 2]
 

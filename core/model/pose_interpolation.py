@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where keyframed bodies are between the samples of their motion."""
+"""Poses of keyframed bodies between the samples of their motion."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ def poses_at(motion: Motion, times: np.ndarray, interpolation: str = "linear") -
     ``linear``: linear in position, constant angular velocity.
 
     ``smooth``: a cubic in position and a cumulative cubic Bézier curve of rotations (Kim, Kim and Shin, SIGGRAPH 1995), with
-    continuous velocity. The velocity at a sample is that of the parabola through it and the two samples before, so that
-    nothing has to be known of the future: the timeline, which learns a motion frame by frame, gives the numbers of a bake.
+    continuous velocity. The velocity at a sample is that of the parabola through it and the two samples before. No later
+    sample is needed, so the timeline, which receives a motion frame by frame, gives the same numbers as a bake.
 
     Parameters
     ----------

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The state of a running simulation as plain arrays and JSON, and back into a new simulation of the same scenario.
 
-Nothing is listed here: whatever a simulation holds is walked through, so that what joins it later (an effect's memory, a
-controller) is kept as well. Descriptions, which do not change, are left out: frozen dataclasses and functions. There is no
-pickle in it: reading the file of somebody else runs nothing of theirs.
+All attributes of a simulation are walked through, so that a later addition (an effect's memory, a controller) is saved without
+a change here. Descriptions, which do not change, are left out: frozen dataclasses and functions. The file contains no pickle:
+reading it runs no code from it.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 _FIXED = {"scenario", "_model", "_tree", "_closed", "_center", "_motions", "_detection"}
-"""What a new simulation of the same scenario has already."""
+"""Attributes that a new simulation of the same scenario has already."""
 _LEFT_OUT = {"left": "out"}
 
 
@@ -29,7 +29,7 @@ def pack(simulation: Any) -> dict[str, np.ndarray]:
 
 
 def unpack(simulation: Any, packed: Mapping[str, np.ndarray]) -> None:
-    """Bring a new simulation of the same scenario into a packed state.
+    """Set a new simulation of the same scenario to a packed state.
 
     Raises
     ------
@@ -69,7 +69,7 @@ def _is_description(value: Any) -> bool:
 
 
 def _unpack(now: Any, tree: Any, packed: Mapping[str, np.ndarray]) -> Any:
-    """Return what takes the place of `now`; arrays of the same shape keep their memory, which others may look at."""
+    """Return the unpacked value of `now`; arrays of the same shape keep their memory, which other objects may share."""
     if not isinstance(tree, dict):
         return type(now)(tree) if isinstance(now, np.generic) else tree
     if tree == _LEFT_OUT:

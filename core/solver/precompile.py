@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Compile the solver before it is needed: a tiny scene is solved once, and numba keeps what it compiled.
 
-That takes a minute, once for each version. Beside Blender's window a process of its own does it (:func:`main`), since a thread
+That takes a minute, once for each version. While Blender's window is open a process of its own does it (:func:`main`): a thread
 would share the interpreter with the window, and could not be stopped when Blender closes.
 """
 
@@ -49,7 +49,7 @@ def _numba() -> str:
 
 
 def is_needed() -> bool:
-    """Whether the solver's first run would have to wait for the compiler. Imports nothing heavy."""
+    """True when the solver's first run would have to wait for the compiler. This imports nothing heavy."""
     if _done or os.environ.get("PALPATE_NUMBA", "1") == "0":
         return False
     try:
@@ -75,7 +75,7 @@ def compile_solver(report: Report = lambda done, total: None) -> None:
         with _PeriodicReport(lambda: report(sum(bool(kernel.signatures) for kernel in list(KERNELS)), max(1, len(KERNELS)))):
             _solve()
         _done = True
-        with suppress(OSError):  # in a folder that must not be written to numba chooses another, and we ask anew next time
+        with suppress(OSError):  # where the folder is read-only numba chooses another one, and this is asked again next time
             cache_folder().mkdir(parents=True, exist_ok=True)
             completion_file().touch()
 
@@ -88,7 +88,7 @@ def compile_solver_with_notice() -> None:
 
 
 class _PeriodicReport:
-    """Does something twice a second meanwhile."""
+    """Calls a function twice a second while its block runs."""
 
     def __init__(self, look: Callable[[], None]):
         self._look, self._over = look, threading.Event()
@@ -107,7 +107,7 @@ class _PeriodicReport:
 
 
 def _solve() -> None:
-    """Solve a frame of a scene that goes through every kernel, alone and with a helper."""
+    """Solve a frame of a scene that uses every kernel, with one thread and with a helper."""
     from .simulation import Simulation
 
     for threads in (1, 2):
@@ -156,15 +156,15 @@ def scenario() -> Scenario:
 
 
 def _end_with_parent() -> None:
-    """Leave when whoever started us is gone: then the pipe on stdin is closed, however it went."""
+    """End this process when its parent is gone: the pipe on stdin is closed then, however the parent ended."""
     sys.stdin.buffer.read()
     os._exit(1)
 
 
 def main() -> None:
-    """Compile in a process of its own; a line of JSON on stdout twice a second says how far it is.
+    """Compile in a process of its own; a line of JSON on stdout twice a second tells the progress.
 
-    When that is noted as done, the laws of effects follow, which take a second each when they are first used.
+    When the solver is noted as compiled, the laws of effects follow, each of which takes a second when it is first used.
     """
     threading.Thread(target=_end_with_parent, daemon=True).start()
     compile_solver(lambda done, total: print(json.dumps({"done": done, "total": total}), flush=True))

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Run by its path, in a process beside Blender: compile the solver (:mod:`.precompile`).
+"""Compile the solver (:mod:`.precompile`) in a process beside Blender; this file is run by its path.
 
     python -I precompile_process.py PACKAGE SYS_PATH_AS_JSON
 
-What numba keeps holds the names of modules, so the package is loaded under the very name that it has in Blender, as in
-``bl_ext.user_default.palpate``, whose parents only exist there.
+Numba's cache contains names of modules, so the package is loaded under the name that it has in Blender, as in
+``bl_ext.user_default.palpate``. The parents of that name only exist in Blender; here they are empty packages.
 """
 
 import importlib.util

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How long a substep may be, and why."""
+"""Advice on the length of a substep, with its reason."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the drives are told, step by step: their targets over time, or what their controllers make of a sensor's values."""
+"""Commands to the actuators, step by step: their targets over time, or the output of controllers that read a sensor."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from .grip_controller import Command, GripControl, TactileData
 
 
 class DriveCommands:
-    """The targets and controllers of a scenario's drives on their way through time.
+    """The targets and controllers of a scenario's actuators.
 
     Parameters
     ----------
@@ -38,7 +38,7 @@ class DriveCommands:
         }
 
     def extend(self, time: float, targets: Mapping[int, float]) -> None:
-        """Append what the targets of some bodies' drives will be."""
+        """Append the next targets of some bodies' actuators."""
         for body, value in targets.items():
             if body in self._targets and self._targets[body].times[-1] < time - 1e-9:
                 self._targets[body] = self._targets[body].extended(time, value)
@@ -46,14 +46,14 @@ class DriveCommands:
     def control_intervals(
         self, times: np.ndarray, dt: float, read: Callable[[int], np.ndarray]
     ) -> Iterator[tuple[int, int, np.ndarray]]:
-        """Yield the steps of a frame in stretches during which no controller is asked.
+        """Yield the steps of a frame in intervals during which no controller is updated.
 
         Parameters
         ----------
         times : (steps + 1,) float, seconds
         dt : float, seconds
         read : callable
-            Returns the (n,) values of a sensor, by its index, where the simulation has come to.
+            Returns the (n,) values of a sensor, by its index, in the present state.
 
         Yields
         ------

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How a body turns that nothing touches: its angular momentum and its energy both stay what they are (kernels).
+"""Rotation of a body that nothing touches: its angular momentum and its energy are both conserved (kernels).
 
-A body with three different moments of inertia tumbles: its angular velocity changes although nothing acts. To turn it by the
-angular velocity of a step's beginning adds energy in every step, until it spins about its thinnest axis with twice of it. The
-midpoint rule of Simo and Wong (1991, ALGO_C1) keeps both: the mean of the angular velocities at a step's ends is what a Cayley
-map turns the body by.
+A body with three different moments of inertia tumbles: its angular velocity changes although nothing acts. Rotating it by the
+angular velocity at a step's beginning would add energy in every step, until it spins about its thinnest axis with twice as
+much. The midpoint rule of Simo and Wong (1991, ALGO_C1) conserves both: a Cayley map rotates the body by the mean of the
+angular velocities at the step's ends.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import numpy as np
 from ...compiled.kernels import kernel
 
 LARGEST_TURN = 0.25
-"""Radians by which the midpoint rule turns a body at once: its rounds end after a few."""
+"""Largest rotation of one midpoint step, radians: its iterations then converge after a few."""
 
 
 @kernel
@@ -31,7 +31,7 @@ def matrix_times_vector(matrix: np.ndarray, x: float, y: float, z: float) -> tup
 
 @kernel
 def to_body_axes(rotation: np.ndarray, x: float, y: float, z: float) -> tuple[float, float, float]:
-    """A vector of the world in the axes of a body with the given rotation."""
+    """Return a vector of the world in the axes of a body with the given rotation."""
     return (
         rotation[0, 0] * x + rotation[1, 0] * y + rotation[2, 0] * z,
         rotation[0, 1] * x + rotation[1, 1] * y + rotation[2, 1] * z,
@@ -41,7 +41,7 @@ def to_body_axes(rotation: np.ndarray, x: float, y: float, z: float) -> tuple[fl
 
 @kernel
 def _inverse_cayley_rotation(vx: float, vy: float, vz: float, jx: float, jy: float, jz: float) -> tuple[float, float, float]:
-    """Turn `v` back by the Cayley map of 2 `j`: the length of `j` is the tangent of half the angle."""
+    """Rotate `v` by the inverse Cayley map of 2 `j`: the length of `j` is the tangent of half the angle."""
     cx, cy, cz = vy * jz - vz * jy, vz * jx - vx * jz, vx * jy - vy * jx
     scale = 2.0 / (1.0 + jx * jx + jy * jy + jz * jz)
     return (
@@ -53,7 +53,7 @@ def _inverse_cayley_rotation(vx: float, vy: float, vz: float, jx: float, jy: flo
 
 @kernel
 def _half_rotation(lx: float, ly: float, lz: float, dt: float, inverse: np.ndarray) -> tuple[float, float, float]:
-    """Turn over a short step, as the tangent of half the angle along its axis; `l` is the angular momentum. Body axes."""
+    """Rotation over a short step, as the tangent of half the angle along its axis; `l` is the angular momentum. Body axes."""
     wx, wy, wz = matrix_times_vector(inverse, lx, ly, lz)
     jx, jy, jz = 0.5 * dt * wx, 0.5 * dt * wy, 0.5 * dt * wz
     for _ in range(40):
@@ -71,7 +71,7 @@ def _half_rotation(lx: float, ly: float, lz: float, dt: float, inverse: np.ndarr
 def mean_angular_velocity(
     rotation: np.ndarray, inverse: np.ndarray, lx: float, ly: float, lz: float, dt: float
 ) -> tuple[float, float, float]:
-    """Angular velocity that turns a body over a step as it tumbles when nothing acts.
+    """Mean angular velocity of a body over a step in which nothing acts on it.
 
     Parameters
     ----------

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Controllers of a gripper, written against tactile data and nothing of the simulation, so that they can drive real hardware.
+"""Controllers of a gripper. They use tactile data and nothing of the simulation, so that they can drive real hardware.
 
-A controller is given what the sensor's electronics give, an array of values, at its own pace, and answers with a
-:class:`Command` to the drive of the finger. In a simulation :mod:`.simulation` calls it; on a robot, a loop of five lines does:
+A controller receives an array of values from the sensor's electronics, at its own rate, and returns a :class:`Command` to the
+drive of the finger. In a simulation :mod:`.drive_commands` calls it; on a robot, a loop of five lines does:
 
     controller = GripControl(speed=0.05, max_force=40.0)
     while True:
@@ -43,7 +43,7 @@ class TactileData:
 
 
 class Command(NamedTuple):
-    """What a drive is told; positive is the direction in which the finger closes.
+    """Command to a drive; positive is the direction in which the finger closes.
 
     Its force is ``push + damping (velocity - speed)``, and while `homing` also a spring to where it started.
 
@@ -64,10 +64,9 @@ class Command(NamedTuple):
 class GripControl:
     """Velocity until first touch, then force control on the tactile sum (paper, section 5.2.2 and Fig. 12).
 
-    After the first touch the drive pushes with the wanted force and damps its own motion; what the sensor's sum still lacks
-    (a curved object presses the texels sideways as well, a guide has friction) an integral adds slowly. Nothing of the
-    object's or the sensor's stiffness has to be known. When the touch is lost it approaches again; a target of zero or less
-    opens the finger.
+    After the first touch the drive pushes with the wanted force and damps its own motion. An integral slowly adds what the
+    sensor's sum still lacks: a curved object presses the texels sideways as well, and a guide has friction. The stiffness of
+    object and sensor need not be known. When the touch is lost the finger approaches again; a target of zero or less opens it.
 
     Attributes
     ----------
