@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 import bpy
 import numpy as np
@@ -16,12 +15,10 @@ import numpy as np
 from ...core.errors import PalpateError, SceneError
 from ...core.geometry.mesh import TriangleMesh
 from ...core.geometry.texels import Texels
+from ...core.solver.time_step_adviser import Advice, advise
 from ..scene import attached_objects, mesh_arrays, participants, scene_fingerprint, scene_reader, sensor_reader
-from ..session import dependencies, session_state, transforms, units
+from ..session import session_state, transforms, units
 from . import laid_sensors, problems
-
-if TYPE_CHECKING:
-    from ...core.solver.time_step_adviser import Advice
 
 DELAY = 0.2
 """Seconds from a change to the new report, besides three times the duration of the last computation."""
@@ -165,7 +162,4 @@ def _advice(scene, depsgraph) -> tuple[Advice | None, str]:
         return None, str(error)
     except PalpateError:  # a problem of some sensor: its own report names it
         return None, ""
-    dependencies.choose_numba_cache()
-    from ...core.solver.time_step_adviser import advise  # loads numba, which enabling the add-on must not
-
     return advise(scenario), ""

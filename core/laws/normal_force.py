@@ -15,7 +15,6 @@ from __future__ import annotations
 import numpy as np
 
 from ..compiled.kernels import inlined, kernel
-from ..model.sensor_parameters import HUNT_CROSSLEY, SensorParameters
 from .contact_law import LINEAR_EXPONENT, ContactLaw
 
 
@@ -124,12 +123,3 @@ def elastic_energy(stiffness: np.ndarray, depth: np.ndarray, exponent: float) ->
     """
     power = 1.0 if exponent == LINEAR_EXPONENT else exponent
     return float(np.sum(stiffness * depth ** (power + 1.0))) / (power + 1.0)
-
-
-def largest_stiffness_and_damping(parameters: SensorParameters) -> tuple[float, float]:
-    """Return stiffness (N/m) and damping (N·s/m) along the normal where they are largest within the maximum penetration."""
-    p = parameters
-    if p.normal_law != HUNT_CROSSLEY:
-        return p.k, p.cn
-    stiffness = p.k * p.exponent * p.max_penetration ** (p.exponent - 1.0)
-    return stiffness, 1.5 * p.dissipation * p.k * p.max_penetration**p.exponent

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..laws.normal_force import largest_stiffness_and_damping
+from ..laws.contact_stiffness import largest_stiffness_and_damping
 from ..model.scenario import Scenario
 from ..model.sensor import Sensor
 
