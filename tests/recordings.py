@@ -52,7 +52,7 @@ def recording_of(texels, frames=10):
         times=np.arange(frames) / 24,
         sensors={"pad": sensor},
         body_names=("pad",),
-        poses=np.zeros((frames, 1, 7)),
+        poses=np.tile([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0], (frames, 1, 1)),
         velocities=np.zeros((frames, 1, 6)),
         dt=1e-4,
     )

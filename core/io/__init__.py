@@ -7,6 +7,7 @@ that a bake can be exported to are in the package ``export``, because some of th
 """
 
 __all__ = [
+    "bake_check",
     "bake_folder",
     "bake_reader",
     "csv_table",

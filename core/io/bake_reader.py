@@ -13,7 +13,8 @@ import numpy as np
 from ..errors import FileError
 from ..geometry.texels import Texels
 from ..model.recording import Recording
-from ..model.sensor_parameters import SENSOR_PARAMETERS, Painted, SensorParameters
+from ..model.sensor_parameters import Painted, SensorParameters
+from .bake_check import SensorFiles, check_bake, checked_parameters
 from .bake_folder import MANIFEST_NAME, RECORDING_NAME, Manifest, read_manifest
 from .recording_npz import load_recording
 from .sensor_npz import SENSOR_NAME, load_sensor
@@ -80,21 +81,25 @@ def read_sensors(folders: Sequence[Path]) -> Bake:
                 f"The sensors '{first.sensor}' and '{manifest.sensor}' in '{folder.parent}' were baked from different scenes: "
                 "bake again, or choose the folder of one sensor."
             )
-    recordings = [load_recording(folder / RECORDING_NAME) for folder in folders]
-    sensors = {name: sensor for recording in recordings for name, sensor in recording.sensors.items()}
-    read = {manifest.sensor: load_sensor(folder / SENSOR_NAME) for folder, manifest in manifests.items()}
-    return Bake(
-        recording=replace(recordings[0], sensors=sensors),
-        texels={name: texels for name, (texels, _) in read.items()},
-        painted={name: painted for name, (_, painted) in read.items()},
-        parameters={
-            manifest.sensor: SensorParameters(
-                **{key: value for key, value in manifest.parameters.items() if key in SENSOR_PARAMETERS}
+    read: dict[str, SensorFiles] = {}
+    for folder, manifest in manifests.items():
+        if manifest.sensor in read:
+            raise FileError(
+                f"'{folder}' and '{read[manifest.sensor].folder}' both hold the sensor '{manifest.sensor}': "
+                "move one of them out of the bake folder."
             )
-            for manifest in manifests.values()
-        },
-        folders={manifest.sensor: folder for folder, manifest in manifests.items()},
-        manifests={manifest.sensor: manifest for manifest in manifests.values()},
+        recording, (texels, painted) = load_recording(folder / RECORDING_NAME), load_sensor(folder / SENSOR_NAME)
+        read[manifest.sensor] = SensorFiles(folder, manifest, recording, texels, painted)
+    parameters = {name: checked_parameters(files.folder, files.manifest) for name, files in read.items()}
+    check_bake(read)
+    sensors = {name: files.recording.sensors[name] for name, files in read.items()}
+    return Bake(
+        recording=replace(next(iter(read.values())).recording, sensors=sensors),
+        texels={name: files.texels for name, files in read.items()},
+        painted={name: files.painted for name, files in read.items()},
+        parameters=parameters,
+        folders={name: files.folder for name, files in read.items()},
+        manifests={name: files.manifest for name, files in read.items()},
     )
 
 

@@ -1,0 +1,277 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Checks of a bake's content as it is read: whether the files of a sensor's folder are whole and belong together.
+
+A file that opens may still hold what was never baked: an array of another shape or type, a NaN, a frame twice, the texels of
+another sensor. Every such fault is found here once, so that whoever draws or exports a bake may rely on it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..errors import FileError, PalpateError
+from ..geometry.layout.grid_layout import GridLayout
+from ..geometry.layout.texture_maps import UVLayout
+from ..geometry.texels import Texels
+from ..model.recording import Recording, SensorRecording
+from ..model.sensor_parameters import SENSOR_PARAMETERS, Painted, SensorParameters
+from .bake_folder import MANIFEST_NAME, RECORDING_NAME, Manifest
+from .sensor_npz import SENSOR_NAME
+
+MOST_PIXELS = 1 << 26
+"""Pixels of a tactile image above which its size is taken for damage."""
+UNIT_TOLERANCE = 1e-6
+"""By how much the length of a unit vector or a quaternion may differ from one."""
+
+_NUMBER, _WHOLE, _FLAG = "f", "iu", "b"
+"""Kinds of array types (:attr:`numpy.dtype.kind`)."""
+_PER_TEXEL = {"normal_force": (), "shear": (2,), "friction": (), "depth": (), "slip": (), "contact": (), "reading": ()}
+"""Arrays of a recording with a value per frame and texel, and the shape of each value."""
+
+
+@dataclass(frozen=True)
+class SensorFiles:
+    """What was read from the folder of one sensor.
+
+    Attributes
+    ----------
+    folder : Path
+    manifest : Manifest
+    recording : Recording
+        From the folder's ``recording.npz``.
+    texels : Texels
+    painted : Painted
+    """
+
+    folder: Path
+    manifest: Manifest
+    recording: Recording
+    texels: Texels
+    painted: Painted
+
+
+def check_bake(sensors: Mapping[str, SensorFiles]) -> None:
+    """Check the files of all sensors that are read together, each by itself and against the others.
+
+    Parameters
+    ----------
+    sensors : mapping of str to SensorFiles
+        By sensor name.
+
+    Raises
+    ------
+    FileError
+        A file is damaged or belongs to another bake; the message names it.
+    """
+    for files in sensors.values():
+        check_sensor_files(files)
+    if not sensors:
+        return
+    first, *others = sensors.values()
+    for other in others:
+        for name in ("frames", "times", "poses", "velocities"):
+            if not np.array_equal(getattr(first.recording, name), getattr(other.recording, name)):
+                raise FileError(
+                    f"'{other.folder / RECORDING_NAME}' and '{first.folder / RECORDING_NAME}' differ in '{name}', so they are "
+                    "not of the same bake: bake again, or choose the folder of one sensor."
+                )
+
+
+def check_sensor_files(files: SensorFiles) -> None:
+    """Check the manifest, the texels and the recording of one sensor; raises FileError as :func:`check_bake` does."""
+    for name, check in ((MANIFEST_NAME, _check_manifest), (SENSOR_NAME, _check_texels), (RECORDING_NAME, _check_recording)):
+        try:
+            check(files)
+        except _Fault as fault:
+            raise FileError(f"'{files.folder / name}' is damaged ({fault}): bake again.") from fault
+
+
+def checked_parameters(folder: Path, manifest: Manifest) -> SensorParameters:
+    """Return the parameters that a manifest holds; a parameter that an older version did not have keeps its default.
+
+    Raises
+    ------
+    FileError
+        A value is of another kind than its parameter, or has no meaning.
+    """
+    values: dict[str, Any] = {}
+    for name, specification in SENSOR_PARAMETERS.items():
+        if name in manifest.parameters:
+            try:
+                values[name] = specification.read(manifest.parameters[name])
+            except OverflowError:
+                values[name] = None
+            if values[name] is None:
+                raise FileError(
+                    f"'{folder / MANIFEST_NAME}' is damaged ({name} is {manifest.parameters[name]!r:.60} and not "
+                    f"{specification.wanted}): bake again."
+                )
+    parameters = SensorParameters(**values)
+    try:
+        parameters.check(manifest.sensor)
+    except PalpateError as error:
+        raise FileError(f"'{folder / MANIFEST_NAME}' is damaged: {error}") from error
+    return parameters
+
+
+class _Fault(Exception):
+    """What is wrong with a file, as words for the brackets of a message."""
+
+
+def _require(good: object, fault: str) -> None:
+    if not good:
+        raise _Fault(fault)
+
+
+def _check_array(name: str, array: object, kinds: str, shape: tuple[int | None, ...]) -> None:
+    """Require an array of one of some kinds and of a shape, in which None is any length, without NaN or infinite values."""
+    _require(isinstance(array, np.ndarray), f"'{name}' is no array")
+    assert isinstance(array, np.ndarray)
+    _require(array.dtype.kind in kinds and array.dtype.itemsize <= 8, f"'{name}' has the type {array.dtype}")
+    fits = array.ndim == len(shape) and all(want is None or want == got for want, got in zip(shape, array.shape, strict=True))
+    wanted = " × ".join("any" if side is None else str(side) for side in shape)
+    _require(fits, f"'{name}' has the shape {' × '.join(map(str, array.shape)) or 'of a single value'} and not {wanted}")
+    if array.dtype.kind == _NUMBER:
+        _require(np.isfinite(array).all(), f"'{name}' has values that are not finite")
+
+
+# --- the manifest
+
+
+def _check_manifest(files: SensorFiles) -> None:
+    manifest = files.manifest
+    _require(manifest.sensor, "the sensor has no name")
+    _require(manifest.fps > 0, f"fps is {manifest.fps:g}")
+    _require(manifest.dt > 0, f"dt is {manifest.dt:g}")
+    _require(manifest.frame_start <= manifest.frame_end, f"frames run from {manifest.frame_start} to {manifest.frame_end}")
+    height, width = manifest.shape
+    _require(height > 0 and width > 0 and height * width <= MOST_PIXELS, f"shape is {height} × {width} pixels")
+
+
+# --- texels
+
+
+def _check_texels(files: SensorFiles) -> None:
+    texels, manifest = files.texels, files.manifest
+    _require(isinstance(texels.position, np.ndarray) and texels.position.ndim == 2, "'position' is no table")
+    count = len(texels.position)
+    _require(count > 0, "it has no texels")
+    _check_array("vertex", texels.vertex, _WHOLE, (count,))
+    for name in ("position", "normal", "tangent"):
+        _check_array(name, getattr(texels, name), _NUMBER, (count, 3))
+    _check_array("area", texels.area, _NUMBER, (count,))
+    _require((texels.vertex >= 0).all(), "'vertex' has negative numbers")
+    _require((texels.area >= 0).all(), "'area' has negative values")
+    for name in ("normal", "tangent"):
+        lengths = np.linalg.norm(getattr(texels, name), axis=1)
+        _require((np.abs(lengths - 1.0) < UNIT_TOLERANCE).all(), f"'{name}' has vectors that are not of length one")
+    if isinstance(texels.layout, GridLayout):
+        _check_grid(texels.layout, count)
+    else:
+        _check_texture_map(texels.layout, count)
+    shape = tuple(texels.layout.shape)
+    _require(shape == manifest.shape, f"its images have {_by(shape)} pixels, those of the manifest {_by(manifest.shape)}")
+    for item in fields(Painted):
+        values = getattr(files.painted, item.name)
+        if values is not None:
+            _check_array(f"painted/{item.name}", values, _NUMBER, (count,))
+    try:
+        files.painted.check(manifest.sensor, count)
+    except PalpateError as error:
+        raise _Fault(str(error).rstrip(".")) from error
+
+
+def _by(shape: tuple[int, ...]) -> str:
+    return " × ".join(str(side) for side in shape)
+
+
+def _check_sides(*sides: object) -> None:
+    for side in sides:
+        whole = isinstance(side, int | np.integer) and not isinstance(side, bool)
+        _require(whole and 0 < side <= MOST_PIXELS, f"a side of its images is {side!r:.40}")  # type: ignore[operator]
+
+
+def _check_corners(triangles: object, count: int) -> None:
+    """Require a table of triangles between `count` texels."""
+    _check_array("layout/triangles", triangles, _WHOLE, (None, 3))
+    assert isinstance(triangles, np.ndarray)
+    _require(((triangles >= 0) & (triangles < count)).all(), "'layout/triangles' names texels that do not exist")
+
+
+def _check_grid(layout: GridLayout, count: int) -> None:
+    _check_sides(layout.rows, layout.columns)
+    _check_array("layout/row", layout.row, _WHOLE, (count,))
+    _check_array("layout/column", layout.column, _WHOLE, (count,))
+    _require(((layout.row >= 0) & (layout.row < layout.rows)).all(), "'layout/row' leads out of the image")
+    _require(((layout.column >= 0) & (layout.column < layout.columns)).all(), "'layout/column' leads out of the image")
+    pixels = layout.row.astype(np.int64) * layout.columns + layout.column.astype(np.int64)
+    _require(len(np.unique(pixels)) == count, "two texels have the same pixel")
+    _check_corners(layout.triangles, count)
+
+
+def _check_texture_map(layout: UVLayout, count: int) -> None:
+    _check_sides(layout.height, layout.width)
+    _check_corners(layout.triangles, count)
+    _require(len(np.unique(layout.triangles)) == count, "'layout/triangles' leaves texels out")
+    _check_array("layout/corner_uv", layout.corner_uv, _NUMBER, (len(layout.triangles), 3, 2))
+    _require(((layout.corner_uv > -0.01) & (layout.corner_uv < 1.01)).all(), "'layout/corner_uv' leads out of the image")
+    for name in ("cell", "margin"):
+        value = getattr(layout, name)
+        whole = isinstance(value, int) and not isinstance(value, bool)
+        _require(whole and 0 <= value <= max(layout.shape), f"'layout/{name}' is {value!r:.40}")
+    _require(isinstance(layout.nearest, bool), f"'layout/nearest' is {layout.nearest!r:.40}")
+    _require(isinstance(layout.map_name, str), f"'layout/map_name' is {layout.map_name!r:.40}")
+
+
+# --- the recording
+
+
+def _check_recording(files: SensorFiles) -> None:
+    recording, manifest = files.recording, files.manifest
+    _require(
+        list(recording.sensors) == [manifest.sensor],
+        f"it is of {', '.join(repr(name) for name in recording.sensors) or 'no sensor'} and not of '{manifest.sensor}'",
+    )
+    _require(recording.digest == manifest.digest, "its digest and that of the manifest differ")
+    _require(recording.dt == manifest.dt, f"its time step is {recording.dt:g} s, that of the manifest {manifest.dt:g} s")
+    _check_frames(recording, manifest)
+    bodies, count = len(recording.body_names), len(recording.frames)
+    _require(
+        not manifest.body or manifest.body in recording.body_names, f"'{manifest.body}', which carries the sensor, is not in it"
+    )
+    _check_array("poses", recording.poses, _NUMBER, (count, bodies, 7))
+    _check_array("velocities", recording.velocities, _NUMBER, (count, bodies, 6))
+    turns = np.linalg.norm(recording.poses[:, :, 3:], axis=2)
+    _require((np.abs(turns - 1.0) < UNIT_TOLERANCE).all(), "'poses' has quaternions that are not of length one")
+    _check_channels(recording.sensors[manifest.sensor], count, len(files.texels))
+
+
+def _check_frames(recording: Recording, manifest: Manifest) -> None:
+    """Require the frames and times that the manifest promises, each once and in order."""
+    frames = recording.frames
+    _check_array("frames", frames, _WHOLE, (None,))
+    count = len(frames)
+    _require(count > 0, "it has no frames")
+    _check_array("times", recording.times, _NUMBER, (count,))
+    expected = np.arange(count) + int(manifest.frame_start)
+    _require(np.array_equal(frames, expected), f"its frames do not follow each other from {manifest.frame_start}")
+    last = int(frames[-1])
+    good = last == manifest.frame_end if manifest.complete else last <= manifest.frame_end
+    _require(good, f"its last frame is {last}, that of the manifest {manifest.frame_end}")
+    seconds = np.arange(count) / manifest.fps
+    _require(np.allclose(recording.times, seconds, rtol=1e-9, atol=1e-9), "'times' does not follow from the frames and fps")
+
+
+def _check_channels(sensor: SensorRecording, frames: int, texels: int) -> None:
+    for name, value_shape in _PER_TEXEL.items():
+        kinds = _FLAG if name == "contact" else _NUMBER
+        _check_array(name, getattr(sensor, name), kinds, (frames, texels, *value_shape))
+    for name in ("net_force", "net_torque", "centre_of_pressure"):
+        _check_array(name, getattr(sensor, name), _NUMBER, (frames, 3))
+    for name in ("friction", "depth", "slip"):
+        _require((getattr(sensor, name) >= 0).all(), f"'{name}' has negative values")
