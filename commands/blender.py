@@ -12,6 +12,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from ..core.errors import FileError, PalpateError
+from ..core.io.regular_file import open_regular
 from . import console
 
 _COMPRESSED = (b"\x28\xb5\x2f\xfd", b"\x1f\x8b")  # Zstandard, and gzip in files from before Blender 3.0
@@ -63,7 +64,7 @@ def open_blend(path: str | os.PathLike) -> None:
     if path.is_dir():
         raise FileError(f"'{path}' is a folder: give the name of a .blend file in it.")
     try:
-        with path.open("rb") as file:
+        with open_regular(path) as file:
             magic = file.read(7)
     except FileNotFoundError as error:
         raise FileError(f"There is no file '{path}': check its name and folder.") from error

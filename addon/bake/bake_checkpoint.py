@@ -20,6 +20,7 @@ from ...core.errors import FileError
 from ...core.io.file_writing import atomic_write
 from ...core.io.npz import DAMAGED
 from ...core.io.recording_npz import load_recording, save_recording
+from ...core.io.regular_file import open_regular
 from ...core.model.recording import Frame, Recording
 from ...core.solver import checkpoint
 
@@ -50,7 +51,7 @@ class BakeCheckpoint:
     def restore(self, simulation) -> list[Frame] | None:
         """Bring a new simulation to the checkpoint and return the frames so far; None if there is no usable checkpoint."""
         try:
-            with np.load(self.folder / STATE_FILE, allow_pickle=False) as members:
+            with open_regular(self.folder / STATE_FILE) as file, np.load(file, allow_pickle=False) as members:
                 packed = {name: members[name] for name in members.files}
             about = json.loads(str(packed.pop("about")))
             if about["key"] != self._key:

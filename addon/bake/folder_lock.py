@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import IO
 
 from ...core.errors import FileError
+from ...core.io.regular_file import open_regular
 
 LOCK_FILE_NAME = "baking.lock"
 
@@ -30,7 +31,7 @@ class FolderLock:
         self._file: IO[bytes] | None = None
         while self._file is None:
             try:
-                file = open(self._path, "ab")  # noqa: SIM115 - it stays open as long as the lock is held
+                file = open_regular(self._path, "ab")  # noqa: SIM115 - it stays open as long as the lock is held
             except OSError:
                 return  # the folder is not writable: writing the bake's own files will say so
             if not _lock(file):

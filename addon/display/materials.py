@@ -15,6 +15,7 @@ import bpy
 import numpy as np
 
 from ...core.figures import color_maps
+from ...core.io.regular_file import require_regular
 from ..scene.display_names import UV_MAP
 
 TEXEL_UV = "palpate_uv"
@@ -49,6 +50,7 @@ def load_sequence(uid: str, first: Path, relative: bool):
     """
     image = find_block(bpy.data.images, uid)
     path = bpy.path.relpath(str(first)) if relative else str(first)
+    require_regular(first)
     if image is None:
         image = bpy.data.images.load(path)
         image[SENSOR_KEY] = uid

@@ -17,6 +17,7 @@ __all__ = [
     "npz",
     "openrave",
     "recording_npz",
+    "regular_file",
     "sensor_npz",
     "sensor_toml",
     "settings_migration",

@@ -18,6 +18,7 @@ from typing import Any
 
 from ..errors import FileError
 from .file_writing import os_error_reason, write_file
+from .regular_file import read_bytes
 
 MANIFEST_FORMAT = "palpate-bake/1"
 MANIFEST_NAME = "manifest.json"
@@ -133,7 +134,7 @@ def read_manifest(folder: str | os.PathLike) -> Manifest:
     """
     path = Path(folder) / MANIFEST_NAME
     try:
-        content = json.loads(path.read_bytes().decode("utf-8", "surrogatepass"))
+        content = json.loads(read_bytes(path).decode("utf-8", "surrogatepass"))
     except FileNotFoundError:
         raise FileError(f"'{path}' does not exist: bake first, or choose a sensor's folder inside the bake folder.") from None
     except OSError as error:

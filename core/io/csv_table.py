@@ -21,6 +21,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import FileError
+from .regular_file import open_regular
 
 UNITS: dict[str, dict[str, float]] = {
     "m": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "µm": 1e-6},
@@ -103,7 +104,7 @@ def read_table(
                 f"'{path.name}' holds {size / 1e9:.1f} GB and at most {form.largest / 1e9:.1f} GB are read: "
                 "cut it into several files, or keep fewer samples per second."
             )
-        with path.open(encoding="utf-8-sig", newline="") as file:
+        with open_regular(path, "r", encoding="utf-8-sig", newline="") as file:
             lines = _lines(file, form)
             names, separator = _header(lines, path, form)
             chosen = None if choose is None else list(choose(names))

@@ -16,6 +16,8 @@ from functools import lru_cache
 
 import numpy as np
 
+from .regular_file import read_bytes
+
 MAGIC = 20000630
 VERSION = 2
 _LONG_NAMES, _OTHER_FLAGS = 0x400, 0x1A00  # tiles, deep data and several parts: not for us
@@ -191,8 +193,7 @@ def read(path: str | os.PathLike) -> tuple[dict[str, np.ndarray], dict[str, str]
     FormatError
         The file is damaged, or uses a part of the format that is not read here.
     """
-    with open(path, "rb") as file:
-        data = file.read()
+    data = read_bytes(path)
     header = read_header(data)
     try:
         return _pixels(data, header), header.texts

@@ -15,6 +15,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from .exr_codec import FormatError, read_header
+from .regular_file import open_regular
 
 _MOST_PACKED = 1100
 """Bytes of pixels per byte of a file. ZIP cannot compress better, so a header that promises more is damaged."""
@@ -80,7 +81,7 @@ def read(path: str | os.PathLike) -> tuple[dict[str, np.ndarray], dict[str, str]
     """
     import OpenEXR
 
-    with open(path, "rb") as plain:
+    with open_regular(path) as plain:
         data = plain.read()
     header = read_header(data)
     shape = header.height, header.width

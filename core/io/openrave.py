@@ -10,7 +10,6 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
@@ -18,6 +17,7 @@ from ..errors import FileError, PalpateError
 from ..model.parameter import numbers_of
 from ..model.sensor_parameters import DEPTH_PER_THICKNESS, SENSOR_PARAMETERS, SensorParameters
 from .file_writing import atomic_write
+from .regular_file import read_bytes
 
 SENSOR_TYPE = "SimTactileSensor"
 NUMBERS = tuple(
@@ -59,7 +59,7 @@ def read_openrave(path: str | os.PathLike) -> list[OpenRaveSensor]:
         There is no such file, it is not XML, it holds no tactile sensor, or a value is not a number or out of bounds.
     """
     try:
-        text = Path(path).read_bytes()
+        text = read_bytes(path)
     except FileNotFoundError as error:
         raise FileError(f"There is no file '{path}': check its name and folder.") from error
     except OSError as error:

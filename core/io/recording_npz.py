@@ -19,6 +19,7 @@ from ..errors import FileError
 from ..model.recording import Recording, SensorRecording
 from .file_writing import os_error_reason
 from .npz import DAMAGED, write_arrays
+from .regular_file import open_regular
 
 RECORDING_FORMAT = "palpate-recording/2"
 
@@ -64,7 +65,7 @@ def load_recording(path: str | os.PathLike) -> Recording:
     if not file.exists():
         raise FileError(f"'{path}' does not exist: bake first, or choose another file.")
     try:
-        with np.load(file, allow_pickle=False) as members:
+        with open_regular(file) as opened, np.load(opened, allow_pickle=False) as members:
             if not isinstance(members, np.lib.npyio.NpzFile) or "header" not in members.files:
                 raise FileError(f"'{path}' is not a recording of Palpate: choose a recording.npz of a bake.")
             return _recording(path, members)

@@ -17,6 +17,7 @@ from ..geometry.texels import Texels
 from ..model.sensor_parameters import Painted
 from .file_writing import os_error_reason
 from .npz import DAMAGED, write_arrays
+from .regular_file import open_regular
 
 SENSOR_FORMAT = "palpate-sensor/1"
 SENSOR_NAME = "sensor.npz"
@@ -55,7 +56,7 @@ def load_sensor(path: str | os.PathLike) -> tuple[Texels, Painted]:
     if not Path(path).exists():
         raise FileError(f"'{path}' does not exist: bake again with this version.")
     try:
-        with np.load(path, allow_pickle=False) as members:
+        with open_regular(path) as opened, np.load(opened, allow_pickle=False) as members:
             if str(members["format"]) != SENSOR_FORMAT:
                 raise FileError(f"'{path}' is not a '{SENSOR_FORMAT}' file: bake again with this version.")
             cls = _LAYOUTS[str(members["layout"])]

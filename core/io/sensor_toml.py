@@ -34,6 +34,7 @@ from ..errors import FileError, PalpateError
 from ..model.effect import Effect
 from ..model.sensor_parameters import SENSOR_PARAMETERS, SensorParameters
 from .file_writing import atomic_write
+from .regular_file import read_bytes
 
 FORMAT = "palpate-sensor-toml/1"
 SHAPE_WORDS = ("grid", "mesh", "thickness")
@@ -88,7 +89,7 @@ def read_sensor(path: str | os.PathLike) -> SensorModel:
         A value is not valid.
     """
     try:
-        text = Path(path).read_text(encoding="utf-8")
+        text = read_bytes(path).decode("utf-8")
     except UnicodeDecodeError as error:
         raise FileError(f"'{path}' is not a text file: choose a sensor's .toml.") from error
     except OSError as error:

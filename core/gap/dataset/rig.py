@@ -18,6 +18,7 @@ from ...errors import FileError, ParameterError, SensorError
 from ...geometry.mesh import TriangleMesh, checked_mesh
 from ...geometry.texels import Texels, texels_from_region
 from ...io.csv_table import read_table
+from ...io.regular_file import open_regular, require_regular
 from ...io.sensor_toml import SHAPE_WORDS, stated_parameters
 from ...model.sensor_parameters import DAMPING_PER_STIFFNESS, DEPTH_PER_THICKNESS, SENSOR_PARAMETERS, SensorParameters
 
@@ -191,7 +192,7 @@ def read_rig(path: str | Path) -> Rig:
 def _toml(path: Path) -> dict[str, Any]:
     """Contents of the TOML file."""
     try:
-        with path.open("rb") as file:
+        with open_regular(path) as file:
             return tomllib.load(file)
     except FileNotFoundError as error:
         raise FileError(f"There is no rig '{path}': check the path.") from error
@@ -303,6 +304,7 @@ def _mesh(path: Path, name: str) -> tuple[TriangleMesh, list[str]]:
     """A triangle mesh from a file, and remarks about it."""
     import trimesh
 
+    require_regular(path)
     try:
         loaded = trimesh.load(path, process=False, force="mesh")
     except Exception as error:  # whatever a reader of meshes raises for a broken file
