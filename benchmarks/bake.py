@@ -104,8 +104,8 @@ def sample_bake_and_solve(name: str) -> tuple[float, float]:
 
 
 def _in_turn(scene, rounds: int) -> tuple[float, float]:
-    from palpate.addon.bake import folder_swap
     from palpate.addon.bake.bake import bake
+    from palpate.core.io import bake_switch
     from palpate.core.jobs.job_runner import run_job
     from palpate.core.solver.simulation import run
 
@@ -115,7 +115,7 @@ def _in_turn(scene, rounds: int) -> tuple[float, float]:
         start = time.perf_counter()
         scenario = run_job(bake(scene)).scenario
         middle = time.perf_counter()
-        folder_swap.wait_for_removals()
+        bake_switch.wait_for_removals()
         begun = time.perf_counter()
         run(scenario)
         times.append((middle - start, time.perf_counter() - begun))

@@ -6,6 +6,8 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
+from palpate.core.io.private_folder import PRIVATE_FOLDER
+
 
 def grid(name="Pad", location=(0.0, 0.0, 0.0), columns=6, rows=14, size=0.05):
     """Return a flat pad of columns × rows vertices."""
@@ -75,8 +77,14 @@ def reopen(path):
 
 
 def contents(folder) -> dict[str, bytes]:
-    """Return the content of all files in a folder by their paths in it."""
-    return {str(path.relative_to(folder)): path.read_bytes() for path in sorted(folder.rglob("*")) if path.is_file()}
+    """Return the content of all files in a folder by their paths in it, without the hidden folder of a bake folder."""
+    files = [path for path in sorted(folder.rglob("*")) if path.is_file() and PRIVATE_FOLDER not in path.parts]
+    return {str(path.relative_to(folder)): path.read_bytes() for path in files}
+
+
+def visible(folder) -> list[str]:
+    """Return the sorted names in a bake folder, without the hidden folder."""
+    return sorted(path.name for path in folder.iterdir() if path.name != PRIVATE_FOLDER)
 
 
 def dump(uids=True) -> dict[str, str]:

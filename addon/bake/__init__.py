@@ -5,4 +5,4 @@
 killed goes on where it was.
 """
 
-__all__ = ["bake", "bake_checkpoint", "bake_files", "folder_lock", "folder_swap", "scene_writer"]
+__all__ = ["bake", "bake_checkpoint", "bake_files", "scene_writer"]

@@ -10,6 +10,7 @@ from __future__ import annotations
 import json
 import math
 import os
+import re
 import zlib
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass, field
@@ -17,12 +18,16 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import FileError
-from .file_writing import os_error_reason, write_file
+from .file_writing import file_sha256, os_error_reason, write_file
 from .regular_file import read_bytes
+from .sensor_npz import SENSOR_NAME
 
 MANIFEST_FORMAT = "palpate-bake/1"
 MANIFEST_NAME = "manifest.json"
 RECORDING_NAME = "recording.npz"
+
+BAKE_FILE_NAMES = re.compile(rf"tactile_-?\d+\.exr|{'|'.join(map(re.escape, (RECORDING_NAME, SENSOR_NAME, MANIFEST_NAME)))}")
+"""Names of the files in a sensor's folder that a bake writes and replaces."""
 
 _RESERVED = {"con", "prn", "aux", "nul", *(f"{port}{i}" for port in ("com", "lpt") for i in range(1, 10))}
 """Names that Windows reserves for devices."""
@@ -84,6 +89,14 @@ class Manifest:
         Name, without its folder, of the .blend that was baked; empty when it had none, or when the manifest is older.
     body : str
         Name of the body that carries the sensor, among those of the recording; empty when the manifest is older.
+    bake_id : str
+        Hash of all files of the bake, the same for all of its sensors; empty when the manifest is older.
+    scene_id : str
+        Id of the scene that was baked, as stored in its .blend; empty when it stored none, or when the manifest is older.
+    scene_path : str
+        Path of the .blend, relative to the bake folder, with ``/``; empty as `scene_file`.
+    files : dict of str to str
+        SHA-256 of each file in the folder except the manifest itself, by name; empty when the manifest is older.
     """
 
     sensor: str
@@ -101,6 +114,35 @@ class Manifest:
     scene_file: str = ""
     body: str = ""
     step_reason: str = ""
+    bake_id: str = ""
+    scene_id: str = ""
+    scene_path: str = ""
+    files: dict[str, str] = field(default_factory=dict)
+
+    def check_file(self, folder: Path, name: str) -> None:
+        """Check a file in the bake's folder against its SHA-256; without one, as in older manifests, nothing is checked.
+
+        Raises
+        ------
+        FileError
+            The file is missing or damaged.
+        """
+        if name not in self.files:
+            return
+        path = folder / name
+        try:
+            found = file_sha256(path)
+        except FileNotFoundError:
+            raise FileError(f"'{path}' is missing from the bake: bake again.") from None
+        except OSError as error:
+            raise FileError(f"'{path}' could not be read ({os_error_reason(error)}): check its permissions.") from error
+        if found != self.files[name]:
+            raise FileError(f"'{path}' is damaged (its content is not what was baked): bake again.")
+
+    def check_files(self, folder: Path) -> None:
+        """Check all files of the bake's folder, as :meth:`check_file` does."""
+        for name in self.files:
+            self.check_file(folder, name)
 
 
 def write_manifest(folder: str | os.PathLike, manifest: Manifest, atomic: bool = True) -> Path:
@@ -168,7 +210,14 @@ def _manifest(content: dict[str, Any]) -> Manifest:
         scene_file=_typed({"scene_file": "", **content}, "scene_file", str),
         body=_typed({"body": "", **content}, "body", str),
         step_reason=_typed({"step_reason": "", **content}, "step_reason", str),
+        bake_id=_typed({"bake_id": "", **content}, "bake_id", str),
+        scene_id=_typed({"scene_id": "", **content}, "scene_id", str),
+        scene_path=_typed({"scene_path": "", **content}, "scene_path", str),
+        files=_typed({"files": {}, **content}, "files", dict),
     )
+    for name, digest in manifest.files.items():
+        if not BAKE_FILE_NAMES.fullmatch(name) or not isinstance(digest, str):
+            raise ValueError(f"files has {name!r}")
     if not (math.isfinite(manifest.fps) and math.isfinite(manifest.dt)):
         raise ValueError("fps and dt must be finite")
     return manifest

@@ -14,8 +14,9 @@ from ..errors import FileError
 from ..geometry.texels import Texels
 from ..model.recording import Recording
 from ..model.sensor_parameters import Painted, SensorParameters
+from . import bake_switch
 from .bake_check import SensorFiles, check_bake, checked_parameters
-from .bake_folder import MANIFEST_NAME, RECORDING_NAME, Manifest, read_manifest
+from .bake_folder import MANIFEST_NAME, RECORDING_NAME, Manifest, folder_names, read_manifest
 from .recording_npz import load_recording
 from .sensor_npz import SENSOR_NAME, load_sensor
 
@@ -65,14 +66,23 @@ def read_bake(folder: str | os.PathLike) -> Bake:
     folder = Path(folder)
     if not folder.is_dir():
         raise FileError(f"The folder '{folder}' does not exist: bake first, or choose another.")
-    folders = [folder] if (folder / MANIFEST_NAME).is_file() else sorted(path for path in folder.iterdir() if _is_bake(path))
+    if (folder / MANIFEST_NAME).is_file():
+        return read_sensors([folder])
+    bake_switch.settle(folder)
+    folders = [place for name, place in bake_switch.present_folders(folder) if _is_bake(name, place)]
     if not folders:
         raise FileError(f"'{folder}' holds no bake: bake first, or choose the folder that Physics › Palpate › Bake names.")
     return read_sensors(folders)
 
 
 def read_sensors(folders: Sequence[Path]) -> Bake:
-    """Read the folders of some sensors of one bake; raises FileError as :func:`read_bake` does."""
+    """Read the folders of some sensors of one bake; raises FileError as :func:`read_bake` does.
+
+    A switch to another bake that was interrupted is carried out first (:mod:`.bake_switch`).
+    """
+    for parent in {folder.parent for folder in folders}:
+        bake_switch.settle(parent)
+    folders = [bake_switch.present_folder(folder) for folder in folders]
     manifests = {folder: read_manifest(folder) for folder in folders}
     first = manifests[folders[0]]
     for folder, manifest in manifests.items():
@@ -88,6 +98,8 @@ def read_sensors(folders: Sequence[Path]) -> Bake:
                 f"'{folder}' and '{read[manifest.sensor].folder}' both hold the sensor '{manifest.sensor}': "
                 "move one of them out of the bake folder."
             )
+        for name in (RECORDING_NAME, SENSOR_NAME):
+            manifest.check_file(folder, name)
         recording, (texels, painted) = load_recording(folder / RECORDING_NAME), load_sensor(folder / SENSOR_NAME)
         read[manifest.sensor] = SensorFiles(folder, manifest, recording, texels, painted)
     parameters = {name: checked_parameters(files.folder, files.manifest) for name, files in read.items()}
@@ -103,8 +115,20 @@ def read_sensors(folders: Sequence[Path]) -> Bake:
     )
 
 
-def _is_bake(folder: Path) -> bool:
-    return not folder.name.endswith((".partial", ".old")) and (folder / MANIFEST_NAME).is_file()
+def check_images(bake: Bake) -> None:
+    """Check all files of a bake, its tactile images as well; raises FileError that names the first damaged one."""
+    for name, folder in bake.folders.items():
+        bake.manifests[name].check_files(folder)
+
+
+def _is_bake(name: str, folder: Path) -> bool:
+    """Return True if a folder in a bake folder holds a sensor's bake, and not a copy of one that an older version has left."""
+    if not (folder / MANIFEST_NAME).is_file():
+        return False
+    if not name.endswith((".partial", ".old")):
+        return True
+    sensor = read_manifest(folder).sensor
+    return folder_names([sensor])[sensor] == name
 
 
 def frame_index(recording: Recording, frame: int) -> int:

@@ -9,14 +9,17 @@ leaves either the old or the new file. It may also leave a temporary file, whose
 from __future__ import annotations
 
 import errno
+import hashlib
 import os
 import re
 import secrets
+import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from ..errors import FileError
+from .regular_file import open_regular
 
 
 @contextmanager
@@ -50,8 +53,7 @@ def atomic_write(path: str | os.PathLike) -> Iterator[Path]:
     temporary = _new_file_in(target.parent, target.stem, target.suffix)
     try:
         yield temporary
-        with open(temporary, "rb+") as file:
-            os.fsync(file.fileno())
+        sync_file(temporary)
         os.replace(temporary, target)
     except BaseException as error:
         with suppress(OSError):
@@ -59,7 +61,7 @@ def atomic_write(path: str | os.PathLike) -> Iterator[Path]:
         if isinstance(error, OSError):
             raise FileError(f"'{path}' could not be written ({os_error_reason(error)}): {_remedy(error)}.") from error
         raise
-    _sync_folder(target.parent)
+    sync_folder(target.parent)
 
 
 @contextmanager
@@ -144,6 +146,70 @@ def remove_leftovers(folder: str | os.PathLike) -> list[Path]:
     return removed
 
 
+def exchange_file(new: Path, target: Path, backups: int = 0) -> None:
+    """Put a finished file in the place of another; at every moment `target` is one of the two.
+
+    Parameters
+    ----------
+    new : Path
+        In the folder of `target`.
+    target : Path
+    backups : int
+        Number of earlier versions that are kept as ``<target>1``, ``<target>2``, …
+
+    Raises
+    ------
+    OSError
+        It cannot be replaced.
+    """
+    if backups and target.exists():
+        _back_up(target, backups)
+    os.replace(new, target)
+    sync_folder(target.parent)
+
+
+def _back_up(target: Path, backups: int) -> None:
+    """Give the present file a second name, ``<target>1``; that of before becomes ``<target>2``, and so on."""
+    versions = [target.with_name(f"{target.name}{number}") for number in range(1, backups + 1)]
+    if versions[0].exists() and versions[0].samefile(target):
+        return  # an interrupted exchange has done it
+    temporary = _new_file_in(target.parent, target.name, "")
+    temporary.unlink()
+    try:
+        os.link(target, temporary)
+    except OSError:  # the file system has no hard links
+        shutil.copy2(target, temporary)
+    for older, newer in zip(reversed(versions), reversed(versions[:-1])):
+        if newer.exists():
+            os.replace(newer, older)
+    os.replace(temporary, versions[0])
+
+
+def sync_folder(folder: Path) -> None:
+    """Flush a folder's list of names to the disk, on systems that allow it, so that a rename survives a power cut."""
+    with suppress(OSError):
+        handle = os.open(folder, os.O_RDONLY)
+        try:
+            os.fsync(handle)
+        finally:
+            os.close(handle)
+
+
+def sync_file(path: Path) -> None:
+    """Bring the content of a file onto the disk."""
+    with open(path, "rb+") as file:
+        os.fsync(file.fileno())
+
+
+def file_sha256(path: Path) -> str:
+    """Return the SHA-256 of a file's content, 64 hexadecimal digits."""
+    digest = hashlib.sha256()
+    with open_regular(path) as file:
+        while block := file.read(1 << 20):
+            digest.update(block)
+    return digest.hexdigest()
+
+
 def _require_folder(folder: Path) -> None:
     if folder.is_dir():
         return
@@ -168,16 +234,6 @@ def _new_file_in(folder: Path, stem: str, suffix: str) -> Path:
             f"No file can be made in the folder '{folder}' ({os_error_reason(error)}): {_remedy(error)}."
         ) from error
     return path
-
-
-def _sync_folder(folder: Path) -> None:
-    """Flush a folder's list of names to the disk, on systems that allow it, so that a rename survives a power cut."""
-    with suppress(OSError):
-        handle = os.open(folder, os.O_RDONLY)
-        try:
-            os.fsync(handle)
-        finally:
-            os.close(handle)
 
 
 def os_error_reason(error: OSError) -> str:

@@ -17,7 +17,7 @@ from palpate.addon.bake import bake_checkpoint  # noqa: E402
 from palpate.addon.bake.bake import bake  # noqa: E402
 from palpate.core.jobs.job_runner import run_job  # noqa: E402
 
-bake_checkpoint.CHECKPOINT_INTERVAL = 0.0
+bake_checkpoint.CHECKPOINT_INTERVAL, bake_checkpoint.MAX_COST_SHARE = 0.0, float("inf")
 bpy.ops.wm.open_mainfile(filepath=sys.argv[1])
 computed = []
 

@@ -6,15 +6,17 @@ from pathlib import Path
 import bpy
 import numpy as np
 import pytest
-from blender_scenes import changes, cube, dump, grid, press, press_and_drop, reopen, save
+from blender_scenes import changes, contents, cube, dump, grid, press, press_and_drop, reopen, save, visible
 
-from palpate.addon.bake import folder_swap
 from palpate.addon.bake.bake import bake
 from palpate.addon.display import heat_map, marker_meshes, materials
 from palpate.addon.scene import display_names, scene_reader
 from palpate.addon.session import fcurves, session_state, transforms
 from palpate.core.errors import FileError
-from palpate.core.io.bake_folder import read_manifest
+from palpate.core.io import bake_switch
+from palpate.core.io.bake_folder import folder_names, read_manifest
+from palpate.core.io.bake_reader import read_bake
+from palpate.core.io.private_folder import MARKER_NAME, PRIVATE_FOLDER
 from palpate.core.io.recording_npz import load_recording
 from palpate.core.io.tactile_exr import read_exr
 from palpate.core.jobs.job_runner import SlicedJob, run_job
@@ -22,7 +24,7 @@ from palpate.core.jobs.job_runner import SlicedJob, run_job
 
 def baked(scene):
     result = run_job(bake(scene))
-    folder_swap.wait_for_removals()
+    bake_switch.wait_for_removals()
     return result
 
 
@@ -30,7 +32,7 @@ def test_one_folder_per_sensor(tmp_path):
     scene, *_ = press_and_drop(frames=4)
     save(tmp_path)
     result = baked(scene)
-    assert sorted(path.name for path in (tmp_path / "palpate").iterdir()) == ["Pad", "Pad 2"]
+    assert visible(tmp_path / "palpate") == ["Pad", "Pad 2"]
     for name, folder in result.folders.items():
         files = sorted(path.name for path in folder.iterdir())
         assert files == ["manifest.json", "recording.npz", "sensor.npz", *(f"tactile_{frame:04d}.exr" for frame in range(1, 5))]
@@ -187,7 +189,7 @@ def test_a_stopped_bake_leaves_the_old_one(tmp_path):
     scene, pad, *_ = press_and_drop(frames=4)
     save(tmp_path)
     baked(scene)
-    files = {path: path.read_bytes() for path in (tmp_path / "palpate").rglob("*") if path.is_file()}
+    files = contents(tmp_path / "palpate")
     before = dump()
     pad.palpate.k = 70.0
     for steps in (1, 3, 5, 7):
@@ -195,19 +197,79 @@ def test_a_stopped_bake_leaves_the_old_one(tmp_path):
         for _ in range(steps):
             work.work(0.0)
         work.cancel()
-        assert {path: path.read_bytes() for path in (tmp_path / "palpate").rglob("*") if path.is_file()} == files
+        assert contents(tmp_path / "palpate") == files
         assert [line for line in changes(before, dump()) if not line.startswith("Pad: settings")] == []
         assert not session_state.is_baking()
 
 
-def test_a_kill_between_two_renames_is_put_right(tmp_path):
-    scene, *_ = press(frames=3)
+NAMES = ["A", "A.old", "project", "unfinished.partial", "baking.lock", "back\\slash", ".palpate", "growing-0", "Ä" * 31]
+
+
+def test_names_of_sensors_cannot_collide_with_what_is_palpate_s_own(tmp_path):
+    scene, pad, _ = press(frames=2)
+    pad.name = NAMES[0]
+    for name in NAMES[1:]:
+        twin = pad.copy()
+        twin.name = name
+        scene.collection.objects.link(twin)
+    bpy.ops.palpate.reset()
     save(tmp_path)
-    folder = baked(scene).folders["Pad"]
-    folder.rename(folder.with_name("Pad.old"))
-    folder.with_name("Pad.partial").mkdir()
-    baked(scene)
-    assert [path.name for path in folder.parent.iterdir()] == ["Pad"]
+    for _ in range(2):
+        result = baked(scene)
+        assert sorted(result.folders) == sorted(NAMES)
+        assert sorted(read_bake(tmp_path / "palpate").texels) == sorted(NAMES)
+        assert visible(tmp_path / "palpate") == sorted(folder_names(NAMES).values())
+
+
+def test_a_name_of_300_characters_has_a_folder():
+    (folder,) = folder_names(["a" * 300]).values()
+    assert len(folder) < 80
+
+
+def user_folders(folder):
+    """Fill a folder with what names of Palpate's own once were."""
+    for name in ("Pad.old", "Pad.partial", "unfinished.partial", "project.old", "backup"):
+        (folder / name).mkdir(parents=True)
+        (folder / name / "thesis.txt").write_text("years of work")
+    (folder / "baking.lock").write_text("mine")
+    return contents(folder)
+
+
+def test_folders_of_the_user_s_are_never_removed(tmp_path):
+    scene, *_ = press(frames=2)
+    save(tmp_path)
+    mine = user_folders(tmp_path / "palpate")
+    for _ in range(2):
+        baked(scene)
+        found = contents(tmp_path / "palpate")
+        assert {name: found[name] for name in mine} == mine
+
+
+@pytest.mark.parametrize("what", ["project", "manifest", ".palpate", "link"])
+def test_a_refused_bake_has_touched_nothing(tmp_path, what):
+    """The bake folder of a .blend from the net leads to a folder of the user's; its sensor has the name of a folder there."""
+    scene, pad, _ = press(frames=2)
+    pad.name = "project"
+    save(tmp_path)
+    folder = tmp_path / "palpate"
+    user_folders(folder)
+    hidden = folder / PRIVATE_FOLDER
+    if what in ("project", "manifest"):
+        (folder / "project").mkdir()
+        (folder / "project" / "main.tex").write_text("years of work")
+        if what == "manifest":  # that of another program
+            (folder / "project" / "manifest.json").write_text('{"name": "My web page"}')
+    elif what == ".palpate":
+        hidden.mkdir()
+        (hidden / "notes.txt").write_text("years of work")
+    else:
+        (tmp_path / "elsewhere").mkdir()
+        hidden.symlink_to(tmp_path / "elsewhere")
+    files = {str(path) for path in tmp_path.rglob("*")}
+    reason = "holds other files than a bake" if what in ("project", "manifest") else "was not made by Palpate"
+    with pytest.raises(FileError, match=reason):
+        baked(scene)
+    assert {str(path) for path in tmp_path.rglob("*")} == files
 
 
 def test_a_folder_with_other_files_is_not_overwritten(tmp_path):
@@ -236,18 +298,18 @@ def test_files_put_beside_the_images_outlive_the_next_bake(tmp_path):
     def check(images):
         assert {name: (folder / name).read_bytes() for name in mine} == mine
         assert sorted(path.name for path in folder.glob("tactile_0*.exr")) == [f"tactile_{i:04d}.exr" for i in images]
-        assert [path.name for path in folder.parent.iterdir()] == ["Pad"]
+        assert visible(folder.parent) == ["Pad"]
+        assert [path.name for path in (folder.parent / PRIVATE_FOLDER).iterdir()] == [MARKER_NAME]
 
     scene.frame_end = 2
     baked(scene)
     check((1, 2))
-    # a kill after the swap, before they were moved into the new folder
-    old = folder.with_name("Pad.old")
-    folder.rename(old)
-    folder.mkdir()
+    # a kill after the switch, before the old folder was removed
+    replaced = folder.parent / PRIVATE_FOLDER / "growing-0123456789abcdef" / "replaced" / "Pad"
+    replaced.mkdir(parents=True)
     for name in ("manifest.json", "recording.npz"):
-        (folder / name).write_bytes((old / name).read_bytes())
-    (folder / "notes.txt").write_bytes(mine["notes.txt"])
+        (replaced / name).write_bytes((folder / name).read_bytes())
+    (folder / "notes.txt").rename(replaced / "notes.txt")
     baked(scene)
     check((1, 2))
 
@@ -258,10 +320,11 @@ def test_a_swap_that_fails_is_taken_back(tmp_path, monkeypatch, failing):
     save(tmp_path)
     folder = baked(scene).folders["Pad"]
     (folder / "notes.txt").write_text("years of work")
-    files = {path: path.read_bytes() for path in (tmp_path / "palpate").rglob("*") if path.is_file()}
+    files = contents(tmp_path / "palpate")
     before = dump()
     pad.palpate.k *= 2.0
     rename, calls = Path.rename, []
+    order = ["Pad", "Pad", "Pad 2", "Pad 2"]
 
     def rename_but_one(path, target):
         calls.append(path.name)
@@ -273,12 +336,12 @@ def test_a_swap_that_fails_is_taken_back(tmp_path, monkeypatch, failing):
     with pytest.raises(FileError, match=r"^The bake could not be written to '.*palpate' \(permission denied\)"):
         baked(scene)
     monkeypatch.undo()
-    assert calls[:failing] == ["Pad", "Pad.partial", "Pad 2", "Pad 2.partial"][:failing]
-    assert {path: path.read_bytes() for path in (tmp_path / "palpate").rglob("*") if path.is_file()} == files
-    assert sorted(path.name for path in (tmp_path / "palpate").iterdir()) == ["Pad", "Pad 2"]
+    assert calls[:failing] == order[:failing]
+    assert contents(tmp_path / "palpate") == files
+    assert visible(tmp_path / "palpate") == ["Pad", "Pad 2"]
     assert [line for line in changes(before, dump()) if not line.startswith("Pad: settings")] == []
     baked(scene)
-    assert (folder / "recording.npz").read_bytes() != files[folder / "recording.npz"]
+    assert (folder / "recording.npz").read_bytes() != files[str(Path("Pad", "recording.npz"))]
 
 
 def test_the_bake_of_another_blend_beside_it_is_not_replaced(tmp_path):
@@ -286,7 +349,7 @@ def test_the_bake_of_another_blend_beside_it_is_not_replaced(tmp_path):
     first = save(tmp_path, "first.blend")
     folder = baked(scene).folders["Pad"]
     assert read_manifest(folder).scene_file == "first.blend"
-    files = {path: path.read_bytes() for path in (tmp_path / "palpate").rglob("*") if path.is_file()}
+    files = contents(tmp_path / "palpate")
     save(tmp_path, "second.blend")
     stages = []
     with pytest.raises(FileError) as caught:
@@ -295,7 +358,7 @@ def test_the_bake_of_another_blend_beside_it_is_not_replaced(tmp_path):
         f"'{folder}' holds the bake of 'first.blend', which lies beside 'second.blend': choose another bake folder."
     )
     assert set(stages) == {"Reading the scene"}
-    assert {path: path.read_bytes() for path in (tmp_path / "palpate").rglob("*") if path.is_file()} == files
+    assert contents(tmp_path / "palpate") == files
     scene.palpate.folder = "//palpate second"
     assert baked(scene).folders["Pad"].parent.name == "palpate second"
     scene.palpate.folder = "//palpate"

@@ -3,6 +3,7 @@
 
 import json
 import random
+import shutil
 import signal
 import subprocess
 import sys
@@ -10,11 +11,13 @@ import time
 from pathlib import Path
 
 import pytest
-from blender_scenes import contents, press_and_drop, save
+from blender_scenes import contents, press_and_drop, save, visible
 
-from palpate.addon.bake import bake_checkpoint, bake_files, folder_lock, folder_swap
+from palpate.addon.bake import bake_checkpoint, bake_files
 from palpate.addon.bake.bake import bake
 from palpate.core.errors import FileError
+from palpate.core.io import bake_switch
+from palpate.core.io.private_folder import LOCK_NAME, MARKER_NAME, PRIVATE_FOLDER
 from palpate.core.io.recording_npz import load_recording
 from palpate.core.jobs.job_runner import SlicedJob, run_job
 
@@ -74,35 +77,46 @@ def abandon(scene, steps):
         bake_files.BakeFiles.discard = discard
 
 
+def always_due(monkeypatch):
+    monkeypatch.setattr(bake_checkpoint, "CHECKPOINT_INTERVAL", 0.0)
+    monkeypatch.setattr(bake_checkpoint, "MAX_COST_SHARE", float("inf"))
+
+
+def growing(tmp_path):
+    """The folder in which the only unfinished bake grows."""
+    (found,) = bake_switch.growing_folders(tmp_path / "palpate" / PRIVATE_FOLDER)
+    return found
+
+
 @pytest.fixture
 def killed(tmp_path, monkeypatch):
     """A scene whose bake was killed at its sixth frame."""
-    monkeypatch.setattr(bake_checkpoint, "CHECKPOINT_INTERVAL", 0.0)
+    always_due(monkeypatch)
     scene, pad, *_ = press_and_drop(frames=8)
     save(tmp_path)
     abandon(scene, 8 + 6)
-    assert (tmp_path / "palpate" / bake_checkpoint.CHECKPOINT_FOLDER / bake_checkpoint.STATE_FILE).is_file()
+    assert (growing(tmp_path) / bake_checkpoint.CHECKPOINT_FOLDER / bake_checkpoint.STATE_FILE).is_file()
     return scene, pad
 
 
 def computed(scene):
     frames = []
     run_job(bake(scene), lambda step: frames.append(step.frame) if step.stage == "Computing forces" else None)
-    folder_swap.wait_for_removals()
+    bake_switch.wait_for_removals()
     return frames
 
 
 def test_the_next_bake_goes_on(killed, tmp_path):
     scene, _ = killed
     assert computed(scene)[0] == 6
-    assert sorted(path.name for path in (tmp_path / "palpate").iterdir()) == ["Pad", "Pad 2"]
+    assert visible(tmp_path / "palpate") == ["Pad", "Pad 2"]
     assert load_recording(tmp_path / "palpate" / "Pad" / "recording.npz").frames.tolist() == list(range(1, 9))
 
 
 @pytest.mark.parametrize("what", ["parameter", "damaged state", "lost frames", "lost images"])
 def test_what_does_not_fit_is_begun_anew(killed, tmp_path, what):
     scene, pad = killed
-    place = tmp_path / "palpate" / bake_checkpoint.CHECKPOINT_FOLDER
+    place = growing(tmp_path) / bake_checkpoint.CHECKPOINT_FOLDER
     if what == "parameter":
         pad.palpate.k = 77.0
     elif what == "damaged state":
@@ -110,11 +124,25 @@ def test_what_does_not_fit_is_begun_anew(killed, tmp_path, what):
     elif what == "lost frames":
         next(place.glob("frames_*")).unlink()
     else:
-        for path in sorted((tmp_path / "palpate" / "Pad.partial").iterdir()):
-            path.unlink()
-        (tmp_path / "palpate" / "Pad.partial").rmdir()
+        shutil.rmtree(growing(tmp_path) / "sensors" / "Pad")
     assert computed(scene)[0] == 1
-    assert sorted(path.name for path in (tmp_path / "palpate").iterdir()) == ["Pad", "Pad 2"]
+    assert visible(tmp_path / "palpate") == ["Pad", "Pad 2"]
+
+
+@pytest.mark.parametrize("damage", ["empty", "short", "other", "missing"])
+def test_images_that_a_power_cut_has_damaged_are_written_again(killed, tmp_path, damage):
+    """The checkpoint vouches for them, but the disk has lost them."""
+    scene, _ = killed
+    images = sorted(growing(tmp_path).rglob("tactile_*.exr"))
+    assert len(images) >= 10
+    for path in images[1:8:3]:
+        content = path.read_bytes()
+        path.write_bytes({"empty": b"", "short": content[: len(content) // 2]}.get(damage, content[:-1] + b"?"))
+        if damage == "missing":
+            path.unlink()
+    assert computed(scene)[0] == 6
+    found = contents(tmp_path / "palpate")
+    assert found == contents_of_a_whole_bake(scene, tmp_path)
 
 
 def test_one_bake_at_a_time(tmp_path):
@@ -124,24 +152,25 @@ def test_one_bake_at_a_time(tmp_path):
     expected = contents_of_a_whole_bake(scene, tmp_path)
     scene.palpate.folder = "//palpate"
     first = bake(scene)
-    while not (tmp_path / "palpate" / folder_lock.LOCK_FILE_NAME).exists():
+    while not (tmp_path / "palpate" / PRIVATE_FOLDER / LOCK_NAME).exists():
         next(first)
     with pytest.raises(FileError, match="Another bake is writing to"):
         run_job(bake(scene))
     run_job(first)
-    folder_swap.wait_for_removals()
+    bake_switch.wait_for_removals()
     assert contents(tmp_path / "palpate") == expected
     run_job(bake(scene))
-    folder_swap.wait_for_removals()
+    bake_switch.wait_for_removals()
     assert contents(tmp_path / "palpate") == expected
 
 
 def test_escape_leaves_nothing(tmp_path, monkeypatch):
-    monkeypatch.setattr(bake_checkpoint, "CHECKPOINT_INTERVAL", 0.0)
+    always_due(monkeypatch)
     scene, *_ = press_and_drop(frames=8)
     save(tmp_path)
     work = SlicedJob(bake(scene))
     for _ in range(14):
         work.work(0.0)
     work.cancel()
-    assert list((tmp_path / "palpate").iterdir()) == []
+    assert visible(tmp_path / "palpate") == []
+    assert [path.name for path in (tmp_path / "palpate" / PRIVATE_FOLDER).iterdir()] == [MARKER_NAME]

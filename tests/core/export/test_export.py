@@ -3,7 +3,8 @@
 
 import csv
 import json
-from dataclasses import asdict
+import shutil
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
@@ -15,8 +16,9 @@ from palpate.core.export import registry
 from palpate.core.export.registry import export, exporters
 from palpate.core.figures import color_maps
 from palpate.core.figures.figure_style import FigureStyle
-from palpate.core.io.bake_folder import Manifest, write_manifest
-from palpate.core.io.bake_reader import frame_index, read_bake
+from palpate.core.io.bake_folder import Manifest, read_manifest, write_manifest
+from palpate.core.io.bake_reader import check_images, frame_index, read_bake
+from palpate.core.io.file_writing import file_sha256
 from palpate.core.io.recording_npz import save_recording
 from palpate.core.io.sensor_npz import load_sensor, save_sensor
 from palpate.core.jobs.job_runner import run_job
@@ -45,6 +47,27 @@ def bake(tmp_path):
     put(tmp_path / "bake", "pad", grid_texels(), Painted(friction=np.linspace(0.5, 2.0, 15)))
     put(tmp_path / "bake", "tip/1", round_texels())
     return read_bake(tmp_path / "bake")
+
+
+@pytest.mark.parametrize("name", ["recording.npz", "sensor.npz", "tactile_0001.exr"])
+@pytest.mark.parametrize("damage", ["changed", "missing"])
+def test_a_damaged_file_is_named(bake, tmp_path, name, damage):
+    folder = tmp_path / "bake" / "pad"
+    (folder / "tactile_0001.exr").write_bytes(b"image")
+    names = ("recording.npz", "sensor.npz", "tactile_0001.exr")
+    write_manifest(folder, replace(read_manifest(folder), files={each: file_sha256(folder / each) for each in names}))
+    check_images(read_bake(tmp_path / "bake"))
+    (folder / name).write_bytes((folder / name).read_bytes() + b"?")
+    if damage == "missing":
+        (folder / name).unlink()
+    with pytest.raises(FileError, match=f"pad/{name}' is {'damaged' if damage == 'changed' else 'missing'}"):
+        check_images(read_bake(tmp_path / "bake"))
+
+
+def test_a_sensor_may_be_called_old_and_a_copy_that_is_called_so_is_no_sensor(bake, tmp_path):
+    put(tmp_path / "bake", "pad.old", grid_texels())
+    shutil.copytree(tmp_path / "bake" / "pad", tmp_path / "bake" / "pad.partial")
+    assert sorted(read_bake(tmp_path / "bake").texels) == ["pad", "pad.old", "tip/1"]
 
 
 @pytest.mark.parametrize("texels", [grid_texels(), round_texels()], ids=["grid", "uv"])

@@ -11,10 +11,9 @@ from contextlib import suppress
 from pathlib import Path
 from typing import IO
 
-from ...core.errors import FileError
-from ...core.io.regular_file import open_regular
-
-LOCK_FILE_NAME = "baking.lock"
+from ..errors import FileError
+from .private_folder import LOCK_NAME, make_private_folder
+from .regular_file import open_regular
 
 
 class FolderLock:
@@ -23,13 +22,15 @@ class FolderLock:
     Raises
     ------
     FileError
-        Another bake holds it.
+        Another bake holds it, or the hidden folder that holds the lock cannot be made.
     """
 
     def __init__(self, folder: Path):
-        self._path = folder / LOCK_FILE_NAME
+        self._path = make_private_folder(folder) / LOCK_NAME
         self._file: IO[bytes] | None = None
         while self._file is None:
+            if self._path.is_symlink():
+                raise FileError(f"'{self._path}' is a link: remove it, or choose another bake folder.")
             try:
                 file = open_regular(self._path, "ab")  # noqa: SIM115 - it stays open as long as the lock is held
             except OSError:
