@@ -38,6 +38,8 @@ def float_property(parameter: Parameter, label: str, description: str, limits: d
         Precision and step.
     """
     if limits is None:
+        # Blender's bounds are inclusive: zero can be typed where only values above it are allowed. The check of the parameter
+        # then says what to type, whereas a tiny lower bound would silently replace the zero by a number that means as little.
         limits = {"min": max(parameter.low, LOWEST), "max": min(parameter.high, HIGHEST)}
     name = with_unit(label, parameter)
     return FloatProperty(name=name, description=description, default=parameter.default, **limits, **more, **FIXED)

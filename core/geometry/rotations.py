@@ -147,7 +147,7 @@ def write_twist_map(rotation: np.ndarray, gx: float, gy: float, gz: float, sign:
     for i in range(3):
         rx, ry, rz = sign * rotation[0, i], sign * rotation[1, i], sign * rotation[2, i]
         out[i, 0], out[i, 1], out[i, 2] = rx, ry, rz
-        out[i, 3], out[i, 4], out[i, 5] = gy * rz - gz * ry, gz * rx - gx * rz, gx * ry - gy * rx  # R (ω × g)
+        out[i, 3], out[i, 4], out[i, 5] = gy * rz - gz * ry, gz * rx - gx * rz, gx * ry - gy * rx  # Rᵀ (ω × g)
         out[3 + i, 0], out[3 + i, 1], out[3 + i, 2] = 0.0, 0.0, 0.0
         out[3 + i, 3], out[3 + i, 4], out[3 + i, 5] = rx, ry, rz
 

@@ -75,7 +75,7 @@ class Manifest:
     step_reason : str
         Why that one; empty when the manifest is older.
     digest : str
-        :meth:`.scenario.Scenario.digest` of what is solved; another digest makes the bake stale.
+        :meth:`.scenario.Scenario.digest` of what was solved. Sensors of one bake have the same digest.
     unit : str
         Of the channel ``reading``.
     shape : (int, int)

@@ -12,8 +12,8 @@ import numpy as np
 def digest_of(value: object) -> str:
     """Return a hash of a description, the same in every process and on every platform.
 
-    Names of fields and their order count. Bakes keep the hash of their scenario, so a field that is renamed or moved makes them
-    stale.
+    The names of fields and their order count. Checkpoints and bakes keep the hash of their scenario, so after a field has been
+    renamed or moved, an unfinished bake starts again from its first frame.
 
     Parameters
     ----------

@@ -13,7 +13,10 @@ from ..model.scenario import Scenario
 from ..model.sensor import Sensor
 
 SHARE_OF_LIMIT = 0.2
-"""Share of the explicit stability limit that is used: about thirty steps per period of the stiffest contact."""
+"""Share of the explicit stability limit that is used.
+
+A contact that vibrates against all stiff texels at once takes 5π ≈ 16 such steps per period without damping, and more with it.
+"""
 LONGEST = 1e-3
 """Longest step that is advised (s), so that fast motions are followed where nothing is stiff."""
 SHORTEST = 1e-6
@@ -73,13 +76,12 @@ def advise(scenario: Scenario) -> Advice:
             limit,
             f"{LONGEST * 1e3:g} ms: nothing that forces move touches a sensor, only the motion has to be followed.",
         )
-    dt = float(np.clip(SHARE_OF_LIMIT * limit, SHORTEST, LONGEST))
-    return Advice(
-        dt,
-        limit,
-        f"{dt * 1e3:.3g} ms: {SHARE_OF_LIMIT:.0%} of the explicit stability limit of '{culprit}' ({limit * 1e3:.3g} ms)"
-        + (", the longest that is advised." if dt == LONGEST else "."),
-    )
+    wanted = SHARE_OF_LIMIT * limit
+    of_limit = f"the explicit stability limit of '{culprit}'"
+    if SHORTEST <= wanted <= LONGEST:
+        return Advice(wanted, limit, f"{wanted * 1e3:.3g} ms: {SHARE_OF_LIMIT:.0%} of {of_limit} ({limit * 1e3:.3g} ms).")
+    dt, which = (SHORTEST, "shortest") if wanted < SHORTEST else (LONGEST, "longest")
+    return Advice(dt, limit, f"{dt * 1e3:.3g} ms: the {which} that is advised; {of_limit} is {limit * 1e3:.3g} ms.")
 
 
 @dataclass(frozen=True)

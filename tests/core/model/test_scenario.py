@@ -14,7 +14,7 @@ from palpate.core.model.motion import Motion
 from palpate.core.model.pose_interpolation import poses_at
 from palpate.core.model.sensor_parameters import SensorParameters
 from palpate.core.solver.simulation import run
-from palpate.core.solver.time_step_adviser import LONGEST, advise, plan, stability_limit
+from palpate.core.solver.time_step_adviser import LONGEST, SHARE_OF_LIMIT, advise, plan, stability_limit
 
 NUMBERS = [item.name for item in fields(SensorParameters) if item.type == "float"]
 
@@ -113,7 +113,24 @@ def test_the_step_of_a_run_is_explained():
     assert (
         f"{chosen.substeps} to a frame" in chosen.reason and advised.reason in chosen.reason and "as set" not in chosen.reason
     )
+    assert advised.reason.endswith(f"ms: 20% of the explicit stability limit of 'cube' ({advised.limit * 1e3:.3g} ms).")
     long = plan(replace(scenario, dt=0.01))
     assert "as set" in long.reason and advised.reason in long.reason and "less exactly" in long.reason
     assert "less exactly" not in plan(replace(scenario, dt=1e-5)).reason
     assert run(replace(scenario, frame_end=2)).step_reason == chosen.reason
+
+
+@pytest.mark.parametrize(("mass", "dt", "which"), [(1e6, 1e-3, "longest"), (1e-9, 1e-6, "shortest")])
+def test_advice_at_its_bounds_names_no_share_of_the_limit(mass, dt, which):
+    advised = advise(cube_on_pad(mass, dt=None))
+    assert advised.dt == dt and "%" not in advised.reason
+    assert (
+        f": the {which} that is advised; the explicit stability limit of 'cube' is {advised.limit * 1e3:.3g} ms."
+        in advised.reason
+    )
+
+
+def test_the_advised_step_resolves_an_undamped_vibration_in_sixteen_steps():
+    stiffness, mass = 300.0, 0.2
+    period = 2 * np.pi * np.sqrt(mass / stiffness)
+    assert period / (SHARE_OF_LIMIT * stability_limit(stiffness, 0.0, mass)) == pytest.approx(5 * np.pi)
