@@ -25,4 +25,5 @@ __all__ = [
     "sensor_toml",
     "settings_migration",
     "tactile_exr",
+    "toml_file",
 ]

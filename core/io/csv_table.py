@@ -34,6 +34,10 @@ UNITS: dict[str, dict[str, float]] = {
 """SI unit → units that a column may be written in, and the SI value of one of them."""
 
 
+LARGEST_NUMBER = 1e30
+"""Numbers of a larger magnitude are refused: nothing that is measured is so large, and sums of their squares overflow."""
+
+
 @dataclass(frozen=True)
 class CsvFormat:
     """What a table may look like.
@@ -117,6 +121,10 @@ def read_table(
         raise FileError(f"'{path.name}' is not a text file in UTF-8: export the table as CSV.") from error
     except OSError as error:
         raise FileError(f"'{path}' could not be read ({error.strerror}): check its name and permissions.") from error
+    except csv.Error as error:
+        raise FileError(f"'{path.name}' is not a table ({error}): export it as CSV, with quotation marks closed.") from error
+    except ValueError as error:  # a NUL in the name
+        raise FileError(f"{str(path)!r} cannot be the name of a file: check it.") from error
     if len(values) == 0:
         raise FileError(f"'{path.name}' has a header and no data: there are no measurements below its header, add them.")
     return Table(names if chosen is None else [names[i] for i in chosen], values)
@@ -230,7 +238,11 @@ class _Context:
             if not _is_number(text):
                 raise FileError(f"Line {line} of '{self.path.name}' has '{text[:40]}' for {name}: {remedy}.")
             if not math.isfinite(float(text)):
-                raise FileError(f"Line {line} of '{self.path.name}' has {text} for {name}: {remedy}.")
+                raise FileError(f"Line {line} of '{self.path.name}' has {text[:40]} for {name}: {remedy}.")
+            if abs(float(text)) > LARGEST_NUMBER:
+                raise FileError(
+                    f"Line {line} of '{self.path.name}' has {text[:40]} for {name}, which nothing measured can be: {remedy}."
+                )
 
 
 def _values(
@@ -252,10 +264,7 @@ def _values(
             row = [float(cell) if cell and not cell.isspace() else math.nan for cell in cells]
         except ValueError:
             context.complain(number, heads, cells)
-        if not all(map(math.isfinite, row)) and (
-            not context.form.missing
-            or any(cell.strip() and not math.isfinite(value) for cell, value in zip(cells, row, strict=True))
-        ):
+        if not all(-LARGEST_NUMBER <= value <= LARGEST_NUMBER for value in row):  # false for NaN, too
             context.complain(number, heads, cells)
         values.extend(row)
     return np.frombuffer(values, float).reshape(-1, len(heads)) if values else np.zeros((0, len(heads)))

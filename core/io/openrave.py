@@ -64,6 +64,8 @@ def read_openrave(path: str | os.PathLike) -> list[OpenRaveSensor]:
         raise FileError(f"There is no file '{path}': check its name and folder.") from error
     except OSError as error:
         raise FileError(f"'{path}' cannot be read ({error.strerror}): check its name and permissions.") from error
+    except ValueError as error:  # a NUL in the name
+        raise FileError(f"{str(path)!r} cannot be the name of a file: check it.") from error
     if b"<!ENTITY" in text:  # nested entities can grow without limit
         raise FileError(f"'{path}' declares XML entities: write them out, a sensor definition needs none.")
     try:
@@ -103,7 +105,7 @@ def _sensor(path: str | os.PathLike, attached: ElementTree.Element) -> OpenRaveS
             values[key] = float((child.text or "").strip())
         except ValueError as error:
             raise FileError(
-                f"<{key}> of sensor '{name}' in '{path}' is '{child.text}', which is no number: correct it."
+                f"<{key}> of sensor '{name}' in '{path}' is '{child.text or '':.60}', which is no number: correct it."
             ) from error
     missing = tuple(key for key in (THICKNESS, *NUMBERS) if key not in values)
     if THICKNESS in values:

@@ -23,7 +23,6 @@ Reading a file gives exactly the numbers that were written.
 from __future__ import annotations
 
 import os
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -34,9 +33,13 @@ from ..errors import FileError, PalpateError
 from ..model.effect import Effect
 from ..model.sensor_parameters import SENSOR_PARAMETERS, SensorParameters
 from .file_writing import atomic_write
-from .regular_file import read_bytes
+from .toml_file import checked_name, is_number, read_toml
 
 FORMAT = "palpate-sensor-toml/1"
+MOST_TEXELS = 65536
+"""Texels of a grid in a file."""
+SHORTEST_LENGTH, LONGEST_LENGTH = 1e-9, 1e6
+"""Metres; a length of a sensor or of what presses on it is between them, whatever its unit was taken for."""
 SHAPE_WORDS = ("grid", "mesh", "thickness")
 """Keys of a rig's [sensor] that say where its texels are. They are kept as they are."""
 
@@ -88,16 +91,7 @@ def read_sensor(path: str | os.PathLike) -> SensorModel:
     EffectError, ParameterError
         A value is not valid.
     """
-    try:
-        text = read_bytes(path).decode("utf-8")
-    except UnicodeDecodeError as error:
-        raise FileError(f"'{path}' is not a text file: choose a sensor's .toml.") from error
-    except OSError as error:
-        raise FileError(f"'{path}' could not be read ({error.strerror}): check the name.") from error
-    try:
-        table = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise FileError(f"'{path}' is not valid TOML ({error}): mend that line.") from error
+    table = read_toml(path, "sensor")
     try:
         return sensor_of(table)
     except PalpateError as error:
@@ -112,6 +106,7 @@ def sensor_of(table: Mapping[str, Any]) -> SensorModel:
     name, words, entries = table.get("name", "sensor"), table.get("sensor", {}), table.get("effect", [])
     if not isinstance(name, str) or not isinstance(words, Mapping):
         raise FileError('It needs name = "…" and [sensor] with the sensor\'s words.')
+    checked_name(name, "the file")
     if not isinstance(entries, list) or not all(isinstance(entry, Mapping) for entry in entries):
         raise FileError("Its effects have to be written as [[effect]], one for each.")
     known_words(words, {*SENSOR_PARAMETERS, *SHAPE_WORDS}, "[sensor]")
@@ -119,7 +114,56 @@ def sensor_of(table: Mapping[str, Any]) -> SensorModel:
     parameters.check(name)
     effects = tuple(from_dict(entry, parameters.gain) for entry in entries)
     check(effects, name, gain=parameters.gain)
-    return SensorModel(name, parameters, effects, {key: words[key] for key in SHAPE_WORDS if key in words})
+    return SensorModel(name, parameters, effects, _checked_shape(words))
+
+
+def _checked_shape(words: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the words for the shape that a [sensor] has; raise FileError for a grid, mesh or thickness that is none."""
+    shape = {key: words[key] for key in SHAPE_WORDS if key in words}
+    if "grid" in shape:
+        rows, columns, pitch = checked_grid(shape["grid"], "[sensor]")
+        shape["grid"] = {**shape["grid"], "rows": rows, "columns": columns, "pitch": list(pitch)}
+    if "mesh" in shape:
+        checked_name(shape["mesh"], "mesh of [sensor]")
+    if "thickness" in shape:
+        checked_lengths(shape["thickness"], 1, "thickness of [sensor]")
+    return shape
+
+
+def checked_grid(grid: Any, where: str) -> tuple[int, int, tuple[float, float]]:
+    """Return rows, columns and pitch (x and y, metres) of a grid as a file writes it.
+
+    Raises
+    ------
+    FileError
+        It is no grid, or one with too many texels; `where` says of which table or file.
+    """
+    if not isinstance(grid, Mapping):
+        raise FileError(f"grid of {where} is {grid!r:.80}: write {{ rows = 14, columns = 6, pitch = [0.0034, 0.0034] }}.")
+    known_words(grid, {"rows", "columns", "pitch"}, f"grid of {where}")
+    counts = []
+    for key in ("rows", "columns"):
+        count = grid.get(key)
+        if not isinstance(count, int) or isinstance(count, bool) or not 1 <= count <= MOST_TEXELS:
+            raise FileError(f"{key} of {where} is {count!r:.60}: give a whole number from 1 to {MOST_TEXELS}.")
+        counts.append(count)
+    rows, columns = counts
+    if rows * columns > MOST_TEXELS:
+        raise FileError(f"The grid of {where} has {rows * columns} texels: at most {MOST_TEXELS} are read.")
+    pitch = grid.get("pitch")
+    pitch_x, pitch_y = checked_lengths(pitch if isinstance(pitch, list | tuple) else [pitch, pitch], 2, f"pitch of {where}")
+    return rows, columns, (pitch_x, pitch_y)
+
+
+def checked_lengths(value: Any, count: int, what: str) -> tuple[float, ...]:
+    """Return a number of lengths (m) that a file gives; raise FileError, which names `what`, when they are none."""
+    items = value if isinstance(value, list | tuple) else [value]
+    if len(items) != count or not all(is_number(item) and SHORTEST_LENGTH <= item <= LONGEST_LENGTH for item in items):
+        many = "a number" if count == 1 else f"{count} numbers"
+        raise FileError(
+            f"{what} is {value!r:.80}: give {many} above zero, in metres, from {SHORTEST_LENGTH:g} to {LONGEST_LENGTH:g}."
+        )
+    return tuple(float(item) for item in items)
 
 
 def stated_parameters(words: Mapping[str, Any], where: str) -> dict[str, Any]:
@@ -152,7 +196,7 @@ def known_words(table: Mapping[str, Any], words: set[str], where: str) -> None:
     """Raise :class:`FileError` for the first key of a table that is not among the `words` of its format."""
     for key in table:
         if key not in words:
-            raise FileError(f"'{key}' in {where} is not a word of this format: it knows {', '.join(sorted(words))}.")
+            raise FileError(f"{key!r:.60} in {where} is not a word of this format: it knows {', '.join(sorted(words))}.")
 
 
 def _plain(words: Mapping[str, Any]) -> dict[str, Any]:

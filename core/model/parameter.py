@@ -96,7 +96,12 @@ class Parameter:
 
     def read(self, word: Any) -> float | None:
         """Return the value that a word of a file means, None when it means none."""
-        return float(word) if isinstance(word, int | float) and not isinstance(word, bool) else None
+        if not isinstance(word, int | float) or isinstance(word, bool):
+            return None
+        try:
+            return float(word)
+        except OverflowError:  # a whole number of hundreds of digits
+            return None
 
     wanted = "a number"
     """What a file has to give."""

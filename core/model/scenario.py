@@ -67,6 +67,8 @@ class Scenario:
             raise ParameterError(
                 f"The time step of '{self.name}' is {self.dt:g} s: give a value above zero, or leave it automatic."
             )
+        if not np.isfinite(self.gravity).all():
+            raise SceneError(f"The gravity of '{self.name}' is NaN or infinite: set it under Scene › Gravity.")
         if self.interpolation not in ("linear", "smooth"):
             raise ParameterError(f"The interpolation of '{self.name}' is '{self.interpolation}': choose linear or smooth.")
         if not self.sensors:
@@ -82,16 +84,31 @@ class Scenario:
             if sensor.deformation is not None:
                 sensor.deformation.check(sensor.name, (len(sensor.texels), 9))
         for target in self.targets:
+            if not np.isfinite(target.mesh.vertices).all():
+                raise SceneError(f"A vertex of '{target.name}' is NaN or infinite: check its mesh and what deforms it.")
             if target.deformation is not None:
                 target.deformation.check(target.name, target.mesh.vertices.shape)
         for body in self.bodies:
             if body.moved_by_forces and not (np.isfinite(body.mass) and body.mass > 0):
                 kind = "free" if body.free else "driven"
                 raise ParameterError(f"The mass of {kind} body '{body.name}' is {body.mass:g} kg: give it a value above zero.")
+            self._check_start(body)
             self._check_drive(body)
             path = (body.motion.positions, body.motion.quaternions)
             if not all(np.isfinite(values).all() for values in path):
                 raise SceneError(f"The motion of '{body.name}' has a NaN or infinite pose: check its keyframes and drivers.")
+
+    def _check_start(self, body: Body) -> None:
+        for what, value in (("velocity", body.velocity), ("angular velocity", body.angular_velocity)):
+            if not np.isfinite(value).all():
+                raise ParameterError(f"The {what} of '{body.name}' at the start is NaN or infinite: give it three numbers.")
+        for what, value in (("centre of mass", body.center_of_mass), ("inertia", body.inertia)):
+            if not np.isfinite(value).all():
+                raise ParameterError(f"The {what} of '{body.name}' is NaN or infinite: check its mesh and its mass.")
+        if body.moved_by_forces and not (np.linalg.eigvalsh(body.inertia) > 0.0).all():
+            raise ParameterError(
+                f"The inertia of '{body.name}' is zero about some axis: give it a larger mass, or a shape with an extent."
+            )
 
     def _check_drive(self, body: Body) -> None:
         drive = body.drive

@@ -178,9 +178,16 @@ def from_dict(table: Mapping[str, Any], gain: float = 1.0) -> Effect:
         raise EffectError(f"seed of effect '{name}' is {seed!r}: give it a whole number from 0 to 2147483647.")
     for key, value in rest.items():
         numbers = value if isinstance(value, list | tuple) else [value]
-        if not all(isinstance(number, int | float) and not isinstance(number, bool) for number in numbers):
-            raise EffectError(f"{key} of effect '{name}' is {value!r}: give it a number.")
+        if not all(_is_number(number) for number in numbers):
+            raise EffectError(f"{key} of effect '{name}' is {value!r:.80}: give it a number.")
     return effect(name, form, seed, gain, **rest)
+
+
+def _is_number(value: Any) -> bool:
+    """Return whether a value of a file is a number that a float can hold, NaN and infinity included."""
+    if not isinstance(value, int | float) or isinstance(value, bool):
+        return False
+    return isinstance(value, float) or abs(value) < 1 << 1023
 
 
 def _plain(value: Any) -> Value:

@@ -124,7 +124,11 @@ def read_friction(path: str | os.PathLike, texels: int = 1) -> FrictionData:
     ------
     FileError
         A column is missing, there are too few lines, or the time does not increase.
+    ParameterError
+        The number of texels is not above zero.
     """
+    if texels < 1:
+        raise ParameterError(f"The number of texels is {texels}: give at least one.")
     columns = read_columns(path, {"velocity": "m/s", "force": "N", "time": "s"})
     for name in ("velocity", "force"):
         if name not in columns:

@@ -75,12 +75,14 @@ def texel_stiffness(pressure: float, area: float, texels: int, compression: floa
     texels : int
     compression : float, metres
     """
-    if not area > 0:
-        raise ParameterError(f"The sensor's area is {area:g} m²: give a value above zero.")
+    if not (np.isfinite(area) and area > 0):
+        raise ParameterError(f"The sensor's area is {area:g} m²: give a finite value above zero.")
     if not texels > 0:
         raise ParameterError(f"The number of texels is {texels}: give at least one.")
-    if not compression > 0:
-        raise ParameterError(f"The compression is {compression:g} m: give a value above zero.")
+    if not (np.isfinite(compression) and compression > 0):
+        raise ParameterError(f"The compression is {compression:g} m: give a finite value above zero.")
+    if not np.isfinite(pressure):
+        raise ParameterError(f"The pressure is {pressure:g} Pa: give a finite value.")
     return pressure * area / (texels * compression)
 
 
@@ -109,8 +111,8 @@ def read_foam(path: str | os.PathLike, weight_area: float | None = None) -> Foam
         raise FileError(f"'{path}' needs exactly one of the columns 'pressure', 'force' and 'mass'; it has {len(loads)}.")
     load = columns[loads[0]]
     if loads[0] != "pressure":
-        if weight_area is None or not weight_area > 0:
-            raise FileError(f"'{path}' has a column '{loads[0]}': say on which area it rested, in m², above zero.")
+        if weight_area is None or not (np.isfinite(weight_area) and weight_area > 0):
+            raise FileError(f"'{path}' has a column '{loads[0]}': say on which area it rested, in m², finite and above zero.")
         load = load * (STANDARD_GRAVITY if loads[0] == "mass" else 1.0) / weight_area
     return FoamData(columns["compression"], load)
 
@@ -128,8 +130,10 @@ def fit_stiffness(data: FoamData, area: float, texels: int) -> StiffnessFit:
     Raises
     ------
     ParameterError
-        There are not enough different compressions, or the pressure does not rise with the compression.
+        Area or number of texels is not above zero, there are not enough different compressions, or the pressure does not rise
+        with the compression.
     """
+    per_texel = texel_stiffness(1.0, area, texels, 1.0)
     x, p = np.asarray(data.compression, float), np.asarray(data.pressure, float)
     if len(np.unique(x)) < 2 or not np.any(x > 0):
         raise ParameterError("A stiffness needs measurements at two different compressions or more: add some.")
@@ -137,7 +141,6 @@ def fit_stiffness(data: FoamData, area: float, texels: int) -> StiffnessFit:
     slope_offset, offset = linear_estimates(np.stack([x, np.ones_like(x)], axis=1), p)
     if slope.value <= 0 or slope_offset.value <= 0:
         raise ParameterError("The foam's pressure does not rise with its compression: check the columns and their signs.")
-    per_texel = texel_stiffness(1.0, area, texels, 1.0)
     return StiffnessFit(
         data,
         slope.scaled(per_texel),

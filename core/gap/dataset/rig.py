@@ -6,7 +6,6 @@ Every mistake in a rig raises an error here, in one sentence, before anything is
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -18,14 +17,16 @@ from ...errors import FileError, ParameterError, SensorError
 from ...geometry.mesh import TriangleMesh, checked_mesh
 from ...geometry.texels import Texels, texels_from_region
 from ...io.csv_table import read_table
-from ...io.regular_file import open_regular, require_regular
-from ...io.sensor_toml import SHAPE_WORDS, stated_parameters
+from ...io.regular_file import require_regular
+from ...io.sensor_toml import SHAPE_WORDS, checked_grid, checked_lengths, known_words, stated_parameters
+from ...io.toml_file import LONGEST_NAME, checked_name, read_toml
 from ...model.sensor_parameters import DAMPING_PER_STIFFNESS, DEPTH_PER_THICKNESS, SENSOR_PARAMETERS, SensorParameters
 
 FORMAT = "palpate-rig/1"
 POSE, TURN, SLIDE = ("x", "y", "z"), ("qw", "qx", "qy", "qz"), ("slide_x", "slide_y")
 FORCE = ("force_x", "force_y", "force_z")
-MOST_TEXELS = 65536
+SMALLEST_RESPONSE = 1e-30
+"""Responses of a smaller magnitude, in any unit, count as zero."""
 LONGEST_STEP = 5.0
 """Seconds between samples above which the clock must be in milliseconds."""
 
@@ -143,10 +144,11 @@ def read_rig(path: str | Path) -> Rig:
         Something in it cannot be used; the message says what, where, and what to do.
     """
     path = Path(path)
-    words = _toml(path)
+    words = read_toml(path, "rig")
     if words.get("format") != FORMAT:
         raise FileError(f"'{path.name}' is not a rig: its first line must be format = \"{FORMAT}\".")
-    _known(words, {"format", "name", "sensor", "indenter", "trial"}, f"'{path.name}'")
+    known_words(words, {"format", "name", "sensor", "indenter", "trial"}, f"'{path.name}'")
+    rig_name = checked_name(words.get("name", path.stem), f"'{path.name}'")
     folder, warnings = path.resolve().parent, []
     sensor = _table(words, "sensor", path)
     texels, grid = _texels(sensor, folder, path)
@@ -174,9 +176,10 @@ def read_rig(path: str | Path) -> Rig:
         raise FileError(
             f"All responses in '{path.name}' are zero: check that the sensor was connected and the right columns exported."
         )
+    warnings += _channel_warnings(trials)
     _check_units(trials, indenter, texels, parameters, thickness, path)
     return Rig(
-        name=str(words.get("name", path.stem)),
+        name=rig_name,
         texels=texels,
         parameters=parameters,
         given=frozenset(set(sensor) & set(SENSOR_PARAMETERS)),
@@ -187,26 +190,6 @@ def read_rig(path: str | Path) -> Rig:
         words=sensor,
         warnings=tuple(warnings),
     )
-
-
-def _toml(path: Path) -> dict[str, Any]:
-    """Contents of the TOML file."""
-    try:
-        with open_regular(path) as file:
-            return tomllib.load(file)
-    except FileNotFoundError as error:
-        raise FileError(f"There is no rig '{path}': check the path.") from error
-    except OSError as error:
-        raise FileError(f"The rig '{path}' could not be read ({error.strerror}): give a .toml file.") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise FileError(f"'{path.name}' is not TOML ({error}): mend that line.") from error
-
-
-def _known(table: Mapping[str, Any], keys: set[str], where: str) -> None:
-    """Refuse unknown keys of a table."""
-    for key in table:
-        if key not in keys:
-            raise FileError(f"{where} has '{key}', which means nothing there: use one of {', '.join(sorted(keys))}.")
 
 
 def _table(words: Mapping[str, Any], key: str, path: Path) -> dict[str, Any]:
@@ -221,24 +204,15 @@ def _inside(name: Any, folder: Path, what: str, path: Path) -> Path:
     """Path of a file beside the rig; a path that leads out of its folder is refused."""
     if not isinstance(name, str) or not name.strip():
         raise FileError(f"{what} of '{path.name}' names no file: write the name of one beside the rig.")
+    name = checked_name(name, f"{what} of '{path.name}'")
     found = (folder / name).resolve()
     if not found.is_relative_to(folder):
         raise FileError(f"{what} of '{path.name}' is '{name}', outside the rig's folder: move the file beside the rig.")
-    if not found.is_file():
+    if len(found.name.encode()) > LONGEST_NAME or not found.is_file():
         raise FileError(
             f"{what} of '{path.name}' is '{name}', which is not there: check the name, it counts from the rig's folder."
         )
     return found
-
-
-def _numbers(value: Any, count: int, what: str, path: Path) -> tuple[float, ...]:
-    """A number of positive numbers, in metres."""
-    items = value if isinstance(value, list) else [value]
-    good = len(items) == count and all(isinstance(v, int | float) and not isinstance(v, bool) for v in items)
-    if not good or not all(np.isfinite(v) and v > 0 for v in items):
-        many = "a number above zero" if count == 1 else f"{count} numbers above zero"
-        raise FileError(f"{what} of '{path.name}' is {value!r}: give {many}, in metres.")
-    return tuple(float(v) for v in items)
 
 
 # --- the sensor
@@ -257,22 +231,8 @@ def _texels(sensor: dict[str, Any], folder: Path, path: Path) -> tuple[Texels, t
                 "remove them, so that texel numbers and vertices agree."
             )
         return texels, None
-    grid = sensor["grid"]
-    if not isinstance(grid, dict):
-        raise FileError(f"grid of '{path.name}' is {grid!r}: write {{ rows = 14, columns = 6, pitch = [0.0034, 0.0034] }}.")
-    _known(grid, {"rows", "columns", "pitch"}, f"grid of '{path.name}'")
-    counts = []
-    for key in ("rows", "columns"):
-        count = grid.get(key)
-        if not isinstance(count, int) or isinstance(count, bool) or count < 1:
-            raise FileError(f"{key} of '{path.name}' is {count!r}: give a whole number above zero.")
-        counts.append(count)
-    rows, columns = counts
-    if rows * columns > MOST_TEXELS:
-        raise FileError(f"The grid of '{path.name}' has {rows * columns} texels: at most {MOST_TEXELS} are read.")
-    pitch = grid.get("pitch")
-    pitch_x, pitch_y = _numbers(pitch if isinstance(pitch, list) else [pitch, pitch], 2, "pitch", path)
-    return grid_texels(rows, columns, pitch_x, pitch_y), (rows, columns, (pitch_x, pitch_y))
+    rows, columns, pitch = checked_grid(sensor["grid"], f"'{path.name}'")
+    return grid_texels(rows, columns, *pitch), (rows, columns, pitch)
 
 
 def grid_texels(rows: int, columns: int, pitch_x: float, pitch_y: float) -> Texels:
@@ -317,10 +277,10 @@ def _mesh(path: Path, name: str) -> tuple[TriangleMesh, list[str]]:
 def _parameters(sensor: dict[str, Any], path: Path) -> tuple[SensorParameters, float | None]:
     """Parameters of the sensor, and its thickness."""
     where = f"[sensor] of '{path.name}'"
-    _known(sensor, {*SENSOR_PARAMETERS, *SHAPE_WORDS, "name"}, where)
+    known_words(sensor, {*SENSOR_PARAMETERS, *SHAPE_WORDS, "name"}, where)
     thickness = None
     if "thickness" in sensor:
-        (thickness,) = _numbers(sensor["thickness"], 1, "thickness", path)
+        (thickness,) = checked_lengths(sensor["thickness"], 1, f"thickness of '{path.name}'")
         if thickness > 1.0:
             raise ParameterError(f"thickness of '{path.name}' is {thickness:g} m: give it in metres.")
     values = stated_parameters(sensor, where)
@@ -344,7 +304,7 @@ def _parameters(sensor: dict[str, Any], path: Path) -> tuple[SensorParameters, f
 
 def _indenter(words: dict[str, Any], folder: Path, path: Path) -> Indenter:
     """The indenter."""
-    _known(words, {"shape", "mesh", "name"}, f"[indenter] of '{path.name}'")
+    known_words(words, {"shape", "mesh", "name"}, f"[indenter] of '{path.name}'")
     if ("shape" in words) == ("mesh" in words):
         raise FileError(f"[indenter] of '{path.name}' needs either a shape or a mesh, and not both.")
     if "mesh" in words:
@@ -361,15 +321,15 @@ def _indenter(words: dict[str, Any], folder: Path, path: Path) -> Indenter:
     ((kind, size),) = shape.items()
     edges = None
     if kind == "sphere":
-        (radius,) = _numbers(size, 1, "The sphere's radius", path)
+        (radius,) = checked_lengths(size, 1, f"The sphere's radius of '{path.name}'")
         solid = trimesh.creation.icosphere(subdivisions=4, radius=radius)
         name = f"{2e3 * radius:g} mm ball"
     elif kind == "box":
-        size, radius = _numbers(size, 3, "The box's size", path), None
+        size, radius = checked_lengths(size, 3, f"The box's size of '{path.name}'"), None
         solid, edges = trimesh.creation.box(size), tuple(map(float, size))
         name = " × ".join(f"{1e3 * edge:g}" for edge in size) + " mm box"
     else:
-        (across, height), radius = _numbers(size, 2, "The cylinder's size", path), None
+        (across, height), radius = checked_lengths(size, 2, f"The cylinder's size of '{path.name}'"), None
         solid = trimesh.creation.cylinder(radius=across, height=height, sections=256)
         name = f"cylinder of {2e3 * across:g} mm"
     mesh = checked_mesh(solid.vertices, solid.faces, "the indenter")[0]
@@ -384,7 +344,7 @@ def _trial(entry: Any, number: int, folder: Path, path: Path, texels: int, has_i
     where = f"Trial {number}"
     if not isinstance(entry, dict):
         raise FileError(f"{where} of '{path.name}' is not a table: write [[trial]] above its file.")
-    _known(entry, {"file", "use", "name"}, f"{where} of '{path.name}'")
+    known_words(entry, {"file", "use", "name"}, f"{where} of '{path.name}'")
     use = entry.get("use", "fit")
     if use not in ("fit", "check"):
         raise FileError(f'{where} of \'{path.name}\' has use = {use!r}: write "fit" or "check".')
@@ -553,9 +513,26 @@ def _gaps_filled(stimuli: list[np.ndarray | None], time: np.ndarray, file: Path)
 
 
 def _responds(trial: Trial) -> bool:
-    """Whether a trial has any response other than zero."""
+    """Whether a trial has any response that is not zero but for rounding."""
     parts = [part for part in (trial.reading, trial.force) if part is not None]
-    return any(np.nanmax(np.abs(part), initial=0.0) > 0 for part in parts if not np.isnan(part).all())
+    return any(np.nanmax(np.abs(part), initial=0.0) > SMALLEST_RESPONSE for part in parts if not np.isnan(part).all())
+
+
+def _channel_warnings(trials: list[Trial]) -> list[str]:
+    """Name the texels without any value, and those whose reading has the same value, not zero, in all recordings."""
+    readings = [trial.reading for trial in trials if trial.reading is not None]
+    if not readings:
+        return []
+    values = np.concatenate(readings)
+    measured = ~np.isnan(values).all(axis=0)
+    high, low = np.nanmax(values, axis=0, initial=-np.inf), np.nanmin(values, axis=0, initial=np.inf)
+    said = []
+    for found, what in ((~measured, "no values in any recording"), (measured & (high == low) & (high != 0), "one value only")):
+        names = [f"texel_{i}" for i in np.flatnonzero(found)]
+        if names:
+            more = f" and {len(names) - 3} more" if len(names) > 3 else ""
+            said.append(f"{', '.join(names[:3])}{more}: {what}; check the connection, they say nothing about the sensor.")
+    return said
 
 
 def _check_units(

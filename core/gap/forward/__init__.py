@@ -5,4 +5,4 @@
 ``contact_phases`` describes a trial: phases of contact, and the features on which a residual may depend.
 """
 
-__all__ = ["contact_phases", "predictor", "stimulus"]
+__all__ = ["contact_phases", "predictor", "response_check", "stimulus"]

@@ -12,6 +12,7 @@ from ..dataset.rig import Rig
 from ..fitting.least_squares import FRICTION_LEVEL, FRICTION_PARAMETERS
 from ..fitting.noise_floor import ChannelNoise, force_noise, reading_noise
 from ..forward.predictor import Model, Predictor
+from ..forward.response_check import check_responses
 
 
 def prepared(rig: Rig) -> tuple[list[Predictor], tuple[ChannelNoise, ChannelNoise], tuple[float, float]]:
@@ -23,8 +24,14 @@ def prepared(rig: Rig) -> tuple[list[Predictor], tuple[ChannelNoise, ChannelNois
     noise : (ChannelNoise, ChannelNoise)
     full : (float, float)
         Largest minus smallest value over all trials and channels.
+
+    Raises
+    ------
+    FileError
+        The recordings do not fit their stimulus, see :func:`.check_responses`.
     """
     predictors = [Predictor(trial, rig) for trial in rig.trials]
+    check_responses(rig, [predictor.stimulus for predictor in predictors])
     readings = [p.trial.reading for p in predictors if p.trial.reading is not None]
     forces = [p.trial.force for p in predictors if p.trial.force is not None]
     full = _range(readings), _range(forces)

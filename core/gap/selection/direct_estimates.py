@@ -102,6 +102,8 @@ def quantization_starts(views: Sequence[TrialView], model: Model, candidate: Can
         tried = np.unique([np.median(apart), apart.mean(), apart.max(), float(np.average(apart, weights=apart))])
         return [Effect(candidate.name, candidate.form.name, {"step": float(step)}) for step in tried]
     noise, full = views[0].noise[0], float(np.ptp(values))
+    if full == 0.0:
+        return []
     frequency = np.arange(COARSEST_FREQUENCY / full, 1.0 / (STEP_IN_NOISE * noise), FREQUENCY_STEP / full)
     if not 2 < len(frequency) < MOST_FREQUENCIES:
         return []

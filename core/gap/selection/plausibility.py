@@ -46,6 +46,8 @@ def _adhesion_pulls(found: FittedCandidate, view_set: ViewSet) -> bool:
             own = (view.predictor.trial.reading - p.zero) / p.gain * abs(p.gain) / view.noise[0]
             predicted.append(reading[pulled])
             measured.append(own[pulled])
+    if not predicted:
+        return True  # only net forces were measured, in which a single texel's pull is not seen
     pull, seen = np.concatenate(predicted), np.concatenate(measured)
     return len(pull) > ENOUGH_SAMPLES and float(np.nanmean(seen)) < LEAST_PRESENT_SHARE * float(pull.mean()) < LEAST_MEAN_PULL
 

@@ -45,7 +45,7 @@ def test_a_short_file_has_defaults(tmp_path):
     ("text", "kind", "sentence"),
     [
         ("format = 3", FileError, "begins with format"),
-        ("k = ", FileError, "not valid TOML"),
+        ("k = ", FileError, "is not TOML"),
         ("HEAD\n[sensor]\nstiffness = 3", FileError, "'stiffness' in \\[sensor\\] is not a word"),
         ("HEAD\n[senor]\nk = 3", FileError, "'senor' in the file"),
         ("HEAD\n[sensor]\nk = 'soft'", FileError, "k of \\[sensor\\] is 'soft': give a number"),
@@ -66,10 +66,10 @@ def test_bad_files(tmp_path, text, kind, sentence):
 
 
 def test_no_file(tmp_path):
-    with pytest.raises(FileError, match="could not be read"):
+    with pytest.raises(FileError, match="There is no sensor"):
         read_sensor(tmp_path / "missing.toml")
     (tmp_path / "picture.toml").write_bytes(b"\x89PNG\xff")
-    with pytest.raises(FileError, match="not a text file"):
+    with pytest.raises(FileError, match="is not a text file"):
         read_sensor(tmp_path / "picture.toml")
     with pytest.raises(FileError, match="does not exist"):
         write_sensor(tmp_path / "no" / "folder" / "sensor.toml", SensorModel("pad"))

@@ -8,8 +8,10 @@ import pytest
 from scipy.linalg import eigvals
 from solver_scenes import cube_on_pad, pressed
 
-from palpate.core.errors import ParameterError
+from palpate.core.effects.engine.sensor_effects import check_scenario
+from palpate.core.errors import EffectError, PalpateError, ParameterError
 from palpate.core.geometry.rotations import quaternions_from_vectors, rotation_matrices, rotation_vectors
+from palpate.core.model.effect import Effect
 from palpate.core.model.motion import Motion
 from palpate.core.model.pose_interpolation import poses_at
 from palpate.core.model.sensor_parameters import SensorParameters
@@ -56,6 +58,40 @@ def test_digest_is_stable_and_notices_every_number():
     assert replace(scenario, fps=25.0).digest() != digest
     assert replace(scenario, frame_end=49).digest() != digest
     assert replace(scenario, dt=None).digest() != digest
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
+def test_what_is_not_finite_is_found_before_anything_is_solved(value):
+    scenario = cube_on_pad()
+    bad = np.array([0.0, value, 0.0])
+    with pytest.raises(PalpateError, match="gravity of 'scene'"):
+        replace(scenario, gravity=bad).check()
+    for key, words in {
+        "velocity": "The velocity of",
+        "angular_velocity": "The angular velocity of",
+        "center_of_mass": "centre of mass",
+        "inertia": "inertia",
+    }.items():
+        for i, body in enumerate(scenario.bodies):
+            broken = replace(body, **{key: np.full((3, 3), value) if key == "inertia" else bad})
+            bodies = (*scenario.bodies[:i], broken, *scenario.bodies[i + 1 :])
+            with pytest.raises(PalpateError, match=f"{words}.*'{body.name}'"):
+                replace(scenario, bodies=bodies).check()
+    target = scenario.targets[0]
+    vertices = target.mesh.vertices.copy()
+    vertices[3, 1] = value
+    with pytest.raises(PalpateError, match=f"vertex of '{target.name}'"):
+        replace(scenario, targets=(replace(target, mesh=replace(target.mesh, vertices=vertices)),)).check()
+
+
+def test_the_effects_of_each_sensor_are_checked():
+    scenario = cube_on_pad()
+    (good,) = scenario.sensors
+    for effect in (Effect("creep", "exponential", {"amount": 7.0, "time": 1.0}), Effect("creap", "", {})):
+        bad = replace(good, name="bad", effects=(effect,))
+        for sensors in ((bad, good), (good, bad), (good, replace(bad, readout=False), good)):
+            with pytest.raises(EffectError, match="creap|sensor 'bad'"):
+                check_scenario(replace(scenario, sensors=sensors))
 
 
 @pytest.mark.parametrize(("k", "c", "m"), [(84000.0, 840.0, 1.0), (58.5, 0.0583, 1e-3), (1e6, 1e4, 1e-3), (1.0, 0.0, 100.0)])

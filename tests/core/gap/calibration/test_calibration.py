@@ -57,6 +57,25 @@ def test_foam_that_does_not_resist_is_refused():
         fit_stiffness(FoamData(np.array([1e-3, 1e-3]), np.array([30.0, 20.0])), 1.0, 1)
 
 
+@pytest.mark.parametrize("area", [0.0, -1.0, np.inf, np.nan])
+def test_areas_that_mean_nothing_are_refused(area, tmp_path):
+    x = np.array([1e-3, 2e-3, 3e-3])
+    with pytest.raises(ParameterError, match="The sensor's area is .*finite value above zero"):
+        fit_stiffness(FoamData(x, 1e6 * x), area, 84)
+    (tmp_path / "foam.csv").write_text("compression,force\n0.001,1\n0.002,2\n")
+    with pytest.raises(FileError, match="which area"):
+        read_foam(tmp_path / "foam.csv", area)
+
+
+def test_no_texels_are_refused(tmp_path):
+    x = np.array([1e-3, 2e-3, 3e-3])
+    with pytest.raises(ParameterError, match="number of texels is 0"):
+        fit_stiffness(FoamData(x, 1e6 * x), 1.0, 0)
+    (tmp_path / "slide.csv").write_text("velocity,force\n" + "0.1,1\n0.2,2\n" * 4)
+    with pytest.raises(ParameterError, match="number of texels is 0"):
+        read_friction(tmp_path / "slide.csv", 0)
+
+
 def test_steady_sliding_is_what_the_bristles_settle_to():
     """Against scipy's stiff solver on Eq. 9: after 40 m of sliding at constant velocity Eq. 13 is the steady curve (1e-9)."""
     for v in (0.02, 0.1, 0.3, -0.6):

@@ -124,6 +124,8 @@ BAD = {
     "time in milliseconds": (dict(press=with_values("time", 1e3)), "seconds"),
     "nan": (dict(press=edited(7, "texel_2", "nan")), "Line 8 of 'press.csv' has nan for texel_2"),
     "infinite": (dict(press=edited(7, "texel_2", "inf")), "Line 8"),
+    "huge": (dict(press=edited(7, "texel_2", "1e308")), "Line 8 of 'press.csv' has 1e308 for texel_2, which nothing"),
+    "endless cell": (dict(press='time,depth,texel_0\n0,"' + "1" * 200_000), "not a table"),
     "words": (dict(press=edited(7, "texel_2", "low")), "'low' for texel_2"),
     "ragged": (dict(press=[*table(), ["1", "2"]]), "Line 22 of 'press.csv' has 2 cells"),
     "semicolons": (dict(press="time;depth;texel_0\n0;0;0\n"), "comma"),
@@ -175,6 +177,15 @@ BAD_RIGS = {
     "no such file": (('"again.csv"', '"never.csv"'), "not there"),
     "outside": (('"again.csv"', '"../again.csv"'), "outside the rig's folder"),
     "absolute": (('"again.csv"', '"/etc/passwd"'), "outside the rig's folder"),
+    "NUL in a name": (('"again.csv"', '"again\\u0000.csv"'), "control characters"),
+    "endless name": (('"again.csv"', '"' + 300 * "a" + '.csv"'), "at most 255"),
+    "endless name in bytes": (('"again.csv"', '"' + 200 * "ä" + '.csv"'), "not there"),
+    "name that is a list": (('name = "pad under a ball"', "name = [1]"), "write a text"),
+    "nested": (("k = 80.0", "k = " + 5000 * "[" + 5000 * "]"), "nests"),
+    "endless number": (("k = 80.0", "k = " + 5000 * "9"), "not TOML"),
+    "huge number": (("k = 80.0", "k = " + 400 * "9"), "give a number"),
+    "huge pitch": (("0.003, 0.004", "0.003, 1e308"), "pitch"),
+    "huge grid": (("rows = 3", "rows = " + 400 * "9"), "rows"),
     "no name": (('"again.csv"', "3"), "names no file"),
 }
 
@@ -206,6 +217,14 @@ def test_all_zeros_are_refused(tmp_path):
     rows = [[*row[:4], *(["0"] * TEXELS if i else row[4:])] for i, row in enumerate(table())]
     with pytest.raises(PalpateError, match="All responses"):
         read_rig(write(tmp_path, press=rows, again=rows))
+
+
+def test_channels_that_say_nothing_are_named(tmp_path):
+    rows = table()
+    press = [rows[0], *([*row[:-2], "", "5"] for row in rows[1:])]
+    warnings = read_rig(write(tmp_path, press=press, again=press)).warnings
+    assert warnings[0].startswith("texel_4: no values in any recording")
+    assert warnings[1].startswith("texel_5: one value only")
 
 
 def test_ten_gigabytes_are_refused_without_reading_them(tmp_path):

@@ -1,0 +1,108 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Checks of recordings against their stimulus: that something touches, and that the sensor answers with the right sign."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ...errors import FileError
+from ..dataset.rig import Rig, Trial
+from .stimulus import Stimulus
+
+OPPOSITE = -0.5
+"""Correlation of a response with its load below which the response has the other sign."""
+
+_NO_CONTACT = {
+    "pose": "the indenter never touches the sensor: check unit and sign of x, y and z, and where the shape has its origin",
+    "depth": "`depth` is never above zero: give it in metres, positive where the sensor is pressed in",
+    "force": "`force` is never above zero: give it in newtons, positive for compression",
+}
+"""What is wrong with a recording without contact, by the kind of its stimulus."""
+
+
+def check_responses(rig: Rig, stimuli: Sequence[Stimulus]) -> None:
+    """Check the recordings that are to be fitted.
+
+    Parameters
+    ----------
+    rig : Rig
+    stimuli : sequence of Stimulus
+        Of the rig's trials, in their order.
+
+    Raises
+    ------
+    FileError
+        Nothing touches the sensor, no response ever changes, or the responses have the other sign.
+    """
+    fitted = [stimulus for stimulus in stimuli if stimulus.trial.use == "fit"]
+    touching = [stimulus for stimulus in fitted if (stimulus.load > 0).any()]
+    if not touching:
+        first = fitted[0].trial
+        files = ", ".join(f"'{stimulus.trial.name}.csv'" for stimulus in fitted[:3]) + (" …" if len(fitted) > 3 else "")
+        raise FileError(f"In {files} of '{rig.name}' {_NO_CONTACT[first.stimulus]}.")
+    if not any(_changes(stimulus.trial) for stimulus in fitted):
+        raise FileError(
+            f"No response in the recordings of '{rig.name}' that are to be fitted ever changes: "
+            "check that the sensor was read out while it was pressed."
+        )
+    _check_reading_sign(rig, touching)
+    _check_force_sign(rig, touching)
+
+
+def _changes(trial: Trial) -> bool:
+    """Return whether any channel of a trial has two different values."""
+    channels = [values for values in (trial.reading, trial.force) if values is not None]
+    return any((np.fmax.reduce(values, axis=0) > np.fmin.reduce(values, axis=0)).any() for values in channels)
+
+
+def _check_reading_sign(rig: Rig, touching: Sequence[Stimulus]) -> None:
+    """Refuse readings that fall under load although the gain is known to be positive, or rise although it is negative."""
+    gain = rig.parameters.gain
+    if rig.parameters.unit != "N" and "gain" not in rig.given:
+        return  # the gain, sign included, is fitted
+    pairs = [(stimulus.load, stimulus.trial.reading) for stimulus in touching if stimulus.trial.reading is not None]
+    if np.sign(gain) * _correlation(pairs) < OPPOSITE:
+        how = "fall" if gain > 0 else "rise"
+        raise FileError(
+            f"The readings of '{rig.name}' {how} where the sensor is pressed: compression counts as positive, "
+            "so change the sign of texel_0 and the others, or give unit and gain in [sensor]."
+        )
+
+
+def _check_force_sign(rig: Rig, touching: Sequence[Stimulus]) -> None:
+    """Refuse net forces that point away from what presses on the sensor."""
+    pairs = []
+    for stimulus in touching:
+        force = stimulus.trial.force
+        if force is not None:
+            normal = -rig.texels.normal if stimulus.normal is None else stimulus.normal
+            pairs.append((np.sum(stimulus.load[:, :, None] * normal, axis=1), force))
+    if _correlation(pairs) < OPPOSITE:
+        raise FileError(
+            f"force_x, force_y and force_z of '{rig.name}' point the other way: the force on the sensor is needed, "
+            "not that on the indenter, so change their signs."
+        )
+
+
+def _correlation(pairs: Sequence[tuple[np.ndarray, np.ndarray]]) -> float:
+    """Return the correlation of loads with responses, both less the mean of their channel; zero when nothing changes.
+
+    Parameters
+    ----------
+    pairs : sequence of ((T, c) float, (T, c) float)
+        Load and response of each recording; missing responses are NaN.
+    """
+    product = load_square = response_square = 0.0
+    for load, response in pairs:
+        good = np.isfinite(response)
+        count = np.maximum(good.sum(axis=0), 1)
+        x, y = np.where(good, load, 0.0), np.where(good, response, 0.0)
+        x = np.where(good, x - x.sum(axis=0) / count, 0.0)
+        y = np.where(good, y - y.sum(axis=0) / count, 0.0)
+        product += float((x * y).sum())
+        load_square += float((x * x).sum())
+        response_square += float((y * y).sum())
+    size = float(np.sqrt(load_square) * np.sqrt(response_square))
+    return product / size if size > 0.0 else 0.0
