@@ -46,7 +46,7 @@ class Exporter:
         Place in lists, from 0, without gaps. Scenes store a choice by this number: a new format takes the next one.
     write : callable
         Takes the bake, a folder that exists, and a style for colours. It yields :func:`sensor_progress` before each sensor is
-        written, and returns what was written: files, or one folder per sensor.
+        written, and returns the files that it wrote, in that folder or in a folder in it.
     """
 
     name: str

@@ -15,6 +15,7 @@ from ..io.bake_reader import Bake
 from ..io.file_writing import writable_folder
 from ..jobs.progress import Job
 from .exporter import Exporter
+from .file_list import FileList
 
 FORMATS = f"{__package__}.formats"
 """The package of the formats."""
@@ -49,7 +50,8 @@ def export(bake: Bake, kind: str, folder: str | os.PathLike, style: FigureStyle 
     Returns
     -------
     list of Path
-        What was written: files, or one folder per sensor.
+        What was written: files, and folders that hold the others. Files that an earlier export of this format left, and that
+        were not written again, are removed (:mod:`.file_list`).
 
     Raises
     ------
@@ -59,4 +61,9 @@ def export(bake: Bake, kind: str, folder: str | os.PathLike, style: FigureStyle 
     known = exporters()
     if kind not in known:
         raise PalpateError(f"There is no export to '{kind}': choose from {', '.join(known)}.")
-    return (yield from known[kind].write(bake, writable_folder(folder, create=True), style or FigureStyle()))
+    folder = writable_folder(folder, create=True)
+    files = FileList(folder)
+    files.begin(kind)
+    written = yield from known[kind].write(bake, folder, style or FigureStyle())
+    files.finish(kind, written)
+    return list(dict.fromkeys(path if path.parent == folder else path.parent for path in written))

@@ -6,6 +6,7 @@ matplotlib is imported on use, and only its Agg canvas, so that nothing here nee
 
 from __future__ import annotations
 
+import io
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -78,5 +79,8 @@ def _write(figure: Figure, path: Path, dpi: float, kind: str, metadata: dict[str
     import matplotlib
 
     plain = {"pdf.fonttype": 42, "svg.fonttype": "none", "svg.hashsalt": "palpate"}
-    with atomic_write(path) as temporary, matplotlib.rc_context(plain):
-        figure.savefig(temporary, dpi=dpi, format=kind, metadata=metadata)
+    encoded = io.BytesIO()  # a full disk breaks the encoders, so they write into memory
+    with matplotlib.rc_context(plain):
+        figure.savefig(encoded, dpi=dpi, format=kind, metadata=metadata)
+    with atomic_write(path) as temporary:
+        temporary.write_bytes(encoded.getvalue())

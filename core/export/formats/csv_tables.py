@@ -37,20 +37,20 @@ def write_csv(bake: Bake, folder: Path, _style: FigureStyle) -> Job[list[Path]]:
     for name, stem in folder_names(bake.texels).items():
         yield sensor_progress(bake, name)
         own = writable_folder(folder / stem, create=True)
-        _write_sensor(bake, name, own)
-        written.append(own)
+        written += _write_sensor(bake, name, own)
     return written
 
 
-def _write_sensor(bake: Bake, name: str, folder: Path) -> None:
+def _write_sensor(bake: Bake, name: str, folder: Path) -> list[Path]:
+    """Write the tables of one sensor and return them."""
     recorded, texels = bake.recording.sensors[name], bake.texels[name]
     clock = np.column_stack([bake.recording.frames, bake.recording.times])
-    _write_table(folder / "texels.csv", *_texel_table(texels))
+    tables = {"texels": _texel_table(texels)}
     columns = [f"texel_{i}" for i in range(len(texels))]
     channels = {"shear_x": recorded.shear[:, :, 0], "shear_y": recorded.shear[:, :, 1]}
     for key in _QUANTITIES:
         values = channels[key] if key in channels else getattr(recorded, key)
-        _write_table(folder / f"{key}.csv", ["frame", "time", *columns], np.column_stack([clock, values]))
+        tables[key] = ["frame", "time", *columns], np.column_stack([clock, values])
     header = ["frame", "time", "normal", "shear", "texels touching", "slip share"]
     header += [f"{key}_{axis}" for key in ("force", "torque", "centre") for axis in "xyz"]
     total = np.column_stack(
@@ -65,7 +65,10 @@ def _write_sensor(bake: Bake, name: str, folder: Path) -> None:
             recorded.centre_of_pressure,
         ]
     )
-    _write_table(folder / "sums.csv", header, total)
+    tables["sums"] = header, total
+    for key, table in tables.items():
+        _write_table(folder / f"{key}.csv", *table)
+    return [folder / f"{key}.csv" for key in tables]
 
 
 def _texel_table(texels: Texels) -> tuple[list[str], np.ndarray]:

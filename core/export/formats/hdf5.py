@@ -17,6 +17,9 @@ from ...io.file_writing import atomic_write
 from ...jobs.progress import Job
 from ..exporter import UNITS, Exporter, bake_arrays, sensor_progress
 
+_GROWTH = 1 << 24
+"""Bytes by which the memory of a file grows."""
+
 
 def write_hdf5(bake: Bake, folder: Path, _style: FigureStyle) -> Job[list[Path]]:
     """Write ``palpate.h5``."""
@@ -25,7 +28,8 @@ def write_hdf5(bake: Bake, folder: Path, _style: FigureStyle) -> Job[list[Path]]
     except ImportError as error:
         raise PalpateError("HDF5 needs the package h5py, which is not installed: run 'pip install h5py'.") from error
     recording, path = bake.recording, folder / "palpate.h5"
-    with atomic_write(path) as temporary, h5py.File(temporary, "w") as file:
+    # The library crashes when the disk is full, so it writes into memory.
+    with h5py.File(path.name, "w", driver="core", backing_store=False, block_size=_GROWTH) as file:
         file.attrs.update({"format": "palpate-hdf5/1", "digest": recording.digest, "dt": recording.dt})
         _dataset(file, "frame", recording.frames, "1")
         _dataset(file, "time", recording.times, "s")
@@ -43,6 +47,10 @@ def write_hdf5(bake: Bake, folder: Path, _style: FigureStyle) -> Job[list[Path]]
             group.attrs["parameters"] = json.dumps(asdict(bake.parameters[name]))
             for key, array in bake_arrays(bake, name).items():
                 _dataset(group, key, array, _unit(bake, name, key))
+        file.flush()
+        content = file.id.get_file_image()
+    with atomic_write(path) as temporary:
+        temporary.write_bytes(content)
     return [path]
 
 

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 from pathlib import Path
 
@@ -24,7 +25,8 @@ def write_png(bake: Bake, folder: Path, style: FigureStyle) -> Job[list[Path]]:
     """Write one picture per frame and ``scale.json`` into a folder per sensor; all sensors share one colour scale."""
     from matplotlib.image import imsave
 
-    recording, written = bake.recording, []
+    recording = bake.recording
+    written: list[Path] = []
     top = style.scale_limit(recording, bake.texels)
     for name, stem in folder_names(bake.texels).items():
         yield sensor_progress(bake, name)
@@ -37,8 +39,11 @@ def write_png(bake: Bake, folder: Path, style: FigureStyle) -> Job[list[Path]]:
             color = color_maps.colors(style.colour_map, layout.image(own).ravel() / top).reshape(*layout.shape, 3)
             pixels = np.dstack([color, mask])[::-1]
             pixels = np.repeat(np.repeat(pixels, magnified, axis=0), magnified, axis=1)
-            with atomic_write(own_folder / f"tactile_{frame:04d}.png") as temporary:
-                imsave(temporary, (pixels * 255 + 0.5).astype(np.uint8), metadata={"Software": "Palpate"})
+            path, encoded = own_folder / f"tactile_{frame:04d}.png", io.BytesIO()  # a full disk breaks the encoder
+            imsave(encoded, (pixels * 255 + 0.5).astype(np.uint8), format="png", metadata={"Software": "Palpate"})
+            with atomic_write(path) as temporary:
+                temporary.write_bytes(encoded.getvalue())
+            written.append(path)
         scale = {
             "quantity": " ".join(style.quantity_label),
             "first_colour": 0.0,
@@ -47,7 +52,7 @@ def write_png(bake: Bake, folder: Path, style: FigureStyle) -> Job[list[Path]]:
         }
         with atomic_write(own_folder / "scale.json") as temporary:
             temporary.write_text(json.dumps(scale, indent=2) + "\n", encoding="utf-8")
-        written.append(own_folder)
+        written.append(own_folder / "scale.json")
     return written
 
 

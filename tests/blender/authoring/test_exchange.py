@@ -90,7 +90,7 @@ def test_files_that_are_something_else_say_so(tmp_path):
     sensor()
     (tmp_path / "bad.toml").write_text("a = [", encoding="utf-8")
     (tmp_path / "bad.xml").write_text("<a>", encoding="utf-8")
-    with pytest.raises(RuntimeError, match="not valid TOML"):
+    with pytest.raises(RuntimeError, match="is not TOML"):
         bpy.ops.palpate.sensor_toml_import(filepath=str(tmp_path / "bad.toml"))
     with pytest.raises(RuntimeError, match="bad.xml"):
         bpy.ops.palpate.openrave_import(filepath=str(tmp_path / "bad.xml"))

@@ -2,9 +2,14 @@
 """A bake read back from its folder is the bake, and every export says the same numbers with their units."""
 
 import csv
+import hashlib
 import json
+import os
+import re
 import shutil
-from dataclasses import asdict, replace
+import subprocess
+import sys
+from dataclasses import asdict, fields, replace
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +18,7 @@ from recordings import grid_texels, recording_of, round_texels
 
 from palpate.core.errors import FileError, PalpateError
 from palpate.core.export import registry
+from palpate.core.export.file_list import LIST_FORMAT, LIST_NAME
 from palpate.core.export.registry import export, exporters
 from palpate.core.figures import color_maps
 from palpate.core.figures.figure_style import FigureStyle
@@ -22,6 +28,7 @@ from palpate.core.io.file_writing import file_sha256
 from palpate.core.io.recording_npz import save_recording
 from palpate.core.io.sensor_npz import load_sensor, save_sensor
 from palpate.core.jobs.job_runner import run_job
+from palpate.core.model.recording import SensorRecording
 from palpate.core.model.sensor_parameters import Painted, SensorParameters
 
 
@@ -123,7 +130,7 @@ def table(path):
 
 def test_csv_holds_every_texel_and_the_sums(bake, tmp_path):
     run_job(export(bake, "csv", tmp_path / "out"))
-    assert sorted(path.name for path in (tmp_path / "out").iterdir())[:2] == ["bodies.csv", "pad"]
+    assert sorted(path.name for path in (tmp_path / "out").iterdir())[:3] == [LIST_NAME, "bodies.csv", "pad"]
     felt = bake.recording.sensors["pad"]
     header, rows = table(tmp_path / "out" / "pad" / "normal_force.csv")
     assert header[:3] == ["frame", "time", "texel_0"] and len(header) == 17
@@ -191,3 +198,93 @@ def test_every_format_is_registered_once():
     assert [exporter.position for exporter in found.values()] == list(range(len(found)))
     modules = {path.stem for path in Path(registry.__file__).parent.glob("formats/*.py")} - {"__init__"}
     assert len(modules) == len(found)
+
+
+# --- an export after another one
+
+
+def shortened(bake, count):
+    """The first frames of a bake."""
+    recording = bake.recording
+    parts = {key: getattr(recording, key)[:count] for key in ("frames", "times", "poses", "velocities")}
+    sensors = {
+        name: SensorRecording(**{item.name: getattr(sensor, item.name)[:count] for item in fields(sensor)})
+        for name, sensor in recording.sensors.items()
+    }
+    return replace(bake, recording=replace(recording, sensors=sensors, **parts))
+
+
+def files_in(folder):
+    return {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
+
+
+def test_fewer_frames_leave_no_images_of_more_frames(bake, tmp_path):
+    out = tmp_path / "out"
+    run_job(export(bake, "png", out))
+    run_job(export(bake, "npz", out))
+    (out / "pad" / "mine.txt").write_text("mine")
+    (out / "pad" / "tactile_0009.png").write_text("changed by the user")
+    run_job(export(shortened(bake, 4), "png", out))
+    found = files_in(out)
+    assert {name for name in found if name.startswith("pad/tactile")} == {
+        *(f"pad/tactile_{frame:04d}.png" for frame in range(1, 5)),
+        "pad/tactile_0009.png",
+    }
+    assert "pad/mine.txt" in found and "pad.npz" in found
+    run_job(export(bake.select(["pad"]), "png", out))
+    assert {path.split("/")[0] for path in files_in(out) if "/" in path} == {"pad"}
+
+
+@pytest.mark.parametrize(
+    "name", ["../victim.txt", "/victim.txt", "link/victim.txt", "pad/../../victim.txt", "", ".", "a\\..\\b"]
+)
+def test_a_list_from_the_net_removes_nothing_outside_of_the_folder(bake, tmp_path, name):
+    out, victim = tmp_path / "out", tmp_path / "victim.txt"
+    out.mkdir()
+    victim.write_text("victim")
+    (out / "link").symlink_to(tmp_path)
+    digest = hashlib.sha256(b"victim").hexdigest()
+    name = str(victim) if name.startswith("/") else name
+    exports = {"npz": {"complete": True, "files": {name: digest}}}
+    (out / LIST_NAME).write_text(json.dumps({"format": LIST_FORMAT, "exports": exports}))
+    run_job(export(bake, "npz", out))
+    assert victim.read_text() == "victim"
+
+
+@pytest.mark.parametrize("content", ["", "[]", "{", "[" * 100_000, '{"format": "palpate-export/1", "exports": {"npz": 3}}'])
+def test_a_damaged_list_is_as_none(bake, tmp_path, content):
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / LIST_NAME).write_text(content)
+    run_job(export(bake, "npz", tmp_path / "out"))
+    assert json.loads((tmp_path / "out" / LIST_NAME).read_text())["exports"]["npz"]["complete"]
+
+
+@pytest.mark.parametrize("kind", ["csv", "npz", "hdf5", "png"])
+def test_a_full_disk_is_one_sentence(bake, tmp_path, kind):
+    """In a process of its own, whose files cannot grow: a library that writes by itself could take the tests with it."""
+    pytest.importorskip("resource")
+    script = FULL_DISK.format(bake=str(tmp_path / "bake"), kind=kind, out=str(tmp_path / "out"))
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, env={**os.environ, **PATH})
+    assert done.returncode == 0, done.stderr
+    assert re.search(r"could not be written \(.*\): ", done.stdout), done.stdout
+    assert not [name for name in files_in(tmp_path / "out") if "partial" in name]
+
+
+FULL_DISK = """
+import resource, signal
+from palpate.core.errors import FileError
+from palpate.core.export.file_list import LIST_FORMAT, LIST_NAME
+from palpate.core.export.registry import export, exporters
+from palpate.core.io.bake_reader import read_bake
+from palpate.core.jobs.job_runner import run_job
+import matplotlib.image
+bake = read_bake({bake!r})
+exporters()
+signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+resource.setrlimit(resource.RLIMIT_FSIZE, (400, 400))
+try:
+    run_job(export(bake, {kind!r}, {out!r}))
+except FileError as error:
+    print(error)
+"""
+PATH = {"PYTHONPATH": str(Path(registry.__file__).parents[3])}
