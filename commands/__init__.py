@@ -1,19 +1,24 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The command line: ``palpate COMMAND …``, and the same as ``blender --command palpate COMMAND …``.
 
-Exit status: 0 done, 1 something the user can put right (one line on stderr), 2 wrong usage, 130 stopped with Ctrl-C.
+Exit status: 0 done, 1 something the user can put right (one line on stderr), 2 wrong usage, 130 stopped with Ctrl-C, 141 the
+program that read the output has gone (as ``head`` does).
 """
 
 from __future__ import annotations
 
 import argparse
+import errno
 import importlib
 import sys
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
+from typing import NoReturn
 
 from .. import __version__
 from ..core.errors import Cancelled, PalpateError
+from ..core.io.file_writing import os_error_reason
 from . import console
 
 COMMANDS = {
@@ -29,7 +34,27 @@ COMMANDS = {
 }
 """Commands in the order of the help. A command is ready once this package has a module of its name."""
 
+STOPPED, NO_READER = 130, 141
+"""Exit statuses after Ctrl-C and after a closed pipe: 128 plus the number of the signal, as of other programs."""
+
+FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
+"""Numbers of the errors that a stream raises when what was printed cannot be stored."""
+
 READY = tuple(name for name in COMMANDS if (Path(__file__).parent / f"{name}.py").is_file())
+
+
+def run_process() -> NoReturn:
+    """Run the command of this process and end the process with its exit status."""
+    status = 1
+    try:
+        status = main()
+    except KeyboardInterrupt:
+        status = STOPPED
+    except BaseException:
+        with suppress(OSError):
+            sys.excepthook(*sys.exc_info())
+    finally:
+        console.end_process(status)
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -48,29 +73,53 @@ def main(argv: Sequence[str] | None = None) -> int:
     prefix = "palpate:"
     try:
         with console.Interrupt.noted():
-            parser = _parser()
-            arguments, rest = parser.parse_known_args(argv)
-            if arguments.command is None:
-                parser.print_help(sys.stderr)
-                return 2
-            prefix = f"palpate {arguments.command}:"
-            if arguments.command not in READY:
-                print(prefix, "not yet", file=sys.stderr)
-                return 1
-            if rest:
-                _reject_unknown(parser, arguments.command, rest)
-            return arguments.run(arguments)
-    except SystemExit as stop:  # argparse has printed its help or an error
-        return int(stop.code or 0)
+            try:
+                arguments = _parse(argv)
+                prefix = f"palpate {arguments.command}:"
+                console.Interrupt.check()
+                status = arguments.run(arguments)
+            except SystemExit as stop:  # argparse has printed its help or an error
+                status = int(stop.code or 0)
+            if sys.stdout is not None:
+                sys.stdout.flush()
+            return status
     except KeyboardInterrupt:
-        print(prefix, "stopped; an earlier bake is still as it was.", file=sys.stderr)
-        return 130
+        return _say(prefix, "stopped; an earlier bake is still as it was.", STOPPED)
     except Cancelled as stop:
-        print(prefix, stop, file=sys.stderr)
-        return 130
+        return _say(prefix, stop, STOPPED)
     except PalpateError as error:
-        print(prefix, error, file=sys.stderr)
-        return 1
+        return _say(prefix, error, 1)
+    except MemoryError:
+        return _say(prefix, "There is not enough memory: close other programs, or give fewer frames or texels.", 1)
+    except BrokenPipeError:
+        return NO_READER
+    except OSError as error:
+        if error.filename is not None or error.errno not in FULL:
+            raise
+        reason = os_error_reason(error)
+        return _say(prefix, f"The output could not be written ({reason}): free some space or write to another place.", 1)
+
+
+def _parse(argv: Sequence[str] | None) -> argparse.Namespace:
+    """Return the arguments; raise SystemExit after help and wrong usage."""
+    parser = _parser()
+    arguments, rest = parser.parse_known_args(argv)
+    if arguments.command is None:
+        parser.print_help(sys.stderr)
+        raise SystemExit(2)
+    if arguments.command not in READY:
+        print(f"palpate {arguments.command}: not yet", file=sys.stderr)
+        raise SystemExit(1)
+    if rest:
+        _reject_unknown(parser, arguments.command, rest)
+    return arguments
+
+
+def _say(prefix: str, message: object, status: int) -> int:
+    """Print why a command ends, and return its exit status."""
+    with suppress(OSError):  # nobody may read stderr any more
+        print(prefix, message, file=sys.stderr)
+    return status
 
 
 def _reject_unknown(parser: argparse.ArgumentParser, command: str, rest: list[str]) -> None:

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """``python -m palpate.commands`` is ``palpate``."""
 
-import sys
+from . import run_process
 
-from . import main
-
-sys.exit(main())
+run_process()

@@ -14,6 +14,9 @@ from ..core.io.file_writing import writable_folder
 from ..core.response.metrics import net_shear
 from . import blender, console
 
+LAST_FRAME = 1048574
+"""The last frame that a scene of Blender can have."""
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("scene", metavar="SCENE.blend", help="file with sensors and what touches them")
@@ -39,6 +42,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="parameters and effects for the only sensor, or for the one of this name; may be given again. A scene that is "
         "saved keeps them.",
     )
+    blender.add_script_arguments(parser)
     where = parser.add_mutually_exclusive_group()
     where.add_argument("--save", action="store_true", help="save motion, heat maps and arrows into SCENE.blend itself")
     where.add_argument("--save-as", metavar="FILE", help="save them into another .blend")
@@ -49,8 +53,10 @@ def run(arguments: argparse.Namespace) -> int:
         print("palpate bake: --sensor bakes a part of the scene, which cannot be saved: leave one of them out", file=sys.stderr)
         return 2
     with console.blender_output_hidden():
-        scene = blender.open_scene(arguments.scene)
+        scene = blender.open_scene(arguments.scene, arguments.scripts)
         own_start = scene.frame_start
+        if saved_path(arguments):
+            blender.check_writable(saved_path(arguments))
         _prepare(scene, arguments)
         baked = bake_with_progress(scene, into_scene=bool(arguments.save or arguments.save_as))
         saved = save_scene(arguments)
@@ -112,13 +118,18 @@ def _newtons(value: float) -> str:
 
 def save_scene(arguments: argparse.Namespace) -> Path | None:
     """Save the open scene if --save or --save-as asks for it, and return its path."""
+    path = saved_path(arguments)
+    if path is not None:
+        blender.save_blend(path)
+    return path
+
+
+def saved_path(arguments: argparse.Namespace) -> Path | None:
+    """Return the file that --save or --save-as names; None if the scene is not saved."""
     if not (arguments.save or arguments.save_as):
         return None
     path = Path(arguments.save_as or arguments.scene)
-    if path.suffix != ".blend":
-        path = path.with_name(f"{path.name}.blend")
-    blender.save_blend(path)
-    return path
+    return path if path.suffix == ".blend" else path.with_name(f"{path.name}.blend")
 
 
 def _check_saved_bake(scene, blend: str) -> None:
@@ -155,6 +166,8 @@ def _frame_range(first: int, last: int) -> tuple[int, int]:
         raise SceneError(f"--frames {first} {last} runs backwards: give the first frame first.")
     if first < 0:
         raise SceneError(f"--frames {first} {last} begins before frame 0: Blender's scenes begin there.")
+    if last > LAST_FRAME:
+        raise SceneError(f"--frames {first} {last} ends after frame {LAST_FRAME}, the last of Blender: bake fewer frames.")
     return first, last
 
 

@@ -3,21 +3,28 @@
 
 from __future__ import annotations
 
+import argparse
 import importlib
 import os
 import secrets
 import shutil
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from ..core.errors import FileError, PalpateError
-from ..core.io.regular_file import open_regular
+from ..core.io.file_writing import writable_folder
+from ..core.io.regular_file import open_regular, require_regular
 from . import console
 
 _COMPRESSED = (b"\x28\xb5\x2f\xfd", b"\x1f\x8b")  # Zstandard, and gzip in files from before Blender 3.0
 _SEEKABLE_END = b"\xb1\xea\x92\x8f"
 """Last bytes of Zstandard's seekable format, in which Blender compresses."""
+REFUSE, IGNORE, ALLOW = "refuse", "ignore", "allow"
+"""What is done about the Python in a .blend: not run, and the file refused if a driver needs it; not run; run."""
+MOST_NAMED = 5
+"""Most drivers that a message names."""
 
 
 def start_blender():
@@ -43,20 +50,48 @@ def start_blender():
     return bpy
 
 
-def open_scene(path: str | os.PathLike):
+def add_script_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add --allow-scripts and --ignore-scripts, which set `scripts`."""
+    choice = parser.add_mutually_exclusive_group()
+    choice.add_argument(
+        "--allow-scripts",
+        dest="scripts",
+        action="store_const",
+        const=ALLOW,
+        help="run the Python in the .blend (drivers and registered texts): only for files that you trust",
+    )
+    choice.add_argument(
+        "--ignore-scripts",
+        dest="scripts",
+        action="store_const",
+        const=IGNORE,
+        help="run no Python in the .blend, even where drivers need it, which then count as zero",
+    )
+    parser.set_defaults(scripts=REFUSE)
+
+
+def open_scene(path: str | os.PathLike, scripts: str = REFUSE):
     """Start Blender, open a .blend and return its scene; raises what :func:`start_blender` and :func:`open_blend` raise."""
     bpy = start_blender()
-    open_blend(path)
+    open_blend(path, scripts)
+    console.Interrupt.check()
     return bpy.context.scene
 
 
-def open_blend(path: str | os.PathLike) -> None:
+def open_blend(path: str | os.PathLike, scripts: str = REFUSE) -> None:
     """Open a .blend.
+
+    Parameters
+    ----------
+    path : path
+    scripts : REFUSE, IGNORE or ALLOW
+        What is done about the Python in the file.
 
     Raises
     ------
     FileError
-        The file is missing, is not a .blend, is damaged, or comes from a newer Blender.
+        The file is missing, is not a .blend, is damaged, or comes from a newer Blender; or drivers in it need Python and
+        `scripts` is REFUSE.
     """
     import bpy
 
@@ -73,8 +108,8 @@ def open_blend(path: str | os.PathLike) -> None:
     if magic != b"BLENDER" and not magic.startswith(_COMPRESSED):
         raise FileError(f"'{path}' is not a .blend file: give a file that was saved by Blender.")
     try:
-        # No scripts: a file from another person must not run its code in a batch job.
-        bpy.ops.wm.open_mainfile(filepath=str(path.absolute()), load_ui=False, use_scripts=False)
+        # A file from another person must not run its code in a batch job.
+        bpy.ops.wm.open_mainfile(filepath=str(path.absolute()), load_ui=False, use_scripts=scripts == ALLOW)
     except RuntimeError as error:
         reason = str(error).strip().splitlines()[-1].rpartition(": ")[2].strip().rstrip(".")
         raise FileError(
@@ -83,6 +118,51 @@ def open_blend(path: str | os.PathLike) -> None:
         ) from error
     if bpy.context.object is not None and bpy.context.object.mode != "OBJECT":  # files store the mode in which they were saved
         bpy.ops.object.mode_set(mode="OBJECT")
+    if scripts == REFUSE:
+        _refuse_blocked_drivers(path)
+
+
+def _refuse_blocked_drivers(path: Path) -> None:
+    """Raise FileError if Blender did not evaluate a driver of the open file because it needs Python; name texts not run."""
+    import bpy
+
+    bpy.context.view_layer.update()  # Blender finds out when it evaluates a driver
+    blocked = [
+        f"{curve.data_path} of '{owner.name}' ({' '.join(curve.driver.expression.split())[:60]})"
+        for owner in _animated()
+        for curve in owner.animation_data.drivers
+        if curve.driver.type == "SCRIPTED" and not curve.driver.is_simple_expression and not curve.driver.is_valid
+    ]
+    if blocked:
+        more = f" and {len(blocked) - MOST_NAMED} others" if len(blocked) > MOST_NAMED else ""
+        raise FileError(
+            f"Drivers of '{path}' need Python, which was not run, and would count as zero: "
+            f"{', '.join(blocked[:MOST_NAMED])}{more}: add --allow-scripts if you trust the file, or --ignore-scripts."
+        )
+    texts = ", ".join(f"'{text.name}'" for text in bpy.data.texts if text.use_module)
+    if texts:
+        print(f"note: scripts in '{path}' were not run: {texts}; --allow-scripts runs them", file=sys.stderr)
+
+
+def _animated() -> Iterator:
+    """Yield everything in the open file that has drivers."""
+    import bpy
+
+    for kind in bpy.data.bl_rna.properties:
+        for block in getattr(bpy.data, kind.identifier) if kind.type == "COLLECTION" else ():
+            for owner in (block, getattr(block, "node_tree", None)):
+                if getattr(owner, "animation_data", None) is not None:
+                    yield owner
+
+
+def check_writable(path: Path) -> None:
+    """Raise FileError if a .blend of this name could not be saved."""
+    require_regular(path)
+    if path.is_dir():
+        raise FileError(f"'{path}' is a folder: give the name of a .blend file in it.")
+    writable_folder(path.absolute().parent)
+    if path.exists() and not os.access(path, os.W_OK):
+        raise FileError(f"'{path}' is read-only: change its permissions or choose another name.")
 
 
 def save_blend(path: str | os.PathLike, backup: bool = True) -> None:
@@ -95,12 +175,8 @@ def save_blend(path: str | os.PathLike, backup: bool = True) -> None:
     """
     import bpy
 
-    from ..core.io.file_writing import writable_folder
-
     path = Path(path).absolute()
-    writable_folder(path.parent)
-    if path.exists() and not os.access(path, os.W_OK):
-        raise FileError(f"'{path}' is read-only: change its permissions or choose another name.")
+    check_writable(path)
     files = bpy.context.preferences.filepaths
     versions = files.save_version
     try:

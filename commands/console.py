@@ -7,13 +7,16 @@ import atexit
 import ctypes
 import functools
 import os
+import re
+import shutil
 import signal
 import socket
 import sys
 import tempfile
 import threading
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+from typing import NoReturn
 
 from ..core.errors import PalpateError
 from ..core.jobs.job_runner import run_job
@@ -29,6 +32,7 @@ class Interrupt:
     """
 
     pressed = False
+    at_once = False
 
     @classmethod
     @contextmanager
@@ -37,7 +41,7 @@ class Interrupt:
         if threading.current_thread() is not threading.main_thread():
             yield
             return
-        cls.pressed = False
+        cls.pressed = cls.at_once = False
         before = signal.signal(signal.SIGINT, cls._press)
         try:
             yield
@@ -45,9 +49,22 @@ class Interrupt:
             signal.signal(signal.SIGINT, signal.SIG_DFL if before is None else before)
 
     @classmethod
+    @contextmanager
+    def raised_at_once(cls) -> Iterator[None]:
+        """Let Ctrl-C raise at once while the body runs: for work without Blender, whose files are written atomically."""
+        cls.check()
+        before, cls.at_once = cls.at_once, True
+        try:
+            yield
+        finally:
+            cls.at_once = before
+
+    @classmethod
     def _press(cls, *_) -> None:
         cls.check()
         cls.pressed = True
+        if cls.at_once:
+            cls.check()
 
     @classmethod
     def check(cls) -> None:
@@ -113,6 +130,35 @@ def silence_at_exit() -> None:
             os.dup2(null, descriptor)
 
     atexit.register(silence)
+
+
+def end_process(status: int) -> NoReturn:
+    """End the process as the interpreter does, but without taking Blender's module down.
+
+    Blender 4.5 waits for ever there once it has compiled a driver that needs Python: its module is freed after the thread state
+    that the drivers wait for. Threads are waited for, functions registered with :mod:`atexit` run, and output is flushed.
+    """
+    with suppress(ValueError):  # not the main thread
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading._shutdown()  # type: ignore[attr-defined]
+    atexit._run_exitfuncs()
+    _remove_blenders_folder()
+    for stream in (sys.stdout, sys.stderr):
+        with suppress(OSError, ValueError):  # nobody reads it any more, or it is closed
+            if stream is not None:
+                stream.flush()
+    with suppress(OSError):
+        _flush_c()
+    os._exit(status)
+
+
+def _remove_blenders_folder() -> None:
+    """Remove the temporary folder of this Blender, as it does itself when its module is freed."""
+    bpy = sys.modules.get("bpy")
+    folder = getattr(getattr(bpy, "app", None), "tempdir", "") or ""
+    name = os.path.basename(os.path.normpath(folder))
+    if re.fullmatch(r"blender_\w{6}", name):  # and not the folder of all programs
+        shutil.rmtree(folder, ignore_errors=True)
 
 
 def _flush_c() -> None:

@@ -8,7 +8,7 @@ import argparse
 from ..core.export.registry import export, exporters
 from ..core.figures.figure_style import FigureStyle
 from ..core.io.bake_reader import Bake, read_bake
-from . import blender, console, figure_options
+from . import blender, checks, console, figure_options
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -25,8 +25,11 @@ def run(arguments: argparse.Namespace) -> int:
     bake = find_bake(arguments.bake)
     if arguments.sensor:
         bake = bake.select(arguments.sensor)
+    checks.folder_is_no_bake(arguments.out, bake)
     style: FigureStyle = figure_options.figure_style_from(arguments)
-    written = console.run_with_progress_bar("export", export(bake, arguments.format, arguments.out, style), unit="sensor")
+    with console.Interrupt.raised_at_once():
+        job = export(bake, arguments.format, arguments.out, style)
+        written = console.run_with_progress_bar("export", job, unit="sensor")
     for path in written:
         print(path)
     return 0
@@ -43,7 +46,7 @@ def find_bake(where: str) -> Bake:
     if not where.endswith(".blend"):
         return read_bake(where)
     with console.blender_output_hidden():
-        scene = blender.open_scene(where)
+        scene = blender.open_scene(where, blender.IGNORE)  # the bake is what counts, not the motion
         from ..addon.render import figure_export
 
         return figure_export.read_scene_bake(scene)

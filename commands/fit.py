@@ -7,7 +7,7 @@ import argparse
 from pathlib import Path
 
 from ..core.model.sensor_parameters import DAMPING_PER_STIFFNESS, SensorParameters, unit_of
-from . import console
+from . import checks, console
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -40,7 +40,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    arguments.action(arguments)
+    if arguments.plot:
+        checks.outputs_are_no_inputs((arguments.plot,), (arguments.file,))
+    with console.Interrupt.raised_at_once():
+        arguments.action(arguments)
     if arguments.plot:
         print(f"plot: {Path(arguments.plot).absolute()}")
     return 0

@@ -11,7 +11,12 @@ from ..core.errors import SceneError
 from ..core.io.file_writing import writable_folder
 from ..core.jobs.job_runner import part_of_job
 from ..core.jobs.progress import Job
-from . import console
+from . import blender, checks, console
+
+OUTPUTS = ("gap.json", "sensor.toml", "report.html")
+"""Files that are written beside the plots."""
+LEAST_SPACE = 10e6
+"""Bytes: plots and report of a small sensor."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -19,6 +24,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--out", metavar="DIR", required=True, help="folder for gap.json, sensor.toml, report.html and plots")
     parser.add_argument("--blend", metavar="SCENE.blend", help="also put the amended sensor into this file")
     parser.add_argument("--sensor", metavar="NAME", help="the sensor in it (default: the only one)")
+    blender.add_script_arguments(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -26,16 +32,31 @@ def run(arguments: argparse.Namespace) -> int:
 
     dependencies.choose_numba_cache()
     from ..core.gap.dataset.rig import read_rig
-    from ..core.gap.report import sentences
     from ..core.gap.report.amended_sensor import amended_sensor
     from ..core.solver import precompile
 
     if arguments.sensor and not arguments.blend:
         raise SceneError("--sensor names a sensor of a scene: give the scene with --blend.")
-    rig = read_rig(arguments.rig)
-    folder = writable_folder(arguments.out, create=True)
-    precompile.compile_solver_with_notice()
-    result, errors = console.run_with_progress_bar("gap", _diagnose_and_report(rig, folder))
+    with console.Interrupt.raised_at_once():
+        rig = read_rig(arguments.rig)
+        folder = writable_folder(arguments.out, create=True)
+        checks.outputs_are_no_inputs((folder / name for name in OUTPUTS), (arguments.rig,))
+        checks.space_for(folder, LEAST_SPACE, "The report")
+    if arguments.blend:
+        _sensor_in_scene(arguments)  # wrong names and read-only files are found before the work
+    with console.Interrupt.raised_at_once():
+        precompile.compile_solver_with_notice()
+        result, errors = console.run_with_progress_bar("gap", _diagnose_and_report(rig, folder))
+    if arguments.blend:
+        _put_into_scene(arguments, amended_sensor(result))
+    _print_report(arguments, rig, result, errors, folder)
+    return 0
+
+
+def _print_report(arguments: argparse.Namespace, rig, result, errors, folder: Path) -> None:
+    """Print what was found and where it was written."""
+    from ..core.gap.report import sentences
+
     print(sentences.headline(result, errors))
     rows = [("", "parameter", "value (95 % interval)")]
     for one in result.intervals:
@@ -49,8 +70,7 @@ def run(arguments: argparse.Namespace) -> int:
     print(f"report: {folder / 'report.html'}")
     print(f"sensor: {folder / 'sensor.toml'}")
     if arguments.blend:
-        print(f"saved:  {_put_into_scene(arguments.blend, arguments.sensor, amended_sensor(result))}")
-    return 0
+        print(f"saved:  {arguments.blend}")
 
 
 def _diagnose_and_report(rig, folder: Path) -> Job[tuple]:
@@ -66,15 +86,21 @@ def _diagnose_and_report(rig, folder: Path) -> Job[tuple]:
     return result, errors
 
 
-def _put_into_scene(blend: str, name: str | None, sensor) -> Path:
-    """Put the amended sensor on a sensor of a .blend and save it."""
-    from . import blender
-
+def _sensor_in_scene(arguments: argparse.Namespace):
+    """Open the scene of --blend and return the sensor that gets the result."""
     with console.blender_output_hidden():
-        scene = blender.open_scene(blend)
+        scene = blender.open_scene(arguments.blend, arguments.scripts)
         from ..addon.measured import gap_results
 
-        gap_results.put(gap_results.sensor_called(scene, name), sensor)
-        path = Path(blend)
-        blender.save_blend(path)
-    return path
+        blender.check_writable(Path(arguments.blend))
+        return gap_results.sensor_called(scene, arguments.sensor)
+
+
+def _put_into_scene(arguments: argparse.Namespace, sensor) -> None:
+    """Put the amended sensor on a sensor of a .blend and save it; opened anew, because it may have been edited meanwhile."""
+    with console.blender_output_hidden():
+        target = _sensor_in_scene(arguments)
+        from ..addon.measured import gap_results
+
+        gap_results.put(target, sensor)
+        blender.save_blend(Path(arguments.blend))

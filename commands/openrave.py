@@ -9,7 +9,7 @@ from pathlib import Path
 from ..core.errors import SceneError
 from ..core.io.openrave import NUMBERS, OpenRaveSensor, openrave_xml, read_openrave, write_openrave
 from ..core.model.sensor_parameters import DEPTH_PER_THICKNESS
-from . import blender, console
+from . import blender, checks, console
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -23,12 +23,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     load.add_argument("--from", dest="name", metavar="NAME", help="name of the sensor in the XML (default: the only one)")
     load.add_argument("--sensor", metavar="OBJECT", help="object that gets the parameters (default: the one that <link> names)")
     load.add_argument("--save-as", metavar="FILE", help="save into another .blend (default: SCENE.blend itself)")
+    blender.add_script_arguments(load)
     load.set_defaults(action=_import)
     save = kinds.add_parser("export", help="write the sensors of a .blend as XML")
     save.add_argument("scene", metavar="SCENE.blend")
     save.add_argument("--sensor", metavar="OBJECT", action="append", help="only this sensor; may be given again")
     save.add_argument("--robot", metavar="NAME", help="enclose the sensors in a <Robot> of this name")
     save.add_argument("--out", metavar="FILE", help="file to write (default: print)")
+    blender.add_script_arguments(save)
     save.set_defaults(action=_export)
 
 
@@ -63,8 +65,11 @@ def _note_missing(sensor: OpenRaveSensor) -> None:
 
 def _import(arguments: argparse.Namespace) -> None:
     sensor = _choose_sensor(read_openrave(arguments.file), arguments.name, arguments.file)
+    path = Path(arguments.save_as or arguments.scene)
+    checks.outputs_are_no_inputs((path,), (arguments.file,))
+    blender.check_writable(path)
     with console.blender_output_hidden():
-        scene = blender.open_scene(arguments.scene)
+        scene = blender.open_scene(arguments.scene, arguments.scripts)
         from ..addon.authoring import exchange
 
         name = arguments.sensor or sensor.link
@@ -72,7 +77,6 @@ def _import(arguments: argparse.Namespace) -> None:
         if obj is None:
             raise SceneError(f"There is no object '{name}' in '{arguments.scene}': name the sensor's with --sensor.")
         exchange.put_parameters(obj, sensor.parameters)
-        path = Path(arguments.save_as or arguments.scene)
         blender.save_blend(path)
     _note_missing(sensor)
     print(f"'{sensor.name}' of '{arguments.file}' is now on '{obj.name}'; saved: {path}")
@@ -90,8 +94,10 @@ def _choose_sensor(sensors: list[OpenRaveSensor], name: str | None, file: str) -
 
 
 def _export(arguments: argparse.Namespace) -> None:
+    if arguments.out:
+        checks.outputs_are_no_inputs((arguments.out,), (arguments.scene,))
     with console.blender_output_hidden():
-        scene = blender.open_scene(arguments.scene)
+        scene = blender.open_scene(arguments.scene, arguments.scripts)
         from ..addon.authoring import exchange
 
         found = {obj.name: obj for obj in scene.objects if obj.palpate.role in {"SENSOR", "PAD"}}

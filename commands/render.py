@@ -52,13 +52,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--own-camera", action="store_true", help="leave the scene's camera where it is")
     parser.add_argument("--transparent", action="store_true", help="render without background")
+    blender.add_script_arguments(parser)
     figure_options.add_arguments(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
     folder = writable_folder(arguments.out, create=True)
     with console.blender_output_hidden():
-        scene = blender.open_scene(arguments.scene)
+        scene = blender.open_scene(arguments.scene, arguments.scripts)
         from ..addon.display import bake_display
         from ..addon.render import figure_export
         from ..addon.render.figure_request import FigureRequest

@@ -1,0 +1,51 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Checks before work begins, so that a command fails at once and not after hours."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Iterable
+from contextlib import suppress
+from pathlib import Path
+
+from ..core.errors import FileError
+from ..core.io.bake_reader import Bake
+
+
+def outputs_are_no_inputs(outputs: Iterable[str | os.PathLike], inputs: Iterable[str | os.PathLike]) -> None:
+    """Raise FileError if a file that will be written is one that is read, also through a link."""
+    inputs = list(inputs)
+    for output in outputs:
+        for source in inputs:
+            with suppress(OSError):  # one of them does not exist
+                if os.path.samefile(output, source):
+                    raise FileError(f"'{source}' is read and would be overwritten: write to another place.")
+
+
+def folder_is_no_bake(folder: str | os.PathLike, bake: Bake) -> None:
+    """Raise FileError if a folder to export to is the bake folder, or a sensor's folder in it."""
+    target = Path(os.path.realpath(folder))
+    for sensor_folder in bake.folders.values():
+        own = Path(os.path.realpath(sensor_folder))
+        if target in (own.parent, own) or own in target.parents:
+            raise FileError(f"'{folder}' holds the bake itself: give another folder with --out.")
+
+
+def space_for(folder: Path, needed: float, what: str) -> None:
+    """Raise FileError if the disk of a folder has less space than the work needs at least.
+
+    Parameters
+    ----------
+    folder : Path
+        It exists.
+    needed : float, bytes
+    what : str
+        What will be written, for the message.
+    """
+    free = shutil.disk_usage(folder).free
+    if free < needed:
+        raise FileError(
+            f"{what} needs at least {needed / 1e6:.0f} MB and the disk of '{folder}' has {free / 1e6:.0f} MB left: "
+            "free some space or choose another folder."
+        )

@@ -1,0 +1,160 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Python in a .blend, and how processes end: with drivers, Ctrl-C, closed pipes, and files that are none."""
+
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+
+import pytest
+
+DRIVEN = """
+import bpy, sys
+bpy.ops.wm.open_mainfile(filepath=sys.argv[1], load_ui=False)
+for number, expression in enumerate(("frame * 0.0", "__import__('math').sin(frame) * 0.0 + 0.5")):
+    curve = bpy.data.objects["Finger A"].driver_add(("color", "delta_scale")[number], 0)
+    curve.driver.type = "SCRIPTED"
+    curve.driver.expression = expression
+bpy.data.objects["Finger A"].name = "Finger A"
+bpy.ops.wm.save_as_mainfile(filepath=sys.argv[2])
+import os; os._exit(0)
+"""
+
+
+def palpate(*words, **more):
+    command = [sys.executable, "-m", "palpate.commands", *map(str, words)]
+    return subprocess.run(command, capture_output=True, text=True, timeout=120, **more)
+
+
+@pytest.fixture(scope="module")
+def driven(tmp_path_factory, repository):
+    """The demo with one driver that Blender evaluates itself and one that needs Python."""
+    path = tmp_path_factory.mktemp("driven") / "driven.blend"
+    demo = repository / "sample_blends" / "demo.blend"
+    subprocess.run([sys.executable, "-c", DRIVEN, str(demo), str(path)], check=True, capture_output=True, timeout=60)
+    return path
+
+
+def test_a_driver_that_needs_python_is_named_and_refused(driven, tmp_path):
+    done = palpate("bake", driven, "--frames", "1", "2", "--out", tmp_path / "out")
+    assert (done.returncode, done.stdout) == (1, "")
+    assert "delta_scale of 'Finger A' (__import__('math').sin(frame) * 0.0 + 0.5)" in done.stderr
+    assert "color" not in done.stderr  # Blender evaluates that one without Python
+    assert "--allow-scripts" in done.stderr and "--ignore-scripts" in done.stderr
+    assert len(done.stderr.splitlines()) == 1
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("option", ["--allow-scripts", "--ignore-scripts"])
+def test_commands_end_after_a_driver_that_needs_python(driven, tmp_path, option):
+    """With Blender 4.5 the interpreter itself would wait for ever."""
+    before = set(os.listdir(tempfile.gettempdir()))
+    done = palpate("openrave", "export", driven, option, "--out", tmp_path / "sensors.xml")
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.endswith("sensors.xml\n")
+    left = {name for name in set(os.listdir(tempfile.gettempdir())) - before if name.startswith("blender_")}
+    assert not {name for name in left if time.time() - os.path.getmtime(os.path.join(tempfile.gettempdir(), name)) > 60}
+    done = palpate("bake", driven, "--frames", "1", "2", "--out", tmp_path / "out", option)
+    if option == "--allow-scripts":
+        assert (done.returncode, done.stderr) == (0, "")
+        assert done.stdout.startswith("frames 1 to 2")
+    else:  # half the width by the driver, none without it
+        assert done.returncode == 1 and "zero" in done.stderr
+
+
+def test_a_script_that_was_not_run_is_named(tmp_path, repository):
+    code = (
+        "import bpy, os, sys; bpy.ops.wm.open_mainfile(filepath=sys.argv[1]); text = bpy.data.texts.new('rig_ui.py')\n"
+        "text.use_module = True; bpy.ops.wm.save_as_mainfile(filepath=sys.argv[2]); os._exit(0)"
+    )
+    demo, path = repository / "sample_blends" / "demo.blend", tmp_path / "rig.blend"
+    subprocess.run([sys.executable, "-c", code, str(demo), str(path)], check=True, capture_output=True, timeout=60)
+    done = palpate("openrave", "export", path)
+    assert done.returncode == 0
+    assert done.stderr == f"note: scripts in '{path}' were not run: 'rig_ui.py'; --allow-scripts runs them\n"
+
+
+# --- the end of a process
+
+
+@pytest.mark.parametrize("words", [["--help"], ["openrave", "export", "{demo}"]])
+def test_a_closed_pipe_ends_a_command_without_a_word(words, repository):
+    demo = repository / "sample_blends" / "demo.blend"
+    reader, writer = os.pipe()
+    os.close(reader)
+    command = [sys.executable, "-m", "palpate.commands", *(word.format(demo=demo) for word in words)]
+    done = subprocess.run(command, stdout=writer, stderr=subprocess.PIPE, timeout=60)
+    os.close(writer)
+    assert done.returncode in (0, 141)  # argparse itself takes no notice
+    assert done.stderr == b""
+
+
+@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="this system has no device that is full")
+def test_output_to_a_full_disk_is_one_line(repository):
+    command = [sys.executable, "-m", "palpate.commands", "openrave", "export", str(repository / "sample_blends" / "demo.blend")]
+    with open("/dev/full", "w") as full:
+        done = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True, timeout=60)
+    assert done.returncode == 1
+    assert done.stderr.startswith("palpate openrave: The output could not be written (no space")
+    assert len(done.stderr.splitlines()) == 1
+
+
+@pytest.mark.parametrize("command", ["fit", "gap", "export"])
+def test_ctrl_c_ends_work_that_looks_at_no_keyboard(command, tmp_path):
+    """Reading stands for the work: it waits until it is stopped."""
+    code = (
+        "import sys, time, pathlib\n"
+        "from palpate import commands\n"
+        "from palpate.core.gap.calibration import stiffness\n"
+        "from palpate.core.gap.dataset import rig\n"
+        "from palpate.commands import export\n"
+        "def wait(*_):\n"
+        "    pathlib.Path('begun').touch()\n"
+        "    time.sleep(60)\n"
+        "stiffness.read_foam = rig.read_rig = wait\n"
+        "export.find_bake = lambda _: type('Bake', (), {'folders': {}})()\n"
+        "export.export = wait\n"
+        "commands.run_process()\n"
+    )
+    words = {
+        "fit": ["fit", "stiffness", "a.csv", "--area", "1", "--texels", "1"],
+        "gap": ["gap", "rig.toml", "--out", "out"],
+        "export": ["export", "bake"],
+    }[command]
+    process = subprocess.Popen([sys.executable, "-c", code, *words], cwd=tmp_path, stderr=subprocess.PIPE, text=True)
+    end = time.monotonic() + 30
+    while not (tmp_path / "begun").exists() and time.monotonic() < end:
+        time.sleep(0.02)
+    process.send_signal(signal.SIGINT)
+    _, err = process.communicate(timeout=20)
+    assert process.returncode == 130
+    assert err == f"palpate {command}: stopped; an earlier bake is still as it was.\n"
+
+
+# --- special files
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["bake", "{fifo}"],
+        ["render", "{fifo}"],
+        ["export", "{fifo}.blend"],
+        ["openrave", "show", "{fifo}"],
+        ["openrave", "import", "{fifo}", "a.blend"],
+        ["gap", "{fifo}", "--out", "out"],
+        ["fit", "stiffness", "{fifo}", "--area", "1e-3", "--texels", "84"],
+        ["bake", "{demo}", "--model", "Finger A={fifo}"],
+        ["bake", "{demo}", "--save-as", "{fifo}.blend"],
+    ],
+)
+def test_a_fifo_is_refused_at_once(words, tmp_path, repository):
+    os.mkfifo(tmp_path / "fifo")
+    os.mkfifo(tmp_path / "fifo.blend")
+    demo = repository / "sample_blends" / "demo.blend"
+    done = palpate(*(word.format(fifo=tmp_path / "fifo", demo=demo) for word in words), cwd=tmp_path)
+    assert (done.returncode, done.stdout) == (1, "")
+    assert "is a FIFO, not a file" in done.stderr
+    assert len(done.stderr.splitlines()) == 1
