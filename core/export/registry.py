@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import importlib
+import itertools
 import os
 import pkgutil
 from functools import cache
@@ -23,10 +24,14 @@ FORMATS = f"{__package__}.formats"
 
 @cache
 def exporters() -> dict[str, Exporter]:
-    """Return every exporter by its name, in the order of their positions."""
+    """Return every exporter by its name, in the order of their positions; raise ValueError if two have the same position."""
     package = importlib.import_module(FORMATS)
     found = [importlib.import_module(f"{FORMATS}.{module.name}").EXPORTER for module in pkgutil.iter_modules(package.__path__)]
-    return {exporter.name: exporter for exporter in sorted(found, key=lambda exporter: exporter.position)}
+    found.sort(key=lambda exporter: exporter.position)
+    for one, other in itertools.pairwise(found):
+        if one.position == other.position:
+            raise ValueError(f"The formats '{one.name}' and '{other.name}' have the same position {one.position}.")
+    return {exporter.name: exporter for exporter in found}
 
 
 def export(bake: Bake, kind: str, folder: str | os.PathLike, style: FigureStyle | None = None) -> Job[list[Path]]:

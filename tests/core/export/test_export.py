@@ -17,7 +17,7 @@ import pytest
 from recordings import grid_texels, recording_of, round_texels
 
 from palpate.core.errors import FileError, PalpateError
-from palpate.core.export import registry
+from palpate.core.export import formats, registry
 from palpate.core.export.file_list import LIST_FORMAT, LIST_NAME
 from palpate.core.export.registry import export, exporters
 from palpate.core.figures import color_maps
@@ -288,3 +288,17 @@ except FileError as error:
     print(error)
 """
 PATH = {"PYTHONPATH": str(Path(registry.__file__).parents[3])}
+
+
+def test_two_formats_with_one_position_are_refused(tmp_path, monkeypatch):
+    """Saved scenes would otherwise mean another format by the same bit."""
+    text = 'from palpate.core.export.exporter import Exporter\nEXPORTER = Exporter("tsv", "TSV", "Tables", 0, None)\n'
+    (tmp_path / "tsv_tables.py").write_text(text, encoding="utf-8")
+    monkeypatch.setattr(formats, "__path__", [*formats.__path__, str(tmp_path)])
+    exporters.cache_clear()
+    try:
+        with pytest.raises(ValueError, match="same position 0"):
+            exporters()
+    finally:
+        exporters.cache_clear()
+        sys.modules.pop(f"{formats.__name__}.tsv_tables", None)

@@ -57,3 +57,9 @@ def test_wrong_words_get_a_hint():
 
 def test_effects_are_plain_data():
     assert dataclasses.asdict(effect("creep", amount=0.5))["values"] == {"amount": 0.5, "time": 2.0}
+
+
+def test_effects_at_one_site_have_different_places_in_the_order():
+    """With equal numbers the order of two effects would follow the user's stack, so each new kind takes a free number."""
+    places = [(kind.site, kind.order) for kind in library().values()]
+    assert len(places) == len(set(places))
