@@ -12,14 +12,14 @@ import errno
 import importlib
 import sys
 from collections.abc import Sequence
-from contextlib import suppress
+from contextlib import nullcontext, suppress
 from pathlib import Path
 from typing import NoReturn
 
 from .. import __version__
 from ..core.errors import Cancelled, PalpateError
 from ..core.io.file_writing import os_error_reason
-from . import console
+from . import console, limits
 
 COMMANDS = {
     "demo": "build, bake and render the demo scene, and print what the pads feel",
@@ -77,7 +77,8 @@ def main(argv: Sequence[str] | None = None) -> int:
                 arguments = _parse(argv)
                 prefix = f"palpate {arguments.command}:"
                 console.Interrupt.check()
-                status = arguments.run(arguments)
+                with limits.kept(arguments) if arguments.command in limits.COMMANDS else nullcontext():
+                    status = arguments.run(arguments)
             except SystemExit as stop:  # argparse has printed its help or an error
                 status = int(stop.code or 0)
             if sys.stdout is not None:
@@ -151,5 +152,7 @@ def _parser() -> argparse.ArgumentParser:
         if ready:
             module = importlib.import_module(f".{name}", __package__)
             module.add_arguments(sub)
+            if name in limits.COMMANDS:
+                limits.add_arguments(sub)
             sub.set_defaults(run=module.run)
     return parser

@@ -33,6 +33,10 @@ class Interrupt:
 
     pressed = False
     at_once = False
+    reason: PalpateError | None = None
+    """Another reason to stop: a limit that is reached."""
+    clean_up: Callable[[], object] = staticmethod(lambda: None)
+    """What removes unfinished files of the call into Blender that runs now, before the process is ended in it."""
 
     @classmethod
     @contextmanager
@@ -68,9 +72,11 @@ class Interrupt:
 
     @classmethod
     def check(cls) -> None:
-        """Raise KeyboardInterrupt if Ctrl-C was pressed."""
+        """Raise KeyboardInterrupt if Ctrl-C was pressed, and the other reason to stop if there is one."""
         if cls.pressed:
             raise KeyboardInterrupt
+        if cls.reason is not None:
+            raise cls.reason
 
 
 @contextmanager
@@ -195,6 +201,7 @@ def exit_on_interrupt(message: str, clean_up: Callable[[], object]) -> Iterator[
             os.write(stderr, f"\n{message}\n".encode())
             os._exit(130)
 
+    Interrupt.clean_up = clean_up  # type: ignore[method-assign]
     before = signal.set_wakeup_fd(sender.fileno(), warn_on_full_buffer=False)
     thread = threading.Thread(target=listen, daemon=True)
     thread.start()
@@ -202,6 +209,7 @@ def exit_on_interrupt(message: str, clean_up: Callable[[], object]) -> Iterator[
         yield
     finally:
         signal.set_wakeup_fd(before)
+        Interrupt.clean_up = staticmethod(lambda: None)
         sender.close()  # the thread reads the end of the stream and returns
         thread.join()
         receiver.close()
