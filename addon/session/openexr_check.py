@@ -105,7 +105,7 @@ def unregister() -> None:
 
 
 def _command() -> tuple[str, ...]:
-    if bpy.app.binary_path and not bpy.app.module:
+    if bpy.app.binary_path:  # empty where bpy is a module; `bpy.app.module` is missing in Blender 4.3
         return (bpy.app.binary_path, "--background", "--factory-startup", "--python-exit-code", "1", "--python")
     return (sys.executable, "-s")
 
