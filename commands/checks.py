@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import os
-import shutil
 from collections.abc import Iterable
 from contextlib import suppress
 from pathlib import Path
@@ -30,22 +29,3 @@ def folder_is_no_bake(folder: str | os.PathLike, bake: Bake) -> None:
         own = Path(os.path.realpath(sensor_folder))
         if target in (own.parent, own) or own in target.parents:
             raise FileError(f"'{folder}' holds the bake itself: give another folder with --out.")
-
-
-def space_for(folder: Path, needed: float, what: str) -> None:
-    """Raise FileError if the disk of a folder has less space than the work needs at least.
-
-    Parameters
-    ----------
-    folder : Path
-        It exists.
-    needed : float, bytes
-    what : str
-        What will be written, for the message.
-    """
-    free = shutil.disk_usage(folder).free
-    if free < needed:
-        raise FileError(
-            f"{what} needs at least {needed / 1e6:.0f} MB and the disk of '{folder}' has {free / 1e6:.0f} MB left: "
-            "free some space or choose another folder."
-        )

@@ -8,6 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from ..core.errors import SceneError
+from ..core.io import disk_space
 from ..core.io.file_writing import writable_folder
 from ..core.jobs.job_runner import part_of_job
 from ..core.jobs.progress import Job
@@ -41,7 +42,7 @@ def run(arguments: argparse.Namespace) -> int:
         rig = read_rig(arguments.rig)
         folder = writable_folder(arguments.out, create=True)
         checks.outputs_are_no_inputs((folder / name for name in OUTPUTS), (arguments.rig,))
-        checks.space_for(folder, LEAST_SPACE, "The report")
+        disk_space.require_space(folder, LEAST_SPACE, "The report")
     if arguments.blend:
         _sensor_in_scene(arguments)  # wrong names and read-only files are found before the work
     with console.Interrupt.raised_at_once():

@@ -8,11 +8,13 @@ from bl_operators.presets import AddPresetBase
 from bl_ui.utils import PresetPanel
 from bpy.props import StringProperty
 
-from ..addon.authoring import sensor_presets
+from ..addon.authoring import exchange, sensor_presets
 from ..core.errors import FileError
 from . import support
 
 SUBDIR = "palpate/sensor"
+EXTENSIONS = {".py", ".toml"}
+"""Presets of Blender are Python that it executes; a sensor.toml in the same folder is a preset that is only data."""
 
 
 class PALPATE_PT_presets(PresetPanel, bpy.types.Panel):
@@ -20,15 +22,32 @@ class PALPATE_PT_presets(PresetPanel, bpy.types.Panel):
 
     bl_label = "Sensor Presets"
     preset_subdir = SUBDIR
+    preset_extensions = EXTENSIONS
     preset_operator = "palpate.preset_load"
     preset_add_operator = "palpate.preset_add"
+
+    def draw(self, context):
+        super().draw(context)
+        _draw_files(self.layout)
 
 
 class PALPATE_MT_presets(bpy.types.Menu):
     bl_label = "Sensor Presets"
     preset_subdir = SUBDIR
+    preset_extensions = EXTENSIONS
     preset_operator = "palpate.preset_load"
-    draw = bpy.types.Menu.draw_preset
+
+    def draw(self, context):
+        self.draw_preset(context)
+        _draw_files(self.layout)
+
+
+def _draw_files(layout) -> None:
+    """Draw the buttons for presets that are only data."""
+    layout.separator()
+    layout.operator_context = "INVOKE_DEFAULT"
+    layout.operator("palpate.sensor_toml_import", text="Load from TOML…", icon="IMPORT")
+    layout.operator("palpate.sensor_toml_export", text="Save as TOML…", icon="EXPORT")
 
 
 class PALPATE_OT_preset_load(support.ErrorReporting, bpy.types.Operator):
@@ -50,7 +69,10 @@ class PALPATE_OT_preset_load(support.ErrorReporting, bpy.types.Operator):
         if not path.is_file():
             raise FileError(f"There is no preset '{path}': choose one from the list in the panel's header.")
         support.leave_edit_mode(context)
-        bpy.utils.execfile(str(path))
+        if path.suffix.lower() == ".toml":
+            exchange.load_toml(context, path)
+        else:
+            bpy.utils.execfile(str(path))
         self.report({"INFO"}, f"'{context.object.name}' has the values of '{bpy.path.display_name(path.name)}'")
 
 

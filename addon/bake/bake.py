@@ -73,6 +73,7 @@ def _bake(scene, into_scene: bool) -> Job[BakeResult]:
     if into_scene:
         scene_writer.check_writable(scene, reading)
     yield from first_use.wait()
+    bake_files.check_space(folder, reading.scenario)
     simulation = dependencies.load_solver().Simulation(reading.scenario)
     with bake_files.BakeFiles(folder, reading.scenario, bpy.data.filepath) as files:
         recording = yield from _solve(name, simulation, reading, files)

@@ -32,6 +32,7 @@ from ...core.io.bake_folder import (
     read_manifest,
     write_manifest,
 )
+from ...core.io.disk_space import least_image_bytes, require_space
 from ...core.io.file_writing import file_sha256, remove_leftovers, sync_file, writable_folder
 from ...core.io.folder_lock import FolderLock
 from ...core.io.private_folder import PRIVATE_FOLDER, find_private_folder
@@ -77,6 +78,14 @@ def writable_bake_folder(scene) -> Path:
     folder = bake_folder(scene)
     writable_folder(folder if folder.exists() else folder.parent)
     return folder
+
+
+def check_space(folder: Path, scenario: Scenario) -> None:
+    """Raise FileError if the disk cannot hold the images of a new bake; one that continues has some of them already."""
+    if not any((folder / PRIVATE_FOLDER).glob("growing-*")):
+        texels = [len(sensor.texels) for sensor in scenario.sensors if sensor.readout]
+        frames = scenario.frame_end - scenario.frame_start + 1
+        require_space(folder, least_image_bytes(texels, frames), "The bake")
 
 
 class BakeFiles:

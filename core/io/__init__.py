@@ -12,6 +12,7 @@ __all__ = [
     "bake_reader",
     "bake_switch",
     "csv_table",
+    "disk_space",
     "exr_backend",
     "file_writing",
     "folder_lock",

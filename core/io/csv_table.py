@@ -183,6 +183,16 @@ def _unit_factor(path: str | os.PathLike, cell: str, name: str, unit: str) -> fl
     return UNITS[unit][written]
 
 
+def harmless_cell(text: str) -> str:
+    """Return the text of a cell so that no spreadsheet takes it for a formula.
+
+    A spreadsheet computes a cell that begins with ``=``, ``+``, ``-`` or ``@``, and a formula can start programs. An object
+    of a .blend may be called ``=cmd|…``. An apostrophe before it makes it text, also behind what other languages
+    use as separator.
+    """
+    return re.sub(r"(^|[;|\t\r\n])(\s*)(?=[=+\-@\uff1d\uff0b\uff0d\uff20])", r"\1'\2", text)
+
+
 def _lines(file: Iterable[str], form: CsvFormat) -> Iterator[tuple[int, str]]:
     """Yield the lines that hold cells, with their numbers in the file."""
     for number, line in enumerate(file, start=1):

@@ -14,6 +14,7 @@ from ...geometry.layout.grid_layout import GridLayout
 from ...geometry.texels import Texels
 from ...io.bake_folder import folder_names
 from ...io.bake_reader import Bake
+from ...io.csv_table import harmless_cell
 from ...io.file_writing import atomic_write, writable_folder
 from ...jobs.progress import Job
 from ...response import metrics
@@ -83,7 +84,7 @@ def _texel_table(texels: Texels) -> tuple[list[str], np.ndarray]:
 def _write_table(path: Path, header: Sequence[str], rows: Iterable[Sequence[float]]) -> None:
     with atomic_write(path) as temporary, open(temporary, "w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
-        writer.writerow(header)
+        writer.writerow([harmless_cell(name) for name in header])
         writer.writerows([f"{value:.{_DIGITS}g}" for value in row] for row in rows)
 
 

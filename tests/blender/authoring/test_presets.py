@@ -209,3 +209,20 @@ def test_a_soft_tip_feels_less_under_the_same_ball():
 
         forces.append(run(run_job(scene_reader.read_scene(scene)).scenario).sensors["Pad"].normal_force[-1].sum())
     assert forces[1] == pytest.approx(0.5 * forces[0], rel=1e-6)
+
+
+def test_a_preset_may_be_toml_which_is_only_data(tmp_path):
+    from palpate.operators import presets
+
+    assert ".toml" in presets.PALPATE_PT_presets.preset_extensions == presets.PALPATE_MT_presets.preset_extensions
+    pad = grid()
+    bpy.ops.palpate.sensor_add()
+    pad.palpate.k = 123.0
+    path = tmp_path / "mine.toml"
+    assert bpy.ops.palpate.sensor_toml_export(filepath=str(path)) == {"FINISHED"}
+    pad.palpate.k = 7.0
+    assert bpy.ops.palpate.preset_load(filepath=str(path)) == {"FINISHED"}
+    assert pad.palpate.k == 123.0
+    path.write_text("import os", encoding="utf-8")
+    with pytest.raises(RuntimeError, match="is not TOML"):
+        bpy.ops.palpate.preset_load(filepath=str(path))

@@ -302,3 +302,15 @@ def test_two_formats_with_one_position_are_refused(tmp_path, monkeypatch):
     finally:
         exporters.cache_clear()
         sys.modules.pop(f"{formats.__name__}.tsv_tables", None)
+
+
+def test_the_name_of_a_body_is_no_formula_in_a_table(bake, tmp_path):
+    evil = "=cmd|' /C calc'!A0"
+    recording = replace(bake.recording, body_names=(evil, *bake.recording.body_names[1:]))
+    run_job(export(replace(bake, recording=recording), "csv", tmp_path / "out"))
+    for path in (tmp_path / "out").rglob("*.csv"):
+        with path.open(newline="", encoding="utf-8") as file:
+            header = next(csv.reader(file))
+        assert not [name for name in header if name[0] in "=+-@"]
+        if path.name == "bodies.csv":
+            assert header[2] == f"'{evil} x"

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from palpate.core.errors import FileError
-from palpate.core.io.csv_table import MEASUREMENTS, read_columns, read_table
+from palpate.core.io.csv_table import MEASUREMENTS, harmless_cell, read_columns, read_table
 
 
 def write(folder, text):
@@ -56,3 +56,20 @@ def test_a_short_line_of_measurements_is_told_only_where_a_wanted_cell_is_missin
         read_columns(path, {"force": "N"})
     with pytest.raises(FileError, match="Line 2 of 'table.csv' has 2 cells and the header has 3"):
         read_table(path)
+
+
+@pytest.mark.parametrize(
+    ("name", "cell"),
+    [
+        ("=cmd|' /C calc'!A0 x", "'=cmd|' /C calc'!A0 x"),
+        ("+1", "'+1"),
+        ("-finger", "'-finger"),
+        ("@SUM(A1)", "'@SUM(A1)"),
+        ("\t =1", "'\t =1"),
+        ("pad;=1", "pad;'=1"),
+        ("Finger-A = 1;", "Finger-A = 1;"),
+        ("texel_0", "texel_0"),
+    ],
+)
+def test_no_name_is_a_formula(name, cell):
+    assert harmless_cell(name) == cell
