@@ -21,7 +21,7 @@ class ModalJob(support.ErrorReporting):
     def invoke(self, context, _event):
         if bpy.app.background:
             return self.execute(context)
-        return self.reporting(lambda: self._start(context))
+        return self.report_errors_of(lambda: self._start(context))
 
     def run(self, context):
         self.done(run_job(self.job(context)))
@@ -49,7 +49,7 @@ class ModalJob(support.ErrorReporting):
             return {"RUNNING_MODAL"}  # other events must not change the scene while the job runs
         result = None
         try:
-            result = self.reporting(lambda: self._work(context))
+            result = self.report_errors_of(lambda: self._work(context))
         finally:  # also after an unexpected error, timer and progress have to be removed
             if result != {"RUNNING_MODAL"}:
                 self._end(context)

@@ -19,9 +19,9 @@ class ErrorReporting:
     """Mixin for an operator whose work is `run(context)`: a PalpateError is reported as an error message."""
 
     def execute(self, context):
-        return self.reporting(lambda: self.run(context))
+        return self.report_errors_of(lambda: self.run(context))
 
-    def reporting(self, work):
+    def report_errors_of(self, work):
         """Call `work` and return its result or FINISHED; report a PalpateError and return CANCELLED."""
         try:
             return work() or {"FINISHED"}

@@ -15,8 +15,9 @@ from . import bake_display
 
 MAX_SENSORS = 4
 """Number of sensors that are shown at most."""
-IMAGE, GAP, CURVE, BAR = 120.0, 12.0, 56.0, 10.0
-"""Longest side of an image, gap, height of the curves and width of the colour bar; pixels at a resolution scale of one."""
+IMAGE, SPACING, CURVE, BAR = 120.0, 12.0, 56.0, 10.0
+"""Longest side of an image, space between parts, height of the curves and width of the colour bar; pixels at a resolution scale
+of one."""
 MAX_IMAGE_SIDE = 256
 """Pixels along a side of an image: larger images are subsampled, images of few texels are enlarged."""
 COLORS = ((0.34, 0.7, 0.91), (1.0, 0.62, 0.25), (0.4, 0.85, 0.6), (0.9, 0.6, 0.8))
@@ -52,7 +53,7 @@ class InsetContent:
 
     Attributes
     ----------
-    insets : list of Inset
+    insets : list of SensorInset
     color_map : str
     end : str
         Label at the upper end of the colour bar.
@@ -104,11 +105,9 @@ def inset_content(scene, frame, texels: dict, frames: np.ndarray, loads: dict, m
     """
     settings, insets = scene.palpate, []
     for name, own in list(texels.items())[:MAX_SENSORS]:
-        readings = frame.sensors[name]
-        pixels = tactile_pixels(
-            own.layout, bake_display.displayed_values(settings, readings.normal_force, own), maximum, settings.color_map
-        )
-        insets.append(SensorInset(name, pixels, frames, loads[name], float(readings.normal_force.sum())))
+        forces = frame.sensors[name].normal_force
+        pixels = tactile_pixels(own.layout, bake_display.displayed_values(settings, forces, own), maximum, settings.color_map)
+        insets.append(SensorInset(name, pixels, frames, loads[name], float(forces.sum())))
     span = float(scene.frame_start), float(scene.frame_end)
     return InsetContent(insets, settings.color_map, range_label(settings, maximum), span, float(frame.frame))
 
@@ -150,16 +149,16 @@ def _draw() -> None:
 
 def _sizes(inset: SensorInset, scale: float) -> tuple[float, float]:
     height, width = inset.pixels.shape[:2]
-    longest = IMAGE * scale / max(height, width)
-    return width * longest, height * longest
+    zoom = IMAGE * scale / max(height, width)
+    return width * zoom, height * zoom
 
 
 def _height(content: InsetContent, scale: float) -> float:
-    return max(_sizes(inset, scale)[1] for inset in content.insets) + (CURVE + 4 * GAP + 22.0) * scale
+    return max(_sizes(inset, scale)[1] for inset in content.insets) + (CURVE + 4 * SPACING + 22.0) * scale
 
 
 def _draw_content(content: InsetContent, canvas, x: float, top: float) -> None:
-    scale, gap = canvas.scale, GAP * canvas.scale
+    scale, gap = canvas.scale, SPACING * canvas.scale
     tall = max(_sizes(inset, scale)[1] for inset in content.insets)
     widths = [max(_sizes(inset, scale)[0], 70.0 * scale) for inset in content.insets]
     whole = sum(widths) + gap * (len(widths) + 1) + (BAR + 58.0) * scale

@@ -20,7 +20,7 @@ from . import marker_meshes, markers, materials
 from .baked_sensor import BakedSensor
 
 KINDS = {"NORMALS": ("Normal Forces", "Normal Arrow"), "SHEARS": ("Shear Forces", "Shear Arrow")}
-"""Name of the object (the sensor's name is appended) and its material."""
+"""For each kind of arrow the name of its object, to which the sensor's name is appended, and the name of its material."""
 NORMAL, X_AXIS, Y_AXIS = "palpate_normal", "palpate_x", "palpate_y"
 """Vector attributes of the points: the texel's axes."""
 MIN_ARROW_SHARE = 0.02
@@ -29,7 +29,7 @@ MODIFIER = "Palpate Arrows"
 
 
 def build_arrows(scene, sensor: BakedSensor, image, kinds, lengths: dict, longest: dict) -> None:
-    """Build the arrows of one sensor and remove those that are not wanted.
+    """Make the arrows of one sensor anew: remove those of an earlier bake and build the kinds that are wanted.
 
     Parameters
     ----------
@@ -50,17 +50,17 @@ def build_arrows(scene, sensor: BakedSensor, image, kinds, lengths: dict, longes
         if kind not in kinds:
             continue
         mesh = _points(sensor, f"{name} {sensor.obj.name}")
-        made = bpy.data.objects.new(mesh.name, mesh)
-        markers.link(scene, sensor.obj, made, kind)
-        made.parent = sensor.body
-        _, _, stretch = transforms.decompose(transforms.as_array(sensor.body.matrix_world))
-        made.matrix_parent_inverse = Matrix(np.vstack([np.column_stack([np.linalg.inv(stretch), np.zeros(3)]), [0, 0, 0, 1]]))
-        made.hide_select = True
-        made.color = (*marker_meshes.COLORS[material], 1.0)  # Workbench shows these of what nodes make
-        modifier = made.modifiers.new(MODIFIER, "NODES")
+        arrows = bpy.data.objects.new(mesh.name, mesh)
+        markers.link(scene, sensor.obj, arrows, kind)
+        arrows.parent = sensor.body
+        _, _, scale = transforms.decompose(transforms.as_array(sensor.body.matrix_world))
+        arrows.matrix_parent_inverse = Matrix(np.vstack([np.column_stack([np.linalg.inv(scale), np.zeros(3)]), [0, 0, 0, 1]]))
+        arrows.hide_select = True
+        arrows.color = (*marker_meshes.COLORS[material], 1.0)  # Workbench shows these of what nodes make
+        modifier = arrows.modifiers.new(MODIFIER, "NODES")
         modifier.node_group = _nodes(
             f"{uid}:{kind}",
-            made.name,
+            arrows.name,
             image,
             frames,
             kind,
@@ -72,7 +72,7 @@ def build_arrows(scene, sensor: BakedSensor, image, kinds, lengths: dict, longes
 
 @contextmanager
 def hidden_arrows(scene) -> Iterator[None]:
-    """Switch the arrows off while the body runs: in every frame, their nodes would load an image of the previous bake."""
+    """Hide the arrows inside the ``with`` block, where their nodes would load an image of the previous bake at every frame."""
     names = [
         obj.name
         for obj in scene.objects
@@ -151,11 +151,11 @@ def _nodes(mark: str, name: str, image, frames, kind: str, length: float, longes
     long_enough = add("ShaderNodeMath", operation="GREATER_THAN")
     link(size, long_enough.inputs[0])
     long_enough.inputs[1].default_value = MIN_ARROW_SHARE * longest
-    there = add("ShaderNodeMath", operation="SUBTRACT")
-    link(long_enough.outputs[0], there.inputs[0])
-    link(materials.add_missing_test(add, color), there.inputs[1])
-    turn = add("FunctionNodeAlignRotationToVector", axis="Z")
-    link(arrow, turn.inputs["Vector"])
+    is_drawn = add("ShaderNodeMath", operation="SUBTRACT")
+    link(long_enough.outputs[0], is_drawn.inputs[0])
+    link(materials.add_missing_test(add, color), is_drawn.inputs[1])
+    align = add("FunctionNodeAlignRotationToVector", axis="Z")
+    link(arrow, align.inputs["Vector"])
 
     lift = vector("SCALE", attribute(NORMAL), Scale=0.04 * longest if kind == "SHEARS" else 0.0)
     place = add("GeometryNodeSetPosition")
@@ -164,8 +164,8 @@ def _nodes(mark: str, name: str, image, frames, kind: str, length: float, longes
     on_points = add("GeometryNodeInstanceOnPoints")
     link(place.outputs["Geometry"], on_points.inputs["Points"])
     link(_arrow(add, material), on_points.inputs["Instance"])
-    link(there.outputs[0], on_points.inputs["Selection"])
-    link(turn.outputs["Rotation"], on_points.inputs["Rotation"])
+    link(is_drawn.outputs[0], on_points.inputs["Selection"])
+    link(align.outputs["Rotation"], on_points.inputs["Rotation"])
     link(size, on_points.inputs["Scale"])
     link(on_points.outputs["Instances"], add("NodeGroupOutput").inputs[0])
     return group

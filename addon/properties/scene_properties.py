@@ -9,12 +9,16 @@ from . import figure_properties
 
 COLOR_MAPS = tuple((name, *words) for name, words in color_maps.NAMES.items())
 OVERLAYS = (
-    ("FORCE", "Net Force", "Arrow at the centre of pressure: the force of the sensor on the target"),
-    ("TORQUE", "Free Moment", "Double arrow: the torque of the sensor on the target about the centre of pressure"),
+    (
+        "FORCE",
+        "Net Force",
+        "Arrow at the centre of pressure: the reaction to the net force on the sensor",
+    ),
+    ("TORQUE", "Free Moment", "Double arrow: the reaction torque on the target about the centre of pressure"),
     ("CENTRE", "Centre of Pressure", "Ball at the centre of pressure"),
     ("SLIP", "Slip", "Ring around the centre of pressure, as wide as the share of the load on slipping texels"),
     ("NORMALS", "Texel Normals", "Arrow at each texel, as long as its normal force"),
-    ("SHEARS", "Texel Shear", "Arrow at each texel, along its shear force on the target"),
+    ("SHEARS", "Texel Shear", "Arrow at each texel: the reaction on the target, opposite to the shear force on the texel"),
 )
 
 
@@ -31,12 +35,18 @@ class PALPATE_PG_scene(bpy.types.PropertyGroup):
     )
     use_auto_dt: BoolProperty(
         name="Auto Time Step",
-        description="Choose the substep from the stability limit of the stiffest contact",
+        description="Choose the substep from the stability limit of each free body against all texels that can touch it",
         default=True,
         options=set(),
     )
     dt: FloatProperty(
-        name="Time Step (s)", description="Longest substep, s", default=1e-4, min=0.0, precision=6, step=0.001, options=set()
+        name="Time Step (s)",
+        description="Longest step of the solver, s; a whole number of steps makes a frame",
+        default=1e-4,
+        min=0.0,
+        precision=6,
+        step=0.001,
+        options=set(),
     )
     interpolation: EnumProperty(
         name="Between Frames",
@@ -149,6 +159,8 @@ class PALPATE_PG_scene(bpy.types.PropertyGroup):
     figures: PointerProperty(
         type=figure_properties.PALPATE_PG_figures, description="What figures are made of the bake, and how"
     )
+    # What the latest bake has left: the digest of its scenario (empty without a bake), the fingerprints of settings and of the
+    # shapes of deforming objects, by which changes are noticed, and its first and last frame.
     baked_digest: StringProperty(options={"HIDDEN"})
     baked_fingerprint: StringProperty(options={"HIDDEN"})
     baked_shapes: StringProperty(options={"HIDDEN"})

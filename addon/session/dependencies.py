@@ -12,6 +12,8 @@ import platform
 import sys
 
 REQUIRED_MODULES = ("numpy", "numba", "llvmlite", "trimesh")
+"""Modules without which playing and baking are impossible. Figures, reports and the gap analysis need more packages, which
+pyproject.toml lists; they are imported where they are used."""
 
 
 def root_package() -> str:
@@ -67,9 +69,10 @@ def choose_numba_cache() -> None:
 
 
 def load_solver():
-    """Import and compile the solver, and return the module :mod:`.simulation`.
+    """Import the solver, compile it if needed, and return the module :mod:`.simulation`.
 
-    The first call after installation compiles for about a minute. With a window open, :mod:`.first_use` has compiled before.
+    The first call after installation compiles for about a minute. With a window open, :mod:`.first_use` compiles earlier, in
+    the background.
     """
     choose_numba_cache()
     from ...core.solver import precompile, simulation

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """From measurements of a real sensor to what its model misses.
 
-The rooms stand in the order of the data: ``dataset`` reads a rig, ``forward`` predicts its recordings, ``fitting`` fits the
+The packages stand in the order of the data: ``dataset`` reads a rig, ``forward`` predicts its recordings, ``fitting`` fits the
 model's parameters, ``selection`` finds the effects that are missing, ``report`` writes the result. ``calibration`` finds single
 parameters, stiffness and friction, from measurements of their own.
 """

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What an effect is: plain data on a sensor, a kind in the library, and the mechanism by which a form of it acts.
 
-Each module of the library defines one ``KIND``. A kind has several forms: different formulas for the same phenomenon, since no
-two papers agree on one. A form acts by exactly one mechanism:
+Each module of the library defines one ``KIND``. A kind has several forms: different formulas
+for the same phenomenon, because publications differ. A form acts by exactly one mechanism:
 
 ================  ===========================================================================================================
 ``law``           law with memory, equal in the solver, over whole signals and over streams (see :data:`Law`)
@@ -40,7 +40,7 @@ class TexelInput(NamedTuple):
     Attributes
     ----------
     force : float, N (of a readout law: the reading so far)
-        What the effects before this one give at the end of the step.
+        Result of the effects that act before this one, at the end of the step.
     slope : float, N/m
         Derivative of `force` with respect to the depth at the end of the step.
     depth : float, m
@@ -141,7 +141,7 @@ class Form:
     after_clip : bool
         A law that acts after the normal force was clipped at zero, so that the texel can pull.
     random : bool
-        It draws random numbers, which depend on the seed.
+        Whether the form draws random numbers, which depend on the seed.
     """
 
     name: str

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -48,6 +49,26 @@ class SpectralLine:
     share: float
 
 
+class UnloadedResidual(NamedTuple):
+    """The residual of one trial while its texels carry no load.
+
+    Attributes
+    ----------
+    step : float, seconds
+        Median time between two samples.
+    time : (t,) float, seconds
+    values : (t, n) float
+        Residual about its mean, in units of the noise; zero where it is not known.
+    known : (t, n) bool
+        Where a texel is unloaded and was measured.
+    """
+
+    step: float
+    time: np.ndarray
+    values: np.ndarray
+    known: np.ndarray
+
+
 def strongest_line(views: Sequence[TrialView], model: Model) -> SpectralLine | None:
     """Return the strongest line that all trials have without load; None without a line.
 
@@ -60,33 +81,33 @@ def strongest_line(views: Sequence[TrialView], model: Model) -> SpectralLine | N
     resting = [one for one in (_unloaded_residual(view, model) for view in views) if one is not None]
     if not resting:
         return None
-    step = min(one[0] for one in resting)
-    slots = [np.round((time - time[0]) / step).astype(int) for _, time, _, _ in resting]
-    length = max(int(slot[-1]) for slot in slots) + 1
+    step = min(one.step for one in resting)
+    sample_indices = [np.round((one.time - one.time[0]) / step).astype(int) for one in resting]
+    length = max(int(indices[-1]) for indices in sample_indices) + 1
     powers = []
-    for slot, (_, _, values, known) in zip(slots, resting, strict=True):
-        even = np.zeros((length, values.shape[1]))
-        even[slot] = values
-        powers.append((np.abs(np.fft.rfft(even, axis=0)) ** 2).sum(axis=1) / max(float(known.sum()), 1.0))
+    for indices, one in zip(sample_indices, resting, strict=True):
+        resampled = np.zeros((length, one.values.shape[1]))
+        resampled[indices] = one.values
+        powers.append((np.abs(np.fft.rfft(resampled, axis=0)) ** 2).sum(axis=1) / max(float(one.known.sum()), 1.0))
     usable = slice(LINE_HALF_WIDTH + 1, len(powers[0]) - 2)
     levels = [_noise_level(power) for power in powers]
     ratio = np.sum([power / level for power, level in zip(powers, levels, strict=True)], axis=0)[usable]
     if len(ratio) < 2 * NEIGHBOUR_FREQUENCIES:
         return None
-    at = int(np.argmax(ratio)) + usable.start
-    beside = slice(at - 1, at + 2)
-    everywhere = all(float((p[beside] / q[beside]).max()) > LEAST_PROMINENCE for p, q in zip(powers, levels, strict=True))
-    if not everywhere or _false_alarm_probability(float(ratio.max()), len(powers)) * len(ratio) > FALSE_ALARM:
+    peak = int(np.argmax(ratio)) + usable.start
+    around = slice(peak - 1, peak + 2)
+    in_all_trials = all(
+        float((power[around] / level[around]).max()) > LEAST_PROMINENCE for power, level in zip(powers, levels, strict=True)
+    )
+    if not in_all_trials or _false_alarm_probability(float(ratio.max()), len(powers)) * len(ratio) > FALSE_ALARM:
         return None
-    near = (at + np.linspace(-SEARCH_WIDTH, SEARCH_WIDTH, SEARCH_POINTS)) / (length * step)
+    near = (peak + np.linspace(-SEARCH_WIDTH, SEARCH_WIDTH, SEARCH_POINTS)) / (length * step)
     best = max((_line_at(resting, float(f), views[0].noise[0]) for f in near), key=lambda line: line.share)
     return best if best.share > LEAST_LINE_SHARE else None
 
 
-def _unloaded_residual(view: TrialView, model: Model) -> tuple[float, np.ndarray, np.ndarray, np.ndarray] | None:
-    """Median time step, times, and the residual of texels without load about its mean (zero elsewhere), with a mask of its
-    values.
-    """
+def _unloaded_residual(view: TrialView, model: Model) -> UnloadedResidual | None:
+    """Return the residual of a trial's texels while they are unloaded; None if there is too little of it."""
     reading = view.predictor.trial.reading
     time = view.predictor.stimulus.time
     if reading is None or len(time) < 4 * NEIGHBOUR_FREQUENCIES:
@@ -97,7 +118,7 @@ def _unloaded_residual(view: TrialView, model: Model) -> tuple[float, np.ndarray
         return None
     residual = np.where(known, view.residual(model)[:, : reading.shape[1]], 0.0)
     residual = np.where(known, residual - residual.sum(axis=0) / np.maximum(known.sum(axis=0), 1), 0.0)
-    return view.predictor.trial.step, time, residual, known
+    return UnloadedResidual(view.predictor.trial.step, time, residual, known)
 
 
 def _noise_level(power: np.ndarray) -> np.ndarray:
@@ -116,14 +137,14 @@ def _false_alarm_probability(total: float, trials: int) -> float:
     return float(gammaincc(trials, total))
 
 
-def _line_at(resting: list[tuple[float, np.ndarray, np.ndarray, np.ndarray]], frequency: float, noise: float) -> SpectralLine:
+def _line_at(resting: list[UnloadedResidual], frequency: float, noise: float) -> SpectralLine:
     """Amplitude and share of a line at a frequency, by least squares for each texel."""
-    line = total = channels = 0.0
+    line = total = samples = 0.0
     for _, time, values, known in resting:
         wave = np.exp(-2j * np.pi * frequency * (time - time[0]))
         count = known.sum(axis=0)
         amplitude = 2.0 * np.abs(wave @ values) / np.maximum(count, 1)
         line += float((0.5 * amplitude**2 * count).sum())
         total += float((values * values).sum())
-        channels += float(count.sum())
-    return SpectralLine(frequency, float(np.sqrt(2.0 * line / channels)) * noise, min(line / max(total, 1e-300), 1.0))
+        samples += float(count.sum())
+    return SpectralLine(frequency, float(np.sqrt(2.0 * line / samples)) * noise, min(line / max(total, 1e-300), 1.0))

@@ -4,14 +4,14 @@
 from __future__ import annotations
 
 from ..selection.findings import Diagnosis
+from ..selection.identifiability import LEAST_CYCLES
 
 LOUD_NOISE = 0.05
 """Noise, as a share of the range, above which it hides the smaller effects."""
 ALL_TEXELS = 0.999
 """Share of the texels that must be touched for the recordings to cover the sensor."""
-LEAST_CYCLES = 2
 LEAST_HOLD = 2.0
-"""Seconds."""
+"""Duration of a hold that shows creep, s."""
 LEAST_SPEED_RATIO = 5.0
 """Ratio of fast to slow loading that shows an effect of speed."""
 

@@ -5,4 +5,4 @@
 has seen. ``findings`` holds the result.
 """
 
-__all__ = ["diagnosis", "findings"]
+__all__ = ["diagnosis", "findings", "identifiability"]

@@ -18,7 +18,7 @@ from ..fitting.least_squares import Fit
 from .candidates import DIRECTLY_ESTIMATED, is_spatial
 from .direct_estimates import coarsest_step
 from .findings import Diagnosis
-from .forward_selection import FORCES, READINGS, NoiseFloor, SelectionState, friction_kinds
+from .forward_selection import FORCES, READINGS, GapSizes, SelectionState, friction_kinds
 from .identifiability import (
     LEAST_UNLOADED_SHARE,
     MOVING_BY_THEMSELVES,
@@ -65,10 +65,10 @@ def least_share(name: str, leaves: dict[str, float]) -> float:
     return PARTLY_EXPLAINED if apart else EXPLAINED
 
 
-def is_doubtful(effect: Effect, state: SelectionState, fitted: Sequence[Effect], floor: NoiseFloor) -> bool:
+def is_doubtful(effect: Effect, state: SelectionState, fitted: Sequence[Effect], gap_sizes: GapSizes) -> bool:
     """Return whether one of several effects may only be the misfit of another one's formula."""
     improvement, step = state.improvements.get(effect.name), state.steps.get(effect.name)
-    if _describes_dead_texels(effect, fitted) or _larger_effect_of_same_kind(effect, state, fitted, floor):
+    if _describes_dead_texels(effect, fitted) or _larger_effect_of_same_kind(effect, state, fitted, gap_sizes):
         return True
     if step is not None and step.times_worse(step.remaining_repeated, effect.name) < REPEATED_RATIO:
         return True
@@ -96,7 +96,7 @@ def may_absorb_misfit(effect: Effect, state: SelectionState) -> bool:
     )
 
 
-def _larger_effect_of_same_kind(effect: Effect, state: SelectionState, fitted: Sequence[Effect], floor: NoiseFloor) -> bool:
+def _larger_effect_of_same_kind(effect: Effect, state: SelectionState, fitted: Sequence[Effect], gap_sizes: GapSizes) -> bool:
     """Whether a similar effect closes more already, so that this one may be the misfit of its formula.
 
     Load spreading and crosstalk both pass load on to neighbours. A nonlinear contact law and a nonlinear readout both bend the
@@ -106,7 +106,7 @@ def _larger_effect_of_same_kind(effect: Effect, state: SelectionState, fitted: S
     def share(name: str) -> float:
         return state.improvements[name].of_gap if name in state.improvements else 0.0
 
-    same = SPREADING if effect.name in SPREADING else () if floor.both or effect.name not in NONLINEAR else NONLINEAR
+    same = SPREADING if effect.name in SPREADING else () if gap_sizes.both or effect.name not in NONLINEAR else NONLINEAR
     return any(share(other.name) > share(effect.name) for other in fitted if other.name in same and other.name != effect.name)
 
 
@@ -122,7 +122,7 @@ def _describes_dead_texels(effect: Effect, fitted: Sequence[Effect]) -> bool:
     return False
 
 
-def unsure_names(result: Diagnosis, view_set: ViewSet, state: SelectionState, floor: NoiseFloor) -> set[str]:
+def unsure_names(result: Diagnosis, view_set: ViewSet, state: SelectionState, gap_sizes: GapSizes) -> set[str]:
     """Return the names of effects that are not sure because of other effects, or of gaps in the recordings.
 
     - Effects that close little of the gap, if the recordings leave rivals.
@@ -142,18 +142,21 @@ def unsure_names(result: Diagnosis, view_set: ViewSet, state: SelectionState, fl
     ):
         unsure |= set(MOVING_BY_THEMSELVES)
     step = coarsest_step(view_set.whole, result.base.model)
-    size = {name: abs(improvement.of_gap) * floor.gap(floor.main_quantity) for name, improvement in state.improvements.items()}
-    if "quantization" not in names and floor.main_quantity == READINGS:
+    size = {
+        name: abs(improvement.of_gap) * gap_sizes.gap(gap_sizes.main_quantity)
+        for name, improvement in state.improvements.items()
+    }
+    if "quantization" not in names and gap_sizes.main_quantity == READINGS:
         unsure |= {name for name, square in size.items() if square < (step / result.noise[READINGS].deviation) ** 2}
-    for name in names & set(friction_kinds()) if floor.both else ():
-        closed = state.improvements[name].of_gap * floor.gap(FORCES) * floor.count[FORCES]
-        if closed < _normal_squares(view_set, state.fit, float(floor.noise[FORCES])):
+    for name in names & set(friction_kinds()) if gap_sizes.both else ():
+        closed = state.improvements[name].of_gap * gap_sizes.gap(FORCES) * gap_sizes.count[FORCES]
+        if closed < _normal_squares(view_set, state.fit, float(gap_sizes.noise[FORCES])):
             unsure.add(name)
     return unsure
 
 
-def _normal_squares(view_set: ViewSet, found: Fit, floor: float) -> float:
-    """Sum of squares of the residual of the net normal force, less that of noise (`floor` for each value)."""
+def _normal_squares(view_set: ViewSet, found: Fit, noise: float) -> float:
+    """Sum of squares of the residual of the net normal force, less that of noise (`noise` for each value)."""
     normal = view_set.whole[0].predictor.rig.texels.normal.mean(axis=0)
     residual = np.concatenate([share.residual(found.model)[:, -3:] @ normal for share in view_set.whole])
-    return max(float(residual @ residual) - floor * len(residual), 0.0)
+    return max(float(residual @ residual) - noise * len(residual), 0.0)

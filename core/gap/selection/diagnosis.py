@@ -29,7 +29,7 @@ from .forward_selection import (
     LEAST_STRUCTURE,
     READINGS,
     ForwardSelection,
-    NoiseFloor,
+    GapSizes,
     SelectionState,
     friction_kinds,
 )
@@ -78,21 +78,21 @@ def _select_effects(result: Diagnosis, view_set: ViewSet) -> Iterator[tuple[str,
     base = SelectionState(result.base, held_out_squares(view_set.whole, result.base))
     start = base.means
     noise = np.array([min(1.0, start[READINGS]), min(_unloaded_force_noise(view_set, result.base), start[FORCES])])
-    floor = NoiseFloor(start, noise, result.base.count.sum(axis=0).astype(float))
-    selection = ForwardSelection(view_set, result.scales, result.coverage, floor)
+    gap_sizes = GapSizes(start, noise, result.base.count.sum(axis=0).astype(float))
+    selection = ForwardSelection(view_set, result.scales, result.coverage, gap_sizes)
     state = yield from selection.run(base, partial(_structure, view_set))
     state = replace(state, fit=_with_base_refitted(result, view_set, state.fit))
     result.best, result.structure = state.fit, _structure(view_set, state.fit)
     result.line = strongest_line(view_set.whole, state.fit.model)
-    main, mean = floor.main_quantity, float(state.means[floor.main_quantity])
+    main, mean = gap_sizes.main_quantity, float(state.means[gap_sizes.main_quantity])
     unpredictable = min(start[main] * (1.0 - result.base_structure.total), mean * (1.0 - result.structure.total))
-    floor.noise[main] = float(np.clip(unpredictable, LEAST_NOISE, 1.0))
+    gap_sizes.noise[main] = float(np.clip(unpredictable, LEAST_NOISE, 1.0))
     if result.structure.total < LEAST_STRUCTURE and result.line is None:
         noise_effect = proportional_noise(view_set.whole, state.fit.model)
         if noise_effect is not None:  # then the whole residual is noise
             result.best = replace(state.fit, model=state.fit.model.with_effect(noise_effect))
-            floor.noise[main] = max(floor.noise[main], mean)
-    conclude(result, view_set, state, floor)
+            gap_sizes.noise[main] = max(gap_sizes.noise[main], mean)
+    conclude(result, view_set, state, gap_sizes)
 
 
 def _stages(result: Diagnosis, view_set: ViewSet) -> list[Model]:

@@ -75,7 +75,7 @@ StructureOfFit = Callable[[Fit], ResidualStructure]
 
 
 @dataclass
-class NoiseFloor:
+class GapSizes:
     """The gaps of readings and of net forces: mean squares of the base model and of noise alone.
 
     Attributes
@@ -223,7 +223,7 @@ class ForwardSelection:
     view_set: ViewSet
     scales: Scales
     coverage: Coverage
-    floor: NoiseFloor
+    gap_sizes: GapSizes
 
     def __post_init__(self) -> None:
         self.confounded_kinds = confounded(self.coverage)
@@ -269,7 +269,7 @@ class ForwardSelection:
             if self._effect_count(state) >= 2:
                 state = yield from self._first_reconsidered(state)
         state.first = lone
-        if self.floor.both:
+        if self.gap_sizes.both:
             state = yield from self._friction(state)
         return state
 
@@ -283,7 +283,7 @@ class ForwardSelection:
         forms = candidates([s.predictor for s in self.view_set.whole], state.fit.model)
         forms = [c for c in forms if c.name not in taken or may_repeat(c)]
         forms = [c for c in forms if not is_free_already(c, state.fit.free) and (first or c.name not in self.confounded_kinds)]
-        if self.floor.both:
+        if self.gap_sizes.both:
             forms = [c for c in forms if (c.form.friction_law is not None) == friction]
         ranked: list[FittedCandidate] = []
         for what, done, found in screen(self.view_set, state.fit, forms, self.scales):
@@ -296,8 +296,8 @@ class ForwardSelection:
         if not judged:
             return SelectionStep([], [])
         means = [*(means_of(one.held_out, one.fit) for one in judged), state.means]
-        quantity = self.floor.quantity_for(judged[0].candidate.name)
-        *left, before = (x + self.floor.unresolved(quantity) for x in self._remaining(means, quantity))
+        quantity = self.gap_sizes.quantity_for(judged[0].candidate.name)
+        *left, before = (x + self.gap_sizes.unresolved(quantity) for x in self._remaining(means, quantity))
         taken = {effect.name for effect in state.fit.model.effects}
         again = [i for i, one in enumerate(judged) if one.candidate.name in taken]
         order = [int(i) for i in np.argsort(left, kind="stable") if i not in again]
@@ -310,7 +310,7 @@ class ForwardSelection:
         For readings the forces count too, as far as another of these models does better there: friction takes its part in
         them.
         """
-        g = self.floor
+        g = self.gap_sizes
         left = [max(float(m[quantity] - g.noise[quantity]), 0.0) for m in means]
         if g.both and quantity == READINGS:
             least = min(float(m[FORCES]) for m in means)
@@ -347,12 +347,14 @@ class ForwardSelection:
         if not self._earns_its_place(best, state, first):
             return state
         name = best.candidate.name
-        improvement = self.floor.improvement(state.means, means_of(best.held_out, best.fit), self.floor.quantity_for(name))
+        improvement = self.gap_sizes.improvement(
+            state.means, means_of(best.held_out, best.fit), self.gap_sizes.quantity_for(name)
+        )
         return SelectionState(best.fit, best.held_out, {**state.steps, name: step}, {**state.improvements, name: improvement})
 
     def _earns_its_place(self, one: FittedCandidate, state: SelectionState, first: bool) -> bool:
         """Whether a candidate closes enough of the gap, and does worse in hardly any trial."""
-        g, quantity = self.floor, self.floor.quantity_for(one.candidate.name)
+        g, quantity = self.gap_sizes, self.gap_sizes.quantity_for(one.candidate.name)
         before, after = state.means[quantity], means_of(one.held_out, one.fit)[quantity]
         gained, left = float(before - after), max(float(before - g.noise[quantity]), 1e-12)
         change = state.held_out[:, quantity] - one.held_out[:, quantity]
@@ -375,7 +377,7 @@ class ForwardSelection:
 
     def _is_gap_open(self, state: SelectionState, structure: StructureOfFit) -> bool:
         """Whether enough is left that a further effect could improve the model."""
-        g, mean = self.floor, float(state.means[self.floor.main_quantity])
+        g, mean = self.gap_sizes, float(state.means[self.gap_sizes.main_quantity])
         if any(effect.name == "quantization" for effect in state.fit.model.effects):
             return False  # the rest lies within a quantization step
         if mean - g.noise[g.main_quantity] < max(LEAST_IMPROVEMENT, NEXT_LEAST_SHARE_OF_GAP * g.gap(g.main_quantity)):
@@ -401,14 +403,14 @@ class ForwardSelection:
             step = yield from self._best_next(state, 0.25 + 0.35 * number / len(firsts), 0.35 / len(firsts))
             longer = self._extended(state, step)
             ends += [longer] if longer is not state or state is single else []  # another first effect counts only in a pair
-        remaining = self._remaining([end.means for end in ends], self.floor.main_quantity)
+        remaining = self._remaining([end.means for end in ends], self.gap_sizes.main_quantity)
         best = int(np.argmin(remaining))
         return ends[best] if best == 0 or remaining[best] < PAIR_ADVANTAGE * remaining[0] else ends[0]
 
     def _first_reconsidered(self, state: SelectionState) -> Generator[tuple[str, float], None, SelectionState]:
         """Replace or drop the first effect, which was chosen without the others, if that is better beside them."""
         model = state.fit.model
-        first, quantity = model.effects[0].name, self.floor.main_quantity
+        first, quantity = model.effects[0].name, self.gap_sizes.main_quantity
         rest = tuple(
             replace(item, effect=item.effect - 1) if item.effect > 0 else item for item in state.fit.free if item.effect != 0
         )
@@ -418,7 +420,7 @@ class ForwardSelection:
         without = SelectionState(other, held_out_squares(self.view_set.whole, other), steps, improvements)
         step = yield from self._best_next(without, 0.8, 0.1)
         lost = float(without.means[quantity] - state.means[quantity])
-        if lost < max(LEAST_IMPROVEMENT, UNNEEDED_SHARE * self.floor.gap(quantity)):  # the later effects do all of its work
+        if lost < max(LEAST_IMPROVEMENT, UNNEEDED_SHARE * self.gap_sizes.gap(quantity)):  # the later effects do all of its work
             return without
         if not step.ranked:
             return state
@@ -427,19 +429,19 @@ class ForwardSelection:
         if after < (1.0 if best.candidate.name == first else REPLACED_SHARE) * before - 1e-6:
             name, improvement = (
                 best.candidate.name,
-                self.floor.improvement(without.means, means_of(best.held_out, best.fit), quantity),
+                self.gap_sizes.improvement(without.means, means_of(best.held_out, best.fit), quantity),
             )
             return SelectionState(
                 last_effect_first(best.fit), best.held_out, {name: step, **steps}, {name: improvement, **improvements}
             )
         told = step if np.isfinite(step.of(first)) else state.steps[first]  # its rivals are judged beside the later effects
-        improvements = {**state.improvements, first: self.floor.improvement(without.means, state.means, quantity)}
+        improvements = {**state.improvements, first: self.gap_sizes.improvement(without.means, state.means, quantity)}
         return replace(state, steps={**state.steps, first: told}, improvements=improvements)
 
     def _friction(self, state: SelectionState) -> Generator[tuple[str, float], None, SelectionState]:
         """Add effects on friction, judged by forces alone."""
         for _ in friction_kinds():
-            if state.means[FORCES] < (1.0 + LEAST_FORCE_IMPROVEMENT) * self.floor.noise[FORCES]:
+            if state.means[FORCES] < (1.0 + LEAST_FORCE_IMPROVEMENT) * self.gap_sizes.noise[FORCES]:
                 break
             step = yield from self._best_next(state, 0.9, 0.05, first=True, friction=True)
             longer = self._extended(state, step)

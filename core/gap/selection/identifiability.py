@@ -2,8 +2,18 @@
 """Identifiability: which effects cannot be found in some recordings, or not be distinguished from another one, whatever is
 fitted.
 
-An effect is known by a signature, as by what is different after unloading. Recordings without that signature do not identify
-the effect, however well its formula fits.
+Each effect shows in one feature of the recordings, its signature: hysteresis, for example, in readings that differ after
+unloading. Recordings without this feature do not identify the effect, however well its formula fits. Four functions tell
+this, from the strictest to the mildest:
+
+============================  =================================================  ==========================================
+function                      what the recordings lack                           what follows
+============================  =================================================  ==========================================
+`unidentifiable`              the signature of the effect                        the effect is no candidate
+`confounded`                  anything that separates time from depth            the effect does not join a nonlinear spring
+`indistinguishable`           what separates the effect from certain others      these are rivals, however well each fits
+`hardly_distinguishable`      a clear difference from certain others             these are rivals unless they fit far worse
+============================  =================================================  ==========================================
 """
 
 from __future__ import annotations
@@ -37,16 +47,17 @@ with the load."""
 KNOWN_FROM_CYCLES = ("hysteresis", "softening", "wear")
 """Effects that are known by how a second cycle differs from the first. In a single cycle each lowers the unloading curve."""
 LEAST_CYCLES = 2
+"""Number of loading cycles in one trial from which on a later cycle can be compared with the first."""
 SPREADING = ("load-spreading", "crosstalk")
 """Effects that pass a part of a texel's load on to its neighbours. A sensor has a pattern of its own, so that it says little
 which of their formulas is nearer to it."""
 NONLINEAR = ("stiffening", "saturation", "dead-zone")
-"""Effects that bend the curve of reading over load, as the loading curve of a hysteresis loop is bent."""
+"""Effects that bend the curve of reading over load. The loading curve of a hysteresis loop is bent as well."""
 LOOP_CURVATURE = 3.0
 """Ratio of a curve's steepest to its flattest eighth up to which it may be the loading curve of a hysteresis loop that takes
 two thirds of the force."""
 SHORT_HOLD = 0.5
-"""Seconds of a hold below which creep does not show in it."""
+"""Creep does not show in holds that are shorter than this, s."""
 CURVE_PARTS = 8
 """Number of equal parts of the load over which the slopes of a curve are compared."""
 
@@ -62,9 +73,9 @@ def unidentifiable(coverage: Coverage) -> dict[str, str]:
 def confounded(coverage: Coverage) -> tuple[str, ...]:
     """Return the kinds that recordings cannot distinguish from a nonlinear spring.
 
-    If the load only ever grew, at one speed and without a hold, time and depth are proportional. Effects of time may then be
-    the reason for a bent curve, and count as rivals of a nonlinear spring. The spring is the simpler explanation, so they do
-    not join a model beside it.
+    If the load only grew, at one speed and without a hold, time and depth are proportional. A bent curve may then come from an
+    effect of time or from a nonlinear spring. The spring is the simpler explanation: effects of time are its rivals, and are
+    not added to a model that has it.
     """
     one = not coverage.unloading and coverage.speed_ratio < SINGLE_SPEED_RATIO and coverage.longest_hold == 0.0
     return KNOWN_FROM_TIMING if one else ()
@@ -96,8 +107,8 @@ def indistinguishable(coverage: Coverage, name: str, curvature: float = np.inf) 
 def hardly_distinguishable(coverage: Coverage, name: str) -> tuple[str, ...]:
     """Return the kinds that must fit far worse than one of this name to be distinguished from it.
 
-    Load spreading and crosstalk both pass load on to neighbours. Without rest, creep and drift differ only in how they depend
-    on the load.
+    Load spreading and crosstalk both pass a part of the load on to neighbours. In recordings without unloaded time, creep and
+    drift differ only in how they depend on the load.
     """
     groups = [SPREADING, *([MOVING_BY_THEMSELVES] if coverage.unloaded_share < LEAST_UNLOADED_SHARE else [])]
     return tuple(other for group in groups if name in group for other in group if other != name)

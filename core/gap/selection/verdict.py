@@ -17,7 +17,7 @@ from .forward_selection import (
     LEAST_IMPROVEMENT,
     LEAST_STRUCTURE,
     READINGS,
-    NoiseFloor,
+    GapSizes,
     SelectionState,
     SelectionStep,
     means_of,
@@ -38,32 +38,32 @@ MOST_MEAN_SQUARE = 2.0
 """Mean square of the base model's residual, in units of the noise, up to which a residual without structure is no gap."""
 
 
-def conclude(result: Diagnosis, view_set: ViewSet, state: SelectionState, floor: NoiseFloor) -> None:
+def conclude(result: Diagnosis, view_set: ViewSet, state: SelectionState, gap_sizes: GapSizes) -> None:
     """Write verdict, findings, groups of rivals and ruled-out kinds into a result that has its models already."""
-    _judge_effects(result, state, floor)
-    unsure = unsure_names(result, view_set, state, floor)
+    _judge_effects(result, state, gap_sizes)
+    unsure = unsure_names(result, view_set, state, gap_sizes)
     result.findings = [
         replace(one, confidence=min(one.confidence, UNSURE_CONFIDENCE)) if one.name in unsure else one
         for one in result.findings
     ]
-    _rule_out(result, state.first, floor)
+    _rule_out(result, state.first, gap_sizes)
 
 
-def _judge_effects(result: Diagnosis, state: SelectionState, floor: NoiseFloor) -> None:
+def _judge_effects(result: Diagnosis, state: SelectionState, gap_sizes: GapSizes) -> None:
     """Write the verdict and, for each effect of the model, a finding with its confidence and rivals."""
     effects = result.best.model.effects
     fitted = [effect for effect in effects if effect.name != "noise"]
-    closed = [floor.closed_share(state.means, quantity) for quantity in (READINGS, FORCES)]
-    is_open = any(floor.has_gap(quantity) and closed[quantity] < EXPLAINED for quantity in (READINGS, FORCES))
-    result.verdict = _verdict(result, floor, is_open)
+    closed = [gap_sizes.closed_share(state.means, quantity) for quantity in (READINGS, FORCES)]
+    is_open = any(gap_sizes.has_gap(quantity) and closed[quantity] < EXPLAINED for quantity in (READINGS, FORCES))
+    result.verdict = _verdict(result, gap_sizes, is_open)
     for index, effect in enumerate(effects):
         times_worse, leaves = _alternatives(effect, state, {e.name for e in effects})
-        rivals = _rivals(effect, state, result, times_worse, floor)
+        rivals = _rivals(effect, state, result, times_worse, gap_sizes)
         weight = 1.0 / (1.0 + sum(ratio**RIVAL_EXPONENT for ratio in times_worse.values()))
-        share = closed[floor.quantity_for(effect.name)] if fitted else 1.0
+        share = closed[gap_sizes.quantity_for(effect.name)] if fitted else 1.0
         confidence = weight * (0.5 + 0.5 * share if share >= least_share(effect.name, leaves) else 0.5 * share)
         absorbs = is_open and may_absorb_misfit(effect, state)
-        if rivals or (len(fitted) > 1 and (absorbs or is_doubtful(effect, state, fitted, floor))):
+        if rivals or (len(fitted) > 1 and (absorbs or is_doubtful(effect, state, fitted, gap_sizes))):
             confidence = min(confidence, UNSURE_CONFIDENCE)
         if rivals:
             result.ambiguous.append((effect.name, *rivals))
@@ -73,17 +73,17 @@ def _judge_effects(result: Diagnosis, state: SelectionState, floor: NoiseFloor) 
         )
 
 
-def _verdict(result: Diagnosis, floor: NoiseFloor, is_open: bool) -> str:
+def _verdict(result: Diagnosis, gap_sizes: GapSizes, is_open: bool) -> str:
     """Verdict on the whole rig; `is_open` if the amended model leaves much of the gap."""
     effects = result.best.model.effects
     if all(effect.name == "noise" for effect in effects) and effects:
         return "explained"
     if effects:
         return "unexplained" if is_open else "explained"
-    mean, gap = float(floor.base[floor.main_quantity]), floor.gap(floor.main_quantity)
+    mean, gap = float(gap_sizes.base[gap_sizes.main_quantity]), gap_sizes.gap(gap_sizes.main_quantity)
     small = mean < MOST_MEAN_SQUARE or gap < LEAST_IMPROVEMENT
     quiet = result.base_structure.total < LEAST_STRUCTURE and small and result.line is None
-    return "no gap" if quiet and not (floor.both and floor.has_gap(FORCES)) else "unexplained"
+    return "no gap" if quiet and not (gap_sizes.both and gap_sizes.has_gap(FORCES)) else "unexplained"
 
 
 def _alternatives(effect: Effect, state: SelectionState, taken: set[str]) -> tuple[dict[str, float], dict[str, float]]:
@@ -101,12 +101,12 @@ def _alternatives(effect: Effect, state: SelectionState, taken: set[str]) -> tup
 
 
 def _rivals(
-    effect: Effect, state: SelectionState, result: Diagnosis, times_worse: dict[str, float], floor: NoiseFloor
+    effect: Effect, state: SelectionState, result: Diagnosis, times_worse: dict[str, float], gap_sizes: GapSizes
 ) -> tuple[str, ...]:
     """Kinds that would do as well as an effect, and kinds that these recordings cannot distinguish from it."""
     taken = {e.name for e in state.fit.model.effects}
     own = state.steps.get(effect.name, SelectionStep([], [])).of(effect.name)
-    unresolved = floor.unresolved(floor.quantity_for(effect.name))
+    unresolved = gap_sizes.unresolved(gap_sizes.quantity_for(effect.name))
     is_exact = effect.name in SPREADING and own < UNRESOLVED_TIMES * unresolved
     similar = () if is_exact else hardly_distinguishable(result.coverage, effect.name)
     near = [
@@ -119,12 +119,12 @@ def _rivals(
     return tuple(dict.fromkeys([*near, *same]))
 
 
-def _rule_out(result: Diagnosis, alone: SelectionStep, floor: NoiseFloor) -> None:
+def _rule_out(result: Diagnosis, alone: SelectionStep, gap_sizes: GapSizes) -> None:
     """Write for each kind that was not found why; `alone` has those that were fitted on top of the base model."""
     tried: dict[str, float] = {}
     for one in alone.ranked:
         name = one.candidate.name
-        closed = floor.closed_share(means_of(one.held_out, one.fit), floor.quantity_for(name))
+        closed = gap_sizes.closed_share(means_of(one.held_out, one.fit), gap_sizes.quantity_for(name))
         tried[name] = max(tried.get(name, 0.0), closed)
     named = {name for group in result.ambiguous for name in group} | {one.name for one in result.findings}
     possible = {c.name for c in candidates(result.of("fit"), result.base.model)}

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Dynamics of a step: contacts linearised and summed, implicit velocities, passivity, actuators and free rotation."""
+"""Dynamics of a step: contacts linearised and summed, friction states and effects, implicit velocities and their linear system.
+
+Passivity, actuators with their commands and grip control, relative motion of bodies, and free rotation stand here as well.
+"""
 
 __all__ = [
     "actuators",

@@ -17,8 +17,8 @@ from palpate.core.gap.selection.direct_estimates import companding_starts, few_l
 from palpate.core.gap.selection.forward_selection import (
     FORCES,
     READINGS,
+    GapSizes,
     Improvement,
-    NoiseFloor,
     SelectionState,
     SelectionStep,
     friction_kinds,
@@ -26,21 +26,22 @@ from palpate.core.gap.selection.forward_selection import (
 from palpate.core.gap.selection.view_set import view_set_of
 from palpate.core.model.sensor_parameters import SensorParameters
 
-WITH_FORCES, READ_ALONE = (NoiseFloor(np.full(2, 9.0), np.ones(2), np.array([900.0, count])) for count in (300.0, 0.0))
+WITH_FORCES, READ_ALONE = (GapSizes(np.full(2, 9.0), np.ones(2), np.array([900.0, count])) for count in (300.0, 0.0))
 
 
 def test_readings_and_forces_have_a_gap_each():
-    floor = NoiseFloor(np.array([11.0, 101.0]), np.array([1.0, 1.0]), np.array([8400.0, 300.0]))
+    gap_sizes = GapSizes(np.array([11.0, 101.0]), np.array([1.0, 1.0]), np.array([8400.0, 300.0]))
     assert friction_kinds() == ["stribeck", "viscous-friction"]
-    assert floor.quantity_for("stribeck") == FORCES and floor.quantity_for("creep") == READINGS
+    assert gap_sizes.quantity_for("stribeck") == FORCES and gap_sizes.quantity_for("creep") == READINGS
     after = np.array([2.0, 51.0])
-    assert floor.closed_share(after, READINGS) == pytest.approx(0.9) and floor.closed_share(after, FORCES) == pytest.approx(0.5)
-    gain = floor.improvement(np.array([6.0, 0.0]), after, READINGS)
+    assert gap_sizes.closed_share(after, READINGS) == pytest.approx(0.9)
+    assert gap_sizes.closed_share(after, FORCES) == pytest.approx(0.5)
+    gain = gap_sizes.improvement(np.array([6.0, 0.0]), after, READINGS)
     assert (gain.of_gap, gain.of_remaining) == pytest.approx((0.4, 0.8))
-    alone = NoiseFloor(np.array([0.0, 101.0]), np.array([1.0, 1.0]), np.array([0.0, 300.0]))
+    alone = GapSizes(np.array([0.0, 101.0]), np.array([1.0, 1.0]), np.array([0.0, 300.0]))
     assert alone.quantity_for("creep") == alone.quantity_for("stribeck") == FORCES  # nothing was read
-    trembling = NoiseFloor(np.array([1.0, 14.3]), np.array([1.0, 13.0]), floor.count)
-    assert floor.has_gap(FORCES) and not trembling.has_gap(FORCES)  # coloured noise is not known to a tenth
+    trembling = GapSizes(np.array([1.0, 14.3]), np.array([1.0, 13.0]), gap_sizes.count)
+    assert gap_sizes.has_gap(FORCES) and not trembling.has_gap(FORCES)  # coloured noise is not known to a tenth
 
 
 def test_a_handful_of_values_is_seen():
