@@ -31,6 +31,7 @@ from .detection.narrow_phase import count_too_deep
 from .detection.neighbour_lists import neighbour_lists_for
 from .dynamics.drive_commands import DriveCommands
 from .dynamics.passivity import credit_initial_contacts
+from .fast_crossings import FastCrossings, path_of_moved_bodies
 from .found_contacts import contacts_of
 from .model_builder import build_model, initial_state, texel_starts
 from .parallel_loops import find_all_contacts, help_with_loops
@@ -94,6 +95,7 @@ class Simulation:
         self._drive_commands = DriveCommands(scenario)
         self._texel_start = texel_starts(scenario)
         self._detection: DetectionData | None = None
+        self._fast_crossings = FastCrossings(scenario, self._center)
 
     @property
     def arrays(self) -> tuple[SolverModel, DetectionData, State, Workspace]:
@@ -148,13 +150,27 @@ class Simulation:
             find_all_contacts(-self.dt, *self.arrays)
             credit_initial_contacts(self._model, self._state, self._workspace)
         self._most_too_deep = 0
+        before = self._state.position.copy(), self._state.quaternion.copy()
         for first, last, commands in self._drive_commands.control_intervals(times, self.dt, self._normal_forces):
             path = FramePath(positions, quaternions, velocities, commands)
             with helper_threads(self._workspace.queue, self._helpers, help_with_loops, *self.arrays):
                 too_deep = advance_steps(self.dt, first, last, path, *self.arrays)
             self._most_too_deep = max(self._most_too_deep, too_deep)
         self.frame += 1
+        self._warn_of_fast_crossings(positions, quaternions, before)
         return self.observe()
+
+    def _warn_of_fast_crossings(
+        self, positions: np.ndarray, quaternions: np.ndarray, before: tuple[np.ndarray, np.ndarray]
+    ) -> None:
+        """Warn of targets that were too fast in the last frame; `before` is where the bodies were at its beginning."""
+        positions, quaternions = positions.copy(), quaternions.copy()
+        moved = [index for index, body in enumerate(self.scenario.bodies) if body.moved_by_forces]
+        if moved:
+            after = self._state.position[moved], self._state.quaternion[moved]
+            path = path_of_moved_bodies((before[0][moved], before[1][moved]), after, self.substeps)
+            positions[:, moved], quaternions[:, moved] = path
+        self.warnings += self._fast_crossings.warnings(self.frame, positions, quaternions, self.dt)
 
     def _prescribed_motion(self, times: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Positions (steps + 1, b, 3), quaternions (steps + 1, b, 4) and velocities (steps, b, 6) by the bodies' motions."""
