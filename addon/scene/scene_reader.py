@@ -313,8 +313,9 @@ def _distance_warnings(scenario: Scenario) -> tuple[str, ...]:
     if rounding < ROUNDING_SHARE * skin:
         return ()
     return (
-        f"'{name}' is {distances[name] * 1e-3:.3g} km from the origin, where Blender rounds positions to {rounding * 1e3:.2g} mm "
-        f"and a skin is {skin * 1e3:.3g} mm deep: move the scene to the origin, or its forces are inexact.",
+        f"'{name}' is {distances[name] * 1e-3:.3g} km from the origin, where Blender rounds positions to "
+        f"{rounding * 1e3:.2g} mm and a skin is {skin * 1e3:.3g} mm deep: move the scene to the origin, "
+        "or its forces are inexact.",
     )
 
 
