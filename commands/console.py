@@ -198,6 +198,7 @@ def exit_on_interrupt(message: str, clean_up: Callable[[], object]) -> Iterator[
     def listen() -> None:
         if receiver.recv(1) == bytes([signal.SIGINT]):
             clean_up()
+            _remove_blenders_folder()
             os.write(stderr, f"\n{message}\n".encode())
             os._exit(130)
 

@@ -21,7 +21,7 @@ from ...core.errors import FileError
 from ...core.io.file_writing import atomic_write, file_sha256
 from ...core.io.npz import DAMAGED
 from ...core.io.recording_npz import load_recording, save_recording
-from ...core.io.regular_file import open_regular
+from ...core.io.regular_file import open_regular, read_bytes
 from ...core.model.recording import Frame, Recording
 from ...core.solver import checkpoint
 
@@ -77,7 +77,7 @@ class BakeCheckpoint:
                         return None
                 recording = load_recording(self.folder / _frames_file(i))
                 frames += [recording.at(int(number)) for number in recording.frames]
-                for name, files in json.loads((self.folder / _images_file(i)).read_bytes()).items():
+                for name, files in json.loads(read_bytes(self.folder / _images_file(i))).items():
                     images.setdefault(name, {}).update(files)
             checkpoint.unpack(simulation, packed)
         except (OSError, FileError, *DAMAGED):

@@ -37,6 +37,7 @@ from ...core.io.file_writing import file_sha256, remove_leftovers, sync_file, wr
 from ...core.io.folder_lock import FolderLock
 from ...core.io.private_folder import PRIVATE_FOLDER, find_private_folder
 from ...core.io.recording_npz import save_recording
+from ...core.io.regular_file import read_bytes
 from ...core.io.sensor_npz import SENSOR_NAME, save_sensor
 from ...core.io.tactile_exr import describe, write_exrs
 from ...core.model.recording import Frame, Recording
@@ -386,7 +387,7 @@ def _check_replaceable(folder: Path, blend: Path | None) -> None:
 def _is_bake(folder: Path) -> bool:
     """Return True if a folder holds a manifest of Palpate, or a damaged manifest beside other files of a bake."""
     try:
-        content = json.loads((folder / MANIFEST_NAME).read_bytes().decode("utf-8", "surrogatepass"))
+        content = json.loads(read_bytes(folder / MANIFEST_NAME).decode("utf-8", "surrogatepass"))
     except (FileNotFoundError, NotADirectoryError):
         return False
     except (OSError, ValueError, RecursionError):

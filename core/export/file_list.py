@@ -15,6 +15,7 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 from ..io.file_writing import atomic_write
+from ..io.regular_file import open_regular, read_bytes
 
 LIST_NAME = ".palpate-export.json"
 LIST_FORMAT = "palpate-export/1"
@@ -87,7 +88,7 @@ class FileList:
 def _read(path: Path) -> dict[str, dict[str, Any]]:
     """Return the exports of a list; none when it is missing or damaged, so that nothing is removed by it."""
     try:
-        content = json.loads(path.read_text(encoding="utf-8"))
+        content = json.loads(read_bytes(path).decode("utf-8"))
     except (OSError, ValueError, RecursionError):
         return {}
     if not isinstance(content, dict) or content.get("format") != LIST_FORMAT or not isinstance(content.get("exports"), dict):
@@ -103,7 +104,7 @@ def _read(path: Path) -> dict[str, dict[str, Any]]:
 def _digest(path: Path) -> str:
     """Return the SHA-256 of a file, as hexadecimal text."""
     digest = hashlib.sha256()
-    with path.open("rb") as file:
+    with open_regular(path) as file:
         while block := file.read(_BLOCK):
             digest.update(block)
     return digest.hexdigest()
