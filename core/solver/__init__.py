@@ -2,7 +2,8 @@
 """The solver: scenario → recording, substep by substep, as compiled kernels on plain arrays.
 
 :mod:`.simulation` is the loop over frames and :mod:`.substep` that over the steps of a frame. :mod:`.detection` finds the
-contacts, :mod:`.dynamics` solves for velocities and friction. The formulas of contact themselves stand in laws/.
+contacts. :mod:`.implicit_velocities` solves for the velocities with the parts in :mod:`.dynamics`, which also advances
+friction. The formulas of contact themselves stand in laws/.
 """
 
 __all__ = ["checkpoint", "precompile", "precompile_process", "simulation", "time_step_adviser"]

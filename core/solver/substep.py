@@ -18,7 +18,7 @@ from .detection.detection_data import DetectionData
 from .dynamics.actuators import move_drives, place_driven, prepare_driven
 from .dynamics.effect_memory import commit_effect_memory
 from .dynamics.free_rotation import angular_velocity_of, matrix_times_vector
-from .dynamics.implicit_velocities import solve_velocities
+from .implicit_velocities import solve_velocities
 from .parallel_loops import UPDATE_FRICTION, find_all_contacts, run_parallel_loop
 from .solver_model import DRIVEN, FREE, KEYFRAMED, SolverModel, State
 from .workspace import Workspace

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Dynamics of a step: contacts linearised and summed, friction states and effects, implicit velocities and their linear system.
+"""Dynamics of a step: contacts linearised and summed, friction states and effects, and the linear system of velocities.
 
 Passivity, actuators with their commands and grip control, relative motion of bodies, and free rotation stand here as well.
 """
@@ -13,7 +13,6 @@ __all__ = [
     "free_rotation",
     "friction_state",
     "grip_controller",
-    "implicit_velocities",
     "linear_system",
     "passivity",
     "relative_kinematics",

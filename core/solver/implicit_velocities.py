@@ -11,16 +11,16 @@ import math
 
 import numpy as np
 
-from ...compiled.kernels import inlined, kernel
-from ...geometry.rotations import solve_positive_definite, write_twist
-from ..detection.detection_data import DetectionData
-from ..parallel_loops import SUM_CONTACTS, run_parallel_loop
-from ..solver_model import DRIVEN, FREE, KEYFRAMED, SolverModel, State
-from ..workspace import Workspace
-from .actuators import SPEED, add_actuators
-from .free_rotation import matrix_times_vector, mean_angular_velocity
-from .linear_system import add_pair_to_system, write_pair_forces
-from .passivity import MAX_BISECTIONS, check_energy, reset_force_scales
+from ..compiled.kernels import inlined, kernel
+from ..geometry.rotations import solve_positive_definite, write_twist
+from .detection.detection_data import DetectionData
+from .dynamics.actuators import SPEED, add_actuators
+from .dynamics.free_rotation import matrix_times_vector, mean_angular_velocity
+from .dynamics.linear_system import add_pair_to_system, write_pair_forces
+from .dynamics.passivity import MAX_BISECTIONS, check_energy, reset_force_scales
+from .parallel_loops import SUM_CONTACTS, run_parallel_loop
+from .solver_model import DRIVEN, FREE, KEYFRAMED, SolverModel, State
+from .workspace import Workspace
 
 MAX_ITERATIONS = 40
 """Most iterations, in which contacts are linearised anew, within a substep; four or five are usual, one at rest."""
