@@ -7,8 +7,19 @@ import hashlib
 from functools import cache
 from pathlib import Path
 
-KERNEL_MARKS = (b"@kernel", b"@inlined", b"@allocating_kernel", b"@by_reference", b"KIND = Kind(", b"from numba")
-"""A file that holds one of these takes part in what is compiled; the laws of effects are compiled as well."""
+KERNEL_MARKS = (
+    b"@kernel",
+    b"@inlined",
+    b"@allocating_kernel",
+    b"@by_reference",
+    b"KIND = Kind(",
+    b"from numba",
+    b"= specified(",
+)
+"""A file that holds one of these takes part in what is compiled.
+
+The laws of effects are compiled as well, and the specified parameters of a sensor are the fields of the contact law.
+"""
 
 
 CORE = Path(__file__).resolve().parents[1]

@@ -3,48 +3,38 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections import namedtuple
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
 from ..compiled.kernels import kernel
-from ..model.sensor_parameters import HUNT_CROSSLEY, SensorParameters
+from ..model.sensor_parameters import HUNT_CROSSLEY, LAW_PARAMETERS, SensorParameters
+
+if TYPE_CHECKING:
+    from typing import Self
 
 LINEAR_EXPONENT = 0.0
 """Exponent that stands for the linear normal law (Eq. 8). Any other exponent is that of Hunt and Crossley's law."""
 
 
-class ContactLaw(NamedTuple):
-    """Parameters of the normal law and of LuGre friction at one contact point.
+if TYPE_CHECKING:
 
-    Attributes
-    ----------
-    k : float, N/m (N/mᵖ with Hunt and Crossley's law)
-        Stiffness.
-    cn, ct : float, N·s/m
-        Damping along the normal, and viscous friction.
-    sigma0, sigma1 : float, N/m and N·s/m
-        Stiffness and damping of the bristles.
-    x0 : float, m/s
-        Stribeck speed.
-    mus, mud : float
-        Coefficients of static and of kinetic friction.
-    exponent : float
-        Exponent p of Hunt and Crossley's law; :data:`LINEAR_EXPONENT` for Eq. 8.
-    dissipation : float, s/m
-        Coefficient α of Hunt and Crossley's law.
-    """
+    class ContactLaw(tuple[float, ...]):
+        """Parameters of the normal law and of LuGre friction at one contact point.
 
-    k: float
-    cn: float
-    ct: float
-    sigma0: float
-    sigma1: float
-    x0: float
-    mus: float
-    mud: float
-    exponent: float
-    dissipation: float
+        The fields are :data:`.LAW_PARAMETERS`, in their order and with the units and meanings that
+        :class:`.SensorParameters` specifies, but for one contact point of a texel. `exponent` is :data:`LINEAR_EXPONENT`
+        for Eq. 8.
+        """
+
+        _fields: ClassVar[tuple[str, ...]]
+
+        def __new__(cls, *values: float, **named: float) -> Self: ...  # noqa: D102
+        def __getattr__(self, parameter: str) -> float: ...
+
+else:
+    ContactLaw = namedtuple("ContactLaw", LAW_PARAMETERS)
 
 
 def contact_law(parameters: SensorParameters, force_share: float = 1.0, overlap_share: float = 1.0) -> ContactLaw:

@@ -49,6 +49,8 @@ class Parameter:
         Panel that shows the parameter.
     xml_place : int
         Place among the elements of OpenRAVE's XML (paper, Table 2), counted from one; zero when the XML does not have it.
+    fit_place : int
+        Place among the parameters that the gap analysis fits to friction, counted from one; zero when it is not among them.
     """
 
     name: str
@@ -66,6 +68,7 @@ class Parameter:
     note: str = ""
     group: str = ""
     xml_place: int = 0
+    fit_place: int = 0
 
     def scaled(self, gain: float) -> Parameter:
         """Return the parameter as it is for a sensor with this gain."""

@@ -9,7 +9,7 @@ from math import inf
 import numpy as np
 
 from ..errors import ParameterError
-from .parameter import Choice, ChoiceParameter, Parameter, TextParameter, specifications, specified
+from .parameter import Choice, ChoiceParameter, Parameter, TextParameter, numbers_of, specifications, specified
 
 LINEAR, HUNT_CROSSLEY = "linear", "hunt-crossley"
 NORMAL_LAWS = (
@@ -51,22 +51,27 @@ class SensorParameters:
         note="About 1 % of k in number; Table 2 has 0.0583"))
     ct: float = specified(Parameter(
         "ct", "N·s/m", 0.01, 0.0, inf, "Viscous friction: grows with sliding speed",
-        label="Viscous", symbol="ct", source="Eq. 13", group=FRICTION, xml_place=6, note="Table 2: 0.01"))
+        label="Viscous", symbol="ct", source="Eq. 13", group=FRICTION, xml_place=6, fit_place=5,
+        note="Table 2: 0.01"))
     sigma0: float = specified(Parameter(
         "sigma0", "N/m", 1.0, 0.0, inf, "Bristle stiffness: tangential stiffness before a texel slips",
-        above_low=True, label="Bristles", symbol="σ0", source="Eq. 9, 13", group=FRICTION, xml_place=3, note="Table 2: 1"))
+        above_low=True, label="Bristles", symbol="σ0", source="Eq. 9, 13", group=FRICTION, xml_place=3, fit_place=3,
+        note="Table 2: 1"))
     sigma1: float = specified(Parameter(
         "sigma1", "N·s/m", 0.1, 0.0, inf, "Bristle damping",
         label="Bristles", symbol="σ1", source="Eq. 13", group=FRICTION, xml_place=4, note="Table 2: 0.1"))
     x0: float = specified(Parameter(
         "x0", "m/s", 0.3, 0.0, inf, "Stribeck velocity: speed at which static friction gives way to dynamic",
-        above_low=True, label="Stribeck", symbol="x0", source="Eq. 10", group=FRICTION, xml_place=5, note="Table 2: 0.3"))
+        above_low=True, label="Stribeck", symbol="x0", source="Eq. 10", group=FRICTION, xml_place=5, fit_place=4,
+        note="Table 2: 0.3"))
     mus: float = specified(Parameter(
         "mus", "1", 0.435, 0.0, inf, "Coefficient at which sliding begins",
-        label="Static Friction", symbol="μs", source="Eq. 11", group=FRICTION, xml_place=7, note="Foam on metal: 0.435"))
+        label="Static Friction", symbol="μs", source="Eq. 11", group=FRICTION, xml_place=7, fit_place=1,
+        note="Foam on metal: 0.435"))
     mud: float = specified(Parameter(
         "mud", "1", 0.23, 0.0, inf, "Coefficient of fast sliding, at most μs",
-        label="Dynamic Friction", symbol="μd", source="Eq. 12", group=FRICTION, xml_place=8, note="Foam on metal: 0.23"))
+        label="Dynamic Friction", symbol="μd", source="Eq. 12", group=FRICTION, xml_place=8, fit_place=2,
+        note="Foam on metal: 0.23"))
     max_penetration: float = specified(Parameter(
         "max_penetration", "m", 0.012, 0.0, inf, "Depth past which a texel no longer acts",
         above_low=True, label="Max Penetration", group=CONTACT,
@@ -113,6 +118,14 @@ class SensorParameters:
 
 SENSOR_PARAMETERS = specifications(SensorParameters)
 """The specifications of a sensor's parameters by name."""
+LAW_PARAMETERS = tuple(p.name for p in numbers_of(SENSOR_PARAMETERS) if p.source)
+"""The numbers of the contact law: those that stand in an equation."""
+FRICTION_LAW_PARAMETERS = tuple(p.name for p in numbers_of(SENSOR_PARAMETERS) if p.source and p.group == FRICTION)
+NORMAL_LAW_PARAMETERS = tuple(p.name for p in numbers_of(SENSOR_PARAMETERS) if p.source and p.group == CONTACT)
+FITTED_FRICTION_PARAMETERS = tuple(
+    p.name for p in sorted(numbers_of(SENSOR_PARAMETERS), key=lambda p: p.fit_place) if p.fit_place
+)
+"""Those that the gap analysis fits; they show only in net forces."""
 
 
 @dataclass(frozen=True)

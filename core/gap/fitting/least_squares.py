@@ -31,8 +31,6 @@ TEXEL_PRECISION = 10.0
 
 It lets the gain of a texel without data vary by ± 0.3.
 """
-FRICTION_PARAMETERS = ("mus", "mud", "sigma0", "x0", "ct")
-"""Parameters of the base model that show only in net forces."""
 FRICTION_LEVEL = "mus and mud"
 """Both friction coefficients as one free parameter that scales them alike."""
 GRADIENT_BLOCKS = 12

@@ -12,7 +12,7 @@ from ...effects.engine.registry import actual_placement as placed_texels
 from ...effects.engine.registry import form_of, site_of_action
 from ...model.effect import Effect
 from ...model.sensor import Sensor
-from ...model.sensor_parameters import SensorParameters
+from ...model.sensor_parameters import FRICTION_LAW_PARAMETERS, NORMAL_LAW_PARAMETERS, SensorParameters
 from ..dataset.rig import Rig, Trial
 from .force_model import ContactHistory
 from .stimulus import Stimulus, stimulus_of
@@ -108,7 +108,7 @@ class Predictor:
     def _total(self, model: Model) -> np.ndarray:
         """Sum of normal and friction forces on the sensor, (T, 3) N."""
         p, rubbing = model.parameters, tuple(effect for effect in model.effects if _acts_through(effect, "friction_law"))
-        slides = (p.sigma0, p.sigma1, p.mus, p.mud, p.x0, p.ct, _effects_key(rubbing))
+        slides = (*(getattr(p, name) for name in FRICTION_LAW_PARAMETERS), _effects_key(rubbing))
         key = (self._force_key(model, None), slides)
         if key not in self._totals:
             _remember(
@@ -152,7 +152,7 @@ class Predictor:
 
     def _force_key(self, model: Model, subset: np.ndarray | None) -> object:
         p, which = model.parameters, None if subset is None else subset.tobytes()
-        return which, p.k, p.cn, p.exponent, p.dissipation, _effects_key(_effects_on_normal_force(model))
+        return which, *(getattr(p, name) for name in NORMAL_LAW_PARAMETERS), _effects_key(_effects_on_normal_force(model))
 
     def _contact_history(self, model: Model, subset: np.ndarray | None) -> ContactHistory:
         which = None if subset is None else subset.tobytes()

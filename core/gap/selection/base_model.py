@@ -8,8 +8,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from ...model.sensor_parameters import FITTED_FRICTION_PARAMETERS
 from ..dataset.rig import Rig
-from ..fitting.least_squares import FRICTION_LEVEL, FRICTION_PARAMETERS
+from ..fitting.least_squares import FRICTION_LEVEL
 from ..fitting.noise_floor import ChannelNoise, force_noise, reading_noise
 from ..forward.predictor import Model, Predictor
 from ..forward.response_check import check_responses
@@ -92,15 +93,15 @@ def identified_base_parameters(rig: Rig, predictors: Sequence[Predictor]) -> lis
     if own_unit and has_readings:
         names.append("zero")
     if slides:
-        names += FRICTION_PARAMETERS
+        names += FITTED_FRICTION_PARAMETERS
     return names
 
 
 def base_parameters_to_search(rig: Rig, predictors: Sequence[Predictor]) -> list[str]:
     """Return the names of the base model's parameters that are free during the search for effects."""
     names = identified_base_parameters(rig, predictors)
-    slides = set(FRICTION_PARAMETERS) & set(names)
-    return [name for name in names if name not in FRICTION_PARAMETERS] + (friction_parameters_to_search(rig) if slides else [])
+    others = [name for name in names if name not in FITTED_FRICTION_PARAMETERS]
+    return others + friction_parameters_to_search(rig) if len(others) < len(names) else others
 
 
 def friction_parameters_to_search(rig: Rig) -> list[str]:
@@ -110,7 +111,7 @@ def friction_parameters_to_search(rig: Rig) -> list[str]:
     the two effects of these names. So those that the rig states are held, and only the level of friction is fitted.
     """
     p = rig.parameters
-    names = list(FRICTION_PARAMETERS)
+    names = list(FITTED_FRICTION_PARAMETERS)
     if {"mus", "mud", "x0"} <= rig.given and p.mus > 0:
         names = [FRICTION_LEVEL, *(name for name in names if name not in ("mus", "mud", "x0"))]
     if "ct" in rig.given:

@@ -8,7 +8,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from ...effects.engine.registry import form_of
-from ..fitting.least_squares import FRICTION_PARAMETERS, Fit, FreeParameter, TrialView, derivatives, value_of
+from ...model.sensor_parameters import FITTED_FRICTION_PARAMETERS
+from ..fitting.least_squares import Fit, FreeParameter, TrialView, derivatives, value_of
 from ..forward.predictor import Model
 
 RIDGE = 1e-10
@@ -26,7 +27,7 @@ def visible_parameters(views: Sequence[TrialView], found: Fit) -> tuple[FreePara
 
     def acts_on_friction(item: FreeParameter) -> bool:
         if item.effect < 0:
-            return item.name in FRICTION_PARAMETERS
+            return item.name in FITTED_FRICTION_PARAMETERS
         effect = found.model.effects[item.effect]
         return form_of(effect.name, effect.form).friction_law is not None
 

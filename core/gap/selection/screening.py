@@ -14,7 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...model.effect import Effect
-from ..fitting.least_squares import FRICTION_PARAMETERS, Fit, FreeParameter, TrialView, fit, held_out_squares
+from ...model.sensor_parameters import FITTED_FRICTION_PARAMETERS
+from ..fitting.least_squares import Fit, FreeParameter, TrialView, fit, held_out_squares
 from ..forward.predictor import Model
 from .candidates import DIRECTLY_ESTIMATED, Candidate, FittedCandidate, Scales
 from .direct_estimates import few_levels, moving_readings, quantization_starts, unresponsive_texels
@@ -205,7 +206,7 @@ def _final_fit(
 ) -> FittedCandidate:
     """Fit a candidate and the free parameters to everything, and judge it on stretches that the fit has not seen."""
     # Friction is far from linear, and its derivatives are cheap, so they are not frozen.
-    frozen = next((i for i, item in enumerate(found.free) if item.name in FRICTION_PARAMETERS), len(found.free))
+    frozen = next((i for i, item in enumerate(found.free) if item.name in FITTED_FRICTION_PARAMETERS), len(found.free))
     best = fit(
         whole,
         one.fit.model,
