@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Friction through the whole solver: the LuGre equations again, solved by scipy; discs that turn and slide."""
+"""Friction through the whole solver: the LuGre equations solved by scipy; discs that turn and slide."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import numpy as np
 from scipy.integrate import dblquad, solve_ivp
 from solver_scenes import GRAVITY, about, box, pad, pressed
 
+from oracles.contact_laws import bristle_rate, friction_force, steady_friction
 from oracles.foundation import punch
 from palpate.core.model.body import Body
 from palpate.core.model.motion import Motion
@@ -20,22 +21,6 @@ LUGRE = SensorParameters(k=100.0, cn=0.0, sigma0=400.0, sigma1=0.5, ct=0.05, x0=
 """A texel whose bristles bend by a tenth of a millimetre before it slides."""
 
 
-# ---- LuGre, written out again (Eq. 9 to 13) ----
-def curve(p: SensorParameters, load, speed):
-    """Eq. 10–12: what sliding at a steady speed resists without the viscous part, newtons."""
-    return load * (p.mud + (p.mus - p.mud) * np.exp(-((speed / p.x0) ** 2)))
-
-
-def bristle_rate(p: SensorParameters, load, z, v):
-    """Eq. 9 in one dimension."""
-    return v - p.sigma0 * abs(v) / curve(p, load, v) * z
-
-
-def resistance(p: SensorParameters, load, z, v):
-    """Eq. 13."""
-    return p.sigma0 * z + p.sigma1 * bristle_rate(p, load, z, v) + p.ct * v
-
-
 # ---- driven with a given motion ----
 def steady_state(speed: float) -> float:
     """Relative error of a plate's shear at a steady speed against the formula, after sixty bristle lengths."""
@@ -44,7 +29,7 @@ def steady_state(speed: float) -> float:
     fps = speed / way
     values = {key: getattr(LUGRE, key) for key in ("k", "cn", "ct", "sigma0", "sigma1", "x0", "mus", "mud")}
     sensor = run(pressed(box(0.2, 0.2, 0.02), path, texels=pad(4, 4), fps=fps, dt=0.01 / fps, **values)).sensors["pad"]
-    expected = curve(LUGRE, LUGRE.k * depth, speed) + LUGRE.ct * speed
+    expected = steady_friction(LUGRE, LUGRE.k * depth, speed) + LUGRE.ct * speed
     return float(np.abs(sensor.shear[-1] / expected - [1.0, 0.0]).max())
 
 
@@ -66,7 +51,7 @@ def dragged(displacement, velocity, duration: float, steps: int) -> tuple[np.nda
         lambda t, z: [bristle_rate(LUGRE, load, z[0], velocity(t))],
         (0, duration), [0.0], method="LSODA", t_eval=times, rtol=1e-11, atol=1e-16, max_step=duration / 200,
     )  # fmt: skip
-    expected = resistance(LUGRE, load, exact.y[0], velocity(times))
+    expected = friction_force(LUGRE, load, exact.y[0], velocity(times))
     return times[1:], sensor.shear[1:, 0, 0], expected[1:]
 
 
@@ -135,7 +120,7 @@ def pulled(speed: float, duration: float, dt: float, frames: int = 400, spring: 
     def derivative(t, y):
         x, v, z = y
         push = max(spring * (speed * t - x), 0.0)
-        return [v, (push - len(floor) * resistance(p, load, z, v)) / mass, bristle_rate(p, load, z, v)]
+        return [v, (push - len(floor) * friction_force(p, load, z, v)) / mass, bristle_rate(p, load, z, v)]
 
     exact = solve_ivp(
         derivative, (0, duration), [0.0, 0.0, 0.0], method="LSODA", t_eval=recording.times, rtol=1e-10, atol=1e-14,
@@ -147,7 +132,7 @@ def pulled(speed: float, duration: float, dt: float, frames: int = 400, spring: 
         recording.poses[:, 1, 0],
         recording.sensors["floor"].shear[:, :, 0].sum(axis=1),
         x,
-        len(floor) * resistance(p, load, z, v),
+        len(floor) * friction_force(p, load, z, v),
         spring * (speed * recording.times - x),
     )
 

@@ -8,6 +8,7 @@ import bpy
 import numpy as np
 import pytest
 from blender_scenes import grid
+from oracles import contact_laws
 
 from palpate.addon.authoring import exchange
 from palpate.core.effects.engine import registry
@@ -135,7 +136,7 @@ def test_friction_from_a_curve_is_the_papers_again(tmp_path):
     """Fig. 7's curve, sampled from Table 2 at fn = 0.08 N, gives Table 2 back."""
     pad, p = sensor(mus=0.9, mud=0.8, x0=0.1, ct=0.2), SensorParameters()
     v = np.linspace(0.01, 1.5, 40)
-    force = 0.08 * (p.mud + (p.mus - p.mud) * np.exp(-((v / p.x0) ** 2))) + p.ct * v
+    force = contact_laws.steady_friction(p, 0.08, v) + p.ct * v
     rows = "\n".join(f"{a},{b}" for a, b in zip(v, force, strict=True))
     (tmp_path / "friction.csv").write_text(f"velocity,force\n{rows}\n", encoding="utf-8")
     assert bpy.ops.palpate.friction_fit(filepath=str(tmp_path / "friction.csv"), normal_force=0.08) == {"FINISHED"}

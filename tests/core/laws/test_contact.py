@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The contact law against the paper's formulas written out again, and against scipy's stiff solvers."""
+"""The contact law against the plain formulas of the paper, and against scipy's stiff solvers."""
 
 import numpy as np
 import pytest
+from oracles import contact_laws
 from scipy.integrate import solve_ivp
 
 from palpate.core.laws import friction, normal_force
@@ -13,14 +14,10 @@ PAPER = SensorParameters()  # Table 2; Fig. 7 was drawn with these and fn = 0.08
 LAW = contact_law(PAPER)
 
 
-def g(speed, fn, p=PAPER):
-    """Eq. 10–12 with the exponential that was lost in print."""
-    return fn * p.mud + fn * (p.mus - p.mud) * np.exp(-((speed / p.x0) ** 2))
-
-
 def test_normal_force_never_pulls():
-    assert normal_force.normal_force(1e-3, 0.0, LAW) == pytest.approx(PAPER.k * 1e-3, rel=1e-15)
-    assert normal_force.normal_force(1e-3, 0.5, LAW) == pytest.approx(PAPER.k * 1e-3 + PAPER.cn * 0.5, rel=1e-15)
+    for rate in (0.0, 0.5):
+        expected = contact_laws.normal_force(PAPER, 1e-3, rate)
+        assert normal_force.normal_force(1e-3, rate, LAW) == pytest.approx(expected, rel=1e-15)
     assert normal_force.normal_force(1e-3, -100.0, LAW) == 0.0
 
 
@@ -28,14 +25,16 @@ def test_normal_force_never_pulls():
 def test_steady_state_is_the_friction_curve_of_fig_7(speed):
     """At steady sliding ż = 0, so ft = g(v) sign(v) + ct v (Eq. 9 and 13); reached by the step itself to 1e-9."""
     fn = 0.08
-    assert friction.stribeck_coefficient(speed**2, LAW) * fn == pytest.approx(g(speed, fn), rel=1e-14)
+    assert friction.stribeck_coefficient(speed**2, LAW) * fn == pytest.approx(
+        contact_laws.steady_friction(PAPER, fn, speed), rel=1e-14
+    )
     z = 0.0
     for _ in range(400):
         keep, gain = friction.bristle_step(speed**2, fn, 0.1, LAW)
-        z = keep * z + gain * speed
+        z = friction.next_deflection(keep, z, gain, speed)
     if speed > 0:
         rate = friction.bristle_rate(z, speed, speed**2, fn, LAW)
-        expected = g(speed, fn) + PAPER.ct * speed
+        expected = contact_laws.steady_friction(PAPER, fn, speed) + PAPER.ct * speed
         assert friction.friction_force(z, rate, speed, LAW) == pytest.approx(expected, rel=1e-9 if speed > 0.01 else 0.6)
     else:
         assert z == 0.0
@@ -46,10 +45,10 @@ def test_bristle_step_is_the_exact_solution_at_constant_velocity(dt):
     """Against scipy's Radau at 1e-11, for steps from far below to far above the bristle's own time."""
     fn, speed, z0 = 0.08, 0.2, 0.004
     exact = solve_ivp(
-        lambda _, z: speed - PAPER.sigma0 * speed / g(speed, fn) * z, (0, dt), [z0], method="Radau", rtol=1e-11, atol=1e-15
+        lambda _, z: contact_laws.bristle_rate(PAPER, fn, z, speed), (0, dt), [z0], method="Radau", rtol=1e-11, atol=1e-15
     )
     keep, gain = friction.bristle_step(speed**2, fn, dt, LAW)
-    assert keep * z0 + gain * speed == pytest.approx(exact.y[0, -1], rel=1e-8)
+    assert friction.next_deflection(keep, z0, gain, speed) == pytest.approx(exact.y[0, -1], rel=1e-8)
 
 
 def test_bristles_hold_nothing_without_normal_force_or_friction():

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from oracles import contact_laws
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 from solver_scenes import GRAVITY, cube_on_pad, pad
@@ -31,8 +32,7 @@ def bounce(speed, dt, seconds, **values):
 
 def rate(_, y, p):
     depth, v = y
-    force = TEXELS * p.k * max(depth, 0.0) ** p.exponent * (1 + 1.5 * p.dissipation * v)
-    return [v, -max(force, 0.0) / 0.1]
+    return [v, -TEXELS * contact_laws.normal_force(p, depth, v) / 0.1]
 
 
 @pytest.mark.parametrize("exponent", [1.0, 1.5, 2.0])

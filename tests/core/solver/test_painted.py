@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from oracles import contact_laws
 from solver_scenes import box, cube_on_pad, pad, pressed
 
 from palpate.core.errors import ParameterError
@@ -64,7 +65,7 @@ def test_every_texel_has_its_own_spring_and_its_own_friction():
     force = p.k * k * DEPTH
     assert recording.depth[-1] == pytest.approx(DEPTH, rel=1e-12)
     assert recording.normal_force[-1] == pytest.approx(force, rel=1e-9)
-    g = force * friction * (p.mud + (p.mus - p.mud) * np.exp(-((speed / p.x0) ** 2)))
+    g = contact_laws.steady_friction(p, force * friction, speed)
     assert np.hypot(*recording.shear[-1].T) == pytest.approx(g + p.ct * speed, rel=1e-6)
     assert recording.reading[-1] == pytest.approx(gain * force, rel=1e-9)
 

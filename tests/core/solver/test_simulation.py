@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import trimesh
+from oracles import contact_laws
 from scipy.integrate import solve_ivp
 from solver_scenes import GRAVITY, LEVEL, about, box, cube_on_pad, free_body, pad, pressed, shape
 
@@ -92,16 +93,19 @@ def test_shear_follows_the_stiff_ode_of_scipy_through_stick_slip_and_reversal():
     recording = run(pressed(box(0.08, 0.08, 0.02), path, fps=fps, dt=1e-3, **values))
     fn = p.k * depth
 
-    def rate(z, v):
-        g = fn * p.mud + fn * (p.mus - p.mud) * np.exp(-((v / p.x0) ** 2))
-        return v - p.sigma0 * abs(v) / g * z
-
     z, expected = 0.0, [0.0]
     for before, after in zip(x[:-1], x[1:], strict=True):
         v = (after - before) * fps
-        span = solve_ivp(lambda _, y, v=v: [rate(y[0], v)], (0, 1 / fps), [z], method="Radau", rtol=1e-10, atol=1e-14)
+        span = solve_ivp(
+            lambda _, y, v=v: [contact_laws.bristle_rate(p, fn, y[0], v)],
+            (0, 1 / fps),
+            [z],
+            method="Radau",
+            rtol=1e-10,
+            atol=1e-14,
+        )
         z = span.y[0, -1]
-        expected.append(p.sigma0 * z + p.sigma1 * rate(z, v) + p.ct * v)
+        expected.append(contact_laws.friction_force(p, fn, z, v))
     shear = recording.sensors["pad"].shear
     assert np.ptp(shear[:, :, 0], axis=1).max() < 1e-12  # every texel the same
     assert np.abs(shear[:, :, 1]).max() < 1e-12

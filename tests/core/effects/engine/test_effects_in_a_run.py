@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from oracles import contact_laws
 from solver_scenes import box, cube_on_pad, pressed, shape
 from trimesh.creation import icosphere
 
@@ -175,7 +176,7 @@ def slid(*effects, speed=0.02):
 def test_friction_effects_slow_what_slides():
     """In steady sliding: Eq. 10–12 times the factor, plus the viscous part, 0.5 N on each texel."""
     p, v = SensorParameters(), 0.02
-    mu = p.mud + (p.mus - p.mud) * np.exp(-((v / p.x0) ** 2))
+    mu = contact_laws.steady_friction(p, 1.0, v)
     np.testing.assert_allclose(slid(), 0.5 * mu, rtol=1e-3)
     stribeck = effect("stribeck", "exponential", rise=0.8, speed=0.02)
     np.testing.assert_allclose(slid(stribeck), 0.5 * mu * (1 + 0.8 * np.exp(-1)), rtol=1e-3)

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from oracles import contact_laws
 from scipy.integrate import solve_ivp
 
 from palpate.core.errors import FileError, ParameterError
@@ -79,13 +80,11 @@ def test_no_texels_are_refused(tmp_path):
 def test_steady_sliding_is_what_the_bristles_settle_to():
     """Against scipy's stiff solver on Eq. 9: after 40 m of sliding at constant velocity Eq. 13 is the steady curve (1e-9)."""
     for v in (0.02, 0.1, 0.3, -0.6):
-        g = LOAD * (PAPER.mud + (PAPER.mus - PAPER.mud) * np.exp(-(v**2) / PAPER.x0**2))
-
-        def rate(_, z, v=v, g=g):
-            return v - PAPER.sigma0 * abs(v) / g * z
-
-        z = solve_ivp(rate, (0, 40 / abs(v)), [0.0], method="Radau", rtol=1e-10, atol=1e-13).y[0, -1]
-        settled = PAPER.sigma0 * z + PAPER.sigma1 * rate(0, z) + PAPER.ct * v
+        z = solve_ivp(
+            lambda _, z, v=v: contact_laws.bristle_rate(PAPER, LOAD, z, v),
+            (0, 40 / abs(v)), [0.0], method="Radau", rtol=1e-10, atol=1e-13,
+        ).y[0, -1]  # fmt: skip
+        settled = contact_laws.friction_force(PAPER, LOAD, z, v)
         assert steady_friction(np.array([v]), LOAD, PAPER)[0] == pytest.approx(settled, abs=1e-9)
 
 
@@ -97,12 +96,10 @@ def test_friction_over_time_agrees_with_an_ode_solver():
         return 0.25 * np.sin(1.7 * t) + 0.05 * t
 
     def rate(t, z):
-        v = velocity(t)
-        return v - PAPER.sigma0 * abs(v) / (LOAD * (PAPER.mud + (PAPER.mus - PAPER.mud) * np.exp(-(v**2) / PAPER.x0**2))) * z
+        return contact_laws.bristle_rate(PAPER, LOAD, z, velocity(t))
 
     z = solve_ivp(rate, (0, 4), [0.0], method="Radau", rtol=1e-10, atol=1e-13, t_eval=time).y[0]
-    expected = PAPER.sigma0 * z + PAPER.sigma1 * np.array([rate(t, x) for t, x in zip(time, z, strict=True)])
-    expected += PAPER.ct * velocity(time)
+    expected = contact_laws.friction_force(PAPER, LOAD, z, velocity(time))
     assert friction_over_time(time, velocity(time), LOAD, PAPER) == pytest.approx(expected, abs=1e-6)
 
 
