@@ -141,7 +141,7 @@ def all_items_done(queue: np.ndarray, items: int) -> bool:
 
 @inlined
 def is_stopped(queue: np.ndarray) -> bool:
-    """Whether helpers shall return."""
+    """True when helpers have to return."""
     return atomic_load(queue, NEXT_ITEM) // LOOP_FACTOR == STOP
 
 

@@ -59,7 +59,7 @@ def stribeck_coefficient(speed_squared: float, law: ContactLaw) -> float:
 
 @inlined
 def bristle_step(speed_squared: float, normal_force: float, dt: float, law: ContactLaw) -> tuple[float, float]:
-    """Solve Eq. 9 over `dt` at constant velocity: ``z(t + dt) = keep · z(t) + gain · v``.
+    """Solve Eq. 9 over `dt` at constant velocity; :func:`next_deflection` takes the solution.
 
     Returns
     -------
@@ -70,6 +70,24 @@ def bristle_step(speed_squared: float, normal_force: float, dt: float, law: Cont
     held = g > 0.0  # without friction nothing holds the bristles
     keep, mean = decay_and_mean(law.sigma0 * dt * math.sqrt(speed_squared) / g if held else 0.0)
     return (keep if held else 0.0), (mean * dt if held else 0.0)
+
+
+@inlined
+def next_deflection(keep: float, deflection: float, gain: float, velocity: float) -> float:
+    """One component of the bristle deflection after a step (m), given that before it (m) and the tangential velocity (m/s)."""
+    return keep * deflection + gain * velocity
+
+
+@inlined
+def turned_into_plane(deflection: tuple[float, float, float], normal: tuple[float, float, float]) -> tuple[float, float, float]:
+    """Turn a bristle deflection (m) into the plane with the given unit normal; its length stays."""
+    (zx, zy, zz), (nx, ny, nz) = deflection, normal
+    out_of_plane = zx * nx + zy * ny + zz * nz
+    length = zx * zx + zy * zy + zz * zz
+    flat_x, flat_y, flat_z = zx - out_of_plane * nx, zy - out_of_plane * ny, zz - out_of_plane * nz
+    flat = flat_x * flat_x + flat_y * flat_y + flat_z * flat_z
+    scale = math.sqrt(length / flat) if flat > 0.0 and out_of_plane != 0.0 else 1.0
+    return scale * flat_x, scale * flat_y, scale * flat_z
 
 
 @inlined
@@ -142,7 +160,7 @@ def friction_along_path(
         if i > 0:
             v = 0.5 * (velocity[i - 1] + velocity[i])
             keep, gain = bristle_step(v * v, normal_force, time[i] - time[i - 1], law)
-            z = keep * z + gain * v
+            z = next_deflection(keep, z, gain, v)
         v = velocity[i]
         force[i] = friction_force(z, bristle_rate(z, v, v * v, normal_force, law), v, law)
 

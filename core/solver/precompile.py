@@ -81,7 +81,7 @@ def compile_solver(report: Report = lambda done, total: None) -> None:
 
 
 def compile_solver_with_notice() -> None:
-    """Do as :func:`warm` where that is needed, with a line on stderr, for work without a window."""
+    """Compile the solver unless that was done before, and say so on stderr first; for commands, which have no window."""
     if is_needed():
         print("Palpate is preparing its solver (first use only), which takes about a minute …", file=sys.stderr, flush=True)
         compile_solver()

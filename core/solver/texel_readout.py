@@ -11,7 +11,7 @@ import numpy as np
 from ..compiled.kernels import inlined, kernel
 from ..effects.engine.compiled_program import TexelMotion, has_effects
 from ..laws.contact_law import ContactLaw, read_law
-from ..laws.friction import bristle_rate, friction_force, max_bristle_deflection
+from ..laws.friction import bristle_rate, deflection_scale, friction_force, max_bristle_deflection
 from ..laws.normal_force import normal_force
 from .contact_rows import BRISTLE, DEPTH, NORMAL, POINT, read_vector
 from .dynamics.effect_kernels import NOW, apply_effects, force_and_friction_law, lane_range, press_texel
@@ -114,8 +114,7 @@ def _read_contact(
         apply_effects(pair, NOW, points, p, model, state.effect_memory, workspace)
         fn, p = force_and_friction_law(pair, block, lane, p, model, texels)
     zx, zy, zz = read_vector(rows, block, BRISTLE, lane)
-    length, limit = math.sqrt(zx * zx + zy * zy + zz * zz), max_bristle_deflection(fn, p)
-    held = limit / length if length > limit else 1.0
+    held = deflection_scale(zx * zx + zy * zy + zz * zz, max_bristle_deflection(fn, p))
     zx, zy, zz = held * zx, held * zy, held * zz
     # Friction drags the sensor along with the target; the target's surface normal points into the sensor.
     fx, fy, fz = 0.0, 0.0, 0.0
@@ -135,6 +134,15 @@ def _read_contact(
     out.contact[texel] = True
     out.force[texel] += fn
     out.depth[texel] = max(out.depth[texel], depth)
+    _add_to_wrench(sensor, (px, py, pz), (fx, fy, fz), fn, out)
+
+
+@inlined
+def _add_to_wrench(
+    sensor: int, point: tuple[float, float, float], force: tuple[float, float, float], normal_force: float, out: TexelReadout
+) -> None:
+    """Add the force on a point (m) to a sensor's wrench, and its normal force to the sums for the centre of pressure."""
+    (px, py, pz), (fx, fy, fz) = point, force
     net, moment = out.net, out.moment
     net[sensor, 0] += fx
     net[sensor, 1] += fy
@@ -142,7 +150,7 @@ def _read_contact(
     net[sensor, 3] += py * fz - pz * fy
     net[sensor, 4] += pz * fx - px * fz
     net[sensor, 5] += px * fy - py * fx
-    moment[sensor, 0] += fn * px
-    moment[sensor, 1] += fn * py
-    moment[sensor, 2] += fn * pz
-    moment[sensor, 3] += fn
+    moment[sensor, 0] += normal_force * px
+    moment[sensor, 1] += normal_force * py
+    moment[sensor, 2] += normal_force * pz
+    moment[sensor, 3] += normal_force

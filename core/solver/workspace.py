@@ -16,7 +16,7 @@ SUMS = 27
 
 @by_reference
 class BodyWork(NamedTuple):
-    """Of each of the b bodies.
+    """Working memory for each of the b bodies.
 
     Attributes
     ----------
@@ -74,7 +74,7 @@ class ContactWork(NamedTuple):
 
 @by_reference
 class PairWork(NamedTuple):
-    """Of each of the q pairs.
+    """Working memory for each of the q pairs.
 
     Attributes
     ----------
@@ -129,7 +129,7 @@ class LinearSystem(NamedTuple):
 
 @by_reference
 class DriveWork(NamedTuple):
-    """Of the actuators.
+    """Working memory for the actuators.
 
     Attributes
     ----------
@@ -148,7 +148,7 @@ class DriveWork(NamedTuple):
 
 @by_reference
 class EffectWork(NamedTuple):
-    """Of the sensors' effects.
+    """Working memory for the sensors' effects.
 
     Attributes
     ----------
@@ -167,7 +167,7 @@ class EffectWork(NamedTuple):
 
 @by_reference
 class EnergyWork(NamedTuple):
-    """Of each pair's energy account (see :mod:`.passivity`).
+    """Working memory for each pair's energy account (see :mod:`.passivity`).
 
     Attributes
     ----------

@@ -16,7 +16,15 @@ import numpy as np
 from ...compiled.kernels import kernel
 from ...effects.engine import contact_forces
 from ...laws.contact_law import contact_law
-from ...laws.friction import bristle_rate, bristle_step, friction_force, max_bristle_deflection
+from ...laws.friction import (
+    bristle_rate,
+    bristle_step,
+    deflection_scale,
+    friction_force,
+    max_bristle_deflection,
+    next_deflection,
+    turned_into_plane,
+)
 from ...model.effect import Effect
 from ...model.sensor_parameters import SensorParameters
 
@@ -208,24 +216,18 @@ def sum_forces(samples, force, factor, viscous, parameters, work, total):  # typ
         total[sample, 2] += push * nz
         if not samples.continues[i]:
             zx, zy, zz = 0.0, 0.0, 0.0
-        square, out = zx * zx + zy * zy + zz * zz, zx * nx + zy * ny + zz * nz
-        zx, zy, zz = zx - out * nx, zy - out * ny, zz - out * nz
-        flat = zx * zx + zy * zy + zz * zz
-        if flat > 0.0:  # the bristle turns with the surface and keeps its length
-            turned = (square / flat) ** 0.5
-            zx, zy, zz = turned * zx, turned * zy, turned * zz
+        zx, zy, zz = turned_into_plane((zx, zy, zz), (nx, ny, nz))
         fn = friction_load[i]
         if fn <= 0.0:
             zx, zy, zz = 0.0, 0.0, 0.0
             continue
         if sample > 0:
             keep, gain = keeps[i], gains[i]
-            zx = keep * zx + gain * samples.mean_slip[i, 0]
-            zy = keep * zy + gain * samples.mean_slip[i, 1]
-            zz = keep * zz + gain * samples.mean_slip[i, 2]
-        limit, reach = max_bristle_deflection(fn, parameters), (zx * zx + zy * zy + zz * zz) ** 0.5
-        if reach > limit:
-            zx, zy, zz = zx * limit / reach, zy * limit / reach, zz * limit / reach
+            zx = next_deflection(keep, zx, gain, samples.mean_slip[i, 0])
+            zy = next_deflection(keep, zy, gain, samples.mean_slip[i, 1])
+            zz = next_deflection(keep, zz, gain, samples.mean_slip[i, 2])
+        scale = deflection_scale(zx * zx + zy * zy + zz * zz, max_bristle_deflection(fn, parameters))
+        zx, zy, zz = scale * zx, scale * zy, scale * zz
         vx, vy, vz = samples.slip[i, 0], samples.slip[i, 1], samples.slip[i, 2]
         own, fade, c = owns[i], fades[i], viscous[0] if plain else viscous[i]
         total[sample, 0] += weight * (friction_force(zx, own * vx - fade * zx, vx, parameters) + c * vx)

@@ -173,6 +173,34 @@ def _clear_slot(slot: int, triangle: int, state: State) -> None:
     state.pressed_share[slot] = 0.0
 
 
+@inlined
+def _in_sensor_axes(x: float, y: float, z: float, pose: np.ndarray) -> tuple[float, float, float]:
+    """Return a vector of the target in the sensor's axes; `pose` is the sensor's in the target's frame."""
+    return (
+        pose[0] * x + pose[3] * y + pose[6] * z,
+        pose[1] * x + pose[4] * y + pose[7] * z,
+        pose[2] * x + pose[5] * y + pose[8] * z,
+    )
+
+
+@inlined
+def _place_behind(point: int, distance: float, frame: np.ndarray) -> tuple[float, float, float]:
+    """Return the place at a distance (m) behind a contact point, back along its normal."""
+    return (
+        frame[point, 0] - distance * frame[point, 3],
+        frame[point, 1] - distance * frame[point, 4],
+        frame[point, 2] - distance * frame[point, 5],
+    )
+
+
+@inlined
+def _clear_lanes(block: int, first: int, rows: np.ndarray) -> None:
+    """Write zeros to the lanes of a block from `first` on, which hold no contact."""
+    for lane in range(first, LANES):
+        for column in range(0, ROW, LANES):
+            rows[block, column + lane] = 0.0
+
+
 @kernel
 def find_contacts(pair: int, model: SolverModel, detection: DetectionData, state: State, workspace: Workspace) -> None:
     """Find the contacts of one pair and write them as rows; :func:`.finish_contacts` completes them.
@@ -201,11 +229,10 @@ def find_contacts(pair: int, model: SolverModel, detection: DetectionData, state
         contacts.number[pair], contacts.too_deep[pair] = 0, 0
         return
     _update_lists(pair, pose, model, detection, state)
-    too_deep, slot = 0, model.pairs.first_slot[pair] - 1
+    too_deep, slot, block, lane = 0, model.pairs.first_slot[pair] - 1, first, 0
     if surfaces.target_deforms[target]:
         stop = slot + 1 + model.pairs.stop_point[pair] - model.pairs.first_point[pair]
         place_listed_triangles(target, slot + 1, stop, lists, surfaces, tree)
-    block, lane = first, 0
     for point in range(model.pairs.first_point[pair], model.pairs.stop_point[pair]):
         slot += 1
         before = triangles[slot]
@@ -220,31 +247,21 @@ def find_contacts(pair: int, model: SolverModel, detection: DetectionData, state
             else:
                 _clear_slot(slot, NO_TRIANGLE, state)
             continue
-        triangles[slot] = triangle
         fx, fy, fz = tree.faces[triangle, 9], tree.faces[triangle, 10], tree.faces[triangle, 11]
-        nx = pose[0] * fx + pose[3] * fy + pose[6] * fz
-        ny = pose[1] * fx + pose[4] * fy + pose[7] * fz
-        nz = pose[2] * fx + pose[5] * fy + pose[8] * fz
+        nx, ny, nz = _in_sensor_axes(fx, fy, fz, pose)
         write_vector(rows, block, NORMAL, lane, nx, ny, nz)
-        # From the point back along its normal to the intersection.
         inside = 1.0 - met
-        px = frame[point, 0] - inside * reach * frame[point, 3]
-        py = frame[point, 1] - inside * reach * frame[point, 4]
-        pz = frame[point, 2] - inside * reach * frame[point, 5]
+        px, py, pz = _place_behind(point, inside * reach, frame)
         write_vector(rows, block, POINT, lane, px, py, pz)
         write_vector(rows, block, BRISTLE, lane, bristle[slot, 0], bristle[slot, 1], bristle[slot, 2])
         rows[block, DEPTH + lane] = inside * abs(segment.dx * fx + segment.dy * fy + segment.dz * fz)
-        pressed_share[slot] = inside
-        slots[block, lane] = slot
+        triangles[slot], pressed_share[slot], slots[block, lane] = triangle, inside, slot
         lane += 1
         if lane == LANES:
             block, lane = block + 1, 0
-    count = (block - first) * LANES + lane
     if lane > 0:
-        for unused in range(lane, LANES):
-            for column in range(0, ROW, LANES):
-                rows[block, column + unused] = 0.0
-    contacts.number[pair], contacts.too_deep[pair] = count, too_deep
+        _clear_lanes(block, lane, rows)
+    contacts.number[pair], contacts.too_deep[pair] = (block - first) * LANES + lane, too_deep
 
 
 @kernel

@@ -262,6 +262,18 @@ def _is_box_beside(segment: Segment, shear: Shear, aside: float, bounds: np.ndar
     return abs(x) > wide + aside or abs(y) > high + aside
 
 
+@inlined
+def _box_around(segment: Segment, more: float, radius: float) -> Box:
+    """Box of a tube around a segment, which is longer at both ends by the share `more`; `radius` in metres."""
+    ox, oy, oz, dx, dy, dz = segment
+    fx, fy, fz = ox - more * dx, oy - more * dy, oz - more * dz
+    tx, ty, tz = ox + (1.0 + more) * dx, oy + (1.0 + more) * dy, oz + (1.0 + more) * dz
+    return Box(
+        min(fx, tx) - radius, max(fx, tx) + radius, min(fy, ty) - radius, max(fy, ty) + radius,
+        min(fz, tz) - radius, max(fz, tz) + radius,
+    )  # fmt: skip
+
+
 @kernel
 def _count_sheets(segment: Segment, mesh: int, radius: float, tree: Tree) -> tuple[int, int, float, float]:
     """Count the sheets in the tube around a segment, if it holds nothing else.
@@ -278,18 +290,13 @@ def _count_sheets(segment: Segment, mesh: int, radius: float, tree: Tree) -> tup
         How far the segment's tip may come nearer without reaching it, less than zero where it does. Of this distance along the
         segment a sheet that leans takes up one and a half parts where the tip moves aside, and one where it moves ahead.
     """
-    ox, oy, oz, dx, dy, dz = segment
+    _, _, _, dx, dy, dz = segment
     length = math.sqrt(dx * dx + dy * dy + dz * dz)
     more = EXTENSION * radius / length
     shear = shear_to_axis(segment)
     aside = _lateral_margin(radius, segment, shear)
     rounding = _lateral_margin(0.0, segment, shear)
-    fx, fy, fz = ox - more * dx, oy - more * dy, oz - more * dz
-    tx, ty, tz = ox + (1.0 + more) * dx, oy + (1.0 + more) * dy, oz + (1.0 + more) * dz
-    box = Box(
-        min(fx, tx) - radius, max(fx, tx) + radius, min(fy, ty) - radius, max(fy, ty) + radius,
-        min(fz, tz) - radius, max(fz, tz) + radius,
-    )  # fmt: skip
+    box = _box_around(segment, more, radius)
     leaning = -MIN_FACING * length
     count, triangle, margin, free = 0, -1, 0.0, 0.0
     faces, normal_bounds = tree.faces, tree.normal_bounds

@@ -8,6 +8,7 @@ import math
 import numpy as np
 
 from ...compiled.kernels import kernel
+from ...laws.friction import turned_into_plane
 from ..contact_rows import BRISTLE, DEPTH, LANES, NORMAL, POINT, read_vector, write_vector
 from ..solver_model import SolverModel, State
 from ..workspace import Workspace
@@ -173,14 +174,10 @@ def finish_contacts(
 
 @kernel
 def _rotate_bristles_into_plane(first: int, count: int, rows: np.ndarray) -> None:
-    """Rotate bristles back into the surface, out of which its turning lifts them; their lengths stay."""
+    """Turn the bristles into the plane of the surface, which has turned since the last step; their lengths stay."""
     for block in range(first, first + (count + LANES - 1) // LANES):
         for lane in range(LANES):  # runs in vector registers: no branches, no calls
             nx, ny, nz = read_vector(rows, block, NORMAL, lane)
             zx, zy, zz = read_vector(rows, block, BRISTLE, lane)
-            out_of_plane = zx * nx + zy * ny + zz * nz
-            length = zx * zx + zy * zy + zz * zz
-            flat_x, flat_y, flat_z = zx - out_of_plane * nx, zy - out_of_plane * ny, zz - out_of_plane * nz
-            flat = flat_x * flat_x + flat_y * flat_y + flat_z * flat_z
-            scale = math.sqrt(length / flat) if flat > 0.0 and out_of_plane != 0.0 else 1.0
-            write_vector(rows, block, BRISTLE, lane, scale * flat_x, scale * flat_y, scale * flat_z)
+            zx, zy, zz = turned_into_plane((zx, zy, zz), (nx, ny, nz))
+            write_vector(rows, block, BRISTLE, lane, zx, zy, zz)

@@ -76,7 +76,7 @@ def prepare_driven(
     state: State,
     workspace: Workspace,
 ) -> None:
-    """Prepare a driven body for a step: its velocity by its carrier alone, and the impulse which that takes.
+    """Prepare a driven body for a step: its velocity if only its carrier moves, and the impulse that this motion takes.
 
     Parameters
     ----------
@@ -122,7 +122,7 @@ def actuator_force(
 ) -> tuple[float, float]:
     """Force of an actuator at a speed at the step's end, and how it falls with that speed, N and N·s/m.
 
-    The force that its own weight and its carrier's acceleration ask for is part of it, so that neither displaces an actuator
+    The force contains what its own weight and its carrier's acceleration take, so that neither displaces an actuator
     that is strong enough. Where it is not `limited`, largest force and speed are ignored.
     """
     gains = model.drives.gains[drive]

@@ -11,7 +11,7 @@ import numpy as np
 from ...compiled.kernels import inlined, kernel
 from ...effects.engine.compiled_program import TexelMotion, has_effects, may_pull
 from ...laws.contact_law import LINEAR_EXPONENT, ContactLaw, read_law
-from ...laws.friction import bristle_step, deflection_scale, friction_tangent, max_bristle_deflection
+from ...laws.friction import bristle_step, deflection_scale, friction_tangent, max_bristle_deflection, next_deflection
 from ...laws.normal_force import linear_tangent, normal_tangent
 from ..contact_rows import (
     BRISTLE,
@@ -66,7 +66,7 @@ class LinearContact(NamedTuple):
     push, stiff_n : float, N and N·s/m
     bias, stiff_t : float, N/m and N·s/m
     keep, gain : float
-        ``z(t + dt) = keep z + gain v_t``.
+        See :func:`.next_deflection`.
     """
 
     limit: float
@@ -116,7 +116,9 @@ def linearise_contact(
     held = deflection_scale(zx * zx + zy * zy + zz * zz, limit)  # the load fell: the rest has slipped already
     keep, gain = bristle_step(tx * tx + ty * ty + tz * tz, load, dt, law)
     keep *= held
-    zx, zy, zz = keep * zx + gain * tx, keep * zy + gain * ty, keep * zz + gain * tz
+    zx = next_deflection(keep, zx, gain, tx)
+    zy = next_deflection(keep, zy, gain, ty)
+    zz = next_deflection(keep, zz, gain, tz)
     # The closed solution for constant velocity may exceed the limit: then the contact slides at the limit.
     scale = deflection_scale(zx * zx + zy * zy + zz * zz, limit)
     keep, gain = scale * keep, scale * gain
@@ -180,6 +182,64 @@ def _write_tangents(
             left -= LANES
 
 
+@inlined
+def _add_contact(
+    sums: np.ndarray,
+    lane: int,
+    contact: LinearContact,
+    normal: tuple[float, float, float],
+    point: tuple[float, float, float],
+    bristle: tuple[float, float, float],
+    known_velocity: tuple[float, float, float],
+) -> None:
+    """Add a contact's block ``Jᵀ C J``, its lower triangle row by row, and its wrench to the sums of a lane.
+
+    `bristle` is the deflection at the step's beginning, `known_velocity` the part of the velocity not solved for.
+    """
+    nx, ny, nz = normal
+    px, py, pz = point
+    zx, zy, zz = bristle
+    ux, uy, uz = known_velocity
+    t = contact.stiff_t
+    e = contact.stiff_n - t
+    push = contact.push + e * (ux * nx + uy * ny + uz * nz)
+    fx = -push * nx - contact.bias * zx - t * ux
+    fy = -push * ny - contact.bias * zy - t * uy
+    fz = -push * nz - contact.bias * zz - t * uz
+    mx, my, mz = py * nz - pz * ny, pz * nx - px * nz, px * ny - py * nx
+    ex, ey, ez = e * nx, e * ny, e * nz
+    gx, gy, gz = e * mx, e * my, e * mz
+    tx, ty, tz = t * px, t * py, t * pz
+    square = tx * px + ty * py + tz * pz
+    sums[0 * LANES + lane] += t + ex * nx
+    sums[1 * LANES + lane] += ey * nx
+    sums[2 * LANES + lane] += t + ey * ny
+    sums[3 * LANES + lane] += ez * nx
+    sums[4 * LANES + lane] += ez * ny
+    sums[5 * LANES + lane] += t + ez * nz
+    sums[6 * LANES + lane] += gx * nx
+    sums[7 * LANES + lane] += gx * ny - tz
+    sums[8 * LANES + lane] += gx * nz + ty
+    sums[9 * LANES + lane] += gx * mx + square - tx * px
+    sums[10 * LANES + lane] += gy * nx + tz
+    sums[11 * LANES + lane] += gy * ny
+    sums[12 * LANES + lane] += gy * nz - tx
+    sums[13 * LANES + lane] += gy * mx - ty * px
+    sums[14 * LANES + lane] += gy * my + square - ty * py
+    sums[15 * LANES + lane] += gz * nx - ty
+    sums[16 * LANES + lane] += gz * ny + tx
+    sums[17 * LANES + lane] += gz * nz
+    sums[18 * LANES + lane] += gz * mx - tz * px
+    sums[19 * LANES + lane] += gz * my - tz * py
+    sums[20 * LANES + lane] += gz * mz + square - tz * pz
+    sums[21 * LANES + lane] += fx
+    sums[22 * LANES + lane] += fy
+    sums[23 * LANES + lane] += fz
+    sums[24 * LANES + lane] += py * fz - pz * fy
+    sums[25 * LANES + lane] += pz * fx - px * fz
+    sums[26 * LANES + lane] += px * fy - py * fx
+
+
 @kernel
 def _sum_contacts(pair: int, dt: float, law: ContactLaw, model: SolverModel, memory: np.ndarray, workspace: Workspace) -> None:
     """Linearise the contacts of a pair, and sum their forces on the target and what they resist.
@@ -219,44 +279,7 @@ def _sum_contacts(pair: int, dt: float, law: ContactLaw, model: SolverModel, mem
                 (nx, ny, nz), (zx, zy, zz), (vx, vy, vz), Tangent(bias, slope, scale, viscosity, pulls), dt, law
             )
             rows[b, LIMIT + lane], rows[b, KEEP + lane], rows[b, GAIN + lane] = contact.limit, contact.keep, contact.gain
-            t = contact.stiff_t
-            e = contact.stiff_n - t
-            push = contact.push + e * (ux * nx + uy * ny + uz * nz)
-            fx = -push * nx - contact.bias * zx - t * ux
-            fy = -push * ny - contact.bias * zy - t * uy
-            fz = -push * nz - contact.bias * zz - t * uz
-            mx, my, mz = py * nz - pz * ny, pz * nx - px * nz, px * ny - py * nx
-            ex, ey, ez = e * nx, e * ny, e * nz
-            gx, gy, gz = e * mx, e * my, e * mz
-            tx, ty, tz = t * px, t * py, t * pz
-            square = tx * px + ty * py + tz * pz
-            sums[0 * LANES + lane] += t + ex * nx
-            sums[1 * LANES + lane] += ey * nx
-            sums[2 * LANES + lane] += t + ey * ny
-            sums[3 * LANES + lane] += ez * nx
-            sums[4 * LANES + lane] += ez * ny
-            sums[5 * LANES + lane] += t + ez * nz
-            sums[6 * LANES + lane] += gx * nx
-            sums[7 * LANES + lane] += gx * ny - tz
-            sums[8 * LANES + lane] += gx * nz + ty
-            sums[9 * LANES + lane] += gx * mx + square - tx * px
-            sums[10 * LANES + lane] += gy * nx + tz
-            sums[11 * LANES + lane] += gy * ny
-            sums[12 * LANES + lane] += gy * nz - tx
-            sums[13 * LANES + lane] += gy * mx - ty * px
-            sums[14 * LANES + lane] += gy * my + square - ty * py
-            sums[15 * LANES + lane] += gz * nx - ty
-            sums[16 * LANES + lane] += gz * ny + tx
-            sums[17 * LANES + lane] += gz * nz
-            sums[18 * LANES + lane] += gz * mx - tz * px
-            sums[19 * LANES + lane] += gz * my - tz * py
-            sums[20 * LANES + lane] += gz * mz + square - tz * pz
-            sums[21 * LANES + lane] += fx
-            sums[22 * LANES + lane] += fy
-            sums[23 * LANES + lane] += fz
-            sums[24 * LANES + lane] += py * fz - pz * fy
-            sums[25 * LANES + lane] += pz * fx - px * fz
-            sums[26 * LANES + lane] += px * fy - py * fx
+            _add_contact(sums, lane, contact, (nx, ny, nz), (px, py, pz), (zx, zy, zz), (ux, uy, uz))
     for half in (8, 4, 2, 1):  # the lanes, in pairs
         for i in range(0, SUMS * LANES, LANES):
             for lane in range(half):

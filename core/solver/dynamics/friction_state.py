@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from ...compiled.kernels import inlined, kernel
-from ...laws.friction import deflection_scale
+from ...laws.friction import deflection_scale, next_deflection
 from ..contact_rows import BRISTLE, GAIN, KEEP, LANES, LIMIT, NORMAL, POINT, read_vector, write_vector
 from ..detection.deformation import frame_at
 from ..detection.detection_data import OTHER, SurfaceMotion
@@ -57,9 +57,9 @@ def _update_bristles(pair: int, motion: tuple[float, ...], state: State, workspa
             keep, gain = rows[b, KEEP + lane], rows[b, GAIN + lane]
             rate = vx * nx + vy * ny + vz * nz
             zx, zy, zz = read_vector(rows, b, BRISTLE, lane)
-            zx = keep * zx + gain * (vx - rate * nx)
-            zy = keep * zy + gain * (vy - rate * ny)
-            zz = keep * zz + gain * (vz - rate * nz)
+            zx = next_deflection(keep, zx, gain, vx - rate * nx)
+            zy = next_deflection(keep, zy, gain, vy - rate * ny)
+            zz = next_deflection(keep, zz, gain, vz - rate * nz)
             scale = deflection_scale(zx * zx + zy * zy + zz * zz, rows[b, LIMIT + lane])
             write_vector(rows, b, BRISTLE, lane, scale * zx, scale * zy, scale * zz)
         for lane in range(min(left, LANES)):

@@ -53,7 +53,7 @@ def write_pair_motion(pair: int, model: SolverModel, state: State, workspace: Wo
 
 @kernel
 def motion_values(motion: np.ndarray) -> tuple[float, ...]:
-    """The twelve numbers of a motion as a tuple, which the compiler may keep in registers; an array's it may not."""
+    """The twelve numbers of a motion as a tuple, which may stay in registers; those of an array may not."""
     return (
         motion[0], motion[1], motion[2], motion[3], motion[4], motion[5],
         motion[6], motion[7], motion[8], motion[9], motion[10], motion[11],
