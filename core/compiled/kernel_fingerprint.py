@@ -18,7 +18,8 @@ KERNEL_MARKS = (
 )
 """A file that holds one of these takes part in what is compiled.
 
-The laws of effects are compiled as well, and the specified parameters of a sensor are the fields of the contact law.
+The laws of effects are compiled as well, and the specified parameters of a sensor are the fields of the contact law. Of the
+package laws every file takes part.
 """
 
 
@@ -27,7 +28,7 @@ CORE = Path(__file__).resolve().parents[1]
 
 @cache
 def fingerprint() -> str:
-    """Return a hash of all files with kernels in core.
+    """Return a hash of all files in core that kernels are made from.
 
     A compiled kernel contains the machine code of the kernels that it calls, but numba looks only at a kernel's own file to
     see whether its cached result is still good. After a change in another file, or an upgrade, old code would go on running.
@@ -35,6 +36,6 @@ def fingerprint() -> str:
     digest = hashlib.sha256()
     for path in sorted(CORE.rglob("*.py")):
         source = path.read_bytes()
-        if any(mark in source for mark in KERNEL_MARKS):
+        if path.parent.name == "laws" or any(mark in source for mark in KERNEL_MARKS):
             digest.update(source)
     return digest.hexdigest()[:12]

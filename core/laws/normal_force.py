@@ -15,7 +15,10 @@ from __future__ import annotations
 import numpy as np
 
 from ..compiled.kernels import inlined, kernel
+from . import contact_stiffness
 from .contact_law import LINEAR_EXPONENT, ContactLaw
+
+hunt_crossley_damping = inlined(contact_stiffness.hunt_crossley_damping)
 
 
 @inlined
@@ -33,13 +36,14 @@ def elastic_stiffness(depth: float, force: float, law: ContactLaw) -> float:
 @inlined
 def damping_coefficient(law: ContactLaw) -> float:
     """Coefficient of the rate in the damping term: `cn` (N·s/m), or ``3/2 α`` (s/m), which multiplies the elastic force."""
-    return law.cn if law.exponent == LINEAR_EXPONENT else 1.5 * law.dissipation
+    return law.cn if law.exponent == LINEAR_EXPONENT else hunt_crossley_damping(law.dissipation)
 
 
 @inlined
 def damped_force(elastic: float, rate: float, law: ContactLaw) -> float:
     """Elastic force and damping together, N; it may be negative."""
-    return elastic + law.cn * rate if law.exponent == LINEAR_EXPONENT else elastic * (1.0 + 1.5 * law.dissipation * rate)
+    damping = damping_coefficient(law) * rate
+    return elastic + damping if law.exponent == LINEAR_EXPONENT else elastic * (1.0 + damping)
 
 
 @inlined
