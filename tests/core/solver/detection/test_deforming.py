@@ -164,7 +164,7 @@ def test_learning_shapes_frame_by_frame_gives_the_same_bits():
     ball = shape(trimesh.creation.icosphere(2, 0.012))
     rng = np.random.default_rng(3)
     values = ball.vertices * (1 + 0.02 * rng.normal(size=(8, len(ball.vertices), 1)))
-    frames = np.tile(pad().frames, (8, 1, 1)) + 1e-4 * rng.normal(size=(8, 84, 9))
+    frames = np.tile(pad().local_frames, (8, 1, 1)) + 1e-4 * rng.normal(size=(8, 84, 9))
     times = np.arange(8) / 24.0
     scenario = pressed(replace(ball, vertices=values[0]), [[0, 0, 0.0112]], **STIFF_FRICTION)
 
