@@ -12,4 +12,4 @@ def road(ui):
     yield from ui.press("palpate.sensor_add()")
     yield 3.0
     ui.check(first_use.preparing().progress() is not None, "the compiler runs")
-    ui.check(bpy.app.timers.is_registered(first_use.preparing()._watch), "and is looked at")
+    ui.check(bpy.app.timers.is_registered(first_use.preparing()._poll), "and is looked at")

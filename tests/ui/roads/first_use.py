@@ -17,7 +17,7 @@ def preparing():
 
 def hold(what):
     """Stop the compiler where it is, or let it go on."""
-    os.kill(preparing()._work.process.pid, what)
+    os.kill(preparing()._compilation.process.pid, what)
 
 
 def pad_forces():

@@ -16,7 +16,7 @@ def addon(name):
 
 
 def texels():
-    report = addon("authoring.sensor_report").now(pad(), bpy.context.scene)
+    report = addon("authoring.sensor_report").fresh_report(pad(), bpy.context.scene)
     return len(report.texels) if report.texels is not None else 0
 
 
@@ -51,14 +51,14 @@ def felt(ui, frame):
     """Go to the start and to a frame; return what the sensor feels there."""
     yield from timeline(ui, "frame_current", 1)
     yield from timeline(ui, "frame_current", frame)
-    live = addon("timeline.playback")
+    frame_status = addon("session.frame_status")
 
     def known():
-        status = live.status(bpy.context.scene)
+        status = frame_status.status_of(bpy.context.scene)
         return status.frame is not None and status.frame.frame == frame
 
     yield from ui.wait_until(known, f"frame {frame} is computed", timeout=120)
-    return live.status(bpy.context.scene).frame.sensors["Pad"]
+    return frame_status.status_of(bpy.context.scene).frame.sensors["Pad"]
 
 
 def road(ui):
@@ -122,7 +122,7 @@ def road(ui):
     with ui.context(view):
         pad().vertex_groups.new(name="Soft")
         bpy.ops.object.mode_set(mode="WEIGHT_PAINT")
-        addon("authoring.sensors").set_brush(bpy.context.scene.tool_settings)
+        addon("authoring.sensors").set_full_weight_brush(bpy.context.scene.tool_settings)
     yield 1.0
     x, y = ui.at((0.0, 0.0, 0.0))
     for dy in (20, -10):
