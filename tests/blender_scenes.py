@@ -3,6 +3,9 @@
 
 from __future__ import annotations
 
+import os
+from pathlib import Path
+
 import bpy
 import numpy as np
 
@@ -78,8 +81,11 @@ def reopen(path):
 
 def contents(folder) -> dict[str, bytes]:
     """Return the content of all files in a folder by their paths in it, without the hidden folder of a bake folder."""
-    files = [path for path in sorted(folder.rglob("*")) if path.is_file() and PRIVATE_FOLDER not in path.parts]
-    return {str(path.relative_to(folder)): path.read_bytes() for path in files}
+    files = []
+    for root, folders, names in os.walk(folder):
+        folders[:] = [name for name in folders if name != PRIVATE_FOLDER]
+        files += [Path(root, name) for name in names]
+    return {str(path.relative_to(folder)): path.read_bytes() for path in sorted(files)}
 
 
 def visible(folder) -> list[str]:
