@@ -114,7 +114,8 @@ def test_ctrl_c_ends_work_that_looks_at_no_keyboard(command, tmp_path):
         "    pathlib.Path('begun').touch()\n"
         "    time.sleep(60)\n"
         "stiffness.read_foam = rig.read_rig = wait\n"
-        "export.find_bake = lambda _: type('Bake', (), {'folders': {}})()\n"
+        "from types import SimpleNamespace as Fake\n"
+        "export.find_bake = lambda _: Fake(folders={}, texels={}, recording=Fake(frames=()))\n"
         "export.export = wait\n"
         "commands.run_process()\n"
     )

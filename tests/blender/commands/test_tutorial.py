@@ -9,6 +9,7 @@ import sys
 import bpy
 import numpy as np
 import pytest
+from blender_scenes import visible
 
 from palpate.commands import main
 from palpate.core.io.recording_npz import load_recording
@@ -91,7 +92,7 @@ def test_a_sensor_made_without_a_window(tmp_path, repository):
     for name in ("soft", "stiff"):
         words = ["--model", str(tmp_path / f"{name}.toml"), "--out", str(tmp_path / name)]
         assert main(["bake", str(tmp_path / "scene.blend"), *words]) == 0
-        (sensor,) = (tmp_path / name).iterdir()
+        (sensor,) = (tmp_path / name / folder for folder in visible(tmp_path / name))
         felt[name] = load_recording(sensor / "recording.npz").sensors[sensor.name]
     assert felt["soft"].normal_force.max() > 0
     hold = felt["soft"].normal_force.sum(axis=1).argmax()

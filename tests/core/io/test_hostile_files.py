@@ -160,7 +160,7 @@ def damaged_archive(draw, content):
     return file.getvalue()
 
 
-def only_clear_errors(read, *arguments):
+def assert_clear_errors(read, *arguments):
     """Call a reader: it returns, or raises a PalpateError of one line."""
     try:
         with warnings.catch_warnings():
@@ -171,12 +171,12 @@ def only_clear_errors(read, *arguments):
     return None
 
 
-def read_content(read, name, content):
+def assert_content_is_clear(read, name, content):
     """Let a reader read a file of some content."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / name
         path.write_bytes(content)
-        return only_clear_errors(read, path)
+        return assert_clear_errors(read, path)
 
 
 # --- TOML: rigs and sensors
@@ -220,7 +220,7 @@ def toml_bytes(table):
 @fuzzed
 @given(st.one_of(damaged_tree(SENSOR).map(toml_bytes), damaged_bytes(toml_bytes(SENSOR))))
 def test_sensors_as_toml(content):
-    read_content(read_sensor, "sensor.toml", content)
+    assert_content_is_clear(read_sensor, "sensor.toml", content)
 
 
 @seed(2)
@@ -235,7 +235,7 @@ def test_rigs(content, table):
         path.write_bytes(content)
         (Path(folder) / "a.csv").write_bytes(table)
         (Path(folder) / "b.csv").write_text(TABLE)
-        only_clear_errors(read_rig, path)
+        assert_clear_errors(read_rig, path)
 
 
 # --- tables
@@ -262,7 +262,7 @@ def damaged_table(draw, text, separator):
 @fuzzed
 @given(damaged_table(TABLE, ","))
 def test_recorded_tables(content):
-    found = read_content(read_table, "table.csv", content)
+    found = assert_content_is_clear(read_table, "table.csv", content)
     assert found is None or not np.isinf(found.values).any()
 
 
@@ -270,8 +270,8 @@ def test_recorded_tables(content):
 @fuzzed
 @given(damaged_table(FOAM, ";"), st.sampled_from([0.001, None, 0.0, np.nan, np.inf]))
 def test_typed_tables(content, area):
-    read_content(lambda path: read_foam(path, area), "foam.csv", content)
-    read_content(read_friction, "slide.csv", content.replace(b"compression (mm)", b"velocity_mm/s"))
+    assert_content_is_clear(lambda path: read_foam(path, area), "foam.csv", content)
+    assert_content_is_clear(read_friction, "slide.csv", content.replace(b"compression (mm)", b"velocity_mm/s"))
 
 
 # --- OpenRAVE
@@ -295,7 +295,7 @@ XML = openrave_xml(
     )
 )
 def test_openrave(content):
-    read_content(read_openrave, "robot.xml", content)
+    assert_content_is_clear(read_openrave, "robot.xml", content)
 
 
 # --- bakes
@@ -316,7 +316,7 @@ def bake_files(kind):
         return {path.name: path.read_bytes() for path in folder.iterdir()}
 
 
-def read_whole(files):
+def assert_bake_is_clear(files):
     """Read a bake of one sensor from its files; what is believed can be drawn."""
     with tempfile.TemporaryDirectory() as name:
         own = Path(name) / "bake" / "pad"
@@ -324,8 +324,8 @@ def read_whole(files):
         for file, content in files.items():
             (own / file).write_bytes(content)
         for read, path in ((read_manifest, own), (load_recording, own / "recording.npz"), (load_sensor, own / "sensor.npz")):
-            only_clear_errors(read, path)
-        bake = only_clear_errors(read_bake, own.parent)
+            assert_clear_errors(read, path)
+        bake = assert_clear_errors(read_bake, own.parent)
     if bake is not None:
         readings = bake.recording.sensors["pad"].normal_force
         assert np.isfinite(bake.texels["pad"].layout.image(readings[-1])).all()
@@ -335,7 +335,7 @@ def read_whole(files):
 
 @pytest.mark.parametrize("kind", ["grid", "uv"])
 def test_the_undamaged_bake_is_read(kind):
-    assert read_whole(bake_files(kind)) is not None
+    assert assert_bake_is_clear(bake_files(kind)) is not None
 
 
 @seed(6)
@@ -344,7 +344,7 @@ def test_the_undamaged_bake_is_read(kind):
 def test_manifests(data):
     content = bake_files("grid")["manifest.json"]
     tree = damaged_tree(json.loads(content)).map(lambda table: json.dumps(table).encode())
-    read_whole({**bake_files("grid"), "manifest.json": data.draw(st.one_of(tree, damaged_bytes(content)))})
+    assert_bake_is_clear({**bake_files("grid"), "manifest.json": data.draw(st.one_of(tree, damaged_bytes(content)))})
 
 
 @seed(7)
@@ -352,7 +352,7 @@ def test_manifests(data):
 @given(st.data(), st.sampled_from(["grid", "uv"]))
 def test_recordings(data, kind):
     files = bake_files(kind)
-    read_whole({**files, "recording.npz": data.draw(damaged_archive(files["recording.npz"]))})
+    assert_bake_is_clear({**files, "recording.npz": data.draw(damaged_archive(files["recording.npz"]))})
 
 
 @seed(8)
@@ -360,7 +360,7 @@ def test_recordings(data, kind):
 @given(st.data(), st.sampled_from(["grid", "uv"]))
 def test_sensors_of_bakes(data, kind):
     files = bake_files(kind)
-    read_whole({**files, "sensor.npz": data.draw(damaged_archive(files["sensor.npz"]))})
+    assert_bake_is_clear({**files, "sensor.npz": data.draw(damaged_archive(files["sensor.npz"]))})
 
 
 # --- tactile images
@@ -388,6 +388,6 @@ def test_tactile_images(codec, monkeypatch):
     @fuzzed
     @given(st.data())
     def try_out(data):
-        read_content(tactile_exr.read_exr, "tactile.exr", data.draw(damaged_bytes(image())))
+        assert_content_is_clear(tactile_exr.read_exr, "tactile.exr", data.draw(damaged_bytes(image())))
 
     try_out()

@@ -208,7 +208,7 @@ def test_starting_deeper_than_the_reach_is_said_at_once(depth):
 def test_running_past_the_reach_within_one_step_is_said():
     """3 cm per step, from above the pad to 2 cm below it."""
     recording = run(pressed(box(0.08, 0.08, 0.2), [[0, 0, 0.11], [0, 0, 0.08]], fps=10.0, dt=0.1))
-    assert recording.warnings[0].startswith("Frame 2: 84 texels")
+    assert any(warning.startswith("Frame 2: 84 texels") for warning in recording.warnings)
 
 
 def test_a_hole_is_not_inside():

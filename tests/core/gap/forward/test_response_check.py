@@ -31,9 +31,9 @@ def force(trial, sign):
 
 
 def test_good_recordings_pass():
-    prepared(RIG)
-    prepared(changed(lambda trial: driven(trial, "depth", level(trial))))
-    prepared(changed(lambda trial: replace(trial, reading=None, force=force(trial, -1.0))))
+    assert prepared(RIG)
+    assert prepared(changed(lambda trial: driven(trial, "depth", level(trial))))
+    assert prepared(changed(lambda trial: replace(trial, reading=None, force=force(trial, -1.0))))
 
 
 @pytest.mark.parametrize(
@@ -55,4 +55,4 @@ def test_bad_recordings_get_a_sentence(change, words):
 
 def test_readings_in_an_own_unit_may_fall():
     rig = changed(lambda trial: replace(trial, reading=-trial.reading))
-    prepared(replace(rig, parameters=replace(rig.parameters, unit="V")))
+    assert prepared(replace(rig, parameters=replace(rig.parameters, unit="V")))
