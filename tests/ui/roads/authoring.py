@@ -77,9 +77,9 @@ def road(ui):
 
 
 def kinds(obj):
-    from bl_ext.user_default.palpate.addon import preview
+    from bl_ext.user_default.palpate.addon.authoring import sensor_report
 
-    report = preview.of(obj, bpy.context.scene)
+    report = sensor_report.known_report(obj, bpy.context.scene)
     return [problem.kind for problem in report.problems] if report else None
 
 
