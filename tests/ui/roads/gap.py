@@ -10,9 +10,9 @@ def pad():
 
 
 def found():
-    from bl_ext.user_default.palpate.addon import measured
+    from bl_ext.user_default.palpate.addon.measured import gap_results
 
-    return measured.of(pad())
+    return gap_results.of(pad())
 
 
 def brightest():
