@@ -52,7 +52,7 @@ def road(ui):
     yield 1.0
     yield from ui.screenshot("3b-found")
     ui.value("headline", found().headline)
-    ui.value("named", [named.name for named in found().diagnosis.named])
+    ui.value("named", [named.name for named in found().diagnosis.findings])
 
     # 4. Where the model is wrong
     timeline = ui.area("DOPESHEET_EDITOR")
