@@ -26,10 +26,6 @@ class PALPATE_PT_presets(PresetPanel, bpy.types.Panel):
     preset_operator = "palpate.preset_load"
     preset_add_operator = "palpate.preset_add"
 
-    def draw(self, context):
-        super().draw(context)
-        _draw_files(self.layout)
-
 
 class PALPATE_MT_presets(bpy.types.Menu):
     bl_label = "Sensor Presets"
