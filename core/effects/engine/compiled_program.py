@@ -201,7 +201,8 @@ def law_over_time(
         Inputs of the law, see :class:`.TexelInput`.
     step : (t,) int
         The row of `constants` that belongs to each sample.
-    constants : (lengths of step, c) float
+    constants : (m, c) float
+        A row for each different duration of a step.
     memory : (n, state_size) float
         Brought up to date.
     """
