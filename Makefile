@@ -11,15 +11,18 @@ DEMO_OUT ?= demo-output
 PYTEST_ARGS ?=
 # One group of benchmarks, as in `make bench ONLY=solver`
 ONLY ?=
+# Arguments for the attack, as in `make attack ATTACK_ARGS='faults --tries 50'`; SHORT=1 takes less than ten minutes
+ATTACK_ARGS ?=
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-ui bench docs zip lint clean distclean env env50
+.PHONY: help demo test test-ui bench attack docs zip lint clean distclean env env50
 
 help:
 	@echo 'make demo     set up and run the demo: a picture, tactile images and the forces, in $(DEMO_OUT)/'
 	@echo 'make test     lint, type check, and all tests in bpy $(BPY45) and $(BPY50)'
 	@echo 'make test-ui  the extension in a real Blender window (Debian, as root: it sets up a Blender of its own)'
 	@echo 'make bench    benchmarks, one JSON line per figure; ONLY=solver for one group'
+	@echo 'make attack   faults, kills, power cuts and bad input in thousands; SHORT=1 for ten minutes, ATTACK_ARGS=faults for one area'
 	@echo 'make docs     the documentation as a site, in build/site/'
 	@echo 'make zip      the extension zips for every platform and Python, in dist/'
 	@echo 'make lint     ruff and mypy alone'
@@ -65,6 +68,9 @@ $(VENV)/.bench: $(VENV)/.ready
 
 bench: $(VENV)/.bench
 	@$(BIN)/python -m benchmarks $(ONLY)
+
+attack: env
+	@SHORT=$(SHORT) nice $(BIN)/python -m attack $(ATTACK_ARGS)
 
 $(VENV)/.docs: $(VENV)/.ready
 	$(BIN)/python -m pip install --quiet --editable '.[docs]'

@@ -122,8 +122,9 @@ def writable_folder(path: str | os.PathLike, create: bool = False) -> Path:
         except OSError as error:
             raise FileError(f"The folder '{folder}' could not be made ({os_error_reason(error)}): {_remedy(error)}.") from error
     _require_folder(folder)
-    with suppress(FileNotFoundError):
-        _new_file_in(folder, "check", "").unlink()
+    check = _new_file_in(folder, "check", "")
+    with suppress(OSError):  # the next run that removes leftovers removes it
+        check.unlink()
     return folder
 
 

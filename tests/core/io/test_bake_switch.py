@@ -1,27 +1,21 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The switch from an old bake to a new one, stopped at every single step: what is found then is the old bake or the new one."""
 
-import errno
 import json
-import os
 import shutil
 from contextlib import suppress
 from pathlib import Path
 
 import pytest
 
+from palpate.attack.injector import KILL, Injector, Stopped
 from palpate.core.errors import FileError
 from palpate.core.io import bake_switch
 from palpate.core.io.folder_lock import FolderLock
 from palpate.core.io.private_folder import PRIVATE_FOLDER, find_private_folder, make_private_folder
 
 RUN = "0123456789abcdef"
-CALLS = ("rename", "replace", "unlink", "rmdir", "mkdir", "fsync", "link")
 NAMES = ("Pad", "Pad.old")
-
-
-class Stopped(BaseException):
-    """The process was killed."""
 
 
 @pytest.fixture
@@ -46,24 +40,6 @@ def folder(tmp_path):
 
 def record(folder):
     return bake_switch.Switch(RUN, NAMES, str(folder.parent / "scene.blend"), 2)
-
-
-def stop_at(monkeypatch, number, error=Stopped):
-    """Let the call of that number fail; after a kill all later ones fail too. Return the list of calls."""
-    calls = []
-
-    def failing(name, original):
-        def call(*arguments, **options):
-            calls.append(name)
-            if len(calls) == number or (len(calls) > number and error is Stopped):
-                raise error() if error is Stopped else error(errno.EACCES, "Permission denied")
-            return original(*arguments, **options)
-
-        return call
-
-    for name in CALLS:
-        monkeypatch.setattr(os, name, failing(name, getattr(os, name)))
-    return calls
 
 
 def bakes(folder):
@@ -93,12 +69,10 @@ def check_whole(folder):
 def number_of_calls(folder, tmp_path):
     copy = tmp_path / "copy"
     shutil.copytree(folder.parent, copy, ignore=shutil.ignore_patterns("copy"))
-    with pytest.MonkeyPatch.context() as patch:
-        calls = stop_at(patch, 10**6)
+    with Injector(copy) as injector:
         bake_switch.switch(copy / "bake", record(copy / "bake"))
-        bake_switch.wait_for_removals()
     shutil.rmtree(copy)
-    return len(calls)
+    return len(injector.calls)
 
 
 def test_stopped_at_every_step(folder, tmp_path):
@@ -108,12 +82,12 @@ def test_stopped_at_every_step(folder, tmp_path):
     for number in range(1, total + 1):
         copy = tmp_path / f"copy {number}"
         shutil.copytree(folder.parent, copy, ignore=shutil.ignore_patterns("copy*"))
-        with pytest.MonkeyPatch.context() as patch:
-            patch.setattr(bake_switch.threading.Thread, "start", lambda self: self.run())
-            patch.setattr(bake_switch, "_removals", [])
-            stop_at(patch, number)
-            with pytest.raises(Stopped):
-                bake_switch.switch(copy / "bake", record(copy / "bake"))
+        with (
+            Injector(copy, number, KILL) as injector,
+            suppress(Stopped),
+        ):  # where the thread that removes is stopped, it goes on
+            bake_switch.switch(copy / "bake", record(copy / "bake"))
+        assert len(injector.calls) == number
         found.append(check_whole(copy / "bake"))
     assert found == sorted(found, reverse=True) and set(found) == {"old", "new"}
 
@@ -126,19 +100,15 @@ def test_stopped_while_it_is_settled(folder, tmp_path):
         with pytest.raises(Stopped):
             bake_switch.switch(folder, record(folder))
     assert bakes(folder) == {"new"}
-    for number in range(1, 40):
+    for number in range(1, 60):
         copy = tmp_path / f"copy {number}"
         shutil.copytree(folder.parent, copy, ignore=shutil.ignore_patterns("copy*"))
         path = copy / "bake" / PRIVATE_FOLDER / bake_switch.SWITCH_NAME
         path.write_text(path.read_text().replace(str(folder.parent), str(copy)))
-        with pytest.MonkeyPatch.context() as patch:
-            patch.setattr(bake_switch.threading.Thread, "start", lambda self: self.run())
-            patch.setattr(bake_switch, "_removals", [])
-            calls = stop_at(patch, number)
-            with suppress(Stopped):
-                bake_switch.settle(copy / "bake")
+        with Injector(copy, number, KILL) as injector, suppress(Stopped):
+            bake_switch.settle(copy / "bake")
         assert check_whole(copy / "bake") == "new"
-        if len(calls) < number:
+        if len(injector.calls) < number:
             return
     raise AssertionError("it never came to its end")
 
@@ -148,10 +118,7 @@ def test_an_error_at_any_step_leaves_the_old_bake_or_the_new_one(folder, tmp_pat
         copy = tmp_path / f"copy {number}"
         shutil.copytree(folder.parent, copy, ignore=shutil.ignore_patterns("copy*"))
         failed = False
-        with pytest.MonkeyPatch.context() as patch:
-            patch.setattr(bake_switch.threading.Thread, "start", lambda self: self.run())
-            patch.setattr(bake_switch, "_removals", [])
-            stop_at(patch, number, OSError)
+        with Injector(copy, number, "EACCES"):
             try:
                 bake_switch.switch(copy / "bake", record(copy / "bake"))
             except (FileError, OSError):
@@ -162,10 +129,9 @@ def test_an_error_at_any_step_leaves_the_old_bake_or_the_new_one(folder, tmp_pat
 def test_a_reader_that_cannot_write_reads_from_where_the_record_leads(folder, monkeypatch):
     monkeypatch.setattr(bake_switch, "_rename_back", lambda *_: None)
     monkeypatch.setattr(Path, "unlink", lambda *_, **__: None)
-    with monkeypatch.context() as patch:
-        stop_at(patch, 6)
-        with pytest.raises(Stopped):
-            bake_switch.switch(folder, record(folder))
+    with Injector(folder, 10, KILL) as injector, pytest.raises(Stopped):
+        bake_switch.switch(folder, record(folder))
+    assert [call.split()[0] for call in injector.calls[-4:]] == ["fsync", "mkdir", "rename", "rename"]
     lock = FolderLock(folder)  # another process holds it
     bake_switch.settle(folder)
     assert bake_switch.pending_switch(folder) == record(folder)
