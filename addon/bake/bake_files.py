@@ -357,6 +357,7 @@ class BakeFiles:
             body=scenario.bodies[sensor.body].name,
             step_reason=recording.step_reason,
             bake_id=bake_id,
+            sensors=tuple(self._sensors),
             files=dict(sorted(self._images[self._names[sensor.name]].items())),
         )
 

@@ -16,7 +16,7 @@ import numpy as np
 from ...core.errors import SceneError
 from ...core.figures.figure_style import FigureStyle
 from ...core.io.bake_folder import frame_file
-from ...core.io.bake_reader import Bake, check_images, read_sensors
+from ...core.io.bake_reader import Bake, read_sensors
 from ...core.response import metrics
 from ..session import units
 from . import heat_map, markers, materials, texel_arrows
@@ -160,7 +160,6 @@ def refresh(scene, places: dict) -> None:
     if not places:
         raise SceneError(f"Nothing is baked in '{scene.name}': bake first.")
     bake: Bake = read_sensors(list(places.values()))
-    check_images(bake)
     names = {place: name for name, place in bake.folders.items()}
     recording = bake.recording
     baked_sensors = []

@@ -18,7 +18,7 @@ from ...core.figures.tactile_strip import tactile_strip
 from ...core.figures.texel_numbers import MOST, texel_numbers
 from ...core.figures.time_curves import time_curves
 from ...core.io.bake_folder import folder_names
-from ...core.io.bake_reader import Bake, check_images, frame_index, read_sensors
+from ...core.io.bake_reader import Bake, frame_index, read_sensors
 from ...core.io.file_writing import writable_folder
 from ...core.jobs.job_runner import run_job
 from ...core.jobs.progress import Job, Progress
@@ -40,9 +40,7 @@ def read_scene_bake(scene) -> Bake:
         raise SceneError(
             f"'{scene.name}' is not baked: bake it first ('palpate bake' with --save, or Physics › Palpate › Bake)."
         )
-    bake = read_sensors(list(places.values()))
-    check_images(bake)
-    return bake
+    return read_sensors(list(places.values()))
 
 
 def make_figures(scene, folder, request: FigureRequest) -> Job[list[Path]]:

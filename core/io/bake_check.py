@@ -25,6 +25,10 @@ from .sensor_npz import SENSOR_NAME
 
 MOST_PIXELS = 1 << 26
 """Pixels of a tactile image above which its size is taken for damage."""
+FRAME_RATES = (1e-6, 1e10)
+"""Least and most frames per second; Blender's lie far inside."""
+LARGEST = float(np.finfo(np.float32).max)
+"""Largest value of a texel, because its pixels have 32 bits."""
 UNIT_TOLERANCE = 1e-6
 """By how much the length of a unit vector or a quaternion may differ from one."""
 
@@ -87,7 +91,7 @@ def check_sensor_files(files: SensorFiles) -> None:
     for name, check in ((MANIFEST_NAME, _check_manifest), (SENSOR_NAME, _check_texels), (RECORDING_NAME, _check_recording)):
         try:
             check(files)
-        except _Fault as fault:
+        except Fault as fault:
             raise FileError(f"'{files.folder / name}' is damaged ({fault}): bake again.") from fault
 
 
@@ -119,13 +123,13 @@ def checked_parameters(folder: Path, manifest: Manifest) -> SensorParameters:
     return parameters
 
 
-class _Fault(Exception):
+class Fault(Exception):
     """What is wrong with a file, as words for the brackets of a message."""
 
 
 def _require(good: object, fault: str) -> None:
     if not good:
-        raise _Fault(fault)
+        raise Fault(fault)
 
 
 def _check_array(name: str, array: object, kinds: str, shape: tuple[int | None, ...]) -> None:
@@ -146,8 +150,10 @@ def _check_array(name: str, array: object, kinds: str, shape: tuple[int | None, 
 def _check_manifest(files: SensorFiles) -> None:
     manifest = files.manifest
     _require(manifest.sensor, "the sensor has no name")
-    _require(manifest.fps > 0, f"fps is {manifest.fps:g}")
+    _require(FRAME_RATES[0] <= manifest.fps <= FRAME_RATES[1], f"fps is {manifest.fps:g}")
     _require(manifest.dt > 0, f"dt is {manifest.dt:g}")
+    unit = manifest.parameters.get("unit", manifest.unit)
+    _require(unit == manifest.unit, f"its unit is {manifest.unit!r:.40}, that of its parameters {unit!r:.40}")
     _require(manifest.frame_start <= manifest.frame_end, f"frames run from {manifest.frame_start} to {manifest.frame_end}")
     height, width = manifest.shape
     _require(height > 0 and width > 0 and height * width <= MOST_PIXELS, f"shape is {height} × {width} pixels")
@@ -183,7 +189,7 @@ def _check_texels(files: SensorFiles) -> None:
     try:
         files.painted.check(manifest.sensor, count)
     except PalpateError as error:
-        raise _Fault(str(error).rstrip(".")) from error
+        raise Fault(str(error).rstrip(".")) from error
 
 
 def _by(shape: tuple[int, ...]) -> str:
@@ -270,7 +276,9 @@ def _check_frames(recording: Recording, manifest: Manifest) -> None:
 def _check_channels(sensor: SensorRecording, frames: int, texels: int) -> None:
     for name, value_shape in _PER_TEXEL.items():
         kinds = _FLAG if name == "contact" else _NUMBER
-        _check_array(name, getattr(sensor, name), kinds, (frames, texels, *value_shape))
+        values = getattr(sensor, name)
+        _check_array(name, values, kinds, (frames, texels, *value_shape))
+        _require(kinds == _FLAG or (np.abs(values) <= LARGEST).all(), f"'{name}' has values that no pixel can hold")
     for name in ("net_force", "net_torque", "centre_of_pressure"):
         _check_array(name, getattr(sensor, name), _NUMBER, (frames, 3))
     for name in ("friction", "depth", "slip"):

@@ -7,12 +7,13 @@ A bake folder holds one folder per sensor. Each of these holds one EXR image per
 
 from __future__ import annotations
 
+import hashlib
 import json
 import math
 import os
 import re
 import zlib
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
@@ -24,6 +25,8 @@ from .sensor_npz import SENSOR_NAME
 
 MANIFEST_FORMAT = "palpate-bake/1"
 MANIFEST_NAME = "manifest.json"
+OWN_DIGEST = "manifest_sha256"
+"""Key of the SHA-256 of all that the manifest says otherwise; older manifests have none."""
 RECORDING_NAME = "recording.npz"
 
 BAKE_FILE_NAMES = re.compile(rf"tactile_-?\d+\.exr|{'|'.join(map(re.escape, (RECORDING_NAME, SENSOR_NAME, MANIFEST_NAME)))}")
@@ -95,6 +98,8 @@ class Manifest:
         Id of the scene that was baked, as stored in its .blend; empty when it stored none, or when the manifest is older.
     scene_path : str
         Path of the .blend, relative to the bake folder, with ``/``; empty as `scene_file`.
+    sensors : tuple of str
+        Names of all sensors of the bake; empty when the manifest is older.
     files : dict of str to str
         SHA-256 of each file in the folder except the manifest itself, by name; empty when the manifest is older.
     """
@@ -117,6 +122,7 @@ class Manifest:
     bake_id: str = ""
     scene_id: str = ""
     scene_path: str = ""
+    sensors: tuple[str, ...] = ()
     files: dict[str, str] = field(default_factory=dict)
 
     def check_file(self, folder: Path, name: str) -> None:
@@ -139,11 +145,6 @@ class Manifest:
         if found != self.files[name]:
             raise FileError(f"'{path}' is damaged (its content is not what was baked): bake again.")
 
-    def check_files(self, folder: Path) -> None:
-        """Check all files of the bake's folder, as :meth:`check_file` does."""
-        for name in self.files:
-            self.check_file(folder, name)
-
 
 def write_manifest(folder: str | os.PathLike, manifest: Manifest, atomic: bool = True) -> Path:
     """Write ``manifest.json`` into `folder`, as :func:`.write_file` does, and return its path.
@@ -157,6 +158,7 @@ def write_manifest(folder: str | os.PathLike, manifest: Manifest, atomic: bool =
     """
     content = {"format": MANIFEST_FORMAT, **asdict(manifest)}
     try:
+        content[OWN_DIGEST] = _own_digest(content)
         text = json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False)
     except TypeError as error:
         raise ValueError(f"the manifest of '{manifest.sensor}' holds something that is not JSON: {error}") from error
@@ -185,15 +187,28 @@ def read_manifest(folder: str | os.PathLike) -> Manifest:
         raise FileError(f"'{path}' is damaged (not JSON): delete the folder and bake again.") from error
     if not isinstance(content, dict) or content.get("format") != MANIFEST_FORMAT:
         found = content.get("format") if isinstance(content, dict) else None
-        raise FileError(f"'{path}' is not a '{MANIFEST_FORMAT}' file but {found!r}: bake again with this version.")
+        raise FileError(f"'{path}' is not a '{MANIFEST_FORMAT}' file but {found!r:.60}: bake again with this version.")
     try:
+        own = _own_digest(content)
+        if content.get(OWN_DIGEST, own) != own:
+            raise ValueError("its content is not what was baked")
         return _manifest(content)
-    except (KeyError, TypeError, ValueError, OverflowError) as error:
-        raise FileError(f"'{path}' is damaged ({type(error).__name__}: {error}): delete the folder and bake again.") from error
+    except KeyError as error:
+        raise FileError(f"'{path}' is damaged ({error} is missing): bake again.") from error
+    except (TypeError, ValueError, OverflowError, RecursionError) as error:
+        raise FileError(f"'{path}' is damaged ({error}): bake again.") from error
+
+
+def _own_digest(content: Mapping[str, Any]) -> str:
+    """Return the SHA-256 of a manifest's content without this digest, whatever the order of its keys."""
+    rest = {key: value for key, value in content.items() if key != OWN_DIGEST}
+    return hashlib.sha256(json.dumps(rest, sort_keys=True).encode()).hexdigest()
 
 
 def _manifest(content: dict[str, Any]) -> Manifest:
-    height, width = content["shape"]
+    shape = _typed(content, "shape", list)
+    if len(shape) != 2 or not all(type(side) is int for side in shape):
+        raise TypeError(f"shape is {shape!r:.60}")
     manifest = Manifest(
         sensor=_typed(content, "sensor", str),
         palpate=_typed(content, "palpate", str),
@@ -203,7 +218,7 @@ def _manifest(content: dict[str, Any]) -> Manifest:
         dt=float(_typed(content, "dt", (int, float))),
         digest=_typed(content, "digest", str),
         unit=_typed(content, "unit", str),
-        shape=(int(height), int(width)),
+        shape=(shape[0], shape[1]),
         parameters=_typed(content, "parameters", dict),
         warnings=tuple(str(warning) for warning in _typed(content, "warnings", list)),
         complete=_typed(content, "complete", bool),
@@ -213,11 +228,16 @@ def _manifest(content: dict[str, Any]) -> Manifest:
         bake_id=_typed({"bake_id": "", **content}, "bake_id", str),
         scene_id=_typed({"scene_id": "", **content}, "scene_id", str),
         scene_path=_typed({"scene_path": "", **content}, "scene_path", str),
+        sensors=tuple(_typed({"sensors": [], **content}, "sensors", list)),
         files=_typed({"files": {}, **content}, "files", dict),
     )
+    if not all(isinstance(name, str) for name in manifest.sensors):
+        raise TypeError(f"sensors is {content['sensors']!r:.60}")
+    if any("\0" in name for name in (manifest.sensor, manifest.body)):
+        raise ValueError("a name has a NUL")
     for name, digest in manifest.files.items():
         if not BAKE_FILE_NAMES.fullmatch(name) or not isinstance(digest, str):
-            raise ValueError(f"files has {name!r}")
+            raise ValueError(f"files has {name!r:.60}")
     if not (math.isfinite(manifest.fps) and math.isfinite(manifest.dt)):
         raise ValueError("fps and dt must be finite")
     return manifest
@@ -226,5 +246,5 @@ def _manifest(content: dict[str, Any]) -> Manifest:
 def _typed(content: dict[str, Any], key: str, kind: Any) -> Any:
     value = content[key]
     if not isinstance(value, kind) or (isinstance(value, bool) and kind is not bool):
-        raise TypeError(f"{key} is {value!r}")
+        raise TypeError(f"{key} is {value!r:.60}")
     return value

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 
@@ -17,6 +17,7 @@ from ..model.sensor_parameters import Painted, SensorParameters
 from . import bake_switch
 from .bake_check import SensorFiles, check_bake, checked_parameters
 from .bake_folder import MANIFEST_NAME, RECORDING_NAME, Manifest, folder_names, read_manifest
+from .image_check import check_images
 from .recording_npz import load_recording
 from .sensor_npz import SENSOR_NAME, load_sensor
 
@@ -56,7 +57,7 @@ class Bake:
 
 
 def read_bake(folder: str | os.PathLike) -> Bake:
-    """Read a bake folder, or the folder of one sensor in it.
+    """Read a bake folder, or the folder of one sensor in it, and check all of its files.
 
     Raises
     ------
@@ -66,19 +67,42 @@ def read_bake(folder: str | os.PathLike) -> Bake:
     folder = Path(folder)
     if not folder.is_dir():
         raise FileError(f"The folder '{folder}' does not exist: bake first, or choose another.")
-    if (folder / MANIFEST_NAME).is_file():
+    if os.path.lexists(folder / MANIFEST_NAME):
         return read_sensors([folder])
     bake_switch.settle(folder)
     folders = [place for name, place in bake_switch.present_folders(folder) if _is_bake(name, place)]
     if not folders:
         raise FileError(f"'{folder}' holds no bake: bake first, or choose the folder that Physics › Palpate › Bake names.")
-    return read_sensors(folders)
+    bake = read_sensors(folders)
+    expected = dict.fromkeys(name for manifest in bake.manifests.values() for name in manifest.sensors)
+    for name in expected:
+        if name not in bake.texels:
+            raise FileError(
+                f"The sensor '{name}' is missing from the bake in '{folder}', which had {_quoted(expected)}: bake again, or "
+                "choose the folder of one sensor."
+            )
+    return bake
 
 
-def read_sensors(folders: Sequence[Path]) -> Bake:
-    """Read the folders of some sensors of one bake; raises FileError as :func:`read_bake` does.
+def _quoted(names: Iterable[str]) -> str:
+    return ", ".join(f"'{name}'" for name in names)
+
+
+def read_sensors(folders: Sequence[Path], images: bool = True) -> Bake:
+    """Read the folders of some sensors of one bake.
 
     A switch to another bake that was interrupted is carried out first (:mod:`.bake_switch`).
+
+    Parameters
+    ----------
+    folders : sequence of Path
+    images : bool
+        Check the tactile images as well, every one of which is read for that.
+
+    Raises
+    ------
+    FileError
+        As :func:`read_bake`.
     """
     for parent in {folder.parent for folder in folders}:
         bake_switch.settle(parent)
@@ -104,6 +128,8 @@ def read_sensors(folders: Sequence[Path]) -> Bake:
         read[manifest.sensor] = SensorFiles(folder, manifest, recording, texels, painted)
     parameters = {name: checked_parameters(files.folder, files.manifest) for name, files in read.items()}
     check_bake(read)
+    for files in read.values() if images else ():
+        check_images(files)
     sensors = {name: files.recording.sensors[name] for name, files in read.items()}
     return Bake(
         recording=replace(next(iter(read.values())).recording, sensors=sensors),
@@ -115,15 +141,12 @@ def read_sensors(folders: Sequence[Path]) -> Bake:
     )
 
 
-def check_images(bake: Bake) -> None:
-    """Check all files of a bake, its tactile images as well; raises FileError that names the first damaged one."""
-    for name, folder in bake.folders.items():
-        bake.manifests[name].check_files(folder)
-
-
 def _is_bake(name: str, folder: Path) -> bool:
-    """Return True if a folder in a bake folder holds a sensor's bake, and not a copy of one that an older version has left."""
-    if not (folder / MANIFEST_NAME).is_file():
+    """Return True if a folder in a bake folder holds a sensor's bake, even a damaged one.
+
+    A copy of one that an older version has left is none.
+    """
+    if not any(os.path.lexists(folder / file) for file in (MANIFEST_NAME, RECORDING_NAME, SENSOR_NAME)):
         return False
     if not name.endswith((".partial", ".old")):
         return True

@@ -9,23 +9,20 @@ import re
 import shutil
 import subprocess
 import sys
-from dataclasses import asdict, fields, replace
+from dataclasses import fields, replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from recordings import grid_texels, recording_of, round_texels
 
+from palpate.attack.sample_bake import grid_texels, recording_of, round_texels, write_bake, write_sensor
 from palpate.core.errors import FileError, PalpateError
 from palpate.core.export import formats, registry
 from palpate.core.export.file_list import LIST_FORMAT, LIST_NAME
 from palpate.core.export.registry import export, exporters
 from palpate.core.figures import color_maps
 from palpate.core.figures.figure_style import FigureStyle
-from palpate.core.io.bake_folder import Manifest, read_manifest, write_manifest
-from palpate.core.io.bake_reader import check_images, frame_index, read_bake
-from palpate.core.io.file_writing import file_sha256
-from palpate.core.io.recording_npz import save_recording
+from palpate.core.io.bake_reader import frame_index, read_bake
 from palpate.core.io.sensor_npz import load_sensor, save_sensor
 from palpate.core.jobs.job_runner import run_job
 from palpate.core.model.recording import SensorRecording
@@ -34,19 +31,9 @@ from palpate.core.model.sensor_parameters import Painted, SensorParameters
 
 def put(folder, name, texels, painted=None, digest="d"):
     """Write the folder of one sensor as a bake leaves it."""
-    place = folder / name.replace("/", "_")
-    place.mkdir(parents=True)
     recording = recording_of(texels)
-    recording.sensors = {name: recording.sensors["pad"]}
-    recording.digest = digest
-    recording.sensors[name].slip[:] = 0.01
-    save_recording(place / "recording.npz", recording)
-    save_sensor(place / "sensor.npz", texels, painted)
-    parameters = SensorParameters(unit="V", gain=2.0)
-    write_manifest(
-        place, Manifest(name, "0", 1, 10, 24.0, 1e-4, digest, "V", texels.layout.shape, asdict(parameters), (), True)
-    )
-    return recording
+    recording.sensors["pad"].slip[:] = 0.01
+    return write_sensor(folder, name, texels, painted, replace(recording, digest=digest), SensorParameters(unit="V", gain=2.0))
 
 
 @pytest.fixture
@@ -58,17 +45,15 @@ def bake(tmp_path):
 
 @pytest.mark.parametrize("name", ["recording.npz", "sensor.npz", "tactile_0001.exr"])
 @pytest.mark.parametrize("damage", ["changed", "missing"])
-def test_a_damaged_file_is_named(bake, tmp_path, name, damage):
-    folder = tmp_path / "bake" / "pad"
-    (folder / "tactile_0001.exr").write_bytes(b"image")
-    names = ("recording.npz", "sensor.npz", "tactile_0001.exr")
-    write_manifest(folder, replace(read_manifest(folder), files={each: file_sha256(folder / each) for each in names}))
-    check_images(read_bake(tmp_path / "bake"))
-    (folder / name).write_bytes((folder / name).read_bytes() + b"?")
+def test_a_damaged_file_is_named(tmp_path, name, damage):
+    write_bake(tmp_path, checksums=True)
+    read_bake(tmp_path)
+    path = tmp_path / "pad" / name
+    path.write_bytes(path.read_bytes() + b"?")
     if damage == "missing":
-        (folder / name).unlink()
+        path.unlink()
     with pytest.raises(FileError, match=f"pad/{name}' is {'damaged' if damage == 'changed' else 'missing'}"):
-        check_images(read_bake(tmp_path / "bake"))
+        read_bake(tmp_path)
 
 
 def test_a_sensor_may_be_called_old_and_a_copy_that_is_called_so_is_no_sensor(bake, tmp_path):

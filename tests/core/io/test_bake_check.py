@@ -3,37 +3,19 @@
 
 import json
 import shutil
-from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
-from recordings import grid_texels, recording_of, round_texels
 
+from palpate.attack.sample_bake import write_bake
 from palpate.core.errors import FileError
-from palpate.core.io.bake_folder import Manifest, write_manifest
 from palpate.core.io.bake_reader import read_bake
 from palpate.core.io.npz import write_arrays
-from palpate.core.io.recording_npz import save_recording
-from palpate.core.io.sensor_npz import save_sensor
-from palpate.core.model.sensor_parameters import Painted, SensorParameters
-
-
-def write_sensor(folder, name, texels, painted=None):
-    """Write the folder of one sensor as a bake leaves it."""
-    own = folder / name
-    own.mkdir(parents=True)
-    recording = recording_of(texels)
-    sensors = {name: recording.sensors["pad"]}
-    save_recording(own / "recording.npz", replace(recording, sensors=sensors, digest="d"))
-    save_sensor(own / "sensor.npz", texels, painted)
-    parameters = asdict(SensorParameters())
-    write_manifest(own, Manifest(name, "0", 1, 10, 24.0, 1e-4, "d", "N", texels.layout.shape, parameters, (), True))
 
 
 @pytest.fixture
 def bake(tmp_path):
-    write_sensor(tmp_path / "bake", "cap", round_texels())
-    write_sensor(tmp_path / "bake", "pad", grid_texels(), Painted(k=np.ones(15)))
+    write_bake(tmp_path / "bake")
     return tmp_path / "bake"
 
 

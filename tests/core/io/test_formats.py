@@ -26,7 +26,7 @@ from palpate.core.geometry.layout.texture_maps import uv_layout
 from palpate.core.geometry.mesh import TriangleMesh
 from palpate.core.geometry.texels import texels_from_region
 from palpate.core.io import exr_backend, exr_codec, exr_library, file_writing
-from palpate.core.io.bake_folder import Manifest, folder_names, frame_file, read_manifest, write_manifest
+from palpate.core.io.bake_folder import OWN_DIGEST, Manifest, folder_names, frame_file, read_manifest, write_manifest
 from palpate.core.io.file_writing import atomic_write, remove_leftovers, writable_folder
 from palpate.core.io.recording_npz import load_recording, save_recording
 from palpate.core.io.tactile_exr import CHANNELS, describe, exr_channels, read_exr, write_exr, write_exrs
@@ -257,9 +257,17 @@ def test_manifest_round_trip(tmp_path):
 def test_a_manifest_from_before_scene_files_were_named(tmp_path):
     path = write_manifest(tmp_path, manifest())
     content = json.loads(path.read_bytes())
-    del content["scene_file"]
+    del content["scene_file"], content[OWN_DIGEST]
     path.write_text(json.dumps({**content, "done": [[1, 40]]}), encoding="utf-8")
     assert read_manifest(tmp_path) == manifest(scene_file="")
+
+
+@pytest.mark.parametrize("change", [{"fps": 25.0}, {"unit": "N"}, {"parameters": {"k": 58.6}}, {"warnings": []}, {"new": 1}])
+def test_a_manifest_vouches_for_itself(tmp_path, change):
+    path = write_manifest(tmp_path, manifest())
+    path.write_text(json.dumps({**json.loads(path.read_bytes()), **change}), encoding="utf-8")
+    with pytest.raises(FileError, match="its content is not what was baked"):
+        read_manifest(tmp_path)
 
 
 @pytest.mark.parametrize("value", [float("nan"), float("inf"), object()])
@@ -276,6 +284,7 @@ def test_damaged_manifest(tmp_path):
     path = write_manifest(tmp_path, manifest())
     whole = path.read_bytes()
     good = json.loads(whole)
+    del good[OWN_DIGEST]
     broken = [b"", b"{", b"[]", b"null", b"\xff\xfe", whole[: len(whole) // 2], b"[" * 100_000]
     for key in good:
         if key not in (
@@ -285,6 +294,7 @@ def test_damaged_manifest(tmp_path):
             "bake_id",
             "scene_id",
             "scene_path",
+            "sensors",
             "files",
         ):  # which older ones lack
             broken.append(json.dumps({k: v for k, v in good.items() if k != key}).encode())

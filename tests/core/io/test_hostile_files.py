@@ -7,7 +7,7 @@ import json
 import os
 import tempfile
 import warnings
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from functools import cache
 from pathlib import Path
 
@@ -16,19 +16,19 @@ import pytest
 import tomli_w
 from hypothesis import HealthCheck, given, seed, settings
 from hypothesis import strategies as st
-from recordings import grid_texels, recording_of, round_texels
 
+from palpate.attack.sample_bake import grid_texels, recording_of, round_texels, write_sensor
 from palpate.core.errors import PalpateError
 from palpate.core.gap.calibration.friction import read_friction
 from palpate.core.gap.calibration.stiffness import read_foam
 from palpate.core.gap.dataset.rig import read_rig
 from palpate.core.io import exr_codec, exr_library, tactile_exr
-from palpate.core.io.bake_folder import Manifest, read_manifest, write_manifest
+from palpate.core.io.bake_folder import read_manifest
 from palpate.core.io.bake_reader import read_bake
 from palpate.core.io.csv_table import read_table
 from palpate.core.io.openrave import OpenRaveSensor, openrave_xml, read_openrave
-from palpate.core.io.recording_npz import load_recording, save_recording
-from palpate.core.io.sensor_npz import load_sensor, save_sensor
+from palpate.core.io.recording_npz import load_recording
+from palpate.core.io.sensor_npz import load_sensor
 from palpate.core.io.sensor_toml import FORMAT, read_sensor
 from palpate.core.model.sensor_parameters import Painted, SensorParameters
 
@@ -307,13 +307,8 @@ def bake_files(kind):
     texels = grid_texels() if kind == "grid" else round_texels()
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        recording = recording_of(texels, frames=4)
-        recording = replace(recording, sensors={"pad": recording.sensors["pad"]}, digest="d")
-        save_recording(folder / "recording.npz", recording)
-        save_sensor(folder / "sensor.npz", texels, Painted(k=np.ones(len(texels))))
-        parameters = asdict(SensorParameters())
-        write_manifest(folder, Manifest("pad", "0", 1, 4, 24.0, 1e-4, "d", "N", texels.layout.shape, parameters, (), True))
-        return {path.name: path.read_bytes() for path in folder.iterdir()}
+        write_sensor(folder, "pad", texels, Painted(k=np.ones(len(texels))))
+        return {path.name: path.read_bytes() for path in (folder / "pad").iterdir()}
 
 
 def assert_bake_is_clear(files):

@@ -1,0 +1,142 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Small sensors, made-up recordings of them, and bakes of these, from which tests and attacks on readers start."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, replace
+from pathlib import Path
+
+import numpy as np
+
+from palpate.core.geometry.mesh import TriangleMesh
+from palpate.core.geometry.texels import Texels, texels_from_region
+from palpate.core.io.bake_folder import (
+    MANIFEST_NAME,
+    OWN_DIGEST,
+    RECORDING_NAME,
+    Manifest,
+    folder_names,
+    frame_file,
+    write_manifest,
+)
+from palpate.core.io.file_writing import file_sha256
+from palpate.core.io.recording_npz import save_recording
+from palpate.core.io.sensor_npz import SENSOR_NAME, save_sensor
+from palpate.core.io.tactile_exr import write_exrs
+from palpate.core.model.recording import Recording, SensorRecording
+from palpate.core.model.sensor_parameters import Painted, SensorParameters
+
+ROWS, COLUMNS, PITCH = 5, 3, 0.004
+
+
+def grid_texels():
+    """A flat pad of 5 × 3 texels in z = 0."""
+    y, x = np.mgrid[0:ROWS, 0:COLUMNS]
+    vertices = np.stack([x.ravel() * PITCH, y.ravel() * PITCH, np.zeros(ROWS * COLUMNS)], axis=1)
+    quads = np.array(
+        [
+            [j * COLUMNS + i, j * COLUMNS + i + 1, (j + 1) * COLUMNS + i + 1, (j + 1) * COLUMNS + i]
+            for j in range(ROWS - 1)
+            for i in range(COLUMNS - 1)
+        ]
+    )
+    triangles = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
+    return texels_from_region(TriangleMesh(vertices, triangles, quads), np.ones(len(vertices), bool), "pad")
+
+
+def round_texels():
+    """A cap of a sphere, whose texels form no grid."""
+    angle = np.arange(12) * np.pi / 6
+    rim = np.stack([0.01 * np.cos(angle), 0.01 * np.sin(angle), np.zeros(12)], axis=1)
+    vertices = np.concatenate([[[0, 0, 0.004]], rim])
+    triangles = np.array([[0, 1 + i, 1 + (i + 1) % 12] for i in range(12)])
+    return texels_from_region(TriangleMesh(vertices, triangles), np.ones(13, bool), "cap")
+
+
+def recording_of(texels, frames=10):
+    """Forces that rise, slide along the rows, and vanish; nothing happens in the last three frames."""
+    n = len(texels)
+    load = np.clip(np.arange(frames) - 1, 0, None) * (np.arange(frames) < frames - 3)
+    normal = load[:, None] * np.linspace(0.01, 0.02, n)
+    shear = np.zeros((frames, n, 2))
+    shear[:, :, 1] = 0.2 * normal
+    zeros, vector = np.zeros((frames, n)), np.zeros((frames, 3))
+    sensor = SensorRecording(
+        normal, shear, np.linalg.norm(shear, axis=2), zeros, zeros, normal > 0, normal, vector, vector, vector
+    )
+    return Recording(
+        frames=np.arange(1, frames + 1),
+        times=np.arange(frames) / 24,
+        sensors={"pad": sensor},
+        body_names=("pad",),
+        poses=np.tile([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0], (frames, 1, 1)),
+        velocities=np.zeros((frames, 1, 6)),
+        dt=1e-4,
+    )
+
+
+def write_sensor(
+    bake: Path,
+    name: str,
+    texels: Texels,
+    painted: Painted | None = None,
+    recording: Recording | None = None,
+    parameters: SensorParameters | None = None,
+    sensors: tuple[str, ...] = (),
+    checksums: bool = False,
+) -> Recording:
+    """Write the folder of one sensor as a bake leaves it, with a made-up recording if none is given; return its recording.
+
+    Without `checksums` the manifest is as those of older versions, and readers depend on the content alone.
+    """
+    parameters = parameters or SensorParameters()
+    recording = recording or recording_of(texels, 7)
+    recording = replace(recording, sensors={name: recording.sensors["pad"]}, digest=recording.digest or "d")
+    own = bake / folder_names([name])[name]
+    own.mkdir(parents=True)
+    save_recording(own / RECORDING_NAME, recording)
+    save_sensor(own / SENSOR_NAME, texels, painted)
+    frames = [recording.at(int(number)) for number in recording.frames]
+    about = {"sensor": name, "digest": recording.digest, "unit": parameters.unit}
+    write_exrs(
+        [own / frame_file(frame.frame) for frame in frames],
+        texels.layout,
+        [frame.sensors[name] for frame in frames],
+        [{**about, "frame": str(frame.frame), "time": repr(frame.time)} for frame in frames],
+    )
+    manifest = Manifest(
+        sensor=name,
+        palpate="0",
+        frame_start=frames[0].frame,
+        frame_end=frames[-1].frame,
+        fps=24.0,
+        dt=recording.dt,
+        digest=recording.digest,
+        unit=parameters.unit,
+        shape=tuple(texels.layout.shape),
+        parameters=asdict(parameters),
+        complete=True,
+        body="pad",
+        sensors=sensors,
+    )
+    table = {path.name: file_sha256(path) for path in sorted(own.iterdir())} if checksums else {}
+    write_manifest(own, replace(manifest, files=table))
+    if not checksums:
+        _remove_own_digest(own)
+    return recording
+
+
+def write_bake(folder: Path, checksums: bool = False) -> None:
+    """Write a bake of two sensors, ``pad`` with rows and columns and ``cap`` without."""
+    names = ("cap", "pad") if checksums else ()
+    write_sensor(folder, "cap", round_texels(), sensors=names, checksums=checksums)
+    write_sensor(folder, "pad", grid_texels(), Painted(k=np.ones(ROWS * COLUMNS)), sensors=names, checksums=checksums)
+
+
+def _remove_own_digest(folder: Path) -> None:
+    """Make a manifest one of an older version, which did not vouch for itself."""
+    path = folder / MANIFEST_NAME
+    content = json.loads(path.read_text(encoding="utf-8"))
+    del content[OWN_DIGEST]
+    path.write_text(json.dumps(content), encoding="utf-8")

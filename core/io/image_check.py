@@ -1,0 +1,58 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Checks of the tactile images of a bake: each frame has its image, and the image shows what the recording says.
+
+An image that the manifest vouches for with its SHA-256 is what was baked. Any other, as in older bakes, is read and compared
+with the recording.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..errors import FileError
+from ..model.recording import SensorFrame
+from .bake_check import SensorFiles
+from .bake_folder import frame_file
+from .tactile_exr import CHANNELS, exr_channels, read_exr
+
+ROUNDING = 1e-5
+"""Share of an image's largest value by which a pixel may differ from the recording, which another order of sums explains."""
+
+
+def check_images(files: SensorFiles) -> None:
+    """Check the tactile images of one sensor, whose other files have been checked.
+
+    Raises
+    ------
+    FileError
+        An image is missing or damaged, or shows something else than the recording; the message names it.
+    """
+    recording, name = files.recording, files.manifest.sensor
+    for number in recording.frames:
+        file = frame_file(int(number))
+        if file in files.manifest.files:
+            files.manifest.check_file(files.folder, file)
+        else:
+            fault = _fault(files, int(number), recording.at(int(number)).sensors[name])
+            if fault:
+                raise FileError(f"'{files.folder / file}' does not belong to its bake ({fault}): bake again.")
+
+
+def _fault(files: SensorFiles, number: int, frame: SensorFrame) -> str:
+    """Return what is wrong with the image of a frame; empty if nothing is."""
+    found, about = read_exr(files.folder / frame_file(number))
+    manifest = files.manifest
+    said = {"sensor": manifest.sensor, "frame": str(number), "digest": manifest.digest, "unit": manifest.unit}
+    for key, value in said.items():
+        if about.get(key, value) != value:
+            return f"its {key} is {about[key]!r:.60} and not {value!r:.60}"
+    expected = exr_channels(files.texels.layout, frame)
+    for channel in CHANNELS:
+        if channel not in found:
+            return f"it has no channel {channel}"
+        if found[channel].shape != manifest.shape:
+            return f"it has {' × '.join(map(str, found[channel].shape))} pixels"
+        difference = np.abs(found[channel] - expected[channel])
+        if channel != "contact" and not (difference <= ROUNDING * np.abs(expected[channel]).max(initial=0.0)).all():
+            return f"its channel {channel} differs from the recording"
+    return ""
