@@ -72,7 +72,9 @@ class PALPATE_OT_gap_add(support.ErrorReporting, bpy.types.Operator):
 
     def run(self, context):
         count = gap_results.add_found(context.object)
-        self.report({"INFO"}, f"'{context.object.name}' has the fitted parameters and {count} effects")
+        caution = gap_results.of(context.object).caution
+        said = f"'{context.object.name}' has the fitted parameters and {count} effects"
+        self.report({"WARNING"} if caution else {"INFO"}, f"{said}. {caution}" if caution else said)
 
 
 class PALPATE_OT_gap_curves(support.ErrorReporting, bpy.types.Operator):

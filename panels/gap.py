@@ -26,6 +26,8 @@ class Measured(Subpanel):
             draw_sentences(box, line, "DOT", context)
         if result.experiment:
             draw_sentences(box, result.experiment, "QUESTION", context)
+        if result.lines and result.caution:
+            draw_sentences(box, result.caution, "ERROR", context)
         if result.lines:
             layout.operator("palpate.gap_add", icon="ADD")
         layout.operator("palpate.gap_curves", icon="FCURVE")

@@ -42,6 +42,7 @@ class Result:
     headline: str
     lines: list[str]
     experiment: str
+    caution: str
     pictures: dict[str, Path]
 
 
@@ -93,7 +94,8 @@ def find(obj):
         save_figure(picture(name, diagnosis, errors), pictures[name], 150)
     identity.ensure_uid(obj)
     headline, evidence = sentences.headline(diagnosis, errors), sentences.evidence(diagnosis, errors)
-    result = Result(diagnosis, errors, headline, evidence, next_experiment(diagnosis), pictures)
+    advice, caution = next_experiment(diagnosis), sentences.caution(diagnosis)
+    result = Result(diagnosis, errors, headline, evidence, advice, caution, pictures)
     _results[identity.key(obj)] = result
     return result
 

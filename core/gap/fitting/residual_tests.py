@@ -16,6 +16,9 @@ import numpy as np
 from ..forward.contact_phases import features, relative_load
 from ..forward.predictor import Predictor
 
+LEAST_STRUCTURE = 0.03
+"""Share of a residual that can be predicted, below which the residual is noise."""
+
 
 @dataclass(frozen=True)
 class ResidualStructure:

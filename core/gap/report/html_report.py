@@ -93,13 +93,13 @@ def _gap_table(found: dict[str, Any]) -> Table:
         before, after = gap["before"][use], gap["after"][use]
         if before is None:
             continue
-        left = [max(value**2 - floor**2, 0.0) ** 0.5 for value in (before, after)]
-        closed = f"{1.0 - left[1] / left[0]:.0%}" if left[0] > CLOSED_FROM * floor else "–"
+        left = [max(value**2 - floor**2, 0.0) for value in (before, after)]
+        closed = f"{1.0 - left[1] / left[0]:.0%}" if left[0] > (CLOSED_FROM * floor) ** 2 else "–"
         row = [words, f"{before:.3%}", f"{after:.3%}" if found["found"] else "–", f"{floor:.3%}"]
         rows.append([*row, closed if found["found"] else "–"])
         if frictionless is not None:
             rows[-1].insert(1, f"{frictionless[use]:.3%}")
-    head = ["NRMSE, share of the range", "base", "amended", "noise floor", "gap closed, noise removed"]
+    head = ["NRMSE, share of the range", "base", "amended", "noise floor", "squared gap closed, noise removed"]
     if frictionless is not None:
         head.insert(1, "base without its friction")
     return Table(head, rows, set(range(1, len(head))))

@@ -4,13 +4,19 @@
 from __future__ import annotations
 
 from ..fitting.intervals import ParameterInterval
+from ..fitting.residual_tests import LEAST_STRUCTURE
 from ..forward.contact_phases import FEATURES
-from ..selection.findings import Diagnosis
+from ..selection.check_recordings import CHECK_CLOSED
+from ..selection.findings import Diagnosis, Finding
+from ..selection.gap_sizes import FORCES, READINGS
 from .comparison import GapErrors
 from .experiments import LOUD_NOISE
+from .recording_differences import recording_differences
 
 SURE = 0.5
 """Confidence from which on an effect counts as found."""
+MANY_FLOORS = 3.0
+"""The headline says how much stays in the check recordings from this many times the noise floor on."""
 FRICTION_MATTERS = 1.5
 """The headline mentions the base model's friction if without it the error would be at least this many times as large."""
 
@@ -18,35 +24,100 @@ FRICTION_MATTERS = 1.5
 def headline(result: Diagnosis, errors: GapErrors) -> str:
     """Return the result in one sentence."""
     before, after = errors.base["fit"] or 0.0, errors.amended["fit"] or 0.0
-    sure = [one for one in result.findings if one.confidence >= SURE]
+    findings = by_share_closed(result)
+    sure = [one for one in findings if one.confidence >= SURE]
     if result.verdict == "no gap":
         return f"No gap: the base model with its own parameters refitted leaves {before:.2%} of the range, which is noise."
     if result.verdict == "unexplained":
-        return _unexplained(result, errors, [one.name for one in sure])
+        return _unexplained(result, errors, sure)
     shrink = f"the error shrinks from {before:.2%} to {after:.2%} of the range"
-    if result.ambiguous and not sure:
-        choices = "; ".join(" or ".join(names) for names in result.ambiguous)
-        return f"Not told apart by these recordings: {choices} ({shrink})."
+    stays = _what_stays(result, errors)
     with_rivals = {names[0]: " or ".join(names) for names in result.ambiguous}
-    unsure = _listed([with_rivals.get(one.name, one.name) for one in result.findings if one not in sure])
+    if not sure and findings and all(one.name in with_rivals for one in findings):
+        choices = "; ".join(with_rivals[one.name] for one in findings)
+        return f"Not told apart by these recordings: {choices} ({shrink}).{stays}"
+    unsure = _listed([with_rivals.get(one.name, one.name) for one in findings if one not in sure])
+    open_names = " (not told apart)" if with_rivals else ""
     if not sure:
-        return f"Perhaps missing: {unsure}; {shrink}."
-    besides = ""
-    if len(sure) < len(result.findings):
-        besides = f", and perhaps {unsure}{' (not told apart)' if with_rivals else ''}"
-    return f"Missing: {_listed([one.name for one in sure])}{besides}; {shrink}."
+        return f"Perhaps missing: {unsure}{open_names}; {shrink}.{stays}"
+    besides = f", and perhaps {unsure}{open_names}" if len(sure) < len(findings) else ""
+    return f"Missing: {_listed([one.name for one in sure])}{besides}; {shrink}.{stays}"
 
 
-def _unexplained(result: Diagnosis, errors: GapErrors, sure: list[str]) -> str:
+def by_share_closed(result: Diagnosis) -> list[Finding]:
+    """Return the findings, the one that closes most of the gap first."""
+    return sorted(result.findings, key=lambda one: -one.closes)
+
+
+def _what_stays(result: Diagnosis, errors: GapErrors) -> str:
+    """A sentence on the error of the check recordings if it is many times the noise; empty otherwise."""
+    left = errors.amended["check"]
+    if left is None or left < MANY_FLOORS * errors.noise_floor or any(one.name == "noise" for one in result.findings):
+        return ""
+    return f" In the check recordings {left:.2%} of the range stays, {left / errors.noise_floor:.0f} times the noise."
+
+
+def check_failure(result: Diagnosis) -> str:
+    """Return in a sentence why the check recordings do not bear the amended model out; empty if they do."""
+    worst = result.check.worst
+    if worst is None or all(one.name == "noise" for one in result.findings):
+        return ""
+    quantity = next(q for q in (READINGS, FORCES) if result.check.refutes(q) and worst.count[q])
+    before, after = ((float(x[quantity]) ** 0.5) * _noise_share(result, quantity) for x in (worst.before, worst.after))
+    what = "" if quantity == READINGS else " of the net force"
+    if worst.is_worse(quantity):
+        said = f"in the check recording '{worst.name}' the error{what} rises from {before:.2%} to {after:.2%} of the range"
+    else:
+        share = max(result.check.closed[quantity] or 0.0, 0.0)
+        said = (
+            f"in the check recordings only {share:.0%} of the squared gap{what} closes (at least {CHECK_CLOSED:.0%} is asked), "
+            f"in '{worst.name}' from {before:.2%} to {after:.2%} of the range"
+        )
+    return f"{said}; {'; '.join(recording_differences(result, worst.name))}"
+
+
+def _noise_share(result: Diagnosis, quantity: int) -> float:
+    """Deviation of the noise as a share of the range."""
+    return result.noise[quantity].deviation / result.full[quantity]
+
+
+def caution(result: Diagnosis) -> str:
+    """Return what to know before the amended sensor is used; empty if nothing speaks against it."""
+    failure = check_failure(result)
+    if failure:
+        return f"The check recordings do not bear the amended sensor out: {failure}."
+    if result.verdict == "unexplained" and result.findings:
+        return "The amended sensor explains only a part of the gap."
+    return ""
+
+
+def _unexplained(result: Diagnosis, errors: GapErrors, sure: list[Finding]) -> str:
     """The headline of a gap that is not explained."""
-    part = f" {_listed(sure)} is part of it." if sure else ""
+    names = [one.name for one in sure]
+    part = f" {_listed(names)} {'is' if len(names) == 1 else 'are'} part of it." if names else ""
+    failure = check_failure(result)
+    if failure and result.findings:
+        fitted = _listed([one.name for one in by_share_closed(result)])
+        many = len(result.findings) > 1
+        return f"Unexplained: {fitted} {'fit' if many else 'fits'} the fitted recordings, but {failure}.{part}"
+    is_quiet = result.structure.total < LEAST_STRUCTURE and result.line is None
+    if result.unlike_fitted and not result.findings and is_quiet:
+        apart = max(result.unlike_fitted, key=lambda one: float(one.before.max())).name
+        left, other = errors.base["fit"] or 0.0, errors.base["check"] or 0.0
+        return (
+            f"Unexplained: the base model fits the fitted recordings ({left:.2%} of the range) and not the check recording "
+            f"'{apart}' (all of them: {other:.2%}); {'; '.join(recording_differences(result, apart))}."
+        )
     if result.line is not None:
         line, unit = result.line, result.rig.parameters.unit
         said = f"a line at {line.frequency:.3g} Hz of {line.amplitude:.3g} {unit}, there without load too"
         return f"Unexplained: {said}, is {line.share:.0%} of the noise without load.{part}"
-    strongest = FEATURES.get(result.structure.strongest, "nothing that was looked at")
-    after = errors.amended["fit"] or 0.0
-    return f"Unexplained: what is left ({after:.2%} of the range) varies most with {strongest}.{part}{_friction(errors)}"
+    after, structure = errors.amended["fit"] or 0.0, result.structure
+    if structure.shares.get(structure.strongest, 0.0) < LEAST_STRUCTURE:
+        said = f"nothing that was looked at predicts what is left ({after:.2%} of the range)"
+    else:
+        said = f"what is left ({after:.2%} of the range) varies most with {FEATURES[structure.strongest]}"
+    return f"Unexplained: {said}.{part}{_friction(errors)}"
 
 
 def _friction(errors: GapErrors) -> str:
@@ -61,19 +132,25 @@ def evidence(result: Diagnosis, errors: GapErrors) -> list[str]:
     """Return a sentence for each effect that was found, and one for the trials that were never fitted."""
     left = [error or 0.0 for error in errors.stages]
     said = []
-    for one in result.findings:
+    for one in by_share_closed(result):
         rivals = f"; it could as well be {' or '.join(one.rivals)}" if one.rivals else ""
         before, after = left[one.effect], left[min(one.effect + 1, len(left) - 1)]
         said.append(f"{one.name} ({one.form}): {before:.2%} → {after:.2%}, confidence {one.confidence:.0%}{rivals}")
+        said += [f"{one.name}: {why}, so its name is not sure" for why in one.unsettled]
     if result.of("check") and result.findings:
         before, after = errors.base["check"] or 0.0, errors.amended["check"] or 0.0
         said.append(f"never fitted: {before:.2%} → {after:.2%}; noise alone is {errors.noise_floor:.2%}")
+    least = [share for share in map(result.closed.least, (READINGS, FORCES)) if share is not None]
+    if least and result.findings:
+        said.append(
+            f"of the squared gap {max(min(least), 0.0):.0%} closes (the least of fitted, left-out and check recordings)"
+        )
     return said
 
 
 def warnings(result: Diagnosis) -> list[str]:
     """Return what a reader should know about the recordings, without the rig's own warnings."""
-    said = []
+    said = [text for text in (caution(result),) if text]
     overpressed = max((p.stimulus.overpressed for p in result.predictors), default=0)
     if overpressed:
         said.append(

@@ -11,12 +11,15 @@ from ...io.file_writing import atomic_write
 from ...io.sensor_toml import write_sensor
 from ...jobs.progress import Job, Progress
 from ..forward.predictor import Model
+from ..selection.check_recordings import CheckedRecording
 from ..selection.findings import Diagnosis, Finding
+from ..selection.gap_sizes import FORCES, READINGS
 from .amended_sensor import amended_sensor, with_mean_gain_moved
 from .comparison import GapErrors, error_location, gap_errors
 from .experiments import next_experiment
 from .html_report import html_report
 from .plots import draw
+from .recording_differences import recording_differences
 from .sentences import headline, warnings
 
 FORMAT = "palpate-gap/1"
@@ -37,7 +40,8 @@ def summary(result: Diagnosis, errors: GapErrors) -> dict[str, Any]:
             "without_effects": {item.name: getattr(result.base.model.parameters, item.name) for item in result.base.free},
             "gap_without_friction": errors.frictionless,
         },
-        "gap": {"before": errors.base, "after": errors.amended, "noise_floor": errors.noise_floor},
+        "gap": {"before": errors.base, "after": errors.amended, "noise_floor": errors.noise_floor, "closed": _closed(result)},
+        "check": [_checked(one, result) for one in result.check.recordings],
         "where": error_location(result, result.base.model),
         "varies_with": {key: round(value, 4) for key, value in result.base_structure.shares.items()},
         "left_varies_with": {key: round(value, 4) for key, value in result.structure.shares.items()},
@@ -46,6 +50,28 @@ def summary(result: Diagnosis, errors: GapErrors) -> dict[str, Any]:
         "next_experiment": next_experiment(result),
         "warnings": list(result.rig.warnings) + warnings(result),
     }
+
+
+def _closed(result: Diagnosis) -> dict[str, Any] | None:
+    """Shares of the squared gap that are closed, of readings or else of forces; None without a gap or an effect."""
+    quantity = next((q for q in (READINGS, FORCES) if result.closed.least(q) is not None), None)
+    if quantity is None or not result.findings:
+        return None
+    parts = {"fit": result.closed.fitted, "left_out": result.closed.left_out, "check": result.closed.check}
+    shares = {name: None if part[quantity] is None else round(float(part[quantity] or 0.0), 4) for name, part in parts.items()}
+    return shares | {"least": min(share for share in shares.values() if share is not None)}
+
+
+def _checked(one: CheckedRecording, result: Diagnosis) -> dict[str, Any]:
+    """One entry under ``check`` in gap.json: errors of one check recording, and what differs if it speaks against the model."""
+    errors = {}
+    for quantity, name in ((READINGS, "readings"), (FORCES, "forces")):
+        if one.count[quantity]:
+            share = result.noise[quantity].deviation / result.full[quantity]
+            errors[name] = [float(x[quantity]) ** 0.5 * share for x in (one.before, one.after)]
+    against = one.is_worse(READINGS) or one.is_worse(FORCES) or one is result.check.worst
+    differs = recording_differences(result, one.name) if against and result.findings else []
+    return {"trial": one.name, "errors": errors, "worse": one.is_worse(READINGS) or one.is_worse(FORCES), "differs": differs}
 
 
 def _found(one: Finding, model: Model, result: Diagnosis, errors: GapErrors) -> dict[str, Any]:
@@ -58,6 +84,8 @@ def _found(one: Finding, model: Model, result: Diagnosis, errors: GapErrors) -> 
         "parameters": {key: list(value) if isinstance(value, tuple) else value for key, value in effect.values.items()},
         "intervals": {interval.name: [interval.low, interval.high] for interval in intervals},
         "confidence": one.confidence,
+        "closes": one.closes,
+        "unsettled": list(one.unsettled),
         "gap_before": errors.stages[one.effect],
         "gap_after": errors.stages[min(one.effect + 1, len(errors.stages) - 1)],
         "next_best": {"effect": one.next_best, "leaves": round(one.leaves, 3)} if one.next_best else None,

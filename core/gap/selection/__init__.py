@@ -5,4 +5,4 @@
 has seen. ``findings`` holds the result.
 """
 
-__all__ = ["diagnosis", "findings", "identifiability"]
+__all__ = ["check_recordings", "diagnosis", "findings", "gap_sizes", "identifiability"]

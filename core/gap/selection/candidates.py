@@ -8,11 +8,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...effects.engine.registry import library
+from ...effects.engine.registry import form_of, library
 from ...effects.engine.specification import Form, Kind, TransducerArray
 from ...model.effect import Effect
 from ...model.parameter import Parameter
-from ..fitting.least_squares import Fit, FreeParameter
+from ..fitting.least_squares import Fit, FreeParameter, value_of
 from ..fitting.noise_floor import coverage
 from ..forward.predictor import Model, Predictor
 from .identifiability import unidentifiable
@@ -37,6 +37,8 @@ SIGNED_SHARE = 0.25
 """Bounds of a parameter that may have either sign, as a share of the upper bound of its magnitude."""
 LOG_RATIO = 30.0
 """A range is searched on a logarithmic scale if its ends differ by more than this ratio."""
+AT_BOUND = 0.01
+"""A parameter is at a bound if it differs from it by less than this share of the bound."""
 START_COUNT = 8
 """Number of starting points of a candidate."""
 COUPLING_PITCH, COUPLING_LOAD = 0.003, 0.05
@@ -222,6 +224,30 @@ class FittedCandidate:
         n = len(self.fit.model.effects)
         values = self.fit.model.effects[n - 1].values
         return sum(len(v) if isinstance(v, tuple) else 1 for v in values.values())
+
+
+def parameters_at_bounds(model: Model, free: Sequence[FreeParameter], index: int) -> dict[str, float]:
+    """Return the fitted parameters of an effect that are at a bound, with the bound.
+
+    The bound at which a part of the formula does nothing does not count: a simpler formula does as well.
+
+    Parameters
+    ----------
+    model : Model
+    free : sequence of FreeParameter
+    index : int
+        Of the effect in the model's stack.
+    """
+    effect = model.effects[index]
+    neutral = form_of(effect.name, effect.form).neutral
+    found = {}
+    for item in free:
+        if item.effect == index and not item.per_texel:
+            value = float(value_of(model, item))
+            for end in (item.low, item.high):
+                if end != float(neutral.get(item.name, 0.0)) and abs(value - end) <= AT_BOUND * abs(end):
+                    found[item.name] = end
+    return found
 
 
 def candidates(predictors: Sequence[Predictor], model: Model) -> list[Candidate]:

@@ -15,10 +15,11 @@ import numpy as np
 from ...effects.engine.registry import form_of
 from ...model.effect import Effect
 from ..fitting.least_squares import Fit
-from .candidates import DIRECTLY_ESTIMATED, is_spatial
+from .candidates import DIRECTLY_ESTIMATED, is_spatial, parameters_at_bounds
 from .direct_estimates import coarsest_step
 from .findings import Diagnosis
-from .forward_selection import FORCES, READINGS, GapSizes, SelectionState, friction_kinds
+from .forward_selection import SelectionState
+from .gap_sizes import FORCES, READINGS, GapSizes, friction_kinds
 from .identifiability import (
     LEAST_UNLOADED_SHARE,
     MOVING_BY_THEMSELVES,
@@ -43,6 +44,9 @@ UNSURE_CONFIDENCE = 0.45
 SAME_PATTERN = 0.8
 """Correlation over the texels from which on two effects with parameters of single texels count as one. An offset that fades
 under load, for example, takes off everywhere what it has put on."""
+MOST_OF_THE_GAP = 0.5
+"""An effect that closes at least this share of the gap keeps its confidence beside ambiguous ones that each close less than
+`SMALL_SHARE`."""
 DEAD_TEXEL_SHARE = 0.5
 """Share of an effect's variance over the texels that is on dead texels, from which on it only describes these."""
 
@@ -96,6 +100,32 @@ def may_absorb_misfit(effect: Effect, state: SelectionState) -> bool:
     )
 
 
+def unsettled_parameters(effect: Effect, index: int, result: Diagnosis) -> tuple[str, ...]:
+    """Return in words which parameters of an effect are at a bound, and which the recordings leave open altogether.
+
+    An effect is left open only if all of its parameters are: two that act as their product alone have wide intervals, and the
+    product has not.
+
+    Parameters
+    ----------
+    effect : Effect
+    index : int
+        Of the effect in the amended model.
+    result : Diagnosis
+        With intervals.
+    """
+    form, unit = form_of(effect.name, effect.form), result.rig.parameters.unit
+    units = {parameter.name: parameter.unit_of(unit) for parameter in form.parameters}
+    at = parameters_at_bounds(result.best.model, result.best.free, index)
+    said = [f"{name} is at its bound of {end:.3g} {units[name]}".removesuffix(" 1") for name, end in at.items()]
+    bounds = {item.name: (item.low, item.high) for item in result.best.free if item.effect == index}
+    own = [one for one in result.intervals if one.effect == index and one.name in bounds]
+    open_names = [one.name for one in own if one.low <= bounds[one.name][0] and one.high >= bounds[one.name][1]]
+    if own and len(open_names) == len(own):
+        said.append(f"these recordings leave {' and '.join(open_names)} open")
+    return tuple(said)
+
+
 def _larger_effect_of_same_kind(effect: Effect, state: SelectionState, fitted: Sequence[Effect], gap_sizes: GapSizes) -> bool:
     """Whether a similar effect closes more already, so that this one may be the misfit of its formula.
 
@@ -127,6 +157,7 @@ def unsure_names(result: Diagnosis, view_set: ViewSet, state: SelectionState, ga
 
     - Effects that close little of the gap, if the recordings leave rivals.
     - All effects, if the recordings cannot distinguish some effect from another; any measured curve could belong to either.
+      Only an effect that closes most of the gap stays sure beside ambiguous ones that close little.
     - Drift and creep, if one of them has a rival and the recordings contain no rest.
     - Effects that change the readings by less than a quantization step.
     - Effects on friction, if the normal force is off by more than they close: friction is proportional to it.
@@ -135,8 +166,10 @@ def unsure_names(result: Diagnosis, view_set: ViewSet, state: SelectionState, ga
     unsure = small if result.ambiguous else set()
     names = {one.name for one in result.findings}
     curvature = curvature_ratio(result.of("fit"), result.best.model)
-    if any(indistinguishable(result.coverage, name, curvature) for name in names):
-        unsure |= names - set(DIRECTLY_ESTIMATED)
+    ambiguous = {name for name in names if indistinguishable(result.coverage, name, curvature)}
+    if ambiguous:
+        main = {name for name in names - ambiguous if _closes_most(name, ambiguous, state)}
+        unsure |= names - set(DIRECTLY_ESTIMATED) - main
     if result.coverage.unloaded_share < LEAST_UNLOADED_SHARE and {name for pair in result.ambiguous for name in pair} & set(
         MOVING_BY_THEMSELVES
     ):
@@ -153,6 +186,12 @@ def unsure_names(result: Diagnosis, view_set: ViewSet, state: SelectionState, ga
         if closed < _normal_squares(view_set, state.fit, float(gap_sizes.noise[FORCES])):
             unsure.add(name)
     return unsure
+
+
+def _closes_most(name: str, others: set[str], state: SelectionState) -> bool:
+    """Whether an effect closes most of the gap, and each of some others little of it."""
+    shares = {key: improvement.of_gap for key, improvement in state.improvements.items()}
+    return shares.get(name, 0.0) >= MOST_OF_THE_GAP and all(shares.get(other, 1.0) < SMALL_SHARE for other in others)
 
 
 def _normal_squares(view_set: ViewSet, found: Fit, noise: float) -> float:

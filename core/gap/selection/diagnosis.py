@@ -18,21 +18,16 @@ from ..fitting.heteroscedastic_noise import proportional_noise
 from ..fitting.intervals import parameter_intervals
 from ..fitting.least_squares import Fit, fit, free_base_parameters, held_out_squares
 from ..fitting.noise_floor import SHORTEST_STRETCH, coverage
-from ..fitting.residual_tests import ResidualStructure, residual_structure
+from ..fitting.residual_tests import LEAST_STRUCTURE, ResidualStructure, residual_structure
 from ..fitting.spectral_lines import strongest_line
 from ..forward.predictor import Model
 from .base_model import base_parameters_to_search, identified_base_parameters, prepared, start_model
 from .candidates import scales_of
+from .check_recordings import check_views, checked
 from .findings import Diagnosis
-from .forward_selection import (
-    FORCES,
-    LEAST_STRUCTURE,
-    READINGS,
-    ForwardSelection,
-    GapSizes,
-    SelectionState,
-    friction_kinds,
-)
+from .forward_selection import ForwardSelection, SelectionState
+from .gap_sizes import FORCES, READINGS, GapSizes, friction_kinds
+from .harmful_effects import without_harmful_effects
 from .verdict import conclude
 from .view_set import ViewSet, view_set_of
 
@@ -69,7 +64,6 @@ def diagnose(rig: Rig) -> Job[Diagnosis]:
     for what, share in _select_effects(result, view_set):
         yield Progress(what, SELECTION_BEGINS + int((TOTAL_WORK - SELECTION_BEGINS) * share), TOTAL_WORK)
     result.stages = _stages(result, view_set)
-    result.intervals = parameter_intervals(result.best)
     return result
 
 
@@ -81,6 +75,9 @@ def _select_effects(result: Diagnosis, view_set: ViewSet) -> Iterator[tuple[str,
     gap_sizes = GapSizes(start, noise, result.base.count.sum(axis=0).astype(float))
     selection = ForwardSelection(view_set, result.scales, result.coverage, gap_sizes)
     state = yield from selection.run(base, partial(_structure, view_set))
+    deviations = result.noise[READINGS].deviation, result.noise[FORCES].deviation
+    check = check_views(result.predictors, deviations)
+    state = without_harmful_effects(view_set.whole, check, state, gap_sizes)
     state = replace(state, fit=_with_base_refitted(result, view_set, state.fit))
     result.best, result.structure = state.fit, _structure(view_set, state.fit)
     result.line = strongest_line(view_set.whole, state.fit.model)
@@ -92,6 +89,9 @@ def _select_effects(result: Diagnosis, view_set: ViewSet) -> Iterator[tuple[str,
         if noise_effect is not None:  # then the whole residual is noise
             result.best = replace(state.fit, model=state.fit.model.with_effect(noise_effect))
             gap_sizes.noise[main] = max(gap_sizes.noise[main], mean)
+    result.intervals = parameter_intervals(result.best)
+    memory = result.noise[READINGS].correlation_time, result.noise[FORCES].correlation_time
+    result.check = checked(check, result.base.model, result.best.model, gap_sizes, memory)
     conclude(result, view_set, state, gap_sizes)
 
 

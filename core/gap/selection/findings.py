@@ -15,6 +15,7 @@ from ..fitting.residual_tests import ResidualStructure
 from ..fitting.spectral_lines import SpectralLine
 from ..forward.predictor import Model, Predictor
 from .candidates import Scales
+from .check_recordings import CheckedRecording, CheckOutcome
 
 
 @dataclass(frozen=True)
@@ -35,6 +36,10 @@ class Finding:
         The other kind that came nearest to this one; empty if none was fitted.
     leaves : float
         How many times as much of the gap `next_best` leaves.
+    closes : float
+        Share of the whole gap that it closed when it joined.
+    unsettled : tuple of str
+        What is wrong with its parameters, in words: those at a bound, and those that the recordings leave open.
     """
 
     effect: int
@@ -44,6 +49,29 @@ class Finding:
     rivals: tuple[str, ...]
     next_best: str = ""
     leaves: float = np.inf
+    closes: float = 0.0
+    unsettled: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class ClosedShares:
+    """Shares of a gap (of mean squares, noise removed) that the amended model closes, each for readings and for net forces.
+
+    Attributes
+    ----------
+    fitted, left_out, check : (float or None, float or None)
+        In the fitted recordings; in their parts when these are left out of the fit; in the check recordings; None without a
+        gap.
+    """
+
+    fitted: tuple[float | None, float | None] = (None, None)
+    left_out: tuple[float | None, float | None] = (None, None)
+    check: tuple[float | None, float | None] = (None, None)
+
+    def least(self, quantity: int) -> float | None:
+        """Return the smallest of the three, for readings or forces; None without a gap."""
+        known = [share for share in (self.fitted[quantity], self.left_out[quantity], self.check[quantity]) if share is not None]
+        return min(known) if known else None
 
 
 @dataclass
@@ -82,6 +110,12 @@ class Diagnosis:
         Kinds that were not found, each with the reason.
     line : SpectralLine or None
         A periodic disturbance of the readings without load.
+    check : CheckOutcome
+        What the check recordings say of the amended model, or of the base model if there are no effects.
+    closed : ClosedShares
+        How much of the gaps the amended model closes.
+    unlike_fitted : list of CheckedRecording
+        Check recordings that the base model fits far worse than the fitted ones.
     """
 
     rig: Rig
@@ -101,6 +135,9 @@ class Diagnosis:
     ambiguous: list[tuple[str, ...]] = field(default_factory=list)
     ruled_out: list[tuple[str, str]] = field(default_factory=list)
     line: SpectralLine | None = None
+    check: CheckOutcome = field(default_factory=CheckOutcome)
+    closed: ClosedShares = field(default_factory=ClosedShares)
+    unlike_fitted: list[CheckedRecording] = field(default_factory=list)
 
     def of(self, use: str) -> list[Predictor]:
         """Return the predictors of the trials of one use, "fit" or "check"."""

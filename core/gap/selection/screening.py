@@ -105,7 +105,7 @@ class ScreenedCandidate:
 
 
 def screen(
-    view_set: ViewSet, found: Fit, forms: Sequence[Candidate], scales: Scales
+    view_set: ViewSet, found: Fit, forms: Sequence[Candidate], scales: Scales, reasons: dict[str, str] | None = None
 ) -> Iterator[tuple[str, float, list[FittedCandidate]]]:
     """Look for one more effect on top of a fit.
 
@@ -115,6 +115,8 @@ def screen(
     found : Fit
     forms : sequence of Candidate
     scales : Scales
+    reasons : dict of str to str, optional
+        Gets the reason for each kind of which no form is fitted to everything.
 
     Yields
     ------
@@ -140,6 +142,8 @@ def screen(
     small = sum(int(view.counts.sum()) for view in view_set.whole) < SMALL_RECORDING
     effort = THOROUGH if small else QUICK
     kept = _worth_a_fit(promises, effort)
+    if reasons is not None:
+        reasons |= _reasons_without_fit(forms, promises, kept)
     if not kept:
         yield "nothing promises anything", 1.0, []
         return
@@ -150,6 +154,8 @@ def screen(
         screened.append(min(tries, key=lambda tried: tried.left))
         yield "fitting those that promise most", 0.35 + 0.35 * (number + 1) / len(kept), []
     last, whole = _finalists(screened, effort), ScoreTest(view_set.whole, found)
+    if reasons is not None:
+        reasons |= _reasons_after_first_fits(screened, last)
     results: list[FittedCandidate] = []
     for number, finalist in enumerate(last):
         results.append(_final_fit(finalist, view_set.whole, found, whole, scales, effort))
@@ -169,6 +175,36 @@ def _worth_a_fit(promises: list[Promise], effort: Effort) -> list[Promise]:
         if one.share > LEAST_PROMISE[group] * promises[0].share and len(kept) < most:
             kept.append(one)
     return kept
+
+
+def _reasons_without_fit(forms: Sequence[Candidate], promises: list[Promise], kept: list[Promise]) -> dict[str, str]:
+    """For each kind of which no form is fitted, what it promised and what the most promising kind did."""
+    best: dict[str, float] = {}
+    for one in promises:
+        best[one.candidate.name] = max(best.get(one.candidate.name, 0.0), one.share)
+    first = max(best, key=lambda name: best[name], default="")
+    fitted = {one.candidate.name for one in kept}
+    return {
+        name: f"a first look promised that it would close {best[name]:.1%} of the squares, and {best[first]:.1%} for {first}"
+        if name in best
+        else "a first look found nothing that it would close"
+        for name in dict.fromkeys(form.name for form in forms)
+        if name not in fitted
+    }
+
+
+def _reasons_after_first_fits(screened: list[ScreenedCandidate], last: list[ScreenedCandidate]) -> dict[str, str]:
+    """For each kind that was fitted to a part of the recordings only, what it left there and what the best kind did."""
+    best: dict[str, float] = {}
+    for one in screened:
+        best[one.candidate.name] = min(best.get(one.candidate.name, np.inf), one.left)
+    first = min(best, key=lambda name: best[name])
+    finalists = {one.candidate.name for one in last}
+    return {
+        name: f"fitted to a part of the recordings it leaves {left:.0%} of the gap there, and {first} {best[first]:.0%}"
+        for name, left in best.items()
+        if name not in finalists
+    }
 
 
 def _first_fit(candidate: Candidate, start: Effect, score_test: ScoreTest, scales: Scales, effort: Effort) -> ScreenedCandidate:

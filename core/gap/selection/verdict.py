@@ -9,19 +9,21 @@ import numpy as np
 
 from ...effects.engine.registry import library
 from ...model.effect import Effect
+from ..fitting.residual_tests import LEAST_STRUCTURE
 from .candidates import NOT_FITTED, candidates
-from .confidence import EXPLAINED, UNSURE_CONFIDENCE, is_doubtful, least_share, may_absorb_misfit, unsure_names
-from .findings import Diagnosis, Finding
-from .forward_selection import (
-    FORCES,
-    LEAST_IMPROVEMENT,
-    LEAST_STRUCTURE,
-    READINGS,
-    GapSizes,
-    SelectionState,
-    SelectionStep,
-    means_of,
+from .check_recordings import CheckedRecording
+from .confidence import (
+    EXPLAINED,
+    UNSURE_CONFIDENCE,
+    is_doubtful,
+    least_share,
+    may_absorb_misfit,
+    unsettled_parameters,
+    unsure_names,
 )
+from .findings import ClosedShares, Diagnosis, Finding
+from .forward_selection import SelectionState, SelectionStep, means_of
+from .gap_sizes import FORCES, LEAST_IMPROVEMENT, READINGS, GapSizes
 from .identifiability import SPREADING, curvature_ratio, hardly_distinguishable, indistinguishable, unidentifiable
 from .view_set import ViewSet
 
@@ -35,42 +37,73 @@ RIVAL_EXPONENT = -4.0
 UNRESOLVED_TIMES = 2.0
 """A spreading effect that leaves less than this many times what no fit can resolve has the sensor's own formula."""
 MOST_MEAN_SQUARE = 2.0
-"""Mean square of the base model's residual, in units of the noise, up to which a residual without structure is no gap."""
+"""Mean square of the base model's residual, in units of the noise, up to which a residual without structure is no gap. In a
+check recording it may also be as many times that of the fitted ones."""
 
 
 def conclude(result: Diagnosis, view_set: ViewSet, state: SelectionState, gap_sizes: GapSizes) -> None:
     """Write verdict, findings, groups of rivals and ruled-out kinds into a result that has its models already."""
+    result.closed = _closed_shares(result, state, gap_sizes)
+    result.unlike_fitted = _unlike_fitted(result, gap_sizes)
     _judge_effects(result, state, gap_sizes)
     unsure = unsure_names(result, view_set, state, gap_sizes)
     result.findings = [
         replace(one, confidence=min(one.confidence, UNSURE_CONFIDENCE)) if one.name in unsure else one
         for one in result.findings
     ]
-    _rule_out(result, state.first, gap_sizes)
+    _rule_out(result, state, gap_sizes)
+
+
+def _closed_shares(result: Diagnosis, state: SelectionState, gap_sizes: GapSizes) -> ClosedShares:
+    """How much of the gaps the amended model closes."""
+    if all(effect.name == "noise" for effect in result.best.model.effects):
+        return ClosedShares()
+    before, after = (means_of(one.sse, one) for one in (result.base, result.best))
+    fitted: list[float | None] = [None, None]
+    left_out: list[float | None] = [None, None]
+    for quantity in (READINGS, FORCES):
+        if gap_sizes.has_gap(quantity):
+            gap = max(float(before[quantity] - gap_sizes.noise[quantity]), 1e-12)
+            fitted[quantity] = float(np.clip((before[quantity] - after[quantity]) / gap, 0.0, 1.0))
+            left_out[quantity] = gap_sizes.closed_share(state.means, quantity)
+    return ClosedShares((fitted[0], fitted[1]), (left_out[0], left_out[1]), result.check.closed)
 
 
 def _judge_effects(result: Diagnosis, state: SelectionState, gap_sizes: GapSizes) -> None:
     """Write the verdict and, for each effect of the model, a finding with its confidence and rivals."""
     effects = result.best.model.effects
     fitted = [effect for effect in effects if effect.name != "noise"]
-    closed = [gap_sizes.closed_share(state.means, quantity) for quantity in (READINGS, FORCES)]
-    is_open = any(gap_sizes.has_gap(quantity) and closed[quantity] < EXPLAINED for quantity in (READINGS, FORCES))
-    result.verdict = _verdict(result, gap_sizes, is_open)
+    left_out = [gap_sizes.closed_share(state.means, quantity) for quantity in (READINGS, FORCES)]
+    closed = [_least_share_closed(result, left_out, quantity) for quantity in (READINGS, FORCES)]
+    is_open = any(gap_sizes.has_gap(quantity) and left_out[quantity] < EXPLAINED for quantity in (READINGS, FORCES))
+    result.verdict = _verdict(result, gap_sizes, is_open or (bool(fitted) and result.check.is_refuted))
     for index, effect in enumerate(effects):
         times_worse, leaves = _alternatives(effect, state, {e.name for e in effects})
         rivals = _rivals(effect, state, result, times_worse, gap_sizes)
         weight = 1.0 / (1.0 + sum(ratio**RIVAL_EXPONENT for ratio in times_worse.values()))
-        share = closed[gap_sizes.quantity_for(effect.name)] if fitted else 1.0
+        quantity = gap_sizes.quantity_for(effect.name)
+        share = closed[quantity] if fitted else 1.0
+        unsettled = unsettled_parameters(effect, index, result)
         confidence = weight * (0.5 + 0.5 * share if share >= least_share(effect.name, leaves) else 0.5 * share)
         absorbs = is_open and may_absorb_misfit(effect, state)
+        if unsettled or (fitted and result.check.refutes(quantity)):
+            confidence = min(confidence, UNSURE_CONFIDENCE)
         if rivals or (len(fitted) > 1 and (absorbs or is_doubtful(effect, state, fitted, gap_sizes))):
             confidence = min(confidence, UNSURE_CONFIDENCE)
         if rivals:
             result.ambiguous.append((effect.name, *rivals))
         nearest = min(times_worse, key=lambda name: times_worse[name], default="")
+        closes = state.improvements[effect.name].of_gap if effect.name in state.improvements else 0.0
+        near = nearest, leaves.get(nearest, np.inf)
         result.findings.append(
-            Finding(index, effect.name, effect.form, round(confidence, 3), rivals, nearest, leaves.get(nearest, np.inf))
+            Finding(index, effect.name, effect.form, round(confidence, 3), rivals, *near, round(closes, 4), unsettled)
         )
+
+
+def _least_share_closed(result: Diagnosis, left_out: list[float], quantity: int) -> float:
+    """Smallest share of a gap that is closed: in left-out parts, in the fitted recordings, and in the check recordings."""
+    least = result.closed.least(quantity)
+    return left_out[quantity] if least is None else float(np.clip(least, 0.0, 1.0))
 
 
 def _verdict(result: Diagnosis, gap_sizes: GapSizes, is_open: bool) -> str:
@@ -81,9 +114,16 @@ def _verdict(result: Diagnosis, gap_sizes: GapSizes, is_open: bool) -> str:
     if effects:
         return "unexplained" if is_open else "explained"
     mean, gap = float(gap_sizes.base[gap_sizes.main_quantity]), gap_sizes.gap(gap_sizes.main_quantity)
-    small = mean < MOST_MEAN_SQUARE or gap < LEAST_IMPROVEMENT
+    small = (mean < MOST_MEAN_SQUARE or gap < LEAST_IMPROVEMENT) and not result.unlike_fitted
     quiet = result.base_structure.total < LEAST_STRUCTURE and small and result.line is None
     return "no gap" if quiet and not (gap_sizes.both and gap_sizes.has_gap(FORCES)) else "unexplained"
+
+
+def _unlike_fitted(result: Diagnosis, gap_sizes: GapSizes) -> list[CheckedRecording]:
+    """Check recordings that the base model fits far worse than the fitted ones."""
+    quantity = gap_sizes.main_quantity
+    most = MOST_MEAN_SQUARE * max(1.0, float(gap_sizes.base[quantity]))
+    return [one for one in result.check.recordings if one.count[quantity] > 0 and one.before[quantity] > most]
 
 
 def _alternatives(effect: Effect, state: SelectionState, taken: set[str]) -> tuple[dict[str, float], dict[str, float]]:
@@ -119,10 +159,10 @@ def _rivals(
     return tuple(dict.fromkeys([*near, *same]))
 
 
-def _rule_out(result: Diagnosis, alone: SelectionStep, gap_sizes: GapSizes) -> None:
-    """Write for each kind that was not found why; `alone` has those that were fitted on top of the base model."""
+def _rule_out(result: Diagnosis, state: SelectionState, gap_sizes: GapSizes) -> None:
+    """Write for each kind that was not found why."""
     tried: dict[str, float] = {}
-    for one in alone.ranked:
+    for one in state.first.ranked:  # those that were fitted on top of the base model
         name = one.candidate.name
         closed = gap_sizes.closed_share(means_of(one.held_out, one.fit), gap_sizes.quantity_for(name))
         tried[name] = max(tried.get(name, 0.0), closed)
@@ -131,7 +171,9 @@ def _rule_out(result: Diagnosis, alone: SelectionStep, gap_sizes: GapSizes) -> N
     for kind in library().values():
         if kind.name in named:
             continue
-        if kind.name in NOT_FITTED:
+        if kind.name in state.dropped:
+            why = "it makes the check recordings worse"
+        elif kind.name in NOT_FITTED:
             why = "what is left does not tremble the more, the larger the reading"
         elif kind.name not in possible:
             why = unidentifiable(result.coverage).get(kind.name, "these recordings cannot show it")
@@ -140,5 +182,5 @@ def _rule_out(result: Diagnosis, alone: SelectionStep, gap_sizes: GapSizes) -> N
         elif result.verdict == "no gap":
             why = "nothing is left for it to explain"
         else:
-            why = "a first look promised far less than what was fitted"
+            why = state.first.passed_over.get(kind.name, "the model has it already, as a parameter of the base model")
         result.ruled_out.append((kind.name, why))

@@ -14,15 +14,8 @@ from palpate.core.gap.selection.base_model import friction_parameters_to_search
 from palpate.core.gap.selection.candidates import Candidate, FittedCandidate
 from palpate.core.gap.selection.confidence import EXPLAINED, REPEATED_RATIO, is_doubtful, least_share, may_absorb_misfit
 from palpate.core.gap.selection.direct_estimates import companding_starts, few_levels
-from palpate.core.gap.selection.forward_selection import (
-    FORCES,
-    READINGS,
-    GapSizes,
-    Improvement,
-    SelectionState,
-    SelectionStep,
-    friction_kinds,
-)
+from palpate.core.gap.selection.forward_selection import SelectionState, SelectionStep
+from palpate.core.gap.selection.gap_sizes import FORCES, READINGS, GapSizes, Improvement, friction_kinds
 from palpate.core.gap.selection.view_set import view_set_of
 from palpate.core.model.sensor_parameters import SensorParameters
 
