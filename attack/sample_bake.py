@@ -12,6 +12,7 @@ import numpy as np
 from palpate.core.geometry.mesh import TriangleMesh
 from palpate.core.geometry.texels import Texels, texels_from_region
 from palpate.core.io.bake_folder import (
+    IMAGE_LIST_NAME,
     MANIFEST_NAME,
     OWN_DIGEST,
     RECORDING_NAME,
@@ -20,6 +21,7 @@ from palpate.core.io.bake_folder import (
     frame_file,
     write_manifest,
 )
+from palpate.core.io.checksum_list import checksum_line
 from palpate.core.io.file_writing import file_sha256
 from palpate.core.io.recording_npz import save_recording
 from palpate.core.io.sensor_npz import SENSOR_NAME, save_sensor
@@ -120,8 +122,12 @@ def write_sensor(
         body="pad",
         sensors=sensors,
     )
-    table = {path.name: file_sha256(path) for path in sorted(own.iterdir())} if checksums else {}
-    write_manifest(own, replace(manifest, files=table))
+    if checksums:
+        images = [frame_file(frame.frame) for frame in frames]
+        (own / IMAGE_LIST_NAME).write_bytes(b"".join(checksum_line(image, file_sha256(own / image)) for image in images))
+        vouched = {file: file_sha256(own / file) for file in (IMAGE_LIST_NAME, RECORDING_NAME, SENSOR_NAME)}
+        manifest = replace(manifest, files=vouched)
+    write_manifest(own, manifest)
     if not checksums:
         _remove_own_digest(own)
     return recording

@@ -42,6 +42,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="parameters and effects for the only sensor, or for the one of this name; may be given again. A scene that is "
         "saved keeps them.",
     )
+    parser.add_argument(
+        "--no-images",
+        action="store_true",
+        help="write the recordings alone, without an image per frame and sensor. Cannot be saved.",
+    )
     blender.add_script_arguments(parser)
     where = parser.add_mutually_exclusive_group()
     where.add_argument("--save", action="store_true", help="save motion, heat maps and arrows into SCENE.blend itself")
@@ -52,13 +57,16 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.sensor and (arguments.save or arguments.save_as):
         print("palpate bake: --sensor bakes a part of the scene, which cannot be saved: leave one of them out", file=sys.stderr)
         return 2
+    if arguments.no_images and saved_path(arguments):
+        print("palpate bake: --no-images leaves out what a saved scene shows: leave one of them out", file=sys.stderr)
+        return 2
     with console.blender_output_hidden():
         scene = blender.open_scene(arguments.scene, arguments.scripts)
         own_start = scene.frame_start
         if saved_path(arguments):
             blender.check_writable(saved_path(arguments))
         _prepare(scene, arguments)
-        baked = bake_with_progress(scene, into_scene=bool(arguments.save or arguments.save_as))
+        baked = bake_with_progress(scene, into_scene=bool(saved_path(arguments)), images=not arguments.no_images)
         saved = save_scene(arguments)
     print(report(baked))
     if scene.frame_start != own_start:
@@ -85,11 +93,11 @@ def _prepare(scene, arguments: argparse.Namespace) -> None:
         _read_out_only(scene, arguments.sensor)
 
 
-def bake_with_progress(scene, into_scene: bool = True):
+def bake_with_progress(scene, into_scene: bool = True, images: bool = True):
     """Bake a scene with a progress bar on stderr; Ctrl-C leaves an earlier bake as it was."""
     from ..addon.bake import bake
 
-    return console.run_with_progress_bar("bake", bake.bake(scene, into_scene))
+    return console.run_with_progress_bar("bake", bake.bake(scene, into_scene, images))
 
 
 def report(baked) -> str:

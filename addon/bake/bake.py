@@ -39,7 +39,7 @@ class BakeResult:
     folders: dict[str, Path]
 
 
-def bake(scene, into_scene: bool = True) -> Job[BakeResult]:
+def bake(scene, into_scene: bool = True, images: bool = True) -> Job[BakeResult]:
     """Compute the whole frame range of a scene, write the files, and put the result into the scene.
 
     Nothing in the scene changes before the last step, and an earlier bake stays as it is until then: closing the generator, an
@@ -51,6 +51,8 @@ def bake(scene, into_scene: bool = True) -> Job[BakeResult]:
     scene : Scene
     into_scene : bool
         False writes the files only. Use it where objects are linked from other files and cannot show a bake.
+    images : bool
+        False writes the recordings alone, as for a million frames. A scene cannot show such a bake: `into_scene` is False too.
 
     Raises
     ------
@@ -58,14 +60,16 @@ def bake(scene, into_scene: bool = True) -> Job[BakeResult]:
         Before anything changes, if the scene or the bake folder is unsuitable; later, if the folder fills up or if the user
         deletes an object that takes part.
     """
+    if into_scene and not images:
+        raise ValueError("a scene shows a bake by its images")
     with session_state.suspended():
         try:
-            return (yield from part_of_job(_bake(scene, into_scene), _note_for_panel))
+            return (yield from part_of_job(_bake(scene, into_scene, images), _note_for_panel))
         finally:
             session_state.session.bake_progress = None
 
 
-def _bake(scene, into_scene: bool) -> Job[BakeResult]:
+def _bake(scene, into_scene: bool, images: bool) -> Job[BakeResult]:
     """Do the steps of a bake, each in the room that owns it."""
     name = scene.name
     folder = bake_files.writable_bake_folder(scene)
@@ -73,9 +77,9 @@ def _bake(scene, into_scene: bool) -> Job[BakeResult]:
     if into_scene:
         scene_writer.check_writable(scene, reading)
     yield from first_use.wait()
-    bake_files.check_space(folder, reading.scenario)
+    bake_files.check_space(folder, reading.scenario, images)
     simulation = dependencies.load_solver().Simulation(reading.scenario)
-    with bake_files.BakeFiles(folder, reading.scenario, bpy.data.filepath) as files:
+    with bake_files.BakeFiles(folder, reading.scenario, bpy.data.filepath, images) as files:
         recording = yield from _solve(name, simulation, reading, files)
         files.finish(recording)
     if into_scene:
@@ -98,17 +102,17 @@ def _solve(name: str, simulation, reading: SceneReading, files: bake_files.BakeF
     """Compute forces and readings frame by frame, and write each frame while the next is computed: the second half."""
     scenario = simulation.scenario
     total = _total_steps(scenario.frame_start, scenario.frame_end)
-    frames = files.resume(simulation)
+    done = files.resume(simulation)
 
-    def write_frame(step: Progress) -> Progress:
-        files.write_frame(frames[-1])
-        files.save_checkpoint(simulation, frames)
+    def save_checkpoint(step: Progress) -> Progress:
+        files.save_checkpoint(simulation)
         reading.objects(_scene_called(name))  # raises if the user has deleted one
         return replace(step, done=total // 2 + step.done, total=total)
 
-    recording = yield from part_of_job(dependencies.load_solver().solve(scenario, simulation, frames), write_frame)
+    job = dependencies.load_solver().solve_frames(simulation, files.write_frame, done)
+    yield from part_of_job(job, save_checkpoint)
     reading.objects(_scene_called(name))
-    return replace(recording, warnings=reading.warnings + recording.warnings)
+    return files.recording(simulation, (*reading.warnings, *simulation.warnings))
 
 
 def _show(scene, reading: SceneReading, recording: Recording, folders: dict[str, Path]) -> None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The files of a bake: images are written frame by frame into a hidden folder, and replace the old bake in one step.
+"""The files of a bake: frames and images are written one by one into a hidden folder, and replace the old bake in one step.
 
 A kill at any moment leaves either the old bake or the new one (:mod:`.bake_switch`), and a checkpoint from which the next bake
 continues (:mod:`.bake_checkpoint`).
@@ -12,8 +12,9 @@ import json
 import math
 import os
 import secrets
+from collections.abc import Iterable, Sequence
+from contextlib import suppress
 from dataclasses import asdict, replace
-from functools import partial
 from pathlib import Path
 
 import bpy
@@ -23,31 +24,30 @@ from ...core.errors import FileError
 from ...core.io import bake_switch
 from ...core.io.bake_folder import (
     BAKE_FILE_NAMES,
+    IMAGE_LIST_NAME,
     MANIFEST_FORMAT,
     MANIFEST_NAME,
     RECORDING_NAME,
     Manifest,
     folder_names,
-    frame_file,
     read_manifest,
     write_manifest,
 )
-from ...core.io.disk_space import least_image_bytes, require_space
+from ...core.io.disk_space import bake_bytes, require_space
 from ...core.io.file_writing import file_sha256, remove_leftovers, sync_file, writable_folder
 from ...core.io.folder_lock import FolderLock
+from ...core.io.frame_rows import FrameRows
 from ...core.io.private_folder import PRIVATE_FOLDER, find_private_folder
 from ...core.io.recording_npz import save_recording
 from ...core.io.regular_file import read_bytes
 from ...core.io.sensor_npz import SENSOR_NAME, save_sensor
-from ...core.io.tactile_exr import describe, write_exrs
 from ...core.model.recording import Frame, Recording
 from ...core.model.scenario import Scenario
 from ...core.model.sensor import Sensor
 from .background_writer import BackgroundWriter
-from .bake_checkpoint import BakeCheckpoint, ImageTable
+from .bake_checkpoint import CHECKPOINT_FOLDER, FRAMES_FILE, BakeCheckpoint, Vouched
+from .bake_images import BakeImages
 
-MAX_BATCH_IMAGES, MAX_BATCH_PIXELS = 16, 16384
-"""Most images of one sensor that are written together, and most pixels in them: one call for many small images is faster."""
 CAN_SYNC_ALL = hasattr(os, "sync")
 """True where one call brings all written files onto the disk; elsewhere each file is synchronised by itself."""
 
@@ -81,12 +81,13 @@ def writable_bake_folder(scene) -> Path:
     return folder
 
 
-def check_space(folder: Path, scenario: Scenario) -> None:
-    """Raise FileError if the disk cannot hold the images of a new bake; one that continues has some of them already."""
+def check_space(folder: Path, scenario: Scenario, images: bool = True) -> None:
+    """Raise FileError if the disk cannot hold a new bake; one that continues has a part of its files already."""
     if not any((folder / PRIVATE_FOLDER).glob("growing-*")):
-        texels = [len(sensor.texels) for sensor in scenario.sensors if sensor.readout]
-        frames = scenario.frame_end - scenario.frame_start + 1
-        require_space(folder, least_image_bytes(texels, frames), "The bake")
+        read_out = [sensor for sensor in scenario.sensors if sensor.readout]
+        texels = [len(sensor.texels) for sensor in read_out]
+        pixels = [math.prod(sensor.texels.layout.shape) for sensor in read_out] if images else []
+        require_space(folder, bake_bytes(len(scenario.frames), len(scenario.bodies), texels, pixels), "The bake")
 
 
 class BakeFiles:
@@ -99,6 +100,8 @@ class BakeFiles:
     scenario : Scenario
     blend : str
         Path of the .blend that is baked; empty if the scene has not been saved.
+    images : bool
+        False writes no tactile images.
 
     Attributes
     ----------
@@ -112,7 +115,7 @@ class BakeFiles:
         must not be replaced.
     """
 
-    def __init__(self, folder: Path, scenario: Scenario, blend: str = ""):
+    def __init__(self, folder: Path, scenario: Scenario, blend: str = "", images: bool = True):
         self._blend = Path(blend) if blend else None
         self._sensors = {sensor.name: sensor for sensor in scenario.sensors if sensor.readout}
         self._names = folder_names(self._sensors)
@@ -120,10 +123,13 @@ class BakeFiles:
         self.folder = Path(os.path.abspath(folder))
         self.folders = {name: self.folder / self._names[name] for name in self._sensors}
         self._writer = BackgroundWriter()
-        self._unwritten: list[Frame] = []
-        self._images: ImageTable = {self._names[name]: {} for name in self._sensors}
-        self._unsaved: ImageTable = {}
-        self._run, self._growing, self._checkpoint = "", None, None
+        self._has_images = images
+        self._files: dict[str, dict[str, str]] = {name: {} for name in self._sensors}
+        self._run = ""
+        self._growing: Path | None = None
+        self._checkpoint: BakeCheckpoint | None = None
+        self._rows: FrameRows | None = None
+        self._images: BakeImages | None = None
         if find_private_folder(self.folder) is None:
             self._check_replaceable()  # before anything is made
         writable_folder(self.folder, create=True)
@@ -148,13 +154,13 @@ class BakeFiles:
         if error_type is not None:
             self.discard()
 
-    def resume(self, simulation) -> list[Frame]:
+    def resume(self, simulation) -> int:
         """Bring a new simulation to the checkpoint of a killed bake of the same scenario.
 
         Returns
         -------
-        list of Frame
-            The frames up to the checkpoint; empty if there is none.
+        int
+            Number of frames up to the checkpoint; zero if there is none.
 
         Raises
         ------
@@ -162,40 +168,46 @@ class BakeFiles:
             The temporary folders cannot be created.
         """
         private = self.folder / PRIVATE_FOLDER
-        frames: list[Frame] = []
+        frames = 0
         try:
             for growing in bake_switch.growing_folders(private):
-                restored = None if self._growing else self._restored(growing, simulation)
-                if restored is None:
+                frames = frames or self._restored(growing, simulation)
+                if growing != self._growing:
                     bake_switch.remove_growing(growing)
-                    continue
-                self._grow_in(growing)
-                frames, self._images = restored
-                for name in self._sensors:
-                    remove_leftovers(self._new_folder(name))
-            if self._growing is None:
-                self._grow_in(bake_switch.growing_folder(private, secrets.token_hex(8)))
-                self._growing.mkdir()
-                (self._growing / "sensors").mkdir()
-                for name in self._sensors:
-                    self._new_folder(name).mkdir()
+            if not frames:
+                self._begin(bake_switch.growing_folder(private, secrets.token_hex(8)))
+            elif self._images is not None:
+                self._images.rewrite_damaged(self._rows.frame)
         except OSError as error:
             raise _write_error(self.folder, error) from error
-        self._rewrite_damaged_images(frames)
         return frames
 
     def write_frame(self, frame: Frame) -> None:
-        """Write the tactile image of every sensor, some frames together, while the solver continues."""
-        self._unwritten.append(frame)
-        pixels = max((math.prod(sensor.texels.layout.shape) for sensor in self._sensors.values()), default=1)
-        if len(self._unwritten) >= min(MAX_BATCH_IMAGES, MAX_BATCH_PIXELS // pixels):
-            self._submit_images()
+        """Write a frame: its row, and the tactile image of every sensor, some frames together, while the solver continues."""
+        try:
+            self._rows.append(frame)
+        except OSError as error:
+            raise _write_error(self.folder, error) from error
+        if self._images is not None:
+            self._images.write(frame)
 
-    def save_checkpoint(self, simulation, frames: list[Frame]) -> None:
+    def save_checkpoint(self, simulation) -> None:
         """Save the frames and the state of the solver, if the last checkpoint is some seconds old."""
-        if self._checkpoint.is_due(frames):
-            self._submit_images()
-            self._checkpoint.save(simulation, frames, self._synced_images)
+        if self._checkpoint.is_due(len(self._rows)):
+            self._checkpoint.save(simulation, self._sync_frames)
+
+    def recording(self, simulation, warnings: Sequence[str]) -> Recording:
+        """Return what was written; a long one is a view of the file (:class:`.FrameRows`).
+
+        Raises
+        ------
+        FileError
+            It cannot be written or read.
+        """
+        try:
+            return self._rows.recording(simulation.dt, self._digest, warnings, simulation.step_reason)
+        except OSError as error:
+            raise _write_error(self.folder, error) from error
 
     def finish(self, recording: Recording) -> None:
         """Write the recordings, then make the new bake the present one: all of its folders or none.
@@ -216,17 +228,22 @@ class BakeFiles:
         FileError
             A file cannot be written.
         """
-        self._submit_images()
+        if self._images is not None:
+            self._images.submit()
         for name in self._sensors:
             self._write_recording(name, recording)
-        self._writer.finish()
+        written = [self._new_folder(name) / file for name in self._sensors for file in (RECORDING_NAME, SENSOR_NAME)]
+        if self._images is not None:
+            written += self._images.finish()
+            for name, (_, sha256) in self._images.states().items():
+                self._files[name][IMAGE_LIST_NAME] = sha256
         self._writer.stop()
-        table = json.dumps([self._digest, *(sorted(files.items()) for files in self._images.values())])
+        table = json.dumps([self._digest, *(sorted(files.items()) for files in self._files.values())])
         bake_id = hashlib.sha256(table.encode("utf-8", "surrogatepass")).hexdigest()[:32]
         for name, sensor in self._sensors.items():
             manifest = self._manifest(sensor, recording, bake_id)
-            write_manifest(self._new_folder(name), manifest, atomic=not CAN_SYNC_ALL)
-        self._sync(self._images)
+            written.append(write_manifest(self._new_folder(name), manifest, atomic=not CAN_SYNC_ALL))
+        self._sync(written)
 
     def switch(self) -> None:
         """Make the complete bake the present one, in a single step.
@@ -242,11 +259,13 @@ class BakeFiles:
             bake_switch.switch(self.folder, record)
         except OSError as error:
             raise _write_error(self.folder, error) from error
+        self._close()
         self._lock.release()
 
     def discard(self) -> None:
         """Remove the unfinished files and release the folder."""
         self._writer.stop()
+        self._close()
         if self._growing is not None and bake_switch.pending_switch(self.folder) is None:
             bake_switch.remove_growing(self._growing)
         self._lock.release()
@@ -255,88 +274,91 @@ class BakeFiles:
         for folder in self.folders.values():
             _check_replaceable(folder, self._blend)
 
+    def _close(self) -> None:
+        for part in (self._rows, self._images):
+            if part is not None:
+                with suppress(OSError):  # a disk that is full has been reported before
+                    part.close()
+
     def _grow_in(self, growing: Path) -> None:
+        """Choose the folder in which the bake grows. It need not exist."""
         self._growing, self._run = growing, growing.name.removeprefix(bake_switch.GROWING_PREFIX)
-        if self._checkpoint is None:
-            self._checkpoint = BakeCheckpoint(growing, self._digest)
+        self._checkpoint = BakeCheckpoint(growing, self._digest)
+        texels = {name: len(sensor.texels) for name, sensor in self._sensors.items()}
+        bodies = [body.name for body in self._scenario.bodies]
+        self._rows = FrameRows(growing / CHECKPOINT_FOLDER / FRAMES_FILE, bodies, texels)
+        if self._has_images:
+            folders = {name: self._new_folder(name) for name in self._sensors}
+            self._images = BakeImages(self._sensors, folders, self._digest, self._writer)
+
+    def _begin(self, growing: Path) -> None:
+        """Make the files of a new bake."""
+        self._grow_in(growing)
+        for folder in (growing, growing / "sensors", growing / CHECKPOINT_FOLDER):
+            folder.mkdir()
+        for name in self._sensors:
+            self._new_folder(name).mkdir()
+        self._rows.begin()
+        if self._images is not None:
+            self._images.begin()
 
     def _new_folder(self, name: str) -> Path:
         """Return where the new bake of a sensor grows."""
         return bake_switch.new_folder(self._growing, self._names[name])
 
-    def _restored(self, growing: Path, simulation) -> tuple[list[Frame], ImageTable] | None:
-        """Bring a new simulation to the checkpoint in a folder, if it is of this scene; else return None."""
+    def _restored(self, growing: Path, simulation) -> int:
+        """Bring a new simulation to the checkpoint in a folder, if it is of this scene, and return the number of its frames."""
         if not all(bake_switch.new_folder(growing, name).is_dir() for name in self._names.values()):
-            return None
-        point = BakeCheckpoint(growing, self._digest)
-        restored = point.restore(simulation)
-        if restored is None or set(restored[1]) - set(self._images):
-            return None
-        self._checkpoint = point
-        return restored[0], {name: restored[1].get(name, {}) for name in self._images}
-
-    def _rewrite_damaged_images(self, frames: list[Frame]) -> None:
-        """Write again the images that a power cut has damaged, from the frames of the checkpoint."""
+            return 0
+        self._grow_in(growing)
+        frames = self._checkpoint.restore(simulation, self._take_over)
+        if not frames:
+            self._close()
+            self._growing = self._rows = self._images = None
+            return 0
         for name in self._sensors:
-            folder, table = self._new_folder(name), self._images[self._names[name]]
-            damaged = [frame for frame in frames if not _is_whole(folder, frame_file(frame.frame), table)]
-            for i in range(0, len(damaged), MAX_BATCH_IMAGES):
-                self._writer.submit(partial(self._write_images, self._sensors[name], damaged[i : i + MAX_BATCH_IMAGES]))
-        self._writer.finish()
+            remove_leftovers(self._new_folder(name))
+        return frames
 
-    def _synced_images(self) -> ImageTable:
-        """Bring all images so far onto the disk, and return the SHA-256 of those that no checkpoint has."""
-        self._writer.finish()
-        images, self._unsaved = self._unsaved, {}
-        self._sync(images)
-        return images
+    def _take_over(self, vouched: Vouched) -> bool:
+        """Take over the files of a checkpoint; return False if they are not what it vouches for."""
+        if set(vouched.images) != (set(self._sensors) if self._has_images else set()):
+            return False
+        if not self._rows.restore(vouched.frames, vouched.rows_sha256):
+            return False
+        return self._images is None or self._images.restore(vouched.images)
 
-    def _sync(self, files: ImageTable) -> None:
-        """Bring files in the new folders onto the disk."""
+    def _sync_frames(self) -> Vouched:
+        """Bring all frames and images so far onto the disk."""
+        files = [] if self._images is None else self._images.finish()
+        try:
+            self._rows.flush()
+        except OSError as error:
+            raise _write_error(self.folder, error) from error
+        self._sync([*files, self._growing / CHECKPOINT_FOLDER / FRAMES_FILE])
+        images = {} if self._images is None else self._images.states()
+        return Vouched(len(self._rows), self._rows.sha256, images)
+
+    def _sync(self, files: Iterable[Path]) -> None:
+        """Bring files onto the disk."""
         if CAN_SYNC_ALL:
             os.sync()  # one call for all files is much faster than one for each
             return
         try:
-            for folder, table in files.items():
-                for name in table:
-                    sync_file(bake_switch.new_folder(self._growing, folder) / name)
+            for path in files:
+                sync_file(path)
         except OSError as error:
             raise _write_error(self.folder, error) from error
-
-    def _submit_images(self) -> None:
-        """Hand the images of the frames so far to the writer's thread."""
-        frames, self._unwritten = self._unwritten, []
-        for name in self._sensors:
-            if frames:
-                self._writer.submit(partial(self._write_images, self._sensors[name], frames))
-
-    def _write_images(self, sensor: Sensor, frames: list[Frame]) -> None:
-        folder, files = self._new_folder(sensor.name), [frame_file(frame.frame) for frame in frames]
-        headers = [describe(sensor, frame, self._digest) for frame in frames]
-        write_exrs(
-            [folder / file for file in files],
-            sensor.texels.layout,
-            [frame.sensors[sensor.name] for frame in frames],
-            headers,
-        )
-        self._note(sensor.name, files)
 
     def _write_recording(self, name: str, recording: Recording) -> None:
         """Write the recording of one sensor, and what its texels are."""
         sensor, folder, atomic = self._sensors[name], self._new_folder(name), not CAN_SYNC_ALL
         save_recording(folder / RECORDING_NAME, replace(recording, sensors={name: recording.sensors[name]}), atomic=atomic)
         save_sensor(folder / SENSOR_NAME, sensor.texels, sensor.painted, atomic=atomic)
-        self._note(name, [RECORDING_NAME, SENSOR_NAME])
-
-    def _note(self, name: str, files: list[str]) -> None:
-        """Note the SHA-256 of files that have just been written."""
-        folder = self._new_folder(name)
         try:
-            table = {file: file_sha256(folder / file) for file in files}
+            self._files[name] |= {file: file_sha256(folder / file) for file in (RECORDING_NAME, SENSOR_NAME)}
         except OSError as error:
             raise _write_error(self.folder, error) from error
-        self._images[self._names[name]].update(table)
-        self._unsaved.setdefault(self._names[name], {}).update(table)
 
     def _manifest(self, sensor: Sensor, recording: Recording, bake_id: str) -> Manifest:
         scenario = self._scenario
@@ -358,16 +380,8 @@ class BakeFiles:
             step_reason=recording.step_reason,
             bake_id=bake_id,
             sensors=tuple(self._sensors),
-            files=dict(sorted(self._images[self._names[sensor.name]].items())),
+            files=dict(sorted(self._files[sensor.name].items())),
         )
-
-
-def _is_whole(folder: Path, file: str, table: dict[str, str]) -> bool:
-    """Return True if a file is there with the content that the table vouches for."""
-    try:
-        return table.get(file) == file_sha256(folder / file)
-    except OSError:
-        return False
 
 
 def _check_replaceable(folder: Path, blend: Path | None) -> None:

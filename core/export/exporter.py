@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +13,7 @@ from ..figures.figure_style import FigureStyle
 from ..geometry.layout.grid_layout import GridLayout
 from ..io.bake_reader import Bake
 from ..jobs.progress import Job, Progress
-from ..model.recording import SensorRecording
+from ..model.recording import SENSOR_FIELDS
 
 UNITS = {
     "normal_force": "N",
@@ -59,7 +59,7 @@ class Exporter:
 def bake_arrays(bake: Bake, name: str) -> dict[str, np.ndarray]:
     """Return everything about one sensor as arrays: its recording, and its texels under names that begin with ``texel_``."""
     texels, recorded = bake.texels[name], bake.recording.sensors[name]
-    arrays = {item.name: getattr(recorded, item.name) for item in fields(SensorRecording)}
+    arrays = {key: getattr(recorded, key) for key in SENSOR_FIELDS}
     arrays |= {f"texel_{key}": getattr(texels, key) for key in ("position", "normal", "tangent", "area", "vertex")}
     arrays["texel_uv"] = texels.layout.uv()
     if isinstance(texels.layout, GridLayout):

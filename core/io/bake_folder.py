@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A bake folder: names of its folders and files, and the manifest that describes each sensor's bake.
 
-A bake folder holds one folder per sensor. Each of these holds one EXR image per frame, ``recording.npz``, ``sensor.npz`` and
-``manifest.json``.
+A bake folder holds one folder per sensor. Each of these holds ``recording.npz``, ``sensor.npz``, ``manifest.json`` and, unless
+the bake has no images, one EXR image per frame and ``images.sha256``, the list of their checksums.
 """
 
 from __future__ import annotations
@@ -13,12 +13,13 @@ import math
 import os
 import re
 import zlib
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
 from ..errors import FileError
+from .checksum_list import read_checksums
 from .file_writing import file_sha256, os_error_reason, write_file
 from .regular_file import read_bytes
 from .sensor_npz import SENSOR_NAME
@@ -28,8 +29,10 @@ MANIFEST_NAME = "manifest.json"
 OWN_DIGEST = "manifest_sha256"
 """Key of the SHA-256 of all that the manifest says otherwise; older manifests have none."""
 RECORDING_NAME = "recording.npz"
+IMAGE_LIST_NAME = "images.sha256"
 
-BAKE_FILE_NAMES = re.compile(rf"tactile_-?\d+\.exr|{'|'.join(map(re.escape, (RECORDING_NAME, SENSOR_NAME, MANIFEST_NAME)))}")
+_SINGLE_FILES = (RECORDING_NAME, SENSOR_NAME, MANIFEST_NAME, IMAGE_LIST_NAME)
+BAKE_FILE_NAMES = re.compile(rf"tactile_-?\d+\.exr|{'|'.join(map(re.escape, _SINGLE_FILES))}")
 """Names of the files in a sensor's folder that a bake writes and replaces."""
 
 _RESERVED = {"con", "prn", "aux", "nul", *(f"{port}{i}" for port in ("com", "lpt") for i in range(1, 10))}
@@ -101,7 +104,9 @@ class Manifest:
     sensors : tuple of str
         Names of all sensors of the bake; empty when the manifest is older.
     files : dict of str to str
-        SHA-256 of each file in the folder except the manifest itself, by name; empty when the manifest is older.
+        SHA-256 of each file in the folder except the manifest itself and the images, by name. Those of the images are in
+        ``images.sha256``, which is one of these files; manifests of some older versions have them here, and in still older ones
+        the dict is empty.
     """
 
     sensor: str
@@ -125,6 +130,23 @@ class Manifest:
     sensors: tuple[str, ...] = ()
     files: dict[str, str] = field(default_factory=dict)
 
+    @property
+    def has_images(self) -> bool:
+        """Whether the bake has tactile images; older manifests without checksums always have."""
+        return not self.files or any(name == IMAGE_LIST_NAME or name.endswith(".exr") for name in self.files)
+
+    def image_checksums(self, folder: Path) -> Iterator[tuple[str, str]]:
+        """Yield the name and the SHA-256 of each tactile image that the manifest vouches for, in the order of the frames.
+
+        Raises
+        ------
+        FileError
+            The list of images is missing or damaged.
+        """
+        if IMAGE_LIST_NAME in self.files:
+            self.check_file(folder, IMAGE_LIST_NAME)
+            yield from read_checksums(folder / IMAGE_LIST_NAME)
+
     def check_file(self, folder: Path, name: str) -> None:
         """Check a file in the bake's folder against its SHA-256; without one, as in older manifests, nothing is checked.
 
@@ -133,17 +155,20 @@ class Manifest:
         FileError
             The file is missing or damaged.
         """
-        if name not in self.files:
-            return
-        path = folder / name
-        try:
-            found = file_sha256(path)
-        except FileNotFoundError:
-            raise FileError(f"'{path}' is missing from the bake: bake again.") from None
-        except OSError as error:
-            raise FileError(f"'{path}' could not be read ({os_error_reason(error)}): check its permissions.") from error
-        if found != self.files[name]:
-            raise FileError(f"'{path}' is damaged (its content is not what was baked): bake again.")
+        if name in self.files:
+            check_sha256(folder / name, self.files[name])
+
+
+def check_sha256(path: Path, sha256: str) -> None:
+    """Raise FileError if a file of a bake is missing or does not have this SHA-256."""
+    try:
+        found = file_sha256(path)
+    except FileNotFoundError:
+        raise FileError(f"'{path}' is missing from the bake: bake again.") from None
+    except OSError as error:
+        raise FileError(f"'{path}' could not be read ({os_error_reason(error)}): check its permissions.") from error
+    if found != sha256:
+        raise FileError(f"'{path}' is damaged (its content is not what was baked): bake again.")
 
 
 def write_manifest(folder: str | os.PathLike, manifest: Manifest, atomic: bool = True) -> Path:

@@ -1,18 +1,20 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Checks of the tactile images of a bake: each frame has its image, and the image shows what the recording says.
 
-An image that the manifest vouches for with its SHA-256 is what was baked. Any other, as in older bakes, is read and compared
+An image that the manifest, or its list of images, vouches for with its SHA-256 is what was baked. Any other, as in older bakes, is read and compared
 with the recording.
 """
 
 from __future__ import annotations
+
+from itertools import zip_longest
 
 import numpy as np
 
 from ..errors import FileError
 from ..model.recording import SensorFrame
 from .bake_check import SensorFiles
-from .bake_folder import frame_file
+from .bake_folder import IMAGE_LIST_NAME, check_sha256, frame_file
 from .tactile_exr import CHANNELS, exr_channels, read_exr
 
 ROUNDING = 1e-5
@@ -27,15 +29,29 @@ def check_images(files: SensorFiles) -> None:
     FileError
         An image is missing or damaged, or shows something else than the recording; the message names it.
     """
-    recording, name = files.recording, files.manifest.sensor
+    recording, manifest, name = files.recording, files.manifest, files.manifest.sensor
+    if not manifest.has_images:
+        return
+    if IMAGE_LIST_NAME in manifest.files:
+        _check_listed(files)
+        return
     for number in recording.frames:
         file = frame_file(int(number))
-        if file in files.manifest.files:
-            files.manifest.check_file(files.folder, file)
+        if file in manifest.files:
+            manifest.check_file(files.folder, file)
         else:
             fault = _fault(files, int(number), recording.at(int(number)).sensors[name])
             if fault:
                 raise FileError(f"'{files.folder / file}' does not belong to its bake ({fault}): bake again.")
+
+
+def _check_listed(files: SensorFiles) -> None:
+    """Check the images that the list of the bake names, one for each frame."""
+    listed = files.manifest.image_checksums(files.folder)
+    for number, found in zip_longest(files.recording.frames, listed):
+        if number is None or found is None or found[0] != frame_file(int(number)):
+            raise FileError(f"'{files.folder / IMAGE_LIST_NAME}' does not list an image for each frame: bake again.")
+        check_sha256(files.folder / found[0], found[1])
 
 
 def _fault(files: SensorFiles, number: int, frame: SensorFrame) -> str:

@@ -7,9 +7,11 @@ import os
 import zipfile
 import zlib
 from collections.abc import Mapping
+from typing import IO
 
 import numpy as np
 
+from ..model.recording import row_blocks
 from .file_writing import write_file
 
 DAMAGED = (
@@ -47,4 +49,17 @@ def write_arrays(path: str | os.PathLike, arrays: Mapping[str, np.ndarray], atom
             info.create_system = 3  # the same bytes on every system
             info.external_attr = 0o644 << 16
             with archive.open(info, "w", force_zip64=array.nbytes > 1 << 30) as member:
-                np.lib.format.write_array(member, np.asarray(array, order="C"), allow_pickle=False)
+                _write_member(member, array)
+
+
+def _write_member(member: IO[bytes], array: np.ndarray) -> None:
+    """Write an array in numpy's format, block by block, so that a mapped file is never in memory as a whole."""
+    if array.ndim == 0:
+        np.lib.format.write_array(member, array, allow_pickle=False)
+        return
+    if array.dtype.hasobject:
+        raise ValueError("objects are not written: reading them would run code")
+    descr = np.lib.format.dtype_to_descr(array.dtype)
+    np.lib.format.write_array_header_1_0(member, {"descr": descr, "fortran_order": False, "shape": array.shape})
+    for rows in row_blocks(array):
+        member.write(array[rows].tobytes())

@@ -9,21 +9,18 @@ from __future__ import annotations
 
 import json
 import os
-from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ..errors import FileError
-from ..model.recording import Recording, SensorRecording
+from ..model.recording import SENSOR_FIELDS, Recording, SensorRecording, row_blocks
 from .file_writing import os_error_reason
 from .npz import DAMAGED, write_arrays
 from .regular_file import open_regular
 
 RECORDING_FORMAT = "palpate-recording/2"
-
-_SENSOR_FIELDS = tuple(item.name for item in fields(SensorRecording))
 
 
 def save_recording(path: str | os.PathLike, recording: Recording, atomic: bool = True) -> None:
@@ -40,12 +37,12 @@ def save_recording(path: str | os.PathLike, recording: Recording, atomic: bool =
     for name in ("frames", "times", "poses", "velocities"):
         arrays[name] = np.asarray(getattr(recording, name))
     for i, sensor in enumerate(recording.sensors.values()):
-        for name in _SENSOR_FIELDS:
+        for name in SENSOR_FIELDS:
             arrays[f"sensor_{i}/{name}"] = np.asarray(getattr(sensor, name))
     for name, array in arrays.items():
         if name != "header" and len(array) != len(recording.frames):
             raise ValueError(f"'{name}' has {len(array)} frames, the recording {len(recording.frames)}")
-        if array.dtype.kind == "f" and not np.isfinite(array).all():
+        if array.dtype.kind == "f" and not all(np.isfinite(array[rows]).all() for rows in row_blocks(array)):
             raise ValueError(f"'{name}' of the recording has values that are not finite")
         if array.dtype.kind not in "fiubU":
             raise ValueError(f"'{name}' of the recording has type {array.dtype}")
@@ -95,11 +92,11 @@ def _recording(path: str | os.PathLike, members: Any) -> Recording:
         )
     arrays = {name: members[name] for name in ("frames", "times", "poses", "velocities")}
     sensors = {
-        str(name): SensorRecording(**{key: members[f"sensor_{i}/{key}"] for key in _SENSOR_FIELDS})
+        str(name): SensorRecording(**{key: members[f"sensor_{i}/{key}"] for key in SENSOR_FIELDS})
         for i, name in enumerate(header["sensors"])
     }
     count = len(arrays["frames"])
-    parts = [*arrays.values(), *(getattr(sensor, key) for sensor in sensors.values() for key in _SENSOR_FIELDS)]
+    parts = [*arrays.values(), *(getattr(sensor, key) for sensor in sensors.values() for key in SENSOR_FIELDS)]
     if any(len(part) != count for part in parts):
         raise ValueError("its arrays have different numbers of frames")
     return Recording(

@@ -1,20 +1,30 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The results of a run: per frame and texel, per frame and sensor, per frame and body."""
+"""The results of a run: per frame and texel, per frame and sensor, per frame and body.
+
+The arrays of a long recording may be views of a file (:mod:`..io.frame_rows`, :mod:`..io.recording_npz`). What goes through
+all frames therefore goes block by block (:meth:`Recording.blocks`), and memory does not grow with the number of frames.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field, fields
+import mmap
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, fields, replace
 
 import numpy as np
 
+BLOCK_BYTES = 1 << 22
+"""Bytes of a recording that are worked on at once: large enough for numpy, small beside everything else in memory."""
 PER_TEXEL = ("normal_force", "shear", "friction", "depth", "slip", "contact", "reading")
 """Names of the per-texel channels, in the order in which every exporter writes them."""
 
 
 @dataclass
-class SensorFrame:
-    """One sensor at one frame. Forces act **on the sensor** and are given in the frame of the sensor's body.
+class SensorArrays:
+    """What a sensor measures: at one frame (:class:`SensorFrame`) or at F frames (:class:`SensorRecording`).
+
+    Forces act **on the sensor** and are given in the frame of the sensor's body. The shapes are those of one frame; arrays of a
+    recording have a leading axis of length F.
 
     Attributes
     ----------
@@ -51,6 +61,15 @@ class SensorFrame:
     centre_of_pressure: np.ndarray
 
 
+SENSOR_FIELDS = tuple(item.name for item in fields(SensorArrays))
+"""Names of the arrays of a sensor, in the order in which files hold them."""
+
+
+@dataclass
+class SensorFrame(SensorArrays):
+    """One sensor at one frame."""
+
+
 @dataclass
 class Frame:
     """All sensors and all bodies at one frame.
@@ -75,23 +94,16 @@ class Frame:
 
 
 @dataclass
-class SensorRecording:
-    """The frames of one sensor stacked: every array of :class:`SensorFrame` with a leading axis of length F."""
-
-    normal_force: np.ndarray
-    shear: np.ndarray
-    friction: np.ndarray
-    depth: np.ndarray
-    slip: np.ndarray
-    contact: np.ndarray
-    reading: np.ndarray
-    net_force: np.ndarray
-    net_torque: np.ndarray
-    centre_of_pressure: np.ndarray
+class SensorRecording(SensorArrays):
+    """The frames of one sensor stacked: every array has a leading axis of length F."""
 
     def at(self, i: int) -> SensorFrame:
         """Return the recorded frame with index `i`."""
-        return SensorFrame(**{item.name: getattr(self, item.name)[i] for item in fields(self)})
+        return SensorFrame(**{name: getattr(self, name)[i] for name in SENSOR_FIELDS})
+
+    def part(self, frames: slice) -> SensorRecording:
+        """Return some of the frames, by their indices; the arrays are views."""
+        return SensorRecording(**{name: getattr(self, name)[frames] for name in SENSOR_FIELDS})
 
 
 @dataclass
@@ -140,10 +152,7 @@ class Recording:
         """Return the recording of frames that are given in order."""
         sensors = {
             name: SensorRecording(
-                **{
-                    item.name: np.stack([getattr(frame.sensors[name], item.name) for frame in frames])
-                    for item in fields(SensorFrame)
-                }
+                **{key: np.stack([getattr(frame.sensors[name], key) for frame in frames]) for key in SENSOR_FIELDS}
             )
             for name in frames[0].sensors
         }
@@ -173,3 +182,42 @@ class Recording:
             poses=self.poses[i],
             velocities=self.velocities[i],
         )
+
+    def part(self, frames: slice) -> Recording:
+        """Return some of the frames, by their indices; the arrays are views."""
+        return replace(
+            self,
+            frames=self.frames[frames],
+            times=self.times[frames],
+            poses=self.poses[frames],
+            velocities=self.velocities[frames],
+            sensors={name: sensor.part(frames) for name, sensor in self.sensors.items()},
+        )
+
+    def blocks(self) -> Iterator[Recording]:
+        """Yield the recording in parts of :data:`BLOCK_BYTES` or less, in order; each has a frame at least."""
+        arrays = [getattr(sensor, name) for sensor in self.sensors.values() for name in SENSOR_FIELDS]
+        arrays += [self.poses, self.velocities]
+        row = max(sum(array.nbytes for array in arrays) // max(1, len(self.frames)), *(array.strides[0] for array in arrays))
+        count = max(1, BLOCK_BYTES // max(1, row))
+        for begin in range(0, len(self.frames), count):
+            yield self.part(slice(begin, begin + count))
+            for array in arrays:
+                release_pages(array)
+
+
+def row_blocks(array: np.ndarray) -> Iterator[slice]:
+    """Yield slices that cover the rows of an array, each of :data:`BLOCK_BYTES` in its file or memory, or of a single row."""
+    rows = max(1, BLOCK_BYTES // max(1, abs(array.strides[0])))
+    for begin in range(0, len(array), rows):
+        yield slice(begin, min(begin + rows, len(array)))
+        release_pages(array)
+
+
+def release_pages(array: np.ndarray) -> None:
+    """Let go of the memory that holds what was read of a mapped file; the array stays as it is, and others are left alone."""
+    base = array
+    while isinstance(base, np.ndarray) and base.base is not None:
+        base = base.base
+    if isinstance(base, mmap.mmap) and hasattr(mmap, "MADV_DONTNEED") and not array.flags.writeable:
+        base.madvise(mmap.MADV_DONTNEED)  # what is asked for again comes from the file

@@ -300,10 +300,38 @@ class Simulation:
         )
 
 
-def solve(scenario: Scenario, simulation: Simulation | None = None, frames: list[Frame] | None = None) -> Job[Recording]:
-    """Run a scenario frame by frame.
+def solve_frames(simulation: Simulation, keep: Callable[[Frame], object], done: int = 0) -> Job[None]:
+    """Run a simulation to its last frame and hand over each frame, so that none has to stay in memory.
 
     Closing the generator stops the run; nothing outside is touched.
+
+    Parameters
+    ----------
+    simulation : Simulation
+    keep : callable
+        Called with each frame.
+    done : int
+        Frames that it has been through, the present one too; these are not handed over again. 0: the present one is the first.
+
+    Yields
+    ------
+    Progress
+        After each frame.
+    """
+    scenario = simulation.scenario
+    total = len(scenario.frames)
+    if not done:
+        keep(simulation.observe())
+        done = 1
+    yield Progress("Computing forces", done, total, simulation.frame)
+    while simulation.frame < scenario.frame_end:
+        keep(simulation.advance())
+        done += 1
+        yield Progress("Computing forces", done, total, simulation.frame)
+
+
+def solve(scenario: Scenario, simulation: Simulation | None = None, frames: list[Frame] | None = None) -> Job[Recording]:
+    """Run a scenario frame by frame, with all frames in memory; :func:`solve_frames` keeps none.
 
     Parameters
     ----------
@@ -323,14 +351,8 @@ def solve(scenario: Scenario, simulation: Simulation | None = None, frames: list
     Recording
     """
     simulation = simulation or Simulation(scenario)
-    total = len(scenario.frames)
     frames = [] if frames is None else frames
-    if not frames:
-        frames.append(simulation.observe())
-    yield Progress("Computing forces", len(frames), total, simulation.frame)
-    while simulation.frame < scenario.frame_end:
-        frames.append(simulation.advance())
-        yield Progress("Computing forces", len(frames), total, simulation.frame)
+    yield from solve_frames(simulation, frames.append, len(frames))
     names = [body.name for body in scenario.bodies]
     return Recording.stack(frames, names, simulation.dt, scenario.digest(), simulation.warnings, simulation.step_reason)
 

@@ -35,7 +35,8 @@ def test_one_folder_per_sensor(tmp_path):
     assert visible(tmp_path / "palpate") == ["Pad", "Pad 2"]
     for name, folder in result.folders.items():
         files = sorted(path.name for path in folder.iterdir())
-        assert files == ["manifest.json", "recording.npz", "sensor.npz", *(f"tactile_{frame:04d}.exr" for frame in range(1, 5))]
+        own = ["images.sha256", "manifest.json", "recording.npz", "sensor.npz"]
+        assert files == [*own, *(f"tactile_{frame:04d}.exr" for frame in range(1, 5))]
         manifest = read_manifest(folder)
         assert manifest.complete and manifest.sensor == name and manifest.digest == result.recording.digest
         recording = load_recording(folder / "recording.npz")
@@ -44,6 +45,25 @@ def test_one_folder_per_sensor(tmp_path):
         force = recording.sensors[name].normal_force[-1]
         assert channels["R"] == pytest.approx(np.float32(force).reshape(14, 6)) and force.max() > 0
         assert about["digest"] == manifest.digest
+
+
+def test_a_bake_without_images_has_the_same_recordings(tmp_path):
+    scene, *_ = press_and_drop(frames=4)
+    save(tmp_path)
+    with_images = baked(scene)
+    assert all(read_manifest(folder).has_images for folder in with_images.folders.values())
+    expected = {path: content for path, content in contents(tmp_path / "palpate").items() if str(path).endswith(".npz")}
+    scene.palpate.folder = str(tmp_path / "plain")
+    found = run_job(bake(scene, into_scene=False, images=False))
+    bake_switch.wait_for_removals()
+    for folder in found.folders.values():
+        assert visible(folder) == ["manifest.json", "recording.npz", "sensor.npz"]
+        assert not read_manifest(folder).has_images
+    plain = {path: content for path, content in contents(tmp_path / "plain").items() if str(path).endswith(".npz")}
+    assert plain == expected and len(plain) == 4
+    assert read_bake(tmp_path / "plain").recording.digest == with_images.recording.digest
+    with pytest.raises(ValueError, match="by its images"):
+        next(bake(scene, images=False))
 
 
 def test_progress_reaches_its_end(tmp_path):

@@ -64,9 +64,9 @@ def contents_of_a_whole_bake(scene, tmp_path):
     return contents(tmp_path / "whole")
 
 
-def abandon(scene, steps):
+def abandon(scene, steps, **options):
     """Stop a bake as a kill would: it cannot clean up."""
-    work = SlicedJob(bake(scene))
+    work = SlicedJob(bake(scene, **options))
     discard = bake_files.BakeFiles.discard
     bake_files.BakeFiles.discard = lambda self: self._lock.release()  # as the operating system does
     try:
@@ -99,9 +99,9 @@ def killed(tmp_path, monkeypatch):
     return scene, pad
 
 
-def computed(scene):
+def computed(scene, **options):
     frames = []
-    run_job(bake(scene), lambda step: frames.append(step.frame) if step.stage == "Computing forces" else None)
+    run_job(bake(scene, **options), lambda step: frames.append(step.frame) if step.stage == "Computing forces" else None)
     bake_switch.wait_for_removals()
     return frames
 
@@ -122,11 +122,41 @@ def test_what_does_not_fit_is_begun_anew(killed, tmp_path, what):
     elif what == "damaged state":
         (place / bake_checkpoint.STATE_FILE).write_bytes((place / bake_checkpoint.STATE_FILE).read_bytes()[:1000])
     elif what == "lost frames":
-        next(place.glob("frames_*")).unlink()
+        (place / bake_checkpoint.FRAMES_FILE).unlink()
     else:
         shutil.rmtree(growing(tmp_path) / "sensors" / "Pad")
     assert computed(scene)[0] == 1
     assert visible(tmp_path / "palpate") == ["Pad", "Pad 2"]
+
+
+def test_a_bake_without_images_goes_on_too(tmp_path, monkeypatch):
+    always_due(monkeypatch)
+    scene, *_ = press_and_drop(frames=8)
+    save(tmp_path)
+    abandon(scene, 8 + 6, into_scene=False, images=False)
+    assert computed(scene, into_scene=False, images=False)[0] == 6
+    found = contents(tmp_path / "palpate")
+    scene.palpate.folder = str(tmp_path / "whole")
+    run_job(bake(scene, into_scene=False, images=False))
+    assert found == contents(tmp_path / "whole") and len(found) == 6
+
+
+def test_a_bake_with_images_does_not_go_on_from_one_without(tmp_path, monkeypatch):
+    always_due(monkeypatch)
+    scene, *_ = press_and_drop(frames=8)
+    save(tmp_path)
+    abandon(scene, 8 + 6, into_scene=False, images=False)
+    assert computed(scene)[0] == 1
+
+
+def test_a_checkpoint_costs_the_same_at_any_length(killed, tmp_path):
+    """What it writes anew is the state alone: it has no list that grows with the frames."""
+    scene, _ = killed
+    place = growing(tmp_path) / bake_checkpoint.CHECKPOINT_FOLDER
+    before = (place / bake_checkpoint.STATE_FILE).stat().st_size
+    abandon(scene, 8 + 2)
+    assert abs((place / bake_checkpoint.STATE_FILE).stat().st_size - before) < 64
+    assert sorted(path.name for path in place.iterdir()) == [bake_checkpoint.FRAMES_FILE, bake_checkpoint.STATE_FILE]
 
 
 @pytest.mark.parametrize("damage", ["empty", "short", "other", "missing"])

@@ -4,12 +4,21 @@
 import pytest
 
 from palpate.core.errors import FileError
-from palpate.core.io.disk_space import BLOCK, least_image_bytes, require_space
+from palpate.core.io.disk_space import BLOCK, bake_bytes, recording_bytes, require_space
+from palpate.core.io.frame_rows import row_type
 
 
-def test_an_image_occupies_at_least_a_block():
-    assert least_image_bytes([1, 84], 10) == 20 * BLOCK
-    assert least_image_bytes([10**6], 2) == 2 * 10**6
+def test_the_estimate_of_a_recording_is_the_size_of_its_rows():
+    """Apart from the bytes with which a row is filled up."""
+    kind = row_type(2, {"a": 9, "b": 16})
+    assert 1000 * kind.itemsize == pytest.approx(recording_bytes(1000, 2, [9, 16]), rel=0.01)
+
+
+def test_the_estimate_of_a_bake_holds_recordings_and_images():
+    alone = bake_bytes(10, 2, [84], [])
+    assert alone == 2 * recording_bytes(10, 2, [84])
+    assert bake_bytes(10, 2, [84], [84]) == pytest.approx(alone + 20 * BLOCK, rel=0.02)
+    assert bake_bytes(2, 2, [84], [10**6]) > 2 * 28e6
 
 
 def test_a_disk_that_is_too_small_is_named(tmp_path):

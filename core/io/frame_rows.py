@@ -1,0 +1,161 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The frames of a run, in a file that only grows at its end: one row of fixed size per frame.
+
+A run of a million frames is kept in it without growing in memory, and a checkpoint of it costs the same at any length: the rows
+since the last one are brought onto the disk, and the SHA-256 of all rows so far is at hand.
+"""
+
+from __future__ import annotations
+
+import mmap
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..model.recording import SENSOR_FIELDS, Frame, Recording, SensorRecording
+from .growing_file import GrowingFile
+
+IN_MEMORY_BYTES = 1 << 24
+"""Largest recording that is read into memory; a larger one stays in its file, which is mapped."""
+_VECTORS = ("net_force", "net_torque", "centre_of_pressure")
+_SHARED = ("frames", "times", "poses", "velocities")
+
+
+def row_type(bodies: int, texels: Mapping[str, int]) -> np.dtype:
+    """Return the type of a row: the arrays of one frame under the names that they have in ``recording.npz``.
+
+    Parameters
+    ----------
+    bodies : int
+    texels : mapping of str to int
+        Number of texels by sensor name.
+    """
+    parts: list[tuple[Any, ...]] = [
+        ("frames", "<i8"),
+        ("times", "<f8"),
+        ("poses", "<f8", (bodies, 7)),
+        ("velocities", "<f8", (bodies, 6)),
+    ]
+    for i, count in enumerate(texels.values()):
+        for name in SENSOR_FIELDS:
+            shape = (3,) if name in _VECTORS else (count, 2) if name == "shear" else (count,)
+            parts.append((f"sensor_{i}/{name}", "?" if name == "contact" else "<f8", shape))
+    return np.dtype(parts, align=True)
+
+
+class FrameRows:
+    """The rows of one run. Every method that touches the file raises OSError where the system refuses.
+
+    Parameters
+    ----------
+    path : Path
+        The file. It is made by :meth:`begin` or taken over by :meth:`restore`.
+    bodies : sequence of str
+        Names of the bodies.
+    texels : mapping of str to int
+        Number of texels of each sensor that is read out, by its name.
+    """
+
+    def __init__(self, path: Path, bodies: Sequence[str], texels: Mapping[str, int]):
+        self._file = GrowingFile(path)
+        self._bodies, self._sensors = tuple(bodies), tuple(texels)
+        self._type = row_type(len(bodies), texels)
+        self._row = np.zeros(1, self._type)
+
+    def __len__(self) -> int:
+        """Return how many frames were written."""
+        return self._file.length // self._type.itemsize
+
+    @property
+    def sha256(self) -> str:
+        """SHA-256 of all rows so far, 64 hexadecimal digits."""
+        return self._file.sha256
+
+    def begin(self) -> None:
+        """Make the file, without frames."""
+        self._file.begin()
+
+    def restore(self, count: int, sha256: str) -> bool:
+        """Take over the first `count` rows of a file, as :meth:`.GrowingFile.restore` does."""
+        return self._file.restore(count * self._type.itemsize, sha256)
+
+    def append(self, frame: Frame) -> None:
+        """Write one more frame.
+
+        Raises
+        ------
+        ValueError
+            A number is not finite (a fault of the program, not of the user).
+        """
+        row = self._row[0]
+        row["frames"] = frame.frame
+        for name, values in self._values(frame):
+            if not np.isfinite(values).all():
+                raise ValueError(f"'{name}' of frame {frame.frame} has values that are not finite")
+            row[name] = values
+        self._file.append(self._row.tobytes())
+
+    def flush(self) -> None:
+        """Hand what was written to the operating system."""
+        self._file.flush()
+
+    def sync(self) -> None:
+        """Bring what was written onto the disk."""
+        self._file.sync()
+
+    def close(self) -> None:
+        """Close the file; what was read of it stays."""
+        self._file.close()
+
+    def frame(self, i: int) -> Frame:
+        """Return the frame with index `i`."""
+        self._file.flush()
+        row = np.fromfile(self._file.path, self._type, 1, offset=i * self._type.itemsize)
+        return self._recording(row, 0.0, "", (), "").at(int(row["frames"][0]))
+
+    def recording(self, dt: float, digest: str, warnings: Sequence[str], step_reason: str) -> Recording:
+        """Return all frames, with what else a :class:`.Recording` says.
+
+        A recording above :data:`IN_MEMORY_BYTES` is a view of the file and cannot be changed. It stays valid when the file is
+        removed.
+        """
+        self._file.flush()
+        if self._file.length <= IN_MEMORY_BYTES:
+            rows = np.fromfile(self._file.path, self._type, len(self))
+            return _in_memory(self._recording(rows, dt, digest, warnings, step_reason))
+        with open(self._file.path, "rb") as file:
+            mapped = mmap.mmap(file.fileno(), self._file.length, access=mmap.ACCESS_READ)
+        rows = np.frombuffer(mapped, self._type)
+        return self._recording(rows, dt, digest, warnings, step_reason)
+
+    def _values(self, frame: Frame) -> list[tuple[str, Any]]:
+        values: list[tuple[str, Any]] = [("times", frame.time), ("poses", frame.poses), ("velocities", frame.velocities)]
+        for i, sensor in enumerate(self._sensors):
+            values += [(f"sensor_{i}/{name}", getattr(frame.sensors[sensor], name)) for name in SENSOR_FIELDS]
+        return values
+
+    def _recording(self, rows: np.ndarray, dt: float, digest: str, warnings: Sequence[str], step_reason: str) -> Recording:
+        return Recording(
+            **{name: rows[name] for name in _SHARED},
+            sensors={
+                sensor: SensorRecording(**{name: rows[f"sensor_{i}/{name}"] for name in SENSOR_FIELDS})
+                for i, sensor in enumerate(self._sensors)
+            },
+            body_names=self._bodies,
+            dt=dt,
+            digest=digest,
+            warnings=tuple(warnings),
+            step_reason=step_reason,
+        )
+
+
+def _in_memory(recording: Recording) -> Recording:
+    """Return a recording whose arrays are laid out one by one, as those of ``recording.npz``."""
+    for name in _SHARED:
+        setattr(recording, name, getattr(recording, name).copy())
+    for sensor in recording.sensors.values():
+        for name in SENSOR_FIELDS:
+            setattr(sensor, name, getattr(sensor, name).copy())
+    return recording

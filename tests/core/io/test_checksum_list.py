@@ -1,0 +1,112 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The list of images beside a bake: what it vouches for, and one sentence for each way in which it is damaged."""
+
+import shutil
+import subprocess
+from dataclasses import replace
+
+import pytest
+
+from palpate.attack.sample_bake import grid_texels, write_sensor
+from palpate.core.errors import FileError
+from palpate.core.io.bake_folder import IMAGE_LIST_NAME, read_manifest, write_manifest
+from palpate.core.io.bake_reader import read_bake
+from palpate.core.io.checksum_list import checksum_line, read_checksums
+from palpate.core.io.file_writing import file_sha256
+
+IMAGES = [f"tactile_{frame:04d}.exr" for frame in range(1, 8)]
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """A sensor's folder with seven images."""
+    write_sensor(tmp_path, "pad", grid_texels(), checksums=True)
+    return tmp_path / "pad"
+
+
+def vouch_for_list(folder):
+    manifest = read_manifest(folder)
+    files = {**manifest.files, IMAGE_LIST_NAME: file_sha256(folder / IMAGE_LIST_NAME)}
+    write_manifest(folder, replace(manifest, files=files))
+
+
+def fault(folder):
+    with pytest.raises(FileError) as error:
+        read_bake(folder)
+    return str(error.value)
+
+
+def test_a_whole_bake_passes(folder):
+    read_bake(folder)
+    assert read_manifest(folder).has_images
+    assert [name for name, _ in read_checksums(folder / IMAGE_LIST_NAME)] == IMAGES
+
+
+def test_other_programs_read_the_list(folder):
+    if shutil.which("sha256sum") is None:
+        pytest.skip("this system has no sha256sum")
+    done = subprocess.run(["sha256sum", "--check", "--strict", IMAGE_LIST_NAME], cwd=folder, capture_output=True, text=True)
+    assert done.returncode == 0 and done.stdout.count("OK") == 7
+
+
+def test_the_damaged_image_is_named(folder):
+    (folder / IMAGES[1]).write_bytes(b"other")
+    assert f"{IMAGES[1]}' is damaged" in fault(folder)
+    (folder / IMAGES[1]).unlink()
+    assert f"{IMAGES[1]}' is missing" in fault(folder)
+
+
+def test_a_damaged_list_is_named(folder):
+    path = folder / IMAGE_LIST_NAME
+    path.write_bytes(path.read_bytes().replace(b"tactile_0001", b"tactile_0009"))
+    assert "images.sha256' is damaged (its content is not what was baked)" in fault(folder)
+    path.unlink()
+    assert "images.sha256' is missing from the bake: bake again." in fault(folder)
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        b"nonsense\n",
+        checksum_line("tactile_0008.exr", "0" * 63),
+        checksum_line("tactile_0008.exr", "0" * 64)[:-1],
+        b"0" * 64 + b"  tactile_\x00.exr\n",
+        b"0" * 10_000_000,
+    ],
+)
+def test_a_list_of_something_else_is_refused(folder, line):
+    with open(folder / IMAGE_LIST_NAME, "ab") as file:
+        file.write(line)
+    vouch_for_list(folder)
+    assert "images.sha256' is damaged (a line is no SHA-256 with a name): bake again." in fault(folder)
+
+
+@pytest.mark.parametrize("change", ["one more", "one less", "order", "a path", "twice"])
+def test_the_list_has_every_frame_once(folder, change):
+    path = folder / IMAGE_LIST_NAME
+    lines = path.read_bytes().splitlines(keepends=True)
+    outside = checksum_line("../pad/tactile_0007.exr", file_sha256(folder / IMAGES[6]))
+    path.write_bytes(
+        b"".join(
+            {
+                "one more": [*lines, checksum_line("tactile_0008.exr", "0" * 64)],
+                "one less": lines[:-1],
+                "order": [lines[1], lines[0], *lines[2:]],
+                "a path": [*lines[:6], outside],
+                "twice": [lines[0], *lines],
+            }[change]
+        )
+    )
+    vouch_for_list(folder)
+    assert "images.sha256' does not list an image for each frame: bake again." in fault(folder)
+
+
+def test_manifests_with_an_inline_table_mean_what_they_meant(folder):
+    manifest = read_manifest(folder)
+    files = {**manifest.files, **dict(read_checksums(folder / IMAGE_LIST_NAME))}
+    del files[IMAGE_LIST_NAME]
+    (folder / IMAGE_LIST_NAME).unlink()
+    write_manifest(folder, replace(manifest, files=files))
+    read_bake(folder)
+    (folder / IMAGES[2]).write_bytes((folder / IMAGES[3]).read_bytes())
+    assert f"{IMAGES[2]}' is damaged" in fault(folder)

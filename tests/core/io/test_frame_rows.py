@@ -1,0 +1,124 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Frames in a file that grows: they come back bit for bit, after a kill as well, and no length of a run fills the memory."""
+
+import numpy as np
+import pytest
+
+from palpate.core.io import frame_rows
+from palpate.core.io.frame_rows import FrameRows, row_type
+from palpate.core.io.growing_file import GrowingFile
+from palpate.core.io.recording_npz import save_recording
+from palpate.core.model import recording as model
+from palpate.core.model.recording import SENSOR_FIELDS, Frame, Recording, SensorFrame
+
+TEXELS = {"Finger/A": 5, "pad": 1}
+BODIES = ("world", "finger")
+
+
+def frames(count, seed=3):
+    rng = np.random.default_rng(seed)
+
+    def sensor(n):
+        shapes = [(n,), (n, 2), (n,), (n,), (n,), (n,), (n,), (3,), (3,), (3,)]
+        arrays = dict(zip(SENSOR_FIELDS, (rng.normal(size=shape) for shape in shapes), strict=True))
+        return SensorFrame(**{**arrays, "contact": arrays["contact"] > 0})
+
+    return [
+        Frame(i + 7, i / 24, {name: sensor(n) for name, n in TEXELS.items()}, rng.normal(size=(2, 7)), rng.normal(size=(2, 6)))
+        for i in range(count)
+    ]
+
+
+def written(path, wanted):
+    rows = FrameRows(path, BODIES, TEXELS)
+    rows.begin()
+    for frame in wanted:
+        rows.append(frame)
+    return rows
+
+
+def arrays_of(recording):
+    found = {name: getattr(recording, name) for name in ("frames", "times", "poses", "velocities")}
+    for sensor, own in recording.sensors.items():
+        found |= {f"{sensor}/{name}": getattr(own, name) for name in SENSOR_FIELDS}
+    return found
+
+
+@pytest.mark.parametrize("mapped", [False, True])
+def test_frames_come_back_bit_for_bit(tmp_path, monkeypatch, mapped):
+    wanted = frames(40)
+    if mapped:
+        monkeypatch.setattr(frame_rows, "IN_MEMORY_BYTES", 0)
+        monkeypatch.setattr(model, "BLOCK_BYTES", 2000)  # a few frames
+    rows = written(tmp_path / "rows", wanted)
+    assert len(rows) == 40
+    found, expected = rows.recording(1e-4, "d", ["careful"], "because"), Recording.stack(wanted, BODIES, 1e-4, "d")
+    rows.close()
+    (tmp_path / "rows").unlink()  # as at the end of a bake
+    assert found.warnings == ("careful",) and found.step_reason == "because" and found.dt == 1e-4
+    for name, array in arrays_of(expected).items():
+        own = arrays_of(found)[name]
+        assert own.dtype == array.dtype and own.tobytes() == array.tobytes(), name
+        assert own.flags.writeable != mapped
+    parts = [arrays_of(part) for part in found.blocks()]
+    assert (len(parts) > 5) == mapped
+    for name, array in arrays_of(expected).items():
+        assert np.concatenate([part[name] for part in parts]).tobytes() == array.tobytes()
+    save_recording(tmp_path / "streamed.npz", found)
+    expected.warnings, expected.step_reason = found.warnings, found.step_reason
+    save_recording(tmp_path / "at once.npz", expected)
+    assert (tmp_path / "streamed.npz").read_bytes() == (tmp_path / "at once.npz").read_bytes()
+
+
+def test_rows_after_a_checkpoint_are_cut_off(tmp_path):
+    wanted = frames(9)
+    rows = written(tmp_path / "rows", wanted[:4])
+    vouched = rows.sha256
+    for frame in frames(3, seed=8):
+        rows.append(frame)
+    rows.close()
+    again = FrameRows(tmp_path / "rows", BODIES, TEXELS)
+    assert again.restore(4, vouched) and len(again) == 4 and again.sha256 == vouched
+    for frame in wanted[4:]:
+        again.append(frame)
+    assert again.sha256 == written(tmp_path / "whole", wanted).sha256
+    assert again.recording(1e-4, "", (), "").poses.tobytes() == Recording.stack(wanted, BODIES, 1e-4).poses.tobytes()
+    third = again.frame(2)
+    assert third.frame == 9 and third.sensors["pad"].shear.tobytes() == wanted[2].sensors["pad"].shear.tobytes()
+
+
+@pytest.mark.parametrize("damage", ["missing", "short", "other"])
+def test_rows_that_a_power_cut_has_damaged_are_refused(tmp_path, damage):
+    rows = written(tmp_path / "rows", frames(5))
+    rows.sync()
+    content, vouched = bytearray((tmp_path / "rows").read_bytes()), rows.sha256
+    rows.close()
+    content[100] ^= 1
+    (tmp_path / "rows").unlink()
+    if damage != "missing":
+        (tmp_path / "rows").write_bytes(content[:-1] if damage == "short" else content)
+    assert not FrameRows(tmp_path / "rows", BODIES, TEXELS).restore(5, vouched)
+
+
+def test_a_number_that_is_not_finite_reaches_no_file(tmp_path):
+    rows, (frame,) = written(tmp_path / "rows", []), frames(1)
+    frame.sensors["pad"].slip[0] = np.nan
+    with pytest.raises(ValueError, match=r"sensor_1/slip' of frame 7"):
+        rows.append(frame)
+    assert len(rows) == 0
+
+
+def test_numbers_in_a_row_lie_where_processors_read_them_fast():
+    kind = row_type(2, {"a": 3, "b": 5})
+    assert kind.itemsize % 8 == 0
+    assert all(offset % 8 == 0 for name, (_, offset, *_) in kind.fields.items() if not name.endswith("contact"))
+
+
+def test_a_growing_file_knows_its_checksum(tmp_path):
+    file = GrowingFile(tmp_path / "file")
+    file.begin()
+    file.append(b"abc")
+    assert file.length == 3 and file.sha256 == "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad"  # FIPS 180-2
+    file.sync()
+    assert (tmp_path / "file").read_bytes() == b"abc"
+    file.close()
