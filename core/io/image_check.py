@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Checks of the tactile images of a bake: each frame has its image, and the image shows what the recording says.
 
-An image that the manifest, or its list of images, vouches for with its SHA-256 is what was baked. Any other, as in older bakes, is read and compared
-with the recording.
+An image that the manifest or the list of images vouches for with its SHA-256 is what was baked. Any other, as in older bakes,
+is read and compared with the recording.
 """
 
 from __future__ import annotations
