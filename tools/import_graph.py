@@ -30,38 +30,28 @@ MAY_IMPORT: dict[str, set[str]] = {
     "": {"core", "addon", "operators", "panels", "commands", "paper", "sample_blends"},
 }
 
-# The order of the rooms: each may import only from those that stand before it.
+
+def _all_of(source: str) -> list[str] | None:
+    """Return the list `__all__` of a module's source, None where it has none."""
+    for node in ast.parse(source).body:
+        if isinstance(node, ast.Assign) and any(isinstance(t, ast.Name) and t.id == "__all__" for t in node.targets):
+            return list(ast.literal_eval(node.value))
+    return None
+
+
+def _rooms_of(package: str) -> tuple[str, ...]:
+    """Return the rooms that a package names in its `__all__`, in their order."""
+    return tuple(_all_of((ROOT / package / "__init__.py").read_text(encoding="utf-8")) or ())
+
+
+# The order of the rooms: each may import only from those that stand before it. The two packages that others enter only by
+# their rooms name them in this order themselves; inside the rooms, `__all__` is in alphabetical order.
 ORDER: dict[str, tuple[str, ...]] = {
-    "core": (
-        "errors",
-        "compiled",
-        "jobs",
-        "geometry",
-        "model",
-        "laws",
-        "effects",
-        "response",
-        "solver",
-        "io",
-        "figures",
-        "export",
-        "gap",
-    ),
+    "core": _rooms_of("core"),
     "core.effects": ("engine", "library"),
     "core.gap": ("dataset", "forward", "fitting", "selection", "report", "calibration"),
     "core.solver": ("detection", "dynamics"),
-    "addon": (
-        "session",
-        "properties",
-        "scene",
-        "display",
-        "timeline",
-        "authoring",
-        "bake",
-        "render",
-        "measured",
-        "events",
-    ),
+    "addon": _rooms_of("addon"),
 }
 DEEPEST = 8  # layers of imports among the direct children of one package
 # Folders inside a package that Blender runs as scripts; they are not modules of it.
@@ -218,13 +208,6 @@ class Graph:
         start = f"{package}." if package else ""
         inside = {m: {t for t in ts if t.startswith(start)} for m, ts in self.edges.items() if m.startswith(start)}
         return circles(inside)
-
-
-def _all_of(source: str) -> list[str] | None:
-    for node in ast.parse(source).body:
-        if isinstance(node, ast.Assign) and any(isinstance(t, ast.Name) and t.id == "__all__" for t in node.targets):
-            return list(ast.literal_eval(node.value))
-    return None
 
 
 def circles(graph: Mapping[str, set[str]]) -> list[list[str]]:

@@ -21,7 +21,7 @@ DAMAGED = (
     AttributeError,
     EOFError,
     RuntimeError,
-    NotImplementedError,
+    NotImplementedError,  # by zipfile, of a compression that it does not know
     MemoryError,
     OverflowError,
     SyntaxError,
