@@ -157,7 +157,8 @@ class Simulation:
                 too_deep = advance_steps(self.dt, first, last, path, *self.arrays)
             self._most_too_deep = max(self._most_too_deep, too_deep)
         self.frame += 1
-        self._warn_of_fast_crossings(positions, quaternions, before)
+        if self._fast_crossings.may_occur(velocities, before, (self._state.position, self._state.quaternion), self.dt):
+            self._warn_of_fast_crossings(positions, quaternions, before)
         return self.observe()
 
     def _warn_of_fast_crossings(

@@ -8,9 +8,10 @@ import pytest
 from solver_scenes import LEVEL, box, cube_on_pad, pressed
 
 from palpate.core.geometry.mesh import TriangleMesh
+from palpate.core.geometry.rotations import quaternion_product, rotation_vectors
 from palpate.core.model.body import Body
 from palpate.core.model.motion import Motion
-from palpate.core.solver.fast_crossings import _entering, path_of_moved_bodies
+from palpate.core.solver.fast_crossings import BodiesInFrame, _entering, _travel, path_of_moved_bodies
 from palpate.core.solver.simulation import run
 
 
@@ -82,3 +83,24 @@ def test_paths_take_the_shorter_turn():
     positions, quaternions = path_of_moved_bodies(before, after, 4)
     np.testing.assert_allclose(positions[2], 0.5)
     np.testing.assert_allclose(quaternions, np.tile(LEVEL, (5, 1, 1)))
+
+
+def test_the_quick_bound_is_never_below_the_fastest_step():
+    """Random motions, of bodies with and without forces: the bound that every frame asks for, against the path itself."""
+    random = np.random.default_rng(5)
+    steps, dt, radius = 7, 1e-3, np.array([0.3])
+    for moved in (False, True) * 40:
+        turns = random.normal(size=(steps + 1, 1, 4)) if not moved else random.normal(size=(2, 1, 4))
+        turns /= np.linalg.norm(turns, axis=2, keepdims=True)
+        places = random.normal(size=(len(turns), 1, 3))
+        velocities = np.zeros((steps, 1, 6))
+        if moved:
+            places, turns = path_of_moved_bodies((places[0], turns[0]), (places[1], turns[1]), steps)
+        else:
+            relative = quaternion_product(turns[1:], turns[:-1] * np.array([1.0, -1, -1, -1]))
+            velocities = np.concatenate([np.diff(places, axis=0), rotation_vectors(relative)], axis=2) / dt
+        bodies = BodiesInFrame(velocities, places[0], turns[0], places[-1], turns[-1], np.array([moved]), radius)
+        cosines = np.abs((turns[1:] * turns[:-1]).sum(axis=2))
+        farthest = (np.linalg.norm(np.diff(places, axis=0), axis=2) + 2 * np.arccos(np.minimum(cosines, 1)) * radius).max()
+        bound = _travel(0, bodies, dt)
+        assert farthest * (1 - 1e-9) <= bound <= 2 * farthest * (1 + 1e-9)
