@@ -63,11 +63,10 @@ def run(arguments: argparse.Namespace) -> int:
     with console.blender_output_hidden():
         scene = blender.open_scene(arguments.scene, arguments.scripts)
         own_start = scene.frame_start
-        if saved_path(arguments):
-            blender.check_writable(saved_path(arguments))
+        saved = saved_path(arguments)
+        blend = None if saved is None else blender.blend_to_save(saved)
         _prepare(scene, arguments)
-        baked = bake_with_progress(scene, into_scene=bool(saved_path(arguments)), images=not arguments.no_images)
-        saved = save_scene(arguments)
+        baked = bake_with_progress(scene, into_scene=saved is not None, images=not arguments.no_images, blend=blend)
     print(report(baked))
     if scene.frame_start != own_start:
         print(f"note: bodies and bristles started at frame {scene.frame_start}, not at the scene's {own_start}")
@@ -93,11 +92,11 @@ def _prepare(scene, arguments: argparse.Namespace) -> None:
         _read_out_only(scene, arguments.sensor)
 
 
-def bake_with_progress(scene, into_scene: bool = True, images: bool = True):
-    """Bake a scene with a progress bar on stderr; Ctrl-C leaves an earlier bake as it was."""
+def bake_with_progress(scene, into_scene: bool = True, images: bool = True, blend=None):
+    """Bake a scene with a progress bar on stderr, and save a .blend with it; Ctrl-C leaves an earlier bake as it was."""
     from ..addon.bake import bake
 
-    return console.run_with_progress_bar("bake", bake.bake(scene, into_scene, images))
+    return console.run_with_progress_bar("bake", bake.bake(scene, into_scene, images, blend))
 
 
 def report(baked) -> str:
@@ -122,14 +121,6 @@ def report(baked) -> str:
 def _newtons(value: float) -> str:
     """Return a force as text; rounding errors appear as zero."""
     return f"{value if value > 1e-9 else 0.0:.4f} N"
-
-
-def save_scene(arguments: argparse.Namespace) -> Path | None:
-    """Save the open scene if --save or --save-as asks for it, and return its path."""
-    path = saved_path(arguments)
-    if path is not None:
-        blender.save_blend(path)
-    return path
 
 
 def saved_path(arguments: argparse.Namespace) -> Path | None:

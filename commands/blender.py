@@ -14,7 +14,8 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from ..core.errors import FileError, PalpateError
-from ..core.io.file_writing import writable_folder
+from ..core.io import bake_switch
+from ..core.io.file_writing import back_up, exchange_file, sync_file, writable_folder
 from ..core.io.regular_file import open_regular, require_regular
 from . import console
 
@@ -98,6 +99,7 @@ def open_blend(path: str | os.PathLike, scripts: str = REFUSE) -> None:
     path = Path(path)
     if path.is_dir():
         raise FileError(f"'{path}' is a folder: give the name of a .blend file in it.")
+    bake_switch.settle_blend(path)
     try:
         with open_regular(path) as file:
             magic = file.read(7)
@@ -168,6 +170,8 @@ def check_writable(path: Path) -> None:
 def save_blend(path: str | os.PathLike, backup: bool = True) -> None:
     """Save the open scene, compressed. With `backup`, an existing file becomes .blend1, as in Blender itself.
 
+    At every moment there is a file of this name, the old one or the new one. A symbolic link stays a link.
+
     Raises
     ------
     FileError
@@ -175,21 +179,91 @@ def save_blend(path: str | os.PathLike, backup: bool = True) -> None:
     """
     import bpy
 
-    path = Path(path).absolute()
-    check_writable(path)
+    blend = blend_to_save(path)
+    backups = blend.backups if backup else 0
+    with _save_errors(path):
+        if _is_open_file(blend.path):
+            waiting = blend.path.with_name(f".{blend.path.name}.{secrets.token_hex(4)}.partial")
+            blend.write(waiting)
+            exchange_file(waiting, blend.path, backups)
+            return
+        if backups and blend.path.exists():
+            back_up(blend.path, backups)
+        with _restored_on_error(blend.path), _without_versions():  # Blender replaces the file with a single rename
+            bpy.ops.wm.save_as_mainfile(filepath=str(blend.path), compress=True, relative_remap=True)
+            if not _is_whole(blend.path):
+                raise OSError("it was cut short")
+            sync_file(blend.path)
+
+
+def blend_to_save(path: str | os.PathLike):
+    """Return how the open scene is saved to `path` together with a bake.
+
+    Raises
+    ------
+    FileError
+        The file cannot be written.
+    """
+    import bpy
+
+    from ..addon.bake.bake_files import BlendToSave
+
+    check_writable(Path(path))
+    target = Path(os.path.realpath(path))
+    check_writable(target)
+    versions = bpy.context.preferences.filepaths.save_version
+    return BlendToSave(target, lambda waiting: _write_copy(waiting, target), versions)
+
+
+def _write_copy(waiting: Path, target: Path) -> None:
+    """Write the open scene to `waiting`, which lies beside `target` and will replace it, and bring it onto the disk."""
+    import bpy
+
+    with _save_errors(target):
+        try:
+            with _without_versions():
+                bpy.ops.wm.save_as_mainfile(
+                    filepath=str(waiting), compress=True, copy=True, relative_remap=not _is_open_file(target)
+                )
+            if not _is_whole(waiting):
+                raise OSError("it was cut short")
+            sync_file(waiting)
+        except BaseException:
+            with suppress(OSError):
+                waiting.unlink(missing_ok=True)
+            raise
+
+
+def _is_open_file(path: Path) -> bool:
+    """Return True if this is the .blend that is open."""
+    import bpy
+
+    opened = bpy.data.filepath
+    return bool(opened) and path.exists() and os.path.exists(opened) and path.samefile(opened)
+
+
+@contextmanager
+def _without_versions() -> Iterator[None]:
+    """Let Blender keep no earlier versions: it moves the old file away before the new one is in its place."""
+    import bpy
+
     files = bpy.context.preferences.filepaths
     versions = files.save_version
     try:
-        files.save_version = versions if backup else 0
-        with _restored_on_error(path):
-            bpy.ops.wm.save_as_mainfile(filepath=str(path), compress=True, relative_remap=True)
-            if not _is_whole(path):
-                raise OSError("it was cut short")
+        files.save_version = 0
+        yield
+    finally:
+        files.save_version = versions
+
+
+@contextmanager
+def _save_errors(path: str | os.PathLike) -> Iterator[None]:
+    """Raise FileError for an error of Blender or of the operating system while a .blend is saved."""
+    try:
+        yield
     except (RuntimeError, OSError) as error:
         reason = " ".join(str(error).removeprefix("Error:").split()).rstrip(".")
         raise FileError(f"'{path}' could not be saved ({reason}): check the folder and the space left on the disk.") from error
-    finally:
-        files.save_version = versions
 
 
 def _is_whole(path: Path) -> bool:
@@ -213,6 +287,8 @@ def _restored_on_error(path: Path) -> Iterator[None]:
     except BaseException:
         with suppress(OSError):
             os.replace(copy, path) if copy is not None else path.unlink()
+        if copy is not None:
+            copy.unlink(missing_ok=True)  # where nothing was written, both are one file, and the exchange does nothing
         raise
     if copy is not None:
         copy.unlink()

@@ -39,7 +39,9 @@ class BakeResult:
     folders: dict[str, Path]
 
 
-def bake(scene, into_scene: bool = True, images: bool = True) -> Job[BakeResult]:
+def bake(
+    scene, into_scene: bool = True, images: bool = True, blend: bake_files.BlendToSave | None = None
+) -> Job[BakeResult]:
     """Compute the whole frame range of a scene, write the files, and put the result into the scene.
 
     Nothing in the scene changes before the last step, and an earlier bake stays as it is until then: closing the generator, an
@@ -53,6 +55,9 @@ def bake(scene, into_scene: bool = True, images: bool = True) -> Job[BakeResult]
         False writes the files only. Use it where objects are linked from other files and cannot show a bake.
     images : bool
         False writes the recordings alone, as for a million frames. A scene cannot show such a bake: `into_scene` is False too.
+    blend : BlendToSave, optional
+        The .blend to save with the bake: after a kill both are the old ones or both the new ones. The scene in memory shows the
+        new bake before that step.
 
     Raises
     ------
@@ -64,12 +69,12 @@ def bake(scene, into_scene: bool = True, images: bool = True) -> Job[BakeResult]
         raise ValueError("a scene shows a bake by its images")
     with session_state.suspended():
         try:
-            return (yield from part_of_job(_bake(scene, into_scene, images), _note_for_panel))
+            return (yield from part_of_job(_bake(scene, into_scene, images, blend), _note_for_panel))
         finally:
             session_state.session.bake_progress = None
 
 
-def _bake(scene, into_scene: bool, images: bool) -> Job[BakeResult]:
+def _bake(scene, into_scene: bool, images: bool, blend: bake_files.BlendToSave | None) -> Job[BakeResult]:
     """Do the steps of a bake, each in the room that owns it."""
     name = scene.name
     folder = bake_files.writable_bake_folder(scene)
@@ -81,8 +86,11 @@ def _bake(scene, into_scene: bool, images: bool) -> Job[BakeResult]:
     simulation = dependencies.load_solver().Simulation(reading.scenario)
     with bake_files.BakeFiles(folder, reading.scenario, bpy.data.filepath, images) as files:
         recording = yield from _solve(name, simulation, reading, files)
-        files.finish(recording)
-    if into_scene:
+        files.complete(recording)
+        if blend is not None:
+            _show(_scene_called(name), reading, recording, files.folders)
+        files.switch(blend)
+    if into_scene and blend is None:
         _show(_scene_called(name), reading, recording, files.folders)
     return BakeResult(recording, reading.scenario, files.folders)
 

@@ -12,9 +12,9 @@ import json
 import math
 import os
 import secrets
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
-from dataclasses import asdict, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 import bpy
@@ -88,6 +88,25 @@ def check_space(folder: Path, scenario: Scenario, images: bool = True) -> None:
         texels = [len(sensor.texels) for sensor in read_out]
         pixels = [math.prod(sensor.texels.layout.shape) for sensor in read_out] if images else []
         require_space(folder, bake_bytes(len(scenario.frames), len(scenario.bodies), texels, pixels), "The bake")
+
+
+@dataclass(frozen=True)
+class BlendToSave:
+    """A .blend that is written with a bake, and exchanged in the same step.
+
+    Attributes
+    ----------
+    path : Path
+        Absolute and without links.
+    write : callable
+        Writes the open scene to the path that it is given, and brings it onto the disk.
+    backups : int
+        Number of earlier versions that are kept.
+    """
+
+    path: Path
+    write: Callable[[Path], None]
+    backups: int = 0
 
 
 class BakeFiles:
@@ -209,17 +228,6 @@ class BakeFiles:
         except OSError as error:
             raise _write_error(self.folder, error) from error
 
-    def finish(self, recording: Recording) -> None:
-        """Write the recordings, then make the new bake the present one: all of its folders or none.
-
-        Raises
-        ------
-        FileError
-            A file cannot be written, or a folder cannot be replaced. The old bake is unchanged.
-        """
-        self.complete(recording)
-        self.switch()
-
     def complete(self, recording: Recording) -> None:
         """Write the recordings and bring all files onto the disk; the old bake stays the present one.
 
@@ -245,17 +253,21 @@ class BakeFiles:
             written.append(write_manifest(self._new_folder(name), manifest, atomic=not CAN_SYNC_ALL))
         self._sync(written)
 
-    def switch(self) -> None:
-        """Make the complete bake the present one, in a single step.
+    def switch(self, blend: BlendToSave | None = None) -> None:
+        """Make the complete bake the present one, and a .blend with it, in a single step.
 
         Raises
         ------
         FileError
-            A folder cannot be replaced. The old bake is unchanged.
+            The .blend cannot be written, or a folder cannot be replaced. The old bake and the old .blend are unchanged.
         """
         self._check_replaceable()  # again, because the user may have put files there during the bake
         record = bake_switch.Switch(self._run, tuple(self._names[name] for name in self._sensors))
         try:
+            if blend is not None:
+                record = replace(record, blend=str(blend.path), backups=blend.backups)
+                bake_switch.announce_blend(self.folder, self._run, blend.path)
+                blend.write(record.new_blend())
             bake_switch.switch(self.folder, record)
         except OSError as error:
             raise _write_error(self.folder, error) from error

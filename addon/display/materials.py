@@ -52,7 +52,8 @@ def load_sequence(uid: str, first: Path, relative: bool):
     path = bpy.path.relpath(str(first)) if relative else str(first)
     require_regular(first)
     if image is None:
-        image = bpy.data.images.load(path)
+        # The files of a bake that is saved together with its .blend are not in their place yet.
+        image = bpy.data.images.load(path) if first.exists() else bpy.data.images.new(first.parent.name, 1, 1)
         image[SENSOR_KEY] = uid
     image.name = f"Palpate {first.parent.name}"
     image.filepath = path

@@ -12,6 +12,7 @@ of a bake is removed.
 
 from __future__ import annotations
 
+import glob
 import json
 import os
 import re
@@ -23,13 +24,16 @@ from pathlib import Path
 
 from ..errors import FileError
 from .bake_folder import BAKE_FILE_NAMES
-from .file_writing import atomic_write, exchange_file, os_error_reason, sync_folder
+from .file_writing import atomic_write, exchange_file, os_error_reason, remove_leftovers, sync_file, sync_folder, write_file
 from .folder_lock import FolderLock
 from .private_folder import PRIVATE_FOLDER, find_private_folder, remove_tree
+from .regular_file import read_bytes
 
 SWITCH_NAME = "switch.json"
 SWITCH_FORMAT = "palpate-switch/1"
 GROWING_PREFIX = "growing-"
+BLEND_NOTE = "blend"
+"""File in the folder of a run: the path of the .blend that the run saves."""
 
 _removals: list[threading.Thread] = []
 
@@ -63,6 +67,39 @@ class Switch:
 def waiting_blend(blend: Path, run: str) -> Path:
     """Return the name under which a run writes a .blend, beside the old one."""
     return blend.with_name(f".{blend.name}.{run}.partial")
+
+
+def announce_blend(bake_folder: Path, run: str, blend: Path) -> None:
+    """Note that a .blend, which is about to be written, belongs to a run, and in which bake folder the run is.
+
+    A kill leaves the waiting .blend; :func:`remove_growing` and :func:`settle_blend` find it by these notes.
+
+    Raises
+    ------
+    FileError
+        A note cannot be written.
+    """
+    with atomic_write(growing_folder(bake_folder / PRIVATE_FOLDER, run) / BLEND_NOTE) as temporary:
+        temporary.write_bytes(os.fsencode(blend))
+    with write_file(_folder_note(blend, run), atomic=False) as note:
+        note.write_bytes(os.fsencode(bake_folder))
+        sync_file(note)
+
+
+def settle_blend(blend: Path) -> None:
+    """Carry out a switch that was interrupted and that exchanges this .blend; see :func:`settle`."""
+    target = Path(os.path.realpath(blend))
+    for path in target.parent.glob(f".{glob.escape(target.name)}.*.bake"):
+        if _folder_note(target, path.name[-21:-5]) == path and not path.is_symlink():
+            bake_folder = Path(os.fsdecode(read_bytes(path)))
+            settle(bake_folder)
+            if pending_switch(bake_folder) is None and not os.path.lexists(waiting_blend(target, path.name[-21:-5])):
+                with suppress(OSError):
+                    path.unlink()
+
+
+def _folder_note(blend: Path, run: str) -> Path:
+    return blend.with_name(f".{blend.name}.{run}.bake")
 
 
 def growing_folder(private: Path, run: str) -> Path:
@@ -200,10 +237,27 @@ def remove_growing(growing: Path) -> None:
                 _remove_replaced(old, growing.parent.parent / old.name)
         with suppress(OSError):
             replaced.rmdir()
+    _remove_waiting_blend(growing)
     remove_tree(growing / "sensors")
     remove_tree(growing / "checkpoint")
     with suppress(OSError):
         growing.rmdir()
+
+
+def _remove_waiting_blend(growing: Path) -> None:
+    """Remove the .blend that a run has written, its notes, and what Blender leaves beside it when it is killed."""
+    note, run = growing / BLEND_NOTE, growing.name.removeprefix(GROWING_PREFIX)
+    with suppress(OSError, FileError, ValueError):
+        blend = Path(os.fsdecode(read_bytes(note)))
+        waiting = waiting_blend(blend, run)
+        for path in (waiting, waiting.with_name(f"{waiting.name}@"), _folder_note(blend, run)):
+            path.unlink(missing_ok=True)
+        for path in blend.parent.glob(f".{glob.escape(blend.name)}.*.partial"):
+            if re.fullmatch(r"[0-9a-f]{8}", path.name[len(blend.name) + 2 : -len(".partial")]):
+                path.unlink(missing_ok=True)  # the unfinished copy of an earlier version
+    with suppress(OSError):
+        note.unlink(missing_ok=True)
+        remove_leftovers(growing)
 
 
 def wait_for_removals() -> None:
@@ -276,6 +330,8 @@ def _conclude(bake_folder: Path, record: Switch) -> None:
     with suppress(OSError):  # the new bake is in its place: who finds the record again has nothing left to do
         (private / SWITCH_NAME).unlink(missing_ok=True)
         sync_folder(private)
+        if record.blend:
+            _folder_note(Path(record.blend), record.run).unlink(missing_ok=True)
     thread = threading.Thread(
         target=remove_growing, args=(growing_folder(private, record.run),), name="palpate-remover", daemon=False
     )

@@ -164,13 +164,16 @@ def exchange_file(new: Path, target: Path, backups: int = 0) -> None:
         It cannot be replaced.
     """
     if backups and target.exists():
-        _back_up(target, backups)
+        back_up(target, backups)
     os.replace(new, target)
     sync_folder(target.parent)
 
 
-def _back_up(target: Path, backups: int) -> None:
-    """Give the present file a second name, ``<target>1``; that of before becomes ``<target>2``, and so on."""
+def back_up(target: Path, backups: int) -> None:
+    """Give the present file a second name, ``<target>1``; that of before becomes ``<target>2``, and so on.
+
+    The file itself stays in its place. Raises OSError where that is impossible.
+    """
     versions = [target.with_name(f"{target.name}{number}") for number in range(1, backups + 1)]
     if versions[0].exists() and versions[0].samefile(target):
         return  # an interrupted exchange has done it

@@ -1,0 +1,160 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A .blend that is saved with its bake: both are the old ones or both the new ones, whenever the process is stopped."""
+
+import gc
+import os
+import shutil
+from contextlib import suppress
+
+import bpy
+import pytest
+from blender_scenes import press, save, visible
+
+from palpate.addon.bake import bake_files
+from palpate.addon.bake.bake import bake
+from palpate.addon.display import baked_scene
+from palpate.commands import blender
+from palpate.core.io import bake_switch
+from palpate.core.io.bake_reader import check_images, read_bake
+from palpate.core.io.private_folder import PRIVATE_FOLDER
+from palpate.core.jobs.job_runner import run_job
+
+CALLS = ("rename", "replace", "unlink", "rmdir", "mkdir", "fsync", "link")
+
+
+class Stopped(BaseException):
+    """The process was killed."""
+
+
+def bake_and_save(path, k=None):
+    scene = blender.open_scene(path)
+    if k is not None:
+        scene.objects["Pad"].palpate.k = k
+    result = run_job(bake(scene, blend=blender.blend_to_save(path)))
+    bake_switch.wait_for_removals()
+    return result.recording.digest
+
+
+@pytest.fixture
+def saved(tmp_path):
+    """A baked and saved .blend, and the digest of its bake."""
+    press(frames=2)
+    path = save(tmp_path)
+    return path, bake_and_save(path)
+
+
+def found(path):
+    """Check that .blend and bake belong together as a later process finds them; return their digest."""
+    scene = blender.open_scene(path)
+    read = read_bake(path.parent / "palpate")
+    check_images(read)
+    (folder,) = baked_scene.bake_folders(scene).values()
+    assert folder == read.folders["Pad"] == path.parent / "palpate" / "Pad"
+    assert scene.palpate.baked_digest == read.recording.digest
+    return read.recording.digest
+
+
+def stop_at(patch, number):
+    """From the switch on, let the call of that number and all later ones fail; return a list for the list of calls."""
+    calls, switch = [], bake_files.BakeFiles.switch
+
+    def begin(self, blend=None):
+        calls.append(failing_calls(patch, number))
+        switch(self, blend)
+
+    patch.setattr(bake_files.BakeFiles, "switch", begin)
+    start = bake_switch.threading.Thread.start
+    patch.setattr(
+        bake_switch.threading.Thread, "start", lambda self: self.run() if self.name == "palpate-remover" else start(self)
+    )
+    patch.setattr(bake_switch, "_removals", [])
+    patch.setattr(bake_switch, "wait_for_removals", lambda: None)
+    return calls
+
+
+def test_the_first_bake_is_saved_with_the_blend(saved):
+    path, digest = saved
+    assert found(path) == digest
+    image = next(image for image in bpy.data.images if image.name == "Palpate Pad")
+    assert (image.filepath, image.source, image.colorspace_settings.name) == (
+        "//palpate/Pad/tactile_0001.exr",
+        "SEQUENCE",
+        "Non-Color",
+    )
+    assert sorted(name.name for name in path.parent.iterdir()) == ["palpate", "scene.blend", "scene.blend1"]
+    assert visible(path.parent / "palpate") == ["Pad"]
+
+
+def test_stopped_at_every_step_of_the_switch(saved, tmp_path):
+    path, old = saved
+    digests, number = [], 1
+    while True:
+        home = tmp_path / f"copy {number}"
+        home.mkdir()
+        shutil.copy(path, home)
+        shutil.copytree(path.parent / "palpate", home / "palpate")
+        copy = home / path.name
+        with pytest.MonkeyPatch.context() as patch:
+            calls = stop_at(patch, number)
+            with suppress(Stopped):
+                bake_and_save(copy, k=77.0)
+        gc.collect()  # the lock of the stopped process
+        assert copy.is_file()
+        digests.append(found(copy))
+        (home / "palpate" / "Pad" / "notes.txt").write_text("mine")
+        assert bake_and_save(copy, k=88.0) == found(copy)
+        assert sorted(item.name for item in home.iterdir() if not item.name.startswith("scene.blend")) == ["palpate"]
+        assert [item.name for item in (home / "palpate" / PRIVATE_FOLDER).iterdir()] == ["palpate-folder.json"]
+        assert (home / "palpate" / "Pad" / "notes.txt").read_text() == "mine"
+        if len(calls[0]) < number:
+            break
+        number += 1
+    assert number > 15
+    new = digests[-1]
+    assert new != old and digests == [old] * digests.count(old) + [new] * digests.count(new) and digests[0] == old
+
+
+def test_a_link_to_a_blend_stays_a_link(saved, tmp_path):
+    path, _ = saved
+    home = tmp_path / "elsewhere"
+    home.mkdir()
+    shutil.copytree(path.parent / "palpate", home / "palpate")
+    link = home / "link.blend"
+    link.symlink_to(path)
+    bpy.ops.wm.open_mainfile(filepath=str(link))
+    blender.save_blend(link)
+    assert link.is_symlink() and link.resolve() == path
+    assert found(path)
+
+
+def failing_calls(patch, number):
+    """From now on let the call of that number and all later ones fail; return the list of calls."""
+    calls = []
+
+    def failing(name, original):
+        def call(*arguments, **options):
+            calls.append(name)
+            if len(calls) >= number:
+                raise Stopped()
+            return original(*arguments, **options)
+
+        return call
+
+    for name in CALLS:
+        patch.setattr(os, name, failing(name, getattr(os, name)))
+    return calls
+
+
+def test_a_blend_that_is_saved_is_there_at_every_moment(saved):
+    path, _ = saved
+    blender.open_scene(path)
+    for number in range(1, 100):
+        with pytest.MonkeyPatch.context() as patch:
+            calls = failing_calls(patch, number)
+            with suppress(Stopped):
+                blender.save_blend(path)
+        assert path.read_bytes().startswith(b"\x28\xb5\x2f\xfd") or path.read_bytes().startswith(b"BLENDER")
+        if len(calls) < number:
+            break
+    assert 3 < number < 99
+    blender.open_blend(path)
