@@ -16,7 +16,7 @@ import numpy as np
 
 from ..properties import start_transforms
 from ..session import fcurves
-from . import display_names
+from . import display_names, drives
 
 _POINT_PROPERTIES = ("co", "handle_left", "handle_right")
 _EASING_PROPERTIES = ("easing", "back", "amplitude", "period")
@@ -30,7 +30,7 @@ _IGNORED_PROPERTIES = {"name", "show_expanded", "select", "active", "strip_time"
 def fingerprint(objects) -> str:
     """Return a hash of the animation of objects and of everything that they depend on, also between frames.
 
-    Of a body that forces move only the drivers count: its keyframes are those of a bake.
+    Of a body that forces move only the drivers and the target of its drive count: its other keyframes are those of a bake.
     """
     digest = hashlib.blake2b(digest_size=16)
     for block in related_data_blocks(objects):
@@ -41,16 +41,36 @@ def fingerprint(objects) -> str:
         for driver in data.drivers:
             _feed_curve(digest, driver)
             digest.update(repr(_driver(driver.driver)).encode("utf-8", "surrogatepass"))
+        target = None
         if isinstance(block, bpy.types.Object) and block.palpate.body in start_transforms.MOVED_BY_FORCES:
-            continue
+            target = drives.target_path(block)
+            if target is None:
+                continue
         for curve in fcurves.of_animation_data(data) or ():
-            _feed_curve(digest, curve)
+            if target in (None, curve.data_path):
+                _feed_curve(digest, curve)
         for track in data.nla_tracks:
             for strip in track.strips:
-                digest.update(repr((track.mute, track.is_solo, _values(strip))).encode("utf-8", "surrogatepass"))
-                for curve in (*strip.fcurves, *(fcurves.of_animation_data(strip) or ())):
-                    _feed_curve(digest, curve)
+                if target is None or target in _strip_paths(strip):
+                    _feed_strip(digest, track, strip)
     return digest.hexdigest()
+
+
+def animated_paths(obj) -> set[str]:
+    """Return the data paths of the properties of an object that keyframes, drivers or NLA strips animate."""
+    data = obj.animation_data
+    strips = () if data is None else (strip for track in data.nla_tracks for strip in track.strips)
+    return fcurves.animated_paths(obj).union(*map(_strip_paths, strips))
+
+
+def _strip_paths(strip) -> set[str]:
+    return {curve.data_path for curve in fcurves.of_animation_data(strip) or ()}
+
+
+def _feed_strip(digest, track, strip) -> None:
+    digest.update(repr((track.mute, track.is_solo, _values(strip))).encode("utf-8", "surrogatepass"))
+    for curve in (*strip.fcurves, *(fcurves.of_animation_data(strip) or ())):
+        _feed_curve(digest, curve)
 
 
 def related_data_blocks(objects) -> list:

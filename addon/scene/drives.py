@@ -27,6 +27,14 @@ def drive_target(obj, depsgraph) -> float:
     return units.as_typed(getattr(settings, TARGET_PROPERTIES[settings.drive_control]))
 
 
+def target_path(obj) -> str | None:
+    """Return the data path of the target of an object's drive; None when it has none: not driven, or coupled with another."""
+    settings = obj.palpate
+    if settings.body != "DRIVEN" or settings.drive_leader not in (None, obj):
+        return None
+    return f"palpate.{TARGET_PROPERTIES[settings.drive_control]}"
+
+
 def drive_of(obj, matrix: np.ndarray, depsgraph) -> Drive:
     """Return the drive of a driven object, without its sensor and leader.
 

@@ -63,7 +63,7 @@ def settings_of(scene, objects) -> tuple:
 
 
 def fingerprint(scene) -> str:
-    """Return a short text that changes with settings, participants, their own meshes and regions, scales and animation.
+    """Return a short text that changes with settings, participants, their meshes and regions, scales, drives and animation.
 
     Meshes are read again only when Blender has reported a change of geometry.
     """
@@ -74,7 +74,8 @@ def fingerprint(scene) -> str:
         _mesh_fingerprints[key] = _digest(*(mesh_fingerprint.own_fingerprint(obj) for obj in objects))
         session_state.session.changed_geometry -= changed
     settings, animation = repr(settings_of(scene, objects)), animation_fingerprint.fingerprint(objects)
-    return _digest(settings, _mesh_fingerprints[key], *map(_constant_scales, objects), animation)
+    constants = (constant(obj) for obj in objects for constant in (_constant_scales, _constant_drive_target))
+    return _digest(settings, _mesh_fingerprints[key], *constants, animation)
 
 
 def _constant_scales(obj) -> str:
@@ -84,6 +85,12 @@ def _constant_scales(obj) -> str:
         found.append((tuple(obj.scale), tuple(obj.delta_scale)))
         obj = obj.parent
     return repr(found)
+
+
+def _constant_drive_target(obj) -> str:
+    """Return the target of an object's drive as text; empty without a drive, and where the target is animated."""
+    path = drives.target_path(obj)
+    return "" if path is None or path in animation_fingerprint.animated_paths(obj) else repr((path, obj.path_resolve(path)))
 
 
 def _digest(*parts: str) -> str:
