@@ -9,6 +9,7 @@ from pathlib import Path
 import bpy
 
 from ...core.errors import SceneError
+from ...core.io.bake_owner import BakeOwner
 from ...core.jobs.job_runner import part_of_job
 from ...core.jobs.progress import Job, Progress
 from ...core.model.recording import Recording
@@ -16,7 +17,7 @@ from ...core.model.scenario import Scenario
 from ..display import texel_arrows
 from ..scene import scene_fingerprint, scene_reader
 from ..scene.scene_reading import SceneReading
-from ..session import dependencies, first_use, session_state
+from ..session import dependencies, first_use, identity, session_state
 from ..timeline import playback
 from . import bake_files, scene_writer
 
@@ -84,14 +85,15 @@ def _bake(scene, into_scene: bool, images: bool, blend: bake_files.BlendToSave |
     yield from first_use.wait()
     bake_files.check_space(folder, reading.scenario, images)
     simulation = dependencies.load_solver().Simulation(reading.scenario)
-    with bake_files.BakeFiles(folder, reading.scenario, bpy.data.filepath, images) as files:
+    owner = _owner(scene, into_scene, blend)
+    with bake_files.BakeFiles(folder, reading.scenario, owner, images) as files:
         recording = yield from _solve(name, simulation, reading, files)
         files.complete(recording)
         if blend is not None:
-            _show(_scene_called(name), reading, recording, files.folders)
+            _show(_scene_called(name), reading, recording, files, owner)
         files.switch(blend)
     if into_scene and blend is None:
-        _show(_scene_called(name), reading, recording, files.folders)
+        _show(_scene_called(name), reading, recording, files, owner)
     return BakeResult(recording, reading.scenario, files.folders)
 
 
@@ -123,12 +125,22 @@ def _solve(name: str, simulation, reading: SceneReading, files: bake_files.BakeF
     return files.recording(simulation, (*reading.warnings, *simulation.warnings))
 
 
-def _show(scene, reading: SceneReading, recording: Recording, folders: dict[str, Path]) -> None:
+def _owner(scene, into_scene: bool, blend: bake_files.BlendToSave | None) -> BakeOwner:
+    """Return the scene as the owner of its bake. It gets an id only where the bake is put into it, and so can be saved."""
+    opened = Path(bpy.data.filepath) if bpy.data.filepath else None
+    others = frozenset(identity.scene_id(other) for other in bpy.data.scenes if other != scene) - {""}
+    saved = opened if blend is None else blend.path
+    scene_id = identity.scene_id(scene) or (identity.new_scene_id(scene, saved) if into_scene else "")
+    return BakeOwner(scene_id, saved, opened, others)
+
+
+def _show(scene, reading: SceneReading, recording: Recording, files: bake_files.BakeFiles, owner: BakeOwner) -> None:
     """Put the result into the scene and evaluate the present frame again, so that the new keyframes take effect."""
-    scene_writer.write(scene, reading, recording, folders)
+    scene_writer.write(scene, reading, recording, files.folders)
+    scene.palpate.scene_id, scene.palpate.baked_id = owner.scene_id, files.bake_id
     scene.frame_set(scene.frame_current, subframe=scene.frame_subframe)
     scene.palpate.baked_fingerprint = scene_fingerprint.fingerprint(scene)
-    playback.show_new_bake(scene, recording, folders)
+    playback.show_new_bake(scene, recording, files.folders)
 
 
 def _total_steps(frame_start: int, frame_end: int) -> int:

@@ -33,6 +33,7 @@ from ...core.io.bake_folder import (
     read_manifest,
     write_manifest,
 )
+from ...core.io.bake_owner import BakeOwner, other_owner
 from ...core.io.disk_space import bake_bytes, require_space
 from ...core.io.file_writing import file_sha256, remove_leftovers, sync_file, writable_folder
 from ...core.io.folder_lock import FolderLock
@@ -117,8 +118,8 @@ class BakeFiles:
     folder : Path
         The bake folder. It is created if its parent exists.
     scenario : Scenario
-    blend : str
-        Path of the .blend that is baked; empty if the scene has not been saved.
+    owner : BakeOwner, optional
+        The scene that is baked. Default: one that has neither an id nor a .blend.
     images : bool
         False writes no tactile images.
 
@@ -126,6 +127,8 @@ class BakeFiles:
     ----------
     folders : dict of str to Path
         Folder of each sensor that is read out, by the sensor's name.
+    bake_id : str
+        Hash of all files of the bake; empty until it is complete.
 
     Raises
     ------
@@ -134,8 +137,9 @@ class BakeFiles:
         must not be replaced.
     """
 
-    def __init__(self, folder: Path, scenario: Scenario, blend: str = "", images: bool = True):
-        self._blend = Path(blend) if blend else None
+    def __init__(self, folder: Path, scenario: Scenario, owner: BakeOwner | None = None, images: bool = True):
+        self._owner = BakeOwner() if owner is None else owner
+        self.bake_id = ""
         self._sensors = {sensor.name: sensor for sensor in scenario.sensors if sensor.readout}
         self._names = folder_names(self._sensors)
         self._scenario, self._digest = scenario, scenario.digest()
@@ -247,9 +251,9 @@ class BakeFiles:
                 self._files[name][IMAGE_LIST_NAME] = sha256
         self._writer.stop()
         table = json.dumps([self._digest, *(sorted(files.items()) for files in self._files.values())])
-        bake_id = hashlib.sha256(table.encode("utf-8", "surrogatepass")).hexdigest()[:32]
+        self.bake_id = hashlib.sha256(table.encode("utf-8", "surrogatepass")).hexdigest()[:32]
         for name, sensor in self._sensors.items():
-            manifest = self._manifest(sensor, recording, bake_id)
+            manifest = self._manifest(sensor, recording)
             written.append(write_manifest(self._new_folder(name), manifest, atomic=not CAN_SYNC_ALL))
         self._sync(written)
 
@@ -284,7 +288,7 @@ class BakeFiles:
 
     def _check_replaceable(self) -> None:
         for folder in self.folders.values():
-            _check_replaceable(folder, self._blend)
+            _check_replaceable(folder, self._owner)
 
     def _close(self) -> None:
         for part in (self._rows, self._images):
@@ -372,7 +376,7 @@ class BakeFiles:
         except OSError as error:
             raise _write_error(self.folder, error) from error
 
-    def _manifest(self, sensor: Sensor, recording: Recording, bake_id: str) -> Manifest:
+    def _manifest(self, sensor: Sensor, recording: Recording) -> Manifest:
         scenario = self._scenario
         return Manifest(
             sensor=sensor.name,
@@ -387,28 +391,32 @@ class BakeFiles:
             parameters=asdict(sensor.parameters),
             warnings=recording.warnings,
             complete=True,
-            scene_file=self._blend.name if self._blend else "",
+            scene_file=self._owner.blend.name if self._owner.blend else "",
             body=scenario.bodies[sensor.body].name,
             step_reason=recording.step_reason,
-            bake_id=bake_id,
+            bake_id=self.bake_id,
             sensors=tuple(self._sensors),
+            scene_id=self._owner.scene_id,
+            scene_path=self._owner.scene_path(self.folder),
             files=dict(sorted(self._files[sensor.name].items())),
         )
 
 
-def _check_replaceable(folder: Path, blend: Path | None) -> None:
-    """Raise FileError if a sensor's folder holds other files than a bake, or the bake of another .blend beside this one."""
+def _check_replaceable(folder: Path, owner: BakeOwner) -> None:
+    """Raise FileError if a sensor's folder holds other files than a bake, or the bake of another scene."""
     if not folder.exists():
         return
     if not _is_bake(folder):
         if not folder.is_dir() or any(folder.iterdir()):
             raise FileError(f"'{folder}' holds other files than a bake: rename it, or choose another bake folder.")
         return
-    other = _other_blend(folder, blend) if blend else ""
+    try:
+        manifest = read_manifest(folder)
+    except FileError:
+        return  # a bake that cannot be read may be replaced
+    other = other_owner(manifest, folder.parent, owner)
     if other:
-        raise FileError(
-            f"'{folder}' holds the bake of '{other}', which lies beside '{blend.name}': choose another bake folder."
-        )
+        raise FileError(f"'{folder}' holds the bake of {other}: choose another bake folder, or rename this one.")
 
 
 def _is_bake(folder: Path) -> bool:
@@ -421,19 +429,6 @@ def _is_bake(folder: Path) -> bool:
         others = {path.name for path in folder.iterdir()} - {MANIFEST_NAME}
         return any(BAKE_FILE_NAMES.fullmatch(name) for name in others)
     return isinstance(content, dict) and str(content.get("format")).partition("/")[0] == MANIFEST_FORMAT.partition("/")[0]
-
-
-def _other_blend(folder: Path, blend: Path) -> str:
-    """Return the name of another .blend beside `blend` whose bake is in `folder`; empty if there is none."""
-    try:
-        name = read_manifest(folder).scene_file
-    except FileError:
-        return ""  # a bake that cannot be read may be replaced
-    if not name or name == blend.name:
-        return ""
-    other = blend.with_name(name)
-    # On a file system that ignores case, the old name of a renamed file still leads to the file.
-    return name if other.is_file() and not (blend.exists() and other.samefile(blend)) else ""
 
 
 def _write_error(folder: Path, error: OSError) -> FileError:

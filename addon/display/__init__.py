@@ -7,6 +7,7 @@ Palpate is not installed. What playing shows is drawn over the 3D view and is pa
 
 __all__ = [
     "bake_display",
+    "bake_identity",
     "baked_scene",
     "baked_sensor",
     "heat_map",

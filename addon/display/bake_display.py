@@ -19,7 +19,7 @@ from ...core.io.bake_folder import frame_file
 from ...core.io.bake_reader import Bake, read_sensors
 from ...core.response import metrics
 from ..session import units
-from . import heat_map, markers, materials, texel_arrows
+from . import bake_identity, heat_map, markers, materials, texel_arrows
 from .baked_sensor import BakedSensor
 
 MIN_COLOR_RANGE = 1e-6
@@ -155,10 +155,11 @@ def refresh(scene, places: dict) -> None:
     Raises
     ------
     PalpateError
-        The files are missing or damaged, or no longer match the scene.
+        The files are missing or damaged, belong to another bake, or no longer match the scene.
     """
     if not places:
         raise SceneError(f"Nothing is baked in '{scene.name}': bake first.")
+    bake_identity.require_own_bake(scene)
     bake: Bake = read_sensors(list(places.values()))
     names = {place: name for name, place in bake.folders.items()}
     recording = bake.recording

@@ -72,6 +72,7 @@ def palpate_undo_post(_scene, _depsgraph=None):
 
 @persistent
 def palpate_save_pre(_path):
+    identity.separate_copied_scenes()
     for scene in bpy.data.scenes:
         playback.hide(scene)
 

@@ -159,9 +159,13 @@ class PALPATE_PG_scene(bpy.types.PropertyGroup):
     figures: PointerProperty(
         type=figure_properties.PALPATE_PG_figures, description="What figures are made of the bake, and how"
     )
-    # What the latest bake has left: the digest of its scenario (empty without a bake), the fingerprints of settings and of the
-    # shapes of deforming objects, by which changes are noticed, and its first and last frame.
+    # Tells this scene from others that bake into the same folder; made at the first bake.
+    scene_id: StringProperty(options={"HIDDEN"})
+    # What the latest bake has left: the digest of its scenario (empty without a bake) and its id, by which the bake in the
+    # folder is recognised, the fingerprints of settings and of the shapes of deforming objects, by which changes are noticed,
+    # and its first and last frame.
     baked_digest: StringProperty(options={"HIDDEN"})
+    baked_id: StringProperty(options={"HIDDEN"})
     baked_fingerprint: StringProperty(options={"HIDDEN"})
     baked_shapes: StringProperty(options={"HIDDEN"})
     baked_start: IntProperty(options={"HIDDEN"})

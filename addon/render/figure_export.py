@@ -22,7 +22,7 @@ from ...core.io.bake_reader import Bake, frame_index, read_sensors
 from ...core.io.file_writing import writable_folder
 from ...core.jobs.job_runner import run_job
 from ...core.jobs.progress import Job, Progress
-from ..display import baked_scene
+from ..display import bake_identity, baked_scene
 from . import render, render_setup, video, workbench_colors
 from .figure_request import FigureRequest
 
@@ -33,13 +33,14 @@ def read_scene_bake(scene) -> Bake:
     Raises
     ------
     PalpateError
-        The scene shows no bake, or a file of the bake is missing or damaged.
+        The scene shows no bake, its folder holds another one, or a file of the bake is missing or damaged.
     """
     places = baked_scene.bake_folders(scene)
     if not places:
         raise SceneError(
             f"'{scene.name}' is not baked: bake it first ('palpate bake' with --save, or Physics › Palpate › Bake)."
         )
+    bake_identity.require_own_bake(scene)
     return read_sensors(list(places.values()))
 
 

@@ -1,12 +1,18 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Identify objects by a unique id that lasts.
+"""Identify objects and scenes by a unique id that lasts.
 
 Blender's pointers become invalid after undo, deletion and loading; names change when the user renames an object.
+Scenes have ids as well, by which bakes are told apart.
 """
 
 from __future__ import annotations
 
+import hashlib
+import os
 import uuid
+from pathlib import Path
+
+import bpy
 
 _owners: dict[str, int] = {}
 """By uid: the session uid of the object that had it first. Duplicating an object copies the uid, but not the session uid."""
@@ -46,3 +52,29 @@ def register_owners(objects) -> None:
 def forget() -> None:
     """Forget all owners, because another file is open and session uids are new."""
     _owners.clear()
+
+
+def scene_id(scene) -> str:
+    """Return the id that a scene stores; empty if it has none, or only that of the scene of which it is a copy."""
+    own = scene.palpate.scene_id
+    is_copy = any(other.palpate.scene_id == own and other.session_uid < scene.session_uid for other in bpy.data.scenes)
+    return "" if is_copy else own
+
+
+def new_scene_id(scene, blend: Path | None) -> str:
+    """Return an id for a scene that has none, 32 hexadecimal digits.
+
+    Made from the path of its .blend and its name, so that a bake that is killed and repeated gives the same bytes; random where
+    the scene was never saved, or where a scene that has been renamed since has this id already.
+    """
+    if blend is None:
+        return uuid.uuid4().hex
+    text = f"{os.path.realpath(blend)}\n{scene.name_full}"
+    made = hashlib.blake2b(text.encode("utf-8", "surrogatepass"), digest_size=16).hexdigest()
+    return made if all(other.palpate.scene_id != made for other in bpy.data.scenes) else uuid.uuid4().hex
+
+
+def separate_copied_scenes() -> None:
+    """Take the ids of their originals from copied scenes: once a file is saved, nothing tells which of two is the copy."""
+    for scene in [scene for scene in bpy.data.scenes if scene.is_editable and scene.palpate.scene_id and not scene_id(scene)]:
+        scene.palpate.scene_id = ""

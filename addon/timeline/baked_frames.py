@@ -11,7 +11,7 @@ import numpy as np
 from ...core.errors import PalpateError
 from ...core.io.bake_reader import Bake, read_sensors
 from ...core.model.recording import Frame, Recording
-from ..display import bake_display, baked_scene, inset
+from ..display import bake_display, bake_identity, baked_scene, inset
 from ..session import animation_time, frame_status
 from . import staleness
 
@@ -45,7 +45,10 @@ def show(scene, depsgraph) -> None:
         frame_status.set_status(scene, f"Frame {number} is outside of the bake.")
         return
     text = f"Frame {number} of the bake."
-    if staleness.is_stale(scene, depsgraph, recording):
+    other = bake_identity.other_bake(scene)
+    if other:
+        text = other
+    elif staleness.is_stale(scene, depsgraph, recording):
         text = "The bake is out of date, something has changed since: bake again."
     sensors = recording.at(number).sensors
     frame = Frame(number, 0.0, sensors, poses=np.zeros((0, 7)), velocities=np.zeros((0, 6)))

@@ -9,6 +9,7 @@ that a bake can be exported to are in the package ``export``, because some of th
 __all__ = [
     "bake_check",
     "bake_folder",
+    "bake_owner",
     "bake_reader",
     "bake_switch",
     "checksum_list",

@@ -374,9 +374,7 @@ def test_the_bake_of_another_blend_beside_it_is_not_replaced(tmp_path):
     stages = []
     with pytest.raises(FileError) as caught:
         run_job(bake(scene), lambda progress: stages.append(progress.stage))
-    assert str(caught.value) == (
-        f"'{folder}' holds the bake of 'first.blend', which lies beside 'second.blend': choose another bake folder."
-    )
+    assert str(caught.value) == (f"'{folder}' holds the bake of '{first}': choose another bake folder, or rename this one.")
     assert set(stages) == {"Reading the scene"}
     assert contents(tmp_path / "palpate") == files
     scene.palpate.folder = "//palpate second"

@@ -1,0 +1,65 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Does a folder hold the bake that a scene shows? The .blend stores the digest and the id of its bake, the manifest both too.
+
+They differ when the folder was baked anew by another .blend, by a script or by `palpate bake` without --save, or when an older
+copy of the .blend is opened. Keyframes in the scene then belong to other forces than the files. This is asked at every frame,
+so manifests are kept in memory until their files change.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from ...core.errors import FileError, SceneError
+from ...core.io.bake_folder import MANIFEST_NAME, Manifest, read_manifest
+from ...core.io.bake_switch import present_folder
+from . import baked_scene
+
+_manifests: dict[Path, tuple[tuple[int, ...], Manifest | None]] = {}
+"""By folder of a sensor's bake: size, time and inode of its manifest, and the manifest; None when it cannot be read."""
+
+
+def other_bake(scene) -> str:
+    """Return a sentence if a folder holds another bake than the one that a scene shows; empty if not.
+
+    Nothing is said where a manifest cannot be read, and for scenes that were baked by versions without digests.
+    """
+    settings = scene.palpate
+    for folder in sorted(baked_scene.bake_folders(scene).values()):
+        found = _manifest(folder)
+        if found is None or not settings.baked_digest:
+            continue
+        same_id = not (settings.baked_id and found.bake_id) or found.bake_id == settings.baked_id
+        if found.digest != settings.baked_digest or not same_id:
+            return (
+                f"'{folder}' holds another bake than the one that '{scene.name}' shows: "
+                "bake again, or open the .blend that was saved with that bake."
+            )
+    return ""
+
+
+def require_own_bake(scene) -> None:
+    """Raise SceneError if a folder holds another bake than the one that a scene shows."""
+    text = other_bake(scene)
+    if text:
+        raise SceneError(text)
+
+
+def _manifest(folder: Path) -> Manifest | None:
+    """Return the manifest in a sensor's folder; None when it cannot be read."""
+    try:
+        place = present_folder(folder)
+        about = (place / MANIFEST_NAME).stat()
+        stamp = (about.st_size, about.st_mtime_ns, about.st_ino)
+        if folder not in _manifests or _manifests[folder][0] != stamp:
+            _manifests[folder] = stamp, _read(place)
+    except (OSError, FileError):
+        return None
+    return _manifests[folder][1]
+
+
+def _read(folder: Path) -> Manifest | None:
+    try:
+        return read_manifest(folder)
+    except FileError:
+        return None  # who reads the bake says so
