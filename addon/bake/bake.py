@@ -40,9 +40,7 @@ class BakeResult:
     folders: dict[str, Path]
 
 
-def bake(
-    scene, into_scene: bool = True, images: bool = True, blend: bake_files.BlendToSave | None = None
-) -> Job[BakeResult]:
+def bake(scene, into_scene: bool = True, images: bool = True, blend: bake_files.BlendToSave | None = None) -> Job[BakeResult]:
     """Compute the whole frame range of a scene, write the files, and put the result into the scene.
 
     Nothing in the scene changes before the last step, and an earlier bake stays as it is until then: closing the generator, an

@@ -15,7 +15,7 @@ from palpate.addon.bake.bake import bake
 from palpate.addon.display import baked_scene
 from palpate.commands import blender
 from palpate.core.io import bake_switch
-from palpate.core.io.bake_reader import check_images, read_bake
+from palpate.core.io.bake_reader import read_bake
 from palpate.core.io.private_folder import PRIVATE_FOLDER
 from palpate.core.jobs.job_runner import run_job
 
@@ -47,7 +47,6 @@ def found(path):
     """Check that .blend and bake belong together as a later process finds them; return their digest."""
     scene = blender.open_scene(path)
     read = read_bake(path.parent / "palpate")
-    check_images(read)
     (folder,) = baked_scene.bake_folders(scene).values()
     assert folder == read.folders["Pad"] == path.parent / "palpate" / "Pad"
     assert scene.palpate.baked_digest == read.recording.digest
