@@ -176,7 +176,8 @@ def test_bake_writes_images_and_leaves_the_file_alone(tmp_path, demo_blend, capf
     assert not [line for line in out if "Read" in line or "Saved" in line or "Info" in line]  # Blender's own words
     for name in ("Finger A", "Finger B"):
         files = {path.name for path in (tmp_path / "out" / name).iterdir()}
-        assert files == {*(f"tactile_{frame:04d}.exr" for frame in range(1, 7)), "recording.npz", "sensor.npz", "manifest.json"}
+        images = {f"tactile_{frame:04d}.exr" for frame in range(1, 7)}
+        assert files == images | {"images.sha256", "recording.npz", "sensor.npz", "manifest.json"}
     assert demo_blend.read_bytes() == before
 
 
