@@ -5,7 +5,8 @@ import numpy as np
 import trimesh
 from scipy.signal import lfilter
 
-from palpate.core.gap.dataset.rig import Indenter, Rig, Trial, grid_texels
+from palpate.core.gap.dataset.rig import Indenter, Rig, grid_texels
+from palpate.core.gap.dataset.trial import Trial
 from palpate.core.geometry.mesh import checked_mesh
 from palpate.core.model.sensor_parameters import SensorParameters
 

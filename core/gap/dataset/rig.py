@@ -7,7 +7,7 @@ Every mistake in a rig raises an error here, in one sentence, before anything is
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -21,12 +21,16 @@ from ...io.regular_file import require_regular
 from ...io.sensor_toml import SHAPE_WORDS, checked_grid, checked_lengths, known_words, stated_parameters
 from ...io.toml_file import LONGEST_NAME, checked_name, read_toml
 from ...model.sensor_parameters import DAMPING_PER_STIFFNESS, DEPTH_PER_THICKNESS, SENSOR_PARAMETERS, SensorParameters
+from .sessions import CLOCKS, TrialHistory, on_common_clocks, read_history
+from .trial import Trial
 
 FORMAT = "palpate-rig/1"
 POSE, TURN, SLIDE = ("x", "y", "z"), ("qw", "qx", "qy", "qz"), ("slide_x", "slide_y")
 FORCE = ("force_x", "force_y", "force_z")
 SMALLEST_RESPONSE = 1e-30
 """Responses of a smaller magnitude, in any unit, count as zero."""
+TRIAL_WORDS = {"file", "use", "name", "session", "started", "tared"}
+"""Words of a [[trial]]."""
 LONGEST_STEP = 5.0
 """Seconds between samples above which the clock must be in milliseconds."""
 
@@ -50,47 +54,6 @@ class Indenter:
     radius: float | None = None
     name: str = "indenter"
     edges: tuple[float, ...] | None = None
-
-
-@dataclass(frozen=True)
-class Trial:
-    """One recording.
-
-    Attributes
-    ----------
-    name : str
-        Of its file, without the suffix.
-    use : "fit" or "check"
-    time : (T,) float, seconds, increasing
-        Since the first sample of the rig's first recording.
-    stimulus : "pose", "depth" or "force"
-    position, quaternion : (T, 3), (T, 4) float, or None
-        Of the indenter in the sensor's frame.
-    level : (T,) float or None
-        Depth of all texels (m), or force that all texels share (N).
-    slide : (T, 2) float, metres
-        Travel of the surface along the sensor's x and y; zero if none was recorded.
-    reading : (T, n) float or None, the sensor's unit
-        NaN if a value is missing.
-    force : (T, 3) float or None, newtons
-        Net force on the sensor; NaN if a component is missing.
-    """
-
-    name: str
-    use: str
-    time: np.ndarray
-    stimulus: str
-    position: np.ndarray | None
-    quaternion: np.ndarray | None
-    level: np.ndarray | None
-    slide: np.ndarray
-    reading: np.ndarray | None
-    force: np.ndarray | None
-
-    @property
-    def step(self) -> float:
-        """Median time between samples, seconds."""
-        return float(np.median(np.diff(self.time)))
 
 
 @dataclass(frozen=True)
@@ -147,7 +110,10 @@ def read_rig(path: str | Path) -> Rig:
     words = read_toml(path, "rig")
     if words.get("format") != FORMAT:
         raise FileError(f"'{path.name}' is not a rig: its first line must be format = \"{FORMAT}\".")
-    known_words(words, {"format", "name", "sensor", "indenter", "trial"}, f"'{path.name}'")
+    known_words(words, {"format", "name", "clock", "sensor", "indenter", "trial"}, f"'{path.name}'")
+    clock = words.get("clock")
+    if clock is not None and clock not in CLOCKS:
+        raise FileError(f'clock of \'{path.name}\' is {clock!r:.60}: write "absolute" or "own".')
     rig_name = checked_name(words.get("name", path.stem), f"'{path.name}'")
     folder, warnings = path.resolve().parent, []
     sensor = _table(words, "sensor", path)
@@ -157,13 +123,14 @@ def read_rig(path: str | Path) -> Rig:
     entries = words.get("trial")
     if not isinstance(entries, list) or not entries:
         raise FileError(f"'{path.name}' has no [[trial]]: name at least one CSV file.")
-    trials = []
+    trials, histories = [], []
     for number, entry in enumerate(entries, start=1):
-        trial, said = _trial(entry, number, folder, path, len(texels), indenter is not None)
+        trial, history, said = _trial(entry, number, folder, path, len(texels), indenter is not None)
         trials.append(trial)
+        histories.append(history)
         warnings += said
-    began = min(float(trial.time[0]) for trial in trials)  # recordings keep their order on a common clock
-    trials = [replace(trial, time=trial.time - began) for trial in trials]
+    trials, said = on_common_clocks(trials, histories, clock, path)
+    warnings += said
     names = [trial.name for trial in trials]
     for name in names:
         if names.count(name) > 1:
@@ -339,12 +306,18 @@ def _indenter(words: dict[str, Any], folder: Path, path: Path) -> Indenter:
 # --- trials
 
 
-def _trial(entry: Any, number: int, folder: Path, path: Path, texels: int, has_indenter: bool) -> tuple[Trial, list[str]]:
-    """A trial from its entry in the rig and its CSV file, and remarks about it."""
+def _trial(
+    entry: Any, number: int, folder: Path, path: Path, texels: int, has_indenter: bool
+) -> tuple[Trial, TrialHistory, list[str]]:
+    """A trial from its entry in the rig and its CSV file, its place in time, and remarks about it."""
     where = f"Trial {number}"
     if not isinstance(entry, dict):
         raise FileError(f"{where} of '{path.name}' is not a table: write [[trial]] above its file.")
-    known_words(entry, {"file", "use", "name"}, f"{where} of '{path.name}'")
+    known_words(entry, TRIAL_WORDS, f"{where} of '{path.name}'")
+    history = read_history(entry, f"{where} of '{path.name}'")
+    tared = entry.get("tared", False)
+    if not isinstance(tared, bool):
+        raise FileError(f"tared of {where} of '{path.name}' is {tared!r:.60}: write true or false.")
     use = entry.get("use", "fit")
     if use not in ("fit", "check"):
         raise FileError(f'{where} of \'{path.name}\' has use = {use!r}: write "fit" or "check".')
@@ -355,8 +328,12 @@ def _trial(entry: Any, number: int, folder: Path, path: Path, texels: int, has_i
     kind = _stimulus_kind(columns, file, has_indenter)
     reading = _readings(columns, texels, file)
     force = _vector(columns, FORCE, partial=True)
-    if kind == "force" and force is not None:
-        force = None if np.isnan(force).all() else force
+    has_columns = reading is not None or force is not None
+    reading, force = (None if part is None or np.isnan(part).all() else part for part in (reading, force))
+    if has_columns and reading is None and force is None:
+        raise FileError(
+            f"Every cell of the response in '{file.name}' is empty: record the trial again, or remove its [[trial]]."
+        )
     if reading is None and force is None:
         raise FileError(f"'{file.name}' has no response: it needs texel_0 … texel_{texels - 1}, or force_x force_y force_z.")
     slide = _vector(columns, SLIDE, partial=False)
@@ -385,7 +362,9 @@ def _trial(entry: Any, number: int, folder: Path, path: Path, texels: int, has_i
             slide=np.zeros((len(time), 2)) if slide is None else slide,
             reading=reading,
             force=force,
+            tared=tared,
         ),
+        history,
         said,
     )
 

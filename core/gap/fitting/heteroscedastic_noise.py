@@ -83,6 +83,8 @@ def proportional_noise(views: Sequence[TrialView], model: Model) -> Effect | Non
     )
     large = square[size > np.quantile(size, LARGE_QUANTILE)]
     small = square[size < np.quantile(size, SMALL_QUANTILE)]
+    if not (len(large) and len(small)):  # all readings are equal, as at the rail of a converter
+        return None
     grows = large.mean() > LEAST_VARIANCE_RATIO * floor and large.mean() > LEAST_GROWTH * small.mean()
     steady = pooled > 0.0 and min(each, default=0.0) > STEADY[0] * pooled and max(each, default=0.0) < STEADY[1] * pooled
     weight = np.array([len(one.size) for one in found], float)

@@ -55,22 +55,22 @@ def residual_structure(predictors: Sequence[Predictor], residuals: Sequence[np.n
         predictors, residuals, halves = [predictors[0]] * 2, [residuals[0]] * 2, True
     else:
         halves = False
-    folds, names, sizes = [], [], []
-    for number, (predictor, residual) in enumerate(zip(predictors, residuals, strict=True)):
-        found = features(predictor, residual)
-        names, sizes = list(found), [len(columns) for columns in found.values()]
-        table = np.concatenate(list(found.values())).reshape(sum(sizes), *residual.shape)
+    found = [features(predictor, residual) for predictor, residual in zip(predictors, residuals, strict=True)]
+    sizes = {name: len(columns) for groups in found for name, columns in groups.items()}
+    folds = []
+    for number, (groups, residual) in enumerate(zip(found, residuals, strict=True)):
+        table = _table(groups, sizes, residual.shape)
         part = slice(None)
         if halves:
             middle = len(residual) // 2
             part = slice(None, middle) if number == 0 else slice(middle, None)
-        folds.append((table[:, part].reshape(sum(sizes), -1), residual[part]))
+        folds.append((table[:, part].reshape(len(table), -1), residual[part]))
     total = sum(float(np.vdot(r, r)) for _, r in folds)
     if total <= 0:
-        return ResidualStructure(0.0, dict.fromkeys(names, 0.0))
+        return ResidualStructure(0.0, dict.fromkeys(sizes, 0.0))
     sums = [(x @ x.T, x @ r.ravel()) for x, r in folds]
     shares, start = {}, 0
-    for name, size in zip(names, sizes, strict=True):
+    for name, size in sizes.items():
         shares[name] = _share_predicted(folds, sums, np.arange(start, start + size), total)
         start += size
     everything = _share_predicted(folds, sums, np.arange(start), total)
@@ -78,6 +78,11 @@ def residual_structure(predictors: Sequence[Predictor], residuals: Sequence[np.n
         shares["texel"] = _share_predicted_by_texel(predictors, [r for _, r in folds], total)
         everything = 1.0 - (1.0 - max(everything, 0.0)) * (1.0 - max(shares["texel"], 0.0))
     return ResidualStructure(max(everything, *shares.values(), 0.0), {name: max(share, 0.0) for name, share in shares.items()})
+
+
+def _table(groups: dict[str, np.ndarray], sizes: dict[str, int], shape: tuple[int, ...]) -> np.ndarray:
+    """Features of one trial (p, T, n); zero for a group that only other trials have, such as depth beside no contact."""
+    return np.concatenate([groups.get(name, np.zeros((size, *shape))) for name, size in sizes.items()])
 
 
 def _share_predicted(

@@ -26,6 +26,8 @@ NEIGHBOUR_FREQUENCIES, LINE_HALF_WIDTH = 16, 3
 """Number of frequencies on either side that give the level of the noise, and how many of these the line itself may cover."""
 LEAST_PROMINENCE = 3.0
 """Least ratio of a line to the level of the noise in every trial."""
+LONGEST_GRID = 32
+"""Points of the even grid of time per sample, above which no spectrum is computed: a recording with such pauses has none."""
 SEARCH_WIDTH, SEARCH_POINTS = 0.6, 13
 """The frequency of a line is refined within this many frequency steps on either side, at so many points."""
 
@@ -82,6 +84,8 @@ def strongest_line(views: Sequence[TrialView], model: Model) -> SpectralLine | N
     if not resting:
         return None
     step = min(one.step for one in resting)
+    if max(float(np.ptp(one.time)) for one in resting) / step > LONGEST_GRID * max(len(one.time) for one in resting):
+        return None
     sample_indices = [np.round((one.time - one.time[0]) / step).astype(int) for one in resting]
     length = max(int(indices[-1]) for indices in sample_indices) + 1
     powers = []

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,15 +11,20 @@ import numpy as np
 from ...effects.engine import readout_chain
 from ...effects.engine.registry import actual_placement as placed_texels
 from ...effects.engine.registry import form_of, site_of_action
+from ...geometry.texels import Texels
 from ...model.effect import Effect
 from ...model.sensor import Sensor
 from ...model.sensor_parameters import FRICTION_LAW_PARAMETERS, NORMAL_LAW_PARAMETERS, SensorParameters
-from ..dataset.rig import Rig, Trial
+from ..dataset.rig import Rig
+from ..dataset.trial import Trial
 from .force_model import ContactHistory
-from .stimulus import Stimulus, stimulus_of
+from .stimulus import Stimulus, joined_stimuli, stimulus_of
 
 CACHE_SIZE = 4
 """Number of placements, forces and readings that are kept per trial: a derivative by one parameter needs the others again."""
+SESSION_CACHE_SIZE, SESSION_CACHE_BYTES = 64, 2.5e8
+"""The same for a session, at most: each of its trials asks for all derivatives, one trial after the other. Fewer are kept if
+they would take more memory than this."""
 
 
 @dataclass(frozen=True)
@@ -52,40 +58,28 @@ class Prediction:
     force: np.ndarray | None
 
 
-class Predictor:
-    """Predicts a trial for any model. Intermediate results are kept, so that a changed parameter costs little.
+class ResponseModel:
+    """Forces and readings along a stimulus, for any model. Intermediate results are kept, so that a changed parameter costs
+    little.
 
     Parameters
     ----------
-    trial : Trial
     rig : Rig
+    stimulus : Stimulus
+    cache_size : int
+        Number of results of each kind that are kept.
     """
 
-    def __init__(self, trial: Trial, rig: Rig):
-        self.trial, self.rig = trial, rig
-        self.stimulus = stimulus_of(trial, rig)
+    def __init__(self, rig: Rig, stimulus: Stimulus, cache_size: int = CACHE_SIZE):
+        self.rig, self.stimulus, self.cache_size = rig, stimulus, cache_size
         self._placed: dict[object, Stimulus] = {}
         self._histories: dict[object, ContactHistory] = {}
         self._forces: dict[object, np.ndarray] = {}
         self._totals: dict[object, np.ndarray] = {}
         self._readings: dict[object, np.ndarray] = {}
 
-    def predict(self, model: Model, subset: np.ndarray | None = None, with_forces: bool = True) -> Prediction:
-        """Return the prediction of a model. Its arrays are kept and must not be written to.
-
-        Parameters
-        ----------
-        model : Model
-        subset : (c,) int, optional
-            Only these texels. This is right only if no effect couples texels.
-        with_forces : bool
-            Whether the net force is wanted, if it was measured.
-        """
-        wanted = with_forces and self.trial.force is not None
-        return Prediction(self._reading(model, subset), self._total(model) if wanted else None)
-
-    def _reading(self, model: Model, subset: np.ndarray | None) -> np.ndarray:
-        """Readings, (T, n) in the sensor's unit."""
+    def reading(self, model: Model, subset: np.ndarray | None = None) -> np.ndarray:
+        """Return the readings of each texel, or of some, (T, n) in the sensor's unit."""
         p = model.parameters
         # Without noise: the prediction is the expected value.
         reading = tuple(e for e in model.effects if site_of_action(e) == "readout" and e.name != "noise")
@@ -102,11 +96,11 @@ class Predictor:
                 )
                 reading = tuple(_effect_on_texels(effect, subset) for effect in reading)
             force = self.normal_force(model, subset)
-            _remember(self._readings, key, readout_chain.readings(reading, site, self.trial.time, force), CACHE_SIZE)
+            _remember(self._readings, key, readout_chain.readings(reading, site, self.stimulus.time, force), self.cache_size)
         return self._readings[key]
 
-    def _total(self, model: Model) -> np.ndarray:
-        """Sum of normal and friction forces on the sensor, (T, 3) N."""
+    def total_force(self, model: Model) -> np.ndarray:
+        """Return the sum of normal and friction forces on the sensor, (T, 3) N."""
         p, rubbing = model.parameters, tuple(effect for effect in model.effects if _acts_through(effect, "friction_law"))
         slides = (*(getattr(p, name) for name in FRICTION_LAW_PARAMETERS), _effects_key(rubbing))
         key = (self._force_key(model, None), slides)
@@ -115,22 +109,26 @@ class Predictor:
                 self._totals,
                 key,
                 self._contact_history(model, None).total_force(p, rubbing, self.normal_force(model)),
-                CACHE_SIZE,
+                self.cache_size,
             )
         return self._totals[key]
 
     def placed(self, model: Model) -> Stimulus:
         """Return the stimulus of the texels at the places where effects move them."""
         moving = tuple(effect for effect in model.effects if _acts_through(effect, "placement"))
-        if not moving or self.trial.stimulus != "pose":
+        if not moving or self.stimulus.trial.stimulus != "pose":
             return self.stimulus
         key = _effects_key(moving)
         if key not in self._placed:
             t = self.rig.texels
             position, normal, tangent = placed_texels(moving, t.position, t.normal, t.tangent)
             moved = replace(t, position=position, normal=normal, tangent=tangent)
-            _remember(self._placed, key, stimulus_of(self.trial, self.rig, moved), CACHE_SIZE)
+            _remember(self._placed, key, self._stimulus_of(moved), self.cache_size)
         return self._placed[key]
+
+    def _stimulus_of(self, texels: Texels) -> Stimulus:
+        """The stimulus of texels at other places."""
+        return stimulus_of(self.stimulus.trial, self.rig, texels)
 
     def normal_force(self, model: Model, subset: np.ndarray | None = None) -> np.ndarray:
         """Return the normal force of each texel, or of some, (T, n) N: known, or from the contact law with its effects."""
@@ -146,7 +144,7 @@ class Predictor:
                 self._forces,
                 key,
                 self._contact_history(model, subset).force(model.parameters, _effects_on_normal_force(model)),
-                CACHE_SIZE,
+                self.cache_size,
             )
         return self._forces[key]
 
@@ -158,8 +156,92 @@ class Predictor:
         which = None if subset is None else subset.tobytes()
         key = which, _effects_key(tuple(effect for effect in model.effects if _acts_through(effect, "placement")))
         if key not in self._histories:
-            _remember(self._histories, key, ContactHistory.of(self.placed(model), subset, self.rig), 2 * CACHE_SIZE)
+            _remember(self._histories, key, ContactHistory.of(self.placed(model), subset, self.rig), 2 * self.cache_size)
         return self._histories[key]
+
+
+class Session(ResponseModel):
+    """The recordings of a session as one, with an unloaded sensor between them.
+
+    Parameters
+    ----------
+    trials : sequence of Trial
+        In any order.
+    rig : Rig
+    """
+
+    def __init__(self, trials: Sequence[Trial], rig: Rig):
+        self.trials = sorted(trials, key=lambda trial: float(trial.time[0]))
+        self.stimuli = [stimulus_of(trial, rig) for trial in self.trials]
+        joined, self._starts = joined_stimuli(self.stimuli, rig.texels)
+        most = int(SESSION_CACHE_BYTES / (8.0 * joined.load.size))
+        super().__init__(rig, joined, int(np.clip(most, CACHE_SIZE, SESSION_CACHE_SIZE)))
+
+    def samples_of(self, trial: Trial) -> slice:
+        """Return the samples of the session that are those of one of its trials."""
+        number = next(i for i, one in enumerate(self.trials) if one is trial)
+        return slice(self._starts[number], self._starts[number] + len(trial.time))
+
+    def stimulus_in(self, trial: Trial) -> Stimulus:
+        """Return the stimulus of one of its trials."""
+        return next(stimulus for stimulus in self.stimuli if stimulus.trial is trial)
+
+    def _stimulus_of(self, texels: Texels) -> Stimulus:
+        return joined_stimuli([stimulus_of(trial, self.rig, texels) for trial in self.trials], texels)[0]
+
+
+class Predictor:
+    """Predicts a trial for any model.
+
+    Parameters
+    ----------
+    trial : Trial
+    rig : Rig
+    session : Session, optional
+        The session that the trial belongs to; without it the trial begins with an untouched sensor.
+    """
+
+    def __init__(self, trial: Trial, rig: Rig, session: Session | None = None):
+        self.trial, self.rig, self.session = trial, rig, session
+        self.stimulus = stimulus_of(trial, rig) if session is None else session.stimulus_in(trial)
+        self._responses = ResponseModel(rig, self.stimulus) if session is None else session
+        self._samples = slice(None) if session is None else session.samples_of(trial)
+
+    def predict(self, model: Model, subset: np.ndarray | None = None, with_forces: bool = True) -> Prediction:
+        """Return the prediction of a model. Its arrays are kept and must not be written to.
+
+        Parameters
+        ----------
+        model : Model
+        subset : (c,) int, optional
+            Only these texels. This is right only if no effect couples texels.
+        with_forces : bool
+            Whether the net force is wanted, if it was measured.
+        """
+        wanted = with_forces and self.trial.force is not None
+        reading = self._responses.reading(model, subset)[self._samples]
+        force = self._responses.total_force(model)[self._samples] if wanted else None
+        if self.trial.tared:
+            reading, force = reading - reading[:1], None if force is None else force - force[:1]
+        return Prediction(reading, force)
+
+    def normal_force(self, model: Model) -> np.ndarray:
+        """Return the normal force of each texel, (T, n) N."""
+        return self._responses.normal_force(model)[self._samples]
+
+
+def predictors_of(trials: Sequence[Trial], rig: Rig) -> list[Predictor]:
+    """Return a predictor for each trial; those of one session share its history.
+
+    Parameters
+    ----------
+    trials : sequence of Trial
+        All trials of each session, whatever their use: a recording that is only checked has worn the sensor, too.
+    rig : Rig
+    """
+    names = {trial.session for trial in trials if trial.session}
+    sessions = {name: Session([trial for trial in trials if trial.session == name], rig) for name in names}
+    return [Predictor(trial, rig, sessions.get(trial.session)) for trial in trials]
 
 
 def _effects_on_normal_force(model: Model) -> tuple[Effect, ...]:

@@ -8,7 +8,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from ...errors import FileError
-from ..dataset.rig import Rig, Trial
+from ..dataset.rig import Rig
+from ..dataset.trial import Trial
 from .stimulus import Stimulus
 
 OPPOSITE = -0.5

@@ -8,6 +8,7 @@ indenter goes through the solver's contact search.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -21,7 +22,11 @@ from ...model.scenario import Scenario
 from ...model.sensor import Sensor
 from ...model.target import Target
 from ...solver.simulation import Simulation
-from ..dataset.rig import Rig, Trial
+from ..dataset.rig import Rig
+from ..dataset.trial import Trial
+
+LONGEST_SPLIT = 3.0
+"""Pause between two recordings, in samples, up to which they are parts of one recording that simply goes on."""
 
 
 @dataclass(frozen=True)
@@ -95,6 +100,60 @@ def stimulus_of(trial: Trial, rig: Rig, texels: Texels | None = None) -> Stimulu
         return Stimulus(trial, nothing, nothing, level / n, None, slide, slip)
     rate = np.where(level > 0, np.gradient(trial.level, trial.time)[:, None], 0.0)
     return Stimulus(trial, level, rate, None, None, slide, slip)
+
+
+def joined_stimuli(stimuli: Sequence[Stimulus], texels: Texels) -> tuple[Stimulus, list[int]]:
+    """Return the stimuli of a session's trials as one, and the index of each trial's first sample.
+
+    In a pause between two trials nothing touches the sensor: an unloaded sample follows the one trial, and another one precedes
+    the next. There is no pause between the parts of a recording whose samples simply go on.
+
+    Parameters
+    ----------
+    stimuli : sequence of Stimulus
+        In order of time.
+    texels : Texels
+    """
+    parts, starts, count = [stimuli[0]], [0], len(stimuli[0].time)
+    for before, after in zip(stimuli[:-1], stimuli[1:], strict=True):
+        pause = float(after.time[0] - before.time[-1])
+        if pause > LONGEST_SPLIT * max(before.trial.step, after.trial.step):
+            ends = [before.time[-1] + min(before.trial.step, pause / 3), after.time[0] - min(after.trial.step, pause / 3)]
+            parts.append(_unloaded(before, np.array(ends)))
+            count += 2
+        starts.append(count)
+        parts.append(after)
+        count += len(after.time)
+    first = stimuli[0]
+    no_slip, no_normal = all(one.slip is None for one in stimuli), all(one.normal is None for one in stimuli)
+
+    def vectors(name: str, missing: np.ndarray) -> np.ndarray:
+        values = [(getattr(part, name), len(part.time)) for part in parts]
+        return np.concatenate([np.broadcast_to(missing, (n, *missing.shape)) if x is None else x for x, n in values])
+
+    joined = Stimulus(
+        trial=replace(first.trial, time=np.concatenate([part.time for part in parts])),
+        depth=np.concatenate([part.depth for part in parts]),
+        rate=np.concatenate([part.rate for part in parts]),
+        force_share=None if first.force_share is None else np.concatenate([_shares(part) for part in parts]),
+        normal=None if no_normal else vectors("normal", -texels.normal),
+        slide=np.concatenate([part.slide for part in parts]),
+        slip=None if no_slip else vectors("slip", np.zeros((len(texels), 3))),
+        overpressed=max(one.overpressed for one in stimuli),
+    )
+    return joined, starts
+
+
+def _unloaded(like: Stimulus, time: np.ndarray) -> Stimulus:
+    """A stimulus of the same kind at some times at which nothing touches the sensor."""
+    nothing = np.zeros((len(time), like.depth.shape[1]))
+    share = None if like.force_share is None else nothing
+    return Stimulus(replace(like.trial, time=time), nothing, nothing, share, None, nothing, None)
+
+
+def _shares(stimulus: Stimulus) -> np.ndarray:
+    assert stimulus.force_share is not None
+    return stimulus.force_share
 
 
 def _posed(trial: Trial, rig: Rig, texels: Texels, along: np.ndarray | None) -> Stimulus:

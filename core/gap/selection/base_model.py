@@ -12,7 +12,7 @@ from ...model.sensor_parameters import FITTED_FRICTION_PARAMETERS
 from ..dataset.rig import Rig
 from ..fitting.least_squares import FRICTION_LEVEL
 from ..fitting.noise_floor import ChannelNoise, force_noise, reading_noise
-from ..forward.predictor import Model, Predictor
+from ..forward.predictor import Model, Predictor, predictors_of
 from ..forward.response_check import check_responses
 
 
@@ -31,7 +31,7 @@ def prepared(rig: Rig) -> tuple[list[Predictor], tuple[ChannelNoise, ChannelNois
     FileError
         The recordings do not fit their stimulus, see :func:`.check_responses`.
     """
-    predictors = [Predictor(trial, rig) for trial in rig.trials]
+    predictors = predictors_of(rig.trials, rig)
     check_responses(rig, [predictor.stimulus for predictor in predictors])
     readings = [p.trial.reading for p in predictors if p.trial.reading is not None]
     forces = [p.trial.force for p in predictors if p.trial.force is not None]
@@ -62,10 +62,18 @@ def start_model(rig: Rig, predictors: Sequence[Predictor]) -> Model:
             y.append(predictor.trial.reading[good])
     if not x:
         return Model(p)
-    gain, zero = np.polyfit(np.concatenate(x), np.concatenate(y), 1)
-    if not np.isfinite(gain) or gain == 0:
-        gain = 1.0
-    return Model(replace(p, gain=float(gain), zero=p.zero if "zero" in rig.given else float(zero)))
+    gain, zero = _line_through(np.concatenate(x), np.concatenate(y))
+    return Model(replace(p, gain=gain, zero=p.zero if "zero" in rig.given else zero))
+
+
+def _line_through(x: np.ndarray, y: np.ndarray) -> tuple[float, float]:
+    """Slope and intercept of ``y ≈ slope · x + intercept`` (m,); a slope of 1 where x or y never changes."""
+    from_mean = x - x.mean()
+    square = float(from_mean @ from_mean)
+    slope = float(from_mean @ y) / square if square > 0.0 else 0.0
+    if not np.isfinite(slope) or slope == 0.0:
+        slope = 1.0
+    return slope, float(y.mean() - slope * x.mean())
 
 
 def identified_base_parameters(rig: Rig, predictors: Sequence[Predictor]) -> list[str]:
@@ -90,7 +98,7 @@ def identified_base_parameters(rig: Rig, predictors: Sequence[Predictor]) -> lis
             names.append("gain")
     if force_known and has_readings and "gain" not in names:
         names.append("gain")
-    if own_unit and has_readings:
+    if own_unit and any(p.trial.reading is not None and not p.trial.tared for p in predictors):
         names.append("zero")
     if slides:
         names += FITTED_FRICTION_PARAMETERS

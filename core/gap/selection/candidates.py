@@ -56,7 +56,7 @@ class Scales:
     pitch, size : float, m
         Distance between neighbouring texels, and extent of the sensor.
     step, seconds : float, s
-        Median time between samples, and length of the longest trial.
+        Median time between samples, and length of the longest trial or session.
     speed : float, m/s
         Largest speed of sliding.
     texels : int
@@ -88,7 +88,7 @@ def scales_of(predictors: Sequence[Predictor], model: Model) -> Scales:
         pitch=pitch,
         size=max(extent, pitch),
         step=float(np.median([q.trial.step for q in predictors])),
-        seconds=max(float(q.trial.time[-1] - q.trial.time[0]) for q in predictors),
+        seconds=max(float(np.ptp(q.trial.time if q.session is None else q.session.stimulus.time)) for q in predictors),
         speed=max(max(float(q.stimulus.slide.max(initial=0.0)) for q in predictors), 1e-6),
         texels=len(p),
     )

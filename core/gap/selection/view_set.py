@@ -14,8 +14,9 @@ from typing import Any
 import numpy as np
 
 from ...effects.engine.registry import form_of
+from ..dataset.trial import Trial
 from ..fitting.least_squares import TrialView
-from ..forward.predictor import Model, Predictor
+from ..forward.predictor import Model, Predictor, predictors_of
 from .candidates import DIRECTLY_ESTIMATED, Candidate, is_spatial
 
 FEW_TEXELS = 16
@@ -76,19 +77,27 @@ def view_set_of(predictors: Sequence[Predictor], noise: tuple[float, float]) -> 
     few_texels_with_forces = [TrialView(p, _texels_of_all_loads(p), noise=noise) for p in predictors]
     all_have_readings = all(p.trial.reading is not None for p in predictors)
     few_texels = [replace(view, with_forces=not all_have_readings) for view in few_texels_with_forces]
-    few_samples = [TrialView(_thinned(p), noise=noise, with_forces=not all_have_readings) for p in predictors]
+    few_samples = [TrialView(p, noise=noise, with_forces=not all_have_readings) for p in _thinned(predictors)]
     return ViewSet(whole, few_texels, few_texels_with_forces, few_samples)
 
 
-def _thinned(predictor: Predictor) -> Predictor:
-    """Predictor of every fourth sample of a trial."""
-    trial = predictor.trial
+def _thinned(predictors: Sequence[Predictor]) -> list[Predictor]:
+    """Predictors of every fourth sample of some trials, and of the other trials of their sessions."""
+    trials = [predictor.trial for predictor in predictors]
+    shared = {predictor.trial.session: predictor.session for predictor in predictors if predictor.session is not None}
+    others = [one for session in shared.values() for one in session.trials if all(one is not trial for trial in trials)]
+    found = predictors_of([_thinned_trial(trial) for trial in (*trials, *others)], predictors[0].rig)
+    return found[: len(trials)]
+
+
+def _thinned_trial(trial: Trial) -> Trial:
+    """Every fourth sample of a trial."""
     every = slice(None, None, SAMPLE_STRIDE if len(trial.time) >= LEAST_SAMPLES * SAMPLE_STRIDE else 1)
     parts: dict[str, Any] = {
         name: None if getattr(trial, name) is None else getattr(trial, name)[every]
         for name in ("time", "position", "quaternion", "level", "slide", "reading", "force")
     }
-    return Predictor(replace(trial, **parts), predictor.rig)
+    return replace(trial, **parts)
 
 
 def _texels_of_all_loads(predictor: Predictor) -> np.ndarray | None:

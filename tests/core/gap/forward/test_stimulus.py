@@ -8,7 +8,8 @@ import pytest
 import trimesh
 
 from palpate.core.errors import PalpateError
-from palpate.core.gap.dataset.rig import Indenter, Rig, Trial, grid_texels
+from palpate.core.gap.dataset.rig import Indenter, Rig, grid_texels
+from palpate.core.gap.dataset.trial import Trial
 from palpate.core.gap.fitting.noise_floor import coverage
 from palpate.core.gap.forward.predictor import Predictor
 from palpate.core.gap.forward.stimulus import stimulus_of

@@ -1,0 +1,55 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""One recording of a rig."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One recording.
+
+    Attributes
+    ----------
+    name : str
+        Of its file, without the suffix.
+    use : "fit" or "check"
+    time : (T,) float, seconds, increasing
+        Since the first sample of its session, or of the rig's first recording.
+    stimulus : "pose", "depth" or "force"
+    position, quaternion : (T, 3), (T, 4) float, or None
+        Of the indenter in the sensor's frame.
+    level : (T,) float or None
+        Depth of all texels (m), or force that all texels share (N).
+    slide : (T, 2) float, metres
+        Travel of the surface along the sensor's x and y; zero if none was recorded.
+    reading : (T, n) float or None, the sensor's unit
+        NaN if a value is missing.
+    force : (T, 3) float or None, newtons
+        Net force on the sensor; NaN if a component is missing.
+    session : str
+        Name of the session in which the sensor's state goes on from recording to recording; empty if it belongs to none.
+    tared : bool
+        Whether the responses of its first sample were subtracted from all its responses.
+    """
+
+    name: str
+    use: str
+    time: np.ndarray
+    stimulus: str
+    position: np.ndarray | None
+    quaternion: np.ndarray | None
+    level: np.ndarray | None
+    slide: np.ndarray
+    reading: np.ndarray | None
+    force: np.ndarray | None
+    session: str = ""
+    tared: bool = False
+
+    @property
+    def step(self) -> float:
+        """Median time between samples, seconds."""
+        return float(np.median(np.diff(self.time)))

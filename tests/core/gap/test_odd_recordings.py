@@ -1,0 +1,97 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Whatever a user records is either used or refused in one sentence; no recording ends in a traceback or in NaN."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from palpate.benchmarks._recordings import Recording
+from palpate.core.errors import PalpateError
+from palpate.core.gap.dataset.rig import read_rig
+from palpate.core.gap.report.comparison import gap_errors
+from palpate.core.gap.report.summary import summary
+from palpate.core.gap.selection import screening
+from palpate.core.gap.selection.diagnosis import diagnose
+from palpate.core.jobs.job_runner import run_job
+
+TIME = 0.05 * np.arange(70)
+RESPONSES = ("texel_0", "texel_1")
+
+
+def recording(seed):
+    """A press, a hold and a release of two texels that creep a little."""
+    rng = np.random.default_rng(seed)
+    depth = np.interp(TIME, [0.0, 0.5, 1.2, 2.5, 3.0, 3.5], [-1e-3, -1e-3, 2e-3, 2e-3, -1e-3, -1e-3])
+    force = 80.0 * np.maximum(depth, 0.0) * (1.0 - 0.1 * np.clip(TIME - 0.8, 0.0, 1.0))
+    return {"time": TIME, "depth": depth} | {name: force + 1e-3 * rng.normal(size=len(TIME)) for name in RESPONSES}
+
+
+def responses(change):
+    """A fault of all channels."""
+
+    def act(columns):
+        return columns | {name: change(columns[name]) for name in RESPONSES}
+
+    return act
+
+
+def one(change):
+    """A fault of one channel."""
+    return lambda columns: columns | {"texel_0": change(columns["texel_0"])}
+
+
+def without_contact(columns):
+    return columns | {"depth": 0.0 * TIME - 1e-3} | {name: 1e-3 * np.sin(50.0 * TIME) for name in RESPONSES}
+
+
+FAULTS = {
+    "no contact": without_contact,
+    "one press shorter than the others": lambda columns: {name: values[20:28] for name, values in columns.items()},
+    "at the rail": responses(lambda values: np.clip(values, 0.0, 0.02)),
+    "stuck": responses(lambda values: 0.0 * values + 0.3),
+    "one stuck": one(lambda values: 0.0 * values + 0.3),
+    "one empty": one(lambda values: values * np.nan),
+    "empty but three": responses(lambda values: np.where(np.arange(len(TIME)) < 3, values, np.nan)),
+    "nothing but noise": responses(lambda values: np.cos(1e4 * values)),
+    "two levels": responses(lambda values: np.round(values / values.max())),
+    "huge": responses(lambda values: 1e25 * values),
+    "tiny": responses(lambda values: 1e-25 * values),
+    "days of pause": lambda columns: columns | {"time": TIME + 1e6 * (TIME > 2.0)},
+    "nanoseconds": lambda columns: columns | {"time": 1e-9 * TIME},
+    "always the same depth": lambda columns: columns | {"depth": 0.0 * TIME + 1e-3},
+}
+REFUSED = {"empty": responses(lambda values: values * np.nan), "the other sign": responses(lambda values: -values)}
+
+
+def rig_with(folder, fault, where):
+    """Two recordings to fit and one to check, of which `where` names those with a fault."""
+    made = [(name, "check" if name == "c" else "fit", recording(seed)) for seed, name in enumerate("abc")]
+    made = [(name, use, fault(columns) if name in where else columns) for name, use, columns in made]
+    return Recording("odd", "grid = { rows = 1, columns = 2, pitch = 0.004 }\nk = 70.0", made).write(folder)
+
+
+@pytest.fixture
+def short_search(monkeypatch):
+    """A search that fits a few candidates: what is tested are the steps around it."""
+    few = replace(screening.QUICK, most_first_fits=2, max_steps=4, kinds=1, forms=1)
+    monkeypatch.setattr(screening, "THOROUGH", few)
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.usefixtures("short_search")
+@pytest.mark.parametrize(("name", "where"), [*((name, "a") for name in FAULTS), ("no contact", "c"), ("stuck", "c")])
+def test_one_odd_recording_is_used(tmp_path, name, where):
+    result = run_job(diagnose(read_rig(rig_with(tmp_path, FAULTS[name], where))))
+    json.dumps(summary(result, gap_errors(result)), allow_nan=False)
+    assert result.verdict in ("explained", "no gap", "unexplained")
+
+
+@pytest.mark.parametrize("name", [*REFUSED, "no contact", "stuck", "no response at all"])
+def test_rigs_with_nothing_else_are_refused(tmp_path, name):
+    fault = {**REFUSED, **FAULTS, "no response at all": responses(lambda values: 0.0 * values)}[name]
+    with pytest.raises(PalpateError) as caught:
+        run_job(diagnose(read_rig(rig_with(tmp_path, fault, "abc"))))
+    message = str(caught.value)
+    assert message.endswith((".", ")")) and "\n" not in message and len(message) < 400
