@@ -11,7 +11,7 @@ from ..compiled.kernels import kernel
 
 
 def rotation_matrices(quaternions: np.ndarray) -> np.ndarray:
-    """(…, 4) unit quaternions (w, x, y, z) to (…, 3, 3) rotation matrices."""
+    """Return the (…, 3, 3) rotation matrices of (…, 4) unit quaternions (w, x, y, z)."""
     w, x, y, z = np.moveaxis(np.asarray(quaternions, float), -1, 0)
     rows = [
         [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
@@ -86,7 +86,7 @@ def rotate_quaternion(quaternion: np.ndarray, wx: float, wy: float, wz: float) -
 
 @kernel
 def write_twist(velocity: np.ndarray, dt: float, twist: np.ndarray) -> None:
-    """Write how the points of a body move over a step that rotates it by the angle ``|ω| dt``.
+    """Write how the points of a body move during a step that rotates it by the angle ``|ω| dt``: twelve numbers, V and W.
 
     The point at arm r, seen from the step's beginning, moves by ``dt (V + W r)`` with ``W = (exp([ω dt]×) - 1) / dt``: the
     chord of its arc, to rounding. With ``ω × r`` instead, two bodies that rotate together would drift apart by the square of
@@ -119,7 +119,7 @@ def write_backward_twist(velocity: np.ndarray, dt: float, twist: np.ndarray) -> 
 
 @kernel
 def write_world_inertia(rotation: np.ndarray, inertia: np.ndarray, out: np.ndarray) -> None:
-    """R I Rᵀ into `out` (3, 3)."""
+    """Write the inertia in world axes, ``R I Rᵀ``, into `out` (3, 3)."""
     for i in range(3):
         for j in range(3):
             total = 0.0
@@ -131,7 +131,7 @@ def write_world_inertia(rotation: np.ndarray, inertia: np.ndarray, out: np.ndarr
 
 @kernel
 def write_twist_map(rotation: np.ndarray, gx: float, gy: float, gz: float, sign: float, out: np.ndarray) -> None:
-    """Matrix (6, 6) from a body's twist in world axes to velocities near a sensor, in the axes of the sensor's body.
+    """Write the matrix (6, 6) that maps a body's velocities in world axes to velocities at a sensor, in the sensor body's axes.
 
     Parameters
     ----------
@@ -140,7 +140,7 @@ def write_twist_map(rotation: np.ndarray, gx: float, gy: float, gz: float, sign:
     gx, gy, gz : float, metres
         From the body's reference point to that of the sensor's body, world axes.
     sign : float
-        -1 for the sensor's own body, whose motion counts against the target's.
+        1 for the target's body, and -1 for the sensor's own, because velocities are those of the target relative to the sensor.
     out : (6, 6) float
         Written.
     """
@@ -154,7 +154,7 @@ def write_twist_map(rotation: np.ndarray, gx: float, gy: float, gz: float, sign:
 
 @kernel
 def project_on_axis(axis: np.ndarray, out: np.ndarray) -> None:
-    """Replace the first column of a twist map by its product with a body's `axis` (3,), for the speed along that axis."""
+    """Replace the first column of a twist map by the column for a speed along `axis` (3,), in world axes, of the body."""
     for i in range(6):
         out[i, 0] = axis[0] * out[i, 0] + axis[1] * out[i, 1] + axis[2] * out[i, 2]
 
@@ -173,7 +173,8 @@ def add_triple_product(
 ) -> None:
     """Add ``scale · leftᵀ middle right`` into `matrix`.
 
-    `middle` is symmetric, 6 × 6, and its lower triangle is read; of `left` and `right` the first columns are used.
+    `middle` is symmetric, 6 × 6; only its lower triangle is read. Of `left` the first `left_width` columns are used, and of
+    `right` the first `right_width`.
     """
     for j in range(right_width):
         for i in range(6):

@@ -24,14 +24,14 @@ from .solver_model import SolverModel, State
 from .workspace import Workspace
 
 FIND_CONTACTS, SUM_CONTACTS, UPDATE_FRICTION = 2, 3, 4
-"""Numbers of the loops; :mod:`.thread_team` uses 0 and 1 itself."""
+"""Numbers of the loops in the queue. :mod:`.thread_team` has the numbers 0 (idle) and 1 (stop)."""
 
 
 @inlined
 def find_all_contacts(dt: float, model: SolverModel, detection: DetectionData, state: State, workspace: Workspace) -> int:
     """Find the contacts of all pairs where the bodies are now, and return how many points are pressed too deep to act.
 
-    `dt` is the step that begins, or minus the step that has ended (see :func:`.finish_contacts`).
+    `dt` is the length of the step that begins, or minus the length of the step that has ended (see :func:`.finish_contacts`).
     """
     for body in range(len(state.position)):
         write_rotation(state.quaternion[body], workspace.bodies.rotation[body])
@@ -58,27 +58,27 @@ def run_parallel_loop(loop: int, model: SolverModel, detection: DetectionData, s
         if pair < pairs:
             _run_item(loop, pair, model, detection, state, workspace)
             finish_item(queue)
-    turn = 0
+    waits = 0
     while not all_items_done(queue, pairs):
-        wait_briefly(queue, turn)
-        turn += 1
-    if turn >= SPINS:
+        wait_briefly(queue, waits)
+        waits += 1
+    if waits >= SPINS:
         queue[LATE_LOOPS] += 1
 
 
 @kernel
 def help_with_loops(model: SolverModel, detection: DetectionData, state: State, workspace: Workspace) -> None:
     """Work on the loops that :func:`run_parallel_loop` puts into the queue, until the queue says stop."""
-    queue, pairs, turn = workspace.queue, len(model.pairs.sensor), 0
+    queue, pairs, waits = workspace.queue, len(model.pairs.sensor), 0
     while not is_stopped(queue):
         loop, pair = claim_item(queue, pairs)
         if pair < pairs:
             _run_item(loop, pair, model, detection, state, workspace)
             finish_item(queue)
-            turn = 0
+            waits = 0
         else:
-            wait_briefly(queue, turn)
-            turn += 1
+            wait_briefly(queue, waits)
+            waits += 1
 
 
 @inlined
@@ -92,5 +92,5 @@ def _run_item(loop: int, pair: int, model: SolverModel, detection: DetectionData
     elif workspace.contacts.number[pair] > 0:
         if loop == SUM_CONTACTS:
             sum_pair_contacts(pair, dt, model, state, workspace)
-        else:
+        else:  # UPDATE_FRICTION
             update_pair_friction(pair, dt, model, detection.surfaces, state, workspace)
