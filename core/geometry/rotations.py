@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Rotations and twists of rigid bodies, and the small linear algebra of their dynamics."""
+"""Rotations and velocities of rigid bodies, and the small linear algebra of their dynamics."""
 
 from __future__ import annotations
 
@@ -85,7 +85,7 @@ def rotate_quaternion(quaternion: np.ndarray, wx: float, wy: float, wz: float) -
 
 
 @kernel
-def write_twist(velocity: np.ndarray, dt: float, twist: np.ndarray) -> None:
+def write_step_motion(velocity: np.ndarray, dt: float, step_motion: np.ndarray) -> None:
     """Write how the points of a body move during a step that rotates it by the angle ``|ω| dt``: twelve numbers, V and W.
 
     The point at arm r, seen from the step's beginning, moves by ``dt (V + W r)`` with ``W = (exp([ω dt]×) - 1) / dt``: the
@@ -97,7 +97,7 @@ def write_twist(velocity: np.ndarray, dt: float, twist: np.ndarray) -> None:
     velocity : (6,) float
         Velocity of the reference point and angular velocity.
     dt : float, seconds
-    twist : (12,) float
+    step_motion : (12,) float
         Written: V, then W row by row.
     """
     wx, wy, wz = velocity[3], velocity[4], velocity[5]
@@ -105,16 +105,17 @@ def write_twist(velocity: np.ndarray, dt: float, twist: np.ndarray) -> None:
     half = 0.5 * math.sqrt(square) * dt
     sine = 1.0 if abs(half) < 1e-6 else math.sin(half) / half
     s, c = sine * math.cos(half), 0.5 * dt * sine * sine
-    twist[0], twist[1], twist[2] = velocity[0], velocity[1], velocity[2]
-    twist[3], twist[4], twist[5] = c * (wx * wx - square), c * wx * wy - s * wz, c * wx * wz + s * wy
-    twist[6], twist[7], twist[8] = c * wx * wy + s * wz, c * (wy * wy - square), c * wy * wz - s * wx
-    twist[9], twist[10], twist[11] = c * wx * wz - s * wy, c * wy * wz + s * wx, c * (wz * wz - square)
+    out = step_motion
+    out[0], out[1], out[2] = velocity[0], velocity[1], velocity[2]
+    out[3], out[4], out[5] = c * (wx * wx - square), c * wx * wy - s * wz, c * wx * wz + s * wy
+    out[6], out[7], out[8] = c * wx * wy + s * wz, c * (wy * wy - square), c * wy * wz - s * wx
+    out[9], out[10], out[11] = c * wx * wz - s * wy, c * wy * wz + s * wx, c * (wz * wz - square)
 
 
 @kernel
-def write_backward_twist(velocity: np.ndarray, dt: float, twist: np.ndarray) -> None:
-    """Write the twist of the step that has just ended, as seen from its end: ``W = (1 - exp(-[ω dt]×)) / dt``."""
-    write_twist(velocity, -dt, twist)
+def write_backward_step_motion(velocity: np.ndarray, dt: float, step_motion: np.ndarray) -> None:
+    """Write the motion over the step that has just ended, as seen from its end: ``W = (1 - exp(-[ω dt]×)) / dt``."""
+    write_step_motion(velocity, -dt, step_motion)
 
 
 @kernel

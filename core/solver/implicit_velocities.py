@@ -12,7 +12,7 @@ import math
 import numpy as np
 
 from ..compiled.kernels import inlined, kernel
-from ..geometry.rotations import solve_positive_definite, write_twist
+from ..geometry.rotations import solve_positive_definite, write_step_motion
 from .detection.detection_data import DetectionData
 from .dynamics.actuators import SPEED, add_actuators
 from .dynamics.free_rotation import matrix_times_vector, mean_angular_velocity
@@ -59,7 +59,7 @@ def _iterate(
     vector, guess, n = system.vector, system.guess, bodies.unknowns
     last_change, share = 0.0, 1.0
     for iteration in range(MAX_ITERATIONS):
-        _write_twists(dt, model, state, workspace)
+        _write_step_motions(dt, model, state, workspace)
         for i in range(n):
             vector[i] = system.momentum[i]
             for j in range(n):
@@ -90,7 +90,7 @@ def _iterate(
         if last:
             break
         last_change = change
-    _write_twists(dt, model, state, workspace)
+    _write_step_motions(dt, model, state, workspace)
 
 
 @kernel
@@ -153,9 +153,9 @@ def _write_initial_guess(dt: float, model: SolverModel, state: State, workspace:
                 work.spin_correction[body, i] = mean[i] - spin[i]
             momentum[at + 3], momentum[at + 4], momentum[at + 5] = matrix_times_vector(inertia, mean[0], mean[1], mean[2])
         elif bodies.kind[body] == KEYFRAMED:
-            write_twist(velocity[body], dt, work.twist[body])
+            write_step_motion(velocity[body], dt, work.step_motion[body])
             for i in range(12):
-                work.known_twist[body, i] = work.twist[body, i]
+                work.known_step_motion[body, i] = work.step_motion[body, i]
     for drive in range(len(model.drives.gains)):
         at = model.drives.unknown[drive]
         guess[at] = free[at] = state.drives[drive, SPEED]
@@ -163,23 +163,23 @@ def _write_initial_guess(dt: float, model: SolverModel, state: State, workspace:
 
 
 @kernel
-def _write_twists(dt: float, model: SolverModel, state: State, workspace: Workspace) -> None:
-    """Write the velocities and twists that follow from the guess, and the part of the twists that is not solved for.
+def _write_step_motions(dt: float, model: SolverModel, state: State, workspace: Workspace) -> None:
+    """Write the velocities and step motions that follow from the guess, and the part of the motions that is not solved for.
 
     Of a free body that part is by how much a finite rotation exceeds ``ω × r``; of a driven one it is its carrier's motion.
     """
     bodies, work = model.bodies, workspace.bodies
-    guess, velocity, twist, known = workspace.system.guess, state.velocity, work.twist, work.known_twist
+    guess, velocity, motion, known = workspace.system.guess, state.velocity, work.step_motion, work.known_step_motion
     for body in range(len(bodies.kind)):
         at = bodies.first_unknown[body]
         if bodies.kind[body] == FREE:
             for i in range(6):
                 velocity[body, i] = guess[at + i]
-            write_twist(velocity[body], dt, twist[body])
+            write_step_motion(velocity[body], dt, motion[body])
             for i in range(3):
                 known[body, i] = 0.0
             for i in range(3, 12):
-                known[body, i] = twist[body, i]
+                known[body, i] = motion[body, i]
             known[body, 4] += velocity[body, 5]
             known[body, 5] -= velocity[body, 4]
             known[body, 6] -= velocity[body, 5]
@@ -189,7 +189,7 @@ def _write_twists(dt: float, model: SolverModel, state: State, workspace: Worksp
         elif bodies.kind[body] == DRIVEN:
             for i in range(6):
                 velocity[body, i] = work.carrier_velocity[body, i]
-            write_twist(velocity[body], dt, known[body])
+            write_step_motion(velocity[body], dt, known[body])
             for i in range(3):
                 velocity[body, i] += guess[at] * workspace.drives.axis[body, i]
-            write_twist(velocity[body], dt, twist[body])
+            write_step_motion(velocity[body], dt, motion[body])

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..compiled.kernels import inlined, kernel
-from ..geometry.rotations import rotate_quaternion, write_backward_twist, write_rotation, write_world_inertia
+from ..geometry.rotations import rotate_quaternion, write_backward_step_motion, write_rotation, write_world_inertia
 from .detection.deformation import refit_boxes, set_moment
 from .detection.detection_data import DetectionData
 from .dynamics.actuators import move_drives, place_driven, prepare_driven
@@ -99,7 +99,7 @@ def advance_steps(
         set_moment(last, last - 1, dt, model, surfaces)
     _place(path.position[last], path.quaternion[last], model, state, workspace)
     for body in range(len(model.bodies.kind)):
-        write_backward_twist(state.velocity[body], dt, workspace.bodies.twist[body])
+        write_backward_step_motion(state.velocity[body], dt, workspace.bodies.step_motion[body])
     return worst
 
 

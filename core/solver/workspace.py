@@ -22,10 +22,10 @@ class BodyWork(NamedTuple):
     ----------
     rotation, inertia : (b, 3, 3) float
         Orientation, and inertia in world axes.
-    twist : (b, 12) float
+    step_motion : (b, 12) float
         Velocity V of each body's reference point and a matrix W, row by row: the points at arm r move by ``dt (V + W r)``.
-    known_twist : (b, 12) float
-        The part of the twist that is not solved for.
+    known_step_motion : (b, 12) float
+        The part of the step motion that is not solved for.
     spin_correction : (b, 3) float, rad/s
         By how much the mean spin of a free body over the step differs from its spin at the beginning if nothing acts.
     velocity_before : (b, 6) float
@@ -36,8 +36,8 @@ class BodyWork(NamedTuple):
 
     rotation: np.ndarray
     inertia: np.ndarray
-    twist: np.ndarray
-    known_twist: np.ndarray
+    step_motion: np.ndarray
+    known_step_motion: np.ndarray
     spin_correction: np.ndarray
     velocity_before: np.ndarray
     carrier_velocity: np.ndarray
@@ -112,7 +112,7 @@ class LinearSystem(NamedTuple):
     block, wrench : (6, 6), (6,) float
         What the contacts of one pair resist, and their force and torque on the target, both in the sensor's axes.
     map_a, map_b : (6, 6) float
-        From the twists of a pair's two bodies to their relative motion.
+        From the velocities of a pair's two bodies to their relative velocity.
     """
 
     matrix: np.ndarray

@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..effects.engine.compiled_program import TexelContacts
-from ..geometry.rotations import write_backward_twist
+from ..geometry.rotations import write_backward_step_motion
 from .contact_rows import LANES, ROW
 from .detection.detection_data import SurfaceMotion
 from .solver_model import DRIVEN, FREE, SolverModel, State
@@ -53,14 +53,14 @@ def workspace_for(model: SolverModel, state: State, surfaces: SurfaceMotion, que
 
 def _body_work(state: State) -> BodyWork:
     b = len(state.position)
-    twist = np.zeros((b, 12))
+    step_motion = np.zeros((b, 12))
     for body in range(b):
-        write_backward_twist(state.velocity[body], 1e-9, twist[body])
+        write_backward_step_motion(state.velocity[body], 1e-9, step_motion[body])
     return BodyWork(
         rotation=np.zeros((b, 3, 3)),
         inertia=np.zeros((b, 3, 3)),
-        twist=twist,
-        known_twist=np.zeros((b, 12)),
+        step_motion=step_motion,
+        known_step_motion=np.zeros((b, 12)),
         spin_correction=np.zeros((b, 3)),
         velocity_before=np.zeros((b, 6)),
         carrier_velocity=np.zeros((b, 6)),

@@ -137,8 +137,8 @@ def sum_pair_contacts(pair: int, dt: float, model: SolverModel, state: State, wo
     """Sum up the contacts of a pair, linearised at the velocities that are guessed."""
     a, b = model.pairs.sensor_body[pair], model.pairs.target_body[pair]
     bodies, pairs = workspace.bodies, workspace.pairs
-    relative_motion(a, b, bodies.twist, state.position, bodies.rotation, pairs.motion[pair])
-    relative_motion(a, b, bodies.known_twist, state.position, bodies.rotation, pairs.known_motion[pair])
+    relative_motion(a, b, bodies.step_motion, state.position, bodies.rotation, pairs.motion[pair])
+    relative_motion(a, b, bodies.known_step_motion, state.position, bodies.rotation, pairs.known_motion[pair])
     _sum_contacts(pair, dt, read_law(model.pairs.law, pair), model, state.effect_memory, workspace)
 
 

@@ -74,7 +74,7 @@ def _write_motion_at_step_end(pair: int, dt: float, model: SolverModel, workspac
 
     The result is written over the pair's known motion, and the rotation into the first of the pair's rotations.
     """
-    a, twist, rotation = model.pairs.sensor_body[pair], workspace.bodies.twist, workspace.bodies.rotation
+    a, step_motion, rotation = model.pairs.sensor_body[pair], workspace.bodies.step_motion, workspace.bodies.rotation
     motion, result = workspace.pairs.motion[pair], workspace.pairs.known_motion[pair]
     turned = workspace.pairs.rotations[pair, 0]
     for i in range(12):
@@ -84,7 +84,7 @@ def _write_motion_at_step_end(pair: int, dt: float, model: SolverModel, workspac
             turn = 0.0  # entry (m, k) of the sensor's W in its own axes
             for i in range(3):
                 for j in range(3):
-                    turn += rotation[a, i, m] * twist[a, 3 + 3 * i + j] * rotation[a, j, k]
+                    turn += rotation[a, i, m] * step_motion[a, 3 + 3 * i + j] * rotation[a, j, k]
             turned[k, m] = dt * turn + (1.0 if k == m else 0.0)
             result[k] += dt * turn * motion[m]
             for j in range(3):

@@ -13,7 +13,9 @@ from ..workspace import ContactWork, Workspace
 
 
 @kernel
-def relative_motion(a: int, b: int, twist: np.ndarray, position: np.ndarray, rotation: np.ndarray, motion: np.ndarray) -> None:
+def relative_motion(
+    a: int, b: int, step_motion: np.ndarray, position: np.ndarray, rotation: np.ndarray, motion: np.ndarray
+) -> None:
     """How the points of body `b` move relative to body `a`, in the axes of `a`: ``v = U + W p`` (Eq. 3).
 
     `p` is a point's position relative to the reference point of `a`. One motion serves all contacts of a pair.
@@ -22,7 +24,7 @@ def relative_motion(a: int, b: int, twist: np.ndarray, position: np.ndarray, rot
     ----------
     a, b : int
         Bodies.
-    twist, position, rotation : (b, 12), (b, 3), (b, 3, 3) float
+    step_motion, position, rotation : (b, 12), (b, 3), (b, 3, 3) float
         Of all bodies (see :class:`.BodyWork`).
     motion : (12,) float
         Written: U (m/s), then W (1/s) row by row.
@@ -32,10 +34,10 @@ def relative_motion(a: int, b: int, twist: np.ndarray, position: np.ndarray, rot
         for m in range(3):
             motion[3 + 3 * k + m] = 0.0
     for i in range(3):
-        u = twist[b, i] - twist[a, i]
+        u = step_motion[b, i] - step_motion[a, i]
         for j in range(3):
-            u += twist[b, 3 + 3 * i + j] * (position[a, j] - position[b, j])
-            w = twist[b, 3 + 3 * i + j] - twist[a, 3 + 3 * i + j]
+            u += step_motion[b, 3 + 3 * i + j] * (position[a, j] - position[b, j])
+            w = step_motion[b, 3 + 3 * i + j] - step_motion[a, 3 + 3 * i + j]
             for k in range(3):
                 for m in range(3):
                     motion[3 + 3 * k + m] += rotation[a, i, k] * w * rotation[a, j, m]
@@ -45,10 +47,10 @@ def relative_motion(a: int, b: int, twist: np.ndarray, position: np.ndarray, rot
 
 @kernel
 def write_pair_motion(pair: int, model: SolverModel, state: State, workspace: Workspace) -> None:
-    """Write the relative motion of a pair's bodies, as their present twists say it, into the workspace."""
+    """Write the relative motion of a pair's bodies, as their present step motions say it, into the workspace."""
     a, b = model.pairs.sensor_body[pair], model.pairs.target_body[pair]
     bodies = workspace.bodies
-    relative_motion(a, b, bodies.twist, state.position, bodies.rotation, workspace.pairs.motion[pair])
+    relative_motion(a, b, bodies.step_motion, state.position, bodies.rotation, workspace.pairs.motion[pair])
 
 
 @kernel
