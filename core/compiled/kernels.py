@@ -109,6 +109,10 @@ else:
 
     def compiled_callback(function: Callable[..., Any]) -> Any:
         """Raise: only compiled code has addresses."""
-        raise NotImplementedError
+        raise RuntimeError(
+            f"'{function.__name__}' has no address without numba: look at COMPILED first, and call the function itself."
+        )
 
-    call_address = compiled_callback
+    def call_address(_address: int, *_numbers: int) -> None:
+        """Raise: only compiled code has addresses."""
+        raise RuntimeError("Nothing can be called by its address without numba: look at COMPILED first.")

@@ -12,12 +12,11 @@ from typing import NamedTuple
 import numpy as np
 
 from ..compiled.kernels import inlined, kernel
-from ..geometry.rotations import rotate_quaternion, write_backward_step_motion, write_rotation, write_world_inertia
+from ..geometry.rotations import write_backward_step_motion, write_world_inertia
 from .detection.deformation import refit_boxes, set_moment
 from .detection.detection_data import DetectionData
 from .dynamics.actuators import move_drives, place_driven, prepare_driven
 from .dynamics.effect_memory import commit_effect_memory
-from .dynamics.free_rotation import angular_velocity_of, matrix_times_vector
 from .implicit_velocities import solve_velocities
 from .parallel_loops import UPDATE_FRICTION, find_all_contacts, run_parallel_loop
 from .solver_model import DRIVEN, FREE, KEYFRAMED, SolverModel, State
@@ -94,7 +93,7 @@ def advance_steps(
             move_drives(dt, path.commands[step], model, state, workspace)
         for body in range(len(model.bodies.kind)):
             if model.bodies.kind[body] == FREE:
-                _move_free(body, dt, model, state, workspace)
+                _move_free(body, dt, state, workspace)
     if deforms:
         set_moment(last, last - 1, dt, model, surfaces)
     _place(path.position[last], path.quaternion[last], model, state, workspace)
@@ -137,14 +136,13 @@ def _place(position: np.ndarray, quaternion: np.ndarray, model: SolverModel, sta
 
 
 @inlined
-def _move_free(body: int, dt: float, model: SolverModel, state: State, workspace: Workspace) -> None:
-    """Move a free body with its new velocity. A body that nothing touches keeps its angular momentum and its energy."""
+def _move_free(body: int, dt: float, state: State, workspace: Workspace) -> None:
+    """Move a free body with its new velocity, and give it the orientation and spin that :mod:`.passivity` found for the end."""
     velocity, work = state.velocity[body], workspace.bodies
-    rotation, extra = work.rotation[body], work.spin_correction[body]
     for i in range(3):
         state.position[body, i] += dt * velocity[i]
-    spin = velocity[3] - extra[0], velocity[4] - extra[1], velocity[5] - extra[2]
-    lx, ly, lz = matrix_times_vector(work.inertia[body], spin[0], spin[1], spin[2])
-    rotate_quaternion(state.quaternion[body], dt * velocity[3], dt * velocity[4], dt * velocity[5])
-    write_rotation(state.quaternion[body], rotation)
-    velocity[3], velocity[4], velocity[5] = angular_velocity_of(rotation, model.bodies.inverse_inertia[body], lx, ly, lz)
+        velocity[3 + i] = work.end_spin[body, i]
+        for j in range(3):
+            work.rotation[body, i, j] = work.end_rotation[body, i, j]
+    for i in range(4):
+        state.quaternion[body, i] = work.end_quaternion[body, i]

@@ -28,6 +28,12 @@ class BodyWork(NamedTuple):
         The part of the step motion that is not solved for.
     spin_correction : (b, 3) float, rad/s
         By how much the mean spin of a free body over the step differs from its spin at the beginning if nothing acts.
+    end_quaternion, end_rotation, end_spin : (b, 4), (b, 3, 3), (b, 3) float
+        Orientation and angular velocity (rad/s) of a free body at the step's end, as the velocities solved for give them.
+    unbooked_energy : (b,) float, joules
+        By how much the rotational energy of a free body grows more in the step than torques and mean spins say.
+    contact_force : (b,) float, N
+        Sum of the sizes of the forces with which pairs whose energy is accounted for act on a body.
     velocity_before : (b, 6) float
         Velocity at the step's beginning.
     carrier_velocity : (b, 6) float
@@ -39,6 +45,11 @@ class BodyWork(NamedTuple):
     step_motion: np.ndarray
     known_step_motion: np.ndarray
     spin_correction: np.ndarray
+    end_quaternion: np.ndarray
+    end_rotation: np.ndarray
+    end_spin: np.ndarray
+    unbooked_energy: np.ndarray
+    contact_force: np.ndarray
     velocity_before: np.ndarray
     carrier_velocity: np.ndarray
 

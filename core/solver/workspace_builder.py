@@ -62,6 +62,11 @@ def _body_work(state: State) -> BodyWork:
         step_motion=step_motion,
         known_step_motion=np.zeros((b, 12)),
         spin_correction=np.zeros((b, 3)),
+        end_quaternion=np.zeros((b, 4)),
+        end_rotation=np.zeros((b, 3, 3)),
+        end_spin=np.zeros((b, 3)),
+        unbooked_energy=np.zeros(b),
+        contact_force=np.zeros(b),
         velocity_before=np.zeros((b, 6)),
         carrier_velocity=np.zeros((b, 6)),
     )

@@ -13,7 +13,10 @@ import math
 
 import numpy as np
 
-from ...compiled.kernels import kernel
+from ...compiled.kernels import inlined, kernel
+from ...geometry.rotations import rotate_quaternion, write_rotation
+from ..solver_model import SolverModel, State
+from ..workspace import Workspace
 
 LARGEST_TURN = 0.25
 """Largest rotation of one midpoint step, radians: its iterations then converge after a few."""
@@ -116,3 +119,30 @@ def angular_velocity_of(
     bx, by, bz = to_body_axes(rotation, lx, ly, lz)
     wx, wy, wz = matrix_times_vector(inverse, bx, by, bz)
     return matrix_times_vector(rotation, wx, wy, wz)
+
+
+@inlined
+def write_rotation_at_end(body: int, dt: float, model: SolverModel, state: State, workspace: Workspace) -> None:
+    """Write orientation and spin of a free body at the step's end, and by how much its energy differs from what was reckoned.
+
+    A body that nothing touches keeps its angular momentum and its energy. Torques bring it momentum, but the spin that follows
+    depends on how the body lies at the end: its energy grows by more or less than the torques' impulse times the mean of the
+    spins at both ends, which is what the work of its contacts is reckoned with.
+    """
+    velocity, work = state.velocity[body], workspace.bodies
+    quaternion, rotation, extra = work.end_quaternion[body], work.end_rotation[body], work.spin_correction[body]
+    before, inertia = work.velocity_before[body], work.inertia[body]
+    spin = velocity[3] - extra[0], velocity[4] - extra[1], velocity[5] - extra[2]
+    lx, ly, lz = matrix_times_vector(inertia, spin[0], spin[1], spin[2])
+    for i in range(4):
+        quaternion[i] = state.quaternion[body, i]
+    rotate_quaternion(quaternion, dt * velocity[3], dt * velocity[4], dt * velocity[5])
+    write_rotation(quaternion, rotation)
+    ex, ey, ez = angular_velocity_of(rotation, model.bodies.inverse_inertia[body], lx, ly, lz)
+    work.end_spin[body, 0], work.end_spin[body, 1], work.end_spin[body, 2] = ex, ey, ez
+    first = before[3] - extra[0], before[4] - extra[1], before[5] - extra[2]
+    gx, gy, gz = matrix_times_vector(inertia, velocity[3] - before[3], velocity[4] - before[4], velocity[5] - before[5])
+    kx, ky, kz = lx - gx, ly - gy, lz - gz  # angular momentum at the beginning
+    grown = lx * ex + ly * ey + lz * ez - (kx * first[0] + ky * first[1] + kz * first[2])
+    reckoned = gx * (before[3] + velocity[3]) + gy * (before[4] + velocity[4]) + gz * (before[5] + velocity[5])
+    work.unbooked_energy[body] = 0.5 * (grown - reckoned)

@@ -21,6 +21,7 @@ from ...laws.normal_force import elastic_energy
 from ..found_contacts import contacts_of
 from ..solver_model import FREE, KEYFRAMED, SolverModel, State
 from ..workspace import Workspace
+from .free_rotation import write_rotation_at_end
 from .linear_system import is_last_part
 
 MAX_BISECTIONS = 24
@@ -61,6 +62,10 @@ def check_energy(bisection: int, dt: float, model: SolverModel, state: State, wo
     """
     energy, within_account = workspace.energy, True
     scale = energy.scale
+    for body in range(len(model.bodies.kind)):
+        if model.bodies.kind[body] == FREE:
+            write_rotation_at_end(body, dt, model, state, workspace)
+    _sum_contact_forces(model, workspace)
     for pair in range(len(model.pairs.sensor)):
         energy.work[pair] = _contact_work(pair, dt, model, state, workspace)
         energy.available[pair] = max(state.stored_energy[pair] + _integration_energy(pair, dt, model, state), 0.0)
@@ -80,11 +85,31 @@ def check_energy(bisection: int, dt: float, model: SolverModel, state: State, wo
 
 
 @kernel
+def _sum_contact_forces(model: SolverModel, workspace: Workspace) -> None:
+    """Add up the sizes of the forces that act on each body, by which its pairs share its :attr:`.BodyWork.unbooked_energy`."""
+    total = workspace.bodies.contact_force
+    for body in range(len(total)):
+        total[body] = 0.0
+    for pair in range(len(model.pairs.sensor)):
+        size = _force_size(pair, workspace)
+        total[model.pairs.sensor_body[pair]] += size
+        total[model.pairs.target_body[pair]] += size
+
+
+@inlined
+def _force_size(pair: int, workspace: Workspace) -> float:
+    """Size of the force of a pair, N; zero where its energy is not accounted for."""
+    force = workspace.energy.force[pair]
+    return math.sqrt(force[0] * force[0] + force[1] * force[1] + force[2] * force[2])
+
+
+@kernel
 def _contact_work(pair: int, dt: float, model: SolverModel, state: State, workspace: Workspace) -> float:
     """Work that a pair's forces do in a step on both bodies together, joules.
 
     Work that is put in is reckoned with the mean of the velocities at both ends, so that all that a body loses is found; work
-    that comes out with the velocity at the end if that is more.
+    that comes out with the velocity at the end if that is more. What a turning body gains besides counts as work of the pairs
+    that touch it, by the sizes of their forces.
     """
     force, touches = workspace.energy.force[pair], False
     for i in range(6):
@@ -98,6 +123,11 @@ def _contact_work(pair: int, dt: float, model: SolverModel, state: State, worksp
     for i in range(6):
         mean += 0.5 * dt * force[i] * (before[i] + after[i])
         end += dt * force[i] * after[i]
+    size, besides = _force_size(pair, workspace), 0.0
+    for body in (a, b):
+        if model.bodies.kind[body] == FREE and size > 0.0:
+            besides += workspace.bodies.unbooked_energy[body] * (size / workspace.bodies.contact_force[body])
+    mean, end = mean + besides, end + besides
     return mean if mean < 0.0 else max(mean, end)
 
 

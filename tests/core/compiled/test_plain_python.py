@@ -1,9 +1,23 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Every line also runs in plain Python, and says the same."""
 
+import os
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 from oracles.plain import numbers, scenes, without_numba
+
+ASK_FOR_ADDRESSES = """
+from palpate.core.compiled.kernels import COMPILED, call_address, compiled_callback
+print(COMPILED)
+for ask in (lambda: compiled_callback(len), lambda: call_address(0, 1)):
+    try:
+        ask()
+    except RuntimeError as error:
+        print(error)
+"""
 
 
 def test_plain_python_gives_the_same_numbers():
@@ -21,3 +35,12 @@ def test_without_the_internals_of_numba_everything_runs_as_plain_python():
     assert set(fallback) == set(plain)
     for name, values in plain.items():
         assert np.array_equal(fallback[name], values), name
+
+
+def test_without_numba_a_function_has_no_address_and_the_error_says_so():
+    environment = {**os.environ, "PALPATE_NUMBA": "0"}
+    done = subprocess.run([sys.executable, "-c", ASK_FOR_ADDRESSES], env=environment, capture_output=True, text=True)
+    compiled, callback, call = done.stdout.splitlines()
+    assert compiled == "False"
+    assert callback == "'len' has no address without numba: look at COMPILED first, and call the function itself."
+    assert call == "Nothing can be called by its address without numba: look at COMPILED first."
