@@ -17,6 +17,7 @@ __all__ = [
     "mesh_fingerprint",
     "moved_bodies",
     "participants",
+    "rounding_warnings",
     "scene_fingerprint",
     "scene_reader",
     "scene_reading",

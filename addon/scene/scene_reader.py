@@ -25,13 +25,18 @@ from ...core.model.sensor import Sensor
 from ...core.model.target import Target
 from ..properties import start_transforms
 from ..session import animation_time, identity, units
-from . import attached_objects, body_poses, deforming_objects, drives, moved_bodies, participants, sensor_reader, uv_layouts
+from . import (
+    attached_objects,
+    body_poses,
+    deforming_objects,
+    drives,
+    moved_bodies,
+    participants,
+    rounding_warnings,
+    sensor_reader,
+    uv_layouts,
+)
 from .scene_reading import FrameSample, SceneReading
-
-FLOAT32_ROUNDING = 2.0**-24
-"""Largest relative rounding of Blender's numbers."""
-ROUNDING_SHARE = 0.005
-"""Share of the thinnest skin's depth by which rounded positions may be off without a warning."""
 
 
 def read_scene(scene) -> Generator[Progress, None, SceneReading]:
@@ -275,9 +280,9 @@ def _read_frames(scene) -> Generator[Progress, None, SceneReading]:
     samples = (len(frames) - 1) * samples_per_frame + 1
     times = np.array([step / (reading.scenario.fps * samples_per_frame) for step in range(samples)])
     scenario = history.applied_to(reading.scenario, times)
-    return replace(
-        reading, scenario=scenario, warnings=reading.warnings + _mass_warnings(scenario) + _distance_warnings(scenario)
-    )
+    warnings = _mass_warnings(scenario) + rounding_warnings.distance_warnings(scenario)
+    warnings += rounding_warnings.keyframe_warnings(participants.find_participants(scene)[0], scenario, reading.metres_per_unit)
+    return replace(reading, scenario=scenario, warnings=reading.warnings + warnings)
 
 
 def _sample_time(frame: int, number: int, samples_per_frame: int) -> tuple[int, float]:
@@ -298,24 +303,6 @@ def _mass_warnings(scenario: Scenario) -> tuple[str, ...]:
         for target in scenario.targets
         if target.deformation is not None and scenario.bodies[target.body].name == target.name
         if scenario.bodies[target.body].moved_by_forces
-    )
-
-
-def _distance_warnings(scenario: Scenario) -> tuple[str, ...]:
-    """Return a warning for the body that is so far from the origin that rounding changes forces; Blender keeps 24 bits."""
-    skin = min(sensor.parameters.max_penetration for sensor in scenario.sensors)
-    distances = {body.name: float(np.linalg.norm(body.motion.positions, axis=1).max()) for body in scenario.bodies}
-    for target in scenario.targets:
-        name = scenario.bodies[target.body].name
-        distances[name] += float(np.linalg.norm(target.mesh.vertices, axis=1).max())
-    name = max(distances, key=lambda body: distances[body])
-    rounding = distances[name] * FLOAT32_ROUNDING
-    if rounding < ROUNDING_SHARE * skin:
-        return ()
-    return (
-        f"'{name}' is {distances[name] * 1e-3:.3g} km from the origin, where Blender rounds positions to "
-        f"{rounding * 1e3:.2g} mm and a skin is {skin * 1e3:.3g} mm deep: move the scene to the origin, "
-        "or its forces are inexact.",
     )
 
 

@@ -13,10 +13,11 @@ from ...core.errors import PalpateError
 from ...core.model.recording import Recording
 from ..properties import start_transforms
 from ..scene import body_poses, mesh_fingerprint, participants, scene_fingerprint
-from ..session import animation_time
+from ..session import animation_time, units
 
 SAME_POSE = 1e-6
-"""Metres, and components of a quaternion, by which a recorded pose may differ: an evaluated matrix has 32 bits."""
+"""Share of the largest length in a pose, and components of a quaternion, by which a recorded pose may differ: an evaluated
+matrix has 32 bits."""
 
 
 def is_stale(scene, depsgraph, recording: Recording | None) -> bool:
@@ -59,6 +60,7 @@ def _has_moved(scene, depsgraph, recording: Recording) -> bool:
     if number not in recording.frames or part:
         return False
     poses = recording.poses[int(np.searchsorted(recording.frames, number))]
+    extent = float(np.abs(poses[:, :3]).max(initial=0.0))
     for name, pose in zip(recording.body_names, poses, strict=True):
         obj = scene.objects.get(name)
         if obj is None:
@@ -69,7 +71,8 @@ def _has_moved(scene, depsgraph, recording: Recording) -> bool:
             now = body_poses.body_pose(scene, obj, depsgraph)
         except PalpateError:
             return True
-        if np.abs(now[:3] - pose[:3]).max() > SAME_POSE:
+        size = max(extent, units.metres_per_unit(scene) * max(obj.dimensions))
+        if np.abs(now[:3] - pose[:3]).max() > SAME_POSE * size:
             return True
         if min(np.abs(now[3:] - sign * pose[3:]).max() for sign in (1.0, -1.0)) > SAME_POSE:
             return True
