@@ -18,7 +18,7 @@ from pathlib import Path
 
 from .area import Area, Tally
 
-AREAS = ("faults",)
+AREAS = ("faults", "power_cut", "kills", "readers", "commands", "numbers")
 DEFAULT_SEED = 20261122
 
 

@@ -90,7 +90,7 @@ class Faults(Area):
             answer = {"status": KILLED, "printed": "", "traceback": "", "calls": []}
         case.data["operation"] = answer["calls"][case.data["at"] - 1 :][:1]
         case.data["printed"] = answer["printed"][-2000:]
-        if answer["traceback"] or "Traceback" in answer["printed"]:
+        if answer["status"] != KILLED and (answer["traceback"] or "Traceback" in answer["printed"]):
             return Outcome(TRACEBACK, answer["traceback"] or answer["printed"])
         if answer["status"] == 1 and len(answer["printed"].strip().splitlines()) != 1:
             return Outcome(WRONG, f"not one sentence: {answer['printed']}")

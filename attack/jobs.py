@@ -185,12 +185,15 @@ class Stage:
 
 
 def tree_without_ids(folder: Path) -> dict[str, str]:
-    """Return the tree of a folder without what differs from run to run: random ids, and memory addresses in .blend files."""
-    found = tree(folder)
+    """Return the tree of a folder without what differs from run to run, random ids, and memory addresses in .blend files.
+
+    Backups of a .blend are left out: a command that is run twice makes one more of them.
+    """
+    found = {key: digest for key, digest in tree(folder).items() if not key.endswith((".blend1", ".blend2"))}
     for key in found:
         if key.endswith("palpate-folder.json"):
             found[key] = "marker"
-        elif key.endswith((".blend", ".blend1", ".blend2")):
+        elif key.endswith(".blend"):
             found[key] = "blend"
     return found
 

@@ -70,10 +70,9 @@ def describe_blend(path: str) -> str:
 
 def describe_bake(folder: str) -> str:
     """Return the digest of the present bake of a folder, once all its files are checked."""
-    from palpate.core.io.bake_reader import check_images, read_bake
+    from palpate.core.io.bake_reader import read_bake
 
     bake = read_bake(folder)
-    check_images(bake)
     names = sorted(bake.manifests)
     if names != sorted(SENSORS):
         raise ValueError(f"the sensors are {names}")

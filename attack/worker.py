@@ -168,6 +168,7 @@ def run_command(argv: list[str], cwd: str, fault: dict[str, Any] | None = None) 
         if injector is not None:
             answer["calls"] = injector.calls
         _forget()
+        os.chdir("/")  # the folder may be unmounted next
         sys.stdout.flush()
         sys.stderr.flush()
         printed.seek(0)

@@ -19,8 +19,7 @@ import numpy as np
 
 from ... import __version__
 from ...core.errors import FileError
-from ...core.io.file_writing import atomic_write
-from ...core.io.npz import DAMAGED
+from ...core.io.npz import DAMAGED, write_arrays
 from ...core.io.regular_file import open_regular
 from ...core.solver import checkpoint
 
@@ -120,8 +119,8 @@ class BakeCheckpoint:
         began = time.monotonic()
         vouched = sync()
         about = {"key": self._key, **asdict(vouched)}
-        with atomic_write(self.folder / STATE_FILE) as temporary, open(temporary, "wb") as file:
-            np.savez(file, about=np.array(json.dumps(about)), **checkpoint.pack(simulation))
+        packed = {"about": np.array(json.dumps(about)), **checkpoint.pack(simulation)}
+        write_arrays(self.folder / STATE_FILE, packed, compress=False)
         self._saved_frames = vouched.frames
         self._last_save = time.monotonic()
         self._cost = self._last_save - began

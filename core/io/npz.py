@@ -33,8 +33,16 @@ DAMAGED = (
 _LONG_AGO = (1980, 1, 1, 0, 0, 0)  # the earliest date of a zip archive; the current time would change the bytes
 
 
-def write_arrays(path: str | os.PathLike, arrays: Mapping[str, np.ndarray], atomic: bool = True) -> None:
+def write_arrays(path: str | os.PathLike, arrays: Mapping[str, np.ndarray], atomic: bool = True, compress: bool = True) -> None:
     """Write arrays as .npz, as :func:`.write_file` does; equal arrays give equal bytes.
+
+    Parameters
+    ----------
+    path : path
+    arrays : mapping of str to ndarray
+    atomic : bool
+    compress : bool
+        False is quicker, for files that do not stay.
 
     Raises
     ------
@@ -44,7 +52,7 @@ def write_arrays(path: str | os.PathLike, arrays: Mapping[str, np.ndarray], atom
     with write_file(path, atomic) as temporary, zipfile.ZipFile(temporary, "w") as archive:
         for name, array in arrays.items():
             info = zipfile.ZipInfo(f"{name}.npy", _LONG_AGO)
-            info.compress_type = zipfile.ZIP_DEFLATED
+            info.compress_type = zipfile.ZIP_DEFLATED if compress else zipfile.ZIP_STORED
             info._compresslevel = 3  # type: ignore[attr-defined]
             info.create_system = 3  # the same bytes on every system
             info.external_attr = 0o644 << 16
