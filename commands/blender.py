@@ -15,7 +15,7 @@ from pathlib import Path
 
 from ..core.errors import FileError, PalpateError
 from ..core.io import bake_switch
-from ..core.io.file_writing import back_up, exchange_file, sync_file, writable_folder
+from ..core.io.file_writing import back_up, exchange_file, remove_leftovers_of, sync_file, writable_folder
 from ..core.io.regular_file import open_regular, require_regular
 from . import console
 
@@ -182,6 +182,7 @@ def save_blend(path: str | os.PathLike, backup: bool = True) -> None:
     blend = blend_to_save(path)
     backups = blend.backups if backup else 0
     with _save_errors(path):
+        remove_leftovers_of(blend.path)
         if _is_open_file(blend.path):
             waiting = blend.path.with_name(f".{blend.path.name}.{secrets.token_hex(4)}.partial")
             blend.write(waiting)

@@ -10,6 +10,7 @@ from pathlib import Path
 from ..core.errors import SceneError
 from ..core.io import disk_space
 from ..core.io.file_writing import writable_folder
+from ..core.io.temporary_folder import remove_unfinished
 from ..core.jobs.job_runner import part_of_job
 from ..core.jobs.progress import Job
 from . import blender, checks, console
@@ -41,6 +42,7 @@ def run(arguments: argparse.Namespace) -> int:
     with console.Interrupt.raised_at_once():
         rig = read_rig(arguments.rig)
         folder = writable_folder(arguments.out, create=True)
+        remove_unfinished(folder)
         checks.outputs_are_no_inputs((folder / name for name in OUTPUTS), (arguments.rig,))
         disk_space.require_space(folder, LEAST_SPACE, "The report")
     if arguments.blend:

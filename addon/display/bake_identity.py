@@ -45,12 +45,20 @@ def require_own_bake(scene) -> None:
         raise SceneError(text)
 
 
+def manifest_stamp(folder: Path) -> tuple[int, ...]:
+    """Return what changes when the manifest in a sensor's folder is replaced; empty where there is none."""
+    try:
+        about = (folder / MANIFEST_NAME).stat()
+    except OSError:
+        return ()
+    return about.st_size, about.st_mtime_ns, about.st_ino
+
+
 def _manifest(folder: Path) -> Manifest | None:
     """Return the manifest in a sensor's folder; None when it cannot be read."""
     try:
         place = present_folder(folder)
-        about = (place / MANIFEST_NAME).stat()
-        stamp = (about.st_size, about.st_mtime_ns, about.st_ino)
+        stamp = manifest_stamp(place)
         if folder not in _manifests or _manifests[folder][0] != stamp:
             _manifests[folder] = stamp, _read(place)
     except (OSError, FileError):

@@ -6,7 +6,6 @@ No forces are computed: pictures are renders of the scene, and figures are drawn
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
@@ -20,6 +19,7 @@ from ...core.figures.time_curves import time_curves
 from ...core.io.bake_folder import folder_names
 from ...core.io.bake_reader import Bake, frame_index, read_sensors
 from ...core.io.file_writing import writable_folder
+from ...core.io.temporary_folder import remove_unfinished, temporary_folder
 from ...core.jobs.job_runner import run_job
 from ...core.jobs.progress import Job, Progress
 from ..display import bake_identity, baked_scene
@@ -66,6 +66,7 @@ def make_figures(scene, folder, request: FigureRequest) -> Job[list[Path]]:
     if request.sensors:
         bake = bake.select(request.sensors)
     folder = writable_folder(folder, create=True)
+    remove_unfinished(folder)
     frames = request.frames or (_frame_of_largest_force(bake),)
     for number in frames:
         frame_index(bake.recording, number)
@@ -125,13 +126,13 @@ def _make_video(scene, folder, request, bake, steps, written) -> Job[None]:
     numbers = [int(number) for number in bake.recording.frames]
     height = 2 * (min(request.size[1], 720) // 2)
     size = (2 * round(0.5 * height * request.size[0] / request.size[1]), height)
-    with tempfile.TemporaryDirectory(prefix="palpate-video-") as temporary:
+    with temporary_folder(folder, "video") as temporary:
         pictures = []
         with _prepared_scene(scene, request, bake, numbers, size) as show_frame:
             for number in numbers:
                 yield steps.next("Rendering the video", number)
                 show_frame(number)
-                picture = Path(temporary) / f"{number - numbers[0]:06d}.png"
+                picture = temporary / f"{number - numbers[0]:06d}.png"
                 render.render_frame(scene, picture, number, samples=request.samples, size=size)
                 side_by_side(picture, picture, bake.recording, bake.texels, number, request.style, height)
                 pictures.append(picture)

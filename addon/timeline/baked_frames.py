@@ -17,8 +17,9 @@ from . import staleness
 
 _new: dict[Path, Recording] = {}
 """By folder of a sensor's bake: the recording of the bake that has just been made."""
-_read: dict[tuple[Path, ...], Bake | PalpateError] = {}
-"""By the folders of a scene's sensors: their bake, read and checked when it is first needed, or why it cannot be read."""
+_read: dict[tuple[Path, ...], tuple[list[tuple[int, ...]], Bake | PalpateError]] = {}
+"""By the folders of a scene's sensors: the stamps of their manifests and their bake, read and checked when it is first needed
+and when another one has taken its place, or why it cannot be read."""
 
 
 def forget() -> None:
@@ -86,12 +87,13 @@ def _bake(scene) -> Bake | None:
     folders = _folders(scene)
     if not folders:
         return None
-    if folders not in _read:
+    stamps = [bake_identity.manifest_stamp(folder) for folder in folders]
+    if folders not in _read or _read[folders][0] != stamps:
         try:
-            _read[folders] = read_sensors(folders, images=False)
+            _read[folders] = stamps, read_sensors(folders, images=False)
         except PalpateError as error:
-            _read[folders] = error
-    found = _read[folders]
+            _read[folders] = stamps, error
+    found = _read[folders][1]
     if isinstance(found, PalpateError):
         raise found
     return found

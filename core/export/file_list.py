@@ -1,26 +1,32 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The list of files that an export leaves in its folder, so that the next one can remove what it does not replace.
+"""The list of files that an export leaves in its folder, and the exchange of these files by those of the next export.
 
-An export of a hundred frames that is followed by one of ten into the same folder would leave ninety images of the earlier bake
-beside the new ones. Only files that the list names, and that still have the content it was written for, are removed.
+An export is written whole into a hidden folder. Then the list names the new files, the old files are removed, and the new ones
+are renamed into their place. A process that is killed leaves the old files or the new ones, or only some of the old or of the
+new ones, but never both beside each other; the next export into the folder completes what is unfinished. An export of a hundred
+frames that is followed by one of ten leaves no images of the earlier one. Only files that the list names, and that still have
+the content it was written for, are removed.
 """
 
 from __future__ import annotations
 
-import hashlib
+import errno
 import json
-from collections.abc import Iterable
+import os
+import re
+import shutil
+from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from pathlib import Path, PurePosixPath
 from typing import Any
 
-from ..io.file_writing import atomic_write
-from ..io.regular_file import open_regular, read_bytes
+from ..errors import FileError
+from ..io.file_writing import atomic_write, file_sha256, os_error_reason, require_replaceable, sync_folder
+from ..io.regular_file import read_bytes
+from ..io.temporary_folder import remove_unfinished
 
 LIST_NAME = ".palpate-export.json"
 LIST_FORMAT = "palpate-export/1"
-
-_BLOCK = 1 << 20
 
 
 class FileList:
@@ -29,60 +35,131 @@ class FileList:
     Parameters
     ----------
     folder : Path
+        What a killed export has left in it is completed or removed.
+
+    Raises
+    ------
+    FileError
+        The files of a killed export cannot be put in their place.
     """
 
     def __init__(self, folder: Path):
         self._folder = folder
         self._formats = _read(folder / LIST_NAME)
+        for kind, listed in self._formats.items():
+            if not listed["complete"] and listed["new_in"]:
+                listed["files"] = {name: digest for name, digest in listed["files"].items() if self._is_inside(folder / name)}
+                self._exchange(kind, self._folder / listed["new_in"])
+        remove_unfinished(folder)
+        for parent in {self._folder.joinpath(name).parent for listed in self._formats.values() for name in listed["files"]}:
+            if parent != folder and self._is_inside(parent):
+                remove_unfinished(parent)
 
-    def begin(self, kind: str) -> None:
-        """Note that an export of a format has begun: until :meth:`finish` its files may be of two bakes."""
-        self._write(kind, self._files(kind), complete=False)
+    def replace(self, kind: str, new: Path, written: Iterable[Path]) -> list[Path]:
+        """Put the files of a complete export in the place of those of the earlier export of this format.
 
-    def finish(self, kind: str, written: Iterable[Path]) -> list[Path]:
-        """Note the files of an export, and remove those of the earlier export of this format that were not written again.
+        Parameters
+        ----------
+        kind : str
+            The format.
+        new : Path
+            A folder in the folder of the list, in which the export was written.
+        written : iterable of Path
+            The files in it.
 
         Returns
         -------
         list of Path
-            What was removed.
+            Where the files are now.
+
+        Raises
+        ------
+        FileError
+            Something is in the place of a file that no file may replace, or a file cannot be moved.
         """
-        names = {path.relative_to(self._folder).as_posix(): path for path in written}
-        stale = {name: digest for name, digest in self._files(kind).items() if name not in names}
-        for other, listed in self._formats.items():
-            if other != kind:
-                for name in listed["files"]:
-                    stale.pop(name, None)
-        removed = [path for name, digest in stale.items() if (path := self._own_file(name, digest)) is not None]
-        for path in removed:
-            path.unlink(missing_ok=True)
-        for parent in {path.parent for path in removed} - {self._folder}:
+        names = [path.relative_to(new).as_posix() for path in written]
+        for name in names:
+            require_replaceable(self._folder / name)
+            if name.count("/") and self._folder.joinpath(name).parent.is_file():
+                raise FileError(f"'{self._folder.joinpath(name).parent}' is a file where a folder is needed: rename it.")
+        listed = {
+            "complete": False,
+            "files": {name: file_sha256(new / name) for name in names},
+            "replaced": self._formats.get(kind, {}).get("files", {}),
+            "new_in": new.name,
+        }
+        self._formats[kind] = listed
+        self._write()
+        self._exchange(kind, new)
+        return [self._folder / name for name in names]
+
+    def _exchange(self, kind: str, new: Path) -> None:
+        """Remove the files of the earlier export and move the new ones in; what was done already is left as it is."""
+        listed = self._formats[kind]
+        present = {name for name in listed["files"] if self._is_inside(new / name) and os.path.lexists(new / name)}
+        shared = {name for other, its in self._formats.items() if other != kind for name in its["files"]}
+        gone = {name for name in listed["files"] if name not in present and not os.path.lexists(self._folder / name)}
+        try:
+            for name, digest in listed["replaced"].items():
+                if name not in shared and (name in present or name not in listed["files"]):
+                    self._remove(name, digest)
+            for name in sorted(present):
+                target = self._folder / name
+                target.parent.mkdir(exist_ok=True)
+                _move(new / name, target)
+            for parent in {self._folder.joinpath(name).parent for name in listed["files"]}:
+                sync_folder(parent)
+        except OSError as error:
+            raise FileError(
+                f"The export to '{self._folder}' could not be put in its place ({os_error_reason(error)}): "
+                "check its permissions and export again."
+            ) from error
+        self._formats[kind] = {"complete": not gone, "files": listed["files"], "replaced": {}, "new_in": ""}
+        self._write()
+
+    def _remove(self, name: str, digest: str) -> None:
+        """Remove a file of the earlier export, and its folder if it is empty then."""
+        path = self._own_file(name, digest)
+        if path is None:
+            return
+        path.unlink(missing_ok=True)
+        if path.parent != self._folder:
             with suppress(OSError):  # it holds other files
-                parent.rmdir()
-        self._write(kind, {name: _digest(path) for name, path in names.items()}, complete=True)
-        return removed
+                path.parent.rmdir()
 
-    def _files(self, kind: str) -> dict[str, str]:
-        return self._formats.get(kind, {}).get("files", {})
-
-    def _write(self, kind: str, files: dict[str, str], complete: bool) -> None:
-        self._formats[kind] = {"complete": complete, "files": files}
+    def _write(self) -> None:
         with atomic_write(self._folder / LIST_NAME) as temporary:
             content = {"format": LIST_FORMAT, "exports": self._formats}
             temporary.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
 
     def _own_file(self, name: str, digest: str) -> Path | None:
         """Return the path of a listed file; None when it is gone, was changed since, or lies outside the folder."""
-        parts = PurePosixPath(name).parts
-        if not parts or PurePosixPath(name).is_absolute() or any(part in ("..", LIST_NAME) or "\\" in part for part in parts):
-            return None
-        path = self._folder.joinpath(*parts)
+        path = self._folder.joinpath(name)
         try:
-            if path.is_symlink() or not path.is_file() or not path.resolve().is_relative_to(self._folder.resolve()):
+            if path.is_symlink() or not path.is_file() or not self._is_inside(path):
                 return None
-            return path if _digest(path) == digest else None
-        except (OSError, ValueError):
+            return path if file_sha256(path) == digest else None
+        except (OSError, ValueError, FileError):
             return None
+
+    def _is_inside(self, path: Path) -> bool:
+        """Return True if a path leads to a place in the folder."""
+        try:
+            return path.resolve().is_relative_to(self._folder.resolve())
+        except (OSError, ValueError, RuntimeError):
+            return False
+
+
+def _move(new: Path, target: Path) -> None:
+    """Put a file in its place; where that is a link to a file, into the place to which it leads."""
+    place = Path(os.path.realpath(target))
+    try:
+        os.replace(new, place)
+    except OSError as error:
+        if error.errno != errno.EXDEV:
+            raise
+        with atomic_write(place) as temporary:
+            shutil.copyfile(new, temporary)
 
 
 def _read(path: Path) -> dict[str, dict[str, Any]]:
@@ -95,16 +172,26 @@ def _read(path: Path) -> dict[str, dict[str, Any]]:
         return {}
     found = {}
     for kind, listed in content["exports"].items():
-        files = listed.get("files") if isinstance(listed, dict) else None
-        if isinstance(files, dict) and all(isinstance(digest, str) for digest in files.values()):
-            found[kind] = {"complete": listed.get("complete") is True, "files": files}
+        if isinstance(listed, dict) and isinstance(listed.get("files"), dict):
+            new_in = listed.get("new_in")
+            is_ours = isinstance(new_in, str) and re.fullmatch(r"\.palpate-export\.[0-9a-f]{8}\.partial", new_in)
+            found[kind] = {
+                "complete": listed.get("complete") is True,
+                "files": _safe(listed["files"]),
+                "replaced": _safe(listed.get("replaced")),
+                "new_in": new_in if is_ours else "",
+            }
     return found
 
 
-def _digest(path: Path) -> str:
-    """Return the SHA-256 of a file, as hexadecimal text."""
-    digest = hashlib.sha256()
-    with open_regular(path) as file:
-        while block := file.read(_BLOCK):
-            digest.update(block)
-    return digest.hexdigest()
+def _safe(files: object) -> dict[str, str]:
+    """Return the entries of a table of files that name a file in the folder of the list or in a folder in it."""
+    if not isinstance(files, Mapping):
+        return {}
+    return {name: digest for name, digest in files.items() if isinstance(digest, str) and _is_safe(name)}
+
+
+def _is_safe(name: str) -> bool:
+    parts = PurePosixPath(name).parts
+    hidden = any(part in ("..", LIST_NAME) or "\\" in part or "\0" in part for part in parts)
+    return 0 < len(parts) <= 2 and not PurePosixPath(name).is_absolute() and not hidden

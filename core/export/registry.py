@@ -10,10 +10,11 @@ import pkgutil
 from functools import cache
 from pathlib import Path
 
-from ..errors import PalpateError
+from ..errors import FileError, PalpateError
 from ..figures.figure_style import FigureStyle
 from ..io.bake_reader import Bake
 from ..io.file_writing import writable_folder
+from ..io.temporary_folder import temporary_folder
 from ..jobs.progress import Job
 from .exporter import Exporter
 from .file_list import FileList
@@ -55,8 +56,8 @@ def export(bake: Bake, kind: str, folder: str | os.PathLike, style: FigureStyle 
     Returns
     -------
     list of Path
-        What was written: files, and folders that hold the others. Files that an earlier export of this format left, and that
-        were not written again, are removed (:mod:`.file_list`).
+        What was written: files, and folders that hold the others. They take the place of the files that an earlier export of
+        this format left, which stay as they are until all new files are complete (:mod:`.file_list`).
 
     Raises
     ------
@@ -68,7 +69,10 @@ def export(bake: Bake, kind: str, folder: str | os.PathLike, style: FigureStyle 
         raise PalpateError(f"There is no export to '{kind}': choose from {', '.join(known)}.")
     folder = writable_folder(folder, create=True)
     files = FileList(folder)
-    files.begin(kind)
-    written = yield from known[kind].write(bake, folder, style or FigureStyle())
-    files.finish(kind, written)
+    with temporary_folder(folder, "export") as new:
+        try:
+            written = yield from known[kind].write(bake, new, style or FigureStyle())
+        except FileError as error:
+            raise FileError(str(error).replace(str(new), str(folder))) from error
+        written = files.replace(kind, new, written)
     return list(dict.fromkeys(path if path.parent == folder else path.parent for path in written))

@@ -30,5 +30,6 @@ __all__ = [
     "sensor_toml",
     "settings_migration",
     "tactile_exr",
+    "temporary_folder",
     "toml_file",
 ]

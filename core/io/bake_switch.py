@@ -24,7 +24,16 @@ from pathlib import Path
 
 from ..errors import FileError
 from .bake_folder import BAKE_FILE_NAMES
-from .file_writing import atomic_write, exchange_file, os_error_reason, remove_leftovers, sync_file, sync_folder, write_file
+from .file_writing import (
+    atomic_write,
+    exchange_file,
+    os_error_reason,
+    remove_leftovers,
+    remove_leftovers_of,
+    sync_file,
+    sync_folder,
+    write_file,
+)
 from .folder_lock import FolderLock
 from .private_folder import PRIVATE_FOLDER, find_private_folder, remove_tree
 from .regular_file import read_bytes
@@ -252,9 +261,7 @@ def _remove_waiting_blend(growing: Path) -> None:
         waiting = waiting_blend(blend, run)
         for path in (waiting, waiting.with_name(f"{waiting.name}@"), _folder_note(blend, run)):
             path.unlink(missing_ok=True)
-        for path in blend.parent.glob(f".{glob.escape(blend.name)}.*.partial"):
-            if re.fullmatch(r"[0-9a-f]{8}", path.name[len(blend.name) + 2 : -len(".partial")]):
-                path.unlink(missing_ok=True)  # the unfinished copy of an earlier version
+        remove_leftovers_of(blend)  # the unfinished copy of an earlier version
     with suppress(OSError):
         note.unlink(missing_ok=True)
         remove_leftovers(growing)

@@ -3,12 +3,13 @@
 
 The new content is written to a temporary file beside the target, which then replaces the target. A process that is killed
 leaves either the old or the new file. It may also leave a temporary file, whose name contains ``.partial``;
-:func:`remove_leftovers` deletes these.
+:func:`remove_leftovers` deletes these. While a temporary file is written it is locked, so that other processes leave it alone.
 """
 
 from __future__ import annotations
 
 import errno
+import glob
 import hashlib
 import os
 import re
@@ -19,6 +20,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from ..errors import FileError
+from .file_lock import try_lock
 from .regular_file import open_regular
 
 
@@ -43,14 +45,9 @@ def atomic_write(path: str | os.PathLike) -> Iterator[Path]:
         The folder is missing, cannot be written to, is full, or `path` is a folder, a device or read-only.
     """
     target = Path(os.path.realpath(path))
-    if target.is_dir():
-        raise FileError(f"'{path}' is a folder: give the name of a file in it.")
-    if target.exists() and not target.is_file():  # a rename would put a plain file in the place of /dev/null
-        raise FileError(f"'{path}' is a device, not a file: give the name of a file.")
-    if target.exists() and not os.access(target, os.W_OK):
-        raise FileError(f"'{path}' is read-only: change its permissions or choose another name.")
+    require_replaceable(path)
     _require_folder(target.parent)
-    temporary = _new_file_in(target.parent, target.stem, target.suffix)
+    temporary, handle = _new_locked_file(target.parent, target.stem, target.suffix)
     try:
         yield temporary
         sync_file(temporary)
@@ -61,7 +58,21 @@ def atomic_write(path: str | os.PathLike) -> Iterator[Path]:
         if isinstance(error, OSError):
             raise FileError(f"'{path}' could not be written ({os_error_reason(error)}): {_remedy(error)}.") from error
         raise
+    finally:
+        if handle is not None:
+            os.close(handle)
     sync_folder(target.parent)
+
+
+def require_replaceable(path: str | os.PathLike) -> None:
+    """Raise FileError if something is at `path` that no file may replace: a folder, a device, or a file that is read-only."""
+    target = Path(os.path.realpath(path))
+    if target.is_dir():
+        raise FileError(f"'{path}' is a folder: give the name of a file in it.")
+    if target.exists() and not target.is_file():  # a rename would put a plain file in the place of /dev/null
+        raise FileError(f"'{path}' is a device, not a file: give the name of a file.")
+    if target.exists() and not os.access(target, os.W_OK):
+        raise FileError(f"'{path}' is read-only: change its permissions or choose another name.")
 
 
 @contextmanager
@@ -128,10 +139,17 @@ def writable_folder(path: str | os.PathLike, create: bool = False) -> Path:
     return folder
 
 
-def remove_leftovers(folder: str | os.PathLike) -> list[Path]:
+def remove_leftovers(folder: str | os.PathLike, is_ending: bool = False) -> list[Path]:
     """Delete the temporary files that interrupted calls of :func:`atomic_write` left in `folder`.
 
-    No other process may be writing to the folder meanwhile.
+    Files that are being written, by this process or by another, stay.
+
+    Parameters
+    ----------
+    folder : path
+    is_ending : bool
+        True if this process is about to end, and its own files are deleted as well. No other process may be writing to the
+        folder then.
 
     Returns
     -------
@@ -142,9 +160,30 @@ def remove_leftovers(folder: str | os.PathLike) -> list[Path]:
     for path in sorted(Path(folder).glob(".*.partial*")):
         if re.fullmatch(r"\..*\.[0-9a-f]{8}\.partial(\.[^.]*)?", path.name) and path.is_file():
             with suppress(OSError):
-                path.unlink()
-                removed.append(path)
+                if is_ending or not _is_being_written(path):
+                    path.unlink()
+                    removed.append(path)
     return removed
+
+
+def remove_leftovers_of(target: Path) -> None:
+    """Delete what interrupted exchanges of a .blend have left beside it, and Blender's own unfinished file of such a one."""
+    for path in target.parent.glob(f".{glob.escape(target.name)}.*.partial*"):
+        if re.fullmatch(r"[0-9a-f]{8}\.partial@?", path.name[len(target.name) + 2 :]):
+            with suppress(OSError):
+                if path.name.endswith("@") or not _is_being_written(path):
+                    path.unlink(missing_ok=True)
+
+
+def _is_being_written(path: Path) -> bool:
+    """Return True if a process holds the lock on a temporary file. Windows lets nobody delete a file that is open."""
+    if path.is_symlink() or os.name == "nt":
+        return False
+    handle = os.open(path, os.O_RDWR | os.O_NONBLOCK | os.O_NOFOLLOW)
+    try:
+        return not try_lock(handle)
+    finally:
+        os.close(handle)
 
 
 def exchange_file(new: Path, target: Path, backups: int = 0) -> None:
@@ -227,9 +266,28 @@ def _require_folder(folder: Path) -> None:
 
 def _new_file_in(folder: Path, stem: str, suffix: str) -> Path:
     """Create an empty file with a unique name; the user's umask decides who may read it."""
+    path, handle = _open_new_file(folder, stem, suffix)
+    os.close(handle)
+    return path
+
+
+def _new_locked_file(folder: Path, stem: str, suffix: str) -> tuple[Path, int | None]:
+    """Create an empty file as :func:`_new_file_in` does; return it with the descriptor that holds its lock."""
+    while True:
+        path, handle = _open_new_file(folder, stem, suffix)
+        if os.name == "nt":  # Windows could not replace the target by a file that is open
+            os.close(handle)
+            return path, None
+        if try_lock(handle) and path.exists():
+            return path, handle
+        os.close(handle)  # another process took it for a leftover before it was locked
+
+
+def _open_new_file(folder: Path, stem: str, suffix: str) -> tuple[Path, int]:
+    """Create an empty file with a unique name and return it with its descriptor."""
     path = folder / f".{stem}.{secrets.token_hex(4)}.partial{suffix}"
     try:
-        os.close(os.open(path, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))
+        return path, os.open(path, os.O_CREAT | os.O_EXCL | os.O_RDWR, 0o666)
     except OSError as error:
         # Permissions alone do not decide: root may write despite them, and cannot write to a read-only file system.
         if error.errno in (errno.EACCES, errno.EPERM, errno.EROFS) or not os.access(folder, os.W_OK):
@@ -237,7 +295,6 @@ def _new_file_in(folder: Path, stem: str, suffix: str) -> Path:
         raise FileError(
             f"No file can be made in the folder '{folder}' ({os_error_reason(error)}): {_remedy(error)}."
         ) from error
-    return path
 
 
 def os_error_reason(error: OSError) -> str:

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import IO
 
 from ..errors import FileError
+from .file_lock import try_lock
 from .private_folder import LOCK_NAME, make_private_folder
 from .regular_file import open_regular
 
@@ -35,7 +36,7 @@ class FolderLock:
                 file = open_regular(self._path, "ab")  # noqa: SIM115 - it stays open as long as the lock is held
             except OSError:
                 return  # the folder is not writable: writing the bake's own files will say so
-            if not _lock(file):
+            if not try_lock(file.fileno()):
                 file.close()
                 raise FileError(f"Another bake is writing to '{folder}': wait for it, or choose another bake folder.")
             if _is_same_file(self._path, file):
@@ -54,27 +55,6 @@ class FolderLock:
         if os.name == "nt":  # Windows cannot remove an open file, neither this one nor another bake's
             with suppress(OSError):
                 self._path.unlink()
-
-
-def _lock(file: IO[bytes]) -> bool:
-    """Lock an open file; return False if another process holds the lock. True where locks are not supported."""
-    if os.name == "nt":
-        import msvcrt
-
-        try:
-            msvcrt.locking(file.fileno(), msvcrt.LK_NBLCK, 1)  # type: ignore[attr-defined]
-        except OSError:
-            return False
-        return True
-    import fcntl
-
-    try:
-        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        return False
-    except OSError:  # some network file systems support no locks
-        pass
-    return True
 
 
 def _is_same_file(path: Path, file: IO[bytes]) -> bool:

@@ -4,6 +4,7 @@
 import shutil
 
 import bpy
+import numpy as np
 import pytest
 from blender_scenes import contents, press, reopen, save
 
@@ -15,6 +16,7 @@ from palpate.commands import blender, export
 from palpate.core.errors import FileError, SceneError
 from palpate.core.io import bake_switch
 from palpate.core.io.bake_folder import read_manifest
+from palpate.core.io.bake_reader import read_bake
 from palpate.core.jobs.job_runner import run_job
 
 
@@ -47,7 +49,7 @@ def test_blend_and_bake_name_each_other(saved, tmp_path):
 
 def test_who_finds_another_bake_in_the_folder_says_so(saved, tmp_path):
     scene, path = saved
-    old = tmp_path / "old"
+    old, own_recording = tmp_path / "old", read_bake(tmp_path / "palpate").recording
     shutil.copytree(tmp_path / "palpate", old)
     scene.frame_set(2)
     assert frame_status.status_of(scene).text == "Frame 2 of the bake." and bake_identity.other_bake(scene) == ""
@@ -72,7 +74,9 @@ def test_who_finds_another_bake_in_the_folder_says_so(saved, tmp_path):
     old.rename(tmp_path / "palpate")  # its own bake is back while the file is open
     scene = bpy.context.scene
     scene.frame_set(3)
-    assert frame_status.status_of(scene).text == "Frame 3 of the bake."
+    status = frame_status.status_of(scene)
+    assert status.text == "Frame 3 of the bake."
+    assert np.array_equal(status.frame.sensors["Pad"].normal_force, own_recording.sensors["Pad"].normal_force[2])
     assert figure_export.read_scene_bake(scene).folders
 
 

@@ -164,3 +164,14 @@ def test_a_blend_that_is_saved_is_there_at_every_moment(saved):
             break
     assert 3 < number < 99
     blender.open_blend(path)
+
+
+def test_what_a_killed_save_has_left_is_removed_by_the_next_one(saved):
+    path, _ = saved
+    left = [path.with_name(f".{path.name}.0123abcd.partial{end}") for end in ("", "@")]
+    mine = path.with_name(f".{path.name}.notes.partial")
+    for file in (*left, mine):
+        file.write_text("half")
+    blender.open_scene(path)
+    blender.save_blend(path)
+    assert not any(file.exists() for file in left) and mine.exists()
