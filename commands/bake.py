@@ -84,7 +84,7 @@ def _prepare(scene, arguments: argparse.Namespace) -> None:
         _put_model(scene, option)
     if arguments.frames:
         scene.frame_start, scene.frame_end = _frame_range(*arguments.frames)
-    if arguments.out:
+    if arguments.out is not None:
         scene.palpate.folder = str(writable_folder(arguments.out, create=True))
     if not arguments.save:
         _check_saved_bake(scene, arguments.scene)

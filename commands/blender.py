@@ -15,7 +15,7 @@ from pathlib import Path
 
 from ..core.errors import FileError, PalpateError
 from ..core.io import bake_switch
-from ..core.io.file_writing import back_up, exchange_file, remove_leftovers_of, sync_file, writable_folder
+from ..core.io.file_writing import back_up, exchange_file, remove_leftovers_of, sync_file, writable_file
 from ..core.io.regular_file import open_regular, require_regular
 from . import console
 
@@ -97,7 +97,7 @@ def open_blend(path: str | os.PathLike, scripts: str = REFUSE) -> None:
     import bpy
 
     path = Path(path)
-    if path.is_dir():
+    if os.path.isdir(path):
         raise FileError(f"'{path}' is a folder: give the name of a .blend file in it.")
     bake_switch.settle_blend(path)
     try:
@@ -158,13 +158,11 @@ def _animated() -> Iterator:
 
 
 def check_writable(path: Path) -> None:
-    """Raise FileError if a .blend of this name could not be saved."""
+    """Raise FileError if a .blend of this name could not be saved; folders above it that are missing are made."""
     require_regular(path)
-    if path.is_dir():
+    if os.path.isdir(path):
         raise FileError(f"'{path}' is a folder: give the name of a .blend file in it.")
-    writable_folder(path.absolute().parent)
-    if path.exists() and not os.access(path, os.W_OK):
-        raise FileError(f"'{path}' is read-only: change its permissions or choose another name.")
+    writable_file(path)
 
 
 def save_blend(path: str | os.PathLike, backup: bool = True) -> None:

@@ -6,6 +6,8 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from ..core.figures.figure_canvas import file_type
+from ..core.io.file_writing import writable_file
 from ..core.model.sensor_parameters import DAMPING_PER_STIFFNESS, SensorParameters, unit_of
 from . import checks, console
 
@@ -40,8 +42,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    if arguments.plot:
+    if arguments.plot is not None:
         checks.outputs_are_no_inputs((arguments.plot,), (arguments.file,))
+        file_type(arguments.plot)
+        writable_file(arguments.plot)
     with console.Interrupt.raised_at_once():
         arguments.action(arguments)
     if arguments.plot:

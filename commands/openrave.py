@@ -7,6 +7,7 @@ import argparse
 from pathlib import Path
 
 from ..core.errors import SceneError
+from ..core.io.file_writing import writable_file
 from ..core.io.openrave import NUMBERS, OpenRaveSensor, openrave_xml, read_openrave, write_openrave
 from ..core.model.sensor_parameters import DEPTH_PER_THICKNESS
 from . import blender, checks, console
@@ -94,8 +95,9 @@ def _choose_sensor(sensors: list[OpenRaveSensor], name: str | None, file: str) -
 
 
 def _export(arguments: argparse.Namespace) -> None:
-    if arguments.out:
+    if arguments.out is not None:
         checks.outputs_are_no_inputs((arguments.out,), (arguments.scene,))
+        writable_file(arguments.out)
     with console.blender_output_hidden():
         scene = blender.open_scene(arguments.scene, arguments.scripts)
         from ..addon.authoring import exchange

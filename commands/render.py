@@ -58,9 +58,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    folder = writable_folder(arguments.out, create=True)
     with console.blender_output_hidden():
         scene = blender.open_scene(arguments.scene, arguments.scripts)
+        folder = writable_folder(arguments.out, create=True)
         from ..addon.display import bake_display
         from ..addon.render import figure_export
         from ..addon.render.figure_request import FigureRequest

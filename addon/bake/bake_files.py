@@ -78,7 +78,7 @@ def writable_bake_folder(scene) -> Path:
         As :func:`bake_folder`, or a bake could not be written there.
     """
     folder = bake_folder(scene)
-    writable_folder(folder if folder.exists() else folder.parent)
+    writable_folder(folder if os.path.exists(folder) else folder.parent)
     return folder
 
 
@@ -116,7 +116,7 @@ class BakeFiles:
     Parameters
     ----------
     folder : Path
-        The bake folder. It is created if its parent exists.
+        The bake folder. It is created if it is missing.
     scenario : Scenario
     owner : BakeOwner, optional
         The scene that is baked. Default: one that has neither an id nor a .blend.

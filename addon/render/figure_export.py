@@ -50,7 +50,7 @@ def make_figures(scene, folder, request: FigureRequest) -> Job[list[Path]]:
     Parameters
     ----------
     folder : path
-        It is created if its parent exists.
+        It is created if it is missing, with the folders above it.
 
     Returns
     -------

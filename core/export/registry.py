@@ -44,7 +44,7 @@ def export(bake: Bake, kind: str, folder: str | os.PathLike, style: FigureStyle 
     kind : str
         Name of an exporter, as "csv".
     folder : path
-        Created if it is missing and its parent folder exists.
+        Created if it is missing, with the folders above it.
     style : FigureStyle, optional
         Colours and their scale, for formats with pictures.
 

@@ -47,6 +47,21 @@ def tidy_axes(axes: Axes) -> None:
         axes.spines[side].set_linewidth(0.6)
 
 
+def file_type(path: str | Path) -> str:
+    """Return the type of a figure's file, one of :data:`FILE_TYPES`, by its ending.
+
+    Raises
+    ------
+    ParameterError
+        The ending is of another kind.
+    """
+    path = Path(path)
+    kind = path.suffix.lstrip(".").lower()
+    if kind not in FILE_TYPES:
+        raise ParameterError(f"'{path.name}' is no figure that can be written: end its name with .png, .pdf or .svg.")
+    return kind
+
+
 def save_figure(figure: Figure, path: str | Path, dpi: float) -> None:
     """Write the figure, whole or not at all, as PNG, PDF or SVG by its ending.
 
@@ -60,9 +75,7 @@ def save_figure(figure: Figure, path: str | Path, dpi: float) -> None:
         It cannot be written.
     """
     path = Path(path)
-    kind = path.suffix.lstrip(".").lower()
-    if kind not in FILE_TYPES:
-        raise ParameterError(f"'{path.name}' is no figure that can be written: end its name with .png, .pdf or .svg.")
+    kind = file_type(path)
     metadata = {"CreationDate": None} if kind == "pdf" else {"Date": None} if kind == "svg" else {"Software": "Palpate"}
     for axes in figure.axes:
         for label in (axes.xaxis.label, axes.yaxis.label, *axes.get_xticklabels(), *axes.get_yticklabels()):

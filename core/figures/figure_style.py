@@ -19,6 +19,10 @@ FONT, SMALL = 8.5, 8.0
 """Sizes of the text, points: nothing is smaller than 8 pt at the size of the written figure."""
 WIDTHS = {"single": 3.5, "middle": 5.5, "double": 7.2}
 """Widths of a journal's columns, inches (89, 140 and 183 mm)."""
+LIMITS = (1e-12, 1e39)
+"""Least and largest end of a colour scale, N or kPa; more than any 32-bit property holds."""
+DPI = (1, 2400)
+"""Least and highest resolution; a page of the highest fills a gigabyte."""
 INK, GREY, RULE = "#1c2430", "#68727f", "#e4e7eb"
 NORMAL_COLOUR, SHEAR_COLOUR = "#1f5fa8", "#c8501e"
 SERIES = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#4d4d4d")
@@ -57,6 +61,10 @@ class FigureStyle:
         ):
             if value not in known:
                 raise ParameterError(f"There is no {what} '{value}': choose from {', '.join(known)}.")
+        if self.limit is not None and not LIMITS[0] <= self.limit <= LIMITS[1]:
+            raise ParameterError(f"The end of the colour scale is {self.limit:g}: choose {LIMITS[0]:g} to {LIMITS[1]:g}.")
+        if not DPI[0] <= self.dpi <= DPI[1]:
+            raise ParameterError(f"The resolution is {self.dpi} dpi: choose {DPI[0]} to {DPI[1]}.")
 
     @property
     def width_inches(self) -> float:

@@ -64,9 +64,9 @@ def read_bake(folder: str | os.PathLike) -> Bake:
     FileError
         There is no bake, a file of it is damaged, or its sensors do not belong to the same run.
     """
-    folder = Path(folder)
-    if not folder.is_dir():
+    if not os.fspath(folder) or not os.path.isdir(folder):  # an empty name would be the present folder
         raise FileError(f"The folder '{folder}' does not exist: bake first, or choose another.")
+    folder = Path(folder)
     if os.path.lexists(folder / MANIFEST_NAME):
         return read_sensors([folder])
     bake_switch.settle(folder)

@@ -66,7 +66,7 @@ def require_space(folder: str | os.PathLike, needed: float, what: str) -> None:
         There is less space.
     """
     place = Path(os.path.abspath(folder))
-    while not place.exists():
+    while not os.path.exists(place):
         place = place.parent
     free = shutil.disk_usage(place).free
     if free < needed:

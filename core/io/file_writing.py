@@ -44,8 +44,8 @@ def atomic_write(path: str | os.PathLike) -> Iterator[Path]:
     FileError
         The folder is missing, cannot be written to, is full, or `path` is a folder, a device or read-only.
     """
-    target = Path(os.path.realpath(path))
     require_replaceable(path)
+    target = Path(os.path.realpath(path))
     _require_folder(target.parent)
     temporary, handle = _new_locked_file(target.parent, target.stem, target.suffix)
     try:
@@ -66,12 +66,13 @@ def atomic_write(path: str | os.PathLike) -> Iterator[Path]:
 
 def require_replaceable(path: str | os.PathLike) -> None:
     """Raise FileError if something is at `path` that no file may replace: a folder, a device, or a file that is read-only."""
+    require_name(path)
     target = Path(os.path.realpath(path))
-    if target.is_dir():
+    if os.path.isdir(target):
         raise FileError(f"'{path}' is a folder: give the name of a file in it.")
-    if target.exists() and not target.is_file():  # a rename would put a plain file in the place of /dev/null
+    if os.path.exists(target) and not os.path.isfile(target):  # a rename would put a plain file in the place of /dev/null
         raise FileError(f"'{path}' is a device, not a file: give the name of a file.")
-    if target.exists() and not os.access(target, os.W_OK):
+    if os.path.exists(target) and not os.access(target, os.W_OK):
         raise FileError(f"'{path}' is read-only: change its permissions or choose another name.")
 
 
@@ -113,7 +114,7 @@ def writable_folder(path: str | os.PathLike, create: bool = False) -> Path:
     ----------
     path : path
     create : bool
-        Create the folder if it is missing and its parent folder exists.
+        Create the folder if it is missing, and the folders above it that are missing.
 
     Returns
     -------
@@ -125,11 +126,12 @@ def writable_folder(path: str | os.PathLike, create: bool = False) -> Path:
     FileError
         There is no such folder, something else has its name, or it cannot be written to.
     """
+    require_name(path)
     folder = Path(os.path.abspath(path))
-    if create and not folder.exists():
-        _require_folder(folder.parent)
+    if create and not os.path.exists(folder):
+        _require_no_file_above(folder)
         try:
-            folder.mkdir(exist_ok=True)
+            folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise FileError(f"The folder '{folder}' could not be made ({os_error_reason(error)}): {_remedy(error)}.") from error
     _require_folder(folder)
@@ -137,6 +139,27 @@ def writable_folder(path: str | os.PathLike, create: bool = False) -> Path:
     with suppress(OSError):  # the next run that removes leftovers removes it
         check.unlink()
     return folder
+
+
+def writable_file(path: str | os.PathLike) -> Path:
+    """Check before work begins that a file could be written, and create the folders above it that are missing.
+
+    Returns
+    -------
+    Path
+        Absolute, without links.
+
+    Raises
+    ------
+    FileError
+        As :func:`atomic_write`.
+    """
+    require_replaceable(path)
+    target = Path(os.path.realpath(path))
+    writable_folder(target.parent, create=True)
+    with suppress(FileNotFoundError):
+        _new_file_in(target.parent, target.stem, target.suffix).unlink()  # its name may be too long
+    return target
 
 
 def remove_leftovers(folder: str | os.PathLike, is_ending: bool = False) -> list[Path]:
@@ -253,15 +276,26 @@ def file_sha256(path: Path) -> str:
     return digest.hexdigest()
 
 
+def require_name(path: str | os.PathLike) -> None:
+    """Raise FileError if no file can have this name: an empty one would be the present folder."""
+    name = os.fspath(path)
+    if not name.strip() or "\0" in name:
+        raise FileError(f"{name!r} is no name of a file or a folder: give another.")
+
+
 def _require_folder(folder: Path) -> None:
-    if folder.is_dir():
+    if os.path.isdir(folder):
         return
-    if folder.exists():
+    if os.path.exists(folder):
         raise FileError(f"'{folder}' is a file where a folder is needed: choose another folder.")
-    for above in folder.parents:
-        if above.exists() and not above.is_dir():
-            raise FileError(f"'{folder}' cannot be a folder because '{above}' is a file: choose another folder.")
+    _require_no_file_above(folder)
     raise FileError(f"The folder '{folder}' does not exist: create it or choose another.")
+
+
+def _require_no_file_above(folder: Path) -> None:
+    for above in folder.parents:
+        if os.path.exists(above) and not os.path.isdir(above):
+            raise FileError(f"'{folder}' cannot be a folder because '{above}' is a file: choose another folder.")
 
 
 def _new_file_in(folder: Path, stem: str, suffix: str) -> Path:

@@ -23,9 +23,12 @@ from ...laws.contact_law import contact_law
 from ...laws.friction import friction_along_path, stribeck_force
 from ...model.sensor_parameters import SensorParameters
 from ..fitting.regression import Estimate, linearised_estimates
+from .stiffness import MOST_TEXELS
 
 STEADY = ("mus", "mud", "x0", "ct")
 DYNAMIC = (*STEADY, "sigma0", "sigma1")
+NORMAL_FORCES = (1e-9, 1e9)
+"""Least and largest normal force on a texel, N: beyond it the unit is wrong or numbers overflow."""
 
 
 @dataclass(frozen=True)
@@ -127,8 +130,8 @@ def read_friction(path: str | os.PathLike, texels: int = 1) -> FrictionData:
     ParameterError
         The number of texels is not above zero.
     """
-    if texels < 1:
-        raise ParameterError(f"The number of texels is {texels}: give at least one.")
+    if not 1 <= texels <= MOST_TEXELS:
+        raise ParameterError(f"The number of texels is {texels}: give at least one and at most {MOST_TEXELS:g}.")
     columns = read_columns(path, {"velocity": "m/s", "force": "N", "time": "s"})
     for name in ("velocity", "force"):
         if name not in columns:
@@ -160,8 +163,11 @@ def fit_friction(data: FrictionData, normal_force: float, parameters: SensorPara
     ParameterError
         The normal force is not above zero, or all velocities are equal.
     """
-    if not (np.isfinite(normal_force) and normal_force > 0):
-        raise ParameterError(f"The normal force is {normal_force:g} N: give a value above zero.")
+    if not NORMAL_FORCES[0] <= normal_force <= NORMAL_FORCES[1]:
+        raise ParameterError(
+            f"The normal force is {normal_force:g} N: give a value above zero, "
+            f"from {NORMAL_FORCES[0]:g} to {NORMAL_FORCES[1]:g} N."
+        )
     if np.ptp(np.abs(data.velocity)) == 0:
         raise ParameterError("A friction curve needs measurements at different velocities: add some.")
     start = parameters or SensorParameters()

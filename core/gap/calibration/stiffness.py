@@ -14,6 +14,10 @@ from ..fitting.regression import Estimate, linear_estimates
 
 STANDARD_GRAVITY = 9.80665
 """Standard acceleration of gravity, which converts masses to forces, m/s²."""
+AREAS = (1e-12, 1e6)
+"""Least and largest area of a sensor or of a weight, m²: beyond it the unit is wrong or numbers overflow."""
+MOST_TEXELS = 10**9
+"""Most texels that may share an area or a force."""
 
 
 @dataclass(frozen=True)
@@ -75,10 +79,10 @@ def texel_stiffness(pressure: float, area: float, texels: int, compression: floa
     texels : int
     compression : float, metres
     """
-    if not (np.isfinite(area) and area > 0):
-        raise ParameterError(f"The sensor's area is {area:g} m²: give a finite value above zero.")
-    if not texels > 0:
-        raise ParameterError(f"The number of texels is {texels}: give at least one.")
+    if not AREAS[0] <= area <= AREAS[1]:
+        raise ParameterError(f"The sensor's area is {area:g} m²: give a finite value above zero, in m².")
+    if not 1 <= texels <= MOST_TEXELS:
+        raise ParameterError(f"The number of texels is {texels}: give at least one and at most {MOST_TEXELS:g}.")
     if not (np.isfinite(compression) and compression > 0):
         raise ParameterError(f"The compression is {compression:g} m: give a finite value above zero.")
     if not np.isfinite(pressure):
@@ -111,7 +115,7 @@ def read_foam(path: str | os.PathLike, weight_area: float | None = None) -> Foam
         raise FileError(f"'{path}' needs exactly one of the columns 'pressure', 'force' and 'mass'; it has {len(loads)}.")
     load = columns[loads[0]]
     if loads[0] != "pressure":
-        if weight_area is None or not (np.isfinite(weight_area) and weight_area > 0):
+        if weight_area is None or not AREAS[0] <= weight_area <= AREAS[1]:
             raise FileError(f"'{path}' has a column '{loads[0]}': say on which area it rested, in m², finite and above zero.")
         load = load * (STANDARD_GRAVITY if loads[0] == "mass" else 1.0) / weight_area
     return FoamData(columns["compression"], load)

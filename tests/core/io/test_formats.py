@@ -27,7 +27,7 @@ from palpate.core.geometry.mesh import TriangleMesh
 from palpate.core.geometry.texels import texels_from_region
 from palpate.core.io import exr_backend, exr_codec, exr_library, file_writing
 from palpate.core.io.bake_folder import OWN_DIGEST, Manifest, folder_names, frame_file, read_manifest, write_manifest
-from palpate.core.io.file_writing import atomic_write, remove_leftovers, writable_folder
+from palpate.core.io.file_writing import atomic_write, remove_leftovers, writable_file, writable_folder
 from palpate.core.io.recording_npz import load_recording, save_recording
 from palpate.core.io.tactile_exr import CHANNELS, describe, exr_channels, read_exr, write_exr, write_exrs
 from palpate.core.model.effect import Effect
@@ -122,6 +122,17 @@ def test_wrong_places(tmp_path):
     assert os.listdir(tmp_path) == ["file"] and (tmp_path / "file").read_text() == "text"
 
 
+def test_a_file_is_checked_before_there_is_work(tmp_path):
+    assert writable_file(tmp_path / "a" / "b" / "c.png") == tmp_path / "a" / "b" / "c.png"
+    assert (tmp_path / "a" / "b").is_dir() and not any((tmp_path / "a" / "b").iterdir())
+    (tmp_path / "link").symlink_to(tmp_path / "a" / "b" / "c.png")
+    assert writable_file(tmp_path / "link") == tmp_path / "a" / "b" / "c.png"
+    for place in (tmp_path / "a", "", "a\0b", tmp_path / ("x" * 300)):
+        with pytest.raises(FileError):
+            writable_file(place)
+            raise AssertionError(place)
+
+
 @on_linux
 def test_places_where_not_even_root_may_write():
     cannot_write("/proc/a.exr", "/proc")
@@ -159,15 +170,17 @@ def test_writable_folder(tmp_path):
     one_sentence(error, tmp_path / "new")
     assert writable_folder(tmp_path / "new", create=True).is_dir()
     assert writable_folder(tmp_path / "new", create=True).is_dir()
-    with pytest.raises(FileError) as error:
-        writable_folder(tmp_path / "x" / "y", create=True)
-    one_sentence(error, tmp_path / "x")
+    assert writable_folder(tmp_path / "x" / "y" / "z", create=True).is_dir()
+    for name in ("", " ", "a\0b", "x" * 300, "x" * 5000):
+        with pytest.raises(FileError) as error:
+            writable_folder(name, create=True)
+        assert "\n" not in str(error.value) and str(error.value).endswith(".")
     (tmp_path / "file").write_text("")
     for place in ("file", "file/deeper"):
         with pytest.raises(FileError) as error:
             writable_folder(tmp_path / place, create=True)
         one_sentence(error, tmp_path / "file")
-    assert sorted(os.listdir(tmp_path)) == ["file", "new"]
+    assert sorted(os.listdir(tmp_path)) == ["file", "new", "x"]
 
 
 def test_kill_in_the_middle_leaves_the_old_file(tmp_path):
