@@ -13,7 +13,7 @@ import shutil
 import warnings
 import zipfile
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -22,8 +22,9 @@ import numpy as np
 
 from palpate.attack.sample_bake import grid_texels, recording_of, round_texels, write_sensor
 from palpate.core.errors import PalpateError
-from palpate.core.io.bake_folder import MANIFEST_NAME, RECORDING_NAME
+from palpate.core.io.bake_folder import IMAGE_LIST_NAME, MANIFEST_NAME, RECORDING_NAME, read_manifest, write_manifest
 from palpate.core.io.bake_switch import SWITCH_NAME
+from palpate.core.io.file_writing import file_sha256
 from palpate.core.io.npz import write_arrays
 from palpate.core.io.private_folder import make_private_folder
 from palpate.core.io.sensor_npz import SENSOR_NAME
@@ -47,16 +48,32 @@ class Way:
         Spoils the bake in a folder.
     harmless : bool
         The format allows it, so a reader may accept it: it then reads a whole bake.
+    needs : str
+        A file of the bake without which there is nothing to damage.
     """
 
     name: str
     damage: Damage
     harmless: bool = False
+    needs: str = ""
+
+    def applies(self, bake: Path) -> bool:
+        """Return True if the bake in a folder can be damaged in this way."""
+        return not self.needs or (bake / self.needs).is_file()
 
 
 def ways() -> list[Way]:
     """Return all ways, always in the same order."""
-    found = [*_of_arrays(), *_of_values(), *_of_archives(), *_of_headers(), *_of_manifests(), *_of_images(), *_of_folders()]
+    found = [
+        *_of_arrays(),
+        *_of_values(),
+        *_of_archives(),
+        *_of_headers(),
+        *_of_manifests(),
+        *_of_images(),
+        *_of_image_lists(),
+        *_of_folders(),
+    ]
     names = [way.name for way in found]
     assert len(set(names)) == len(names)
     return found
@@ -449,6 +466,41 @@ def _of_images() -> Iterator[Way]:
         yield Way(f"image: {what}", partial(_raw_image, file=file, factor=factor))
     yield Way("image: of another size", partial(_other_size, file=file))
     yield Way("image: without its header", partial(_raw_image, file=file, factor=2.0, header=False))
+
+
+def _of_image_lists() -> Iterator[Way]:
+    """The list of the images' checksums, which older bakes do not have."""
+    file = f"pad/{IMAGE_LIST_NAME}"
+    changes: dict[str, Damage] = {
+        "missing": partial(_missing, file=file),
+        "empty": partial(_cut, file=file, share=0.0),
+        "cut": partial(_cut, file=file, share=0.5),
+        "one line fewer": partial(_change_lines, file=file, change=lambda lines: lines[:-1]),
+        "one line more": partial(_change_lines, file=file, change=lambda lines: [*lines, lines[-1]]),
+        "in another order": partial(_change_lines, file=file, change=lambda lines: lines[::-1]),
+        "of another sensor": partial(_copy, source=f"cap/{IMAGE_LIST_NAME}", file=file),
+        "text": partial(_replace, file=file, content=b"what did you expect?\n"),
+        "not UTF-8": partial(_replace, file=file, content=b"\xff\xfe\n"),
+        "a path out": partial(_change_lines, file=file, change=lambda lines: [b"0" * 64 + b"  ../../etc/passwd\n", *lines[1:]]),
+        "a FIFO": partial(_fifo, file=file),
+        "a link to a device": partial(_link, file=file, target="/dev/zero"),
+    }
+    for what, damage in changes.items():
+        yield Way(f"list of images: {what}", damage, needs=file)
+        if what not in ("missing", "a FIFO", "a link to a device"):
+            yield Way(f"list of images: {what}, and vouched for", partial(_vouched, damage=damage, file=file), needs=file)
+
+
+def _change_lines(bake: Path, file: str, change: Callable[[list[bytes]], list[bytes]]) -> None:
+    (bake / file).write_bytes(b"".join(change((bake / file).read_bytes().splitlines(keepends=True))))
+
+
+def _vouched(bake: Path, damage: Damage, file: str) -> None:
+    """Damage a file, and let the manifest vouch for the result."""
+    damage(bake)
+    manifest = read_manifest((bake / file).parent)
+    name = Path(file).name
+    write_manifest((bake / file).parent, replace(manifest, files={**manifest.files, name: file_sha256(bake / file)}))
 
 
 def _copy(bake: Path, source: str, file: str) -> None:

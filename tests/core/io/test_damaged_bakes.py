@@ -27,6 +27,8 @@ def good(request, tmp_path_factory):
 
 
 def damaged(good, tmp_path, way):
+    if not way.applies(good):
+        pytest.skip("older bakes have no such file")
     shutil.copytree(good, tmp_path / "bake")
     way.damage(tmp_path / "bake")
     return tmp_path / "bake"
@@ -52,7 +54,7 @@ def test_what_is_harmless_can_be_exported(tmp_path, kind):
     if kind == "hdf5":
         pytest.importorskip("h5py")
     write_bake(tmp_path / "good")
-    ways = [way for way in WAYS if way.harmless and not way.name.startswith(("pad/recording", "image"))]
+    ways = [way for way in WAYS if way.harmless and not way.needs and not way.name.startswith(("pad/recording", "image"))]
     for i, way in enumerate(random.Random(7).sample(ways, 4)):
         bake = damaged(tmp_path / "good", tmp_path / str(i), way)
         verdict, words = damaged_bakes.judge(

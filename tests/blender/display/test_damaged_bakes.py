@@ -1,0 +1,80 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What Blender shows of a bake is refused in one sentence when a file of the bake is damaged: Load, render and the timeline."""
+
+import json
+import random
+import shutil
+
+import bpy
+import pytest
+from blender_scenes import changes, dump, press, save
+
+from palpate.addon.bake.bake import bake
+from palpate.addon.display import bake_display, baked_scene
+from palpate.addon.render import figure_export
+from palpate.addon.render.figure_request import FigureRequest
+from palpate.addon.scene import participants
+from palpate.addon.session import frame_status
+from palpate.addon.timeline import baked_frames
+from palpate.attack import damaged_bakes
+from palpate.core.jobs.job_runner import run_job
+
+FOR_ALL_SENSORS = [
+    way for way in damaged_bakes.ways() if not way.harmless and "cap" not in way.name and "painted" not in way.name
+]
+"""Ways that need no second sensor and nothing painted."""
+SAMPLE = random.Random(4).sample(FOR_ALL_SENSORS, 14)
+
+
+@pytest.fixture(params=["older", "with checksums"])
+def baked(request, tmp_path):
+    """A baked scene with the sensor "pad"; the older bake has no checksums."""
+    scene, pad, _ = press(frames=4)
+    bpy.ops.palpate.reset()
+    scene.palpate.use_live = False
+    pad.name = "pad"
+    save(tmp_path)
+    run_job(bake(scene))
+    path = tmp_path / "palpate" / "pad" / "manifest.json"
+    if request.param == "older":
+        content = json.loads(path.read_text())
+        path.write_text(json.dumps({key: value for key, value in content.items() if key not in ("files", "manifest_sha256")}))
+    return scene
+
+
+def readers(scene, folder):
+    """What reads a bake, by its name."""
+    request = FigureRequest(kinds=("strip",), formats=("png",))
+    return {
+        "Load": lambda: bake_display.refresh(scene, baked_scene.bake_folders(scene)),
+        "render": lambda: run_job(figure_export.make_figures(scene, folder, request)),
+    }
+
+
+def status(scene) -> str:
+    baked_frames.forget()
+    baked_frames.show(scene, participants.depsgraph_of(scene))
+    return frame_status.status_of(scene).text
+
+
+def test_damage_is_one_sentence_and_changes_nothing(baked, tmp_path):
+    for read in readers(baked, tmp_path / "figures").values():
+        read()
+    assert status(baked) == "Frame 1 of the bake."
+    shutil.rmtree(tmp_path / "figures")
+    shutil.copytree(tmp_path / "palpate", tmp_path / "good")
+    before = dump()
+    for way in SAMPLE:
+        if not way.applies(tmp_path / "good"):
+            continue
+        shutil.rmtree(tmp_path / "palpate")
+        shutil.copytree(tmp_path / "good", tmp_path / "palpate")
+        way.damage(tmp_path / "palpate")
+        for what, read in readers(baked, tmp_path / "figures").items():
+            verdict, words = damaged_bakes.judge(way, read)
+            assert verdict == damaged_bakes.CLEAR, f"{what}, {way.name}: {words}"
+        shown = status(baked)
+        if not way.name.startswith(("image", "list of images")):  # the timeline reads none
+            assert shown.endswith(".") and shown != "Frame 1 of the bake.", f"{way.name}: {shown}"
+    assert changes(before, dump()) == []
+    assert not (tmp_path / "figures").exists()
