@@ -46,3 +46,24 @@ def test_wrong_places_are_found_before_the_work(scene, tmp_path, capfd):
         (line,) = capfd.readouterr().err.strip().splitlines()
         assert line.startswith(f"palpate {words[0]}: "), line
         assert contents(tmp_path) == before, words
+
+
+def test_links_stay_links(scene, tmp_path):
+    for folder in ("real", "other", "bakes"):
+        (tmp_path / folder).mkdir()
+    (tmp_path / "scene.blend").rename(tmp_path / "real" / "scene.blend")
+    os.symlink("real/scene.blend", "scene.blend")
+    os.symlink("bakes", "bake")
+    os.symlink("../elsewhere", "other/dangling.blend")
+    for last in ("2", "3"):  # the second replaces the first
+        assert main(["bake", "scene.blend", "--frames", "1", last, "--out", "bake", "--save"]) == 0
+        assert os.path.islink("scene.blend") and os.path.islink("bake")
+        assert len(list((tmp_path / "bakes" / "Finger A").glob("*.exr"))) == int(last)
+        for source in ("scene.blend", "real/scene.blend", "bake", "bake/Finger A"):
+            assert main(["export", source, "--format", "npz", "--out", "out"]) == 0, source
+    assert main(["render", "scene.blend", "--only", "curves", "--format", "svg", "--out", "out"]) == 0
+    assert sorted(path.name for path in (tmp_path / "real").iterdir() if not path.name.startswith(".")) in (
+        ["scene.blend"],
+        ["scene.blend", "scene.blend1"],
+        ["scene.blend", "scene.blend1", "scene.blend2"],
+    )
