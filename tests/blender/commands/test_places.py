@@ -11,13 +11,13 @@ from palpate.commands import main
 
 
 @pytest.fixture
-def scene(tmp_path, repository, monkeypatch):
+def blend(tmp_path, repository, monkeypatch):
     monkeypatch.chdir(tmp_path)
     shutil.copy(repository / "sample_blends" / "demo.blend", tmp_path / "scene.blend")
     return tmp_path / "scene.blend"
 
 
-def test_missing_folders_are_made(scene, tmp_path):
+def test_missing_folders_are_made(blend, tmp_path):
     bake = ["bake", "scene.blend", "--frames", "1", "2"]
     assert main([*bake, "--out", "a/b/bake", "--save-as", "c/d/baked.blend"]) == 0
     assert (tmp_path / "a" / "b" / "bake" / "Finger A" / "manifest.json").is_file()
@@ -28,7 +28,7 @@ def test_missing_folders_are_made(scene, tmp_path):
     assert (tmp_path / "i" / "j" / "robot.xml").is_file()
 
 
-def test_wrong_places_are_found_before_the_work(scene, tmp_path, capfd):
+def test_wrong_places_are_found_before_the_work(blend, tmp_path, capfd):
     (tmp_path / "file").write_text("a file")
     before = contents(tmp_path)
     for words in (
@@ -48,7 +48,7 @@ def test_wrong_places_are_found_before_the_work(scene, tmp_path, capfd):
         assert contents(tmp_path) == before, words
 
 
-def test_links_stay_links(scene, tmp_path):
+def test_links_stay_links(blend, tmp_path):
     for folder in ("real", "other", "bakes"):
         (tmp_path / folder).mkdir()
     (tmp_path / "scene.blend").rename(tmp_path / "real" / "scene.blend")
