@@ -49,8 +49,8 @@ def test_numbers_of_texels_that_mean_nothing(folder, capsys, value):
 def test_colour_scales_and_resolutions_that_mean_nothing(folder, capsys, value):
     write_bake(folder / "bake")
     if value != "1e308":  # a scale may be long: everything is dark then
-        refusal(capsys, "export", "bake", "--format=png", "--out=out", f"--limit={value}")
-    refusal(capsys, "export", "bake", "--format=png", "--out=out", f"--dpi={value}")
+        assert refusal(capsys, "export", "bake", "--format=png", "--out=out", f"--limit={value}")
+    assert refusal(capsys, "export", "bake", "--format=png", "--out=out", f"--dpi={value}")
 
 
 NAMES = ["", "a\0b", "x" * 300, "x" * 5000, "foam.csv/deeper"]
@@ -59,14 +59,14 @@ NAMES = ["", "a\0b", "x" * 300, "x" * 5000, "foam.csv/deeper"]
 @pytest.mark.parametrize("name", NAMES, ids=lambda name: repr(name)[:20])
 def test_names_that_nothing_can_have(folder, capsys, name):
     write_bake(folder / "bake")
-    refusal(capsys, "export", name, "--out", "out")
-    refusal(capsys, "export", "bake", "--out", name)
-    refusal(capsys, "export", "bake", "--sensor", name, "--out", "out")
-    refusal(capsys, "gap", name, "--out", "out")
-    refusal(capsys, "openrave", "show", name)
-    refusal(capsys, "fit", "stiffness", name, "--area=1", "--texels=2")
+    assert refusal(capsys, "export", name, "--out", "out")
+    assert refusal(capsys, "export", "bake", "--out", name)
+    assert refusal(capsys, "export", "bake", "--sensor", name, "--out", "out")
+    assert refusal(capsys, "gap", name, "--out", "out")
+    assert refusal(capsys, "openrave", "show", name)
+    assert refusal(capsys, "fit", "stiffness", name, "--area=1", "--texels=2")
     if name:
-        refusal(capsys, "fit", "stiffness", "foam.csv", "--area=1", "--texels=2", "--plot", f"{name}.png")
+        assert refusal(capsys, "fit", "stiffness", "foam.csv", "--area=1", "--texels=2", "--plot", f"{name}.png")
 
 
 def test_a_plot_is_checked_before_the_fit(folder, capsys):
