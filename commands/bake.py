@@ -107,12 +107,15 @@ def report(baked) -> str:
     lines = [f"frames {span}"]
     texels = {sensor.name: sensor.texels for sensor in baked.scenario.sensors}
     rows = [("sensor", "texels", "peak texel", "peak normal", "peak shear", "normal at end")]
+    peaks, at_end = {name: np.zeros(3) for name in baked.folders}, dict.fromkeys(baked.folders, 0.0)
+    for part in recording.blocks():
+        for name, readings in part.sensors.items():
+            normal = readings.normal_force.sum(axis=1)
+            shear = np.linalg.norm(net_shear(readings, texels[name]), axis=1)
+            own = (readings.normal_force.max(initial=0.0), normal.max(), shear.max())
+            peaks[name], at_end[name] = np.maximum(peaks[name], own), float(normal[-1])
     for name in baked.folders:
-        readings = recording.sensors[name]
-        normal = readings.normal_force.sum(axis=1)
-        shear = np.linalg.norm(net_shear(readings, texels[name]), axis=1)
-        peaks = (readings.normal_force.max(initial=0.0), normal.max(), shear.max(), normal[-1])
-        rows.append((name, str(readings.normal_force.shape[1]), *(_newtons(value) for value in peaks)))
+        rows.append((name, str(len(texels[name])), *(_newtons(value) for value in (*peaks[name], at_end[name]))))
     lines += ["", console.text_table(rows, "<>>>>>")]
     lines += [f"warning: {warning}" for warning in recording.warnings]
     return "\n".join(lines)

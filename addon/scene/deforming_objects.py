@@ -14,6 +14,7 @@ import numpy as np
 from ...core.errors import SceneError
 from ...core.geometry.mesh import TriangleMesh
 from ...core.geometry.texels import DeformedTexels
+from ...core.io.growing_table import GrowingTable
 from ...core.model.deformation import Deformation
 from ...core.model.scenario import Scenario
 from ...core.model.sensor import Sensor
@@ -167,31 +168,36 @@ def with_first_shapes(scenario: Scenario, surfaces) -> tuple[tuple[Sensor, ...],
 
 
 class ShapeHistory:
-    """Shapes of what may deform, sample after sample. A shape that never changes is stored once."""
+    """Shapes of what may deform, sample after sample. A shape that has not changed yet is stored once."""
 
     def __init__(self, scenario: Scenario):
         groups = (("target", scenario.targets), ("sensor", scenario.sensors))
-        self._samples = {
-            (kind, index): [part.deformation.values[0]]
+        self._first = {
+            (kind, index): part.deformation.values[0]
             for kind, group in groups
             for index, part in enumerate(group)
             if part.deformation is not None
         }
-        self._last: dict[tuple[str, int], np.ndarray] = {}
+        self._tables: dict[tuple[str, int], GrowingTable] = {}
+        self._count = 1
 
     def append(self, shapes: dict[tuple[str, int], np.ndarray]) -> None:
         """Add the shapes of one more sample, by ("target" or "sensor", index)."""
         for place, found in shapes.items():
-            samples = self._samples[place]
-            is_same = found is self._last.get(place) or np.array_equal(found, samples[-1])
-            samples.append(samples[-1] if is_same else found)
-            self._last[place] = found
+            first = self._first[place]
+            if place not in self._tables and found is not first and not np.array_equal(found, first):
+                self._tables[place] = GrowingTable(first)
+                for _ in range(self._count - 1):
+                    self._tables[place].append(first)
+            if place in self._tables:
+                self._tables[place].append(found)
+        self._count += 1
 
     def applied_to(self, scenario: Scenario, times: np.ndarray) -> tuple[tuple[Sensor, ...], tuple[Target, ...]]:
         """Return sensors and targets with their deformations; those that kept their shape get none."""
         groups = {"sensor": list(scenario.sensors), "target": list(scenario.targets)}
-        for (kind, index), samples in self._samples.items():
-            is_constant = all(found is samples[0] for found in samples)
-            deformation = None if is_constant else Deformation(times, np.array(samples))
+        for kind, index in self._first:
+            table = self._tables.get((kind, index))
+            deformation = None if table is None else Deformation(times, table.array())
             groups[kind][index] = replace(groups[kind][index], deformation=deformation)
         return tuple(groups["sensor"]), tuple(groups["target"])

@@ -17,6 +17,7 @@ import numpy as np
 from ...core.effects.engine.sensor_effects import check_scenario
 from ...core.errors import SceneError
 from ...core.geometry.mesh import TriangleMesh, mass_properties
+from ...core.io.growing_table import GrowingTable
 from ...core.jobs.progress import Progress
 from ...core.model.body import Body
 from ...core.model.motion import Motion, Signal
@@ -228,14 +229,19 @@ class _MotionHistory:
 
     def __init__(self, reading: SceneReading):
         bodies = reading.scenario.bodies
-        self._poses = {i: [(b.motion.positions[0], b.motion.quaternions[0])] for i, b in enumerate(bodies) if not b.free}
-        self._drive_targets = {i: list(bodies[i].drive.target.values) for i in reading.driven_bodies}
+        self._poses = {
+            i: (GrowingTable(b.motion.positions[0]), GrowingTable(b.motion.quaternions[0]))
+            for i, b in enumerate(bodies)
+            if not b.free
+        }
+        self._drive_targets = {i: GrowingTable(bodies[i].drive.target.values[0]) for i in reading.driven_bodies}
         self._shapes = deforming_objects.ShapeHistory(reading.scenario)
 
     def append(self, sample: FrameSample) -> None:
         """Add one sample."""
         for index, pose in sample.poses.items():
-            self._poses[index].append(pose)
+            for table, part in zip(self._poses[index], pose, strict=True):
+                table.append(part)
         for index, value in sample.drive_targets.items():
             self._drive_targets[index].append(value)
         self._shapes.append(sample.shapes)
@@ -243,11 +249,11 @@ class _MotionHistory:
     def applied_to(self, scenario: Scenario, times: np.ndarray) -> Scenario:
         """Return the scenario with the whole motion; `times` (n,) float, seconds, are those of the samples."""
         bodies = list(scenario.bodies)
-        for index, path in self._poses.items():
-            positions, quaternions = (np.array(part) for part in zip(*path, strict=True))
-            bodies[index] = replace(bodies[index], motion=Motion(times, positions, quaternions))
+        for index, (positions, quaternions) in self._poses.items():
+            motion = Motion(times, positions.array(), quaternions.array())
+            bodies[index] = replace(bodies[index], motion=motion)
         for index, values in self._drive_targets.items():
-            drive = replace(bodies[index].drive, target=Signal(times, np.array(values)))
+            drive = replace(bodies[index].drive, target=Signal(times, values.array()))
             bodies[index] = replace(bodies[index], drive=drive)
         sensors, targets = self._shapes.applied_to(scenario, times)
         return replace(scenario, bodies=tuple(bodies), sensors=sensors, targets=targets)
@@ -274,11 +280,12 @@ def _read_frames(scene) -> Generator[Progress, None, SceneReading]:
             sample = reading.sample(scene, depsgraph)
             history.append(sample)
         for index, matrix in sample.parent_matrices.items():
-            reading.parent_matrices[index].append(matrix)
+            before = reading.parent_matrices[index][-1]
+            reading.parent_matrices[index].append(before if np.array_equal(before, matrix) else matrix)
         reading.record_fingerprints(watched, depsgraph)
         yield Progress("Reading", frame - frames[0] + 1, len(frames), frame)
     samples = (len(frames) - 1) * samples_per_frame + 1
-    times = np.array([step / (reading.scenario.fps * samples_per_frame) for step in range(samples)])
+    times = np.arange(samples) / (reading.scenario.fps * samples_per_frame)
     scenario = history.applied_to(reading.scenario, times)
     warnings = _mass_warnings(scenario) + rounding_warnings.distance_warnings(scenario)
     warnings += rounding_warnings.keyframe_warnings(participants.find_participants(scene)[0], scenario, reading.metres_per_unit)

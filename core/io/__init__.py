@@ -20,6 +20,7 @@ __all__ = [
     "folder_lock",
     "frame_rows",
     "growing_file",
+    "growing_table",
     "html_templates",
     "npz",
     "openrave",

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import SceneError
+from .recording import row_blocks
 
 
 @dataclass(frozen=True)
@@ -41,7 +42,7 @@ class Deformation:
                 f"'{name}' deforms with {self.values.shape[1]} vertices and has {shape[0]}: "
                 "use modifiers that keep the number of vertices."
             )
-        if not np.isfinite(self.values).all():
+        if not all(np.isfinite(self.values[rows]).all() for rows in row_blocks(self.values)):
             time = self.times[np.flatnonzero(~np.isfinite(self.values).all(axis=(1, 2)))[0]]
             raise SceneError(
                 f"A vertex of '{name}' is NaN or infinite {time:g} s after the first frame: check what deforms it."

@@ -73,7 +73,7 @@ def _velocities(motion: Motion, at: np.ndarray) -> tuple[np.ndarray, np.ndarray]
     """
     last = np.maximum(at - 1, 0)  # intervals by their left ends
     before = np.maximum(at - 2, 0)
-    h, g = np.diff(motion.times)[last][:, None], np.diff(motion.times)[before][:, None]
+    h, g = ((motion.times[i + 1] - motion.times[i])[:, None] for i in (last, before))
     bend = h / (h + g)
     slopes = []
     for change in (lambda i: motion.positions[i + 1] - motion.positions[i], lambda i: _turns(motion, i)):
