@@ -115,7 +115,8 @@ def report(baked) -> str:
             own = (readings.normal_force.max(initial=0.0), normal.max(), shear.max())
             peaks[name], at_end[name] = np.maximum(peaks[name], own), float(normal[-1])
     for name in baked.folders:
-        rows.append((name, str(len(texels[name])), *(_newtons(value) for value in (*peaks[name], at_end[name]))))
+        count = recording.sensors[name].normal_force.shape[1]
+        rows.append((name, str(count), *(_newtons(value) for value in (*peaks[name], at_end[name]))))
     lines += ["", console.text_table(rows, "<>>>>>")]
     lines += [f"warning: {warning}" for warning in recording.warnings]
     return "\n".join(lines)

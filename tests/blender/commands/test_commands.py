@@ -166,6 +166,18 @@ def test_scripts_in_a_file_do_not_run(tmp_path, demo_blend):
 # --- what bake makes
 
 
+def test_a_bake_without_images_has_the_recordings_alone(tmp_path, demo_blend, capfd):
+    assert main(["bake", str(demo_blend), "--frames", "1", "3", "--no-images", "--out", str(tmp_path / "out")]) == 0
+    for name in ("Finger A", "Finger B"):
+        files = {path.name for path in (tmp_path / "out" / name).iterdir()}
+        assert files == {"recording.npz", "sensor.npz", "manifest.json"}
+    assert main(["export", str(tmp_path / "out"), "--out", str(tmp_path / "csv")]) == 0
+    assert (tmp_path / "csv" / "Finger A" / "normal_force.csv").read_text().count("\n") == 4
+    assert main(["bake", str(demo_blend), "--no-images", "--save-as", str(tmp_path / "new.blend")]) == 2
+    assert "--no-images leaves out what a saved scene shows" in capfd.readouterr().err
+    assert not (tmp_path / "new.blend").exists()
+
+
 def test_bake_writes_images_and_leaves_the_file_alone(tmp_path, demo_blend, capfd):
     before = demo_blend.read_bytes()
     assert main(["bake", str(demo_blend), "--frames", "1", "6", "--out", str(tmp_path / "out")]) == 0
@@ -349,6 +361,7 @@ def test_peak_shear_adds_forces_and_not_numbers_of_different_axes():
     texels = SimpleNamespace(tangent=np.array([[1.0, 0, 0], [-1.0, 0, 0]]), bitangent=np.array([[0, 1.0, 0], [0, 1.0, 0]]))
     readings = SimpleNamespace(normal_force=np.ones((1, 2)), shear=np.array([[[1.0, 0.0], [1.0, 0.0]]]))
     recording = SimpleNamespace(frames=[1], times=[0.0], dt=1e-3, warnings=(), sensors={"Tip": readings})
+    recording.blocks = lambda: [recording]
     scenario = SimpleNamespace(sensors=[SimpleNamespace(name="Tip", texels=texels)])
     row = report(SimpleNamespace(recording=recording, scenario=scenario, folders={"Tip": None})).splitlines()[-1]
     assert row.split() == ["Tip", "2", "1.0000", "N", "2.0000", "N", "0.0000", "N", "2.0000", "N"]
