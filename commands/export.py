@@ -8,11 +8,7 @@ import argparse
 from ..core.export.registry import export, exporters
 from ..core.figures.figure_style import FigureStyle
 from ..core.io.bake_reader import Bake, read_bake
-from ..core.io.disk_space import require_space
 from . import blender, checks, console, figure_options
-
-LEAST_BYTES = {"csv": 14}
-"""Bytes that a format needs at least for a texel in a frame: seven tables with a digit and a comma each."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -30,8 +26,6 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.sensor:
         bake = bake.select(arguments.sensor)
     checks.folder_is_no_bake(arguments.out, bake)
-    numbers = len(bake.recording.frames) * sum(len(texels) for texels in bake.texels.values())
-    require_space(arguments.out, LEAST_BYTES.get(arguments.format, 0) * numbers, "The export")
     style: FigureStyle = figure_options.figure_style_from(arguments)
     with console.Interrupt.raised_at_once():
         job = export(bake, arguments.format, arguments.out, style)

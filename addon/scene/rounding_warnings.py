@@ -6,6 +6,7 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
+from ...core.model.recording import row_blocks
 from ...core.model.scenario import Scenario
 from ..session import fcurves
 from . import animation_fingerprint
@@ -26,7 +27,7 @@ _LENGTHS = ("location", "delta_location", f"palpate.{TARGET_PROPERTIES['POSITION
 def distance_warnings(scenario: Scenario) -> tuple[str, ...]:
     """Return a warning for the body that is so far from the origin that rounding changes forces."""
     skin = _thinnest_skin(scenario)
-    distances = {body.name: float(np.linalg.norm(body.motion.positions, axis=1).max()) for body in scenario.bodies}
+    distances = {body.name: _largest_distance(body.motion.positions) for body in scenario.bodies}
     for target in scenario.targets:
         name = scenario.bodies[target.body].name
         distances[name] += float(np.linalg.norm(target.mesh.vertices, axis=1).max())
@@ -83,3 +84,7 @@ def _largest_flat_difference(curve) -> float:
 def _thinnest_skin(scenario: Scenario) -> float:
     """Return the smallest maximum penetration of a scenario's sensors, metres."""
     return min(sensor.parameters.max_penetration for sensor in scenario.sensors)
+
+
+def _largest_distance(positions: np.ndarray) -> float:
+    return max(float(np.linalg.norm(positions[rows], axis=1).max()) for rows in row_blocks(positions))

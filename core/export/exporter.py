@@ -12,6 +12,7 @@ import numpy as np
 from ..figures.figure_style import FigureStyle
 from ..geometry.layout.grid_layout import GridLayout
 from ..io.bake_reader import Bake
+from ..io.disk_space import recording_bytes
 from ..jobs.progress import Job, Progress
 from ..model.recording import SENSOR_FIELDS
 
@@ -32,6 +33,12 @@ UNITS = {
 Write = Callable[[Bake, Path, FigureStyle], Job[list[Path]]]
 
 
+def uncompressed_bytes(bake: Bake) -> float:
+    """Return how many bytes the arrays of a bake have."""
+    frames, bodies = len(bake.recording.frames), len(bake.recording.body_names)
+    return sum(recording_bytes(frames, bodies, [len(texels)]) for texels in bake.texels.values())
+
+
 @dataclass(frozen=True)
 class Exporter:
     """A format that a bake can be written in.
@@ -47,6 +54,8 @@ class Exporter:
     write : callable
         Takes the bake, a folder that exists, and a style for colours. It yields :func:`sensor_progress` before each sensor is
         written, and returns the files that it wrote, in that folder or in a folder in it.
+    size : callable
+        Returns an estimate from above of the bytes that it writes. Default: those of all arrays.
     """
 
     name: str
@@ -54,6 +63,7 @@ class Exporter:
     description: str
     position: int
     write: Write
+    size: Callable[[Bake], float] = uncompressed_bytes
 
 
 def bake_arrays(bake: Bake, name: str) -> dict[str, np.ndarray]:

@@ -13,6 +13,7 @@ from pathlib import Path
 from ..errors import FileError, PalpateError
 from ..figures.figure_style import FigureStyle
 from ..io.bake_reader import Bake
+from ..io.disk_space import require_space
 from ..io.file_writing import writable_folder
 from ..io.temporary_folder import temporary_folder
 from ..jobs.progress import Job
@@ -62,11 +63,13 @@ def export(bake: Bake, kind: str, folder: str | os.PathLike, style: FigureStyle 
     Raises
     ------
     PalpateError
-        The format is unknown or needs a package that is not installed, or a file cannot be written.
+        The format is unknown or needs a package that is not installed, the disk has too little space, or a file cannot be
+        written.
     """
     known = exporters()
     if kind not in known:
         raise PalpateError(f"There is no export to '{kind}': choose from {', '.join(known)}.")
+    require_space(folder, known[kind].size(bake), "The export")
     folder = writable_folder(folder, create=True)
     files = FileList(folder)
     with temporary_folder(folder, "export") as new:

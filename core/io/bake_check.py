@@ -7,7 +7,7 @@ another sensor. Every such fault is found here once, so that whoever draws or ex
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
@@ -18,7 +18,7 @@ from ..errors import FileError, PalpateError
 from ..geometry.layout.grid_layout import GridLayout
 from ..geometry.layout.texture_maps import UVLayout
 from ..geometry.texels import Texels
-from ..model.recording import Recording, SensorRecording
+from ..model.recording import Recording, SensorRecording, row_blocks
 from ..model.sensor_parameters import SENSOR_PARAMETERS, Painted, SensorParameters
 from .bake_folder import MANIFEST_NAME, RECORDING_NAME, Manifest
 from .sensor_npz import SENSOR_NAME
@@ -79,11 +79,15 @@ def check_bake(sensors: Mapping[str, SensorFiles]) -> None:
     first, *others = sensors.values()
     for other in others:
         for name in ("frames", "times", "poses", "velocities"):
-            if not np.array_equal(getattr(first.recording, name), getattr(other.recording, name)):
+            if not _is_equal(getattr(first.recording, name), getattr(other.recording, name)):
                 raise FileError(
                     f"'{other.folder / RECORDING_NAME}' and '{first.folder / RECORDING_NAME}' differ in '{name}', so they are "
                     "not of the same bake: bake again, or choose the folder of one sensor."
                 )
+
+
+def _is_equal(one: np.ndarray, other: np.ndarray) -> bool:
+    return one.shape == other.shape and all(np.array_equal(one[rows], other[rows]) for rows in row_blocks(one))
 
 
 def check_sensor_files(files: SensorFiles) -> None:
@@ -132,6 +136,15 @@ def _require(good: object, fault: str) -> None:
         raise Fault(fault)
 
 
+def _everywhere(test: Callable[[np.ndarray], np.ndarray], array: np.ndarray) -> bool:
+    """Return True if a test holds for all of an array, which is gone through block by block."""
+    return all(bool(test(array[rows]).all()) for rows in row_blocks(array))
+
+
+def _is_unit(quaternions: np.ndarray) -> np.ndarray:
+    return np.abs(np.linalg.norm(quaternions, axis=-1) - 1.0) < UNIT_TOLERANCE
+
+
 def _check_array(name: str, array: object, kinds: str, shape: tuple[int | None, ...]) -> None:
     """Require an array of one of some kinds and of a shape, in which None is any length, without NaN or infinite values."""
     _require(isinstance(array, np.ndarray), f"'{name}' is no array")
@@ -141,7 +154,7 @@ def _check_array(name: str, array: object, kinds: str, shape: tuple[int | None, 
     wanted = " × ".join("any" if side is None else str(side) for side in shape)
     _require(fits, f"'{name}' has the shape {' × '.join(map(str, array.shape)) or 'of a single value'} and not {wanted}")
     if array.dtype.kind == _NUMBER:
-        _require(np.isfinite(array).all(), f"'{name}' has values that are not finite")
+        _require(_everywhere(np.isfinite, array), f"'{name}' has values that are not finite")
 
 
 # --- the manifest
@@ -252,8 +265,7 @@ def _check_recording(files: SensorFiles) -> None:
     )
     _check_array("poses", recording.poses, _NUMBER, (count, bodies, 7))
     _check_array("velocities", recording.velocities, _NUMBER, (count, bodies, 6))
-    turns = np.linalg.norm(recording.poses[:, :, 3:], axis=2)
-    _require((np.abs(turns - 1.0) < UNIT_TOLERANCE).all(), "'poses' has quaternions that are not of length one")
+    _require(_everywhere(_is_unit, recording.poses[:, :, 3:]), "'poses' has quaternions that are not of length one")
     _check_channels(recording.sensors[manifest.sensor], count, len(files.texels))
 
 
@@ -278,8 +290,11 @@ def _check_channels(sensor: SensorRecording, frames: int, texels: int) -> None:
         kinds = _FLAG if name == "contact" else _NUMBER
         values = getattr(sensor, name)
         _check_array(name, values, kinds, (frames, texels, *value_shape))
-        _require(kinds == _FLAG or (np.abs(values) <= LARGEST).all(), f"'{name}' has values that no pixel can hold")
+        _require(
+            kinds == _FLAG or _everywhere(lambda part: np.abs(part) <= LARGEST, values),
+            f"'{name}' has values that no pixel can hold",
+        )
     for name in ("net_force", "net_torque", "centre_of_pressure"):
         _check_array(name, getattr(sensor, name), _NUMBER, (frames, 3))
     for name in ("friction", "depth", "slip"):
-        _require((getattr(sensor, name) >= 0).all(), f"'{name}' has negative values")
+        _require(_everywhere(lambda part: part >= 0, getattr(sensor, name)), f"'{name}' has negative values")

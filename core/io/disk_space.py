@@ -50,13 +50,14 @@ def bake_bytes(frames: int, bodies: int, texels: Sequence[int], pixels: Sequence
 
 
 def require_space(folder: str | os.PathLike, needed: float, what: str) -> None:
-    """Check that a disk has the space that work needs at least.
+    """Check that a disk has the space that work needs.
 
     Parameters
     ----------
     folder : path
         It need not exist yet.
     needed : float, bytes
+        From above.
     what : str
         What will be written, for the message.
 
@@ -71,6 +72,6 @@ def require_space(folder: str | os.PathLike, needed: float, what: str) -> None:
     free = shutil.disk_usage(place).free
     if free < needed:
         raise FileError(
-            f"{what} needs at least {needed / 1e6:.0f} MB and the disk of '{folder}' has {free / 1e6:.0f} MB left: "
+            f"{what} needs up to {needed / 1e6:.0f} MB and the disk of '{folder}' has {free / 1e6:.0f} MB left: "
             "free some space or choose another folder."
         )

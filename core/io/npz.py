@@ -3,7 +3,10 @@
 
 from __future__ import annotations
 
+import math
+import mmap
 import os
+import tempfile
 import zipfile
 import zlib
 from collections.abc import Mapping
@@ -11,8 +14,10 @@ from typing import IO
 
 import numpy as np
 
+from ..errors import FileError
 from ..model.recording import row_blocks
-from .file_writing import write_file
+from .disk_space import require_space
+from .file_writing import os_error_reason, write_file
 
 DAMAGED = (
     ValueError,
@@ -30,6 +35,9 @@ DAMAGED = (
 )
 """Exceptions that reading a damaged archive may raise."""
 
+MAPPED_BYTES = 1 << 24
+"""Size from which an array is not held in memory but mapped from a temporary file."""
+_COPIED = 1 << 20
 _LONG_AGO = (1980, 1, 1, 0, 0, 0)  # the earliest date of a zip archive; the current time would change the bytes
 
 
@@ -58,6 +66,54 @@ def write_arrays(path: str | os.PathLike, arrays: Mapping[str, np.ndarray], atom
             info.external_attr = 0o644 << 16
             with archive.open(info, "w", force_zip64=array.nbytes > 1 << 30) as member:
                 _write_member(member, array)
+
+
+def read_array(members: np.lib.npyio.NpzFile, name: str) -> np.ndarray:
+    """Return an array of an open archive; one of :data:`MAPPED_BYTES` or more is mapped from a temporary file.
+
+    The file has no name, lies where :func:`tempfile.gettempdir` says, and is gone when the array is. The array is read-only.
+
+    Raises
+    ------
+    FileError
+        The temporary file cannot be written.
+    KeyError, ValueError, zipfile.BadZipFile, …
+        There is no such array, or it is damaged (:data:`DAMAGED`).
+    """
+    info = members.zip.getinfo(f"{name}.npy")
+    if info.file_size < MAPPED_BYTES:
+        return members[name]
+    with members.zip.open(info) as member:
+        version = np.lib.format.read_magic(member)
+        if version != (1, 0):
+            raise ValueError(f"'{name}' has version {version}")
+        shape, is_fortran, kind = np.lib.format.read_array_header_1_0(member)
+        if is_fortran or kind.hasobject:
+            raise ValueError(f"'{name}' is not laid out as Palpate writes it")
+        size = math.prod(shape) * kind.itemsize
+        require_space(tempfile.gettempdir(), size, f"'{name}' of a long recording")
+        with tempfile.TemporaryFile(prefix="palpate-") as file:
+            _unpack(member, file, size, name)
+            mapped = mmap.mmap(file.fileno(), size, access=mmap.ACCESS_READ)
+    return np.frombuffer(mapped, kind).reshape(shape)
+
+
+def _unpack(member: IO[bytes], file: IO[bytes], size: int, name: str) -> None:
+    left = size
+    while block := member.read(_COPIED):  # to its end, where the checksum is compared
+        left -= len(block)
+        if left < 0:
+            break
+        try:
+            file.write(block)
+        except OSError as error:
+            raise FileError(
+                f"'{name}' of a long recording could not be unpacked into '{tempfile.gettempdir()}' "
+                f"({os_error_reason(error)}): free some space there, or name another folder in the environment variable TMPDIR."
+            ) from error
+    if left:
+        raise ValueError(f"'{name}' has not the size that it says")
+    file.flush()
 
 
 def _write_member(member: IO[bytes], array: np.ndarray) -> None:

@@ -17,7 +17,7 @@ import numpy as np
 from ..errors import FileError
 from ..model.recording import SENSOR_FIELDS, Recording, SensorRecording, row_blocks
 from .file_writing import os_error_reason
-from .npz import DAMAGED, write_arrays
+from .npz import DAMAGED, read_array, write_arrays
 from .regular_file import open_regular
 
 RECORDING_FORMAT = "palpate-recording/2"
@@ -51,7 +51,7 @@ def save_recording(path: str | os.PathLike, recording: Recording, atomic: bool =
 
 
 def load_recording(path: str | os.PathLike) -> Recording:
-    """Read a recording that :func:`save_recording` wrote.
+    """Read a recording that :func:`save_recording` wrote; long arrays of it are mapped (:func:`.npz.read_array`).
 
     Raises
     ------
@@ -90,9 +90,9 @@ def _recording(path: str | os.PathLike, members: Any) -> Recording:
         raise FileError(
             f"'{path}' has the format {header['format']!r}, not '{RECORDING_FORMAT}': bake again with this version."
         )
-    arrays = {name: members[name] for name in ("frames", "times", "poses", "velocities")}
+    arrays = {name: read_array(members, name) for name in ("frames", "times", "poses", "velocities")}
     sensors = {
-        str(name): SensorRecording(**{key: members[f"sensor_{i}/{key}"] for key in SENSOR_FIELDS})
+        str(name): SensorRecording(**{key: read_array(members, f"sensor_{i}/{key}") for key in SENSOR_FIELDS})
         for i, name in enumerate(header["sensors"])
     }
     count = len(arrays["frames"])

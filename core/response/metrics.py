@@ -99,12 +99,12 @@ def pressure(normal_force: np.ndarray, texels: Texels) -> np.ndarray:
 
 def peak_force(recording: Recording) -> float:
     """Return the largest normal force of any texel at any frame, N; one newton without any contact."""
-    return _peak(sensor.normal_force for sensor in recording.sensors.values())
+    return _peak(sensor.normal_force for part in recording.blocks() for sensor in part.sensors.values())
 
 
 def peak_pressure(recording: Recording, texels: Mapping[str, Texels]) -> float:
     """Return the largest pressure on any texel at any frame, Pa; one pascal without any contact."""
-    return _peak(pressure(recording.sensors[name].normal_force, texels[name]) for name in texels)
+    return _peak(pressure(part.sensors[name].normal_force, texels[name]) for part in recording.blocks() for name in texels)
 
 
 def _peak(values: Iterable[np.ndarray]) -> float:
@@ -114,7 +114,8 @@ def _peak(values: Iterable[np.ndarray]) -> float:
 
 def peak_shear(recording: Recording) -> float:
     """Return the largest shear force of any texel at any frame, N; zero without any."""
-    return max((float(np.linalg.norm(s.shear, axis=2).max(initial=0.0)) for s in recording.sensors.values()), default=0.0)
+    sensors = (sensor for part in recording.blocks() for sensor in part.sensors.values())
+    return max((float(np.linalg.norm(sensor.shear, axis=2).max(initial=0.0)) for sensor in sensors), default=0.0)
 
 
 def rounded_limit(value: float) -> float:

@@ -17,11 +17,15 @@ from ...io.bake_reader import Bake
 from ...io.csv_table import harmless_cell
 from ...io.file_writing import atomic_write, writable_folder
 from ...jobs.progress import Job
+from ...model.recording import Recording, SensorRecording
 from ...response import metrics
 from ..exporter import Exporter, sensor_progress
 
 _QUANTITIES = ("normal_force", "shear_x", "shear_y", "depth", "slip", "contact", "reading")
 """Quantities of a texel; each gets a table of its own."""
+_SHEAR = ("shear_x", "shear_y")
+_NUMBER_BYTES = 16
+"""Bytes of a number with a sign, nine digits, a point, an exponent and a comma."""
 _DIGITS = 9
 """Significant digits: more than any measurement has, in about half the space of a full double."""
 
@@ -32,8 +36,10 @@ def write_csv(bake: Bake, folder: Path, _style: FigureStyle) -> Job[list[Path]]:
     header = ["frame", "time"] + [
         f"{body} {key}" for body in recording.body_names for key in ("x", "y", "z", "qw", "qx", "qy", "qz")
     ]
-    rows = np.column_stack([recording.frames, recording.times, recording.poses.reshape(len(recording.frames), -1)])
-    _write_table(folder / "bodies.csv", header, rows)
+    tables = (
+        np.column_stack([part.frames, part.times, part.poses.reshape(len(part.frames), -1)]) for part in recording.blocks()
+    )
+    _write_table(folder / "bodies.csv", header, tables)
     written = [folder / "bodies.csv"]
     for name, stem in folder_names(bake.texels).items():
         yield sensor_progress(bake, name)
@@ -44,19 +50,36 @@ def write_csv(bake: Bake, folder: Path, _style: FigureStyle) -> Job[list[Path]]:
 
 def _write_sensor(bake: Bake, name: str, folder: Path) -> list[Path]:
     """Write the tables of one sensor and return them."""
-    recorded, texels = bake.recording.sensors[name], bake.texels[name]
-    clock = np.column_stack([bake.recording.frames, bake.recording.times])
-    tables = {"texels": _texel_table(texels)}
-    columns = [f"texel_{i}" for i in range(len(texels))]
-    channels = {"shear_x": recorded.shear[:, :, 0], "shear_y": recorded.shear[:, :, 1]}
+    recording, texels = bake.recording, bake.texels[name]
+    header, table = _texel_table(texels)
+    _write_table(folder / "texels.csv", header, [table])
+    columns = ["frame", "time", *(f"texel_{i}" for i in range(len(texels)))]
     for key in _QUANTITIES:
-        values = channels[key] if key in channels else getattr(recorded, key)
-        tables[key] = ["frame", "time", *columns], np.column_stack([clock, values])
+        tables = (np.column_stack([_clock(part), _channel(part.sensors[name], key)]) for part in recording.blocks())
+        _write_table(folder / f"{key}.csv", columns, tables)
     header = ["frame", "time", "normal", "shear", "texels touching", "slip share"]
     header += [f"{key}_{axis}" for key in ("force", "torque", "centre") for axis in "xyz"]
-    total = np.column_stack(
+    _write_table(folder / "sums.csv", header, (_sums(bake, name, part) for part in recording.blocks()))
+    return [folder / f"{key}.csv" for key in ("texels", *_QUANTITIES, "sums")]
+
+
+def _clock(part: Recording) -> np.ndarray:
+    return np.column_stack([part.frames, part.times])
+
+
+def _channel(sensor: SensorRecording, key: str) -> np.ndarray:
+    """(F, n) values of a quantity."""
+    if key in _SHEAR:
+        return sensor.shear[:, :, _SHEAR.index(key)]
+    return np.asarray(getattr(sensor, key))
+
+
+def _sums(bake: Bake, name: str, part: Recording) -> np.ndarray:
+    """Return the sums of a sensor for some frames."""
+    recorded, texels = part.sensors[name], bake.texels[name]
+    return np.column_stack(
         [
-            clock,
+            _clock(part),
             recorded.normal_force.sum(axis=1),
             np.linalg.norm(metrics.net_shear(recorded, texels), axis=1),
             recorded.contact.sum(axis=1),
@@ -66,10 +89,6 @@ def _write_sensor(bake: Bake, name: str, folder: Path) -> list[Path]:
             recorded.centre_of_pressure,
         ]
     )
-    tables["sums"] = header, total
-    for key, table in tables.items():
-        _write_table(folder / f"{key}.csv", *table)
-    return [folder / f"{key}.csv" for key in tables]
 
 
 def _texel_table(texels: Texels) -> tuple[list[str], np.ndarray]:
@@ -81,11 +100,19 @@ def _texel_table(texels: Texels) -> tuple[list[str], np.ndarray]:
     return header, np.column_stack(table)
 
 
-def _write_table(path: Path, header: Sequence[str], rows: Iterable[Sequence[float]]) -> None:
+def _write_table(path: Path, header: Sequence[str], tables: Iterable[np.ndarray]) -> None:
+    """Write tables below one another."""
     with atomic_write(path) as temporary, open(temporary, "w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
         writer.writerow([harmless_cell(name) for name in header])
-        writer.writerows([f"{value:.{_DIGITS}g}" for value in row] for row in rows)
+        for table in tables:
+            writer.writerows([f"{value:.{_DIGITS}g}" for value in row] for row in table)
 
 
-EXPORTER = Exporter("csv", "CSV", "Tables, one column per texel", 0, write_csv)
+def _csv_bytes(bake: Bake) -> float:
+    """Return an estimate from above of the bytes of all tables."""
+    per_frame = 7 * len(bake.recording.body_names) + sum(len(_QUANTITIES) * len(texels) + 32 for texels in bake.texels.values())
+    return float(_NUMBER_BYTES * per_frame * len(bake.recording.frames))
+
+
+EXPORTER = Exporter("csv", "CSV", "Tables, one column per texel", 0, write_csv, _csv_bytes)

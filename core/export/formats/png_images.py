@@ -13,6 +13,7 @@ from ...figures import color_maps
 from ...figures.figure_style import FigureStyle
 from ...io.bake_folder import folder_names
 from ...io.bake_reader import Bake
+from ...io.disk_space import BLOCK
 from ...io.file_writing import atomic_write, writable_folder
 from ...jobs.progress import Job
 from ..exporter import Exporter, sensor_progress
@@ -32,10 +33,11 @@ def write_png(bake: Bake, folder: Path, style: FigureStyle) -> Job[list[Path]]:
         yield sensor_progress(bake, name)
         own_folder = writable_folder(folder / stem, create=True)
         texels = bake.texels[name]
-        layout, values = texels.layout, style.values(recording.sensors[name], texels)
+        layout, recorded = texels.layout, recording.sensors[name]
         mask = layout.mask()
         magnified = max(1, -(-_LEAST_PIXELS // max(layout.shape)))
-        for frame, own in zip(recording.frames, values, strict=True):
+        for i, frame in enumerate(recording.frames):
+            own = style.values(recorded.at(i), texels)
             color = color_maps.colors(style.colour_map, layout.image(own).ravel() / top).reshape(*layout.shape, 3)
             pixels = np.dstack([color, mask])[::-1]
             pixels = np.repeat(np.repeat(pixels, magnified, axis=0), magnified, axis=1)
@@ -56,4 +58,10 @@ def write_png(bake: Bake, folder: Path, style: FigureStyle) -> Job[list[Path]]:
     return written
 
 
-EXPORTER = Exporter("png", "PNG", "Every tactile image as a picture in colours", 3, write_png)
+def _png_bytes(bake: Bake) -> float:
+    """Return an estimate from above of the bytes of all pictures; magnified pixels are packed well."""
+    pixels = [int(np.prod(texels.layout.shape)) for texels in bake.texels.values()]
+    return float(len(bake.recording.frames) * sum(2 * BLOCK + 4 * count for count in pixels))
+
+
+EXPORTER = Exporter("png", "PNG", "Every tactile image as a picture in colours", 3, write_png, _png_bytes)

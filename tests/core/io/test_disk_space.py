@@ -23,5 +23,5 @@ def test_the_estimate_of_a_bake_holds_recordings_and_images():
 
 def test_a_disk_that_is_too_small_is_named(tmp_path):
     require_space(tmp_path / "not" / "yet", 1.0, "The bake")
-    with pytest.raises(FileError, match=r"^The bake needs at least 1\d+ MB and the disk of '.*yet' has \d+ MB left: free"):
+    with pytest.raises(FileError, match=r"^The bake needs up to 1\d+ MB and the disk of '.*yet' has \d+ MB left: free"):
         require_space(tmp_path / "not" / "yet", 1e24, "The bake")

@@ -1,13 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Frames in a file that grows: they come back bit for bit, after a kill as well, and no length of a run fills the memory."""
 
+import zipfile
+
 import numpy as np
 import pytest
 
-from palpate.core.io import frame_rows
+from palpate.core.errors import FileError
+from palpate.core.io import frame_rows, npz
 from palpate.core.io.frame_rows import FrameRows, row_type
 from palpate.core.io.growing_file import GrowingFile
-from palpate.core.io.recording_npz import save_recording
+from palpate.core.io.recording_npz import load_recording, save_recording
 from palpate.core.model import recording as model
 from palpate.core.model.recording import SENSOR_FIELDS, Frame, Recording, SensorFrame
 
@@ -122,3 +125,38 @@ def test_a_growing_file_knows_its_checksum(tmp_path):
     file.sync()
     assert (tmp_path / "file").read_bytes() == b"abc"
     file.close()
+
+
+def test_a_long_recording_is_mapped_when_it_is_read(tmp_path, monkeypatch):
+    expected = Recording.stack(frames(30), BODIES, 1e-4, "d")
+    save_recording(tmp_path / "recording.npz", expected)
+    monkeypatch.setattr(npz, "MAPPED_BYTES", 1000)
+    found = load_recording(tmp_path / "recording.npz")
+    for name, array in arrays_of(expected).items():
+        own = arrays_of(found)[name]
+        assert own.dtype == array.dtype and own.shape == array.shape and own.tobytes() == array.tobytes(), name
+    assert not found.poses.flags.writeable and found.frames.flags.writeable
+
+
+@pytest.mark.parametrize("change", ["truncated", "another checksum", "more than it says", "less than it says", "columns first"])
+def test_a_long_recording_that_is_damaged_is_refused(tmp_path, monkeypatch, change):
+    path = tmp_path / "recording.npz"
+    save_recording(path, Recording.stack(frames(40), BODIES, 1e-4, "d"))
+    monkeypatch.setattr(npz, "MAPPED_BYTES", 1000)
+    with zipfile.ZipFile(path) as archive:
+        members = {name: archive.read(name) for name in archive.namelist()}
+    content = members["poses.npy"]
+    if change == "columns first":
+        content = content.replace(b"'fortran_order': False,", b"'fortran_order': True, ")
+    members["poses.npy"] = {
+        "truncated": content[:50],
+        "more than it says": content + bytes(8),
+        "less than it says": content[:-8],
+    }.get(change, content)
+    with zipfile.ZipFile(path, "w") as archive:
+        for name, member in members.items():
+            archive.writestr(name, member)
+    if change == "another checksum":
+        path.write_bytes(path.read_bytes().replace(content[-64:], content[-64:-1] + bytes([content[-1] ^ 1])))
+    with pytest.raises(FileError, match=r"recording.npz' is damaged or no recording \(.*\): bake again"):
+        load_recording(path)
