@@ -216,8 +216,10 @@ def row_blocks(array: np.ndarray) -> Iterator[slice]:
 
 def release_pages(array: np.ndarray) -> None:
     """Let go of the memory that holds what was read of a mapped file; the array stays as it is, and others are left alone."""
-    base = array
+    base: object = array
     while isinstance(base, np.ndarray) and base.base is not None:
         base = base.base
+    if isinstance(base, memoryview):
+        base = base.obj
     if isinstance(base, mmap.mmap) and hasattr(mmap, "MADV_DONTNEED") and not array.flags.writeable:
         base.madvise(mmap.MADV_DONTNEED)  # what is asked for again comes from the file

@@ -2,6 +2,7 @@
 """Frames in a file that grows: they come back bit for bit, after a kill as well, and no length of a run fills the memory."""
 
 import zipfile
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -71,6 +72,24 @@ def test_frames_come_back_bit_for_bit(tmp_path, monkeypatch, mapped):
     expected.warnings, expected.step_reason = found.warnings, found.step_reason
     save_recording(tmp_path / "at once.npz", expected)
     assert (tmp_path / "streamed.npz").read_bytes() == (tmp_path / "at once.npz").read_bytes()
+
+
+@pytest.mark.skipif(not Path("/proc/self/smaps").exists(), reason="only Linux tells what of a file is in memory")
+def test_blocks_leave_no_file_in_memory(tmp_path, monkeypatch):
+    monkeypatch.setattr(frame_rows, "IN_MEMORY_BYTES", 0)
+    monkeypatch.setattr(model, "BLOCK_BYTES", 1 << 16)
+    rows = written(tmp_path / "mapped rows", frames(3000))
+    found = rows.recording(1e-4, "", (), "")
+
+    def resident():
+        parts = Path("/proc/self/smaps").read_text().split("mapped rows")
+        return int(parts[1].split("Rss:")[1].split()[0])
+
+    assert np.isfinite(found.poses).all() and resident() > 1000  # kB: all of it was read
+    assert sum(len(part.frames) for part in found.blocks()) == 3000
+    assert resident() < 200
+    save_recording(tmp_path / "recording.npz", found)
+    assert resident() < 200
 
 
 def test_rows_after_a_checkpoint_are_cut_off(tmp_path):
