@@ -324,6 +324,14 @@ def box_of(segment: Segment, part: float) -> Box:
     )  # fmt: skip
 
 
+NOT_MET = 2.0
+"""Position that stands for no intersection: beyond the segment's tip at 1."""
+MISSES = 9.0
+"""What :func:`intersect_triangle` returns for a triangle that the segment does not cross."""
+LEAVING_OFFSET = -3.0
+"""A crossing that leaves a surface at the position t is returned as ``LEAVING_OFFSET - t``, which is negative."""
+
+
 @kernel
 def segment_entry(segment: Segment, mesh: int, hint: int, tree: Tree) -> tuple[float, int, float]:
     """Find where a segment first enters a surface from outside.
@@ -341,14 +349,14 @@ def segment_entry(segment: Segment, mesh: int, hint: int, tree: Tree) -> tuple[f
     Returns
     -------
     t : float
-        Position on the segment, 0 at the base and 1 at the tip; 2 when there is none.
+        Position on the segment, 0 at the base and 1 at the tip; :data:`NOT_MET` when there is none.
     triangle : int
         In leaf order, -1 when there is none.
-    exit : float
+    leaving : float
         Position of the nearest intersection that leaves a surface, as far as it lies before `t`: then the base is inside the
-        object. Beyond `t` it may be any such intersection; 2 when none was met.
+        object. Beyond `t` it may be any such intersection; :data:`NOT_MET` when none was met.
     """
-    t, triangle, leaving = 2.0, -1, 2.0
+    t, triangle, leaving = NOT_MET, -1, NOT_MET
     shear = shear_to_axis(segment)
     if hint >= 0:
         u = intersect_triangle(segment, shear, tree.faces, hint)
@@ -368,14 +376,17 @@ def segment_entry(segment: Segment, mesh: int, hint: int, tree: Tree) -> tuple[f
                     t, triangle = u, i
                     box = box_of(segment, u)
             elif u < 0.0:
-                leaving = min(leaving, -3.0 - u)
+                leaving = min(leaving, LEAVING_OFFSET - u)
         node += 1
     return t, triangle, leaving
 
 
 @kernel
 def intersect_triangle(segment: Segment, shear: Shear, faces: np.ndarray, i: int) -> float:
-    """Position on the segment where it crosses a triangle: t in 0…1 entering, -3 - t leaving, 9 when it misses.
+    """Return the position on the segment where it crosses a triangle.
+
+    A position t from 0 to 1 is a crossing that enters the surface. A crossing that leaves it is ``LEAVING_OFFSET - t``, and no
+    crossing is :data:`MISSES`.
 
     The corners are projected along the segment into a plane, each computed from the corner alone, and the origin must lie on
     one side of all three edges. Rounding may turn the sign of an edge into zero, which counts as inside on both sides, but
@@ -392,14 +403,14 @@ def intersect_triangle(segment: Segment, shear: Shear, faces: np.ndarray, i: int
     u, v, w = ax * by - ay * bx, bx * cy - by * cx, cx * ay - cy * ax
     low, high = min(u, v, w), max(u, v, w)
     if (low < 0.0 and high > 0.0) or (low == 0.0 and high == 0.0):
-        return 9.0
+        return MISSES
     slope = faces[i, 9] * dx + faces[i, 10] * dy + faces[i, 11] * dz
     if slope == 0.0:
-        return 9.0
+        return MISSES
     t = height / slope
     if not 0.0 <= t <= 1.0:
-        return 9.0
-    return t if slope < 0.0 else -3.0 - t
+        return MISSES
+    return t if slope < 0.0 else LEAVING_OFFSET - t
 
 
 @kernel

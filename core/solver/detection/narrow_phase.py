@@ -16,8 +16,9 @@ from .deformation import place_all_triangles, place_listed_triangles
 from .detection_data import DetectionData
 from .neighbour_lists import find_entry, rebuild_list
 
-JUST_TOO_DEEP = 0.9
-"""Share of the maximum penetration from which on a point, whose segment then meets nothing, may have been pressed past it."""
+NEARLY_TOO_DEEP = 0.9
+"""Share of the maximum penetration. If a point was deeper than this a step ago and its segment meets nothing now, it may be
+pressed past the maximum penetration now."""
 
 
 @kernel
@@ -279,7 +280,7 @@ def _is_too_deep(
         and min(segment.oz, tz) <= bounds[root, 5] and max(segment.oz, tz) >= bounds[root, 2]
     )  # fmt: skip
     moved_past = in_box and before == TOO_DEEP
-    if in_box and before >= 0 and state.pressed_share[slot] > JUST_TOO_DEEP:
+    if in_box and before >= 0 and state.pressed_share[slot] > NEARLY_TOO_DEEP:
         place_all_triangles(target, detection.surfaces, tree)
         moved_past = _is_inside(segment, target, tree)
     return leaving <= 1.0 or moved_past

@@ -25,6 +25,8 @@ import numpy as np
 
 from ...compiled.kernels import inlined, kernel
 from ...geometry.bvh import (
+    LEAVING_OFFSET,
+    NOT_MET,
     Box,
     Segment,
     Shear,
@@ -79,11 +81,11 @@ def find_entry(
         triangle, t = _walk_to_triangle(segment, known, tree)
         if triangle >= 0:
             lists.known_triangle[slot] = triangle
-            return t, triangle if 0.0 <= t <= 1.0 else -1, 2.0
+            return t, triangle if 0.0 <= t <= 1.0 else -1, NOT_MET
         return segment_entry(segment, target, hint, tree)
     if known >= 0:
         t = intersect_plane(segment, tree.faces, known)
-        return t, known if 0.0 <= t <= 1.0 else -1, 2.0
+        return t, known if 0.0 <= t <= 1.0 else -1, NOT_MET
     if count >= 0:
         return _entry_from_list(segment, slot, lists, tree.faces)
     return segment_entry(segment, target, hint, tree)
@@ -92,7 +94,7 @@ def find_entry(
 @kernel
 def _entry_from_list(segment: Segment, slot: int, lists: NeighbourLists, faces: np.ndarray) -> tuple[float, int, float]:
     """Return the same as :func:`.segment_entry`, from a list of all triangles that the segment can meet."""
-    t, triangle, leaving = 2.0, -1, 2.0
+    t, triangle, leaving = NOT_MET, -1, NOT_MET
     shear = shear_to_axis(segment)
     for j in range(lists.length[slot]):
         i = lists.triangles[slot, j]
@@ -101,7 +103,7 @@ def _entry_from_list(segment: Segment, slot: int, lists: NeighbourLists, faces: 
             if u < t:
                 t, triangle = u, i
         elif u < 0.0:
-            leaving = min(leaving, -3.0 - u)
+            leaving = min(leaving, LEAVING_OFFSET - u)
     return t, triangle, leaving
 
 
@@ -149,11 +151,11 @@ def _walk_to_triangle(segment: Segment, triangle: int, tree: Tree) -> tuple[int,
         if least > 0.0:
             return triangle, intersect_plane(segment, tree.faces, triangle)
         if not least < 0.0:
-            return -1, 2.0
+            return -1, NOT_MET
         triangle = tree.adjacent[triangle, 0 if u == least else (1 if v == least else 2)]
         if triangle < 0:
-            return -1, 2.0
-    return -1, 2.0
+            return -1, NOT_MET
+    return -1, NOT_MET
 
 
 @kernel
