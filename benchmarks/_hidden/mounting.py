@@ -18,8 +18,8 @@ RATE, SECONDS = 40.0, 16.0
 TRIALS = ("fit", "fit", "fit", "fit", "check", "check")
 KINDS = ("mounted", "mounted-beside")
 LARGEST = {"shift": 2.5e-3, "height": 0.8e-3, "turn": 0.12, "tilt": 0.05}
-"""Largest errors of a mounted sensor: metres along the surface and along the normal, rad about the normal and about the surface's
-axes; each number is at least a quarter of its largest."""
+"""Largest errors of a mounted sensor: metres along the surface and along the normal, rad about the normal and about the axes of
+the surface; each number is at least a quarter of its largest."""
 
 
 @dataclass(frozen=True)

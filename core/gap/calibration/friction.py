@@ -6,7 +6,7 @@ Such a curve identifies `mus`, `mud`, `x0` and `ct`. The stiffness and the dampi
 the velocity changes: a recording with a `time` column that starts from rest identifies `sigma0` and `sigma1` as well.
 
 The fit starts from the curve of steady sliding, whose values other than `x0` are linear, and refines all values by nonlinear
-least squares.
+least squares. For a recording over time it starts from several stiffnesses of the bristles.
 """
 
 from __future__ import annotations
@@ -29,6 +29,10 @@ STEADY = ("mus", "mud", "x0", "ct")
 DYNAMIC = (*STEADY, "sigma0", "sigma1")
 NORMAL_FORCES = (1e-9, 1e9)
 """Least and largest normal force on a texel, N: beyond it the unit is wrong or numbers overflow."""
+STIFFNESSES, BEST_STARTS = 16, 2
+"""Number of stiffnesses of the bristles that are tried as they are, and of those from which the fit starts."""
+DAMPING_SHARE = 0.01
+"""Damping of the bristles in seconds, as a multiple of their stiffness, that is tried beside the given one."""
 
 
 @dataclass(frozen=True)
@@ -172,10 +176,35 @@ def fit_friction(data: FrictionData, normal_force: float, parameters: SensorPara
         raise ParameterError("A friction curve needs measurements at different velocities: add some.")
     start = parameters or SensorParameters()
     steady = _steady_start(data, normal_force)
-    names = STEADY if data.time is None else DYNAMIC
-    if data.time is not None:
-        steady |= {"sigma0": start.sigma0, "sigma1": start.sigma1}
-    return _refine(data, normal_force, start, names, steady)
+    if data.time is None:
+        return _refine(data, normal_force, start, STEADY, steady)
+    starts = _dynamic_starts(data, normal_force, start, steady)
+    return min((_refine(data, normal_force, start, DYNAMIC, values) for values in starts), key=lambda one: one.residual)
+
+
+def _dynamic_starts(
+    data: FrictionData, normal_force: float, base: SensorParameters, steady: dict[str, float]
+) -> list[dict[str, float]]:
+    """Start values with several stiffnesses of the bristles: the given one, and those that fit best among many as they are.
+
+    The misfit has a local minimum where bristles are so soft that they never slip, and another where they are so stiff that
+    they slip at once. A stiffness shows if bristles reach the level of friction within the travel, but not within one sample.
+    """
+    assert data.time is not None
+    given = steady | {"sigma0": base.sigma0, "sigma1": base.sigma1}
+    step = np.abs(data.velocity[1:]) * np.diff(data.time)
+    if not step.any():
+        return [given]
+    level = max(steady["mus"], 1e-6) * normal_force
+    softest, stiffest = level / float(step.sum()), level / float(step[step > 0].min())
+    tried = []
+    for sigma0 in np.geomspace(softest, max(stiffest, 10.0 * softest), STIFFNESSES):
+        for sigma1 in (base.sigma1, DAMPING_SHARE * float(sigma0)):
+            values = steady | {"sigma0": float(sigma0), "sigma1": sigma1}
+            misfit = friction_over_time(data.time, data.velocity, normal_force, _with(base, values)) - data.force
+            tried.append((float(misfit @ misfit), values))
+    tried.sort(key=lambda one: one[0])
+    return [given, *(values for _, values in tried[:BEST_STARTS])]
 
 
 def _steady_start(data: FrictionData, normal_force: float) -> dict[str, float]:

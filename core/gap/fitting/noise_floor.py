@@ -26,6 +26,11 @@ WHITE_CORRELATION = 0.05
 """Autocorrelation below which samples count as uncorrelated."""
 MAD_TO_DEVIATION = 1.4826
 """Standard deviation of a normal distribution divided by its median absolute deviation."""
+DEAD_BAND, LEAST_BAND = 5.0, 1e-4
+"""Half the width of the dead band behind which cycles and holds of a measured load are counted, in standard deviations of its
+noise; and the share of the largest load from which on there is such noise."""
+ALTERNATION = -0.3
+"""Correlation of neighbouring second differences of a load, below which they are noise."""
 PRESSED_SHARE, UNLOADING_SHARE = 0.05, 0.1
 """Shares of the largest load: above the first the sensor counts as pressed; a decrease by the second is an unloading."""
 LEAST_SLIDING_SPEED = 1e-5
@@ -209,9 +214,10 @@ def coverage(predictors: Sequence[Predictor]) -> Coverage:
         pressed = load.sum(axis=1)
         at = pressed > PRESSED_SHARE * max(float(pressed.max(initial=0.0)), 1e-300)
         centres.append(load[at] @ texels.position / pressed[at, None])
-        total = load.max(axis=1)
-        full = max(total.max(initial=0.0), 1e-300)
-        rate = np.gradient(total, s.time) / full
+        raw = load.max(axis=1)
+        full = max(raw.max(initial=0.0), 1e-300)
+        total, rate, band = _without_load_noise(raw, s.time)
+        rate = rate / full
         pace = hold_rate_limit(rate[total > 0])
         speeds.append(rate[rate > pace])
         unloading |= bool((np.maximum.accumulate(total) - total).max() > UNLOADING_SHARE * full)
@@ -221,8 +227,7 @@ def coverage(predictors: Sequence[Predictor]) -> Coverage:
         levels += [float(total[a:b].mean()) for a, b in holds if b - a >= SHORTEST_STRETCH]
         idle = s.time[(load <= UNLOADED_SHARE * max(float(load.max(initial=0.0)), 1e-300)).any(axis=1)]
         rest = max(rest, float(np.ptp(idle)) / float(np.ptp(s.time)) if len(idle) else 0.0)
-        starts = np.flatnonzero((total > 0) & (np.concatenate([[0.0], total[:-1]]) <= 0))
-        cycles = max(cycles, len(starts))
+        cycles = max(cycles, _cycle_count(total, max(UNLOADED_SHARE * full, band)))
         slides |= bool(s.slide.max(initial=0.0) > LEAST_SLIDING_SPEED)
     quick = np.concatenate(speeds) if speeds else np.zeros(0)
     spread = float(np.quantile(quick, 0.9) / np.quantile(quick, 0.1)) if len(quick) > 4 else 1.0
@@ -237,6 +242,54 @@ def coverage(predictors: Sequence[Predictor]) -> Coverage:
         load_moves=_load_moves(np.concatenate(centres), texels.area, touched),
         held_load_ratio=max(levels) / min(levels) if levels else 1.0,
     )
+
+
+def _without_load_noise(load: np.ndarray, time: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
+    """A load (T,) behind a dead band as wide as its noise, its rate (T,), and the band.
+
+    A load that is programmed has no noise, and is returned as it is. Behind the dead band a measured load only moves if it
+    leaves the band. Where it rests there, its rate is that of a line through the measured values: a slow ramp is no hold.
+    """
+    band = DEAD_BAND * _load_noise(load)
+    if not band > LEAST_BAND * max(float(load.max(initial=0.0)), 1e-300):
+        return load, np.gradient(load, time), 0.0
+    out = np.empty_like(load)
+    at = low = high = float(load[0])
+    edges = [0]  # of pieces in which it moves by less than half the band
+    for i, value in enumerate(load.tolist()):
+        at = min(max(at, value - band), value + band)
+        low, high = min(low, at), max(high, at)
+        if high - low > 0.5 * band:
+            edges.append(i)
+            low = high = at
+        out[i] = at
+    out = np.maximum(out, 0.0)
+    rate = np.gradient(out, time)
+    for a, b in zip(edges, [*edges[1:], len(load)], strict=True):
+        if b - a >= SHORTEST_STRETCH:
+            t = time[a:b] - time[a:b].mean()
+            rate[a:b] = float(t @ load[a:b]) / float(t @ t)
+    return out, rate, band
+
+
+def _load_noise(load: np.ndarray) -> float:
+    """Standard deviation of the noise of a load (T,); 0 if its second differences are those of a smooth curve.
+
+    Those of white noise have a correlation of -2/3 from sample to sample, those of a curve a positive one.
+    """
+    second = np.diff(load, 2)
+    pressed = load[1:-1] > PRESSED_SHARE * float(load.max(initial=0.0))  # a force below zero counts as none
+    moving = second[pressed & (second != 0.0)]
+    if len(moving) < SHORTEST_STRETCH or float(second[1:] @ second[:-1]) > ALTERNATION * float(second @ second):
+        return 0.0
+    return float(MAD_TO_DEVIATION * np.median(np.abs(moving)) / np.sqrt(6.0))
+
+
+def _cycle_count(load: np.ndarray, band: float) -> int:
+    """Number of times that a load (T,) rises above twice a dead band after it was within the band, or begins above it."""
+    state = np.where(load > 2.0 * band, 1, np.where(load <= band, 0, -1))
+    known = state[state >= 0]
+    return int(np.count_nonzero(np.diff(known, prepend=0) > 0))
 
 
 def _load_moves(centre: np.ndarray, area: np.ndarray, touched: np.ndarray) -> bool:

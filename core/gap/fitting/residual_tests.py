@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..forward.contact_phases import features, relative_load
+from ..forward.contact_phases import features, missing_readings, relative_load
 from ..forward.predictor import Predictor
 
 LEAST_STRUCTURE = 0.03
@@ -58,8 +58,11 @@ def residual_structure(predictors: Sequence[Predictor], residuals: Sequence[np.n
     found = [features(predictor, residual) for predictor, residual in zip(predictors, residuals, strict=True)]
     sizes = {name: len(columns) for groups in found for name, columns in groups.items()}
     folds = []
-    for number, (groups, residual) in enumerate(zip(found, residuals, strict=True)):
+    for number, (predictor, groups, residual) in enumerate(zip(predictors, found, residuals, strict=True)):
         table = _table(groups, sizes, residual.shape)
+        missing = missing_readings(predictor)
+        if missing is not None:
+            table[:, missing] = 0.0
         part = slice(None)
         if halves:
             middle = len(residual) // 2
@@ -103,9 +106,10 @@ def _share_predicted_by_texel(predictors: Sequence[Predictor], residuals: Sequen
     """The same for a constant and a gain of each texel."""
     parts = []
     for predictor, r in zip(predictors, residuals, strict=True):
-        d = relative_load(predictor.stimulus)
-        moments = [np.full(d.shape[1], float(len(d))), d.sum(axis=0), (d * d).sum(axis=0), r.sum(axis=0), (d * r).sum(axis=0)]
-        parts.append(np.stack(moments))
+        d, missing = relative_load(predictor.stimulus), missing_readings(predictor)
+        known = np.ones(d.shape) if missing is None else (~missing).astype(float)
+        d = d * known
+        parts.append(np.stack([known.sum(axis=0), d.sum(axis=0), (d * d).sum(axis=0), r.sum(axis=0), (d * r).sum(axis=0)]))
     left = 0.0
     for i, (predictor, r) in enumerate(zip(predictors, residuals, strict=True)):
         one, d1, d2, r1, rd = sum(p for j, p in enumerate(parts) if j != i)
@@ -114,5 +118,8 @@ def _share_predicted_by_texel(predictors: Sequence[Predictor], residuals: Sequen
         det = one * d2 - d1 * d1
         offset, gain = (d2 * r1 - d1 * rd) / det, (one * rd - d1 * r1) / det
         miss = r - offset - gain * relative_load(predictor.stimulus)
+        missing = missing_readings(predictor)
+        if missing is not None:
+            miss[missing] = 0.0
         left += float(np.vdot(miss, miss))
     return 1.0 - left / total

@@ -87,6 +87,15 @@ FEATURES: dict[str, str] = {
 }
 
 
+def missing_readings(predictor: Predictor) -> np.ndarray | None:
+    """Return where readings are missing, (T, n) bool; None if none is, or if there are no readings at all."""
+    reading = predictor.trial.reading
+    if reading is None:
+        return None
+    missing = ~np.isfinite(reading)
+    return missing if missing.any() and not missing.all() else None
+
+
 def features(predictor: Predictor, residual: np.ndarray) -> dict[str, np.ndarray]:
     """Return features of each texel at each sample, arrays (f, T, n) by group of :data:`FEATURES`.
 
@@ -127,9 +136,12 @@ def features(predictor: Predictor, residual: np.ndarray) -> dict[str, np.ndarray
     if n > 1:
         around = _neighbour_load(predictor, d)
         groups["neighbours"] = [around - d, around * (d > 0), np.broadcast_to(d.mean(axis=1, keepdims=True), d.shape)]
-        others = (residual.sum(axis=1, keepdims=True) - residual) / (n - 1)
+        # A missing reading is no residual of zero: it is no other texel either.
+        missing = missing_readings(predictor)
+        known = np.ones(d.shape) if missing is None else (~missing).astype(float)
+        others = (residual.sum(axis=1, keepdims=True) - residual) / np.maximum(known.sum(axis=1, keepdims=True) - known, 1.0)
         groups["common mode"] = [others]
-        shared = [_pattern_of_others(residual, d), _pattern_of_others(residual, rate)]
+        shared = [_pattern_of_others(residual, shape, known) for shape in (d, rate)]
         groups["shared by loaded texels"] = shared
     return {name: np.stack(columns) for name, columns in groups.items()}
 
@@ -184,8 +196,12 @@ def _neighbour_load(predictor: Predictor, d: np.ndarray) -> np.ndarray:
     return mean / count
 
 
-def _pattern_of_others(residual: np.ndarray, shape: np.ndarray) -> np.ndarray:
-    """Residual that each texel would have if all followed `shape` with one amplitude per sample, found from the others."""
+def _pattern_of_others(residual: np.ndarray, shape: np.ndarray, known: np.ndarray) -> np.ndarray:
+    """Residual that each texel would have if all followed `shape` with one amplitude per sample, found from the others.
+
+    `known` (T, n) is zero where a reading is missing, and one elsewhere.
+    """
+    shape = shape * known
     top = (residual * shape).sum(axis=1, keepdims=True) - residual * shape
     square = (shape * shape).sum(axis=1, keepdims=True) - shape * shape
     # A texel that is nearly alone under load has no others to compare with.

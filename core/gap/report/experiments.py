@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from ..fitting.residual_tests import LEAST_STRUCTURE
 from ..selection.findings import Diagnosis
 from ..selection.identifiability import LEAST_CYCLES
 
@@ -92,7 +93,7 @@ def _hint(result: Diagnosis) -> str:
             f"line at {result.line.frequency:.3g} Hz (or at a higher frequency that the sampling folds to it) "
             "acts without any load"
         )
-    return HINTS.get(result.structure.strongest, REPEAT)
+    return HINTS.get(result.structure.strongest, REPEAT) if result.structure.total >= LEAST_STRUCTURE else REPEAT
 
 
 def _lacking(result: Diagnosis) -> list[str]:

@@ -17,6 +17,8 @@ SURE = 0.5
 """Confidence from which on an effect counts as found."""
 MANY_FLOORS = 3.0
 """The headline says how much stays in the check recordings from this many times the noise floor on."""
+LEAST_SHARE = 0.01
+"""A quantity that predicts a smaller share of what is left is not said to predict it."""
 FRICTION_MATTERS = 1.5
 """The headline mentions the base model's friction if without it the error would be at least this many times as large."""
 
@@ -113,7 +115,7 @@ def _unexplained(result: Diagnosis, errors: GapErrors, sure: list[Finding]) -> s
         said = f"a line at {line.frequency:.3g} Hz of {line.amplitude:.3g} {unit}, there without load too"
         return f"Unexplained: {said}, is {line.share:.0%} of the noise without load.{part}"
     after, structure = errors.amended["fit"] or 0.0, result.structure
-    if structure.shares.get(structure.strongest, 0.0) < LEAST_STRUCTURE:
+    if structure.total < LEAST_STRUCTURE or structure.shares.get(structure.strongest, 0.0) < LEAST_SHARE:
         said = f"nothing that was looked at predicts what is left ({after:.2%} of the range)"
     else:
         said = f"what is left ({after:.2%} of the range) varies most with {FEATURES[structure.strongest]}"

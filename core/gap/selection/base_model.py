@@ -10,10 +10,19 @@ import numpy as np
 
 from ...model.sensor_parameters import FITTED_FRICTION_PARAMETERS
 from ..dataset.rig import Rig
-from ..fitting.least_squares import FRICTION_LEVEL
+from ..fitting.least_squares import FRICTION_LEVEL, Fit, TrialView, fit, free_base_parameters
 from ..fitting.noise_floor import ChannelNoise, force_noise, reading_noise
 from ..forward.predictor import Model, Predictor, predictors_of
 from ..forward.response_check import check_responses
+
+FULL_STEPS, TRIAL_STEPS = 40, 6
+"""Steps of the base model's fit, and of a fit from each of several starts, of which the best goes on."""
+BRISTLE_STARTS = 5
+"""Number of stiffnesses of the bristles from which the fit starts beside the default."""
+SMALL_STEP = 0.1
+"""Quantile of the distances of sliding between two samples that counts as a small one."""
+LEAST_FRICTION = 0.05
+"""Least friction coefficient from which the stiffnesses are estimated."""
 
 
 def prepared(rig: Rig) -> tuple[list[Predictor], tuple[ChannelNoise, ChannelNoise], tuple[float, float]]:
@@ -74,6 +83,52 @@ def _line_through(x: np.ndarray, y: np.ndarray) -> tuple[float, float]:
     if not np.isfinite(slope) or slope == 0.0:
         slope = 1.0
     return slope, float(y.mean() - slope * x.mean())
+
+
+def base_fit(rig: Rig, views: Sequence[TrialView], full: float) -> Fit:
+    """Fit the base model to recordings, from several stiffnesses of the bristles if the rig does not state one.
+
+    The misfit of net forces has a local minimum where bristles are so soft that they never slip.
+
+    Parameters
+    ----------
+    rig : Rig
+    views : sequence of TrialView
+    full : float
+        Range of the readings.
+    """
+    predictors = [view.predictor for view in views]
+    start = start_model(rig, predictors)
+    names = base_parameters_to_search(rig, predictors)
+    starts = [start]
+    if "sigma0" in names and "sigma0" not in rig.given:
+        starts += _bristle_starts(views, start)
+    fits = []
+    for model in starts:
+        free = free_base_parameters(model.parameters, names, full)
+        steps = FULL_STEPS if len(starts) == 1 else TRIAL_STEPS
+        fits.append(fit(views, model, free, max_steps=steps, tolerance=1e-7, with_equations=len(starts) == 1))
+    best = min(fits, key=lambda one: one.mean)
+    return fits[0] if len(fits) == 1 else fit(views, best.model, best.free, max_steps=FULL_STEPS, tolerance=1e-7)
+
+
+def _bristle_starts(views: Sequence[TrialView], model: Model) -> list[Model]:
+    """Models with stiffnesses at which bristles slip within the whole travel, within a sample, and between."""
+    p, travels, steps, loads = model.parameters, [0.0], [], [0.0]
+    for view in views:
+        stimulus = view.predictor.stimulus
+        moved = stimulus.slide * np.diff(stimulus.time, prepend=stimulus.time[0])[:, None]
+        force = view.predictor.normal_force(model)
+        travels.append(float(moved.sum(axis=0).max(initial=0.0)))
+        steps.append(moved[moved > 0])
+        loads.append(float(force[force > 0].mean()) if (force > 0).any() else 0.0)
+    moving = np.concatenate(steps)
+    level = max(p.mus, LEAST_FRICTION) * max(loads)
+    if not len(moving) or level <= 0.0:
+        return []
+    softest = level / max(travels)
+    stiffest = max(level / float(np.quantile(moving, SMALL_STEP)), 10.0 * softest)
+    return [Model(replace(p, sigma0=float(x), sigma1=p.sigma1)) for x in np.geomspace(softest, stiffest, BRISTLE_STARTS)]
 
 
 def identified_base_parameters(rig: Rig, predictors: Sequence[Predictor]) -> list[str]:

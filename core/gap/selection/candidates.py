@@ -37,6 +37,8 @@ SIGNED_SHARE = 0.25
 """Bounds of a parameter that may have either sign, as a share of the upper bound of its magnitude."""
 LOG_RATIO = 30.0
 """A range is searched on a logarithmic scale if its ends differ by more than this ratio."""
+LEAST_WIDTH = 0.25
+"""Least width of load spreading in a fit, in pitches: below, nothing reaches the neighbours, and no derivative leads back."""
 AT_BOUND = 0.01
 """A parameter is at a bound if it differs from it by less than this share of the bound."""
 START_COUNT = 8
@@ -151,8 +153,11 @@ class Candidate:
             _, top = search_range(p, scales)
             size = max(abs(p.default), 0.1 * top) if p.unit == "1" else 0.3 * top
             high = min(p.high, TIGHTER_BOUNDS.get((self.kind.name, self.form.name, p.name), p.high))
+            low = p.low
+            if self.form.coupling is not None and p.unit == "m":
+                low = min(max(low, LEAST_WIDTH * scales.pitch), high)
             rest = float(self.form.neutral.get(p.name, p.default)) if p.per_texel else 0.0
-            made.append(FreeParameter(index, p.name, p.low, high, p.log, max(size, 1e-12), p.per_texel, rest))
+            made.append(FreeParameter(index, p.name, low, high, p.log, max(size, 1e-12), p.per_texel, rest))
         return made
 
     def effect(self, values: dict[str, float], texels: int, gain: float) -> Effect:

@@ -21,7 +21,7 @@ from ..fitting.noise_floor import SHORTEST_STRETCH, coverage
 from ..fitting.residual_tests import LEAST_STRUCTURE, ResidualStructure, residual_structure
 from ..fitting.spectral_lines import strongest_line
 from ..forward.predictor import Model
-from .base_model import base_parameters_to_search, identified_base_parameters, prepared, start_model
+from .base_model import base_fit, identified_base_parameters, prepared
 from .candidates import scales_of
 from .check_recordings import check_views, checked
 from .findings import Diagnosis
@@ -55,9 +55,7 @@ def diagnose(rig: Rig) -> Job[Diagnosis]:
     fitted = [p for p in predictors if p.trial.use == "fit"]
     view_set = view_set_of(fitted, (noise[0].deviation, noise[1].deviation))
     yield Progress("base model", BASE_MODEL_BEGINS, TOTAL_WORK)
-    start = start_model(rig, fitted)
-    free = free_base_parameters(start.parameters, base_parameters_to_search(rig, fitted), full[0])
-    base = fit(view_set.whole, start, free, max_steps=40, tolerance=1e-7)
+    base = base_fit(rig, view_set.whole, full[0])
     structure = _structure(view_set, base)
     scales = scales_of(fitted, base.model)
     result = Diagnosis(rig, predictors, noise, full, coverage(fitted), scales, base, base, structure, structure)

@@ -57,6 +57,8 @@ class Effort:
         Candidates that are fitted to a part of the data; None: all that promise anything.
     starts : int
         Starting points of each first fit.
+    trial_steps : int or None
+        Steps of a fit from each of them, before the best goes on alone; None: all go on to the end.
     max_steps, tolerance : int, float
         Of the fits (see :func:`.least_squares.fit`).
     kinds, forms : int
@@ -65,15 +67,16 @@ class Effort:
 
     most_first_fits: int | None
     starts: int
+    trial_steps: int | None
     max_steps: int
     tolerance: float
     kinds: int
     forms: int
 
 
-QUICK = Effort(most_first_fits=14, starts=1, max_steps=14, tolerance=1e-4, kinds=4, forms=2)
-THOROUGH = Effort(most_first_fits=None, starts=4, max_steps=40, tolerance=1e-6, kinds=8, forms=4)
-"""For small recordings: a single starting point loses candidates that depend strongly on their parameters."""
+QUICK = Effort(most_first_fits=14, starts=3, trial_steps=3, max_steps=14, tolerance=1e-4, kinds=4, forms=2)
+THOROUGH = Effort(most_first_fits=None, starts=4, trial_steps=None, max_steps=40, tolerance=1e-6, kinds=8, forms=4)
+"""For small recordings. A single starting point would lose candidates that depend strongly on their parameters."""
 FIRST_FIT_TOLERANCE = 1e-3
 
 
@@ -150,8 +153,7 @@ def screen(
     screened: list[ScreenedCandidate] = []
     for number, one in enumerate(kept):
         score_test = score_tests[id(view_set.quick(one.candidate, found.model))]
-        tries = [_first_fit(one.candidate, start, score_test, scales, effort) for start in one.starts[: effort.starts]]
-        screened.append(min(tries, key=lambda tried: tried.left))
+        screened.append(_best_first_fit(one, score_test, scales, effort))
         yield "fitting those that promise most", 0.35 + 0.35 * (number + 1) / len(kept), []
     last, whole = _finalists(screened, effort), ScoreTest(view_set.whole, found)
     if reasons is not None:
@@ -207,13 +209,24 @@ def _reasons_after_first_fits(screened: list[ScreenedCandidate], last: list[Scre
     }
 
 
-def _first_fit(candidate: Candidate, start: Effect, score_test: ScoreTest, scales: Scales, effort: Effort) -> ScreenedCandidate:
-    """Fit a candidate and the free parameters to the views of a score test."""
+def _best_first_fit(one: Promise, score_test: ScoreTest, scales: Scales, effort: Effort) -> ScreenedCandidate:
+    """Fit a candidate from its best starting points."""
+    starts = [score_test.model.with_effect(start) for start in one.starts[: effort.starts]]
+    steps = effort.max_steps if effort.trial_steps is None or len(starts) == 1 else effort.trial_steps
+    tries = [_first_fit(one.candidate, model, score_test, scales, steps) for model in starts]
+    best = min(tries, key=lambda tried: tried.left)
+    if steps == effort.max_steps:
+        return best
+    return _first_fit(one.candidate, best.fit.model, score_test, scales, effort.max_steps)
+
+
+def _first_fit(candidate: Candidate, start: Model, score_test: ScoreTest, scales: Scales, max_steps: int) -> ScreenedCandidate:
+    """Fit a candidate, the last effect of `start`, and the free parameters to the views of a score test."""
     best = fit(
         score_test.views,
-        score_test.model.with_effect(start),
+        start,
         free_with(score_test.free, score_test.model, candidate, scales),
-        max_steps=effort.max_steps,
+        max_steps=max_steps,
         tolerance=FIRST_FIT_TOLERANCE,
         frozen=len(score_test.free),
         with_equations=False,
@@ -289,7 +302,14 @@ def starting_points(
     if candidate.form.placement is not None:
         starts = [_displacement_start(candidate, score_test, scales), *_large_displacements(candidate, score_test, scales)]
         return sorted(starts, key=lambda entry: -entry[0])
-    return _scaled_starts(candidate, score_test, scales)
+    starts = _scaled_starts(candidate, score_test, scales)
+    return _by_decrease(starts, score_test) if candidate.form.coupling is not None else starts
+
+
+def _by_decrease(starts: list[tuple[float, Effect]], score_test: ScoreTest) -> list[tuple[float, Effect]]:
+    """Starting points in the order of what they decrease as they are; promises stay in their own order."""
+    effects = sorted((effect for _, effect in starts), key=lambda one: -score_test.decrease(score_test.model.with_effect(one)))
+    return [(promise, effect) for (promise, _), effect in zip(starts, effects, strict=True)]
 
 
 def _scaled_starts(candidate: Candidate, score_test: ScoreTest, scales: Scales) -> list[tuple[float, Effect]]:
@@ -305,7 +325,11 @@ def _scaled_starts(candidate: Candidate, score_test: ScoreTest, scales: Scales) 
                 continue
             longer = values[strength] * np.clip(length, -LONGEST_STEP, LONGEST_STEP)
             scaled = float(np.clip(longer, parameter.low, parameter.high))
-            effect = candidate.effect({**values, strength: scaled}, scales.texels, gain)
+            other = candidate.effect({**values, strength: scaled}, scales.texels, gain)
+            # How far loads spread is not linear in a width: near zero it does nothing. Take the one that fits better as it is.
+            is_width = candidate.form.coupling is not None and parameter.unit == "m"
+            near = (effect, other) if is_width else (other,)
+            effect = near[0] if len(near) == 1 else max(near, key=lambda one: score_test.decrease(model.with_effect(one)))
         elif length <= 0.0:
             continue
         elif inverse is not None:

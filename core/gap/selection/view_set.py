@@ -107,6 +107,9 @@ def _texels_of_all_loads(predictor: Predictor) -> np.ndarray | None:
         return None
     load = predictor.stimulus.load.sum(axis=0)
     order = np.argsort(load)[::-1]
+    reading = predictor.trial.reading
+    if reading is not None:  # in a dense grid of which few cells are measured the others tell nothing
+        order = order[np.isfinite(reading).any(axis=0)[order]]
     loaded = order[load[order] > 0]
     unloaded = order[load[order] <= 0]
     count = min(len(loaded), FEW_TEXELS - UNLOADED_TEXELS)

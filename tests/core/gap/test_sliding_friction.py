@@ -6,10 +6,12 @@ from dataclasses import replace
 import gap_cases as cases
 import numpy as np
 
+from palpate.core.gap.fitting.least_squares import TrialView
 from palpate.core.gap.forward.contact_phases import TRAVEL_BANDS, features
 from palpate.core.gap.forward.predictor import Model, Predictor
 from palpate.core.gap.report import sentences, summary
 from palpate.core.gap.report.comparison import gap_errors
+from palpate.core.gap.selection.base_model import base_fit
 from palpate.core.gap.selection.diagnosis import diagnose
 from palpate.core.jobs.job_runner import run_job
 from palpate.core.model.sensor_parameters import SensorParameters
@@ -56,3 +58,13 @@ def test_the_way_since_the_last_turn():
     assert ((bands != 0).sum(axis=0) <= 1).all() and len(bands) == len(TRAVEL_BANDS) - 1
     peak = np.flatnonzero(np.isclose(predictor.trial.slide[:, 0], 0.02, atol=1e-9))[0]
     assert bands[0, peak + 2] == -1.0 and bands[-1, peak - 2] == 1.0  # just turned back; at the end of the way there
+
+
+def test_friction_is_found_from_a_default_stiffness_of_the_bristles():
+    """A rig that does not state `sigma0` begins at 1 N/m, five thousand times too soft."""
+    rig = brake(0.0)
+    rig = replace(rig, parameters=replace(PARAMETERS, sigma0=1.0, sigma1=1e-4))
+    views = [TrialView(Predictor(trial, rig), noise=(1.0, 0.01)) for trial in rig.of("fit")]
+    found = base_fit(rig, views, 1.0)
+    assert found.mean < 1.2
+    assert 2e3 < found.model.parameters.sigma0 < 2e4

@@ -12,7 +12,7 @@ import pytest
 from scipy.optimize import least_squares
 from scipy.signal import lfilter
 
-from palpate.core.effects.engine.registry import effect
+from palpate.core.effects.engine.registry import effect, kind_of
 from palpate.core.gap.fitting.least_squares import FreeParameter, TrialView, fit, free_base_parameters, held_out_squares
 from palpate.core.gap.fitting.noise_floor import reading_noise
 from palpate.core.gap.fitting.residual_tests import residual_structure
@@ -20,8 +20,11 @@ from palpate.core.gap.forward.predictor import Model, Predictor
 from palpate.core.gap.report import summary
 from palpate.core.gap.report.comparison import nrmse
 from palpate.core.gap.report.experiments import next_experiment
+from palpate.core.gap.selection.candidates import Candidate, scales_of
 from palpate.core.gap.selection.diagnosis import diagnose
 from palpate.core.gap.selection.findings import Diagnosis
+from palpate.core.gap.selection.score_test import ScoreTest
+from palpate.core.gap.selection.screening import starting_points
 from palpate.core.io.sensor_toml import read_sensor
 from palpate.core.jobs.job_runner import run_job
 
@@ -109,6 +112,45 @@ def test_noise_has_no_structure_and_hum_has():
     ]
     found = residual_structure(predictors, hum)
     assert found.strongest == "common mode" and found.total > 0.05
+
+
+def test_empty_cells_of_a_dense_grid_hide_nothing():
+    """Cells that are not measured count neither as residuals of zero nor as neighbours that agree."""
+    rig = cases.rig(seed=5, seconds=6.0, trials=4)
+    rng, empty = np.random.default_rng(5), np.arange(cases.ROWS * cases.COLUMNS) % 6 != 0
+    shares = []
+    for hidden in (False, True):
+        residuals, predictors = [], []
+        for number, trial in enumerate(rig.of("fit")):
+            residual = 0.4 * np.sin(2 * np.pi * 7.3 * trial.time)[:, None] + rng.normal(size=trial.reading.shape)
+            reading = np.where(empty & hidden, np.nan, trial.reading)
+            predictors.append(Predictor(replace(trial, reading=reading), rig))
+            residuals.append(np.where(empty & hidden, 0.0, residual))
+            assert number < 3
+        shares.append(residual_structure(predictors, residuals).shares["common mode"])
+    # Of four texels each is predicted by three others, whose mean has a third of their noise.
+    expected = 0.08 / (0.08 + 1.0 / 3.0) * 0.08 / 1.08
+    assert shares[1] == pytest.approx(expected, rel=0.5) and shares[0] > shares[1] > 0.005
+
+
+@pytest.mark.parametrize("form", ["gaussian", "exponential"])
+def test_a_search_of_load_spreading_does_not_begin_where_nothing_spreads(form):
+    """Loads that spread by a kernel of their own: the first starting point spreads them about as far."""
+    width = 1.2 * cases.PITCH
+    position = cases.rig(trials=1, seconds=1.0).texels.position
+    apart = np.linalg.norm(position[:, None] - position[None], axis=2)
+    kernel = 1.0 / (1.0 + (apart / width) ** 2) ** 2
+    kernel /= kernel.sum(axis=0)
+    rig = cases.rig(change=lambda r, t: r @ kernel.T, seed=14, trials=3, seconds=6.0, stated=80.0)
+    views = views_of(rig, 1e-3)
+    found = fit(views, Model(rig.parameters), free_base_parameters(rig.parameters, ("k", "cn"), 1.0))
+    kind = kind_of("load-spreading")
+    candidate = Candidate(kind, next(one for one in kind.forms if one.name == form))
+    scales = scales_of([view.predictor for view in views], found.model)
+    first = starting_points(candidate, ScoreTest(views, found), views, scales)[0][1]
+    assert 0.3 * width < first.values["width"] < 3.0 * width
+    (free,) = candidate.free_parameters(0, scales, 1.0)
+    assert 0.2 * cases.PITCH < free.low < 0.3 * cases.PITCH
 
 
 def test_nothing_hidden_but_wrong_parameters_is_no_gap():

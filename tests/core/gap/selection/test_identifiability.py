@@ -92,6 +92,35 @@ def test_one_cycle_does_not_tell_what_a_second_would():
     assert indistinguishable(replace(once, cycles=3), "softening") == () == indistinguishable(once, "stiffening")
 
 
+@pytest.mark.parametrize("noise", [0.0, 0.005, 0.02])
+def test_noise_of_a_measured_load_is_neither_cycles_nor_the_end_of_a_hold(noise):
+    """One press that is held for 8 of 10 s, and the noise of a load cell on it: one cycle, one hold."""
+    time = np.linspace(0, 12, 2400)
+    rng = np.random.default_rng(3)
+    level = np.interp(time, [1, 2, 10, 11], [0, 1, 1, 0]) + noise * rng.normal(size=len(time))
+    trial = replace(cases.depth_trial(time, level, reading=level[:, None] * np.ones(2)), stimulus="force")
+    rig = cases.grid_rig(1, 2, 3e-3, SensorParameters(), [trial])
+    seen = coverage([Predictor(trial, rig)])
+    assert seen.cycles == 1 and seen.longest_hold == pytest.approx(8.0, abs=0.5)
+
+
+def test_a_slow_noisy_ramp_is_no_hold():
+    time = np.linspace(0, 4000, 4000)
+    level = time / 4000 + 0.01 * np.random.default_rng(4).normal(size=len(time))
+    trial = replace(cases.depth_trial(time, level, reading=level[:, None] * np.ones(2)), stimulus="force")
+    seen = coverage([Predictor(trial, cases.grid_rig(1, 2, 3e-3, SensorParameters(), [trial]))])
+    assert seen.longest_hold < 400.0 and seen.cycles == 1
+
+
+@pytest.mark.parametrize("samples", [12, 40])
+def test_a_curved_load_is_no_noise(samples):
+    """Sines of few samples a cycle: each is counted."""
+    time = np.arange(20 * samples) / samples
+    level = 1e-3 * (0.5 - 0.5 * np.cos(2 * np.pi * time))
+    trial = cases.depth_trial(time, level, reading=level[:, None] * np.ones(2))
+    assert coverage([Predictor(trial, cases.grid_rig(1, 2, 3e-3, SensorParameters(), [trial]))]).cycles == 20
+
+
 @pytest.mark.parametrize("depth", [1e-1, 4e-3, 2e-4])
 def test_the_way_in_alone_may_be_that_of_a_loop(depth):
     """What bends little may be half a loop; a curve several times as steep at its end is not."""
