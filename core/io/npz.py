@@ -36,7 +36,9 @@ DAMAGED = (
 """Exceptions that reading a damaged archive may raise."""
 
 MAPPED_BYTES = 1 << 24
-"""Size from which an array is not held in memory but mapped from a temporary file."""
+"""Size of all arrays from which they are not held in memory but mapped from temporary files."""
+SMALL_BYTES = 1 << 16
+"""Size up to which an array is held in memory nevertheless."""
 _COPIED = 1 << 20
 _LONG_AGO = (1980, 1, 1, 0, 0, 0)  # the earliest date of a zip archive; the current time would change the bytes
 
@@ -69,7 +71,7 @@ def write_arrays(path: str | os.PathLike, arrays: Mapping[str, np.ndarray], atom
 
 
 def read_array(members: np.lib.npyio.NpzFile, name: str) -> np.ndarray:
-    """Return an array of an open archive; one of :data:`MAPPED_BYTES` or more is mapped from a temporary file.
+    """Return an array of an open archive; those of an archive of :data:`MAPPED_BYTES` or more are mapped from temporary files.
 
     The file has no name, lies where :func:`tempfile.gettempdir` says, and is gone when the array is. The array is read-only.
 
@@ -81,7 +83,7 @@ def read_array(members: np.lib.npyio.NpzFile, name: str) -> np.ndarray:
         There is no such array, or it is damaged (:data:`DAMAGED`).
     """
     info = members.zip.getinfo(f"{name}.npy")
-    if info.file_size < MAPPED_BYTES:
+    if info.file_size < SMALL_BYTES or sum(one.file_size for one in members.zip.infolist()) < MAPPED_BYTES:
         return members[name]
     with members.zip.open(info) as member:
         version = np.lib.format.read_magic(member)

@@ -150,6 +150,7 @@ def test_a_long_recording_is_mapped_when_it_is_read(tmp_path, monkeypatch):
     expected = Recording.stack(frames(30), BODIES, 1e-4, "d")
     save_recording(tmp_path / "recording.npz", expected)
     monkeypatch.setattr(npz, "MAPPED_BYTES", 1000)
+    monkeypatch.setattr(npz, "SMALL_BYTES", 1000)
     found = load_recording(tmp_path / "recording.npz")
     for name, array in arrays_of(expected).items():
         own = arrays_of(found)[name]
@@ -162,6 +163,7 @@ def test_a_long_recording_that_is_damaged_is_refused(tmp_path, monkeypatch, chan
     path = tmp_path / "recording.npz"
     save_recording(path, Recording.stack(frames(40), BODIES, 1e-4, "d"))
     monkeypatch.setattr(npz, "MAPPED_BYTES", 1000)
+    monkeypatch.setattr(npz, "SMALL_BYTES", 1000)
     with zipfile.ZipFile(path) as archive:
         members = {name: archive.read(name) for name in archive.namelist()}
     content = members["poses.npy"]
