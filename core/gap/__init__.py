@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """From measurements of a real sensor to what its model misses.
 
-The packages stand in the order of the data: ``dataset`` reads a rig, ``forward`` predicts its recordings, ``fitting`` fits the
-model's parameters, ``selection`` finds the effects that are missing, ``report`` writes the result. ``calibration`` finds single
-parameters, stiffness and friction, from measurements of their own.
+The packages stand in the order of the data: ``dataset`` reads a rig, ``forward`` predicts its recordings, ``data_faults`` finds
+what loggers did to them, ``fitting`` fits the model's parameters, ``selection`` finds the effects that are missing, ``report``
+writes the result. ``calibration`` finds single parameters, stiffness and friction, from measurements of their own.
 """
 
-__all__ = ["calibration", "dataset", "fitting", "forward", "report", "selection"]
+__all__ = ["calibration", "data_faults", "dataset", "fitting", "forward", "report", "selection"]

@@ -21,6 +21,7 @@ from ...io.regular_file import require_regular
 from ...io.sensor_toml import SHAPE_WORDS, checked_grid, checked_lengths, known_words, stated_parameters
 from ...io.toml_file import LONGEST_NAME, checked_name, read_toml
 from ...model.sensor_parameters import DAMPING_PER_STIFFNESS, DEPTH_PER_THICKNESS, SENSOR_PARAMETERS, SensorParameters
+from .fault_kinds import FAULT_KINDS
 from .sessions import CLOCKS, TrialHistory, on_common_clocks, read_history
 from .trial import Trial
 
@@ -76,6 +77,8 @@ class Rig:
     words : mapping
         The `[sensor]` table of the file.
     warnings : tuple of str
+    correct : tuple of str
+        Kinds of faults of the data that are to be put right, keys of :data:`.fault_kinds.FAULT_KINDS`.
     """
 
     name: str
@@ -88,6 +91,7 @@ class Rig:
     trials: tuple[Trial, ...]
     words: Mapping[str, Any] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
+    correct: tuple[str, ...] = ()
 
     def of(self, use: str) -> tuple[Trial, ...]:
         """Return the trials of one use, "fit" or "check"."""
@@ -110,10 +114,11 @@ def read_rig(path: str | Path) -> Rig:
     words = read_toml(path, "rig")
     if words.get("format") != FORMAT:
         raise FileError(f"'{path.name}' is not a rig: its first line must be format = \"{FORMAT}\".")
-    known_words(words, {"format", "name", "clock", "sensor", "indenter", "trial"}, f"'{path.name}'")
+    known_words(words, {"format", "name", "clock", "data", "sensor", "indenter", "trial"}, f"'{path.name}'")
     clock = words.get("clock")
     if clock is not None and clock not in CLOCKS:
         raise FileError(f'clock of \'{path.name}\' is {clock!r:.60}: write "absolute" or "own".')
+    correct = _faults_to_correct(words, path)
     rig_name = checked_name(words.get("name", path.stem), f"'{path.name}'")
     folder, warnings = path.resolve().parent, []
     sensor = _table(words, "sensor", path)
@@ -156,7 +161,24 @@ def read_rig(path: str | Path) -> Rig:
         trials=tuple(trials),
         words=sensor,
         warnings=tuple(warnings),
+        correct=correct,
     )
+
+
+def _faults_to_correct(words: Mapping[str, Any], path: Path) -> tuple[str, ...]:
+    """Kinds of faults of the data that the rig's [data] wants to be put right."""
+    if "data" not in words:
+        return ()
+    table = _table(words, "data", path)
+    known_words(table, {"correct"}, f"[data] of '{path.name}'")
+    wanted = table.get("correct", [])
+    if wanted == "all":
+        return tuple(FAULT_KINDS)
+    if not isinstance(wanted, list) or not all(isinstance(kind, str) and kind in FAULT_KINDS for kind in wanted):
+        raise FileError(
+            f"correct of [data] in '{path.name}' is {wanted!r:.80}: write \"all\", or a list of {', '.join(FAULT_KINDS)}."
+        )
+    return tuple(wanted)
 
 
 def _table(words: Mapping[str, Any], key: str, path: Path) -> dict[str, Any]:

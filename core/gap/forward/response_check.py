@@ -64,11 +64,11 @@ def _check_reading_sign(rig: Rig, touching: Sequence[Stimulus]) -> None:
     if rig.parameters.unit != "N" and "gain" not in rig.given:
         return  # the gain, sign included, is fitted
     pairs = [(stimulus.load, stimulus.trial.reading) for stimulus in touching if stimulus.trial.reading is not None]
-    if np.sign(gain) * _correlation(pairs) < OPPOSITE:
+    if np.sign(gain) * correlation(pairs) < OPPOSITE:
         how = "fall" if gain > 0 else "rise"
         raise FileError(
             f"The readings of '{rig.name}' {how} where the sensor is pressed: compression counts as positive, "
-            "so change the sign of texel_0 and the others, or give unit and gain in [sensor]."
+            'so change the sign of texel_0 and the others, give unit and gain, or write correct = ["sign"] in [data].'
         )
 
 
@@ -80,14 +80,14 @@ def _check_force_sign(rig: Rig, touching: Sequence[Stimulus]) -> None:
         if force is not None:
             normal = -rig.texels.normal if stimulus.normal is None else stimulus.normal
             pairs.append((np.sum(stimulus.load[:, :, None] * normal, axis=1), force))
-    if _correlation(pairs) < OPPOSITE:
+    if correlation(pairs) < OPPOSITE:
         raise FileError(
             f"force_x, force_y and force_z of '{rig.name}' point the other way: the force on the sensor is needed, "
-            "not that on the indenter, so change their signs."
+            'not that on the indenter, so change their signs, or write correct = ["sign"] in [data].'
         )
 
 
-def _correlation(pairs: Sequence[tuple[np.ndarray, np.ndarray]]) -> float:
+def correlation(pairs: Sequence[tuple[np.ndarray, np.ndarray]]) -> float:
     """Return the correlation of loads with responses, both less the mean of their channel; zero when nothing changes.
 
     Parameters

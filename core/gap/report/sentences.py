@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from ..dataset.fault_kinds import FAULT_KINDS
 from ..fitting.intervals import ParameterInterval
 from ..fitting.residual_tests import LEAST_STRUCTURE
 from ..forward.contact_phases import FEATURES
@@ -24,7 +25,18 @@ FRICTION_MATTERS = 1.5
 
 
 def headline(result: Diagnosis, errors: GapErrors) -> str:
-    """Return the result in one sentence."""
+    """Return the result in one sentence, after a sentence on faults of the data that were not put right."""
+    faults = result.misleading_faults
+    if not faults:
+        return _outcome(result, errors)
+    kinds = _listed(list(dict.fromkeys(FAULT_KINDS[fault.kind] for fault in faults)))
+    correct = ", ".join(f'"{kind}"' for kind in dict.fromkeys(fault.kind for fault in faults))
+    outcome = _outcome(result, errors)
+    return f"The data have {kinds}; put that right first (correct = [{correct}] in [data]). As they are: {outcome}"
+
+
+def _outcome(result: Diagnosis, errors: GapErrors) -> str:
+    """The result in one sentence."""
     before, after = errors.base["fit"] or 0.0, errors.amended["fit"] or 0.0
     findings = by_share_closed(result)
     sure = [one for one in findings if one.confidence >= SURE]
@@ -152,7 +164,7 @@ def evidence(result: Diagnosis, errors: GapErrors) -> list[str]:
 
 def warnings(result: Diagnosis) -> list[str]:
     """Return what a reader should know about the recordings, without the rig's own warnings."""
-    said = [text for text in (caution(result),) if text]
+    said = [fault.sentence for fault in result.faults] + [text for text in (caution(result),) if text]
     overpressed = max((p.stimulus.overpressed for p in result.predictors), default=0)
     if overpressed:
         said.append(

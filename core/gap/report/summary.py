@@ -48,6 +48,10 @@ def summary(result: Diagnosis, errors: GapErrors) -> dict[str, Any]:
         "ruled_out": [{"effect": name, "why": why} for name, why in result.ruled_out],
         "ambiguous": [list(names) for names in result.ambiguous],
         "next_experiment": next_experiment(result),
+        "data_faults": [
+            {"kind": fault.kind, "trials": list(fault.trials), "evidence": fault.evidence, "put_right": fault.put_right}
+            for fault in result.faults
+        ],
         "warnings": list(result.rig.warnings) + warnings(result),
     }
 

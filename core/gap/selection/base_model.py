@@ -12,7 +12,7 @@ from ...model.sensor_parameters import FITTED_FRICTION_PARAMETERS
 from ..dataset.rig import Rig
 from ..fitting.least_squares import FRICTION_LEVEL, Fit, TrialView, fit, free_base_parameters
 from ..fitting.noise_floor import ChannelNoise, force_noise, reading_noise
-from ..forward.predictor import Model, Predictor, predictors_of
+from ..forward.predictor import Model, Predictor
 from ..forward.response_check import check_responses
 
 FULL_STEPS, TRIAL_STEPS = 40, 6
@@ -25,12 +25,17 @@ LEAST_FRICTION = 0.05
 """Least friction coefficient from which the stiffnesses are estimated."""
 
 
-def prepared(rig: Rig) -> tuple[list[Predictor], tuple[ChannelNoise, ChannelNoise], tuple[float, float]]:
-    """Compute the contacts of each trial, and measure noise and range of readings and of net forces.
+def prepared(rig: Rig, predictors: Sequence[Predictor]) -> tuple[tuple[ChannelNoise, ChannelNoise], tuple[float, float]]:
+    """Check the recordings, and measure noise and range of readings and of net forces.
+
+    Parameters
+    ----------
+    rig : Rig
+    predictors : sequence of Predictor
+        Of the rig's trials, in their order.
 
     Returns
     -------
-    predictors : list of Predictor
     noise : (ChannelNoise, ChannelNoise)
     full : (float, float)
         Largest minus smallest value over all trials and channels.
@@ -40,13 +45,12 @@ def prepared(rig: Rig) -> tuple[list[Predictor], tuple[ChannelNoise, ChannelNois
     FileError
         The recordings do not fit their stimulus, see :func:`.check_responses`.
     """
-    predictors = predictors_of(rig.trials, rig)
     check_responses(rig, [predictor.stimulus for predictor in predictors])
     readings = [p.trial.reading for p in predictors if p.trial.reading is not None]
     forces = [p.trial.force for p in predictors if p.trial.force is not None]
     full = _range(readings), _range(forces)
     noise = reading_noise(predictors, full[0]), force_noise(predictors, full[1])
-    return predictors, noise, full
+    return noise, full
 
 
 def _range(arrays: Sequence[np.ndarray]) -> float:

@@ -13,6 +13,8 @@ from functools import partial
 import numpy as np
 
 from ...jobs.progress import Job, Progress
+from ..data_faults.data_fault import DataFault
+from ..data_faults.search import find_faults, put_right
 from ..dataset.rig import Rig
 from ..fitting.heteroscedastic_noise import proportional_noise
 from ..fitting.intervals import parameter_intervals
@@ -20,7 +22,7 @@ from ..fitting.least_squares import Fit, fit, free_base_parameters, held_out_squ
 from ..fitting.noise_floor import SHORTEST_STRETCH, coverage
 from ..fitting.residual_tests import LEAST_STRUCTURE, ResidualStructure, residual_structure
 from ..fitting.spectral_lines import strongest_line
-from ..forward.predictor import Model
+from ..forward.predictor import Model, Predictor, predictors_of
 from .base_model import base_fit, identified_base_parameters, prepared
 from .candidates import scales_of
 from .check_recordings import check_views, checked
@@ -51,7 +53,8 @@ def diagnose(rig: Rig) -> Job[Diagnosis]:
     Diagnosis
     """
     yield Progress("contacts of every trial", 0, TOTAL_WORK)
-    predictors, noise, full = prepared(rig)
+    rig, predictors, faults = _without_faults(rig)
+    noise, full = prepared(rig, predictors)
     fitted = [p for p in predictors if p.trial.use == "fit"]
     view_set = view_set_of(fitted, (noise[0].deviation, noise[1].deviation))
     yield Progress("base model", BASE_MODEL_BEGINS, TOTAL_WORK)
@@ -59,10 +62,21 @@ def diagnose(rig: Rig) -> Job[Diagnosis]:
     structure = _structure(view_set, base)
     scales = scales_of(fitted, base.model)
     result = Diagnosis(rig, predictors, noise, full, coverage(fitted), scales, base, base, structure, structure)
+    result.faults = faults
     for what, share in _select_effects(result, view_set):
         yield Progress(what, SELECTION_BEGINS + int((TOTAL_WORK - SELECTION_BEGINS) * share), TOTAL_WORK)
     result.stages = _stages(result, view_set)
     return result
+
+
+def _without_faults(rig: Rig) -> tuple[Rig, list[Predictor], list[DataFault]]:
+    """The rig with those faults of its data put right for which it asks, predictors of its trials, and all faults."""
+    predictors = predictors_of(rig.trials, rig)
+    faults = find_faults(rig, [predictor.stimulus for predictor in predictors])
+    if not any(fault.kind in rig.correct for fault in faults):
+        return rig, predictors, faults
+    rig, faults = put_right(rig, [predictor.stimulus for predictor in predictors])
+    return rig, predictors_of(rig.trials, rig), faults
 
 
 def _select_effects(result: Diagnosis, view_set: ViewSet) -> Iterator[tuple[str, float]]:

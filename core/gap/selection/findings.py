@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from ..data_faults.data_fault import DataFault
 from ..dataset.rig import Rig
 from ..fitting.intervals import ParameterInterval
 from ..fitting.least_squares import Fit
@@ -110,6 +111,8 @@ class Diagnosis:
         Kinds that were not found, each with the reason.
     line : SpectralLine or None
         A periodic disturbance of the readings without load.
+    faults : list of DataFault
+        Faults of the data, whether they were put right or not.
     check : CheckOutcome
         What the check recordings say of the amended model, or of the base model if there are no effects.
     closed : ClosedShares
@@ -135,9 +138,21 @@ class Diagnosis:
     ambiguous: list[tuple[str, ...]] = field(default_factory=list)
     ruled_out: list[tuple[str, str]] = field(default_factory=list)
     line: SpectralLine | None = None
+    faults: list[DataFault] = field(default_factory=list)
     check: CheckOutcome = field(default_factory=CheckOutcome)
     closed: ClosedShares = field(default_factory=ClosedShares)
     unlike_fitted: list[CheckedRecording] = field(default_factory=list)
+
+    @property
+    def misleading_faults(self) -> list[DataFault]:
+        """Faults of the data that were not put right and that an effect may have been fitted to.
+
+        A unit that is wrong in all recordings alike is none of these: the stiffness is fitted.
+        """
+        return [fault for fault in self.faults if not fault.put_right and not self._is_scale(fault)]
+
+    def _is_scale(self, fault: DataFault) -> bool:
+        return fault.kind == "unit" and len(fault.trials) == len(self.predictors)
 
     def of(self, use: str) -> list[Predictor]:
         """Return the predictors of the trials of one use, "fit" or "check"."""

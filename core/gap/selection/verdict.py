@@ -48,7 +48,9 @@ def conclude(result: Diagnosis, view_set: ViewSet, state: SelectionState, gap_si
     _judge_effects(result, state, gap_sizes)
     unsure = unsure_names(result, view_set, state, gap_sizes)
     result.findings = [
-        replace(one, confidence=min(one.confidence, UNSURE_CONFIDENCE)) if one.name in unsure else one
+        replace(one, confidence=min(one.confidence, UNSURE_CONFIDENCE))
+        if one.name in unsure or result.misleading_faults
+        else one
         for one in result.findings
     ]
     _rule_out(result, state, gap_sizes)

@@ -8,9 +8,14 @@ import numpy as np
 import pytest
 
 from palpate.core.errors import FileError
-from palpate.core.gap.selection.base_model import prepared
+from palpate.core.gap.forward.predictor import predictors_of
+from palpate.core.gap.selection import base_model
 
 RIG = gap_cases.rig(trials=2, seconds=3.0)
+
+
+def prepared(rig):
+    return base_model.prepared(rig, predictors_of(rig.trials, rig))
 
 
 def changed(change):

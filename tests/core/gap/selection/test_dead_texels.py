@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from palpate.core.effects.engine.registry import form_of, kind_of
-from palpate.core.gap.forward.predictor import Model
+from palpate.core.gap.forward.predictor import Model, predictors_of
 from palpate.core.gap.selection.base_model import prepared
 from palpate.core.gap.selection.candidates import Candidate
 from palpate.core.gap.selection.direct_estimates import unresponsive_texels
@@ -40,7 +40,8 @@ def test_texels_that_do_not_answer(change, level):
         return reading
 
     rig = cases.rig(change=changed, seed=3, stated=80.0, noise=1e-4)
-    predictors, noise, _ = prepared(rig)
+    predictors = predictors_of(rig.trials, rig)
+    noise, _ = prepared(rig, predictors)
     view_set = view_set_of(predictors, (noise[0].deviation, 1.0))
     candidate = Candidate(kind_of("dead-texels"), form_of("dead-texels", "held"))
     found = unresponsive_texels(view_set.whole, Model(rig.parameters), candidate, len(rig.texels))

@@ -7,7 +7,7 @@ import pytest
 
 from palpate.core.effects.engine.registry import effect
 from palpate.core.gap.fitting.least_squares import fit, free_base_parameters
-from palpate.core.gap.forward.predictor import Model
+from palpate.core.gap.forward.predictor import Model, predictors_of
 from palpate.core.gap.selection.base_model import prepared
 from palpate.core.gap.selection.candidates import Candidate, FittedCandidate, scales_of
 from palpate.core.gap.selection.plausibility import is_plausible
@@ -19,7 +19,8 @@ SPREAD = 0.02 * np.random.default_rng(1).normal(size=cases.ROWS * cases.COLUMNS)
 
 def offset_each(rig):
     """An offset for each texel, fitted on top of the base model."""
-    predictors, noise, full = prepared(rig)
+    predictors = predictors_of(rig.trials, rig)
+    noise, full = prepared(rig, predictors)
     view_set, none = view_set_of(predictors, (noise[0].deviation, 1.0)), tuple([0.0] * len(SPREAD))
     from palpate.core.effects.engine.registry import form_of, kind_of
 

@@ -1,0 +1,110 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Channels in another order than the texels: reversed, mirrored, or some of them swapped."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ..dataset.rig import Rig, Trial
+from ..forward.stimulus import Stimulus
+from .data_fault import Correction, DataFault, centred
+
+MOST_CHANNELS = 1024
+"""Number of texels above which the table of all pairs is not computed."""
+LEAST_ORDER, BETTER_ORDER = 0.5, 0.5
+"""Another order of all channels is found if their squared correlation with the loads is at least the first, and it leaves less
+than the second of the squares that the given order leaves."""
+SWAPPED_LEAVES = 0.35
+"""Two channels are swapped if each leaves less than this share of its squares with the other's load."""
+LEAST_LOADED = 0.002
+"""Least variance of a texel's load, as a share of the largest, for its channel to be judged."""
+
+
+def find_channel_faults(rig: Rig, stimuli: Sequence[Stimulus]) -> list[DataFault]:
+    """Return channels in another order, or swapped channels, in all recordings of a rig."""
+    recorded = [s for s in stimuli if s.trial.reading is not None]
+    n = len(rig.texels)
+    if not recorded or not 2 <= n <= MOST_CHANNELS:
+        return []
+    xx, xy, yy = _moments(recorded, n)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        squared = np.nan_to_num(xy * xy / np.outer(xx, yy))  # [texel, channel]
+    loaded = (xx > LEAST_LOADED * xx.max(initial=0.0)) & (xx > 0)
+    if loaded.sum() < 2:
+        return []
+    names = tuple(s.trial.name for s in recorded)
+
+    def left(order: np.ndarray) -> float:
+        """Share of the squares of the channels that the loads of their texels leave."""
+        weight = yy[order]
+        return 1.0 - float((weight * squared[np.arange(n), order]).sum() / max(float(weight.sum()), 1e-300))
+
+    given = left(np.arange(n))
+    best, what = min(((left(order), what) for what, order in _orders(rig, n).items()), default=(1.0, ""))
+    if what and 1.0 - best > LEAST_ORDER and best < BETTER_ORDER * given:
+        order = _orders(rig, n)[what]
+        said = f"{what}, the loads explain {1.0 - best:.0%} of the readings, and {1.0 - given:.0%} as they are"
+        return [DataFault("reversed-channels", names, said, dict.fromkeys(names, _reordered(order)))]
+    pairs = _swapped(squared, loaded & (yy > 0))
+    if not pairs:
+        return []
+    order = np.arange(n)
+    for a, b in pairs:
+        order[[a, b]] = b, a
+    listed = ", ".join(f"texel_{a} and texel_{b}" for a, b in pairs[:3]) + (
+        f" and {len(pairs) - 3} more" if len(pairs) > 3 else ""
+    )
+    a, b = pairs[0]
+    said = (
+        f"{listed} each follow the other's load (texel_{a}: correlation {squared[b, a] ** 0.5:.2f} with the load of texel_{b}, "
+        f"{squared[a, a] ** 0.5:.2f} with its own)"
+    )
+    return [DataFault("swapped-channels", names, said, dict.fromkeys(names, _reordered(order)))]
+
+
+def _moments(recorded: Sequence[Stimulus], n: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Variances of loads (n,) and responses (n,), and their covariances [texel, channel] (n, n)."""
+    xx, xy, yy = np.zeros(n), np.zeros((n, n)), np.zeros(n)
+    for s in recorded:
+        assert s.trial.reading is not None
+        whole = np.isfinite(s.trial.reading)
+        x, y = centred(s.load, np.where(whole, s.trial.reading, np.nan))
+        x = s.load - s.load.mean(axis=0)
+        xx, xy, yy = xx + (x * x).sum(axis=0), xy + x.T @ y, yy + (y * y).sum(axis=0)
+    return xx, xy, yy
+
+
+def _orders(rig: Rig, n: int) -> dict[str, np.ndarray]:
+    """Orders that exporters mix up: for each texel the number of the channel that would be its own."""
+    orders = {"in reverse order": np.arange(n)[::-1]}
+    if rig.grid is not None:
+        rows, columns, _ = rig.grid
+        table = np.arange(n).reshape(rows, columns)
+        if rows > 1 and columns > 1:
+            orders["with rows in reverse order"] = table[::-1].ravel()
+            orders["with columns in reverse order"] = table[:, ::-1].ravel()
+            orders["column by column"] = np.arange(n).reshape(columns, rows).T.ravel()
+    return {what: order for what, order in orders.items() if (order != np.arange(n)).any()}
+
+
+def _swapped(squared: np.ndarray, judged: np.ndarray) -> list[tuple[int, int]]:
+    """Pairs of channels that leave far less with each other's load than with their own."""
+    pairs, free = [], judged.copy()
+    for a in np.flatnonzero(judged):
+        b = int(np.argmax(np.where(judged, squared[:, a], -1.0)))
+        if b <= a or not (free[a] and free[b]) or int(np.argmax(np.where(judged, squared[:, b], -1.0))) != a:
+            continue
+        if all(1.0 - squared[other, one] < SWAPPED_LEAVES * (1.0 - squared[one, one]) for one, other in ((a, b), (b, a))):
+            pairs.append((int(a), b))
+            free[[a, b]] = False
+    return pairs
+
+
+def _reordered(order: np.ndarray) -> Correction:
+    def act(trial: Trial) -> Trial:
+        return trial if trial.reading is None else replace(trial, reading=trial.reading[:, order])
+
+    return act

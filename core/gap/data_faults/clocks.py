@@ -1,0 +1,242 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Clocks of stimulus and response that are shifted or run apart, and samples that one of them lost.
+
+The changes of load and response are correlated in windows of each recording, at shifts of up to some seconds. Of three simple
+courses of the shift over time, constant, line and step, the one with the largest sum of correlations is taken. Changes and not
+values are compared, because creep, drift and hysteresis hardly move a change.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..dataset.rig import Trial
+from ..forward.stimulus import Stimulus
+from .data_fault import Correction, DataFault
+
+LONGEST_SHIFT, LARGEST_SHIFT_SHARE = 3.0, 0.25
+"""Longest shift that is looked for: seconds, and share of a recording."""
+MOST_SAMPLES, MOST_CHANNELS = 3000, 12
+"""Samples and channels per recording that are compared."""
+WINDOWS = 16
+SMOOTHING = 0.06
+"""Seconds over which changes are taken."""
+LEAST_SHIFT, LEAST_SHIFT_SAMPLES = 0.1, 3.0
+"""Smallest shift that is a fault: seconds, and samples. Lag, creep and loops of a sensor move its changes less."""
+LONGEST_LAG = 0.3
+"""Seconds by which a response may be late in all recordings: a sensor may be that slow (the effect `lag`)."""
+LEAST_GAIN = 0.1
+"""Least increase of the correlation of the changes by a shift, a line or a step."""
+MOST_LEFT = 0.5
+"""What lacks to a correlation of one must become less by this factor: in a recording that repeats itself, another period fits
+about as well."""
+LEAST_CORRELATION = 0.4
+"""Least correlation of the changes, with the shift, from which a clock can be judged."""
+LEAST_DRIFT = 0.12
+"""Smallest difference of the shift, between the ends of a recording or at a step, in seconds."""
+
+
+@dataclass(frozen=True)
+class Course:
+    """How late a response is over a recording: ``start + rate · (t − t₀)`` seconds, and `step` more from `since` on."""
+
+    start: float
+    rate: float
+    step: float
+    since: float
+    correlation: float
+    unshifted: float
+
+    def at(self, time: np.ndarray) -> np.ndarray:
+        """Return how late the response is at some times of the recording, (T,) s."""
+        late: np.ndarray = self.start + self.rate * (time - time[0]) + self.step * (time >= self.since)
+        return late
+
+
+def find_clock_faults(stimuli: Sequence[Stimulus]) -> list[DataFault]:
+    """Return shifted clocks, clocks that run apart and dropped samples of some recordings."""
+    courses = {s.trial.name: course for s in stimuli if (course := course_of(s)) is not None}
+    steps = {name: c for name, c in courses.items() if c.step}
+    rates = {name: c for name, c in courses.items() if c.rate}
+    typical = float(np.median([c.start for c in courses.values()])) if courses else 0.0
+    shifts = {}
+    for s in stimuli:
+        course = courses.get(s.trial.name)
+        if course is None or course.step or course.rate:
+            continue
+        least = max(LEAST_SHIFT, LEAST_SHIFT_SAMPLES * s.trial.step)
+        gains = _is_clearly_better(course.correlation, course.unshifted)
+        is_common = abs(course.start - typical) < least
+        if gains and (course.start < -least or course.start > (max(LONGEST_LAG, least) if is_common else least)):
+            shifts[s.trial.name] = course
+    faults = []
+    for kind, found, say in (
+        ("clock-shift", shifts, _say_shift),
+        ("clock-rate", rates, _say_rate),
+        ("dropped-samples", steps, _say_step),
+    ):
+        if found:
+            name = max(found, key=lambda one: found[one].correlation - found[one].unshifted)
+            corrections = {one: _on_time(course) for one, course in found.items()}
+            faults.append(DataFault(kind, tuple(found), say(found[name], name), corrections))
+    return faults
+
+
+def course_of(stimulus: Stimulus) -> Course | None:
+    """Return how late the response of a recording is over time; None if that cannot be judged."""
+    prepared = _changes(stimulus)
+    if prepared is None:
+        return None
+    time, load, response, step = prepared
+    most = int(min(LONGEST_SHIFT, LARGEST_SHIFT_SHARE * (time[-1] - time[0])) / step)
+    if most < 4:
+        return None
+    table = _windowed(load, response, most)
+    size = np.sqrt(float((load * load).sum())) * np.sqrt(float((response * response).sum()))
+    if size <= 0.0:
+        return None
+    table /= size
+    if -table.sum(axis=0).min() > table.sum(axis=0).max():  # a response that falls under load is as good as one that rises
+        table = -table
+    shifts = np.arange(-most, most + 1) * step
+    middles = (np.arange(WINDOWS) + 0.5) / WINDOWS * (time[-1] - time[0])
+    total = table.sum(axis=0)
+    best = int(np.argmax(total))
+    unshifted = float(total[most])
+    constant = Course(_peak(total, best, shifts), 0.0, 0.0, np.inf, float(total[best]), unshifted)
+    line, jump = _best_line(table, shifts, middles, unshifted), _best_step(table, shifts, middles + time[0], unshifted)
+    chosen = constant
+    least = max(LEAST_DRIFT, 4.0 * step)
+    if _is_clearly_better(max(line.correlation, jump.correlation), constant.correlation):
+        other = jump if jump.correlation > line.correlation else line
+        span = abs(other.step) if other.step else abs(other.rate) * (time[-1] - time[0])
+        if span >= least:
+            chosen = other
+    return chosen if chosen.correlation >= LEAST_CORRELATION else None
+
+
+def _is_clearly_better(new: float, old: float) -> bool:
+    """Whether one correlation is so much larger than another one that this is no accident."""
+    return new - old >= LEAST_GAIN and 1.0 - new < MOST_LEFT * (1.0 - old)
+
+
+def _changes(stimulus: Stimulus) -> tuple[np.ndarray, np.ndarray, np.ndarray, float] | None:
+    """Even times, changes of load and of response on them (T, c), and the step; None without enough of either."""
+    trial = stimulus.trial
+    load, response = _signals(stimulus)
+    good = np.isfinite(response).all(axis=1)
+    if good.sum() < 64 or not load.any():
+        return None
+    step = max(trial.step, float(np.ptp(trial.time)) / MOST_SAMPLES)
+    if np.ptp(trial.time) / step > 2 * MOST_SAMPLES:
+        return None
+    even = np.arange(trial.time[0], trial.time[-1], step)
+    on_even = [
+        np.stack([np.interp(even, trial.time[good], column[good]) for column in values.T], axis=1)
+        for values in (load, response)
+    ]
+    width = max(1, round(SMOOTHING / step))
+    x, y = (values[width:] - values[:-width] for values in on_even)
+    return even[width:], x / max(float(np.abs(x).max()), 1e-300), y / max(float(np.abs(y).max()), 1e-300), step
+
+
+def _signals(stimulus: Stimulus) -> tuple[np.ndarray, np.ndarray]:
+    """Loads and responses (T, c) of the channels with the largest loads; the net force counts only without readings."""
+    trial, load = stimulus.trial, stimulus.load
+    if trial.reading is None:
+        assert trial.force is not None
+        normal = np.array([0.0, 0.0, -1.0]) if stimulus.normal is None else stimulus.normal.mean(axis=(0, 1))
+        return load.sum(axis=1, keepdims=True), np.nan_to_num(trial.force @ normal)[:, None]
+    known = np.isfinite(trial.reading).mean(axis=0) > 0.9
+    strength = np.where(known, (np.diff(load, axis=0) ** 2).sum(axis=0), -1.0)
+    chosen = np.argsort(-strength)[:MOST_CHANNELS]
+    chosen = chosen[strength[chosen] > 0]
+    return load[:, chosen], trial.reading[:, chosen]
+
+
+def _windowed(load: np.ndarray, response: np.ndarray, most: int) -> np.ndarray:
+    """Sums of products of load and shifted response, (windows, 2 most + 1); windows of the load."""
+    count = len(load)
+    edges = np.linspace(0, count, WINDOWS + 1).astype(int)[:-1]
+    padded = np.concatenate([np.zeros((most, load.shape[1])), response, np.zeros((most, load.shape[1]))])
+    table = np.empty((WINDOWS, 2 * most + 1))
+    for k in range(2 * most + 1):
+        table[:, k] = np.add.reduceat((load * padded[k : k + count]).sum(axis=1), edges)
+    return table
+
+
+def _peak(total: np.ndarray, best: int, shifts: np.ndarray) -> float:
+    """Place of a maximum between the samples, by a parabola."""
+    if not 0 < best < len(total) - 1:
+        return float(shifts[best])
+    a, b, c = total[best - 1 : best + 2]
+    curve = a - 2.0 * b + c
+    return float(shifts[best] + (0.5 * (a - c) / curve if curve < 0 else 0.0) * (shifts[1] - shifts[0]))
+
+
+def _best_line(table: np.ndarray, shifts: np.ndarray, middles: np.ndarray, unshifted: float) -> Course:
+    """The line of the shift over time with the largest sum of correlations."""
+    step, most = shifts[1] - shifts[0], len(shifts) // 2
+    rows, best = np.arange(len(table)), None
+    for rate in np.linspace(-0.08, 0.08, 161):
+        moved = np.round(rate * middles / step).astype(int)
+        for start in range(-most, most + 1):
+            index = start + moved + most
+            inside = (index >= 0) & (index < table.shape[1])
+            value = float(table[rows[inside], index[inside]].sum())
+            if best is None or value > best[0]:
+                best = (value, start * step, float(rate))
+    assert best is not None
+    return Course(best[1], best[2], 0.0, np.inf, best[0], unshifted)
+
+
+def _best_step(table: np.ndarray, shifts: np.ndarray, middles: np.ndarray, unshifted: float) -> Course:
+    """The step of the shift, from one constant to another, with the largest sum of correlations."""
+    before, after = np.cumsum(table, axis=0), np.cumsum(table[::-1], axis=0)[::-1]
+    value = before.max(axis=1)[:-1] + after.max(axis=1)[1:]
+    at = int(np.argmax(value))
+    first, second = float(shifts[before[at].argmax()]), float(shifts[after[at + 1].argmax()])
+    since = 0.5 * (middles[at] + middles[at + 1])
+    return Course(first, 0.0, second - first, since, float(value[at]), unshifted)
+
+
+def _on_time(course: Course) -> Correction:
+    """A function that moves the responses of a trial to the time of the stimulus; what was not recorded then is missing."""
+
+    def act(trial: Trial) -> Trial:
+        source = trial.time + course.at(trial.time)
+        right = np.clip(np.searchsorted(trial.time, source), 1, len(trial.time) - 1)
+        share = (source - trial.time[right - 1]) / (trial.time[right] - trial.time[right - 1])
+        share = np.where((source < trial.time[0]) | (source > trial.time[-1]), np.nan, share)[:, None]
+
+        def at_source(values: np.ndarray | None) -> np.ndarray | None:
+            return None if values is None else (1.0 - share) * values[right - 1] + share * values[right]
+
+        return replace(trial, reading=at_source(trial.reading), force=at_source(trial.force))
+
+    return act
+
+
+def _say_shift(course: Course, name: str) -> str:
+    way = "after" if course.start > 0 else "before"
+    return (
+        f"in '{name}.csv' the response comes {abs(course.start):.3g} s {way} the stimulus "
+        f"(correlation of their changes {course.correlation:.2f}, unshifted {course.unshifted:.2f})"
+    )
+
+
+def _say_rate(course: Course, name: str) -> str:
+    return (
+        f"in '{name}.csv' the response's clock loses {course.rate:.2%} against that of the stimulus "
+        f"(correlation of their changes {course.correlation:.2f}, {course.unshifted:.2f} with one clock)"
+    )
+
+
+def _say_step(course: Course, name: str) -> str:
+    return (
+        f"in '{name}.csv' the response jumps by {abs(course.step):.3g} s against the stimulus at about {course.since:.3g} s "
+        f"(correlation of their changes {course.correlation:.2f}, {course.unshifted:.2f} without the jump)"
+    )

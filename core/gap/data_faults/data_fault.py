@@ -1,0 +1,56 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A fault of the data: its kind, the recordings that have it, the evidence, and how it is put right."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..dataset.fault_kinds import FAULT_KINDS
+from ..dataset.trial import Trial
+
+Correction = Callable[[Trial], Trial]
+
+
+@dataclass(frozen=True)
+class DataFault:
+    """A fault of the data.
+
+    Attributes
+    ----------
+    kind : str
+        A key of :data:`.fault_kinds.FAULT_KINDS`.
+    trials : tuple of str
+        Names of the recordings that have it.
+    evidence : str
+        What shows it, in one sentence without a full stop.
+    corrections : dict of str to callable
+        For each of these recordings a function that returns it without the fault.
+    put_right : bool
+        Whether this was done.
+    """
+
+    kind: str
+    trials: tuple[str, ...]
+    evidence: str
+    corrections: dict[str, Correction] = field(default_factory=dict, compare=False)
+    put_right: bool = False
+
+    @property
+    def sentence(self) -> str:
+        """The fault in one sentence, with what was done or can be done."""
+        files = ", ".join(f"'{name}.csv'" for name in self.trials[:3]) + (" …" if len(self.trials) > 3 else "")
+        what = f"{files}: {FAULT_KINDS[self.kind]}: {self.evidence}"
+        if self.put_right:
+            return f"{what}; this was put right."
+        return f'{what}; correct = ["{self.kind}"] in [data] of the rig puts it right.'
+
+
+def centred(load: np.ndarray, response: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return load and response less the mean of their columns over the samples that were measured; zero elsewhere."""
+    good = np.isfinite(response)
+    count = np.maximum(good.sum(axis=0), 1)
+    x, y = np.where(good, load, 0.0), np.where(good, response, 0.0)
+    return np.where(good, x - x.sum(axis=0) / count, 0.0), np.where(good, y - y.sum(axis=0) / count, 0.0)

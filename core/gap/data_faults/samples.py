@@ -1,0 +1,158 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Samples that a logger repeated, and readings at the rail of a converter.
+
+All three faults show in values that are equal to the last digit while the load changes, which noise never lets happen.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ..dataset.rig import Rig, Trial
+from ..forward.stimulus import Stimulus
+from .data_fault import Correction, DataFault
+
+MOVING = 0.05
+"""Share of the fastest change of the load (95 % quantile) above which a load counts as moving."""
+LEAST_STUCK, STUCK_SAMPLES, STUCK_MOVE = 0.2, 6, 0.1
+"""A logger is stuck if nothing changes for this many seconds and samples while the load changes by this share of its largest
+value."""
+MOST_QUIET_REPEATS = 0.05
+"""It is also stuck while the load rests, if otherwise at most this share of the samples repeats the one before."""
+LEAST_REPEATS, MOST_STEPS = 0.08, 4.0
+"""Least share of moving samples that repeat the one before. The others change by more than so many steps of the converter."""
+RAIL_RUN, RAIL_MOVE, LEAST_RAILED = 4, 0.05, 12
+"""Samples in a row at the extreme value while the load changes by this share of the largest; least number of such samples."""
+
+
+def find_sample_faults(rig: Rig, stimuli: Sequence[Stimulus]) -> list[DataFault]:
+    """Return stuck loggers, repeated samples and saturated converters of some recordings."""
+    stuck: dict[str, np.ndarray] = {}
+    repeated: dict[str, np.ndarray] = {}
+    for s in stimuli:
+        equal, moving = _equal_rows(s)
+        if equal is None:
+            continue
+        frozen = _frozen(s, equal)
+        if frozen.any():
+            stuck[s.trial.name] = frozen
+            continue
+        if moving.sum() >= 20 and (equal & moving).sum() > LEAST_REPEATS * moving.sum() and not _is_coarse(s, equal):
+            repeated[s.trial.name] = equal
+    faults = []
+    if stuck:
+        name, frozen = max(stuck.items(), key=lambda item: int(item[1].sum()))
+        seconds = float(frozen.sum()) * next(s.trial.step for s in stimuli if s.trial.name == name)
+        said = f"in '{name}.csv' no response changes for {seconds:.3g} s, to the last digit"
+        faults.append(DataFault("stuck-logger", tuple(stuck), said, {one: _without(rows) for one, rows in stuck.items()}))
+    if repeated:
+        name, rows = max(repeated.items(), key=lambda item: float(item[1].mean()))
+        said = f"in '{name}.csv' {rows.mean():.0%} of the samples repeat the responses of the sample before to the last digit"
+        corrections = {one: _without(rows) for one, rows in repeated.items()}
+        faults.append(DataFault("repeated-samples", tuple(repeated), said, corrections))
+    return [*faults, *_rails(stimuli)]
+
+
+def _responses(trial: Trial) -> np.ndarray:
+    """All responses side by side, (T, c)."""
+    return np.concatenate([part for part in (trial.reading, trial.force) if part is not None], axis=1)
+
+
+def _equal_rows(stimulus: Stimulus) -> tuple[np.ndarray | None, np.ndarray]:
+    """Samples whose responses all equal those of the sample before, and samples at which the load moves; (T,) bool."""
+    values = _responses(stimulus.trial)
+    alive = np.fmax.reduce(values, axis=0) > np.fmin.reduce(values, axis=0)
+    load = stimulus.load.sum(axis=1)
+    change = np.abs(np.diff(load, prepend=load[0]))
+    moving = change > MOVING * np.quantile(change, 0.95)
+    if not alive.any() or not moving.any():
+        return None, moving
+    before, after = values[:-1, alive], values[1:, alive]
+    same = (before == after) | (np.isnan(before) & np.isnan(after))
+    return np.concatenate([[False], same.all(axis=1) & np.isfinite(after).any(axis=1)]), moving
+
+
+def _frozen(stimulus: Stimulus, equal: np.ndarray) -> np.ndarray:
+    """Samples of long runs of equal responses during which the load changes, (T,) bool."""
+    load = stimulus.load.sum(axis=1)
+    full = max(float(load.max(initial=0.0)), 1e-300)
+    found = np.zeros(len(equal), bool)
+    for start, stop in runs(equal):
+        duration = stimulus.time[stop - 1] - stimulus.time[start - 1]
+        if stop - start < STUCK_SAMPLES or duration < LEAST_STUCK:
+            continue
+        elsewhere = np.concatenate([equal[:start], equal[stop:]])
+        never_rests = float(elsewhere.mean()) < MOST_QUIET_REPEATS if len(elsewhere) else False
+        if never_rests or np.ptp(load[start - 1 : stop]) > STUCK_MOVE * full:
+            found[start:stop] = True
+    return found
+
+
+def _is_coarse(stimulus: Stimulus, equal: np.ndarray) -> bool:
+    """Whether equal responses may be steps of a converter: between samples they change by a few steps only."""
+    values = _responses(stimulus.trial)
+    change = np.abs(np.diff(values, axis=0))
+    step = np.where(change > 0, change, np.inf).min(axis=0, initial=np.inf)
+    fresh = np.where(np.isfinite(change), change, 0.0)[~equal[1:]]
+    return not bool((np.quantile(fresh, 0.9, axis=0) > MOST_STEPS * step)[np.isfinite(step)].any())
+
+
+def runs(flag: np.ndarray) -> list[tuple[int, int]]:
+    """Return the first sample of each run in which a flag (T,) is set, and the sample after its end."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], flag, [False]]).astype(int))).reshape(-1, 2)
+    return [(int(a), int(b)) for a, b in edges]
+
+
+def _rails(stimuli: Sequence[Stimulus]) -> list[DataFault]:
+    """A converter at its rail: readings that stay at the largest or smallest value of all while the load changes."""
+    recorded = [s for s in stimuli if s.trial.reading is not None]
+    if not recorded:
+        return []
+    values = [s.trial.reading for s in recorded if s.trial.reading is not None]
+    high, low = max(float(np.nanmax(v)) for v in values), min(float(np.nanmin(v)) for v in values)
+    best: tuple[int, float] | None = None
+    for rail in (high, low):
+        count = sum(_railed_samples(s, rail) for s in recorded)
+        if count >= LEAST_RAILED and (best is None or count > best[0]):
+            best = (count, rail)
+    if best is None:
+        return []
+    count, rail = best
+    names = tuple(s.trial.name for s, v in zip(recorded, values, strict=True) if (v == rail).any())
+    said = (
+        f"{count} readings stay at {rail:.6g}, the {'largest' if rail == high else 'smallest'} of all, while the load changes"
+    )
+    return [DataFault("saturated-converter", names, said, dict.fromkeys(names, _without_value(rail)))]
+
+
+def _railed_samples(stimulus: Stimulus, rail: float) -> int:
+    """Number of loaded samples at a rail in runs during which the texel's load changes."""
+    reading, load = stimulus.trial.reading, stimulus.load
+    assert reading is not None
+    full, count = max(float(load.max(initial=0.0)), 1e-300), 0
+    for texel in np.flatnonzero((reading == rail).any(axis=0)):
+        for start, stop in runs((reading[:, texel] == rail) & (load[:, texel] > 0)):
+            if stop - start >= RAIL_RUN and np.ptp(load[start:stop, texel]) > RAIL_MOVE * full:
+                count += stop - start
+    return count
+
+
+def _without(rows: np.ndarray) -> Correction:
+    def act(trial: Trial) -> Trial:
+        def without(values: np.ndarray | None) -> np.ndarray | None:
+            return None if values is None else np.where(rows[:, None], np.nan, values)
+
+        return replace(trial, reading=without(trial.reading), force=without(trial.force))
+
+    return act
+
+
+def _without_value(rail: float) -> Correction:
+    def act(trial: Trial) -> Trial:
+        assert trial.reading is not None
+        return replace(trial, reading=np.where(trial.reading == rail, np.nan, trial.reading))
+
+    return act

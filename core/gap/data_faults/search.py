@@ -1,0 +1,74 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Look for faults of the data, and put right those that the rig asks for."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ..dataset.rig import Rig
+from ..forward.stimulus import Stimulus
+from .channels import find_channel_faults
+from .clocks import find_clock_faults
+from .data_fault import DataFault
+from .samples import find_sample_faults
+from .scales import find_scale_faults
+
+
+def find_faults(rig: Rig, stimuli: Sequence[Stimulus]) -> list[DataFault]:
+    """Return the faults of a rig's data, in the order in which they are put right.
+
+    Parameters
+    ----------
+    rig : Rig
+    stimuli : sequence of Stimulus
+        Of the rig's trials.
+    """
+    judged = [s for s in stimuli if (s.load > 0).any() and _responses_change(s)]
+    if not judged:
+        return []
+    faults = find_scale_faults(rig, judged) + find_channel_faults(rig, judged)
+    if any(fault.kind == "reversed-channels" for fault in faults):
+        return faults  # nothing else can be judged before the channels are those of the texels
+    samples = find_sample_faults(rig, judged)
+    stuck = {name for fault in samples if fault.kind == "stuck-logger" for name in fault.trials}
+    clocks = find_clock_faults([s for s in judged if s.trial.name not in stuck])
+    if any(fault.kind == "repeated-samples" for fault in samples):
+        clocks = [fault for fault in clocks if fault.kind != "dropped-samples"]
+    return [*faults, *clocks, *samples]
+
+
+def _responses_change(s: Stimulus) -> bool:
+    parts = [part for part in (s.trial.reading, s.trial.force) if part is not None]
+    return any((np.fmax.reduce(part, axis=0) > np.fmin.reduce(part, axis=0)).any() for part in parts)
+
+
+def put_right(rig: Rig, stimuli: Sequence[Stimulus]) -> tuple[Rig, list[DataFault]]:
+    """Return a rig without the faults that it wants to be put right, and all faults that it had.
+
+    One fault is put right after the other, and what is left is looked for again, because a fault may hide another one.
+
+    Parameters
+    ----------
+    rig : Rig
+    stimuli : sequence of Stimulus
+        Of its trials, in their order.
+    """
+    done: list[DataFault] = []
+    while True:
+        found = find_faults(rig, stimuli)
+        known = [(fault.kind, name) for fault in done for name in fault.trials]
+        wanted = [
+            fault
+            for fault in found
+            if fault.kind in rig.correct and any((fault.kind, name) not in known for name in fault.trials)
+        ]
+        if not wanted:
+            return rig, [*done, *found]
+        corrections = wanted[0].corrections
+        trials = tuple(corrections[one.name](one) if one.name in corrections else one for one in rig.trials)
+        rig = replace(rig, trials=trials)
+        stimuli = [replace(s, trial=trial) for s, trial in zip(stimuli, trials, strict=True)]
+        done.append(replace(wanted[0], put_right=True))
