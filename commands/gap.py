@@ -58,12 +58,14 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _print_report(arguments: argparse.Namespace, rig, result, errors, folder: Path) -> None:
     """Print what was found and where it was written."""
+    from ..core.gap.fitting import least_squares
     from ..core.gap.report import sentences
 
     print(sentences.headline(result, errors))
     rows = [("", "parameter", "value (95 % interval)")]
     for one in result.intervals:
-        owner = "base model" if one.effect < 0 else result.best.model.effects[one.effect].name
+        owners = {least_squares.BASE: "base model", least_squares.RECORDING: "recordings"}
+        owner = owners.get(one.effect) or result.best.model.effects[one.effect].name
         rows.append((owner, one.name, sentences.interval_text(one)))
     print()
     print(console.text_table(rows, "<<<"))

@@ -19,7 +19,7 @@ from ...geometry.texels import Texels, texels_from_region
 from ...io.csv_table import read_table
 from ...io.regular_file import require_regular
 from ...io.sensor_toml import SHAPE_WORDS, checked_grid, checked_lengths, known_words, stated_parameters
-from ...io.toml_file import LONGEST_NAME, checked_name, read_toml
+from ...io.toml_file import LONGEST_NAME, checked_name, is_number, read_toml
 from ...model.sensor_parameters import DAMPING_PER_STIFFNESS, DEPTH_PER_THICKNESS, SENSOR_PARAMETERS, SensorParameters
 from .fault_kinds import FAULT_KINDS
 from .sessions import CLOCKS, TrialHistory, on_common_clocks, read_history
@@ -30,7 +30,7 @@ POSE, TURN, SLIDE = ("x", "y", "z"), ("qw", "qx", "qy", "qz"), ("slide_x", "slid
 FORCE = ("force_x", "force_y", "force_z")
 SMALLEST_RESPONSE = 1e-30
 """Responses of a smaller magnitude, in any unit, count as zero."""
-TRIAL_WORDS = {"file", "use", "name", "session", "started", "tared"}
+TRIAL_WORDS = {"file", "use", "name", "session", "started", "tared", "specimen", "factor", "zero"}
 """Words of a [[trial]]."""
 LONGEST_STEP = 5.0
 """Seconds between samples above which the clock must be in milliseconds."""
@@ -343,6 +343,7 @@ def _trial(
     use = entry.get("use", "fit")
     if use not in ("fit", "check"):
         raise FileError(f'{where} of \'{path.name}\' has use = {use!r}: write "fit" or "check".')
+    own = _own_numbers(entry, f"{where} of '{path.name}'")
     file = _inside(entry.get("file"), folder, f"{where}'s file", path)
     table = read_table(file)
     columns = {name: table.values[:, i] for i, name in enumerate(table.names)}
@@ -385,10 +386,38 @@ def _trial(
             reading=reading,
             force=force,
             tared=tared,
+            factor=own["factor"],
+            zero=own["zero"],
         ),
         history,
         said,
     )
+
+
+FREE = "free"
+"""What a rig writes for a number that is fitted."""
+LARGEST_FACTOR = 1e6
+"""Largest factor of a recording; its inverse is the smallest."""
+
+
+def _own_numbers(entry: dict[str, Any], where: str) -> dict[str, str | float]:
+    """Factor and zero of a trial: numbers, or names of free numbers, which the recordings of one specimen share."""
+    specimen = entry.get("specimen", "")
+    if "specimen" in entry:
+        specimen = checked_name(specimen, f"specimen of {where}")
+    numbers: dict[str, str | float] = {"factor": 1.0, "zero": 0.0}
+    for word in numbers:
+        value = entry.get(word, numbers[word])
+        if value == FREE:
+            numbers[word] = specimen or Path(str(entry.get("file"))).stem
+        elif is_number(value) and abs(value) <= LARGEST_FACTOR and (word == "zero" or value >= 1.0 / LARGEST_FACTOR):
+            numbers[word] = float(value)
+        else:
+            wanted = "a number" if word == "zero" else "a number above zero"
+            raise FileError(f'{word} of {where} is {value!r:.60}: write "free" or {wanted}.')
+    if specimen and not any(isinstance(value, str) for value in numbers.values()):
+        raise FileError(f'{where} has a specimen and no free number: write factor = "free", zero = "free" or both.')
+    return numbers
 
 
 def _meaning(name: str) -> bool:

@@ -34,6 +34,9 @@ class Trial:
         Name of the session in which the sensor's state goes on from recording to recording; empty if it belongs to none.
     tared : bool
         Whether the responses of its first sample were subtracted from all its responses.
+    factor, zero : str or float
+        Numbers of this recording by which its readings differ from those of the sensor: they are multiplied (about the sensor's
+        zero) and shifted. Of recordings without readings it is the net force that is multiplied. Free numbers have a name.
     """
 
     name: str
@@ -48,6 +51,8 @@ class Trial:
     force: np.ndarray | None
     session: str = ""
     tared: bool = False
+    factor: str | float = 1.0
+    zero: str | float = 0.0
 
     @property
     def step(self) -> float:

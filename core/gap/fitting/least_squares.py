@@ -31,6 +31,8 @@ TEXEL_PRECISION = 10.0
 
 It lets the gain of a texel without data vary by ± 0.3.
 """
+BASE, RECORDING = -1, -2
+"""In place of an effect's index: a parameter of the base model, and a number of recordings."""
 FRICTION_LEVEL = "mus and mud"
 """Both friction coefficients as one free parameter that scales them alike."""
 GRADIENT_BLOCKS = 12
@@ -53,7 +55,8 @@ class FreeParameter:
     Attributes
     ----------
     effect : int
-        Index of the effect in the model's stack; -1 for a parameter of the base model.
+        Index of the effect in the model's stack; :data:`BASE` for a parameter of the base model, :data:`RECORDING` for a number
+        of recordings.
     name : str
     low, high : float
         Bounds.
@@ -91,7 +94,9 @@ class FreeParameter:
 
 def value_of(model: Model, free: FreeParameter) -> np.ndarray | float:
     """Return the value of a free parameter in a model: a number, or (n,) float for a parameter of single texels."""
-    if free.effect < 0:
+    if free.effect == RECORDING:
+        return model.recordings[free.name]
+    if free.effect == BASE:
         return float(getattr(model.parameters, free.name))
     return np.asarray(model.effects[free.effect].values[free.name], float)
 
@@ -102,9 +107,12 @@ def with_values(model: Model, free: Sequence[FreeParameter], values: Sequence[np
     Tied parameters follow. `mud` is lowered to `mus` if it would exceed it.
     """
     base: dict[str, Any] = {}
+    recordings = dict(model.recordings)
     stacks: dict[int, dict[str, float | tuple[float, ...]]] = {}
     for item, value in zip(free, values, strict=True):
-        if item.effect < 0:
+        if item.effect == RECORDING:
+            recordings[item.name] = float(value)
+        elif item.effect == BASE:
             base[item.name] = float(value)
             grows = float(value) / max(float(getattr(model.parameters, item.name)), 1e-12) if item.tied else 1.0
             base |= {name: grows * float(getattr(model.parameters, name)) for name in item.tied}
@@ -117,7 +125,7 @@ def with_values(model: Model, free: Sequence[FreeParameter], values: Sequence[np
     effects = list(model.effects)
     for index, new in stacks.items():
         effects[index] = replace(effects[index], values={**effects[index].values, **new})
-    return Model(parameters, tuple(effects))
+    return Model(parameters, tuple(effects), recordings)
 
 
 @dataclass(frozen=True)

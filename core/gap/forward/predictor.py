@@ -3,8 +3,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -29,10 +29,19 @@ they would take more memory than this."""
 
 @dataclass(frozen=True)
 class Model:
-    """A model of a sensor: parameters of the base model, and effects on top of it."""
+    """A model of a sensor: parameters of the base model, effects on top of it, and free numbers of single recordings.
+
+    Attributes
+    ----------
+    parameters : SensorParameters
+    effects : tuple of Effect
+    recordings : mapping of str to float
+        Free numbers by which recordings differ, ``factor of NAME`` and ``zero of NAME`` (see :class:`.trial.Trial`).
+    """
 
     parameters: SensorParameters
     effects: tuple[Effect, ...] = ()
+    recordings: Mapping[str, float] = field(default_factory=dict)
 
     def with_effect(self, effect: Effect) -> Model:
         """Return the model with one more effect."""
@@ -56,6 +65,11 @@ class Prediction:
 
     reading: np.ndarray
     force: np.ndarray | None
+
+
+def number_name(word: str, name: str) -> str:
+    """Return the name of a free number of recordings in :attr:`Model.recordings`; `word` is "factor" or "zero"."""
+    return f"{word} of {name}"
 
 
 class ResponseModel:
@@ -223,7 +237,44 @@ class Predictor:
         force = self._responses.total_force(model)[self._samples] if wanted else None
         if self.trial.tared:
             reading, force = reading - reading[:1], None if force is None else force - force[:1]
-        return Prediction(reading, force)
+        return self._of_recording(model, Prediction(reading, force), subset)
+
+    def _of_recording(self, model: Model, of_sensor: Prediction, subset: np.ndarray | None) -> Prediction:
+        """The prediction with the recording's own factor and zero."""
+        trial, reading, force = self.trial, of_sensor.reading, of_sensor.force
+        if trial.factor == 1.0 and trial.zero == 0.0:
+            return of_sensor
+        rest = 0.0 if trial.tared else model.parameters.zero
+        if trial.reading is None:
+            if force is None or trial.force is None:
+                return of_sensor
+            factor, _ = self._numbers(model, force, trial.force)
+            return Prediction(reading, factor * force)
+        measured = trial.reading if subset is None else trial.reading[:, subset]
+        factor, zero = self._numbers(model, reading - rest, measured - rest)
+        return Prediction(rest + zero + factor * (reading - rest), force)
+
+    def _numbers(self, model: Model, predicted: np.ndarray, measured: np.ndarray) -> tuple[float, float]:
+        """Factor and zero of the recording.
+
+        Free numbers that the model does not have are those of a specimen of which no recording was fitted. They are computed
+        from the recording itself, by least squares.
+        """
+        given: list[float | None] = []
+        for word, value in (("factor", self.trial.factor), ("zero", self.trial.zero)):
+            given.append(model.recordings.get(number_name(word, value)) if isinstance(value, str) else value)
+        factor, zero = given
+        if (factor is None or zero is None) and self.trial.use == "check":
+            x, y = predicted[np.isfinite(measured)], measured[np.isfinite(measured)]
+            if factor is None:
+                shift = (float(x.mean()), float(y.mean())) if zero is None else (0.0, zero)
+                x, y = x - shift[0], y - shift[1]
+                square = float(x @ x)
+                factor = float(x @ y) / square if square > 0.0 else 1.0
+            if zero is None:
+                good = np.isfinite(measured)
+                zero = float((measured[good] - factor * predicted[good]).mean()) if good.any() else 0.0
+        return 1.0 if factor is None else factor, 0.0 if zero is None else zero
 
     def normal_force(self, model: Model) -> np.ndarray:
         """Return the normal force of each texel, (T, n) N."""

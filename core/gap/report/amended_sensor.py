@@ -37,7 +37,7 @@ def with_mean_gain_moved(result: Diagnosis) -> Model:
             p = replace(p, gain=p.gain * mean)
         effects = list(model.effects)
         effects[index] = replace(effect, values={**effect.values, "factor": tuple(factor.tolist())})
-        model = Model(p, tuple(effects))
+        model = replace(model, parameters=p, effects=tuple(effects))
     return model
 
 

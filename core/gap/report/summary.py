@@ -10,6 +10,7 @@ from typing import Any
 from ...io.file_writing import atomic_write
 from ...io.sensor_toml import write_sensor
 from ...jobs.progress import Job, Progress
+from ..fitting.least_squares import BASE, RECORDING
 from ..forward.predictor import Model
 from ..selection.check_recordings import CheckedRecording
 from ..selection.findings import Diagnosis, Finding
@@ -28,7 +29,9 @@ FORMAT = "palpate-gap/1"
 def summary(result: Diagnosis, errors: GapErrors) -> dict[str, Any]:
     """Return the contents of gap.json."""
     model = with_mean_gain_moved(result)
-    base = [one for one in result.intervals if one.effect < 0]
+    base_free = [item for item in result.base.free if item.effect == BASE]
+    base = [one for one in result.intervals if one.effect == BASE]
+    recordings = [one for one in result.intervals if one.effect == RECORDING]
     return {
         "format": FORMAT,
         "name": result.rig.name,
@@ -37,8 +40,12 @@ def summary(result: Diagnosis, errors: GapErrors) -> dict[str, Any]:
         "base": {
             "parameters": {one.name: getattr(model.parameters, one.name) for one in base},
             "intervals": {one.name: [one.low, one.high] for one in base},
-            "without_effects": {item.name: getattr(result.base.model.parameters, item.name) for item in result.base.free},
+            "without_effects": {item.name: getattr(result.base.model.parameters, item.name) for item in base_free},
             "gap_without_friction": errors.frictionless,
+        },
+        "recordings": {
+            "numbers": dict(model.recordings),
+            "intervals": {one.name: [one.low, one.high] for one in recordings},
         },
         "gap": {"before": errors.base, "after": errors.amended, "noise_floor": errors.noise_floor, "closed": _closed(result)},
         "check": [_checked(one, result) for one in result.check.recordings],

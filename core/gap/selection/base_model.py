@@ -10,9 +10,9 @@ import numpy as np
 
 from ...model.sensor_parameters import FITTED_FRICTION_PARAMETERS
 from ..dataset.rig import Rig
-from ..fitting.least_squares import FRICTION_LEVEL, Fit, TrialView, fit, free_base_parameters
+from ..fitting.least_squares import FRICTION_LEVEL, RECORDING, Fit, FreeParameter, TrialView, fit, free_base_parameters
 from ..fitting.noise_floor import ChannelNoise, force_noise, reading_noise
-from ..forward.predictor import Model, Predictor
+from ..forward.predictor import Model, Predictor, number_name
 from ..forward.response_check import check_responses
 
 FULL_STEPS, TRIAL_STEPS = 40, 6
@@ -23,6 +23,8 @@ SMALL_STEP = 0.1
 """Quantile of the distances of sliding between two samples that counts as a small one."""
 LEAST_FRICTION = 0.05
 """Least friction coefficient from which the stiffnesses are estimated."""
+LARGEST_OWN_FACTOR = 1e3
+"""Largest factor between two recordings that is fitted; its inverse is the smallest."""
 
 
 def prepared(rig: Rig, predictors: Sequence[Predictor]) -> tuple[tuple[ChannelNoise, ChannelNoise], tuple[float, float]]:
@@ -102,14 +104,15 @@ def base_fit(rig: Rig, views: Sequence[TrialView], full: float) -> Fit:
         Range of the readings.
     """
     predictors = [view.predictor for view in views]
-    start = start_model(rig, predictors)
+    start = with_recording_numbers(start_model(rig, predictors), predictors)
     names = base_parameters_to_search(rig, predictors)
+    numbers = recording_numbers(rig, predictors, full)
     starts = [start]
     if "sigma0" in names and "sigma0" not in rig.given:
         starts += _bristle_starts(views, start)
     fits = []
     for model in starts:
-        free = free_base_parameters(model.parameters, names, full)
+        free = [*free_base_parameters(model.parameters, names, full), *numbers]
         steps = FULL_STEPS if len(starts) == 1 else TRIAL_STEPS
         fits.append(fit(views, model, free, max_steps=steps, tolerance=1e-7, with_equations=len(starts) == 1))
     best = min(fits, key=lambda one: one.mean)
@@ -132,7 +135,8 @@ def _bristle_starts(views: Sequence[TrialView], model: Model) -> list[Model]:
         return []
     softest = level / max(travels)
     stiffest = max(level / float(np.quantile(moving, SMALL_STEP)), 10.0 * softest)
-    return [Model(replace(p, sigma0=float(x), sigma1=p.sigma1)) for x in np.geomspace(softest, stiffest, BRISTLE_STARTS)]
+    stiffnesses = np.geomspace(softest, stiffest, BRISTLE_STARTS)
+    return [replace(model, parameters=replace(p, sigma0=float(x), sigma1=p.sigma1)) for x in stiffnesses]
 
 
 def identified_base_parameters(rig: Rig, predictors: Sequence[Predictor]) -> list[str]:
@@ -162,6 +166,45 @@ def identified_base_parameters(rig: Rig, predictors: Sequence[Predictor]) -> lis
     if slides:
         names += FITTED_FRICTION_PARAMETERS
     return names
+
+
+def recording_numbers(rig: Rig, predictors: Sequence[Predictor], full: float) -> list[FreeParameter]:
+    """Return the free factors and zeros of recordings (see :class:`.trial.Trial`).
+
+    The first factor is one if all recordings have a free one, because a factor that they share is the sensor's. The same
+    holds for zeros if the sensor's own is fitted.
+
+    Parameters
+    ----------
+    rig : Rig
+    predictors : sequence of Predictor
+        Of the trials that are fitted.
+    full : float
+        Range of the readings.
+    """
+    made = []
+    own_zero = "zero" in identified_base_parameters(rig, predictors)
+    for word in ("factor", "zero"):
+        recorded = [p.trial for p in predictors if word == "factor" or p.trial.reading is not None]
+        values = [getattr(trial, word) for trial in recorded]
+        names = list(dict.fromkeys(value for value in values if isinstance(value, str)))
+        all_free = all(isinstance(value, str) for value in values)
+        for name in names[1:] if all_free and (word == "factor" or own_zero) else names:
+            called = number_name(word, name)
+            if word == "factor":
+                made.append(FreeParameter(RECORDING, called, 1.0 / LARGEST_OWN_FACTOR, LARGEST_OWN_FACTOR, log=True))
+            else:
+                made.append(FreeParameter(RECORDING, called, -100.0 * full, 100.0 * full, scale=full))
+    return made
+
+
+def with_recording_numbers(model: Model, predictors: Sequence[Predictor]) -> Model:
+    """Return a model in which every free factor of the fitted recordings is one, and every free zero is zero."""
+    numbers: dict[str, float] = {}
+    for word, value in (("factor", 1.0), ("zero", 0.0)):
+        named = [getattr(p.trial, word) for p in predictors]
+        numbers |= {number_name(word, name): value for name in named if isinstance(name, str)}
+    return replace(model, recordings=numbers)
 
 
 def base_parameters_to_search(rig: Rig, predictors: Sequence[Predictor]) -> list[str]:

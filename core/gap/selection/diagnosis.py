@@ -18,7 +18,7 @@ from ..data_faults.search import find_faults, put_right
 from ..dataset.rig import Rig
 from ..fitting.heteroscedastic_noise import proportional_noise
 from ..fitting.intervals import parameter_intervals
-from ..fitting.least_squares import Fit, fit, free_base_parameters, held_out_squares
+from ..fitting.least_squares import BASE, Fit, fit, free_base_parameters, held_out_squares
 from ..fitting.noise_floor import SHORTEST_STRETCH, coverage
 from ..fitting.residual_tests import LEAST_STRUCTURE, ResidualStructure, residual_structure
 from ..fitting.spectral_lines import strongest_line
@@ -113,7 +113,7 @@ def _stages(result: Diagnosis, view_set: ViewSet) -> list[Model]:
     effects = result.best.model.effects
     for count in range(1, len(effects)):
         free = [item for item in result.best.free if item.effect < count]
-        start = Model(result.best.model.parameters, effects[:count])
+        start = replace(result.best.model, effects=effects[:count])
         stages.append(fit(view_set.whole, start, free, max_steps=6, tolerance=1e-4, with_equations=False).model)
     return [*stages, result.best.model] if effects else stages
 
@@ -137,11 +137,11 @@ def _with_base_refitted(result: Diagnosis, view_set: ViewSet, found: Fit) -> Fit
     intervals are as wide as the recordings say.
     """
     names = identified_base_parameters(result.rig, [view.predictor for view in view_set.whole])
-    if set(names) == {item.name for item in found.free if item.effect < 0}:
+    if set(names) == {item.name for item in found.free if item.effect == BASE}:
         return found
     has_friction_effect = any(effect.name in friction_kinds() for effect in found.model.effects)
     free = free_base_parameters(found.model.parameters, names, result.full[READINGS])
-    free += [item for item in found.free if item.effect >= 0]
+    free += [item for item in found.free if item.effect != BASE]
     return fit(view_set.whole, found.model, free, max_steps=0 if has_friction_effect else 10, tolerance=1e-5)
 
 

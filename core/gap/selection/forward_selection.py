@@ -18,7 +18,6 @@ import numpy as np
 from ..fitting.least_squares import Fit, FreeParameter, fit, held_out_squares
 from ..fitting.noise_floor import Coverage
 from ..fitting.residual_tests import LEAST_STRUCTURE, ResidualStructure
-from ..forward.predictor import Model
 from .candidates import DIRECTLY_ESTIMATED, Candidate, FittedCandidate, Scales, candidates, parameters_at_bounds
 from .gap_sizes import FORCES, LEAST_IMPROVEMENT, READINGS, GapSizes, Improvement, friction_kinds
 from .identifiability import confounded
@@ -427,4 +426,4 @@ def last_effect_first(found: Fit) -> Fit:
     free = tuple(
         item if item.effect < 0 else replace(item, effect=0 if item.effect == last else item.effect + 1) for item in found.free
     )
-    return replace(found, model=Model(found.model.parameters, effects), free=free)
+    return replace(found, model=replace(found.model, effects=effects), free=free)
