@@ -26,9 +26,10 @@ class FaultyCase:
 
 
 def _shifted(rng, one: Measured, plan: dict) -> None:
-    late = plan.setdefault("late", float(rng.choice([-1, 1]) * rng.uniform(0.2, 1.2)))
-    if plan["scope"] == ALL and late > 0:
-        late = plan["late"] = late + 0.3
+    drawn = float(rng.choice([-1, 1]) * rng.uniform(0.2, 1.2))
+    if plan["scope"] == ALL and drawn > 0:
+        drawn += 0.3  # a sensor may be late by less
+    late = plan.setdefault("late", drawn)
     _resample(rng, one, lambda time: time - late)
 
 

@@ -21,8 +21,9 @@ LONGEST_SHIFT, LARGEST_SHIFT_SHARE = 3.0, 0.25
 """Longest shift that is looked for: seconds, and share of a recording."""
 MOST_SAMPLES, MOST_CHANNELS = 3000, 12
 """Samples and channels per recording that are compared."""
-WINDOWS = 16
-SMOOTHING = 0.06
+LEAST_SAMPLES = 64
+WINDOWS = 24
+SMOOTHING = 0.1
 """Seconds over which changes are taken."""
 LEAST_SHIFT, LEAST_SHIFT_SAMPLES = 0.1, 3.0
 """Smallest shift that is a fault: seconds, and samples. Lag, creep and loops of a sensor move its changes less."""
@@ -30,9 +31,11 @@ LONGEST_LAG = 0.3
 """Seconds by which a response may be late in all recordings: a sensor may be that slow (the effect `lag`)."""
 LEAST_GAIN = 0.1
 """Least increase of the correlation of the changes by a shift, a line or a step."""
-MOST_LEFT = 0.5
+MOST_LEFT = 0.6
 """What lacks to a correlation of one must become less by this factor: in a recording that repeats itself, another period fits
 about as well."""
+LEAST_SIDE = 0.15
+"""Least share of the correlation on either side of a step."""
 RATES = np.linspace(-0.08, 0.08, 161)
 """Rates at which two clocks may run apart."""
 SAME_RATE = 0.25
@@ -140,7 +143,7 @@ def _changes(stimulus: Stimulus) -> tuple[np.ndarray, np.ndarray, np.ndarray, fl
     trial = stimulus.trial
     load, response = _signals(stimulus)
     good = np.isfinite(response).all(axis=1)
-    if good.sum() < 64 or not load.any():
+    if good.sum() < LEAST_SAMPLES or not load.any():
         return None
     step = max(trial.step, float(np.ptp(trial.time)) / MOST_SAMPLES)
     if np.ptp(trial.time) / step > 2 * MOST_SAMPLES:
@@ -151,6 +154,8 @@ def _changes(stimulus: Stimulus) -> tuple[np.ndarray, np.ndarray, np.ndarray, fl
         for values in (load, response)
     ]
     width = max(1, round(SMOOTHING / step))
+    if len(even) < width + LEAST_SAMPLES:
+        return None
     x, y = (values[width:] - values[:-width] for values in on_even)
     return even[width:], x / max(float(np.abs(x).max()), 1e-300), y / max(float(np.abs(y).max()), 1e-300), step
 
@@ -207,7 +212,8 @@ def _best_line(table: np.ndarray, shifts: np.ndarray, middles: np.ndarray, unshi
 def _best_step(table: np.ndarray, shifts: np.ndarray, middles: np.ndarray, unshifted: float) -> Course:
     """The step of the shift, from one constant to another, with the largest sum of correlations."""
     before, after = np.cumsum(table, axis=0), np.cumsum(table[::-1], axis=0)[::-1]
-    value = before.max(axis=1)[:-1] + after.max(axis=1)[1:]
+    first, second = before.max(axis=1)[:-1], after.max(axis=1)[1:]
+    value = np.where(np.minimum(first, second) > LEAST_SIDE * (first + second), first + second, -np.inf)
     at = int(np.argmax(value))
     first, second = float(shifts[before[at].argmax()]), float(shifts[after[at + 1].argmax()])
     since = 0.5 * (middles[at] + middles[at + 1])
