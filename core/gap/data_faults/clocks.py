@@ -212,8 +212,8 @@ def _best_line(table: np.ndarray, shifts: np.ndarray, middles: np.ndarray, unshi
 def _best_step(table: np.ndarray, shifts: np.ndarray, middles: np.ndarray, unshifted: float) -> Course:
     """The step of the shift, from one constant to another, with the largest sum of correlations."""
     before, after = np.cumsum(table, axis=0), np.cumsum(table[::-1], axis=0)[::-1]
-    first, second = before.max(axis=1)[:-1], after.max(axis=1)[1:]
-    value = np.where(np.minimum(first, second) > LEAST_SIDE * (first + second), first + second, -np.inf)
+    left, right = before.max(axis=1)[:-1], after.max(axis=1)[1:]
+    value = np.where(np.minimum(left, right) > LEAST_SIDE * (left + right), left + right, -np.inf)
     at = int(np.argmax(value))
     first, second = float(shifts[before[at].argmax()]), float(shifts[after[at + 1].argmax()])
     since = 0.5 * (middles[at] + middles[at + 1])
