@@ -49,14 +49,18 @@ def _run(name: str, arguments: argparse.Namespace, folder: Path) -> Tally:
     chosen: type[Area] = importlib.import_module(f"{__package__}.{name}").AREA
     short = os.environ.get("SHORT", "") not in ("", "0")
     area = chosen(arguments.seed, arguments.tries or (chosen.short if short else chosen.long), folder)
-    tally = Tally(name, arguments.seed, Path(arguments.out).absolute())
+    return attack(area, Tally(name, area.seed, area.tries, Path(arguments.out).absolute()), arguments.case)
+
+
+def attack(area: Area, tally: Tally, only: list[str] | None = None) -> Tally:
+    """Try the cases of an area, or only those of some names, and count what became of them."""
     began = time.monotonic()
     try:
         for case in area.cases():
-            if arguments.case and case.name not in arguments.case:
+            if only and case.name not in only:
                 continue
             tally.add(case, area.attempt(case))
-            if sys.stderr.isatty() or sum(tally.counts.values()) % 50 == 0:
+            if sum(tally.counts.values()) % 50 == 0:
                 print(f"{tally.line()} {time.monotonic() - began:.0f} s", file=sys.stderr, flush=True)
     finally:
         area.close()

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+import shlex
 import shutil
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -76,13 +77,14 @@ class Tally:
     Parameters
     ----------
     area : str
-    seed : int
+    seed, tries : int
+        As of the area, to repeat a case.
     folder : Path
         Each finding gets a folder in it, with ``finding.json`` and the evidence.
     """
 
-    def __init__(self, area: str, seed: int, folder: Path):
-        self._area, self._seed, self._folder = area, seed, folder
+    def __init__(self, area: str, seed: int, tries: int, folder: Path):
+        self._area, self._seed, self._tries, self._folder = area, seed, tries, folder
         self.counts = dict.fromkeys(OUTCOMES, 0)
 
     def add(self, case: Case, outcome: Outcome) -> None:
@@ -92,12 +94,13 @@ class Tally:
             return
         place = self._folder / self._area / f"{sum(self.counts.values()) - 1:05d}-{outcome.kind}"
         place.mkdir(parents=True, exist_ok=True)
+        numbers = f"--seed {self._seed} --tries {self._tries}"
         finding = {
             "area": self._area,
             "case": case.name,
             "outcome": outcome.kind,
             "seen": outcome.seen,
-            "repeat": f"python -m attack {self._area} --seed {self._seed} --case '{case.name}'",
+            "repeat": f"python -m attack {self._area} {numbers} --case {shlex.quote(case.name)}",
             "data": case.data,
         }
         (place / "finding.json").write_text(json.dumps(finding, indent=2) + "\n", encoding="utf-8", errors="backslashreplace")

@@ -26,6 +26,8 @@ LONGEST = 120.0
 """Seconds after which a command counts as hung; none of them has much to do."""
 DISK_SHARE = 0.25
 """Part of the cases that run on a small disk."""
+SCENES_SHARE = 0.15
+"""Part of the cases that are hostile scenes."""
 DISKS = (60, 900)
 """Smallest and largest number of free kilobytes on a small disk."""
 
@@ -85,8 +87,9 @@ class Commands(Area):
 
     short, long = 120, 900
 
-    def __init__(self, seed: int, tries: int, folder: Path):
+    def __init__(self, seed: int, tries: int, folder: Path, disks: bool = True, scenes: int | None = None):
         super().__init__(seed, tries, folder)
+        self._disks, self._scenes = disks and os.geteuid() == 0 and sys.platform == "linux", scenes
         self._worker = Worker(folder)
         self._stage = Stage(folder, self._worker)
         self._jobs = {job.name: job for job in JOBS}
@@ -101,13 +104,15 @@ class Commands(Area):
         words = [(template, at, odd) for template, at in every for odd in (NAMES if template[at] == "NAME" else NUMBERS)]
         dice.shuffle(words)
         scenes = self._worker.call("hostile_scenes:kinds")
-        disks = round(self.tries * DISK_SHARE) if os.geteuid() == 0 and sys.platform == "linux" else 0
+        dice.shuffle(scenes)
+        scenes = scenes[: round(self.tries * SCENES_SHARE) if self._scenes is None else self._scenes]
+        disks = round(self.tries * DISK_SHARE) if self._disks else 0
         for template, at, odd in words[: max(1, self.tries - disks - len(scenes))]:
             filled = ["3" if word == "NUMBER" else word for word in template]
             filled[at] = odd
             name = f"{' '.join(template)} [{at}] = {odd!r}"
             yield Case(name, {"words": [*filled]})
-        for kind in scenes[: self.tries]:
+        for kind in scenes:
             yield Case(f"scene: {kind}", {"scene": kind, "words": ["bake", "hostile.blend", "--out", "new"]})
         for i in range(disks):
             job = dice.choice([job for job in JOBS if job.name != "gap"])
@@ -135,9 +140,9 @@ class Commands(Area):
         answer = stage.run(job.words, timeout=LONGEST)
         case.data["printed"], case.data["status"] = answer["printed"][-2000:], answer["status"]
         return (
-            _judge_words(answer)
+            judge_words(answer)
             or self._judge_bake(answer)
-            or _judge_files(before, tree(stage.place), job.words, answer)
+            or judge_files(before, tree(stage.place), job.words, answer)
             or Outcome(CLEAR)
         )
 
@@ -192,7 +197,7 @@ class Commands(Area):
                 stage.bake_now()
             if job.saves:
                 stage.blend_now(job.saves)
-            return _judge_words(answer) or Outcome(CLEAR)
+            return judge_words(answer) or Outcome(CLEAR)
         finally:
             self._unmount()
 
@@ -217,7 +222,7 @@ def furnish(place: Path) -> None:
     os.chmod(place / "locked", 0o500)
 
 
-def _judge_words(answer: dict) -> Outcome | None:
+def judge_words(answer: dict) -> Outcome | None:
     """Check that a command ended as it should and said why, if it did not succeed."""
     printed = answer["printed"]
     if answer["traceback"] or "Traceback (most recent" in printed:
@@ -230,7 +235,7 @@ def _judge_words(answer: dict) -> Outcome | None:
     return None
 
 
-def _judge_files(before: dict[str, str], after: dict[str, str], words: tuple[str, ...], answer: dict) -> Outcome | None:
+def judge_files(before: dict[str, str], after: dict[str, str], words: tuple[str, ...], answer: dict) -> Outcome | None:
     """Check that nothing was changed by a command that failed, and the user's files by none."""
     gone = [path for path in before if path not in after and "/.palpate/" not in path and not _is_listed(path)]
     if gone:

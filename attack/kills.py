@@ -28,11 +28,11 @@ class Kills(Area):
 
     short, long = 12, 90
 
-    def __init__(self, seed: int, tries: int, folder: Path):
+    def __init__(self, seed: int, tries: int, folder: Path, jobs: tuple[Job, ...] = JOBS):
         super().__init__(seed, tries, folder)
         self._worker = Worker(folder)
         self._stage = Stage(folder, self._worker)
-        self._jobs = {job.name: job for job in JOBS}
+        self._jobs = {job.name: job for job in jobs}
         self._seconds: dict[str, float] = {}
 
     def close(self) -> None:

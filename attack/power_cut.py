@@ -37,6 +37,8 @@ from .worker import PACKAGE, Crashed, Failed, Hung, Worker, run_command
 NOTHING, HALF, ZEROS, ALL = "nothing", "half", "zeros", "all"
 DEVICE_SHARE, LEAST_DEVICE_CUTS = 0.1, 12
 """Part of the cuts that are made with a real file system, and how many are wanted at least."""
+CUT_JOBS = tuple(job for job in JOBS if job.name in ("bake", "bake --save", "export csv"))
+"""Jobs that are cut in simulation."""
 DEVICE_SIZE = 24 << 20
 """Bytes of its block device."""
 
@@ -221,11 +223,11 @@ class PowerCut(Area):
 
     short, long = 30, 300
 
-    def __init__(self, seed: int, tries: int, folder: Path):
+    def __init__(self, seed: int, tries: int, folder: Path, jobs: tuple[Job, ...] = CUT_JOBS):
         super().__init__(seed, tries, folder)
         self._worker = Worker(folder)
         self._stage = Stage(folder, self._worker)
-        self._jobs = {job.name: job for job in JOBS if job.name in ("bake", "bake --save", "export csv")}
+        self._jobs = {job.name: job for job in jobs}
         self._recorded: dict[str, Recorded] = {}
         self._device: Device | None = None
         self._expected: dict[str, str] = {}
@@ -237,9 +239,10 @@ class PowerCut(Area):
 
     def cases(self) -> Iterator[Case]:
         dice = random.Random(self.seed)
-        for name, share in (("bake", 0.5), ("bake --save", 0.3), ("export csv", 0.2)):
-            self._record(self._jobs[name])
-            count = max(1, round(self.tries * share))
+        total = sum(job.share for job in self._jobs.values())
+        for name, job in self._jobs.items():
+            self._record(job)
+            count = max(1, round(self.tries * job.share / total))
             for i in range(count):  # spread over all moments
                 at = min(len(self._recorded[name]) - 1, int((i + dice.random()) * len(self._recorded[name]) / count))
                 yield Case(f"simulated {name}: {i}", {"job": name, "at": at, "seed": dice.randrange(1 << 30)})
