@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -275,6 +276,12 @@ class Predictor:
                 good = np.isfinite(measured)
                 zero = float((measured[good] - factor * predicted[good]).mean()) if good.any() else 0.0
         return 1.0 if factor is None else factor, 0.0 if zero is None else zero
+
+    def with_numbers_of(self, trial: Trial) -> Predictor:
+        """Return a predictor of the same recording with the factor and the zero of `trial`, which share what is computed."""
+        twin = copy(self)
+        twin.trial = trial
+        return twin
 
     def normal_force(self, model: Model) -> np.ndarray:
         """Return the normal force of each texel, (T, n) N."""

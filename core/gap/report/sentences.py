@@ -36,7 +36,17 @@ def headline(result: Diagnosis, errors: GapErrors) -> str:
 
 
 def _outcome(result: Diagnosis, errors: GapErrors) -> str:
-    """The result in one sentence."""
+    """The result in one sentence, after one on how the recordings differ."""
+    if result.between is None:
+        return _effects(result, errors)
+    own, after = result.between, errors.amended["fit"] or 0.0
+    said = f"Missing: {own.name} between recordings, of which each has a level and a gain of its own"
+    said += f"; the error shrinks from {own.before:.2%} to {after:.2%} of the range. Name their session to learn more."
+    return f"{said} Beside that: {_effects(result, errors)}" if result.findings else said
+
+
+def _effects(result: Diagnosis, errors: GapErrors) -> str:
+    """The missing effects in one sentence."""
     before, after = errors.base["fit"] or 0.0, errors.amended["fit"] or 0.0
     findings = by_share_closed(result)
     sure = [one for one in findings if one.confidence >= SURE]

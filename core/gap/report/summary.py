@@ -37,6 +37,7 @@ def summary(result: Diagnosis, errors: GapErrors) -> dict[str, Any]:
         "name": result.rig.name,
         "verdict": result.verdict,
         "found": [_found(one, model, result, errors) for one in result.findings],
+        "between_recordings": _between(result),
         "base": {
             "parameters": {one.name: getattr(model.parameters, one.name) for one in base},
             "intervals": {one.name: [one.low, one.high] for one in base},
@@ -60,6 +61,22 @@ def summary(result: Diagnosis, errors: GapErrors) -> dict[str, Any]:
             for fault in result.faults
         ],
         "warnings": list(result.rig.warnings) + warnings(result),
+    }
+
+
+def _between(result: Diagnosis) -> dict[str, Any] | None:
+    """How the recordings differ, by levels and gains of their own; None if they need none."""
+    own = result.between
+    if own is None:
+        return None
+    return {
+        "effect": own.name,
+        "form": "between recordings",
+        "factors": own.factors,
+        "zeros": own.zeros,
+        "closes": round(own.closes, 4),
+        "gap_before": own.before,
+        "confidence": own.confidence,
     }
 
 

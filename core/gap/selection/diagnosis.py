@@ -19,16 +19,18 @@ from ..dataset.rig import Rig
 from ..fitting.heteroscedastic_noise import proportional_noise
 from ..fitting.intervals import parameter_intervals
 from ..fitting.least_squares import BASE, Fit, fit, free_base_parameters, held_out_squares
-from ..fitting.noise_floor import SHORTEST_STRETCH, coverage
+from ..fitting.noise_floor import SHORTEST_STRETCH, ChannelNoise, coverage
 from ..fitting.residual_tests import LEAST_STRUCTURE, ResidualStructure, residual_structure
 from ..fitting.spectral_lines import strongest_line
 from ..forward.predictor import Model, Predictor, predictors_of
 from .base_model import base_fit, identified_base_parameters, prepared
+from .between_recordings import LEAST_CLOSED, LEAST_LOWERED, MOST_LEFT, differences, with_own_numbers
 from .candidates import scales_of
 from .check_recordings import check_views, checked
+from .confidence import UNSURE_CONFIDENCE
 from .findings import Diagnosis
 from .forward_selection import ForwardSelection, SelectionState
-from .gap_sizes import FORCES, READINGS, GapSizes, friction_kinds
+from .gap_sizes import FORCES, READINGS, UNRESOLVED_SQUARE, GapSizes, friction_kinds
 from .harmful_effects import without_harmful_effects
 from .verdict import conclude
 from .view_set import ViewSet, view_set_of
@@ -55,18 +57,57 @@ def diagnose(rig: Rig) -> Job[Diagnosis]:
     yield Progress("contacts of every trial", 0, TOTAL_WORK)
     rig, predictors, faults = _without_faults(rig)
     noise, full = prepared(rig, predictors)
+    yield Progress("base model", BASE_MODEL_BEGINS, TOTAL_WORK)
+    result, view_set = _with_base_model(rig, predictors, noise, full)
+    result.faults = faults
+    other, second, closes = with_own_numbers(rig), None, 0.0
+    if other is not None:
+        twins = [one.with_numbers_of(trial) for one, trial in zip(predictors, other.trials, strict=True)]
+        own, own_views = _with_base_model(other, twins, noise, full)
+        own.faults = faults
+        before, after = _left(view_set, result.base), _left(own_views, own.base)
+        closes = 1.0 - after / before
+        second = own if closes >= LEAST_CLOSED and before - after > LEAST_LOWERED else None
+    ends = TOTAL_WORK if second is None else (SELECTION_BEGINS + TOTAL_WORK) // 2
+    for what, share in _select_effects(result, view_set):
+        yield Progress(what, SELECTION_BEGINS + int((ends - SELECTION_BEGINS) * share), TOTAL_WORK)
+    result.stages = _stages(result, view_set)
+    if second is not None:
+        for what, share in _select_effects(second, own_views):
+            yield Progress(what, ends + int((TOTAL_WORK - ends) * share), TOTAL_WORK)
+        second.stages = _stages(second, own_views)
+        if _left(own_views, second.best) < MOST_LEFT * _left(view_set, result.best):
+            error = _relative_error(result.base, noise, full)
+            second.between = differences(second.best.model, second.of("fit"), closes, error, full[READINGS])
+            if second.misleading_faults:
+                second.between = replace(second.between, confidence=min(second.between.confidence, UNSURE_CONFIDENCE))
+            second.verdict = "explained" if second.verdict == "no gap" else second.verdict
+            result = second
+    return result
+
+
+def _with_base_model(
+    rig: Rig, predictors: list[Predictor], noise: tuple[ChannelNoise, ChannelNoise], full: tuple[float, float]
+) -> tuple[Diagnosis, ViewSet]:
+    """A diagnosis that has the fitted base model alone, and the views of the fitted trials."""
     fitted = [p for p in predictors if p.trial.use == "fit"]
     view_set = view_set_of(fitted, (noise[0].deviation, noise[1].deviation))
-    yield Progress("base model", BASE_MODEL_BEGINS, TOTAL_WORK)
     base = base_fit(rig, view_set.whole, full[0])
     structure = _structure(view_set, base)
     scales = scales_of(fitted, base.model)
-    result = Diagnosis(rig, predictors, noise, full, coverage(fitted), scales, base, base, structure, structure)
-    result.faults = faults
-    for what, share in _select_effects(result, view_set):
-        yield Progress(what, SELECTION_BEGINS + int((TOTAL_WORK - SELECTION_BEGINS) * share), TOTAL_WORK)
-    result.stages = _stages(result, view_set)
-    return result
+    return Diagnosis(rig, predictors, noise, full, coverage(fitted), scales, base, base, structure, structure), view_set
+
+
+def _relative_error(found: Fit, noise: tuple[ChannelNoise, ChannelNoise], full: tuple[float, float]) -> float:
+    """NRMSE of a fit on the fitted trials."""
+    scale = np.array([one.deviation / size for one, size in zip(noise, full, strict=True)])
+    return float(np.sqrt((found.sse.sum(axis=0) * scale**2).sum() / max(float(found.count.sum()), 1.0)))
+
+
+def _left(view_set: ViewSet, found: Fit) -> float:
+    """Mean square of a fit on unseen stretches, less that of noise, plus what no fit can resolve."""
+    mean = float(held_out_squares(view_set.whole, found).sum()) / max(float(found.count.sum()), 1.0)
+    return max(mean - 1.0, 0.0) + UNRESOLVED_SQUARE
 
 
 def _without_faults(rig: Rig) -> tuple[Rig, list[Predictor], list[DataFault]]:

@@ -15,6 +15,7 @@ from ..fitting.noise_floor import ChannelNoise, Coverage
 from ..fitting.residual_tests import ResidualStructure
 from ..fitting.spectral_lines import SpectralLine
 from ..forward.predictor import Model, Predictor
+from .between_recordings import RecordingDifferences
 from .candidates import Scales
 from .check_recordings import CheckedRecording, CheckOutcome
 
@@ -113,6 +114,8 @@ class Diagnosis:
         A periodic disturbance of the readings without load.
     faults : list of DataFault
         Faults of the data, whether they were put right or not.
+    between : RecordingDifferences or None
+        Levels and gains by which the recordings differ, if the search was better with them; they are part of both models.
     check : CheckOutcome
         What the check recordings say of the amended model, or of the base model if there are no effects.
     closed : ClosedShares
@@ -139,6 +142,7 @@ class Diagnosis:
     ruled_out: list[tuple[str, str]] = field(default_factory=list)
     line: SpectralLine | None = None
     faults: list[DataFault] = field(default_factory=list)
+    between: RecordingDifferences | None = None
     check: CheckOutcome = field(default_factory=CheckOutcome)
     closed: ClosedShares = field(default_factory=ClosedShares)
     unlike_fitted: list[CheckedRecording] = field(default_factory=list)

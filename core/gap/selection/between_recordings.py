@@ -1,0 +1,92 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Differences between recordings: a level and a gain of each, which no state of the sensor within a recording explains.
+
+A sensor that wears, drifts or warms up from recording to recording looks, without a session in the rig, like one whose
+recordings differ. Effects of single texels or of the contact may then be fitted to these differences. So the search for effects
+is done a second time with a free factor and zero of each recording, if these alone close a good part of the gap, and counts if
+far less is left.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..dataset.rig import Rig
+from ..forward.predictor import Model, Predictor, number_name
+
+LEAST_RECORDINGS = 3
+"""Number of fitted recordings from which on they are compared: of two, each may be the odd one."""
+LEAST_CLOSED = 0.25
+"""Least share of the gap that factors and zeros alone must close, as for any first effect."""
+LEAST_LOWERED = 0.1
+"""Least mean square, in units of the noise's variance, by which they must lower the residual: noise is coloured."""
+MOST_LEFT = 0.5
+"""With factors and zeros, the search must leave less than this share of what it leaves without."""
+WEAR_ORDER = -0.5
+"""Rank correlation of the factors with the order of the recordings below which they fall as of wear."""
+
+
+@dataclass(frozen=True)
+class RecordingDifferences:
+    """Levels and gains by which recordings differ.
+
+    Attributes
+    ----------
+    name : str
+        "wear" if gains fall from recording to recording, else "drift".
+    closes : float
+        Share of the gap that they close alone, on unseen stretches.
+    confidence : float
+    before : float
+        NRMSE on the fitted recordings of the base model without them.
+    factors, zeros : dict of str to float
+        Of the fitted recordings, in order of the rig; zeros in the sensor's unit.
+    """
+
+    name: str
+    closes: float
+    confidence: float
+    before: float
+    factors: dict[str, float]
+    zeros: dict[str, float]
+
+
+def with_own_numbers(rig: Rig) -> Rig | None:
+    """Return a rig whose recordings each have a free factor and zero; None if that is no question in this rig.
+
+    It is none if the rig names sessions, specimens or numbers of recordings, or has fewer than three recordings to be fitted.
+    """
+    said = any(trial.session or trial.factor != 1.0 or trial.zero != 0.0 for trial in rig.trials)
+    if said or len(rig.of("fit")) < LEAST_RECORDINGS:
+        return None
+    trials = [
+        replace(trial, factor=trial.name, zero=0.0 if trial.reading is None or trial.tared else trial.name)
+        for trial in rig.trials
+    ]
+    return replace(rig, trials=tuple(trials))
+
+
+def differences(model: Model, fitted: Sequence[Predictor], closes: float, before: float, full: float) -> RecordingDifferences:
+    """Return the levels and gains of a fitted model by name.
+
+    Parameters
+    ----------
+    model : Model
+    fitted : sequence of Predictor
+        Of the recordings that were fitted, in the order of the rig.
+    closes, before : float
+        See :class:`RecordingDifferences`.
+    full : float
+        Range of the readings.
+    """
+    names = [one.trial.name for one in fitted]
+    factors = {name: model.recordings.get(number_name("factor", name), 1.0) for name in names}
+    zeros = {name: model.recordings.get(number_name("zero", name), 0.0) for name in names}
+    gain, level = np.array(list(factors.values())), np.array(list(zeros.values()))
+    falls = float(np.corrcoef(np.argsort(np.argsort(gain)), np.arange(len(gain)))[0, 1]) < WEAR_ORDER
+    confidence = round(0.5 + 0.5 * float(np.clip(closes, 0.0, 1.0)), 3)
+    is_gain = float(gain.std()) * full > float(level.std())
+    return RecordingDifferences("wear" if is_gain and falls else "drift", closes, confidence, before, factors, zeros)
