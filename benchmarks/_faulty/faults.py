@@ -131,6 +131,11 @@ def kinds_for(family: str) -> list[str]:
     return [kind for kind in KINDS if FAMILIES[family].has_places or not kind.endswith("-channels")]
 
 
+def _differ(columns: dict[str, np.ndarray], before: dict[str, np.ndarray]) -> bool:
+    """Whether a fault changed anything: a recording may never come near a rail."""
+    return any(not np.array_equal(columns[name], before[name]) for name in columns)
+
+
 def draw(family: str, kind: str, number: int, folder: Path) -> FaultyCase:
     """Write case `number` of a family and a fault (empty for none) into a folder; the same every time."""
     rng = np.random.default_rng([sum(map(ord, family)), sum(map(ord, kind or "healthy")), number])
@@ -144,9 +149,10 @@ def draw(family: str, kind: str, number: int, folder: Path) -> FaultyCase:
             scope = ONE  # nothing says what a count is
         hit = trials if scope == ALL else [trials[int(rng.integers(3))]]
         plan = {"scope": scope, "mixed": bool(rng.integers(2))}
+        before = [dict(one.columns) for one in hit]
         for one in hit:
             act(rng, one, plan)
-        where = tuple(one.name for one in hit)
+        where = tuple(one.name for one, columns in zip(hit, before, strict=True) if _differ(one.columns, columns))
     folder.mkdir(parents=True, exist_ok=True)
     lines = ['format = "palpate-rig/1"', f'name = "{family} {number}"', "[sensor]", made.sensor]
     for one in trials:
