@@ -30,7 +30,7 @@ POSE, TURN, SLIDE = ("x", "y", "z"), ("qw", "qx", "qy", "qz"), ("slide_x", "slid
 FORCE = ("force_x", "force_y", "force_z")
 SMALLEST_RESPONSE = 1e-30
 """Responses of a smaller magnitude, in any unit, count as zero."""
-TRIAL_WORDS = {"file", "use", "name", "session", "started", "tared", "specimen", "factor", "zero"}
+TRIAL_WORDS = {"file", "use", "name", "session", "started", "tared", "specimen", "factor", "zero", "force_zero"}
 """Words of a [[trial]]."""
 LONGEST_STEP = 5.0
 """Seconds between samples above which the clock must be in milliseconds."""
@@ -388,6 +388,7 @@ def _trial(
             tared=tared,
             factor=own["factor"],
             zero=own["zero"],
+            force_zero=_force_zero(entry, f"{where} of '{path.name}'"),
         ),
         history,
         said,
@@ -415,9 +416,19 @@ def _own_numbers(entry: dict[str, Any], where: str) -> dict[str, str | float]:
         else:
             wanted = "a number" if word == "zero" else "a number above zero"
             raise FileError(f'{word} of {where} is {value!r:.60}: write "free" or {wanted}.')
-    if specimen and not any(isinstance(value, str) for value in numbers.values()):
-        raise FileError(f'{where} has a specimen and no free number: write factor = "free", zero = "free" or both.')
+    if specimen and FREE not in [entry.get(word) for word in (*numbers, "force_zero")]:
+        raise FileError(f'{where} has a specimen and no free number: write factor = "free" or zero = "free".')
     return numbers
+
+
+def _force_zero(entry: dict[str, Any], where: str) -> str | tuple[float, ...]:
+    """What the force sensor shows without load: three numbers, or the name of free ones that a specimen's recordings share."""
+    value = entry.get("force_zero", [0.0, 0.0, 0.0])
+    if value == FREE:
+        return str(entry.get("specimen") or Path(str(entry.get("file"))).stem)
+    if isinstance(value, list) and len(value) == 3 and all(is_number(one) and abs(one) <= LARGEST_FACTOR for one in value):
+        return tuple(float(one) for one in value)
+    raise FileError(f'force_zero of {where} is {value!r:.60}: write "free", or three numbers in newtons.')
 
 
 def _meaning(name: str) -> bool:

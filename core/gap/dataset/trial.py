@@ -37,6 +37,8 @@ class Trial:
     factor, zero : str or float
         Numbers of this recording by which its readings differ from those of the sensor: they are multiplied (about the sensor's
         zero) and shifted. Of recordings without readings it is the net force that is multiplied. Free numbers have a name.
+    force_zero : str or (3,) float, newtons
+        What the force sensor shows without load; a name if it is free.
     """
 
     name: str
@@ -53,6 +55,7 @@ class Trial:
     tared: bool = False
     factor: str | float = 1.0
     zero: str | float = 0.0
+    force_zero: str | tuple[float, ...] = (0.0, 0.0, 0.0)
 
     @property
     def step(self) -> float:

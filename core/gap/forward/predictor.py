@@ -16,7 +16,7 @@ from ...geometry.texels import Texels
 from ...model.effect import Effect
 from ...model.sensor import Sensor
 from ...model.sensor_parameters import FRICTION_LAW_PARAMETERS, NORMAL_LAW_PARAMETERS, SensorParameters
-from ..dataset.rig import Rig
+from ..dataset.rig import FORCE, Rig
 from ..dataset.trial import Trial
 from .force_model import ContactHistory
 from .stimulus import Stimulus, joined_stimuli, stimulus_of
@@ -243,17 +243,30 @@ class Predictor:
     def _of_recording(self, model: Model, of_sensor: Prediction, subset: np.ndarray | None) -> Prediction:
         """The prediction with the recording's own factor and zero."""
         trial, reading, force = self.trial, of_sensor.reading, of_sensor.force
-        if trial.factor == 1.0 and trial.zero == 0.0:
-            return of_sensor
-        rest = 0.0 if trial.tared else model.parameters.zero
-        if trial.reading is None:
-            if force is None or trial.force is None:
-                return of_sensor
-            factor, _ = self._numbers(model, force, trial.force)
-            return Prediction(reading, factor * force)
-        measured = trial.reading if subset is None else trial.reading[:, subset]
-        factor, zero = self._numbers(model, reading - rest, measured - rest)
-        return Prediction(rest + zero + factor * (reading - rest), force)
+        if trial.factor != 1.0 or trial.zero != 0.0:
+            if trial.reading is not None:
+                rest = 0.0 if trial.tared else model.parameters.zero
+                measured = trial.reading if subset is None else trial.reading[:, subset]
+                factor, zero = self._numbers(model, reading - rest, measured - rest)
+                reading = rest + zero + factor * (reading - rest)
+            elif force is not None and trial.force is not None:
+                force = self._numbers(model, force, trial.force)[0] * force
+        if force is not None:
+            force = self._with_force_zero(model, force)
+        return Prediction(reading, force)
+
+    def _with_force_zero(self, model: Model, force: np.ndarray) -> np.ndarray:
+        """The net force as its sensor shows it, (T, 3) N."""
+        name, measured = self.trial.force_zero, self.trial.force
+        if not isinstance(name, str):
+            return force + np.array(name) if any(name) else force
+        given = [model.recordings.get(number_name(axis, name)) for axis in FORCE]
+        if self.trial.use == "check" and measured is not None:  # of a specimen of which no recording was fitted
+            for i, axis_zero in enumerate(given):
+                good = np.isfinite(measured[:, i])
+                if axis_zero is None and good.any():
+                    given[i] = float((measured[good, i] - force[good, i]).mean())
+        return force + np.array([0.0 if value is None else value for value in given])
 
     def _numbers(self, model: Model, predicted: np.ndarray, measured: np.ndarray) -> tuple[float, float]:
         """Factor and zero of the recording.

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from ...model.sensor_parameters import FITTED_FRICTION_PARAMETERS
-from ..dataset.rig import Rig
+from ..dataset.rig import FORCE, Rig
 from ..fitting.least_squares import FRICTION_LEVEL, RECORDING, Fit, FreeParameter, TrialView, fit, free_base_parameters
 from ..fitting.noise_floor import ChannelNoise, force_noise, reading_noise
 from ..forward.predictor import Model, Predictor, number_name
@@ -195,6 +195,12 @@ def recording_numbers(rig: Rig, predictors: Sequence[Predictor], full: float) ->
                 made.append(FreeParameter(RECORDING, called, 1.0 / LARGEST_OWN_FACTOR, LARGEST_OWN_FACTOR, log=True))
             else:
                 made.append(FreeParameter(RECORDING, called, -100.0 * full, 100.0 * full, scale=full))
+    for trial in {p.trial.force_zero: p.trial for p in predictors if p.trial.force is not None}.values():
+        for axis, values in zip(FORCE, np.transpose(trial.force if trial.force is not None else np.zeros((0, 3))), strict=True):
+            if isinstance(trial.force_zero, str) and np.isfinite(values).any():
+                size = max(float(np.nanmax(np.abs(values))), 1e-12)
+                name = number_name(axis, trial.force_zero)
+                made.append(FreeParameter(RECORDING, name, -100.0 * size, 100.0 * size, scale=size))
     return made
 
 
@@ -204,6 +210,8 @@ def with_recording_numbers(model: Model, predictors: Sequence[Predictor]) -> Mod
     for word, value in (("factor", 1.0), ("zero", 0.0)):
         named = [getattr(p.trial, word) for p in predictors]
         numbers |= {number_name(word, name): value for name in named if isinstance(name, str)}
+    biased = [p.trial.force_zero for p in predictors if isinstance(p.trial.force_zero, str) and p.trial.force is not None]
+    numbers |= {number_name(axis, name): 0.0 for name in biased for axis in FORCE}
     return replace(model, recordings=numbers)
 
 

@@ -83,6 +83,21 @@ def test_a_specimen_that_is_only_checked_has_its_own_numbers():
     assert view.squares(view.residual(stiffer))[0] > 5.0 * view.counts[0]  # a factor does not make up for everything
 
 
+def test_the_force_sensor_has_a_bias():
+    shift = np.array([0.02, -0.03, 0.05])
+    trials = [pressed(i, net=True, use=use) for i, use in enumerate(("fit", "fit", "check"))]
+    trials = [replace(one, force=one.force + shift, force_zero=name) for one, name in zip(trials, "AAB", strict=True)]
+    predictors, _, found = fitted(trials)
+    biases = [found.model.recordings[f"{axis} of A"] for axis in ("force_x", "force_y", "force_z")]
+    np.testing.assert_allclose(biases, shift, atol=3e-4)
+    assert found.mean < 1.2 and found.model.parameters.k == pytest.approx(80.0, rel=0.01)
+    view = TrialView(predictors[2], noise=(NOISE, NOISE))  # a day that is only checked has a bias of its own
+    assert view.squares(view.residual(found.model))[1] < 1.2 * view.counts[1]
+    stated = [replace(one, force_zero=tuple(shift)) for one in trials]
+    *_, found = fitted(stated)
+    assert found.mean < 1.2 and not found.model.recordings
+
+
 def test_a_rig_says_them(tmp_path):
     def read(words):
         return read_rig(write(tmp_path, RIG.replace('file = "press.csv"', f'file = "press.csv"\n{words}'))).trials[0]
@@ -91,7 +106,11 @@ def test_a_rig_says_them(tmp_path):
     assert (read('factor = "free"\nzero = "free"').factor, read('zero = "free"').zero) == ("press", "press")
     assert read('specimen = "A"\nfactor = "free"').factor == "A"
     assert (read("factor = 2").factor, read("zero = -0.5").zero) == (2.0, -0.5)
+    assert read('force_zero = "free"').force_zero == "press" and read("force_zero = [0, 0.5, 1]").force_zero == (0.0, 0.5, 1.0)
+    assert read('specimen = "A"\nforce_zero = "free"').force_zero == "A"
     for words in (
+        "force_zero = 1",
+        'force_zero = [0, 0, "a"]',
         'factor = "some"',
         "factor = -1",
         "factor = 0",
