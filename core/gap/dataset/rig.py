@@ -7,7 +7,7 @@ Every mistake in a rig raises an error here, in one sentence, before anything is
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -19,9 +19,11 @@ from ...geometry.texels import Texels, texels_from_region
 from ...io.csv_table import read_table
 from ...io.regular_file import require_regular
 from ...io.sensor_toml import SHAPE_WORDS, checked_grid, checked_lengths, known_words, stated_parameters
-from ...io.toml_file import LONGEST_NAME, checked_name, is_number, read_toml
+from ...io.toml_file import LONGEST_NAME, checked_name, read_toml
 from ...model.sensor_parameters import DAMPING_PER_STIFFNESS, DEPTH_PER_THICKNESS, SENSOR_PARAMETERS, SensorParameters
+from .column_names import ColumnRule, read_column_rules, translated
 from .fault_kinds import FAULT_KINDS
+from .own_numbers import force_zero_of, own_numbers
 from .sessions import CLOCKS, TrialHistory, on_common_clocks, read_history
 from .trial import Trial
 
@@ -114,7 +116,7 @@ def read_rig(path: str | Path) -> Rig:
     words = read_toml(path, "rig")
     if words.get("format") != FORMAT:
         raise FileError(f"'{path.name}' is not a rig: its first line must be format = \"{FORMAT}\".")
-    known_words(words, {"format", "name", "clock", "data", "sensor", "indenter", "trial"}, f"'{path.name}'")
+    known_words(words, {"format", "name", "clock", "columns", "data", "sensor", "indenter", "trial"}, f"'{path.name}'")
     clock = words.get("clock")
     if clock is not None and clock not in CLOCKS:
         raise FileError(f'clock of \'{path.name}\' is {clock!r:.60}: write "absolute" or "own".')
@@ -128,9 +130,11 @@ def read_rig(path: str | Path) -> Rig:
     entries = words.get("trial")
     if not isinstance(entries, list) or not entries:
         raise FileError(f"'{path.name}' has no [[trial]]: name at least one CSV file.")
+    rules = read_column_rules(_table(words, "columns", path), path) if "columns" in words else {}
+    reader = _TrialReader(path, folder, len(texels), indenter is not None, rules)
     trials, histories = [], []
     for number, entry in enumerate(entries, start=1):
-        trial, history, said = _trial(entry, number, folder, path, len(texels), indenter is not None)
+        trial, history, said = reader.read(entry, number)
         trials.append(trial)
         histories.append(history)
         warnings += said
@@ -328,107 +332,62 @@ def _indenter(words: dict[str, Any], folder: Path, path: Path) -> Indenter:
 # --- trials
 
 
-def _trial(
-    entry: Any, number: int, folder: Path, path: Path, texels: int, has_indenter: bool
-) -> tuple[Trial, TrialHistory, list[str]]:
-    """A trial from its entry in the rig and its CSV file, its place in time, and remarks about it."""
-    where = f"Trial {number}"
-    if not isinstance(entry, dict):
-        raise FileError(f"{where} of '{path.name}' is not a table: write [[trial]] above its file.")
-    known_words(entry, TRIAL_WORDS, f"{where} of '{path.name}'")
-    history = read_history(entry, f"{where} of '{path.name}'")
-    tared = entry.get("tared", False)
-    if not isinstance(tared, bool):
-        raise FileError(f"tared of {where} of '{path.name}' is {tared!r:.60}: write true or false.")
-    use = entry.get("use", "fit")
-    if use not in ("fit", "check"):
-        raise FileError(f'{where} of \'{path.name}\' has use = {use!r}: write "fit" or "check".')
-    own = _own_numbers(entry, f"{where} of '{path.name}'")
-    file = _inside(entry.get("file"), folder, f"{where}'s file", path)
-    table = read_table(file)
-    columns = {name: table.values[:, i] for i, name in enumerate(table.names)}
-    time = _clock(columns, file)
-    kind = _stimulus_kind(columns, file, has_indenter)
-    reading = _readings(columns, texels, file)
-    force = _vector(columns, FORCE, partial=True)
-    has_columns = reading is not None or force is not None
-    reading, force = (None if part is None or np.isnan(part).all() else part for part in (reading, force))
-    if has_columns and reading is None and force is None:
-        raise FileError(
-            f"Every cell of the response in '{file.name}' is empty: record the trial again, or remove its [[trial]]."
-        )
-    if reading is None and force is None:
-        raise FileError(f"'{file.name}' has no response: it needs texel_0 … texel_{texels - 1}, or force_x force_y force_z.")
-    slide = _vector(columns, SLIDE, partial=False)
-    position = quaternion = level = None
-    if kind == "pose":
-        position, quaternion = _vector(columns, POSE, partial=False), _turns(columns, file)
-    else:
-        level = columns[kind].copy()
-    said = _gaps_filled([position, quaternion, level, slide], time, file)
-    if quaternion is not None:
-        quaternion = quaternion / np.linalg.norm(quaternion, axis=1, keepdims=True)
-    strangers = [name for name in table.names if not _meaning(name)]
-    if strangers:
-        said.append(f"'{file.name}': {', '.join(repr(name) for name in strangers)} mean nothing here and were left out.")
-    stimulus = position if kind == "pose" else level
-    assert stimulus is not None
-    return (
-        Trial(
-            name=file.stem,
-            use=use,
-            time=time,
-            stimulus=kind,
-            position=position,
-            quaternion=quaternion,
-            level=level,
-            slide=np.zeros((len(time), 2)) if slide is None else slide,
-            reading=reading,
-            force=force,
-            tared=tared,
-            factor=own["factor"],
-            zero=own["zero"],
-            force_zero=_force_zero(entry, f"{where} of '{path.name}'"),
-        ),
-        history,
-        said,
-    )
+@dataclass(frozen=True)
+class _TrialReader:
+    """Reads the trials of one rig: its path and folder, its number of texels, and the rules for its columns."""
 
+    path: Path
+    folder: Path
+    texels: int
+    has_indenter: bool
+    rules: Mapping[str, ColumnRule]
 
-FREE = "free"
-"""What a rig writes for a number that is fitted."""
-LARGEST_FACTOR = 1e6
-"""Largest factor of a recording; its inverse is the smallest."""
+    def read(self, entry: Any, number: int) -> tuple[Trial, TrialHistory, list[str]]:
+        """Return a trial from its entry in the rig and its CSV file, its place in time, and remarks about it."""
+        where = f"Trial {number}"
+        if not isinstance(entry, dict):
+            raise FileError(f"{where} of '{self.path.name}' is not a table: write [[trial]] above its file.")
+        where_in_rig = f"{where} of '{self.path.name}'"
+        known_words(entry, TRIAL_WORDS, where_in_rig)
+        history, tared, use = read_history(entry, where_in_rig), entry.get("tared", False), entry.get("use", "fit")
+        if not isinstance(tared, bool):
+            raise FileError(f"tared of {where_in_rig} is {tared!r:.60}: write true or false.")
+        if use not in ("fit", "check"):
+            raise FileError(f'{where_in_rig} has use = {use!r}: write "fit" or "check".')
+        own, force_zero = own_numbers(entry, where_in_rig), force_zero_of(entry, where_in_rig)
+        file = _inside(entry.get("file"), self.folder, f"{where}'s file", self.path)
+        trial, said = self._recorded(file, use)
+        return replace(trial, tared=tared, factor=own["factor"], zero=own["zero"], force_zero=force_zero), history, said
 
-
-def _own_numbers(entry: dict[str, Any], where: str) -> dict[str, str | float]:
-    """Factor and zero of a trial: numbers, or names of free numbers, which the recordings of one specimen share."""
-    specimen = entry.get("specimen", "")
-    if "specimen" in entry:
-        specimen = checked_name(specimen, f"specimen of {where}")
-    numbers: dict[str, str | float] = {"factor": 1.0, "zero": 0.0}
-    for word in numbers:
-        value = entry.get(word, numbers[word])
-        if value == FREE:
-            numbers[word] = specimen or Path(str(entry.get("file"))).stem
-        elif is_number(value) and abs(value) <= LARGEST_FACTOR and (word == "zero" or value >= 1.0 / LARGEST_FACTOR):
-            numbers[word] = float(value)
+    def _recorded(self, file: Path, use: str) -> tuple[Trial, list[str]]:
+        """The trial of a CSV file, and remarks about it."""
+        table = read_table(file)
+        columns = translated(table.names, table.values, self.rules, self.texels, file)
+        time = _clock(columns, file)
+        kind = _stimulus_kind(columns, file, self.has_indenter)
+        reading, force = _readings(columns, self.texels, file), _vector(columns, FORCE, partial=True)
+        has_columns = reading is not None or force is not None
+        reading, force = (None if part is None or np.isnan(part).all() else part for part in (reading, force))
+        if reading is None and force is None:
+            raise FileError(
+                f"Every cell of the response in '{file.name}' is empty: record the trial again, or remove its [[trial]]."
+                if has_columns
+                else f"'{file.name}' has no response: it needs texel_0 … texel_{self.texels - 1}, or force_x force_y force_z."
+            )
+        slide = _vector(columns, SLIDE, partial=False)
+        position = quaternion = level = None
+        if kind == "pose":
+            position, quaternion = _vector(columns, POSE, partial=False), _turns(columns, file)
         else:
-            wanted = "a number" if word == "zero" else "a number above zero"
-            raise FileError(f'{word} of {where} is {value!r:.60}: write "free" or {wanted}.')
-    if specimen and FREE not in [entry.get(word) for word in (*numbers, "force_zero")]:
-        raise FileError(f'{where} has a specimen and no free number: write factor = "free" or zero = "free".')
-    return numbers
-
-
-def _force_zero(entry: dict[str, Any], where: str) -> str | tuple[float, ...]:
-    """What the force sensor shows without load: three numbers, or the name of free ones that a specimen's recordings share."""
-    value = entry.get("force_zero", [0.0, 0.0, 0.0])
-    if value == FREE:
-        return str(entry.get("specimen") or Path(str(entry.get("file"))).stem)
-    if isinstance(value, list) and len(value) == 3 and all(is_number(one) and abs(one) <= LARGEST_FACTOR for one in value):
-        return tuple(float(one) for one in value)
-    raise FileError(f'force_zero of {where} is {value!r:.60}: write "free", or three numbers in newtons.')
+            level = columns[kind].copy()
+        said = _gaps_filled([position, quaternion, level, slide], time, file)
+        if quaternion is not None:
+            quaternion = quaternion / np.linalg.norm(quaternion, axis=1, keepdims=True)
+        strangers = [name for name in columns if not _meaning(name)]
+        if strangers:
+            said.append(f"'{file.name}': {', '.join(map(repr, strangers))} mean nothing here and were left out.")
+        slide = np.zeros((len(time), 2)) if slide is None else slide
+        return Trial(file.stem, use, time, kind, position, quaternion, level, slide, reading, force), said
 
 
 def _meaning(name: str) -> bool:
