@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from palpate.benchmarks import gap
-from palpate.benchmarks._hidden import cases, other, own, world
-from palpate.core.effects.engine.registry import library
+from palpate.benchmarks._hidden import cases, mounting, other, own, world
+from palpate.core.effects.engine.registry import effect, library
 from palpate.core.gap.dataset.rig import read_rig
 from palpate.core.gap.forward.predictor import Model, Predictor
 
@@ -154,3 +154,19 @@ def test_net_force_under_a_sliding_ball_is_that_of_the_other_code(tmp_path):
         found = Predictor(trial, rig).predict(true)
         assert np.sqrt(np.mean((found.force - force) ** 2)) < 0.6 * np.std(measured - force)
         assert np.abs(found.reading - reading).max() < 0.01 * np.ptp(reading)
+
+
+@pytest.mark.parametrize("kind", mounting.KINDS)
+def test_a_wrongly_mounted_sensor_is_that_of_the_other_code(tmp_path, kind):
+    """The generator moves the ball into the sensor's frame, the library moves the texels: the six numbers mean the same."""
+    case = mounting.draw(kind, 7)
+    rig = read_rig(mounting.write(case, tmp_path))
+    path = tmp_path / "rig.toml"
+    assert not rig.warnings and "misalignment" not in path.read_text(encoding="utf-8")
+    model = Model(rig.parameters).with_effect(effect("misalignment", "rigid", **case.values))
+    found, moved = [], []
+    for trial in rig.trials:
+        predictor = Predictor(trial, rig)
+        found.append(np.corrcoef(predictor.predict(model).reading.ravel(), trial.reading.ravel())[0, 1])
+        moved.append(np.corrcoef(predictor.predict(Model(rig.parameters)).reading.ravel(), trial.reading.ravel())[0, 1])
+    assert min(found) > (0.995 if kind == "mounted" else 0.9) and min(found) > max(moved)
