@@ -234,7 +234,8 @@ class FittedCandidate:
 def parameters_at_bounds(model: Model, free: Sequence[FreeParameter], index: int) -> dict[str, float]:
     """Return the fitted parameters of an effect that are at a bound, with the bound.
 
-    The bound at which a part of the formula does nothing does not count: a simpler formula does as well.
+    The bound at which a part of the formula does nothing does not count: a simpler formula does as well. Nor does the natural
+    bound of a share: then the effect takes all that it can.
 
     Parameters
     ----------
@@ -244,13 +245,16 @@ def parameters_at_bounds(model: Model, free: Sequence[FreeParameter], index: int
         Of the effect in the model's stack.
     """
     effect = model.effects[index]
-    neutral = form_of(effect.name, effect.form).neutral
+    form = form_of(effect.name, effect.form)
+    neutral = form.neutral
+    whole = {p.name: p.high for p in form.parameters if p.unit == "1" and p.low == neutral.get(p.name) == 0.0 and p.high <= 1.0}
     found = {}
     for item in free:
         if item.effect == index and not item.per_texel:
             value = float(value_of(model, item))
             for end in (item.low, item.high):
-                if end != float(neutral.get(item.name, 0.0)) and abs(value - end) <= AT_BOUND * abs(end):
+                counts = end != float(neutral.get(item.name, 0.0)) and end != whole.get(item.name)
+                if counts and abs(value - end) <= AT_BOUND * abs(end):
                     found[item.name] = end
     return found
 

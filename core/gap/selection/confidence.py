@@ -34,6 +34,9 @@ EXPLAINED = 0.5
 """Share of the gap that must be closed for the verdict "explained", and for a sure effect."""
 PARTLY_EXPLAINED, DISTINCT_RATIO = 0.35, 1.5
 """Share of the gap that suffices for a sure effect if all other kinds leave at least `DISTINCT_RATIO` times as much."""
+CLEAR_LEAD = 2.0
+"""A kind is sure, although the recordings leave its parameters open, if all others leave this many times as much. Set on the
+creep of a real adhesive, whose amount, time and exponent trade against each other."""
 REPEATED_RATIO = 1.75
 """A further effect is sure only if a second effect of a kind in the model is at least this many times as bad."""
 SMALL_SHARE, NEARLY_ALL = 0.1, 0.65
@@ -100,11 +103,11 @@ def may_absorb_misfit(effect: Effect, state: SelectionState) -> bool:
     )
 
 
-def unsettled_parameters(effect: Effect, index: int, result: Diagnosis) -> tuple[str, ...]:
+def unsettled_parameters(effect: Effect, index: int, result: Diagnosis, lead: float = 1.0) -> tuple[str, ...]:
     """Return in words which parameters of an effect are at a bound, and which the recordings leave open altogether.
 
     An effect is left open only if all of its parameters are: two that act as their product alone have wide intervals, and the
-    product has not.
+    product has not. This does not count if all other kinds leave far more: then the numbers are open and the kind is not.
 
     Parameters
     ----------
@@ -113,6 +116,8 @@ def unsettled_parameters(effect: Effect, index: int, result: Diagnosis) -> tuple
         Of the effect in the amended model.
     result : Diagnosis
         With intervals.
+    lead : float
+        How many times as much of the gap the best other kind leaves.
     """
     form, unit = form_of(effect.name, effect.form), result.rig.parameters.unit
     units = {parameter.name: parameter.unit_of(unit) for parameter in form.parameters}
@@ -121,7 +126,7 @@ def unsettled_parameters(effect: Effect, index: int, result: Diagnosis) -> tuple
     bounds = {item.name: (item.low, item.high) for item in result.best.free if item.effect == index}
     own = [one for one in result.intervals if one.effect == index and one.name in bounds]
     open_names = [one.name for one in own if one.low <= bounds[one.name][0] and one.high >= bounds[one.name][1]]
-    if own and len(open_names) == len(own):
+    if own and len(open_names) == len(own) and lead < CLEAR_LEAD:
         said.append(f"these recordings leave {' and '.join(open_names)} open")
     return tuple(said)
 

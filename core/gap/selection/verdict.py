@@ -85,7 +85,7 @@ def _judge_effects(result: Diagnosis, state: SelectionState, gap_sizes: GapSizes
         weight = 1.0 / (1.0 + sum(ratio**RIVAL_EXPONENT for ratio in times_worse.values()))
         quantity = gap_sizes.quantity_for(effect.name)
         share = closed[quantity] if fitted else 1.0
-        unsettled = unsettled_parameters(effect, index, result)
+        unsettled = unsettled_parameters(effect, index, result, min(leaves.values(), default=np.inf))
         confidence = weight * (0.5 + 0.5 * share if share >= least_share(effect.name, leaves) else 0.5 * share)
         absorbs = is_open and may_absorb_misfit(effect, state)
         if unsettled or (fitted and result.check.refutes(quantity)):

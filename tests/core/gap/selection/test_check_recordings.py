@@ -14,8 +14,9 @@ from palpate.core.gap.fitting.least_squares import Fit, FreeParameter, TrialView
 from palpate.core.gap.forward.predictor import Model, Predictor
 from palpate.core.gap.report import sentences, summary
 from palpate.core.gap.report.comparison import gap_errors
+from palpate.core.gap.selection.candidates import parameters_at_bounds
 from palpate.core.gap.selection.check_recordings import CheckedRecording, CheckOutcome, checked
-from palpate.core.gap.selection.confidence import _closes_most, unsettled_parameters
+from palpate.core.gap.selection.confidence import CLEAR_LEAD, _closes_most, unsettled_parameters
 from palpate.core.gap.selection.diagnosis import diagnose
 from palpate.core.gap.selection.forward_selection import SelectionState
 from palpate.core.gap.selection.gap_sizes import GapSizes, Improvement
@@ -151,3 +152,12 @@ def test_numbers_at_their_bounds_and_open_ones_do_not_make_a_sure_name(values, i
     result.intervals = [ParameterInterval(0, "z", values["z"], *interval)]
     said = unsettled_parameters(one, 0, result)
     assert len(said) == bool(why) and all(why in text for text in said)
+    assert ("open" in why) == (why != "" and not unsettled_parameters(one, 0, result, CLEAR_LEAD) and bool(said))
+
+
+def test_a_share_of_all_is_no_bound():
+    """All of the force may relax; a width that a fit was not let beyond is at a bound."""
+    creep, loop = effect("creep", "power", amount=0.95), effect("hysteresis", "trailing", width=0.5)
+    model = Model(SensorParameters(), (creep, loop))
+    free = (FreeParameter(0, "amount", 0.0, 0.95), FreeParameter(1, "width", 0.0, 0.5))
+    assert parameters_at_bounds(model, free, 0) == {} and parameters_at_bounds(model, free, 1) == {"width": 0.5}
