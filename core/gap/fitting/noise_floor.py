@@ -178,7 +178,7 @@ class Coverage:
     unloading : bool
         Whether a load ever decreased by more than a tenth of the largest.
     cycles : int
-        Number of times that contact began, in the trial with most.
+        Number of times that contact began, in the trial or session with most.
     slides : bool
         Whether a surface slid over the sensor.
     unloaded_share : float
@@ -206,7 +206,8 @@ def coverage(predictors: Sequence[Predictor]) -> Coverage:
     touched, centres = np.zeros(len(texels), bool), []
     speeds: list[np.ndarray] = []
     levels: list[float] = []
-    hold, unloading, cycles, slides, rest = 0.0, False, 0, False, 0.0
+    hold, unloading, slides, rest = 0.0, False, False, 0.0
+    cycles: dict[object, int] = {}
     for predictor in predictors:
         s = predictor.stimulus
         load = s.load
@@ -227,7 +228,8 @@ def coverage(predictors: Sequence[Predictor]) -> Coverage:
         levels += [float(total[a:b].mean()) for a, b in holds if b - a >= SHORTEST_STRETCH]
         idle = s.time[(load <= UNLOADED_SHARE * max(float(load.max(initial=0.0)), 1e-300)).any(axis=1)]
         rest = max(rest, float(np.ptp(idle)) / float(np.ptp(s.time)) if len(idle) else 0.0)
-        cycles = max(cycles, _cycle_count(total, max(UNLOADED_SHARE * full, band)))
+        where = predictor.trial.session or id(predictor)  # the sensor remembers the cycles of a whole session
+        cycles[where] = cycles.get(where, 0) + _cycle_count(total, max(UNLOADED_SHARE * full, band))
         slides |= bool(s.slide.max(initial=0.0) > LEAST_SLIDING_SPEED)
     quick = np.concatenate(speeds) if speeds else np.zeros(0)
     spread = float(np.quantile(quick, 0.9) / np.quantile(quick, 0.1)) if len(quick) > 4 else 1.0
@@ -236,7 +238,7 @@ def coverage(predictors: Sequence[Predictor]) -> Coverage:
         speed_ratio=spread,
         longest_hold=hold,
         unloading=unloading,
-        cycles=cycles,
+        cycles=max(cycles.values()),
         slides=slides,
         unloaded_share=rest,
         load_moves=_load_moves(np.concatenate(centres), texels.area, touched),

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from palpate.core.effects.engine.registry import effect
+from palpate.core.gap.fitting.noise_floor import coverage
 from palpate.core.gap.forward.predictor import Model, Predictor, predictors_of
 from palpate.core.gap.selection.view_set import view_set_of
 from palpate.core.model.sensor_parameters import SensorParameters
@@ -89,6 +90,12 @@ def test_thinned_views_keep_the_history_of_all_recordings():
     fresh = session_of([(*second, "b")])[0].predict(model).reading[::4]
     # Thinned samples miss the tips of the presses, so a little of the path that softens the sensor.
     assert np.abs(found - exact).max() < 0.02 * exact.max() < 0.2 * np.abs(fresh - exact).max()
+
+
+def test_cycles_of_a_session_are_counted_together():
+    pieces = [(*presses(1, start=10.0 * i), f"t{i}") for i in range(3)]
+    assert coverage(session_of(pieces)).cycles == 3
+    assert coverage(session_of(pieces, session="")).cycles == 1
 
 
 def test_tared_recordings_are_predicted_from_their_first_sample():
