@@ -27,6 +27,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "commands": {"core", "addon", "paper", "sample_blends"},
     "paper": {"core", "addon", "sample_blends"},
     "sample_blends": {"core", "addon"},
+    "sweep": {"core"},
     "": {"core", "addon", "operators", "panels", "commands", "paper", "sample_blends"},
 }
 

@@ -1,0 +1,93 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""From the folder of runs to ``dataset/`` and ``runs.parquet``, both whole or not at all.
+
+Runs are taken in the order of the design, so that equal runs give equal bytes, in whatever order they finished.
+"""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from ..core.errors import FileError
+from ..core.io.file_writing import os_error_reason, sync_folder
+from ..core.io.temporary_folder import remove_unfinished, temporary_folder
+from .features import read_frames
+from .finished_runs import RUNS_FOLDER, read_run, run_order, study_name
+from .lerobot_writer import LeRobotWriter
+from .run_table import write_run_table
+
+DATASET_FOLDER = "dataset"
+
+
+def publish(folder: Path) -> None:
+    """Make ``dataset/``, ``runs.parquet`` and ``timings.csv`` from the runs of a study.
+
+    The dataset is written into a hidden folder and renamed into its place last; that of before is removed then. Runs whose
+    sensors or rates differ cannot share the columns of one dataset: each kind becomes one, ``dataset/part-000`` and so on.
+
+    Parameters
+    ----------
+    folder : Path
+        Of the study.
+
+    Raises
+    ------
+    FileError
+        There is no study, a run is damaged, pyarrow is not installed, or something cannot be written.
+    """
+    require_pyarrow()
+    remove_unfinished(folder)
+    order = run_order(folder)
+    try:
+        write_run_table(folder, order)
+        with temporary_folder(folder, "dataset") as hidden:
+            new = _write_parts(folder, order, hidden)
+            _exchange(new, folder / DATASET_FOLDER, hidden / "before")
+    except OSError as error:
+        raise FileError(
+            f"The dataset in '{folder}' could not be written ({os_error_reason(error)}): free some space or check its "
+            "permissions, and give the same command again."
+        ) from error
+
+
+def require_pyarrow() -> None:
+    """Raise FileError where the package pyarrow, which writes the files of a dataset, is not installed."""
+    try:
+        import pyarrow  # noqa: F401
+    except ImportError as error:
+        raise FileError("Datasets need the package pyarrow: install it with `pip install 'palpate[sweep]'`.") from error
+
+
+def _write_parts(folder: Path, order: list[tuple[int, str]], hidden: Path) -> Path | None:
+    """Write all runs and return the folder that is to become the dataset; None if there are no runs."""
+    task = study_name(folder)
+    parts = hidden / "parts"
+    writers: dict[str, LeRobotWriter] = {}
+    for _, digest in order:
+        run = read_run(folder / RUNS_FOLDER / digest)
+        frames = read_frames(run)
+        writer = writers.get(frames.layout_digest)
+        if writer is None:
+            writer = LeRobotWriter(parts / f"part-{len(writers):03d}", frames, task)
+            writers[frames.layout_digest] = writer
+        writer.add(run, frames)
+    for writer in writers.values():
+        writer.finish()
+    if len(writers) <= 1:
+        return parts / "part-000" if writers else None
+    return parts
+
+
+def _exchange(new: Path | None, target: Path, before: Path) -> None:
+    """Put the new dataset in its place; a kill between the two renames leaves none, and the next call makes it again."""
+    for path in sorted(new.rglob("*")) if new is not None else ():
+        if path.is_dir():
+            sync_folder(path)
+    if os.path.lexists(target):
+        if target.is_symlink() or not target.is_dir():
+            raise FileError(f"'{target}' is no folder: move it away, the dataset takes this name.")
+        os.rename(target, before)
+    if new is not None:
+        os.rename(new, target)
+    sync_folder(target.parent)

@@ -1,0 +1,218 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a dataset says of each frame: names, shapes and units, and the numbers themselves, taken from a run's recordings.
+
+A sensor whose texels form a grid gives pictures, row 0 at the bottom and column 0 at the left as in its tactile images. Any
+other gives lists in the order of its texels, whose places are in ``meta/texels.parquet``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..core.errors import FileError
+from ..core.geometry.layout.grid_layout import GridLayout
+from ..core.geometry.texels import Texels
+from ..core.io.bake_check import checked_parameters
+from ..core.io.bake_folder import MANIFEST_NAME, RECORDING_NAME, folder_names, read_manifest
+from ..core.io.recording_npz import load_recording
+from ..core.io.sensor_npz import SENSOR_NAME, load_sensor
+from ..core.model.digest import digest_of
+from ..core.model.recording import Recording, SensorRecording
+from ..core.model.sensor_parameters import Painted, SensorParameters
+from ..core.response import metrics
+from .finished_runs import FinishedRun
+
+POSE_AXES = ("x", "y", "z", "qw", "qx", "qy", "qz")
+CHANNELS = ("normal_force", "shear_x", "shear_y")
+AXES = ("x", "y", "z")
+
+
+@dataclass(frozen=True)
+class Feature:
+    """One column of the dataset.
+
+    Attributes
+    ----------
+    name : str
+    dtype : str
+        As numpy names it, or "string".
+    shape : tuple of int
+        Of one frame; (1,) for a single number.
+    names : tuple of str
+        Of the numbers along the only axis, or of the axes where there are several.
+    unit : str
+        "1" for what has none, "" where nothing has a unit (names, indices).
+    about : str
+        What it is, in a sentence.
+    channels : tuple of str
+        Of the last axis where there are several.
+    """
+
+    name: str
+    dtype: str
+    shape: tuple[int, ...]
+    names: tuple[str, ...]
+    unit: str
+    about: str
+    channels: tuple[str, ...] = ()
+
+    @property
+    def is_constant(self) -> bool:
+        """True for what is the same in all frames of a run."""
+        return self.name.startswith("varied.")
+
+
+@dataclass(frozen=True)
+class SensorRun:
+    """One sensor in one run; without a manifest its parameters are not known."""
+
+    texels: Texels
+    painted: Painted
+    recording: Recording
+    arrays: SensorRecording
+    parameters: SensorParameters | None
+    unit: str
+
+
+@dataclass(frozen=True)
+class RunFrames:
+    """The frames of a run as columns.
+
+    Attributes
+    ----------
+    features : tuple of Feature
+    columns : dict of str to (F, …) ndarray or str
+        By name of the feature; a value that is the same in all frames may be a single text.
+    times : (F,) float, s
+    fps : float
+    texels : dict of str to Texels
+        By sensor.
+    layout_digest : str
+        Equal for runs whose frames may stand in one dataset: the same features, the same texels, the same rate.
+    """
+
+    features: tuple[Feature, ...]
+    columns: dict[str, Any]
+    times: np.ndarray
+    fps: float
+    texels: dict[str, Texels] = field(default_factory=dict)
+    layout_digest: str = ""
+
+
+def read_frames(run: FinishedRun) -> RunFrames:
+    """Read the recordings of a run.
+
+    Raises
+    ------
+    FileError
+        A file of it is missing or damaged, or holds a number that 32 bits cannot.
+    """
+    # The names of their folders are unique and have no slash, which LeRobot does not allow in names.
+    sensors = {own: _read_sensor(run.folder / own) for own in folder_names(run.sensors).values()}
+    if not sensors:
+        raise FileError(f"The run '{run.folder}' has no sensor: delete the folder and run the sweep again.")
+    first = next(iter(sensors.values())).recording
+    features: list[Feature] = []
+    columns: dict[str, Any] = {}
+    for feature, values in _all_features(run, first, sensors):
+        features.append(feature)
+        columns[feature.name] = values if isinstance(values, str) else _narrowed(run, feature, values)
+    fps = _frame_rate(first.times)
+    texels = {name: sensor.texels for name, sensor in sensors.items()}
+    digest = digest_of((tuple(features), fps, tuple(texels), tuple(texels.values())))
+    return RunFrames(tuple(features), columns, first.times - first.times[0], fps, texels, digest)
+
+
+def _read_sensor(folder: Path) -> SensorRun:
+    recording = load_recording(folder / RECORDING_NAME)
+    texels, painted = load_sensor(folder / SENSOR_NAME)
+    if len(recording.sensors) != 1 or len(recording.frames) == 0:
+        raise FileError(f"'{folder / RECORDING_NAME}' is no recording of one sensor: delete the run and sweep again.")
+    (arrays,) = recording.sensors.values()
+    if arrays.normal_force.shape[1] != len(texels):
+        raise FileError(f"'{folder}' holds a recording and a sensor of different runs: delete the run and sweep again.")
+    parameters, unit = None, ""
+    if (folder / MANIFEST_NAME).is_file():
+        manifest = read_manifest(folder)
+        parameters, unit = checked_parameters(folder, manifest), manifest.unit
+    return SensorRun(texels, painted, recording, arrays, parameters, unit)
+
+
+def _frame_rate(times: np.ndarray) -> float:
+    """Return frames per second, to nine digits, so that rounding of the times makes no other rate; 1 for a single frame."""
+    span = float(times[-1] - times[0])
+    return float(f"{(len(times) - 1) / span:.9g}") if len(times) > 1 and span > 0 else 1.0
+
+
+def _narrowed(run: FinishedRun, feature: Feature, values: np.ndarray) -> np.ndarray:
+    """Return the values in the type that the dataset stores."""
+    if feature.dtype == "float32" and not (np.abs(values) <= np.finfo(np.float32).max).all():
+        raise FileError(f"'{feature.name}' of the run '{run.folder}' is no 32-bit number: delete the run and sweep again.")
+    return np.ascontiguousarray(values, dtype=feature.dtype)
+
+
+def _all_features(run: FinishedRun, recording: Recording, sensors: dict[str, SensorRun]) -> Iterator[tuple[Feature, Any]]:
+    for name, sensor in sensors.items():
+        yield from _texel_features(name, sensor)
+        yield from _net_features(name, sensor.arrays)
+    yield from _pose_features(recording)
+    for name, value in run.values.items():
+        about = "What was varied; the same in all frames of a run."
+        plain = f"varied.{name.replace('/', '_')}"  # LeRobot allows no slash
+        if isinstance(value, str):
+            yield Feature(plain, "string", (1,), (), "", about), value
+        else:
+            yield Feature(plain, "float64", (1,), (), "", about), np.full(len(recording.frames), value)
+
+
+def _texel_features(name: str, sensor: SensorRun) -> Iterator[tuple[Feature, np.ndarray]]:
+    """Yield what is recorded of each texel: forces, readings, and the truth about contact."""
+    texels, arrays = sensor.texels, sensor.arrays
+    shape: tuple[int, ...] = texels.layout.shape if isinstance(texels.layout, GridLayout) else (len(texels),)
+    names = ("row", "column") if len(shape) == 2 else ("texel",)
+
+    def placed(values: np.ndarray) -> np.ndarray:
+        if not isinstance(texels.layout, GridLayout):
+            return values
+        picture = np.zeros((len(values), *shape, *values.shape[2:]), values.dtype)
+        picture[:, texels.layout.row, texels.layout.column] = values
+        return picture
+
+    force = np.concatenate([arrays.normal_force[:, :, None], arrays.shear], axis=2)
+    about = "Forces on the texels: along the normal, and shear along the texel's x and y axes."
+    image = Feature(f"observation.tactile.{name}", "float32", (*shape, 3), (*names, "channel"), "N", about, CHANNELS)
+    yield image, placed(force)
+    about = "Readings of the texels, in the sensor's unit."
+    yield Feature(f"observation.reading.{name}", "float32", shape, names, sensor.unit, about), placed(arrays.reading)
+    touch = placed(np.asarray(arrays.contact, bool))
+    yield Feature(f"contact.touch.{name}", "bool", shape, names, "1", "Which texels touch something."), touch
+    if sensor.parameters is not None:
+        slips = placed(metrics.slipping(arrays, sensor.parameters, sensor.painted))
+        about = "Which texels touch, move, and are at the limit of friction."
+        yield Feature(f"contact.slip.{name}", "bool", shape, names, "1", about), slips
+
+
+def _net_features(name: str, arrays: SensorRecording) -> Iterator[tuple[Feature, np.ndarray]]:
+    frame = "in the frame of the sensor's body"
+    yield _vector(f"observation.net_force.{name}", "N", f"Net force on the sensor, {frame}."), arrays.net_force
+    about = f"Net torque on the sensor about the origin of its body, {frame}."
+    yield _vector(f"observation.net_torque.{name}", "N m", about), arrays.net_torque
+    about = f"Force-weighted mean of the contact points, {frame}; zero while nothing touches."
+    yield _vector(f"contact.centre_of_pressure.{name}", "m", about), arrays.centre_of_pressure
+
+
+def _vector(name: str, unit: str, about: str) -> Feature:
+    return Feature(name, "float32", (3,), AXES, unit, about)
+
+
+def _pose_features(recording: Recording) -> Iterator[tuple[Feature, np.ndarray]]:
+    """Yield the poses of all bodies as one list, which is how LeRobot keeps the state of a robot."""
+    count = len(recording.body_names)
+    names = tuple(f"{body}.{axis}" for body in recording.body_names for axis in POSE_AXES)
+    about = "Poses of the bodies in the world: position, m, and quaternion."
+    yield Feature("observation.state", "float32", (7 * count,), names, "m, 1", about), recording.poses.reshape(-1, 7 * count)

@@ -1,0 +1,206 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""``report.html``: a study at a glance, one page with its pictures inside."""
+
+from __future__ import annotations
+
+import base64
+from collections import Counter
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..core.io.bake_folder import RECORDING_NAME, folder_names
+from ..core.io.file_writing import atomic_write
+from ..core.io.html_templates import render_html
+from ..core.io.recording_npz import load_recording
+from ..core.io.sensor_npz import SENSOR_NAME, load_sensor
+from ..core.io.temporary_folder import temporary_folder
+from .dependencies import Dependency, dependencies
+from .finished_runs import RUNS_FOLDER, FailedRun, failed_runs, finished_runs, read_run, run_order, study_name
+from .report_figures import MOST_METRICS, MOST_PARAMETERS, RunImage, draw_image_sheet, draw_small_multiples
+
+REPORT_NAME = "report.html"
+TEMPLATE = Path(__file__).parent / "templates" / "sweep_report.html"
+MOST_DEPENDENCIES, MOST_MESSAGES, MOST_IMAGES = 15, 12, 24
+
+
+@dataclass(frozen=True)
+class StudyColumns:
+    """The finished runs of a study as columns: numbers only, no recordings.
+
+    Attributes
+    ----------
+    values : dict of str to list
+        What was varied; None where a run lacks it.
+    metrics : dict of str to (n,) float
+        NaN where a run lacks it.
+    frames_seconds : float
+        Time that computing took, of all runs.
+    """
+
+    values: dict[str, list[Any]]
+    metrics: dict[str, np.ndarray]
+    frames_seconds: float
+
+
+def write_report(folder: Path) -> None:
+    """Write ``report.html`` into the folder of a study.
+
+    Parameters
+    ----------
+    folder : Path
+
+    Raises
+    ------
+    FileError
+        There is no study, a run is damaged, or the page cannot be written.
+    """
+    order, failed = run_order(folder), failed_runs(folder)
+    columns = _columns(folder, order)
+    found = dependencies(columns.values, columns.metrics)
+    with temporary_folder(folder, "report") as hidden:
+        pictures = _draw(hidden, folder, order, columns, found)
+        page = render_html(
+            TEMPLATE,
+            name=study_name(folder),
+            headline=_headline(len(order), failed, columns),
+            strongest=_strongest_sentence(found, columns, len(order)),
+            dependencies=[_dependency_row(one) for one in found[:MOST_DEPENDENCIES] if one.strength > 0],
+            left_off=sum(one.strength > 0 for one in found[MOST_DEPENDENCIES:]),
+            ranges=[_range_row(f"{name}", values) for name, values in columns.values.items()],
+            metrics=[_range_row(name, [x for x in values if np.isfinite(x)]) for name, values in columns.metrics.items()],
+            messages=Counter(run.sentence for run in failed).most_common(MOST_MESSAGES),
+            failures=len(failed),
+            failed_dependencies=_failed_rows(folder, order, columns, failed),
+            pictures={path.stem: base64.b64encode(path.read_bytes()).decode() for path in pictures},
+            shown=_shown_sentence(columns),
+        )
+        with atomic_write(folder / REPORT_NAME) as temporary:
+            temporary.write_text(page, encoding="utf-8")
+
+
+def _columns(folder: Path, order: list[tuple[int, str]]) -> StudyColumns:
+    values: dict[str, list[Any]] = {}
+    metrics: dict[str, np.ndarray] = {}
+    seconds = 0.0
+    for number, run in enumerate(finished_runs(folder, order)):
+        seconds += run.seconds
+        for name, value in run.values.items():
+            values.setdefault(name, [None] * len(order))[number] = value
+        for name, metric in run.metrics.items():
+            metrics.setdefault(name, np.full(len(order), np.nan))[number] = metric
+    return StudyColumns(values, metrics, seconds)
+
+
+def _draw(
+    hidden: Path, folder: Path, order: list[tuple[int, str]], columns: StudyColumns, found: list[Dependency]
+) -> list[Path]:
+    """Draw the pictures that the study has something for, and return their files."""
+    drawn = []
+    parameters, metrics = _most_dependent(columns, found)
+    if parameters and metrics:
+        strong = {(one.parameter, one.metric) for one in found if one.strength > 0}
+        values = {name: columns.values[name] for name in parameters}
+        path = hidden / "multiples.png"
+        draw_small_multiples(path, values, {name: columns.metrics[name] for name in metrics}, strong)
+        drawn.append(path)
+    images = _images(folder, order)
+    if images:
+        draw_image_sheet(hidden / "images.png", images)
+        drawn.append(hidden / "images.png")
+    return drawn
+
+
+def _most_dependent(columns: StudyColumns, found: list[Dependency]) -> tuple[list[str], list[str]]:
+    """Return the parameters and metrics that are drawn: those in the strongest dependencies first, then in their order."""
+    parameters = list(dict.fromkeys([*(one.parameter for one in found if one.strength > 0), *columns.values]))
+    metrics = list(dict.fromkeys([*(one.metric for one in found if one.strength > 0), *columns.metrics]))
+    return parameters[:MOST_PARAMETERS], metrics[:MOST_METRICS]
+
+
+def _images(folder: Path, order: list[tuple[int, str]]) -> list[RunImage]:
+    """Return images of the first sensor of runs that are spread evenly over the design."""
+    chosen = np.unique(np.linspace(0, len(order) - 1, min(len(order), MOST_IMAGES)).round().astype(int))
+    images = []
+    for index, digest in (order[i] for i in chosen):
+        run = read_run(folder / RUNS_FOLDER / digest)
+        if not run.sensors:
+            continue
+        sensor = run.folder / folder_names(run.sensors)[run.sensors[0]]
+        (recorded,) = load_recording(sensor / RECORDING_NAME).sensors.values()
+        frame = int(np.argmax(np.linalg.norm(recorded.net_force, axis=1)))
+        images.append(RunImage(f"run {index}", load_sensor(sensor / SENSOR_NAME)[0], recorded.at(frame)))
+    return images
+
+
+def _headline(runs: int, failed: list[FailedRun], columns: StudyColumns) -> str:
+    if not runs and not failed:
+        return "No run has finished yet."
+    text = f"{_count(runs, 'run')} finished, {len(failed) or 'none'} failed." if runs else f"All {len(failed)} runs failed."
+    if columns.values:
+        text += f" {_count(len(columns.values), 'parameter')} varied."
+    if columns.frames_seconds > 0:
+        text += f" Computing took {_duration(columns.frames_seconds)} of processor time."
+    return text
+
+
+def _count(number: int, what: str) -> str:
+    return f"{number:,} {what}" + ("" if number == 1 else "s")
+
+
+def _duration(seconds: float) -> str:
+    if seconds < 120:
+        return f"{seconds:.3g} s"
+    return f"{seconds / 60:.3g} min" if seconds < 7200 else f"{seconds / 3600:.3g} h"
+
+
+def _strongest_sentence(found: list[Dependency], columns: StudyColumns, runs: int) -> str:
+    strong = [one for one in found if one.strength > 0]
+    if strong:
+        return f"The strongest dependency is that of {strong[0].metric} on {strong[0].parameter}."
+    if not found:
+        return "There are too few runs, parameters or metrics to look for dependencies."
+    return f"No metric depends on any parameter as far as {_count(runs, 'run')} can tell."
+
+
+def _shown_sentence(columns: StudyColumns) -> str:
+    """Say what the small multiples leave out."""
+    left = max(0, len(columns.values) - MOST_PARAMETERS), max(0, len(columns.metrics) - MOST_METRICS)
+    if not any(left):
+        return ""
+    parts = [_count(number, what) for number, what in zip(left, ("parameter", "metric")) if number]
+    verb = "is" if sum(left) == 1 else "are"
+    return f"Not drawn {verb} {' and '.join(parts)} with weaker dependencies; runs.parquet has all."
+
+
+def _dependency_row(one: Dependency) -> list[str]:
+    correlation = "–" if one.rank_correlation is None else f"{one.rank_correlation:+.2f}".replace("-", "−")
+    return [one.metric, one.parameter, correlation, f"{one.information:.2f}", f"{one.runs:,}"]
+
+
+def _range_row(name: str, values: Any) -> list[str]:
+    """Return name, smallest, median and largest value, and how many runs have one; for names, how many there are."""
+    known = [value for value in values if value is not None]
+    if any(isinstance(value, str) for value in known):
+        names = Counter(map(str, known))
+        shown = ", ".join(sorted(names)[:6]) + (" …" if len(names) > 6 else "")
+        return [name, shown, "", "", f"{len(known):,}"]
+    if not known:
+        return [name, "", "", "", "0"]
+    return [
+        name,
+        *(f"{part:.4g}".replace("-", "−") for part in (min(known), float(np.median(known)), max(known))),
+        f"{len(known):,}",
+    ]
+
+
+def _failed_rows(folder: Path, order: list[tuple[int, str]], columns: StudyColumns, failed: list[FailedRun]) -> list[list[str]]:
+    """Return how failing depends on each parameter, as far as the failed runs say which ones they were."""
+    known = [run for run in failed if run.values]
+    if not known or not columns.values:
+        return []
+    values = {name: own + [run.values.get(name) for run in known] for name, own in columns.values.items()}
+    outcome = np.concatenate([np.zeros(len(order)), np.ones(len(known))])
+    return [_dependency_row(one)[1:] for one in dependencies(values, {"failing": outcome}) if one.strength > 0]

@@ -1,0 +1,93 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""``runs.parquet``: a row a run, with what was varied, the metrics and the status; ``timings.csv``: how long each run took.
+
+Times are in a file of their own, because two computations of the same study give equal tables but never equal times.
+"""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+from typing import Any
+
+from ..core.errors import FileError
+from ..core.io.file_writing import atomic_write
+from .finished_runs import FailedRun, FinishedRun, Value, failed_runs, finished_runs
+
+TABLE_NAME, TIMINGS_NAME = "runs.parquet", "timings.csv"
+FINISHED, FAILED = "finished", "failed"
+ROWS_AT_ONCE = 10_000
+"""Rows that wait in memory."""
+
+
+def write_run_table(folder: Path, order: list[tuple[int, str]]) -> None:
+    """Write ``runs.parquet`` and ``timings.csv`` into the folder of a study.
+
+    Columns: ``run`` (place in the design), ``digest``, ``status`` ("finished" or "failed"), ``message`` (why it failed),
+    ``varied.<name>`` and ``metric.<name>``. A metric without a value is null.
+
+    Raises
+    ------
+    FileError
+        A file cannot be read or written.
+    """
+    import pyarrow
+    from pyarrow import parquet
+
+    failed = failed_runs(folder)
+    schema = _schema(folder, order, failed)
+    columns = {"compression": "zstd"}
+    with (
+        atomic_write(folder / TABLE_NAME) as table_path,
+        atomic_write(folder / TIMINGS_NAME) as timings_path,
+        open(timings_path, "w", newline="", encoding="utf-8") as timings,
+        parquet.ParquetWriter(table_path, schema, **columns) as writer,
+    ):
+        lines = csv.writer(timings, lineterminator="\n")
+        lines.writerow(["run", "digest", "seconds"])
+        waiting: list[dict[str, Any]] = []
+        for run in finished_runs(folder, order):
+            lines.writerow([run.index, run.digest, f"{run.seconds:.6g}"])
+            waiting.append(_row(run))
+            if len(waiting) >= ROWS_AT_ONCE:
+                writer.write_table(pyarrow.Table.from_pylist(waiting, schema))
+                waiting = []
+        waiting += [_failed_row(run) for run in failed]
+        writer.write_table(pyarrow.Table.from_pylist(waiting, schema))
+
+
+def _schema(folder: Path, order: list[tuple[int, str]], failed: list[FailedRun]) -> Any:
+    """Return the columns: all names that occur in any run, in the order in which they first occur."""
+    import pyarrow
+
+    varied: dict[str, Any] = {}
+    metrics: dict[str, Any] = {}
+    for run in finished_runs(folder, order):
+        _note_kinds(varied, run.values, run.folder)
+        metrics |= dict.fromkeys(run.metrics)
+    for lost in failed:
+        _note_kinds(varied, lost.values, folder)
+    fixed = [("run", pyarrow.int64()), *((name, pyarrow.string()) for name in ("digest", "status", "message"))]
+    own = [(f"varied.{name}", kind) for name, kind in varied.items()]
+    # The names of metrics are sorted, because the first run need not have all of them.
+    return pyarrow.schema([*fixed, *own, *((f"metric.{name}", pyarrow.float64()) for name in sorted(metrics))])
+
+
+def _note_kinds(kinds: dict[str, Any], values: dict[str, Value], folder: Path) -> None:
+    import pyarrow
+
+    for name, value in values.items():
+        kind = pyarrow.string() if isinstance(value, str) else pyarrow.float64()
+        if kinds.setdefault(name, kind) != kind:
+            raise FileError(f"'{name}' is a number in some runs and a text in '{folder}': choose values of one kind for it.")
+
+
+def _row(run: FinishedRun) -> dict[str, Any]:
+    values = {f"varied.{name}": value for name, value in run.values.items()}
+    metrics = {f"metric.{name}": value for name, value in run.metrics.items()}
+    return {"run": run.index, "digest": run.digest, "status": FINISHED, "message": "", **values, **metrics}
+
+
+def _failed_row(run: FailedRun) -> dict[str, Any]:
+    values = {f"varied.{name}": value for name, value in run.values.items()}
+    return {"run": run.index, "digest": run.digest, "status": FAILED, "message": run.sentence, **values}
