@@ -42,7 +42,8 @@ def export_hdf5(folder: Path) -> Path:
 
     for part, stem in _parts(folder):
         target = folder / f"{stem}.h5"
-        with atomic_write(target) as temporary, h5py.File(temporary, "w", libver="latest", track_order=True) as file:
+        # atomic_write holds the lock on the file already
+        with atomic_write(target) as temporary, h5py.File(temporary, "w", libver="latest", locking=False) as file:
 
             def create(name: str, shape: tuple[int, ...], kind: Any, chunks: tuple[int, ...], file: Any = file) -> Any:
                 kind = h5py.string_dtype() if kind == "string" else kind

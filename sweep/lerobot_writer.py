@@ -116,7 +116,9 @@ class LeRobotWriter:
             self._episodes.close()
         meta = self._root / "meta"
         _write_tasks(meta / "tasks.parquet", self._task)
-        _write_json(meta / "info.json", self._info())
+        info = self._info()
+        _write_json(meta / "info.json", info)
+        _write_card(self._root / "README.md", self._task, info)
         _write_json(meta / "stats.json", {name: found.result() for name, found in self._statistics.items()})
 
     def _flush_frames(self) -> None:
@@ -217,21 +219,10 @@ def _encodings(features: tuple[Feature, ...]) -> dict[str, Any]:
 
 
 def _schema(features: tuple[Feature, ...]) -> pyarrow.Schema:
-    """Return the columns, with the note by which the library `datasets` recognises pictures of more than one axis."""
     import pyarrow
 
     columns = [(name, pyarrow.type_for_alias(dtype)) for name, dtype in INDEX_COLUMNS.items()]
-    columns += [(item.name, _arrow_type(item)) for item in features]
-    described: dict[str, Any] = {name: {"dtype": dtype, "_type": "Value"} for name, dtype in INDEX_COLUMNS.items()}
-    for item in features:
-        value = {"dtype": item.dtype, "_type": "Value"}
-        if item.shape == (1,):
-            described[item.name] = value
-        elif len(item.shape) == 1:
-            described[item.name] = {"feature": value, "length": item.shape[0], "_type": "Sequence"}
-        else:
-            described[item.name] = {"shape": item.shape, "dtype": item.dtype, "_type": f"Array{len(item.shape)}D"}
-    return pyarrow.schema(columns, {"huggingface": json.dumps({"info": {"features": described}})})
+    return pyarrow.schema([*columns, *((item.name, _arrow_type(item)) for item in features)])
 
 
 def _arrow_type(feature: Feature) -> pyarrow.DataType:
@@ -286,6 +277,34 @@ def _described(feature: Feature) -> dict[str, Any]:
     return {"dtype": feature.dtype, "shape": list(feature.shape), "names": names, "palpate": about}
 
 
+def _write_card(path: Path, task: str, info: dict[str, Any]) -> None:
+    """Write the dataset's card, whose first lines tell the library `datasets` which files are the frames."""
+    title = " ".join(task.replace("#", " ").split())
+    lines = [
+        "---",
+        "tags: [LeRobot, tactile]",
+        "configs:",
+        "- config_name: default",
+        "  data_files: data/*/*.parquet",
+        "---",
+        "",
+    ]
+    lines += [
+        f"# {title}",
+        "",
+        f"{info['total_frames']} frames of {info['total_episodes']} runs, simulated with Palpate, in the",
+    ]
+    lines += ["layout of LeRobot v3. `meta/texels.parquet` says where the texels are.", ""]
+    lines += ["| feature | type | shape | unit | meaning |", "| --- | --- | --- | --- | --- |"]
+    for name, feature in info["features"].items():
+        own = feature.get("palpate", {})
+        shape = " × ".join(map(str, feature["shape"]))
+        cells = (f"`{name}`", feature["dtype"], shape, own.get("unit", ""), own.get("about", "A column of LeRobot."))
+        lines.append("| " + " | ".join(cell.replace("|", "/") for cell in cells) + " |")
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8", newline="\n")
+    sync_file(path)
+
+
 def _write_texels(path: Path, texels: dict[str, Texels]) -> None:
     """Write where the texels of all sensors are: a row each, in the frames of their bodies, metres."""
     import pyarrow
@@ -329,5 +348,6 @@ def _write_table(path: Path, table: pyarrow.Table) -> None:
 
 
 def _write_json(path: Path, content: dict[str, Any]) -> None:
-    path.write_text(json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n", encoding="utf-8")
+    text = json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False)
+    path.write_text(text + "\n", encoding="utf-8", newline="\n")
     sync_file(path)

@@ -138,7 +138,7 @@ def _images(folder: Path, order: list[tuple[int, str]]) -> list[RunImage]:
 def _headline(runs: int, failed: list[FailedRun], columns: StudyColumns) -> str:
     if not runs and not failed:
         return "No run has finished yet."
-    text = f"{_count(runs, 'run')} finished, {len(failed) or 'none'} failed." if runs else f"All {len(failed)} runs failed."
+    text = f"{_count(runs, 'run') if runs else 'No run'} finished, {f'{len(failed):,}' if failed else 'none'} failed."
     if columns.values:
         text += f" {_count(len(columns.values), 'parameter')} varied."
     if columns.frames_seconds > 0:

@@ -67,11 +67,11 @@ def draw_small_multiples(
             if column == 0:
                 axes.set_ylabel(_wrapped(metric), fontsize=FONT, color=INK)
             else:
-                axes.set_yticklabels([])
+                axes.tick_params(labelleft=False)
             if row == rows - 1:
                 axes.set_xlabel(_wrapped(parameter), fontsize=FONT, color=INK)
             else:
-                axes.set_xticklabels([])
+                axes.tick_params(labelbottom=False)
     save_figure(figure, path, DPI)
 
 
@@ -127,10 +127,15 @@ def _is_logarithmic(column: np.ndarray) -> bool:
 
 
 def _few_ticks(axes: Axes, own: Sequence[object]) -> None:
-    from matplotlib.ticker import MaxNLocator
+    from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullLocator
 
     axes.yaxis.set_major_locator(MaxNLocator(3))
-    if axes.get_xscale() == "linear" and not any(isinstance(value, str) for value in own):
+    if axes.get_xscale() == "log":
+        low, high = axes.get_xlim()
+        axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if high < 100 * low else (1.0,), numticks=5))
+        axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        axes.xaxis.set_minor_locator(NullLocator())
+    elif not any(isinstance(value, str) for value in own):
         axes.xaxis.set_major_locator(MaxNLocator(3))
 
 

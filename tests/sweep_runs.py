@@ -23,6 +23,7 @@ from palpate.core.solver.simulation import run
 
 FPS, SECONDS = 50.0, 0.3
 RADIUS = 0.008
+FRICTION = {"mus": 0.2, "mud": 0.15, "sigma0": 5e3}
 
 
 def press(seed: int, frames_per_second: float = FPS) -> tuple[Scenario, dict[str, float | str]]:
@@ -35,10 +36,10 @@ def press(seed: int, frames_per_second: float = FPS) -> tuple[Scenario, dict[str
         "pad.k": float(np.exp(random.uniform(np.log(300.0), np.log(3000.0)))),
     }
     heights = smooth_path((0.0, 0.001), (0.12, -values["depth"]), (0.3, -values["depth"]), fps=frames_per_second, end=SECONDS)
-    slide = smooth_path((0.0, 0.0), (0.2, 0.0), (0.3, 0.002), fps=frames_per_second, end=SECONDS)
+    slide = smooth_path((0.0, 0.0), (0.14, 0.0), (0.3, 0.006), fps=frames_per_second, end=SECONDS)
     path = np.stack([values["x"] + slide, np.full(len(heights), values["y"]), heights + RADIUS], axis=1)
     ball = shape(trimesh.creation.icosphere(3, RADIUS), "ball")
-    return pressed(ball, path, pad(), fps=frames_per_second, k=values["pad.k"], mus=0.6, mud=0.5), values
+    return pressed(ball, path, pad(), fps=frames_per_second, k=values["pad.k"], **FRICTION), values
 
 
 def metrics_of(recording: Recording) -> dict[str, float | None]:

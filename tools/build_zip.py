@@ -55,6 +55,7 @@ MARKERS = {
 NUMPY = {"3.11": "1.24.3", "3.13": "2.2.4"}
 # The licence travels with the zip; everything else is in the package folders that pyproject.toml lists.
 ROOT_FILES = ["__init__.py", "LICENSE"]
+NOT_IN_ZIP = {"sweep"}  # needs packages that the zip does not carry
 FIXED_TIME = (1980, 1, 1, 0, 0, 0)  # the earliest a zip can hold
 
 
@@ -65,7 +66,7 @@ class BuildError(Exception):
 def package_files() -> list[Path]:
     """Files of the package, relative to the repository root, without the manifest."""
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
-    folders = {package.split(".")[1] for package in project["tool"]["setuptools"]["packages"] if "." in package}
+    folders = {package.split(".")[1] for package in project["tool"]["setuptools"]["packages"] if "." in package} - NOT_IN_ZIP
     files = [Path(name) for name in ROOT_FILES]
     for folder in sorted(folders):
         for path in sorted((ROOT / folder).rglob("*")):

@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from sweep_runs import new_study, unit_sensor, write_failure, write_press, write_run
+from sweep_runs import FRICTION, new_study, unit_sensor, write_failure, write_press, write_run
 
 from palpate.attack.sample_bake import grid_texels, recording_of, round_texels
 from palpate.core.errors import FileError
@@ -84,7 +84,7 @@ def test_frames_hold_what_was_recorded(solved):
         seen = image[:, layout.row, layout.column]
         np.testing.assert_array_equal(seen[:, :, 0], pad.normal_force.astype(np.float32))
         np.testing.assert_array_equal(seen[:, :, 1:], pad.shear.astype(np.float32))
-        slips = slipping(pad, SensorParameters(k=run["values"]["pad.k"], mus=0.6, mud=0.5))
+        slips = slipping(pad, SensorParameters(k=run["values"]["pad.k"], **FRICTION))
         for name, expected in (("contact.touch.pad", pad.contact), ("contact.slip.pad", slips)):
             np.testing.assert_array_equal(column(part, name, layout.shape)[:, layout.row, layout.column], expected)
         reading = column(part, "observation.reading.pad", layout.shape)[:, layout.row, layout.column]
@@ -199,7 +199,9 @@ def test_texels_without_rows_are_lists(tmp_path):
     assert info["features"][other]["shape"] == [5, 3, 3]
     assert info["features"]["varied.shape"]["dtype"] == "string"
     table = rows(study)
-    (_, place), *_ = [(p, p / "cap") for p in sorted((study / "runs").iterdir()) if '"index": 0' in (p / "run.json").read_text()]
+    (_, place), *_ = [
+        (p, p / "cap") for p in sorted((study / "runs").iterdir()) if '"index": 0' in (p / "run.json").read_text()
+    ]
     recorded = load_recording(place / "recording.npz").sensors["cap"]
     seen = column(table.slice(0, len(recorded.contact)), "observation.tactile.cap", (13, 3))
     np.testing.assert_array_equal(seen[:, :, 0], recorded.normal_force.astype(np.float32))

@@ -1,0 +1,100 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The report names what metrics depend on, and is one file that needs no other."""
+
+from __future__ import annotations
+
+import base64
+import re
+
+import numpy as np
+import pytest
+from sweep_runs import new_study, unit_sensor, write_failure, write_run
+
+from palpate.attack.sample_bake import grid_texels, recording_of, round_texels
+from palpate.core.errors import FileError
+from palpate.sweep.dependencies import dependencies
+from palpate.sweep.report import write_report
+
+
+def study_of(tmp_path, runs=40):
+    """A study whose only metric that varies follows the load, which is 1 to 2."""
+    study = new_study(tmp_path / "study", "a <b>bold</b> name")
+    texels = grid_texels()
+    for index in range(runs):
+        recording = recording_of(texels)
+        recording.sensors["pad"].net_force = recording.sensors["pad"].net_force + [0.0, 0.0, -1.0 - index / runs]
+        values = {"load": 1.0 + index / runs, "other": float(np.random.default_rng(index).random()), "shape": "ball"}
+        write_run(study, index, [unit_sensor("pad", texels)], recording, values)
+    return study
+
+
+def test_the_page_says_what_depends_on_what(tmp_path):
+    study = study_of(tmp_path)
+    write_failure(study, 100, "The mesh <cube> has no faces.")
+    write_report(study)
+    page = (study / "report.html").read_text(encoding="utf-8")
+    assert "The strongest dependency is that of largest_force on load." in page
+    assert "40 runs finished, 1 failed." in page
+    assert "The mesh &lt;cube&gt; has no faces." in page and "<b>bold" not in page
+    assert not re.search(r'(src|href)="(?!data:)', page), "nothing outside the page"
+    pictures = [base64.b64decode(data) for data in re.findall(r"base64,([^\"]+)", page)]
+    assert len(pictures) == 2 and all(picture.startswith(b"\x89PNG") for picture in pictures)
+    before = page
+    write_report(study)
+    assert (study / "report.html").read_text(encoding="utf-8") == before
+    assert not list(study.glob(".palpate*"))
+
+
+def test_a_study_of_failures_alone_has_a_report(tmp_path):
+    study = new_study(tmp_path / "study")
+    write_failure(study, 1, "Nothing touches the sensor.")
+    write_report(study)
+    assert "No run finished, 1 failed." in (study / "report.html").read_text(encoding="utf-8")
+
+
+def test_texels_without_rows_are_drawn(tmp_path):
+    study = new_study(tmp_path / "study")
+    write_run(study, 0, [unit_sensor("pad", round_texels())], recording_of(round_texels()), {"mass": 1.0})
+    write_report(study)
+    assert "base64," in (study / "report.html").read_text(encoding="utf-8")
+
+
+def test_a_damaged_run_is_named(tmp_path):
+    study = study_of(tmp_path, runs=1)
+    path = next((study / "runs").glob("*/run.json"))
+    path.write_text('{"format": "palpate-run/1"}', encoding="utf-8")
+    with pytest.raises(FileError, match="run.json' is damaged"):
+        write_report(study)
+
+
+def test_dependencies_are_found_and_chance_is_not():
+    """Rising, rising and falling, and by name; of 200 pairs without a dependency none may be taken for one too often."""
+    random = np.random.default_rng(1)
+    x, other = random.random(300), random.random(300)
+    names = [("ball", "cube", "cone")[i % 3] for i in range(300)]
+    kind = np.array([len(name) + (name == "cone") * 2.0 for name in names])
+    noise = 0.1 * random.standard_normal(300)
+    metrics = {"rising": x + noise, "humped": (x - 0.5) ** 2 + 0.1 * noise, "named": kind + noise}
+    found = {(one.parameter, one.metric): one for one in dependencies({"x": x, "other": other, "name": names}, metrics)}
+    assert found["x", "rising"].rank_correlation > 0.9
+    assert abs(found["x", "humped"].rank_correlation) < 0.2 and found["x", "humped"].information > 0.7
+    assert found["name", "named"].rank_correlation is None and found["name", "named"].strength > 0.7
+    assert {pair for pair, one in found.items() if one.strength > 0} == {("x", "rising"), ("x", "humped"), ("name", "named")}
+    false = [
+        one
+        for seed in range(20)
+        for one in dependencies(
+            {f"p{i}": np.random.default_rng([seed, i]).random(100) for i in range(10)},
+            {"m": np.random.default_rng([seed, 99]).random(100)},
+        )
+        if one.strength > 0
+    ]
+    assert len(false) <= 2  # of 200, at one in a thousand: more than two come with a probability of 0.001
+
+
+def test_missing_values_count_as_missing():
+    x = [float(i) if i % 2 else None for i in range(40)]
+    y = np.where(np.arange(40) < 30, np.arange(40.0), np.nan)
+    (one,) = dependencies({"x": x}, {"y": y})
+    assert one.runs == 15 and one.rank_correlation == pytest.approx(1.0)
+    assert dependencies({"x": x[:10]}, {"y": y[:10]}) == [], "five runs say nothing"
