@@ -17,6 +17,8 @@ from .jobs import FORMATS, JOBS, MINE, Job, Stage, is_marked_unfinished, tree_wi
 from .trees import FOLDER, differences, tree
 from .worker import KILLED, Crashed, Failed, Hung, Worker
 
+LONGEST = 300.0
+"""Seconds after which a disturbed command counts as hung."""
 EXIT_SHARE = 0.03
 """Part of the faults that really end the process, which has to be started again."""
 
@@ -82,7 +84,7 @@ class Faults(Area):
         stage.start(job)
         before = tree(stage.place)
         try:
-            answer = stage.run(job.words, self._fault(case.data["at"], kind))
+            answer = stage.run(job.words, self._fault(case.data["at"], kind), LONGEST)
         except Crashed:
             if kind != EXIT:
                 raise
@@ -151,7 +153,7 @@ class Faults(Area):
 
     def _run_again(self, job: Job, before: dict[str, str]) -> Outcome | None:
         """Run the same command undisturbed and compare with a run that never was disturbed."""
-        again = self._stage.run(job.words)
+        again = self._stage.run(job.words, timeout=LONGEST)
         if again["traceback"]:
             return Outcome(TRACEBACK, f"the second run: {again['traceback']}")
         if again["status"] != 0:

@@ -10,7 +10,7 @@ from functools import partial
 from pathlib import Path
 
 from .trees import put_back, tree
-from .worker import Failed, Worker
+from .worker import PATIENCE, Failed, Worker
 
 BAKES, SAVED, EXPORTS, MEASURED = "bakes", "saved", "exports", "measured"
 """Names of the folders that jobs start from."""
@@ -94,7 +94,7 @@ class Stage:
         """Return the folder in which every job runs."""
         return self.folder / "place"
 
-    def run(self, words: tuple[str, ...] | list[str], fault: dict | None = None, timeout: float = 300.0) -> dict:
+    def run(self, words: tuple[str, ...] | list[str], fault: dict | None = None, timeout: float = PATIENCE) -> dict:
         """Run a command in the place."""
         return self.worker.call("worker:run_command", timeout, argv=list(words), cwd=str(self.place), fault=fault)
 

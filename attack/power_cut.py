@@ -35,6 +35,8 @@ from .trees import differences, put_back, tree
 from .worker import PACKAGE, Crashed, Failed, Hung, Worker, run_command
 
 NOTHING, HALF, ZEROS, ALL = "nothing", "half", "zeros", "all"
+LONGEST = 300.0
+"""Seconds after which the run after a cut counts as hung."""
 DEVICE_SHARE, LEAST_DEVICE_CUTS = 0.1, 12
 """Part of the cuts that are made with a real file system, and how many are wanted at least."""
 CUT_JOBS = tuple(job for job in JOBS if job.name in ("bake", "bake --save", "export csv"))
@@ -294,7 +296,7 @@ class PowerCut(Area):
         return self._resume(job, before) or Outcome(CLEAR)
 
     def _resume(self, job: Job, before: dict[str, str]) -> Outcome | None:
-        answer = self._stage.run(job.words)
+        answer = self._stage.run(job.words, timeout=LONGEST)
         if answer["traceback"]:
             return Outcome(TRACEBACK, answer["traceback"])
         if answer["status"] != 0:

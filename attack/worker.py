@@ -25,6 +25,8 @@ from .injector import Injector, Stopped
 
 PACKAGE = "palpate.attack"
 """Name of this package for a process that was started in another folder."""
+PATIENCE = 1800.0
+"""Seconds after which a worker counts as hung, where nothing else is said: it may compile the solver on a busy machine."""
 KILLED = "killed"
 """Status of a command that :class:`.Stopped` has ended."""
 
@@ -54,7 +56,7 @@ class Worker:
         self._folder = folder
         self._process: subprocess.Popen | None = None
 
-    def call(self, function: str, timeout: float = 300.0, **arguments: Any) -> Any:
+    def call(self, function: str, timeout: float = PATIENCE, **arguments: Any) -> Any:
         """Call ``module:function`` of this package in the worker with JSON values and return what it returns.
 
         Raises
