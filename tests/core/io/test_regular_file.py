@@ -66,7 +66,7 @@ def test_a_special_file_in_a_bake_folder_is_refused(special):
     path.rename(path.with_name("manifest.json"))
     with pytest.raises(FileError, match=f"is {kind}"):
         read_manifest(path.parent)
-    with pytest.raises(FileError, match="holds no bake"):
+    with pytest.raises(FileError, match=f"is {kind}"):
         read_bake(path.parent)
 
 
