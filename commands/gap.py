@@ -8,17 +8,15 @@ from dataclasses import replace
 from pathlib import Path
 
 from ..core.errors import SceneError
-from ..core.io import disk_space
+from ..core.io.disk_space import require_space
+from ..core.io.file_list import FileList
 from ..core.io.file_writing import writable_folder
-from ..core.io.temporary_folder import remove_unfinished
 from ..core.jobs.job_runner import part_of_job
 from ..core.jobs.progress import Job
 from . import blender, checks, console
 
 OUTPUTS = ("gap.json", "sensor.toml", "report.html")
 """Files that are written beside the plots."""
-LEAST_SPACE = 10e6
-"""Bytes: plots and report of a small sensor."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -34,6 +32,7 @@ def run(arguments: argparse.Namespace) -> int:
 
     dependencies.choose_numba_cache()
     from ..core.gap.dataset.rig import read_rig
+    from ..core.gap.report import summary
     from ..core.gap.report.amended_sensor import amended_sensor
     from ..core.solver import precompile
 
@@ -42,9 +41,9 @@ def run(arguments: argparse.Namespace) -> int:
     with console.Interrupt.raised_at_once():
         rig = read_rig(arguments.rig)
         folder = writable_folder(arguments.out, create=True)
-        remove_unfinished(folder)
         checks.outputs_are_no_inputs((folder / name for name in OUTPUTS), (arguments.rig,))
-        disk_space.require_space(folder, LEAST_SPACE, "The report")
+        require_space(folder, summary.report_bytes(rig), "The report")
+        FileList(folder)  # it completes what a killed run has left
     if arguments.blend:
         _sensor_in_scene(arguments)  # wrong names and read-only files are found before the work
     with console.Interrupt.raised_at_once():

@@ -6,8 +6,8 @@ from __future__ import annotations
 import argparse
 
 from ..core.figures.figure_canvas import FILE_TYPES as FORMATS
+from ..core.io.file_list import remove_unneeded
 from ..core.io.file_writing import writable_folder
-from ..core.io.temporary_folder import remove_unfinished
 from . import blender, console, figure_options
 
 FIGURES = ("scene", "strip", "curves", "numbers", "video")
@@ -78,8 +78,8 @@ def run(arguments: argparse.Namespace) -> int:
             **({"kinds": tuple(arguments.only)} if arguments.only else {}),
             **({"formats": tuple(arguments.format)} if arguments.format else {}),
         )
-        stopped = "palpate render: stopped; figures that were finished are there."
-        with console.exit_on_interrupt(stopped, lambda: remove_unfinished(folder, is_ending=True)):
+        stopped = "palpate render: stopped; earlier figures are as they were."
+        with console.exit_on_interrupt(stopped, lambda: remove_unneeded(folder)):
             job = figure_export.make_figures(scene, folder, request)
             written = console.run_with_progress_bar("render", job, describe=lambda step: f"{step.stage}, frame {step.frame}")
     for path in written:

@@ -8,12 +8,12 @@ from . import modal_job, support
 
 
 class PALPATE_OT_figures_make(modal_job.ModalJob, bpy.types.Operator):
-    """Make the figures that are chosen above, of what is baked: nothing is computed. ESC stops; what is finished stays"""
+    """Make the figures that are chosen above, of what is baked: nothing is computed. ESC stops; earlier figures stay"""
 
     bl_idname = "palpate.figures_make"
     bl_label = "Make Figures"
     bl_options = {"REGISTER"}
-    stopped = "Stopped; figures that were finished are there"
+    stopped = "Stopped; earlier figures are as they were"
 
     @classmethod
     def poll(cls, context):

@@ -155,13 +155,19 @@ def refresh(scene, places: dict) -> None:
     Raises
     ------
     PalpateError
-        The files are missing or damaged, belong to another bake, or no longer match the scene.
+        The files are missing or damaged, belong to another bake, or no longer match the scene, or the bake has no images.
     """
     if not places:
         raise SceneError(f"Nothing is baked in '{scene.name}': bake first.")
     bake_identity.require_own_bake(scene)
     bake: Bake = read_sensors(list(places.values()))
     names = {place: name for name, place in bake.folders.items()}
+    for name, manifest in bake.manifests.items():
+        if not manifest.has_images:
+            raise SceneError(
+                f"The bake of sensor '{name}' in '{bake.folders[name]}' has no tactile images, which the scene would show: "
+                "bake again with images."
+            )
     recording = bake.recording
     baked_sensors = []
     for obj, place in places.items():

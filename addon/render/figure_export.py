@@ -11,20 +11,25 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 from ...core.errors import SceneError
-from ...core.export.registry import export
+from ...core.export.registry import export, exporters
 from ...core.figures.side_by_side import side_by_side
 from ...core.figures.tactile_strip import tactile_strip
 from ...core.figures.texel_numbers import MOST, texel_numbers
 from ...core.figures.time_curves import time_curves
 from ...core.io.bake_folder import folder_names
 from ...core.io.bake_reader import Bake, frame_index, read_sensors
+from ...core.io.disk_space import require_space
+from ...core.io.file_list import FileList
 from ...core.io.file_writing import writable_folder
-from ...core.io.temporary_folder import remove_unfinished, temporary_folder
+from ...core.io.temporary_folder import temporary_folder
 from ...core.jobs.job_runner import run_job
 from ...core.jobs.progress import Job, Progress
 from ..display import bake_identity, baked_scene
-from . import render, render_setup, video, workbench_colors
+from . import figure_size, render, render_setup, video, workbench_colors
 from .figure_request import FigureRequest
+
+DRAWN = {"strip", "curves", "numbers"}
+"""Kinds of figures that need no render."""
 
 
 def read_scene_bake(scene) -> Bake:
@@ -47,6 +52,9 @@ def read_scene_bake(scene) -> Bake:
 def make_figures(scene, folder, request: FigureRequest) -> Job[list[Path]]:
     """Make the figures of a baked scene.
 
+    All figures are written before the first of them is put in its place. Earlier ones of the same kinds stay if they were made
+    from the same bake and have other names; those of another bake are removed (:mod:`....core.io.file_list`).
+
     Parameters
     ----------
     folder : path
@@ -60,43 +68,49 @@ def make_figures(scene, folder, request: FigureRequest) -> Job[list[Path]]:
     Raises
     ------
     PalpateError
-        The scene or one of the frames is not baked, or a file cannot be written.
+        The scene or one of the frames is not baked, the disk has too little space, or a file cannot be written.
     """
     bake = read_scene_bake(scene)
     if request.sensors:
         bake = bake.select(request.sensors)
-    folder = writable_folder(folder, create=True)
-    remove_unfinished(folder)
     frames = request.frames or (_frame_of_largest_force(bake),)
     for number in frames:
         frame_index(bake.recording, number)
+    data = sum(exporters()[kind].size(bake) for kind in request.exports)
+    require_space(folder, figure_size.figures_bytes(bake, request, len(frames)) + data, "The set of figures")
+    folder = writable_folder(folder, create=True)
+    files = FileList(folder)
     steps = _StepCounter(request, frames, len(bake.recording.frames))
-    written: list[Path] = []
-    if "scene" in request.kinds:
-        yield from _render_pictures(scene, folder, request, bake, frames, steps, written)
-    if {"strip", "curves", "numbers"} & set(request.kinds):
-        yield steps.next("Drawing figures", frames[0])
-        written += draw_figures(bake, folder, request, frames)
+    with files.new_files("figures") as new:
+        written: dict[str, list[Path]] = {}
+        if "scene" in request.kinds:
+            written["scene"] = yield from _render_pictures(scene, new, request, bake, frames, steps)
+        if DRAWN & set(request.kinds):
+            yield steps.next("Drawing figures", frames[0])
+            written |= draw_figures(bake, new, request, frames)
+        if "video" in request.kinds:
+            written["video"] = yield from _make_video(scene, new, request, bake, steps)
+        manifest = next(iter(bake.manifests.values()))
+        kinds = {f"figures {kind}": paths for kind, paths in written.items()}
+        made = files.replace(new, kinds, manifest.bake_id or manifest.digest)
     for kind in request.exports:
         yield steps.next(f"Writing {kind.upper()}", frames[0])
-        written += run_job(export(bake, kind, folder / f"data {kind}", request.style))
-    if "video" in request.kinds:
-        yield from _make_video(scene, folder, request, bake, steps, written)
-    return written
+        made += run_job(export(bake, kind, folder / f"data {kind}", request.style))
+    return made
 
 
-def draw_figures(bake: Bake, folder: Path, request: FigureRequest, frames: Sequence[int]) -> list[Path]:
-    """Draw strip, curves and numbers, as far as the request names them; return the files."""
-    written = []
+def draw_figures(bake: Bake, folder: Path, request: FigureRequest, frames: Sequence[int]) -> dict[str, list[Path]]:
+    """Draw strip, curves and numbers, as far as the request names them; return the files of each kind."""
+    written: dict[str, list[Path]] = {kind: [] for kind in request.kinds if kind in DRAWN}
     for ending in request.formats:
         parts = (bake.recording, bake.texels)
         if "strip" in request.kinds:
             columns = request.frames if len(request.frames) > 1 else None
             tactile_strip(folder / f"strip.{ending}", *parts, columns, request.style)
-            written.append(folder / f"strip.{ending}")
+            written["strip"].append(folder / f"strip.{ending}")
         if "curves" in request.kinds:
             time_curves(folder / f"curves.{ending}", *parts, bake.parameters, style=request.style)
-            written.append(folder / f"curves.{ending}")
+            written["curves"].append(folder / f"curves.{ending}")
         if "numbers" in request.kinds:
             for name, stem in folder_names(bake.texels).items():
                 if len(bake.texels[name]) > MOST and not request.sensors:
@@ -104,12 +118,13 @@ def draw_figures(bake: Bake, folder: Path, request: FigureRequest, frames: Seque
                 for number in frames:
                     path = folder / f"numbers {stem} {number:04d}.{ending}"
                     texel_numbers(path, *parts, name, number, request.style)
-                    written.append(path)
+                    written["numbers"].append(path)
     return written
 
 
-def _render_pictures(scene, folder, request, bake, frames, steps, written) -> Job[None]:
-    """Render the frames, each alone and with the tactile images beside it; add the files to `written`."""
+def _render_pictures(scene, folder, request, bake, frames, steps) -> Job[list[Path]]:
+    """Render the frames, each alone and with the tactile images beside it; return the files."""
+    written = []
     with _prepared_scene(scene, request, bake, frames, request.size) as show_frame:
         for number in frames:
             yield steps.next("Rendering", number)
@@ -119,13 +134,13 @@ def _render_pictures(scene, folder, request, bake, frames, steps, written) -> Jo
             beside = folder / f"scene and touch {number:04d}.png"
             side_by_side(plain, beside, bake.recording, bake.texels, number, request.style, request.size[1])
             written.append(beside)
+    return written
 
 
-def _make_video(scene, folder, request, bake, steps, written) -> Job[None]:
-    """Render all frames with the tactile images beside them, and encode them; add the file to `written`."""
+def _make_video(scene, folder, request, bake, steps) -> Job[list[Path]]:
+    """Render all frames with the tactile images beside them, and encode them; return the file."""
     numbers = [int(number) for number in bake.recording.frames]
-    height = 2 * (min(request.size[1], 720) // 2)
-    size = (2 * round(0.5 * height * request.size[0] / request.size[1]), height)
+    size = figure_size.video_size(request)
     with temporary_folder(folder, "video") as temporary:
         pictures = []
         with _prepared_scene(scene, request, bake, numbers, size) as show_frame:
@@ -134,10 +149,10 @@ def _make_video(scene, folder, request, bake, steps, written) -> Job[None]:
                 show_frame(number)
                 picture = temporary / f"{number - numbers[0]:06d}.png"
                 render.render_frame(scene, picture, number, samples=request.samples, size=size)
-                side_by_side(picture, picture, bake.recording, bake.texels, number, request.style, height)
+                side_by_side(picture, picture, bake.recording, bake.texels, number, request.style, size[1])
                 pictures.append(picture)
         yield steps.next("Encoding the video", numbers[-1])
-        written.append(video.encode_video(pictures, folder / "video.mp4", bake.manifests[next(iter(bake.texels))].fps))
+        return [video.encode_video(pictures, folder / "video.mp4", bake.manifests[next(iter(bake.texels))].fps)]
 
 
 @contextmanager

@@ -5,4 +5,4 @@ All files hold SI units, in the frames and with the signs of :mod:`..model.recor
 :mod:`.formats` that defines an ``EXPORTER``; the command line, the scene's figure settings and the checks take it from there.
 """
 
-__all__ = ["exporter", "file_list", "registry"]
+__all__ = ["exporter", "registry"]

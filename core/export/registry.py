@@ -10,15 +10,14 @@ import pkgutil
 from functools import cache
 from pathlib import Path
 
-from ..errors import FileError, PalpateError
+from ..errors import PalpateError
 from ..figures.figure_style import FigureStyle
 from ..io.bake_reader import Bake
 from ..io.disk_space import require_space
+from ..io.file_list import FileList
 from ..io.file_writing import writable_folder
-from ..io.temporary_folder import temporary_folder
 from ..jobs.progress import Job
 from .exporter import Exporter
-from .file_list import FileList
 
 FORMATS = f"{__package__}.formats"
 """The package of the formats."""
@@ -58,7 +57,7 @@ def export(bake: Bake, kind: str, folder: str | os.PathLike, style: FigureStyle 
     -------
     list of Path
         What was written: files, and folders that hold the others. They take the place of the files that an earlier export of
-        this format left, which stay as they are until all new files are complete (:mod:`.file_list`).
+        this format left, which stay as they are until all new files are complete (:mod:`..io.file_list`).
 
     Raises
     ------
@@ -72,10 +71,7 @@ def export(bake: Bake, kind: str, folder: str | os.PathLike, style: FigureStyle 
     require_space(folder, known[kind].size(bake), "The export")
     folder = writable_folder(folder, create=True)
     files = FileList(folder)
-    with temporary_folder(folder, "export") as new:
-        try:
-            written = yield from known[kind].write(bake, new, style or FigureStyle())
-        except FileError as error:
-            raise FileError(str(error).replace(str(new), str(folder))) from error
-        written = files.replace(kind, new, written)
+    with files.new_files("export") as new:
+        written = yield from known[kind].write(bake, new, style or FigureStyle())
+        written = files.replace(new, {kind: written})
     return list(dict.fromkeys(path if path.parent == folder else path.parent for path in written))

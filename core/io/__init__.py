@@ -16,6 +16,7 @@ __all__ = [
     "csv_table",
     "disk_space",
     "exr_backend",
+    "file_list",
     "file_writing",
     "folder_lock",
     "frame_rows",

@@ -11,7 +11,7 @@ import json
 import os
 import re
 import secrets
-from collections.abc import Iterator
+from collections.abc import Callable, Container, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
@@ -20,9 +20,12 @@ from .file_lock import try_lock
 from .file_writing import os_error_reason, remove_leftovers
 from .private_folder import MARKER_FORMAT, MARKER_NAME, remove_tree
 
+NAME = r"\.palpate-[a-z]+\.[0-9a-f]{8}\.partial"
+"""Regular expression of the names of these folders."""
+
 
 @contextmanager
-def temporary_folder(parent: Path, purpose: str) -> Iterator[Path]:
+def temporary_folder(parent: Path, purpose: str, is_kept: Callable[[Path], bool] | None = None) -> Iterator[Path]:
     """Make a hidden folder in `parent`, and remove it with all that it holds when the body ends.
 
     Parameters
@@ -30,6 +33,8 @@ def temporary_folder(parent: Path, purpose: str) -> Iterator[Path]:
     parent : Path
     purpose : str
         Part of its name.
+    is_kept : callable, optional
+        Called with the folder when the body ends; True if it is not to be removed, because a later run needs it.
 
     Raises
     ------
@@ -49,7 +54,8 @@ def temporary_folder(parent: Path, purpose: str) -> Iterator[Path]:
     finally:
         if marker is not None:
             os.close(marker)
-        _remove(folder)
+        if is_kept is None or not is_kept(folder):
+            _remove(folder)
 
 
 def _made(folder: Path) -> int:
@@ -65,20 +71,20 @@ def _made(folder: Path) -> int:
     return handle
 
 
-def remove_unfinished(parent: Path, kept: str = "", is_ending: bool = False) -> None:
+def remove_unfinished(parent: Path, kept: Container[str] = (), is_ending: bool = False) -> None:
     """Remove what killed processes have left in a folder: files of :func:`.atomic_write` and temporary folders.
 
     Parameters
     ----------
     parent : Path
-    kept : str
-        Name of a temporary folder that is not removed.
+    kept : container of str
+        Names of temporary folders that are not removed.
     is_ending : bool
         True if this process is about to end, and what it has begun itself is removed as well.
     """
     remove_leftovers(parent, is_ending)
     for folder in sorted(parent.glob(".palpate-*.partial")):
-        if re.fullmatch(r"\.palpate-[a-z]+\.[0-9a-f]{8}\.partial", folder.name) and folder.name != kept:
+        if re.fullmatch(NAME, folder.name) and folder.name not in kept:
             with suppress(OSError):
                 if not folder.is_symlink() and (is_ending or _is_abandoned(folder)):
                     _remove(folder)

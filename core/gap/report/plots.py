@@ -230,6 +230,8 @@ CAPTIONS = {
     "phases": "Squared error by phase of contact, as a share of that of the base model.",
 }
 """Captions of the pictures by file name."""
+FILE_TYPES = ("png", "pdf")
+"""Each picture is written as all of them."""
 
 
 def picture(name: str, result: Diagnosis, errors: GapErrors) -> Figure:
@@ -251,7 +253,7 @@ def draw(result: Diagnosis, errors: GapErrors, folder: Path) -> list[str]:
         if name == "map" and len(result.rig.texels) == 1:
             continue
         figure = picture(name, result, errors)
-        for kind in ("png", "pdf"):
+        for kind in FILE_TYPES:
             save_figure(figure, folder / f"{name}.{kind}", 200)
         names.append(name)
     return names

@@ -7,9 +7,12 @@ import json
 from pathlib import Path
 from typing import Any
 
+from ...io.disk_space import require_space
+from ...io.file_list import FileList
 from ...io.file_writing import atomic_write
 from ...io.sensor_toml import write_sensor
 from ...jobs.progress import Job, Progress
+from ..dataset.rig import Rig
 from ..fitting.least_squares import BASE, RECORDING
 from ..forward.predictor import Model
 from ..selection.check_recordings import CheckedRecording
@@ -19,11 +22,17 @@ from .amended_sensor import amended_sensor, with_mean_gain_moved
 from .comparison import GapErrors, error_location, gap_errors
 from .experiments import next_experiment
 from .html_report import html_report
-from .plots import draw
+from .plots import FILE_TYPES, draw
 from .recording_differences import recording_differences
 from .sentences import headline, warnings
 
 FORMAT = "palpate-gap/1"
+LEAST_BYTES = 10e6
+"""Bytes of a report of few samples: ten pictures as PNG, PDF and inside the page."""
+SAMPLE_BYTES = 40.0
+"""Bytes of a sample in the pictures: in PDF, white noise takes 9 for a dot and 5 for a point of each of at most five lines."""
+TEXEL_BYTES = 200.0
+"""Bytes of a texel in the map of errors and in the amended sensor."""
 
 
 def summary(result: Diagnosis, errors: GapErrors) -> dict[str, Any]:
@@ -120,8 +129,13 @@ def _found(one: Finding, model: Model, result: Diagnosis, errors: GapErrors) -> 
     }
 
 
+def report_bytes(rig: Rig) -> float:
+    """Return an estimate from above of the bytes that a report of a rig occupies."""
+    return LEAST_BYTES + SAMPLE_BYTES * sum(len(trial.time) for trial in rig.trials) + TEXEL_BYTES * len(rig.texels)
+
+
 def write_report(result: Diagnosis, folder: Path, errors: GapErrors | None = None) -> Job[None]:
-    """Write everything into a folder, gap.json last.
+    """Write everything into a folder. All files of an earlier report there are replaced together (:mod:`...io.file_list`).
 
     Parameters
     ----------
@@ -133,17 +147,27 @@ def write_report(result: Diagnosis, folder: Path, errors: GapErrors | None = Non
     Yields
     ------
     Progress
+
+    Raises
+    ------
+    FileError
+        The folder cannot be written to, or the disk has too little space.
     """
-    yield Progress("writing the amended sensor", 0, 1000)
-    write_sensor(folder / "sensor.toml", amended_sensor(result))
-    yield Progress("drawing", 100, 1000)
-    errors = errors or gap_errors(result)
-    pictures = draw(result, errors, folder)
-    yield Progress("writing the report", 900, 1000)
-    found = summary(result, errors)
-    with atomic_write(folder / "report.html") as temporary:
-        text = html_report(result, found, headline(result, errors), pictures, folder)
-        temporary.write_text(text, encoding="utf-8")
-    with atomic_write(folder / "gap.json") as temporary:
-        temporary.write_text(json.dumps(found, indent=2, ensure_ascii=False, allow_nan=False) + "\n", encoding="utf-8")
+    require_space(folder, report_bytes(result.rig), "The report")
+    files = FileList(folder)
+    with files.new_files("report") as new:
+        yield Progress("writing the amended sensor", 0, 1000)
+        write_sensor(new / "sensor.toml", amended_sensor(result))
+        yield Progress("drawing", 100, 1000)
+        errors = errors or gap_errors(result)
+        pictures = draw(result, errors, new)
+        yield Progress("writing the report", 900, 1000)
+        found = summary(result, errors)
+        with atomic_write(new / "report.html") as temporary:
+            text = html_report(result, found, headline(result, errors), pictures, new)
+            temporary.write_text(text, encoding="utf-8")
+        with atomic_write(new / "gap.json") as temporary:
+            temporary.write_text(json.dumps(found, indent=2, ensure_ascii=False, allow_nan=False) + "\n", encoding="utf-8")
+        drawn = [f"{name}.{kind}" for name in pictures for kind in FILE_TYPES]
+        files.replace(new, {"gap": [new / name for name in ("sensor.toml", *drawn, "report.html", "gap.json")]})
     yield Progress("done", 1000, 1000)

@@ -2,8 +2,12 @@
 """All figures of a baked scene in one go; the scene is afterwards what it was before."""
 
 import os
+import shutil
 import subprocess
 import sys
+from contextlib import suppress
+from dataclasses import replace
+from types import SimpleNamespace
 
 import bpy
 import numpy as np
@@ -14,9 +18,13 @@ from palpate.addon.bake.bake import bake
 from palpate.addon.display import bake_display
 from palpate.addon.render import figure_export, figure_request, render, render_setup, video
 from palpate.addon.render.figure_request import FigureRequest
+from palpate.attack.injector import KILL, Injector, Stopped
 from palpate.commands import main
 from palpate.core.errors import FileError, ParameterError, SceneError
 from palpate.core.figures.figure_style import FigureStyle
+from palpate.core.io import disk_space
+from palpate.core.io.file_list import LIST_NAME
+from palpate.core.io.file_writing import atomic_write
 from palpate.core.jobs.job_runner import run_job
 
 
@@ -48,7 +56,7 @@ def test_everything_at_once_and_nothing_left_behind(baked, tmp_path):
     written = run_job(
         figure_export.make_figures(scene, tmp_path / "out", request), lambda step: stages.append((step.done, step.total))
     )
-    assert {path.name for path in written} == {path.name for path in (tmp_path / "out").iterdir()}
+    assert {path.name for path in written} == {path.name for path in (tmp_path / "out").iterdir()} - {LIST_NAME}
     assert {path.suffix for path in written} == {".png", ".pdf", ".mp4"}
     assert image(tmp_path / "out" / "scene 0003.png").shape[:2] == (64, 96)
     assert image(tmp_path / "out" / "scene and touch 0003.png").shape[0] == 64
@@ -57,6 +65,62 @@ def test_everything_at_once_and_nothing_left_behind(baked, tmp_path):
     assert [line for line in changes(before, dump()) if "Render Result" not in line] == []  # Blender's own
     assert (len(bpy.data.worlds), len(bpy.data.lights), len(bpy.data.cameras)) == (worlds, lights, cameras)
     assert len(bpy.data.scenes) == 1
+
+
+def test_figures_take_the_place_of_earlier_ones_as_a_whole(baked, tmp_path, monkeypatch):
+    """A kill at any operation leaves no old figure beside a new one; those of the same bake with other names stay."""
+    scene, _ = baked
+    age = "old"
+
+    def write(path, *_, **__):
+        with atomic_write(path) as temporary:
+            temporary.write_text(age)
+
+    for name in ("tactile_strip", "time_curves", "texel_numbers"):
+        monkeypatch.setattr(figure_export, name, write)
+
+    def draw(folder, frame=3):
+        run_job(
+            figure_export.make_figures(scene, folder, FigureRequest(("curves", "numbers"), frames=(frame,), formats=("png",)))
+        )
+
+    def ages(folder):
+        return {path.name: path.read_text() for path in folder.iterdir() if path.is_file() and path.name != LIST_NAME}
+
+    out = tmp_path / "out"
+    draw(out)
+    (out / "curves mine.png").write_text("mine")
+    count = tmp_path / "count"
+    shutil.copytree(out, count)
+    age = "new"
+    with Injector(count) as injector:
+        draw(count)
+    new = ages(count)
+    assert len(new) > 2 and set(new.values()) == {"new", "mine"}
+    for number in range(1, len(injector.calls) + 1):
+        copy = tmp_path / "copy"
+        shutil.copytree(out, copy)
+        with Injector(copy, number, KILL), suppress(Stopped):
+            draw(copy)
+        assert len(set(ages(copy).values()) - {"mine"}) <= 1, injector.calls[number - 1]
+        assert ages(copy)["curves mine.png"] == "mine"
+        shutil.rmtree(copy)
+    draw(out, 4)
+    assert {f"numbers Pad 000{frame}.png" for frame in (3, 4)} < set(ages(out))
+    made = figure_export.read_scene_bake(scene)
+    another = replace(made, manifests={name: replace(one, bake_id="another") for name, one in made.manifests.items()})
+    monkeypatch.setattr(figure_export, "read_scene_bake", lambda _: another)
+    draw(out, 2)
+    assert {name for name in ages(out) if "Pad" in name} == {"numbers Pad 0002.png"}
+
+
+def test_a_full_disk_is_found_before_a_render(baked, tmp_path, monkeypatch):
+    scene, _ = baked
+    monkeypatch.setattr(figure_export.render, "render_frame", None)
+    monkeypatch.setattr(disk_space.shutil, "disk_usage", lambda _: SimpleNamespace(free=8e6))
+    with pytest.raises(FileError, match=r"The set of figures needs up to 10 MB and the disk of .* has 8 MB left"):
+        run_job(figure_export.make_figures(scene, tmp_path / "out", FigureRequest(("scene",))))
+    assert not (tmp_path / "out").exists()
 
 
 def test_the_video_has_a_picture_per_frame(baked, tmp_path):

@@ -18,11 +18,11 @@ import pytest
 from palpate.attack.sample_bake import grid_texels, recording_of, round_texels, write_bake, write_sensor
 from palpate.core.errors import FileError, PalpateError
 from palpate.core.export import formats, registry
-from palpate.core.export.file_list import LIST_FORMAT, LIST_NAME
 from palpate.core.export.registry import export, exporters
 from palpate.core.figures import color_maps
 from palpate.core.figures.figure_style import FigureStyle
 from palpate.core.io.bake_reader import frame_index, read_bake
+from palpate.core.io.file_list import LIST_FORMAT, LIST_NAME
 from palpate.core.io.sensor_npz import load_sensor, save_sensor
 from palpate.core.jobs.job_runner import run_job
 from palpate.core.model.recording import SensorRecording
@@ -258,7 +258,7 @@ def test_a_full_disk_is_one_sentence(bake, tmp_path, kind):
 FULL_DISK = """
 import resource, signal
 from palpate.core.errors import FileError
-from palpate.core.export.file_list import LIST_FORMAT, LIST_NAME
+from palpate.core.io.file_list import LIST_FORMAT, LIST_NAME
 from palpate.core.export.registry import export, exporters
 from palpate.core.io.bake_reader import read_bake
 from palpate.core.jobs.job_runner import run_job

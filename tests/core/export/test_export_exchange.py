@@ -14,8 +14,9 @@ from palpate.attack.injector import KILL, Injector, Stopped
 from palpate.core.errors import FileError
 from palpate.core.export import registry
 from palpate.core.export.exporter import Exporter
-from palpate.core.export.file_list import LIST_FORMAT, LIST_NAME
 from palpate.core.export.registry import export
+from palpate.core.io import file_list
+from palpate.core.io.file_list import LIST_FORMAT, LIST_NAME
 from palpate.core.io.file_writing import atomic_write, writable_folder
 from palpate.core.io.temporary_folder import remove_unfinished, temporary_folder
 from palpate.core.jobs.job_runner import run_job
@@ -40,7 +41,7 @@ def write(files, folder, _style):
 @pytest.fixture
 def formats(monkeypatch):
     """A format of plain text; a "bake" is a dictionary of files."""
-    known = {"text": Exporter("text", "Text", "", 0, write), "other": Exporter("other", "Other", "", 1, write)}
+    known = {name: Exporter(name, name, "", i, write, lambda _: 0.0) for i, name in enumerate(("text", "other"))}
     monkeypatch.setattr(registry, "exporters", lambda: known)
 
 
@@ -60,7 +61,8 @@ def files_in(folder):
 
 def exported(folder):
     """The files of exports, without the list and the user's own."""
-    return {name: text for name, text in files_in(folder).items() if not name.startswith(".") and "mine" not in name}
+    found = files_in(folder).items()
+    return {name: text for name, text in found if not any(part[0] == "." for part in name.split("/")) and "mine" not in name}
 
 
 def is_complete(folder):
@@ -126,6 +128,74 @@ def test_the_next_export_of_another_format_completes_a_killed_one(out, tmp_path)
         completed += not was_complete
         assert was_complete or found == NEW
     assert completed > 3
+
+
+@pytest.mark.parametrize("other", [False, True])
+def test_an_error_while_files_are_moved_loses_no_new_file(out, tmp_path, other):
+    """The old export is gone by then: the new one stays whole in hiding, and any next export completes it."""
+    kept = 0
+    for number in range(1, number_of_calls(out, tmp_path) + 1):
+        copy = tmp_path / f"copy {number}"
+        shutil.copytree(out, copy)
+        with Injector(copy, number, "EACCES"), suppress(FileError):
+            run_job(export(NEW, "text", copy))
+        if is_complete(copy):
+            continue
+        kept += 1
+        moved = {name: text for name, text in exported(copy).items() if text == "new"}
+        folders = copy.glob(".palpate-export.*.partial")  # none if only the list could not be written in the end
+        waiting = {name: text for new in folders for name, text in exported(new).items() if text == "new"}
+        assert moved | waiting == NEW and not moved.keys() & waiting.keys()
+        run_job(export({"other.txt": "other"}, "other", copy) if other else export(NEW, "text", copy))
+        assert {name: text for name, text in exported(copy).items() if name != "other.txt"} == NEW
+        assert is_complete(copy) and hidden(copy) == [LIST_NAME]
+    assert kept > 3
+
+
+def test_a_folder_that_cannot_be_written_to_is_found_before_the_old_export_is_touched(out, monkeypatch):
+    def writable(folder, create=False):
+        if folder.name == "tip":
+            raise FileError(f"'{folder}' is read-only.")
+        return writable_folder(folder, create)
+
+    (out / "tip").mkdir()
+    monkeypatch.setattr(file_list, "writable_folder", writable)
+    with pytest.raises(FileError, match="read-only"):
+        run_job(export(NEW, "text", out))
+    assert exported(out) == OLD and hidden(out) == [LIST_NAME] and is_complete(out)
+
+
+def test_a_process_that_ends_keeps_what_waits_for_its_place(out, tmp_path):
+    run_job(export({"other.txt": "other"}, "other", out))
+    calls = number_of_calls(out, tmp_path)
+    for number in range(calls // 2, calls + 1):
+        copy = tmp_path / f"copy {number}"
+        shutil.copytree(out, copy)
+        with Injector(copy, number, KILL), suppress(Stopped):
+            run_job(export(NEW, "text", copy))
+        was_complete, was_old = is_complete(copy), exported(copy) == {**OLD, "other.txt": "other"}
+        file_list.remove_unneeded(copy)
+        file_list.FileList(copy)
+        found = exported(copy)
+        assert found.pop("other.txt") == "other" and is_complete(copy) and hidden(copy) == [LIST_NAME]
+        assert found == (OLD if was_complete and was_old else NEW)
+
+
+def test_files_of_several_kinds_are_exchanged_together_and_those_of_one_source_are_gathered(tmp_path):
+    def write_from(source, *names):
+        files = file_list.FileList(tmp_path)
+        with files.new_files("figures") as new:
+            for name in names:
+                (new / name).write_text(source)
+            written = {f"figures {name[0]}": [new / name] for name in names}
+            return files.replace(new, written, source)
+
+    write_from("first", "a 1", "b 1")
+    assert write_from("first", "a 2") == [tmp_path / "a 2"]
+    assert exported(tmp_path) == {"a 1": "first", "a 2": "first", "b 1": "first"}
+    (tmp_path / "a 1").write_text("mine now")
+    write_from("second", "a 3")
+    assert exported(tmp_path) == {"a 1": "mine now", "a 3": "second", "b 1": "first"}
 
 
 def test_two_formats_share_a_file(out):
