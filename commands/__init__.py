@@ -29,7 +29,7 @@ COMMANDS = {
     "fit": "estimate stiffness and friction from measurements",
     "gap": "find what the model misses against a real sensor",
     "paper": "repeat the experiments of the paper",
-    "sweep": "bake one scene over a range of parameters",
+    "sweep": "compute a scene thousands of times with varied numbers, resumable",
     "openrave": "read and write OpenRAVE sensor definitions",
 }
 """Commands in the order of the help. A command is ready once this package has a module of its name."""

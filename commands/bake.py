@@ -47,6 +47,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="write the recordings alone, without an image per frame and sensor. Cannot be saved.",
     )
+    parser.add_argument(
+        "--scenario",
+        metavar="FILE.npz",
+        help="bake nothing, and write what the solver would compute into a file, for palpate sweep where there is no Blender",
+    )
     blender.add_script_arguments(parser)
     where = parser.add_mutually_exclusive_group()
     where.add_argument("--save", action="store_true", help="save motion, heat maps and arrows into SCENE.blend itself")
@@ -60,12 +65,17 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.no_images and saved_path(arguments):
         print("palpate bake: --no-images leaves out what a saved scene shows: leave one of them out", file=sys.stderr)
         return 2
+    if arguments.scenario is not None and saved_path(arguments):
+        print("palpate bake: --scenario bakes nothing that could be saved: leave one of them out", file=sys.stderr)
+        return 2
     with console.blender_output_hidden():
         scene = blender.open_scene(arguments.scene, arguments.scripts)
         own_start = scene.frame_start
         saved = saved_path(arguments)
         blend = None if saved is None else blender.blend_to_save(saved)
         _prepare(scene, arguments)
+        if arguments.scenario is not None:
+            return _write_scenario(scene, arguments.scenario)
         baked = bake_with_progress(scene, into_scene=saved is not None, images=not arguments.no_images, blend=blend)
     print(report(baked))
     if scene.frame_start != own_start:
@@ -75,6 +85,20 @@ def run(arguments: argparse.Namespace) -> int:
         print(f"{name}: {folder}")
     if saved:
         print(f"saved: {saved}")
+    return 0
+
+
+def _write_scenario(scene, path: str) -> int:
+    """Read a scene and write its scenario."""
+    from ..addon.scene import scene_reader
+    from ..core.io.file_writing import writable_file
+    from ..core.io.scenario_npz import save_scenario
+
+    target = writable_file(path)
+    reading = console.run_with_progress_bar("read", scene_reader.read_scene(scene))
+    save_scenario(target, reading.scenario)
+    for warning in reading.warnings:
+        print(f"warning: {warning}", file=sys.stderr)
     return 0
 
 

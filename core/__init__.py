@@ -17,6 +17,7 @@ __all__ = [
     "response",
     "solver",
     "io",
+    "study",
     "figures",
     "export",
     "gap",

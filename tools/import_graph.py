@@ -24,7 +24,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "addon": {"core"},
     "operators": {"core", "addon"},
     "panels": {"core", "addon", "operators"},
-    "commands": {"core", "addon", "paper", "sample_blends"},
+    "commands": {"core", "addon", "paper", "sample_blends", "sweep"},
     "paper": {"core", "addon", "sample_blends"},
     "sample_blends": {"core", "addon"},
     "sweep": {"core"},

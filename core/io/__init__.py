@@ -28,6 +28,7 @@ __all__ = [
     "private_folder",
     "recording_npz",
     "regular_file",
+    "scenario_npz",
     "sensor_npz",
     "sensor_toml",
     "settings_migration",

@@ -18,7 +18,13 @@ from .regular_file import open_regular
 
 
 class FolderLock:
-    """An exclusive lock on a bake folder, held until it is released.
+    """An exclusive lock on a bake folder or the folder of a study, held until it is released.
+
+    Parameters
+    ----------
+    folder : Path
+    work : str
+        What writes to the folder, for the message.
 
     Raises
     ------
@@ -26,7 +32,7 @@ class FolderLock:
         Another bake holds it, or the hidden folder that holds the lock cannot be made.
     """
 
-    def __init__(self, folder: Path):
+    def __init__(self, folder: Path, work: str = "bake"):
         self._path = make_private_folder(folder) / LOCK_NAME
         self._file: IO[bytes] | None = None
         while self._file is None:
@@ -38,7 +44,7 @@ class FolderLock:
                 return  # the folder is not writable: writing the bake's own files will say so
             if not try_lock(file.fileno()):
                 file.close()
-                raise FileError(f"Another bake is writing to '{folder}': wait for it, or choose another bake folder.")
+                raise FileError(f"Another {work} is writing to '{folder}': wait for it, or choose another folder.")
             if _is_same_file(self._path, file):
                 self._file = file
             else:  # the bake that held the lock has just removed the file: create it again

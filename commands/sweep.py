@@ -1,0 +1,153 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""``palpate sweep``: a scene computed thousands of times with varied numbers, on all cores or many machines, resumable."""
+
+from __future__ import annotations
+
+import argparse
+import subprocess
+import sys
+from pathlib import Path
+
+from ..core.errors import PalpateError
+from . import blender, console
+
+MOST_FAILURES_NAMED = 5
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("study", metavar="STUDY.toml|DIR", help="file of a study, or the folder of one that goes on")
+    parser.add_argument("--out", metavar="DIR", help="output folder (default: beside the study, with its name)")
+    parser.add_argument("--workers", metavar="N", type=_count, help="processes on this machine (default: one per core)")
+    parser.add_argument(
+        "--scheduler", metavar="ADDRESS", help="use a running Dask scheduler, as tcp://HOST:8786; all machines need the folder"
+    )
+    parser.add_argument("--retry-failed", action="store_true", help="compute failed runs again")
+    what = parser.add_mutually_exclusive_group()
+    what.add_argument("--dry-run", action="store_true", help="say from five runs how long all take and how big they are")
+    what.add_argument("--status", action="store_true", help="say how far the study in the folder is; it may be running")
+    what.add_argument("--list", action="store_true", help="list what may vary in the scenes of the study")
+    blender.add_script_arguments(parser)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    place = Path(arguments.study)
+    folder = _folder(place, arguments.out)
+    if arguments.status:
+        from ..sweep.status import status_of
+
+        print(status_of(folder))
+        return 0
+    from ..core.io.file_writing import writable_folder
+    from ..core.io.folder_lock import FolderLock
+    from ..sweep import driver
+
+    driver.require_dask()
+    lock = FolderLock(writable_folder(folder, create=not place.is_dir()), "sweep")
+    try:
+        opened = _opened(place, folder, arguments)
+        if arguments.list:
+            _print_names(opened)
+            return 0
+        return _estimate(opened, arguments) if arguments.dry_run else _compute(opened, arguments)
+    finally:
+        lock.release()
+
+
+def _count(text: str) -> int:
+    count = int(text)
+    if count < 1:
+        raise argparse.ArgumentTypeError(f"{text} is not a whole number above zero")
+    return count
+
+
+def _folder(place: Path, out: str | None) -> Path:
+    """Return the absolute output folder, as every machine has to see it."""
+    if place.is_dir():
+        if out is not None:
+            raise PalpateError(f"'{place}' is a folder, in which its study goes on: leave --out away, or give a study's file.")
+        return place.absolute()
+    return (Path(out) if out is not None else place.with_suffix("")).absolute()
+
+
+def _opened(place: Path, folder: Path, arguments: argparse.Namespace):
+    """Open the study; a .blend is read in a Blender of its own, which is gone before the runs begin."""
+    from ..sweep import study_folder
+
+    if place.is_dir():
+        return study_folder.resume_study(folder)
+    return study_folder.begin_study(place, folder, lambda blend, target: _read_blend(blend, target, arguments.scripts))
+
+
+def _read_blend(blend: Path, target: Path, scripts: str) -> None:
+    command = [sys.executable, "-m", __package__, "bake", str(blend), "--scenario", str(target)]
+    command += [f"--{scripts}-scripts"] if scripts != blender.REFUSE else []
+    finished = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, text=True, errors="replace", check=False)
+    console.Interrupt.check()
+    if finished.returncode:
+        words = finished.stderr.strip().splitlines() or [f"Blender ended with status {finished.returncode}"]
+        raise PalpateError(words[-1].removeprefix("palpate bake: "))
+
+
+def _print_names(opened) -> None:
+    from ..core.study.variation import owners_text
+
+    for name, plan in opened.plans.items():
+        print(f"{name}:")
+        print("  " + owners_text(plan.scenario).replace("\n", "\n  "))
+
+
+def _workers(arguments: argparse.Namespace) -> int:
+    from ..sweep.trial import count_of_cores
+
+    return arguments.workers or count_of_cores()
+
+
+def _estimate(opened, arguments: argparse.Namespace) -> int:
+    from ..sweep.trial import try_runs
+
+    found = try_runs(opened.folder, opened.runs, opened.study.run_limit)
+    workers = _workers(arguments)
+    seconds = found.seconds * len(opened.runs) / workers
+    print(f"{len(opened.runs)} runs, {found.seconds:.3g} s and {found.size / 1e6:.3g} MB each")
+    size = found.size * len(opened.runs) / 1e9
+    print(f"about {_duration(seconds)} with {workers} workers, {size:.3g} GB in '{opened.folder}'")
+    for sentence in found.failures:
+        print(f"failed: {sentence}")
+    return 0
+
+
+def _duration(seconds: float) -> str:
+    for name, size in (("days", 86400.0), ("hours", 3600.0), ("minutes", 60.0)):
+        if seconds >= 2 * size:
+            return f"{seconds / size:.1f} {name}"
+    return f"{seconds:.0f} seconds"
+
+
+def _compute(opened, arguments: argparse.Namespace) -> int:
+    from ..core.study.run_files import done_runs, failed_runs, make_folders
+    from ..sweep import driver
+    from ..sweep.status import status_of
+
+    make_folders(opened.folder)
+    over = done_runs(opened.folder) | (set() if arguments.retry_failed else failed_runs(opened.folder))
+    left = [run for run in opened.runs if run.digest not in over]
+    if left:
+        with console.progress_bar("sweep", len(opened.runs), "run") as bar:
+            bar.update(len(opened.runs) - len(left))
+
+            def show(tally: driver.Tally) -> None:
+                console.Interrupt.check()
+                if tally.failed:
+                    bar.set_postfix(failed=tally.failed, refresh=False)
+                bar.update(len(opened.runs) - len(left) + tally.finished - bar.n)
+
+            with driver.dask_client(arguments.scheduler, min(_workers(arguments), len(left))) as client:
+                tally = driver.run_study(client, opened.folder, left, opened.study.run_limit, show)
+        for index, sentence in tally.failures[:MOST_FAILURES_NAMED]:
+            print(f"run {index} failed: {sentence}")
+    found = status_of(opened.folder)
+    print(found)
+    print(f"results: {opened.folder}")
+    if found.failed:
+        print(f"why runs failed: {opened.folder / 'failed'}; --retry-failed computes them again")
+    return 0

@@ -1,0 +1,16 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Studies: one scene run many times with varied numbers.
+
+:mod:`.study_file` reads what varies, :mod:`.design` chooses the values of every run, :mod:`.variation` and :mod:`.presses` put
+them into a scenario, :mod:`.metrics` sums a run up, and :mod:`.run_files` writes it. Nothing here starts processes: the package
+``sweep`` does.
+"""
+
+__all__ = [
+    "design",
+    "metrics",
+    "presses",
+    "run_files",
+    "study_file",
+    "variation",
+]

@@ -1,0 +1,211 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Presses, slides and twists of an object at any place of a sensor's surface, with a depth or a force.
+
+The object's z axis passes through the place, along the normal of the surface or tilted against it, and its lowest point along
+that axis does the pressing. It approaches, holds, slides and turns if asked to, holds again, and goes back.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from math import inf, pi
+
+import numpy as np
+
+from ..errors import SceneError
+from ..geometry.mesh import mass_properties
+from ..geometry.rotations import quaternion_product, quaternions_from_vectors, rotation_matrices
+from ..model.body import Body
+from ..model.drive import Drive
+from ..model.motion import Motion, Signal
+from ..model.parameter import Parameter, specifications, specified
+from ..model.scenario import Scenario
+from ..model.sensor import Sensor
+
+TWIST_STEPS = 16
+"""Samples of a slide and twist; between two of them a turn has far less than half a revolution, so it is unique."""
+FORCE_MARGIN = 4.0
+"""Largest force of the drive of a press, per force that is asked for: enough to brake the object at the contact."""
+
+
+@dataclass(frozen=True)
+class Press:
+    """One press. Lengths in metres, angles in radians; places and directions in the frame of the sensor's body.
+
+    Attributes
+    ----------
+    sensor, target : str
+        Names of the sensor and of the target whose body presses on it.
+    place, across, along : float
+        The place: `place` chooses a texel, each with a probability in proportion to its area, and the two others a point in a
+        square of that area around it, along the texel's x and y axis.
+    """
+
+    sensor: str
+    target: str
+    # fmt: off
+    place: float = specified(Parameter("place", "1", 0.5, 0.0, 1.0, "Share of the surface before the texel that is pressed"))
+    across: float = specified(Parameter("across", "1", 0.5, 0.0, 1.0, "Where in the cell of the texel, along its x axis"))
+    along: float = specified(Parameter("along", "1", 0.5, 0.0, 1.0, "Where in the cell of the texel, along its y axis"))
+    depth: float = specified(Parameter("depth", "m", 1e-3, 0.0, inf, "How far the object's lowest point goes past the place"))
+    force: float = specified(Parameter(
+        "force", "N", 0.0, 0.0, inf, "Sum of normal forces that is held instead of a depth; zero: the depth counts"))
+    speed: float = specified(Parameter("speed", "m/s", 0.02, 0.0, inf, "Speed of approach and return", above_low=True))
+    clearance: float = specified(Parameter("clearance", "m", 5e-4, 0.0, inf, "Distance from the place at the start"))
+    tilt: float = specified(Parameter("tilt", "rad", 0.0, 0.0, 1.4, "Angle between the approach and the normal"))
+    tilt_direction: float = specified(Parameter(
+        "tilt_direction", "rad", 0.0, -inf, inf, "Where the tilt leans to, from the texel's x axis to its y axis"))
+    spin: float = specified(Parameter("spin", "rad", 0.0, -inf, inf, "Turn of the object about its z axis"))
+    hold: float = specified(Parameter("hold", "s", 0.05, 0.0, inf, "Rest after the press, and after the slide"))
+    slide: float = specified(Parameter("slide", "m", 0.0, 0.0, inf, "Length of the slide"))
+    slide_direction: float = specified(Parameter(
+        "slide_direction", "rad", 0.0, -inf, inf, "Where it slides to, from the texel's x axis to its y axis"))
+    slide_speed: float = specified(Parameter("slide_speed", "m/s", 0.02, 0.0, inf, "Speed of the slide", above_low=True))
+    twist: float = specified(Parameter("twist", "rad", 0.0, -4 * pi, 4 * pi, "Turn about the approach during the slide"))
+    twist_speed: float = specified(Parameter("twist_speed", "rad/s", 2.0, 0.0, inf, "Speed of the twist", above_low=True))
+    settle: float = specified(Parameter("settle", "s", 0.3, 0.0, inf, "Time in which a force is reached, after the approach"))
+    mass: float = specified(Parameter("mass", "kg", 0.1, 0.0, inf, "Of the object, when a force is held", above_low=True))
+    # fmt: on
+
+
+PRESS_PARAMETERS = specifications(Press)
+"""The specifications of a press's numbers by name."""
+PLACE_PARAMETERS = ("place", "across", "along")
+"""Those that say where; a study varies them uniformly unless it says otherwise."""
+
+
+def with_press(scenario: Scenario, press: Press) -> Scenario:
+    """Return a scenario in which a target's body makes a press and nothing else; its frames end with the press.
+
+    Raises
+    ------
+    SceneError
+        There is no such sensor or target, both have one body, or the sensor's body moves.
+    ParameterError
+        A number is outside its bounds.
+    """
+    for name, specification in PRESS_PARAMETERS.items():
+        specification.check(getattr(press, name), "the press")
+    sensor, body = _sensor_of(scenario, press), _body_of(scenario, press)
+    frame = _Frame.at(scenario, sensor, press)
+    lowest = min(float(target.mesh.vertices[:, 2].min()) for target in scenario.targets if target.body == body)
+    times, depth, share = _phases(press)
+    origin = frame.place + (-(depth + lowest))[:, None] * frame.axis + (share * press.slide)[:, None] * frame.sideways
+    turn = share * press.twist + press.spin
+    own = quaternion_product(frame.upright[None], quaternions_from_vectors(turn[:, None] * np.array([0.0, 0.0, 1.0])))
+    base = scenario.bodies[sensor.body].motion
+    motion = Motion(
+        times,
+        base.positions[0] + origin @ rotation_matrices(base.quaternions[:1])[0].T,
+        quaternion_product(base.quaternions[:1], own),
+    )
+    pressing = replace(scenario.bodies[body], motion=motion, free=False, drive=None)
+    if press.force > 0.0:
+        down = -rotation_matrices(base.quaternions[:1])[0] @ frame.axis
+        pressing = _driven(pressing, scenario, body, press, down)
+    bodies = tuple(pressing if index == body else other for index, other in enumerate(scenario.bodies))
+    last = scenario.frame_start + max(1, math.ceil(times[-1] * scenario.fps - 1e-9))
+    return replace(scenario, bodies=bodies, frame_end=last, interpolation="linear")
+
+
+def place_of(scenario: Scenario, press: Press) -> np.ndarray:
+    """Return the (3,) place of a press, metres, in the frame of the sensor's body."""
+    return _Frame.at(scenario, _sensor_of(scenario, press), press).place
+
+
+@dataclass(frozen=True)
+class _Frame:
+    """Where a press is: the place, the unit vectors out of it and along the slide, and the object's upright orientation."""
+
+    place: np.ndarray
+    axis: np.ndarray
+    sideways: np.ndarray
+    upright: np.ndarray
+
+    @classmethod
+    def at(cls, scenario: Scenario, sensor: Sensor, press: Press) -> _Frame:
+        texels = sensor.texels
+        reached = np.cumsum(texels.area)
+        texel = min(int(np.searchsorted(reached, press.place * reached[-1], side="right")), len(texels) - 1)
+        normal, x_axis, y_axis = texels.normal[texel], texels.tangent[texel], texels.bitangent[texel]
+        side = math.sqrt(float(texels.area[texel]))
+        place = texels.position[texel] + side * ((press.across - 0.5) * x_axis + (press.along - 0.5) * y_axis)
+        leaning = math.cos(press.tilt_direction) * x_axis + math.sin(press.tilt_direction) * y_axis
+        # The object stands on the texel's frame and is turned about the axis that leans it.
+        lean = quaternions_from_vectors((press.tilt * np.cross(normal, leaning))[None])[0]
+        axis = math.cos(press.tilt) * normal + math.sin(press.tilt) * leaning
+        sideways = math.cos(press.slide_direction) * x_axis + math.sin(press.slide_direction) * y_axis
+        standing = _quaternion(np.column_stack([x_axis, y_axis, normal]))
+        return cls(place, axis, sideways, quaternion_product(lean[None], standing[None])[0])
+
+
+def _quaternion(rotation: np.ndarray) -> np.ndarray:
+    """Return the (4,) quaternion (w, x, y, z) of a (3, 3) rotation matrix."""
+    from scipy.spatial.transform import Rotation
+
+    x, y, z, w = Rotation.from_matrix(rotation).as_quat()
+    return np.array([w, x, y, z])
+
+
+def _phases(press: Press) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return times (m,) s, depths (m,) m and the share (m,) of slide and twist that is done, at the corners of the motion.
+
+    A press with a force stays where it starts: its drive approaches.
+    """
+    depth = -press.clearance if press.force > 0.0 else press.depth
+    approach = press.clearance / press.speed + press.settle if press.force > 0.0 else (depth + press.clearance) / press.speed
+    sliding = max(press.slide / press.slide_speed, abs(press.twist) / press.twist_speed)
+    corners = [(approach, depth, 0.0), (press.hold, depth, 0.0)]
+    if sliding > 0.0:
+        corners += [(sliding / TWIST_STEPS, depth, step / TWIST_STEPS) for step in range(1, TWIST_STEPS + 1)]
+        corners.append((press.hold, depth, 1.0))
+    if press.force == 0.0:
+        corners.append((approach, -press.clearance, corners[-1][2]))
+    rows = [(0.0, -press.clearance, 0.0)]
+    for seconds, at, share in corners:
+        if seconds > 0.0:
+            rows.append((rows[-1][0] + seconds, at, share))
+    times, depths, shares = np.array(rows).T
+    return times, depths, shares
+
+
+def _driven(body: Body, scenario: Scenario, index: int, press: Press, down: np.ndarray) -> Body:
+    """Return a body with a drive that presses with a force along `down`, a unit vector in the world."""
+    mesh = next(target.mesh for target in scenario.targets if target.body == index)
+    center, inertia, _ = mass_properties(mesh, press.mass, press.target)
+    number = next(i for i, sensor in enumerate(scenario.sensors) if sensor.name == press.sensor)
+    weight = press.mass * float(np.linalg.norm(scenario.gravity))
+    drive = Drive(
+        control="force",
+        target=Signal.constant(press.force),
+        axis=down / np.linalg.norm(down),
+        axis_in_world=True,
+        max_force=FORCE_MARGIN * (press.force + weight),
+        max_speed=press.speed,
+        sensor=number,
+    )
+    return replace(body, drive=drive, mass=press.mass, center_of_mass=center, inertia=inertia)
+
+
+def _sensor_of(scenario: Scenario, press: Press) -> Sensor:
+    sensor = next((sensor for sensor in scenario.sensors if sensor.name == press.sensor), None)
+    if sensor is None:
+        known = ", ".join(f"'{sensor.name}'" for sensor in scenario.sensors)
+        raise SceneError(f"There is no sensor '{press.sensor}' in '{scenario.name}' to press on: choose from {known}.")
+    body = scenario.bodies[sensor.body]
+    path = np.hstack([body.motion.positions, body.motion.quaternions])
+    if body.moved_by_forces or np.abs(path - path[0]).max() > 1e-9:
+        raise SceneError(f"The body of sensor '{press.sensor}' moves: a press needs a sensor that rests, remove its motion.")
+    return sensor
+
+
+def _body_of(scenario: Scenario, press: Press) -> int:
+    """Return the index of the body that presses."""
+    found = next((target.body for target in scenario.targets if target.name == press.target and target.sensor is None), None)
+    if found is None:
+        known = ", ".join(f"'{target.name}'" for target in scenario.targets if target.sensor is None) or "none"
+        raise SceneError(f"There is no target '{press.target}' in '{scenario.name}' to press with: choose from {known}.")
+    if any(sensor.body == found for sensor in scenario.sensors):
+        raise SceneError(f"'{press.target}' has a sensor on its own body: press with a target that has none.")
+    return found

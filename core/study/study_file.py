@@ -1,0 +1,378 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The file of a study: which scene, which design, and what varies over what.
+
+::
+
+    format = "palpate-sweep/1"
+    scene = "fingertip.blend"            # or scenes = ["*.blend"]
+    design = "latin-hypercube"           # grid, random, latin-hypercube or sobol
+    samples = 1000                       # runs per scene; a grid takes all combinations of its levels
+    seed = 1
+
+    [vary]
+    "Fingertip.k" = { log-uniform = [20, 200] }
+    "Fingertip.effect.creep" = { choice = [true, false] }
+
+    [press]                              # presses at random places
+    depth = { uniform = [0.5e-3, 2e-3] }
+    slide = { uniform = [0.0, 3e-3] }
+
+The output folder keeps the file with a table ``[frozen]`` at its end: the version, and digests of the scenes.
+"""
+
+from __future__ import annotations
+
+import difflib
+import hashlib
+import json
+import math
+import os
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..errors import FileError, ParameterError
+from ..io.toml_file import checked_name, is_number, read_toml
+from ..model.parameter import Parameter
+from ..model.scenario import Scenario
+from .design import (
+    CHOICE,
+    DEFAULT_LEVELS,
+    DESIGNS,
+    DISTRIBUTIONS,
+    GRID,
+    LOG_UNIFORM,
+    NORMAL,
+    UNIFORM,
+    Design,
+    Distribution,
+    Value,
+    check_count,
+    points_of,
+)
+from .presses import PLACE_PARAMETERS, PRESS_PARAMETERS, Press, with_press
+from .variation import PRESS, Variable, variable, variables_of
+
+FORMAT = "palpate-sweep/1"
+FROZEN = "frozen"
+SCENE = "scene"
+"""Name of the column that tells the scene of a run, where a study has several."""
+_WORDS = ("format", "scene", "scenes", "design", "samples", "seed", "fps", "run_limit", "vary", "press", FROZEN)
+_DIRECTIONS = {"tilt_direction": "tilt", "slide_direction": "slide"}
+"""Directions of a press, which are any as long as the study says nothing else, and what they direct."""
+LARGEST_LEVELS = 10_000
+
+
+@dataclass(frozen=True)
+class Study:
+    """A study as its file says, before the scene is known.
+
+    Attributes
+    ----------
+    scenes : tuple of str
+        Files or patterns, relative to the file of the study.
+    design : Design
+    vary : mapping
+        By names of variables: a table with a distribution, or a value that is the same in all runs.
+    press : mapping or None
+        The table of a press.
+    fps : float or None
+        Frames per second instead of those of the scene.
+    run_limit : float or None
+        Seconds that a run may take.
+    frozen : mapping
+        What the output folder's copy says beside it.
+    """
+
+    scenes: tuple[str, ...]
+    design: Design
+    vary: Mapping[str, Any] = field(default_factory=dict)
+    press: Mapping[str, Any] | None = None
+    fps: float | None = None
+    run_limit: float | None = None
+    frozen: Mapping[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A study on one of its scenes.
+
+    Attributes
+    ----------
+    scenario : Scenario
+        As the scene says, with the study's frame rate.
+    varied : dict of str to Distribution
+    fixed : dict of str to value
+    press : Press or None
+        With the numbers that do not vary.
+    """
+
+    scenario: Scenario
+    varied: Mapping[str, Distribution]
+    fixed: Mapping[str, Value]
+    press: Press | None
+
+
+@dataclass(frozen=True)
+class Run:
+    """One run of a study.
+
+    Attributes
+    ----------
+    index : int
+        From zero, over all scenes.
+    scene : str
+        Name of its scene in the output folder.
+    values : dict of str to value
+        What varies.
+    digest : str
+        Name of its folder: a hash of the scenario of the scene, of what the study fixes, of `index` and `values`.
+    """
+
+    index: int
+    scene: str
+    values: Mapping[str, Value]
+    digest: str
+
+
+def read_study(path: str | os.PathLike) -> Study:
+    """Read the file of a study.
+
+    Raises
+    ------
+    FileError, ParameterError
+        It cannot be read or says what no study can say.
+    """
+    return study_of(read_toml(path, "study"), Path(path).name)
+
+
+def study_of(table: Mapping[str, Any], name: str) -> Study:
+    """Return the study that the tables of a file say; raise what :func:`read_study` raises."""
+    if table.get("format") != FORMAT:
+        raise FileError(f"The format of '{name}' is {table.get('format')!r:.60}: a study begins with format = \"{FORMAT}\".")
+    _known(table, _WORDS, f"'{name}'")
+    scenes = table.get("scenes", [table["scene"]] if "scene" in table else [])
+    if ("scene" in table) == ("scenes" in table) or not isinstance(scenes, list) or not scenes:
+        raise FileError(f'\'{name}\' needs scene = "file.blend" or scenes = ["*.blend"], one of the two.')
+    for scene in scenes:
+        checked_name(scene, f"the scenes of '{name}'")
+    for word in ("vary", "press", FROZEN):
+        if not isinstance(table.get(word, {}), Mapping):
+            raise FileError(f"{word} of '{name}' is {table[word]!r:.60}: write it as a table, [{word}].")
+    return Study(
+        scenes=tuple(scenes),
+        design=_design(table, name),
+        vary=dict(_flattened(table.get("vary", {}))),
+        press=table.get("press"),
+        fps=_positive(table, "fps", name),
+        run_limit=_positive(table, "run_limit", name),
+        frozen=table.get(FROZEN, {}),
+    )
+
+
+def _known(table: Mapping[str, Any], words: Iterable[str], where: str) -> None:
+    """Raise FileError for a word that is not known, with the known word that is most like it."""
+    for word in table:
+        if word not in words:
+            near = difflib.get_close_matches(word, list(words), n=1)
+            advice = f"did you mean '{near[0]}'?" if near else f"it knows {', '.join(words)}."
+            raise FileError(f"'{word:.60}' in {where} is not a word of a study: {advice}")
+
+
+def _positive(table: Mapping[str, Any], word: str, name: str) -> float | None:
+    value = table.get(word)
+    if value is not None and not (is_number(value) and value > 0):
+        raise FileError(f"{word} of '{name}' is {value!r:.60}: give a number above zero.")
+    return None if value is None else float(value)
+
+
+def _design(table: Mapping[str, Any], name: str) -> Design:
+    kind, samples, seed = table.get("design"), table.get("samples", 0), table.get("seed", 0)
+    if kind not in DESIGNS:
+        near = difflib.get_close_matches(str(kind), DESIGNS, n=1)
+        advice = f"did you mean '{near[0]}'?" if near else f"choose one of {', '.join(DESIGNS)}."
+        raise FileError(f"design of '{name}' is {kind!r:.60}: {advice}")
+    if kind == GRID and "samples" in table:
+        raise FileError(f"'{name}' has a grid and samples: a grid takes all combinations, so leave samples out, or use random.")
+    if kind != GRID and not (isinstance(samples, int) and not isinstance(samples, bool) and samples > 0):
+        raise FileError(f"samples of '{name}' is {samples!r:.60}: give a whole number of runs, above zero.")
+    if not isinstance(seed, int) or isinstance(seed, bool) or not 0 <= seed < 2**63:
+        raise FileError(f"seed of '{name}' is {seed!r:.60}: give a whole number of zero or more.")
+    check_count(samples)
+    return Design(str(kind), samples, seed)
+
+
+def _flattened(table: Mapping[str, Any], start: str = "") -> Iterable[tuple[str, Any]]:
+    """Yield the entries of nested tables under their names with dots; a table with a distribution is an entry."""
+    for key, value in table.items():
+        if isinstance(value, Mapping) and value and not set(value) & set(DISTRIBUTIONS):
+            if "levels" in value:
+                raise ParameterError(f"{start}{key} has levels and no distribution: add one of {', '.join(DISTRIBUTIONS)}.")
+            yield from _flattened(value, f"{start}{key}.")
+        else:
+            yield f"{start}{key}", value
+
+
+def plan_for(study: Study, scenario: Scenario) -> Plan:
+    """Return what a study means on a scene.
+
+    Raises
+    ------
+    ParameterError, FileError
+        A name is not known in the scene, or its values are not possible.
+    """
+    if study.fps is not None:
+        scenario = _with_fps(scenario, study.fps)
+    press, entries = None, dict(study.vary)
+    if study.press is not None:
+        press = _press(study, scenario)
+        with_press(scenario, press)  # refuses what no press of this study could do
+        entries |= _press_entries(study)
+    elif any(name.startswith(f"{PRESS}.") for name in entries):
+        raise ParameterError("The study varies numbers of a press and has no [press]: add that table.")
+    known = variables_of(scenario, press is not None)
+    varied: dict[str, Distribution] = {}
+    fixed: dict[str, Value] = {}
+    for name, entry in entries.items():
+        found = variable(name, known, scenario)
+        if isinstance(entry, Mapping):
+            varied[name] = _distribution(found, entry)
+        else:
+            fixed[name] = found.read(entry)
+    if not varied and study.design.kind == GRID:
+        raise ParameterError("The study varies nothing: give [vary] or [press] at least one distribution.")
+    return Plan(scenario, varied, fixed, press)
+
+
+def _with_fps(scenario: Scenario, fps: float) -> Scenario:
+    """Return a scenario that is recorded at another frame rate over the same time."""
+    seconds = (scenario.frame_end - scenario.frame_start) / scenario.fps
+    return replace(scenario, fps=fps, frame_end=scenario.frame_start + max(1, math.floor(seconds * fps + 1e-9)))
+
+
+def _press(study: Study, scenario: Scenario) -> Press:
+    """Return the press of a study with default numbers; sensor and target may go unnamed where there is only one."""
+    table = study.press or {}
+    _known(table, ("sensor", "target", *PRESS_PARAMETERS), "[press]")
+    readable = [sensor.name for sensor in scenario.sensors if sensor.readout]
+    carriers = {sensor.body for sensor in scenario.sensors}
+    pressing = [target.name for target in scenario.targets if target.sensor is None and target.body not in carriers]
+    names = {}
+    for word, candidates in (("sensor", readable), ("target", pressing)):
+        if word not in table and len(candidates) != 1:
+            known = ", ".join(f"'{name}'" for name in candidates) or "none"
+            raise ParameterError(f"[press] does not say its {word}, and '{scenario.name}' has {known}: add {word} = \"…\".")
+        names[word] = checked_name(table.get(word, *candidates[:1]), "[press]")
+    if study.design.kind == GRID and not all(word in table for word in PLACE_PARAMETERS):
+        raise ParameterError("A grid has no random places to press on: use random, latin-hypercube or sobol.")
+    if "depth" in table and "force" in table:
+        raise ParameterError("[press] has a depth and a force: give one of the two.")
+    return Press(names["sensor"], names["target"])
+
+
+def _press_entries(study: Study) -> dict[str, Any]:
+    table = study.press or {}
+    entries = {f"{PRESS}.{word}": table[word] for word in PRESS_PARAMETERS if word in table}
+    for word in PLACE_PARAMETERS:
+        entries.setdefault(f"{PRESS}.{word}", {UNIFORM: [0.0, 1.0]})
+    for direction, directed in _DIRECTIONS.items():
+        if directed in table and study.design.kind != GRID:
+            entries.setdefault(f"{PRESS}.{direction}", {UNIFORM: [-math.pi, math.pi]})
+    return entries
+
+
+def _distribution(found: Variable, entry: Mapping[str, Any]) -> Distribution:
+    """Return the distribution that a table says, checked against the bounds of its variable."""
+    _known(entry, (*DISTRIBUTIONS, "levels"), found.name)
+    kinds = [word for word in entry if word in DISTRIBUTIONS]
+    if len(kinds) != 1:
+        raise ParameterError(f"{found.name} has {len(kinds)} distributions: give one of {', '.join(DISTRIBUTIONS)}.")
+    (kind,), words, levels = kinds, entry[kinds[0]], entry.get("levels", DEFAULT_LEVELS)
+    if not isinstance(levels, int) or isinstance(levels, bool) or not 1 <= levels <= LARGEST_LEVELS:
+        raise ParameterError(f"levels of {found.name} is {levels!r:.60}: give a whole number from 1 to {LARGEST_LEVELS}.")
+    if kind == CHOICE:
+        if not isinstance(words, list) or not words:
+            raise ParameterError(f"choice of {found.name} is {words!r:.60}: give a list of values.")
+        return Distribution(CHOICE, tuple(found.read(word) for word in words))
+    if not isinstance(found.specification, Parameter):
+        raise ParameterError(f"{found.name} is no number that can be {kind}: use choice.")
+    if not isinstance(words, list) or len(words) != 2 or not all(is_number(word) for word in words):
+        raise ParameterError(f"{kind} of {found.name} is {words!r:.60}: give two numbers.")
+    first, second = float(words[0]), float(words[1])
+    low, high = found.bounds
+    if found.specification.above_low:
+        low = float(np.nextafter(low, math.inf))
+    if kind == NORMAL:
+        if not second > 0.0:
+            raise ParameterError(f"normal of {found.name} has the deviation {second:g}: give mean and deviation, above zero.")
+        return Distribution(NORMAL, (found.read(first), second), levels, low, high)
+    if not first < second:
+        raise ParameterError(f"{kind} of {found.name} runs from {first:g} to {second:g}: give the lower number first.")
+    if kind == LOG_UNIFORM and not first > 0.0:
+        raise ParameterError(f"log-uniform of {found.name} begins at {first:g}: give numbers above zero, or use uniform.")
+    return Distribution(kind, (found.read(first), found.read(second)), levels, low, high)
+
+
+def runs_of(study: Study, plans: Mapping[str, Plan], digests: Mapping[str, str]) -> list[Run]:
+    """Return all runs of a study in order.
+
+    Parameters
+    ----------
+    study : Study
+    plans : mapping of str to Plan
+        By the names of the scenes.
+    digests : mapping of str to str
+        Of the scenarios of the scenes.
+
+    Raises
+    ------
+    ParameterError
+        There are too many.
+    """
+    check_count(sum(study.design.count(plan.varied) for plan in plans.values()))
+    runs: list[Run] = []
+    for scene, plan in plans.items():
+        same = {"scene": digests[scene], "fixed": dict(plan.fixed), "fps": plan.scenario.fps, "press": _words_of(plan.press)}
+        start = hashlib.sha256(json.dumps(same, sort_keys=True).encode())
+        for values in points_of(study.design, plan.varied):
+            own = start.copy()
+            own.update(json.dumps([len(runs), values]).encode())
+            named = {SCENE: scene, **values} if len(plans) > 1 else values
+            runs.append(Run(len(runs), scene, named, own.hexdigest()[:24]))
+    return runs
+
+
+def _words_of(press: Press | None) -> list[Any]:
+    return [] if press is None else [press.sensor, press.target]
+
+
+def frozen_text(text: str, frozen: Mapping[str, Any]) -> str:
+    """Return the text of a study with the table ``[frozen]`` at its end."""
+    import tomli_w
+
+    return text.rstrip("\n") + "\n\n" + tomli_w.dumps({FROZEN: frozen})
+
+
+def differences(before: Study, now: Study) -> list[str]:
+    """Return what two studies say differently, one phrase each."""
+    found = []
+    pairs = [("scenes", before.scenes, now.scenes), ("fps", before.fps, now.fps)]
+    pairs += [(word, getattr(before.design, word), getattr(now.design, word)) for word in ("kind", "samples", "seed")]
+    for name in dict.fromkeys([*before.vary, *now.vary]):
+        pairs.append((name, before.vary.get(name), now.vary.get(name)))
+    old, new = before.press or {}, now.press or {}
+    for name in dict.fromkeys([*old, *new]):
+        pairs.append((f"{PRESS}.{name}", old.get(name), new.get(name)))
+    if (before.press is None) != (now.press is None):
+        pairs.append(("[press]", before.press is not None, now.press is not None))
+    for name, was, now_is in pairs:
+        if was != now_is:
+            found.append(f"{'design' if name == 'kind' else name} was {_shown(was)} and is {_shown(now_is)}")
+    return found
+
+
+def _shown(value: Any) -> str:
+    return "missing" if value is None else f"{value!r:.80}"

@@ -1,0 +1,141 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""``python -m palpate.sweep.child FOLDER``: computes runs of a study, one for each line of standard input.
+
+A line is a run as JSON; the answer is a line of JSON on standard output. The process ends when its input does, at once: whoever
+started it is gone then, and an unfinished run is computed again.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import queue
+import sys
+import threading
+import time
+import traceback
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, TextIO
+
+from ..core.errors import FileError, PalpateError
+from ..core.io.scenario_npz import load_scenario
+from ..core.study.metrics import metrics_of
+from ..core.study.presses import Press
+from ..core.study.run_files import SCENES, STUDY_NAME, write_failure, write_run
+from ..core.study.study_file import SCENE, Plan, Run, Study, plan_for, read_study
+from ..core.study.variation import PRESS, varied_scenario
+
+DONE, FAILED, UNWRITABLE = "done", "failed", "unwritable"
+"""What became of a run; the last one: its files could not be written, so no run can be."""
+
+
+class Scenes:
+    """The scenes of a study, each read when a run first needs it."""
+
+    def __init__(self, folder: Path):
+        self.folder = folder
+        self.study: Study = read_study(folder / STUDY_NAME)
+        self._plans: dict[str, Plan] = {}
+
+    def plan(self, scene: str) -> Plan:
+        """Return what the study means on a scene."""
+        if scene not in self._plans:
+            self._plans[scene] = plan_for(self.study, load_scenario(self.folder / SCENES / f"{scene}.npz"))
+        return self._plans[scene]
+
+
+def compute_run(scenes: Scenes, run: Run) -> None:
+    """Compute a run and write it.
+
+    Raises
+    ------
+    PalpateError
+        Its values make no run.
+    """
+    from dataclasses import replace
+
+    from ..core.jobs.job_runner import run_job
+    from ..core.solver.simulation import Simulation, solve
+
+    began = time.perf_counter()
+    plan = scenes.plan(run.scene)
+    values = {**plan.fixed, **{name: value for name, value in run.values.items() if name != SCENE}}
+    scenario = varied_scenario(plan.scenario, values, plan.press)
+    recording = run_job(solve(scenario, Simulation(scenario, threads=1)))
+    made: Press | None = plan.press
+    if made is not None:
+        own = {name.removeprefix(f"{PRESS}."): value for name, value in values.items() if name.startswith(f"{PRESS}.")}
+        made = replace(made, **own)
+    metrics = metrics_of(scenario, recording, made)
+    write_run(scenes.folder, run, scenario, recording, metrics, time.perf_counter() - began)
+
+
+def answer_to(scenes: Scenes, run: Run) -> dict[str, Any]:
+    """Compute a run and return what became of it; a failure is written to the folder of failures."""
+    began = time.perf_counter()
+    answer: dict[str, Any] = {"digest": run.digest, "status": DONE}
+    try:
+        try:
+            compute_run(scenes, run)
+        except FileError:
+            raise
+        except PalpateError as error:
+            answer |= {"status": FAILED, "sentence": str(error)}
+            write_failure(scenes.folder, run.digest, str(error))
+        except MemoryError:
+            answer |= {"status": FAILED, "sentence": "There is not enough memory for this run: use fewer workers."}
+            write_failure(scenes.folder, run.digest, answer["sentence"])
+        except Exception as error:
+            answer |= {"status": FAILED, "sentence": f"A fault of the program: {type(error).__name__}: {error}"}
+            write_failure(scenes.folder, run.digest, answer["sentence"], traceback.format_exc())
+    except FileError as error:
+        answer |= {"status": UNWRITABLE, "sentence": str(error)}
+    return answer | {"seconds": time.perf_counter() - began}
+
+
+def run_from(words: Mapping[str, Any]) -> Run:
+    """Return the run that a line of JSON says."""
+    return Run(int(words["index"]), str(words["scene"]), dict(words["values"]), str(words["digest"]))
+
+
+def _lines() -> queue.Queue[str]:
+    """Return a queue of the lines of standard input; the process ends with them."""
+    lines: queue.Queue[str] = queue.Queue()
+
+    def read() -> None:
+        for line in sys.stdin:
+            lines.put(line)
+        os._exit(0)
+
+    threading.Thread(target=read, name="palpate sweep input", daemon=True).start()
+    return lines
+
+
+def _own_output() -> TextIO:
+    """Return standard output for the answers, and send what anything else prints there to standard error."""
+    output = os.fdopen(os.dup(1), "w", encoding="utf-8", buffering=1)
+    os.dup2(2, 1)
+    return output
+
+
+def main() -> None:
+    """Answer lines until there are no more."""
+    output = _own_output()
+    try:
+        scenes = Scenes(Path(sys.argv[1]))
+    except PalpateError as error:
+        print(json.dumps({"status": UNWRITABLE, "sentence": str(error)}), file=output, flush=True)
+        return
+    lines = _lines()
+    from ..core.solver import precompile
+
+    precompile.compile_solver()  # loads what was compiled, so that the first run is as fast as the others
+    print(json.dumps({"status": "ready"}), file=output, flush=True)
+    while True:
+        answer = answer_to(scenes, run_from(json.loads(lines.get())))
+        print(json.dumps(answer), file=output, flush=True)
+
+
+if __name__ == "__main__":
+    main()

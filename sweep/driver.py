@@ -1,0 +1,214 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Gives the runs of a study to Dask workers, in batches that last about two seconds, and counts what comes back."""
+
+from __future__ import annotations
+
+import logging
+import os
+import tempfile
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+from ..core.errors import FileError, PalpateError
+from ..core.study.study_file import Run
+from .child import DONE, FAILED, UNWRITABLE
+from .worker import compute_batch
+
+BATCH_SECONDS = 2.0
+"""Length of a batch: long beside the milliseconds that Dask needs for a task, short for who waits for Ctrl-C."""
+LARGEST_BATCH = 500
+BATCHES_AHEAD = 2
+"""Batches that wait at each worker, so that it is never idle."""
+MOST_LOSSES = 20
+"""How often a batch may be lost with its worker before the study stops; a run itself cannot end a worker."""
+LOOK = 0.2
+"""Seconds between two looks at the keyboard."""
+
+
+@dataclass
+class Tally:
+    """What has become of the runs of a study so far.
+
+    Attributes
+    ----------
+    done, failed : int
+    seconds : float
+        Of computing, in the processes.
+    failures : list of (int, str)
+        Indices of the first failed runs and their sentences.
+    """
+
+    done: int = 0
+    failed: int = 0
+    seconds: float = 0.0
+    failures: list[tuple[int, str]] = field(default_factory=list)
+
+    @property
+    def finished(self) -> int:
+        """Runs that are done or failed."""
+        return self.done + self.failed
+
+
+def require_dask() -> None:
+    """Raise :class:`PalpateError` where Dask is missing."""
+    try:
+        import distributed  # noqa: F401
+    except ImportError as error:
+        raise PalpateError(f"palpate sweep needs Dask ({error}): run 'pip install palpate[sweep]'.") from error
+
+
+@contextmanager
+def dask_client(scheduler: str | None, workers: int) -> Iterator[Any]:
+    """Connect to a scheduler, or start workers on this machine, and yield the client.
+
+    Parameters
+    ----------
+    scheduler : str or None
+        Address, as in tcp://127.0.0.1:8786. None: a cluster of this machine's own.
+    workers : int
+        Of the local cluster, one thread each.
+
+    Raises
+    ------
+    PalpateError
+        Dask is missing, or nothing answers at the address.
+    """
+    require_dask()
+    import dask
+    from distributed import Client, LocalCluster
+
+    for name in ("distributed", "asyncio", "tornado"):
+        logging.getLogger(name).setLevel(logging.CRITICAL)
+    settings = {"distributed.scheduler.allowed-failures": MOST_LOSSES, "distributed.logging.distributed": "critical"}
+    with dask.config.set(settings), tempfile.TemporaryDirectory(prefix="palpate-dask-") as scratch:
+        if scheduler is not None:
+            try:
+                client = Client(scheduler, timeout=10, set_as_default=False)
+            except (OSError, TimeoutError, ValueError) as error:
+                raise PalpateError(
+                    f"No scheduler answers at '{scheduler}' ({error}): start 'dask scheduler' there, or leave --scheduler out."
+                ) from error
+            with _closing(client):
+                yield client
+            return
+        cluster = LocalCluster(
+            n_workers=workers,
+            threads_per_worker=1,
+            processes=True,
+            dashboard_address=None,
+            memory_limit=0,  # the runs are computed in processes of their own
+            local_directory=scratch,
+            silence_logs=logging.CRITICAL,
+        )
+        with _closing(cluster, timeout=10), _closing(Client(cluster, set_as_default=False)) as client:
+            yield client
+
+
+@contextmanager
+def _closing(resource: Any, **words: Any) -> Iterator[Any]:
+    try:
+        yield resource
+    finally:
+        with suppress(Exception):  # its other end may be gone
+            resource.close(**words)
+
+
+def run_study(
+    client: Any, folder: Path, runs: Sequence[Run], limit: float | None, on_progress: Callable[[Tally], object]
+) -> Tally:
+    """Compute runs and return what became of them.
+
+    Parameters
+    ----------
+    client : distributed.Client
+    folder : Path
+        Of the study, under the same path on all machines.
+    runs : sequence of Run
+        Those that are not done.
+    limit : float or None
+        Seconds that a run may take.
+    on_progress : callable
+        Called several times a second. An exception that it raises, KeyboardInterrupt included, stops the study.
+
+    Raises
+    ------
+    FileError
+        Files cannot be written. What is done is kept.
+    PalpateError
+        Workers are lost again and again.
+    """
+    return _Dispatch(client, folder, runs, limit).run(on_progress)
+
+
+class _Dispatch:
+    """Batches at the workers and those to come."""
+
+    def __init__(self, client: Any, folder: Path, runs: Sequence[Run], limit: float | None):
+        self.client, self.folder, self.runs, self.limit = client, folder, runs, limit
+        self.index_of = {run.digest: run.index for run in runs}
+        self.next = 0
+        self.batch = 1
+        self.waiting: dict[Any, tuple[Sequence[Run], int]] = {}
+        self.tally = Tally()
+
+    def run(self, on_progress: Callable[[Tally], object]) -> Tally:
+        from distributed import wait
+
+        try:
+            while self.next < len(self.runs) or self.waiting:
+                self._submit()
+                on_progress(self.tally)
+                with suppress(TimeoutError):
+                    for future in wait(list(self.waiting), timeout=LOOK, return_when="FIRST_COMPLETED").done:
+                        self._take(future)
+            on_progress(self.tally)
+            return self.tally
+        finally:
+            with suppress(Exception):  # the scheduler may be gone
+                self.client.cancel(list(self.waiting), force=True)
+
+    def _submit(self) -> None:
+        workers = max(1, len(self.client.scheduler_info(n_workers=-1)["workers"]))
+        while self.next < len(self.runs) and len(self.waiting) < (1 + BATCHES_AHEAD) * workers:
+            left = len(self.runs) - self.next
+            size = max(1, min(self.batch, LARGEST_BATCH, left // ((1 + BATCHES_AHEAD) * workers)))
+            self._send(self.runs[self.next : self.next + size], 0)
+            self.next += size
+
+    def _send(self, runs: Sequence[Run], losses: int) -> None:
+        words = [asdict(run) for run in runs]
+        future = self.client.submit(compute_batch, os.fspath(self.folder), words, self.limit, pure=False)
+        self.waiting[future] = runs, losses
+
+    def _take(self, future: Any) -> None:
+        from distributed.scheduler import KilledWorker
+
+        runs, losses = self.waiting.pop(future)
+        if future.status != "finished":
+            error = future.exception() if future.status == "error" else None
+            if error is not None and not isinstance(error, KilledWorker):
+                raise error
+            if losses + 1 >= MOST_LOSSES:
+                raise PalpateError(
+                    f"Workers were lost {MOST_LOSSES} times with run {runs[0].index}: look at their logs, and give the same "
+                    "command again."
+                )
+            self._send(runs, losses + 1)
+            return
+        answers = future.result()
+        for answer in answers:
+            if answer["status"] == UNWRITABLE:
+                raise FileError(answer["sentence"])
+            self.tally.seconds += answer["seconds"]
+            if answer["status"] == DONE:
+                self.tally.done += 1
+            elif answer["status"] == FAILED:
+                self.tally.failed += 1
+                if len(self.tally.failures) < 100:
+                    self.tally.failures.append((self.index_of[answer["digest"]], answer["sentence"]))
+        spent = sum(answer["seconds"] for answer in answers)
+        if spent > 0.0:
+            self.batch = max(1, round(BATCH_SECONDS * len(answers) / spent))

@@ -1,0 +1,176 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The output folder of a study as a driver opens it: frozen at the first command, compared at every later one."""
+
+from __future__ import annotations
+
+import glob
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from .. import __version__
+from ..core.errors import FileError
+from ..core.io.bake_folder import folder_names
+from ..core.io.file_writing import atomic_write, file_sha256
+from ..core.io.scenario_npz import load_scenario, save_scenario
+from ..core.study.run_files import FAILED, RUNS, SCENES, STUDY_NAME, make_folders
+from ..core.study.study_file import Plan, Run, Study, differences, frozen_text, plan_for, read_study, runs_of
+
+BLEND, SCENARIO = ".blend", ".npz"
+ReadBlend = Callable[[Path, Path], None]
+"""``read_blend(blend, scenario)`` writes what the scene of a .blend says to the solver into a file."""
+_OWN = {RUNS, FAILED, SCENES, STUDY_NAME, ".palpate"}
+
+
+@dataclass(frozen=True)
+class OpenStudy:
+    """A study with its output folder.
+
+    Attributes
+    ----------
+    folder : Path
+    study : Study
+    plans : mapping of str to Plan
+        By the names of the scenes.
+    runs : list of Run
+    """
+
+    folder: Path
+    study: Study
+    plans: Mapping[str, Plan]
+    runs: list[Run]
+
+
+def begin_study(file: Path, folder: Path, read_blend: ReadBlend) -> OpenStudy:
+    """Open a study by its file: freeze it in an empty folder, or go on in the folder of the same study.
+
+    Parameters
+    ----------
+    file : Path
+    folder : Path
+        Made if it is missing.
+    read_blend : callable
+
+    Raises
+    ------
+    PalpateError
+        The file or a scene cannot be read, the folder holds something else, or another study, or this one with another scene.
+    """
+    study = read_study(file)
+    sources = _sources(study, file.parent)
+    if (folder / STUDY_NAME).exists():
+        opened = resume_study(folder)
+        changed = differences(opened.study, study)
+        if changed:
+            raise FileError(f"'{folder}' belongs to another study ({'; '.join(changed)}): give another folder with --out.")
+        _check_sources(opened, sources, read_blend)
+        return opened
+    if folder.exists() and (not folder.is_dir() or {path.name for path in folder.iterdir()} - _OWN):
+        raise FileError(f"'{folder}' holds other files and no study: give a new or empty folder with --out.")
+    make_folders(folder)
+    plans, entries = {}, []
+    for name, source in sources.items():
+        target = folder / SCENES / f"{name}.npz"
+        _freeze_scene(source, target, read_blend)
+        scenario = load_scenario(target)
+        plans[name] = plan_for(study, scenario)
+        entries.append({"name": name, "file": source.name, "sha256": file_sha256(source), "digest": scenario.digest()})
+    runs = runs_of(study, plans, {entry["name"]: entry["digest"] for entry in entries})
+    frozen = {"version": __version__, "runs": len(runs), "scenes": entries}
+    text = frozen_text(file.read_text(encoding="utf-8"), frozen)
+    with atomic_write(folder / STUDY_NAME) as fresh:
+        fresh.write_text(text, encoding="utf-8", newline="\n")
+    return OpenStudy(folder, study, plans, runs)
+
+
+def resume_study(folder: Path) -> OpenStudy:
+    """Open a study by its folder.
+
+    Raises
+    ------
+    PalpateError
+        There is no study in it, another version of Palpate began it, or a file of it is damaged.
+    """
+    if not (folder / STUDY_NAME).is_file():
+        raise FileError(f"There is no study in '{folder}': give the file of a study, or the folder that it was run in.")
+    study = read_study(folder / STUDY_NAME)
+    version, entries = frozen_entries(study, folder)
+    if version != __version__:
+        raise FileError(
+            f"The study in '{folder}' was begun with Palpate {version}, and this is {__version__}, which may compute other "
+            "numbers: go on with that version, or give another folder with --out."
+        )
+    plans = {}
+    for entry in entries:
+        scenario = load_scenario(folder / SCENES / f"{entry['name']}.npz")
+        if scenario.digest() != entry["digest"]:
+            raise FileError(f"The scene '{entry['name']}' in '{folder}' is not the one that the study began with: begin anew.")
+        plans[entry["name"]] = plan_for(study, scenario)
+    runs = runs_of(study, plans, {entry["name"]: entry["digest"] for entry in entries})
+    return OpenStudy(folder, study, plans, runs)
+
+
+def frozen_entries(study: Study, folder: Path) -> tuple[str, list[dict[str, Any]]]:
+    """Return version and scenes of a frozen study; raise :class:`FileError` when they are missing."""
+    version, entries = study.frozen.get("version"), study.frozen.get("scenes")
+    words = ("name", "file", "sha256", "digest")
+    if not isinstance(version, str) or not isinstance(entries, list) or not entries:
+        raise FileError(f"'{folder / STUDY_NAME}' is not the study of an output folder: its table [frozen] is missing or cut.")
+    if not all(isinstance(entry, dict) and all(isinstance(entry.get(word), str) for word in words) for entry in entries):
+        raise FileError(f"'{folder / STUDY_NAME}' is damaged: a scene of its table [frozen] is cut; begin anew.")
+    return version, entries
+
+
+def _sources(study: Study, base: Path) -> dict[str, Path]:
+    """Return the files of a study's scenes by the names that they get in the output folder."""
+    files: list[Path] = []
+    for pattern in study.scenes:
+        found = sorted(glob.glob(str(base / pattern))) if glob.has_magic(pattern) else [str(base / pattern)]
+        if not found:
+            raise FileError(f"No file fits the scene '{pattern}' beside the study: check its name and folder.")
+        files += [Path(path) for path in found if Path(path) not in files]
+    for file in files:
+        if not file.is_file():
+            raise FileError(f"There is no scene '{file}': check its name; it is counted from the study's folder.")
+        if file.suffix not in (BLEND, SCENARIO):
+            raise FileError(f"The scene '{file}' is neither a .blend nor a scenario (.npz): give one of these.")
+    stems: dict[str, Path] = {}
+    for file in files:
+        stem = file.stem if file.stem not in stems else file.name
+        if stem in stems:
+            raise FileError(f"Two scenes of the study are called '{file.name}': rename one of them.")
+        stems[stem] = file
+    names = folder_names(stems)
+    return {names[stem]: file for stem, file in stems.items()}
+
+
+def _freeze_scene(source: Path, target: Path, read_blend: ReadBlend) -> None:
+    if source.suffix == BLEND:
+        read_blend(source, target)
+    else:
+        save_scenario(target, load_scenario(source))
+
+
+def _check_sources(opened: OpenStudy, sources: Mapping[str, Path], read_blend: ReadBlend) -> None:
+    """Raise FileError if the scenes are no longer those that the study began with; a .blend is read only if it has changed."""
+    _, entries = frozen_entries(opened.study, opened.folder)
+    before, now = {entry["name"]: entry for entry in entries}, set(sources)
+    if set(before) != now:
+        odd = sorted(set(before) ^ now)[0]
+        what = "is new" if odd in now else "is missing"
+        raise FileError(f"The scene '{odd}' {what} since the study in '{opened.folder}' began: give another folder with --out.")
+    for name, source in sources.items():
+        if file_sha256(source) == before[name]["sha256"]:
+            continue
+        target = opened.folder / SCENES / f"now-{name}.npz"
+        try:
+            _freeze_scene(source, target, read_blend)
+            digest = load_scenario(target).digest()
+        finally:
+            target.unlink(missing_ok=True)
+        if digest != before[name]["digest"]:
+            raise FileError(
+                f"'{source}' has changed since the study in '{opened.folder}' began: give another folder with --out, or "
+                f"the folder itself instead of the study's file, which goes on with the scene as it was."
+            )

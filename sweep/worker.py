@@ -1,0 +1,164 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a Dask worker does: it passes runs to a process of its own and writes down which of them ended it.
+
+A process that dies or hangs is an ordinary failure here. If it took the worker with it, Dask would give up the whole
+batch after a few times.
+"""
+
+from __future__ import annotations
+
+import atexit
+import json
+import os
+import queue
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+from ..core.errors import FileError
+from ..core.study.run_files import RUN_NAME, RUNS, write_failure
+from .child import DONE, FAILED, UNWRITABLE
+
+MOST_DEATHS = 3
+"""How often a process may die on a run before the run counts as failed: once may be an accident or an administrator."""
+START_LIMIT = 900.0
+"""Seconds that a process may take to start; the first one on a machine compiles the solver, about a minute."""
+
+
+class Child:
+    """A process that computes runs of one study."""
+
+    def __init__(self, folder: str):
+        environment = {**os.environ, "NUMBA_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+        self._process = subprocess.Popen(
+            [sys.executable, "-m", f"{__package__}.child", folder],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            text=True,
+            encoding="utf-8",
+            env=environment,
+            start_new_session=True,  # Ctrl-C in a terminal reaches the driver alone, which stops the others
+        )
+        self._answers: queue.Queue[str] = queue.Queue()
+        threading.Thread(target=self._read, daemon=True).start()
+        first = self._answer(START_LIMIT)
+        if first is None or first["status"] != "ready":
+            self.kill()
+            raise FileError("A process for runs did not start" + (f": {first['sentence']}" if first else "."))
+
+    def _read(self) -> None:
+        assert self._process.stdout is not None
+        for line in self._process.stdout:
+            self._answers.put(line)
+        self._answers.put("")
+
+    def _answer(self, limit: float | None) -> dict[str, Any] | None:
+        """Return the next answer, None when the process has died; raises queue.Empty after `limit` seconds."""
+        line = self._answers.get(timeout=limit)
+        return json.loads(line) if line else None
+
+    @property
+    def is_alive(self) -> bool:
+        """Whether it can take a run."""
+        return self._process.poll() is None
+
+    def compute(self, words: dict[str, Any], limit: float | None) -> dict[str, Any] | None:
+        """Compute a run; return the answer, None if the process died, and raise queue.Empty when the limit is over."""
+        assert self._process.stdin is not None
+        try:
+            self._process.stdin.write(json.dumps(words) + "\n")
+            self._process.stdin.flush()
+        except OSError:
+            return None
+        return self._answer(limit)
+
+    def kill(self) -> int:
+        """End the process and return its exit status."""
+        with suppress(OSError):
+            self._process.kill()
+        with suppress(OSError):
+            assert self._process.stdin is not None
+            self._process.stdin.close()
+        return self._process.wait()
+
+
+_children: dict[str, Child] = {}
+
+
+def _child_for(folder: str) -> Child:
+    """Return the process for a study; those for other studies are ended."""
+    for other in [name for name in _children if name != folder or not _children[name].is_alive]:
+        _children.pop(other).kill()
+    if folder not in _children:
+        _children[folder] = Child(folder)
+    return _children[folder]
+
+
+@atexit.register
+def end_children() -> None:
+    """End the processes of this worker."""
+    while _children:
+        _children.popitem()[1].kill()
+
+
+def compute_batch(folder: str, runs: Sequence[dict[str, Any]], limit: float | None = None) -> list[dict[str, Any]]:
+    """Compute runs of a study that are not done yet; called by Dask.
+
+    Parameters
+    ----------
+    folder : str
+        Of the study, as this machine sees it.
+    runs : sequence of dict
+        Fields of :class:`.Run`.
+    limit : float, optional
+        Seconds that each may take.
+
+    Returns
+    -------
+    list of dict
+        For each run its digest, a status (:data:`.child.DONE`, ``FAILED`` or ``UNWRITABLE``), seconds, and the sentence of a
+        failure. After an unwritable run the others are left out.
+    """
+    answers = []
+    for words in runs:
+        if (Path(folder) / RUNS / str(words["digest"]) / RUN_NAME).is_file():  # by a worker that Dask had lost
+            answers.append({"digest": words["digest"], "status": DONE, "seconds": 0.0})
+            continue
+        answers.append(_computed(folder, words, limit))
+        if answers[-1]["status"] == UNWRITABLE:
+            break
+    return answers
+
+
+def _computed(folder: str, words: dict[str, Any], limit: float | None) -> dict[str, Any]:
+    """Return what became of a run; the process is started again where it dies."""
+    sentence = ""
+    began = time.monotonic()
+    for _ in range(MOST_DEATHS):
+        try:
+            answer = _child_for(folder).compute(words, limit)
+        except queue.Empty:
+            _children.pop(folder).kill()
+            sentence = f"Run {words['index']} was ended after its limit of {limit:g} s: raise run_limit, or vary less widely."
+            break
+        except FileError as error:
+            return {"digest": words["digest"], "status": UNWRITABLE, "sentence": str(error), "seconds": 0.0}
+        if answer is not None:
+            return answer
+        status = _children.pop(folder).kill()
+        reason = f"signal {-status}" if status < 0 else f"exit status {status}"
+        sentence = (
+            f"The process that computed run {words['index']} ended {MOST_DEATHS} times ({reason}): it may need more memory."
+        )
+    answer = {"digest": words["digest"], "status": FAILED, "sentence": sentence, "seconds": time.monotonic() - began}
+    try:
+        write_failure(Path(folder), words["digest"], sentence)
+    except FileError as error:
+        answer |= {"status": UNWRITABLE, "sentence": str(error)}
+    return answer
