@@ -146,6 +146,13 @@ def _compute(opened, arguments: argparse.Namespace) -> int:
         for index, sentence in tally.failures[:MOST_FAILURES_NAMED]:
             print(f"run {index} failed: {sentence}")
     found = status_of(opened.folder)
+    if found.done:
+        from ..sweep.dataset import publish
+        from ..sweep.report import write_report
+
+        console.Interrupt.check()
+        publish(opened.folder)
+        write_report(opened.folder)
     print(found)
     print(f"results: {opened.folder}")
     if found.failed:

@@ -86,7 +86,7 @@ def dask_client(scheduler: str | None, workers: int) -> Iterator[Any]:
     with dask.config.set(settings), tempfile.TemporaryDirectory(prefix="palpate-dask-") as scratch:
         if scheduler is not None:
             try:
-                client = Client(scheduler, timeout=10, set_as_default=False)
+                client = Client(scheduler, timeout=10)
             except (OSError, TimeoutError, ValueError) as error:
                 raise PalpateError(
                     f"No scheduler answers at '{scheduler}' ({error}): start 'dask scheduler' there, or leave --scheduler out."
@@ -103,7 +103,7 @@ def dask_client(scheduler: str | None, workers: int) -> Iterator[Any]:
             local_directory=scratch,
             silence_logs=logging.CRITICAL,
         )
-        with _closing(cluster, timeout=10), _closing(Client(cluster, set_as_default=False)) as client:
+        with _closing(cluster, timeout=10), _closing(Client(cluster)) as client:
             yield client
 
 

@@ -30,6 +30,7 @@ CAPTIONS = {
     "core.response": "forces to readings, metrics",
     "core.solver": "bodies and contacts over time",
     "core.io": "files in and out",
+    "core.study": "many runs of a scene",
     "core.figures": "images, curves, strips",
     "core.export": "a bake for other programs",
     "core.gap": "what a sensor's model lacks",

@@ -1,0 +1,163 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""``palpate sweep`` from the command line: what is done stays done, whatever is killed, and mistakes are one sentence."""
+
+import hashlib
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from study_scenes import HEAD, tiny_scene
+
+from palpate.core.io.recording_npz import load_recording
+from palpate.core.io.scenario_npz import save_scenario
+from palpate.core.study.run_files import SCENES, done_runs, make_folders, write_failure
+from palpate.sweep.worker import compute_batch, end_children
+
+pytest.importorskip("distributed")
+
+STUDY = (
+    HEAD
+    + """design = "latin-hypercube"
+samples = 24
+fps = 200
+[vary]
+"Pad.k" = { log-uniform = [20, 200] }
+[press]
+depth = { uniform = [0.5e-3, 2e-3] }
+slide = { uniform = [0, 1e-3] }
+"""
+)
+LONGEST = 300
+"""Seconds until a command counts as hanging; a busy machine may have to compile the solver first."""
+
+
+def command(*words, **options):
+    return [sys.executable, "-m", "palpate.commands", "sweep", *map(str, words)]
+
+
+def sweep(*words):
+    return subprocess.run(command(*words), capture_output=True, text=True, timeout=LONGEST, check=False)
+
+
+def write_study(folder: Path, text: str = STUDY) -> Path:
+    save_scenario(folder / "tiny.npz", tiny_scene())
+    (folder / "study.toml").write_text(text, encoding="utf-8")
+    return folder / "study.toml"
+
+
+def contents(folder: Path) -> dict[str, str]:
+    """Hashes of all files of the runs; the seconds that a run took are left out."""
+    found = {}
+    for file in sorted((folder / "runs").rglob("*")):
+        if file.name == "run.json":
+            words = json.loads(file.read_bytes())
+            words.pop("seconds")
+            found[str(file.relative_to(folder))] = json.dumps(words, sort_keys=True)
+        elif file.is_file():
+            found[str(file.relative_to(folder))] = hashlib.sha256(file.read_bytes()).hexdigest()
+    return found
+
+
+@pytest.fixture(scope="module")
+def undisturbed(tmp_path_factory):
+    """The output folder of the study, computed in one go."""
+    folder = tmp_path_factory.mktemp("undisturbed")
+    finished = sweep(write_study(folder), "--out", folder / "out", "--workers", 2)
+    assert (finished.returncode, finished.stderr) == (0, "")
+    assert "24 runs: 24 done, 0 failed, 0 left" in finished.stdout
+    return folder / "out"
+
+
+def test_a_run_holds_what_it_promises(undisturbed):
+    (place,) = [path for path in (undisturbed / "runs").iterdir() if json.loads((path / "run.json").read_bytes())["index"] == 5]
+    run = json.loads((place / "run.json").read_bytes())
+    recording = load_recording(place / "Pad" / "recording.npz")
+    assert run["digest"] == place.name
+    assert run["frames"] == len(recording.frames)
+    assert run["metrics"]["max_normal_force"] == recording.sensors["Pad"].normal_force.sum(axis=1).max() > 0
+    assert run["metrics"]["max_depth"] <= run["values"]["press.depth"]
+    assert (place / "Pad" / "sensor.npz").is_file()
+
+
+@pytest.mark.skipif(os.name == "nt", reason="signals of POSIX")
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGINT])
+def test_a_stopped_study_goes_on_where_it_was(undisturbed, tmp_path, number):
+    study = write_study(tmp_path)
+    process = subprocess.Popen(command(study, "--workers", 2), stderr=subprocess.PIPE, text=True, start_new_session=True)
+    folder, began = tmp_path / "study", time.monotonic()
+    while len(done_runs(folder)) < 3 and process.poll() is None and time.monotonic() < began + LONGEST:
+        time.sleep(0.02)
+    os.killpg(process.pid, number) if number == signal.SIGINT else process.kill()  # a terminal's Ctrl-C reaches the group
+    stderr = process.communicate(timeout=LONGEST)[1]
+    assert process.returncode == (130 if number == signal.SIGINT else -9), stderr
+    if number == signal.SIGINT:
+        assert stderr.splitlines()[-1].startswith("palpate sweep: stopped"), stderr
+    earlier = done_runs(folder)
+    before = {name: (folder / "runs" / name / "run.json").stat().st_mtime_ns for name in earlier}
+    finished = sweep(folder, "--workers", 2)
+    assert (finished.returncode, finished.stderr) == (0, "")
+    assert contents(folder) == contents(undisturbed)
+    assert before == {name: (folder / "runs" / name / "run.json").stat().st_mtime_ns for name in earlier}  # not computed again
+    assert not list((folder / "runs").glob(".*"))
+
+
+def test_another_study_in_the_same_folder_is_refused(undisturbed, tmp_path):
+    study = write_study(tmp_path, STUDY.replace("24", "25").replace("2e-3", "3e-3"))
+    refused = sweep(study, "--out", undisturbed)
+    assert refused.returncode == 1
+    (line,) = refused.stderr.splitlines()
+    assert "samples was 24 and is 25" in line
+    assert "press.depth was" in line
+    assert sweep(undisturbed, "--status").stdout == "24 runs: 24 done, 0 failed, 0 left\n"
+
+
+def test_a_misspelt_name_is_one_line_and_begins_nothing(tmp_path):
+    refused = sweep(write_study(tmp_path, STUDY.replace("Pad.k", "Pad.kk")))
+    assert refused.returncode == 1
+    assert refused.stderr == "palpate sweep: There is no 'Pad.kk' to vary in 'tiny': did you mean 'Pad.k'?\n"
+    assert not (tmp_path / "study" / "study.toml").exists()
+
+
+@pytest.fixture
+def by_hand(tmp_path):
+    """A folder of a study with three runs, the second of which cannot be computed."""
+    text = STUDY.replace('design = "latin-hypercube"\nsamples = 24', 'design = "random"\nsamples = 3')
+    make_folders(tmp_path)
+    write_study(tmp_path, text)
+    save_scenario(tmp_path / SCENES / "tiny.npz", tiny_scene())
+    yield tmp_path
+    end_children()
+
+
+def words_of(index: int, **values) -> dict:
+    return {"index": index, "scene": "tiny", "values": values, "digest": f"{index:024x}"}
+
+
+def test_a_run_that_fails_leaves_the_others_alone(by_hand):
+    runs = [words_of(0), words_of(1, **{"Pad.mus": 0.0}), words_of(2)]
+    assert [answer["status"] for answer in compute_batch(str(by_hand), runs)] == ["done", "failed", "done"]
+    assert done_runs(by_hand) == {runs[0]["digest"], runs[2]["digest"]}
+    said = (by_hand / "failed" / f"{runs[1]['digest']}.txt").read_text(encoding="utf-8")
+    assert said.startswith("mud of sensor 'Pad' (0.23) is larger than mus (0)")
+    assert said.count("\n") == 1
+
+
+def test_a_run_that_never_ends_is_ended(by_hand):
+    slow = words_of(1, **{"press.speed": 1e-9})  # frames for weeks
+    answers = compute_batch(str(by_hand), [slow, words_of(2)], 5.0)
+    assert [answer["status"] for answer in answers] == ["failed", "done"]
+    assert "ended after its limit of 5 s" in answers[0]["sentence"]
+
+
+def test_a_run_that_is_done_is_not_computed_again(by_hand):
+    write_failure(by_hand, words_of(0)["digest"], "An earlier failure.")
+    compute_batch(str(by_hand), [words_of(0)])
+    assert not list((by_hand / "failed").iterdir())
+    before = (by_hand / "runs" / words_of(0)["digest"] / "run.json").stat().st_mtime_ns
+    assert compute_batch(str(by_hand), [words_of(0)])[0]["status"] == "done"
+    assert (by_hand / "runs" / words_of(0)["digest"] / "run.json").stat().st_mtime_ns == before
