@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import argparse
+import importlib.util
 import subprocess
 import sys
 from pathlib import Path
@@ -30,6 +31,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
+    if importlib.util.find_spec(f"{__package__.rpartition('.')[0]}.sweep") is None:  # as in the extension's zip
+        raise PalpateError("Blender's extension has no studies: run 'pip install palpate[sweep]' in a Python of its own.")
     place = Path(arguments.study)
     folder = _folder(place, arguments.out)
     if arguments.status:

@@ -5,6 +5,6 @@ The driver (:mod:`.driver`) gives batches of runs to Dask workers; a worker (:mo
 (:mod:`.child`), so that what ends a run ends neither a worker nor the study. What is done is known from files
 (:mod:`..core.study.run_files`).
 
-From these files :mod:`.dataset` makes the dataset and the table of runs, :mod:`.report` the page about them, :mod:`.exports` other
-formats.
+From these files :mod:`.dataset` makes the dataset and the table of runs, :mod:`.report` the page about them, :mod:`.exports`
+other formats.
 """
