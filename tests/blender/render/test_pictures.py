@@ -183,7 +183,7 @@ def test_the_command(baked, tmp_path, capsys):
     _, path = baked
     words = ["render", str(path), "--out", str(tmp_path / "out"), "--only", "strip", "--only", "numbers", "--format", "pdf"]
     assert main([*words, "--sensor", "Pad", "--colour-map", "paper", "--quantity", "pressure", "--width", "single"]) == 0
-    assert sorted(item.name for item in (tmp_path / "out").iterdir()) == ["numbers Pad 0004.pdf", "strip.pdf"]
+    assert sorted(item.name for item in (tmp_path / "out").iterdir()) == [LIST_NAME, "numbers Pad 0004.pdf", "strip.pdf"]
     assert main([*words, "--sensor", "Thumb"]) == 1
     assert "There is no sensor 'Thumb'" in capsys.readouterr().err
 
