@@ -11,6 +11,7 @@ from palpate.addon.bake.bake import bake
 from palpate.addon.render import figure_request
 from palpate.commands import render
 from palpate.core.errors import ParameterError
+from palpate.core.io.file_list import LIST_NAME
 from palpate.core.jobs.job_runner import run_job
 
 
@@ -33,7 +34,7 @@ def test_everything_that_is_chosen_is_made(baked):
     expected = {f"{kind}.{ending}" for kind in ("strip", "curves") for ending in ("png", "pdf")}
     expected |= {f"numbers Pad {number:04d}.{ending}" for number in (2, 3, 4) for ending in ("png", "pdf")}
     expected |= {f"{kind} {number:04d}.png" for kind in ("scene", "scene and touch") for number in (2, 3, 4)}
-    assert names == expected | {"video.mp4", "data csv", "data npz", "data png"}
+    assert names == expected | {"video.mp4", "data csv", "data npz", "data png", LIST_NAME}
     assert (place / "figures" / "data csv" / "Pad" / "normal_force.csv").is_file()
     picture = bpy.data.images.load(str(place / "figures" / "scene 0004.png"))
     assert tuple(picture.size) == (160, 120) and picture.channels == 4
