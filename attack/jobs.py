@@ -137,8 +137,6 @@ class Stage:
         return found
 
     def _make(self, name: str) -> None:
-        if self.place.exists():
-            put_back(self.place, self.folder / "before")
         empty = self.folder / "empty"
         empty.mkdir(exist_ok=True)
         put_back(empty, self.place)

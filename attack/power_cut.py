@@ -156,7 +156,7 @@ class Recorded:
             (place / folder).mkdir(parents=True, exist_ok=True)
         lost = 0
         for name, (inode, older) in names["files"].items():
-            synced = now["durable"].get(str(inode))
+            synced = now["durable"].get(str(inode), names["durable"].get(str(inode)))  # it may be removed by now
             present = contents.get(inode, older)
             data = self._content(present)
             if synced != present:

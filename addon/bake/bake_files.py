@@ -12,8 +12,8 @@ import json
 import math
 import os
 import secrets
-from collections.abc import Callable, Iterable, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
@@ -207,12 +207,10 @@ class BakeFiles:
 
     def write_frame(self, frame: Frame) -> None:
         """Write a frame: its row, and the tactile image of every sensor, some frames together, while the solver continues."""
-        try:
+        with _refusals_named(self.folder):
             self._rows.append(frame)
-        except OSError as error:
-            raise _write_error(self.folder, error) from error
-        if self._images is not None:
-            self._images.write(frame)
+            if self._images is not None:
+                self._images.write(frame)
 
     def save_checkpoint(self, simulation) -> None:
         """Save the frames and the state of the solver, if the last checkpoint is some seconds old."""
@@ -240,13 +238,15 @@ class BakeFiles:
         FileError
             A file cannot be written.
         """
-        if self._images is not None:
-            self._images.submit()
+        with _refusals_named(self.folder):
+            if self._images is not None:
+                self._images.submit()
         for name in self._sensors:
             self._write_recording(name, recording)
         written = [self._new_folder(name) / file for name in self._sensors for file in (RECORDING_NAME, SENSOR_NAME)]
         if self._images is not None:
-            written += self._images.finish()
+            with _refusals_named(self.folder):
+                written += self._images.finish()
             for name, (_, sha256) in self._images.states().items():
                 self._files[name][IMAGE_LIST_NAME] = sha256
         self._writer.stop()
@@ -346,11 +346,9 @@ class BakeFiles:
 
     def _sync_frames(self) -> Vouched:
         """Bring all frames and images so far onto the disk."""
-        files = [] if self._images is None else self._images.finish()
-        try:
+        with _refusals_named(self.folder):
+            files = [] if self._images is None else self._images.finish()
             self._rows.flush()
-        except OSError as error:
-            raise _write_error(self.folder, error) from error
         self._sync([*files, self._growing / CHECKPOINT_FOLDER / FRAMES_FILE])
         images = {} if self._images is None else self._images.states()
         return Vouched(len(self._rows), self._rows.sha256, images)
@@ -429,6 +427,15 @@ def _is_bake(folder: Path) -> bool:
         others = {path.name for path in folder.iterdir()} - {MANIFEST_NAME}
         return any(BAKE_FILE_NAMES.fullmatch(name) for name in others)
     return isinstance(content, dict) and str(content.get("format")).partition("/")[0] == MANIFEST_FORMAT.partition("/")[0]
+
+
+@contextmanager
+def _refusals_named(folder: Path) -> Iterator[None]:
+    """Raise FileError where the system refuses to write; the writer's thread may have met it some frames ago."""
+    try:
+        yield
+    except OSError as error:
+        raise _write_error(folder, error) from error
 
 
 def _write_error(folder: Path, error: OSError) -> FileError:

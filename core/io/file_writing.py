@@ -135,9 +135,8 @@ def writable_folder(path: str | os.PathLike, create: bool = False) -> Path:
         except OSError as error:
             raise FileError(f"The folder '{folder}' could not be made ({os_error_reason(error)}): {_remedy(error)}.") from error
     _require_folder(folder)
-    check = _new_file_in(folder, "check", "")
-    with suppress(OSError):  # the next run that removes leftovers removes it
-        check.unlink()
+    _new_file_in(folder, "check", "")
+    _remove_empty(folder, "check", "")
     return folder
 
 
@@ -157,8 +156,8 @@ def writable_file(path: str | os.PathLike) -> Path:
     require_replaceable(path)
     target = Path(os.path.realpath(path))
     writable_folder(target.parent, create=True)
-    with suppress(FileNotFoundError):
-        _new_file_in(target.parent, target.stem, target.suffix).unlink()  # its name may be too long
+    _new_file_in(target.parent, target.stem, target.suffix)  # its name may be too long
+    _remove_empty(target.parent, target.stem, target.suffix)
     return target
 
 
@@ -303,6 +302,14 @@ def _new_file_in(folder: Path, stem: str, suffix: str) -> Path:
     path, handle = _open_new_file(folder, stem, suffix)
     os.close(handle)
     return path
+
+
+def _remove_empty(folder: Path, stem: str, suffix: str) -> None:
+    """Remove the files that :func:`_new_file_in` has made, also those of a run that was stopped before it could do so."""
+    for path in folder.glob(f".{glob.escape(stem)}.????????.partial{glob.escape(suffix)}"):
+        with suppress(OSError):  # the next run tries again
+            if path.stat().st_size == 0 and not _is_being_written(path):
+                path.unlink()
 
 
 def _new_locked_file(folder: Path, stem: str, suffix: str) -> tuple[Path, int | None]:

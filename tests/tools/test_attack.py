@@ -224,6 +224,8 @@ def test_what_commands_do_to_files_is_judged(after, words, status, kind):
         ("palpate bake: One.\npalpate bake: Two.\n", 1, WRONG),
         ("Traceback (most recent call last):\n  ...\nValueError\n", 1, TRACEBACK),
         ("done\n", 0, None),
+        ("usage: palpate [-h] COMMAND ...\n", 2, None),
+        ("usage: palpate [-h] COMMAND ...\n", 1, WRONG),
         ("", None, WRONG),
     ],
 )

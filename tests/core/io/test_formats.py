@@ -20,6 +20,7 @@ import numpy as np
 import OpenEXR
 import pytest
 
+from palpate.attack.injector import Injector
 from palpate.core.errors import FileError, PalpateError
 from palpate.core.geometry.layout.grid_layout import GridLayout
 from palpate.core.geometry.layout.texture_maps import uv_layout
@@ -161,6 +162,16 @@ def test_read_only_file(tmp_path, monkeypatch):
     monkeypatch.setattr(file_writing.os, "access", lambda path, mode: path != target)  # root may write anything
     assert "read-only" in cannot_write(target, target)
     assert target.read_text() == "old"
+
+
+@pytest.mark.parametrize(("at", "check"), [(3, writable_folder), (6, lambda folder: writable_file(folder / "scene.blend"))])
+def test_a_trial_file_that_cannot_be_removed_is_removed_the_next_time(tmp_path, at, check):
+    with Injector(tmp_path, at, "EACCES") as injector:
+        check(tmp_path)
+    assert injector.calls[-1].startswith("unlink") and len(list(tmp_path.iterdir())) == 1
+    (tmp_path / ".check.0123abcd.partial.txt").write_text("of the user's")
+    check(tmp_path)
+    assert [path.name for path in tmp_path.iterdir()] == [".check.0123abcd.partial.txt"]
 
 
 def test_writable_folder(tmp_path):
