@@ -89,9 +89,9 @@ def test_files_that_are_no_blend(tmp_path, demo_blend, capfd):
         (["--frames", "9", "3"], "runs backwards"),
         (["--frames", "-5", "3"], "before frame 0"),
         (["--sensor", "Thumb"], "'Finger A', 'Finger B'"),
-        (["--out", "{tmp}/nowhere/below"], "does not exist"),
+        (["--out", "{tmp}/file/below"], "is a file: choose another folder"),
         (["--out", "{tmp}/file"], "a file where a folder"),
-        (["--frames", "1", "2", "--out", "{tmp}/out", "--save-as", "{tmp}/nowhere/new.blend"], "does not exist"),
+        (["--frames", "1", "2", "--out", "{tmp}/out", "--save-as", "{tmp}/file/new.blend"], "a file where a folder"),
     ],
 )
 def test_mistakes_are_one_line(more, reason, tmp_path, demo_blend, capfd):

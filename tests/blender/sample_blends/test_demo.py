@@ -119,11 +119,13 @@ def test_demo_renders_heat_map_and_arrow(tmp_path):
 
 
 def test_demo_into_a_place_that_is_none(tmp_path, capfd):
+    (tmp_path / "a").write_text("mine")
     assert main(["demo", "--out", str(tmp_path / "a" / "b")]) == 1
     out, err = capfd.readouterr()
     assert out == ""
     assert len(err.splitlines()) == 1
-    assert list(tmp_path.iterdir()) == []
+    assert [path.name for path in tmp_path.iterdir()] == ["a"]
+    assert (tmp_path / "a").read_text() == "mine"
 
 
 # --- the camera
