@@ -122,36 +122,14 @@ def read_rig(path: str | Path) -> Rig:
         raise FileError(f'clock of \'{path.name}\' is {clock!r:.60}: write "absolute" or "own".')
     correct = _faults_to_correct(words, path)
     rig_name = checked_name(words.get("name", path.stem), f"'{path.name}'")
-    folder, warnings = path.resolve().parent, []
+    folder = path.resolve().parent
     sensor = _table(words, "sensor", path)
     texels, grid = _texels(sensor, folder, path)
     parameters, thickness = _parameters(sensor, path)
     indenter = _indenter(_table(words, "indenter", path), folder, path) if "indenter" in words else None
-    entries = words.get("trial")
-    if not isinstance(entries, list) or not entries:
-        raise FileError(f"'{path.name}' has no [[trial]]: name at least one CSV file.")
     rules = read_column_rules(_table(words, "columns", path), path) if "columns" in words else {}
     reader = _TrialReader(path, folder, len(texels), indenter is not None, rules)
-    trials, histories = [], []
-    for number, entry in enumerate(entries, start=1):
-        trial, history, said = reader.read(entry, number)
-        trials.append(trial)
-        histories.append(history)
-        warnings += said
-    trials, said = on_common_clocks(trials, histories, clock, path)
-    warnings += said
-    names = [trial.name for trial in trials]
-    for name in names:
-        if names.count(name) > 1:
-            raise FileError(
-                f"Two trials of '{path.name}' read '{name}.csv': give each recording once, so that none judges itself."
-            )
-    if not any(trial.use == "fit" for trial in trials):
-        raise FileError(f"No trial of '{path.name}' has use = \"fit\": give at least one to fit.")
-    if not any(_responds(trial) for trial in trials):
-        raise FileError(
-            f"All responses in '{path.name}' are zero: check that the sensor was connected and the right columns exported."
-        )
+    trials, warnings = _read_trials(words.get("trial"), reader, clock, path)
     warnings += _channel_warnings(trials)
     _check_units(trials, indenter, texels, parameters, thickness, path)
     return Rig(
@@ -167,6 +145,38 @@ def read_rig(path: str | Path) -> Rig:
         warnings=tuple(warnings),
         correct=correct,
     )
+
+
+def _read_trials(entries: Any, reader: _TrialReader, clock: str | None, path: Path) -> tuple[list[Trial], list[str]]:
+    """Read the recordings that the [[trial]] tables name, and put those of one session on one clock.
+
+    Returns
+    -------
+    trials : list of Trial
+    warnings : list of str
+    """
+    if not isinstance(entries, list) or not entries:
+        raise FileError(f"'{path.name}' has no [[trial]]: name at least one CSV file.")
+    trials, histories, warnings = [], [], []
+    for number, entry in enumerate(entries, start=1):
+        trial, history, said = reader.read(entry, number)
+        trials.append(trial)
+        histories.append(history)
+        warnings += said
+    trials, said = on_common_clocks(trials, histories, clock, path)
+    names = [trial.name for trial in trials]
+    for name in names:
+        if names.count(name) > 1:
+            raise FileError(
+                f"Two trials of '{path.name}' read '{name}.csv': give each recording once, so that none judges itself."
+            )
+    if not any(trial.use == "fit" for trial in trials):
+        raise FileError(f"No trial of '{path.name}' has use = \"fit\": give at least one to fit.")
+    if not any(_responds(trial) for trial in trials):
+        raise FileError(
+            f"All responses in '{path.name}' are zero: check that the sensor was connected and the right columns exported."
+        )
+    return trials, [*warnings, *said]
 
 
 def _faults_to_correct(words: Mapping[str, Any], path: Path) -> tuple[str, ...]:
