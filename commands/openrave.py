@@ -74,7 +74,7 @@ def _import(arguments: argparse.Namespace) -> None:
         from ..addon.authoring import exchange
 
         name = arguments.sensor or sensor.link
-        obj = scene.objects.get(name)
+        obj = {one.name: one for one in scene.objects}.get(name)  # Blender's own search knows no name that is not UTF-8
         if obj is None:
             raise SceneError(f"There is no object '{name}' in '{arguments.scene}': name the sensor's with --sensor.")
         exchange.put_parameters(obj, sensor.parameters)

@@ -110,6 +110,7 @@ def _is_abandoned(folder: Path) -> bool:
         return False
     try:
         content = os.read(handle, 1000)
-        return (not content or MARKER_FORMAT.encode() in content) and try_lock(handle)
+        is_lost = not content.strip(b"\0")  # a kill or a power cut came before it was written
+        return (is_lost or MARKER_FORMAT.encode() in content) and try_lock(handle)
     finally:
         os.close(handle)

@@ -18,6 +18,7 @@ from palpate.core.export.registry import export
 from palpate.core.io import file_list
 from palpate.core.io.file_list import LIST_FORMAT, LIST_NAME
 from palpate.core.io.file_writing import atomic_write, writable_folder
+from palpate.core.io.private_folder import MARKER_NAME
 from palpate.core.io.temporary_folder import remove_unfinished, temporary_folder
 from palpate.core.jobs.job_runner import run_job
 
@@ -263,11 +264,15 @@ def test_what_killed_runs_have_left_is_removed_and_nothing_else(tmp_path):
         kept = tmp_path / "kept"
         shutil.copytree(abandoned, kept)
     kept.rename(abandoned)  # as a kill leaves it
+    torn = tmp_path / ".palpate-export.89abcdef.partial"  # as a power cut leaves it
+    torn.mkdir()
+    (torn / MARKER_NAME).write_bytes(bytes(70))
+    (torn / "half.csv").write_text("half")
     with temporary_folder(tmp_path, "video") as in_use, atomic_write(running) as temporary:
         temporary.write_text("running")
         remove_unfinished(tmp_path)
         assert in_use.is_dir() and temporary.is_file()
-        assert not abandoned.exists() and not leftover.exists()
+        assert not abandoned.exists() and not torn.exists() and not leftover.exists()
     assert running.read_text() == "running"
     assert (mine / "thesis.txt").read_text() == "mine"
     assert sorted(path.name for path in tmp_path.iterdir()) == [mine.name, "running.txt"]
