@@ -136,7 +136,7 @@ def writable_folder(path: str | os.PathLike, create: bool = False) -> Path:
             raise FileError(f"The folder '{folder}' could not be made ({os_error_reason(error)}): {_remedy(error)}.") from error
     _require_folder(folder)
     _new_file_in(folder, "check", "")
-    _remove_empty(folder, "check", "")
+    _remove_unlocked(folder, "check", "")
     return folder
 
 
@@ -157,7 +157,7 @@ def writable_file(path: str | os.PathLike) -> Path:
     target = Path(os.path.realpath(path))
     writable_folder(target.parent, create=True)
     _new_file_in(target.parent, target.stem, target.suffix)  # its name may be too long
-    _remove_empty(target.parent, target.stem, target.suffix)
+    _remove_unlocked(target.parent, target.stem, target.suffix)
     return target
 
 
@@ -304,11 +304,11 @@ def _new_file_in(folder: Path, stem: str, suffix: str) -> Path:
     return path
 
 
-def _remove_empty(folder: Path, stem: str, suffix: str) -> None:
-    """Remove the files that :func:`_new_file_in` has made, also those of a run that was stopped before it could do so."""
+def _remove_unlocked(folder: Path, stem: str, suffix: str) -> None:
+    """Remove the files of these names that nobody is writing: those of runs that were stopped before they could do so."""
     for path in folder.glob(f".{glob.escape(stem)}.????????.partial{glob.escape(suffix)}"):
         with suppress(OSError):  # the next run tries again
-            if path.stat().st_size == 0 and not _is_being_written(path):
+            if not _is_being_written(path):
                 path.unlink()
 
 

@@ -12,9 +12,11 @@ from itertools import zip_longest
 import numpy as np
 
 from ..errors import FileError
+from ..geometry.layout.texture_maps import OverlapError
 from ..model.recording import SensorFrame
 from .bake_check import SensorFiles
 from .bake_folder import IMAGE_LIST_NAME, check_sha256, frame_file
+from .sensor_npz import SENSOR_NAME
 from .tactile_exr import CHANNELS, exr_channels, read_exr
 
 ROUNDING = 1e-5
@@ -62,7 +64,11 @@ def _fault(files: SensorFiles, number: int, frame: SensorFrame) -> str:
     for key, value in said.items():
         if about.get(key, value) != value:
             return f"its {key} is {about[key]!r:.60} and not {value!r:.60}"
-    expected = exr_channels(files.texels.layout, frame)
+    try:
+        expected = exr_channels(files.texels.layout, frame)
+    except OverlapError:
+        path = files.folder / SENSOR_NAME
+        raise FileError(f"'{path}' is damaged (two parts of the region cover one pixel): bake again.") from None
     for channel in CHANNELS:
         if channel not in found:
             return f"it has no channel {channel}"
