@@ -5,6 +5,8 @@ import os
 import re
 import subprocess
 import sys
+import time
+from pathlib import Path
 from types import SimpleNamespace
 
 import bpy
@@ -45,6 +47,10 @@ def refusal(operator=None) -> str:
 
 
 def everything_in(folder):
+    """All files and folders, once the bake before has removed what it replaced, which it does in the background."""
+    end = time.monotonic() + 10.0
+    while list(Path(folder).glob("palpate/.palpate/growing-*")) and time.monotonic() < end:
+        time.sleep(0.02)
     return sorted(os.path.join(where, name) for where, folders, files in os.walk(folder) for name in folders + files)
 
 
