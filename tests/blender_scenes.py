@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import os
+import time
 from pathlib import Path
 
 import bpy
@@ -77,6 +78,13 @@ def save(folder, name="scene.blend"):
 def reopen(path):
     bpy.ops.wm.open_mainfile(filepath=str(path))
     return bpy.context.scene
+
+
+def wait_for_removal(folder) -> None:
+    """Wait until the last bake has removed what it replaced, which it does in the background; at most ten seconds."""
+    end = time.monotonic() + 10.0
+    while any(Path(folder).glob(f"**/{PRIVATE_FOLDER}/growing-*")) and time.monotonic() < end:
+        time.sleep(0.02)
 
 
 def contents(folder) -> dict[str, bytes]:

@@ -5,14 +5,12 @@ import os
 import re
 import subprocess
 import sys
-import time
-from pathlib import Path
 from types import SimpleNamespace
 
 import bpy
 import numpy as np
 import pytest
-from blender_scenes import ball, changes, cube, dump, press, press_and_drop, save
+from blender_scenes import ball, changes, cube, dump, press, press_and_drop, save, wait_for_removal
 
 from palpate.addon.bake.bake import bake
 from palpate.addon.scene import scene_reader
@@ -47,10 +45,7 @@ def refusal(operator=None) -> str:
 
 
 def everything_in(folder):
-    """All files and folders, once the bake before has removed what it replaced, which it does in the background."""
-    end = time.monotonic() + 10.0
-    while list(Path(folder).glob("palpate/.palpate/growing-*")) and time.monotonic() < end:
-        time.sleep(0.02)
+    wait_for_removal(folder)
     return sorted(os.path.join(where, name) for where, folders, files in os.walk(folder) for name in folders + files)
 
 
@@ -307,6 +302,7 @@ def test_a_target_deleted_while_its_bake_runs(tmp_path, steps):
     run_job(bake(scene))
     other = ball("Other")
     other.palpate.role = "TARGET"
+    wait_for_removal(tmp_path)
     files = {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
     work = SlicedJob(bake(scene))
     for _ in range(steps):
