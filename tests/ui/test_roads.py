@@ -35,7 +35,8 @@ def test_press(play_road):
     """Played, scrubbed, stopped by ESC, baked, undone."""
     result = play_road("press", timeout=900)
     assert result["values"]["largest while playing"] > 0.0
-    assert result["values"]["files"][3:] == [f"tactile_{frame:04d}.exr" for frame in range(1, 41)]
+    assert result["values"]["files"][:4] == ["images.sha256", "manifest.json", "recording.npz", "sensor.npz"]
+    assert result["values"]["files"][4:] == [f"tactile_{frame:04d}.exr" for frame in range(1, 41)]
     assert result["values"]["arrow"][0] > 0.0
 
 
@@ -45,7 +46,7 @@ def test_tutorial(play_road):
     assert values["vertices"] == 84
     assert values["size"] == pytest.approx([0.02, 0.05, 0], abs=1e-6)
     assert values["force"] == pytest.approx(0.97, abs=0.005)
-    assert values["files"] == 63  # an image for each frame, the recording, the sensor and the manifest
+    assert values["files"] == 64  # an image for each frame, their checksums, the recording, the sensor and the manifest
 
 
 def test_paint(play_road):
