@@ -58,11 +58,12 @@ def road(ui):
     yield from ui.screenshot("chosen")
 
     yield from ui.press("palpate.figures_make()")
-    yield from ui.wait_until(lambda: list(place.glob("scene*.png")), "the first figure is there", timeout=180)
+    yield from ui.wait_until(lambda: list(place.glob("**/scene*.png")), "the first figure waits for the others", timeout=180)
     yield from ui.stop("palpate.figures_make")  # many figures and a video are still to come
     ui.check(not (place / "video.mp4").exists(), "before the video")
     ui.check(scene.camera.name == camera and "Palpate Camera" not in bpy.data.objects, "and the camera is the scene's own")
     ui.check(scene.frame_current == 12, "and the frame as before")
+    yield from ui.becomes(lambda: not list(place.glob("**/scene*.png")), "and no figure of an unfinished set stays")
     ui.check(not list(place.glob("*.part*")), "and nothing half-made stays")
     yield from ui.screenshot("stopped")
 
