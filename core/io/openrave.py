@@ -8,6 +8,7 @@ thickness of the foam, and the model holds the maximum penetration, which is twi
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import Any
@@ -126,9 +127,18 @@ def openrave_xml(sensors: Iterable[OpenRaveSensor], robot: str | None = None) ->
     sensors : iterable of OpenRaveSensor
     robot : str, optional
         Name of a ``<Robot>`` around the definitions. Without it they stand side by side, for pasting into a robot file.
+
+    Raises
+    ------
+    FileError
+        A name has a character that XML does not know.
     """
     from xml.sax.saxutils import escape, quoteattr
 
+    sensors = list(sensors)
+    for name in (robot or "", *(sensor.name for sensor in sensors), *(sensor.link for sensor in sensors)):
+        if re.search("[\x00-\x08\x0b\x0c\x0e-\x1f\ud800-\udfff\ufffe\uffff]", name):
+            raise FileError(f"XML cannot hold the name {ascii(name)}: give the robot or the sensor another one.")
     lines = [f"<Robot name={quoteattr(robot)}>"] if robot is not None else []
     indent = "  " if robot is not None else ""
     for sensor in sensors:
@@ -145,7 +155,7 @@ def openrave_xml(sensors: Iterable[OpenRaveSensor], robot: str | None = None) ->
 
 
 def write_openrave(path: str | os.PathLike, sensors: Iterable[OpenRaveSensor], robot: str | None = None) -> None:
-    """Write :func:`openrave_xml` to a file, completely or not at all."""
+    """Write :func:`openrave_xml` to a file, completely or not at all; raises FileError if that is impossible."""
     text = openrave_xml(sensors, robot)
     with atomic_write(path) as temporary:
         temporary.write_text(text, encoding="utf-8")

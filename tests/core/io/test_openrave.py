@@ -98,3 +98,14 @@ def test_a_missing_file_gets_a_sentence(tmp_path):
 
 def test_links_are_escaped():
     assert "a &lt; b &amp; c" in openrave_xml([OpenRaveSensor("n", "a < b & c", SensorParameters())])
+
+
+@pytest.mark.parametrize("name", ["\udcff\udcfe", "a\0b", "\x1b[31m"])
+def test_names_that_xml_cannot_hold_get_a_sentence(tmp_path, name):
+    for sensors, robot in (
+        ([OpenRaveSensor("T", "finger", SensorParameters())], name),
+        ([OpenRaveSensor(name, "f", SensorParameters())], "hand"),
+    ):
+        with pytest.raises(FileError, match="XML cannot hold the name"):
+            write_openrave(tmp_path / "robot.xml", sensors, robot)
+    assert not list(tmp_path.iterdir())
