@@ -11,6 +11,7 @@ import argparse
 import importlib
 import json
 import os
+import signal
 import sys
 import tempfile
 import time
@@ -68,4 +69,5 @@ def attack(area: Area, tally: Tally, only: list[str] | None = None) -> Tally:
 
 
 if __name__ == "__main__":
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))  # processes are ended and disks unmounted then, too
     sys.exit(main())

@@ -200,6 +200,7 @@ class Device:
 
     def make(self) -> bool:
         """Make and mount an empty file system; return False if the system does not let us."""
+        self.image.unlink(missing_ok=True)  # the system may still keep blocks of the device that the old file was
         with open(self.image, "wb") as file:
             file.truncate(DEVICE_SIZE)
         made = subprocess.run(["mkfs.ext4", "-q", "-m", "0", str(self.image)], capture_output=True).returncode == 0
@@ -359,6 +360,7 @@ class PowerCut(Area):
         if cut is not None:
             time.sleep(cut[0])
             process.send_signal(signal.SIGSTOP)
+            cut[1].unlink(missing_ok=True)
             shutil.copyfile(device.image, cut[1])
             process.kill()
             process.wait()
