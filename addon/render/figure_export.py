@@ -16,7 +16,7 @@ from ...core.figures.side_by_side import side_by_side
 from ...core.figures.tactile_strip import tactile_strip
 from ...core.figures.texel_numbers import MOST, texel_numbers
 from ...core.figures.time_curves import time_curves
-from ...core.io.bake_folder import folder_names
+from ...core.io.bake_folder import file_stems
 from ...core.io.bake_reader import Bake, frame_index, read_sensors
 from ...core.io.disk_space import require_space
 from ...core.io.file_list import FileList
@@ -95,7 +95,7 @@ def make_figures(scene, folder, request: FigureRequest) -> Job[list[Path]]:
         made = files.replace(new, kinds, manifest.bake_id or manifest.digest)
     for kind in request.exports:
         yield steps.next(f"Writing {kind.upper()}", frames[0])
-        made += run_job(export(bake, kind, folder / f"data {kind}", request.style))
+        made += run_job(export(bake, kind, folder / f"data_{kind}", request.style))
     return made
 
 
@@ -112,11 +112,11 @@ def draw_figures(bake: Bake, folder: Path, request: FigureRequest, frames: Seque
             time_curves(folder / f"curves.{ending}", *parts, bake.parameters, style=request.style)
             written["curves"].append(folder / f"curves.{ending}")
         if "numbers" in request.kinds:
-            for name, stem in folder_names(bake.texels).items():
+            for name, stem in file_stems(bake.texels).items():
                 if len(bake.texels[name]) > MOST and not request.sensors:
                     continue  # unreadably many numbers; a sensor that the request names raises an error instead
                 for number in frames:
-                    path = folder / f"numbers {stem} {number:04d}.{ending}"
+                    path = folder / f"numbers_{stem}_{number:04d}.{ending}"
                     texel_numbers(path, *parts, name, number, request.style)
                     written["numbers"].append(path)
     return written
@@ -129,9 +129,9 @@ def _render_pictures(scene, folder, request, bake, frames, steps) -> Job[list[Pa
         for number in frames:
             yield steps.next("Rendering", number)
             show_frame(number)
-            plain = folder / f"scene {number:04d}.png"
+            plain = folder / f"scene_{number:04d}.png"
             written.append(render.render_frame(scene, plain, number, samples=request.samples, size=request.size))
-            beside = folder / f"scene and touch {number:04d}.png"
+            beside = folder / f"scene_and_touch_{number:04d}.png"
             side_by_side(plain, beside, bake.recording, bake.texels, number, request.style, request.size[1])
             written.append(beside)
     return written

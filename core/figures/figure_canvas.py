@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+FONTS = ("Arial", "Helvetica", "Liberation Sans", "Nimbus Sans", "DejaVu Sans")
+"""The first of these that the system has: the letters that journals ask for, or those that come with matplotlib."""
 FILE_TYPES = ("png", "pdf", "svg")
 """Endings of the files that a figure can become."""
 
@@ -91,7 +93,13 @@ def save_figure(figure: Figure, path: str | Path, dpi: float) -> None:
 def _write(figure: Figure, path: Path, dpi: float, kind: str, metadata: dict[str, Any]) -> None:
     import matplotlib
 
-    plain = {"pdf.fonttype": 42, "svg.fonttype": "none", "svg.hashsalt": "palpate"}
+    plain = {
+        "font.family": "sans-serif",
+        "font.sans-serif": FONTS,
+        "pdf.fonttype": 42,
+        "svg.fonttype": "none",
+        "svg.hashsalt": "palpate",
+    }
     encoded = io.BytesIO()  # a full disk breaks the encoders, so they write into memory
     with matplotlib.rc_context(plain):
         figure.savefig(encoded, dpi=dpi, format=kind, metadata=metadata)

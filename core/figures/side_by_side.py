@@ -164,9 +164,9 @@ def _force_so_far(axes: Axes, recording: Recording, i: int, texels: Mapping[str,
         below = len(texels) - 1 - number  # the first are wider, so that equal curves do not hide each other
         axes.plot(recording.times, force, color=SERIES[number], lw=0.8 + below, alpha=0.35)
         axes.plot(recording.times[: i + 1], force[: i + 1], color=SERIES[number], lw=1.4 + 1.2 * below)
-        axes.plot(recording.times[i], force[i], "o", color=SERIES[number], ms=3.5 + 2.0 * below)
+        axes.plot(recording.times[i], force[i], "o", color=SERIES[number], ms=3.5 + 2.0 * below, clip_on=False)
+    axes.margins(x=0.02, y=0.12)  # room for the marker at the peak
     axes.set_ylim(bottom=0)
-    axes.margins(x=0.02)
     axes.set_xlabel("time (s)", labelpad=-7)
     axes.set_title("normal force (N)", fontsize=SMALL, color=INK, loc="left", pad=3)
     tidy_axes(axes)

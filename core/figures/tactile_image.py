@@ -18,43 +18,49 @@ if TYPE_CHECKING:
 
 SMALLEST_ARROW = 0.08
 """Share of the strongest shear below which no arrow is drawn."""
+LONGEST_ARROW = 0.95
+"""Of an arrow over the distance between two: neighbours that point the same way do not touch."""
 MOST_ARROWS = 18
 """Along the longer side: where texels are denser, an arrow is the mean of several."""
 LEAST_ARROWS, ARROW_ROOM = 5, 0.09
 """The fewest of them, and the inches that one needs to be seen."""
-ARROW = "simple,head_length=5,head_width=5,tail_width=1.5"
+OUTLINE = "#9aa3ad"
+"""Colour of the rim of a surface and of the frame of an image."""
+ARROW = "simple,head_length=4,head_width=5,tail_width=1.5"
+MOST_VECTORS = 5000
+"""Triangles of a surface beyond which its colours are pixels in a PDF or SVG, which would else be slow to show."""
 _BARS = (0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100, 200, 500)
 
 
 @dataclass(frozen=True)
 class SensorView:
-    """How one sensor's texels are drawn: an image and where the texels lie on it.
+    """How one sensor's texels are drawn: a grid as an image, any other surface in parts, one for each texel.
 
     Attributes
     ----------
-    extent : (4,) float
-        Left, right, bottom and top of the whole image, in millimetres.
     window : (4,) float
-        The part of it that shows texels.
+        Left, right, bottom and top of what is shown, in millimetres.
     points : (n, 2) float
         Where the texels lie.
     seen : (n,) bool
         Which of them are not on the far side.
     triangles : (m, 3) int or None
-        Drawn instead of the image where that is an atlas of single triangles, or a map without true lengths: the most
-        loaded side of the surface, seen from outside.
+        Of a surface, as numbers of texels; None for a grid.
+    corners : (m, 3, 2) float or None
+        Where the corners of the triangles are drawn: on the flattened surface, or, where that is an atlas of single triangles
+        or a map without true lengths, as the most loaded side is seen from outside.
     axes : (2, 3) float or None
-        Of that view, in the frame of the sensor's body; elsewhere the texels' own axes are the image's.
+        Of a view from outside, in the frame of the sensor's body; elsewhere the texels' own axes are the image's.
     most : int
         Arrows along the longer side.
     """
 
     texels: Texels
-    extent: tuple[float, float, float, float]
     window: tuple[float, float, float, float]
     points: np.ndarray
     seen: np.ndarray
     triangles: np.ndarray | None = None
+    corners: np.ndarray | None = None
     axes: np.ndarray | None = None
     most: int = MOST_ARROWS
 
@@ -69,17 +75,12 @@ class SensorView:
         if isinstance(layout, GridLayout):
             pitch_x, pitch_y = _pitch(texels, layout.row, layout.column), _pitch(texels, layout.column, layout.row)
             points = np.stack([(layout.column + 0.5) * pitch_x, (layout.row + 0.5) * pitch_y], axis=1)
-            whole = (0.0, columns * pitch_x, 0.0, rows * pitch_y)
-            return cls(texels, whole, whole, points, np.ones(len(texels), bool))
+            return cls(texels, (0.0, columns * pitch_x, 0.0, rows * pitch_y), points, np.ones(len(texels), bool))
         if layout.cell or layout.map_name:
             return cls._from_outside(texels, load)
-        size = _millimetres_per_pixel(texels)
-        points = np.asarray(layout.uv()) * [columns, rows] * size
-        row, column = np.nonzero(layout.mask())
-        left, right, bottom, top = (float(size * x) for x in (column.min() - 1, column.max() + 2, row.min() - 1, row.max() + 2))
-        return cls(
-            texels, (0.0, columns * size, 0.0, rows * size), (left, right, bottom, top), points, np.ones(len(texels), bool)
-        )
+        scale = np.array([columns, rows]) * _millimetres_per_pixel(texels)
+        corners, points = layout.corner_uv * scale, np.asarray(layout.uv()) * scale
+        return cls(texels, _window(corners), points, np.ones(len(texels), bool), layout.triangles, corners)
 
     @classmethod
     def _from_outside(cls, texels: Texels, load: np.ndarray | None) -> SensorView:
@@ -98,11 +99,8 @@ class SensorView:
         triangles = layout.triangles[turn > 0]
         seen = np.zeros(len(texels), bool)
         seen[triangles] = True
-        low, high = points[seen].min(axis=0), points[seen].max(axis=0)
-        points = points - low
-        reach = tuple(float(x) for x in high - low)
-        window = (0.0, reach[0], 0.0, reach[1])
-        return cls(texels, window, window, points, seen, triangles, axes)
+        corners = points[triangles]
+        return cls(texels, _window(corners), points, seen, triangles, corners, axes)
 
     @property
     def width(self) -> float:
@@ -125,7 +123,7 @@ class SensorView:
         layout = self.texels.layout
         if isinstance(layout, GridLayout):
             return f"{layout.rows} × {layout.columns} texels\n{self.width / layout.columns:.3g} mm pitch"
-        how = "flattened" if self.triangles is None else f"{self.seen.sum()} in view"
+        how = "flattened" if self.axes is None else f"{self.seen.sum()} in view"
         return f"{len(self.texels)} texels,\n{how}"
 
     def at_size(self, inches: float) -> SensorView:
@@ -134,12 +132,23 @@ class SensorView:
         return replace(self, most=int(np.clip(longer / ARROW_ROOM, LEAST_ARROWS, MOST_ARROWS)))
 
     @property
-    def arrow(self) -> float:
-        """Length of the longest arrow, mm."""
+    def _texels_apart(self) -> float:
+        """Distance of neighbouring texels, mm; the side of a square of the mean area where they form no grid."""
         layout = self.texels.layout
-        if isinstance(layout, GridLayout) and max(layout.shape) <= self.most:
-            return 1.2 * self.width / layout.columns
-        return 1.4 * max(self.width, self.height) / self.most
+        if isinstance(layout, GridLayout):
+            return min(self.width / layout.columns, self.height / layout.rows)
+        return float(np.sqrt(self.width * self.height / max(self.seen.sum(), 1)))
+
+    @property
+    def _cell(self) -> float:
+        """Side of the squares, mm, of which each gets an arrow; zero where each texel does."""
+        cell = max(self.width, self.height) / self.most
+        return cell if cell > self._texels_apart * (1 + 1e-9) else 0.0
+
+    @property
+    def arrow(self) -> float:
+        """Length of the longest arrow, mm: no longer than arrows are apart."""
+        return LONGEST_ARROW * max(self._cell, self._texels_apart)
 
     def draw(
         self,
@@ -149,18 +158,17 @@ class SensorView:
         strongest: float,
         top: float,
         style: FigureStyle,
-        edge: str = "#9aa3ad",
+        edge: str = OUTLINE,
     ) -> Any:
-        """Draw one tactile image; the arrow of the `strongest` shear is a little longer than a texel."""
+        """Draw one tactile image; the arrow of the `strongest` shear is as long as texels, or arrows, are apart."""
         layout = self.texels.layout
-        colours: dict[str, Any] = {"cmap": style.matplotlib_colormap(), "vmin": 0.0, "vmax": top}
+        colours: dict[str, Any] = {"cmap": style.matplotlib_colormap(), "clim": (0.0, top)}
         image: Any
-        if self.triangles is not None:
-            image = axes.tripcolor(*self.points.T, self.triangles, values, shading="gouraud", rasterized=True, **colours)
-            axes.set_aspect("equal")
+        if self.corners is not None and self.triangles is not None:
+            image = _draw_surface(axes, self.triangles, self.corners, values, colours)
         else:
             picture: Any = np.ma.masked_array(layout.image(values), ~layout.mask())
-            image = axes.imshow(picture, origin="lower", extent=self.extent, interpolation="nearest", **colours)
+            image = axes.imshow(picture, origin="lower", extent=self.window, interpolation="nearest", **colours)
         self._arrows(axes, shear, strongest)
         if isinstance(layout, GridLayout) and max(layout.shape) <= 64:
             rows, columns = layout.shape
@@ -198,7 +206,7 @@ class SensorView:
             color="white",
             edgecolor="black",
             linewidth=0.35,
-            width=self.arrow * 0.1,
+            width=self.arrow * 0.12,
             units="xy",
             headwidth=3.6,
             headlength=3.8,
@@ -210,16 +218,51 @@ class SensorView:
 
     def _thinned(self, shear: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return where arrows stand and the mean shear of the texels around them; every texel where there are few."""
-        cell = max(self.width, self.height) / self.most
-        places = np.floor((self.points - [self.window[0], self.window[2]]) / cell).astype(int)
-        layout = self.texels.layout
-        if isinstance(layout, GridLayout) and max(layout.shape) <= self.most:
-            return self.points, shear
-        places, points, shear = places[self.seen], self.points[self.seen], shear[self.seen]
+        points, shear = self.points[self.seen], shear[self.seen]
+        if not self._cell:
+            return points, shear
+        places = np.floor((points - [self.window[0], self.window[2]]) / self._cell).astype(int)
         _, which, count = np.unique(places, axis=0, return_inverse=True, return_counts=True)
         which = which.ravel()
         middle, mean = (np.column_stack([np.bincount(which, table[:, i]) / count for i in (0, 1)]) for table in (points, shear))
         return middle, mean
+
+
+def _window(corners: np.ndarray) -> tuple[float, float, float, float]:
+    """Return left, right, bottom and top of (m, 3, 2) corners, with a rim of 1 % of the longer side."""
+    low, high = corners.min(axis=(0, 1)), corners.max(axis=(0, 1))
+    rim = 0.01 * float((high - low).max())
+    return float(low[0]) - rim, float(high[0]) + rim, float(low[1]) - rim, float(high[1]) + rim
+
+
+def _draw_surface(axes: Axes, triangles: np.ndarray, corners: np.ndarray, values: np.ndarray, colours: dict[str, Any]) -> Any:
+    """Give each texel the third of every triangle that is nearest to its corner, and draw the outline of the surface.
+
+    A gradient from texel to texel would look finer than the sensor is.
+    """
+    from matplotlib.collections import LineCollection, PolyCollection
+
+    middle = corners.mean(axis=1, keepdims=True).repeat(3, axis=1)
+    after, before = 0.5 * (corners + np.roll(corners, -1, axis=1)), 0.5 * (corners + np.roll(corners, 1, axis=1))
+    parts = np.stack([corners, after, middle, before], axis=2).reshape(-1, 4, 2)
+    whole = len(triangles) > MOST_VECTORS
+    # A part without an edge leaves a hair of the page between itself and its neighbours.
+    surface = PolyCollection(
+        parts, array=values[triangles].ravel(), edgecolors="face", linewidths=0.2, rasterized=whole, **colours
+    )
+    axes.add_collection(surface)
+    rim = LineCollection(list(_outline(triangles, corners)), colors=OUTLINE, linewidths=0.5, zorder=1.5)
+    axes.add_collection(rim)
+    axes.set_aspect("equal")
+    return surface
+
+
+def _outline(triangles: np.ndarray, corners: np.ndarray) -> np.ndarray:
+    """Return the edges that belong to one triangle only, (e, 2, 2)."""
+    edges = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2).reshape(-1, 2)
+    ends = np.stack([corners, np.roll(corners, -1, axis=1)], axis=2).reshape(-1, 2, 2)
+    _, which, count = np.unique(np.sort(edges, axis=1), axis=0, return_inverse=True, return_counts=True)
+    return ends[count[which.ravel()] == 1]
 
 
 def _pitch(texels: Texels, across: np.ndarray, along: np.ndarray) -> float:

@@ -24,6 +24,7 @@ MOST = 1024
 """Texels whose numbers can still be told apart on a page."""
 _LETTER = 0.62
 """Width of a digit over the size of its font."""
+ZERO = "0"
 _RIGHT, _ABOVE, _SIDE = 0.95, 0.32, 0.12
 """Inches around the image: for the colour bar, for the title, and elsewhere."""
 
@@ -97,11 +98,14 @@ def _numbers(values: np.ndarray, quantity: str) -> tuple[str, list[str]]:
 
 
 def _write_numbers(axes: Axes, view: SensorView, words: list[str], colours: np.ndarray) -> None:
-    """Write a word on each texel in view, in white or black ink, whichever is legible on the texel's (n, 4) colour."""
+    """Write a word on each texel in view that is not at zero, in ink that is legible on the texel's (n, 4) colour."""
     from matplotlib.patheffects import withStroke
 
     on_grid = isinstance(view.texels.layout, GridLayout)
-    for (x, y), word, colour in zip(view.points[view.seen], np.array(words)[view.seen], colours[view.seen], strict=True):
+    for texel in np.flatnonzero(view.seen):
+        (x, y), word, colour = view.points[texel], words[texel], colours[texel]
+        if word == ZERO:  # the colour says it, and so many zeros would hide the others
+            continue
         light = float(np.dot(colour[:3], (0.299, 0.587, 0.114))) > 0.5
         ink, around = (INK, "white") if light else ("white", INK)
         # Without a grid, numbers at the edge lie half on the white page.
@@ -119,7 +123,7 @@ def _digits(value: float, peak: float) -> str:
     """Return a number with as many decimals as give the largest one three digits."""
     decimals = 0 if peak <= 0 else int(np.clip(2 - np.floor(np.log10(peak)), 0, 3))
     text = f"{value:.{decimals}f}"
-    return "0" if float(text) == 0.0 else text
+    return ZERO if float(text) == 0.0 else text
 
 
 def _room(view: SensorView, axis: int = 0) -> float:

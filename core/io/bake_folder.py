@@ -59,6 +59,19 @@ def folder_names(names: Iterable[str]) -> dict[str, str]:
     return chosen
 
 
+def file_stems(names: Iterable[str]) -> dict[str, str]:
+    """Return a unique part of a file name without blanks for each sensor."""
+    chosen: dict[str, str] = {}
+    taken: set[str] = set()
+    for name, folder in folder_names(names).items():
+        stem = folder.replace(" ", "_")
+        while stem.casefold() in taken:
+            stem += "_"
+        taken.add(stem.casefold())
+        chosen[name] = stem
+    return chosen
+
+
 def frame_file(frame: int) -> str:
     """Return the name of a frame's tactile image; Blender plays files named like this as a sequence."""
     return f"tactile_{frame:04d}.exr"

@@ -16,6 +16,10 @@ AT_LIMIT = 0.9
 CREEPING = 1e-6
 """Speed, m/s, up to which a texel at its limit still counts as sticking."""
 
+ROUNDED_SHEAR = 1e-9
+"""Of the shear of a texel over the largest normal force: less is rounding. A cube at rest on a level pad leaves 3e-16,
+and a tilt of a microradian would give 1e-6."""
+
 
 def net_shear(sensor: SensorRecording, texels: Texels) -> np.ndarray:
     """Return the sum of all texels' shear forces, in the frame of the sensor's body.
@@ -113,9 +117,10 @@ def _peak(values: Iterable[np.ndarray]) -> float:
 
 
 def peak_shear(recording: Recording) -> float:
-    """Return the largest shear force of any texel at any frame, N; zero without any."""
+    """Return the largest shear force of any texel at any frame, N; zero where there is none beyond rounding."""
     sensors = (sensor for part in recording.blocks() for sensor in part.sensors.values())
-    return max((float(np.linalg.norm(sensor.shear, axis=2).max(initial=0.0)) for sensor in sensors), default=0.0)
+    peak = max((float(np.linalg.norm(sensor.shear, axis=2).max(initial=0.0)) for sensor in sensors), default=0.0)
+    return peak if peak > ROUNDED_SHEAR * peak_force(recording) else 0.0
 
 
 def rounded_limit(value: float) -> float:

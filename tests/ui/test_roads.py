@@ -75,9 +75,9 @@ def test_fits(play_road):
 def test_figures(play_road):
     """All figures by the panel's button, stopped once by ESC."""
     files = play_road("figures", timeout=900)["values"]["files"]
-    expected = {f"{kind}.{ending}" for kind in ("strip", "curves") for ending in ("png", "pdf")} | {"video.mp4", "data csv"}
+    expected = {f"{kind}.{ending}" for kind in ("strip", "curves") for ending in ("png", "pdf")} | {"video.mp4", "data_csv"}
     assert expected <= set(files)
-    for start in ("scene 00", "scene and touch 00", "numbers Left finger 00", "numbers Right finger 00"):
+    for start in ("scene_00", "scene_and_touch_00", "numbers_Left_finger_00", "numbers_Right_finger_00"):
         assert any(name.startswith(start) for name in files), start
 
 

@@ -32,11 +32,11 @@ def test_everything_that_is_chosen_is_made(baked):
     assert bpy.ops.palpate.figures_make() == {"FINISHED"}
     names = {path.name for path in (place / "figures").iterdir()}
     expected = {f"{kind}.{ending}" for kind in ("strip", "curves") for ending in ("png", "pdf")}
-    expected |= {f"numbers Pad {number:04d}.{ending}" for number in (2, 3, 4) for ending in ("png", "pdf")}
-    expected |= {f"{kind} {number:04d}.png" for kind in ("scene", "scene and touch") for number in (2, 3, 4)}
-    assert names == expected | {"video.mp4", "data csv", "data npz", "data png", LIST_NAME}
-    assert (place / "figures" / "data csv" / "Pad" / "normal_force.csv").is_file()
-    picture = bpy.data.images.load(str(place / "figures" / "scene 0004.png"))
+    expected |= {f"numbers_Pad_{number:04d}.{ending}" for number in (2, 3, 4) for ending in ("png", "pdf")}
+    expected |= {f"{kind}_{number:04d}.png" for kind in ("scene", "scene_and_touch") for number in (2, 3, 4)}
+    assert names == expected | {"video.mp4", "data_csv", "data_npz", "data_png", LIST_NAME}
+    assert (place / "figures" / "data_csv" / "Pad" / "normal_force.csv").is_file()
+    picture = bpy.data.images.load(str(place / "figures" / "scene_0004.png"))
     assert tuple(picture.size) == (160, 120) and picture.channels == 4
 
 

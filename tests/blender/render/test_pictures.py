@@ -58,8 +58,8 @@ def test_everything_at_once_and_nothing_left_behind(baked, tmp_path):
     )
     assert {path.name for path in written} == {path.name for path in (tmp_path / "out").iterdir()} - {LIST_NAME}
     assert {path.suffix for path in written} == {".png", ".pdf", ".mp4"}
-    assert image(tmp_path / "out" / "scene 0003.png").shape[:2] == (64, 96)
-    assert image(tmp_path / "out" / "scene and touch 0003.png").shape[0] == 64
+    assert image(tmp_path / "out" / "scene_0003.png").shape[:2] == (64, 96)
+    assert image(tmp_path / "out" / "scene_and_touch_0003.png").shape[0] == 64
     assert (tmp_path / "out" / "video.mp4").stat().st_size > 1000
     assert stages[-1][0] == stages[-1][1] and [done for done, _ in stages] == sorted(done for done, _ in stages)
     assert [line for line in changes(before, dump()) if "Render Result" not in line] == []  # Blender's own
@@ -106,12 +106,12 @@ def test_figures_take_the_place_of_earlier_ones_as_a_whole(baked, tmp_path, monk
         assert ages(copy)["curves mine.png"] == "mine"
         shutil.rmtree(copy)
     draw(out, 4)
-    assert {f"numbers Pad 000{frame}.png" for frame in (3, 4)} < set(ages(out))
+    assert {f"numbers_Pad_000{frame}.png" for frame in (3, 4)} < set(ages(out))
     made = figure_export.read_scene_bake(scene)
     another = replace(made, manifests={name: replace(one, bake_id="another") for name, one in made.manifests.items()})
     monkeypatch.setattr(figure_export, "read_scene_bake", lambda _: another)
     draw(out, 2)
-    assert {name for name in ages(out) if "Pad" in name} == {"numbers Pad 0002.png", "numbers Pad 2 0002.png"}
+    assert {name for name in ages(out) if "Pad" in name} == {"numbers_Pad_0002.png", "numbers_Pad_2_0002.png"}
 
 
 def test_a_full_disk_is_found_before_a_render(baked, tmp_path, monkeypatch):
@@ -183,7 +183,7 @@ def test_the_command(baked, tmp_path, capsys):
     _, path = baked
     words = ["render", str(path), "--out", str(tmp_path / "out"), "--only", "strip", "--only", "numbers", "--format", "pdf"]
     assert main([*words, "--sensor", "Pad", "--colour-map", "paper", "--quantity", "pressure", "--width", "single"]) == 0
-    assert sorted(item.name for item in (tmp_path / "out").iterdir()) == [LIST_NAME, "numbers Pad 0004.pdf", "strip.pdf"]
+    assert sorted(item.name for item in (tmp_path / "out").iterdir()) == [LIST_NAME, "numbers_Pad_0004.pdf", "strip.pdf"]
     assert main([*words, "--sensor", "Thumb"]) == 1
     assert "There is no sensor 'Thumb'" in capsys.readouterr().err
 
@@ -207,7 +207,7 @@ def test_workbench_shows_the_heat_map_and_leaves_meshes_alone(baked, tmp_path):
         view=(-90, 89),
     )
     run_job(figure_export.make_figures(scene, tmp_path / "out", request))
-    picture = image(tmp_path / "out" / "scene 0004.png")[..., :3]
+    picture = image(tmp_path / "out" / "scene_0004.png")[..., :3]
     assert np.ptp(picture, axis=2).max() > 0.4  # the purples and oranges of magma, on grey
     assert [line for line in changes(before, dump()) if "Render Result" not in line] == []
     assert len(bpy.data.meshes) == meshes

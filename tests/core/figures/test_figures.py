@@ -153,6 +153,48 @@ def test_numbers_are_those_of_the_texels_in_their_places(tmp_path, monkeypatch):
         assert float(text.get_text()) == pytest.approx(1e3 * force[row, column], abs=0.05)  # millinewtons
 
 
+def test_no_number_stands_on_a_texel_at_zero(tmp_path, monkeypatch):
+    texels = grid_texels()
+    recording = recording_of(texels)
+    recording.sensors["pad"].normal_force[:, 3:] = 0.0
+    figure = drawn(tmp_path, monkeypatch, lambda path: texel_numbers(path, recording, {"pad": texels}, "pad", 5))
+    assert len(figure.axes[0].texts) == 3
+
+
+def test_on_a_surface_each_texel_colours_its_share_of_the_area(tmp_path, monkeypatch):
+    """A texel has its value on a third of the triangles around it; together the texels cover the surface."""
+    texels = round_texels()
+    recording = recording_of(texels)
+    figure = drawn(tmp_path, monkeypatch, lambda path: tactile_strip(path, recording, {"pad": texels}, [5]))
+    surface, rim = figure.axes[0].collections[:2]
+    parts = np.array([path.vertices[:4] for path in surface.get_paths()])
+    ahead = np.roll(parts, -1, axis=1)
+    area = 0.5 * np.abs((parts[..., 0] * ahead[..., 1] - parts[..., 1] * ahead[..., 0]).sum(axis=1))
+    flat = 12 * 0.5 * 10.0**2 * np.sin(np.pi / 6)  # of the rim's polygon in mm²; the cap is flattened along its axis
+    assert area.sum() == pytest.approx(flat, rel=0.05)
+    force = recording.sensors["pad"].normal_force[4]
+    middle = surface.get_array() == force[0]
+    assert area[middle].sum() == pytest.approx(area.sum() / 3)
+    assert sorted(np.unique(surface.get_array())) == pytest.approx(sorted(force))
+    assert len(rim.get_segments()) == 12
+
+
+@pytest.mark.parametrize("texels", [grid_texels(), round_texels()], ids=["grid", "surface"])
+@pytest.mark.parametrize("inches", [0.01, 0.05, 0.5])
+def test_no_arrow_is_longer_than_arrows_are_apart(texels, inches):
+    view = tactile_image.SensorView.of(texels).at_size(inches)
+    places, _ = view._thinned(np.zeros((len(texels), 2)))
+    gaps = np.linalg.norm(places[:, None] - places[None], axis=2)[~np.eye(len(places), dtype=bool)]
+    assert view.arrow < np.median(gaps.reshape(len(places), -1).min(axis=1)) * 1.3
+
+
+def test_rounding_is_no_shear():
+    recording = recording_of(grid_texels())
+    assert metrics.peak_shear(recording) > 0.0
+    recording.sensors["pad"].shear[:] *= 1e-14
+    assert metrics.peak_shear(recording) == 0.0
+
+
 def test_a_colour_bar_in_kilopascals_is_force_over_area(tmp_path, monkeypatch):
     """A corner texel of a grid has a quarter (one of its two corners: a sixth or a third) of an inner one's area."""
     texels = grid_texels()
@@ -182,10 +224,10 @@ def test_a_closed_sensor_is_shown_from_the_side_that_bears(tmp_path, monkeypatch
     felt.shear[:, :, 1] = np.einsum("ij,ij->i", force, texels.bitangent)
     figure = drawn(tmp_path, monkeypatch, lambda path: tactile_strip(path, recording, {"pad": texels}, [3]))
     axes = figure.axes[0]
-    mesh, arrows = axes.collections
-    seen = np.unique(mesh._triangulation.triangles)
-    assert (texels.normal[seen] @ [1.0, 0.0, 0.0] > -0.35).all() and loaded[seen].sum() == loaded.sum()
+    _, _, arrows = axes.collections
     view = tactile_image.SensorView.of(texels, felt.normal_force.sum(axis=0))
+    seen = np.unique(view.triangles)
+    assert (texels.normal[seen] @ [1.0, 0.0, 0.0] > -0.35).all() and loaded[seen].sum() == loaded.sum()
     expected = np.array([0.0, 0.0, 1.0]) @ view.axes.T
     mean = np.array([arrows.U.mean(), arrows.V.mean()])
     np.testing.assert_allclose(mean / np.linalg.norm(mean), expected, atol=0.05)

@@ -27,7 +27,15 @@ from palpate.core.geometry.layout.texture_maps import uv_layout
 from palpate.core.geometry.mesh import TriangleMesh
 from palpate.core.geometry.texels import texels_from_region
 from palpate.core.io import exr_backend, exr_codec, exr_library, file_writing
-from palpate.core.io.bake_folder import OWN_DIGEST, Manifest, folder_names, frame_file, read_manifest, write_manifest
+from palpate.core.io.bake_folder import (
+    OWN_DIGEST,
+    Manifest,
+    file_stems,
+    folder_names,
+    frame_file,
+    read_manifest,
+    write_manifest,
+)
 from palpate.core.io.file_writing import atomic_write, remove_leftovers, writable_file, writable_folder
 from palpate.core.io.recording_npz import load_recording, save_recording
 from palpate.core.io.tactile_exr import CHANNELS, describe, exr_channels, read_exr, write_exr, write_exrs
@@ -216,6 +224,14 @@ def test_kill_in_the_middle_leaves_the_old_file(tmp_path):
 
 
 # --- names
+
+
+def test_file_stems_have_no_blanks_and_are_unique():
+    assert file_stems(["Index finger", "Index_finger", "Thumb"]) == {
+        "Index finger": "Index_finger",
+        "Index_finger": "Index_finger_",
+        "Thumb": "Thumb",
+    }
 
 
 def test_folder_names():
