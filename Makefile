@@ -52,7 +52,7 @@ demo: env
 lint: env
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
-	$(BIN)/mypy
+	$(BIN)/python tools/check_types.py
 
 test: lint env50
 	$(BIN)/python -m pytest tests/core tests/tools tests/blender $(PYTEST_ARGS)

@@ -6,7 +6,7 @@ Nothing of Blender is imported here at module level, so that ``palpate.core`` lo
 
 import atexit
 
-__version__ = "0.1.0"
+from .core.version import VERSION as __version__  # noqa: F401
 
 
 def _rooms():

@@ -16,9 +16,9 @@ from contextlib import nullcontext, suppress
 from pathlib import Path
 from typing import NoReturn
 
-from .. import __version__
 from ..core.errors import Cancelled, PalpateError
 from ..core.io.file_writing import os_error_reason
+from ..core.version import VERSION
 from . import console, limits
 
 COMMANDS = {
@@ -139,7 +139,7 @@ def _parser() -> argparse.ArgumentParser:
         description="Make any mesh a tactile sensor: simulate, bake and render what it feels.",
         epilog="palpate COMMAND --help says more about a command.",
     )
-    parser.add_argument("--version", action="version", version=f"palpate {__version__}")
+    parser.add_argument("--version", action="version", version=f"palpate {VERSION}")
     subparsers = parser.add_subparsers(dest="command", metavar="COMMAND", title="commands")
     for name, summary in COMMANDS.items():
         ready = name in READY

@@ -6,6 +6,7 @@ from __future__ import annotations
 import argparse
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -13,6 +14,10 @@ from ..core.errors import SceneError
 from ..core.io.file_writing import writable_folder
 from ..core.response.metrics import net_shear
 from . import blender, console
+
+if TYPE_CHECKING:
+    from ..addon.bake.bake import BakeResult
+    from ..addon.bake.bake_files import BlendToSave
 
 LAST_FRAME = 1048574
 """The last frame that a scene of Blender can have."""
@@ -88,7 +93,7 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _write_scenario(scene, path: str) -> int:
+def _write_scenario(scene: Any, path: str) -> int:
     """Read a scene and write its scenario."""
     from ..addon.scene import scene_reader
     from ..core.io.file_writing import writable_file
@@ -102,7 +107,7 @@ def _write_scenario(scene, path: str) -> int:
     return 0
 
 
-def _prepare(scene, arguments: argparse.Namespace) -> None:
+def _prepare(scene: Any, arguments: argparse.Namespace) -> None:
     """Change the open scene as the options ask."""
     for option in arguments.model:
         _put_model(scene, option)
@@ -116,21 +121,23 @@ def _prepare(scene, arguments: argparse.Namespace) -> None:
         _read_out_only(scene, arguments.sensor)
 
 
-def bake_with_progress(scene, into_scene: bool = True, images: bool = True, blend=None):
+def bake_with_progress(
+    scene: Any, into_scene: bool = True, images: bool = True, blend: BlendToSave | None = None
+) -> BakeResult:
     """Bake a scene with a progress bar on stderr, and save a .blend with it; Ctrl-C leaves an earlier bake as it was."""
     from ..addon.bake import bake
 
     return console.run_with_progress_bar("bake", bake.bake(scene, into_scene, images, blend))
 
 
-def report(baked) -> str:
+def report(baked: BakeResult) -> str:
     """Return a summary of a bake for the terminal."""
     recording = baked.recording
     first, last = recording.frames[0], recording.frames[-1]
     span = f"{first} to {last} ({recording.times[-1]:.2f} s), substep {recording.dt * 1e3:.3g} ms"
     lines = [f"frames {span}"]
     texels = {sensor.name: sensor.texels for sensor in baked.scenario.sensors}
-    rows = [("sensor", "texels", "peak texel", "peak normal", "peak shear", "normal at end")]
+    rows: list[tuple[str, ...]] = [("sensor", "texels", "peak texel", "peak normal", "peak shear", "normal at end")]
     peaks, at_end = {name: np.zeros(3) for name in baked.folders}, dict.fromkeys(baked.folders, 0.0)
     for part in recording.blocks():
         for name, readings in part.sensors.items():
@@ -159,7 +166,7 @@ def saved_path(arguments: argparse.Namespace) -> Path | None:
     return path if path.suffix == ".blend" else path.with_name(f"{path.name}.blend")
 
 
-def _check_saved_bake(scene, blend: str) -> None:
+def _check_saved_bake(scene: Any, blend: str) -> None:
     """Raise SceneError if the bake would replace the one that the saved file shows."""
     import bpy
 
@@ -175,7 +182,7 @@ def _check_saved_bake(scene, blend: str) -> None:
             )
 
 
-def _put_model(scene, option: str) -> None:
+def _put_model(scene: Any, option: str) -> None:
     """Apply the option ``--model [NAME=]SENSOR.toml`` to a sensor."""
     from ..addon.measured import gap_results
     from ..core.io.sensor_toml import read_sensor
@@ -198,7 +205,7 @@ def _frame_range(first: int, last: int) -> tuple[int, int]:
     return first, last
 
 
-def _read_out_only(scene, wanted: list[str]) -> None:
+def _read_out_only(scene: Any, wanted: list[str]) -> None:
     """Make all sensors but the wanted ones pads."""
     sensors = {obj.name: obj for obj in scene.objects if obj.palpate.role == "SENSOR"}
     for name in wanted:

@@ -12,12 +12,16 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from ..core.errors import FileError, PalpateError
 from ..core.io import bake_switch
 from ..core.io.file_writing import back_up, exchange_file, remove_leftovers_of, sync_file, writable_file
 from ..core.io.regular_file import open_regular, require_regular
 from . import console
+
+if TYPE_CHECKING:
+    from ..addon.bake.bake_files import BlendToSave
 
 _COMPRESSED = (b"\x28\xb5\x2f\xfd", b"\x1f\x8b")  # Zstandard, and gzip in files from before Blender 3.0
 _SEEKABLE_END = b"\xb1\xea\x92\x8f"
@@ -28,7 +32,7 @@ MOST_NAMED = 5
 """Most drivers that a message names."""
 
 
-def start_blender():
+def start_blender() -> Any:
     """Start Blender if it does not run yet, register the add-on, and return bpy.
 
     Raises
@@ -71,7 +75,7 @@ def add_script_arguments(parser: argparse.ArgumentParser) -> None:
     parser.set_defaults(scripts=REFUSE)
 
 
-def open_scene(path: str | os.PathLike, scripts: str = REFUSE):
+def open_scene(path: str | os.PathLike, scripts: str = REFUSE) -> Any:
     """Start Blender, open a .blend and return its scene; raises what :func:`start_blender` and :func:`open_blend` raise."""
     bpy = start_blender()
     open_blend(path, scripts)
@@ -195,7 +199,7 @@ def save_blend(path: str | os.PathLike, backup: bool = True) -> None:
             sync_file(blend.path)
 
 
-def blend_to_save(path: str | os.PathLike):
+def blend_to_save(path: str | os.PathLike) -> BlendToSave:
     """Return how the open scene is saved to `path` together with a bake.
 
     Raises

@@ -16,7 +16,7 @@ import tempfile
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
-from typing import NoReturn
+from typing import Any, NoReturn
 
 from ..core.errors import PalpateError
 from ..core.jobs.job_runner import run_job
@@ -64,7 +64,7 @@ class Interrupt:
             cls.at_once = before
 
     @classmethod
-    def _press(cls, *_) -> None:
+    def _press(cls, *_: object) -> None:
         cls.check()
         cls.pressed = True
         if cls.at_once:
@@ -173,7 +173,7 @@ def _flush_c() -> None:
     library.fflush(None)
 
 
-def _descriptor(stream) -> int | None:
+def _descriptor(stream: Any) -> int | None:
     """Return the file descriptor of a stream; None if it has none."""
     try:
         return stream.fileno()
@@ -202,7 +202,7 @@ def exit_on_interrupt(message: str, clean_up: Callable[[], object]) -> Iterator[
             os.write(stderr, f"\n{message}\n".encode())
             os._exit(130)
 
-    Interrupt.clean_up = clean_up  # type: ignore[method-assign]
+    Interrupt.clean_up = clean_up
     before = signal.set_wakeup_fd(sender.fileno(), warn_on_full_buffer=False)
     thread = threading.Thread(target=listen, daemon=True)
     thread.start()
@@ -217,7 +217,7 @@ def exit_on_interrupt(message: str, clean_up: Callable[[], object]) -> Iterator[
         os.close(stderr)
 
 
-def progress_bar(label: str, total: int, unit: str = "frame"):
+def progress_bar(label: str, total: int, unit: str = "frame") -> Any:
     """Return a tqdm bar on stderr; it shows nothing if stderr is not a terminal."""
     from tqdm import tqdm
 

@@ -6,6 +6,7 @@ from __future__ import annotations
 import argparse
 import time
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -17,6 +18,11 @@ from ..core.io.file_writing import remove_leftovers, writable_folder
 from ..core.response import metrics
 from . import blender, console, figure_options
 from .bake import bake_with_progress, report
+
+if TYPE_CHECKING:
+    from ..addon.bake.bake import BakeResult
+    from ..core.model.recording import Recording
+    from ..core.model.sensor import Sensor
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -58,7 +64,7 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _build_and_bake(blend: Path, size: tuple[int, int]):
+def _build_and_bake(blend: Path, size: tuple[int, int]) -> tuple[Any, BakeResult]:
     """Build the demo scene, bake it and save it; return the scene and the result of the bake."""
     bpy = blender.start_blender()
     from ..sample_blends import demo
@@ -74,12 +80,12 @@ def _build_and_bake(blend: Path, size: tuple[int, int]):
     return scene, baked
 
 
-def _sensors(baked) -> dict:
+def _sensors(baked: BakeResult) -> dict[str, Sensor]:
     """Return the sensors that are read out, by name."""
     return {sensor.name: sensor for sensor in baked.scenario.sensors if sensor.readout}
 
 
-def _draw(scene, baked, folder: Path, arguments: argparse.Namespace) -> dict[str, Path]:
+def _draw(scene: Any, baked: BakeResult, folder: Path, arguments: argparse.Namespace) -> dict[str, Path]:
     """Draw tactile strip and forces, and render the picture; return the files by what they show."""
     from ..sample_blends import demo
 
@@ -99,14 +105,14 @@ def _draw(scene, baked, folder: Path, arguments: argparse.Namespace) -> dict[str
     return files
 
 
-def _weight(baked) -> float:
+def _weight(baked: BakeResult) -> float:
     """Return the weight of the cube, N."""
     from ..sample_blends import demo
 
     return demo.CUBE_MASS * float(np.linalg.norm(baked.scenario.gravity))
 
 
-def _render_picture(scene, path: Path, arguments: argparse.Namespace) -> None:
+def _render_picture(scene: Any, path: Path, arguments: argparse.Namespace) -> None:
     """Render the scene; Ctrl-C ends the process during the render."""
     from ..addon.render import render
     from ..sample_blends import demo
@@ -122,7 +128,7 @@ def _render_picture(scene, path: Path, arguments: argparse.Namespace) -> None:
         bar.update()
 
 
-def _report_on_contacts(baked) -> str:
+def _report_on_contacts(baked: BakeResult) -> str:
     """Return what the pads measure: friction under the ball, and the weight of the cube."""
     from ..sample_blends import demo
 
@@ -131,7 +137,7 @@ def _report_on_contacts(baked) -> str:
     return f"{slide}\n\n{demo.CUBE} at rest on {demo.PAD_B}: required {required:.6f} N, measured {measured:.6f} N"
 
 
-def _labels(scene, recording, sensors, demo) -> list[Label]:
+def _labels(scene: Any, recording: Recording, sensors: dict[str, Sensor], demo: Any) -> list[Label]:
     """Return labels for the ball and the cube, with the forces on their pads."""
     from ..addon.render import render
 
@@ -151,7 +157,7 @@ def _labels(scene, recording, sensors, demo) -> list[Label]:
     return labels
 
 
-def _slide(recording, sensor) -> str:
+def _slide(recording: Recording, sensor: Sensor) -> str:
     """Return how friction builds up under the ball until it slips, as a table."""
     readings, mu = recording.sensors[sensor.name], sensor.parameters
     normal = readings.normal_force.sum(axis=1)

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import argparse
+from typing import Any
 
 from ..core.figures import color_maps
 from ..core.figures.figure_style import WIDTHS, FigureStyle
@@ -34,7 +35,7 @@ def pixels(text: str) -> int:
     return value
 
 
-def figure_style_from(arguments: argparse.Namespace, **others) -> FigureStyle:
+def figure_style_from(arguments: argparse.Namespace, **others: Any) -> FigureStyle:
     """Return the figure style of the options; `others` replaces the defaults where no option is given."""
     given = {key: value for key in STYLE_OPTIONS if (value := getattr(arguments, key)) is not None}
     if "colour_map" in given:

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
+from typing import Any
 
 from ..core.figures.figure_canvas import file_type
 from ..core.io.file_writing import writable_file
@@ -75,7 +76,7 @@ def _stiffness(arguments: argparse.Namespace) -> None:
         plot_stiffness(arguments.plot, fit)
 
 
-def _pascals(fit) -> str:
+def _pascals(fit: Any) -> str:
     return f"{fit.offset.value:.4g} Pa ({fit.offset.low:.4g} to {fit.offset.high:.4g})"
 
 

@@ -6,6 +6,7 @@ from __future__ import annotations
 import argparse
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from ..core.errors import SceneError
 from ..core.io.disk_space import require_space
@@ -14,6 +15,10 @@ from ..core.io.file_writing import writable_folder
 from ..core.jobs.job_runner import part_of_job
 from ..core.jobs.progress import Job
 from . import blender, checks, console
+
+if TYPE_CHECKING:
+    from ..core.gap.dataset.rig import Rig
+    from ..core.gap.selection.findings import Diagnosis
 
 OUTPUTS = ("gap.json", "sensor.toml", "report.html")
 """Files that are written beside the plots."""
@@ -55,7 +60,7 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _print_report(arguments: argparse.Namespace, rig, result, errors, folder: Path) -> None:
+def _print_report(arguments: argparse.Namespace, rig: Rig, result: Diagnosis, errors: Any, folder: Path) -> None:
     """Print what was found and where it was written."""
     from ..core.gap.fitting import least_squares
     from ..core.gap.report import sentences
@@ -77,7 +82,7 @@ def _print_report(arguments: argparse.Namespace, rig, result, errors, folder: Pa
         print(f"saved:  {arguments.blend}")
 
 
-def _diagnose_and_report(rig, folder: Path) -> Job[tuple]:
+def _diagnose_and_report(rig: Rig, folder: Path) -> Job[tuple[Diagnosis, Any]]:
     """Find the gap of a rig and write its report; return the diagnosis and its errors."""
     from ..core.gap.report import summary
     from ..core.gap.report.comparison import gap_errors
@@ -90,7 +95,7 @@ def _diagnose_and_report(rig, folder: Path) -> Job[tuple]:
     return result, errors
 
 
-def _sensor_in_scene(arguments: argparse.Namespace):
+def _sensor_in_scene(arguments: argparse.Namespace) -> Any:
     """Open the scene of --blend and return the sensor that gets the result."""
     with console.blender_output_hidden():
         scene = blender.open_scene(arguments.blend, arguments.scripts)
@@ -100,7 +105,7 @@ def _sensor_in_scene(arguments: argparse.Namespace):
         return gap_results.sensor_called(scene, arguments.sensor)
 
 
-def _put_into_scene(arguments: argparse.Namespace, sensor) -> None:
+def _put_into_scene(arguments: argparse.Namespace, sensor: Any) -> None:
     """Put the amended sensor on a sensor of a .blend and save it; opened anew, because it may have been edited meanwhile."""
     with console.blender_output_hidden():
         target = _sensor_in_scene(arguments)

@@ -5,6 +5,8 @@ from __future__ import annotations
 
 import argparse
 import time
+from collections.abc import Sequence
+from typing import Any
 
 from ..core.errors import ParameterError
 from ..core.io.file_writing import writable_folder
@@ -34,7 +36,7 @@ def run(arguments: argparse.Namespace) -> int:
         chapters = []
         with console.progress_bar("paper", sum(experiments.EXPERIMENTS[name].steps for name in wanted), unit="step") as bar:
 
-            def progress(*_) -> None:
+            def progress(*_: object) -> None:
                 console.Interrupt.check()
                 bar.update()
 
@@ -48,7 +50,7 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def report(chapters) -> str:
+def report(chapters: Sequence[Any]) -> str:
     """Return all rows as text for the terminal."""
     lines = []
     for chapter in chapters:

@@ -8,11 +8,17 @@ import importlib.util
 import subprocess
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from ..core.errors import PalpateError
 from . import blender, console
 
+if TYPE_CHECKING:
+    from ..sweep.study_folder import OpenStudy
+
 MOST_FAILURES_NAMED = 5
+FORMATS = ("hdf5", "zarr")
+"""What a finished dataset is exported to; the names of sweep.exports, which is not read before a study runs."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -21,6 +27,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--workers", metavar="N", type=_count, help="processes on this machine (default: one per core)")
     parser.add_argument(
         "--scheduler", metavar="ADDRESS", help="use a running Dask scheduler, as tcp://HOST:8786; all machines need the folder"
+    )
+    parser.add_argument(
+        "--format",
+        choices=FORMATS,
+        action="append",
+        default=[],
+        help="also write the finished dataset as dataset.h5 or dataset.zarr; may be given again",
     )
     parser.add_argument("--retry-failed", action="store_true", help="compute failed runs again")
     what = parser.add_mutually_exclusive_group()
@@ -42,9 +55,10 @@ def run(arguments: argparse.Namespace) -> int:
         return 0
     from ..core.io.file_writing import writable_folder
     from ..core.io.folder_lock import FolderLock
-    from ..sweep import driver
+    from ..sweep import driver, exports
 
     driver.require_dask()
+    exports.require_packages(arguments.format)
     lock = FolderLock(writable_folder(folder, create=not place.is_dir()), "sweep")
     try:
         opened = _opened(place, folder, arguments)
@@ -72,7 +86,7 @@ def _folder(place: Path, out: str | None) -> Path:
     return (Path(out) if out is not None else place.with_suffix("")).absolute()
 
 
-def _opened(place: Path, folder: Path, arguments: argparse.Namespace):
+def _opened(place: Path, folder: Path, arguments: argparse.Namespace) -> OpenStudy:
     """Open the study; a .blend is read in a Blender of its own, which is gone before the runs begin."""
     from ..sweep import study_folder
 
@@ -91,7 +105,7 @@ def _read_blend(blend: Path, target: Path, scripts: str) -> None:
         raise PalpateError(words[-1].removeprefix("palpate bake: "))
 
 
-def _print_names(opened) -> None:
+def _print_names(opened: OpenStudy) -> None:
     from ..core.study.variation import owners_text
 
     for name, plan in opened.plans.items():
@@ -105,7 +119,7 @@ def _workers(arguments: argparse.Namespace) -> int:
     return arguments.workers or count_of_cores()
 
 
-def _estimate(opened, arguments: argparse.Namespace) -> int:
+def _estimate(opened: OpenStudy, arguments: argparse.Namespace) -> int:
     from ..sweep.trial import try_runs
 
     found = try_runs(opened.folder, opened.runs, opened.study.run_limit)
@@ -126,7 +140,7 @@ def _duration(seconds: float) -> str:
     return f"{seconds:.0f} seconds"
 
 
-def _compute(opened, arguments: argparse.Namespace) -> int:
+def _compute(opened: OpenStudy, arguments: argparse.Namespace) -> int:
     from ..core.study.run_files import done_runs, failed_runs, make_folders
     from ..sweep import driver
     from ..sweep.status import status_of
@@ -149,15 +163,20 @@ def _compute(opened, arguments: argparse.Namespace) -> int:
         for index, sentence in tally.failures[:MOST_FAILURES_NAMED]:
             print(f"run {index} failed: {sentence}")
     found = status_of(opened.folder)
+    written: list[Path] = []
     if found.done:
         from ..sweep.dataset import publish
+        from ..sweep.exports import EXPORTS
         from ..sweep.report import write_report
 
-        console.Interrupt.check()
-        publish(opened.folder)
-        write_report(opened.folder)
+        with console.Interrupt.raised_at_once():  # all of these files are written whole or not at all
+            publish(opened.folder, opened.runs)
+            written = [path for kind in dict.fromkeys(arguments.format) for path in EXPORTS[kind](opened.folder)]
+            write_report(opened.folder, opened.runs)
     print(found)
     print(f"results: {opened.folder}")
+    for path in written:
+        print(f"export: {path}")
     if found.failed:
         print(f"why runs failed: {opened.folder / 'failed'}; --retry-failed computes them again")
     return 0

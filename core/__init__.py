@@ -8,6 +8,7 @@ right-handed and quaternions are ordered (w, x, y, z).
 
 __all__ = [
     "errors",
+    "version",
     "compiled",
     "jobs",
     "geometry",

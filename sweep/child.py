@@ -65,7 +65,8 @@ def compute_run(scenes: Scenes, run: Run) -> None:
     recording = run_job(solve(scenario, Simulation(scenario, threads=1)))
     made: Press | None = plan.press
     if made is not None:
-        own = {name.removeprefix(f"{PRESS}."): value for name, value in values.items() if name.startswith(f"{PRESS}.")}
+        start = f"{PRESS}."
+        own: dict[str, Any] = {name[len(start) :]: value for name, value in values.items() if name.startswith(start)}
         made = replace(made, **own)
     metrics = metrics_of(scenario, recording, made)
     write_run(scenes.folder, run, scenario, recording, metrics, time.perf_counter() - began)

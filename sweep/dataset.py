@@ -7,20 +7,24 @@ Runs are taken in the order of the design, so that equal runs give equal bytes, 
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from pathlib import Path
 
 from ..core.errors import FileError
 from ..core.io.file_writing import os_error_reason, sync_folder
 from ..core.io.temporary_folder import remove_unfinished, temporary_folder
+from ..core.study.run_files import RUNS
+from ..core.study.run_record import read_run_record
+from ..core.study.study_file import Run
 from .features import read_frames
-from .finished_runs import RUNS_FOLDER, read_run, run_order, study_name
+from .finished_runs import failures, run_order, study_name
 from .lerobot_writer import LeRobotWriter
 from .run_table import write_run_table
 
 DATASET_FOLDER = "dataset"
 
 
-def publish(folder: Path) -> None:
+def publish(folder: Path, planned: Sequence[Run] = ()) -> None:
     """Make ``dataset/``, ``runs.parquet`` and ``timings.csv`` from the runs of a study.
 
     The dataset is written into a hidden folder and renamed into its place last; that of before is removed then. Runs whose
@@ -30,6 +34,8 @@ def publish(folder: Path) -> None:
     ----------
     folder : Path
         Of the study.
+    planned : sequence of Run
+        All runs of the study, which tell what varied in those that failed.
 
     Raises
     ------
@@ -40,7 +46,7 @@ def publish(folder: Path) -> None:
     remove_unfinished(folder)
     order = run_order(folder)
     try:
-        write_run_table(folder, order)
+        write_run_table(folder, order, failures(folder, planned))
         with temporary_folder(folder, "dataset") as hidden:
             new = _write_parts(folder, order, hidden)
             _exchange(new, folder / DATASET_FOLDER, hidden / "before")
@@ -65,7 +71,7 @@ def _write_parts(folder: Path, order: list[tuple[int, str]], hidden: Path) -> Pa
     parts = hidden / "parts"
     writers: dict[str, LeRobotWriter] = {}
     for _, digest in order:
-        run = read_run(folder / RUNS_FOLDER / digest)
+        run = read_run_record(folder / RUNS / digest)
         frames = read_frames(run)
         writer = writers.get(frames.layout_digest)
         if writer is None:

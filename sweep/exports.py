@@ -8,16 +8,17 @@ does not grow with the dataset.
 
 from __future__ import annotations
 
+import importlib
 import json
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ..core.errors import FileError
-from ..core.io.file_writing import atomic_write, os_error_reason, sync_folder
+from ..core.io.file_writing import atomic_write, os_error_reason, sync_file, sync_folder
 from ..core.io.temporary_folder import temporary_folder
 from .dataset import DATASET_FOLDER, require_pyarrow
 
@@ -27,19 +28,18 @@ CHUNK_BYTES = 1 << 20
 """Numbers of an array that are compressed together."""
 
 
-def export_hdf5(folder: Path) -> Path:
-    """Write ``dataset.h5`` beside the dataset of a study, and return its path; several parts become several files.
+def export_hdf5(folder: Path) -> list[Path]:
+    """Write ``dataset.h5`` beside the dataset of a study; each part becomes one. Return what was written.
 
     Raises
     ------
     FileError
         There is no dataset, a package is missing, or the file cannot be written.
     """
-    try:
-        import h5py
-    except ImportError as error:
-        raise FileError("HDF5 needs the package h5py: install it with `pip install h5py`.") from error
+    require_packages(["hdf5"])
+    import h5py
 
+    written = []
     for part, stem in _parts(folder):
         target = folder / f"{stem}.h5"
         # atomic_write holds the lock on the file already
@@ -51,11 +51,12 @@ def export_hdf5(folder: Path) -> Path:
                 return file.create_dataset(name, shape, kind, track_times=False, **packed)
 
             _fill(part, create, file.attrs)
-    return target
+        written.append(target)
+    return written
 
 
-def export_zarr(folder: Path) -> Path:
-    """Write ``dataset.zarr`` beside the dataset of a study, and return its path; several parts become several folders.
+def export_zarr(folder: Path) -> list[Path]:
+    """Write ``dataset.zarr`` beside the dataset of a study; each part becomes one. Return what was written.
 
     The folder is written under a hidden name and renamed into its place.
 
@@ -64,11 +65,10 @@ def export_zarr(folder: Path) -> Path:
     FileError
         As :func:`export_hdf5`.
     """
-    try:
-        import zarr
-    except ImportError as error:
-        raise FileError("Zarr needs the package zarr: install it with `pip install zarr`.") from error
+    require_packages(["zarr"])
+    import zarr
 
+    written = []
     for part, stem in _parts(folder):
         target = folder / f"{stem}.zarr"
         try:
@@ -80,17 +80,41 @@ def export_zarr(folder: Path) -> Path:
                     return group.create_array(name, shape=shape, dtype=kind, chunks=chunks)
 
                 _fill(part, create, group.attrs)
+                sync_tree(hidden / "new")
                 if os.path.lexists(target):
                     os.rename(target, hidden / "before")
                 os.rename(hidden / "new", target)
         except OSError as error:
             raise FileError(f"'{target}' could not be written ({os_error_reason(error)}): free some space.") from error
         sync_folder(folder)
-    return target
+        written.append(target)
+    return written
 
 
-EXPORTS: dict[str, Callable[[Path], Path]] = {"hdf5": export_hdf5, "zarr": export_zarr}
+EXPORTS: dict[str, Callable[[Path], list[Path]]] = {"hdf5": export_hdf5, "zarr": export_zarr}
 """Exports of a finished dataset, by the name that the command takes."""
+PACKAGES = {"hdf5": "h5py", "zarr": "zarr"}
+"""What each of them needs."""
+
+
+def require_packages(formats: Sequence[str]) -> None:
+    """Raise FileError where a package for one of the formats is not installed."""
+    for name in formats:
+        package = PACKAGES[name]
+        try:
+            importlib.import_module(package)
+        except ImportError as error:
+            raise FileError(f"--format {name} needs the package {package}: install it with 'pip install {package}'.") from error
+
+
+def sync_tree(folder: Path) -> None:
+    """Bring all files of a folder, and the names in it, onto the disk."""
+    for path in sorted(folder.rglob("*")):
+        if path.is_dir():
+            sync_folder(path)
+        else:
+            sync_file(path)
+    sync_folder(folder)
 
 
 def _parts(folder: Path) -> list[tuple[Path, str]]:

@@ -25,7 +25,7 @@ from ..core.model.digest import digest_of
 from ..core.model.recording import Recording, SensorRecording
 from ..core.model.sensor_parameters import Painted, SensorParameters
 from ..core.response import metrics
-from .finished_runs import FinishedRun
+from ..core.study.run_record import RunRecord
 
 POSE_AXES = ("x", "y", "z", "qw", "qx", "qy", "qz")
 CHANNELS = ("normal_force", "shear_x", "shear_y")
@@ -104,7 +104,7 @@ class RunFrames:
     layout_digest: str = ""
 
 
-def read_frames(run: FinishedRun) -> RunFrames:
+def read_frames(run: RunRecord) -> RunFrames:
     """Read the recordings of a run.
 
     Raises
@@ -149,14 +149,14 @@ def _frame_rate(times: np.ndarray) -> float:
     return float(f"{(len(times) - 1) / span:.9g}") if len(times) > 1 and span > 0 else 1.0
 
 
-def _narrowed(run: FinishedRun, feature: Feature, values: np.ndarray) -> np.ndarray:
+def _narrowed(run: RunRecord, feature: Feature, values: np.ndarray) -> np.ndarray:
     """Return the values in the type that the dataset stores."""
     if feature.dtype == "float32" and not (np.abs(values) <= np.finfo(np.float32).max).all():
         raise FileError(f"'{feature.name}' of the run '{run.folder}' is no 32-bit number: delete the run and sweep again.")
     return np.ascontiguousarray(values, dtype=feature.dtype)
 
 
-def _all_features(run: FinishedRun, recording: Recording, sensors: dict[str, SensorRun]) -> Iterator[tuple[Feature, Any]]:
+def _all_features(run: RunRecord, recording: Recording, sensors: dict[str, SensorRun]) -> Iterator[tuple[Feature, Any]]:
     for name, sensor in sensors.items():
         yield from _texel_features(name, sensor)
         yield from _net_features(name, sensor.arrays)

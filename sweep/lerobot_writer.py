@@ -17,8 +17,8 @@ import numpy as np
 from ..core.geometry.layout.grid_layout import GridLayout
 from ..core.geometry.texels import Texels
 from ..core.io.file_writing import sync_file
+from ..core.study.run_record import RunRecord
 from .features import AXES, Feature, RunFrames
-from .finished_runs import FinishedRun
 from .running_statistics import RunningStatistics
 
 if TYPE_CHECKING:
@@ -72,7 +72,7 @@ class LeRobotWriter:
         (root / "meta").mkdir(parents=True, exist_ok=True)
         _write_texels(root / "meta" / "texels.parquet", first.texels)
 
-    def add(self, run: FinishedRun, frames: RunFrames) -> None:
+    def add(self, run: RunRecord, frames: RunFrames) -> None:
         """Append the frames of a run."""
         count = len(frames.times)
         columns = {

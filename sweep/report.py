@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import base64
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -17,8 +18,11 @@ from ..core.io.html_templates import render_html
 from ..core.io.recording_npz import load_recording
 from ..core.io.sensor_npz import SENSOR_NAME, load_sensor
 from ..core.io.temporary_folder import temporary_folder
+from ..core.study.run_files import RUNS
+from ..core.study.run_record import read_run_record
+from ..core.study.study_file import Run
 from .dependencies import Dependency, dependencies
-from .finished_runs import RUNS_FOLDER, FailedRun, failed_runs, finished_runs, read_run, run_order, study_name
+from .finished_runs import FailedRun, failures, finished_runs, run_order, study_name
 from .report_figures import MOST_METRICS, MOST_PARAMETERS, RunImage, draw_image_sheet, draw_small_multiples
 
 REPORT_NAME = "report.html"
@@ -45,19 +49,21 @@ class StudyColumns:
     frames_seconds: float
 
 
-def write_report(folder: Path) -> None:
+def write_report(folder: Path, planned: Sequence[Run] = ()) -> None:
     """Write ``report.html`` into the folder of a study.
 
     Parameters
     ----------
     folder : Path
+    planned : sequence of Run
+        All runs of the study, which tell what varied in those that failed.
 
     Raises
     ------
     FileError
         There is no study, a run is damaged, or the page cannot be written.
     """
-    order, failed = run_order(folder), failed_runs(folder)
+    order, failed = run_order(folder), failures(folder, planned)
     columns = _columns(folder, order)
     found = dependencies(columns.values, columns.metrics)
     with temporary_folder(folder, "report") as hidden:
@@ -125,7 +131,7 @@ def _images(folder: Path, order: list[tuple[int, str]]) -> list[RunImage]:
     chosen = np.unique(np.linspace(0, len(order) - 1, min(len(order), MOST_IMAGES)).round().astype(int))
     images = []
     for index, digest in (order[i] for i in chosen):
-        run = read_run(folder / RUNS_FOLDER / digest)
+        run = read_run_record(folder / RUNS / digest)
         if not run.sensors:
             continue
         sensor = run.folder / folder_names(run.sensors)[run.sensors[0]]
@@ -197,7 +203,7 @@ def _range_row(name: str, values: Any) -> list[str]:
 
 
 def _failed_rows(folder: Path, order: list[tuple[int, str]], columns: StudyColumns, failed: list[FailedRun]) -> list[list[str]]:
-    """Return how failing depends on each parameter, as far as the failed runs say which ones they were."""
+    """Return how failing depends on each parameter, as far as it is known which runs failed."""
     known = [run for run in failed if run.values]
     if not known or not columns.values:
         return []

@@ -12,7 +12,8 @@ from typing import Any
 
 from ..core.errors import FileError
 from ..core.io.file_writing import atomic_write
-from .finished_runs import FailedRun, FinishedRun, Value, failed_runs, finished_runs
+from ..core.study.run_record import RunRecord, Value
+from .finished_runs import FailedRun, finished_runs
 
 TABLE_NAME, TIMINGS_NAME = "runs.parquet", "timings.csv"
 FINISHED, FAILED = "finished", "failed"
@@ -20,7 +21,7 @@ ROWS_AT_ONCE = 10_000
 """Rows that wait in memory."""
 
 
-def write_run_table(folder: Path, order: list[tuple[int, str]]) -> None:
+def write_run_table(folder: Path, order: list[tuple[int, str]], failed: list[FailedRun]) -> None:
     """Write ``runs.parquet`` and ``timings.csv`` into the folder of a study.
 
     Columns: ``run`` (place in the design), ``digest``, ``status`` ("finished" or "failed"), ``message`` (why it failed),
@@ -34,14 +35,12 @@ def write_run_table(folder: Path, order: list[tuple[int, str]]) -> None:
     import pyarrow
     from pyarrow import parquet
 
-    failed = failed_runs(folder)
     schema = _schema(folder, order, failed)
-    columns = {"compression": "zstd"}
     with (
         atomic_write(folder / TABLE_NAME) as table_path,
         atomic_write(folder / TIMINGS_NAME) as timings_path,
         open(timings_path, "w", newline="", encoding="utf-8") as timings,
-        parquet.ParquetWriter(table_path, schema, **columns) as writer,
+        parquet.ParquetWriter(table_path, schema, compression="zstd") as writer,
     ):
         lines = csv.writer(timings, lineterminator="\n")
         lines.writerow(["run", "digest", "seconds"])
@@ -82,7 +81,7 @@ def _note_kinds(kinds: dict[str, Any], values: dict[str, Value], folder: Path) -
             raise FileError(f"'{name}' is a number in some runs and a text in '{folder}': choose values of one kind for it.")
 
 
-def _row(run: FinishedRun) -> dict[str, Any]:
+def _row(run: RunRecord) -> dict[str, Any]:
     values = {f"varied.{name}": value for name, value in run.values.items()}
     metrics = {f"metric.{name}": value for name, value in run.metrics.items()}
     return {"run": run.index, "digest": run.digest, "status": FINISHED, "message": "", **values, **metrics}

@@ -9,13 +9,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from .. import __version__
 from ..core.errors import FileError
 from ..core.io.bake_folder import folder_names
 from ..core.io.file_writing import atomic_write, file_sha256
 from ..core.io.scenario_npz import load_scenario, save_scenario
 from ..core.study.run_files import FAILED, RUNS, SCENES, STUDY_NAME, make_folders
 from ..core.study.study_file import Plan, Run, Study, differences, frozen_text, plan_for, read_study, runs_of
+from ..core.version import VERSION
 
 BLEND, SCENARIO = ".blend", ".npz"
 ReadBlend = Callable[[Path, Path], None]
@@ -77,7 +77,7 @@ def begin_study(file: Path, folder: Path, read_blend: ReadBlend) -> OpenStudy:
         plans[name] = plan_for(study, scenario)
         entries.append({"name": name, "file": source.name, "sha256": file_sha256(source), "digest": scenario.digest()})
     runs = runs_of(study, plans, {entry["name"]: entry["digest"] for entry in entries})
-    frozen = {"version": __version__, "runs": len(runs), "scenes": entries}
+    frozen = {"version": VERSION, "runs": len(runs), "scenes": entries}
     text = frozen_text(file.read_text(encoding="utf-8"), frozen)
     with atomic_write(folder / STUDY_NAME) as fresh:
         fresh.write_text(text, encoding="utf-8", newline="\n")
@@ -96,9 +96,9 @@ def resume_study(folder: Path) -> OpenStudy:
         raise FileError(f"There is no study in '{folder}': give the file of a study, or the folder that it was run in.")
     study = read_study(folder / STUDY_NAME)
     version, entries = frozen_entries(study, folder)
-    if version != __version__:
+    if version != VERSION:
         raise FileError(
-            f"The study in '{folder}' was begun with Palpate {version}, and this is {__version__}, which may compute other "
+            f"The study in '{folder}' was begun with Palpate {version}, and this is {VERSION}, which may compute other "
             "numbers: go on with that version, or give another folder with --out."
         )
     plans = {}

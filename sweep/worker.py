@@ -21,7 +21,8 @@ from pathlib import Path
 from typing import Any
 
 from ..core.errors import FileError
-from ..core.study.run_files import RUN_NAME, RUNS, write_failure
+from ..core.study.run_files import RUNS, write_failure
+from ..core.study.run_record import RUN_NAME
 from .child import DONE, FAILED, UNWRITABLE
 
 MOST_DEATHS = 3

@@ -20,6 +20,8 @@ from palpate.core.model.scenario import Scenario
 from palpate.core.model.sensor import Sensor
 from palpate.core.model.sensor_parameters import SensorParameters
 from palpate.core.solver.simulation import run
+from palpate.core.study import run_files
+from palpate.core.study.study_file import Run
 
 FPS, SECONDS = 50.0, 0.3
 RADIUS = 0.008
@@ -77,7 +79,7 @@ def write_sensor_folder(folder: Path, sensor: Sensor, recording: Recording) -> N
 
 def write_run(study: Path, index: int, sensors: list[Sensor], recording: Recording, values: dict) -> Path:
     """Write one finished run into the folder of a study and return its folder."""
-    digest = hashlib.sha256(json.dumps([index, values]).encode()).hexdigest()[:16]
+    digest = hashlib.sha256(json.dumps([index, values]).encode()).hexdigest()[:24]
     folder = study / "runs" / digest
     for name, own in folder_names(sensor.name for sensor in sensors).items():
         write_sensor_folder(folder / own, next(sensor for sensor in sensors if sensor.name == name), recording)
@@ -98,7 +100,8 @@ def write_run(study: Path, index: int, sensors: list[Sensor], recording: Recordi
 def new_study(folder: Path, name: str = "presses") -> Path:
     """Make the folder of a study without runs."""
     (folder / "runs").mkdir(parents=True)
-    (folder / "study.toml").write_text(f'format = "palpate-sweep/1"\nname = "{name}"\n', encoding="utf-8")
+    text = f'format = "palpate-sweep/1"\nname = "{name}"\nscene = "pad.npz"\ndesign = "random"\nsamples = 1000\n'
+    (folder / "study.toml").write_text(text, encoding="utf-8")
     return folder
 
 
@@ -108,13 +111,12 @@ def write_press(study: Path, index: int, frames_per_second: float = FPS) -> Path
     return write_run(study, index, list(scenario.sensors), run(scenario), values)
 
 
-def write_failure(study: Path, index: int, sentence: str) -> None:
-    """Write a failed run: a sentence and a traceback, and which run it was."""
-    _, values = press(index)
+def write_failure(study: Path, index: int, sentence: str) -> Run:
+    """Write a failed run, a sentence and a traceback, and return which run it was."""
     (study / "failed").mkdir(exist_ok=True)
-    (study / "failed" / f"f{index:015x}.txt").write_text(f"{sentence}\n\nTraceback …\n", encoding="utf-8")
-    about = json.dumps({"index": index, "values": values})
-    (study / "failed" / f"f{index:015x}.json").write_text(about, encoding="utf-8")
+    run = Run(index, "pad", press(index)[1], f"f{index:023x}")
+    run_files.write_failure(study, run.digest, sentence, "Traceback …")
+    return run
 
 
 def unit_sensor(name: str, texels) -> Sensor:

@@ -17,11 +17,11 @@ from pathlib import Path
 
 import numpy as np
 
-from ... import __version__
 from ...core.errors import FileError
 from ...core.io.npz import DAMAGED, write_arrays
 from ...core.io.regular_file import open_regular
 from ...core.solver import checkpoint
+from ...core.version import VERSION
 
 CHECKPOINT_FOLDER = "checkpoint"
 STATE_FILE = "state.npz"
@@ -64,7 +64,7 @@ class BakeCheckpoint:
 
     def __init__(self, folder: Path, digest: str):
         self.folder = folder / CHECKPOINT_FOLDER
-        self._key = {"palpate": __version__, "digest": digest}
+        self._key = {"palpate": VERSION, "digest": digest}
         self._saved_frames = 0
         self._last_save = time.monotonic()
         self._cost = 0.0

@@ -14,12 +14,11 @@ import os
 import secrets
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import bpy
 
-from ... import __version__
 from ...core.errors import FileError
 from ...core.io import bake_switch
 from ...core.io.bake_folder import (
@@ -41,6 +40,7 @@ from ...core.io.frame_rows import FrameRows
 from ...core.io.private_folder import PRIVATE_FOLDER, find_private_folder
 from ...core.io.recording_npz import save_recording
 from ...core.io.regular_file import read_bytes
+from ...core.io.sensor_manifest import manifest_of
 from ...core.io.sensor_npz import SENSOR_NAME, save_sensor
 from ...core.model.recording import Frame, Recording
 from ...core.model.scenario import Scenario
@@ -375,28 +375,12 @@ class BakeFiles:
             raise _write_error(self.folder, error) from error
 
     def _manifest(self, sensor: Sensor, recording: Recording) -> Manifest:
-        scenario = self._scenario
-        return Manifest(
-            sensor=sensor.name,
-            palpate=__version__,
-            frame_start=scenario.frame_start,
-            frame_end=scenario.frame_end,
-            fps=scenario.fps,
-            dt=recording.dt,
-            digest=self._digest,
-            unit=sensor.parameters.unit,
-            shape=tuple(int(side) for side in sensor.texels.layout.shape),
-            parameters=asdict(sensor.parameters),
-            warnings=recording.warnings,
-            complete=True,
+        return replace(
+            manifest_of(self._scenario, sensor, recording, self._files[sensor.name]),
             scene_file=self._owner.blend.name if self._owner.blend else "",
-            body=scenario.bodies[sensor.body].name,
-            step_reason=recording.step_reason,
             bake_id=self.bake_id,
-            sensors=tuple(self._sensors),
             scene_id=self._owner.scene_id,
             scene_path=self._owner.scene_path(self.folder),
-            files=dict(sorted(self._files[sensor.name].items())),
         )
 
 

@@ -29,6 +29,7 @@ __all__ = [
     "recording_npz",
     "regular_file",
     "scenario_npz",
+    "sensor_manifest",
     "sensor_npz",
     "sensor_toml",
     "settings_migration",

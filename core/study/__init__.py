@@ -2,8 +2,8 @@
 """Studies: one scene run many times with varied numbers.
 
 :mod:`.study_file` reads what varies, :mod:`.design` chooses the values of every run, :mod:`.variation` and :mod:`.presses` put
-them into a scenario, :mod:`.metrics` sums a run up, and :mod:`.run_files` writes it. Nothing here starts processes: the package
-``sweep`` does.
+them into a scenario, :mod:`.metrics` sums a run up, and :mod:`.run_files` writes it, its numbers as a
+:mod:`.run_record`. Nothing here starts processes: the package ``sweep`` does.
 """
 
 __all__ = [
@@ -11,6 +11,7 @@ __all__ = [
     "metrics",
     "presses",
     "run_files",
+    "run_record",
     "study_file",
     "variation",
 ]

@@ -6,7 +6,7 @@
     study.toml                              the study, with the version and the digests of its scenes
     scenes/<scene>.npz                      the scenes as the solver sees them (scenario_npz)
     runs/<digest>/run.json                  values and metrics of a run
-    runs/<digest>/<sensor>/recording.npz    and sensor.npz, as in a bake
+    runs/<digest>/<sensor>/recording.npz    with sensor.npz and manifest.json, as in a bake without images
     failed/<digest>.txt                     why a run could not be computed: a sentence, and the traceback of a fault
 
 A run is written in a hidden folder, brought onto the disk and renamed, so it is there as a whole or not at all.
@@ -14,26 +14,26 @@ A run is written in a hidden folder, brought onto the disk and renamed, so it is
 
 from __future__ import annotations
 
-import json
 import os
 import re
 from collections.abc import Mapping
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 from ..errors import FileError
-from ..io.bake_folder import RECORDING_NAME, folder_names
-from ..io.file_writing import atomic_write, os_error_reason, sync_file, sync_folder, writable_folder
+from ..io.bake_folder import MANIFEST_NAME, RECORDING_NAME, folder_names, write_manifest
+from ..io.file_writing import atomic_write, file_sha256, os_error_reason, sync_file, sync_folder, writable_folder
 from ..io.recording_npz import save_recording
+from ..io.sensor_manifest import manifest_of
 from ..io.sensor_npz import SENSOR_NAME, save_sensor
 from ..io.temporary_folder import remove_unfinished, temporary_folder
 from ..model.recording import Recording
 from ..model.scenario import Scenario
+from .run_record import RUN_NAME, RunRecord, write_run_record
 from .study_file import Run
 
-RUN_FORMAT = "palpate-run/1"
-RUN_NAME, STUDY_NAME = "run.json", "study.toml"
+STUDY_NAME = "study.toml"
 RUNS, FAILED, SCENES = "runs", "failed", "scenes"
 
 _DIGEST = re.compile(r"[0-9a-f]{24}")
@@ -71,7 +71,12 @@ def _digests(folder: Path, suffix: str) -> set[str]:
 
 
 def write_run(
-    folder: Path, run: Run, scenario: Scenario, recording: Recording, metrics: Mapping[str, float], seconds: float
+    folder: Path,
+    run: Run,
+    scenario: Scenario,
+    recording: Recording,
+    metrics: Mapping[str, float],
+    seconds: float,
 ) -> None:
     """Write a run as a whole; a failure of it that was written earlier is removed.
 
@@ -93,20 +98,24 @@ def write_run(
         A file cannot be written.
     """
     runs = folder / RUNS
-    description = {
-        "format": RUN_FORMAT,
-        "digest": run.digest,
-        "index": run.index,
-        "values": dict(run.values),
-        "metrics": dict(metrics),
-        "seconds": round(seconds, 6),
-        "frames": len(recording.frames),
-        "sensors": list(recording.sensors),
-    }
     with temporary_folder(runs, "run") as hidden:
+        place = hidden / "run"
+        record = RunRecord(
+            place,
+            run.digest,
+            run.index,
+            dict(run.values),
+            dict(metrics),
+            seconds,
+            tuple(recording.sensors),
+            len(recording.frames),
+        )
         try:
-            _write_files(hidden / "run", scenario, recording, description)
-            os.rename(hidden / "run", runs / run.digest)
+            place.mkdir()
+            _write_sensors(place, scenario, recording)
+            write_run_record(record)
+            sync_folder(place)
+            os.rename(place, runs / run.digest)
         except OSError as error:
             if not (runs / run.digest / RUN_NAME).is_file():  # else another process was faster
                 raise FileError(
@@ -118,29 +127,21 @@ def write_run(
         (folder / FAILED / f"{run.digest}.txt").unlink(missing_ok=True)
 
 
-def _write_files(place: Path, scenario: Scenario, recording: Recording, description: Mapping[str, Any]) -> None:
-    place.mkdir()
+def _write_sensors(place: Path, scenario: Scenario, recording: Recording) -> None:
+    """Write the files of each sensor and bring them onto the disk."""
     names = folder_names(recording.sensors)
     for sensor in scenario.sensors:
         if not sensor.readout:
             continue
         own = place / names[sensor.name]
         own.mkdir()
-        save_recording(own / RECORDING_NAME, _of_one_sensor(recording, sensor.name), atomic=False)
+        save_recording(own / RECORDING_NAME, replace(recording, sensors={sensor.name: recording.sensors[sensor.name]}), False)
         save_sensor(own / SENSOR_NAME, sensor.texels, sensor.painted, atomic=False)
-        for name in (RECORDING_NAME, SENSOR_NAME):
+        files = {name: file_sha256(own / name) for name in (RECORDING_NAME, SENSOR_NAME)}
+        write_manifest(own, manifest_of(scenario, sensor, recording, files), atomic=False)
+        for name in (RECORDING_NAME, SENSOR_NAME, MANIFEST_NAME):
             sync_file(own / name)
         sync_folder(own)
-    file = place / RUN_NAME
-    file.write_text(json.dumps(description, ensure_ascii=False, allow_nan=False) + "\n", encoding="utf-8", newline="\n")
-    sync_file(file)
-    sync_folder(place)
-
-
-def _of_one_sensor(recording: Recording, name: str) -> Recording:
-    from dataclasses import replace
-
-    return replace(recording, sensors={name: recording.sensors[name]})
 
 
 def write_failure(folder: Path, digest: str, sentence: str, details: str = "") -> None:
@@ -148,11 +149,3 @@ def write_failure(folder: Path, digest: str, sentence: str, details: str = "") -
     text = sentence.rstrip("\n") + "\n" + (f"\n{details.rstrip()}\n" if details else "")
     with atomic_write(folder / FAILED / f"{digest}.txt") as fresh:
         fresh.write_text(text, encoding="utf-8", newline="\n", errors="backslashreplace")
-
-
-def failure_of(folder: Path, digest: str) -> str:
-    """Return the sentence why a run could not be computed; empty when it cannot be read."""
-    try:
-        return (folder / FAILED / f"{digest}.txt").read_text(encoding="utf-8").partition("\n")[0]
-    except OSError:
-        return ""

@@ -4,6 +4,7 @@
 ::
 
     format = "palpate-sweep/1"
+    name = "presses on a fingertip"      # optional, for the report and the dataset
     scene = "fingertip.blend"            # or scenes = ["*.blend"]
     design = "latin-hypercube"           # grid, random, latin-hypercube or sobol
     samples = 1000                       # runs per scene; a grid takes all combinations of its levels
@@ -60,7 +61,7 @@ FORMAT = "palpate-sweep/1"
 FROZEN = "frozen"
 SCENE = "scene"
 """Name of the column that tells the scene of a run, where a study has several."""
-_WORDS = ("format", "scene", "scenes", "design", "samples", "seed", "fps", "run_limit", "vary", "press", FROZEN)
+_WORDS = ("format", "name", "scene", "scenes", "design", "samples", "seed", "fps", "run_limit", "vary", "press", FROZEN)
 _DIRECTIONS = {"tilt_direction": "tilt", "slide_direction": "slide"}
 """Directions of a press, which are any as long as the study says nothing else, and what they direct."""
 LARGEST_LEVELS = 10_000
@@ -83,6 +84,8 @@ class Study:
         Frames per second instead of those of the scene.
     run_limit : float or None
         Seconds that a run may take.
+    name : str
+        For the report and the dataset; empty if the file gives none.
     frozen : mapping
         What the output folder's copy says beside it.
     """
@@ -93,6 +96,7 @@ class Study:
     press: Mapping[str, Any] | None = None
     fps: float | None = None
     run_limit: float | None = None
+    name: str = ""
     frozen: Mapping[str, Any] = field(default_factory=dict)
 
 
@@ -169,6 +173,7 @@ def study_of(table: Mapping[str, Any], name: str) -> Study:
         press=table.get("press"),
         fps=_positive(table, "fps", name),
         run_limit=_positive(table, "run_limit", name),
+        name=checked_name(table["name"], f"name of '{name}'") if "name" in table else "",
         frozen=table.get(FROZEN, {}),
     )
 
@@ -359,7 +364,7 @@ def frozen_text(text: str, frozen: Mapping[str, Any]) -> str:
 def differences(before: Study, now: Study) -> list[str]:
     """Return what two studies say differently, one phrase each."""
     found = []
-    pairs = [("scenes", before.scenes, now.scenes), ("fps", before.fps, now.fps)]
+    pairs = [(word, getattr(before, word), getattr(now, word)) for word in ("name", "scenes", "fps")]
     pairs += [(word, getattr(before.design, word), getattr(now.design, word)) for word in ("kind", "samples", "seed")]
     for name in dict.fromkeys([*before.vary, *now.vary]):
         pairs.append((name, before.vary.get(name), now.vary.get(name)))

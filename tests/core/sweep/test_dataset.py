@@ -33,9 +33,8 @@ def solved(tmp_path_factory):
     for index in range(RUNS):
         if index not in (2, 4):
             write_press(study, index)
-    write_failure(study, 4, "The second sentence.")
-    write_failure(study, 2, "The first sentence.")
-    publish(study)
+    failed = [write_failure(study, 4, "The second sentence."), write_failure(study, 2, "The first sentence.")]
+    publish(study, failed)
     return study
 
 
@@ -211,7 +210,7 @@ def test_runs_with_other_sensors_become_parts(tmp_path):
     study = made_up(tmp_path, runs=2)
     other = made_up(tmp_path, sensors=(("cap", "round"),), runs=1, name="other")
     for path in (other / "runs").iterdir():
-        shutil.copytree(path, study / "runs" / ("0" + path.name[1:]))
+        shutil.copytree(path, study / "runs" / path.name[::-1])
     publish(study)
     parts = {path.name: json.loads((path / "meta" / "info.json").read_text()) for path in (study / "dataset").iterdir()}
     assert sorted(parts) == ["part-000", "part-001"]

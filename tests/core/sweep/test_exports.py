@@ -48,7 +48,7 @@ def assert_same_arrays(study, arrays, episodes):
 
 def test_hdf5(study):
     h5py = pytest.importorskip("h5py")
-    path = export_hdf5(study)
+    (path,) = export_hdf5(study)
     with h5py.File(path) as file:
         assert file.attrs["fps"] == 24
         assert file[IMAGE].attrs["unit"] == "N" and list(file[IMAGE].attrs["channels"])[0] == "normal_force"
@@ -57,12 +57,12 @@ def test_hdf5(study):
         }
         assert_same_arrays(study, read.__getitem__, lambda name: file["episodes"][name][:])
     before = path.read_bytes()
-    assert export_hdf5(study).read_bytes() == before
+    assert export_hdf5(study)[0].read_bytes() == before
 
 
 def test_zarr(study):
     zarr = pytest.importorskip("zarr", exc_type=ImportError)
-    group = zarr.open_group(export_zarr(study), mode="r")
+    group = zarr.open_group(export_zarr(study)[0], mode="r")
     assert group.attrs["fps"] == 24 and group[IMAGE].attrs["unit"] == "N"
     assert_same_arrays(study, lambda name: group[name][:], lambda name: group[f"episodes/{name}"][:])
 

@@ -10,21 +10,25 @@ import sys
 import time
 from pathlib import Path
 
+import numpy as np
 import pytest
 from study_scenes import HEAD, tiny_scene
 
+from palpate.core.io.bake_reader import read_bake
 from palpate.core.io.recording_npz import load_recording
 from palpate.core.io.scenario_npz import save_scenario
 from palpate.core.study.run_files import SCENES, done_runs, make_folders, write_failure
 from palpate.sweep.worker import compute_batch, end_children
 
 pytest.importorskip("distributed")
+parquet = pytest.importorskip("pyarrow.parquet")
 
 STUDY = (
     HEAD
     + """design = "latin-hypercube"
 samples = 24
 fps = 200
+name = "small presses"
 [vary]
 "Pad.k" = { log-uniform = [20, 200] }
 [press]
@@ -81,7 +85,28 @@ def test_a_run_holds_what_it_promises(undisturbed):
     assert run["frames"] == len(recording.frames)
     assert run["metrics"]["max_normal_force"] == recording.sensors["Pad"].normal_force.sum(axis=1).max() > 0
     assert run["metrics"]["max_depth"] <= run["values"]["press.depth"]
-    assert (place / "Pad" / "sensor.npz").is_file()
+    baked = read_bake(place)  # a run is read like a bake
+    assert baked.parameters["Pad"].k == run["values"]["Pad.k"]
+    assert baked.manifests["Pad"].unit == baked.parameters["Pad"].unit == "N"
+
+
+def test_the_dataset_of_a_study_knows_units_and_slip(undisturbed):
+    info = json.loads((undisturbed / "dataset" / "meta" / "info.json").read_bytes())
+    assert info["features"]["observation.reading.Pad"]["palpate"]["unit"] == "N"
+    table = parquet.read_table(undisturbed / "dataset" / "data").to_pylist()
+    slips = [row["episode_index"] for row in table if np.any(row["contact.slip.Pad"])]
+    found = parquet.read_table(undisturbed / "runs.parquet").to_pylist()
+    assert sorted(set(slips)) == [row["run"] for row in found if row["metric.first_slip"] is not None] != []
+    assert parquet.read_table(undisturbed / "dataset" / "meta" / "tasks.parquet").to_pydict()["task"] == ["small presses"]
+
+
+def test_a_finished_study_is_exported(undisturbed):
+    h5py = pytest.importorskip("h5py")
+    finished = sweep(undisturbed, "--format", "hdf5")
+    assert (finished.returncode, finished.stderr) == (0, "")
+    assert f"export: {undisturbed / 'dataset.h5'}" in finished.stdout.splitlines()
+    with h5py.File(undisturbed / "dataset.h5") as file:
+        assert len(file["episodes/run"]) == 24
 
 
 @pytest.mark.skipif(os.name == "nt", reason="signals of POSIX")

@@ -1,0 +1,127 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""``run.json``: what a run was, and the numbers that sum it up; written with its recordings, read for tables and datasets."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, field
+from math import isfinite
+from pathlib import Path
+from typing import Any
+
+from ..errors import FileError
+from ..io.file_writing import os_error_reason, sync_file
+from ..io.regular_file import read_bytes
+
+RUN_FORMAT = "palpate-run/1"
+RUN_NAME = "run.json"
+
+Value = float | str
+"""What a run may vary, as it is read: a number, or a name from a choice. Whole numbers and switches count as numbers."""
+
+
+@dataclass(frozen=True)
+class RunRecord:
+    """One finished run, without its recordings.
+
+    Attributes
+    ----------
+    folder : Path
+    digest : str
+        Name of the folder of a finished run.
+    index : int
+        Place of the run in the design.
+    values : dict of str to value
+        What was varied, in the order of the study.
+    metrics : dict of str to float
+        Numbers that sum the run up; a metric that has no value in it (no slip, no time of first slip) is missing.
+    seconds : float
+        Time that computing took. No result depends on it.
+    sensors : tuple of str
+    frames : int
+        Frames of the recordings.
+    """
+
+    folder: Path
+    digest: str
+    index: int
+    values: dict[str, Any] = field(default_factory=dict)
+    metrics: dict[str, float] = field(default_factory=dict)
+    seconds: float = 0.0
+    sensors: tuple[str, ...] = ()
+    frames: int = 0
+
+
+def write_run_record(record: RunRecord) -> None:
+    """Write ``run.json`` into the folder of a record and bring it onto the disk; the folder is not yet in its place.
+
+    Raises
+    ------
+    OSError
+        It cannot be written.
+    """
+    content = {
+        "format": RUN_FORMAT,
+        "digest": record.digest,
+        "index": record.index,
+        "values": record.values,
+        "metrics": record.metrics,
+        "seconds": round(record.seconds, 6),
+        "frames": record.frames,
+        "sensors": list(record.sensors),
+    }
+    file = record.folder / RUN_NAME
+    text = json.dumps(content, ensure_ascii=False, allow_nan=False) + "\n"
+    file.write_bytes(text.encode("utf-8", "surrogatepass"))
+    sync_file(file)
+
+
+def read_run_record(folder: Path) -> RunRecord:
+    """Read ``run.json`` in the folder of a run.
+
+    Raises
+    ------
+    FileError
+        It cannot be read, or it is not one that this version reads.
+    """
+    path = folder / RUN_NAME
+    content = _read_json(path)
+    if not isinstance(content, dict) or content.get("format") != RUN_FORMAT:
+        raise FileError(f"'{path}' is not a '{RUN_FORMAT}' file: delete the folder '{folder.name}' and run the sweep again.")
+    try:
+        sensors = content["sensors"]
+        if not isinstance(sensors, list) or not all(isinstance(name, str) for name in sensors):
+            raise TypeError("its sensors are no names")
+        return RunRecord(
+            folder=folder,
+            digest=folder.name,
+            index=int(content["index"]),
+            values=values_read(content["values"]),
+            metrics={name: _finite(name, value) for name, value in content["metrics"].items() if value is not None},
+            seconds=float(content.get("seconds", 0.0)),
+            sensors=tuple(sensors),
+            frames=int(content.get("frames", 0)),
+        )
+    except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
+        raise FileError(f"'{path}' is damaged ({error}): delete the folder '{folder.name}' and run the sweep again.") from error
+
+
+def values_read(content: dict[str, Any]) -> dict[str, Value]:
+    """Return what was varied, with all numbers as floats; raise ValueError for one that is not finite."""
+    return {name: value if isinstance(value, str) else _finite(name, value) for name, value in content.items()}
+
+
+def _finite(name: str, value: Any) -> float:
+    number = float(value)
+    if not isfinite(number):
+        raise ValueError(f"{name} is {value}")
+    return number
+
+
+def _read_json(path: Path) -> Any:
+    try:
+        return json.loads(read_bytes(path).decode("utf-8", "surrogatepass"))
+    except OSError as error:
+        raise FileError(f"'{path}' could not be read ({os_error_reason(error)}): check its permissions.") from error
+    except (ValueError, RecursionError) as error:
+        raise FileError(f"'{path}' is damaged (no JSON): delete the folder '{path.parent.name}' and sweep again.") from error
