@@ -28,18 +28,19 @@ LAST = {
 
 @dataclass(frozen=True)
 class Recording:
-    """A set of recordings: name of the rig, lines of its [sensor], and trials as (name, use, columns)."""
+    """A set of recordings: name of the rig, lines of its [sensor], trials as (name, use, columns), lines of each [[trial]]."""
 
     name: str
     sensor: str
     trials: list[tuple[str, str, Columns]]
+    words: str = ""
 
     def write(self, folder: Path) -> Path:
         """Write it as a rig and return the path of its TOML file."""
         folder.mkdir(parents=True, exist_ok=True)
         lines = ['format = "palpate-rig/1"', f'name = "{self.name}"', "[sensor]", self.sensor]
         for trial, use, columns in self.trials:
-            lines += ["[[trial]]", f'file = "{trial}.csv"', f'use = "{use}"']
+            lines += ["[[trial]]", f'file = "{trial}.csv"', f'use = "{use}"', self.words]
             table = np.column_stack(list(columns.values()))
             rows = [",".join("" if np.isnan(value) else f"{value:.9g}" for value in row) for row in table.tolist()]
             (folder / f"{trial}.csv").write_text("\n".join([",".join(columns), *rows]) + "\n", encoding="utf-8")
