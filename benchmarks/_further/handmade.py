@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A physical model of each further set, as somebody would write it who knows what was measured and nothing of Palpate.
 
-A model is a list of terms of the stimulus, nonlinear in a few numbers. The numbers are fitted by least squares; the terms' weights
-follow from a linear fit, in the fitted recordings alone. What the rig leaves free (a factor of each recording) is free here, too.
+A model is a list of terms of the stimulus, nonlinear in a few numbers. The numbers are fitted by least squares; the terms'
+weights follow from a linear fit, in the fitted recordings alone. What the rig leaves free (a factor of each recording) is free
+here, too.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .._recordings import Columns, Recording
+from palpate.benchmarks._recordings import Columns, Recording
 
 Terms = Callable[[np.ndarray, Columns, int], list[np.ndarray]]
 """Terms (T,) of one channel from the nonlinear numbers, the columns of a recording, and the number of the channel."""

@@ -5,7 +5,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from .._recordings import Columns, Recording
+from palpate.benchmarks._recordings import Columns, Recording
+
 from .handmade import free_factors, low_pass, responses, with_own_factor
 
 MOST_SAMPLES = 1500

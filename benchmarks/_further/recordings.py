@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from .._recordings import Columns, Recording, thinned
+from palpate.benchmarks._recordings import Columns, Recording, thinned
 
 SAMPLE = 0.057
 """Seconds between samples of the microfluidic sensor: what the way and speed of its presses say about their lengths."""
@@ -126,7 +126,7 @@ def _presses(table: np.ndarray, first: int, count: int = 40) -> Columns:
 
 
 def hydrogel(data: Path) -> Recording:
-    """Voltages of sixteen electrodes over the sum of four load cells (volts, taken as newtons), each recording from its own zero."""
+    """Voltages of sixteen electrodes over the sum of four load cells (volts, taken as newtons), each recording from zero."""
     from scipy.io import loadmat
 
     trials: list[tuple[str, str, Columns]] = []
