@@ -22,6 +22,7 @@ MAX_IMAGE_SIDE = 256
 """Pixels along a side of an image: larger images are subsampled, images of few texels are enlarged."""
 COLORS = ((0.34, 0.7, 0.91), (1.0, 0.62, 0.25), (0.4, 0.85, 0.6), (0.9, 0.6, 0.8))
 BACKGROUND_COLOR, AXIS_COLOR = (0.05, 0.05, 0.06, 0.72), (1.0, 1.0, 1.0, 0.35)
+NOTE_COLOR = (1.0, 0.62, 0.1, 1.0)
 
 
 @dataclass
@@ -61,6 +62,8 @@ class InsetContent:
         First and last frame of the scene.
     frame : float
         The present frame.
+    note : str
+        Words above the curves that say what is wrong with the numbers; empty where nothing is.
     """
 
     insets: list[SensorInset]
@@ -68,6 +71,7 @@ class InsetContent:
     end: str
     span: tuple[float, float]
     frame: float
+    note: str = ""
     bar: object = None
 
 
@@ -88,7 +92,7 @@ def tactile_pixels(layout, values: np.ndarray, maximum: float, color_map: str) -
     return pixels
 
 
-def inset_content(scene, frame, texels: dict, frames: np.ndarray, loads: dict, maximum: float) -> InsetContent:
+def inset_content(scene, frame, texels: dict, frames: np.ndarray, loads: dict, maximum: float, note: str = "") -> InsetContent:
     """Return the content of the inset for one frame.
 
     Parameters
@@ -102,6 +106,8 @@ def inset_content(scene, frame, texels: dict, frames: np.ndarray, loads: dict, m
         Sum of the normal forces of each sensor at these frames.
     maximum : float, N or Pa
         End of the colours.
+    note : str, optional
+        See :class:`InsetContent`.
     """
     settings, insets = scene.palpate, []
     for name, own in list(texels.items())[:MAX_SENSORS]:
@@ -109,7 +115,7 @@ def inset_content(scene, frame, texels: dict, frames: np.ndarray, loads: dict, m
         pixels = tactile_pixels(own.layout, bake_display.displayed_values(settings, forces, own), maximum, settings.color_map)
         insets.append(SensorInset(name, pixels, frames, loads[name], float(forces.sum())))
     span = float(scene.frame_start), float(scene.frame_end)
-    return InsetContent(insets, settings.color_map, range_label(settings, maximum), span, float(frame.frame))
+    return InsetContent(insets, settings.color_map, range_label(settings, maximum), span, float(frame.frame), note)
 
 
 def range_label(settings, maximum: float) -> str:
@@ -197,8 +203,9 @@ def _draw_curves(content: InsetContent, canvas, x: float, y: float, width: float
             )  # the first curves are wider, so that equal curves do not hide each other
     now = x + (content.frame - first) / span * width
     canvas.line([(now, y), (now, y + height)], AXIS_COLOR, 1.0)
-    text = ",  ".join(f"{inset.now:.3g} N" for inset in content.insets)
-    canvas.text(x + 4.0 * scale, y + height + 3.0 * scale, f"normal force  {text}", (1.0, 1.0, 1.0, 1.0))
+    text = content.note or "normal force  " + ",  ".join(f"{inset.now:.3g} N" for inset in content.insets)
+    color = NOTE_COLOR if content.note else (1.0, 1.0, 1.0, 1.0)
+    canvas.text(x + 4.0 * scale, y + height + 3.0 * scale, text, color, width)
 
 
 class _PixelPainter:

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Heat maps and force arrows drawn over the sensors in the 3D view while the timeline plays. They are stored in no file."""
+"""Heat maps and force arrows drawn over the sensors in the 3D view. They are stored in no file.
+
+They show what playing computes, and a bake where its materials cannot be seen, as in Solid view.
+"""
 
 from __future__ import annotations
 
@@ -9,13 +12,16 @@ import bpy
 import numpy as np
 
 from ...core.figures import color_maps
-from ..session import redraw, transforms
+from ...core.io.bake_reader import frame_index
+from ..session import redraw, transforms, units
 from . import bake_display, inset
 
 LIFT = 0.004
 """Distance of the overlay from the sensor's surface, as a share of the sensor's size: at zero the two would flicker."""
 ARROW_SHARE = 1.0
 """Length of the longest arrow, as a share of the sensor's size."""
+SHOWING_MATERIALS = {"MATERIAL", "RENDERED"}
+"""Kinds of shading in which a bake's own materials are seen."""
 
 
 @dataclass
@@ -28,11 +34,14 @@ class SensorOverlay:
     colors : (t, 4) float32
     line : (2, 3) float32 or None
         Ends of the net-force arrow.
+    plain_only : bool
+        Drawn only in views that show no materials, because these show the same.
     """
 
     corners: np.ndarray
     colors: np.ndarray
     line: np.ndarray | None
+    plain_only: bool = False
     batches: list | None = None
 
 
@@ -60,12 +69,44 @@ def show(scene, run, frame) -> None:
 def sensor_overlays(scene, run, frame) -> list[SensorOverlay]:
     """Return the heat maps and arrows of one frame of a live simulation; all sensors share one scale."""
     maximum, strongest = _scale(scene, run, frame)
-    return [
-        _sensor_overlay(
-            scene, sensor, frame.sensors[sensor.name], frame.poses[sensor.body], maximum, strongest, run.reading.metres_per_unit
-        )
-        for sensor in _read_out(run)
-    ]
+    scale, overlays = run.reading.metres_per_unit, []
+    for sensor in _read_out(run):
+        readings, pose = frame.sensors[sensor.name], frame.poses[sensor.body]
+        overlay = _heat_map(scene, sensor.texels, readings.normal_force, pose, maximum, scale)
+        overlay.line = _net_force(sensor.texels, readings, pose, strongest, scale)
+        overlays.append(overlay)
+    return overlays
+
+
+def show_bake(scene, bake, number: int, maximum: float) -> None:
+    """Show the heat maps of one frame of a bake in views without materials; its arrows are objects of the scene.
+
+    Parameters
+    ----------
+    bake : Bake
+    number : int
+        The frame, which the bake must have.
+    maximum : float, N or Pa
+        End of the colours.
+    """
+    if scene.palpate.show_overlay:
+        _overlays[scene.session_uid] = baked_overlays(scene, bake, number, maximum)
+        redraw.views()
+
+
+def baked_overlays(scene, bake, number: int, maximum: float) -> list[SensorOverlay]:
+    """Return the heat maps of one frame of a bake; see :func:`show_bake`."""
+    recording, overlays = bake.recording, []
+    sensors, poses = recording.at(number).sensors, recording.poses[frame_index(recording, number)]
+    for name, texels in bake.texels.items():
+        body = bake.manifests[name].body or name
+        if body in recording.body_names:
+            pose = poses[recording.body_names.index(body)]
+            force = sensors[name].normal_force
+            overlay = _heat_map(scene, texels, force, pose, maximum, units.metres_per_unit(scene))
+            overlay.plain_only = True
+            overlays.append(overlay)
+    return overlays
 
 
 def inset_content(scene, run, frame) -> inset.InsetContent:
@@ -97,23 +138,30 @@ def _scale(scene, run, frame) -> tuple[float, float]:
     return (value if settings.use_auto_range else bake_display.user_range(settings)), net
 
 
-def _sensor_overlay(scene, sensor, readings, pose, maximum: float, strongest: float, scale: float) -> SensorOverlay:
-    texels = sensor.texels
-    rotation = transforms.rotation(pose[3:])
+def _heat_map(scene, texels, force: np.ndarray, pose: np.ndarray, maximum: float, scale: float) -> SensorOverlay:
+    """Return the heat map of a sensor at a pose, (7,) in metres; `scale` is the metres of a Blender unit.
+
+    It lies on both sides of the surface, because the body of a sensor that is a sheet is seen from both.
+    """
     size = float(np.ptp(texels.position, axis=0).max())
-    points = texels.position + LIFT * size * texels.normal
-    world = (pose[:3] + points @ rotation.T) / scale
-    rgb = color_maps.colors(
-        scene.palpate.color_map, bake_display.displayed_values(scene.palpate, readings.normal_force, texels) / maximum
-    )
+    lift = LIFT * size * texels.normal
+    rotation = transforms.rotation(pose[3:])
+    sides = [(pose[:3] + (texels.position + side * lift) @ rotation.T) / scale for side in (1.0, -1.0)]
+    rgb = color_maps.colors(scene.palpate.color_map, bake_display.displayed_values(scene.palpate, force, texels) / maximum)
     corner = texels.layout.triangles.ravel()
     colors = np.column_stack([rgb, np.ones(len(rgb))])[corner]
-    line = None
-    if readings.contact.any():
-        foot = readings.centre_of_pressure
-        tip = foot - readings.net_force * (ARROW_SHARE * size / strongest)
-        line = (pose[:3] + np.array([foot, tip]) @ rotation.T) / scale
-    return SensorOverlay(world[corner].astype(np.float32), colors.astype(np.float32), line)
+    corners = np.concatenate([points[corner] for points in sides])
+    return SensorOverlay(corners.astype(np.float32), np.tile(colors, (2, 1)).astype(np.float32), None)
+
+
+def _net_force(texels, readings, pose: np.ndarray, strongest: float, scale: float) -> np.ndarray | None:
+    """Return the ends of the net-force arrow; None without contact."""
+    if not readings.contact.any():
+        return None
+    size = float(np.ptp(texels.position, axis=0).max())
+    foot = readings.centre_of_pressure
+    tip = foot - readings.net_force * (ARROW_SHARE * size / strongest)
+    return (pose[:3] + np.array([foot, tip]) @ transforms.rotation(pose[3:]).T) / scale
 
 
 def clear(scene=None) -> None:
@@ -139,6 +187,8 @@ def _draw() -> None:
     gpu.state.depth_test_set("LESS_EQUAL")
     gpu.state.depth_mask_set(True)
     for overlay in overlays:
+        if overlay.plain_only and space.shading.type in SHOWING_MATERIALS:
+            continue
         if overlay.batches is None:
             overlay.batches = _batches(overlay)
         for shader, batch, uniforms in overlay.batches:

@@ -11,7 +11,7 @@ from ..display import overlays
 from ..properties import migrations
 from ..scene import participants
 from ..session import first_use, identity, session_state
-from ..timeline import playback
+from ..timeline import playback, second_look
 
 
 def _examine_file() -> None:
@@ -52,6 +52,7 @@ def palpate_depsgraph_update_post(_scene, depsgraph):
                 session.geometry_version += 1
             if update.is_updated_transform:
                 session.changed_motion.add(block.name)
+    second_look.soon()
 
 
 @persistent
@@ -61,6 +62,7 @@ def palpate_load_post(_path):
     playback.forget()
     sensor_report.forget()
     _examine_file()
+    second_look.soon()
 
 
 @persistent
@@ -68,6 +70,7 @@ def palpate_undo_post(_scene, _depsgraph=None):
     playback.forget()
     sensor_report.forget()
     session_state.participants_changed()
+    second_look.soon()
 
 
 @persistent
@@ -121,6 +124,7 @@ def unregister():
     texel_overlay.unregister()
     overlays.unregister()
     sensor_report.forget()
+    second_look.stop()
     first_use.stop()
     first_use.when_ready.clear()
     for name, function in LISTS.items():

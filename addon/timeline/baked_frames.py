@@ -11,7 +11,7 @@ import numpy as np
 from ...core.errors import PalpateError
 from ...core.io.bake_reader import Bake, read_sensors
 from ...core.model.recording import Frame, Recording
-from ..display import bake_display, bake_identity, baked_scene, inset
+from ..display import bake_display, bake_identity, baked_scene, inset, overlays
 from ..session import animation_time, frame_status
 from . import staleness
 
@@ -45,21 +45,21 @@ def show(scene, depsgraph) -> None:
     if recording is None or number not in recording.frames:
         frame_status.set_status(scene, f"Frame {number} is outside of the bake.")
         return
-    text = f"Frame {number} of the bake."
+    text, note = f"Frame {number} of the bake.", ""
     other = bake_identity.other_bake(scene)
     if other:
-        text = other
+        text, note = other, "not the bake of this file"
     elif staleness.is_stale(scene, depsgraph, recording):
-        text = "The bake is out of date, something has changed since: bake again."
+        text, note = "The bake is out of date, something has changed since: bake again.", "out of date: bake again"
     sensors = recording.at(number).sensors
     frame = Frame(number, 0.0, sensors, poses=np.zeros((0, 7)), velocities=np.zeros((0, 6)))
     frame_status.set_status(scene, text, frame, recording.step_reason)
-    if scene.palpate.show_inset and not bpy.app.background:
-        _show_inset(scene, frame)
+    if not bpy.app.background:
+        _show_in_views(scene, frame, note)
 
 
-def _show_inset(scene, frame: Frame) -> None:
-    """Show the tactile images and force curves of a bake's frame."""
+def _show_in_views(scene, frame: Frame, note: str) -> None:
+    """Show the heat maps, tactile images and force curves of a bake's frame in the 3D views."""
     try:
         bake = _bake(scene)
     except PalpateError:
@@ -69,8 +69,10 @@ def _show_inset(scene, frame: Frame) -> None:
     recording, texels = bake.recording, bake.texels
     style = bake_display.figure_style(scene)
     top = style.scale_limit(recording, texels) * (1e3 if style.quantity == "pressure" else 1.0)
-    loads = {name: readings.normal_force.sum(axis=1) for name, readings in recording.sensors.items()}
-    inset.show(scene, inset.inset_content(scene, frame, texels, recording.frames.astype(float), loads, top))
+    overlays.show_bake(scene, bake, frame.frame, top)
+    if scene.palpate.show_inset:
+        loads = {name: readings.normal_force.sum(axis=1) for name, readings in recording.sensors.items()}
+        inset.show(scene, inset.inset_content(scene, frame, texels, recording.frames.astype(float), loads, top, note))
 
 
 def _recording(scene) -> Recording | None:

@@ -88,3 +88,8 @@ def test_gap(play_road, real_blender, repository):
     assert sorted(values["named"]) == ["creep", "gain-mismatch"]
     assert sorted(values["effects"]) == ["creep", "gain-mismatch"]
     assert {"gap: loading", "gap: hold", "gap: unloading"} <= set(values["markers"])
+
+
+def test_out_of_date(play_road):
+    """Numbers that are no longer true are taken away or named so, at once."""
+    assert play_road("out_of_date", timeout=900)["screenshots"] == ["solid.png", "out-of-date.png"]

@@ -1,0 +1,128 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What is shown is looked at again when something else than the frame changes: no old number stays unmarked."""
+
+import bpy
+import numpy as np
+import pytest
+from blender_scenes import press, press_and_drop, save
+
+from palpate.addon.bake.bake import bake
+from palpate.addon.display import overlays
+from palpate.addon.session import frame_status
+from palpate.addon.timeline import baked_frames, live_cache, second_look
+from palpate.core.figures import color_maps
+from palpate.core.io.bake_reader import read_sensors
+from palpate.core.jobs.job_runner import run_job
+
+
+@pytest.fixture(autouse=True)
+def forget():
+    yield
+    second_look.stop()
+
+
+def play_to(scene, last):
+    for frame in range(1, last + 1):
+        scene.frame_set(frame)
+
+
+def stiffer(scene, pad, target):
+    pad.palpate.k *= 2
+
+
+def another_scale(scene, pad, target):
+    target.scale = 3 * (1.1,)
+
+
+def another_effect(scene, pad, target):
+    pad.palpate.effects.add().kind = "creep"
+
+
+def another_key(scene, pad, target):
+    target.location.z -= 1e-3
+    target.keyframe_insert("location", frame=scene.frame_end)
+
+
+@pytest.mark.parametrize("change", [stiffer, another_scale, another_effect, another_key])
+def test_a_bake_is_out_of_date_at_once(tmp_path, change):
+    scene, pad, target = press(frames=4)
+    save(tmp_path)
+    run_job(bake(scene))
+    scene.frame_set(2)
+    second_look.look_again(scene)
+    assert frame_status.status_of(scene).text == "Frame 2 of the bake."
+    change(scene, pad, target)
+    second_look.look_again(scene)
+    assert "out of date" in frame_status.status_of(scene).text and scene.frame_current == 2
+
+
+def test_a_baked_file_that_was_opened_shows_its_numbers_at_once(tmp_path):
+    scene, pad, _ = press(frames=4)
+    save(tmp_path)
+    run_job(bake(scene))
+    bpy.ops.wm.save_mainfile()
+    bpy.ops.wm.open_mainfile(filepath=bpy.data.filepath)
+    scene = bpy.context.scene
+    second_look.look_again(scene)
+    status = frame_status.status_of(scene)
+    assert status.text == f"Frame {scene.frame_current} of the bake." and "Pad" in status.frame.sensors
+
+
+def test_a_slider_gives_the_numbers_of_playing_anew(monkeypatch):
+    monkeypatch.setattr(second_look, "QUICK", 60.0)
+    scene, pad, *_ = press_and_drop(frames=6)
+    play_to(scene, 5)
+    soft = frame_status.status_of(scene).frame.sensors["Pad"].normal_force
+    pad.palpate.k *= 2
+    second_look.look_again(scene)
+    hard = frame_status.status_of(scene).frame.sensors["Pad"].normal_force
+    assert scene.frame_current == 5 and hard.sum() > 1.5 * soft.sum()
+    play_to(scene, 5)
+    np.testing.assert_array_equal(live_cache.get(scene).frames[5].sensors["Pad"].normal_force, hard)
+
+
+def test_what_would_take_long_is_taken_away(monkeypatch):
+    monkeypatch.setattr(second_look, "QUICK", 0.0)
+    scene, pad, *_ = press_and_drop(frames=6)
+    play_to(scene, 5)
+    pad.palpate.k *= 2
+    second_look.look_again(scene)
+    status = frame_status.status_of(scene)
+    assert status.frame is None and status.text.startswith(("Out of date", "Frame 5 is not computed"))
+    assert live_cache.get(scene) is None and scene.frame_current == 5
+
+
+def test_what_is_moved_without_a_keyframe_stays_where_it_was_put(monkeypatch):
+    monkeypatch.setattr(second_look, "QUICK", 60.0)
+    scene, _, target = press(frames=6)
+    play_to(scene, 5)
+    target.location.x = 0.003
+    second_look.look_again(scene)
+    assert target.location.x == pytest.approx(0.003)
+    assert frame_status.status_of(scene).text.startswith("Out of date")
+
+
+def test_nothing_changed_is_left_as_it_is():
+    scene, *_ = press_and_drop(frames=6)
+    play_to(scene, 5)
+    run, status = live_cache.get(scene), frame_status.status_of(scene)
+    second_look.look_again(scene)
+    assert live_cache.get(scene) is run and frame_status.status_of(scene) is status
+
+
+def test_views_without_materials_show_the_colours_of_a_bake_on_both_sides(tmp_path):
+    scene, pad, _ = press(frames=4)
+    save(tmp_path)
+    run_job(bake(scene))
+    scene.frame_set(4)
+    bake_read = read_sensors(list(baked_frames._folders(scene)), images=False)
+    (overlay,) = overlays.baked_overlays(scene, bake_read, 4, 0.5)
+    texels, force = bake_read.texels["Pad"], bake_read.recording.at(4).sensors["Pad"].normal_force
+    corner = texels.layout.triangles.ravel()
+    assert overlay.plain_only and overlay.line is None
+    expected = color_maps.colors(scene.palpate.color_map, force / 0.5)[corner]
+    np.testing.assert_allclose(overlay.colors[:, :3], np.tile(expected, (2, 1)), atol=1e-6)
+    above, below = np.split(overlay.corners, 2)
+    away = np.einsum("ij,ij->i", above - below, texels.normal[corner])
+    assert (away > 0).all()  # the pad stands at the origin, unturned
+    np.testing.assert_allclose(0.5 * (above + below), texels.position[corner], atol=1e-7)
