@@ -116,6 +116,7 @@ def register():
     for name, function in LISTS.items():
         getattr(bpy.app.handlers, name).append(function)
     first_use.when_ready.append(playback.solver_is_ready)
+    session_state.when_settings_change.append(second_look.soon)
     overlays.register()
     texel_overlay.register()
 
@@ -124,6 +125,7 @@ def unregister():
     texel_overlay.unregister()
     overlays.unregister()
     sensor_report.forget()
+    session_state.when_settings_change.clear()
     second_look.stop()
     first_use.stop()
     first_use.when_ready.clear()

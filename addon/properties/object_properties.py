@@ -39,6 +39,7 @@ def _role_changed(settings, context):
 
 def _body_changed(settings, _context):
     start_transforms.restore_unless_moved(settings.id_data)
+    session_state.settings_changed()
 
 
 class PALPATE_PG_object(SensorParameterProperties, PaintedProperties, DriveParameterProperties, bpy.types.PropertyGroup):
@@ -47,7 +48,7 @@ class PALPATE_PG_object(SensorParameterProperties, PaintedProperties, DriveParam
     schema_version: IntProperty(options={"HIDDEN"})
     uid: StringProperty(options={"HIDDEN"})
     role: EnumProperty(
-        name="Role", description="What this object does in the simulation", items=ROLES, update=_role_changed, **FIXED
+        name="Role", description="What this object does in the simulation", items=ROLES, **(FIXED | {"update": _role_changed})
     )
 
     region: EnumProperty(
@@ -127,8 +128,7 @@ class PALPATE_PG_object(SensorParameterProperties, PaintedProperties, DriveParam
             ("DRIVEN", "Driven", "An actuator of limited force along one axis; its parent carries it. A finger of a gripper"),
             ("PARENT", "Part of Parent", "It is fixed to its parent: what presses on it moves the parent's body"),
         ),
-        update=_body_changed,
-        **FIXED,
+        **(FIXED | {"update": _body_changed}),
     )
     mass: FloatProperty(
         name="Mass (kg)",
@@ -209,15 +209,21 @@ class PALPATE_PG_object(SensorParameterProperties, PaintedProperties, DriveParam
         description="Target of position control, m from the start; can be keyframed",
         precision=5,
         step=0.1,
+        update=session_state.settings_changed,
     )
     drive_speed: FloatProperty(
-        name="Speed (m/s)", description="Target of velocity control, m/s; can be keyframed", precision=4, step=1
+        name="Speed (m/s)",
+        description="Target of velocity control, m/s; can be keyframed",
+        precision=4,
+        step=1,
+        update=session_state.settings_changed,
     )
     drive_force: FloatProperty(
         name="Tactile Sum (N)",
         description="Target of force control: sum of the sensor's normal forces, N; zero opens. Can be keyframed",
         default=5.0,
         precision=4,
+        update=session_state.settings_changed,
     )
     drive_sensor: PointerProperty(
         name="Sensor",

@@ -6,10 +6,10 @@ from bpy.props import EnumProperty, FloatProperty, StringProperty
 from ...core.model.drive import DRIVE_PARAMETERS
 from ...core.model.parameter import ChoiceParameter, Parameter, Specification
 from ...core.model.sensor_parameters import SENSOR_PARAMETERS, SensorParameters
-from ..session import units
+from ..session import session_state, units
 
-FIXED: dict = {"options": set(), "override": {"LIBRARY_OVERRIDABLE"}}
-"""A parameter is constant during a run, so it has no keyframes."""
+FIXED: dict = {"options": set(), "override": {"LIBRARY_OVERRIDABLE"}, "update": session_state.settings_changed}
+"""A parameter is constant during a run, so it has no keyframes; what is shown follows it."""
 LOWEST, HIGHEST = -1e9, 3.402823466e38
 """Bounds of a panel's number where the parameter has none; the second is the largest number of Blender."""
 

@@ -5,8 +5,11 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, PointerProperty, StringProperty
 
 from ...core.figures import color_maps
+from ..session import session_state
 from . import figure_properties
 
+SETTING: dict = {"options": set(), "update": session_state.settings_changed}
+"""A setting of a scene has no keyframes; what is shown follows it."""
 COLOR_MAPS = tuple((name, *words) for name, words in color_maps.NAMES.items())
 OVERLAYS = (
     (
@@ -31,13 +34,13 @@ class PALPATE_PG_scene(bpy.types.PropertyGroup):
         description="Tactile images and recordings go here, in one folder per sensor; // is the folder of the .blend",
         default="//palpate",
         subtype="DIR_PATH",
-        options=set(),
+        **SETTING,
     )
     use_auto_dt: BoolProperty(
         name="Auto Time Step",
         description="Choose the substep from the stability limit of each free body against all texels that can touch it",
         default=True,
-        options=set(),
+        **SETTING,
     )
     dt: FloatProperty(
         name="Time Step (s)",
@@ -46,7 +49,7 @@ class PALPATE_PG_scene(bpy.types.PropertyGroup):
         min=0.0,
         precision=6,
         step=0.001,
-        options=set(),
+        **SETTING,
     )
     interpolation: EnumProperty(
         name="Between Frames",
@@ -55,7 +58,7 @@ class PALPATE_PG_scene(bpy.types.PropertyGroup):
             ("LINEAR", "Linear", "Straight, with constant speed: speeds jump at the frames"),
             ("SMOOTH", "Smooth", "Without jumps of speed"),
         ),
-        options=set(),
+        **SETTING,
     )
     subframes: IntProperty(
         name="Samples per Frame",
@@ -64,53 +67,53 @@ class PALPATE_PG_scene(bpy.types.PropertyGroup):
         min=1,
         soft_max=16,
         max=1000,
-        options=set(),
+        **SETTING,
     )
     use_live: BoolProperty(
         name="Live Playback",
         description="Playing forward from the first frame computes frame by frame; scrubbing shows what was computed",
         default=True,
-        options=set(),
+        **SETTING,
     )
     show_texels: BoolProperty(
         name="Texels",
         description="Mark the texels of the active sensor in the 3D view; red ones have a problem",
         default=True,
-        options=set(),
+        **SETTING,
     )
     show_normals: BoolProperty(
-        name="Normals", description="Show the normals of the texels of the active sensor", default=True, options=set()
+        name="Normals", description="Show the normals of the texels of the active sensor", default=True, **SETTING
     )
     show_numbers: BoolProperty(
         name="Numbers",
         description="Show row and column of the texels where they form a grid, and their number where not",
         default=False,
-        options=set(),
+        **SETTING,
     )
     show_reach: BoolProperty(
         name="Reach",
         description="Show the maximum penetration: how deep the texels of the active sensor reach",
         default=False,
-        options=set(),
+        **SETTING,
     )
     show_overlay: BoolProperty(
         name="Live Heat Map",
         description="Colour the texels in the 3D view while playing; nothing of it is saved",
         default=True,
-        options=set(),
+        **SETTING,
     )
     show_inset: BoolProperty(
         name="Live Images and Curves",
         description="Tactile images, their scale and the force over time in a corner of the 3D view",
         default=True,
-        options=set(),
+        **SETTING,
     )
-    color_map: EnumProperty(name="Colour Map", description="Colours of the heat map", items=COLOR_MAPS, options=set())
+    color_map: EnumProperty(name="Colour Map", description="Colours of the heat map", items=COLOR_MAPS, **SETTING)
     use_auto_range: BoolProperty(
         name="Auto Range",
         description="The heat maps of all sensors end at the largest value of any of them",
         default=True,
-        options=set(),
+        **SETTING,
     )
     quantity: EnumProperty(
         name="Shows",
@@ -119,10 +122,10 @@ class PALPATE_PG_scene(bpy.types.PropertyGroup):
             ("FORCE", "Force", "Normal force of the texel, N"),
             ("PRESSURE", "Pressure", "Normal force over the area of the texel, kPa"),
         ),
-        options=set(),
+        **SETTING,
     )
     range_max_pressure: FloatProperty(
-        name="Maximum (kPa)", description="Pressure at the end of the heat map, kPa", default=10.0, min=1e-9, options=set()
+        name="Maximum (kPa)", description="Pressure at the end of the heat map, kPa", default=10.0, min=1e-9, **SETTING
     )
     overlays: EnumProperty(
         name="On Baked Sensors",
@@ -130,6 +133,7 @@ class PALPATE_PG_scene(bpy.types.PropertyGroup):
         items=OVERLAYS,
         default={"FORCE"},
         options={"ENUM_FLAG"},
+        update=session_state.settings_changed,
     )
     texel_arrow_scale: FloatProperty(
         name="Texel Arrow Scale (m/N)",
@@ -137,16 +141,16 @@ class PALPATE_PG_scene(bpy.types.PropertyGroup):
         default=0.1,
         min=0.0,
         precision=5,
-        options=set(),
+        **SETTING,
     )
     range_max: FloatProperty(
-        name="Maximum (N)", description="Normal force at the end of the heat map, N", default=0.1, min=1e-9, options=set()
+        name="Maximum (N)", description="Normal force at the end of the heat map, N", default=0.1, min=1e-9, **SETTING
     )
     use_auto_arrow: BoolProperty(
         name="Auto Length",
         description="The longest arrow of a bake is as long as the largest side of any sensor",
         default=True,
-        options=set(),
+        **SETTING,
     )
     arrow_scale: FloatProperty(
         name="Arrow Scale (m/N)",
@@ -154,7 +158,7 @@ class PALPATE_PG_scene(bpy.types.PropertyGroup):
         default=0.05,
         min=0.0,
         precision=5,
-        options=set(),
+        **SETTING,
     )
     figures: PointerProperty(
         type=figure_properties.PALPATE_PG_figures, description="What figures are made of the bake, and how"

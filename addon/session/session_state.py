@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 
@@ -37,6 +37,15 @@ class Session:
 
 
 session = Session()
+
+when_settings_change: list[Callable[[], None]] = []
+"""Called when the user or a script has changed a setting, which Blender reports to nobody else."""
+
+
+def settings_changed(_settings=None, _context=None) -> None:
+    """Tell those who want to know; the update function of the properties."""
+    for notify in when_settings_change:
+        notify()
 
 
 def is_baking() -> bool:

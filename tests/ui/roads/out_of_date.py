@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What is shown follows what is changed, without a change of the frame: live numbers, a bake, after undo and in another scene."""
+"""What is shown follows what is changed at the same frame: live numbers, a bake, after undo and in another scene."""
 
 import importlib
 
