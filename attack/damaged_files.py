@@ -37,6 +37,7 @@ from palpate.core.io.sensor_npz import load_sensor
 from palpate.core.io.sensor_toml import FORMAT, read_sensor
 from palpate.core.model.sensor_parameters import Painted, SensorParameters
 
+from . import unfinished_bakes
 from .area import CLEAR, TRACEBACK, WRONG
 from .sample_bake import grid_texels, recording_of, round_texels, write_sensor
 
@@ -201,7 +202,7 @@ def damaged_archive(draw, content):
     for _ in range(draw(st.integers(1, 3))):
         name = draw(st.sampled_from(sorted(arrays)))
         what = draw(st.sampled_from(["change", "change", "change", "remove", "exchange"]))
-        if name == "header" and what == "change":
+        if name in ("header", "tree", "about") and what == "change":  # JSON
             try:
                 header = json.loads(str(arrays[name]))
             except ValueError:
@@ -439,6 +440,7 @@ def readers() -> dict[str, Reader]:
         Reader("recording", _bakes("recording.npz", damaged_archive), _read_bake),
         Reader("sensor.npz", _bakes("sensor.npz", damaged_archive), _read_bake),
         Reader("switch", _switches(), _read_bake),
+        Reader("unfinished bake", unfinished_bakes.inputs(damaged_archive, damaged_bytes), unfinished_bakes.read),
         Reader("image, library", _file("tactile.exr", damaged_bytes(image())), partial(_read_image, exr_library)),
         Reader("image, codec", _file("tactile.exr", damaged_bytes(image())), partial(_read_image, exr_codec)),
     ]

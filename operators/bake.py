@@ -31,7 +31,7 @@ class PALPATE_OT_bake(modal_job.ModalJob, bpy.types.Operator):
         return bake(context.scene)
 
     def done(self, baked):
-        for warning in baked.recording.warnings:
+        for warning in (*baked.recording.warnings, *baked.notes):
             self.report({"WARNING"}, warning)
         frames = baked.recording.frames
         names = ", ".join(f"'{name}'" for name in baked.folders)

@@ -33,11 +33,14 @@ class BakeResult:
         What was solved.
     folders : dict of str to Path
         Bake folder of each sensor, by the sensor's name.
+    notes : tuple of str
+        Sentences for the user that are no part of the bake.
     """
 
     recording: Recording
     scenario: Scenario
     folders: dict[str, Path]
+    notes: tuple[str, ...] = ()
 
 
 def bake(scene, into_scene: bool = True, images: bool = True, blend: bake_files.BlendToSave | None = None) -> Job[BakeResult]:
@@ -92,7 +95,7 @@ def _bake(scene, into_scene: bool, images: bool, blend: bake_files.BlendToSave |
         files.switch(blend)
     if into_scene and blend is None:
         _show(_scene_called(name), reading, recording, files, owner)
-    return BakeResult(recording, reading.scenario, files.folders)
+    return BakeResult(recording, reading.scenario, files.folders, tuple(files.notes))
 
 
 def _read(scene) -> Job[SceneReading]:

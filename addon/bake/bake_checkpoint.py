@@ -5,12 +5,17 @@ A folder beside those of the sensors holds the frames so far (:mod:`.frame_rows`
 them. The state is written after everything it vouches for is on the disk: the first rows of the file of frames and the first
 lines of the lists of images, each by its length and SHA-256. What a killed bake has written after them is cut off, and what a
 power cut has damaged is found. A checkpoint writes what is new and the state, so it costs the same at any length of a bake.
+
+A checkpoint may come from anywhere, as a bake folder does. What is damaged or does not fit is not used: the bake begins anew.
 """
 
 from __future__ import annotations
 
 import json
+import os
+import stat
 import time
+import zipfile
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -30,6 +35,8 @@ CHECKPOINT_INTERVAL = 5.0
 """Seconds between two checkpoints: a kill loses no more solver time than this."""
 MAX_COST_SHARE = 0.03
 """Largest share of a bake's time that checkpoints may take: where a checkpoint is slow, the interval grows."""
+_SHA256 = "sha256"
+"""Name of the member that has the SHA-256 of all others."""
 
 
 @dataclass(frozen=True)
@@ -60,10 +67,16 @@ class BakeCheckpoint:
         The folder in which the bake grows.
     digest : str
         Digest of the scenario. A checkpoint of another scenario is ignored.
+
+    Attributes
+    ----------
+    damage : str
+        What is wrong with the checkpoint; empty if there is none, or one of another scenario or version.
     """
 
     def __init__(self, folder: Path, digest: str):
         self.folder = folder / CHECKPOINT_FOLDER
+        self.damage = ""
         self._key = {"palpate": VERSION, "digest": digest}
         self._saved_frames = 0
         self._last_save = time.monotonic()
@@ -84,20 +97,25 @@ class BakeCheckpoint:
             Number of frames so far; zero if there is no usable checkpoint, and the bake starts again, which costs only time.
         """
         try:
-            with open_regular(self.folder / STATE_FILE) as file, np.load(file, allow_pickle=False) as members:
-                packed = {name: members[name] for name in members.files}
-            about = json.loads(str(packed.pop("about")))
+            _require_plain_files(self.folder.parent)
+            packed = _read_state(self.folder / STATE_FILE)
+            about = json.loads(str(packed["about"]))
             if about["key"] != self._key:
                 return 0
+            if packed.pop(_SHA256).tolist() != checkpoint.digest(packed):
+                raise ValueError("its state does not have its checksum")
             vouched = Vouched(
                 frames=int(about["frames"]),
                 rows_sha256=str(about["rows_sha256"]),
                 images={name: (int(length), str(sha256)) for name, (length, sha256) in about["images"].items()},
             )
             if vouched.frames < 1 or not check(vouched):
-                return 0
-            checkpoint.unpack(simulation, packed)
-        except (OSError, FileError, *DAMAGED):
+                raise ValueError("frames or images that it lists are not there, or are others")
+            checkpoint.unpack(simulation, packed, simulation.scenario.frame_start + vouched.frames - 1)
+        except FileNotFoundError:
+            return 0  # killed before the first checkpoint
+        except (OSError, FileError, *DAMAGED) as error:
+            self.damage = " ".join(str(error).split())[:200] or type(error).__name__
             return 0
         self._saved_frames = vouched.frames
         return vouched.frames
@@ -120,7 +138,26 @@ class BakeCheckpoint:
         vouched = sync()
         about = {"key": self._key, **asdict(vouched)}
         packed = {"about": np.array(json.dumps(about)), **checkpoint.pack(simulation)}
+        packed[_SHA256] = np.array(checkpoint.digest(packed))
         write_arrays(self.folder / STATE_FILE, packed, compress=False)
         self._saved_frames = vouched.frames
         self._last_save = time.monotonic()
         self._cost = self._last_save - began
+
+
+def _read_state(path: Path) -> dict[str, np.ndarray]:
+    """Return the arrays of a state. They are not compressed, so they need no more memory than the file says."""
+    with open_regular(path) as file, np.load(file, allow_pickle=False) as members:
+        if any(one.compress_type != zipfile.ZIP_STORED for one in members.zip.infolist()):
+            raise ValueError("its state is compressed")
+        return {name: members[name] for name in members.files}
+
+
+def _require_plain_files(folder: Path) -> None:
+    """Raise ValueError if a folder holds a link, a device or the like: a bake that goes on writes into its files."""
+    for above, folders, files in os.walk(folder):
+        for name in (*folders, *files):
+            found = os.lstat(os.path.join(above, name))
+            plain = stat.S_ISDIR(found.st_mode) or (stat.S_ISREG(found.st_mode) and found.st_nlink == 1)
+            if not plain:
+                raise ValueError(f"'{name}' is a link or no file")

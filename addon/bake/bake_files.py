@@ -18,6 +18,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import bpy
+import numpy as np
 
 from ...core.errors import FileError
 from ...core.io import bake_switch
@@ -129,6 +130,8 @@ class BakeFiles:
         Folder of each sensor that is read out, by the sensor's name.
     bake_id : str
         Hash of all files of the bake; empty until it is complete.
+    notes : list of str
+        Sentences for the user that are no part of the bake.
 
     Raises
     ------
@@ -140,6 +143,7 @@ class BakeFiles:
     def __init__(self, folder: Path, scenario: Scenario, owner: BakeOwner | None = None, images: bool = True):
         self._owner = BakeOwner() if owner is None else owner
         self.bake_id = ""
+        self.notes: list[str] = []
         self._sensors = {sensor.name: sensor for sensor in scenario.sensors if sensor.readout}
         self._names = folder_names(self._sensors)
         self._scenario, self._digest = scenario, scenario.digest()
@@ -328,6 +332,11 @@ class BakeFiles:
             return 0
         self._grow_in(growing)
         frames = self._checkpoint.restore(simulation, self._take_over)
+        if self._checkpoint.damage:
+            self.notes.append(
+                f"What a killed bake has left in '{self.folder}' is damaged ({self._checkpoint.damage}), "
+                "so this bake began at its first frame."
+            )
         if not frames:
             self._close()
             self._growing = self._rows = self._images = None
@@ -340,9 +349,13 @@ class BakeFiles:
         """Take over the files of a checkpoint; return False if they are not what it vouches for."""
         if set(vouched.images) != (set(self._sensors) if self._has_images else set()):
             return False
-        if not self._rows.restore(vouched.frames, vouched.rows_sha256):
+        frames = self._scenario.frames[: vouched.frames]
+        if len(frames) < vouched.frames or not self._rows.restore(vouched.frames, vouched.rows_sha256):
             return False
-        return self._images is None or self._images.restore(vouched.images)
+        times = (np.asarray(frames) - self._scenario.frame_start) / self._scenario.fps
+        if not self._rows.are_of(frames, times):
+            return False
+        return self._images is None or self._images.restore(vouched.images, frames)
 
     def _sync_frames(self) -> Vouched:
         """Bring all frames and images so far onto the disk."""

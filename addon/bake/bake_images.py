@@ -8,7 +8,7 @@ vouches for all images so far.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 
@@ -57,9 +57,23 @@ class BakeImages:
         for one in self._lists.values():
             one.begin()
 
-    def restore(self, states: Mapping[str, ListState]) -> bool:
-        """Take over the lists of a checkpoint; return False if one is missing or is not what the checkpoint vouches for."""
-        return all(one.restore(*states[name]) for name, one in self._lists.items())
+    def restore(self, states: Mapping[str, ListState], frames: Sequence[int]) -> bool:
+        """Take over the lists of a checkpoint.
+
+        Returns
+        -------
+        bool
+            False if one is missing, is not what the checkpoint vouches for, or does not name the images of these frames.
+
+        Raises
+        ------
+        FileError
+            A list is no list.
+        """
+        if not all(one.restore(*states[name]) for name, one in self._lists.items()):
+            return False
+        files = [frame_file(frame) for frame in frames]
+        return all([file for file, _ in read_checksums(one.path)] == files for one in self._lists.values())
 
     def states(self) -> dict[str, ListState]:
         """Return the state of each list, by the name of the folder. All images are written (:meth:`finish`)."""

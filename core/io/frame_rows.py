@@ -16,9 +16,12 @@ import numpy as np
 
 from ..model.recording import SENSOR_FIELDS, Frame, Recording, SensorRecording
 from .growing_file import GrowingFile
+from .regular_file import open_regular
 
 IN_MEMORY_BYTES = 1 << 24
 """Largest recording that is read into memory; a larger one stays in its file, which is mapped."""
+_BLOCK_BYTES = 1 << 22
+"""Size of the rows that are looked at together."""
 _VECTORS = ("net_force", "net_torque", "centre_of_pressure")
 _SHARED = ("frames", "times", "poses", "velocities")
 
@@ -80,6 +83,20 @@ class FrameRows:
     def restore(self, count: int, sha256: str) -> bool:
         """Take over the first `count` rows of a file, as :meth:`.GrowingFile.restore` does."""
         return self._file.restore(count * self._type.itemsize, sha256)
+
+    def are_of(self, frames: Sequence[int], times: np.ndarray) -> bool:
+        """Return whether the rows are those of some frames (n,), at some times (n,) s, and all of their numbers are finite."""
+        self._file.flush()
+        block = max(1, _BLOCK_BYTES // self._type.itemsize)
+        with open_regular(self._file.path) as file:
+            for first in range(0, len(frames), block):
+                own = slice(first, first + block)
+                rows = np.frombuffer(file.read(len(frames[own]) * self._type.itemsize), self._type)
+                if rows["frames"].tolist() != list(frames[own]) or not np.array_equal(rows["times"], times[own]):
+                    return False
+                if not all(_finite(rows[name]) for name in self._type.names or ()):
+                    return False
+        return True
 
     def append(self, frame: Frame) -> None:
         """Write one more frame.
@@ -159,3 +176,10 @@ def _in_memory(recording: Recording) -> Recording:
         for name in SENSOR_FIELDS:
             setattr(sensor, name, getattr(sensor, name).copy())
     return recording
+
+
+def _finite(values: np.ndarray) -> bool:
+    """Return whether all floats of an array, or of the fields of a structured one, are finite."""
+    if values.dtype.names:
+        return all(_finite(values[name]) for name in values.dtype.names)
+    return values.dtype.kind != "f" or bool(np.isfinite(values).all())

@@ -53,6 +53,8 @@ class FastCrossings:
         Point of each body, in its frame, whose path is given.
     """
 
+    CARRIED = ("_warned",)
+
     def __init__(self, scenario: Scenario, center: np.ndarray):
         self._scenario, self._center = scenario, center
         self._radius = np.zeros(len(scenario.bodies))
@@ -62,6 +64,7 @@ class FastCrossings:
             reach = float(np.linalg.norm(points - center[body], axis=1).max())
             self._radius[body] = max(self._radius[body], reach)
         self._pairs = [(s, t) for s in scenario.sensors for t in scenario.targets if s.body != t.body]
+        self._warned = np.zeros(len(self._pairs), np.bool_)
         self._bodies = np.array([(s.body, t.body) for s, t in self._pairs], np.int64).reshape(-1, 2)
         self._limits = np.array([_limit_of(s) for s, _ in self._pairs], float)
         self._moved = np.array([body.moved_by_forces for body in scenario.bodies])
@@ -101,13 +104,13 @@ class FastCrossings:
         cosines = np.abs(np.einsum("sbi,sbi->sb", quaternions[1:], quaternions[:-1])).min(axis=0)
         travel = travel + 2.0 * np.arccos(np.minimum(cosines, 1.0)) * self._radius
         found = []
-        for sensor, target in list(self._pairs):
+        for i, (sensor, target) in enumerate(self._pairs):
             limit = _limit_of(sensor)
-            if travel[sensor.body] + travel[target.body] < limit:
+            if self._warned[i] or travel[sensor.body] + travel[target.body] < limit:
                 continue
             deepest = self._deepest_entry(sensor, target, positions, quaternions, limit)
             if deepest > 0.0:
-                self._pairs.remove((sensor, target))
+                self._warned[i] = True
                 advised = dt * GOOD_SHARE * sensor.parameters.max_penetration / deepest
                 found.append(
                     f"Frame {frame}: '{target.name}' goes {deepest * 1e3:.3g} mm into '{sensor.name}' within one time step of "

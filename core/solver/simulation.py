@@ -18,13 +18,14 @@ from ..effects.engine.sensor_effects import check_scenario, mounted_texels
 from ..geometry.bvh import build_tree
 from ..geometry.contact_points import contact_points
 from ..geometry.mesh import is_closed
-from ..geometry.rotations import quaternion_product, rotation_matrices, rotation_vectors
+from ..geometry.rotations import quaternion_product, rotation_matrices, rotation_vectors, write_backward_step_motion
 from ..jobs.job_runner import run_job
 from ..jobs.progress import Job, Progress
 from ..model.pose_interpolation import poses_at
 from ..model.recording import Frame, Recording, SensorFrame
 from ..model.scenario import Scenario
 from ..response.readings import ReadoutChain
+from .detection.deformation import refit_boxes, set_moment
 from .detection.deforming_surfaces import DeformingSurfaces
 from .detection.detection_data import DetectionData
 from .detection.narrow_phase import count_too_deep
@@ -69,6 +70,9 @@ class Simulation:
         One sentence each; grows while the simulation runs.
     """
 
+    CARRIED = ("frame", "warnings", "_state", "_readers", "_drive_commands", "_fast_crossings")
+    """What goes from frame to frame (see :mod:`.checkpoint`); all the rest follows from it and from the scenario."""
+
     def __init__(self, scenario: Scenario, threads: int | None = None):
         check_scenario(scenario)
         self.scenario = scenario
@@ -82,7 +86,6 @@ class Simulation:
         meshes = [replace(t.mesh, vertices=t.mesh.vertices - self._center[t.body]) for t in scenario.targets]
         self._tree = build_tree(meshes)
         self._closed = [is_closed(mesh.triangles) for mesh in meshes]
-        self._most_too_deep = 0  # most contact points at once that a substep of the last frame found pressed too deep
         points = [contact_points(s.texels, s.parameters.points_per_texel) for s in scenario.sensors]
         self._model = build_model(scenario, self._center, points, self.dt)
         self._deforming_surfaces = DeformingSurfaces(scenario, self._center, points, self._tree, self._model)
@@ -91,6 +94,8 @@ class Simulation:
         self._neighbour_lists = neighbour_lists_for(len(self._state.triangle), len(self._model.pairs.sensor))
         queue, self._helpers = make_queue(len(self._state.triangle), threads)
         self._workspace = workspace_for(self._model, self._state, self._surface_motion, queue)
+        # How many contact points of each pair were pressed too deep in the worst step of the last frame.
+        self._most_too_deep = np.zeros(len(self._model.pairs.sensor), np.int64)
         self._readers = [ReadoutChain.of(sensor) for sensor in scenario.sensors]
         self._drive_commands = DriveCommands(scenario)
         self._texel_start = texel_starts(scenario)
@@ -141,25 +146,48 @@ class Simulation:
 
     def advance(self) -> Frame:
         """Bring the state one frame on and return what the sensors measure there."""
-        times = self._time_of(self.frame) + np.arange(self.substeps + 1) * self.dt
-        times[-1] = self._time_of(self.frame + 1)
+        times = self._step_times(self.frame)
         positions, quaternions, velocities = self._prescribed_motion(times)
         if self._deforming_surfaces.any_deforms:
             self._surface_motion = self._deforming_surfaces.at(times)
+            if self._drive_commands.reads_sensors:  # controllers read before the first step
+                self._place_surfaces(0, 1, 0.0)
         if self.frame == self.scenario.frame_start:
             find_all_contacts(-self.dt, *self.arrays)
             credit_initial_contacts(self._model, self._state, self._workspace)
-        self._most_too_deep = 0
+        self._most_too_deep[:] = 0
         before = self._state.position.copy(), self._state.quaternion.copy()
         for first, last, commands in self._drive_commands.control_intervals(times, self.dt, self._normal_forces):
             path = FramePath(positions, quaternions, velocities, commands)
             with helper_threads(self._workspace.queue, self._helpers, help_with_loops, *self.arrays):
                 too_deep = advance_steps(self.dt, first, last, path, *self.arrays)
-            self._most_too_deep = max(self._most_too_deep, too_deep)
+            if too_deep > self._most_too_deep.sum():
+                self._most_too_deep[:] = self._workspace.contacts.most_too_deep
         self.frame += 1
         if self._fast_crossings.may_occur(velocities, before, (self._state.position, self._state.quaternion), self.dt):
             self._warn_of_fast_crossings(positions, quaternions, before)
         return self.observe()
+
+    def follow_state(self) -> None:
+        """Bring to the state what follows from it, after the state of a later frame was put into a new simulation."""
+        if self.frame == self.scenario.frame_start:
+            return
+        for velocity, motion in zip(self._state.velocity, self._workspace.bodies.step_motion, strict=True):
+            write_backward_step_motion(velocity, self.dt, motion)
+        if self._deforming_surfaces.any_deforms:
+            self._surface_motion = self._deforming_surfaces.at(self._step_times(self.frame - 1))
+            self._place_surfaces(self.substeps, self.substeps - 1, self.dt)
+
+    def _place_surfaces(self, now: int, other: int, dt: float) -> None:
+        """Bring deforming surfaces to a moment of their present frame; the arguments are those of :func:`.set_moment`."""
+        refit_boxes(self._surface_motion, self._tree)
+        set_moment(now, other, dt, self._model, self._surface_motion)
+
+    def _step_times(self, frame: int) -> np.ndarray:
+        """(substeps + 1,) times at which the steps after a frame begin, and the last one ends, s."""
+        times = self._time_of(frame) + np.arange(self.substeps + 1) * self.dt
+        times[-1] = self._time_of(frame + 1)
+        return times
 
     def _warn_of_fast_crossings(
         self, positions: np.ndarray, quaternions: np.ndarray, before: tuple[np.ndarray, np.ndarray]
@@ -235,20 +263,18 @@ class Simulation:
         """Say once, at the first frame where it happens, that texels are pressed too deep to act."""
         if any("maximum penetration" in warning for warning in self.warnings):
             return
-        sensors, targets, total, names = self.scenario.sensors, self.scenario.targets, 0, []
-        for pair, (sensor, target) in enumerate(zip(self._model.pairs.sensor, self._model.pairs.target, strict=True)):
-            too_deep = self._count_too_deep(pair)
-            if too_deep:
-                name = f"'{targets[target].name}' into '{sensors[sensor].name}'"
-                if name not in names:  # a large sensor has several pairs with one target
-                    names.append(name)
-                total += too_deep
-        total = max(total, self._most_too_deep)
+        sensors, targets, pairs = self.scenario.sensors, self.scenario.targets, self._model.pairs
+        now = np.array([self._count_too_deep(pair) for pair in range(len(pairs.sensor))], np.int64)
+        total = max(now.sum(), self._most_too_deep.sum())
         if total:
+            pressed = [  # between frames as well; a large sensor has several pairs with one target
+                f"'{targets[pairs.target[pair]].name}' into '{sensors[pairs.sensor[pair]].name}'"
+                for pair in np.flatnonzero(now + self._most_too_deep)
+            ]
             what = "texels" if all(sensor.parameters.points_per_texel == 1 for sensor in sensors) else "contact points"
             self.warnings.append(
                 f"Frame {self.frame}: {total} {what} are pressed past their maximum penetration by "
-                f"{', '.join(names) or 'an object'} and do not act; press less deep, or raise k or the maximum penetration."
+                f"{', '.join(dict.fromkeys(pressed))} and do not act; press less deep, or raise k or the maximum penetration."
             )
 
     def _count_too_deep(self, pair: int) -> int:

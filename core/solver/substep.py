@@ -69,7 +69,8 @@ def advance_steps(
     Returns
     -------
     too_deep : int
-        Largest number of contact points that were pressed too deep to act in any one step.
+        Largest number of contact points that were pressed too deep to act in any one step; if it is not zero,
+        ``workspace.contacts.most_too_deep`` has their numbers in that step, by pair.
     """
     worst = 0
     surfaces = detection.surfaces
@@ -81,7 +82,11 @@ def advance_steps(
         _set_prescribed_velocities(step, dt, path, model, state, workspace)
         if deforms:
             set_moment(step, step + 1, dt, model, surfaces)
-        worst = max(worst, find_all_contacts(dt, model, detection, state, workspace))
+        too_deep = find_all_contacts(dt, model, detection, state, workspace)
+        if too_deep > worst:
+            worst = too_deep
+            for pair in range(len(model.pairs.sensor)):
+                workspace.contacts.most_too_deep[pair] = workspace.contacts.too_deep[pair]
         for body in range(len(model.bodies.kind)):
             if model.bodies.kind[body] == FREE:
                 write_world_inertia(workspace.bodies.rotation[body], model.bodies.inertia[body], workspace.bodies.inertia[body])

@@ -72,6 +72,8 @@ class ContactWork(NamedTuple):
         Where each pair's rows begin.
     number, too_deep : (q,) int
         How many rows each pair has in use, and how many of its points are pressed past their maximum penetration.
+    most_too_deep : (q,) int
+        `too_deep` of the step of a frame in which it was largest in all.
     """
 
     rows: np.ndarray
@@ -81,6 +83,7 @@ class ContactWork(NamedTuple):
     first_block: np.ndarray
     number: np.ndarray
     too_deep: np.ndarray
+    most_too_deep: np.ndarray
 
 
 @by_reference

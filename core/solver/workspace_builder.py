@@ -30,6 +30,7 @@ def workspace_for(model: SolverModel, state: State, surfaces: SurfaceMotion, que
             first_block=blocks[:-1],
             number=np.zeros(q, np.int64),
             too_deep=np.zeros(q, np.int64),
+            most_too_deep=np.zeros(q, np.int64),
         ),
         pairs=PairWork(
             sums=np.zeros((q, SUMS * LANES)),

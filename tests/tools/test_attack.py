@@ -2,14 +2,16 @@
 """The attack's own instruments see what they are to see, and a short, seeded part of each area finds nothing."""
 
 import errno
+import io
 import json
 import os
 import random
 import threading
 
+import numpy as np
 import pytest
 
-from palpate.attack import commands, faults, kills, numbers, power_cut, readers, trees
+from palpate.attack import commands, faults, kills, numbers, power_cut, readers, trees, unfinished_bakes
 from palpate.attack.__main__ import AREAS, attack, main
 from palpate.attack.area import CLEAR, LOST, TRACEBACK, WRONG, Area, Case, Outcome, Tally
 from palpate.attack.injector import DONE, KILL, Injector, Stopped
@@ -116,6 +118,31 @@ def work(folder):
         os.fsync(file.fileno())
     (folder / "new" / "file").rename(folder / "file")
     (folder / "new").rmdir()
+
+
+@pytest.mark.parametrize("damage", ["none", "a number", "a number, vouched for"])
+def test_unfinished_bakes_are_damaged_and_judged(damage, tmp_path):
+    """Undamaged, it goes on and says nothing; a changed number is told by its checksum, and believed with a new one."""
+    files = dict(unfinished_bakes.unfinished())
+    state = next(path for path in files if path.endswith("state.npz"))
+    if damage != "none":
+        with np.load(io.BytesIO(files[state])) as members:
+            arrays = {name: members[name] for name in members.files}
+        key = json.loads(str(arrays["tree"]))["object"]["_state"]["fields"]["position"]["array"]
+        arrays[key][1, 2] += 0.001
+        file = io.BytesIO()
+        np.savez(file, **arrays)
+        files[state] = file.getvalue()
+    if damage.endswith("vouched for"):
+        files[state] = unfinished_bakes.with_checksums(files, state)
+    for path, content in files.items():
+        (tmp_path / path).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / path).write_bytes(content)
+    notes = unfinished_bakes.bake(tmp_path / "bake")
+    told = "its state does not have its checksum" in "".join(notes)
+    assert (len(notes), told) == ((1, True) if damage == "a number" else (0, False))
+    same = (tmp_path / "bake/pad/recording.npz").read_bytes() == unfinished_bakes.whole()["bake/pad/recording.npz"]
+    assert same == (damage != "a number, vouched for")
 
 
 def test_every_operation_is_counted_and_none_outside(tmp_path):

@@ -53,6 +53,8 @@ class ReadoutChain:
     transducers : TransducerArray
     """
 
+    CARRIED = ("_links",)
+
     def __init__(self, effects: Iterable[Effect], transducers: TransducerArray):
         self.transducers = transducers
         self._links: list[_Memoryless | _Coupling | _Law | _Delay | _Conversion] = []
@@ -63,11 +65,11 @@ class ReadoutChain:
                 converted = True
             values = complete_values(item, transducers.gain)
             if form.law is not None:
-                self._links.append(_Law(form, values))
+                self._links.append(_Law(form, values, len(transducers.position)))
             elif form.coupling is not None:
                 self._links.append(_Coupling(form.coupling(values, transducers)))
             elif form.delay is not None:
-                self._links.append(_Delay(form.delay(values)))
+                self._links.append(_Delay(form.delay(values), len(transducers.position)))
             else:
                 self._links.append(_Memoryless(form, values, transducers, item.seed))
         if not converted:
@@ -96,6 +98,8 @@ class ReadoutChain:
 class _Conversion:
     """Converts newtons to the unit of the sensor (paper, section 4)."""
 
+    CARRIED = ()
+
     def __init__(self, transducers: TransducerArray):
         self.transducers = transducers
 
@@ -105,6 +109,8 @@ class _Conversion:
 
 class _Memoryless:
     """Applies a formula without memory."""
+
+    CARRIED = ()
 
     def __init__(self, form: Form, values: Values, transducers: TransducerArray, seed: int):
         self.form, self.values, self.transducers, self.seed = form, values, transducers, seed
@@ -117,6 +123,8 @@ class _Memoryless:
 class _Coupling:
     """Applies a linear coupling of texels."""
 
+    CARRIED = ()
+
     def __init__(self, weights: CouplingMatrix):
         self.weights = weights
 
@@ -127,15 +135,15 @@ class _Coupling:
 class _Law:
     """Applies a law with memory."""
 
-    def __init__(self, form: Form, values: Values):
+    CARRIED = ("memory", "last")
+
+    def __init__(self, form: Form, values: Values, texels: int):
         self.form, self.values = form, values
-        self.memory: np.ndarray | None = None
+        self.memory = np.zeros((texels, form.state_size))
         self.last: float | None = None
 
     def apply(self, time: np.ndarray, signal: np.ndarray) -> np.ndarray:
         assert self.form.constants is not None
-        if self.memory is None:
-            self.memory = np.zeros((signal.shape[1], self.form.state_size))
         lengths, step = steps_of(time, self.last)
         self.last = float(time[-1])
         return law_over_time(self.form, signal, step, self.form.constants(self.values, lengths), self.memory)
@@ -144,13 +152,19 @@ class _Law:
 class _Delay:
     """Delays the signal, which is linear between samples and constant before the first."""
 
-    def __init__(self, delay: float):
+    CARRIED = ("time", "signal")
+
+    def __init__(self, delay: float, texels: int):
         self.delay = delay
-        self.time = np.zeros(0)  # the part of the past that is still needed
-        self.signal: np.ndarray | None = None
+        self.time, self.signal = np.zeros(0), np.zeros((0, texels))  # the part of the past that is still needed
+
+    def check_carried(self) -> None:
+        """Raise ValueError unless each time, of increasing ones, has a sample."""
+        if len(self.time) != len(self.signal) or not (np.diff(self.time) > 0.0).all():
+            raise ValueError("samples of the past do not follow one another")
 
     def apply(self, time: np.ndarray, signal: np.ndarray) -> np.ndarray:
-        if self.signal is None:
+        if not len(self.time):
             self.time, self.signal = time, signal
         else:
             fresh = time > self.time[-1]

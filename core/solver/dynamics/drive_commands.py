@@ -21,6 +21,8 @@ class DriveCommands:
     scenario : Scenario
     """
 
+    CARRIED = ("_controllers",)
+
     def __init__(self, scenario: Scenario):
         self._scenario = scenario
         self._drives = {
@@ -36,6 +38,11 @@ class DriveCommands:
             for body, drive in self._drives.items()
             if drive.control == "force"
         }
+
+    @property
+    def reads_sensors(self) -> bool:
+        """Whether any actuator has a controller."""
+        return bool(self._controllers)
 
     def extend(self, time: float, targets: Mapping[int, float]) -> None:
         """Append the next targets of some bodies' actuators."""

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A bake that is killed, at whatever moment, goes on where it was, and ends with the same bytes as one that was not."""
 
+import hashlib
 import json
 import random
 import shutil
@@ -10,6 +11,7 @@ import sys
 import time
 from pathlib import Path
 
+import numpy as np
 import pytest
 from blender_scenes import contents, press_and_drop, save, visible
 
@@ -20,6 +22,7 @@ from palpate.core.io import bake_switch
 from palpate.core.io.private_folder import LOCK_NAME, MARKER_NAME, PRIVATE_FOLDER
 from palpate.core.io.recording_npz import load_recording
 from palpate.core.jobs.job_runner import SlicedJob, run_job
+from palpate.core.solver import checkpoint
 
 SCRIPT = Path(__file__).with_name("killed_bake.py")
 FRAMES = 60
@@ -127,6 +130,45 @@ def test_what_does_not_fit_is_begun_anew(killed, tmp_path, what):
         shutil.rmtree(growing(tmp_path) / "sensors" / "Pad")
     assert computed(scene)[0] == 1
     assert visible(tmp_path / "palpate") == ["Pad", "Pad 2"]
+    assert len(load_recording(tmp_path / "palpate" / "Pad" / "recording.npz").frames) == 8
+
+
+@pytest.mark.parametrize("what", ["frames.rows", "images.sha256", "tactile_0007.exr", "hard link"])
+def test_nothing_is_written_through_links(killed, tmp_path, what):
+    """A bake folder from the net must not lead a bake into the user's files."""
+    scene, _ = killed
+    mine, place = tmp_path / "thesis.txt", growing(tmp_path)
+    if what == "hard link":
+        image = place / "sensors" / "Pad" / "tactile_0001.exr"
+        mine.hardlink_to(image)
+    else:
+        mine.write_text("thesis")
+        link = place / "checkpoint" / what if what == "frames.rows" else place / "sensors" / "Pad" / what
+        link.unlink(missing_ok=True)
+        link.symlink_to(mine)
+    before = mine.read_bytes()
+    baked = run_job(bake(scene))
+    assert mine.read_bytes() == before
+    assert len(baked.notes) == 1 and "is damaged (" in baked.notes[0] and "is a link or no file" in baked.notes[0]
+
+
+def test_a_list_that_leads_out_is_not_followed(killed, tmp_path):
+    """Its checksum stands in the state, as one from the net would have it."""
+    scene, _ = killed
+    place = growing(tmp_path)
+    own = place / "sensors" / "Pad" / "images.sha256"
+    own.write_bytes(own.read_bytes().replace(b"  tactile_0002.exr", b"  ../../t002.exr.."))
+    state = place / "checkpoint" / bake_checkpoint.STATE_FILE
+    with np.load(state) as members:
+        arrays = {name: members[name] for name in members.files}
+    about = json.loads(str(arrays["about"]))
+    about["images"]["Pad"][1] = hashlib.sha256(own.read_bytes()).hexdigest()
+    arrays["about"] = np.array(json.dumps(about))
+    del arrays["sha256"]
+    arrays["sha256"] = np.array(checkpoint.digest(arrays))
+    np.savez(state, **arrays)
+    (note,) = run_job(bake(scene)).notes
+    assert "frames or images that it lists are not there" in note and str(tmp_path / "palpate") in note
 
 
 def test_a_bake_without_images_goes_on_too(tmp_path, monkeypatch):

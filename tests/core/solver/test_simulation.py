@@ -211,6 +211,17 @@ def test_running_past_the_reach_within_one_step_is_said():
     assert any(warning.startswith("Frame 2: 84 texels") for warning in recording.warnings)
 
 
+def test_who_was_too_deep_between_two_frames_is_named():
+    """At the frames themselves nothing is touched."""
+    scenario = pressed(box(0.08, 0.08, 0.2), [[0, 0, 0.11], [0, 0, 0.08], [0, 0, 0.11]], times=np.arange(3) / 20.0, fps=10.0)
+    recording = run(replace(scenario, frame_end=2))
+    assert (recording.sensors["pad"].normal_force == 0).all()
+    (warning,) = (one for one in recording.warnings if "past their maximum penetration" in one)
+    assert warning.startswith(
+        "Frame 2: 84 texels are pressed past their maximum penetration by 'probe' into 'pad' and do not act"
+    )
+
+
 def test_a_hole_is_not_inside():
     """Texels in the middle of a ring are within its box and yet free."""
     ring = shape(trimesh.creation.annulus(0.01, 0.06, 0.1))
