@@ -13,11 +13,12 @@ import copy
 import hashlib
 import json
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .solver_model import TOO_DEEP, SolverModel, State
+if TYPE_CHECKING:
+    from .solver_model import SolverModel, State
 
 MAY_BE_INFINITE = "stored_energy"
 """Field of :class:`.State` that is infinite where animation brings energy (see :mod:`.passivity`)."""
@@ -160,6 +161,8 @@ def _check_state(state: State, model: SolverModel, first_triangle: np.ndarray) -
     first_triangle : (T + 1,) int
         Where the triangles of each target begin.
     """
+    from .solver_model import TOO_DEEP  # compiles kernels; a bake that only looks for a checkpoint needs none
+
     sizes = {"drives": len(model.drives.gains), "effect_memory": len(model.points.frame)}
     pairs = model.pairs
     sizes |= {"stored_energy": len(pairs.sensor)}
