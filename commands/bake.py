@@ -57,6 +57,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="FILE.npz",
         help="bake nothing, and write what the solver would compute into a file, for palpate sweep where there is no Blender",
     )
+    parser.add_argument(
+        "--overrides",
+        metavar="FILE.toml",
+        help="set properties of the file by their paths before it is baked; a scene that is saved keeps them",
+    )
+    parser.add_argument(
+        "--study",
+        metavar="STUDY.toml",
+        help="with --scenario: also write what the properties are that a study varies by their paths, and a copy of the .blend "
+        "whose files are found from any folder",
+    )
     blender.add_script_arguments(parser)
     where = parser.add_mutually_exclusive_group()
     where.add_argument("--save", action="store_true", help="save motion, heat maps and arrows into SCENE.blend itself")
@@ -73,6 +84,9 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.scenario is not None and saved_path(arguments):
         print("palpate bake: --scenario bakes nothing that could be saved: leave one of them out", file=sys.stderr)
         return 2
+    if arguments.study is not None and arguments.scenario is None:
+        print("palpate bake: --study says what --scenario also writes: add --scenario FILE.npz", file=sys.stderr)
+        return 2
     with console.blender_output_hidden():
         scene = blender.open_scene(arguments.scene, arguments.scripts)
         own_start = scene.frame_start
@@ -80,7 +94,7 @@ def run(arguments: argparse.Namespace) -> int:
         blend = None if saved is None else blender.blend_to_save(saved)
         _prepare(scene, arguments)
         if arguments.scenario is not None:
-            return _write_scenario(scene, arguments.scenario)
+            return _write_scenario(scene, arguments.scenario, arguments.study)
         baked = bake_with_progress(scene, into_scene=saved is not None, images=not arguments.no_images, blend=blend)
     print(report(baked))
     if scene.frame_start != own_start:
@@ -93,13 +107,15 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _write_scenario(scene: Any, path: str) -> int:
-    """Read a scene and write its scenario."""
+def _write_scenario(scene: Any, path: str, study: str | None) -> int:
+    """Read a scene and write its scenario, and beside it what a study needs to read the scene anew."""
     from ..addon.scene import scene_reader
     from ..core.io.file_writing import writable_file
     from ..core.io.scenario_npz import save_scenario
 
     target = writable_file(path)
+    if study is not None:
+        _write_properties(Path(study), target)
     reading = console.run_with_progress_bar("read", scene_reader.read_scene(scene))
     save_scenario(target, reading.scenario)
     for warning in reading.warnings:
@@ -107,8 +123,27 @@ def _write_scenario(scene: Any, path: str) -> int:
     return 0
 
 
+def _write_properties(study: Path, target: Path) -> None:
+    """Write what the properties are that a study names, and a copy of the .blend; neither where the study names none."""
+    import bpy
+
+    from ..addon.study import scene_overrides
+    from ..core.study.scene_property import is_scene_property, write_properties
+    from ..core.study.study_file import read_study
+
+    paths = [name for name in read_study(study).vary if is_scene_property(name)]
+    if not paths:
+        return
+    properties = [scene_overrides.describe(path) for path in paths]
+    bpy.ops.file.make_paths_absolute()  # the copy lies in another folder
+    blender.blend_to_save(target.with_suffix(".blend")).write(target.with_suffix(".blend"))
+    write_properties(target.with_suffix(".json"), properties)
+
+
 def _prepare(scene: Any, arguments: argparse.Namespace) -> None:
     """Change the open scene as the options ask."""
+    if arguments.overrides is not None:
+        _override(arguments.overrides)
     for option in arguments.model:
         _put_model(scene, option)
     if arguments.frames:
@@ -181,6 +216,14 @@ def _check_saved_bake(scene: Any, blend: str) -> None:
                 f"'{blend}' plays the bake in '{target}', which would no longer fit it: "
                 "add --save to renew both, or --out DIR to bake elsewhere."
             )
+
+
+def _override(file: str) -> None:
+    """Apply the option ``--overrides FILE.toml``."""
+    from ..addon.study import scene_overrides
+    from ..core.study.scene_property import read_overrides
+
+    scene_overrides.apply(read_overrides(file))
 
 
 def _put_model(scene: Any, option: str) -> None:

@@ -5,8 +5,6 @@ from __future__ import annotations
 
 import argparse
 import importlib.util
-import subprocess
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -19,6 +17,8 @@ if TYPE_CHECKING:
 MOST_FAILURES_NAMED = 5
 FORMATS = ("hdf5", "zarr")
 """What a finished dataset is exported to; the names of sweep.exports, which is not read before a study runs."""
+MOST_NAMED = 3
+"""Most properties that a sentence names."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -89,28 +89,25 @@ def _folder(place: Path, out: str | None) -> Path:
 def _opened(place: Path, folder: Path, arguments: argparse.Namespace) -> OpenStudy:
     """Open the study; a .blend is read in a Blender of its own, which is gone before the runs begin."""
     from ..sweep import study_folder
+    from ..sweep.scene_evaluation import read_blend
+
+    def read(blend: Path, target: Path) -> None:
+        read_blend(blend, target, arguments.scripts, "--study", str(place))
+        console.Interrupt.check()
 
     if place.is_dir():
         return study_folder.resume_study(folder)
-    return study_folder.begin_study(place, folder, lambda blend, target: _read_blend(blend, target, arguments.scripts))
-
-
-def _read_blend(blend: Path, target: Path, scripts: str) -> None:
-    command = [sys.executable, "-m", __package__, "bake", str(blend), "--scenario", str(target)]
-    command += [f"--{scripts}-scripts"] if scripts != blender.REFUSE else []
-    finished = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, text=True, errors="replace", check=False)
-    console.Interrupt.check()
-    if finished.returncode:
-        words = finished.stderr.strip().splitlines() or [f"Blender ended with status {finished.returncode}"]
-        raise PalpateError(words[-1].removeprefix("palpate bake: "))
+    return study_folder.begin_study(place, folder, read)
 
 
 def _print_names(opened: OpenStudy) -> None:
+    from ..core.study.scene_property import PREFIX
     from ..core.study.variation import owners_text
 
     for name, plan in opened.plans.items():
         print(f"{name}:")
         print("  " + owners_text(plan.scenario).replace("\n", "\n  "))
+        print(f"  {PREFIX}…: a property of a .blend by its path, which Copy Full Data Path gives; each run needs Blender then")
 
 
 def _workers(arguments: argparse.Namespace) -> int:
@@ -122,7 +119,8 @@ def _workers(arguments: argparse.Namespace) -> int:
 def _estimate(opened: OpenStudy, arguments: argparse.Namespace) -> int:
     from ..sweep.trial import try_runs
 
-    found = try_runs(opened.folder, opened.runs, opened.study.run_limit)
+    print(_kind_of_runs(opened))
+    found = try_runs(opened.folder, opened.runs, opened.study.run_limit, arguments.scripts)
     workers = _workers(arguments)
     seconds = found.seconds * len(opened.runs) / workers
     print(f"{len(opened.runs)} runs, {found.seconds:.3g} s and {found.size / 1e6:.3g} MB each")
@@ -131,6 +129,15 @@ def _estimate(opened: OpenStudy, arguments: argparse.Namespace) -> int:
     for sentence in found.failures:
         print(f"failed: {sentence}")
     return 0
+
+
+def _kind_of_runs(opened: OpenStudy) -> str:
+    """Say whether runs need Blender, and why."""
+    properties = list(dict.fromkeys(path for plan in opened.plans.values() for path in plan.scene_properties))
+    if not properties:
+        return "runs without Blender: all that varies is known to the solver"
+    more = f" and {len(properties) - MOST_NAMED} others" if len(properties) > MOST_NAMED else ""
+    return f"each run reads the scene in a Blender of its own, because it sets {', '.join(properties[:MOST_NAMED])}{more}"
 
 
 def _duration(seconds: float) -> str:
@@ -159,7 +166,7 @@ def _compute(opened: OpenStudy, arguments: argparse.Namespace) -> int:
                 bar.update(len(opened.runs) - len(left) + tally.finished - bar.n)
 
             with driver.dask_client(arguments.scheduler, min(_workers(arguments), len(left))) as client:
-                tally = driver.run_study(client, opened.folder, left, opened.study.run_limit, show)
+                tally = driver.run_study(client, opened.folder, left, opened.study.run_limit, show, arguments.scripts)
         for index, sentence in tally.failures[:MOST_FAILURES_NAMED]:
             print(f"run {index} failed: {sentence}")
     found = status_of(opened.folder)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""``python -m palpate.sweep.child FOLDER``: computes runs of a study, one for each line of standard input.
+"""``python -m palpate.sweep.child FOLDER [SCRIPTS]``: computes runs of a study, one for each line of standard input.
 
 A line is a run as JSON; the answer is a line of JSON on standard output. The process ends when its input does, at once: whoever
 started it is gone then, and an unfinished run is computed again.
@@ -19,12 +19,15 @@ from pathlib import Path
 from typing import Any, TextIO
 
 from ..core.errors import FileError, PalpateError
-from ..core.io.scenario_npz import load_scenario
+from ..core.model.scenario import Scenario
 from ..core.study.metrics import metrics_of
 from ..core.study.presses import Press
-from ..core.study.run_files import SCENES, STUDY_NAME, write_failure, write_run
-from ..core.study.study_file import SCENE, Plan, Run, Study, plan_for, read_study
+from ..core.study.run_files import STUDY_NAME, write_failure, write_run
+from ..core.study.scene_property import is_scene_property, scene_values
+from ..core.study.study_file import SCENE, Plan, Run, Study, at_rate, read_study
 from ..core.study.variation import PRESS, varied_scenario
+from .scene_evaluation import REFUSE, SceneReader
+from .study_scenes import frozen_meshes, plan_of
 
 DONE, FAILED, UNWRITABLE = "done", "failed", "unwritable"
 """What became of a run; the last one: its files could not be written, so no run can be."""
@@ -33,16 +36,25 @@ DONE, FAILED, UNWRITABLE = "done", "failed", "unwritable"
 class Scenes:
     """The scenes of a study, each read when a run first needs it."""
 
-    def __init__(self, folder: Path):
+    def __init__(self, folder: Path, scripts: str = REFUSE):
         self.folder = folder
         self.study: Study = read_study(folder / STUDY_NAME)
+        self._reader = SceneReader(folder, scripts)
+        self._meshes = frozen_meshes(self.study, folder)
         self._plans: dict[str, Plan] = {}
 
     def plan(self, scene: str) -> Plan:
         """Return what the study means on a scene."""
         if scene not in self._plans:
-            self._plans[scene] = plan_for(self.study, load_scenario(self.folder / SCENES / f"{scene}.npz"))
+            self._plans[scene] = plan_of(self.study, self.folder, scene, self._meshes)
         return self._plans[scene]
+
+    def scenario(self, scene: str, values: Mapping[str, Any]) -> Scenario:
+        """Return the scenario of a scene with the values of a run; it is read anew where they have properties of the scene."""
+        plan, read_with = self.plan(scene), scene_values(values)
+        scenario = at_rate(self._reader.read(scene, read_with), self.study.fps) if read_with else plan.scenario
+        rest = {name: value for name, value in values.items() if not is_scene_property(name)}
+        return varied_scenario(scenario, rest, plan.press, plan.meshes)
 
 
 def compute_run(scenes: Scenes, run: Run) -> None:
@@ -61,7 +73,7 @@ def compute_run(scenes: Scenes, run: Run) -> None:
     began = time.perf_counter()
     plan = scenes.plan(run.scene)
     values = {**plan.fixed, **{name: value for name, value in run.values.items() if name != SCENE}}
-    scenario = varied_scenario(plan.scenario, values, plan.press)
+    scenario = scenes.scenario(run.scene, values)
     recording = run_job(solve(scenario, Simulation(scenario, threads=1)))
     made: Press | None = plan.press
     if made is not None:
@@ -124,7 +136,7 @@ def main() -> None:
     """Answer lines until there are no more."""
     output = _own_output()
     try:
-        scenes = Scenes(Path(sys.argv[1]))
+        scenes = Scenes(Path(sys.argv[1]), *sys.argv[2:3])
     except PalpateError as error:
         print(json.dumps({"status": UNWRITABLE, "sentence": str(error)}), file=output, flush=True)
         return

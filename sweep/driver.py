@@ -15,6 +15,7 @@ from typing import Any
 from ..core.errors import FileError, PalpateError
 from ..core.study.study_file import Run
 from .child import DONE, FAILED, UNWRITABLE
+from .scene_evaluation import REFUSE
 from .worker import compute_batch
 
 BATCH_SECONDS = 2.0
@@ -117,7 +118,12 @@ def _closing(resource: Any, **words: Any) -> Iterator[Any]:
 
 
 def run_study(
-    client: Any, folder: Path, runs: Sequence[Run], limit: float | None, on_progress: Callable[[Tally], object]
+    client: Any,
+    folder: Path,
+    runs: Sequence[Run],
+    limit: float | None,
+    on_progress: Callable[[Tally], object],
+    scripts: str = REFUSE,
 ) -> Tally:
     """Compute runs and return what became of them.
 
@@ -132,6 +138,8 @@ def run_study(
         Seconds that a run may take.
     on_progress : callable
         Called several times a second. An exception that it raises, KeyboardInterrupt included, stops the study.
+    scripts : str
+        What is done about the Python in a .blend, one of :data:`.scene_evaluation.SCRIPTS`.
 
     Raises
     ------
@@ -140,14 +148,14 @@ def run_study(
     PalpateError
         Workers are lost again and again.
     """
-    return _Dispatch(client, folder, runs, limit).run(on_progress)
+    return _Dispatch(client, folder, runs, limit, scripts).run(on_progress)
 
 
 class _Dispatch:
     """Batches at the workers and those to come."""
 
-    def __init__(self, client: Any, folder: Path, runs: Sequence[Run], limit: float | None):
-        self.client, self.folder, self.runs, self.limit = client, folder, runs, limit
+    def __init__(self, client: Any, folder: Path, runs: Sequence[Run], limit: float | None, scripts: str):
+        self.client, self.folder, self.runs, self.limit, self.scripts = client, folder, runs, limit, scripts
         self.index_of = {run.digest: run.index for run in runs}
         self.next = 0
         self.batch = 1
@@ -180,7 +188,7 @@ class _Dispatch:
 
     def _send(self, runs: Sequence[Run], losses: int) -> None:
         words = [asdict(run) for run in runs]
-        future = self.client.submit(compute_batch, os.fspath(self.folder), words, self.limit, pure=False)
+        future = self.client.submit(compute_batch, os.fspath(self.folder), words, self.limit, self.scripts, pure=False)
         self.waiting[future] = runs, losses
 
     def _take(self, future: Any) -> None:

@@ -13,13 +13,16 @@ from ..core.errors import FileError
 from ..core.io.bake_folder import folder_names
 from ..core.io.file_writing import atomic_write, file_sha256
 from ..core.io.scenario_npz import load_scenario, save_scenario
+from ..core.study.mesh_choices import MESHES, StudyMeshes, find_meshes, freeze_meshes
 from ..core.study.run_files import FAILED, RUNS, SCENES, STUDY_NAME, make_folders
-from ..core.study.study_file import Plan, Run, Study, differences, frozen_text, plan_for, read_study, runs_of
+from ..core.study.study_file import Plan, Run, Study, differences, frozen_text, read_study, runs_of
 from ..core.version import VERSION
+from .study_scenes import FROZEN_MESHES, frozen_meshes, plan_of
 
 BLEND, SCENARIO = ".blend", ".npz"
 ReadBlend = Callable[[Path, Path], None]
-"""``read_blend(blend, scenario)`` writes what the scene of a .blend says to the solver into a file."""
+"""``read_blend(blend, scenario)`` writes what a .blend says to the solver into a file, and beside it what is
+needed to read the scene anew where the study asks for that (:mod:`.study_scenes`)."""
 _OWN = {RUNS, FAILED, SCENES, STUDY_NAME, ".palpate"}
 
 
@@ -64,20 +67,24 @@ def begin_study(file: Path, folder: Path, read_blend: ReadBlend) -> OpenStudy:
         changed = differences(opened.study, study)
         if changed:
             raise FileError(f"'{folder}' belongs to another study ({'; '.join(changed)}): give another folder with --out.")
-        _check_sources(opened, sources, read_blend)
+        _check_sources(opened, sources, file.parent, read_blend)
         return opened
     if folder.exists() and (not folder.is_dir() or {path.name for path in folder.iterdir()} - _OWN):
         raise FileError(f"'{folder}' holds other files and no study: give a new or empty folder with --out.")
+    mesh_files = find_meshes(study.vary, file.parent)
     make_folders(folder)
+    meshes = StudyMeshes(folder / SCENES / MESHES, freeze_meshes(mesh_files, folder / SCENES / MESHES))
     plans, entries = {}, []
     for name, source in sources.items():
         target = folder / SCENES / f"{name}.npz"
         _freeze_scene(source, target, read_blend)
-        scenario = load_scenario(target)
-        plans[name] = plan_for(study, scenario)
-        entries.append({"name": name, "file": source.name, "sha256": file_sha256(source), "digest": scenario.digest()})
-    runs = runs_of(study, plans, {entry["name"]: entry["digest"] for entry in entries})
-    frozen = {"version": VERSION, "runs": len(runs), "scenes": entries}
+        plans[name] = plan_of(study, folder, name, meshes)
+        digest = load_scenario(target).digest()
+        entries.append({"name": name, "file": source.name, "sha256": file_sha256(source), "digest": digest})
+    runs = runs_of(study, plans, _digests(plans, entries))
+    frozen: dict[str, Any] = {"version": VERSION, "runs": len(runs), "scenes": entries}
+    if meshes:
+        frozen[FROZEN_MESHES] = [{"file": name, "sha256": sha256} for name, sha256 in meshes.digests.items()]
     text = frozen_text(file.read_text(encoding="utf-8"), frozen)
     with atomic_write(folder / STUDY_NAME) as fresh:
         fresh.write_text(text, encoding="utf-8", newline="\n")
@@ -101,14 +108,22 @@ def resume_study(folder: Path) -> OpenStudy:
             f"The study in '{folder}' was begun with Palpate {version}, and this is {VERSION}, which may compute other "
             "numbers: go on with that version, or give another folder with --out."
         )
-    plans = {}
+    plans, meshes = {}, frozen_meshes(study, folder)
     for entry in entries:
         scenario = load_scenario(folder / SCENES / f"{entry['name']}.npz")
         if scenario.digest() != entry["digest"]:
             raise FileError(f"The scene '{entry['name']}' in '{folder}' is not the one that the study began with: begin anew.")
-        plans[entry["name"]] = plan_for(study, scenario)
-    runs = runs_of(study, plans, {entry["name"]: entry["digest"] for entry in entries})
-    return OpenStudy(folder, study, plans, runs)
+        plans[entry["name"]] = plan_of(study, folder, entry["name"], meshes)
+    return OpenStudy(folder, study, plans, runs_of(study, plans, _digests(plans, entries)))
+
+
+def _digests(plans: Mapping[str, Plan], entries: list[dict[str, Any]]) -> dict[str, str]:
+    """Return what the runs of each scene depend on: its scenario, and its file where each run is read from it."""
+    digests = {}
+    for entry in entries:
+        name = entry["name"]
+        digests[name] = f"{entry['digest']} {entry['sha256']}" if plans[name].scene_properties else entry["digest"]
+    return digests
 
 
 def frozen_entries(study: Study, folder: Path) -> tuple[str, list[dict[str, Any]]]:
@@ -152,7 +167,7 @@ def _freeze_scene(source: Path, target: Path, read_blend: ReadBlend) -> None:
         save_scenario(target, load_scenario(source))
 
 
-def _check_sources(opened: OpenStudy, sources: Mapping[str, Path], read_blend: ReadBlend) -> None:
+def _check_sources(opened: OpenStudy, sources: Mapping[str, Path], base: Path, read_blend: ReadBlend) -> None:
     """Raise FileError if the scenes are no longer those that the study began with; a .blend is read only if it has changed."""
     _, entries = frozen_entries(opened.study, opened.folder)
     before, now = {entry["name"]: entry for entry in entries}, set(sources)
@@ -163,6 +178,8 @@ def _check_sources(opened: OpenStudy, sources: Mapping[str, Path], read_blend: R
     for name, source in sources.items():
         if file_sha256(source) == before[name]["sha256"]:
             continue
+        if opened.plans[name].scene_properties:
+            raise _changed(source, opened)
         target = opened.folder / SCENES / f"now-{name}.npz"
         try:
             _freeze_scene(source, target, read_blend)
@@ -170,7 +187,14 @@ def _check_sources(opened: OpenStudy, sources: Mapping[str, Path], read_blend: R
         finally:
             target.unlink(missing_ok=True)
         if digest != before[name]["digest"]:
-            raise FileError(
-                f"'{source}' has changed since the study in '{opened.folder}' began: give another folder with --out, or "
-                f"the folder itself instead of the study's file, which goes on with the scene as it was."
-            )
+            raise _changed(source, opened)
+    for name, file in find_meshes(opened.study.vary, base).items():
+        if file_sha256(file) != frozen_meshes(opened.study, opened.folder).digests.get(name):
+            raise _changed(file, opened)
+
+
+def _changed(file: Path, opened: OpenStudy) -> FileError:
+    return FileError(
+        f"'{file}' has changed since the study in '{opened.folder}' began: give another folder with --out, or "
+        f"the folder itself instead of the study's file, which goes on with it as it was."
+    )

@@ -12,6 +12,7 @@ from pathlib import Path
 
 from ..core.study.run_files import RUNS, SCENES, STUDY_NAME, make_folders
 from ..core.study.study_file import Run
+from .scene_evaluation import REFUSE
 from .worker import compute_batch, end_children
 
 RUNS_TRIED = 5
@@ -36,7 +37,7 @@ class Estimate:
     failures: list[str]
 
 
-def try_runs(folder: Path, runs: Sequence[Run], limit: float | None) -> Estimate:
+def try_runs(folder: Path, runs: Sequence[Run], limit: float | None, scripts: str = REFUSE) -> Estimate:
     """Compute some runs, spread over a study, away from its folder.
 
     Parameters
@@ -47,6 +48,8 @@ def try_runs(folder: Path, runs: Sequence[Run], limit: float | None) -> Estimate
         All of them.
     limit : float or None
         Seconds that a run may take.
+    scripts : str
+        What is done about the Python in a .blend.
     """
     step = max(1, len(runs) // RUNS_TRIED)
     chosen = [asdict(run) for run in runs[::step][:RUNS_TRIED]]
@@ -56,10 +59,10 @@ def try_runs(folder: Path, runs: Sequence[Run], limit: float | None) -> Estimate
         shutil.copy(folder / STUDY_NAME, trial)
         shutil.copytree(folder / SCENES, trial / SCENES, dirs_exist_ok=True)
         try:
-            compute_batch(name, chosen[:1], limit)  # the first run loads what was compiled
+            compute_batch(name, chosen[:1], limit, scripts)  # the first run loads what was compiled
             shutil.rmtree(trial / RUNS)
             make_folders(trial)
-            answers = compute_batch(name, chosen, limit)
+            answers = compute_batch(name, chosen, limit, scripts)
         finally:
             end_children()
         written = sum(file.stat().st_size for file in (trial / RUNS).rglob("*") if file.is_file())

@@ -11,6 +11,7 @@ import atexit
 import json
 import os
 import queue
+import signal
 import subprocess
 import sys
 import threading
@@ -24,6 +25,7 @@ from ..core.errors import FileError
 from ..core.study.run_files import RUNS, write_failure
 from ..core.study.run_record import RUN_NAME
 from .child import DONE, FAILED, UNWRITABLE
+from .scene_evaluation import REFUSE
 
 MOST_DEATHS = 3
 """How often a process may die on a run before the run counts as failed: once may be an accident or an administrator."""
@@ -34,10 +36,10 @@ START_LIMIT = 900.0
 class Child:
     """A process that computes runs of one study."""
 
-    def __init__(self, folder: str):
+    def __init__(self, folder: str, scripts: str = REFUSE):
         environment = {**os.environ, "NUMBA_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
         self._process = subprocess.Popen(
-            [sys.executable, "-m", f"{__package__}.child", folder],
+            [sys.executable, "-m", f"{__package__}.child", folder, scripts],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,
@@ -80,8 +82,10 @@ class Child:
         return self._answer(limit)
 
     def kill(self) -> int:
-        """End the process and return its exit status."""
+        """End the process, and a Blender that it has started, and return its exit status."""
         with suppress(OSError):
+            if hasattr(os, "killpg"):
+                os.killpg(self._process.pid, signal.SIGKILL)  # it leads a session of its own
             self._process.kill()
         with suppress(OSError):
             assert self._process.stdin is not None
@@ -89,16 +93,17 @@ class Child:
         return self._process.wait()
 
 
-_children: dict[str, Child] = {}
+_children: dict[tuple[str, str], Child] = {}
 
 
-def _child_for(folder: str) -> Child:
+def _child_for(folder: str, scripts: str) -> Child:
     """Return the process for a study; those for other studies are ended."""
-    for other in [name for name in _children if name != folder or not _children[name].is_alive]:
+    key = folder, scripts
+    for other in [one for one in _children if one != key or not _children[one].is_alive]:
         _children.pop(other).kill()
-    if folder not in _children:
-        _children[folder] = Child(folder)
-    return _children[folder]
+    if key not in _children:
+        _children[key] = Child(folder, scripts)
+    return _children[key]
 
 
 @atexit.register
@@ -108,7 +113,9 @@ def end_children() -> None:
         _children.popitem()[1].kill()
 
 
-def compute_batch(folder: str, runs: Sequence[dict[str, Any]], limit: float | None = None) -> list[dict[str, Any]]:
+def compute_batch(
+    folder: str, runs: Sequence[dict[str, Any]], limit: float | None = None, scripts: str = REFUSE
+) -> list[dict[str, Any]]:
     """Compute runs of a study that are not done yet; called by Dask.
 
     Parameters
@@ -119,6 +126,8 @@ def compute_batch(folder: str, runs: Sequence[dict[str, Any]], limit: float | No
         Fields of :class:`.Run`.
     limit : float, optional
         Seconds that each may take.
+    scripts : str
+        What is done about the Python in a .blend, one of :data:`.scene_evaluation.SCRIPTS`.
 
     Returns
     -------
@@ -131,28 +140,28 @@ def compute_batch(folder: str, runs: Sequence[dict[str, Any]], limit: float | No
         if (Path(folder) / RUNS / str(words["digest"]) / RUN_NAME).is_file():  # by a worker that Dask had lost
             answers.append({"digest": words["digest"], "status": DONE, "seconds": 0.0})
             continue
-        answers.append(_computed(folder, words, limit))
+        answers.append(_computed(folder, words, limit, scripts))
         if answers[-1]["status"] == UNWRITABLE:
             break
     return answers
 
 
-def _computed(folder: str, words: dict[str, Any], limit: float | None) -> dict[str, Any]:
+def _computed(folder: str, words: dict[str, Any], limit: float | None, scripts: str) -> dict[str, Any]:
     """Return what became of a run; the process is started again where it dies."""
     sentence = ""
     began = time.monotonic()
     for _ in range(MOST_DEATHS):
         try:
-            answer = _child_for(folder).compute(words, limit)
+            answer = _child_for(folder, scripts).compute(words, limit)
         except queue.Empty:
-            _children.pop(folder).kill()
+            _children.pop((folder, scripts)).kill()
             sentence = f"Run {words['index']} was ended after its limit of {limit:g} s: raise run_limit, or vary less widely."
             break
         except FileError as error:
             return {"digest": words["digest"], "status": UNWRITABLE, "sentence": str(error), "seconds": 0.0}
         if answer is not None:
             return answer
-        status = _children.pop(folder).kill()
+        status = _children.pop((folder, scripts)).kill()
         reason = f"signal {-status}" if status < 0 else f"exit status {status}"
         sentence = (
             f"The process that computed run {words['index']} ended {MOST_DEATHS} times ({reason}): it may need more memory."

@@ -23,6 +23,7 @@ __all__ = [
     "growing_file",
     "growing_table",
     "html_templates",
+    "mesh_file",
     "npz",
     "openrave",
     "private_folder",

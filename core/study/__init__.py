@@ -8,10 +8,12 @@ them into a scenario, :mod:`.metrics` sums a run up, and :mod:`.run_files` write
 
 __all__ = [
     "design",
+    "mesh_choices",
     "metrics",
     "presses",
     "run_files",
     "run_record",
+    "scene_property",
     "study_file",
     "variation",
 ]

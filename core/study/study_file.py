@@ -36,6 +36,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import FileError, ParameterError
+from ..geometry.mesh import TriangleMesh
 from ..io.toml_file import checked_name, is_number, read_toml
 from ..model.parameter import Parameter
 from ..model.scenario import Scenario
@@ -54,14 +55,18 @@ from .design import (
     check_count,
     points_of,
 )
+from .mesh_choices import MESH, StudyMeshes, expanded
 from .presses import PLACE_PARAMETERS, PRESS_PARAMETERS, Press, with_press
+from .scene_property import SceneProperty, WholeNumber, is_scene_property
 from .variation import PRESS, Variable, variable, variables_of
 
 FORMAT = "palpate-sweep/1"
 FROZEN = "frozen"
 SCENE = "scene"
 """Name of the column that tells the scene of a run, where a study has several."""
-_WORDS = ("format", "name", "scene", "scenes", "design", "samples", "seed", "fps", "run_limit", "vary", "press", FROZEN)
+_WORDS = (
+    *("format", "name", "scene", "scenes", "design", "samples", "seed", "fps", "run_limit", "images", "vary", "press", FROZEN),
+)
 _DIRECTIONS = {"tilt_direction": "tilt", "slide_direction": "slide"}
 """Directions of a press, which are any as long as the study says nothing else, and what they direct."""
 LARGEST_LEVELS = 10_000
@@ -86,6 +91,8 @@ class Study:
         Seconds that a run may take.
     name : str
         For the report and the dataset; empty if the file gives none.
+    images : bool
+        Whether runs have tactile images.
     frozen : mapping
         What the output folder's copy says beside it.
     """
@@ -97,6 +104,7 @@ class Study:
     fps: float | None = None
     run_limit: float | None = None
     name: str = ""
+    images: bool = False
     frozen: Mapping[str, Any] = field(default_factory=dict)
 
 
@@ -112,12 +120,20 @@ class Plan:
     fixed : dict of str to value
     press : Press or None
         With the numbers that do not vary.
+    meshes : mapping of str to TriangleMesh
+        Shapes that targets may have, by the names of their files.
     """
 
     scenario: Scenario
     varied: Mapping[str, Distribution]
     fixed: Mapping[str, Value]
     press: Press | None
+    meshes: Mapping[str, TriangleMesh] = field(default_factory=dict)
+
+    @property
+    def scene_properties(self) -> list[str]:
+        """Paths of the properties of the scene that the study sets: where there are any, each run is read from the scene."""
+        return [name for name in (*self.varied, *self.fixed) if is_scene_property(name)]
 
 
 @dataclass(frozen=True)
@@ -174,6 +190,7 @@ def study_of(table: Mapping[str, Any], name: str) -> Study:
         fps=_positive(table, "fps", name),
         run_limit=_positive(table, "run_limit", name),
         name=checked_name(table["name"], f"name of '{name}'") if "name" in table else "",
+        images=_switch(table, "images", name),
         frozen=table.get(FROZEN, {}),
     )
 
@@ -192,6 +209,13 @@ def _positive(table: Mapping[str, Any], word: str, name: str) -> float | None:
     if value is not None and not (is_number(value) and value > 0):
         raise FileError(f"{word} of '{name}' is {value!r:.60}: give a number above zero.")
     return None if value is None else float(value)
+
+
+def _switch(table: Mapping[str, Any], word: str, name: str) -> bool:
+    value = table.get(word, False)
+    if not isinstance(value, bool):
+        raise FileError(f"{word} of '{name}' is {value!r:.60}: write true or false.")
+    return value
 
 
 def _design(table: Mapping[str, Any], name: str) -> Design:
@@ -221,16 +245,29 @@ def _flattened(table: Mapping[str, Any], start: str = "") -> Iterable[tuple[str,
             yield f"{start}{key}", value
 
 
-def plan_for(study: Study, scenario: Scenario) -> Plan:
+def plan_for(
+    study: Study,
+    scenario: Scenario,
+    properties: Mapping[str, SceneProperty] | None = None,
+    meshes: Mapping[str, TriangleMesh] | None = None,
+) -> Plan:
     """Return what a study means on a scene.
+
+    Parameters
+    ----------
+    study : Study
+    scenario : Scenario
+    properties : mapping of str to SceneProperty, optional
+        What the properties of the scene are that the study names.
+    meshes : mapping of str to TriangleMesh, optional
+        The shapes of targets that the study names.
 
     Raises
     ------
     ParameterError, FileError
         A name is not known in the scene, or its values are not possible.
     """
-    if study.fps is not None:
-        scenario = _with_fps(scenario, study.fps)
+    scenario, meshes = at_rate(scenario, study.fps), meshes or {}
     press, entries = None, dict(study.vary)
     if study.press is not None:
         press = _press(study, scenario)
@@ -239,21 +276,36 @@ def plan_for(study: Study, scenario: Scenario) -> Plan:
     elif any(name.startswith(f"{PRESS}.") for name in entries):
         raise ParameterError("The study varies numbers of a press and has no [press]: add that table.")
     known = variables_of(scenario, press is not None)
+    known |= {name: item.variable() for name, item in (properties or {}).items()}
     varied: dict[str, Distribution] = {}
     fixed: dict[str, Value] = {}
     for name, entry in entries.items():
+        if is_scene_property(name) and name not in known:
+            raise ParameterError(
+                f"'{name}' is a property of Blender, and '{scenario.name}' is no .blend: give the .blend itself."
+            )
         found = variable(name, known, scenario)
         if isinstance(entry, Mapping):
-            varied[name] = _distribution(found, entry)
+            varied[name] = _distribution(found, _with_files(found, entry, meshes))
         else:
             fixed[name] = found.read(entry)
     if not varied and study.design.kind == GRID:
         raise ParameterError("The study varies nothing: give [vary] or [press] at least one distribution.")
-    return Plan(scenario, varied, fixed, press)
+    return Plan(scenario, varied, fixed, press, meshes)
 
 
-def _with_fps(scenario: Scenario, fps: float) -> Scenario:
-    """Return a scenario that is recorded at another frame rate over the same time."""
+def _with_files(found: Variable, entry: Mapping[str, Any], meshes: Mapping[str, TriangleMesh]) -> Mapping[str, Any]:
+    """Return the table of a target's shape with the names of files in the place of patterns; other tables as they are."""
+    words = entry.get(CHOICE)
+    if found.words != (MESH,) or not isinstance(words, list) or not all(isinstance(word, str) for word in words):
+        return entry
+    return {**entry, CHOICE: expanded(words, meshes)}
+
+
+def at_rate(scenario: Scenario, fps: float | None) -> Scenario:
+    """Return a scenario that is recorded at another frame rate over the same time; None: as it is."""
+    if fps is None:
+        return scenario
     seconds = (scenario.frame_end - scenario.frame_start) / scenario.fps
     return replace(scenario, fps=fps, frame_end=scenario.frame_start + max(1, math.floor(seconds * fps + 1e-9)))
 
@@ -304,6 +356,8 @@ def _distribution(found: Variable, entry: Mapping[str, Any]) -> Distribution:
         return Distribution(CHOICE, tuple(found.read(word) for word in words))
     if not isinstance(found.specification, Parameter):
         raise ParameterError(f"{found.name} is no number that can be {kind}: use choice.")
+    if isinstance(found.specification, WholeNumber):
+        raise ParameterError(f"{found.name} is a whole number, which cannot be {kind}: use choice.")
     if not isinstance(words, list) or len(words) != 2 or not all(is_number(word) for word in words):
         raise ParameterError(f"{kind} of {found.name} is {words!r:.60}: give two numbers.")
     first, second = float(words[0]), float(words[1])
@@ -330,7 +384,7 @@ def runs_of(study: Study, plans: Mapping[str, Plan], digests: Mapping[str, str])
     plans : mapping of str to Plan
         By the names of the scenes.
     digests : mapping of str to str
-        Of the scenarios of the scenes.
+        Of the scenes: of their scenarios, and of their files where each run is read from the scene.
 
     Raises
     ------
@@ -341,6 +395,8 @@ def runs_of(study: Study, plans: Mapping[str, Plan], digests: Mapping[str, str])
     runs: list[Run] = []
     for scene, plan in plans.items():
         same = {"scene": digests[scene], "fixed": dict(plan.fixed), "fps": plan.scenario.fps, "press": _words_of(plan.press)}
+        if isinstance(plan.meshes, StudyMeshes) and plan.meshes:
+            same["meshes"] = plan.meshes.digests
         start = hashlib.sha256(json.dumps(same, sort_keys=True).encode())
         for values in points_of(study.design, plan.varied):
             own = start.copy()
@@ -364,7 +420,7 @@ def frozen_text(text: str, frozen: Mapping[str, Any]) -> str:
 def differences(before: Study, now: Study) -> list[str]:
     """Return what two studies say differently, one phrase each."""
     found = []
-    pairs = [(word, getattr(before, word), getattr(now, word)) for word in ("name", "scenes", "fps")]
+    pairs = [(word, getattr(before, word), getattr(now, word)) for word in ("name", "scenes", "fps", "images")]
     pairs += [(word, getattr(before.design, word), getattr(now.design, word)) for word in ("kind", "samples", "seed")]
     for name in dict.fromkeys([*before.vary, *now.vary]):
         pairs.append((name, before.vary.get(name), now.vary.get(name)))

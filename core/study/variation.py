@@ -11,6 +11,7 @@
 ``BODY.velocity.x``, …                  m/s, of a free body at the start; ``angular_velocity`` in rad/s
 ``BODY.drive.PARAMETER``                of :class:`.Drive`; ``drive.target`` in the unit of its control, constant
 ``TARGET.scale``                        factor of its shape about the body's origin
+``TARGET.mesh``                         its shape: a mesh file, in metres, in the frame of its body
 ``gravity.x``, ``y``, ``z``             m/s²
 ``press.NUMBER``                        of :class:`.Press`
 ======================================  =================================================================================
@@ -31,7 +32,7 @@ import numpy as np
 from ..effects.engine.registry import effect, form_of, kind_of, library
 from ..effects.engine.sensor_effects import check_scenario
 from ..errors import PalpateError, ParameterError
-from ..geometry.mesh import mass_properties
+from ..geometry.mesh import TriangleMesh, mass_properties
 from ..geometry.rotations import quaternion_product, quaternions_from_vectors, rotation_matrices
 from ..model.body import Body
 from ..model.drive import DRIVE_PARAMETERS
@@ -113,6 +114,7 @@ def variables_of(scenario: Scenario, has_press: bool = False) -> dict[str, Varia
     for target in scenario.targets:
         if target.sensor is None:
             add(target.name, ("scale",), Parameter("scale", "1", 1.0, 0.0, inf, "Factor of the shape", above_low=True))
+            add(target.name, ("mesh",), TextParameter("mesh", "", "File of the shape"))
     for axis in AXES:
         add("gravity", (axis,), Parameter(axis, "m/s²", 0.0, -inf, inf, "Acceleration of gravity"))
     if has_press:
@@ -188,13 +190,18 @@ def owners_text(scenario: Scenario) -> str:
         elif isinstance(specification, ChoiceParameter):
             lines.append(f"{item.name}: one of {', '.join(str(choice.value) for choice in specification.choices)}")
         else:
-            lines.append(f"{item.name}: a text")
+            lines.append(f"{item.name}: {'a mesh file' if item.words == ('mesh',) else 'a text'}")
     for sensor in scenario.sensors:
         lines.append(f"{sensor.name}.effect.KIND[.PARAMETER]: KIND is one of {', '.join(library())}")
     return "\n".join(lines)
 
 
-def varied_scenario(scenario: Scenario, values: Mapping[str, Any], press: Press | None = None) -> Scenario:
+def varied_scenario(
+    scenario: Scenario,
+    values: Mapping[str, Any],
+    press: Press | None = None,
+    meshes: Mapping[str, TriangleMesh] | None = None,
+) -> Scenario:
     """Return a scenario with the values of one run.
 
     Parameters
@@ -205,6 +212,8 @@ def varied_scenario(scenario: Scenario, values: Mapping[str, Any], press: Press 
         By names that :func:`variable` knows.
     press : Press, optional
         The numbers of the study's press that do not vary.
+    meshes : mapping of str to TriangleMesh, optional
+        The shapes of targets by the names of their files.
 
     Raises
     ------
@@ -226,7 +235,7 @@ def varied_scenario(scenario: Scenario, values: Mapping[str, Any], press: Press 
         gravity=gravity,
         sensors=tuple(_varied_sensor(sensor, grouped.get(sensor.name, ())) for sensor in scenario.sensors),
     )
-    changed = _with_scales(changed, grouped)
+    changed = _with_shapes(changed, grouped, meshes or {})
     bodies = tuple(_varied_body(body, grouped.get(body.name, ()), scenario) for body in changed.bodies)
     changed = replace(changed, bodies=bodies)
     if press is not None:
@@ -263,21 +272,29 @@ def _varied_effects(effects: tuple[Effect, ...], kind: str, wanted: dict[str, An
     return tuple(fresh if item is old else item for item in effects)
 
 
-def _with_scales(scenario: Scenario, grouped: Mapping[str, list]) -> Scenario:
-    """Return the scenario with the targets in their sizes, and the mass properties of the bodies that these are."""
+def _with_shapes(scenario: Scenario, grouped: Mapping[str, list], meshes: Mapping[str, TriangleMesh]) -> Scenario:
+    """Return the scenario with the targets in their shapes and sizes, and the mass properties of the bodies that these are."""
     targets, bodies = list(scenario.targets), list(scenario.bodies)
     for index, target in enumerate(targets):
-        factor = next((value for words, value in grouped.get(target.name, ()) if words == ("scale",)), None)
-        if factor is None or target.sensor is not None:
+        own = {words[0]: value for words, value in grouped.get(target.name, ()) if words in (("scale",), ("mesh",))}
+        if not own or target.sensor is not None:
             continue
         if target.deformation is not None:
-            raise PalpateError(f"'{target.name}' deforms, so its scale cannot vary: leave it out of the study.")
-        targets[index] = target = replace(target, mesh=replace(target.mesh, vertices=target.mesh.vertices * factor))
+            raise PalpateError(f"'{target.name}' deforms, so its {' and '.join(own)} cannot vary: leave it out of the study.")
+        mesh = _mesh_called(own["mesh"], target.name, meshes) if "mesh" in own else target.mesh
+        mesh = replace(mesh, vertices=mesh.vertices * own.get("scale", 1.0))
+        targets[index] = target = replace(target, mesh=mesh)
         body = bodies[target.body]
         if body.moved_by_forces and body.name == target.name:
             center, inertia, _ = mass_properties(target.mesh, body.mass, body.name)
             bodies[target.body] = replace(body, center_of_mass=center, inertia=inertia)
     return replace(scenario, targets=tuple(targets), bodies=tuple(bodies))
+
+
+def _mesh_called(name: str, target: str, meshes: Mapping[str, TriangleMesh]) -> TriangleMesh:
+    if name not in meshes:
+        raise ParameterError(f"The mesh of '{target}' is '{name:.80}', and the study has no such file: check its name.")
+    return meshes[name]
 
 
 def _varied_body(body: Body, changes: Iterable[tuple[tuple[str, ...], Any]], scenario: Scenario) -> Body:

@@ -31,7 +31,7 @@ def plan(text):
         (HEAD + 'design = "random"\nsamples = true', "give a whole number of runs"),
         (RANDOM + "fps = 0", "give a number above zero"),
         (RANDOM + "[vary]\n'Pad.mu' = { uniform = [0, 1] }", "did you mean 'Pad.mu[sd]'"),
-        (RANDOM + "[vary]\n'Ball.mass' = { uniform = [1, 2] }", "did you mean 'Box.mass'"),
+        (RANDOM + "[vary]\n'Bix.mass' = { uniform = [1, 2] }", "did you mean 'Box.mass'"),
         (RANDOM + "[vary]\n'Pad.k' = { unifrom = [0, 1] }", "There is no 'Pad.k.unifrom'|did you mean"),
         (RANDOM + "[vary]\n'Pad.k' = { uniform = [-1, 1] }", "k of 'Pad' in the study is -1: give it a value above zero"),
         (RANDOM + "[vary]\n'Pad.k' = { uniform = [2, 1] }", "give the lower number first"),

@@ -1,0 +1,240 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Properties of the open file by their paths, as ``bpy.data.objects["Ball"].location[2]``: what they are, and other values.
+
+A path is walked step by step and never executed, so that a file of overrides from somebody else only sets properties.
+"""
+
+from __future__ import annotations
+
+import difflib
+import re
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from math import inf
+from typing import Any
+
+import bpy
+
+from ...core.errors import ParameterError, SceneError
+from ...core.study.scene_property import CHOICE, NUMBER, PREFIX, SWITCH, WHOLE_NUMBER, SceneProperty
+from ..session import fcurves
+
+LARGEST = 1e38
+"""Bounds beyond it are those of the type, not of the property."""
+_STEP = re.compile(r"""\.(\w+)|\[(\d+)\]|\[("(?:[^"\\]|\\.)*"|'(?:[^'\\]|\\.)*')\]""")
+_UNITS = {
+    "LENGTH": "Blender units",
+    "ROTATION": "rad",
+    "MASS": "kg",
+    "TIME": "frames",
+    "TIME_ABSOLUTE": "s",
+    "VELOCITY": "Blender units/s",
+    "ACCELERATION": "Blender units/s²",
+    "TEMPERATURE": "K",
+}
+_OWN_SETTINGS = "PALPATE_PG_"
+"""Settings of Palpate can have no keyframes, since they are constant during a run; a study may set them nevertheless."""
+
+
+@dataclass(frozen=True)
+class Found:
+    """A property of the open file.
+
+    Attributes
+    ----------
+    path : str
+    owner : bpy_struct
+    key : str
+        Name of the property, or of the custom property in quotation marks and brackets.
+    index : int or None
+        Component of a vector.
+    """
+
+    path: str
+    owner: Any
+    key: str
+    index: int | None = None
+
+    def get(self) -> Any:
+        """Return its value."""
+        value = self.owner[self.key] if self.is_custom else getattr(self.owner, self.key)
+        return value if self.index is None else value[self.index]
+
+    def put(self, value: Any) -> None:
+        """Set its value."""
+        if self.index is not None:
+            (self.owner[self.key] if self.is_custom else getattr(self.owner, self.key))[self.index] = value
+        elif self.is_custom:
+            self.owner[self.key] = value
+        else:
+            setattr(self.owner, self.key, value)
+
+    @property
+    def is_custom(self) -> bool:
+        """Whether it is a custom property, which the type of its owner does not know."""
+        return self.key not in self.owner.bl_rna.properties
+
+    @property
+    def data_path(self) -> str:
+        """Its path from its data-block, without the component, as keyframes name it."""
+        if not self.is_custom:
+            return self.owner.path_from_id(self.key)
+        start = "" if self.owner == self.owner.id_data else self.owner.path_from_id()
+        return f'{start}["{bpy.utils.escape_identifier(self.key)}"]'
+
+
+def find_property(path: str) -> Found:
+    """Return the property at a path.
+
+    Raises
+    ------
+    ParameterError
+        There is none; the message has the name that is most like it.
+    """
+    value, found, before = bpy.data, None, "bpy.data"
+    for step in _steps(path):
+        owner = value
+        if step.kind == ATTRIBUTE:
+            _require(step.name, owner.bl_rna.properties.keys() if hasattr(owner, "bl_rna") else (), before, path)
+            value, found = getattr(owner, step.name), Found(path, owner, step.name)
+        elif step.kind == KEY:
+            _require(step.name, owner.keys() if hasattr(owner, "keys") else (), before, path)
+            value = owner[step.name]
+            found = None if isinstance(owner, bpy.types.bpy_prop_collection) else Found(path, owner, step.name)
+        else:
+            count = len(owner) if hasattr(owner, "__len__") and not isinstance(owner, str) else 0
+            if not step.index < count:
+                raise ParameterError(f"There is no [{step.index}] in '{before}' of '{path}': it has {count} components.")
+            value = owner[step.index]
+            found = None if found is None or hasattr(value, "bl_rna") else replace(found, index=step.index)
+        before += step.text
+    if found is None or value is None or hasattr(value, "bl_rna") or isinstance(value, bpy.types.bpy_prop_collection):
+        raise ParameterError(f"'{path}' is no number, switch or choice: add the name of one of its properties.")
+    return found
+
+
+ATTRIBUTE, KEY, INDEX = "attribute", "key", "index"
+
+
+@dataclass(frozen=True)
+class _Step:
+    """A step of a path: the name of an attribute, the text of a key, or an index; and how it is written."""
+
+    kind: str
+    text: str
+    name: str = ""
+    index: int = 0
+
+
+def _steps(path: str) -> Iterator[_Step]:
+    """Yield the steps of a path after ``bpy.data``."""
+    if not path.startswith(PREFIX):
+        raise ParameterError(f"'{path:.80}' is no path of a property: begin it with {PREFIX}, as Copy Full Data Path does.")
+    at = len(PREFIX) - 1
+    while at < len(path):
+        step = _STEP.match(path, at)
+        if step is None:
+            raise ParameterError(f"'{path}' cannot be read at '{path[at : at + 20]}': copy it by Copy Full Data Path.")
+        at = step.end()
+        if step[1] is not None:
+            yield _Step(ATTRIBUTE, step[0], step[1])
+        elif step[2] is not None:
+            yield _Step(INDEX, step[0], index=int(step[2]))
+        else:
+            yield _Step(KEY, step[0], re.sub(r"\\(.)", r"\1", step[3][1:-1]))
+
+
+def _require(name: str, known: Iterable[str], where: str, path: str) -> None:
+    """Raise ParameterError for a name that is not there, with the name that is most like it."""
+    names = [one for one in known if one != "rna_type"]
+    if name in names:
+        return
+    near = difflib.get_close_matches(name, names, n=1, cutoff=0.5)
+    advice = f"did you mean '{near[0]}'?" if near else "check its spelling, or copy it by Copy Full Data Path."
+    inside = "" if where == "bpy.data" else f" in '{where}'"
+    raise ParameterError(f"There is no '{name}'{inside}, which the study names as '{path}': {advice}")
+
+
+def describe(path: str) -> SceneProperty:
+    """Return what the property at a path is.
+
+    Raises
+    ------
+    ParameterError
+        There is none, or a study cannot vary it.
+    """
+    found = find_property(path)
+    value = found.get()
+    if hasattr(value, "__len__") and not isinstance(value, str | set):
+        raise ParameterError(f"'{path}' has {len(value)} components: add [0] to [{len(value) - 1}] for one of them.")
+    item = _described_custom(found, value) if found.is_custom else _described(found)
+    _refuse_animated(found)
+    return item
+
+
+def _described(found: Found) -> SceneProperty:
+    rna = found.owner.bl_rna.properties[found.key]
+    is_own = found.owner.bl_rna.identifier.startswith(_OWN_SETTINGS)
+    if rna.is_readonly or not (rna.is_animatable or is_own) or not found.owner.id_data.is_editable:
+        raise ParameterError(f"'{found.path}' cannot be set by a study: it is read-only, linked, or has no keyframes.")
+    if rna.type == "BOOLEAN":
+        return SceneProperty(found.path, SWITCH)
+    if rna.type == "ENUM" and not rna.is_enum_flag:
+        return SceneProperty(found.path, CHOICE, choices=tuple(item.identifier for item in rna.enum_items))
+    if rna.type not in ("FLOAT", "INT"):
+        raise ParameterError(f"'{found.path}' is no number, switch or choice, so a study cannot vary it.")
+    low, high = _bounds(rna.hard_min, rna.hard_max)
+    kind = NUMBER if rna.type == "FLOAT" else WHOLE_NUMBER
+    return SceneProperty(found.path, kind, _UNITS.get(rna.unit, ""), low, high)
+
+
+def _described_custom(found: Found, value: Any) -> SceneProperty:
+    if isinstance(value, bool):
+        return SceneProperty(found.path, SWITCH)
+    if not isinstance(value, int | float):
+        raise ParameterError(f"'{found.path}' is no number or switch, so a study cannot vary it.")
+    limits = found.owner.id_properties_ui(found.key).as_dict()
+    low, high = _bounds(limits.get("min", -inf), limits.get("max", inf))
+    return SceneProperty(found.path, NUMBER if isinstance(value, float) else WHOLE_NUMBER, "", low, high)
+
+
+def _bounds(low: float, high: float) -> tuple[float, float]:
+    largest = 2**31 - 1 if isinstance(low, int) else LARGEST
+    return (-inf if low <= -largest else float(low)), (inf if high >= largest else float(high))
+
+
+def _refuse_animated(found: Found) -> None:
+    """Raise ParameterError for a property that keyframes or a driver would set again at the next frame."""
+    block = found.owner.id_data
+    data = block.animation_data
+    if data is None:
+        return
+    strips = [strip for track in data.nla_tracks for strip in track.strips]
+    curves = [*(fcurves.of_animation_data(data) or ()), *data.drivers]
+    curves += [curve for strip in strips for curve in fcurves.of_animation_data(strip) or ()]
+    path = found.data_path
+    for curve in curves:
+        if curve.data_path == path and (found.index is None or curve.array_index == found.index):
+            raise ParameterError(
+                f"'{found.path}' has keyframes or a driver, which would set it again at the next frame: delete them, or vary "
+                "a property that they depend on."
+            )
+
+
+def apply(values: Mapping[str, Any]) -> None:
+    """Set properties of the open file, all or none.
+
+    Raises
+    ------
+    ParameterError
+        A path is not that of a property, or a value is outside its bounds.
+    SceneError
+        Blender does not take a value.
+    """
+    checked = [(find_property(path), describe(path).variable().read(value)) for path, value in values.items()]
+    for found, value in checked:
+        try:
+            found.put(value)
+        except (TypeError, ValueError, AttributeError) as error:
+            raise SceneError(f"Blender does not take {value!r} for '{found.path}' ({error}): vary something else.") from error
+    bpy.context.view_layer.update()

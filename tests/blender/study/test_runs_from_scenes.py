@@ -1,0 +1,111 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Studies whose runs read the scene anew: each run is what the scene gives when the property is set by hand."""
+
+import json
+import subprocess
+import sys
+
+import bpy
+import numpy as np
+import pytest
+from blender_scenes import press, save
+
+from palpate.addon.scene import scene_reader
+from palpate.core.errors import PalpateError
+from palpate.core.io.recording_npz import load_recording
+from palpate.core.jobs.job_runner import run_job
+from palpate.core.solver.simulation import run
+from palpate.core.study.variation import varied_scenario
+from palpate.sweep.scene_evaluation import read_blend
+from palpate.sweep.study_folder import begin_study, resume_study
+from palpate.sweep.worker import compute_batch, end_children
+
+SCALE = 'bpy.data.objects["Ball"].scale[2]'
+STUDY = f"""format = "palpate-sweep/1"
+scene = "scene.blend"
+design = "grid"
+[vary]
+'{SCALE}' = {{ choice = [1.0, 1.2] }}
+"Pad.k" = {{ choice = [50.0, 80.0] }}
+"""
+
+
+def begun(folder, text=STUDY):
+    press()
+    save(folder)
+    study = folder / "study.toml"
+    study.write_text(text, encoding="utf-8")
+    return begin_study(study, folder / "out", lambda blend, target: read_blend(blend, target, "refuse", "--study", str(study)))
+
+
+@pytest.fixture(autouse=True)
+def _no_children_left():
+    yield
+    end_children()
+
+
+def computed(opened):
+    words = [{"index": r.index, "scene": r.scene, "values": dict(r.values), "digest": r.digest} for r in opened.runs]
+    return compute_batch(str(opened.folder), words)
+
+
+def test_a_run_is_what_the_scene_gives_with_these_values(tmp_path):
+    opened = begun(tmp_path)
+    assert [answer["status"] for answer in computed(opened)] == ["done"] * 4
+    scene = bpy.context.scene
+    for one in opened.runs:
+        bpy.data.objects["Ball"].scale[2] = one.values[SCALE]
+        scenario = run_job(scene_reader.read_scene(scene)).scenario
+        expected = run(varied_scenario(scenario, {"Pad.k": one.values["Pad.k"]})).sensors["Pad"]
+        found = load_recording(opened.folder / "runs" / one.digest / "Pad" / "recording.npz").sensors["Pad"]
+        np.testing.assert_array_equal(found.normal_force, expected.normal_force)
+        assert expected.normal_force.max() > 0.0
+    (tmp_path / "scene.blend").unlink()
+    assert [one.digest for one in resume_study(opened.folder).runs] == [one.digest for one in opened.runs]
+    assert not [path for path in (opened.folder / "scenes").iterdir() if path.name.startswith(".")]
+
+
+def test_a_run_that_the_scene_cannot_make_fails_alone(tmp_path):
+    opened = begun(tmp_path, STUDY.replace("[1.0, 1.2]", "[0.0, 1.0]").replace("[50.0, 80.0]", "[50.0]"))
+    first, second = computed(opened)
+    assert (first["status"], second["status"]) == ("failed", "done")
+    assert "'Ball'" in first["sentence"]
+    assert "\n" not in first["sentence"]
+
+
+def test_mistakes_are_found_before_anything_is_computed(tmp_path):
+    with pytest.raises(PalpateError, match=r"did you mean 'scale'\?"):
+        begun(tmp_path, STUDY.replace("scale[2]", "scal[2]"))
+    assert not (tmp_path / "out" / "study.toml").exists()
+    with pytest.raises(PalpateError, match="has keyframes"):
+        begun(tmp_path, STUDY.replace("scale[2]", "location[2]"))
+
+
+def test_the_dry_run_says_why_blender_is_needed_and_a_changed_scene_is_refused(tmp_path):
+    pytest.importorskip("distributed")
+    begun(tmp_path)
+    command = [sys.executable, "-m", "palpate.commands", "sweep", str(tmp_path / "study.toml"), "--out", str(tmp_path / "out")]
+    said = subprocess.run([*command, "--dry-run"], capture_output=True, text=True, check=False)
+    assert (said.returncode, said.stderr) == (0, "")
+    assert f"each run reads the scene in a Blender of its own, because it sets {SCALE}" in said.stdout
+    bpy.data.objects["Ball"].scale[0] = 1.5
+    save(tmp_path)
+    refused = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert refused.returncode == 1
+    assert "scene.blend' has changed since the study" in refused.stderr
+
+
+def test_a_bake_takes_the_same_values_from_a_file(tmp_path):
+    press()
+    save(tmp_path)
+    (tmp_path / "o.toml").write_text(f"format = \"palpate-overrides/1\"\n[overrides]\n'{SCALE}' = 1.2\n", encoding="utf-8")
+    words = ["bake", tmp_path / "scene.blend", "--overrides", tmp_path / "o.toml", "--no-images", "--out", tmp_path / "bake"]
+    done = subprocess.run(
+        [sys.executable, "-m", "palpate.commands", *map(str, words)], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    bpy.data.objects["Ball"].scale[2] = 1.2
+    expected = run(run_job(scene_reader.read_scene(bpy.context.scene)).scenario)
+    found = load_recording(tmp_path / "bake" / "Pad" / "recording.npz")
+    np.testing.assert_array_equal(found.sensors["Pad"].normal_force, expected.sensors["Pad"].normal_force)
+    assert json.loads((tmp_path / "bake" / "Pad" / "manifest.json").read_text())["digest"] == expected.digest
