@@ -21,6 +21,7 @@ PICTURE = ROOT / "docs" / "images" / "architecture.svg"
 
 CAPTIONS = {
     "core.errors": "errors that a user can mend",
+    "core.version": "number of this version",
     "core.compiled": "kernels and thread team (numba)",
     "core.jobs": "progress, cancel, long work",
     "core.geometry": "meshes, rays, texels, layouts",
@@ -42,6 +43,7 @@ CAPTIONS = {
     "addon.bake": "runs, saves, resumes",
     "addon.display": "heat maps, arrows, overlays",
     "addon.render": "figures and videos",
+    "addon.study": "what a study varies",
     "addon.measured": "measured data and gaps",
     "addon.events": "Blender's handlers",
     "operators": "buttons",
