@@ -8,6 +8,7 @@ __all__ = [
     "session",
     "properties",
     "scene",
+    "study",
     "display",
     "timeline",
     "authoring",
