@@ -129,10 +129,10 @@ class PALPATE_OT_skin_add(support.ErrorReporting, bpy.types.Operator):
         support.leave_edit_mode(context)
         pattern = {key: getattr(self, key) for key in laid_sensors.PATTERN_PROPERTIES}
         pattern["spacing"] = pattern["spacing"] or laid_sensors.usual_spacing(carrier, context.scene)
-        was_sensor = carrier.palpate.role == "SENSOR"
+        replaces = laid_sensors.is_own_region(carrier, source)
         obj = laid_sensors.lay_texels(context, carrier, source, pattern)
         text = f"'{obj.name}' has {len(obj.data.vertices)} texels"
-        if was_sensor and source == "OWN":  # its own texels would feel the same load a second time
+        if replaces:  # its own texels would bear the same load a second time
             carrier.palpate.role = "TARGET" if carrier.palpate.body == "FREE" else "NONE"
             text += f"; '{carrier.name}' itself is no sensor any more"
         self.report({"INFO"}, text)

@@ -106,6 +106,19 @@ def lay_texels(context, carrier, source: str, pattern: dict):
     return obj
 
 
+def is_own_region(carrier, source: str) -> bool:
+    """Return True when `source` is the region on which the object is a sensor or pad itself, under whatever name.
+
+    Weight Paint, for example, proposes the active vertex group, which is the sensor's own one after *Paint Region*.
+    """
+    if carrier.palpate.role not in {"SENSOR", "PAD"} or source == "SELECTION":
+        return False
+    try:
+        return sensors.describe_region(carrier, source).items() <= sensors.describe_region(carrier, "OWN").items()
+    except SensorError:
+        return False  # there is no such region, which lay_texels says
+
+
 def update_texels(context, obj) -> int:
     """Lay the texels of a laid sensor again onto the surface as it is now, and return their number.
 

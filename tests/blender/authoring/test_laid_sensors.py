@@ -88,6 +88,30 @@ def test_texels_are_laid_onto_a_selection(method, settings, grid_size):
     assert texels.position[:, 2].min() > 0.002  # only where it was selected
 
 
+@pytest.mark.parametrize("role", ["SENSOR", "PAD"])
+def test_texels_laid_on_a_painted_region_take_its_place(role):
+    """After *Paint Region* the mode is Weight Paint and the active group the sensor's own: nothing may be pressed twice."""
+    obj = finger()
+    bpy.ops.palpate.weight_paint()
+    obj.palpate.role = role
+    obj.vertex_groups.active.add(upper(obj), 1.0, "REPLACE")
+    assert obj.mode == "WEIGHT_PAINT"
+    assert bpy.ops.palpate.skin_add(method="NOISE", spacing=0.002) == {"FINISHED"}
+    assert bpy.context.object.palpate.role == "SENSOR" and obj.palpate.role == "NONE"
+
+
+def test_texels_laid_beside_a_painted_region_leave_it_as_it_is():
+    obj = finger()
+    bpy.ops.palpate.weight_paint()
+    obj.vertex_groups.active.add(upper(obj), 1.0, "REPLACE")
+    bpy.ops.object.mode_set(mode="OBJECT")
+    other = obj.vertex_groups.new(name="Other side")
+    other.add([v.index for v in obj.data.vertices if v.index not in upper(obj)], 1.0, "REPLACE")
+    obj.vertex_groups.active_index = other.index
+    assert bpy.ops.palpate.skin_add(source="GROUP", method="NOISE", spacing=0.002) == {"FINISHED"}
+    assert obj.palpate.role == "SENSOR"
+
+
 def test_lift_and_turn():
     obj = finger()
     bpy.ops.palpate.skin_add(method="NOISE", spacing=0.003, source="MESH", lift=0.001)
