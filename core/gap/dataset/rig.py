@@ -23,7 +23,7 @@ from ...io.toml_file import LONGEST_NAME, checked_name, read_toml
 from ...model.sensor_parameters import DAMPING_PER_STIFFNESS, DEPTH_PER_THICKNESS, SENSOR_PARAMETERS, SensorParameters
 from .column_names import ColumnRule, read_column_rules, translated
 from .fault_kinds import FAULT_KINDS
-from .own_numbers import force_zero_of, own_numbers
+from .own_numbers import force_zero_of, own_numbers, with_contact_heights
 from .sessions import CLOCKS, TrialHistory, on_common_clocks, read_history
 from .trial import Trial
 
@@ -32,8 +32,13 @@ POSE, TURN, SLIDE = ("x", "y", "z"), ("qw", "qx", "qy", "qz"), ("slide_x", "slid
 FORCE = ("force_x", "force_y", "force_z")
 SMALLEST_RESPONSE = 1e-30
 """Responses of a smaller magnitude, in any unit, count as zero."""
-TRIAL_WORDS = {"file", "use", "name", "session", "started", "tared", "specimen", "factor", "zero", "force_zero"}
+TRIAL_WORDS = {
+    *("file", "use", "name", "session", "started", "tared", "specimen", "factor", "zero", "force_zero"),
+    *("contact_height",),
+}
 """Words of a [[trial]]."""
+RIG_SENSOR_WORDS = {"name", "contact_height"}
+"""Words of a [sensor] that belong to the measurement and not to the sensor."""
 LONGEST_STEP = 5.0
 """Seconds between samples above which the clock must be in milliseconds."""
 
@@ -129,7 +134,7 @@ def read_rig(path: str | Path) -> Rig:
     indenter = _indenter(_table(words, "indenter", path), folder, path) if "indenter" in words else None
     rules = read_column_rules(_table(words, "columns", path), path) if "columns" in words else {}
     reader = _TrialReader(path, folder, len(texels), indenter is not None, rules)
-    trials, warnings = _read_trials(words.get("trial"), reader, clock, path)
+    trials, warnings = _read_trials(words.get("trial"), reader, clock, sensor, path)
     warnings += _channel_warnings(trials)
     _check_units(trials, indenter, texels, parameters, thickness, path)
     return Rig(
@@ -147,7 +152,9 @@ def read_rig(path: str | Path) -> Rig:
     )
 
 
-def _read_trials(entries: Any, reader: _TrialReader, clock: str | None, path: Path) -> tuple[list[Trial], list[str]]:
+def _read_trials(
+    entries: Any, reader: _TrialReader, clock: str | None, sensor: Mapping[str, Any], path: Path
+) -> tuple[list[Trial], list[str]]:
     """Read the recordings that the [[trial]] tables name, and put those of one session on one clock.
 
     Returns
@@ -163,6 +170,7 @@ def _read_trials(entries: Any, reader: _TrialReader, clock: str | None, path: Pa
         trials.append(trial)
         histories.append(history)
         warnings += said
+    trials = with_contact_heights(trials, entries, sensor, path)
     trials, said = on_common_clocks(trials, histories, clock, path)
     names = [trial.name for trial in trials]
     for name in names:
@@ -280,7 +288,7 @@ def _mesh(path: Path, name: str) -> tuple[TriangleMesh, list[str]]:
 def _parameters(sensor: dict[str, Any], path: Path) -> tuple[SensorParameters, float | None]:
     """Parameters of the sensor, and its thickness."""
     where = f"[sensor] of '{path.name}'"
-    known_words(sensor, {*SENSOR_PARAMETERS, *SHAPE_WORDS, "name"}, where)
+    known_words(sensor, {*SENSOR_PARAMETERS, *SHAPE_WORDS, *RIG_SENSOR_WORDS}, where)
     thickness = None
     if "thickness" in sensor:
         (thickness,) = checked_lengths(sensor["thickness"], 1, f"thickness of '{path.name}'")

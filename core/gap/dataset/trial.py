@@ -39,6 +39,11 @@ class Trial:
         zero) and shifted. Of recordings without readings it is the net force that is multiplied. Free numbers have a name.
     force_zero : str or (3,) float, newtons
         What the force sensor shows without load; a name if it is free.
+    contact_height : str or float, metres
+        How much higher the sensor's surface is than poses or depths say: contact begins earlier by as much. A name if it is
+        free. Without meaning in a recording with a known force.
+    height_start : float, metres
+        Where the fit of a free contact height starts; contacts are described with this height.
     """
 
     name: str
@@ -56,6 +61,8 @@ class Trial:
     factor: str | float = 1.0
     zero: str | float = 0.0
     force_zero: str | tuple[float, ...] = (0.0, 0.0, 0.0)
+    contact_height: str | float = 0.0
+    height_start: float = 0.0
 
     @property
     def step(self) -> float:

@@ -21,6 +21,7 @@ from ..dataset.trial import Trial
 from .force_model import ContactHistory
 from .stimulus import Stimulus, joined_stimuli, stimulus_of
 
+CONTACT_HEIGHT = "contact height"
 CACHE_SIZE = 4
 """Number of placements, forces and readings that are kept per trial: a derivative by one parameter needs the others again."""
 SESSION_CACHE_SIZE, SESSION_CACHE_BYTES = 64, 2.5e8
@@ -37,7 +38,8 @@ class Model:
     parameters : SensorParameters
     effects : tuple of Effect
     recordings : mapping of str to float
-        Free numbers by which recordings differ, ``factor of NAME`` and ``zero of NAME`` (see :class:`.trial.Trial`).
+        Free numbers by which recordings differ, such as ``factor of NAME`` and ``contact height of NAME`` (see
+        :class:`.trial.Trial`).
     """
 
     parameters: SensorParameters
@@ -69,7 +71,7 @@ class Prediction:
 
 
 def number_name(word: str, name: str) -> str:
-    """Return the name of a free number of recordings in :attr:`Model.recordings`; `word` is "factor" or "zero"."""
+    """Return the name of a free number of recordings in :attr:`Model.recordings`; `word` says what it is, as "factor"."""
     return f"{word} of {name}"
 
 
@@ -131,19 +133,27 @@ class ResponseModel:
     def placed(self, model: Model) -> Stimulus:
         """Return the stimulus of the texels at the places where effects move them."""
         moving = tuple(effect for effect in model.effects if _acts_through(effect, "placement"))
-        if not moving or self.stimulus.trial.stimulus != "pose":
+        if self.stimulus.trial.stimulus != "pose":
+            moving = ()
+        heights = self._heights(model)
+        if not moving and heights == self._heights(None):
             return self.stimulus
-        key = _effects_key(moving)
+        key = _effects_key(moving), heights
         if key not in self._placed:
             t = self.rig.texels
-            position, normal, tangent = placed_texels(moving, t.position, t.normal, t.tangent)
-            moved = replace(t, position=position, normal=normal, tangent=tangent)
-            _remember(self._placed, key, self._stimulus_of(moved), self.cache_size)
+            if moving:
+                position, normal, tangent = placed_texels(moving, t.position, t.normal, t.tangent)
+                t = replace(t, position=position, normal=normal, tangent=tangent)
+            _remember(self._placed, key, self._stimulus_of(t, heights), self.cache_size)
         return self._placed[key]
 
-    def _stimulus_of(self, texels: Texels) -> Stimulus:
+    def _heights(self, model: Model | None) -> tuple[float, ...]:
+        """Contact height of each of its trials; None: where fits start."""
+        return (_height_of(self.stimulus.trial, model),)
+
+    def _stimulus_of(self, texels: Texels, heights: tuple[float, ...]) -> Stimulus:
         """The stimulus of texels at other places."""
-        return stimulus_of(self.stimulus.trial, self.rig, texels)
+        return stimulus_of(self.stimulus.trial, self.rig, texels, heights[0])
 
     def normal_force(self, model: Model, subset: np.ndarray | None = None) -> np.ndarray:
         """Return the normal force of each texel, or of some, (T, n) N: known, or from the contact law with its effects."""
@@ -165,11 +175,13 @@ class ResponseModel:
 
     def _force_key(self, model: Model, subset: np.ndarray | None) -> object:
         p, which = model.parameters, None if subset is None else subset.tobytes()
-        return which, *(getattr(p, name) for name in NORMAL_LAW_PARAMETERS), _effects_key(_effects_on_normal_force(model))
+        law = (*(getattr(p, name) for name in NORMAL_LAW_PARAMETERS), self._heights(model))
+        return which, *law, _effects_key(_effects_on_normal_force(model))
 
     def _contact_history(self, model: Model, subset: np.ndarray | None) -> ContactHistory:
         which = None if subset is None else subset.tobytes()
-        key = which, _effects_key(tuple(effect for effect in model.effects if _acts_through(effect, "placement")))
+        moving = tuple(effect for effect in model.effects if _acts_through(effect, "placement"))
+        key = which, _effects_key(moving), self._heights(model)
         if key not in self._histories:
             _remember(self._histories, key, ContactHistory.of(self.placed(model), subset, self.rig), 2 * self.cache_size)
         return self._histories[key]
@@ -201,8 +213,12 @@ class Session(ResponseModel):
         """Return the stimulus of one of its trials."""
         return next(stimulus for stimulus in self.stimuli if stimulus.trial is trial)
 
-    def _stimulus_of(self, texels: Texels) -> Stimulus:
-        return joined_stimuli([stimulus_of(trial, self.rig, texels) for trial in self.trials], texels)[0]
+    def _heights(self, model: Model | None) -> tuple[float, ...]:
+        return tuple(_height_of(trial, model) for trial in self.trials)
+
+    def _stimulus_of(self, texels: Texels, heights: tuple[float, ...]) -> Stimulus:
+        stimuli = [stimulus_of(trial, self.rig, texels, at) for trial, at in zip(self.trials, heights, strict=True)]
+        return joined_stimuli(stimuli, texels)[0]
 
 
 class Predictor:
@@ -313,6 +329,14 @@ def predictors_of(trials: Sequence[Trial], rig: Rig) -> list[Predictor]:
     names = {trial.session for trial in trials if trial.session}
     sessions = {name: Session([trial for trial in trials if trial.session == name], rig) for name in names}
     return [Predictor(trial, rig, sessions.get(trial.session)) for trial in trials]
+
+
+def _height_of(trial: Trial, model: Model | None) -> float:
+    """Contact height of a trial; that from which its fit starts if it is free and the model does not have it."""
+    if not isinstance(trial.contact_height, str):
+        return trial.contact_height
+    numbers = {} if model is None else model.recordings
+    return numbers.get(number_name(CONTACT_HEIGHT, trial.contact_height), trial.height_start)
 
 
 def _effects_on_normal_force(model: Model) -> tuple[Effect, ...]:

@@ -73,7 +73,7 @@ class Stimulus:
         return self.trial.time
 
 
-def stimulus_of(trial: Trial, rig: Rig, texels: Texels | None = None) -> Stimulus:
+def stimulus_of(trial: Trial, rig: Rig, texels: Texels | None = None, height: float | None = None) -> Stimulus:
     """Return the stimulus of the texels in a trial of a rig.
 
     Parameters
@@ -82,8 +82,29 @@ def stimulus_of(trial: Trial, rig: Rig, texels: Texels | None = None) -> Stimulu
     rig : Rig
     texels : Texels, optional
         Texels at other places than the rig's.
+    height : float, metres, optional
+        Another contact height than the trial's own, or than the one from which the fit of a free one starts.
     """
     texels = rig.texels if texels is None else texels
+    if height is None:
+        height = trial.height_start if isinstance(trial.contact_height, str) else trial.contact_height
+    if height != 0.0 and trial.stimulus != "force":
+        return replace(_stimulus(_raised(trial, rig, height), rig, texels), trial=trial)
+    return _stimulus(trial, rig, texels)
+
+
+def _raised(trial: Trial, rig: Rig, height: float) -> Trial:
+    """The trial as seen from a sensor whose surface is higher (m)."""
+    if trial.position is not None:
+        up = rig.texels.normal.sum(axis=0)
+        return replace(trial, position=trial.position - height * up / max(float(np.linalg.norm(up)), 1e-9))
+    assert trial.level is not None
+    clipped = trial.level.min() >= 0.0  # such a logger writes zero for whatever is above the surface
+    return replace(trial, level=np.where(clipped & (trial.level <= 0.0), 0.0, trial.level + height))
+
+
+def _stimulus(trial: Trial, rig: Rig, texels: Texels) -> Stimulus:
+    """The stimulus of the texels, at the poses and depths of a trial."""
     n = len(texels)
     along = None
     if np.ptp(trial.slide, axis=0).any():

@@ -12,7 +12,7 @@ from ...model.sensor_parameters import FITTED_FRICTION_PARAMETERS
 from ..dataset.rig import FORCE, Rig
 from ..fitting.least_squares import FRICTION_LEVEL, RECORDING, Fit, FreeParameter, TrialView, fit, free_base_parameters
 from ..fitting.noise_floor import ChannelNoise, force_noise, reading_noise
-from ..forward.predictor import Model, Predictor, number_name
+from ..forward.predictor import CONTACT_HEIGHT, Model, Predictor, number_name
 from ..forward.response_check import check_responses
 
 FULL_STEPS, TRIAL_STEPS = 40, 6
@@ -23,6 +23,8 @@ SMALL_STEP = 0.1
 """Quantile of the distances of sliding between two samples that counts as a small one."""
 LEAST_FRICTION = 0.05
 """Least friction coefficient from which the stiffnesses are estimated."""
+HEIGHT_SCALE = 0.1
+"""A change of the contact height that matters, as a share of the largest penetration."""
 LARGEST_OWN_FACTOR = 1e3
 """Largest factor between two recordings that is fitted; its inverse is the smallest."""
 
@@ -169,7 +171,7 @@ def identified_base_parameters(rig: Rig, predictors: Sequence[Predictor]) -> lis
 
 
 def recording_numbers(rig: Rig, predictors: Sequence[Predictor], full: float) -> list[FreeParameter]:
-    """Return the free factors and zeros of recordings (see :class:`.trial.Trial`).
+    """Return the free factors, zeros and contact heights of recordings (see :class:`.trial.Trial`).
 
     The first factor is one if all recordings have a free one, because a factor that they share is the sensor's. The same
     holds for zeros if the sensor's own is fitted.
@@ -201,17 +203,29 @@ def recording_numbers(rig: Rig, predictors: Sequence[Predictor], full: float) ->
                 size = max(float(np.nanmax(np.abs(values))), 1e-12)
                 name = number_name(axis, trial.force_zero)
                 made.append(FreeParameter(RECORDING, name, -100.0 * size, 100.0 * size, scale=size))
-    return made
+    return [*made, *_contact_heights(rig, predictors)]
+
+
+def _contact_heights(rig: Rig, predictors: Sequence[Predictor]) -> list[FreeParameter]:
+    """Free contact heights, between those at which the start is off by the largest penetration."""
+    starts = {p.trial.contact_height: p.trial.height_start for p in predictors if isinstance(p.trial.contact_height, str)}
+    deep = rig.parameters.max_penetration
+    return [
+        FreeParameter(RECORDING, number_name(CONTACT_HEIGHT, str(name)), start - deep, start + deep, scale=HEIGHT_SCALE * deep)
+        for name, start in starts.items()
+    ]
 
 
 def with_recording_numbers(model: Model, predictors: Sequence[Predictor]) -> Model:
-    """Return a model in which every free factor of the fitted recordings is one, and every free zero is zero."""
+    """Return a model with free factors of one, free zeros of zero, and free contact heights where their fit starts."""
     numbers: dict[str, float] = {}
     for word, value in (("factor", 1.0), ("zero", 0.0)):
-        named = [getattr(p.trial, word) for p in predictors]
-        numbers |= {number_name(word, name): value for name in named if isinstance(name, str)}
+        names = [getattr(p.trial, word) for p in predictors]
+        numbers |= {number_name(word, name): value for name in names if isinstance(name, str)}
     biased = [p.trial.force_zero for p in predictors if isinstance(p.trial.force_zero, str) and p.trial.force is not None]
     numbers |= {number_name(axis, name): 0.0 for name in biased for axis in FORCE}
+    named = [p.trial for p in predictors if isinstance(p.trial.contact_height, str)]
+    numbers |= {number_name(CONTACT_HEIGHT, str(trial.contact_height)): trial.height_start for trial in named}
     return replace(model, recordings=numbers)
 
 

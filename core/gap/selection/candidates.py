@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -162,7 +162,8 @@ class Candidate:
 
     def effect(self, values: dict[str, float], texels: int, gain: float) -> Effect:
         """Return the effect with some values and defaults for the others; parameters of single texels start equal."""
-        complete = {**self.form.defaults(gain), **values}
+        held = {name: value for name, value in self.form.neutral.items() if name not in self.form.defaults(gain)}
+        complete = {**held, **self.form.defaults(gain), **values}
         spread = {
             p.name: tuple([float(complete[p.name])] * texels)  # type: ignore[arg-type]
             for p in self.form.parameters
@@ -267,6 +268,7 @@ def candidates(predictors: Sequence[Predictor], model: Model) -> list[Candidate]
     several = len(predictors[0].rig.texels) > 1
     loaded = all(p.trial.stimulus == "force" for p in predictors)
     cannot = unidentifiable(coverage(predictors))
+    heights_open = all(isinstance(p.trial.contact_height, str) for p in predictors if p.trial.stimulus == "pose")
     found = []
     for kind in library().values():
         if kind.name in NOT_FITTED or kind.name in cannot:
@@ -284,11 +286,18 @@ def candidates(predictors: Sequence[Predictor], model: Model) -> list[Candidate]
                 continue  # with known loads the contact law does not matter
             if not acts_on_force and not read:
                 continue
-            one = Candidate(kind, form)
+            one = Candidate(kind, _without_height(form) if heights_open else form)
             if not several and (one.has_texel_parameters or is_spatial(form)):
                 continue
             found.append(one)
     return found
+
+
+def _without_height(form: Form) -> Form:
+    """A form that moves texels without its height, which belongs to the base model if contact heights are free."""
+    if form.placement is None:
+        return form
+    return replace(form, parameters=tuple(p for p in form.parameters if p.name != "z"))
 
 
 def is_spatial(form: Form) -> bool:

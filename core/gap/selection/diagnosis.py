@@ -28,6 +28,7 @@ from .between_recordings import LEAST_CLOSED, LEAST_LOWERED, MOST_LEFT, differen
 from .candidates import scales_of
 from .check_recordings import check_views, checked
 from .confidence import UNSURE_CONFIDENCE
+from .contact_heights import with_starting_heights
 from .findings import Diagnosis
 from .forward_selection import ForwardSelection, SelectionState
 from .gap_sizes import FORCES, READINGS, UNRESOLVED_SQUARE, GapSizes, friction_kinds
@@ -55,7 +56,7 @@ def diagnose(rig: Rig) -> Job[Diagnosis]:
     Diagnosis
     """
     yield Progress("contacts of every trial", 0, TOTAL_WORK)
-    rig, predictors, faults = _without_faults(rig)
+    rig, predictors, faults = _without_faults(with_starting_heights(rig))
     noise, full = prepared(rig, predictors)
     yield Progress("base model", BASE_MODEL_BEGINS, TOTAL_WORK)
     result, view_set = _with_base_model(rig, predictors, noise, full)
