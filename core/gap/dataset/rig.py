@@ -22,6 +22,7 @@ from ...io.sensor_toml import SHAPE_WORDS, checked_grid, checked_lengths, known_
 from ...io.toml_file import LONGEST_NAME, checked_name, read_toml
 from ...model.sensor_parameters import DAMPING_PER_STIFFNESS, DEPTH_PER_THICKNESS, SENSOR_PARAMETERS, SensorParameters
 from .column_names import ColumnRule, read_column_rules, translated
+from .cover import COVER_WORDS, Cover, read_cover
 from .fault_kinds import FAULT_KINDS
 from .own_numbers import force_zero_of, own_numbers, with_contact_heights
 from .sessions import CLOCKS, TrialHistory, on_common_clocks, read_history
@@ -37,7 +38,7 @@ TRIAL_WORDS = {
     *("contact_height",),
 }
 """Words of a [[trial]]."""
-RIG_SENSOR_WORDS = {"name", "contact_height"}
+RIG_SENSOR_WORDS = {"name", "contact_height", *COVER_WORDS}
 """Words of a [sensor] that belong to the measurement and not to the sensor."""
 LONGEST_STEP = 5.0
 """Seconds between samples above which the clock must be in milliseconds."""
@@ -86,6 +87,8 @@ class Rig:
     warnings : tuple of str
     correct : tuple of str
         Kinds of faults of the data that are to be put right, keys of :data:`.fault_kinds.FAULT_KINDS`.
+    cover : Cover or None
+        Over texels at given places, or strips; None if contact is computed at the texels themselves.
     """
 
     name: str
@@ -99,6 +102,12 @@ class Rig:
     words: Mapping[str, Any] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
     correct: tuple[str, ...] = ()
+    cover: Cover | None = None
+
+    @property
+    def surface(self) -> Texels:
+        """Points at which contact is computed: those of the cover, or the texels if there is none."""
+        return self.texels if self.cover is None else self.cover.surface
 
     def of(self, use: str) -> tuple[Trial, ...]:
         """Return the trials of one use, "fit" or "check"."""
@@ -129,14 +138,14 @@ def read_rig(path: str | Path) -> Rig:
     rig_name = checked_name(words.get("name", path.stem), f"'{path.name}'")
     folder = path.resolve().parent
     sensor = _table(words, "sensor", path)
-    texels, grid = _texels(sensor, folder, path)
+    texels, grid, cover = _texels(sensor, folder, path)
     parameters, thickness = _parameters(sensor, path)
     indenter = _indenter(_table(words, "indenter", path), folder, path) if "indenter" in words else None
     rules = read_column_rules(_table(words, "columns", path), path) if "columns" in words else {}
     reader = _TrialReader(path, folder, len(texels), indenter is not None, rules)
     trials, warnings = _read_trials(words.get("trial"), reader, clock, sensor, path)
     warnings += _channel_warnings(trials)
-    _check_units(trials, indenter, texels, parameters, thickness, path)
+    _check_units(trials, indenter, texels if cover is None else cover.surface, parameters, thickness, path)
     return Rig(
         name=rig_name,
         texels=texels,
@@ -149,6 +158,7 @@ def read_rig(path: str | Path) -> Rig:
         words=sensor,
         warnings=tuple(warnings),
         correct=correct,
+        cover=cover,
     )
 
 
@@ -229,10 +239,17 @@ def _inside(name: Any, folder: Path, what: str, path: Path) -> Path:
 # --- the sensor
 
 
-def _texels(sensor: dict[str, Any], folder: Path, path: Path) -> tuple[Texels, tuple | None]:
-    """Texels of the sensor, and its grid if it is given as one."""
-    if ("grid" in sensor) == ("mesh" in sensor):
-        raise FileError(f"[sensor] of '{path.name}' needs either grid = {{ rows, columns, pitch }} or mesh = \"….ply\".")
+def _texels(sensor: dict[str, Any], folder: Path, path: Path) -> tuple[Texels, tuple | None, Cover | None]:
+    """Texels of the sensor, its grid if it is given as one, and its cover if it has one."""
+    has_cover = not COVER_WORDS.isdisjoint(sensor)
+    if ("grid" in sensor) + ("mesh" in sensor) + has_cover != 1:
+        raise FileError(
+            f"[sensor] of '{path.name}' needs one of grid = {{ rows, columns, pitch }}, mesh = \"….ply\", and sensors or "
+            "strips with a cover."
+        )
+    if has_cover:
+        texels, cover = read_cover(sensor, path)
+        return texels, None, cover
     if "mesh" in sensor:
         mesh, _ = _mesh(_inside(sensor["mesh"], folder, "The sensor's mesh", path), "the sensor's mesh")
         texels = texels_from_region(mesh, np.ones(len(mesh.vertices), bool), "sensor")
@@ -241,9 +258,9 @@ def _texels(sensor: dict[str, Any], folder: Path, path: Path) -> tuple[Texels, t
                 f"{len(mesh.vertices) - len(texels)} vertices of the mesh in '{path.name}' are on no face: "
                 "remove them, so that texel numbers and vertices agree."
             )
-        return texels, None
+        return texels, None, None
     rows, columns, pitch = checked_grid(sensor["grid"], f"'{path.name}'")
-    return grid_texels(rows, columns, *pitch), (rows, columns, pitch)
+    return grid_texels(rows, columns, *pitch), (rows, columns, pitch), None
 
 
 def grid_texels(rows: int, columns: int, pitch_x: float, pitch_y: float) -> Texels:

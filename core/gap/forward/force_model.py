@@ -46,7 +46,7 @@ class ContactSamples(NamedTuple):
     continues : (m,) bool
         Whether the sample before was in contact too.
     weight : (m,) float
-        Number of equal texels.
+        Number of equal texels; under a cover the sum of their shares of a texel.
     normal : (m, 3) float
         Direction of the normal force on the sensor.
     slip, mean_slip : (m, 3) float, m/s
@@ -98,19 +98,21 @@ class ContactHistory:
 
     @classmethod
     def of(cls, stimulus: Stimulus, subset: np.ndarray | None, rig: Rig) -> ContactHistory:
-        """Return the contact history of some texels of a rig, or of all (`subset` None)."""
+        """Return the contact history of some points of a rig's surface, or of all (`subset` None)."""
         load = stimulus.load
         chosen = np.arange(load.shape[1]) if subset is None else subset
         (touched,) = np.nonzero(load[:, chosen].any(axis=0))
         touched_texels = chosen[touched]
-        normal = -rig.texels.normal[None] if stimulus.normal is None else stimulus.normal
+        normal = -rig.surface.normal[None] if stimulus.normal is None else stimulus.normal
         normal = np.broadcast_to(normal, (*load.shape, 3))
         slip = np.zeros_like(normal) if stimulus.slip is None else stimulus.slip
         arrays = [load, stimulus.rate, stimulus.slide, *np.moveaxis(normal, 2, 0), *np.moveaxis(slip, 2, 0)]
         first, group = _equal_columns([values[:, touched_texels] for values in arrays])
         one = touched_texels[first]
+        share = None if rig.cover is None else rig.cover.share[touched_texels]
+        count = np.bincount(group, share, minlength=len(one))
         step = np.diff(stimulus.time, prepend=stimulus.time[0])
-        samples = _contact_samples(load[:, one] > 0, np.bincount(group, minlength=len(one)), normal[:, one], slip[:, one], step)
+        samples = _contact_samples(load[:, one] > 0, count, normal[:, one], slip[:, one], step)
         depth, rate, slide = (values[:, one].copy() for values in (stimulus.depth, stimulus.rate, stimulus.slide))
         return cls(stimulus.time, len(chosen), touched, group, depth, slide * step[:, None], rate, samples)
 

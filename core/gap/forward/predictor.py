@@ -19,7 +19,7 @@ from ...model.sensor_parameters import FRICTION_LAW_PARAMETERS, NORMAL_LAW_PARAM
 from ..dataset.rig import FORCE, Rig
 from ..dataset.trial import Trial
 from .force_model import ContactHistory
-from .stimulus import Stimulus, joined_stimuli, stimulus_of
+from .stimulus import Stimulus, joined_stimuli, of_texels, surface_stimulus_of
 
 CONTACT_HEIGHT = "contact height"
 CACHE_SIZE = 4
@@ -83,6 +83,7 @@ class ResponseModel:
     ----------
     rig : Rig
     stimulus : Stimulus
+        Of the points of the rig's surface.
     cache_size : int
         Number of results of each kind that are kept.
     """
@@ -92,6 +93,7 @@ class ResponseModel:
         self._placed: dict[object, Stimulus] = {}
         self._histories: dict[object, ContactHistory] = {}
         self._forces: dict[object, np.ndarray] = {}
+        self._texel_forces: dict[object, np.ndarray] = {}
         self._totals: dict[object, np.ndarray] = {}
         self._readings: dict[object, np.ndarray] = {}
 
@@ -125,13 +127,13 @@ class ResponseModel:
             _remember(
                 self._totals,
                 key,
-                self._contact_history(model, None).total_force(p, rubbing, self.normal_force(model)),
+                self._contact_history(model, None).total_force(p, rubbing, self.surface_force(model)),
                 self.cache_size,
             )
         return self._totals[key]
 
     def placed(self, model: Model) -> Stimulus:
-        """Return the stimulus of the texels at the places where effects move them."""
+        """Return the stimulus of the points of the surface at the places where effects move them."""
         moving = tuple(effect for effect in model.effects if _acts_through(effect, "placement"))
         if self.stimulus.trial.stimulus != "pose":
             moving = ()
@@ -140,7 +142,7 @@ class ResponseModel:
             return self.stimulus
         key = _effects_key(moving), heights
         if key not in self._placed:
-            t = self.rig.texels
+            t = self.rig.surface
             if moving:
                 position, normal, tangent = placed_texels(moving, t.position, t.normal, t.tangent)
                 t = replace(t, position=position, normal=normal, tangent=tangent)
@@ -153,10 +155,22 @@ class ResponseModel:
 
     def _stimulus_of(self, texels: Texels, heights: tuple[float, ...]) -> Stimulus:
         """The stimulus of texels at other places."""
-        return stimulus_of(self.stimulus.trial, self.rig, texels, heights[0])
+        return surface_stimulus_of(self.stimulus.trial, self.rig, texels, heights[0])
 
     def normal_force(self, model: Model, subset: np.ndarray | None = None) -> np.ndarray:
-        """Return the normal force of each texel, or of some, (T, n) N: known, or from the contact law with its effects."""
+        """Return the normal force of each texel, or of some, (T, n) N."""
+        cover = self.rig.cover
+        if cover is None:
+            return self.surface_force(model, subset)
+        key = self._force_key(model, None)
+        if key not in self._texel_forces:
+            _remember(self._texel_forces, key, self.surface_force(model) @ cover.weights.T, self.cache_size)
+        return self._texel_forces[key] if subset is None else self._texel_forces[key][:, subset]
+
+    def surface_force(self, model: Model, subset: np.ndarray | None = None) -> np.ndarray:
+        """Return the normal force at each point of the surface, or at some, (T, m) N: known, or from the contact law with its
+        effects. Each point has the force that a whole texel would have there.
+        """
         stimulus = self.placed(model)
         if stimulus.force_share is not None:
             return stimulus.force_share if subset is None else stimulus.force_share[:, subset]
@@ -199,8 +213,9 @@ class Session(ResponseModel):
 
     def __init__(self, trials: Sequence[Trial], rig: Rig):
         self.trials = sorted(trials, key=lambda trial: float(trial.time[0]))
-        self.stimuli = [stimulus_of(trial, rig) for trial in self.trials]
-        joined, self._starts = joined_stimuli(self.stimuli, rig.texels)
+        stimuli = [surface_stimulus_of(trial, rig) for trial in self.trials]
+        self.stimuli = [of_texels(stimulus, rig) for stimulus in stimuli]
+        joined, self._starts = joined_stimuli(stimuli, rig.surface)
         most = int(SESSION_CACHE_BYTES / (8.0 * joined.load.size))
         super().__init__(rig, joined, int(np.clip(most, CACHE_SIZE, SESSION_CACHE_SIZE)))
 
@@ -217,7 +232,7 @@ class Session(ResponseModel):
         return tuple(_height_of(trial, model) for trial in self.trials)
 
     def _stimulus_of(self, texels: Texels, heights: tuple[float, ...]) -> Stimulus:
-        stimuli = [stimulus_of(trial, self.rig, texels, at) for trial, at in zip(self.trials, heights, strict=True)]
+        stimuli = [surface_stimulus_of(trial, self.rig, texels, at) for trial, at in zip(self.trials, heights, strict=True)]
         return joined_stimuli(stimuli, texels)[0]
 
 
@@ -234,8 +249,8 @@ class Predictor:
 
     def __init__(self, trial: Trial, rig: Rig, session: Session | None = None):
         self.trial, self.rig, self.session = trial, rig, session
-        self.stimulus = stimulus_of(trial, rig) if session is None else session.stimulus_in(trial)
-        self._responses = ResponseModel(rig, self.stimulus) if session is None else session
+        self._responses = ResponseModel(rig, surface_stimulus_of(trial, rig)) if session is None else session
+        self.stimulus = of_texels(self._responses.stimulus, rig) if session is None else session.stimulus_in(trial)
         self._samples = slice(None) if session is None else session.samples_of(trial)
 
     def predict(self, model: Model, subset: np.ndarray | None = None, with_forces: bool = True) -> Prediction:

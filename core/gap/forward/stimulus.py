@@ -73,19 +73,65 @@ class Stimulus:
         return self.trial.time
 
 
-def stimulus_of(trial: Trial, rig: Rig, texels: Texels | None = None, height: float | None = None) -> Stimulus:
-    """Return the stimulus of the texels in a trial of a rig.
+def stimulus_of(trial: Trial, rig: Rig, height: float | None = None) -> Stimulus:
+    """Return the stimulus of the texels in a trial of a rig; under a cover the weighted one of its points.
+
+    Parameters
+    ----------
+    trial : Trial
+    rig : Rig
+    height : float, metres, optional
+        Another contact height than the trial's own, or than the one from which the fit of a free one starts.
+    """
+    return of_texels(surface_stimulus_of(trial, rig, height=height), rig)
+
+
+def of_texels(stimulus: Stimulus, rig: Rig) -> Stimulus:
+    """Return the stimulus of a rig's texels from that of the points of its surface.
+
+    Loads are weighted as the forces are. Directions and speeds are means, weighted by the load as well.
+    """
+    if rig.cover is None:
+        return stimulus
+    to_texels = rig.cover.weights.T
+    load = stimulus.load
+    total = load @ to_texels
+    scale = np.where(total > 0.0, total, 1.0)
+
+    def mean(values: np.ndarray) -> np.ndarray:
+        return (load * values) @ to_texels / scale
+
+    def mean_vector(values: np.ndarray) -> np.ndarray:
+        return np.stack([mean(values[:, :, axis]) for axis in range(3)], axis=2)
+
+    normal = stimulus.normal
+    if normal is not None:
+        normal = np.where(total[:, :, None] > 0.0, mean_vector(normal), -rig.texels.normal)
+        normal = normal / np.maximum(np.linalg.norm(normal, axis=2, keepdims=True), 1e-12)
+    return replace(
+        stimulus,
+        depth=stimulus.depth @ to_texels,
+        rate=stimulus.rate @ to_texels,
+        force_share=None if stimulus.force_share is None else total,
+        normal=normal,
+        slide=mean(stimulus.slide),
+        slip=None if stimulus.slip is None else mean_vector(stimulus.slip),
+    )
+
+
+def surface_stimulus_of(trial: Trial, rig: Rig, texels: Texels | None = None, height: float | None = None) -> Stimulus:
+    """Return the stimulus of the points of a rig's surface, which are its texels if it has no cover.
 
     Parameters
     ----------
     trial : Trial
     rig : Rig
     texels : Texels, optional
-        Texels at other places than the rig's.
+        These points at other places than the rig's.
     height : float, metres, optional
-        Another contact height than the trial's own, or than the one from which the fit of a free one starts.
+        As in :func:`stimulus_of`.
     """
-    texels = rig.texels if texels is None else texels
+    texels = rig.surface if texels is None else texels
     if height is None:
         height = trial.height_start if isinstance(trial.contact_height, str) else trial.contact_height
     if height != 0.0 and trial.stimulus != "force":
@@ -118,9 +164,14 @@ def _stimulus(trial: Trial, rig: Rig, texels: Texels) -> Stimulus:
     nothing = np.zeros_like(level)
     slide = nothing if slip is None else np.sqrt(_dot(slip, slip))
     if trial.stimulus == "force":
-        return Stimulus(trial, nothing, nothing, level / n, None, slide, slip)
+        return Stimulus(trial, nothing, nothing, level / _texel_count(rig), None, slide, slip)
     rate = np.where(level > 0, np.gradient(trial.level, trial.time)[:, None], 0.0)
     return Stimulus(trial, level, rate, None, None, slide, slip)
+
+
+def _texel_count(rig: Rig) -> float:
+    """Number of texels by area that share a force on the whole surface."""
+    return float(len(rig.texels)) if rig.cover is None else float(rig.cover.share.sum())
 
 
 def joined_stimuli(stimuli: Sequence[Stimulus], texels: Texels) -> tuple[Stimulus, list[int]]:

@@ -10,6 +10,8 @@ import numpy as np
 
 from ...effects.engine.registry import form_of, library
 from ...effects.engine.specification import Form, Kind, TransducerArray
+from ...errors import EffectError
+from ...geometry.layout.grid_layout import GridLayout
 from ...model.effect import Effect
 from ...model.parameter import Parameter
 from ..fitting.least_squares import Fit, FreeParameter, value_of
@@ -266,6 +268,7 @@ def candidates(predictors: Sequence[Predictor], model: Model) -> list[Candidate]
     dragged = any(p.trial.force is not None and p.stimulus.slide.any() for p in predictors)
     read = any(p.trial.reading is not None for p in predictors)
     several = len(predictors[0].rig.texels) > 1
+    in_rows = isinstance(predictors[0].rig.texels.layout, GridLayout)
     loaded = all(p.trial.stimulus == "force" for p in predictors)
     cannot = unidentifiable(coverage(predictors))
     heights_open = all(isinstance(p.trial.contact_height, str) for p in predictors if p.trial.stimulus == "pose")
@@ -287,6 +290,8 @@ def candidates(predictors: Sequence[Predictor], model: Model) -> list[Candidate]
             if not acts_on_force and not read:
                 continue
             one = Candidate(kind, _without_height(form) if heights_open else form)
+            if several and not in_rows and _needs_rows(form):
+                continue
             if not several and (one.has_texel_parameters or is_spatial(form)):
                 continue
             found.append(one)
@@ -298,6 +303,18 @@ def _without_height(form: Form) -> Form:
     if form.placement is None:
         return form
     return replace(form, parameters=tuple(p for p in form.parameters if p.name != "z"))
+
+
+def _needs_rows(form: Form) -> bool:
+    """Whether a form is only defined for texels in rows and columns."""
+    if form.memoryless is None or any(p.per_texel for p in form.parameters):
+        return False
+    site = TransducerArray(np.zeros((1, 3)), np.full(1, 9e-6))
+    try:
+        form.memoryless(np.zeros((2, 1)), np.zeros(2), form.defaults(), site, 0)
+    except EffectError:
+        return True
+    return False
 
 
 def is_spatial(form: Form) -> bool:
