@@ -35,9 +35,11 @@ SMALLEST_RESPONSE = 1e-30
 """Responses of a smaller magnitude, in any unit, count as zero."""
 TRIAL_WORDS = {
     *("file", "use", "name", "session", "started", "tared", "specimen", "factor", "zero", "force_zero"),
-    *("contact_height",),
+    *("contact_height", "probe"),
 }
 """Words of a [[trial]]."""
+RIG_WORDS = {"format", "name", "clock", "columns", "data", "sensor", "indenter", "probe", "trial"}
+"""Words of a rig."""
 RIG_SENSOR_WORDS = {"name", "contact_height", *COVER_WORDS}
 """Words of a [sensor] that belong to the measurement and not to the sensor."""
 LONGEST_STEP = 5.0
@@ -89,6 +91,8 @@ class Rig:
         Kinds of faults of the data that are to be put right, keys of :data:`.fault_kinds.FAULT_KINDS`.
     cover : Cover or None
         Over texels at given places, or strips; None if contact is computed at the texels themselves.
+    probes : mapping of str to Indenter
+        Those that recordings name, beside the indenter.
     """
 
     name: str
@@ -103,6 +107,11 @@ class Rig:
     warnings: tuple[str, ...] = ()
     correct: tuple[str, ...] = ()
     cover: Cover | None = None
+    probes: Mapping[str, Indenter] = field(default_factory=dict)
+
+    def indenter_of(self, trial: Trial) -> Indenter | None:
+        """Return what pressed in a trial; None if only a depth or a force is known."""
+        return self.probes[trial.probe] if trial.probe else self.indenter
 
     @property
     def surface(self) -> Texels:
@@ -130,7 +139,7 @@ def read_rig(path: str | Path) -> Rig:
     words = read_toml(path, "rig")
     if words.get("format") != FORMAT:
         raise FileError(f"'{path.name}' is not a rig: its first line must be format = \"{FORMAT}\".")
-    known_words(words, {"format", "name", "clock", "columns", "data", "sensor", "indenter", "trial"}, f"'{path.name}'")
+    known_words(words, RIG_WORDS, f"'{path.name}'")
     clock = words.get("clock")
     if clock is not None and clock not in CLOCKS:
         raise FileError(f'clock of \'{path.name}\' is {clock!r:.60}: write "absolute" or "own".')
@@ -141,12 +150,12 @@ def read_rig(path: str | Path) -> Rig:
     texels, grid, cover = _texels(sensor, folder, path)
     parameters, thickness = _parameters(sensor, path)
     indenter = _indenter(_table(words, "indenter", path), folder, path) if "indenter" in words else None
+    probes = _probes(words.get("probe", []), folder, path)
     rules = read_column_rules(_table(words, "columns", path), path) if "columns" in words else {}
-    reader = _TrialReader(path, folder, len(texels), indenter is not None, rules)
+    reader = _TrialReader(path, folder, len(texels), indenter is not None, rules, frozenset(probes))
     trials, warnings = _read_trials(words.get("trial"), reader, clock, sensor, path)
     warnings += _channel_warnings(trials)
-    _check_units(trials, indenter, texels if cover is None else cover.surface, parameters, thickness, path)
-    return Rig(
+    rig = Rig(
         name=rig_name,
         texels=texels,
         parameters=parameters,
@@ -159,7 +168,10 @@ def read_rig(path: str | Path) -> Rig:
         warnings=tuple(warnings),
         correct=correct,
         cover=cover,
+        probes=probes,
     )
+    _check_units(rig, path)
+    return rig
 
 
 def _read_trials(
@@ -330,6 +342,19 @@ def _parameters(sensor: dict[str, Any], path: Path) -> tuple[SensorParameters, f
 # --- the indenter
 
 
+def _probes(entries: Any, folder: Path, path: Path) -> dict[str, Indenter]:
+    """The probes that recordings may name."""
+    if not isinstance(entries, list) or not all(isinstance(entry, dict) for entry in entries):
+        raise FileError(f"probe of '{path.name}' is no list of tables: write [[probe]], with a name and a shape, for each.")
+    found: dict[str, Indenter] = {}
+    for number, entry in enumerate(entries, start=1):
+        name = checked_name(entry.get("name", ""), f"[[probe]] {number} of '{path.name}'")
+        if name in found:
+            raise FileError(f"'{path.name}' has a [[probe]] {name!r} twice: give each a name of its own.")
+        found[name] = _indenter(entry, folder, path)
+    return found
+
+
 def _indenter(words: dict[str, Any], folder: Path, path: Path) -> Indenter:
     """The indenter."""
     known_words(words, {"shape", "mesh", "name"}, f"[indenter] of '{path.name}'")
@@ -376,6 +401,7 @@ class _TrialReader:
     texels: int
     has_indenter: bool
     rules: Mapping[str, ColumnRule]
+    probes: frozenset[str] = frozenset()
 
     def read(self, entry: Any, number: int) -> tuple[Trial, TrialHistory, list[str]]:
         """Return a trial from its entry in the rig and its CSV file, its place in time, and remarks about it."""
@@ -391,15 +417,20 @@ class _TrialReader:
             raise FileError(f'{where_in_rig} has use = {use!r}: write "fit" or "check".')
         own, force_zero = own_numbers(entry, where_in_rig), force_zero_of(entry, where_in_rig)
         file = _inside(entry.get("file"), self.folder, f"{where}'s file", self.path)
-        trial, said = self._recorded(file, use)
+        probe = entry.get("probe", "")
+        if "probe" in entry and probe not in self.probes:
+            known = ", ".join(sorted(self.probes)) or "none"
+            raise FileError(f"probe of {where_in_rig} is {probe!r:.60}: write the name of a [[probe]] of the rig ({known}).")
+        trial, said = self._recorded(file, use, self.has_indenter or bool(probe))
+        trial = replace(trial, probe=probe)
         return replace(trial, tared=tared, factor=own["factor"], zero=own["zero"], force_zero=force_zero), history, said
 
-    def _recorded(self, file: Path, use: str) -> tuple[Trial, list[str]]:
+    def _recorded(self, file: Path, use: str, has_indenter: bool) -> tuple[Trial, list[str]]:
         """The trial of a CSV file, and remarks about it."""
         table = read_table(file)
         columns = translated(table.names, table.values, self.rules, self.texels, file)
         time = _clock(columns, file)
-        kind = _stimulus_kind(columns, file, self.has_indenter)
+        kind = _stimulus_kind(columns, file, has_indenter)
         reading, force = _readings(columns, self.texels, file), _vector(columns, FORCE, partial=True)
         has_columns = reading is not None or force is not None
         reading, force = (None if part is None or np.isnan(part).all() else part for part in (reading, force))
@@ -415,6 +446,9 @@ class _TrialReader:
             position, quaternion = _vector(columns, POSE, partial=False), _turns(columns, file)
         else:
             level = columns[kind].copy()
+            if kind == "force" and "x" in columns:  # a known weight at a known place, wherever its z is
+                place = [columns["x"], columns["y"], np.zeros(len(time))]
+                position, quaternion = np.stack(place, axis=1), _turns(columns, file)
         said = _gaps_filled([position, quaternion, level, slide], time, file)
         if quaternion is not None:
             quaternion = quaternion / np.linalg.norm(quaternion, axis=1, keepdims=True)
@@ -461,6 +495,10 @@ def _stimulus_kind(columns: Mapping[str, np.ndarray], file: Path, has_indenter: 
     """What drove the rig: "pose", "depth" or "force"."""
     some_pose = [name for name in POSE if name in columns]
     kinds = [kind for kind in ("depth", "force") if kind in columns]
+    if {"x", "y"} <= set(some_pose) and kinds == ["force"]:
+        if not has_indenter:
+            raise FileError(f"'{file.name}' says where a force acts and the rig has no [indenter]: describe its shape.")
+        return "force"
     if some_pose and len(some_pose) < 3:
         lacking = ", ".join(name for name in POSE if name not in columns)
         raise FileError(f"'{file.name}' has no column {lacking}: a pose needs x, y and z.")
@@ -570,17 +608,13 @@ def _channel_warnings(trials: list[Trial]) -> list[str]:
     return said
 
 
-def _check_units(
-    trials: list[Trial],
-    indenter: Indenter | None,
-    texels: Texels,
-    parameters: SensorParameters,
-    thickness: float | None,
-    path: Path,
-) -> None:
-    """Refuse lengths that must be millimetres: a depth far beyond the sensor's back, or a pose far away from it."""
-    deepest = parameters.max_penetration
-    for trial in trials:
+def _check_units(rig: Rig, path: Path) -> None:
+    """Refuse lengths that must be millimetres: a depth far beyond the sensor's back, or a pose far away from it.
+
+    How a weight at a place is shared follows from how far it sinks in, so its rig has to state the stiffness.
+    """
+    deepest = rig.parameters.max_penetration
+    for trial in rig.trials:
         if trial.stimulus == "depth":
             assert trial.level is not None
             if trial.level.max() > 20 * deepest:
@@ -589,11 +623,17 @@ def _check_units(
                     f"and the sensor can be pressed in by {deepest:g} m: "
                     "give it in metres."
                 )
-        elif trial.stimulus == "pose":
-            assert trial.position is not None and indenter is not None
-            spans = [float(np.linalg.norm(np.ptp(points, axis=0))) for points in (texels.position, indenter.mesh.vertices)]
+        elif trial.position is not None:
+            indenter = rig.indenter_of(trial)
+            assert indenter is not None
+            spans = [float(np.linalg.norm(np.ptp(points, axis=0))) for points in (rig.surface.position, indenter.mesh.vertices)]
             if np.abs(trial.position).max() > 20 * max(sum(spans), deepest):
                 raise FileError(
                     f"The pose in '{trial.name}.csv' reaches {np.abs(trial.position).max():g} m from a sensor of "
                     f"{spans[0]:.3g} m: give x, y and z in metres."
+                )
+            if trial.stimulus == "force" and "k" not in rig.given:
+                raise FileError(
+                    f"'{trial.name}.csv' has a force at a place, and [sensor] of '{path.name}' no k: state it, it says how far "
+                    "the indenter sinks in and which texels share the force."
                 )

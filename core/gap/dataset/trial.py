@@ -21,7 +21,7 @@ class Trial:
         Since the first sample of its session, or of the rig's first recording.
     stimulus : "pose", "depth" or "force"
     position, quaternion : (T, 3), (T, 4) float, or None
-        Of the indenter in the sensor's frame.
+        Of the indenter in the sensor's frame. With a known force they say where it acts; z has no meaning then.
     level : (T,) float or None
         Depth of all texels (m), or force that all texels share (N).
     slide : (T, 2) float, metres
@@ -42,6 +42,8 @@ class Trial:
     contact_height : str or float, metres
         How much higher the sensor's surface is than poses or depths say: contact begins earlier by as much. A name if it is
         free. Without meaning in a recording with a known force.
+    probe : str
+        Name of the probe that pressed; empty for the rig's indenter.
     height_start : float, metres
         Where the fit of a free contact height starts; contacts are described with this height.
     """
@@ -63,6 +65,7 @@ class Trial:
     force_zero: str | tuple[float, ...] = (0.0, 0.0, 0.0)
     contact_height: str | float = 0.0
     height_start: float = 0.0
+    probe: str = ""
 
     @property
     def step(self) -> float:

@@ -31,6 +31,9 @@ DEAD_BAND, LEAST_BAND = 5.0, 1e-4
 noise; and the share of the largest load from which on there is such noise."""
 ALTERNATION = -0.3
 """Correlation of neighbouring second differences of a load, below which they are noise."""
+LEAST_TREMBLING = 0.2
+"""Share of the loaded samples in which a load has to change its rate, or it has no noise: weights that are put down change it
+in few samples."""
 PRESSED_SHARE, UNLOADING_SHARE = 0.05, 0.1
 """Shares of the largest load: above the first the sensor counts as pressed; a decrease by the second is an unloading."""
 LEAST_SLIDING_SPEED = 1e-5
@@ -282,7 +285,9 @@ def _load_noise(load: np.ndarray) -> float:
     second = np.diff(load, 2)
     pressed = load[1:-1] > PRESSED_SHARE * float(load.max(initial=0.0))  # a force below zero counts as none
     moving = second[pressed & (second != 0.0)]
-    if len(moving) < SHORTEST_STRETCH or float(second[1:] @ second[:-1]) > ALTERNATION * float(second @ second):
+    if len(moving) < max(SHORTEST_STRETCH, LEAST_TREMBLING * pressed.sum()) or float(
+        second[1:] @ second[:-1]
+    ) > ALTERNATION * float(second @ second):
         return 0.0
     return float(MAD_TO_DEVIATION * np.median(np.abs(moving)) / np.sqrt(6.0))
 

@@ -25,6 +25,8 @@ from ...solver.simulation import Simulation
 from ..dataset.rig import Rig
 from ..dataset.trial import Trial
 
+BISECTIONS, WEIGHT_ERROR = 26, 1e-3
+"""Halvings of the height at which an indenter rests, and the largest relative error of the force that is carried there."""
 LONGEST_SPLIT = 3.0
 """Pause between two recordings, in samples, up to which they are parts of one recording that simply goes on."""
 
@@ -158,6 +160,8 @@ def _stimulus(trial: Trial, rig: Rig, texels: Texels) -> Stimulus:
         along = travel[:, None, :1] * texels.tangent + travel[:, None, 1:] * texels.bitangent
     if trial.stimulus == "pose":
         return _posed(trial, rig, texels, along)
+    if trial.stimulus == "force" and trial.position is not None and rig.indenter_of(trial) is not None:
+        return _weighted(trial, rig, texels, along)
     assert trial.level is not None
     level = np.repeat(np.maximum(trial.level, 0.0)[:, None], n, axis=1)
     slip = None if along is None else along * (level > 0)[:, :, None]
@@ -230,17 +234,11 @@ def _shares(stimulus: Stimulus) -> np.ndarray:
 
 def _posed(trial: Trial, rig: Rig, texels: Texels, along: np.ndarray | None) -> Stimulus:
     """Stimulus of a trial with a known pose; `along` (T, n, 3) is the velocity of a surface that slides by itself."""
-    assert trial.position is not None and trial.quaternion is not None and rig.indenter is not None
-    reach, radius = rig.parameters.max_penetration, rig.indenter.radius
+    assert trial.position is not None and trial.quaternion is not None
+    reach = rig.parameters.max_penetration
     limit, deep = reach, 0
     for _ in range(6):
-        if radius is not None:
-            depth, normal, point, deep = sphere_contact(trial.position, radius, texels.position, texels.normal, reach)
-        elif rig.indenter.edges is not None:
-            pose, edges = (trial.position, trial.quaternion), np.array(rig.indenter.edges)
-            depth, normal, point, deep = box_contact(*pose, edges, texels.position, texels.normal, reach)
-        else:
-            depth, normal, point, deep = _mesh_contact(trial, rig, texels, reach)
+        depth, normal, point, deep = _contact(trial, rig, texels, reach)
         if not deep:
             break
         reach *= 2.0  # a real sensor goes on acting where the model's penetration ends: search from further behind
@@ -263,6 +261,56 @@ def _posed(trial: Trial, rig: Rig, texels: Texels, along: np.ndarray | None) -> 
         slip = np.where(touching[:, :, None], velocity - rate[:, :, None] * normal, 0.0)
     overpressed = int((depth > limit).sum(axis=1).max(initial=0))
     return Stimulus(trial, depth, rate, None, normal, slide, slip, overpressed)
+
+
+def _contact(trial: Trial, rig: Rig, texels: Texels, reach: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, int]:
+    """Contact of texels with what pressed in a trial; returns as of :func:`sphere_contact`."""
+    indenter = rig.indenter_of(trial)
+    assert trial.position is not None and trial.quaternion is not None and indenter is not None
+    if indenter.radius is not None:
+        return sphere_contact(trial.position, indenter.radius, texels.position, texels.normal, reach)
+    if indenter.edges is not None:
+        pose, edges = (trial.position, trial.quaternion), np.array(indenter.edges)
+        return box_contact(*pose, edges, texels.position, texels.normal, reach)
+    return _mesh_contact(trial, rig, texels, reach)
+
+
+def _weighted(trial: Trial, rig: Rig, texels: Texels, along: np.ndarray | None) -> Stimulus:
+    """Stimulus of a known force at a known place.
+
+    The indenter sinks in until springs of the rig's stiffness carry the force, and each texel carries its spring's share.
+    """
+    indenter = rig.indenter_of(trial)
+    assert trial.position is not None and trial.quaternion is not None and trial.level is not None and indenter is not None
+    force = np.maximum(trial.level, 0.0)
+    states, back = np.unique(np.column_stack([trial.position, trial.quaternion, force]), axis=0, return_inverse=True)
+    back, wanted = back.ravel(), states[:, 7]
+    size = float(np.linalg.norm(indenter.mesh.vertices, axis=1).max())
+    high = np.full(len(states), float(texels.position[:, 2].max()) + size)
+    low = high - 2.0 * size - rig.parameters.max_penetration - float(np.ptp(texels.position[:, 2]))
+    share = np.ones(len(texels)) if rig.cover is None else rig.cover.share
+    part = replace(trial, time=np.arange(float(len(states))), position=states[:, :3].copy(), quaternion=states[:, 3:7].copy())
+    reach = 4.0 * (rig.parameters.max_penetration + size)
+    for _ in range(BISECTIONS):
+        middle = 0.5 * (low + high)
+        assert part.position is not None
+        part.position[:, 2] = middle
+        depth, normal, _, _ = _contact(part, rig, texels, reach)
+        enough = rig.parameters.k * depth @ share >= wanted
+        low, high = np.where(enough, middle, low), np.where(enough, high, middle)
+    carried = depth @ share
+    (lost,) = np.nonzero((wanted > 0.0) & (np.abs(rig.parameters.k * carried - wanted) > WEIGHT_ERROR * wanted))
+    if len(lost):
+        x, y = states[lost[0], :2]
+        raise SceneError(
+            f"{wanted[lost[0]]:.3g} N at x = {x:.3g} m, y = {y:.3g} m of '{trial.name}.csv' do not rest on the sensor: check "
+            "the units of force, x and y, and k."
+        )
+    load = np.where(wanted > 0.0, wanted / np.where(carried > 0.0, carried, 1.0), 0.0)[:, None] * depth
+    load, normal = load[back], normal[back]
+    slip = None if along is None else along * (load > 0)[:, :, None]
+    nothing = np.zeros_like(load)
+    return Stimulus(trial, nothing, nothing, load, normal, nothing if slip is None else np.sqrt(_dot(slip, slip)), slip)
 
 
 def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
@@ -357,7 +405,9 @@ def box_contact(
 
 def _mesh_contact(trial: Trial, rig: Rig, texels: Texels, reach: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, int]:
     """The same as :func:`sphere_contact` for any mesh, through the solver's contact search."""
-    assert trial.position is not None and trial.quaternion is not None and rig.indenter is not None
+    assert trial.position is not None and trial.quaternion is not None
+    indenter = rig.indenter_of(trial)
+    assert indenter is not None
     parameters = replace(rig.parameters, max_penetration=reach)
     scenario = Scenario(
         bodies=(
@@ -365,7 +415,7 @@ def _mesh_contact(trial: Trial, rig: Rig, texels: Texels, reach: float) -> tuple
             Body("indenter", Motion.at_rest(trial.position[0], trial.quaternion[0])),
         ),
         sensors=(Sensor("sensor", 0, texels, parameters),),
-        targets=(Target("indenter", 1, rig.indenter.mesh),),
+        targets=(Target("indenter", 1, indenter.mesh),),
         frame_end=1,
         name=rig.name,
     )

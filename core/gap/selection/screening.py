@@ -388,7 +388,8 @@ def _large_displacements(candidate: Candidate, score_test: ScoreTest, scales: Sc
     """
     gain = abs(score_test.model.parameters.gain)
     names = {q.name for q in candidate.form.parameters}
-    indenter = score_test.views[0].predictor.rig.indenter
+    first = score_test.views[0].predictor
+    indenter = first.rig.indenter_of(first.trial)
     if not {"x", "y"} <= names or indenter is None or indenter.radius is not None:
         return []
     tried = []
