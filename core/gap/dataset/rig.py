@@ -35,7 +35,7 @@ SMALLEST_RESPONSE = 1e-30
 """Responses of a smaller magnitude, in any unit, count as zero."""
 TRIAL_WORDS = {
     *("file", "use", "name", "session", "started", "tared", "specimen", "factor", "zero", "force_zero"),
-    *("contact_height", "probe"),
+    *("contact_height", "probe", "repeats"),
 }
 """Words of a [[trial]]."""
 RIG_WORDS = {"format", "name", "clock", "columns", "data", "sensor", "indenter", "probe", "trial"}
@@ -171,6 +171,10 @@ def read_rig(path: str | Path) -> Rig:
         probes=probes,
     )
     _check_units(rig, path)
+    groups = [trial.repeats for trial in trials if trial.repeats]
+    for group in groups:
+        if groups.count(group) < 2:
+            raise FileError(f"Only one recording of '{path.name}' has repeats = \"{group}\": name it on all repeats.")
     return rig
 
 
@@ -422,7 +426,8 @@ class _TrialReader:
             known = ", ".join(sorted(self.probes)) or "none"
             raise FileError(f"probe of {where_in_rig} is {probe!r:.60}: write the name of a [[probe]] of the rig ({known}).")
         trial, said = self._recorded(file, use, self.has_indenter or bool(probe))
-        trial = replace(trial, probe=probe)
+        repeats = checked_name(entry["repeats"], f"repeats of {where_in_rig}") if "repeats" in entry else ""
+        trial = replace(trial, probe=probe, repeats=repeats)
         return replace(trial, tared=tared, factor=own["factor"], zero=own["zero"], force_zero=force_zero), history, said
 
     def _recorded(self, file: Path, use: str, has_indenter: bool) -> tuple[Trial, list[str]]:

@@ -44,6 +44,8 @@ class Trial:
         free. Without meaning in a recording with a known force.
     probe : str
         Name of the probe that pressed; empty for the rig's indenter.
+    repeats : str
+        Name of a group of recordings of the same stimulus; empty if it belongs to none.
     height_start : float, metres
         Where the fit of a free contact height starts; contacts are described with this height.
     """
@@ -66,6 +68,7 @@ class Trial:
     contact_height: str | float = 0.0
     height_start: float = 0.0
     probe: str = ""
+    repeats: str = ""
 
     @property
     def step(self) -> float:

@@ -11,6 +11,7 @@ __all__ = [
     "least_squares",
     "noise_floor",
     "regression",
+    "repeat_noise",
     "residual_tests",
     "spectral_lines",
 ]

@@ -97,7 +97,7 @@ def reading_noise(predictors: Sequence[Predictor], full: float) -> ChannelNoise:
         order = np.argsort(values)
         share = np.cumsum(weight[order]) / weight.sum()
         middle = values[order][np.searchsorted(share, 0.5)]
-        return ChannelNoise(float(np.sqrt(middle)), _correlation_time(curves), "stretches without load")
+        return ChannelNoise(float(np.sqrt(middle)), integral_time(curves), "stretches without load")
     second = [_white_noise_deviation(p.trial.reading) for p in predictors if p.trial.reading is not None]
     deviation = float(np.median(np.concatenate(second))) if second else 0.0
     return ChannelNoise(max(deviation, smallest), 1.0, "differences between samples")
@@ -147,8 +147,8 @@ def _variance_and_autocovariance(part: np.ndarray) -> tuple[np.ndarray, np.ndarr
     return variance, curve
 
 
-def _correlation_time(curves: list[np.ndarray]) -> float:
-    """Integral of the autocorrelation up to where it vanishes, in samples."""
+def integral_time(curves: list[np.ndarray]) -> float:
+    """Return the integral of the autocorrelation up to where it vanishes, in samples, from autocovariances (64,)."""
     total = sum(curves, np.zeros(AUTOCOVARIANCE_LAGS))
     if total[0] <= 0:
         return 1.0

@@ -12,6 +12,7 @@ from ...model.sensor_parameters import FITTED_FRICTION_PARAMETERS
 from ..dataset.rig import FORCE, Rig
 from ..fitting.least_squares import FRICTION_LEVEL, RECORDING, Fit, FreeParameter, TrialView, fit, free_base_parameters
 from ..fitting.noise_floor import ChannelNoise, force_noise, reading_noise
+from ..fitting.repeat_noise import with_repeats
 from ..forward.predictor import CONTACT_HEIGHT, Model, Predictor, number_name
 from ..forward.response_check import check_responses
 
@@ -54,7 +55,7 @@ def prepared(rig: Rig, predictors: Sequence[Predictor]) -> tuple[tuple[ChannelNo
     forces = [p.trial.force for p in predictors if p.trial.force is not None]
     full = _range(readings), _range(forces)
     noise = reading_noise(predictors, full[0]), force_noise(predictors, full[1])
-    return noise, full
+    return (with_repeats(noise[0], predictors, "reading"), with_repeats(noise[1], predictors, "force")), full
 
 
 def _range(arrays: Sequence[np.ndarray]) -> float:

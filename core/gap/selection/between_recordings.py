@@ -57,9 +57,10 @@ class RecordingDifferences:
 def with_own_numbers(rig: Rig) -> Rig | None:
     """Return a rig whose recordings each have a free factor and zero; None if that is no question in this rig.
 
-    It is none if the rig names sessions, specimens or numbers of recordings, or has fewer than three recordings to be fitted.
+    It is none if the rig names sessions, repeats, specimens or numbers of recordings, or has fewer than three recordings to be
+    fitted.
     """
-    said = any(trial.session or trial.factor != 1.0 or trial.zero != 0.0 for trial in rig.trials)
+    said = any(trial.session or trial.repeats or trial.factor != 1.0 or trial.zero != 0.0 for trial in rig.trials)
     if said or len(rig.of("fit")) < LEAST_RECORDINGS:
         return None
     trials = [

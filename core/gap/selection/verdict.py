@@ -9,6 +9,7 @@ import numpy as np
 
 from ...effects.engine.registry import library
 from ...model.effect import Effect
+from ..fitting.repeat_noise import MEASURED_REPEATS
 from ..fitting.residual_tests import LEAST_STRUCTURE
 from .candidates import NOT_FITTED, candidates
 from .check_recordings import CheckedRecording
@@ -117,6 +118,9 @@ def _verdict(result: Diagnosis, gap_sizes: GapSizes, is_open: bool) -> str:
         return "unexplained" if is_open else "explained"
     mean, gap = float(gap_sizes.base[gap_sizes.main_quantity]), gap_sizes.gap(gap_sizes.main_quantity)
     small = (mean < MOST_MEAN_SQUARE or gap < LEAST_IMPROVEMENT) and not result.unlike_fitted
+    if result.noise[gap_sizes.main_quantity].source == MEASURED_REPEATS and small:
+        # Structure that repeats differ by is no gap: what shifts a whole recording is shared by its texels.
+        return "unexplained" if gap_sizes.both and gap_sizes.has_gap(FORCES) else "no gap"
     quiet = result.base_structure.total < LEAST_STRUCTURE and small and result.line is None
     return "no gap" if quiet and not (gap_sizes.both and gap_sizes.has_gap(FORCES)) else "unexplained"
 
