@@ -13,8 +13,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..dataset.rig import Trial
+from ..dataset.rig import Rig
+from ..dataset.trial import Trial
 from ..forward.stimulus import Stimulus
+from .clock_corrections import moved, net_force_along_normal, refined_shifts, strongest_channels, with_shift
 from .data_fault import Correction, DataFault
 
 LONGEST_SHIFT, LARGEST_SHIFT_SHARE = 3.0, 0.25
@@ -65,7 +67,7 @@ class Course:
         return late
 
 
-def find_clock_faults(stimuli: Sequence[Stimulus]) -> list[DataFault]:
+def find_clock_faults(rig: Rig, stimuli: Sequence[Stimulus]) -> list[DataFault]:
     """Return shifted clocks, clocks that run apart and dropped samples of some recordings."""
     courses = {s.trial.name: course for s in stimuli if (course := course_of(s)) is not None}
     steps = {name: c for name, c in courses.items() if c.step}
@@ -87,6 +89,9 @@ def find_clock_faults(stimuli: Sequence[Stimulus]) -> list[DataFault]:
         is_common = abs(course.start - typical) < least
         if gains and (course.start < -least or course.start > (max(LONGEST_LAG, least) if is_common else least)):
             shifts[s.trial.name] = course
+    if shifts and "clock-shift" in rig.correct:
+        exact = refined_shifts(rig, [s.trial for s in stimuli if s.trial.name in shifts], [c.start for c in shifts.values()])
+        shifts = {name: replace(shifts[name], start=start) for name, start in zip(shifts, exact, strict=True)}
     faults = []
     for kind, found, say in (
         ("clock-shift", shifts, _say_shift),
@@ -162,16 +167,10 @@ def _changes(stimulus: Stimulus) -> tuple[np.ndarray, np.ndarray, np.ndarray, fl
 
 def _signals(stimulus: Stimulus) -> tuple[np.ndarray, np.ndarray]:
     """Loads and responses (T, c) of the channels with the largest loads; the net force counts only without readings."""
-    trial, load = stimulus.trial, stimulus.load
-    if trial.reading is None:
-        assert trial.force is not None
-        normal = np.array([0.0, 0.0, -1.0]) if stimulus.normal is None else stimulus.normal.mean(axis=(0, 1))
-        return load.sum(axis=1, keepdims=True), np.nan_to_num(trial.force @ normal)[:, None]
-    known = np.isfinite(trial.reading).mean(axis=0) > 0.9
-    strength = np.where(known, (np.diff(load, axis=0) ** 2).sum(axis=0), -1.0)
-    chosen = np.argsort(-strength)[:MOST_CHANNELS]
-    chosen = chosen[strength[chosen] > 0]
-    return load[:, chosen], trial.reading[:, chosen]
+    if stimulus.trial.reading is None:
+        return stimulus.load.sum(axis=1, keepdims=True), net_force_along_normal(stimulus)
+    chosen = strongest_channels(stimulus, MOST_CHANNELS)
+    return stimulus.load[:, chosen], stimulus.trial.reading[:, chosen]
 
 
 def _windowed(load: np.ndarray, response: np.ndarray, most: int) -> np.ndarray:
@@ -224,15 +223,9 @@ def _on_time(course: Course) -> Correction:
     """A function that moves the responses of a trial to the time of the stimulus; what was not recorded then is missing."""
 
     def act(trial: Trial) -> Trial:
-        source = trial.time + course.at(trial.time)
-        right = np.clip(np.searchsorted(trial.time, source), 1, len(trial.time) - 1)
-        share = (source - trial.time[right - 1]) / (trial.time[right] - trial.time[right - 1])
-        share = np.where((source < trial.time[0]) | (source > trial.time[-1]), np.nan, share)[:, None]
-
-        def at_source(values: np.ndarray | None) -> np.ndarray | None:
-            return None if values is None else (1.0 - share) * values[right - 1] + share * values[right]
-
-        return replace(trial, reading=at_source(trial.reading), force=at_source(trial.force))
+        if course.rate or course.step:
+            return moved(trial, trial.time + course.at(trial.time))
+        return with_shift(trial, course.start)
 
     return act
 

@@ -34,7 +34,7 @@ def find_faults(rig: Rig, stimuli: Sequence[Stimulus]) -> list[DataFault]:
         return faults  # nothing else can be judged before the channels are those of the texels
     samples = find_sample_faults(rig, judged)
     stuck = {name for fault in samples if fault.kind == "stuck-logger" for name in fault.trials}
-    clocks = find_clock_faults([s for s in judged if s.trial.name not in stuck])
+    clocks = find_clock_faults(rig, [s for s in judged if s.trial.name not in stuck])
     if any(fault.kind == "repeated-samples" for fault in samples):
         clocks = [fault for fault in clocks if fault.kind != "dropped-samples"]
     return [*faults, *clocks, *samples]

@@ -128,8 +128,11 @@ def test_strips_carry_what_lies_on_them(tmp_path):
 
 
 def test_eight_transducers_of_which_nothing_is_wrong_but_creep(tmp_path):
-    rig = read_rig(written(tmp_path, RIG.replace(f"k = {K}", f"k = {1.2 * K}"), trials=3, relaxing=True, noise=2e-4))
-    assert len(rig.texels) == 8 and len(rig.surface) == 40 * 24
+    text = RIG.replace(f"k = {K}", f"k = {1.2 * K}")
+    assert len(read_rig(written(tmp_path, text)).surface) == 40 * 24  # points a quarter of the depth apart
+    text = text.replace(f"depth = {DEPTH}", f"depth = {DEPTH}, pitch = 0.0015")
+    rig = read_rig(written(tmp_path, text, trials=3, relaxing=True, noise=2e-4))
+    assert len(rig.texels) == 8 and len(rig.surface) == 20 * 12
     found = run_job(diagnose(rig))
     assert [one.name for one in found.findings if one.confidence >= 0.5] == ["creep"]
     assert found.verdict == "explained"

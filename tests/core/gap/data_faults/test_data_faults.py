@@ -2,14 +2,18 @@
 """Faults of the data are found with evidence, put right on request, and no healthy rig is accused."""
 
 import ast
+from dataclasses import replace
 from pathlib import Path
 
+import gap_cases as cases
+import numpy as np
 import pytest
 
 from palpate.benchmarks._faulty import faults as made
 from palpate.benchmarks._faulty.sensors import FAMILIES
 from palpate.benchmarks.data_faults import is_right
 from palpate.core.errors import PalpateError
+from palpate.core.gap.data_faults.clock_corrections import refined_shifts, with_shift
 from palpate.core.gap.data_faults.search import find_faults, put_right
 from palpate.core.gap.dataset.fault_kinds import FAULT_KINDS
 from palpate.core.gap.dataset.rig import read_rig
@@ -73,3 +77,32 @@ def test_only_what_is_asked_for_is_put_right(tmp_path):
 def test_unknown_corrections_are_refused(tmp_path, words):
     with pytest.raises(PalpateError, match="clock-shift"):
         read_rig(with_correction(made.draw("foam", "", 0, tmp_path).path, words))
+
+
+@pytest.mark.parametrize("fraction", [0.0, 0.5])
+def test_shifts_are_refined_to_a_fraction_of_a_sample(fraction):
+    """A viscous response comes earlier than its load, here by 0.4 samples, which may be left in all shifts."""
+    whole, step = 20, 1.0 / cases.RATE
+    rig = cases.rig(trials=3, seconds=8.0)
+    late = []
+    for trial in rig.trials:
+        ahead = [np.interp(trial.time + fraction * step, trial.time, column) for column in trial.position.T]
+        reading = np.roll(trial.reading, whole, axis=0)
+        reading[:whole] = np.nan
+        late.append(replace(trial, position=np.stack(ahead, axis=1), reading=reading))
+    rough = (whole + fraction + np.array([-0.8, 0.3, 0.9])) * step
+    samples = np.array(refined_shifts(rig, late, rough)) / step - whole - fraction
+    assert np.ptp(samples) < 0.12 and (samples > -0.45).all() and (samples < 0.1).all()
+    mended = with_shift(late[0], (whole + 0.9 * fraction) * step)  # a half would round to either side
+    np.testing.assert_allclose(mended.position[2:-2], rig.trials[0].position[2:-2], atol=2e-4)
+    np.testing.assert_allclose(mended.reading[:-whole], rig.trials[0].reading[:-whole])
+
+
+def test_the_time_of_a_shift_is_found_again_in_an_uneven_clock():
+    trial = cases.rig(trials=1, seconds=4.0, noise=0.0).trials[0]
+    time = trial.time + 0.01 * np.sin(7.0 * trial.time)
+    uneven = replace(trial, time=time, reading=np.repeat(time[:, None], 24, axis=1))
+    moved = with_shift(uneven, 0.3)
+    kept = np.isfinite(moved.reading[:, 0])
+    np.testing.assert_allclose(moved.reading[kept, 0], time[kept] + 0.3)
+    assert moved.position is trial.position and 0.9 < kept.mean() < 0.95
