@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Draw the pictures of docs/gap-real.md: python tools/real_pictures.py, after python -m benchmarks real.
+"""Draw the pictures of docs/gap-real.md: python tools/real_pictures.py, after python -m benchmarks real further.
 
-The curves are those of the reports in build/real; the insole's counts are read from the recordings (``PALPATE_REAL_DATA``).
+The curves are those of the reports in build/real and build/further; the insole's counts are read from the recordings (``PALPATE_REAL_DATA``).
 """
 
 from __future__ import annotations
@@ -15,19 +15,22 @@ import numpy as np
 ROOT = Path(__file__).resolve().parents[1]
 IMAGES = ROOT / "docs" / "images"
 CURVES = ("insole", "tube", "adhesive", "foam")
+FURTHER = ("polymer", "microfluidic", "barometers", "joint", "velostat", "hydrogel")
 
 
-def curves(path: Path) -> None:
-    """Put the curves of four reports side by side."""
+def curves(reports: list[Path], path: Path) -> None:
+    """Put the curves of reports into a sheet of two columns."""
     from PIL import Image
 
-    pictures = [Image.open(ROOT / "build" / "real" / name / "curves.png").convert("RGB") for name in CURVES]
+    pictures = [Image.open(report / "curves.png").convert("RGB") for report in reports]
     width = max(picture.width for picture in pictures)
-    heights = [max(picture.height for picture in pictures[i : i + 2]) for i in (0, 2)]
-    sheet = Image.new("RGB", (2 * width, sum(heights)), "white")
+    tops = [0]
+    for i in range(0, len(pictures), 2):
+        tops.append(tops[-1] + max(picture.height for picture in pictures[i : i + 2]))
+    sheet = Image.new("RGB", (2 * width, tops[-1]), "white")
     for i, picture in enumerate(pictures):
-        sheet.paste(picture, (i % 2 * width, i // 2 * heights[0]))
-    sheet.thumbnail((1600, 1600))
+        sheet.paste(picture, (i % 2 * width, tops[i // 2]))
+    sheet.thumbnail((1600, 2400))
     sheet.save(path, optimize=True)
 
 
@@ -62,6 +65,7 @@ def rest(data: Path, path: Path) -> None:
 
 if __name__ == "__main__":
     sys.path.insert(0, str(ROOT.parent))
-    curves(IMAGES / "gap-real.png")
+    curves([ROOT / "build" / "real" / name for name in CURVES], IMAGES / "gap-real.png")
+    curves([ROOT / "build" / "further" / name for name in FURTHER], IMAGES / "gap-further.png")
     rest(Path(os.environ.get("PALPATE_REAL_DATA", ROOT.parent / "shared" / "data")), IMAGES / "gap-insole.png")
-    print(f"wrote {IMAGES / 'gap-real.png'} and {IMAGES / 'gap-insole.png'}")
+    print(f"wrote gap-real.png, gap-further.png and gap-insole.png in {IMAGES}")

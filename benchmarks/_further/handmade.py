@@ -55,6 +55,12 @@ def _polymer(p, c, channel):
     return [np.maximum(stress + p[3] * fast + p[4] * slow, 0.0)]
 
 
+def _strip(p, c, channel):
+    """The same in terms of the neo-Hookean measure of strain."""
+    fast, slow = (c["depth"] - low_pass(c["time"], c["depth"], tau) for tau in p[:2])
+    return [np.maximum(c["depth"] + p[2] * fast + p[3] * slow, 0.0)]
+
+
 def _velostat(p, c, channel):
     """A power of the force that goes on rising under load, and the conductance at rest."""
     power = (c["force"] / 5.0) ** p[0]
@@ -94,6 +100,13 @@ HANDMADE: dict[str, HandmadeModel] = {
         (0.1, 0.1, 5.0, 0.0, 0.0),
         (6.0, 30.0, 1000.0, 20.0, 20.0),
         "Ogden, two Maxwell branches (6 numbers)",
+    ),
+    "polymer-strip": HandmadeModel(
+        _strip,
+        (3.0, 60.0, 1.0, 1.0),
+        (0.1, 5.0, 0.0, 0.0),
+        (30.0, 1000.0, 20.0, 20.0),
+        "neo-Hooke, two Maxwell branches (5 numbers)",
     ),
     "velostat": HandmadeModel(_velostat, (0.7, 5.0), (0.1, 0.1), (4.0, 200.0), "power law, late part (5 numbers)"),
     "barometers": HandmadeModel(

@@ -4,12 +4,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from palpate.benchmarks._recordings import Columns, Recording, thinned
 
+LENGTH = 0.08
+"""Length of the polymer's strip at rest, m."""
 SAMPLE = 0.057
 """Seconds between samples of the microfluidic sensor: what the way and speed of its presses say about their lengths."""
 PLACES = (-15.0, 0.0, 15.0)
@@ -32,6 +35,16 @@ def polymer(data: Path) -> Recording:
         trials.append((name, use, columns))
     words = "grid = { rows = 1, columns = 1, pitch = 0.01 }\nk = 15.0\ncn = 0.0\nmax_penetration = 0.5"
     return Recording("stretched polymer", words, trials)
+
+
+def polymer_strip(data: Path) -> Recording:
+    """The same over what the stress of a strip of constant volume is proportional to (neo-Hooke), equal for small strains."""
+    plain = polymer(data)
+    trials: list[tuple[str, str, Columns]] = []
+    for name, use, columns in plain.trials:
+        stretch = 1.0 + columns["depth"] / LENGTH
+        trials.append((name, use, columns | {"depth": (stretch - stretch**-2.0) * LENGTH / 3.0}))
+    return replace(plain, name="stretched polymer, as a strip", trials=trials)
 
 
 def velostat(data: Path) -> Recording:
@@ -148,6 +161,7 @@ def hydrogel(data: Path) -> Recording:
 
 FURTHER: dict[str, Callable[[Path], Recording]] = {
     "polymer": polymer,
+    "polymer-strip": polymer_strip,
     "velostat": velostat,
     "barometers": barometers,
     "joint": joint,

@@ -69,4 +69,5 @@ SOURCES = {
         "sixteen electrodes in a hydrogel on four load cells, under sines and steps of force",
     ),
 }
+SOURCES["polymer-strip"] = SOURCES["polymer"]
 """By the name of the set."""
