@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Draw the pictures of docs/gap-real.md: python tools/real_pictures.py, after python -m benchmarks real further.
 
-The curves are those of the reports in build/real and build/further; the insole's counts are read from the recordings (``PALPATE_REAL_DATA``).
+The curves are those of the reports in build/real and build/further; the counts of the insole are read from the recordings
+(``PALPATE_REAL_DATA``).
 """
 
 from __future__ import annotations
