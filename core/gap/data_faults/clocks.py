@@ -38,6 +38,10 @@ MOST_LEFT = 0.6
 about as well."""
 LEAST_SIDE = 0.15
 """Least share of the correlation on either side of a step."""
+LEAST_VARIATION = 0.2
+"""Least variance of the load's changes on either side of a step, as a share of their mean square. Where a load moves at one speed
+no shift can be seen, and the correlation is largest where a sensor that relaxes or goes slack answers most. Of a strip pulled and
+released at one speed each side has below 0.1, of presses above 0.5."""
 RATES = np.linspace(-0.08, 0.08, 161)
 """Rates at which two clocks may run apart."""
 SAME_RATE = 0.25
@@ -127,7 +131,8 @@ def course_of(stimulus: Stimulus) -> Course | None:
     best = int(np.argmax(total))
     unshifted = float(total[most])
     constant = Course(_peak(total, best, shifts), 0.0, 0.0, np.inf, float(total[best]), unshifted)
-    line, jump = _best_line(table, shifts, middles, unshifted), _best_step(table, shifts, middles + time[0], unshifted)
+    line = _best_line(table, shifts, middles, unshifted)
+    jump = _best_step(table, shifts, middles + time[0], unshifted, _varies_on_both_sides(load))
     chosen = replace(constant, line=line)
     least = max(LEAST_DRIFT, 4.0 * step)
     if _is_clearly_better(max(line.correlation, jump.correlation), constant.correlation):
@@ -173,10 +178,15 @@ def _signals(stimulus: Stimulus) -> tuple[np.ndarray, np.ndarray]:
     return stimulus.load[:, chosen], stimulus.trial.reading[:, chosen]
 
 
+def _window_edges(count: int) -> np.ndarray:
+    """Where each window begins, (windows,)."""
+    return np.linspace(0, count, WINDOWS + 1).astype(int)[:-1]
+
+
 def _windowed(load: np.ndarray, response: np.ndarray, most: int) -> np.ndarray:
     """Sums of products of load and shifted response, (windows, 2 most + 1); windows of the load."""
     count = len(load)
-    edges = np.linspace(0, count, WINDOWS + 1).astype(int)[:-1]
+    edges = _window_edges(count)
     padded = np.concatenate([np.zeros((most, load.shape[1])), response, np.zeros((most, load.shape[1]))])
     table = np.empty((WINDOWS, 2 * most + 1))
     for k in range(2 * most + 1):
@@ -208,11 +218,26 @@ def _best_line(table: np.ndarray, shifts: np.ndarray, middles: np.ndarray, unshi
     return Course(best[1] * step, best[2], 0.0, np.inf, best[0], unshifted)
 
 
-def _best_step(table: np.ndarray, shifts: np.ndarray, middles: np.ndarray, unshifted: float) -> Course:
-    """The step of the shift, from one constant to another, with the largest sum of correlations."""
+def _varies_on_both_sides(load: np.ndarray) -> np.ndarray:
+    """Whether the load changes its speed before and after the end of each window but the last, (windows - 1,) bool."""
+    edges = _window_edges(len(load))
+    count = np.diff(np.append(edges, len(load)))[:, None]
+    sums, squares = np.add.reduceat(load, edges), np.add.reduceat(load * load, edges)
+
+    def varies(backwards: bool) -> np.ndarray:
+        way = slice(None, None, -1) if backwards else slice(None)
+        n, first, second = (np.cumsum(values[way], axis=0)[way] for values in (count, sums, squares))
+        found: np.ndarray = (second - first**2 / n).sum(axis=1) >= LEAST_VARIATION * second.sum(axis=1)
+        return found
+
+    return varies(False)[:-1] & varies(True)[1:]
+
+
+def _best_step(table: np.ndarray, shifts: np.ndarray, middles: np.ndarray, unshifted: float, possible: np.ndarray) -> Course:
+    """The step of the shift, from one constant to another, with the largest sum of correlations, where one is possible."""
     before, after = np.cumsum(table, axis=0), np.cumsum(table[::-1], axis=0)[::-1]
     left, right = before.max(axis=1)[:-1], after.max(axis=1)[1:]
-    value = np.where(np.minimum(left, right) > LEAST_SIDE * (left + right), left + right, -np.inf)
+    value = np.where(possible & (np.minimum(left, right) > LEAST_SIDE * (left + right)), left + right, -np.inf)
     at = int(np.argmax(value))
     first, second = float(shifts[before[at].argmax()]), float(shifts[after[at + 1].argmax()])
     since = 0.5 * (middles[at] + middles[at + 1])

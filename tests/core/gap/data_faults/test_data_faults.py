@@ -11,6 +11,8 @@ import pytest
 
 from palpate.benchmarks._faulty import faults as made
 from palpate.benchmarks._faulty.sensors import FAMILIES
+from palpate.benchmarks._further.handmade import low_pass
+from palpate.benchmarks._recordings import Recording
 from palpate.benchmarks.data_faults import is_right
 from palpate.core.errors import PalpateError
 from palpate.core.gap.data_faults.clock_corrections import refined_shifts, with_shift
@@ -64,6 +66,20 @@ def test_a_healthy_rig_is_not_accused(tmp_path, family):
     for number in range(3):
         rig = read_rig(made.draw(family, "", number, tmp_path).path)
         assert not find_faults(rig, stimuli_of(rig))
+
+
+def test_a_strip_that_relaxes_and_goes_slack_has_lost_no_samples(tmp_path):
+    """Pulled and released at one speed each: only the turn can show a shift, and what changes elsewhere is the strip."""
+    rng, trials = np.random.default_rng(5), []
+    for name, use, seconds in (("slow", "fit", 60.0), ("fast", "fit", 40.0), ("other", "check", 50.0)):
+        time = np.arange(0.0, seconds, 0.08)
+        depth = 0.05 * np.minimum(time, seconds - time) / seconds
+        late = [low_pass(time, depth, tau) for tau in (0.3, 2.0, 25.0)]
+        force = 100.0 * np.maximum(depth - 0.5 * late[0] - 0.2 * late[1] - 0.28 * late[2], 0.0)
+        trials.append((name, use, {"time": time, "depth": depth, "texel_0": force + rng.normal(0.0, 1e-3, len(time))}))
+    strip = Recording("strip", "grid = { rows = 1, columns = 1, pitch = 0.01 }\nk = 100.0\nmax_penetration = 0.5", trials)
+    rig = read_rig(strip.write(tmp_path))
+    assert not find_faults(rig, stimuli_of(rig))
 
 
 def test_only_what_is_asked_for_is_put_right(tmp_path):
