@@ -40,8 +40,8 @@ LEAST_SIDE = 0.15
 """Least share of the correlation on either side of a step."""
 LEAST_VARIATION = 0.2
 """Least variance of the load's changes on either side of a step, as a share of their mean square. Where a load moves at one
-speed no shift can be seen, and the correlation is largest where a sensor that relaxes or goes slack answers most. Of a strip that
-is pulled and released at one speed, one side of each step has below 0.1."""
+speed no shift can be seen, and the correlation is largest where a sensor that relaxes or goes slack answers most. Of a strip
+that is pulled and released at one speed, one side of each step has below 0.1."""
 RATES = np.linspace(-0.08, 0.08, 161)
 """Rates at which two clocks may run apart."""
 SAME_RATE = 0.25
