@@ -36,7 +36,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="also write the finished dataset as dataset.h5 or dataset.zarr; may be given again",
     )
     parser.add_argument("--retry-failed", action="store_true", help="compute failed runs again")
+    parser.add_argument(
+        "--part",
+        metavar="I/N",
+        type=_part,
+        help="compute each N-th run only, beginning with the I-th, for farms without a scheduler; give the command without "
+        "--part at the end, which makes the dataset",
+    )
     what = parser.add_mutually_exclusive_group()
+    what.add_argument("--begin", action="store_true", help="read the scenes and freeze the study, and compute no run yet")
     what.add_argument("--dry-run", action="store_true", help="say from five runs how long all take and how big they are")
     what.add_argument("--status", action="store_true", help="say how far the study in the folder is; it may be running")
     what.add_argument("--list", action="store_true", help="list what may vary in the scenes of the study")
@@ -59,11 +67,18 @@ def run(arguments: argparse.Namespace) -> int:
 
     driver.require_dask()
     exports.require_packages(arguments.format)
+    if arguments.part is not None:
+        if not place.is_dir() or arguments.begin or arguments.dry_run or arguments.list:
+            raise PalpateError("--part computes runs of a study that has begun: give its folder, and --begin before that.")
+        return _compute(_opened(place, folder, arguments), arguments)
     lock = FolderLock(writable_folder(folder, create=not place.is_dir()), "sweep")
     try:
         opened = _opened(place, folder, arguments)
         if arguments.list:
             _print_names(opened)
+            return 0
+        if arguments.begin:
+            print(f"{len(opened.runs)} runs have begun: {opened.folder}")
             return 0
         return _estimate(opened, arguments) if arguments.dry_run else _compute(opened, arguments)
     finally:
@@ -75,6 +90,14 @@ def _count(text: str) -> int:
     if count < 1:
         raise argparse.ArgumentTypeError(f"{text} is not a whole number above zero")
     return count
+
+
+def _part(text: str) -> tuple[int, int]:
+    """Return number and count of "I/N"."""
+    number, _, count = text.partition("/")
+    if not (number.isdigit() and count.isdigit() and 1 <= int(number) <= int(count)):
+        raise argparse.ArgumentTypeError(f"{text} is no part: write it as 2/8, the second of eight")
+    return int(number), int(count)
 
 
 def _folder(place: Path, out: str | None) -> Path:
@@ -153,17 +176,19 @@ def _compute(opened: OpenStudy, arguments: argparse.Namespace) -> int:
     from ..sweep.status import status_of
 
     make_folders(opened.folder)
+    number, count = arguments.part or (1, 1)
+    runs = [run for run in opened.runs if run.index % count == number - 1]
     over = done_runs(opened.folder) | (set() if arguments.retry_failed else failed_runs(opened.folder))
-    left = [run for run in opened.runs if run.digest not in over]
+    left = [run for run in runs if run.digest not in over]
     if left:
-        with console.progress_bar("sweep", len(opened.runs), "run") as bar:
-            bar.update(len(opened.runs) - len(left))
+        with console.progress_bar("sweep", len(runs), "run") as bar:
+            bar.update(len(runs) - len(left))
 
             def show(tally: driver.Tally) -> None:
                 console.Interrupt.check()
                 if tally.failed:
                     bar.set_postfix(failed=tally.failed, refresh=False)
-                bar.update(len(opened.runs) - len(left) + tally.finished - bar.n)
+                bar.update(len(runs) - len(left) + tally.finished - bar.n)
 
             with driver.dask_client(arguments.scheduler, min(_workers(arguments), len(left))) as client:
                 tally = driver.run_study(client, opened.folder, left, opened.study.run_limit, show, arguments.scripts)
@@ -171,7 +196,7 @@ def _compute(opened: OpenStudy, arguments: argparse.Namespace) -> int:
             print(f"run {index} failed: {sentence}")
     found = status_of(opened.folder)
     written: list[Path] = []
-    if found.done:
+    if found.done and arguments.part is None:
         from ..sweep.dataset import publish
         from ..sweep.exports import EXPORTS
         from ..sweep.report import write_report

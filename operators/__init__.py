@@ -3,9 +3,9 @@
 
 
 def _classes():
-    from . import bake, debug, effects, exchange, figures, fits, fix, gap, laid_sensor, presets, probe, sensor
+    from . import bake, debug, effects, exchange, figures, fits, fix, gap, laid_sensor, presets, probe, sensor, study
 
-    modules = (sensor, laid_sensor, presets, effects, fix, probe, fits, gap, exchange, bake, figures, debug)
+    modules = (sensor, laid_sensor, presets, effects, fix, probe, fits, gap, exchange, bake, figures, study, debug)
     return tuple(cls for module in modules for cls in module.CLASSES)
 
 

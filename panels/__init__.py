@@ -7,7 +7,7 @@ _panels: tuple = ()
 def _classes():
     global _panels
     if not _panels:
-        from . import bake, body, effects, gap, sensor, subpanels, texels
+        from . import bake, body, effects, gap, sensor, study, subpanels, texels
 
         chosen = (
             sensor.Root,
@@ -17,6 +17,7 @@ def _classes():
             *gap.SUBPANELS,
             *body.SUBPANELS,
             *bake.SUBPANELS,
+            *study.SUBPANELS,
         )
         _panels = subpanels.in_all_places(*chosen)
     return _panels

@@ -3,6 +3,8 @@
 
 import bpy
 
+from ..addon.study import property_path
+
 
 class PALPATE_MT_object(bpy.types.Menu):
     bl_label = "Palpate Tactile Sensors"
@@ -34,6 +36,12 @@ class PALPATE_MT_object(bpy.types.Menu):
         layout.operator("palpate.figures_make")
         layout.operator("palpate.catch_up")
         layout.operator("palpate.reset")
+        layout.separator()
+        layout.operator("palpate.study_vary", text="Vary in Study…")
+        layout.operator("palpate.study_remove")
+        layout.operator("palpate.study_run")
+        layout.operator("palpate.study_write")
+        layout.operator("palpate.study_report")
         layout.separator()
         layout.operator("palpate.measured_open")
         layout.operator("palpate.gap_find")
@@ -71,6 +79,22 @@ def _draw_export(self, _context):
     self.layout.operator("palpate.sensor_toml_export")
 
 
+VARIABLE_TYPES = {"BOOLEAN", "INT", "FLOAT", "ENUM"}
+"""Types of properties that a study may vary."""
+
+
+def _draw_button(self, context):
+    """Offer to vary the property of the button that was right-clicked."""
+    pointer, item = getattr(context, "button_pointer", None), getattr(context, "button_prop", None)
+    if pointer is None or item is None or item.type not in VARIABLE_TYPES:
+        return
+    chosen = getattr(context, "property", None)  # data-block, path and component, in Blenders that tell it
+    path = property_path.path_of(pointer, item.identifier, chosen[2] if chosen is not None else -1)
+    if path:
+        self.layout.separator()
+        self.layout.operator("palpate.study_vary", icon="MOD_ARRAY").path = path
+
+
 ENTRIES = (
     ("TOPBAR_MT_file_import", _draw_import),
     ("TOPBAR_MT_file_export", _draw_export),
@@ -81,6 +105,7 @@ ENTRIES = (
     ("VIEW3D_MT_edit_mesh", _draw),
     ("VIEW3D_MT_paint_weight", _draw),
     ("VIEW3D_MT_sculpt", _draw),
+    ("UI_MT_button_context_menu", _draw_button),
 )
 
 

@@ -15,4 +15,5 @@ __all__ = [
     "parameter_properties",
     "registration",
     "start_transforms",
+    "study_properties",
 ]

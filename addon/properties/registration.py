@@ -4,12 +4,22 @@
 import bpy
 from bpy.props import PointerProperty
 
-from . import effect_stack, figure_properties, laid_sensor_properties, object_properties, scene_properties
+from . import (
+    effect_stack,
+    figure_properties,
+    laid_sensor_properties,
+    object_properties,
+    scene_properties,
+    study_properties,
+)
 
 CLASSES = (
     effect_stack.PALPATE_PG_effect,
     figure_properties.PALPATE_PG_figures,
     laid_sensor_properties.PALPATE_PG_skin,
+    study_properties.PALPATE_AP_preferences,
+    study_properties.PALPATE_PG_study_variable,
+    study_properties.PALPATE_PG_study,
     object_properties.PALPATE_PG_object,
     scene_properties.PALPATE_PG_scene,
 )

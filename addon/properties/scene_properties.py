@@ -6,7 +6,7 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, Po
 
 from ...core.figures import color_maps
 from ..session import session_state
-from . import figure_properties
+from . import figure_properties, study_properties
 
 SETTING: dict = {"options": set(), "update": session_state.settings_changed}
 """A setting of a scene has no keyframes; what is shown follows it."""
@@ -163,6 +163,7 @@ class PALPATE_PG_scene(bpy.types.PropertyGroup):
     figures: PointerProperty(
         type=figure_properties.PALPATE_PG_figures, description="What figures are made of the bake, and how"
     )
+    study: PointerProperty(type=study_properties.PALPATE_PG_study, description="What varies in the study of the scene, and how")
     # Tells this scene from others that bake into the same folder; made at the first bake.
     scene_id: StringProperty(options={"HIDDEN"})
     # What the latest bake has left: the digest of its scenario (empty without a bake) and its id, by which the bake in the

@@ -32,6 +32,8 @@ class Session:
     """True while the frames that a jump on the timeline left out are computed."""
     bake_progress: object = None
     """The last Progress of the running bake, for the panel; None when no bake runs."""
+    study_progress: object = None
+    """The last Progress of the running study, for the panel; None when no study runs."""
     unreadable_settings: dict[str, str] = field(default_factory=dict)
     """By scene or object name: why its settings could not be read."""
 

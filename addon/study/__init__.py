@@ -5,5 +5,8 @@ Runs themselves are computed outside (package ``sweep``), where there is no Blen
 """
 
 __all__ = [
+    "property_path",
     "scene_overrides",
+    "study_process",
+    "study_settings",
 ]

@@ -21,7 +21,7 @@ def kinds_of(base):
 
 def traces() -> dict:
     """Everything of ours that Blender knows."""
-    bases = (bpy.types.Operator, bpy.types.Panel, bpy.types.Menu, bpy.types.PropertyGroup)
+    bases = (bpy.types.Operator, bpy.types.Panel, bpy.types.Menu, bpy.types.PropertyGroup, bpy.types.AddonPreferences)
     classes = {kind for base in bases for kind in kinds_of(base)}
     handlers = bpy.app.handlers
     return {
@@ -71,7 +71,7 @@ def test_disabling_leaves_nothing_and_enabling_again_works(commands):
     assert not any(without["handlers"].values())
     palpate.register()
     first = traces()
-    assert first["object"] and first["scene"] and first["menus"] == 9
+    assert first["object"] and first["scene"] and first["menus"] == 10
     assert "PALPATE_PT_physics" in first["classes"] and "bake" in first["operators"]
     assert list(commands.values()) == ["palpate"]
     palpate.unregister()
@@ -165,6 +165,9 @@ CHANGE_NOTHING = {
     "palpate.catch_up",
     "palpate.figures_make",
     "palpate.debug_info_copy",
+    "palpate.study_write",
+    "palpate.study_run",
+    "palpate.study_report",
 }
 
 

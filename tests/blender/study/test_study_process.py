@@ -1,0 +1,61 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Run Study: the command runs beside Blender, its files tell how far it is, and stopping it loses nothing."""
+
+import time
+
+import bpy
+import pytest
+from blender_scenes import press, save
+
+from palpate.addon.session import session_state
+from palpate.addon.study import property_path, study_process, study_settings
+from palpate.core.errors import PalpateError
+from palpate.core.jobs.job_runner import run_job
+from palpate.core.study.run_files import done_runs
+
+LONGEST = 300
+"""Seconds until a study counts as hanging; a busy machine may have to compile the solver first."""
+
+
+@pytest.fixture
+def study(tmp_path):
+    pytest.importorskip("distributed")
+    scene, pad, _ = press()
+    study_settings.vary(scene, property_path.path_of(pad.palpate, "k"))
+    own = scene.palpate.study
+    own.file, own.samples, own.workers = str(tmp_path / "s.toml"), 6, 1
+    save(tmp_path)
+    return study_settings.write_study(scene)
+
+
+def test_a_study_is_stopped_and_goes_on(study):
+    job = study_process.run_study(study, 1)
+    end = time.monotonic() + LONGEST
+    for progress in job:
+        assert session_state.session.study_progress == progress
+        if progress.done > 1 or time.monotonic() > end:
+            break
+    assert progress.text.startswith("Study: ")
+    job.close()
+    assert session_state.session.study_progress is None
+    folder = study.with_suffix("")
+    assert 1 < len(done_runs(folder)) <= 6
+    with pytest.raises(PalpateError, match="no report"):
+        study_process.report_of(study)
+    assert run_job(study_process.run_study(study, 1)) == "6 runs: 6 done, 0 failed, 0 left"
+    assert study_process.report_of(study).is_file()
+    bpy.context.scene.palpate.study.samples = 5
+    with pytest.raises(PalpateError, match="samples was 6 and is 5"):
+        bpy.ops.wm.save_mainfile()
+        run_job(study_process.run_study(study_settings.write_study(bpy.context.scene), 1))
+
+
+def test_a_missing_command_is_one_sentence(study, monkeypatch):
+    monkeypatch.setattr(study_process, "command_in_preferences", lambda: "/nowhere/palpate")
+    with pytest.raises(PalpateError, match="'/nowhere/palpate' is no command"):
+        run_job(study_process.run_study(study))
+    monkeypatch.setattr(study_process, "command_in_preferences", lambda: "")
+    monkeypatch.setattr(study_process.importlib.util, "find_spec", lambda _name: None)
+    monkeypatch.setattr(study_process.shutil, "which", lambda _name: None)
+    with pytest.raises(PalpateError, match="pip install"):
+        study_process.sweep_command()
