@@ -3,9 +3,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections import OrderedDict
+from collections.abc import Callable, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, field, replace
+from typing import Generic, TypeVar
 
 import numpy as np
 
@@ -21,12 +23,14 @@ from ..dataset.trial import Trial
 from .force_model import ContactHistory
 from .stimulus import Stimulus, joined_stimuli, of_texels, surface_stimulus_of
 
+Value = TypeVar("Value")
 CONTACT_HEIGHT = "contact height"
 CACHE_SIZE = 4
-"""Number of placements, forces and readings that are kept per trial: a derivative by one parameter needs the others again."""
+"""Number of placements, forces and readings that are kept: a derivative by one parameter needs the others again."""
 SESSION_CACHE_SIZE, SESSION_CACHE_BYTES = 64, 2.5e8
-"""The same for a session, at most: each of its trials asks for all derivatives, one trial after the other. Fewer are kept if
-they would take more memory than this."""
+"""Number of readings that a session keeps at most: each of its trials asks for all derivatives, one trial after the other.
+Fewer are kept if they would take more memory than this. What readings are computed from is asked for once, so that no more of
+it is kept than for a trial; sixty-four placements with their contact histories took 13 GB."""
 
 
 @dataclass(frozen=True)
@@ -84,18 +88,18 @@ class ResponseModel:
     rig : Rig
     stimulus : Stimulus
         Of the points of the rig's surface.
-    cache_size : int
-        Number of results of each kind that are kept.
+    readings_kept : int
+        Number of readings and of total forces that are kept.
     """
 
-    def __init__(self, rig: Rig, stimulus: Stimulus, cache_size: int = CACHE_SIZE):
-        self.rig, self.stimulus, self.cache_size = rig, stimulus, cache_size
-        self._placed: dict[object, Stimulus] = {}
-        self._histories: dict[object, ContactHistory] = {}
-        self._forces: dict[object, np.ndarray] = {}
-        self._texel_forces: dict[object, np.ndarray] = {}
-        self._totals: dict[object, np.ndarray] = {}
-        self._readings: dict[object, np.ndarray] = {}
+    def __init__(self, rig: Rig, stimulus: Stimulus, readings_kept: int = CACHE_SIZE):
+        self.rig, self.stimulus = rig, stimulus
+        self._placed: _Recent[Stimulus] = _Recent(CACHE_SIZE)
+        self._histories: _Recent[ContactHistory] = _Recent(2 * CACHE_SIZE)
+        self._forces: _Recent[np.ndarray] = _Recent(CACHE_SIZE)
+        self._texel_forces: _Recent[np.ndarray] = _Recent(CACHE_SIZE)
+        self._totals: _Recent[np.ndarray] = _Recent(readings_kept)
+        self._readings: _Recent[np.ndarray] = _Recent(readings_kept)
 
     def reading(self, model: Model, subset: np.ndarray | None = None) -> np.ndarray:
         """Return the readings of each texel, or of some, (T, n) in the sensor's unit."""
@@ -103,34 +107,30 @@ class ResponseModel:
         # Without noise: the prediction is the expected value.
         reading = tuple(e for e in model.effects if site_of_action(e) == "readout" and e.name != "noise")
         key = (self._force_key(model, subset), p.gain, p.zero, _effects_key(reading))
-        if key not in self._readings:
-            site = readout_chain.transducers_of(Sensor("sensor", 0, self.rig.texels, p))
-            if subset is not None:
-                site = replace(
-                    site,
-                    position=site.position[subset],
-                    area=site.area[subset],
-                    row=None if site.row is None else site.row[subset],
-                    column=None if site.column is None else site.column[subset],
-                )
-                reading = tuple(_effect_on_texels(effect, subset) for effect in reading)
-            force = self.normal_force(model, subset)
-            _remember(self._readings, key, readout_chain.readings(reading, site, self.stimulus.time, force), self.cache_size)
-        return self._readings[key]
+        return self._readings.get_or(key, lambda: self._computed_reading(model, subset, reading))
+
+    def _computed_reading(self, model: Model, subset: np.ndarray | None, effects: tuple[Effect, ...]) -> np.ndarray:
+        """Return the readings under effects on the readout."""
+        site = readout_chain.transducers_of(Sensor("sensor", 0, self.rig.texels, model.parameters))
+        if subset is not None:
+            site = replace(
+                site,
+                position=site.position[subset],
+                area=site.area[subset],
+                row=None if site.row is None else site.row[subset],
+                column=None if site.column is None else site.column[subset],
+            )
+            effects = tuple(_effect_on_texels(effect, subset) for effect in effects)
+        return readout_chain.readings(effects, site, self.stimulus.time, self.normal_force(model, subset))
 
     def total_force(self, model: Model) -> np.ndarray:
         """Return the sum of normal and friction forces on the sensor, (T, 3) N."""
         p, rubbing = model.parameters, tuple(effect for effect in model.effects if _acts_through(effect, "friction_law"))
         slides = (*(getattr(p, name) for name in FRICTION_LAW_PARAMETERS), _effects_key(rubbing))
         key = (self._force_key(model, None), slides)
-        if key not in self._totals:
-            _remember(
-                self._totals,
-                key,
-                self._contact_history(model, None).total_force(p, rubbing, self.surface_force(model)),
-                self.cache_size,
-            )
-        return self._totals[key]
+        return self._totals.get_or(
+            key, lambda: self._contact_history(model, None).total_force(p, rubbing, self.surface_force(model))
+        )
 
     def placed(self, model: Model) -> Stimulus:
         """Return the stimulus of the points of the surface at the places where effects move them."""
@@ -141,13 +141,15 @@ class ResponseModel:
         if not moving and heights == self._heights(None):
             return self.stimulus
         key = _effects_key(moving), heights
-        if key not in self._placed:
+
+        def place() -> Stimulus:
             t = self.rig.surface
             if moving:
                 position, normal, tangent = placed_texels(moving, t.position, t.normal, t.tangent)
                 t = replace(t, position=position, normal=normal, tangent=tangent)
-            _remember(self._placed, key, self._stimulus_of(t, heights), self.cache_size)
-        return self._placed[key]
+            return self._stimulus_of(t, heights)
+
+        return self._placed.get_or(key, place)
 
     def _heights(self, model: Model | None) -> tuple[float, ...]:
         """Contact height of each of its trials; None: where fits start."""
@@ -162,10 +164,9 @@ class ResponseModel:
         cover = self.rig.cover
         if cover is None:
             return self.surface_force(model, subset)
-        key = self._force_key(model, None)
-        if key not in self._texel_forces:
-            _remember(self._texel_forces, key, self.surface_force(model) @ cover.weights.T, self.cache_size)
-        return self._texel_forces[key] if subset is None else self._texel_forces[key][:, subset]
+        weights = cover.weights
+        force = self._texel_forces.get_or(self._force_key(model, None), lambda: self.surface_force(model) @ weights.T)
+        return force if subset is None else force[:, subset]
 
     def surface_force(self, model: Model, subset: np.ndarray | None = None) -> np.ndarray:
         """Return the normal force at each point of the surface, or at some, (T, m) N: known, or from the contact law with its
@@ -177,15 +178,10 @@ class ResponseModel:
         whole = self._forces.get(self._force_key(model, None))
         if subset is not None and whole is not None:
             return whole[:, subset]
-        key = self._force_key(model, subset)
-        if key not in self._forces:
-            _remember(
-                self._forces,
-                key,
-                self._contact_history(model, subset).force(model.parameters, _effects_on_normal_force(model)),
-                self.cache_size,
-            )
-        return self._forces[key]
+        return self._forces.get_or(
+            self._force_key(model, subset),
+            lambda: self._contact_history(model, subset).force(model.parameters, _effects_on_normal_force(model)),
+        )
 
     def _force_key(self, model: Model, subset: np.ndarray | None) -> object:
         p, which = model.parameters, None if subset is None else subset.tobytes()
@@ -196,9 +192,7 @@ class ResponseModel:
         which = None if subset is None else subset.tobytes()
         moving = tuple(effect for effect in model.effects if _acts_through(effect, "placement"))
         key = which, _effects_key(moving), self._heights(model)
-        if key not in self._histories:
-            _remember(self._histories, key, ContactHistory.of(self.placed(model), subset, self.rig), 2 * self.cache_size)
-        return self._histories[key]
+        return self._histories.get_or(key, lambda: ContactHistory.of(self.placed(model), subset, self.rig))
 
 
 class Session(ResponseModel):
@@ -363,11 +357,26 @@ def _acts_through(effect: Effect, mechanism: str) -> bool:
     return form_of(effect.name, effect.form).mechanism == mechanism
 
 
-def _remember(memory: dict, key: object, value: object, most: int) -> None:
-    """Store something, and drop the oldest entries if there are too many."""
-    while len(memory) >= most:
-        del memory[next(iter(memory))]
-    memory[key] = value
+class _Recent(Generic[Value]):
+    """Results by key; those that were asked for last are kept."""
+
+    def __init__(self, most: int):
+        self._most = most
+        self._values: OrderedDict[object, Value] = OrderedDict()
+
+    def get_or(self, key: object, compute: Callable[[], Value]) -> Value:
+        """Return the result of a key; compute it if it is not kept."""
+        if key not in self._values:
+            value = compute()
+            while len(self._values) >= self._most:
+                self._values.popitem(last=False)
+            self._values[key] = value
+        self._values.move_to_end(key)
+        return self._values[key]
+
+    def get(self, key: object) -> Value | None:
+        """Return the result of a key, None if it is not kept."""
+        return self._values.get(key)
 
 
 def _effects_key(effects: tuple[Effect, ...]) -> object:
