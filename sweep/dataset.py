@@ -6,22 +6,25 @@ Runs are taken in the order of the design, so that equal runs give equal bytes, 
 
 from __future__ import annotations
 
-import os
+import re
 from collections.abc import Sequence
 from pathlib import Path
 
 from ..core.errors import FileError
-from ..core.io.file_writing import os_error_reason, sync_folder
+from ..core.io.file_writing import os_error_reason
 from ..core.io.temporary_folder import remove_unfinished, temporary_folder
 from ..core.study.run_files import RUNS
 from ..core.study.run_record import read_run_record
 from ..core.study.study_file import Run
+from .exchange import exchange_folder, require_own
 from .features import read_frames
 from .finished_runs import failures, run_order, study_name
 from .lerobot_writer import LeRobotWriter
 from .run_table import write_run_table
 
 DATASET_FOLDER = "dataset"
+DATASET_FILES = re.compile(r"(part-\d{3,}/)?(README\.md|data/chunk-\d{3,}/file-\d{3,}\.parquet|meta/.+\.(parquet|json))")
+"""Names of the files of a dataset; no other file is removed with an earlier one."""
 
 
 def publish(folder: Path, planned: Sequence[Run] = ()) -> None:
@@ -44,12 +47,13 @@ def publish(folder: Path, planned: Sequence[Run] = ()) -> None:
     """
     require_pyarrow()
     remove_unfinished(folder)
+    require_own(folder / DATASET_FOLDER, DATASET_FILES)
     order = run_order(folder)
     try:
         write_run_table(folder, order, failures(folder, planned))
         with temporary_folder(folder, "dataset") as hidden:
             new = _write_parts(folder, order, hidden)
-            _exchange(new, folder / DATASET_FOLDER, hidden / "before")
+            exchange_folder(new, folder / DATASET_FOLDER, hidden / "before", DATASET_FILES)
     except OSError as error:
         raise FileError(
             f"The dataset in '{folder}' could not be written ({os_error_reason(error)}): free some space or check its "
@@ -70,30 +74,21 @@ def _write_parts(folder: Path, order: list[tuple[int, str]], hidden: Path) -> Pa
     task = study_name(folder)
     parts = hidden / "parts"
     writers: dict[str, LeRobotWriter] = {}
-    for _, digest in order:
-        run = read_run_record(folder / RUNS / digest)
-        frames = read_frames(run)
-        writer = writers.get(frames.layout_digest)
-        if writer is None:
-            writer = LeRobotWriter(parts / f"part-{len(writers):03d}", frames, task)
-            writers[frames.layout_digest] = writer
-        writer.add(run, frames)
-    for writer in writers.values():
-        writer.finish()
+    try:
+        for _, digest in order:
+            run = read_run_record(folder / RUNS / digest)
+            frames = read_frames(run)
+            writer = writers.get(frames.layout_digest)
+            if writer is None:
+                writer = LeRobotWriter(parts / f"part-{len(writers):03d}", frames, task)
+                writers[frames.layout_digest] = writer
+            writer.add(run, frames)
+        for writer in writers.values():
+            writer.finish()
+    except BaseException:
+        for writer in writers.values():
+            writer.abandon()
+        raise
     if len(writers) <= 1:
         return parts / "part-000" if writers else None
     return parts
-
-
-def _exchange(new: Path | None, target: Path, before: Path) -> None:
-    """Put the new dataset in its place; a kill between the two renames leaves none, and the next call makes it again."""
-    for path in sorted(new.rglob("*")) if new is not None else ():
-        if path.is_dir():
-            sync_folder(path)
-    if os.path.lexists(target):
-        if target.is_symlink() or not target.is_dir():
-            raise FileError(f"'{target}' is no folder: move it away, the dataset takes this name.")
-        os.rename(target, before)
-    if new is not None:
-        os.rename(new, target)
-    sync_folder(target.parent)

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import importlib
 import json
-import os
+import re
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -18,12 +18,15 @@ from typing import Any
 import numpy as np
 
 from ..core.errors import FileError
-from ..core.io.file_writing import atomic_write, os_error_reason, sync_file, sync_folder
+from ..core.io.file_writing import atomic_write, os_error_reason
 from ..core.io.temporary_folder import temporary_folder
 from .dataset import DATASET_FOLDER, require_pyarrow
+from .exchange import exchange_folder
 
 HDF5_NAME, ZARR_NAME = "dataset.h5", "dataset.zarr"
 EPISODE_COLUMNS = ("run", "length", "dataset_from_index", "dataset_to_index", "digest")
+ZARR_FILES = re.compile(r"(.+/)?(\.z(group|attrs|array|metadata)|[0-9.]+)")
+"""Names of the files of a Zarr store of format 2."""
 CHUNK_BYTES = 1 << 20
 """Numbers of an array that are compressed together."""
 
@@ -80,13 +83,9 @@ def export_zarr(folder: Path) -> list[Path]:
                     return group.create_array(name, shape=shape, dtype=kind, chunks=chunks)
 
                 _fill(part, create, group.attrs)
-                sync_tree(hidden / "new")
-                if os.path.lexists(target):
-                    os.rename(target, hidden / "before")
-                os.rename(hidden / "new", target)
+                exchange_folder(hidden / "new", target, hidden / "before", ZARR_FILES)
         except OSError as error:
             raise FileError(f"'{target}' could not be written ({os_error_reason(error)}): free some space.") from error
-        sync_folder(folder)
         written.append(target)
     return written
 
@@ -105,16 +104,6 @@ def require_packages(formats: Sequence[str]) -> None:
             importlib.import_module(package)
         except ImportError as error:
             raise FileError(f"--format {name} needs the package {package}: install it with 'pip install {package}'.") from error
-
-
-def sync_tree(folder: Path) -> None:
-    """Bring all files of a folder, and the names in it, onto the disk."""
-    for path in sorted(folder.rglob("*")):
-        if path.is_dir():
-            sync_folder(path)
-        else:
-            sync_file(path)
-    sync_folder(folder)
 
 
 def _parts(folder: Path) -> list[tuple[Path, str]]:

@@ -9,6 +9,7 @@ Beyond it, ``meta/texels.parquet`` says where the texels are.
 from __future__ import annotations
 
 import json
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -107,6 +108,12 @@ class LeRobotWriter:
         if len(self._episode_rows) >= EPISODES_AT_ONCE:
             self._flush_episodes()
 
+    def abandon(self) -> None:
+        """Let go of all files after an error."""
+        for series in (self._data, self._episodes):
+            if series is not None:
+                series.abandon()
+
     def finish(self) -> None:
         """Write what still waits, and the files that describe the dataset."""
         self._flush_frames()
@@ -199,6 +206,14 @@ class _FileSeries:
             self._writer = self._sink = None
             sync_file(self._path)
             self._number += 1
+
+    def abandon(self) -> None:
+        """Let go of the present file after an error; pyarrow would try to complete it later and print that this fails."""
+        if self._writer is not None:
+            self._writer.is_open = False
+            with suppress(OSError):  # what could not be written is still in its buffer
+                self._sink.close()
+            self._writer = self._sink = None
 
     @property
     def _path(self) -> Path:

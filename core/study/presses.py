@@ -27,6 +27,14 @@ TWIST_STEPS = 16
 """Samples of a slide and twist; between two of them a turn has far less than half a revolution, so it is unique."""
 FORCE_MARGIN = 4.0
 """Largest force of the drive of a press, per force that is asked for: enough to brake the object at the contact."""
+SHORTEST_SETTLE = 1e-3
+"""Seconds; a drive that looks at the sensor every millisecond reaches no force sooner."""
+SETTLING_SHARE = 1 / 3
+"""Time constant of the drive's integral, per time in which the force is reached."""
+RELAXATION_SHARE = 1 / 16
+"""Time in which the drive's damper gives way to one texel, per time in which the force is reached. With these two, and no less
+damping than is critical on one texel, forces of 0.05 to 5 N on texels of 58.5 to 10,000 N/m are within 5 % after `settle` and a
+hold of 0.2 s; the default damping of a drive would take seconds on soft foam."""
 
 
 @dataclass(frozen=True)
@@ -175,6 +183,7 @@ def _driven(body: Body, scenario: Scenario, index: int, press: Press, down: np.n
     mesh = next(target.mesh for target in scenario.targets if target.body == index)
     center, inertia, _ = mass_properties(mesh, press.mass, press.target)
     number = next(i for i, sensor in enumerate(scenario.sensors) if sensor.name == press.sensor)
+    stiffness, settle = scenario.sensors[number].parameters.k, max(press.settle, SHORTEST_SETTLE)
     weight = press.mass * float(np.linalg.norm(scenario.gravity))
     drive = Drive(
         control="force",
@@ -184,6 +193,8 @@ def _driven(body: Body, scenario: Scenario, index: int, press: Press, down: np.n
         max_force=FORCE_MARGIN * (press.force + weight),
         max_speed=press.speed,
         sensor=number,
+        damping=max(RELAXATION_SHARE * settle * stiffness, 2.0 * math.sqrt(stiffness * press.mass)),
+        settling=SETTLING_SHARE * settle,
     )
     return replace(body, drive=drive, mass=press.mass, center_of_mass=center, inertia=inertia)
 

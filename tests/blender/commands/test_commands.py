@@ -19,7 +19,9 @@ from palpate.commands import COMMANDS, READY, blender, console, main
 from palpate.commands.bake import report
 from palpate.core.errors import FileError
 from palpate.core.io.recording_npz import load_recording
+from palpate.core.io.scenario_npz import load_scenario
 from palpate.core.jobs.job_runner import run_job
+from palpate.core.solver import simulation
 
 
 @pytest.fixture
@@ -393,3 +395,34 @@ def test_export_of_what_is_not_baked_is_one_line(tmp_path, capsys):
     press(frames=3)
     assert main(["export", str(save(tmp_path))]) == 1
     assert "is not baked" in capsys.readouterr().err
+
+
+# --- scenarios for palpate sweep
+
+
+def test_a_scenario_is_what_a_bake_computes(tmp_path, scene, capfd):
+    """Solved without Blender it gives the very numbers of the bake; writing it leaves no bake and changes no file."""
+    press()
+    blend = save(tmp_path)
+    before = contents(tmp_path)
+    assert main(["bake", str(blend), "--scenario", str(tmp_path / "made" / "scene.npz")]) == 0
+    assert all("preparing its solver" in line for line in lines_of(capfd)[1])  # where it was not yet compiled
+    assert contents(tmp_path) == {**before, "made/scene.npz": (tmp_path / "made" / "scene.npz").read_bytes()}
+    recording = simulation.run(load_scenario(tmp_path / "made" / "scene.npz"))
+    assert main(["bake", str(blend), "--out", str(tmp_path / "baked")]) == 0
+    baked = load_recording(tmp_path / "baked" / "Pad" / "recording.npz")
+    assert baked.digest == recording.digest
+    for name in ("normal_force", "shear", "reading"):
+        np.testing.assert_array_equal(getattr(recording.sensors["Pad"], name), getattr(baked.sensors["Pad"], name))
+    assert baked.sensors["Pad"].normal_force.max() > 0
+
+
+@pytest.mark.parametrize(("name", "reason"), [("folder", "is a folder"), ("", "no name of a file")])
+def test_a_scenario_that_cannot_be_written_is_one_sentence(tmp_path, scene, capfd, name, reason):
+    press()
+    blend = save(tmp_path)
+    (tmp_path / "folder").mkdir()
+    capfd.readouterr()
+    assert main(["bake", str(blend), "--scenario", str(tmp_path / name) if name else ""]) == 1
+    out, (line,) = lines_of(capfd)
+    assert out == [] and reason in line

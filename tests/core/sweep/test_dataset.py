@@ -3,9 +3,13 @@
 
 from __future__ import annotations
 
+import errno
+import gc
 import json
+import os
 import shutil
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -249,3 +253,45 @@ def test_a_number_that_32_bits_cannot_hold_is_refused(tmp_path):
 def test_a_folder_without_a_study_is_refused(tmp_path):
     with pytest.raises(FileError, match="holds no study"):
         publish(tmp_path)
+
+
+def test_a_file_of_the_users_in_the_dataset_is_named_and_stays(tmp_path):
+    study = made_up(tmp_path)
+    publish(study)
+    (study / "dataset" / "data" / "thesis.txt").write_text("mine")
+    before = content(study / "dataset")
+    with pytest.raises(FileError, match="thesis.txt' was not written by `palpate sweep`.*move it away"):
+        publish(study)
+    assert content(study / "dataset") == before
+
+
+def test_a_dataset_that_cannot_take_its_place_leaves_the_earlier_one(tmp_path, monkeypatch):
+    study = made_up(tmp_path)
+    publish(study)
+    before, rename = content(study / "dataset"), os.rename
+
+    def refuse(source, target):
+        if Path(target) == study / "dataset" and Path(source).name != "before":
+            raise OSError(errno.EIO, "input/output error")
+        rename(source, target)
+
+    monkeypatch.setattr(os, "rename", refuse)
+    with pytest.raises(FileError, match="could not be written"):
+        publish(study)
+    assert content(study / "dataset") == before
+
+
+def test_nothing_is_printed_where_the_disk_is_full(tmp_path, monkeypatch, capfd):
+    """An unfinished file is let go of; pyarrow would try once more when it is collected, and print a traceback."""
+    study = made_up(tmp_path)
+
+    def full(*_):
+        raise OSError(errno.ENOSPC, "no space left on device")
+
+    monkeypatch.setattr(lerobot_writer, "sync_file", full)
+    monkeypatch.setattr(lerobot_writer, "ROW_GROUP_BYTES", 1)
+    with pytest.raises(FileError, match="no space left on device.*free some space"):
+        publish(study)
+    gc.collect()
+    assert capfd.readouterr().err == ""
+    assert not (study / "dataset").exists() and not list(study.glob(".palpate*"))

@@ -4,6 +4,7 @@
 import hashlib
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -107,6 +108,28 @@ def test_a_finished_study_is_exported(undisturbed):
     assert f"export: {undisturbed / 'dataset.h5'}" in finished.stdout.splitlines()
     with h5py.File(undisturbed / "dataset.h5") as file:
         assert len(file["episodes/run"]) == 24
+
+
+def test_failed_runs_are_left_alone_until_they_are_asked_for(undisturbed, tmp_path):
+    folder = tmp_path / "study"
+    shutil.copytree(undisturbed, folder)
+    lost = sorted(done_runs(folder))[:2]
+    for digest in lost:
+        shutil.rmtree(folder / "runs" / digest)
+        write_failure(folder, digest, "The lamp went out.")
+    finished = sweep(folder, "--workers", 1)
+    assert (finished.returncode, finished.stderr) == (0, "")
+    assert "24 runs: 22 done, 2 failed, 0 left" in finished.stdout and "--retry-failed computes them again" in finished.stdout
+    table = parquet.read_table(folder / "runs.parquet").to_pylist()
+    expected = {row["run"]: row for row in parquet.read_table(undisturbed / "runs.parquet").to_pylist()}
+    failed = [row for row in table if row["status"] == "failed"]
+    assert {row["digest"] for row in failed} == set(lost) and {row["message"] for row in failed} == {"The lamp went out."}
+    for row in failed:  # a failure's file has only its digest; the table says which run it was
+        assert all(row[name] == expected[row["run"]][name] for name in row if name.startswith("varied.") or name == "digest")
+    again = sweep(folder, "--workers", 1, "--retry-failed")
+    assert "24 runs: 24 done, 0 failed, 0 left" in again.stdout
+    assert contents(folder) == contents(undisturbed)
+    assert (folder / "runs.parquet").read_bytes() == (undisturbed / "runs.parquet").read_bytes()
 
 
 @pytest.mark.skipif(os.name == "nt", reason="signals of POSIX")
