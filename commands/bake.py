@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..core.errors import SceneError
+from ..core.errors import FileError, SceneError
 from ..core.io.file_writing import writable_folder
 from ..core.response.metrics import net_shear
 from . import blender, console
@@ -95,6 +95,8 @@ def run(arguments: argparse.Namespace) -> int:
         _prepare(scene, arguments)
         if arguments.scenario is not None:
             return _write_scenario(scene, arguments.scenario, arguments.study)
+        if saved is not None:
+            _warn_of_keyframes(scene)
         baked = bake_with_progress(scene, into_scene=saved is not None, images=not arguments.no_images, blend=blend)
     print(report(baked))
     if scene.frame_start != own_start:
@@ -105,6 +107,14 @@ def run(arguments: argparse.Namespace) -> int:
     if saved:
         print(f"saved: {saved}")
     return 0
+
+
+def _warn_of_keyframes(scene: Any) -> None:
+    """Say on stderr that a scene would get very many keyframes."""
+    from ..addon.bake.scene_writer import keyframe_warning
+
+    if warning := keyframe_warning(scene):
+        print(f"warning: {warning}", file=sys.stderr, flush=True)
 
 
 def _write_scenario(scene: Any, path: str, study: str | None) -> int:
@@ -149,6 +159,7 @@ def _prepare(scene: Any, arguments: argparse.Namespace) -> None:
     if arguments.frames:
         scene.frame_start, scene.frame_end = _frame_range(*arguments.frames)
     if arguments.out is not None:
+        blender.require_utf8(arguments.out)
         scene.palpate.folder = str(writable_folder(arguments.out, create=True))
     if not arguments.save:
         _check_saved_bake(scene, arguments.scene)
@@ -196,9 +207,11 @@ def _newtons(value: float) -> str:
 
 def saved_path(arguments: argparse.Namespace) -> Path | None:
     """Return the file that --save or --save-as names; None if the scene is not saved."""
-    if not (arguments.save or arguments.save_as):
+    if not arguments.save and arguments.save_as is None:
         return None
-    path = Path(arguments.save_as or arguments.scene)
+    path = Path(arguments.scene if arguments.save_as is None else arguments.save_as)
+    if path.name in ("", ".."):
+        raise FileError(f"'{path}' is a folder: give the name of a .blend file in it.")
     return path if path.suffix == ".blend" else path.with_name(f"{path.name}.blend")
 
 

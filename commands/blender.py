@@ -101,6 +101,7 @@ def open_blend(path: str | os.PathLike, scripts: str = REFUSE) -> None:
     import bpy
 
     path = Path(path)
+    require_utf8(path)
     if os.path.isdir(path):
         raise FileError(f"'{path}' is a folder: give the name of a .blend file in it.")
     bake_switch.settle_blend(path)
@@ -161,8 +162,17 @@ def _animated() -> Iterator:
                     yield owner
 
 
+def require_utf8(path: str | os.PathLike) -> None:
+    """Raise FileError if a path is not UTF-8: Blender would end in a crash."""
+    try:
+        os.path.abspath(path).encode("utf-8")
+    except UnicodeEncodeError as error:
+        raise FileError(f"{str(path)!r} has a name that is not UTF-8, which Blender cannot take: rename it.") from error
+
+
 def check_writable(path: Path) -> None:
     """Raise FileError if a .blend of this name could not be saved; folders above it that are missing are made."""
+    require_utf8(path)
     require_regular(path)
     if os.path.isdir(path):
         raise FileError(f"'{path}' is a folder: give the name of a .blend file in it.")

@@ -66,7 +66,7 @@ def _note_missing(sensor: OpenRaveSensor) -> None:
 
 def _import(arguments: argparse.Namespace) -> None:
     sensor = _choose_sensor(read_openrave(arguments.file), arguments.name, arguments.file)
-    path = Path(arguments.save_as or arguments.scene)
+    path = Path(arguments.scene if arguments.save_as is None else arguments.save_as)
     checks.outputs_are_no_inputs((path,), (arguments.file,))
     blender.check_writable(path)
     with console.blender_output_hidden():

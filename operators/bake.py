@@ -4,6 +4,7 @@
 import bpy
 
 from ..addon.bake.bake import bake
+from ..addon.bake.scene_writer import keyframe_warning
 from ..addon.display import bake_display, baked_scene
 from ..addon.timeline import playback
 from . import modal_job, support
@@ -28,6 +29,8 @@ class PALPATE_OT_bake(modal_job.ModalJob, bpy.types.Operator):
 
     def job(self, context):
         support.leave_edit_mode(context)
+        if warning := keyframe_warning(context.scene):
+            self.report({"WARNING"}, warning)
         return bake(context.scene)
 
     def done(self, baked):

@@ -11,8 +11,30 @@ from ...core.errors import SceneError
 from ...core.model.recording import Recording
 from ..display import bake_display, baked_scene
 from ..display.baked_sensor import BakedSensor
-from ..scene import moved_bodies, scene_fingerprint
+from ..scene import moved_bodies, participants, scene_fingerprint
 from ..scene.scene_reading import SceneReading
+
+MANY_KEYFRAMES = 100_000
+"""Keyframes from which a warning comes before a bake. A keyframe of an object, location and rotation together, takes 94 bytes
+of a compressed .blend, 0.8 kB of memory whenever it is open, and 0.03 ms (of 30,000 frames with bpy 4.5): so this is 9 MB on
+the disk and 80 MB in memory."""
+
+
+def keyframe_warning(scene) -> str:
+    """Return a sentence about a scene that would get very many keyframes by a bake, and an empty one for others."""
+    frames = scene.frame_end - scene.frame_start + 1
+    found = participants.find_participants(scene)[0]
+    bodies = sum(obj.palpate.body in ("FREE", "DRIVEN") for obj in found)
+    markers = sum(obj.palpate.role == "SENSOR" for obj in found) * len(scene.palpate.overlays)
+    keyframes = frames * (bodies + markers)
+    if keyframes <= MANY_KEYFRAMES:
+        return ""
+    return (
+        f"The bake puts {keyframes:,} keyframes into the scene "
+        f"({frames:,} frames, bodies that forces move: {bodies}, markers: {markers}): "
+        f"about {94e-6 * keyframes:,.0f} MB in the .blend and {0.8e-3 * keyframes:,.0f} MB of memory whenever it is open. "
+        "To avoid that, write the files alone with `palpate bake` without --save, or choose fewer overlays."
+    )
 
 
 def check_writable(scene, reading: SceneReading) -> None:

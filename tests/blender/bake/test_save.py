@@ -8,12 +8,13 @@ from contextlib import suppress
 
 import bpy
 import pytest
-from blender_scenes import press, save, visible
+from blender_scenes import press, press_and_drop, save, visible
 
-from palpate.addon.bake import bake_files
+from palpate.addon.bake import bake_files, scene_writer
 from palpate.addon.bake.bake import bake
 from palpate.addon.display import baked_scene
-from palpate.commands import blender
+from palpate.addon.session import fcurves
+from palpate.commands import blender, main
 from palpate.core.io import bake_switch
 from palpate.core.io.bake_reader import read_bake
 from palpate.core.io.private_folder import PRIVATE_FOLDER
@@ -175,3 +176,28 @@ def test_what_a_killed_save_has_left_is_removed_by_the_next_one(saved):
     blender.open_scene(path)
     blender.save_blend(path)
     assert not any(file.exists() for file in left) and mine.exists()
+
+
+def test_very_many_keyframes_are_said_before_they_are_made(tmp_path, monkeypatch):
+    """As many as there are then: of a free cube and of two markers on each of two sensors."""
+    scene, *_ = press_and_drop(frames=8)
+    scene.palpate.overlays = {"FORCE", "CENTRE"}
+    save(tmp_path)
+    assert scene_writer.keyframe_warning(scene) == ""
+    monkeypatch.setattr(scene_writer, "MANY_KEYFRAMES", 39)
+    said = scene_writer.keyframe_warning(scene)
+    assert said.startswith("The bake puts 40 keyframes into the scene (8 frames, bodies that forces move: 1, markers: 4): ")
+    before = {curve for obj in scene.objects for curve in fcurves.of_object(obj) or ()}
+    run_job(bake(scene))
+    made = [curve for obj in scene.objects for curve in fcurves.of_object(obj) or () if curve not in before]
+    assert sum(len(curve.keyframe_points) for curve in made if (curve.data_path, curve.array_index) == ("location", 0)) == 40
+
+
+def test_the_command_says_it_before_the_bake(tmp_path, monkeypatch, capfd):
+    press_and_drop(frames=3)
+    path = save(tmp_path)
+    monkeypatch.setattr(scene_writer, "MANY_KEYFRAMES", 5)
+    assert main(["bake", str(path), "--save"]) == 0
+    assert "warning: The bake puts 9 keyframes into the scene" in capfd.readouterr().err
+    assert main(["bake", str(path), "--out", str(tmp_path / "files")]) == 0
+    assert "keyframes" not in capfd.readouterr().err

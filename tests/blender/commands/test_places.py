@@ -36,6 +36,12 @@ def test_wrong_places_are_found_before_the_work(blend, tmp_path, capfd):
         ["bake", "scene.blend", "--out", "file/deeper"],
         ["bake", "scene.blend", "--out", ""],
         ["bake", "scene.blend", "--out", "x" * 300],
+        ["bake", "scene.blend", "--out", "\udcff\udcfe"],  # not UTF-8: Blender would crash
+        ["bake", "\udcff\udcfe.blend"],
+        ["bake", "scene.blend", "--out", "out", "--save-as", "\udcff\udcfe"],
+        ["bake", "scene.blend", "--out", "out", "--save-as", "/"],
+        ["bake", "scene.blend", "--out", "out", "--save-as", ".."],
+        ["bake", "scene.blend", "--out", "out", "--save-as", ""],
         ["bake", "scene.blend", "--out", "out", "--save-as", "file/deeper.blend"],
         ["render", "scene.blend", "--out", "file"],
         ["openrave", "export", "scene.blend", "--out", "file/deeper.xml"],
