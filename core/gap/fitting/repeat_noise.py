@@ -16,6 +16,12 @@ MEASURED_REPEATS = "measured repeats"
 MOST_DIFFERENT = 0.1
 """Root mean square difference of the loads of two repeats, as a share of the largest load, above which they are none."""
 
+MOST_SQUARE = 2.0
+"""Mean square of a fit's residual, in units of the variance of repeats, up to which what is left is their scatter. In simulated
+sets of four repeats that differed in gain, zero, delay or by a slow wander, the base model left 0.3 to 1.6 where nothing was
+hidden (6 sets), 1.3 where the effect was smaller than the scatter, and 7.7 to 12.9 with larger effects (5 sets). It was judged
+on sets of other stimuli, scatter and effects: 0.5 to 1.2 where nothing was hidden (6 sets)."""
+
 
 def with_repeats(noise: ChannelNoise, predictors: Sequence[Predictor], part: str) -> ChannelNoise:
     """Return the noise of a channel, or the scatter of the recordings that are repeats of each other where that is larger.
@@ -50,6 +56,25 @@ def with_repeats(noise: ChannelNoise, predictors: Sequence[Predictor], part: str
     if deviation <= noise.deviation:
         return noise
     return ChannelNoise(deviation, integral_time([curve]), MEASURED_REPEATS)
+
+
+def is_scatter_of_repeats(noise: Sequence[ChannelNoise], sse: np.ndarray, count: np.ndarray) -> bool:
+    """Return whether a fit leaves no more than measured repeats differ by.
+
+    Structure is then no evidence of an effect: what shifts or scales a whole recording is shared by its texels and samples, and
+    stretches that are left out of a fit differ from the others by it.
+
+    Parameters
+    ----------
+    noise : pair of ChannelNoise
+        Of readings and of net forces.
+    sse, count : (trials, 2) float
+        Sum of squares of the residual of each recording, in units of the noise's variance, and number of its values.
+    """
+    values = count.sum(axis=0)
+    main = int(np.argmax(values > 0))  # readings if there are any
+    mean = sse.sum(axis=0) / np.maximum(values, 1.0)
+    return noise[main].source == MEASURED_REPEATS and bool((mean[values > 0] < MOST_SQUARE).all())
 
 
 def _scatter(members: Sequence[Predictor], part: str, name: str) -> np.ndarray:

@@ -20,6 +20,7 @@ from ..fitting.heteroscedastic_noise import proportional_noise
 from ..fitting.intervals import parameter_intervals
 from ..fitting.least_squares import BASE, Fit, fit, free_base_parameters, held_out_squares
 from ..fitting.noise_floor import SHORTEST_STRETCH, ChannelNoise, coverage
+from ..fitting.repeat_noise import is_scatter_of_repeats
 from ..fitting.residual_tests import LEAST_STRUCTURE, ResidualStructure, residual_structure
 from ..fitting.spectral_lines import strongest_line
 from ..forward.predictor import Model, Predictor, predictors_of
@@ -128,7 +129,10 @@ def _select_effects(result: Diagnosis, view_set: ViewSet) -> Iterator[tuple[str,
     noise = np.array([min(1.0, start[READINGS]), min(_unloaded_force_noise(view_set, result.base), start[FORCES])])
     gap_sizes = GapSizes(start, noise, result.base.count.sum(axis=0).astype(float))
     selection = ForwardSelection(view_set, result.scales, result.coverage, gap_sizes)
-    state = yield from selection.run(base, partial(_structure, view_set))
+    if is_scatter_of_repeats(result.noise, result.base.sse, result.base.count):
+        state = base
+    else:
+        state = yield from selection.run(base, partial(_structure, view_set))
     deviations = result.noise[READINGS].deviation, result.noise[FORCES].deviation
     check = check_views(result.predictors, deviations)
     state = without_harmful_effects(view_set.whole, check, state, gap_sizes)

@@ -9,7 +9,7 @@ import numpy as np
 
 from ...effects.engine.registry import library
 from ...model.effect import Effect
-from ..fitting.repeat_noise import MEASURED_REPEATS
+from ..fitting.repeat_noise import MEASURED_REPEATS, is_scatter_of_repeats
 from ..fitting.residual_tests import LEAST_STRUCTURE
 from .candidates import NOT_FITTED, candidates
 from .check_recordings import CheckedRecording
@@ -116,20 +116,23 @@ def _verdict(result: Diagnosis, gap_sizes: GapSizes, is_open: bool) -> str:
         return "explained"
     if effects:
         return "unexplained" if is_open else "explained"
+    if is_scatter_of_repeats(result.noise, result.base.sse, result.base.count) and not result.unlike_fitted:
+        return "no gap"
     mean, gap = float(gap_sizes.base[gap_sizes.main_quantity]), gap_sizes.gap(gap_sizes.main_quantity)
     small = (mean < MOST_MEAN_SQUARE or gap < LEAST_IMPROVEMENT) and not result.unlike_fitted
-    if result.noise[gap_sizes.main_quantity].source == MEASURED_REPEATS and small:
-        # Structure that repeats differ by is no gap: what shifts a whole recording is shared by its texels.
-        return "unexplained" if gap_sizes.both and gap_sizes.has_gap(FORCES) else "no gap"
     quiet = result.base_structure.total < LEAST_STRUCTURE and small and result.line is None
     return "no gap" if quiet and not (gap_sizes.both and gap_sizes.has_gap(FORCES)) else "unexplained"
 
 
 def _unlike_fitted(result: Diagnosis, gap_sizes: GapSizes) -> list[CheckedRecording]:
-    """Check recordings that the base model fits far worse than the fitted ones."""
+    """Check recordings that the base model fits far worse than the fitted ones; repeats of these differ by their scatter."""
     quantity = gap_sizes.main_quantity
     most = MOST_MEAN_SQUARE * max(1.0, float(gap_sizes.base[quantity]))
-    return [one for one in result.check.recordings if one.count[quantity] > 0 and one.before[quantity] > most]
+    trials = [predictor.trial for predictor in result.predictors]
+    groups = {trial.repeats for trial in trials if trial.use == "fit" and result.noise[quantity].source == MEASURED_REPEATS}
+    repeats = {trial.name for trial in trials if trial.repeats and trial.repeats in groups}
+    judged = [one for one in result.check.recordings if one.count[quantity] > 0 and one.name not in repeats]
+    return [one for one in judged if one.before[quantity] > most]
 
 
 def _alternatives(effect: Effect, state: SelectionState, taken: set[str]) -> tuple[dict[str, float], dict[str, float]]:

@@ -7,13 +7,16 @@ import gap_cases as cases
 import numpy as np
 import pytest
 from rig_files import RIG, write
+from scipy.signal import lfilter
 
 from palpate.core.errors import FileError
 from palpate.core.gap.dataset.rig import read_rig
 from palpate.core.gap.fitting.noise_floor import ChannelNoise
-from palpate.core.gap.fitting.repeat_noise import with_repeats
+from palpate.core.gap.fitting.repeat_noise import is_scatter_of_repeats, with_repeats
 from palpate.core.gap.forward.predictor import predictors_of
+from palpate.core.gap.selection.base_model import base_fit, prepared
 from palpate.core.gap.selection.diagnosis import diagnose
+from palpate.core.gap.selection.view_set import view_set_of
 from palpate.core.jobs.job_runner import run_job
 
 QUIET = ChannelNoise(0.001, 1.0, "stretches without load")
@@ -62,6 +65,33 @@ def test_white_noise_of_repeats_has_its_own_deviation():
 
 def test_what_repeats_differ_by_is_no_gap():
     assert run_job(diagnose(repeated(noise=0.001))).verdict == "no gap"
+
+
+@pytest.mark.parametrize("scatter", ["zeros", "gains of texels", "wander"])
+def test_repeats_that_differ_in_other_ways_are_no_gap_either(scatter):
+    rig, rng = repeated(factors=(1.0,) * 4), np.random.default_rng(8)
+    full = rig.trials[0].reading.max()
+    trials = []
+    for trial in rig.trials:
+        count, texels = trial.reading.shape
+        change = {
+            "zeros": 0.03 * full * rng.normal(),
+            "gains of texels": 0.08 * rng.normal(size=texels) * trial.reading,
+            "wander": 0.08 * lfilter([0.2], [1.0, -0.98], rng.normal(size=count))[:, None] * trial.reading,
+        }[scatter]
+        trials.append(replace(trial, reading=trial.reading + change))
+    found = run_job(diagnose(replace(rig, trials=tuple(trials))))
+    assert found.verdict == "no gap" and not found.findings
+
+
+def test_an_effect_larger_than_the_scatter_is_a_gap():
+    rig = repeated(factors=(1.0, 1.02, 0.98))
+    trials = [replace(one, reading=one.reading + one.reading**2 / one.reading.max()) for one in rig.trials]
+    predictors = predictors_of(trials, replace(rig, trials=tuple(trials)))
+    noise, _ = prepared(rig, predictors)
+    assert noise[0].source == "measured repeats"
+    result = base_fit(rig, view_set_of(predictors, (noise[0].deviation, noise[1].deviation)).whole, 1.0)
+    assert not is_scatter_of_repeats(noise, result.sse, result.count)
 
 
 def test_recordings_with_other_loads_are_no_repeats():
