@@ -8,7 +8,7 @@ move the texels. Each case follows from its kind and number alone.
 from __future__ import annotations
 
 import zlib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -44,8 +44,8 @@ def draw(kind: str, number: int) -> Mounting:
     values = _values(rng)
     other = list(BESIDE)[number % len(BESIDE)] if kind == "mounted-beside" else ""
     times, paths = zip(*(_trial(rng, radius) for _ in TRIALS), strict=True)
-    places = _places()
-    forces = [_force(places, _into_sensor(path, values), radius, k, time) for path, time in zip(paths, times, strict=True)]
+    places = places_of()
+    forces = [pressed(places, _into_sensor(path, values), radius, k, time) for path, time in zip(paths, times, strict=True)]
     if other:
         act = BESIDE[other](rng, k)
         forces = [act(force, time) for force, time in zip(forces, times, strict=True)]
@@ -57,15 +57,35 @@ def draw(kind: str, number: int) -> Mounting:
     return Mounting(kind, number, answer, values, radius, words, list(times), list(paths), readings)
 
 
+def draw_in_place(other: str, number: int, rate: float) -> Mounting:
+    """Return a sensor with one effect of :data:`BESIDE` that is where its rig says, sampled at a rate (Hz)."""
+    rng = np.random.default_rng([zlib.crc32(other.encode()), number])
+    radius, k = rng.uniform(8e-3, 14e-3), float(np.exp(rng.uniform(np.log(30), np.log(120))))
+    times, paths = zip(*(_trial(rng, radius, rate) for _ in TRIALS), strict=True)
+    forces = [pressed(places_of(), path, radius, k, time) for path, time in zip(paths, times, strict=True)]
+    act = BESIDE[other](rng, k)
+    forces = [act(force, time) for force, time in zip(forces, times, strict=True)]
+    noise = rng.uniform(0.003, 0.008) * max(float(np.abs(force).max()) for force in forces)
+    readings = [force + noise * rng.normal(size=force.shape) for force in forces]
+    words = {"k": float(f"{k * rng.uniform(0.9, 1.1):.3g}"), "cn": float(f"{0.01 * k:.3g}"), "unit": "N"}
+    return Mounting("in-place", number, [other], {}, radius, words, list(times), list(paths), readings)
+
+
+def thinned(case: Mounting, by: int) -> Mounting:
+    """The same recordings with every `by`-th sample."""
+    parts = {name: [one[::by] for one in getattr(case, name)] for name in ("times", "paths", "readings")}
+    return replace(case, **parts)
+
+
 def _values(rng) -> dict[str, float]:
     """The six numbers, each between a quarter of its largest value and that value, of either sign."""
     sizes = {"x": "shift", "y": "shift", "z": "height", "about_x": "tilt", "about_y": "tilt", "about_z": "turn"}
     return {name: float(LARGEST[size] * rng.uniform(0.25, 1.0) * rng.choice([-1, 1])) for name, size in sizes.items()}
 
 
-def _places() -> np.ndarray:
+def places_of(rows: int = ROWS, columns: int = COLUMNS) -> np.ndarray:
     """(n, 2) metres: x and y of each texel, row by row."""
-    y, x = np.mgrid[0:ROWS, 0:COLUMNS] * PITCH
+    y, x = np.mgrid[0:rows, 0:columns] * PITCH
     return np.stack([x.ravel() - x.mean(), y.ravel() - y.mean()], axis=1)
 
 
@@ -78,7 +98,7 @@ def _into_sensor(path: np.ndarray, values: dict[str, float]) -> np.ndarray:
     return (path - np.array([values["x"], values["y"], values["z"]])) @ (about_x @ about_y @ about_z)
 
 
-def _force(places: np.ndarray, middle: np.ndarray, radius: float, k: float, time: np.ndarray) -> np.ndarray:
+def pressed(places: np.ndarray, middle: np.ndarray, radius: float, k: float, time: np.ndarray) -> np.ndarray:
     """Spring and damper of each texel along the ball's normal, where the texel's own line meets the ball, (T, n) N."""
     away = middle[:, None, :2] - places
     left = radius**2 - (away**2).sum(axis=2)
@@ -91,7 +111,7 @@ def _force(places: np.ndarray, middle: np.ndarray, radius: float, k: float, time
     return np.where(depth > 0, np.maximum(k * depth + 0.01 * k * pace, 0.0), 0.0)
 
 
-def _trial(rng, radius: float) -> tuple[np.ndarray, np.ndarray]:
+def _trial(rng, radius: float, rate: float = RATE) -> tuple[np.ndarray, np.ndarray]:
     """Presses at five places: held, repeated, and slid along the surface."""
     knots = [(0.0, 0.0, 0.0, -1e-3), (0.8, 0.0, 0.0, -1e-3)]
     t = 0.8
@@ -109,7 +129,7 @@ def _trial(rng, radius: float) -> tuple[np.ndarray, np.ndarray]:
         knots += [(t + 0.3, x, y, -1e-3), (t + 0.7, x, y, -1e-3)]
         t += 0.7
     table = np.array([*knots, (max(t + 0.1, SECONDS), x, y, -1e-3)])
-    time = np.arange(round(SECONDS * RATE) + 1) / RATE
+    time = np.arange(round(SECONDS * rate) + 1) / rate
     along = [np.interp(time, table[:, 0], table[:, i]) for i in (1, 2, 3)]
     return time, np.stack([along[0], along[1], radius - along[2]], axis=1)
 

@@ -96,7 +96,7 @@ def power(values: Values) -> tuple[np.ndarray, np.ndarray]:
 _TIME = Parameter("time", "s", 2.0, 0.02, 1000.0, "Time after which 63 % of the settling is over.", log=True)
 _ONSET = Parameter("time", "s", 0.5, 0.01, 100.0, "Time after which the settling follows the logarithm of time.", log=True)
 _AMOUNT = Parameter("amount", "1", 0.2, 0.0, 0.95, "Share of the force that is lost in the end.")
-_RISE = Parameter("amount", "1", 0.2, 0.0, 5.0, "Share by which the reading has risen in the end.")
+_RISE = Parameter("amount", "1", 0.2, -0.9, 5.0, "Share by which the reading has risen in the end; negative: fallen.")
 _SECOND = (
     Parameter("amount_2", "1", 0.1, 0.0, 0.95, "Amount of a second, slower settling."),
     Parameter("time_2", "s", 20.0, 0.02, 1000.0, "Time of the second settling.", log=True),

@@ -21,6 +21,11 @@ def warm_up(signal: np.ndarray, time: np.ndarray, values: Values, transducers: T
     return signal - scalar(values, "amount") * np.expm1(-time[:, None] / scalar(values, "time"))
 
 
+def sensitivity(signal: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
+    """Approach a final sensitivity exponentially."""
+    return signal * (1.0 - scalar(values, "amount") * np.expm1(-time[:, None] / scalar(values, "time")))
+
+
 def walk(signal: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
     """Perform a random walk, independently in each texel."""
     spread = scalar(values, "spread")
@@ -54,6 +59,17 @@ KIND = Kind(
             neutral={"amount": 0.0},
             memoryless=warm_up,
             after_conversion=True,
+        ),
+        Form(
+            "sensitivity",
+            "r = f · (1 + a · (1 − exp(−t/τ)))",
+            "Doebelin, Measurement Systems (2003), section 3.2: sensitivity drift",
+            (
+                Parameter("amount", "1", 0.2, -0.9, 5.0, "Share a by which the reading of a load has changed when warm."),
+                Parameter("time", "s", 30.0, 0.1, 1e5, "Time τ after which 63 % of the change is over.", log=True),
+            ),
+            neutral={"amount": 0.0},
+            memoryless=sensitivity,
         ),
         Form(
             "random-walk",

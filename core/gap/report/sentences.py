@@ -20,6 +20,7 @@ MANY_FLOORS = 3.0
 """The headline says how much stays in the check recordings from this many times the noise floor on."""
 LEAST_SHARE = 0.01
 """A quantity that predicts a smaller share of what is left is not said to predict it."""
+ASSUMED_SESSION = "If they were recorded in another order or with pauses that matter, name their session and its times."
 FRICTION_MATTERS = 1.5
 """The headline mentions the base model's friction if without it the error would be at least this many times as large."""
 
@@ -37,6 +38,8 @@ def headline(result: Diagnosis, errors: GapErrors) -> str:
 
 def _outcome(result: Diagnosis, errors: GapErrors) -> str:
     """The result in one sentence, after one on how the recordings differ."""
+    if result.assumed_session:
+        return f"Between recordings, taken as one session in their order: {_effects(result, errors)} {ASSUMED_SESSION}"
     if result.between is None:
         return _effects(result, errors)
     own, after = result.between, errors.amended["fit"] or 0.0

@@ -4,17 +4,20 @@
 A sensor that wears, drifts or warms up from recording to recording looks, without a session in the rig, like one whose
 recordings differ. Effects of single texels or of the contact may then be fitted to these differences. So the search for effects
 is done a second time with a free factor and zero of each recording, if these alone close a good part of the gap, and counts if
-far less is left.
+far less is left. Wear and softening go with the load alone, so their order is enough to look for them across the recordings.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 
 from ..dataset.rig import Rig
+from ..dataset.sessions import TrialHistory, on_common_clocks
+from ..dataset.trial import Trial
 from ..forward.predictor import Model, Predictor, number_name
 
 LEAST_RECORDINGS = 3
@@ -25,6 +28,12 @@ LEAST_LOWERED = 0.1
 """Least mean square, in units of the noise's variance, by which they must lower the residual: noise is coloured."""
 MOST_LEFT = 0.5
 """With factors and zeros, the search must leave less than this share of what it leaves without."""
+LOAD_HISTORY = ("wear", "softening")
+"""Effects that need no clock to be found across recordings in a known order: they go with what was pressed."""
+TIME_HISTORY = ("drift",)
+"""Effects that go with the time."""
+COMMON = "all recordings"
+"""Name of what all recordings share."""
 WEAR_ORDER = -0.5
 """Rank correlation of the factors with the order of the recordings below which they fall as of wear."""
 
@@ -54,19 +63,39 @@ class RecordingDifferences:
     zeros: dict[str, float]
 
 
-def with_own_numbers(rig: Rig) -> Rig | None:
-    """Return a rig whose recordings each have a free factor and zero; None if that is no question in this rig.
+def may_differ(rig: Rig) -> bool:
+    """Return whether it is a question in a rig how its recordings differ.
 
     It is none if the rig names sessions, repeats, specimens or numbers of recordings, or has fewer than three recordings to be
     fitted.
     """
     said = any(trial.session or trial.repeats or trial.factor != 1.0 or trial.zero != 0.0 for trial in rig.trials)
-    if said or len(rig.of("fit")) < LEAST_RECORDINGS:
+    return not said and len(rig.of("fit")) >= LEAST_RECORDINGS
+
+
+def with_own_numbers(rig: Rig) -> Rig:
+    """Return a rig whose recordings each have a free factor and zero."""
+    return replace(rig, trials=tuple(replace(one, factor=one.name, zero=_free_zero(one, one.name)) for one in rig.trials))
+
+
+def with_common_zero(rig: Rig) -> Rig:
+    """Return a rig whose recordings share a free zero: what this closes is no difference between them."""
+    return replace(rig, trials=tuple(replace(one, zero=_free_zero(one, COMMON)) for one in rig.trials))
+
+
+def _free_zero(trial: Trial, name: str) -> str | float:
+    return 0.0 if trial.reading is None or trial.tared else name
+
+
+def as_one_session(rig: Rig) -> Rig | None:
+    """Return a rig whose recordings are one session in their order; None if they cannot be.
+
+    The pauses between them are not known, so what this session says of time does not count (see :data:`TIME_HISTORY`).
+    """
+    if len({trial.stimulus == "force" for trial in rig.trials}) > 1:
         return None
-    trials = [
-        replace(trial, factor=trial.name, zero=0.0 if trial.reading is None or trial.tared else trial.name)
-        for trial in rig.trials
-    ]
+    histories = [TrialHistory(COMMON)] * len(rig.trials)
+    trials, _ = on_common_clocks(rig.trials, histories, "own", Path(rig.name))
     return replace(rig, trials=tuple(trials))
 
 

@@ -29,6 +29,9 @@ TIGHTER_BOUNDS = {
 }
 """Upper bounds below the effects' own. Beyond them a formula is still valid but describes another effect: a reading that rises
 fivefold is a lag, a softening that leaves nothing is wear."""
+SOFTENING_OVER = 0.4
+"""Largest path of a softening, as a share of the path that texels are pressed in along a session: by its end 92 % of the loss
+is over. What still goes on is wear."""
 NOT_FITTED = ("noise",)
 """Kinds that are not fitted but found in the final residual (see :mod:`.heteroscedastic_noise`)."""
 DIRECTLY_ESTIMATED = ("dead-texels", "quantization")
@@ -64,6 +67,8 @@ class Scales:
     speed : float, m/s
         Largest speed of sliding.
     texels : int
+    travel : float, m
+        Path that texels are pressed in along the longest session; infinite without a session.
     """
 
     depth: float
@@ -75,6 +80,7 @@ class Scales:
     seconds: float
     speed: float
     texels: int
+    travel: float = np.inf
 
 
 def scales_of(predictors: Sequence[Predictor], model: Model) -> Scales:
@@ -95,7 +101,18 @@ def scales_of(predictors: Sequence[Predictor], model: Model) -> Scales:
         seconds=max(float(np.ptp(q.trial.time if q.session is None else q.session.stimulus.time)) for q in predictors),
         speed=max(max(float(q.stimulus.slide.max(initial=0.0)) for q in predictors), 1e-6),
         texels=len(p),
+        travel=_travel(predictors),
     )
+
+
+def _travel(predictors: Sequence[Predictor]) -> float:
+    """Path that texels are pressed in along the longest session, a mean weighted by their paths, m; infinite without one."""
+    found = []
+    for session in {id(q.session): q.session for q in predictors if q.session is not None}.values():
+        path = np.maximum(np.diff(session.stimulus.depth, axis=0, prepend=0.0), 0.0).sum(axis=0)
+        if path.any():
+            found.append(float((path @ path) / path.sum()))
+    return max(found, default=np.inf)
 
 
 def search_range(parameter: Parameter, scales: Scales) -> tuple[float, float]:
@@ -156,6 +173,8 @@ class Candidate:
             size = max(abs(p.default), 0.1 * top) if p.unit == "1" else 0.3 * top
             high = min(p.high, TIGHTER_BOUNDS.get((self.kind.name, self.form.name, p.name), p.high))
             low = p.low
+            if (self.kind.name, p.name, p.unit) == ("softening", "path", "m"):
+                high = max(min(high, SOFTENING_OVER * scales.travel), low * LOG_RATIO)
             if self.form.coupling is not None and p.unit == "m":
                 low = min(max(low, LEAST_WIDTH * scales.pitch), high)
             rest = float(self.form.neutral.get(p.name, p.default)) if p.per_texel else 0.0

@@ -22,6 +22,7 @@ from .forward_selection import SelectionState
 from .gap_sizes import FORCES, READINGS, GapSizes, friction_kinds
 from .identifiability import (
     LEAST_UNLOADED_SHARE,
+    LOSING,
     MOVING_BY_THEMSELVES,
     NONLINEAR,
     SPREADING,
@@ -134,14 +135,15 @@ def unsettled_parameters(effect: Effect, index: int, result: Diagnosis, lead: fl
 def _larger_effect_of_same_kind(effect: Effect, state: SelectionState, fitted: Sequence[Effect], gap_sizes: GapSizes) -> bool:
     """Whether a similar effect closes more already, so that this one may be the misfit of its formula.
 
-    Load spreading and crosstalk both pass load on to neighbours. A nonlinear contact law and a nonlinear readout both bend the
-    readings, but only the contact law bends the net force.
+    Load spreading and crosstalk both pass load on to neighbours. Wear and softening both take force away with use. A nonlinear
+    contact law and a nonlinear readout both bend the readings, but only the contact law bends the net force.
     """
 
     def share(name: str) -> float:
         return state.improvements[name].of_gap if name in state.improvements else 0.0
 
-    same = SPREADING if effect.name in SPREADING else () if gap_sizes.both or effect.name not in NONLINEAR else NONLINEAR
+    groups = (SPREADING, LOSING, () if gap_sizes.both else NONLINEAR)
+    same = {name for group in groups if effect.name in group for name in group}
     return any(share(other.name) > share(effect.name) for other in fitted if other.name in same and other.name != effect.name)
 
 

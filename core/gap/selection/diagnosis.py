@@ -7,7 +7,7 @@ The base model is refitted, effects are added to it by forward selection, and th
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -25,15 +25,27 @@ from ..fitting.residual_tests import LEAST_STRUCTURE, ResidualStructure, residua
 from ..fitting.spectral_lines import strongest_line
 from ..forward.predictor import Model, Predictor, predictors_of
 from .base_model import base_fit, identified_base_parameters, prepared
-from .between_recordings import LEAST_CLOSED, LEAST_LOWERED, MOST_LEFT, differences, with_own_numbers
-from .candidates import scales_of
+from .between_recordings import (
+    LEAST_CLOSED,
+    LEAST_LOWERED,
+    LOAD_HISTORY,
+    MOST_LEFT,
+    TIME_HISTORY,
+    as_one_session,
+    differences,
+    may_differ,
+    with_common_zero,
+    with_own_numbers,
+)
+from .candidates import FittedCandidate, candidates, scales_of
 from .check_recordings import check_views, checked
-from .confidence import UNSURE_CONFIDENCE
+from .confidence import EXPLAINED, UNSURE_CONFIDENCE
 from .contact_heights import with_starting_heights
 from .findings import Diagnosis
 from .forward_selection import ForwardSelection, SelectionState
 from .gap_sizes import FORCES, READINGS, UNRESOLVED_SQUARE, GapSizes, friction_kinds
 from .harmful_effects import without_harmful_effects
+from .screening import screen
 from .verdict import conclude
 from .view_set import ViewSet, view_set_of
 
@@ -60,32 +72,131 @@ def diagnose(rig: Rig) -> Job[Diagnosis]:
     rig, predictors, faults = _without_faults(with_starting_heights(rig))
     noise, full = prepared(rig, predictors)
     yield Progress("base model", BASE_MODEL_BEGINS, TOTAL_WORK)
-    result, view_set = _with_base_model(rig, predictors, noise, full)
+    plain = _search_of(rig, predictors, noise, full, faults)
+    own = session = None
+    if may_differ(rig):
+        own, session = _search_with_own_numbers(plain), _search_of_one_session(plain)
+    searches = [plain, *(one for one in (session, own) if one is not None and one.is_wanted)]
+    best = plain
+    for number, one in enumerate(searches):
+        if one is own and best is session and session.left <= own.left_of_base:
+            break
+        begins, ends = (SELECTION_BEGINS + (TOTAL_WORK - SELECTION_BEGINS) * (number + i) // len(searches) for i in (0, 1))
+        for what, share in _select_effects(one.result, one.views):
+            yield Progress(what, begins + int((ends - begins) * share), TOTAL_WORK)
+        if one is session and _is_one_session(session, plain):
+            session.result.assumed_session, best = True, session
+        if one is own and own.left < MOST_LEFT * plain.left and (best is plain or own.left < best.left):
+            _name_differences(own, plain, is_of_load=session is None or session.is_of_load)
+            best = own
+    best.result.stages = _stages(best.result, best.views)
+    return best.result
+
+
+@dataclass
+class _Search:
+    """A diagnosis that is being made.
+
+    Attributes
+    ----------
+    result : Diagnosis
+    views : ViewSet
+        Of the fitted trials.
+    closes : float
+        Share of the gap that is closed before the search for effects, by what recordings do not share.
+    is_wanted : bool
+        Whether this is enough for a search for effects.
+    is_of_load : bool
+        Whether what goes on from recording to recording goes with the load rather than with the time.
+    """
+
+    result: Diagnosis
+    views: ViewSet
+    closes: float = 0.0
+    is_wanted: bool = True
+    is_of_load: bool = True
+
+    @property
+    def left(self) -> float:
+        """What the amended model leaves (see :func:`_left`)."""
+        return _left(self.views, self.result.best)
+
+    @property
+    def left_of_base(self) -> float:
+        """What the base model leaves."""
+        return _left(self.views, self.result.base)
+
+
+def _search_of(
+    rig: Rig,
+    predictors: list[Predictor],
+    noise: tuple[ChannelNoise, ChannelNoise],
+    full: tuple[float, float],
+    faults: list[DataFault],
+) -> _Search:
+    """A search that has the fitted base model alone."""
+    result, views = _with_base_model(rig, predictors, noise, full)
     result.faults = faults
-    other, second, closes = with_own_numbers(rig), None, 0.0
-    if other is not None:
-        twins = [one.with_numbers_of(trial) for one, trial in zip(predictors, other.trials, strict=True)]
-        own, own_views = _with_base_model(other, twins, noise, full)
-        own.faults = faults
-        before, after = _left(view_set, result.base), _left(own_views, own.base)
-        closes = 1.0 - after / before
-        second = own if closes >= LEAST_CLOSED and before - after > LEAST_LOWERED else None
-    ends = TOTAL_WORK if second is None else (SELECTION_BEGINS + TOTAL_WORK) // 2
-    for what, share in _select_effects(result, view_set):
-        yield Progress(what, SELECTION_BEGINS + int((ends - SELECTION_BEGINS) * share), TOTAL_WORK)
-    result.stages = _stages(result, view_set)
-    if second is not None:
-        for what, share in _select_effects(second, own_views):
-            yield Progress(what, ends + int((TOTAL_WORK - ends) * share), TOTAL_WORK)
-        second.stages = _stages(second, own_views)
-        if _left(own_views, second.best) < MOST_LEFT * _left(view_set, result.best):
-            error = _relative_error(result.base, noise, full)
-            second.between = differences(second.best.model, second.of("fit"), closes, error, full[READINGS])
-            if second.misleading_faults:
-                second.between = replace(second.between, confidence=min(second.between.confidence, UNSURE_CONFIDENCE))
-            second.verdict = "explained" if second.verdict == "no gap" else second.verdict
-            result = second
-    return result
+    return _Search(result, views)
+
+
+def _search_with_own_numbers(plain: _Search) -> _Search:
+    """The search with a factor and a zero of each recording. What a zero of all recordings closes does not count."""
+    result = plain.result
+    made = []
+    for rig in (with_common_zero(result.rig), with_own_numbers(result.rig)):
+        twins = [one.with_numbers_of(trial) for one, trial in zip(result.predictors, rig.trials, strict=True)]
+        made.append(_search_of(rig, twins, result.noise, result.full, result.faults))
+    common, own = made
+    before, after = min(plain.left_of_base, common.left_of_base), own.left_of_base
+    own.closes = 1.0 - after / before
+    own.is_wanted = own.closes >= LEAST_CLOSED and before - after > LEAST_LOWERED
+    return own
+
+
+def _search_of_one_session(plain: _Search) -> _Search | None:
+    """The search with the recordings as one session in their order; None if they cannot be one, or leave no gap."""
+    result = plain.result
+    rig = as_one_session(result.rig)
+    if rig is None or plain.left_of_base <= LEAST_LOWERED:
+        return None
+    session = _search_of(rig, predictors_of(rig.trials, rig), result.noise, result.full, result.faults)
+    fitted = [view.predictor for view in session.views.whole]
+    forms = [one for one in candidates(fitted, session.result.base.model) if one.name in (*LOAD_HISTORY, *TIME_HISTORY)]
+    ranked: list[FittedCandidate] = []
+    for _, _, found in screen(session.views, session.result.base, forms, session.result.scales):
+        ranked = found or ranked
+    left = {kinds: _least(session, ranked, kinds) for kinds in (LOAD_HISTORY, TIME_HISTORY)}
+    session.is_of_load = left[LOAD_HISTORY] <= left[TIME_HISTORY]
+    session.closes = 1.0 - left[LOAD_HISTORY] / plain.left_of_base
+    session.is_wanted = session.closes > 1.0 - MOST_LEFT
+    return session
+
+
+def _least(search: _Search, ranked: list[FittedCandidate], kinds: tuple[str, ...]) -> float:
+    """What the best candidate of some kinds leaves."""
+    return min((_left(search.views, one.fit) for one in ranked if one.candidate.name in kinds), default=np.inf)
+
+
+def _is_one_session(session: _Search, plain: _Search) -> bool:
+    """Whether what recordings remember of each other explains them far better than if each begins untouched."""
+    result = session.result
+    remembers = any(one.name in LOAD_HISTORY and one.confidence > UNSURE_CONFIDENCE for one in result.findings)
+    return remembers and result.verdict == "explained" and session.left < MOST_LEFT * plain.left
+
+
+def _name_differences(own: _Search, plain: _Search, is_of_load: bool) -> None:
+    """Say in a result by which levels and gains its recordings differ."""
+    result, before = own.result, plain.result
+    error = _relative_error(before.base, before.noise, before.full)
+    result.between = differences(result.best.model, result.of("fit"), own.closes, error, result.full[READINGS])
+    if not is_of_load:
+        result.between = replace(result.between, name="drift")
+    if result.misleading_faults:
+        result.between = replace(result.between, confidence=min(result.between.confidence, UNSURE_CONFIDENCE))
+    most = 1.0 - own.left / plain.left_of_base
+    if result.verdict == "no gap" or (most >= EXPLAINED and not result.check.is_refuted):
+        result.verdict = "explained"
 
 
 def _with_base_model(

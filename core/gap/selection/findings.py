@@ -116,6 +116,8 @@ class Diagnosis:
         Faults of the data, whether they were put right or not.
     between : RecordingDifferences or None
         Levels and gains by which the recordings differ, if the search was better with them; they are part of both models.
+    assumed_session : bool
+        Whether the recordings, of which the rig names no session, are explained as one session in their order.
     check : CheckOutcome
         What the check recordings say of the amended model, or of the base model if there are no effects.
     closed : ClosedShares
@@ -143,6 +145,7 @@ class Diagnosis:
     line: SpectralLine | None = None
     faults: list[DataFault] = field(default_factory=list)
     between: RecordingDifferences | None = None
+    assumed_session: bool = False
     check: CheckOutcome = field(default_factory=CheckOutcome)
     closed: ClosedShares = field(default_factory=ClosedShares)
     unlike_fitted: list[CheckedRecording] = field(default_factory=list)

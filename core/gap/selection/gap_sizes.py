@@ -40,11 +40,14 @@ class GapSizes:
         Mean squares of the base model's residual and of the noise, for readings and forces, in units of the noise's variance.
     count : (2,) float
         Number of measured values.
+    placed : (2,) float or None
+        Mean squares of the model that has nothing but a displacement of the texels, once that is the first effect.
     """
 
     base: np.ndarray
     noise: np.ndarray
     count: np.ndarray
+    placed: np.ndarray | None = None
 
     @property
     def both(self) -> bool:
@@ -64,6 +67,14 @@ class GapSizes:
         """Return the whole gap of readings or of forces."""
         return float(max(self.base[quantity] - self.noise[quantity], 1e-12))
 
+    def sensor_gap(self, quantity: int) -> float:
+        """Return the gap of a sensor that is where the model has it: without what a displacement of the texels closes.
+
+        Where a sensor is mounted says nothing about the sensor, and may close a hundred times as much as its own effects.
+        """
+        whole = self.gap(quantity)
+        return whole if self.placed is None else min(whole, float(max(self.placed[quantity] - self.noise[quantity], 1e-12)))
+
     def closed_share(self, means: np.ndarray, quantity: int) -> float:
         """Return the share of a gap that is closed at these mean squares."""
         return float(np.clip((self.base[quantity] - means[quantity]) / self.gap(quantity), 0.0, 1.0))
@@ -75,7 +86,7 @@ class GapSizes:
 
     def unresolved(self, quantity: int) -> float:
         """Return how much of a gap no fit can resolve."""
-        return UNRESOLVED_SHARE * self.gap(quantity) + UNRESOLVED_SQUARE
+        return UNRESOLVED_SHARE * self.sensor_gap(quantity) + UNRESOLVED_SQUARE
 
     def has_gap(self, quantity: int) -> bool:
         """Return whether there is a gap that matters."""

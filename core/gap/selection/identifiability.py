@@ -53,6 +53,8 @@ SPREADING = ("load-spreading", "crosstalk")
 which of their formulas is nearer to it."""
 NONLINEAR = ("stiffening", "saturation", "dead-zone")
 """Effects that bend the curve of reading over load. The loading curve of a hysteresis loop is bent as well."""
+LOSING = ("wear", "softening")
+"""Effects by which a sensor loses force with what was pressed. How fast the loss dies away is a matter of the formula."""
 LOOP_CURVATURE = 3.0
 """Ratio of a curve's steepest to its flattest eighth up to which it may be the loading curve of a hysteresis loop that takes
 two thirds of the force."""

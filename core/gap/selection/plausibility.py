@@ -11,7 +11,7 @@ import numpy as np
 
 from ..fitting.noise_floor import UNLOADED_SHARE
 from ..forward.contact_phases import relative_load
-from .candidates import FittedCandidate
+from .candidates import FittedCandidate, parameters_at_bounds
 from .view_set import ViewSet
 
 PULL_LEVEL = -0.5
@@ -32,7 +32,16 @@ def is_plausible(found: FittedCandidate, view_set: ViewSet) -> bool:
         return _adhesion_pulls(found, view_set)
     if found.candidate.name == "offset":
         return _offset_is_present_unloaded(found, view_set)
+    if found.candidate.name == "softening":
+        return _loss_comes_to_an_end(found)
     return True
+
+
+def _loss_comes_to_an_end(found: FittedCandidate) -> bool:
+    """Whether a fitted softening is over when its session ends: its path is not at the bound that says so."""
+    index = len(found.fit.model.effects) - 1
+    high = [item.high for item in found.fit.free if item.effect == index and item.name == "path"]
+    return parameters_at_bounds(found.fit.model, found.fit.free, index).get("path") not in high
 
 
 def _adhesion_pulls(found: FittedCandidate, view_set: ViewSet) -> bool:

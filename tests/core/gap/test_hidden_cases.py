@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from palpate.benchmarks import gap
-from palpate.benchmarks._hidden import cases, mounting, other, own, world
+from palpate.benchmarks import sessions as sessions_group
+from palpate.benchmarks._hidden import cases, mounting, other, own, sessions, world
 from palpate.core.effects.engine.registry import effect, library
 from palpate.core.gap.dataset.rig import read_rig
 from palpate.core.gap.forward.predictor import Model, Predictor
@@ -170,3 +171,43 @@ def test_a_wrongly_mounted_sensor_is_that_of_the_other_code(tmp_path, kind):
         found.append(np.corrcoef(predictor.predict(model).reading.ravel(), trial.reading.ravel())[0, 1])
         moved.append(np.corrcoef(predictor.predict(Model(rig.parameters)).reading.ravel(), trial.reading.ravel())[0, 1])
     assert min(found) > (0.995 if kind == "mounted" else 0.9) and min(found) > max(moved)
+
+
+@pytest.mark.parametrize("clock", sessions.CLOCKS)
+def test_a_session_is_told_in_three_ways_and_never_its_answer(tmp_path, clock):
+    case = sessions.draw("wear", clock, 3)
+    path = sessions.write(case, tmp_path)
+    rig = read_rig(path)
+    starts = [float(trial.time[0]) for trial in rig.trials]
+    expected = [0.0] * len(starts) if clock == "own" else case.starts
+    np.testing.assert_allclose(starts, expected, atol=1e-3)
+    assert {bool(trial.session) for trial in rig.trials} == {clock != "own"}
+    assert [i for i, trial in enumerate(rig.trials) if trial.use == "check"] == list(case.checked)
+    assert not any(word in path.read_text(encoding="utf-8") for word in ("wear", "drift", "soft", "warm"))
+
+
+@pytest.mark.parametrize("number", [3, 5000, 5001])
+@pytest.mark.parametrize("kind", sessions.KINDS)
+def test_what_goes_on_does_so_across_the_pauses_between_recordings(kind, number):
+    """Without noise, a healthy recording has the same response to the same load whenever it is made, and no other has."""
+    forms = sessions.DEVELOPMENT if number < sessions.FIRST_SEALED else sessions.SEALED
+    force = np.clip(np.sin(np.arange(200) / 8.0), 0.0, None)[:, None] * np.ones((1, sessions.ROWS * sessions.COLUMNS))
+    times = [start + np.arange(200) / sessions.RATE for start in (0.0, 60.0, 200.0)]
+    if kind == "healthy":
+        assert sessions.draw(kind, "own", number).answer == ()
+        return
+    act = forms[kind][number % len(forms[kind])](np.random.default_rng(number), 1.0, 208.0)
+    found = act([force.copy() for _ in times], times)
+    assert np.abs(found[1] - found[0]).max() > 0.03
+    assert kind == "softening" or np.abs(found[2] - found[1]).max() > 0.02
+
+
+def test_outcomes_of_sessions():
+    say = sessions_group.outcome
+    assert say(("wear",), {"wear"}, "explained", False) == "right"
+    assert say(("softening", "wear"), {"wear"}, "explained", False) == "right"
+    assert say(("wear",), {"softening"}, "explained", False) == "wrong"
+    assert say((), set(), "no gap", False) == "right" and say((), {"drift"}, "explained", False) == "wrong"
+    assert (
+        say(("wear",), set(), "unexplained", False) == "unexplained" and say((), set(), "unexplained", False) == "unexplained"
+    )

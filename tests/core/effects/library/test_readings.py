@@ -53,6 +53,12 @@ def image(texel, value=1.0):
         ("quantization", "bits", {"bits": 4, "range": 2.0}, lambda f: np.round(f * 8) / 8),
         ("drift", "linear", {"rate": 0.03}, lambda f: f + 0.03 * TIME[:, None]),
         ("drift", "warm-up", {"amount": 0.3, "time": 4.0}, lambda f: f + 0.3 * (1 - np.exp(-TIME[:, None] / 4))),
+        (
+            "drift",
+            "sensitivity",
+            {"amount": -0.3, "time": 4.0},
+            lambda f: f * (1 - 0.3 * (1 - np.exp(-TIME[:, None] / 4))),
+        ),
     ],
 )
 def test_formulas(name, form, values, formula):

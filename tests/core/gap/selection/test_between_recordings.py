@@ -11,7 +11,7 @@ from palpate.core.gap.report.comparison import gap_errors
 from palpate.core.gap.report.sentences import headline
 from palpate.core.gap.report.summary import summary
 from palpate.core.gap.selection import screening
-from palpate.core.gap.selection.between_recordings import with_own_numbers
+from palpate.core.gap.selection.between_recordings import as_one_session, may_differ, with_common_zero, with_own_numbers
 from palpate.core.gap.selection.diagnosis import diagnose
 from palpate.core.jobs.job_runner import run_job
 
@@ -31,7 +31,7 @@ def changing(change):
 @pytest.mark.parametrize(
     ("change", "name"),
     [
-        (lambda force, i: force * (1.0 - 0.08 * i), "wear"),
+        (lambda force, i: force * (1.0 - 0.08 * i), "drift"),  # of all texels alike, whatever was pressed: no wear
         (lambda force, i: force * (1.0 + 0.08 * i), "drift"),
         (lambda force, i: force + 0.006 * (0.0, 1.0, -1.0, 2.0, 1.5)[i], "drift"),
     ],
@@ -53,10 +53,42 @@ def test_gains_of_texels_are_still_named(monkeypatch):
     assert result.between is None and [one.name for one in result.findings] == ["gain-mismatch"]
 
 
+def test_a_zero_that_all_recordings_share_is_no_difference_between_them():
+    result = run_job(diagnose(changing(lambda force, i: force + 0.006)))
+    assert result.between is None and not result.assumed_session
+
+
+def test_wear_without_a_session_is_found_as_one_session_in_the_order_of_the_rig():
+    put_on = [np.zeros(cases.ROWS * cases.COLUMNS)]
+
+    def worn(force, i):
+        gathered = put_on[-1] + np.cumsum(np.maximum(np.diff(force, axis=0, prepend=0.0), 0.0), axis=0)
+        put_on.append(gathered[-1])
+        return force / (1.0 + 0.6 * gathered)
+
+    result = run_job(diagnose(changing(worn)))
+    assert result.assumed_session and result.between is None and result.verdict == "explained"
+    assert result.findings[0].name == "wear" and result.findings[0].confidence > 0.5
+    errors = gap_errors(result)
+    assert headline(result, errors).startswith("Between recordings, taken as one session in their order: Missing: wear")
+    assert summary(result, errors)["between_recordings"]["effect"] == "wear"
+
+
 def test_what_a_rig_says_is_not_asked_again():
     rig = changing(lambda force, i: force)
-    own = with_own_numbers(rig)
-    assert own is not None and {(trial.factor, trial.zero) for trial in own.trials} == {(f"t{i}", f"t{i}") for i in range(5)}
+    names = {f"t{i}" for i in range(5)}
+    own, common = with_own_numbers(rig), with_common_zero(rig)
+    assert may_differ(rig) and {(trial.factor, trial.zero) for trial in own.trials} == {(name, name) for name in names}
+    assert {trial.factor for trial in common.trials} == {1.0} and len({trial.zero for trial in common.trials}) == 1
     for words in ({"session": "s"}, {"factor": "A"}, {"zero": 0.1}):
-        assert with_own_numbers(replace(rig, trials=(replace(rig.trials[0], **words), *rig.trials[1:]))) is None
-    assert with_own_numbers(replace(rig, trials=(*rig.trials[:2], rig.trials[4]))) is None
+        assert not may_differ(replace(rig, trials=(replace(rig.trials[0], **words), *rig.trials[1:])))
+    assert not may_differ(replace(rig, trials=(*rig.trials[:2], rig.trials[4])))
+
+
+def test_one_session_keeps_the_order_of_the_rig():
+    rig = changing(lambda force, i: force)
+    session = as_one_session(rig)
+    assert session is not None and len({trial.session for trial in session.trials}) == 1
+    ends = [float(trial.time[-1]) for trial in session.trials]
+    assert all(trial.time[0] > end for trial, end in zip(session.trials[1:], ends[:-1], strict=True))
+    assert [trial.name for trial in session.trials] == [trial.name for trial in rig.trials]

@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """An effect that the recordings refute where it is its own is not taken, however well its formula fits elsewhere."""
 
+from dataclasses import replace
+
 import gap_cases as cases
 import numpy as np
 import pytest
 
-from palpate.core.effects.engine.registry import effect
+from palpate.core.effects.engine.registry import effect, form_of, kind_of
 from palpate.core.gap.fitting.least_squares import fit, free_base_parameters
 from palpate.core.gap.forward.predictor import Model, predictors_of
 from palpate.core.gap.selection.base_model import prepared
@@ -22,8 +24,6 @@ def offset_each(rig):
     predictors = predictors_of(rig.trials, rig)
     noise, full = prepared(rig, predictors)
     view_set, none = view_set_of(predictors, (noise[0].deviation, 1.0)), tuple([0.0] * len(SPREAD))
-    from palpate.core.effects.engine.registry import form_of, kind_of
-
     candidate = Candidate(kind_of("offset"), form_of("offset", "listed"))
     free = free_base_parameters(rig.parameters, ("k", "cn"), full[0])
     free += candidate.free_parameters(0, scales_of(predictors, Model(rig.parameters)), 1.0)
@@ -50,3 +50,20 @@ def test_an_offset_is_there_without_load_from_the_beginning(change, is_one):
     values = np.array(found.fit.model.effects[0].values["offset"])[touched]
     assert np.corrcoef(values, SPREAD[touched])[0, 1] > 0.6  # it fits either way
     assert is_plausible(found, view_set) == is_one
+
+
+@pytest.mark.parametrize(("share_of_way", "is_one"), [(0.1, True), (2.0, False)])
+def test_a_softening_comes_to_its_end_within_its_session(share_of_way, is_one):
+    """What still goes on when the session ends is wear."""
+    rig = cases.rig(change=lambda force, _time: force, seed=4, trials=4)
+    rig = replace(rig, trials=tuple(replace(one, time=one.time + 20.0 * i, session="s") for i, one in enumerate(rig.trials)))
+    predictors = predictors_of(rig.trials, rig)
+    noise, full = prepared(rig, predictors)
+    scales = scales_of(predictors, Model(rig.parameters))
+    assert np.isfinite(scales.travel) and 1e-3 < scales.travel < 0.1
+    candidate = Candidate(kind_of("softening"), form_of("softening", "path"))
+    free = candidate.free_parameters(0, scales, 1.0)
+    start = effect("softening", "path", share=0.3, path=share_of_way * scales.travel)
+    view_set = view_set_of(predictors, (noise[0].deviation, 1.0))
+    found = fit(view_set.whole, Model(rig.parameters, (start,)), free, max_steps=0)
+    assert is_plausible(FittedCandidate(candidate, found, found.sse), view_set) == is_one
