@@ -42,6 +42,10 @@ LEAST_VARIATION = 0.2
 """Least variance of the load's changes on either side of a step, as a share of their mean square. Where a load moves at one
 speed no shift can be seen, and the correlation is largest where a sensor that relaxes or goes slack answers most. Of a strip
 that is pulled and released at one speed, one side of each step has below 0.1."""
+LONG_STEP = 0.6
+"""Seconds from which on a step must make the response quieter where nothing touches."""
+QUIETER, UNLOADED = 0.5, 0.02
+"""Without load the squared changes must become less by this factor; and the share of the largest load below which that is."""
 RATES = np.linspace(-0.08, 0.08, 161)
 """Rates at which two clocks may run apart."""
 SAME_RATE = 0.25
@@ -138,7 +142,8 @@ def course_of(stimulus: Stimulus) -> Course | None:
     if _is_clearly_better(max(line.correlation, jump.correlation), constant.correlation):
         other = jump if jump.correlation > line.correlation else line
         span = abs(other.step) if other.step else abs(other.rate) * (time[-1] - time[0])
-        if span >= least:
+        may_be_period = abs(other.step) > LONG_STEP  # of a recording that repeats itself
+        if span >= least and not (may_be_period and not _stays_quiet_without_load(stimulus, prepared, other)):
             chosen = other
     return chosen if chosen.correlation >= LEAST_CORRELATION else None
 
@@ -146,6 +151,28 @@ def course_of(stimulus: Stimulus) -> Course | None:
 def _is_clearly_better(new: float, old: float) -> bool:
     """Whether one correlation is so much larger than another one that this is no accident."""
     return new - old >= LEAST_GAIN and 1.0 - new < MOST_LEFT * (1.0 - old)
+
+
+def _stays_quiet_without_load(
+    stimulus: Stimulus, prepared: tuple[np.ndarray, np.ndarray, np.ndarray, float], course: Course
+) -> bool:
+    """Whether responses without load change far less if they are moved by a course; True if nothing is ever unloaded.
+
+    A sensor that answers to a part of its loads only, as one that softens does, may fit as well at another period of a recording
+    that repeats itself. But then it would answer where nothing touches.
+    """
+    time, _, response, step = prepared
+    load = _signals(stimulus)[0].max(axis=1)
+    width = max(1, round(SMOOTHING / step))
+    even = np.interp(time - 0.5 * width * step, stimulus.trial.time, load)
+    near = max(1, round(LONGEST_LAG / step))
+    touched = np.convolve(even > UNLOADED * even.max(), np.ones(2 * near + 1), "same") > 0.5
+    squares = (response * response).sum(axis=1)
+    moved = np.arange(len(time)) + np.round(course.at(time) / step).astype(int)
+    inside = (moved >= 0) & (moved < len(time)) & ~touched
+    if inside.sum() < LEAST_SAMPLES:
+        return True
+    return float(squares[moved[inside]].mean()) < QUIETER * float(squares[~touched].mean())
 
 
 def _changes(stimulus: Stimulus) -> tuple[np.ndarray, np.ndarray, np.ndarray, float] | None:
