@@ -158,8 +158,8 @@ def _stays_quiet_without_load(
 ) -> bool:
     """Whether responses without load change far less if they are moved by a course; True if nothing is ever unloaded.
 
-    A sensor that answers to a part of its loads only, as one that softens does, may fit as well at another period of a recording
-    that repeats itself. But then it would answer where nothing touches.
+    A sensor that answers to a part of its loads only, as one that softens does, may fit as well at another period of a
+    recording that repeats itself. But then it would answer where nothing touches.
     """
     time, _, response, step = prepared
     load = _signals(stimulus)[0].max(axis=1)

@@ -26,6 +26,9 @@ LEAST_REPEATS, MOST_STEPS = 0.08, 4.0
 """Least share of moving samples that repeat the one before. The others change by more than so many steps of the converter."""
 RAIL_RUN, RAIL_MOVE, LEAST_RAILED = 4, 0.05, 12
 """Samples in a row at the extreme value while the load changes by this share of the largest; least number of such samples."""
+COARSE_STEPS, MOST_LEVELS = 2.5, 1000
+"""Of readings with few levels, the load must change by this many times its range over their number: each level of a coarse
+converter stays while the load changes. Levels are counted up to the second number."""
 
 
 def find_sample_faults(rig: Rig, stimuli: Sequence[Stimulus]) -> list[DataFault]:
@@ -113,9 +116,11 @@ def _rails(stimuli: Sequence[Stimulus]) -> list[DataFault]:
         return []
     values = [s.trial.reading for s in recorded if s.trial.reading is not None]
     high, low = max(float(np.nanmax(v)) for v in values), min(float(np.nanmin(v)) for v in values)
+    levels = len(np.unique(np.concatenate([np.unique(v[np.isfinite(v)])[:MOST_LEVELS] for v in values])))
+    least = max(RAIL_MOVE, COARSE_STEPS / max(levels, 1))
     best: tuple[int, float] | None = None
     for rail in (high, low):
-        count = sum(_railed_samples(s, rail) for s in recorded)
+        count = sum(_railed_samples(s, rail, least) for s in recorded)
         if count >= LEAST_RAILED and (best is None or count > best[0]):
             best = (count, rail)
     if best is None:
@@ -128,14 +133,14 @@ def _rails(stimuli: Sequence[Stimulus]) -> list[DataFault]:
     return [DataFault("saturated-converter", names, said, dict.fromkeys(names, _without_value(rail)))]
 
 
-def _railed_samples(stimulus: Stimulus, rail: float) -> int:
-    """Number of loaded samples at a rail in runs during which the texel's load changes."""
+def _railed_samples(stimulus: Stimulus, rail: float, least: float) -> int:
+    """Number of loaded samples at a rail in runs during which the texel's load changes by a share of the largest of all."""
     reading, load = stimulus.trial.reading, stimulus.load
     assert reading is not None
     full, count = max(float(load.max(initial=0.0)), 1e-300), 0
     for texel in np.flatnonzero((reading == rail).any(axis=0)):
         for start, stop in runs((reading[:, texel] == rail) & (load[:, texel] > 0)):
-            if stop - start >= RAIL_RUN and np.ptp(load[start:stop, texel]) > RAIL_MOVE * full:
+            if stop - start >= RAIL_RUN and np.ptp(load[start:stop, texel]) > least * full:
                 count += stop - start
     return count
 

@@ -6,7 +6,7 @@ The base model is refitted, effects are added to it by forward selection, and th
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -52,6 +52,10 @@ from .view_set import ViewSet, view_set_of
 TOTAL_WORK = 1000
 BASE_MODEL_BEGINS, SELECTION_BEGINS = 40, 60
 """Share of the whole work, in thousandths, at which the fit of the base model and the selection of effects begin."""
+OTHER_SEARCHES_BEGIN = 500
+"""The same for searches that ask how recordings differ."""
+SETTLED_SHARE = 0.05
+"""Share of the base model's gap. If a search explains more than the rest of it, no search asks how recordings differ."""
 LEAST_NOISE = 0.8
 """Least mean square of the noise in units of its estimate: the estimate is not trusted to be too large by more than this."""
 
@@ -73,24 +77,49 @@ def diagnose(rig: Rig) -> Job[Diagnosis]:
     noise, full = prepared(rig, predictors)
     yield Progress("base model", BASE_MODEL_BEGINS, TOTAL_WORK)
     plain = _search_of(rig, predictors, noise, full, faults)
-    own = session = None
-    if may_differ(rig):
-        own, session = _search_with_own_numbers(plain), _search_of_one_session(plain)
-    searches = [plain, *(one for one in (session, own) if one is not None and one.is_wanted)]
+    yield from _selected(plain, SELECTION_BEGINS, OTHER_SEARCHES_BEGIN if may_differ(rig) else TOTAL_WORK)
     best = plain
-    for number, one in enumerate(searches):
-        if one is own and best is session and session.left <= own.left_of_base:
-            break
-        begins, ends = (SELECTION_BEGINS + (TOTAL_WORK - SELECTION_BEGINS) * (number + i) // len(searches) for i in (0, 1))
-        for what, share in _select_effects(one.result, one.views):
-            yield Progress(what, begins + int((ends - begins) * share), TOTAL_WORK)
-        if one is session and _is_one_session(session, plain):
-            session.result.assumed_session, best = True, session
-        if one is own and own.left < MOST_LEFT * plain.left and (best is plain or own.left < best.left):
-            _name_differences(own, plain, is_of_load=session is None or session.is_of_load)
-            best = own
+    if may_differ(rig) and not _is_settled(plain):
+        best = yield from _best_of_other_searches(plain)
     best.result.stages = _stages(best.result, best.views)
     return best.result
+
+
+def _selected(search: _Search, begins: int, ends: int) -> Iterator[Progress]:
+    """Select the effects of a search, between two shares of the whole work."""
+    for what, share in _select_effects(search.result, search.views):
+        yield Progress(what, begins + int((ends - begins) * share), TOTAL_WORK)
+
+
+def _is_settled(plain: _Search) -> bool:
+    """Whether recordings that each begin with an untouched sensor leave nothing to say about differences between them."""
+    return plain.result.verdict == "no gap" or (
+        plain.result.verdict == "explained" and plain.left < SETTLED_SHARE * plain.left_of_base
+    )
+
+
+def _best_of_other_searches(plain: _Search) -> Generator[Progress, None, _Search]:
+    """Search with the recordings as one session, and with numbers of their own.
+
+    Returns
+    -------
+    _Search
+        The best of them, or the plain one.
+    """
+    own, session, best = _search_with_own_numbers(plain), _search_of_one_session(plain), plain
+    middle = (OTHER_SEARCHES_BEGIN + TOTAL_WORK) // 2
+    if session is not None and session.is_wanted:
+        yield from _selected(session, OTHER_SEARCHES_BEGIN, middle)
+        if _is_one_session(session, plain):
+            session.result.assumed_session, best = True, session
+            if session.left <= own.left_of_base:
+                return session
+    if own.is_wanted:
+        yield from _selected(own, middle, TOTAL_WORK)
+        if own.left < MOST_LEFT * plain.left and (best is plain or own.left < best.left):
+            _name_differences(own, plain, is_of_load=session is None or session.is_of_load)
+            best = own
+    return best
 
 
 @dataclass
