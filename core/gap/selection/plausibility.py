@@ -62,14 +62,16 @@ def _adhesion_pulls(found: FittedCandidate, view_set: ViewSet) -> bool:
 
 
 def _offset_is_present_unloaded(found: FittedCandidate, view_set: ViewSet) -> bool:
-    """Whether a fitted offset is measured without load, from the beginning of the trials on.
+    """Whether a fitted offset is measured without load, from the beginning of the trials on and in each of them.
 
-    What appears only under load, or with time (as the misfit of a drift's formula does), is something else.
+    What appears only under load, or with time (as the misfit of a drift's formula does), is something else. So is what appears
+    from recording to recording, as the drift of a session that differs from texel to texel does.
     """
     model = found.fit.model
     index = len(model.effects) - 1
     texels = len(view_set.whole[0].predictor.rig.texels)
     claimed = np.broadcast_to(np.asarray(model.effects[index].values["offset"], float), texels)
+    is_common = not found.candidate.has_texel_parameters
     always, first = np.zeros((2, texels)), np.zeros((2, texels))
     for view in view_set.whole:
         trial = view.predictor.trial
@@ -79,9 +81,11 @@ def _offset_is_present_unloaded(found: FittedCandidate, view_set: ViewSet) -> bo
         miss = np.where(rest, trial.reading - view.predictor.predict(model.without(index)).reading, 0.0)
         begins = trial.time <= trial.time[0] + BEGINNING_SHARE * np.ptp(trial.time)
         early = rest & (np.cumsum(rest, axis=0) <= ENOUGH_SAMPLES) & begins[:, None]
-        always += [miss.sum(axis=0), rest.sum(axis=0)]
+        total, count = miss.sum(axis=0), rest.sum(axis=0)
+        if not is_common and not _is_borne_out(claimed, total, count, is_common):
+            return False
+        always += [total, count]
         first += [np.where(early, miss, 0.0).sum(axis=0), early.sum(axis=0)]
-    is_common = not found.candidate.has_texel_parameters
     return all(_is_borne_out(claimed, total, count, is_common) for total, count in (always, first))
 
 

@@ -52,6 +52,14 @@ def test_an_offset_is_there_without_load_from_the_beginning(change, is_one):
     assert is_plausible(found, view_set) == is_one
 
 
+def test_an_offset_does_not_grow_from_recording_to_recording():
+    count = iter(range(6))
+    found, view_set = offset_each(
+        cases.rig(change=lambda reading, _time: reading + SPREAD * 0.4 * next(count), seed=4, trials=6)
+    )
+    assert not is_plausible(found, view_set)
+
+
 @pytest.mark.parametrize(("share_of_way", "is_one"), [(0.1, True), (2.0, False)])
 def test_a_softening_comes_to_its_end_within_its_session(share_of_way, is_one):
     """What still goes on when the session ends is wear."""
