@@ -15,7 +15,6 @@ from ...jobs.progress import Job, Progress
 from ..dataset.rig import Rig
 from ..fitting.least_squares import BASE, RECORDING
 from ..forward.predictor import Model
-from ..selection.between_recordings import LOAD_HISTORY
 from ..selection.check_recordings import CheckedRecording
 from ..selection.findings import Diagnosis, Finding
 from ..selection.gap_sizes import FORCES, READINGS
@@ -25,7 +24,7 @@ from .experiments import next_experiment
 from .html_report import html_report
 from .plots import FILE_TYPES, draw
 from .recording_differences import recording_differences
-from .sentences import by_share_closed, headline, warnings
+from .sentences import headline, warnings
 
 FORMAT = "palpate-gap/1"
 LEAST_BYTES = 10e6
@@ -77,8 +76,8 @@ def summary(result: Diagnosis, errors: GapErrors) -> dict[str, Any]:
 def _between(result: Diagnosis) -> dict[str, Any] | None:
     """How the recordings differ, by levels and gains of their own; None if they need none."""
     own = result.between
-    if result.assumed_session:
-        one = next(one for one in by_share_closed(result) if one.name in LOAD_HISTORY)
+    one = result.carried_over
+    if one is not None:
         return {"effect": one.name, "form": "one session in the order of the rig", "confidence": one.confidence}
     if own is None:
         return None

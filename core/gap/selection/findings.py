@@ -15,7 +15,7 @@ from ..fitting.noise_floor import ChannelNoise, Coverage
 from ..fitting.residual_tests import ResidualStructure
 from ..fitting.spectral_lines import SpectralLine
 from ..forward.predictor import Model, Predictor
-from .between_recordings import RecordingDifferences
+from .between_recordings import LOAD_HISTORY, RecordingDifferences
 from .candidates import Scales
 from .check_recordings import CheckedRecording, CheckOutcome
 
@@ -149,6 +149,11 @@ class Diagnosis:
     check: CheckOutcome = field(default_factory=CheckOutcome)
     closed: ClosedShares = field(default_factory=ClosedShares)
     unlike_fitted: list[CheckedRecording] = field(default_factory=list)
+
+    @property
+    def carried_over(self) -> Finding | None:
+        """What goes on from recording to recording in an assumed session; None without one."""
+        return next((one for one in self.findings if self.assumed_session and one.name in LOAD_HISTORY), None)
 
     @property
     def misleading_faults(self) -> list[DataFault]:
