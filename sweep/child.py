@@ -81,7 +81,7 @@ def compute_run(scenes: Scenes, run: Run) -> None:
         own: dict[str, Any] = {name[len(start) :]: value for name, value in values.items() if name.startswith(start)}
         made = replace(made, **own)
     metrics = metrics_of(scenario, recording, made)
-    write_run(scenes.folder, run, scenario, recording, metrics, time.perf_counter() - began)
+    write_run(scenes.folder, run, scenario, recording, metrics, time.perf_counter() - began, scenes.study.images)
 
 
 def answer_to(scenes: Scenes, run: Run) -> dict[str, Any]:

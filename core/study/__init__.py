@@ -12,6 +12,7 @@ __all__ = [
     "metrics",
     "presses",
     "run_files",
+    "run_images",
     "run_record",
     "scene_property",
     "study_file",

@@ -30,6 +30,7 @@ from ..io.sensor_npz import SENSOR_NAME, save_sensor
 from ..io.temporary_folder import remove_unfinished, temporary_folder
 from ..model.recording import Recording
 from ..model.scenario import Scenario
+from .run_images import write_run_images
 from .run_record import RUN_NAME, RunRecord, write_run_record
 from .study_file import Run
 
@@ -77,6 +78,7 @@ def write_run(
     recording: Recording,
     metrics: Mapping[str, float],
     seconds: float,
+    images: bool = False,
 ) -> None:
     """Write a run as a whole; a failure of it that was written earlier is removed.
 
@@ -91,6 +93,8 @@ def write_run(
     metrics : mapping of str to float
     seconds : float
         That computing took.
+    images : bool
+        Whether each frame of each sensor also gets a tactile image.
 
     Raises
     ------
@@ -112,7 +116,7 @@ def write_run(
         )
         try:
             place.mkdir()
-            _write_sensors(place, scenario, recording)
+            _write_sensors(place, scenario, recording, images)
             write_run_record(record)
             sync_folder(place)
             os.rename(place, runs / run.digest)
@@ -127,7 +131,7 @@ def write_run(
         (folder / FAILED / f"{run.digest}.txt").unlink(missing_ok=True)
 
 
-def _write_sensors(place: Path, scenario: Scenario, recording: Recording) -> None:
+def _write_sensors(place: Path, scenario: Scenario, recording: Recording, images: bool) -> None:
     """Write the files of each sensor and bring them onto the disk."""
     names = folder_names(recording.sensors)
     for sensor in scenario.sensors:
@@ -137,9 +141,11 @@ def _write_sensors(place: Path, scenario: Scenario, recording: Recording) -> Non
         own.mkdir()
         save_recording(own / RECORDING_NAME, replace(recording, sensors={sensor.name: recording.sensors[sensor.name]}), False)
         save_sensor(own / SENSOR_NAME, sensor.texels, sensor.painted, atomic=False)
-        files = {name: file_sha256(own / name) for name in (RECORDING_NAME, SENSOR_NAME)}
+        pictures = write_run_images(own, sensor, recording) if images else []
+        written = (RECORDING_NAME, SENSOR_NAME, *pictures[-1:])  # the last one lists the others
+        files = {name: file_sha256(own / name) for name in written}
         write_manifest(own, manifest_of(scenario, sensor, recording, files), atomic=False)
-        for name in (RECORDING_NAME, SENSOR_NAME, MANIFEST_NAME):
+        for name in (RECORDING_NAME, SENSOR_NAME, MANIFEST_NAME, *pictures):
             sync_file(own / name)
         sync_folder(own)
 

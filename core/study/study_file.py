@@ -70,6 +70,8 @@ _WORDS = (
 _DIRECTIONS = {"tilt_direction": "tilt", "slide_direction": "slide"}
 """Directions of a press, which are any as long as the study says nothing else, and what they direct."""
 LARGEST_LEVELS = 10_000
+SAME, FACTOR = "same", "factor"
+"""Words of a number that follows another one: both fingers of a gripper have one stiffness."""
 
 
 @dataclass(frozen=True)
@@ -122,6 +124,8 @@ class Plan:
         With the numbers that do not vary.
     meshes : mapping of str to TriangleMesh
         Shapes that targets may have, by the names of their files.
+    tied : mapping of str to (str, float or None)
+        Names whose value follows that of another name, and the factor of numbers.
     """
 
     scenario: Scenario
@@ -129,11 +133,17 @@ class Plan:
     fixed: Mapping[str, Value]
     press: Press | None
     meshes: Mapping[str, TriangleMesh] = field(default_factory=dict)
+    tied: Mapping[str, tuple[str, float | None]] = field(default_factory=dict)
+
+    def with_tied(self, values: Mapping[str, Value]) -> dict[str, Value]:
+        """Return the values of a run with those that follow others."""
+        known = {**self.fixed, **values}
+        return {**values, **{name: _times(known[other], factor) for name, (other, factor) in self.tied.items()}}
 
     @property
     def scene_properties(self) -> list[str]:
         """Paths of the properties of the scene that the study sets: where there are any, each run is read from the scene."""
-        return [name for name in (*self.varied, *self.fixed) if is_scene_property(name)]
+        return [name for name in (*self.varied, *self.fixed, *self.tied) if is_scene_property(name)]
 
 
 @dataclass(frozen=True)
@@ -237,7 +247,7 @@ def _design(table: Mapping[str, Any], name: str) -> Design:
 def _flattened(table: Mapping[str, Any], start: str = "") -> Iterable[tuple[str, Any]]:
     """Yield the entries of nested tables under their names with dots; a table with a distribution is an entry."""
     for key, value in table.items():
-        if isinstance(value, Mapping) and value and not set(value) & set(DISTRIBUTIONS):
+        if isinstance(value, Mapping) and value and not set(value) & {*DISTRIBUTIONS, SAME}:
             if "levels" in value:
                 raise ParameterError(f"{start}{key} has levels and no distribution: add one of {', '.join(DISTRIBUTIONS)}.")
             yield from _flattened(value, f"{start}{key}.")
@@ -279,19 +289,44 @@ def plan_for(
     known |= {name: item.variable() for name, item in (properties or {}).items()}
     varied: dict[str, Distribution] = {}
     fixed: dict[str, Value] = {}
+    tied: dict[str, tuple[str, float | None]] = {}
     for name, entry in entries.items():
         if is_scene_property(name) and name not in known:
             raise ParameterError(
                 f"'{name}' is a property of Blender, and '{scenario.name}' is no .blend: give the .blend itself."
             )
         found = variable(name, known, scenario)
-        if isinstance(entry, Mapping):
+        if isinstance(entry, Mapping) and SAME in entry:
+            tied[name] = _tie(found, entry, entries)
+        elif isinstance(entry, Mapping):
             varied[name] = _distribution(found, _with_files(found, entry, meshes))
         else:
             fixed[name] = found.read(entry)
     if not varied and study.design.kind == GRID:
         raise ParameterError("The study varies nothing: give [vary] or [press] at least one distribution.")
-    return Plan(scenario, varied, fixed, press, meshes)
+    plan = Plan(scenario, varied, fixed, press, meshes, tied)
+    for name, (other, factor) in tied.items():
+        ends = varied[other].words if other in varied and varied[other].kind != NORMAL else (fixed.get(other),)
+        for end in ends if ends != (None,) else ():
+            variable(name, known, scenario).read(_times(end, factor))  # refuses what some run could not have
+    return plan
+
+
+def _tie(found: Variable, entry: Mapping[str, Any], entries: Mapping[str, Any]) -> tuple[str, float | None]:
+    """Return the name that a number follows, and the factor."""
+    _known(entry, (SAME, FACTOR), found.name)
+    other, factor = entry[SAME], entry.get(FACTOR)
+    if other not in entries or isinstance(entries[other], Mapping) and SAME in entries[other]:
+        near = difflib.get_close_matches(str(other), list(entries), n=1)
+        advice = f"did you mean '{near[0]}'?" if near else "give that a distribution or a value of its own."
+        raise ParameterError(f"{found.name} follows '{other!s:.60}', which the study does not vary: {advice}")
+    if factor is not None and not (is_number(factor) and isinstance(found.specification, Parameter)):
+        raise ParameterError(f"factor of {found.name} is {factor!r:.60}: give a number, or leave it out.")
+    return other, None if factor is None else float(factor)
+
+
+def _times(value: Any, factor: float | None) -> Any:
+    return value if factor is None or not is_number(value) else value * factor
 
 
 def _with_files(found: Variable, entry: Mapping[str, Any], meshes: Mapping[str, TriangleMesh]) -> Mapping[str, Any]:
@@ -397,10 +432,13 @@ def runs_of(study: Study, plans: Mapping[str, Plan], digests: Mapping[str, str])
         same = {"scene": digests[scene], "fixed": dict(plan.fixed), "fps": plan.scenario.fps, "press": _words_of(plan.press)}
         if isinstance(plan.meshes, StudyMeshes) and plan.meshes:
             same["meshes"] = plan.meshes.digests
+        if plan.tied:
+            same["tied"] = dict(plan.tied)
         start = hashlib.sha256(json.dumps(same, sort_keys=True).encode())
         for values in points_of(study.design, plan.varied):
             own = start.copy()
             own.update(json.dumps([len(runs), values]).encode())
+            values = plan.with_tied(values)
             named = {SCENE: scene, **values} if len(plans) > 1 else values
             runs.append(Run(len(runs), scene, named, own.hexdigest()[:24]))
     return runs

@@ -93,3 +93,11 @@ def test_gap(play_road, real_blender, repository):
 def test_out_of_date(play_road):
     """Numbers that are no longer true are taken away or named so, at once."""
     assert play_road("out_of_date", timeout=900)["screenshots"] == ["solid.png", "out-of-date.png"]
+
+
+def test_study(play_road):
+    """A number is varied by right-click; the study is written, run beside the window, stopped by ESC, and goes on."""
+    result = play_road("study", timeout=1200)
+    assert 'scene = "scene.blend"' in result["values"]["file"]
+    assert '"Cube.k"' in result["values"]["file"]
+    assert result["screenshots"] == ["1-menu.png", "1-menu.png", "2-panel.png", "3-running.png", "4-done.png"]

@@ -88,3 +88,33 @@ def test_several_scenes_have_a_column():
     plans = {"one": plan(text), "two": plan(text)}
     runs = runs_of(study(text), plans, {"one": "a", "two": "b"})
     assert [run.values["scene"] for run in runs] == ["one"] * 4 + ["two"] * 4
+
+
+TIED = RANDOM + "[vary]\n'Pad.mus' = { uniform = [0.3, 0.9] }\n'Pad.mud' = { same = 'Pad.mus', factor = 0.5 }\n"
+
+
+def test_a_number_that_follows_another_has_its_values_and_adds_no_axis():
+    read = study(TIED)
+    found = plan(TIED)
+    runs = runs_of(read, {"tiny": found}, {"tiny": "0"})
+    assert list(found.varied) == ["Pad.mus"]
+    for run in runs:
+        assert run.values["Pad.mud"] == 0.5 * run.values["Pad.mus"]
+    other = runs_of(study(TIED.replace("0.5", "0.4")), {"tiny": plan(TIED.replace("0.5", "0.4"))}, {"tiny": "0"})
+    assert not {run.digest for run in runs} & {run.digest for run in other}
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("same = 'Pad.mus'", "same = 'Pad.mu'", "follows 'Pad.mu', which the study does not vary: did you mean 'Pad.mus'"),
+        ("factor = 0.5", "factor = 'half'", "factor of Pad.mud is 'half'"),
+        ("factor = 0.5", "factr = 0.5", "did you mean 'factor'"),
+        ("factor = 0.5", "factor = -1", "give it a value of zero or more"),
+        ("same = 'Pad.mus'", "same = 'Pad.mud'", "which the study does not vary"),
+    ],
+)
+def test_mistakes_in_what_follows_are_one_sentence(old, new, message):
+    with pytest.raises(PalpateError, match=message) as caught:
+        plan(TIED.replace(old, new))
+    assert "\n" not in str(caught.value)

@@ -15,9 +15,12 @@ import numpy as np
 import pytest
 from study_scenes import HEAD, tiny_scene
 
+from palpate.core.io.bake_folder import IMAGE_LIST_NAME, check_sha256, frame_file, read_manifest
 from palpate.core.io.bake_reader import read_bake
+from palpate.core.io.checksum_list import read_checksums
 from palpate.core.io.recording_npz import load_recording
 from palpate.core.io.scenario_npz import save_scenario
+from palpate.core.io.tactile_exr import read_exr
 from palpate.core.study.run_files import SCENES, done_runs, make_folders, write_failure
 from palpate.sweep.worker import compute_batch, end_children
 
@@ -209,3 +212,39 @@ def test_a_run_that_is_done_is_not_computed_again(by_hand):
     before = (by_hand / "runs" / words_of(0)["digest"] / "run.json").stat().st_mtime_ns
     assert compute_batch(str(by_hand), [words_of(0)])[0]["status"] == "done"
     assert (by_hand / "runs" / words_of(0)["digest"] / "run.json").stat().st_mtime_ns == before
+
+
+def test_parts_make_the_whole(undisturbed, tmp_path):
+    """As on a farm: the study is begun, its parts are computed by themselves, and a last command makes the dataset."""
+    study, out = write_study(tmp_path), tmp_path / "out"
+    refused = sweep(study, "--out", out, "--part", "1/2")
+    assert (refused.returncode, refused.stderr.count("\n")) == (1, 1)
+    assert "--begin" in refused.stderr
+    begun = sweep(study, "--out", out, "--begin")
+    assert (begun.returncode, begun.stderr) == (0, "")
+    assert not done_runs(out)
+    for part, count in (("2/2", 12), ("1/2", 24)):
+        finished = sweep(out, "--part", part, "--workers", 1)
+        assert (finished.returncode, finished.stderr) == (0, "")
+        assert len(done_runs(out)) == count
+    assert not (out / "dataset").exists()
+    finished = sweep(out)
+    assert (finished.returncode, finished.stderr) == (0, "")
+    assert contents(out) == contents(undisturbed)
+    assert (out / "dataset").is_dir()
+
+
+def test_runs_have_images_where_the_study_asks_for_them(by_hand):
+    text = (by_hand / "study.toml").read_text(encoding="utf-8")
+    (by_hand / "study.toml").write_text(text.replace("fps = 200", "fps = 200\nimages = true"), encoding="utf-8")
+    assert compute_batch(str(by_hand), [words_of(0)])[0]["status"] == "done"
+    folder = by_hand / "runs" / words_of(0)["digest"] / "Pad"
+    assert read_manifest(folder).has_images
+    for name, sha256 in read_checksums(folder / IMAGE_LIST_NAME):
+        check_sha256(folder / name, sha256)
+    recording = load_recording(folder / "recording.npz")
+    frame = int(recording.frames[len(recording.frames) // 2])
+    channels, _ = read_exr(folder / frame_file(frame))
+    total = recording.at(frame).sensors["Pad"].normal_force.sum()
+    assert channels["R"].sum() == pytest.approx(total, rel=1e-6) and total > 0.0  # images have 32 bits
+    assert len(list(folder.glob("*.exr"))) == len(recording.frames)

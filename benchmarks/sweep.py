@@ -1,0 +1,250 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Studies: what a core gives to runs beside the bare solver, the same presses with MuJoCo, and what a dataset costs.
+
+A share of 1 would mean that reading values, making scenarios, metrics and files cost nothing beside the solver. Both sides are
+measured in turn in one process: seconds of the processor tell what is computed, seconds of the clock also what waits for the
+disk. MuJoCo presses the same ball on as many texels by `mujoco.rollout`, which keeps its results in memory and writes no file;
+ours are written. Its static error is that of the benchmark `solver`, of a cube on the pad.
+"""
+
+from __future__ import annotations
+
+import statistics
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import trimesh
+from solver_scenes import shape
+
+from palpate.core.geometry.texels import texels_from_region
+from palpate.core.io.scenario_npz import save_scenario
+from palpate.core.jobs.job_runner import run_job
+from palpate.core.model.body import Body
+from palpate.core.model.motion import Motion
+from palpate.core.model.scenario import Scenario
+from palpate.core.model.sensor import Sensor
+from palpate.core.model.sensor_parameters import SensorParameters
+from palpate.core.model.target import Target
+from palpate.core.solver.simulation import Simulation, solve
+from palpate.core.study.design import points_of
+from palpate.core.study.run_files import SCENES, STUDY_NAME, make_folders
+from palpate.core.study.study_file import Run, plan_for, read_study
+from palpate.core.study.variation import varied_scenario
+from palpate.sweep.child import Scenes, compute_run
+from palpate.sweep.trial import count_of_cores
+
+from .solver import GRIDS, SLOPE, mujoco_weighing, pad, palpate_weighing
+from .solver import cube as weighed_cube
+
+TEXELS = 84
+RADIUS = 0.006
+"""Of the ball, m."""
+FPS = 100.0
+DEPTH = 1e-3
+"""Deepest press, m."""
+RUNS, ROUNDS = 40, 5
+SPEED = 0.1
+"""Of the approach, m/s: short runs are mostly contact then."""
+LENGTHS = {"50_ms": 0.02, "500_ms": 0.47}
+"""Rest after the press, s, by the length of a run."""
+DATASET_RUNS = 60
+STIFFNESS = 1000.0
+"""Of a texel, N/m."""
+STEP = 1e-3
+"""MuJoCo's usual step, s."""
+
+
+def scene() -> Scenario:
+    """Return a ball over a pad."""
+    sheet = pad(*GRIDS[TEXELS])
+    texels = texels_from_region(sheet, np.ones(len(sheet.vertices), bool))
+    return Scenario(
+        bodies=(Body("pad", Motion.at_rest()), Body("ball", Motion.at_rest((0.0, 0.0, 0.05)))),
+        sensors=(Sensor("pad", 0, texels, SensorParameters(k=STIFFNESS, cn=0.01 * STIFFNESS)),),
+        targets=(Target("ball", 1, shape(trimesh.creation.icosphere(3, RADIUS))),),
+        frame_start=1,
+        frame_end=2,
+        fps=FPS,
+        name="pad",
+    )
+
+
+def begun(folder: Path, hold: float, count: int) -> list[Run]:
+    """Make the folder of a study of presses and return its runs."""
+    make_folders(folder)
+    save_scenario(folder / SCENES / "pad.npz", scene())
+    (folder / STUDY_NAME).write_text(
+        f'format = "palpate-sweep/1"\nscene = "pad.npz"\ndesign = "random"\nsamples = {count}\nfps = {FPS}\n'
+        f"[press]\ndepth = {{ uniform = [{DEPTH / 2}, {DEPTH}] }}\nspeed = {SPEED}\nhold = {hold}\n",
+        encoding="utf-8",
+    )
+    study = read_study(folder / STUDY_NAME)
+    points = points_of(study.design, plan_for(study, scene()).varied)
+    return [Run(i, "pad", values, f"{i:024x}") for i, values in enumerate(points)]
+
+
+def in_turn(*works: Callable[[int], float]) -> list[tuple[float, float]]:
+    """Return the medians of the seconds of the processor and of the clock for each simulated second; works are done in turn.
+
+    A work gets the number of the round and returns how much it has simulated, s.
+    """
+    taken: list[list[tuple[float, float]]] = [[] for _ in works]
+    for number in range(ROUNDS):
+        for own, work in zip(taken, works, strict=True):
+            processor, clock = time.process_time(), time.perf_counter()
+            simulated = work(number)
+            own.append(((time.process_time() - processor) / simulated, (time.perf_counter() - clock) / simulated))
+    return [(statistics.median(p for p, _ in own), statistics.median(c for _, c in own)) for own in taken]
+
+
+def shares(name: str, hold: float) -> Iterator[dict]:
+    """Simulated seconds of runs per second and core, against those of the bare solver."""
+    with tempfile.TemporaryDirectory() as place:
+        folder = Path(place)
+        runs = begun(folder, hold, RUNS * ROUNDS)
+        scenes = Scenes(folder)
+        plan = scenes.plan("pad")
+        scenarios = [varied_scenario(plan.scenario, {**plan.fixed, **run.values}, plan.press) for run in runs]
+        lengths = [(one.frame_end - one.frame_start) / one.fps for one in scenarios]
+        compute_run(scenes, replace(runs[0], digest="f" * 24))  # loads what was compiled
+
+        def bare(number: int) -> float:
+            part = slice(number * RUNS, (number + 1) * RUNS)
+            for scenario in scenarios[part]:
+                run_job(solve(scenario, Simulation(scenario, threads=1)))
+            return sum(lengths[part])
+
+        def whole(number: int) -> float:
+            part = slice(number * RUNS, (number + 1) * RUNS)
+            for run in runs[part]:
+                compute_run(scenes, run)
+            return sum(lengths[part])
+
+        solver, sweep = in_turn(bare, whole)
+    for kind, theirs, ours in zip(("processor", "clock"), solver, sweep, strict=True):
+        yield {
+            "name": f"sweep.share.{name}.{kind}", "value": 1.0 / ours, "unit": "simulated s/s",
+            "peer": "the bare solver", "peer_value": 1.0 / theirs, "ratio": theirs / ours, "goal": 0.9,
+        }  # fmt: skip
+
+
+def mujoco_press(seconds: float):
+    """Return MuJoCo's model of the press: a ball on an actuator over the pad, and its controls, (1, steps, 1)."""
+    import mujoco
+
+    rows, columns = GRIDS[TEXELS]
+    pitch = 0.047 / (max(rows, columns) - 1)
+    half_x, half_y = (columns - 1) * pitch / 2, (rows - 1) * pitch / 2
+    model = mujoco.MjModel.from_xml_string(
+        f"""<mujoco><option timestep="{STEP}" gravity="0 0 0"/>
+        <asset><mesh name="pad" builtin="plate" params="{columns} {rows}" scale="{half_x} {half_y} 0.001"/>
+        <mesh name="ball" builtin="sphere" params="3" scale="{RADIUS} {RADIUS} {RADIUS}"/></asset>
+        <worldbody><body><geom name="pad" type="mesh" mesh="pad" quat="0 1 0 0" contype="0" conaffinity="0"/>
+        <geom type="box" size="{half_x} {half_y} 0.005" pos="0 0 -0.005"/></body>
+        <body pos="0 0 {RADIUS + 5e-4}"><joint name="down" type="slide" axis="0 0 -1" damping="5"/>
+        <geom type="sphere" size="{RADIUS}" mass="0.1"/>
+        <geom type="sdf" mesh="ball" contype="0" conaffinity="0" mass="0"/></body></worldbody>
+        <actuator><position joint="down" kp="2000"/></actuator>
+        <sensor><tactile geom="pad" mesh="pad"/></sensor></mujoco>"""
+    )
+    if model.nsensordata != 3 * TEXELS:
+        raise RuntimeError(f"MuJoCo has {model.nsensordata // 3} texels instead of {TEXELS}")
+    times = np.arange(1, round(seconds / STEP) + 1) * STEP
+    way = DEPTH + 5e-4
+    approach = way / SPEED
+    target = np.interp(times, [0.0, approach, seconds - approach, seconds], [0.0, way, way, 0.0])
+    return model, target.reshape(1, -1, 1)
+
+
+def against_mujoco() -> Iterator[dict]:
+    """Taxel-frames per second and core, by as many threads as there are cores; ours are runs of a study, with their files."""
+    import mujoco
+    import mujoco.rollout
+
+    cores, count = count_of_cores(), RUNS
+    with tempfile.TemporaryDirectory() as place:
+        folder = Path(place)
+        runs = begun(folder, LENGTHS["500_ms"], count * ROUNDS)
+        scenes = Scenes(folder)
+        plan = scenes.plan("pad")
+        compute_run(scenes, replace(runs[0], digest="f" * 24))
+        last = [varied_scenario(plan.scenario, {**plan.fixed, **run.values}, plan.press).frame_end for run in runs]
+        model, controls = mujoco_press((float(np.mean(last)) - 1) / FPS)
+        data = [mujoco.MjData(model) for _ in range(cores)]
+        state = np.zeros((1, mujoco.mj_stateSize(model, mujoco.mjtState.mjSTATE_FULLPHYSICS)))
+        mujoco.mj_getState(model, data[0], state[0], mujoco.mjtState.mjSTATE_FULLPHYSICS)
+        felt = 0.0
+
+        def ours(number: int) -> float:
+            for run in runs[number * count : (number + 1) * count]:
+                compute_run(scenes, run)
+            return float(sum(last[number * count : (number + 1) * count])) * TEXELS
+
+        def theirs(_number: int) -> float:
+            nonlocal felt
+            _, sensed = mujoco.rollout.rollout(model, data, np.tile(state, (count, 1)), np.tile(controls, (count, 1, 1)))
+            felt = max(felt, float(np.abs(sensed).max()))
+            return count * controls.shape[1] * STEP * FPS * TEXELS  # of its steps, those at frames
+
+        (own, _), (other, _) = in_turn(ours, theirs)  # seconds of the processor, of all threads
+    if felt <= 0.0:
+        raise RuntimeError("MuJoCo's ball does not touch its pad: this would not be the same work")
+    peer = f"mujoco-{mujoco.__version__} tactile by rollout, {cores} threads"
+    yield {
+        "name": f"sweep.taxel_frames.{TEXELS}", "value": 1.0 / own, "unit": "taxel-frames/(s·core)",
+        "peer": peer, "peer_value": 1.0 / other, "ratio": own / other, "goal": 0.5,
+    }  # fmt: skip
+    solid = weighed_cube(2)
+    error = max(palpate_weighing(TEXELS, solid, slope, STEP)[1] for slope in (0.0, SLOPE))
+    their_error = max(mujoco_weighing(TEXELS, solid, slope)[1] for slope in (0.0, SLOPE))
+    yield {"name": f"sweep.static_error.{TEXELS}", "value": error, "unit": "1", "peer": peer, "peer_value": their_error}
+
+
+def dataset_share() -> Iterator[dict]:
+    """What writing the dataset and the table costs of the whole time, and its size by that of the numbers, compressed."""
+    import io
+
+    from palpate.core.io.recording_npz import load_recording
+    from palpate.sweep.dataset import publish
+
+    with tempfile.TemporaryDirectory() as place:
+        folder = Path(place)
+        runs = begun(folder, 0.97, DATASET_RUNS)
+        scenes = Scenes(folder)
+        compute_run(scenes, replace(runs[0], index=DATASET_RUNS, digest="f" * 24))
+        start = time.process_time()
+        for run in runs:
+            compute_run(scenes, run)
+        computing = time.process_time() - start
+        start = time.process_time()
+        publish(folder, runs)
+        writing = time.process_time() - start
+        size = sum(file.stat().st_size for file in (folder / "dataset").rglob("*") if file.is_file())
+        raw = 0
+        for run in runs:
+            sensor = load_recording(folder / "runs" / run.digest / "pad" / "recording.npz").sensors["pad"]
+            with io.BytesIO() as packed:
+                np.savez_compressed(
+                    packed, *(np.asarray(getattr(sensor, key), np.float32) for key in ("normal_force", "shear"))
+                )
+                raw += len(packed.getvalue())
+    yield {
+        "name": "sweep.dataset.share", "value": writing / (writing + computing), "unit": "1",
+        "peer": "a tenth", "peer_value": 0.1, "ratio": writing / (writing + computing) / 0.1, "goal": 1.0,
+    }  # fmt: skip
+    yield {
+        "name": "sweep.dataset.size", "value": size / DATASET_RUNS, "unit": "bytes per run",
+        "peer": "normal force and shear in 32 bits, compressed", "peer_value": raw / DATASET_RUNS, "ratio": size / raw,
+    }  # fmt: skip
+
+
+def run() -> Iterator[dict]:
+    """Shares of short and of longer runs, the same presses with MuJoCo, and the dataset."""
+    for name, hold in LENGTHS.items():
+        yield from shares(name, hold)
+    yield from against_mujoco()
+    yield from dataset_share()
