@@ -118,7 +118,7 @@ def _unpack(now: Any, tree: Any, packed: Mapping[str, np.ndarray], where: str) -
 
 def _items(now: list[Any], content: Any, packed: Mapping[str, np.ndarray], where: str) -> list[Any]:
     """Return the items of a list, which are as many as those of a new simulation; sentences may have been added."""
-    if not now:
+    if all(isinstance(item, str) for item in now):
         if not (isinstance(content, list) and all(isinstance(item, str) for item in content)):
             raise ValueError(f"{where} has items that are no text")
         return list(content)

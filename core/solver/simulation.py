@@ -77,9 +77,9 @@ class Simulation:
         check_scenario(scenario)
         self.scenario = scenario
         self.frame = scenario.frame_start
-        self.warnings: list[str] = []
         chosen = plan(scenario)
         self.dt, self.substeps, self.step_reason = chosen.dt, chosen.substeps, chosen.reason
+        self.warnings = [chosen.warning] if chosen.warning else []
         self._motions = [body.motion for body in scenario.bodies]
         # Bodies that forces move are followed at their centre of mass, keyframed ones at their origin.
         self._center = np.array([body.center_of_mass if body.moved_by_forces else np.zeros(3) for body in scenario.bodies])
@@ -208,8 +208,10 @@ class Simulation:
         positions = np.ascontiguousarray(np.stack([position for position, _ in path], axis=1))
         for body in np.flatnonzero(self._model.bodies.kind == DRIVEN):
             positions[:, body] += rotation_matrices(quaternions[:, body]) @ self._center[body]
+        rests = (quaternions[1:] == quaternions[:-1]).all(axis=2)
         conjugate = quaternions[:-1] * np.array([1.0, -1.0, -1.0, -1.0])
         turns = rotation_vectors(quaternion_product(quaternions[1:], conjugate))
+        turns[rests] = 0.0  # and not rounding: bodies that animation moves bring energy (see :mod:`.passivity`)
         velocities = np.concatenate([np.diff(positions, axis=0), turns], axis=2) / self.dt
         return positions, quaternions, velocities
 

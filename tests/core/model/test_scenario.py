@@ -166,6 +166,16 @@ def test_advice_at_its_bounds_names_no_share_of_the_limit(mass, dt, which):
     )
 
 
+def test_steps_far_above_the_limit_are_warned_of_once_at_the_start():
+    scenario = cube_on_pad(mass=0.01, k=1e5, frames=4, dt=None)
+    limit = advise(scenario).limit
+    assert plan(scenario).warning == "" == plan(replace(scenario, dt=9.0 * limit, fps=1 / (9.0 * limit))).warning
+    long = replace(scenario, dt=20.0 * limit, fps=1 / (20.0 * limit))
+    (warning,) = (one for one in run(long).warnings if "stability" in one)
+    assert warning.startswith("Frame 1: steps of ") and "are 20 times the explicit stability limit" in warning
+    assert "of the contact of 'cube' with 'pad'," in warning and f"{advise(scenario).dt * 1e3:.3g} ms or less" in warning
+
+
 def test_the_advised_step_resolves_an_undamped_vibration_in_sixteen_steps():
     stiffness, mass = 300.0, 0.2
     period = 2 * np.pi * np.sqrt(mass / stiffness)

@@ -63,7 +63,16 @@ def plate_that_is_too_fast(frames=8):
     return pressed(box(0.05, 0.05, 0.002), path, dt=0.01)
 
 
-@pytest.mark.parametrize("make", [slipping_cube, grasp, with_effects, grasp_of_what_swells, plate_that_is_too_fast])
+def steps_that_are_too_long():
+    """There is a warning before the first frame."""
+    scenario = cube_on_pad(mass=1e-3, frames=12, dt=5e-3, k=1e5)
+    assert len(Simulation(scenario).warnings) == 1
+    return scenario
+
+
+@pytest.mark.parametrize(
+    "make", [steps_that_are_too_long, slipping_cube, grasp, with_effects, grasp_of_what_swells, plate_that_is_too_fast]
+)
 @pytest.mark.parametrize("at", [1, 6])
 def test_a_run_goes_on_where_it_was(make, at, tmp_path):
     scenario = make()

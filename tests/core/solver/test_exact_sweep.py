@@ -6,7 +6,11 @@ A thousand sets are in ``make bench ONLY=exactness``; here are those that are kn
 
 import numpy as np
 import pytest
-from oracles.sweep import thrown
+from oracles import balance
+from oracles.sweep import energies, random_case, thrown
+from solver_scenes import about
+
+from palpate.core.solver.simulation import Simulation
 
 UNDAMPED = (161, 359, 553, 557, 991)
 """Edges run over texels whose damping is less than 1 % of their stiffness: what only the tanks hold back."""
@@ -39,3 +43,15 @@ def test_bodies_that_turn_far_in_a_step_put_in_no_more_than_they_lose(seed):
     """The energy of a body's rotation depends on how it lies at the step's end, and the accounts of its contacts know it."""
     energies, words = thrown(seed)
     assert energies.growth <= 1e-9, words
+
+
+@pytest.mark.parametrize("degrees", [17.0, 71.0, 103.0])
+def test_a_pad_that_rests_askew_brings_no_energy(degrees):
+    """It has not moved: rounding of its rotation is no motion, and contacts give no more than was put into them."""
+    scenario, _, words = random_case(498)
+    turned = balance.turned_and_moved(scenario, about((3, -1, 2), degrees), np.zeros(3))
+    simulation = Simulation(turned)
+    _, _, velocities = simulation._prescribed_motion(simulation._step_times(1))
+    assert (velocities[:, 0] == 0.0).all()
+    scale = thrown(498, 0)[0].scale
+    assert energies(turned, 100, scale).growth <= 1e-9, words
