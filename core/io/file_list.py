@@ -151,22 +151,26 @@ class FileList:
         files = {name for listed in exchanged.values() for name in listed["files"]}
         present = {name for name in files if self._is_inside(new / name) and os.path.lexists(new / name)}
         gone = {name for name in files - present if not os.path.lexists(self._folder / name)}
+        place = self._folder
         try:
             for kind, listed in exchanged.items():
                 shared = {name for other, its in self._kinds.items() if other != kind for name in its["files"]}
                 for name, digest in listed["replaced"].items():
                     if name not in shared and (name in present or name not in files):
+                        place = self._folder / name
                         self._remove(name, digest)
             for name in sorted(present):
-                target = self._folder / name
-                target.parent.mkdir(exist_ok=True)
-                _move(new / name, target)
-            for parent in {self._folder.joinpath(name).parent for name in files}:
-                sync_folder(parent)
+                place = self._folder / name
+                place.parent.mkdir(exist_ok=True)
+                _move(new / name, place)
+            for place in {self._folder.joinpath(name).parent for name in files}:
+                sync_folder(place)
         except OSError as error:
+            waiting = sum(os.path.lexists(new / name) for name in files)
             raise FileError(
-                f"New files could not be put in their place in '{self._folder}' ({os_error_reason(error)}): check its "
-                "permissions, close programs that show one of them, and do this again; all wait there in a hidden folder."
+                f"'{place}' could not be replaced ({os_error_reason(error)}): close programs that show it, check the "
+                f"permissions of '{self._folder}', and do this again; {len(files) - waiting} of {len(files)} new files are in "
+                "their place, the others wait there in a hidden folder."
             ) from error
         for kind, listed in exchanged.items():
             self._kinds[kind] = listed | {"complete": gone.isdisjoint(listed["files"]), "replaced": {}, "new_in": ""}
