@@ -33,13 +33,13 @@ class UnbreakableFile:
 
     Attributes
     ----------
-    error : OSError or None
+    error : BaseException or None
         The first that occurred. What was written since is lost.
     """
 
     def __init__(self, file: io.BufferedRandom):
         self._file, self._at, self._size = file, 0, 0
-        self.error: OSError | None = None
+        self.error: BaseException | None = None
 
     def seek(self, offset: int, whence: int = 0) -> int:
         """Go to a place, and return it."""
@@ -86,7 +86,7 @@ class UnbreakableFile:
         if self.error is None:
             try:
                 do()
-            except OSError as error:
+            except BaseException as error:  # Ctrl-C, too: it goes on when the library has returned
                 self.error = error
 
 
