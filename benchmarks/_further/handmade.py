@@ -75,6 +75,12 @@ def _barometers(p, c, channel):
     return [np.ones_like(pressed), pressed, low_pass(c["time"], pressed, p[4])]
 
 
+def _barometer(p, c, channel):
+    """A power of the depth beyond an onset, and a part of it that settles."""
+    power = (np.maximum(c["depth"] - p[0] * 1e-3, 0.0) * 1e3) ** p[1]
+    return [np.ones_like(power), power, low_pass(c["time"], power, p[2])]
+
+
 def _joint(p, c, channel):
     """Coulomb, Stribeck and viscous friction, with a bias."""
     rate = np.gradient(c["slide_x"], c["time"])
@@ -109,6 +115,9 @@ HANDMADE: dict[str, HandmadeModel] = {
         "neo-Hooke, two Maxwell branches (5 numbers)",
     ),
     "velostat": HandmadeModel(_velostat, (0.7, 5.0), (0.1, 0.1), (4.0, 200.0), "power law, late part (5 numbers)"),
+    "barometer": HandmadeModel(
+        _barometer, (1.0, 2.0, 3.0), (-0.5, 0.5, 0.1), (2.5, 5.0, 60.0), "onset, power law, late part (6 numbers)"
+    ),
     "barometers": HandmadeModel(
         _barometers,
         (0.0, 0.0, 2.0, 1.5, 5.0),

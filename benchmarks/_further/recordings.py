@@ -70,26 +70,51 @@ def velostat(data: Path) -> Recording:
     return Recording("piezoresistive film", words, trials, 'factor = "free"')
 
 
+BAROMETER_TRIALS = (
+    ("zv1_zd6_t0_20230622_180037", "fit"),
+    ("zv05_zd5_t8_20230622_185843", "fit"),
+    ("zv1_zd5_t8_20230622_181736", "check"),
+    ("zv05_zd6_t8_20230622_185108", "check"),
+)
+"""Recordings of the barometers: speed and depth of the presses, and how long they were held."""
+
+
+def _barometer_table(data: Path, name: str, by: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Times (s), places along the tip (m), ways down (m) and pressures (kPa) over those at rest, of four barometers.
+
+    480 steps of the vertical axis are a millimetre, as are 1000 of the horizontal one.
+    """
+    table = np.genfromtxt(data / "Data_collection" / "tip1" / f"{name}.csv", delimiter=",", skip_header=1)
+    table = thinned(table[np.append(True, np.diff(table[:, 6]) > 0)], by)
+    return table[:, 6], table[:, 4] * 1e-6, table[:, 5] / 480.0e3, (table[:, :4] - np.median(table[:20, :4], axis=0)) * 1e-3
+
+
 def barometers(data: Path) -> Recording:
-    """Pressures (kPa) of four barometers. 480 steps of the vertical axis are a millimetre, as are 1000 of the horizontal one.
+    """Pressures (kPa) of four barometers under a cover that is pressed at twenty places.
 
     Neither the probe nor the height at which it touches is said: a ball of 4 mm is assumed, and contact at 3.4 mm.
     """
-    names = (("zv1_zd6_t0_20230622_180037", "fit"), ("zv05_zd5_t8_20230622_185843", "fit"))
-    names += (("zv1_zd5_t8_20230622_181736", "check"), ("zv05_zd6_t8_20230622_185108", "check"))
     trials: list[tuple[str, str, Columns]] = []
-    for name, use in names:
-        table = np.genfromtxt(data / "Data_collection" / "tip1" / f"{name}.csv", delimiter=",", skip_header=1)
-        table = thinned(table[np.append(True, np.diff(table[:, 6]) > 0)], 4)
-        x, z = table[:, 4] * 1e-6 - 0.00325, 0.004 + (3.4 - table[:, 5] / 480.0) * 1e-3
-        columns = {"time": table[:, 6], "x": x, "y": np.zeros_like(x), "z": z}
-        rest = np.median(table[:20, :4], axis=0)
-        pressure = (table[:, :4] - rest) * 1e-3
+    for name, use in BAROMETER_TRIALS:
+        time, along, down, pressure = _barometer_table(data, name, 6)
+        columns = {"time": time, "x": along - 0.00325, "y": np.zeros_like(along), "z": 0.0074 - down}
         trials.append((name[: name.index("_2023")], use, columns | {f"texel_{i}": p for i, p in enumerate(pressure.T)}))
     places = ", ".join(f"[{x}, 0.0]" for x in (-0.00975, -0.00325, 0.00325, 0.00975))
-    words = f'sensors = [{places}]\ncover = {{ size = [0.03, 0.012], depth = 0.004, pitch = 0.001 }}\nunit = "kPa"\n'
+    words = f'sensors = [{places}]\ncover = {{ size = [0.03, 0.012], depth = 0.004, pitch = 0.0015 }}\nunit = "kPa"\n'
     words += 'k = 500.0\ncontact_height = "free"\n[indenter]\nshape = { sphere = 0.004 }'
     return Recording("barometers under a cover", words, trials)
+
+
+def barometer(data: Path) -> Recording:
+    """Pressure (kPa) of the third barometer over the depth, in the presses next to it."""
+    trials: list[tuple[str, str, Columns]] = []
+    for name, use in BAROMETER_TRIALS:
+        time, along, down, pressure = _barometer_table(data, name, 2)
+        here = np.abs(along - 0.006) < 2e-4
+        columns = {"time": time[here] - time[here][0], "depth": np.maximum(down[here] - 0.0025, 0.0)}
+        trials.append((name[: name.index("_2023")], use, columns | {"texel_0": pressure[here, 2]}))
+    words = 'grid = { rows = 1, columns = 1, pitch = 0.0065 }\nunit = "kPa"\ncontact_height = "free"\nmax_penetration = 0.01'
+    return Recording("one barometer, at one place", words, trials)
 
 
 def joint(data: Path) -> Recording:
@@ -163,6 +188,7 @@ FURTHER: dict[str, Callable[[Path], Recording]] = {
     "polymer": polymer,
     "polymer-strip": polymer_strip,
     "velostat": velostat,
+    "barometer": barometer,
     "barometers": barometers,
     "joint": joint,
     "microfluidic": microfluidic,

@@ -69,5 +69,5 @@ SOURCES = {
         "sixteen electrodes in a hydrogel on four load cells, under sines and steps of force",
     ),
 }
-SOURCES["polymer-strip"] = SOURCES["polymer"]
+SOURCES |= {"polymer-strip": SOURCES["polymer"], "barometer": SOURCES["barometers"]}
 """By the name of the set."""
