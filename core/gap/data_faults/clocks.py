@@ -37,11 +37,12 @@ MOST_LEFT = 0.6
 """What lacks to a correlation of one must become less by this factor: in a recording that repeats itself, another period fits
 about as well."""
 LEAST_SIDE = 0.15
-"""Least share of the correlation on either side of a step."""
-LEAST_VARIATION = 0.2
-"""Least variance of the load's changes on either side of a step, as a share of their mean square. Where a load moves at one
-speed no shift can be seen, and the correlation is largest where a sensor that relaxes or goes slack answers most. Of a strip
-that is pulled and released at one speed, one side of each step has below 0.1."""
+"""Least share of the correlation, and of the load's way, on either side of a step."""
+LEAST_RETURN = 0.4
+"""Least way back of the load on either side of a step, as a share of its way there, or the reverse. Where no place has it,
+there is no line either. A sensor that answers late while it is loaded and early while it is unloaded has a dead zone or gets
+stiffer. One that relaxes or goes slack answers most where a load that moves at one speed cannot show a shift. A lost sample
+moves loading and unloading alike."""
 LONG_STEP = 0.6
 """Seconds from which on a step must make the response quieter where nothing touches."""
 QUIETER, UNLOADED = 0.5, 0.02
@@ -135,8 +136,11 @@ def course_of(stimulus: Stimulus) -> Course | None:
     best = int(np.argmax(total))
     unshifted = float(total[most])
     constant = Course(_peak(total, best, shifts), 0.0, 0.0, np.inf, float(total[best]), unshifted)
+    possible = _returns_on_both_sides(load)
+    if not possible.any():  # one press: its two flanks are no evidence of a course
+        return constant if constant.correlation >= LEAST_CORRELATION else None
     line = _best_line(table, shifts, middles, unshifted)
-    jump = _best_step(table, shifts, middles + time[0], unshifted, _varies_on_both_sides(load))
+    jump = _best_step(table, shifts, middles + time[0], unshifted, possible)
     chosen = replace(constant, line=line)
     least = max(LEAST_DRIFT, 4.0 * step)
     if _is_clearly_better(max(line.correlation, jump.correlation), constant.correlation):
@@ -245,19 +249,18 @@ def _best_line(table: np.ndarray, shifts: np.ndarray, middles: np.ndarray, unshi
     return Course(best[1] * step, best[2], 0.0, np.inf, best[0], unshifted)
 
 
-def _varies_on_both_sides(load: np.ndarray) -> np.ndarray:
-    """Whether the load changes its speed before and after the end of each window but the last, (windows - 1,) bool."""
+def _returns_on_both_sides(load: np.ndarray) -> np.ndarray:
+    """Whether the load both rises and falls before and after the end of each window but the last, (windows - 1,) bool."""
     edges = _window_edges(len(load))
-    count = np.diff(np.append(edges, len(load)))[:, None]
-    sums, squares = np.add.reduceat(load, edges), np.add.reduceat(load * load, edges)
+    ways = [np.add.reduceat(np.maximum(sign * load, 0.0).sum(axis=1), edges) for sign in (1.0, -1.0)]
 
-    def varies(backwards: bool) -> np.ndarray:
+    def returns(backwards: bool) -> np.ndarray:
         way = slice(None, None, -1) if backwards else slice(None)
-        n, first, second = (np.cumsum(values[way], axis=0)[way] for values in (count, sums, squares))
-        found: np.ndarray = (second - first**2 / n).sum(axis=1) >= LEAST_VARIATION * second.sum(axis=1)
-        return found
+        there, back = (np.cumsum(values[way])[way] for values in ways)
+        found: np.ndarray = np.minimum(there, back) >= LEAST_RETURN * np.maximum(there, back)
+        return found & (there + back >= LEAST_SIDE * float(ways[0].sum() + ways[1].sum()))
 
-    return varies(False)[:-1] & varies(True)[1:]
+    return returns(False)[:-1] & returns(True)[1:]
 
 
 def _best_step(table: np.ndarray, shifts: np.ndarray, middles: np.ndarray, unshifted: float, possible: np.ndarray) -> Course:

@@ -82,6 +82,19 @@ def test_a_strip_that_relaxes_and_goes_slack_has_lost_no_samples(tmp_path):
     assert not find_faults(rig, stimuli_of(rig))
 
 
+def test_a_press_that_is_felt_late_and_let_go_early_has_lost_no_samples(tmp_path):
+    """Below a threshold nothing is read: the response to one press begins later and ends earlier than the press."""
+    rng, trials = np.random.default_rng(6), []
+    for name, use, hold in (("short", "fit", 0.0), ("long", "fit", 6.0), ("other", "check", 3.0)):
+        time = np.arange(0.0, 14.0 + hold, 0.1)
+        depth = 0.003 * np.clip(np.minimum(time - 2.0, 12.0 + hold - time) / 5.0, 0.0, 1.0)
+        felt = 1e6 * np.maximum(depth - 0.001, 0.0) ** 2.0
+        trials.append((name, use, {"time": time, "depth": depth, "texel_0": felt + rng.normal(0.0, 0.01, len(time))}))
+    press = Recording("press", 'grid = { rows = 1, columns = 1, pitch = 0.01 }\nunit = "kPa"\nmax_penetration = 0.01', trials)
+    rig = read_rig(press.write(tmp_path))
+    assert not find_faults(rig, stimuli_of(rig))
+
+
 def test_only_what_is_asked_for_is_put_right(tmp_path):
     rig = read_rig(with_correction(made.draw("gel", "stuck-logger", 0, tmp_path).path, '["sign", "unit"]'))
     assert rig.correct == ("sign", "unit")
