@@ -5,8 +5,9 @@ from __future__ import annotations
 
 import argparse
 import importlib.util
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from ..core.errors import PalpateError
 from . import blender, console
@@ -25,7 +26,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("study", metavar="STUDY.toml|DIR", help="file of a study, or the folder of one that goes on")
     parser.add_argument("--out", metavar="DIR", help="output folder (default: beside the study, with its name)")
     parser.add_argument("--workers", metavar="N", type=_count, help="processes on this machine (default: one per core)")
+    where = parser.add_mutually_exclusive_group()
+    where.add_argument("--slurm", metavar="JOBS", type=_count, help="compute in so many jobs of SLURM, by dask-jobqueue")
     parser.add_argument(
+        "--slurm-option",
+        metavar="NAME=VALUE",
+        action="append",
+        default=[],
+        help="of each job: queue, account, cores, memory, walltime and others; --dry-run prints the job's script",
+    )
+    where.add_argument(
         "--scheduler", metavar="ADDRESS", help="use a running Dask scheduler, as tcp://HOST:8786; all machines need the folder"
     )
     parser.add_argument(
@@ -139,10 +149,22 @@ def _workers(arguments: argparse.Namespace) -> int:
     return arguments.workers or count_of_cores()
 
 
+def _slurm(arguments: argparse.Namespace) -> Callable[[], Any] | None:
+    """Return what asks SLURM for the workers; None without --slurm."""
+    from ..sweep import slurm
+
+    options = slurm.options_of(arguments.slurm_option)
+    return None if arguments.slurm is None else lambda: slurm.slurm_cluster(options, arguments.slurm)
+
+
 def _estimate(opened: OpenStudy, arguments: argparse.Namespace) -> int:
     from ..sweep.trial import try_runs
 
     print(_kind_of_runs(opened))
+    if arguments.slurm:
+        from ..sweep import slurm
+
+        print(slurm.job_script(slurm.options_of(arguments.slurm_option)))
     found = try_runs(opened.folder, opened.runs, opened.study.run_limit, arguments.scripts)
     workers = _workers(arguments)
     seconds = found.seconds * len(opened.runs) / workers
@@ -190,7 +212,8 @@ def _compute(opened: OpenStudy, arguments: argparse.Namespace) -> int:
                     bar.set_postfix(failed=tally.failed, refresh=False)
                 bar.update(len(runs) - len(left) + tally.finished - bar.n)
 
-            with driver.dask_client(arguments.scheduler, min(_workers(arguments), len(left))) as client:
+            workers = min(_workers(arguments), len(left))
+            with driver.dask_client(arguments.scheduler, workers, _slurm(arguments)) as client:
                 tally = driver.run_study(client, opened.folder, left, opened.study.run_limit, show, arguments.scripts)
         for index, sentence in tally.failures[:MOST_FAILURES_NAMED]:
             print(f"run {index} failed: {sentence}")

@@ -62,7 +62,7 @@ def require_dask() -> None:
 
 
 @contextmanager
-def dask_client(scheduler: str | None, workers: int) -> Iterator[Any]:
+def dask_client(scheduler: str | None, workers: int, make_cluster: Callable[[], Any] | None = None) -> Iterator[Any]:
     """Connect to a scheduler, or start workers on this machine, and yield the client.
 
     Parameters
@@ -71,6 +71,8 @@ def dask_client(scheduler: str | None, workers: int) -> Iterator[Any]:
         Address, as in tcp://127.0.0.1:8786. None: a cluster of this machine's own.
     workers : int
         Of the local cluster, one thread each.
+    make_cluster : callable, optional
+        Returns another cluster than that of this machine, as :func:`.slurm.slurm_cluster` does.
 
     Raises
     ------
@@ -81,7 +83,8 @@ def dask_client(scheduler: str | None, workers: int) -> Iterator[Any]:
     import dask
     from distributed import Client, LocalCluster
 
-    for name in ("distributed", "asyncio", "tornado"):
+    own = [name for name in logging.root.manager.loggerDict if name.startswith("distributed.")]  # some have levels of their own
+    for name in ("distributed", "asyncio", "tornado", *own):
         logging.getLogger(name).setLevel(logging.CRITICAL)
     settings = {"distributed.scheduler.allowed-failures": MOST_LOSSES, "distributed.logging.distributed": "critical"}
     with dask.config.set(settings), tempfile.TemporaryDirectory(prefix="palpate-dask-") as scratch:
@@ -93,6 +96,11 @@ def dask_client(scheduler: str | None, workers: int) -> Iterator[Any]:
                     f"No scheduler answers at '{scheduler}' ({error}): start 'dask scheduler' there, or leave --scheduler out."
                 ) from error
             with _closing(client):
+                yield client
+            return
+        if make_cluster is not None:
+            cluster = make_cluster()
+            with _closing(cluster, timeout=30), _closing(Client(cluster)) as client:
                 yield client
             return
         cluster = LocalCluster(
@@ -163,20 +171,33 @@ class _Dispatch:
         self.tally = Tally()
 
     def run(self, on_progress: Callable[[Tally], object]) -> Tally:
-        from distributed import wait
+        from concurrent.futures import CancelledError
+
+        from distributed.comm import CommClosedError
 
         try:
-            while self.next < len(self.runs) or self.waiting:
-                self._submit()
-                on_progress(self.tally)
-                with suppress(TimeoutError):
-                    for future in wait(list(self.waiting), timeout=LOOK, return_when="FIRST_COMPLETED").done:
-                        self._take(future)
-            on_progress(self.tally)
+            self._until_done(on_progress)
             return self.tally
+        except (CommClosedError, CancelledError, RuntimeError) as error:
+            if isinstance(error, RuntimeError) and self.client.status == "running":  # a fault, not a lost connection
+                raise
+            raise _scheduler_gone() from error
         finally:
             with suppress(Exception):  # the scheduler may be gone
                 self.client.cancel(list(self.waiting), force=True)
+
+    def _until_done(self, on_progress: Callable[[Tally], object]) -> None:
+        from distributed import wait
+
+        while self.next < len(self.runs) or self.waiting:
+            if self.client.status != "running":
+                raise _scheduler_gone()
+            self._submit()
+            on_progress(self.tally)
+            with suppress(TimeoutError):
+                for future in wait(list(self.waiting), timeout=LOOK, return_when="FIRST_COMPLETED").done:
+                    self._take(future)
+        on_progress(self.tally)
 
     def _submit(self) -> None:
         workers = max(1, len(self.client.scheduler_info(n_workers=-1)["workers"]))
@@ -220,3 +241,10 @@ class _Dispatch:
         spent = sum(answer["seconds"] for answer in answers)
         if spent > 0.0:
             self.batch = max(1, round(BATCH_SECONDS * len(answers) / spent))
+
+
+def _scheduler_gone() -> PalpateError:
+    return PalpateError(
+        "The connection to the Dask scheduler is lost: start it again if it has ended, and give the same command again; what "
+        "is done is kept."
+    )

@@ -11,7 +11,7 @@ import threading
 import numpy as np
 import pytest
 
-from palpate.attack import commands, faults, kills, numbers, power_cut, readers, trees, unfinished_bakes
+from palpate.attack import commands, faults, kills, numbers, power_cut, readers, sweep, trees, unfinished_bakes
 from palpate.attack.__main__ import AREAS, attack, main
 from palpate.attack.area import CLEAR, LOST, TRACEBACK, WRONG, Area, Case, Outcome, Tally
 from palpate.attack.injector import DONE, KILL, Injector, Stopped
@@ -59,6 +59,12 @@ def test_readers(tmp_path):
 def test_commands(tmp_path):
     area = commands.Commands(SEED, 20, scratch(tmp_path), disks=False, scenes=4)
     assert found_by(area, tmp_path) == (20, [])
+
+
+def test_sweep(tmp_path):
+    """Faults alone; kills start Dask several times and are left to `make attack`."""
+    area = sweep.Sweep(SEED, 12, scratch(tmp_path), disks=False, with_kills=False)
+    assert found_by(area, tmp_path) == (12, [])
 
 
 def test_numbers(tmp_path):
