@@ -1,0 +1,53 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The sample studies, each with a few runs instead of hundreds."""
+
+import json
+
+import pytest
+from solver_scenes import GRAVITY
+
+from palpate.sweep.scene_evaluation import read_blend
+from palpate.sweep.study_folder import begin_study
+from palpate.sweep.worker import compute_batch, end_children
+
+
+@pytest.fixture(autouse=True)
+def _no_children_left():
+    yield
+    end_children()
+
+
+def finished(folder, tmp_path, name: str, order, count: int) -> list[dict]:
+    """Compute the first and the last runs of a sample study by an order of their values, and return what they say."""
+    file = folder / f"{name}.toml"
+    opened = begin_study(file, tmp_path / name, lambda blend, target: read_blend(blend, target, "refuse", "--study", str(file)))
+    ordered = sorted(opened.runs, key=lambda run: order(run.values))
+    chosen = [*ordered[:count], *ordered[-count:]]
+    words = [{"index": r.index, "scene": r.scene, "values": dict(r.values), "digest": r.digest} for r in chosen]
+    assert [answer["status"] for answer in compute_batch(str(opened.folder), words)] == ["done"] * 2 * count
+    return [json.loads((opened.folder / "runs" / run.digest / "run.json").read_bytes()) for run in chosen]
+
+
+def test_a_grasp_holds_where_friction_can_bear_the_weight(repository, tmp_path):
+    """The fingers bear the weight by friction: it slides where their friction is less, and is held where it is more."""
+
+    def reserve_of(values):
+        return values["Left finger.mus"] * values["Left finger.k"] / values["Cylinder.mass"]
+
+    runs = finished(repository / "docs" / "sample-study", tmp_path, "grasp", reserve_of, 2)
+    seen = set()
+    for run in runs:
+        values, metrics = run["values"], run["metrics"]
+        assert values["Right finger.k"] == values["Left finger.k"]
+        assert values["Right finger.mud"] == pytest.approx(0.8 * values["Left finger.mus"])
+        grip = sum(metrics[f"{side} finger.max_normal_force"] for side in ("Left", "Right"))
+        reserve = values["Left finger.mus"] * grip / (values["Cylinder.mass"] * GRAVITY)
+        if reserve > 2.0:  # the lift accelerates, and the grip is not always at its largest
+            assert metrics["Cylinder.held"] == 1.0, run
+            assert metrics["Cylinder.fall"] < -0.03, run  # it is lifted by 32 mm and creeps a little
+            seen.add("held")
+        elif reserve < 0.8:
+            assert metrics["Cylinder.held"] == 0.0, run
+            assert abs(metrics["Cylinder.fall"]) < 0.005, run  # it stays on the soft table
+            seen.add("lost")
+    assert seen == {"held", "lost"}
