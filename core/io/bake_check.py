@@ -209,10 +209,15 @@ def _by(shape: tuple[int, ...]) -> str:
     return " × ".join(str(side) for side in shape)
 
 
+def _in_words(value: object) -> str:
+    """Return a value as one line, whatever a file has in its place."""
+    return f"an array of {_by(value.shape)}" if isinstance(value, np.ndarray) and value.ndim else f"{value!r:.40}"
+
+
 def _check_sides(*sides: object) -> None:
     for side in sides:
         whole = isinstance(side, int | np.integer) and not isinstance(side, bool)
-        _require(whole and 0 < side <= MOST_PIXELS, f"a side of its images is {side!r:.40}")  # type: ignore[operator]
+        _require(whole and 0 < side <= MOST_PIXELS, f"a side of its images is {_in_words(side)}")  # type: ignore[operator]
 
 
 def _check_corners(triangles: object, count: int) -> None:
@@ -242,9 +247,9 @@ def _check_texture_map(layout: UVLayout, count: int) -> None:
     for name in ("cell", "margin"):
         value = getattr(layout, name)
         whole = isinstance(value, int) and not isinstance(value, bool)
-        _require(whole and 0 <= value <= max(layout.shape), f"'layout/{name}' is {value!r:.40}")
-    _require(isinstance(layout.nearest, bool), f"'layout/nearest' is {layout.nearest!r:.40}")
-    _require(isinstance(layout.map_name, str), f"'layout/map_name' is {layout.map_name!r:.40}")
+        _require(whole and 0 <= value <= max(layout.shape), f"'layout/{name}' is {_in_words(value)}")
+    _require(isinstance(layout.nearest, bool), f"'layout/nearest' is {_in_words(layout.nearest)}")
+    _require(isinstance(layout.map_name, str), f"'layout/map_name' is {_in_words(layout.map_name)}")
 
 
 # --- the recording
