@@ -43,13 +43,17 @@ class Counts:
     untyped_modules: list[str] = field(default_factory=list)
 
 
+BESIDE_PACKAGES = {"__init__.py", "errors.py", "version.py"}
+"""Files that no package is needed for."""
+
+
 def count(root: Path = ROOT) -> Counts:
     """Count everything in the checkout at `root`."""
     graph = Graph.read(root)
     counts = Counts()
     for package in ("core", "addon"):
-        files = sorted(f.name for f in (root / package).glob("*.py") if f.name not in ("__init__.py", "errors.py"))
-        counts.files_beside_packages[package] = files
+        files = {f.name for f in (root / package).glob("*.py")}
+        counts.files_beside_packages[package] = sorted(files - BESIDE_PACKAGES)
     counts.layers = {package: graph.depth(package) for package in graph.packages}
     counts.circles = [" ↔ ".join(group) for group in graph.file_circles()]
     for file, source in graph.sources.items():
