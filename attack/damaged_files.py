@@ -37,7 +37,7 @@ from palpate.core.io.sensor_npz import load_sensor
 from palpate.core.io.sensor_toml import FORMAT, read_sensor
 from palpate.core.model.sensor_parameters import Painted, SensorParameters
 
-from . import unfinished_bakes
+from . import random_rigs, unfinished_bakes
 from .area import CLEAR, TRACEBACK, WRONG
 from .sample_bake import grid_texels, recording_of, round_texels, write_sensor
 
@@ -432,6 +432,7 @@ def readers() -> dict[str, Reader]:
     found = [
         Reader("sensor.toml", _file("sensor.toml", sensors), lambda folder: read_sensor(folder / "sensor.toml")),
         Reader("rig", _rigs(), lambda folder: read_rig(folder / "rig.toml")),
+        Reader("rig of any words", st.integers(0, 2**32).map(random_rigs.random_rig), random_rigs.read_and_fit),
         Reader("mesh", _meshes(), lambda folder: read_rig(folder / "rig.toml")),
         Reader("recorded table", _file("table.csv", damaged_table(TABLE, ",")), _read_table),
         Reader("typed table", _file("foam.csv", damaged_table(FOAM, ";")), _read_typed),

@@ -81,6 +81,9 @@ def read_cover(sensor: Mapping[str, Any], path: Path) -> tuple[Texels, Cover]:
     surface = _surface(size, _pitch(words, size, narrowest / POINTS_PER_STRIP, where), where)
     covered = np.array([_covered(strip, surface) for strip in strips]) * surface.area
     areas = covered.sum(axis=1)
+    (missed,) = np.nonzero(areas <= 0.0)
+    if len(missed):
+        raise FileError(f"Strip {missed[0]} of '{path.name}' lies between the points of the {where}: give it a smaller pitch.")
     centres = covered @ surface.position[:, :2] / areas[:, None]
     if depth:
         spread = _cut(_load_at_depth(surface.position[:, :2], surface, depth))

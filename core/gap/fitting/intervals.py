@@ -60,6 +60,8 @@ def parameter_intervals(found: Fit) -> list[ParameterInterval]:
         With normal equations.
     """
     common = [item for item in found.free if not item.per_texel]
+    if not common:
+        return []
     kinds = _covariances(found)
     made = []
     for i, item in enumerate(common):

@@ -436,7 +436,7 @@ def derivatives(
 def _equations_of(view: TrialView, free: tuple[FreeParameter, ...], table: np.ndarray, residual: np.ndarray) -> NormalEquations:
     own_each = np.array([item.per_texel for item in free], bool)
     common, local = (table[~own_each], table[own_each]) if own_each.any() else (table, table[:0])
-    flat = common.reshape(len(common), -1)
+    flat = common.reshape(len(common), residual.size)  # there may be none, where all of the base model is known
     n, texels, width = len(view.predictor.rig.texels), view.texels, len(view.texels)
     m = len(local)
     b, c, h = np.zeros((n, m, len(common))), np.zeros((n, m, m)), np.zeros((n, m))
