@@ -119,12 +119,13 @@ def _recording(rng: np.random.Generator, kind: str, texels: int) -> bytes:
     return ("\n".join([",".join(columns), *rows]) + "\n").encode()
 
 
-def read_and_diagnose(folder: Path) -> None:
-    """Read a rig and say what its model misses; AssertionError if the answer is not finite."""
+def read_and_diagnose(folder: Path) -> str:
+    """Read a rig and return the verdict on it; AssertionError if the answer is not finite."""
     found = run_job(diagnose(read_rig(folder / "rig.toml")))
     assert found.verdict in ("explained", "no gap", "unexplained")
     assert np.isfinite(found.base.sse).all() and np.isfinite(found.best.sse).all(), "errors that are not numbers"
     assert all(np.isfinite(value) for value in found.best.model.recordings.values()), "numbers of recordings"
+    return found.verdict
 
 
 def read_and_fit(folder: Path) -> None:
