@@ -99,7 +99,8 @@ def results(folder: Path) -> dict[str, str]:
     for name, digest in tree(folder).items():
         if name in ("timings.csv", "report.html") or name.startswith(".palpate/") or name == ".palpate":
             continue
-        if name.startswith(f"{RUNS}/") and name.endswith("run.json"):
+        is_whole = not any(part.startswith(".") for part in name.split("/"))  # a kill leaves halves in hidden folders
+        if is_whole and name.startswith(f"{RUNS}/") and name.endswith("run.json"):
             words = json.loads((folder / name).read_bytes())
             words.pop("seconds")
             digest = hashlib.sha256(json.dumps(words, sort_keys=True).encode()).hexdigest()
