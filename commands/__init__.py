@@ -70,12 +70,13 @@ def main(argv: Sequence[str] | None = None) -> int:
     int
         The exit status.
     """
-    prefix = "palpate:"
+    prefix, stopped = "palpate:", "stopped; an earlier bake is still as it was."
     try:
         with console.Interrupt.noted():
             try:
                 arguments = _parse(argv)
                 prefix = f"palpate {arguments.command}:"
+                stopped = getattr(arguments, "stopped", stopped)
                 console.Interrupt.check()
                 with limits.kept(arguments) if arguments.command in limits.COMMANDS else nullcontext():
                     status = arguments.run(arguments)
@@ -85,7 +86,7 @@ def main(argv: Sequence[str] | None = None) -> int:
                 sys.stdout.flush()
             return status
     except KeyboardInterrupt:
-        return _say(prefix, "stopped; an earlier bake is still as it was.", STOPPED)
+        return _say(prefix, stopped, STOPPED)
     except Cancelled as stop:
         return _say(prefix, stop, STOPPED)
     except PalpateError as error:

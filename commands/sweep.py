@@ -23,6 +23,7 @@ MOST_NAMED = 3
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.set_defaults(stopped="stopped; the same command goes on where it was.")
     parser.add_argument("study", metavar="STUDY.toml|DIR", help="file of a study, or the folder of one that goes on")
     parser.add_argument("--out", metavar="DIR", help="output folder (default: beside the study, with its name)")
     parser.add_argument("--workers", metavar="N", type=_count, help="processes on this machine (default: one per core)")

@@ -7,19 +7,7 @@ What reads and writes studies is imported when it is needed: it loads scipy and 
 import bpy
 from bpy.props import IntProperty, StringProperty
 
-from ..addon.session import session_state
 from . import modal_job, support
-
-
-def _poll_study(cls, context) -> bool:
-    """Poll: there is a scene, and no study runs."""
-    if context.scene is None:
-        cls.poll_message_set("There is no scene")
-        return False
-    if session_state.session.study_progress is not None:
-        cls.poll_message_set("A study is running: wait for it, or press ESC to stop it")
-        return False
-    return True
 
 
 class PALPATE_OT_study_vary(support.ErrorReporting, bpy.types.Operator):
@@ -35,7 +23,7 @@ class PALPATE_OT_study_vary(support.ErrorReporting, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        return _poll_study(cls, context)
+        return support.poll_study(cls, context)
 
     def invoke(self, context, _event):
         if self.path:
@@ -60,7 +48,7 @@ class PALPATE_OT_study_remove(support.ErrorReporting, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        if not _poll_study(cls, context):
+        if not support.poll_study(cls, context):
             return False
         if not context.scene.palpate.study.variables:
             cls.poll_message_set("Nothing varies yet: right-click on a number and choose Vary in Study")
@@ -80,7 +68,7 @@ class PALPATE_OT_study_write(support.ErrorReporting, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        return _poll_study(cls, context)
+        return support.poll_study(cls, context)
 
     def run(self, context):
         from ..addon.study import study_settings
@@ -99,7 +87,7 @@ class PALPATE_OT_study_run(modal_job.ModalJob, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        return _poll_study(cls, context)
+        return support.poll_study(cls, context)
 
     def job(self, context):
         from ..addon.study import study_process, study_settings
@@ -126,7 +114,10 @@ class PALPATE_OT_study_report(support.ErrorReporting, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        return context.scene is not None
+        if context.scene is None:
+            cls.poll_message_set("There is no scene")
+            return False
+        return True
 
     def run(self, context):
         from ..addon.study import study_process, study_settings

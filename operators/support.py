@@ -107,3 +107,14 @@ def poll_gap_found(cls, context) -> bool:
         cls.poll_message_set("Nothing was found yet: use Find Gap first")
         return False
     return True
+
+
+def poll_study(cls, context) -> bool:
+    """Poll: there is a scene, and no study runs."""
+    if context.scene is None:
+        cls.poll_message_set("There is no scene")
+        return False
+    if session_state.session.study_progress is not None:
+        cls.poll_message_set("A study is running: wait for it, or press ESC to stop it")
+        return False
+    return True

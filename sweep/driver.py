@@ -14,6 +14,7 @@ from typing import Any
 
 from ..core.errors import FileError, PalpateError
 from ..core.study.study_file import Run
+from . import local_worker
 from .child import DONE, FAILED, UNWRITABLE
 from .scene_evaluation import REFUSE
 from .worker import compute_batch
@@ -107,10 +108,11 @@ def dask_client(scheduler: str | None, workers: int, make_cluster: Callable[[], 
             n_workers=workers,
             threads_per_worker=1,
             processes=True,
-            dashboard_address=None,
+            dashboard_address="127.0.0.1:0",  # any free port: two studies on one machine would both take 8787
             memory_limit=0,  # the runs are computed in processes of their own
             local_directory=scratch,
             silence_logs=logging.CRITICAL,
+            preload=[local_worker.__name__],
         )
         with _closing(cluster, timeout=10), _closing(Client(cluster)) as client:
             yield client

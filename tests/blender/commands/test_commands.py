@@ -374,7 +374,7 @@ def test_peak_shear_adds_forces_and_not_numbers_of_different_axes():
     recording = SimpleNamespace(frames=[1], times=[0.0], dt=1e-3, warnings=(), sensors={"Tip": readings})
     recording.blocks = lambda: [recording]
     scenario = SimpleNamespace(sensors=[SimpleNamespace(name="Tip", texels=texels)])
-    row = report(SimpleNamespace(recording=recording, scenario=scenario, folders={"Tip": None})).splitlines()[-1]
+    row = report(SimpleNamespace(recording=recording, scenario=scenario, folders={"Tip": None}, notes=())).splitlines()[-1]
     assert row.split() == ["Tip", "2", "1.0000", "N", "2.0000", "N", "0.0000", "N", "2.0000", "N"]
 
 

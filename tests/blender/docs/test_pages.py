@@ -172,6 +172,10 @@ def test_python_blocks_run(block, bake_folder, monkeypatch, capsys):
     assert set(names) - given - {"__builtins__"}
 
 
+STIMULUS = ("time", "x", "y", "z")
+"""Columns before those of the texels."""
+
+
 def toml_blocks() -> list:
     return [
         pytest.param(block, id=f"{page.stem}-{number}")
@@ -184,8 +188,14 @@ def toml_blocks() -> list:
 def test_toml_blocks_are_read(block, bake_folder):
     table = tomllib.loads(block)
     if table.get("format") == "palpate-rig/1":
+        lines = (bake_folder / "press_0.csv").read_text(encoding="utf-8").splitlines()
+        grid = table["sensor"].get("grid")
+        count = len(STIMULUS) + (grid["rows"] * grid["columns"] if grid else 84)
+        header, *rows = (",".join(line.split(",")[:count]) + "\n" for line in lines)
+        for own, other in table.get("columns", {}).items():  # the logger of this page has names of its own
+            header = re.sub(rf"\b{own}\b", other if isinstance(other, str) else other["name"], header)
         for trial in table["trial"]:
-            shutil.copy(bake_folder / "press_0.csv", bake_folder / trial["file"])
+            (bake_folder / trial["file"]).write_text("".join([header, *rows]), encoding="utf-8")
         (bake_folder / "page.toml").write_text(block, encoding="utf-8")
         assert read_rig(bake_folder / "page.toml").trials
     else:
