@@ -114,10 +114,7 @@ class PALPATE_OT_study_report(support.ErrorReporting, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        if context.scene is None:
-            cls.poll_message_set("There is no scene")
-            return False
-        return True
+        return support.poll_scene(cls, context)
 
     def run(self, context):
         from ..addon.study import study_process, study_settings

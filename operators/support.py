@@ -109,12 +109,17 @@ def poll_gap_found(cls, context) -> bool:
     return True
 
 
-def poll_study(cls, context) -> bool:
-    """Poll: there is a scene, and no study runs."""
+def poll_scene(cls, context) -> bool:
+    """Poll: there is a scene."""
     if context.scene is None:
         cls.poll_message_set("There is no scene")
         return False
+    return True
+
+
+def poll_study(cls, context) -> bool:
+    """Poll: there is a scene, and no study runs."""
     if session_state.session.study_progress is not None:
         cls.poll_message_set("A study is running: wait for it, or press ESC to stop it")
         return False
-    return True
+    return poll_scene(cls, context)

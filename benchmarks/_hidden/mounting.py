@@ -13,6 +13,8 @@ from pathlib import Path
 
 import numpy as np
 
+from .rig_text import csv_header, rig_head
+
 ROWS, COLUMNS, PITCH = 8, 6, 3.4e-3
 RATE, SECONDS = 40.0, 16.0
 TRIALS = ("fit", "fit", "fit", "fit", "check", "check")
@@ -219,13 +221,8 @@ BESIDE = {
 def write(case: Mounting, folder: Path) -> Path:
     """Write a case as a rig and return the path of its TOML file; nothing in the folder tells the answer."""
     folder.mkdir(parents=True, exist_ok=True)
-    words = "\n".join(f'{key} = "{v}"' if isinstance(v, str) else f"{key} = {v!r}" for key, v in case.words.items())
-    lines = [
-        'format = "palpate-rig/1"', f'name = "mounting {case.number}"', "[sensor]",
-        f"grid = {{ rows = {ROWS}, columns = {COLUMNS}, pitch = [{PITCH!r}, {PITCH!r}] }}", "thickness = 6e-3", words,
-        "[indenter]", f"shape = {{ sphere = {case.radius!r} }}",
-    ]  # fmt: skip
-    header = ",".join(["time", "x", "y", "z", *(f"texel_{i}" for i in range(ROWS * COLUMNS))])
+    lines = rig_head(f"mounting {case.number}", (ROWS, COLUMNS, PITCH), case.words, case.radius)
+    header = csv_header(ROWS * COLUMNS)
     for i, use in enumerate(TRIALS):
         lines += ["[[trial]]", f'file = "trial_{i}.csv"', f'use = "{use}"']
         table = np.column_stack([case.times[i], case.paths[i], case.readings[i]])

@@ -17,6 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from .mounting import PITCH, places_of, pressed
+from .rig_text import csv_header, rig_head
 
 ROWS, COLUMNS = 6, 4
 RATE, SECONDS = 25.0, 14.0
@@ -261,13 +262,8 @@ SEALED = {
 def write(case: Case, folder: Path) -> Path:
     """Write a case as a rig and return the path of its TOML file; nothing in the folder tells the answer."""
     folder.mkdir(parents=True, exist_ok=True)
-    words = "\n".join(f'{key} = "{v}"' if isinstance(v, str) else f"{key} = {v!r}" for key, v in case.words.items())
-    lines = [
-        'format = "palpate-rig/1"', f'name = "session {case.number}"', "[sensor]",
-        f"grid = {{ rows = {ROWS}, columns = {COLUMNS}, pitch = [{PITCH!r}, {PITCH!r}] }}", "thickness = 6e-3", words,
-        "[indenter]", f"shape = {{ sphere = {case.radius!r} }}",
-    ]  # fmt: skip
-    header = ",".join(["time", "x", "y", "z", *(f"texel_{i}" for i in range(ROWS * COLUMNS))])
+    lines = rig_head(f"session {case.number}", (ROWS, COLUMNS, PITCH), case.words, case.radius)
+    header = csv_header(ROWS * COLUMNS)
     for i in range(RECORDINGS):
         lines += ["[[trial]]", f'file = "recording_{i}.csv"', f'use = "{"check" if i in case.checked else "fit"}"']
         if case.clock == "session":

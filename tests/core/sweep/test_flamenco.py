@@ -27,7 +27,7 @@ TYPES = {"string": str, "int32": int, "bool": bool}
 def compiled(repository):
     node = shutil.which("node")
     if node is None:
-        pytest.skip("no JavaScript engine")
+        pytest.skip("Node.js is not installed: the job type for Flamenco is not compiled")
     settings = {"study": "/s/study.toml", "folder": "/s/out", "parts": 3, "command": "palpate", "allow_scripts": False}
     script = repository / "examples" / "flamenco" / "palpate_study.js"
     done = subprocess.run([node, "-e", PLAYED, str(script), json.dumps(settings)], capture_output=True, text=True, check=False)
