@@ -25,7 +25,7 @@ COMMANDS = {
     "demo": "build, bake and render the demo scene, and print what the pads feel",
     "bake": "bake the sensors of a .blend to tactile images",
     "render": "make pictures, figures and a video of a baked scene",
-    "export": "write a bake as CSV, NPZ, HDF5 or PNG",
+    "export": "write a bake as CSV, NPZ, HDF5, PNG, MCAP or LeRobot dataset",
     "fit": "estimate stiffness and friction from measurements",
     "gap": "find what the model misses against a real sensor",
     "paper": "repeat the experiments of the paper",

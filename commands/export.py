@@ -1,20 +1,27 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""``palpate export``: a bake as CSV, NPZ, HDF5 or PNG."""
+"""``palpate export``: a bake as CSV, NPZ, HDF5, PNG, MCAP, or a dataset for LeRobot."""
 
 from __future__ import annotations
 
 import argparse
+import importlib.util
 
+from ..core.errors import PalpateError
+from ..core.export.exporter import Exporter
 from ..core.export.registry import export, exporters
 from ..core.figures.figure_style import FigureStyle
 from ..core.io.bake_reader import Bake, read_bake
 from . import blender, checks, console, figure_options
 
+LEROBOT = "lerobot"
+"""Name of :data:`.sweep.bake_dataset.EXPORTER`: a study's dataset of one run. Blender's extension has no studies."""
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
+    formats = [*exporters(), LEROBOT]
     parser.add_argument("bake", metavar="BAKE", help="a bake folder, the folder of one sensor in it, or a baked .blend")
     parser.add_argument(
-        "--format", metavar="KIND", choices=exporters(), default="csv", help=f"{', '.join(exporters())} (default: %(default)s)"
+        "--format", metavar="KIND", choices=formats, default="csv", help=f"{', '.join(formats)} (default: %(default)s)"
     )
     parser.add_argument("--out", metavar="DIR", default="palpate-export", help="folder to write to (default: %(default)s)")
     parser.add_argument("--sensor", metavar="NAME", action="append", help="only this sensor; may be given again")
@@ -28,11 +35,22 @@ def run(arguments: argparse.Namespace) -> int:
     checks.folder_is_no_bake(arguments.out, bake)
     style: FigureStyle = figure_options.figure_style_from(arguments)
     with console.Interrupt.raised_at_once():
-        job = export(bake, arguments.format, arguments.out, style)
+        job = export(bake, _exporter(arguments.format), arguments.out, style)
         written = console.run_with_progress_bar("export", job, unit="sensor")
     for path in written:
         print(path)
     return 0
+
+
+def _exporter(name: str) -> str | Exporter:
+    """Return what is given to :func:`export` for a format."""
+    if name != LEROBOT:
+        return name
+    if importlib.util.find_spec(f"{__package__.rpartition('.')[0]}.sweep") is None:  # as in the extension's zip
+        raise PalpateError("Blender's extension writes no datasets: run 'pip install palpate[sweep]' in a Python of its own.")
+    from ..sweep import bake_dataset
+
+    return bake_dataset.EXPORTER
 
 
 def find_bake(where: str) -> Bake:

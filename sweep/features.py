@@ -7,7 +7,7 @@ other gives lists in the order of its texels, whose places are in ``meta/texels.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -19,6 +19,7 @@ from ..core.geometry.layout.grid_layout import GridLayout
 from ..core.geometry.texels import Texels
 from ..core.io.bake_check import checked_parameters
 from ..core.io.bake_folder import MANIFEST_NAME, RECORDING_NAME, folder_names, read_manifest
+from ..core.io.bake_reader import Bake
 from ..core.io.recording_npz import load_recording
 from ..core.io.sensor_npz import SENSOR_NAME, load_sensor
 from ..core.model.digest import digest_of
@@ -116,12 +117,40 @@ def read_frames(run: RunRecord) -> RunFrames:
     sensors = {own: _read_sensor(run.folder / own) for own in folder_names(run.sensors).values()}
     if not sensors:
         raise FileError(f"The run '{run.folder}' has no sensor: delete the folder and run the sweep again.")
+    return _frames(sensors, run.values, f"the run '{run.folder}' is no 32-bit number: delete the run and sweep again.")
+
+
+def bake_frames(bake: Bake) -> RunFrames:
+    """Return the frames of a bake, as of a run of which nothing was varied.
+
+    Raises
+    ------
+    FileError
+        A number of it is too large for 32 bits.
+    """
+    names = folder_names(bake.texels)
+    sensors = {
+        names[name]: SensorRun(
+            texels,
+            bake.painted[name],
+            bake.recording,
+            bake.recording.sensors[name],
+            bake.parameters[name],
+            bake.parameters[name].unit,
+        )
+        for name, texels in bake.texels.items()
+    }
+    return _frames(sensors, {}, "the bake is no 32-bit number: export it as HDF5 or NPZ.")
+
+
+def _frames(sensors: dict[str, SensorRun], varied: Mapping[str, Any], too_large: str) -> RunFrames:
+    """Return the frames of some sensors of one run; `too_large` ends the sentence about a number that 32 bits cannot hold."""
     first = next(iter(sensors.values())).recording
     features: list[Feature] = []
     columns: dict[str, Any] = {}
-    for feature, values in _all_features(run, first, sensors):
+    for feature, values in _all_features(varied, first, sensors):
         features.append(feature)
-        columns[feature.name] = values if isinstance(values, str) else _narrowed(run, feature, values)
+        columns[feature.name] = values if isinstance(values, str) else _narrowed(too_large, feature, values)
     fps = _frame_rate(first.times)
     texels = {name: sensor.texels for name, sensor in sensors.items()}
     digest = digest_of((tuple(features), fps, tuple(texels), tuple(texels.values())))
@@ -149,19 +178,21 @@ def _frame_rate(times: np.ndarray) -> float:
     return float(f"{(len(times) - 1) / span:.9g}") if len(times) > 1 and span > 0 else 1.0
 
 
-def _narrowed(run: RunRecord, feature: Feature, values: np.ndarray) -> np.ndarray:
+def _narrowed(too_large: str, feature: Feature, values: np.ndarray) -> np.ndarray:
     """Return the values in the type that the dataset stores."""
     if feature.dtype == "float32" and not (np.abs(values) <= np.finfo(np.float32).max).all():
-        raise FileError(f"'{feature.name}' of the run '{run.folder}' is no 32-bit number: delete the run and sweep again.")
+        raise FileError(f"'{feature.name}' of {too_large}")
     return np.ascontiguousarray(values, dtype=feature.dtype)
 
 
-def _all_features(run: RunRecord, recording: Recording, sensors: dict[str, SensorRun]) -> Iterator[tuple[Feature, Any]]:
+def _all_features(
+    varied: Mapping[str, Any], recording: Recording, sensors: dict[str, SensorRun]
+) -> Iterator[tuple[Feature, Any]]:
     for name, sensor in sensors.items():
         yield from _texel_features(name, sensor)
         yield from _net_features(name, sensor.arrays)
     yield from _pose_features(recording)
-    for name, value in run.values.items():
+    for name, value in varied.items():
         about = "What was varied; the same in all frames of a run."
         plain = f"varied.{name.replace('/', '_')}"  # LeRobot allows no slash
         if isinstance(value, str):

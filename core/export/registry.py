@@ -35,14 +35,14 @@ def exporters() -> dict[str, Exporter]:
     return {exporter.name: exporter for exporter in found}
 
 
-def export(bake: Bake, kind: str, folder: str | os.PathLike, style: FigureStyle | None = None) -> Job[list[Path]]:
+def export(bake: Bake, kind: str | Exporter, folder: str | os.PathLike, style: FigureStyle | None = None) -> Job[list[Path]]:
     """Write a bake in another format.
 
     Parameters
     ----------
     bake : Bake
-    kind : str
-        Name of an exporter, as "csv".
+    kind : str or Exporter
+        Name of an exporter, as "csv", or one that is not in the registry.
     folder : path
         Created if it is missing, with the folders above it.
     style : FigureStyle, optional
@@ -65,13 +65,13 @@ def export(bake: Bake, kind: str, folder: str | os.PathLike, style: FigureStyle 
         The format is unknown or needs a package that is not installed, the disk has too little space, or a file cannot be
         written.
     """
-    known = exporters()
-    if kind not in known:
-        raise PalpateError(f"There is no export to '{kind}': choose from {', '.join(known)}.")
-    require_space(folder, known[kind].size(bake), "The export")
+    exporter = kind if isinstance(kind, Exporter) else exporters().get(kind)
+    if exporter is None:
+        raise PalpateError(f"There is no export to '{kind}': choose from {', '.join(exporters())}.")
+    require_space(folder, exporter.size(bake), "The export")
     folder = writable_folder(folder, create=True)
     files = FileList(folder)
     with files.new_files("export") as new:
-        written = yield from known[kind].write(bake, new, style or FigureStyle())
-        written = files.replace(new, {kind: written})
+        written = yield from exporter.write(bake, new, style or FigureStyle())
+        written = files.replace(new, {exporter.name: written})
     return list(dict.fromkeys(path if path.parent == folder else path.parent for path in written))

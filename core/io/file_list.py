@@ -161,7 +161,7 @@ class FileList:
                         self._remove(name, digest)
             for name in sorted(present):
                 place = self._folder / name
-                place.parent.mkdir(exist_ok=True)
+                place.parent.mkdir(parents=True, exist_ok=True)
                 _move(new / name, place)
             for place in {self._folder.joinpath(name).parent for name in files}:
                 sync_folder(place)
@@ -177,14 +177,16 @@ class FileList:
         self._write()
 
     def _remove(self, name: str, digest: str) -> None:
-        """Remove a file of the earlier export, and its folder if it is empty then."""
+        """Remove a file of the earlier export, and the folders about it that are empty then."""
         path = self._own_file(name, digest)
         if path is None:
             return
         path.unlink(missing_ok=True)
-        if path.parent != self._folder:
-            with suppress(OSError):  # it holds other files
-                path.parent.rmdir()
+        with suppress(OSError):  # one of them holds other files
+            for parent in path.parents:
+                if parent == self._folder:
+                    break
+                parent.rmdir()
 
     def _write(self) -> None:
         with atomic_write(self._folder / LIST_NAME) as temporary:

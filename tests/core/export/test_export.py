@@ -173,14 +173,14 @@ def test_png_has_one_scale_for_all_sensors(bake, tmp_path):
 
 
 def test_an_unknown_format_is_refused(bake, tmp_path):
-    with pytest.raises(PalpateError, match="csv, npz, hdf5, png"):
+    with pytest.raises(PalpateError, match="csv, npz, hdf5, png, mcap"):
         run_job(export(bake, "xls", tmp_path))
 
 
 def test_every_format_is_registered_once():
     """A module of the package is a format; its position is its bit in a scene's choice, so positions have no gaps."""
     found = exporters()
-    assert list(found) == ["csv", "npz", "hdf5", "png"]
+    assert list(found) == ["csv", "npz", "hdf5", "png", "mcap"]
     assert [exporter.position for exporter in found.values()] == list(range(len(found)))
     modules = {path.stem for path in Path(registry.__file__).parent.glob("formats/*.py")} - {"__init__"}
     assert len(modules) == len(found)
@@ -245,7 +245,7 @@ def test_a_damaged_list_is_as_none(bake, tmp_path, content):
     assert json.loads((tmp_path / "out" / LIST_NAME).read_text())["exports"]["npz"]["complete"]
 
 
-@pytest.mark.parametrize("kind", ["csv", "npz", "hdf5", "png"])
+@pytest.mark.parametrize("kind", ["csv", "npz", "hdf5", "png", "mcap"])
 def test_a_full_disk_is_one_sentence(bake, tmp_path, kind):
     """In a process of its own, whose files cannot grow: a library that writes by itself could take the tests with it."""
     pytest.importorskip("resource")

@@ -1,0 +1,168 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""MCAP: one file with ROS 2 messages over simulated time, which Foxglove, rerun and ROS 2 open; ROS is not needed."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterable
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ...errors import PalpateError
+from ...figures.figure_style import FigureStyle
+from ...geometry.layout.grid_layout import GridLayout
+from ...io.bake_reader import Bake
+from ...io.file_writing import write_file
+from ...jobs.progress import Job
+from ...model.recording import Recording
+from .. import ros2_messages
+from ..exporter import Exporter, sensor_progress, uncompressed_bytes
+
+WORLD = "world"
+"""Frame of the world."""
+POINT_FIELDS = ("x", "y", "z", "normal_force", "shear_x", "shear_y", "reading", "depth", "slip")
+"""Fields of a texel in the point cloud, float32; ``contact`` follows as a byte."""
+_POINT = np.dtype([*((name, "<f4") for name in POINT_FIELDS), ("contact", "u1")])
+_CHUNK_BYTES = 1 << 20
+
+
+def write_mcap(bake: Bake, folder: Path, _style: FigureStyle) -> Job[list[Path]]:
+    """Write ``palpate.mcap``."""
+    try:
+        from mcap.writer import CompressionType, Writer
+    except ImportError as error:
+        raise PalpateError("MCAP needs the package mcap, which is not installed: run 'pip install mcap'.") from error
+    from mcap.well_known import Profile
+
+    path = folder / "palpate.mcap"
+    with write_file(path) as temporary, open(temporary, "wb") as file:
+        writer = Writer(file, chunk_size=_CHUNK_BYTES, compression=CompressionType.ZSTD)
+        writer.start(profile=Profile.ROS2, library="palpate")
+        output = _Output(writer, bake)
+        names, frames = list(bake.texels), len(bake.recording.frames)
+        done = 0
+        for part in bake.recording.blocks():
+            yield sensor_progress(bake, names[done * len(names) // frames])
+            output.write(part)
+            done += len(part.frames)
+        output.describe()
+        writer.finish()
+    return [path]
+
+
+class _Output:
+    """Channels of a file, and what goes into them."""
+
+    def __init__(self, writer: Any, bake: Bake):
+        self._writer, self._bake = writer, bake
+        self._schemas: dict[str, int] = {}
+        recording = bake.recording
+        self._bodies = _frame_names(recording.body_names)
+        self._frames = {name: self._frame_of(name) for name in bake.texels}
+        topics = topic_names(bake.texels)
+        kinds = {
+            "texels": ros2_messages.POINT_CLOUD,
+            "tactile_image": ros2_messages.IMAGE,
+            "wrench": ros2_messages.WRENCH,
+            "centre_of_pressure": ros2_messages.POINT,
+        }
+        self._transforms = self._channel("/tf", ros2_messages.TRANSFORMS)
+        self._channels = {
+            name: {what: self._channel(f"{topic}/{what}", kind) for what, kind in kinds.items()}
+            for name, topic in topics.items()
+        }
+        self._points = {name: np.zeros(len(texels), _POINT) for name, texels in bake.texels.items()}
+        for name, texels in bake.texels.items():
+            for axis, values in zip("xyz", texels.position.T):
+                self._points[name][axis] = values
+
+    def _frame_of(self, sensor: str) -> str:
+        """Name of the frame in which a sensor's texels are given: its body's."""
+        body = self._bake.manifests[sensor].body
+        return self._bodies.get(body, sensor if sensor != WORLD else f"{sensor}_")
+
+    def _channel(self, topic: str, kind: str) -> int:
+        if kind not in self._schemas:
+            text = ros2_messages.definition(kind).encode()
+            self._schemas[kind] = self._writer.register_schema(kind, "ros2msg", text)
+        return int(self._writer.register_channel(topic, "cdr", self._schemas[kind]))
+
+    def write(self, part: Recording) -> None:
+        """Write some of the frames."""
+        for i, seconds in enumerate(part.times):
+            time = round(float(seconds) * 1e9)
+            poses = ros2_messages.transforms(time, WORLD, list(self._bodies.values()), part.poses[i])
+            self._message(self._transforms, time, int(part.frames[i]), poses)
+            for name, recorded in part.sensors.items():
+                own, frame, points = recorded.at(i), self._frames[name], self._points[name]
+                for field in ("normal_force", "reading", "depth", "slip", "contact"):
+                    points[field] = getattr(own, field)
+                points["shear_x"], points["shear_y"] = own.shear.T
+                picture = self._bake.texels[name].layout.image(own.normal_force)[::-1]
+                content = {
+                    "texels": ros2_messages.point_cloud(time, frame, points),
+                    "tactile_image": ros2_messages.image(time, frame, picture),
+                    "wrench": ros2_messages.wrench(time, frame, own.net_force, own.net_torque),
+                    "centre_of_pressure": ros2_messages.point(time, frame, own.centre_of_pressure),
+                }
+                for what, message in content.items():
+                    self._message(self._channels[name][what], time, int(part.frames[i]), message)
+
+    def _message(self, channel: int, time: int, frame: int, message: bytes) -> None:
+        self._writer.add_message(channel, time, message, time, max(0, frame))
+
+    def describe(self) -> None:
+        """Attach what does not change: where the texels of each sensor are, units and parameters."""
+        recording = self._bake.recording
+        self._writer.add_metadata("palpate", {"digest": recording.digest, "dt": repr(recording.dt)})
+        for name, texels in self._bake.texels.items():
+            grid = texels.layout if isinstance(texels.layout, GridLayout) else None
+            content = {
+                "sensor": name,
+                "frame": self._frames[name],
+                "unit": self._bake.parameters[name].unit,
+                "parameters": asdict(self._bake.parameters[name]),
+                **{key: getattr(texels, key).tolist() for key in ("position", "normal", "tangent", "area")},
+                **({} if grid is None else {"row": grid.row.tolist(), "column": grid.column.tolist()}),
+            }
+            text = json.dumps(content, allow_nan=False).encode()
+            self._writer.add_attachment(0, 0, f"{topic_names(self._bake.texels)[name][1:]}.json", "application/json", text)
+
+
+def topic_names(sensors: Iterable[str]) -> dict[str, str]:
+    """Return a topic for each sensor. ROS allows letters, digits and underscores between slashes, and no digit first."""
+    found: dict[str, str] = {}
+    for name in sensors:
+        plain = re.sub(r"[^A-Za-z0-9_]", "_", name)
+        plain = re.sub(r"__+", "_", f"sensor_{plain}" if not plain[:1].isalpha() else plain)
+        topic, number = f"/{plain}", 2
+        while topic in found.values():
+            topic, number = f"/{plain}_{number}", number + 1
+        found[name] = topic
+    return found
+
+
+def _frame_names(bodies: Iterable[str]) -> dict[str, str]:
+    """Return the name of the frame of each body, its own; that of the world is taken."""
+    names: dict[str, str] = {}
+    for body in bodies:
+        frame = body
+        while frame == WORLD or frame in names.values():
+            frame += "_"
+        names[body] = frame
+    return names
+
+
+def _mcap_bytes(bake: Bake) -> float:
+    """Return an estimate from above of the bytes of the file before it is packed."""
+    pixels = sum(4 * int(np.prod(texels.layout.shape)) + 2000 for texels in bake.texels.values())
+    return uncompressed_bytes(bake) + len(bake.recording.frames) * pixels
+
+
+EXPORTER = Exporter(
+    "mcap", "MCAP", "Messages over time for Foxglove, rerun and ROS 2; needs the package mcap", 4, write_mcap, _mcap_bytes
+)
