@@ -98,8 +98,8 @@ def _unit(rng, one: Measured, plan: dict) -> None:
 def _railed(rng, one: Measured, plan: dict) -> None:
     names = [name for name in one.responses if name.startswith("texel_")]
     values = np.stack([one.columns[name] for name in names])
-    rest = np.median(values)
-    sign = 1.0 if values.max() - rest > rest - values.min() else -1.0
+    rest = np.median(values[:, : int(0.5 / one.step)])  # a converter has one rail: the same side in all recordings
+    sign = plan.setdefault("side", 1.0 if values.max() - rest > rest - values.min() else -1.0)
     rail = plan.setdefault("rail", float(rest + sign * rng.uniform(0.45, 0.8) * np.abs(values - rest).max()))
     for name in names:
         one.columns[name] = np.minimum(one.columns[name], rail) if sign > 0 else np.maximum(one.columns[name], rail)

@@ -10,6 +10,7 @@ from ..forward.contact_phases import FEATURES
 from ..selection.check_recordings import CHECK_CLOSED
 from ..selection.findings import Diagnosis, Finding
 from ..selection.gap_sizes import FORCES, READINGS
+from ..selection.wear_or_drift import CLOCK, NOTHING, TEXELS, USE
 from .comparison import GapErrors
 from .experiments import LOUD_NOISE
 from .recording_differences import recording_differences
@@ -21,6 +22,17 @@ MANY_FLOORS = 3.0
 LEAST_SHARE = 0.01
 """A quantity that predicts a smaller share of what is left is not said to predict it."""
 ASSUMED_SESSION = "If they were recorded in another order or with pauses that matter, name their session and its times."
+TOLD_BY = {
+    USE: " The gains fall with what was loaded rather than with the time.",
+    CLOCK: " The gains fall with the time or the number of recordings rather than with what was loaded.",
+    TEXELS: " All texels change alike, whatever each of them carried: it is no wear of texels.",
+    NOTHING: "",
+}
+"""What tells wear from drift between recordings."""
+NOT_TOLD = (
+    "The gains fall, and the recordings do not say whether with what was loaded or with the time: name their session and when "
+    "they started, and load the sensor far more in some recordings than in others."
+)
 FRICTION_MATTERS = 1.5
 """The headline mentions the base model's friction if without it the error would be at least this many times as large."""
 
@@ -43,8 +55,13 @@ def _outcome(result: Diagnosis, errors: GapErrors) -> str:
     if result.between is None:
         return _effects(result, errors)
     own, after = result.between, errors.amended["fit"] or 0.0
-    said = f"Missing: {own.name} between recordings, of which each has a level and a gain of its own"
-    said += f"; the error shrinks from {own.before:.2%} to {after:.2%} of the range. Name their session to learn more."
+    shrinks = f"the error shrinks from {own.before:.2%} to {after:.2%} of the range"
+    if own.rival:
+        said = f"Not told apart between recordings, of which each has a level and a gain of its own: {own.name} or {own.rival}"
+        said += f" ({shrinks}). {NOT_TOLD}"
+    else:
+        said = f"Missing: {own.name} between recordings, of which each has a level and a gain of its own; {shrinks}."
+        said += f"{TOLD_BY[own.told_by]} Name their session to learn more."
     return f"{said} Beside that: {_effects(result, errors)}" if result.findings else said
 
 

@@ -5,4 +5,4 @@
 has seen. ``findings`` holds the result.
 """
 
-__all__ = ["check_recordings", "diagnosis", "findings", "gap_sizes", "identifiability"]
+__all__ = ["check_recordings", "diagnosis", "findings", "gap_sizes", "identifiability", "wear_or_drift"]

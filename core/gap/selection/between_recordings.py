@@ -19,6 +19,7 @@ from ..dataset.rig import Rig
 from ..dataset.sessions import TrialHistory, on_common_clocks
 from ..dataset.trial import Trial
 from ..forward.predictor import Model, Predictor, number_name
+from .wear_or_drift import NOTHING, TEXELS, USE, told_by_recordings
 
 LEAST_RECORDINGS = 3
 """Number of fitted recordings from which on they are compared: of two, each may be the odd one."""
@@ -30,8 +31,6 @@ MOST_LEFT = 0.5
 """With factors and zeros, the search must leave less than this share of what it leaves without."""
 LOAD_HISTORY = ("wear", "softening")
 """Effects that need no clock to be found across recordings in a known order: they go with what was pressed."""
-TIME_HISTORY = ("drift",)
-"""Effects that go with the time."""
 COMMON = "all recordings"
 """Name of what all recordings share."""
 WEAR_ORDER = -0.5
@@ -45,7 +44,7 @@ class RecordingDifferences:
     Attributes
     ----------
     name : str
-        "wear" if gains fall from recording to recording, else "drift".
+        "wear" if gains fall with use, else "drift".
     closes : float
         Share of the gap that they close alone, on unseen stretches.
     confidence : float
@@ -53,6 +52,10 @@ class RecordingDifferences:
         NRMSE on the fitted recordings of the base model without them.
     factors, zeros : dict of str to float
         Of the fitted recordings, in order of the rig; zeros in the sensor's unit.
+    told_by : str
+        What tells gains that fall apart as wear or drift (see :mod:`.wear_or_drift`); empty if nothing does, or if none fall.
+    rival : str
+        The other name, if gains fall and nothing tells which it is.
     """
 
     name: str
@@ -61,6 +64,8 @@ class RecordingDifferences:
     before: float
     factors: dict[str, float]
     zeros: dict[str, float]
+    told_by: str = NOTHING
+    rival: str = ""
 
 
 def may_differ(rig: Rig) -> bool:
@@ -90,7 +95,7 @@ def _free_zero(trial: Trial, name: str) -> str | float:
 def as_one_session(rig: Rig) -> Rig | None:
     """Return a rig whose recordings are one session in their order; None if they cannot be.
 
-    The pauses between them are not known, so what this session says of time does not count (see :data:`TIME_HISTORY`).
+    The pauses between them are not known, so what this session says of time does not count.
     """
     if len({trial.stimulus == "force" for trial in rig.trials}) > 1:
         return None
@@ -99,24 +104,33 @@ def as_one_session(rig: Rig) -> Rig | None:
     return replace(rig, trials=tuple(trials))
 
 
-def differences(model: Model, fitted: Sequence[Predictor], closes: float, before: float, full: float) -> RecordingDifferences:
-    """Return the levels and gains of a fitted model by name.
+def differences(
+    model: Model, order: Sequence[Predictor], closes: float, before: float, full: float, texels_alike: bool
+) -> RecordingDifferences:
+    """Return the levels and gains of a fitted model by name, and whether they are wear or drift.
 
     Parameters
     ----------
     model : Model
-    fitted : sequence of Predictor
-        Of the recordings that were fitted, in the order of the rig.
+    order : sequence of Predictor
+        Of all recordings, in the order of the rig.
     closes, before : float
         See :class:`RecordingDifferences`.
     full : float
         Range of the readings.
+    texels_alike : bool
+        Whether gains that all texels share describe the recordings far better than what each texel was loaded with.
     """
-    names = [one.trial.name for one in fitted]
+    names = [one.trial.name for one in order if one.trial.use == "fit"]
     factors = {name: model.recordings.get(number_name("factor", name), 1.0) for name in names}
     zeros = {name: model.recordings.get(number_name("zero", name), 0.0) for name in names}
+    confidence = round(0.5 + 0.5 * float(np.clip(closes, 0.0, 1.0)), 3)
+    drift = RecordingDifferences("drift", closes, confidence, before, factors, zeros)
     gain, level = np.array(list(factors.values())), np.array(list(zeros.values()))
     falls = float(np.corrcoef(np.argsort(np.argsort(gain)), np.arange(len(gain)))[0, 1]) < WEAR_ORDER
-    confidence = round(0.5 + 0.5 * float(np.clip(closes, 0.0, 1.0)), 3)
-    is_gain = float(gain.std()) * full > float(level.std())
-    return RecordingDifferences("wear" if is_gain and falls else "drift", closes, confidence, before, factors, zeros)
+    if not falls or float(gain.std()) * full <= float(level.std()):
+        return drift
+    told_by = told_by_recordings([one.stimulus for one in order], factors) or (TEXELS if texels_alike else NOTHING)
+    if told_by == NOTHING:
+        return replace(drift, rival="wear")
+    return replace(drift, name="wear" if told_by == USE else "drift", told_by=told_by)

@@ -30,7 +30,6 @@ from .between_recordings import (
     LEAST_LOWERED,
     LOAD_HISTORY,
     MOST_LEFT,
-    TIME_HISTORY,
     as_one_session,
     differences,
     may_differ,
@@ -117,7 +116,7 @@ def _best_of_other_searches(plain: _Search) -> Generator[Progress, None, _Search
     if own.is_wanted:
         yield from _selected(own, middle, TOTAL_WORK)
         if own.left < MOST_LEFT * plain.left and (best is plain or own.left < best.left):
-            _name_differences(own, plain, is_of_load=session is None or session.is_of_load)
+            _name_differences(own, plain, session)
             best = own
     return best
 
@@ -135,15 +134,15 @@ class _Search:
         Share of the gap that is closed before the search for effects, by what recordings do not share.
     is_wanted : bool
         Whether this is enough for a search for effects.
-    is_of_load : bool
-        Whether what goes on from recording to recording goes with the load rather than with the time.
+    left_by_load : float
+        What wear or softening alone leaves, in a search of one session.
     """
 
     result: Diagnosis
     views: ViewSet
     closes: float = 0.0
     is_wanted: bool = True
-    is_of_load: bool = True
+    left_by_load: float = np.inf
 
     @property
     def left(self) -> float:
@@ -191,20 +190,16 @@ def _search_of_one_session(plain: _Search) -> _Search | None:
         return None
     session = _search_of(rig, predictors_of(rig.trials, rig), result.noise, result.full, result.faults)
     fitted = [view.predictor for view in session.views.whole]
-    forms = [one for one in candidates(fitted, session.result.base.model) if one.name in (*LOAD_HISTORY, *TIME_HISTORY)]
+    forms = [one for one in candidates(fitted, session.result.base.model) if one.name in LOAD_HISTORY]
     ranked: list[FittedCandidate] = []
     for _, _, found in screen(session.views, session.result.base, forms, session.result.scales):
         ranked = found or ranked
-    left = {kinds: _least(session, ranked, kinds) for kinds in (LOAD_HISTORY, TIME_HISTORY)}
-    session.is_of_load = left[LOAD_HISTORY] <= left[TIME_HISTORY]
-    session.closes = 1.0 - left[LOAD_HISTORY] / plain.left_of_base
+    session.left_by_load = min(
+        (_left(session.views, one.fit) for one in ranked if one.candidate.name in LOAD_HISTORY), default=np.inf
+    )
+    session.closes = 1.0 - session.left_by_load / plain.left_of_base
     session.is_wanted = session.closes > 1.0 - MOST_LEFT
     return session
-
-
-def _least(search: _Search, ranked: list[FittedCandidate], kinds: tuple[str, ...]) -> float:
-    """What the best candidate of some kinds leaves."""
-    return min((_left(search.views, one.fit) for one in ranked if one.candidate.name in kinds), default=np.inf)
 
 
 def _is_one_session(session: _Search, plain: _Search) -> bool:
@@ -214,14 +209,18 @@ def _is_one_session(session: _Search, plain: _Search) -> bool:
     return remembers and result.verdict == "explained" and session.left < MOST_LEFT * plain.left
 
 
-def _name_differences(own: _Search, plain: _Search, is_of_load: bool) -> None:
+def _name_differences(own: _Search, plain: _Search, session: _Search | None) -> None:
     """Say in a result by which levels and gains its recordings differ."""
     result, before = own.result, plain.result
     error = _relative_error(before.base, before.noise, before.full)
-    result.between = differences(result.best.model, result.of("fit"), own.closes, error, result.full[READINGS])
-    if not is_of_load:
-        result.between = replace(result.between, name="drift")
-    if result.misleading_faults:
+    texels_alike = session is not None and own.left_of_base < MOST_LEFT * session.left_by_load
+    result.between = differences(result.best.model, result.predictors, own.closes, error, result.full[READINGS], texels_alike)
+    named = [result.between.name]
+    if result.between.rival:
+        named.append(result.between.rival)
+        result.ambiguous.append(tuple(named))
+    result.ruled_out = [(name, why) for name, why in result.ruled_out if name not in named]
+    if result.misleading_faults or result.between.rival:
         result.between = replace(result.between, confidence=min(result.between.confidence, UNSURE_CONFIDENCE))
     most = 1.0 - own.left / plain.left_of_base
     if result.verdict == "no gap" or (most >= EXPLAINED and not result.check.is_refuted):

@@ -7,13 +7,22 @@ import gap_cases as cases
 import numpy as np
 import pytest
 
+from palpate.core.gap.forward.predictor import Model, Predictor, number_name
 from palpate.core.gap.report.comparison import gap_errors
 from palpate.core.gap.report.sentences import headline
 from palpate.core.gap.report.summary import summary
 from palpate.core.gap.selection import screening
-from palpate.core.gap.selection.between_recordings import as_one_session, may_differ, with_common_zero, with_own_numbers
+from palpate.core.gap.selection.between_recordings import (
+    as_one_session,
+    differences,
+    may_differ,
+    with_common_zero,
+    with_own_numbers,
+)
 from palpate.core.gap.selection.diagnosis import diagnose
+from palpate.core.gap.selection.wear_or_drift import CLOCK, NOTHING, TEXELS, USE, told_by_courses
 from palpate.core.jobs.job_runner import run_job
+from palpate.core.model.sensor_parameters import SensorParameters
 
 
 @pytest.fixture(autouse=True)
@@ -45,6 +54,51 @@ def test_levels_and_gains_are_named_between_recordings(change, name):
     errors = gap_errors(result)
     assert headline(result, errors).startswith(f"Missing: {name} between recordings")
     assert summary(result, errors)["between_recordings"]["effect"] == name
+
+
+def test_gains_that_fall_with_use_and_with_the_clock_are_told_apart_where_use_is_uneven():
+    used, passed = np.array([0.02, 0.3, 0.34, 0.75, 0.8, 0.97]), (np.arange(6) + 0.5) / 6
+    uses, clocks = np.array([used, used**1.1]), np.array([passed, passed])
+    assert told_by_courses(np.exp(-0.4 * used), uses, clocks) == USE
+    assert told_by_courses(1.0 - 0.4 * passed, uses, clocks) == CLOCK
+    assert told_by_courses(1.0 - 0.4 * used, np.array([passed]), clocks) == NOTHING
+    assert told_by_courses(np.exp(-0.4 * used)[:3], uses[:, :3], clocks[:, :3]) == NOTHING
+    assert told_by_courses(np.array([1.0, -0.1, 0.5, 0.4, 0.3, 0.2]), uses, clocks) == NOTHING
+
+
+def test_steps_drawn_at_random_are_hardly_ever_taken_for_use():
+    rng, said = np.random.default_rng(3), []
+    for _ in range(300):
+        used, passed, fallen = (np.cumsum(np.exp(0.8 * rng.normal(size=6))) for _ in range(3))
+        said.append(told_by_courses(1.0 - 0.4 * fallen / fallen[-1], used[None] / used[-1], passed[None] / passed[-1]))
+    assert said.count(USE) < 0.1 * len(said)  # 5 % by the rule's chance, on either side, and twice its deviation of 1.7 %
+
+
+SMALL = cases.grid_rig(1, 2, 0.01, SensorParameters(k=60.0))
+
+
+def differing(gains, amounts, texels_alike):
+    """What is said of recordings with such gains, of which each presses all texels `amounts` times."""
+    time = np.arange(200) / 20.0
+    order = [
+        Predictor(cases.depth_trial(time, 1e-3 * np.maximum(np.sin(np.pi * count * time / 10.0), 0.0), name=f"t{i}"), SMALL)
+        for i, count in enumerate(amounts)
+    ]
+    numbers = {number_name("factor", f"t{i}"): gain for i, gain in enumerate(gains)}
+    return differences(Model(SMALL.parameters, recordings=numbers), order, 0.9, 0.05, 1.0, texels_alike)
+
+
+def test_gains_that_fall_alike_in_recordings_that_are_alike_are_wear_or_drift():
+    falling = 1.0 - 0.06 * np.arange(6)
+    alike = differing(falling, [4] * 6, False)
+    assert (alike.name, alike.rival, alike.told_by) == ("drift", "wear", NOTHING)
+    of_all_texels = differing(falling, [4] * 6, True)
+    assert (of_all_texels.name, of_all_texels.rival, of_all_texels.told_by) == ("drift", "", TEXELS)
+    amounts = [2, 16, 2, 2, 20, 4]
+    used = (np.cumsum(amounts) - 0.5 * np.array(amounts)) / sum(amounts)
+    worn = differing(np.exp(-0.4 * used), amounts, False)
+    assert (worn.name, worn.rival, worn.told_by) == ("wear", "", USE)
+    assert differing(falling[::-1], amounts, False).name == "drift"
 
 
 def test_gains_of_texels_are_still_named(monkeypatch):

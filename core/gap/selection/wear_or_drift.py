@@ -1,0 +1,94 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Tell wear from drift where recordings differ by their gains: gains that fall with use, or with the clock.
+
+The pauses between the recordings are not known. So gains that fall by as much from each recording to the next go with the clock
+if the recordings load the sensor unequally, and gains that fall most where most was pressed go with use. Recordings that load
+the sensor alike tell nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import product
+
+import numpy as np
+import scipy.integrate
+import scipy.stats
+
+from ..forward.stimulus import Stimulus
+
+USE, CLOCK, TEXELS, NOTHING = "use", "clock", "texels", ""
+"""What tells whether gains that fall are wear: loads of whole recordings, their order, loads of single texels, nothing."""
+LEAST_GAINS = 4
+"""Number of gains from which on a course is seen in them: a line has two numbers."""
+CHANCE = 0.05
+"""Chance with which one of two courses that are equally wrong may leave as much less (quantile of the F distribution). Of 3,000
+simulated series of gains that fall with time, with pauses or with neither known, 19 are said to go with use."""
+UNRESOLVED_SHARE = 0.001
+"""Share of the squares of the gains that counts as left at least: neither measure of use is quite that of the sensor."""
+BENT_FROM = 6
+"""Number of gains from which on a course is a parabola over use or time, and no line: what is lost may slow down."""
+POWERS = (0.5, 1.0)
+"""Powers of use and time along which gains fall."""
+
+
+def told_by_recordings(order: Sequence[Stimulus], gains: dict[str, float]) -> str:
+    """Return whether gains of recordings follow use or clock, as :func:`told_by_courses` does.
+
+    Parameters
+    ----------
+    order : sequence of Stimulus
+        Of all recordings, in the order of the rig; what is only checked uses the sensor as well.
+    gains : dict of str to float
+        Of those recordings that were fitted.
+    """
+    chosen = [i for i, one in enumerate(order) if one.trial.name in gains]
+    lengths = [float(np.ptp(one.time)) for one in order]
+    rises = [float(np.maximum(np.diff(one.load, axis=0), 0.0).sum()) for one in order]
+    impulses = [float(scipy.integrate.trapezoid(one.load, one.time, axis=0).sum()) for one in order]
+    pauses = [1.0] * len(order)
+    same = float(np.mean(lengths))
+    clocks = [pauses, lengths, [length + same for length in lengths]]
+    values = np.array([gains[order[i].trial.name] for i in chosen])
+    uses, times = (np.array([_middles(one)[chosen] for one in several]) for several in ([rises, impulses], clocks))
+    return told_by_courses(values, uses, times)
+
+
+def _middles(amounts: Sequence[float]) -> np.ndarray:
+    """What has gathered up to the middle of each recording, in shares of the whole."""
+    each = np.array(amounts)
+    found: np.ndarray = (np.cumsum(each) - 0.5 * each) / max(float(each.sum()), 1e-300)
+    return found
+
+
+def told_by_courses(gains: np.ndarray, uses: np.ndarray, clocks: np.ndarray) -> str:
+    """Return what gains that fall go with.
+
+    Parameters
+    ----------
+    gains : (n,) float
+        Above zero, in the order of the recordings.
+    uses, clocks : (m, n) float
+        Measures of what was loaded before, and of the time that has passed, at each gain.
+
+    Returns
+    -------
+    str
+        :data:`USE`, :data:`CLOCK`, or :data:`NOTHING` where neither leaves far less than the other one.
+    """
+    if len(gains) < LEAST_GAINS or not (gains > 0.0).all():
+        return NOTHING
+    by_use, by_clock = (min(_left_share(gains, one**power) for one, power in product(m, POWERS)) for m in (uses, clocks))
+    free = len(gains) - (2 if len(gains) < BENT_FROM else 3)
+    least = float(scipy.stats.f.ppf(CHANCE, free, free))
+    if by_use < least * by_clock:
+        return USE
+    return CLOCK if by_clock < least * by_use else NOTHING
+
+
+def _left_share(gains: np.ndarray, course: np.ndarray) -> float:
+    """Share of the squares of the gains' logarithms about their mean that a line or parabola along a course leaves."""
+    logs = np.log(gains)
+    along = np.polynomial.Polynomial.fit(course, logs, 1 if len(gains) < BENT_FROM else 2)
+    left = float(((logs - along(course)) ** 2).sum()) / max(float(((logs - logs.mean()) ** 2).sum()), 1e-300)
+    return max(left, UNRESOLVED_SHARE)
