@@ -257,7 +257,8 @@ def parameters_at_bounds(model: Model, free: Sequence[FreeParameter], index: int
     """Return the fitted parameters of an effect that are at a bound, with the bound.
 
     The bound at which a part of the formula does nothing does not count: a simpler formula does as well. Nor does the natural
-    bound of a share: then the effect takes all that it can.
+    bound of a share: then the effect takes all that it can, or its shape is the limit that elements which stick and slip have
+    (the β of Bouc and Wen is 1 where unloading yields as loading does, as in every Masing loop).
 
     Parameters
     ----------
@@ -269,7 +270,8 @@ def parameters_at_bounds(model: Model, free: Sequence[FreeParameter], index: int
     effect = model.effects[index]
     form = form_of(effect.name, effect.form)
     neutral = form.neutral
-    whole = {p.name: p.high for p in form.parameters if p.unit == "1" and p.low == neutral.get(p.name) == 0.0 and p.high <= 1.0}
+    shares = [p for p in form.parameters if p.unit == "1" and p.low >= 0.0 and p.high <= 1.0]
+    whole = {p.name: p.high for p in shares if p.low == neutral.get(p.name) == 0.0 or p.low > 0.0 and p.high == 1.0}
     found = {}
     for item in free:
         if item.effect == index and not item.per_texel:

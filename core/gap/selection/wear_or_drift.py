@@ -27,9 +27,9 @@ simulated series of gains that fall with time, with pauses or with neither known
 UNRESOLVED_SHARE = 0.001
 """Share of the squares of the gains that counts as left at least: neither measure of use is quite that of the sensor."""
 BENT_FROM = 6
-"""Number of gains from which on a course is a parabola over use or time, and no line: what is lost may slow down."""
+"""Number of gains from which on a course is a parabola and no line: what is lost may slow down."""
 POWERS = (0.5, 1.0)
-"""Powers of use and time along which gains fall."""
+"""Powers of a measure along which gains fall."""
 
 
 def told_by_recordings(order: Sequence[Stimulus], gains: dict[str, float]) -> str:

@@ -161,3 +161,9 @@ def test_a_share_of_all_is_no_bound():
     model = Model(SensorParameters(), (creep, loop))
     free = (FreeParameter(0, "amount", 0.0, 0.95), FreeParameter(1, "width", 0.0, 0.5))
     assert parameters_at_bounds(model, free, 0) == {} and parameters_at_bounds(model, free, 1) == {"width": 0.5}
+
+
+@pytest.mark.parametrize(("beta", "at_bound"), [(1.0, {}), (0.5, {"beta": 0.5})])
+def test_a_loop_that_unloads_as_it_loads_is_no_bound(beta, at_bound):
+    model = Model(SensorParameters(), (effect("hysteresis", "bouc-wen", beta=beta),))
+    assert parameters_at_bounds(model, (FreeParameter(0, "beta", 0.5, 1.0),), 0) == at_bound
