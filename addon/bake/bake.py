@@ -101,7 +101,7 @@ def _bake(scene, into_scene: bool, images: bool, blend: bake_files.BlendToSave |
 def _read(scene) -> Job[SceneReading]:
     """Read the scene over its whole frame range: the first half of the work."""
     total = _total_steps(scene.frame_start, scene.frame_end)
-    with texel_arrows.hidden_arrows(scene):
+    with texel_arrows.hidden_nodes(scene):
         return (
             yield from part_of_job(
                 scene_reader.read_scene(scene), lambda step: replace(step, stage="Reading the scene", total=total)

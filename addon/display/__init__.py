@@ -11,6 +11,7 @@ __all__ = [
     "baked_scene",
     "baked_sensor",
     "heat_map",
+    "indentation",
     "inset",
     "markers",
     "materials",

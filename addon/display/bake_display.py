@@ -19,7 +19,7 @@ from ...core.io.bake_folder import frame_file
 from ...core.io.bake_reader import Bake, read_sensors
 from ...core.response import metrics
 from ..session import units
-from . import bake_identity, heat_map, markers, materials, texel_arrows
+from . import bake_identity, heat_map, indentation, markers, materials, texel_arrows
 from .baked_sensor import BakedSensor
 
 MIN_COLOR_RANGE = 1e-6
@@ -139,6 +139,10 @@ def show_bake(scene, baked_sensors: list[BakedSensor]) -> None:
         obj, frames = item.obj, (int(item.frames[0]), int(item.frames[-1]))
         image = materials.load_sequence(obj.palpate.uid, item.folder / frame_file(frames[0]), relative)
         heat_map.apply(obj, item.texels, image, frames, colors)
+        if settings.show_indentation:
+            indentation.apply(item, settings.indentation_factor)
+        else:
+            indentation.clear(obj)
         markers.keyframe_markers(scene, item, settings.overlays, {"FORCE": scales.force, "TORQUE": scales.moment})
         texel_arrows.build_arrows(scene, item, image, settings.overlays, scales.texel, scales.longest)
         obj.palpate.bake_folder = bpy.path.relpath(str(item.folder)) if relative else str(item.folder)

@@ -10,7 +10,7 @@ import bpy
 
 from ..scene import moved_bodies
 from ..session import identity
-from . import heat_map, markers, materials
+from . import heat_map, indentation, markers, materials
 
 
 def baked_objects(scene) -> list:
@@ -59,6 +59,7 @@ def clear_object(scene, obj) -> None:
     identity.ensure_uid(obj)
     moved_bodies.remove_motion(obj)
     if obj.palpate.bake_folder:
+        indentation.clear(obj)
         heat_map.clear(obj)
         markers.clear(scene, obj.palpate.uid)
         obj.palpate.bake_folder = ""

@@ -6,7 +6,7 @@ They show what playing computes, and a bake where its materials cannot be seen, 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import bpy
 import numpy as np
@@ -14,7 +14,7 @@ import numpy as np
 from ...core.figures import color_maps
 from ...core.io.bake_reader import frame_index
 from ..session import redraw, transforms, units
-from . import bake_display, inset
+from . import bake_display, indentation, inset
 
 LIFT = 0.004
 """Distance of the overlay from the sensor's surface, as a share of the sensor's size: at zero the two would flicker."""
@@ -102,8 +102,9 @@ def baked_overlays(scene, bake, number: int, maximum: float) -> list[SensorOverl
         body = bake.manifests[name].body or name
         if body in recording.body_names:
             pose = poses[recording.body_names.index(body)]
-            force = sensors[name].normal_force
-            overlay = _heat_map(scene, texels, force, pose, maximum, units.metres_per_unit(scene))
+            readings = sensors[name]
+            shown = _indented(texels, indentation.factor_of(scene.objects.get(name)) * readings.depth)
+            overlay = _heat_map(scene, shown, readings.normal_force, pose, maximum, units.metres_per_unit(scene))
             overlay.plain_only = True
             overlays.append(overlay)
     return overlays
@@ -152,6 +153,19 @@ def _heat_map(scene, texels, force: np.ndarray, pose: np.ndarray, maximum: float
     colors = np.column_stack([rgb, np.ones(len(rgb))])[corner]
     corners = np.concatenate([points[corner] for points in sides])
     return SensorOverlay(corners.astype(np.float32), np.tile(colors, (2, 1)).astype(np.float32), None)
+
+
+def _indented(texels, displacement: np.ndarray):
+    """Return texels that are moved inwards by (n,) metres, as the surface of their sensor is.
+
+    That surface is smooth between the texels and the overlay is not, so the overlay is lifted by an eighth of the largest step
+    between two neighbours: the height of a parabola over the chord between two texels whose slopes differ by that step.
+    """
+    if not displacement.any():
+        return texels
+    corners = displacement[texels.layout.triangles]
+    lift = 0.125 * float(np.ptp(corners, axis=1).max())
+    return replace(texels, position=texels.position + (lift - displacement)[:, None] * texels.normal)
 
 
 def _net_force(texels, readings, pose: np.ndarray, strongest: float, scale: float) -> np.ndarray | None:

@@ -15,6 +15,7 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
+from ..scene.display_names import INDENTATION_MODIFIER
 from ..session import transforms
 from . import marker_meshes, markers, materials
 from .baked_sensor import BakedSensor
@@ -71,29 +72,27 @@ def build_arrows(scene, sensor: BakedSensor, image, kinds, lengths: dict, longes
 
 
 @contextmanager
-def hidden_arrows(scene) -> Iterator[None]:
-    """Hide the arrows inside the ``with`` block, where their nodes would load an image of the previous bake at every frame."""
-    names = [
-        obj.name
+def hidden_nodes(scene) -> Iterator[None]:
+    """Hide arrows and indentations inside the ``with`` block, where their nodes would read the previous bake at every frame."""
+    shown = [
+        (obj.name, modifier.name)
         for obj in scene.objects
-        if obj.library is None and (modifier := _arrow_modifier(obj)) is not None and modifier.show_viewport
+        if obj.library is None
+        for modifier in obj.modifiers
+        if modifier.name in (MODIFIER, INDENTATION_MODIFIER) and modifier.show_viewport
     ]
     try:
-        _show(scene, names, False)
+        _show(scene, shown, False)
         yield
     finally:
         with suppress(ReferenceError):  # the scene was removed meanwhile
-            _show(scene, names, True)
+            _show(scene, shown, True)
 
 
-def _arrow_modifier(obj):
-    return obj.modifiers.get(MODIFIER)
-
-
-def _show(scene, names, shown: bool) -> None:
-    for name in names:
+def _show(scene, modifiers, shown: bool) -> None:
+    for name, modifier_name in modifiers:
         obj = scene.objects.get(name)  # the user may have deleted it meanwhile
-        if obj is not None and (modifier := _arrow_modifier(obj)) is not None:
+        if obj is not None and (modifier := obj.modifiers.get(modifier_name)) is not None:
             modifier.show_viewport = shown
 
 

@@ -127,6 +127,21 @@ class PALPATE_PG_scene(bpy.types.PropertyGroup):
     range_max_pressure: FloatProperty(
         name="Maximum (kPa)", description="Pressure at the end of the heat map, kPa", default=10.0, min=1e-9, **SETTING
     )
+    show_indentation: BoolProperty(
+        name="Indentation",
+        description="The surface of a baked sensor gives way by its penetration, so that what presses does not cut into it",
+        default=True,
+        **SETTING,
+    )
+    indentation_factor: FloatProperty(
+        name="Factor",
+        description="Displacement of the surface over its penetration: 1 is true to scale, more exaggerates",
+        default=1.0,
+        min=0.0,
+        soft_max=10.0,
+        max=1000.0,
+        **SETTING,
+    )
     overlays: EnumProperty(
         name="On Baked Sensors",
         description="Overlays that a bake adds to its sensors, besides the heat map; Shift-click adds one to those chosen",

@@ -94,7 +94,7 @@ def _references_of(block) -> Iterator:
         yield from (block.parent, block.data)
         yield from _constraint_targets(block.constraints)
         for modifier in block.modifiers:
-            if modifier.name != display_names.HEAT_MAP_MODIFIER:
+            if modifier.name not in display_names.MODIFIERS:
                 yield from _pointers(modifier)
                 yield from _node_inputs(modifier)
         for bone in () if block.pose is None else block.pose.bones:

@@ -28,7 +28,7 @@ SCALE_PROPERTIES = {"scale", "delta_scale"}
 
 def may_deform(obj) -> bool:
     """Return True when anything could change the shape of an object over time."""
-    if any(modifier.show_viewport and modifier.name != display_names.HEAT_MAP_MODIFIER for modifier in obj.modifiers):
+    if any(modifier.show_viewport and modifier.name not in display_names.MODIFIERS for modifier in obj.modifiers):
         return True
     if obj.parent_type in {"ARMATURE", "LATTICE"}:
         return True

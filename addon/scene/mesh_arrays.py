@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...core.errors import MeshError, SensorError
+from .display_names import REST_POSITION
 
 
 @dataclass(frozen=True)
@@ -29,15 +30,37 @@ class MeshArrays:
 
 @contextmanager
 def evaluated_mesh(obj, depsgraph):
-    """Yield an object's mesh with modifiers and shape keys applied; curves, text and metaballs are converted."""
+    """Yield an object's mesh with modifiers and shape keys applied; curves, text and metaballs are converted.
+
+    The indentation that shows a bake is left out.
+    """
     source = obj.evaluated_get(depsgraph)
     mesh = source.to_mesh()
     try:
         if mesh is None:
             raise MeshError(f"'{obj.name}' has no surface: use an object that has faces.")
+        if REST_POSITION in mesh.attributes and len(mesh.vertices) >= len(obj.data.vertices):
+            _undo_indentation(mesh, obj.data)
         yield mesh
     finally:
         source.to_mesh_clear()
+
+
+def _undo_indentation(mesh, base) -> None:
+    """Give an indented mesh the vertices and faces of the object's own mesh, and the places that these had before."""
+    rest = np.empty(3 * len(mesh.vertices), dtype=np.float32)
+    mesh.attributes[REST_POSITION].data.foreach_get("vector", rest)
+    starts, totals = np.empty(len(base.polygons), dtype=np.int32), np.empty(len(base.polygons), dtype=np.int32)
+    base.polygons.foreach_get("loop_start", starts)
+    base.polygons.foreach_get("loop_total", totals)
+    mesh.clear_geometry()
+    mesh.vertices.add(len(base.vertices))
+    mesh.vertices.foreach_set("co", rest[: 3 * len(base.vertices)])
+    mesh.loops.add(len(base.loops))
+    mesh.loops.foreach_set("vertex_index", corner_vertices(base))
+    mesh.polygons.add(len(base.polygons))
+    mesh.polygons.foreach_set("loop_start", starts)
+    mesh.update(calc_edges=True)
 
 
 def read_arrays(mesh) -> MeshArrays:

@@ -84,6 +84,10 @@ def test_it_plays_without_the_addon(scene_file, tmp_path):
         assert shown == pytest.approx(recording.sensors["Tip"].normal_force[frame - 1], abs=1e-7)
     assert recording.sensors["Tip"].normal_force[0].max() > 0.0
 
+    depths = [without["frames"][str(frame)]["depth"] for frame in FRAMES]
+    baked = recording.sensors["Pad"].depth.max(axis=1)
+    assert depths == pytest.approx([baked[frame - 1] for frame in FRAMES], rel=0.2, abs=1e-7)  # smooth over 3 by 3 texels
+
     cube_at = recording.body_names.index("Cube")
     for frame in FRAMES:
         matrix = np.array(without["frames"][str(frame)]["bodies"]["Cube"])

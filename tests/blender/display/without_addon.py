@@ -20,6 +20,14 @@ bpy.ops.wm.open_mainfile(filepath=scene_path)
 scene = bpy.context.scene
 render = scene.render
 render.image_settings.file_format = "PNG"
+
+
+def deepest(pad):
+    """Return how far the lowest vertex of a pad is below its highest, metres."""
+    heights = [vertex.co.z for vertex in pad.evaluated_get(bpy.context.evaluated_depsgraph_get()).data.vertices]
+    return max(heights) - min(heights)
+
+
 report = {"has_addon": hasattr(bpy.types.Object, "palpate"), "frames": {}}
 for frame in map(int, frames):
     scene.frame_set(frame)
@@ -31,7 +39,9 @@ for frame in map(int, frames):
     picture.pixels.foreach_get(pixels)
     tip = scene.objects["Tip"].evaluated_get(bpy.context.evaluated_depsgraph_get()).data
     report["frames"][frame] = {
-        "tip": [item.value for item in tip.attributes["palpate_force"].data],
+        # the vertices of the mesh itself come first; those of the indented surface follow
+        "tip": [item.value for item in tip.attributes["palpate_force"].data][: len(scene.objects["Tip"].data.vertices)],
+        "depth": deepest(scene.objects["Pad"]),
         "size": list(picture.size),
         "pixels": np.round(pixels, 4).tolist(),
         "arrows": {o.name: [list(row) for row in o.matrix_world] for o in scene.objects if o.name.startswith("Net Force")},

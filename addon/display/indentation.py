@@ -1,0 +1,307 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The surface of a baked sensor gives way by its baked penetration, so that what presses on it does not cut into it.
+
+Geometry nodes subdivide the sensor's faces and move their vertices inwards. They read the penetration from an image that is
+packed into the .blend, with a row for each frame, so that the surface plays in any Blender and without the files of the bake.
+The user's mesh keeps its vertices.
+
+What reads a scene must not take the indented surface for the sensor's shape: :func:`.mesh_arrays.evaluated_mesh` gives the mesh
+without it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+
+from ..scene import mesh_arrays
+from ..scene.display_names import INDENTATION_MODIFIER, REST_POSITION
+from ..session import transforms
+from . import materials
+from .baked_sensor import BakedSensor
+
+MARK = "indentation"
+"""What follows the sensor's identity in the marks of the image and the node group."""
+FACTOR_LABEL = "Displacement / penetration"
+"""Label of the node that holds the factor."""
+MOST_VERTICES = 12_000
+"""Vertices of a subdivided sensor at most; Blender 4.5 evaluates so many in about 60 ms per frame on one core."""
+MOST_LEVELS = 3
+"""A cell of a coarse grid becomes 8 × 8 faces, on which the outline of a ball looks round."""
+MOST_PIXELS = 4_000_000
+"""Pixels of the image at most, 64 MB of memory; of longer bakes every second, third, … frame is kept."""
+SHARPENINGS = 4
+"""How often the values at the texels are corrected for what the smoothing takes from them. After four corrections the lowest
+point of the surface is at the depth of a wide contact within 3 %, and of a contact of a single texel within a quarter."""
+NEIGHBOUR_WEIGHT = 0.25
+"""Weight of a neighbour beside the texel's own in the correction: on a grid of quads the texel then counts a half, which is
+near the 4/9 of the limit surface of Catmull and Clark."""
+
+
+@dataclass(frozen=True)
+class _Names:
+    """Names of a sensor's attributes. They hold its identity, because several sensors may share a mesh."""
+
+    uid: str
+
+    @property
+    def inward(self) -> str:
+        """Vector on vertices: displacement per metre of depth, object's frame, Blender units; zero where never touched."""
+        return f"palpate_inward:{self.uid}"
+
+    @property
+    def column(self) -> str:
+        """Vector on vertices whose x is the image's texture coordinate u."""
+        return f"palpate_column:{self.uid}"
+
+    @property
+    def channel(self) -> str:
+        """Vector on vertices: one for the channel of the image that holds the vertex, zero for the other two."""
+        return f"palpate_channel:{self.uid}"
+
+
+def apply(sensor: BakedSensor, factor: float) -> None:
+    """Let a sensor's surface follow its bake; it replaces the indentation of an earlier one.
+
+    Nothing is done where nothing ever touched the sensor, where modifiers change the number of its vertices, and where it is
+    laid onto the surface of another object, below which it would disappear.
+
+    Parameters
+    ----------
+    sensor : BakedSensor
+    factor : float
+        Displacement over penetration.
+    """
+    obj, uid = sensor.obj, sensor.obj.palpate.uid
+    clear(obj)
+    touched = _touched(sensor)
+    if not touched.any() or obj.palpate.skin.method != "NONE" or not _keeps_vertices(obj):
+        return
+    step = _frame_step(len(sensor.frames), int(touched.sum()))
+    image = _depth_image(uid, obj.name, sensor.readings.depth[::step], touched)
+    _store_attributes(obj.data, _Names(uid), sensor, touched, image.size[0])
+    modifier = obj.modifiers.new(INDENTATION_MODIFIER, "NODES")
+    play = _Play(image, int(sensor.frames[0]), int(sensor.frames[-1]), step)
+    modifier.node_group = _nodes(uid, obj.name, play, _levels(len(obj.data.vertices)), factor)
+
+
+def clear(obj) -> None:
+    """Remove the indentation of a sensor with its image, nodes and attributes."""
+    if obj.type != "MESH":
+        return
+    modifier, uid = obj.modifiers.get(INDENTATION_MODIFIER), obj.palpate.uid
+    if modifier is not None:
+        obj.modifiers.remove(modifier)
+    names = _Names(uid)
+    for name in (names.inward, names.column, names.channel):
+        attribute = obj.data.attributes.get(name)
+        if attribute is not None:
+            obj.data.attributes.remove(attribute)
+    for blocks in (bpy.data.node_groups, bpy.data.images):
+        block = materials.find_block(blocks, f"{uid}:{MARK}")
+        if block is not None:
+            blocks.remove(block)
+
+
+def factor_of(obj) -> float:
+    """Return the displacement of an object's surface over its penetration; zero for an object that is not indented, or None."""
+    modifier = None if obj is None else obj.modifiers.get(INDENTATION_MODIFIER)
+    if modifier is None or not modifier.show_viewport or modifier.node_group is None:
+        return 0.0
+    node = next((node for node in modifier.node_group.nodes if node.label == FACTOR_LABEL), None)
+    return 0.0 if node is None else node.inputs["Scale"].default_value
+
+
+@dataclass(frozen=True)
+class _Play:
+    """An image of depths, its first and last frame, and the frames from one of its rows to the next."""
+
+    image: object
+    first: int
+    last: int
+    step: int
+
+
+def _touched(sensor: BakedSensor) -> np.ndarray:
+    """(n,) bool: texels with any penetration; a long recording is read in parts."""
+    depth = sensor.readings.depth
+    found = np.zeros(depth.shape[1], dtype=bool)
+    for start in range(0, len(depth), 1000):
+        found |= (depth[start : start + 1000] > 0.0).any(axis=0)
+    return found
+
+
+def _keeps_vertices(obj) -> bool:
+    """Return True when the object's modifiers leave the number of its vertices as it is."""
+    with mesh_arrays.evaluated_mesh(obj, bpy.context.evaluated_depsgraph_get()) as mesh:
+        return len(mesh.vertices) == len(obj.data.vertices)
+
+
+def _frame_step(frames: int, texels: int) -> int:
+    """Return the least distance of kept frames at which the image has no more than :data:`MOST_PIXELS`."""
+    return max(1, -(-frames * -(-texels // 3) // MOST_PIXELS))
+
+
+def _levels(vertices: int) -> int:
+    """Return how often the faces are subdivided; each time their number becomes fourfold."""
+    return next((level for level in range(MOST_LEVELS, 0, -1) if vertices * 4**level <= MOST_VERTICES), 0)
+
+
+def _depth_image(uid: str, name: str, depth: np.ndarray, touched: np.ndarray):
+    """Return an image with a row for each frame and three touched texels in each of its pixels, packed into the .blend."""
+    width = -(-int(touched.sum()) // 3)
+    image = bpy.data.images.new(f"Palpate {name} depth", width, len(depth), alpha=False, float_buffer=True, is_data=True)
+    image[materials.SENSOR_KEY] = f"{uid}:{MARK}"
+    pixels = np.zeros((len(depth), width, 4), dtype=np.float32)
+    pixels[..., 3] = 1.0
+    (texels,) = np.nonzero(touched)
+    for channel in range(3):
+        chosen = texels[channel::3]
+        pixels[:, : len(chosen), channel] = np.maximum(depth[:, chosen], 0.0)
+    image.pixels.foreach_set(pixels.ravel())
+    image.pack()
+    return image
+
+
+def _store_attributes(mesh, names: _Names, sensor: BakedSensor, touched: np.ndarray, width: int) -> None:
+    place = np.cumsum(touched) - 1
+    rows = sensor.texels.vertex[touched]
+    columns = {
+        names.inward: -sensor.texels.normal[touched] @ np.linalg.inv(_body_from_object(sensor)).T,
+        names.column: np.outer((place[touched] // 3 + 0.5) / width, (1.0, 0.0, 0.0)),
+        names.channel: np.eye(3)[place[touched] % 3],
+    }
+    for name, values in columns.items():
+        table = np.zeros((len(mesh.vertices), 3), dtype=np.float32)
+        table[rows] = values
+        mesh.attributes.new(name, "FLOAT_VECTOR", "POINT").data.foreach_set("vector", table.ravel())
+    mesh.update()
+
+
+def _body_from_object(sensor: BakedSensor) -> np.ndarray:
+    """(3, 3) float, which takes the object's vectors (Blender units) to the body's frame (metres)."""
+    body, own = (transforms.as_array(item.matrix_world) for item in (sensor.body, sensor.obj))
+    turn = transforms.rotation(transforms.decompose(body)[1])
+    return sensor.scale * turn.T @ own[:3, :3]
+
+
+def _nodes(uid: str, name: str, play: _Play, levels: int, factor: float):
+    """Return geometry nodes that look up each texel's depth, spread it smoothly over finer faces, and move them inwards."""
+    group = materials.empty_node_group(f"{uid}:{MARK}", f"{name} indentation")
+    add, link, names = materials.NodeAdder(group), group.links.new, _Names(uid)
+    start = add("NodeGroupInput").outputs[0]
+    rest = _store(add, start, REST_POSITION, "FLOAT_VECTOR", add("GeometryNodeInputPosition").outputs[0])
+    depth_name = f"palpate_depth:{uid}"
+    coarse = _store(add, rest, depth_name, "FLOAT", _depth(add, names, play))
+    depth = _attribute(add, depth_name, "FLOAT")
+    fine = coarse
+    if levels:
+        fine = _subdivided(add, "GeometryNodeSubdivideMesh", coarse, levels)
+        depth = _smooth_depth(add, coarse, _sharpened(add, depth), levels)
+    inward = add("ShaderNodeVectorMath", operation="SCALE")
+    link(_attribute(add, names.inward, "FLOAT_VECTOR"), inward.inputs[0])
+    link(depth, inward.inputs["Scale"])
+    exaggerated = add("ShaderNodeVectorMath", operation="SCALE", label=FACTOR_LABEL)
+    link(inward.outputs["Vector"], exaggerated.inputs[0])
+    exaggerated.inputs["Scale"].default_value = factor
+    move = add("GeometryNodeSetPosition")
+    link(fine, move.inputs["Geometry"])
+    link(exaggerated.outputs["Vector"], move.inputs["Offset"])
+    link(move.outputs["Geometry"], add("NodeGroupOutput").inputs[0])
+    return group
+
+
+def _depth(add, names: _Names, play: _Play):
+    """Return the socket of the depth at each texel, metres, between two frames in between."""
+    link = add.tree.links.new
+    clamp = add("ShaderNodeClamp")
+    clamp.inputs["Min"].default_value, clamp.inputs["Max"].default_value = play.first, play.last
+    link(add("GeometryNodeInputSceneTime").outputs["Frame"], clamp.inputs["Value"])
+    rows = play.image.size[1]
+    row = add("ShaderNodeMapRange", clamp=True)
+    last_row = play.first + play.step * (rows - 1)
+    ends = {"From Min": play.first, "From Max": max(last_row, play.first + 1), "To Min": 0.5 / rows, "To Max": 1.0 - 0.5 / rows}
+    for socket, value in ends.items():
+        row.inputs[socket].default_value = value
+    link(clamp.outputs["Result"], row.inputs["Value"])
+    column = add("ShaderNodeSeparateXYZ")
+    link(_attribute(add, names.column, "FLOAT_VECTOR"), column.inputs[0])
+    where = add("ShaderNodeCombineXYZ")
+    link(column.outputs["X"], where.inputs["X"])
+    link(row.outputs["Result"], where.inputs["Y"])
+    texture = add("GeometryNodeImageTexture", interpolation="Linear", extension="EXTEND")
+    texture.inputs["Image"].default_value = play.image
+    link(where.outputs["Vector"], texture.inputs["Vector"])
+    chosen = add("ShaderNodeVectorMath", operation="DOT_PRODUCT")
+    link(texture.outputs["Color"], chosen.inputs[0])
+    link(_attribute(add, names.channel, "FLOAT_VECTOR"), chosen.inputs[1])
+    return chosen.outputs["Value"]
+
+
+def _sharpened(add, depth):
+    """Return values whose smoothed surface passes near the depths: each time, what the smoothing takes away is added."""
+    link, values = add.tree.links.new, depth
+    for _ in range(SHARPENINGS):
+        blur = add("GeometryNodeBlurAttribute", data_type="FLOAT")
+        blur.inputs["Iterations"].default_value = 1
+        blur.inputs["Weight"].default_value = NEIGHBOUR_WEIGHT
+        link(values, blur.inputs["Value"])
+        missing = add("ShaderNodeMath", operation="SUBTRACT")
+        link(depth, missing.inputs[0])
+        link(blur.outputs["Value"], missing.inputs[1])
+        corrected = add("ShaderNodeMath", operation="ADD")
+        link(values, corrected.inputs[0])
+        link(missing.outputs[0], corrected.inputs[1])
+        values = corrected.outputs[0]
+    return values
+
+
+def _smooth_depth(add, coarse, values, levels: int):
+    """Return the socket of the depth on the subdivided faces, smooth between texels and nowhere negative.
+
+    Blender interpolates attributes linearly and only positions smoothly. The depth therefore becomes the x coordinate of a
+    second mesh with the same faces.
+    """
+    link = add.tree.links.new
+    as_vector = add("ShaderNodeCombineXYZ")
+    link(values, as_vector.inputs["X"])
+    place = add("GeometryNodeSetPosition")
+    link(coarse, place.inputs["Geometry"])
+    link(as_vector.outputs["Vector"], place.inputs["Position"])
+    smooth = _subdivided(add, "GeometryNodeSubdivisionSurface", place.outputs["Geometry"], levels)
+    sample = add("GeometryNodeSampleIndex", data_type="FLOAT_VECTOR", domain="POINT")
+    link(smooth, sample.inputs["Geometry"])
+    link(add("GeometryNodeInputPosition").outputs[0], sample.inputs["Value"])
+    link(add("GeometryNodeInputIndex").outputs[0], sample.inputs["Index"])
+    parts = add("ShaderNodeSeparateXYZ")
+    link(sample.outputs["Value"], parts.inputs[0])
+    positive = add("ShaderNodeMath", operation="MAXIMUM")
+    link(parts.outputs["X"], positive.inputs[0])
+    positive.inputs[1].default_value = 0.0
+    return positive.outputs[0]
+
+
+def _subdivided(add, kind: str, mesh, levels: int):
+    """Return the socket of a mesh subdivided by a node of this kind."""
+    node = add(kind)
+    add.tree.links.new(mesh, node.inputs["Mesh"])
+    node.inputs["Level"].default_value = levels
+    return node.outputs["Mesh"]
+
+
+def _store(add, geometry, name: str, data_type: str, value):
+    """Return the socket of a geometry with an attribute on its points."""
+    node = add("GeometryNodeStoreNamedAttribute", data_type=data_type, domain="POINT")
+    node.inputs["Name"].default_value = name
+    add.tree.links.new(geometry, node.inputs["Geometry"])
+    add.tree.links.new(value, node.inputs["Value"])
+    return node.outputs["Geometry"]
+
+
+def _attribute(add, name: str, data_type: str):
+    """Return the socket of a named attribute."""
+    node = add("GeometryNodeInputNamedAttribute", data_type=data_type)
+    node.inputs["Name"].default_value = name
+    return node.outputs["Attribute"]

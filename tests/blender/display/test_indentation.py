@@ -1,0 +1,184 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The surface of a baked sensor gives way by its penetration; what reads the scene, and the user's mesh, know nothing of it."""
+
+import bpy
+import numpy as np
+import pytest
+from blender_scenes import ball, changes, dump, grid, press, press_and_drop, reopen, save
+
+from palpate.addon.bake.bake import bake
+from palpate.addon.display import indentation, overlays
+from palpate.addon.scene import mesh_arrays, mesh_fingerprint
+from palpate.addon.scene.display_names import INDENTATION_MODIFIER
+from palpate.addon.session import frame_status
+from palpate.core.jobs.job_runner import run_job
+
+
+def surface(obj):
+    """Return the vertices of an object as Blender shows them, (n, 3) in world coordinates."""
+    mesh = obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+    matrix = np.array(obj.matrix_world)
+    return mesh_arrays.vertices(mesh) @ matrix[:3, :3].T + matrix[:3, 3]
+
+
+def press_wide(frames=6):
+    """A ball of 40 mm that is pressed 3 mm deep into a turned, stretched pad of 16 by 16 texels."""
+    scene = bpy.context.scene
+    scene.frame_start, scene.frame_end = 1, frames
+    pad = grid(columns=16, rows=16)
+    bpy.ops.mesh.primitive_uv_sphere_add(radius=0.04, location=(0.0, 0.0, 0.0405), segments=128, ring_count=64)
+    target = bpy.context.object
+    pad.palpate.role, target.palpate.role = "SENSOR", "TARGET"
+    pad.scale, pad.rotation_euler = (1.0, 0.8, 1.3), (0.0, 0.0, 0.4)
+    target.keyframe_insert("location", frame=1)
+    target.location.z = 0.037
+    target.keyframe_insert("location", frame=frames)
+    scene.frame_set(1)
+    return scene, pad, target
+
+
+def test_the_surface_lies_where_the_ball_is(tmp_path):
+    """Also between the texels: nowhere does the ball cut deeper than a tenth of its penetration into the surface."""
+    scene, pad, target = press_wide()
+    save(tmp_path)
+    result = run_job(bake(scene))
+    before = surface(pad)
+    assert np.ptp(before[:, 2]) < 1e-9  # at the first frame nothing touches
+    scene.frame_set(6)
+    after = surface(pad)
+    assert len(after) > 14 * len(pad.data.vertices)
+    depth = result.recording.at(6).sensors["Pad"].depth
+    assert -after[:, 2].min() == pytest.approx(depth.max(), rel=0.03)
+    distance = np.linalg.norm(after - np.array(target.matrix_world.translation), axis=1)
+    assert (0.04 - distance).max() < 0.1 * depth.max()
+    outside = np.hypot(*(after[:, :2] - np.array(target.matrix_world.translation)[:2]).T) > 0.022
+    assert np.abs(after[outside, 2]).max() < 0.02 * depth.max()
+    frames = [1, 6]
+    scene.frame_set(5, subframe=0.5)  # between two frames the surface is between theirs
+    half = surface(pad)[:, 2].min()
+    for frame in frames:
+        scene.frame_set(frame)
+    assert after[:, 2].min() < half < -0.5 * depth.max()
+
+
+def test_the_scene_reads_as_without(tmp_path):
+    """A second bake gives the same bits, and no frame of the first is called out of date."""
+    scene, pad, *_ = press_and_drop(frames=6)
+    save(tmp_path)
+    first = run_job(bake(scene))
+    for frame in (1, 4, 6):
+        scene.frame_set(frame)
+        assert frame_status.status_of(scene).text == f"Frame {frame} of the bake."
+    assert INDENTATION_MODIFIER in pad.modifiers
+    with mesh_arrays.evaluated_mesh(pad, bpy.context.evaluated_depsgraph_get()) as mesh:
+        assert np.array_equal(mesh_arrays.positions(mesh), mesh_arrays.positions(pad.data))
+        assert np.array_equal(mesh_arrays.corner_vertices(mesh), mesh_arrays.corner_vertices(pad.data))
+        assert len(mesh.polygons) == len(pad.data.polygons)
+    second = run_job(bake(scene))
+    assert first.recording.digest == second.recording.digest
+    for name, sensor in first.recording.sensors.items():
+        assert np.array_equal(sensor.normal_force, second.recording.sensors[name].normal_force)
+
+
+def test_a_sensor_that_deforms_is_not_stale(tmp_path):
+    scene, pad, _ = press()
+    pad.shape_key_add(name="Basis")
+    key = pad.shape_key_add(name="Bent")
+    for i, vertex in enumerate(pad.data.vertices):
+        key.data[i].co.z = 5.0 * vertex.co.x**2
+    key.keyframe_insert("value", frame=1)
+    key.value = 0.5
+    key.keyframe_insert("value", frame=8)
+    scene.frame_set(1)
+    save(tmp_path)
+    plain = mesh_fingerprint.evaluated_fingerprint(pad, bpy.context.evaluated_depsgraph_get())
+    result = run_job(bake(scene))
+    assert result.scenario.sensors[0].deformation is not None
+    assert mesh_fingerprint.evaluated_fingerprint(pad, bpy.context.evaluated_depsgraph_get()) == plain
+    scene.frame_set(8)
+    assert frame_status.status_of(scene).text == "Frame 8 of the bake."
+    depth = result.recording.at(8).sensors["Pad"].depth.max()
+    with mesh_arrays.evaluated_mesh(pad, bpy.context.evaluated_depsgraph_get()) as mesh:
+        rest = mesh_arrays.vertices(mesh)
+    moved = rest - surface(pad)[: len(rest)]
+    assert np.linalg.norm(moved, axis=1).max() == pytest.approx(depth, rel=0.25)  # under three by three texels
+
+
+def test_factor_and_checkbox_are_applied_and_nothing_is_left(tmp_path):
+    scene, pad, _ = press()
+    bpy.ops.palpate.reset()
+    save(tmp_path)
+    before = dump()
+    run_job(bake(scene))
+    scene.frame_set(8)
+    once = -surface(pad)[:, 2].min()
+    scene.palpate.indentation_factor = 3.0
+    assert bpy.ops.palpate.dress() == {"FINISHED"}
+    assert -surface(pad)[:, 2].min() == pytest.approx(3.0 * once, rel=1e-4)
+    assert indentation.factor_of(pad) == 3.0
+    save(tmp_path)
+    scene = reopen(tmp_path / "scene.blend")
+    pad = scene.objects["Pad"]
+    assert -surface(pad)[:, 2].min() == pytest.approx(3.0 * once, rel=1e-4)
+    scene.palpate.show_indentation = False
+    assert bpy.ops.palpate.dress() == {"FINISHED"}
+    assert np.ptp(surface(pad)[:, 2]) < 1e-9 and indentation.factor_of(pad) == 0.0
+    assert not [image.name for image in bpy.data.images if "depth" in image.name]
+    scene.palpate.show_indentation, scene.palpate.indentation_factor = True, 1.0
+    assert bpy.ops.palpate.dress() == {"FINISHED"}
+    scene.frame_set(1)
+    assert bpy.ops.palpate.bake_clear() == {"FINISHED"}
+    assert [line for line in changes(before, dump()) if "baked_" not in line and "settings" not in line] == []
+
+
+def test_two_sensors_share_a_mesh(tmp_path):
+    """Each gives way by its own penetration."""
+    scene, pad, _ = press()
+    other = pad.copy()
+    scene.collection.objects.link(other)
+    other.name, other.location = "Other", (0.0, 0.3, 0.0)
+    plate = ball("Second", (0.005, 0.3, 0.007))
+    plate.palpate.role = "TARGET"
+    save(tmp_path)
+    result = run_job(bake(scene))
+    scene.frame_set(8)
+    assert pad.data == other.data
+    for obj in (pad, other):
+        depth = result.recording.at(8).sensors[obj.name].depth.max()
+        assert depth > 0.0 and -surface(obj)[:, 2].min() == pytest.approx(depth, rel=0.25)
+
+
+def test_modifiers_that_add_vertices_leave_the_surface_as_it_is(tmp_path):
+    scene, pad, _ = press()
+    pad.modifiers.new("Subdivision", "SUBSURF")
+    save(tmp_path)
+    run_job(bake(scene))
+    assert INDENTATION_MODIFIER not in pad.modifiers
+
+
+def test_long_bakes_keep_every_second_frame(tmp_path, monkeypatch):
+    scene, pad, _ = press()
+    monkeypatch.setattr(indentation, "MOST_PIXELS", 4)
+    save(tmp_path)
+    result = run_job(bake(scene))
+    image = next(image for image in bpy.data.images if image.name.endswith("depth"))
+    width, height = image.size
+    assert width * height <= 4 and height == 4
+    scene.frame_set(7)  # the last that is kept
+    depth = result.recording.at(7).sensors["Pad"].depth.max()
+    assert -surface(pad)[:, 2].min() == pytest.approx(depth, rel=0.25)
+
+
+def test_the_overlay_of_solid_view_lies_on_the_surface(tmp_path):
+    scene, pad, _ = press_wide()
+    save(tmp_path)
+    result = run_job(bake(scene))
+    scene.frame_set(6)
+    made = type("Bake", (), {})()
+    made.recording, made.texels = result.recording, {"Pad": result.scenario.sensors[0].texels}
+    made.manifests = {"Pad": type("Manifest", (), {"body": ""})()}
+    (overlay,) = overlays.baked_overlays(scene, made, 6, 1.0)
+    upper = overlay.corners[: len(overlay.corners) // 2]
+    depth = result.recording.at(6).sensors["Pad"].depth.max()
+    assert -upper[:, 2].min() == pytest.approx(depth, rel=0.15)
+    assert upper[:, 2].min() > surface(pad)[:, 2].min()
