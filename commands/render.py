@@ -52,6 +52,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--view", metavar=("AZIMUTH", "ELEVATION"), nargs=2, type=float, help="direction of the camera, degrees"
     )
     parser.add_argument("--own-camera", action="store_true", help="leave the scene's camera where it is")
+    parser.add_argument(
+        "--opaque-targets",
+        action="store_true",
+        help="let targets hide the texels that they press (default: see-through there)",
+    )
     parser.add_argument("--transparent", action="store_true", help="render without background")
     blender.add_script_arguments(parser)
     figure_options.add_arguments(parser)
@@ -73,6 +78,7 @@ def run(arguments: argparse.Namespace) -> int:
             view=tuple(arguments.view) if arguments.view else None,
             transparent=arguments.transparent,
             own_camera=arguments.own_camera,
+            see_through=not arguments.opaque_targets,
             size=tuple(arguments.size),
             samples=arguments.samples,
             **({"kinds": tuple(arguments.only)} if arguments.only else {}),

@@ -59,6 +59,10 @@ class Display(Subpanel):
             column.prop(own, "range_max_pressure" if own.quantity == "PRESSURE" else "range_max")
         layout.label(text="On baked sensors:")
         layout.grid_flow(even_columns=True, align=True).prop(own, "overlays")
+        row = layout.row(align=True)
+        row.prop(own, "show_indentation")
+        if own.show_indentation:
+            row.prop(own, "indentation_factor")
         column = layout.column(align=True)
         column.prop(own, "use_auto_arrow")
         if not own.use_auto_arrow:
@@ -90,6 +94,7 @@ class Figures(Subpanel):
                 column.prop(own, "view", text="")
             column.prop(own, "size")
             column.prop(own, "samples")
+            column.prop(own, "see_through")
             column.prop(own, "transparent")
         layout.use_property_split = False
         layout.label(text="Data:")

@@ -108,6 +108,12 @@ class PALPATE_PG_figures(bpy.types.PropertyGroup):
         max=360.0,
         **_plain,
     )
+    see_through: BoolProperty(
+        name="See-Through Targets",
+        description="Targets become see-through where they cover texels that carry force",
+        default=True,
+        **_plain,
+    )
     transparent: BoolProperty(name="Transparent", description="Render without a background", **_plain)
     size: IntVectorProperty(
         name="Size", description="Width and height of renders, pixels", size=2, default=(1280, 960), min=16, max=16384, **_plain

@@ -25,7 +25,7 @@ from ...core.io.temporary_folder import temporary_folder
 from ...core.jobs.job_runner import run_job
 from ...core.jobs.progress import Job, Progress
 from ..display import bake_identity, baked_scene
-from . import figure_size, render, render_setup, video, workbench_colors
+from . import figure_size, loaded_texels, render, render_setup, see_through, video, workbench_colors
 from .figure_request import FigureRequest
 
 DRAWN = {"strip", "curves", "numbers"}
@@ -130,11 +130,19 @@ def _render_pictures(scene, folder, request, bake, frames, steps) -> Job[list[Pa
             yield steps.next("Rendering", number)
             show_frame(number)
             plain = folder / f"scene_{number:04d}.png"
-            written.append(render.render_frame(scene, plain, number, samples=request.samples, size=request.size))
+            written.append(_render(scene, plain, number, request, bake, request.size))
             beside = folder / f"scene_and_touch_{number:04d}.png"
             side_by_side(plain, beside, bake.recording, bake.texels, number, request.style, request.size[1])
             written.append(beside)
     return written
+
+
+def _render(scene, path, number: int, request: FigureRequest, bake: Bake, size: tuple[int, int]) -> Path:
+    """Render one frame, with targets see-through where they cover loaded texels if that is wanted."""
+    if not request.see_through:
+        return render.render_frame(scene, path, number, samples=request.samples, size=size)
+    loaded = loaded_texels.loaded_texels(scene, bake, number)
+    return see_through.render_picture(scene, path, number, loaded, samples=request.samples, size=size)
 
 
 def _make_video(scene, folder, request, bake, steps) -> Job[list[Path]]:
@@ -148,7 +156,7 @@ def _make_video(scene, folder, request, bake, steps) -> Job[list[Path]]:
                 yield steps.next("Rendering the video", number)
                 show_frame(number)
                 picture = temporary / f"{number - numbers[0]:06d}.png"
-                render.render_frame(scene, picture, number, samples=request.samples, size=size)
+                _render(scene, picture, number, request, bake, size)
                 side_by_side(picture, picture, bake.recording, bake.texels, number, request.style, size[1])
                 pictures.append(picture)
         yield steps.next("Encoding the video", numbers[-1])

@@ -40,6 +40,8 @@ class FigureRequest:
         Names from :func:`.registry.exporters`; each is written into a folder of its own.
     engine, view, transparent, own_camera
         See :class:`.render_setup.RenderOptions`.
+    see_through : bool
+        Targets become see-through where they cover loaded texels.
     size : (2,) int, pixels
         Width and height of the renders.
     samples : int or None
@@ -56,6 +58,7 @@ class FigureRequest:
     view: tuple[float, float] | None = None
     transparent: bool = False
     own_camera: bool = False
+    see_through: bool = True
     size: tuple[int, int] = (1280, 960)
     samples: int | None = None
 
@@ -102,6 +105,7 @@ def requested_figures(scene, active=None) -> FigureRequest:
         view=tuple(own.view) if own.camera == "VIEW" else None,
         transparent=own.transparent,
         own_camera=own.camera == "OWN",
+        see_through=own.see_through,
         size=tuple(own.size),
         samples=own.samples or None,
     )

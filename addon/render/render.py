@@ -86,6 +86,14 @@ def image_position(scene, point) -> tuple[float, float]:
     return 0.5 + 0.5 * x / (-z * width), 0.5 + 0.5 * y / (-z * height)
 
 
+def pixels_per_unit(scene, point, width: int) -> float:
+    """Return how many pixels a Blender unit across the view takes at a world point, in a picture of this width."""
+    camera = _camera(scene)
+    across, _ = _half_angles(scene, camera)
+    depth = -(camera.matrix_world.normalized().inverted() @ Vector(point)).z
+    return 0.5 * width / (max(depth, 1e-9) * across)
+
+
 def render_frame(scene, path: str | os.PathLike, frame: int, *, samples: int | None = None, size=None) -> Path:
     """Render one frame of `scene` with its engine and camera to a PNG; the scene's settings are restored.
 

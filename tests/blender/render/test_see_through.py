@@ -1,0 +1,108 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What presses does not hide the texels that it presses on, and stays what it is elsewhere; the scene is left as it was."""
+
+import bpy
+import numpy as np
+import pytest
+from blender_scenes import changes, dump, grid, save
+
+from palpate.addon.bake.bake import bake
+from palpate.addon.render import figure_export, loaded_texels, render, render_setup, see_through
+from palpate.addon.render.figure_request import FigureRequest
+from palpate.core.errors import SceneError
+from palpate.core.jobs.job_runner import run_job
+
+SIZE = (96, 72)
+VIEW = (-90.0, 35.0)
+KINDS = {"opaque": {}, "metal": {"Metallic": 1.0, "Roughness": 0.2}, "glass": {"Transmission Weight": 1.0}}
+
+
+@pytest.fixture
+def baked(tmp_path):
+    scene = bpy.context.scene
+    scene.frame_start, scene.frame_end = 1, 3
+    pad = grid(columns=24, rows=24)
+    bpy.ops.mesh.primitive_uv_sphere_add(radius=0.014, location=(0.0, 0.0, 0.0125), segments=64, ring_count=32)
+    target = bpy.context.object
+    pad.palpate.role, target.palpate.role, target.name = "SENSOR", "TARGET", "Ball"
+    scene.render.engine = "CYCLES"
+    scene.cycles.samples, scene.cycles.use_denoising = 8, False
+    save(tmp_path)
+    result = run_job(bake(scene))
+    save(tmp_path)
+    return scene, pad, target, result
+
+
+def picture_of(scene, folder, **options):
+    from matplotlib.image import imread
+
+    request = FigureRequest(("scene",), frames=(3,), size=SIZE, samples=8, view=VIEW, **options)
+    run_job(figure_export.make_figures(scene, folder, request))
+    return imread(folder / "scene_0003.png")
+
+
+def loaded_pixels(scene, pad):
+    """Return the loaded texels, rows and columns of the pixels of the most loaded one and of the ball's top, and the weights."""
+    bake = figure_export.read_scene_bake(scene)
+    with render_setup.render_setup(scene, [3], FigureRequest(view=VIEW).render_options(SIZE)):
+        scene.frame_set(3)
+        loaded = loaded_texels.loaded_texels(scene, bake, 3)
+        points = [loaded.points[loaded.forces.argmax()], (0.0, 0.0, 0.0125 + 0.013)]
+        places = np.array([render.image_position(scene, point) for point in points])
+        weights = see_through.clear_weights(scene, loaded, SIZE)
+    columns, rows = (places * SIZE).astype(int).T
+    return loaded, SIZE[1] - 1 - rows, columns, weights
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_loaded_texels_are_seen_through_what_presses_on_them(baked, tmp_path, kind):
+    """The picture there is that of a scene without the target; at the target's top it is that of a scene with it."""
+    scene, pad, target, _ = baked
+    material = bpy.data.materials.new("Own")
+    material.use_nodes = True
+    for name, value in KINDS[kind].items():
+        material.node_tree.nodes["Principled BSDF"].inputs[name].default_value = value
+    target.data.materials.append(material)
+    before = dump()
+    clear = picture_of(scene, tmp_path / "clear")
+    covered = picture_of(scene, tmp_path / "covered", see_through=False)
+    assert [line for line in changes(before, dump()) if "Render Result" not in line] == []
+    loaded, rows, columns, weights = loaded_pixels(scene, pad)
+    assert len(loaded) > 9 and weights.max() == pytest.approx(see_through.CLEARNESS)
+    # the colours of a heat map are not grey: what differs between red, green and blue is the map
+    colourful = [np.ptp(shot[rows[0], columns[0], :3]) for shot in (clear, covered)]
+    if kind == "glass":
+        assert colourful[0] > 0.2
+    else:
+        assert colourful[0] > 0.2 > 2.0 * colourful[1]
+    top = rows[1], columns[1]
+    assert weights[top] == 0.0 and np.abs(clear[top] - covered[top]).max() < 0.02
+    assert (np.abs(clear - covered).max(axis=2) > 0.02).sum() < 0.3 * clear.shape[0] * clear.shape[1]
+
+
+def test_a_second_render_that_fails_leaves_the_scene_as_it_was(baked, tmp_path, monkeypatch):
+    scene, _, target, _ = baked
+    before, calls, first = dump(), [], render.render_frame
+
+    def fail(*arguments, **options):
+        calls.append(target.hide_render)
+        if len(calls) == 2:
+            raise SceneError("the disk is full")
+        return first(*arguments, **options)
+
+    monkeypatch.setattr(render, "render_frame", fail)
+    with pytest.raises(SceneError, match="disk"):
+        picture_of(scene, tmp_path / "out")
+    assert calls == [False, True] and not target.hide_render and not scene.render.use_border
+    assert [line for line in changes(before, dump()) if "Render Result" not in line] == []
+    assert not list((tmp_path / "out").glob("scene*"))
+
+
+def test_one_render_where_nothing_is_covered(baked, tmp_path, monkeypatch):
+    """From below nothing is between the camera and the pad, whose texels face the other way."""
+    scene, *_ = baked
+    calls, first = [], render.render_frame
+    monkeypatch.setattr(render, "render_frame", lambda *words, **options: calls.append(1) or first(*words, **options))
+    request = FigureRequest(("scene",), frames=(3,), size=(32, 24), samples=1, view=(-90.0, -40.0))
+    run_job(figure_export.make_figures(scene, tmp_path / "out", request))
+    assert len(calls) == 1
