@@ -42,7 +42,7 @@ def picture_of(scene, folder, **options):
 
 
 def loaded_pixels(scene, pad):
-    """Return the loaded texels, rows and columns of the pixels of the most loaded one and of the ball's top, and the weights."""
+    """Return the loaded texels, rows and columns of the most loaded one and of the top of the ball, and the weights."""
     bake = figure_export.read_scene_bake(scene)
     with render_setup.render_setup(scene, [3], FigureRequest(view=VIEW).render_options(SIZE)):
         scene.frame_set(3)
