@@ -32,7 +32,7 @@ help:
 $(VENV)/.ready: pyproject.toml Makefile tools/system_packages.sh
 	tools/system_packages.sh $(PYTHON)
 	test -x $(VENV)/bin/python || $(PYTHON) -m venv $(VENV)
-	$(VENV)/bin/python -m pip install --quiet --editable '.[test]' bpy==$(BPY45)
+	$(VENV)/bin/python -m pip install --quiet --editable '.[test,bench]' bpy==$(BPY45)
 	touch $@
 
 $(VENV50)/.ready: pyproject.toml Makefile tools/system_packages.sh

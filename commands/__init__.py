@@ -30,6 +30,7 @@ COMMANDS = {
     "gap": "find what the model misses against a real sensor",
     "paper": "repeat the experiments of the paper",
     "sweep": "compute a scene thousands of times with varied numbers, resumable",
+    "sensor": "write sensors for other simulators",
     "openrave": "read and write OpenRAVE sensor definitions",
 }
 """Commands in the order of the help. A command is ready once this package has a module of its name."""

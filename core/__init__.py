@@ -21,5 +21,6 @@ __all__ = [
     "study",
     "figures",
     "export",
+    "simulators",
     "gap",
 ]

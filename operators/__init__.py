@@ -3,9 +3,24 @@
 
 
 def _classes():
-    from . import bake, debug, effects, exchange, figures, fits, fix, gap, laid_sensor, presets, probe, sensor, study
+    from . import (
+        bake,
+        debug,
+        effects,
+        exchange,
+        figures,
+        fits,
+        fix,
+        gap,
+        laid_sensor,
+        presets,
+        probe,
+        sensor,
+        simulators,
+        study,
+    )
 
-    modules = (sensor, laid_sensor, presets, effects, fix, probe, fits, gap, exchange, bake, figures, study, debug)
+    modules = (sensor, laid_sensor, presets, effects, fix, probe, fits, gap, exchange, simulators, bake, figures, study, debug)
     return tuple(cls for module in modules for cls in module.CLASSES)
 
 

@@ -77,6 +77,7 @@ def _draw_import(self, _context):
 def _draw_export(self, _context):
     self.layout.operator("palpate.openrave_export")
     self.layout.operator("palpate.sensor_toml_export")
+    self.layout.operator_menu_enum("palpate.sensor_export", "to", text="Palpate Sensors for a Simulator")
 
 
 VARIABLE_TYPES = {"BOOLEAN", "INT", "FLOAT", "ENUM"}

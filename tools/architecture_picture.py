@@ -34,6 +34,7 @@ CAPTIONS = {
     "core.study": "many runs of a scene",
     "core.figures": "images, curves, strips",
     "core.export": "a bake for other programs",
+    "core.simulators": "sensors for other programs",
     "core.gap": "what a sensor's model lacks",
     "addon.session": "units, clock, identity, jobs",
     "addon.properties": "settings kept in the .blend",

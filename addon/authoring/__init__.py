@@ -10,6 +10,7 @@ __all__ = [
     "laid_sensors",
     "probes",
     "problems",
+    "sensor_exchange",
     "sensor_presets",
     "sensor_report",
     "sensors",

@@ -37,4 +37,5 @@ __all__ = [
     "tactile_exr",
     "temporary_folder",
     "toml_file",
+    "xml_file",
 ]

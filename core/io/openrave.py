@@ -8,7 +8,6 @@ thickness of the foam, and the model holds the maximum penetration, which is twi
 from __future__ import annotations
 
 import os
-import re
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import Any
@@ -18,7 +17,7 @@ from ..errors import FileError, PalpateError
 from ..model.parameter import numbers_of
 from ..model.sensor_parameters import DEPTH_PER_THICKNESS, SENSOR_PARAMETERS, SensorParameters
 from .file_writing import atomic_write
-from .regular_file import read_bytes
+from .xml_file import read_xml, require_xml_text
 
 SENSOR_TYPE = "SimTactileSensor"
 NUMBERS = tuple(
@@ -59,25 +58,7 @@ def read_openrave(path: str | os.PathLike) -> list[OpenRaveSensor]:
     FileError
         There is no such file, it is not XML, it holds no tactile sensor, or a value is not a number or out of bounds.
     """
-    try:
-        text = read_bytes(path)
-    except FileNotFoundError as error:
-        raise FileError(f"There is no file '{path}': check its name and folder.") from error
-    except OSError as error:
-        raise FileError(f"'{path}' cannot be read ({error.strerror}): check its name and permissions.") from error
-    except ValueError as error:  # a NUL in the name
-        raise FileError(f"{str(path)!r} cannot be the name of a file: check it.") from error
-    if b"<!ENTITY" in text:  # nested entities can grow without limit
-        raise FileError(f"'{path}' declares XML entities: write them out, a sensor definition needs none.")
-    try:
-        # A fragment of a robot file with several definitions side by side has no root element.
-        body = text[text.index(b"?>") + 2 :] if text.lstrip().startswith(b"<?xml") else text
-        root = ElementTree.fromstring(b"<palpate>" + body + b"</palpate>")
-    except (ElementTree.ParseError, ValueError) as error:
-        line = getattr(error, "position", (1, 0))[0]
-        raise FileError(
-            f"Line {line} of '{path}' is no XML ({error}): a tag may have no space behind its '<' and must be closed."
-        ) from error
+    root = read_xml(path, "a sensor definition")
     found = [_sensor(path, attached) for attached in root.iter("AttachedSensor") if _tactile(attached) is not None]
     if not found:
         raise FileError(f"'{path}' has no <AttachedSensor> with a <sensor type=\"{SENSOR_TYPE}\">: give a file that has one.")
@@ -137,8 +118,7 @@ def openrave_xml(sensors: Iterable[OpenRaveSensor], robot: str | None = None) ->
 
     sensors = list(sensors)
     for name in (robot or "", *(sensor.name for sensor in sensors), *(sensor.link for sensor in sensors)):
-        if re.search("[\x00-\x08\x0b\x0c\x0e-\x1f\ud800-\udfff\ufffe\uffff]", name):
-            raise FileError(f"XML cannot hold the name {ascii(name)}: give the robot or the sensor another one.")
+        require_xml_text(name)
     lines = [f"<Robot name={quoteattr(robot)}>"] if robot is not None else []
     indent = "  " if robot is not None else ""
     for sensor in sensors:

@@ -162,6 +162,7 @@ CHANGE_NOTHING = {
     "palpate.gap_report",
     "palpate.openrave_export",
     "palpate.sensor_toml_export",
+    "palpate.sensor_export",
     "palpate.catch_up",
     "palpate.figures_make",
     "palpate.debug_info_copy",

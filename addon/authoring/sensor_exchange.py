@@ -1,0 +1,59 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Sensors of a scene for other simulators."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...core.errors import SceneError
+from ...core.geometry.mesh import TriangleMesh, checked_mesh
+from ...core.simulators.sensor_on_mesh import SensorOnMesh
+from ..scene import body_poses, mesh_arrays, participants, sensor_reader
+from ..session import transforms, units
+
+
+def sensors_on_meshes(scene, names=()) -> list[SensorOnMesh]:
+    """Return sensors of a scene at its present frame, each in the frame of its own object.
+
+    Parameters
+    ----------
+    names : sequence of str
+        Of sensors or pads. Without names: all sensors that take part.
+
+    Raises
+    ------
+    SceneError
+        There is no sensor, or none of a name.
+    PalpateError
+        A sensor's mesh or region makes no sensor.
+    """
+    found = {obj.name: obj for obj in scene.objects if obj.palpate.role in {"SENSOR", "PAD"}}
+    if not names:
+        names = [obj.name for obj in participants.find_participants(scene)[0] if obj.palpate.role == "SENSOR"]
+    for name in names:
+        if name not in found:
+            known = ", ".join(f"'{known}'" for known in found) or "none"
+            raise SceneError(f"There is no sensor '{name}' in '{scene.name}': choose from {known}.")
+    if not names:
+        raise SceneError(f"'{scene.name}' has no sensor: make one with Physics › Palpate › Make Sensor.")
+    return [_sensor_on_mesh(scene, found[name]) for name in dict.fromkeys(names)]
+
+
+def _sensor_on_mesh(scene, obj) -> SensorOnMesh:
+    depsgraph = participants.depsgraph_of(scene)
+    sensor, mesh = sensor_reader.sensor_in_own_frame(scene, obj, depsgraph)
+    pose = body_poses.body_pose(scene, obj, depsgraph)
+    return SensorOnMesh(sensor, mesh, _carrying_surface(scene, obj, depsgraph), pose[:3], pose[3:])
+
+
+def _carrying_surface(scene, obj, depsgraph) -> TriangleMesh | None:
+    """Return the surface of the object that a sensor is part of, in the sensor's frame, metres; None where it has its own."""
+    carrier = obj.parent
+    if obj.palpate.body != "PARENT" or carrier is None or carrier.type not in participants.OBJECT_TYPES:
+        return None
+    arrays = mesh_arrays.target_arrays(carrier, depsgraph)
+    location, quaternion, _ = body_poses.decompose(obj, body_poses.world_matrix(obj, depsgraph))
+    matrix = np.linalg.inv(transforms.pose_matrix(location, quaternion)) @ body_poses.world_matrix(carrier, depsgraph)
+    vertices = (arrays.vertices @ matrix[:3, :3].T + matrix[:3, 3]) * units.metres_per_unit(scene)
+    triangles = arrays.triangles[:, ::-1] if np.linalg.det(matrix[:3, :3]) < 0 else arrays.triangles
+    return checked_mesh(vertices, triangles, carrier.name)[0]

@@ -1,0 +1,8 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Sensors for other simulators and from them: one module per format in :mod:`.formats`, found by the registry.
+
+A new format is one new module in :mod:`.formats` that defines a ``FORMAT``; the command line, the menus and the checks take it
+from there.
+"""
+
+__all__ = ["registry", "sensor_format", "sensor_on_mesh"]

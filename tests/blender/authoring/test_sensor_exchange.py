@@ -1,0 +1,117 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Sensors of scenes in the files of other simulators: the sample scenes, the operator and the command."""
+
+from __future__ import annotations
+
+import json
+
+import blender_scenes as scenes
+import bpy
+import numpy as np
+import pytest
+from exported_sensors import FLOAT32
+
+from palpate.addon.authoring import laid_sensors, sensor_exchange
+from palpate.commands import main
+from palpate.core.errors import SceneError
+from palpate.core.simulators.registry import export_sensors, written_formats
+
+SAMPLES = {"weighing": ("Finger", 84), "fingertip": ("Fingertip", 176), "hand": ("Index finger", 195)}
+"""Scene → a sensor in it and the number of its texels: a flat grid, a fingertip without rows, and a finger of a hand."""
+
+
+@pytest.fixture
+def item(sample, repository):
+    """Return the sensor of a sample scene."""
+    bpy.ops.wm.open_mainfile(filepath=str(repository / "sample_blends" / f"{sample}.blend"))
+    (found,) = sensor_exchange.sensors_on_meshes(bpy.context.scene, [SAMPLES[sample][0]])
+    return found
+
+
+@pytest.mark.parametrize("sample", SAMPLES)
+def test_probe_lists_of_sample_scenes(sample, item, tmp_path):
+    assert SAMPLES[sample][1] == len(item.texels)
+    listed = json.loads(export_sensors([item], "probes", tmp_path).files[0].read_text(encoding="utf-8"))
+    assert np.array_equal(np.array(listed["position"]), item.texels.position)
+    assert ("row" in listed) == (sample != "fingertip")
+
+
+@pytest.mark.parametrize("sample", SAMPLES)
+def test_mujoco_reads_sample_scenes(item, tmp_path):
+    mujoco = pytest.importorskip("mujoco", reason="MuJoCo reads the MJCF: pip install palpate[bench]")
+    model = mujoco.MjModel.from_xml_path(str(export_sensors([item], "mjcf", tmp_path).files[0]))
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    index = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_MESH, f"{item.name} texels")
+    first, count = model.mesh_vertadr[index], model.mesh_vertnum[index]
+    geom = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_GEOM, f"{item.name} texels")
+    world = model.mesh_vert[first : first + count] @ data.geom_xmat[geom].reshape(3, 3).T + data.geom_xpos[geom]
+    body = data.body(item.name)
+    ours = item.texels.position @ body.xmat.reshape(3, 3).T + body.xpos
+    assert count == len(item.texels) and model.sensor_dim[0] == 3 * count
+    assert np.abs(world - ours).max() < FLOAT32
+
+
+@pytest.mark.parametrize("sample", SAMPLES)
+def test_urdf_libraries_read_sample_scenes(item, tmp_path):
+    yourdfpy = pytest.importorskip("yourdfpy", reason="yourdfpy reads the URDF: pip install palpate[simulators]")
+    robot = yourdfpy.URDF.load(str(export_sensors([item], "urdf", tmp_path).files[1]))
+    poses = np.array([robot.get_transform(joint.child, robot.base_link) for joint in robot.robot.joints])
+    assert np.abs(poses[:, :3, 3] - item.texels.position).max() < FLOAT32
+    assert np.abs(poses[:, :3, 2] - item.texels.normal).max() < FLOAT32
+
+
+@pytest.mark.parametrize("sample", SAMPLES)
+def test_usd_core_reads_sample_scenes(item, tmp_path):
+    pytest.importorskip("pxr", reason="usd-core reads the USD: pip install palpate[simulators]")
+    from pxr import Usd, UsdGeom
+
+    stage = Usd.Stage.Open(str(export_sensors([item], "usd", tmp_path).files[0]))
+    points = UsdGeom.Points(stage.GetPrimAtPath(stage.GetDefaultPrim().GetPath().AppendChild("texels")))
+    assert np.abs(np.array(points.GetPointsAttr().Get()) - item.texels.position).max() < FLOAT32
+    assert np.abs(np.array(points.GetNormalsAttr().Get()) - item.texels.normal).max() < FLOAT32
+
+
+def test_a_laid_sensor_brings_the_surface_that_carries_it(scene):
+    ball = scenes.ball(radius=0.02, location=(0.1, 0.2, 0.3))
+    ball.scale = (2.0, 2.0, 2.0)
+    ball.rotation_euler = (0.3, 0.4, 0.5)
+    pattern = {"method": "GRID", "rows": 4, "columns": 4, "pitch_x": 0.004, "pitch_y": 0.004, "shift_x": 0.0, "shift_y": 0.0}
+    pattern |= {"angle": 0.0, "spacing": 0.004, "seed": 0, "lift": 0.0}
+    skin = laid_sensors.lay_texels(bpy.context, ball, "MESH", pattern)
+    (item,) = sensor_exchange.sensors_on_meshes(scene)
+    assert item.name == skin.name and len(item.texels) < len(item.surface.vertices)
+    centre = item.surface.vertices.mean(axis=0)
+    assert np.linalg.norm(item.surface.vertices - centre, axis=1) == pytest.approx(0.04, rel=1e-5)
+    # texels lie on the flat faces of the surface: between the radius and the apothem of a ball of 24 × 12 faces
+    away = np.linalg.norm(item.texels.position - centre, axis=1)
+    assert away.max() < 0.04 * (1 + 1e-6) and away.min() > 0.04 * np.cos(np.pi / 12)
+
+
+def test_names_that_are_no_sensors_are_refused(scene):
+    with pytest.raises(SceneError, match="has no sensor"):
+        sensor_exchange.sensors_on_meshes(scene)
+    scenes.press()
+    with pytest.raises(SceneError, match="no sensor 'Ball' in 'Scene': choose from 'Pad'"):
+        sensor_exchange.sensors_on_meshes(bpy.context.scene, ["Ball"])
+
+
+@pytest.mark.parametrize("kind", written_formats())
+def test_the_operator_and_the_command_write_the_same(kind, tmp_path):
+    scenes.press()
+    bpy.ops.object.select_all(action="DESELECT")
+    path = scenes.save(tmp_path)
+    assert bpy.ops.palpate.sensor_export(to=kind, directory=str(tmp_path / "window")) == {"FINISHED"}
+    assert main(["sensor", "export", str(path), "--to", kind, "--out", str(tmp_path / "line")]) == 0
+    assert scenes.contents(tmp_path / "window") == scenes.contents(tmp_path / "line")
+
+
+def test_the_command_says_what_is_not_expressed(tmp_path, capsys):
+    scenes.press()
+    path = scenes.save(tmp_path)
+    assert main(["sensor", "export", str(path), "--to", "mjcf", "--out", str(tmp_path / "out"), "--sensor", "Pad"]) == 0
+    printed = capsys.readouterr()
+    assert printed.out.strip() == str(tmp_path / "out" / "Pad.xml")
+    assert "note: 'Pad': MuJoCo's stiffness is per mass" in printed.err
+    assert main(["sensor", "export", str(path), "--to", "mjcf", "--out", str(path)]) == 1
+    assert "would be overwritten" in capsys.readouterr().err
