@@ -11,7 +11,6 @@ import numpy as np
 
 from ..geometry.layout.grid_layout import GridLayout
 from ..geometry.mesh import TriangleMesh, is_closed, vertex_normals
-from ..geometry.rotations import rotation_matrices
 from ..geometry.texels import Texels
 from ..model.sensor import Sensor
 from ..model.sensor_parameters import DEPTH_PER_THICKNESS
@@ -121,12 +120,6 @@ def identifiers(names: Iterable[str]) -> dict[str, str]:
             clean, number = f"{base}_{number}", number + 1
         chosen[name] = clean
     return chosen
-
-
-def in_frame(points: np.ndarray, position: np.ndarray, quaternion: np.ndarray) -> np.ndarray:
-    """Return (n, 3) points of a frame that is at a pose, in the frame in which the pose is given."""
-    turned: np.ndarray = points @ rotation_matrices(np.asarray(quaternion, float)[None])[0].T + position
-    return turned
 
 
 def unmodelled(item: SensorOnMesh) -> list[str]:
