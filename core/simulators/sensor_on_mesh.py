@@ -11,7 +11,6 @@ import numpy as np
 
 from ..geometry.layout.grid_layout import GridLayout
 from ..geometry.mesh import TriangleMesh, is_closed, vertex_normals
-from ..geometry.texels import Texels
 from ..model.sensor import Sensor
 from ..model.sensor_parameters import DEPTH_PER_THICKNESS
 
@@ -45,22 +44,17 @@ class SensorOnMesh:
         return self.sensor.name
 
     @property
-    def texels(self) -> Texels:
-        """Of the sensor, before its effects displace them."""
-        return self.sensor.texels
-
-    @property
     def faces(self) -> np.ndarray:
         """(m, 3) int: the texels at the corners of the region's triangles."""
         number = np.full(len(self.mesh.vertices), -1)
-        number[self.texels.vertex] = np.arange(len(self.texels))
+        number[self.sensor.texels.vertex] = np.arange(len(self.sensor.texels))
         faces = number[self.mesh.triangles]
         return faces[(faces >= 0).all(axis=1)]
 
     @property
     def frames(self) -> np.ndarray:
         """(n, 3, 3) float: columns are each texel's tangent (x), bitangent (y) and normal (z)."""
-        return np.stack([self.texels.tangent, self.texels.bitangent, self.texels.normal], axis=2)
+        return np.stack([self.sensor.texels.tangent, self.sensor.texels.bitangent, self.sensor.texels.normal], axis=2)
 
     @property
     def solid(self) -> tuple[TriangleMesh, bool]:
@@ -98,7 +92,7 @@ def texel_arrays(item: SensorOnMesh) -> dict[str, np.ndarray]:
     ``position`` (m), ``normal``, ``tangent``, ``area`` (m²), where the texels form a grid ``row`` and ``column``, and what is
     painted as ``factor_k``, ``factor_friction`` and ``factor_gain``.
     """
-    texels = item.texels
+    texels = item.sensor.texels
     arrays = {name: np.asarray(getattr(texels, name), float) for name in ("position", "normal", "tangent", "area")}
     if isinstance(texels.layout, GridLayout):
         arrays |= {"row": np.asarray(texels.layout.row), "column": np.asarray(texels.layout.column)}

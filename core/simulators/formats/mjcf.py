@@ -51,7 +51,7 @@ def write_mjcf(sensors: Sequence[SensorOnMesh], folder: Path) -> Written:
 def _model(item: SensorOnMesh, notes: list[str]) -> ElementTree.Element:
     name, law = item.name, item.sensor.parameters
     solid, _ = item.solid
-    shape_kind = "sdf" if _depth_under_hull(solid, item.texels.position) > MOST_HULL_GAP else "mesh"
+    shape_kind = "sdf" if _depth_under_hull(solid, item.sensor.texels.position) > MOST_HULL_GAP else "mesh"
     texels, collision = f"{name} texels", f"{name} collision"
     root = ElementTree.Element("mujoco")
     root.set("model", name)
@@ -63,10 +63,10 @@ def _model(item: SensorOnMesh, notes: list[str]) -> ElementTree.Element:
     shape = {"vertex": numbers(solid.vertices), "face": numbers(solid.triangles)}
     add(asset, "mesh", name=collision, inertia="convex", **shape)
     # three normals for each vertex are its frame; the second and the third span the plane in which sliding is measured
-    frames = {"vertex": numbers(item.texels.position), "normal": numbers(item.frames.transpose(0, 2, 1)[:, [2, 0, 1]])}
+    frames = {"vertex": numbers(item.sensor.texels.position), "normal": numbers(item.frames.transpose(0, 2, 1)[:, [2, 0, 1]])}
     add(asset, "mesh", name=texels, inertia="shell", **frames, face=numbers(item.faces))
     body = add(add(root, "worldbody"), "body", name=name, pos=numbers(item.position), quat=numbers(item.quaternion))
-    share = (1.0 - IMPEDANCE) * len(item.texels) / (CONTACTS * REFERENCE_MASS)
+    share = (1.0 - IMPEDANCE) * len(item.sensor.texels) / (CONTACTS * REFERENCE_MASS)
     contact = {
         "solref": numbers([-share * law.k, -share * max(float(law.cn), LEAST_DAMPING)]),
         "solimp": numbers([IMPEDANCE, IMPEDANCE, 0.001]),
@@ -78,7 +78,7 @@ def _model(item: SensorOnMesh, notes: list[str]) -> ElementTree.Element:
     add(add(root, "sensor"), "tactile", name=name, geom=texels, mesh=texels)
     custom = add(root, "custom")
     add(custom, "numeric", name=f"{name} k", data=numbers(law.k))
-    add(custom, "numeric", name=f"{name} area", data=numbers(item.texels.area))
+    add(custom, "numeric", name=f"{name} area", data=numbers(item.sensor.texels.area))
     return root
 
 
@@ -93,7 +93,7 @@ def _notes(item: SensorOnMesh) -> list[str]:
     ]
     if layered:
         found.append(f"'{name}' is an open sheet: it was made a layer as thick as its foam, half its maximum penetration.")
-    gap = _depth_under_hull(solid, item.texels.position)
+    gap = _depth_under_hull(solid, item.sensor.texels.position)
     if gap > MOST_HULL_GAP:
         found.append(
             f"'{name}' is not convex, its hull lies up to {1e3 * gap:.2g} mm above the texels: MuJoCo finds contact by "

@@ -15,10 +15,10 @@ import numpy as np
 from ...geometry.mesh import TriangleMesh, face_normals
 from ...io.bake_folder import folder_names
 from ...io.file_writing import write_file
+from ..probe_list import write_probe_list
 from ..sensor_format import SensorFormat, Written
 from ..sensor_on_mesh import SensorOnMesh, identifiers, unmodelled
 from ..xml_writing import add, comment, numbers, write_xml
-from .probes import write_probe_list
 
 XACRO = "http://www.ros.org/wiki/xacro"
 DIGITS = 12
@@ -50,9 +50,9 @@ def _robot(item: SensorOnMesh, link: str, mesh: str) -> ElementTree.Element:
     root = ElementTree.Element("robot", {"name": link})
     comment(root, f"Palpate sensor '{item.name}'. {_note(item)}")
     _add_link(root, link, mesh)
-    width = len(str(len(item.texels) - 1))
+    width = len(str(len(item.sensor.texels) - 1))
     angles = roll_pitch_yaw(item.frames)
-    for number, (position, turn) in enumerate(zip(item.texels.position, angles, strict=True)):
+    for number, (position, turn) in enumerate(zip(item.sensor.texels.position, angles, strict=True)):
         child = f"{link}_texel_{number:0{width}d}"
         add(root, "link", name=child)
         joint = add(root, "joint", name=f"{child}_joint", type="fixed")

@@ -30,9 +30,9 @@ def item(sample, repository):
 
 @pytest.mark.parametrize("sample", SAMPLES)
 def test_probe_lists_of_sample_scenes(sample, item, tmp_path):
-    assert SAMPLES[sample][1] == len(item.texels)
+    assert SAMPLES[sample][1] == len(item.sensor.texels)
     listed = json.loads(export_sensors([item], "probes", tmp_path).files[0].read_text(encoding="utf-8"))
-    assert np.array_equal(np.array(listed["position"]), item.texels.position)
+    assert np.array_equal(np.array(listed["position"]), item.sensor.texels.position)
     assert ("row" in listed) == (sample != "fingertip")
 
 
@@ -47,8 +47,8 @@ def test_mujoco_reads_sample_scenes(item, tmp_path):
     geom = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_GEOM, f"{item.name} texels")
     world = model.mesh_vert[first : first + count] @ data.geom_xmat[geom].reshape(3, 3).T + data.geom_xpos[geom]
     body = data.body(item.name)
-    ours = item.texels.position @ body.xmat.reshape(3, 3).T + body.xpos
-    assert count == len(item.texels) and model.sensor_dim[0] == 3 * count
+    ours = item.sensor.texels.position @ body.xmat.reshape(3, 3).T + body.xpos
+    assert count == len(item.sensor.texels) and model.sensor_dim[0] == 3 * count
     assert np.abs(world - ours).max() < FLOAT32
 
 
@@ -57,8 +57,8 @@ def test_urdf_libraries_read_sample_scenes(item, tmp_path):
     yourdfpy = pytest.importorskip("yourdfpy", reason="yourdfpy reads the URDF: pip install palpate[simulators]")
     robot = yourdfpy.URDF.load(str(export_sensors([item], "urdf", tmp_path).files[1]))
     poses = np.array([robot.get_transform(joint.child, robot.base_link) for joint in robot.robot.joints])
-    assert np.abs(poses[:, :3, 3] - item.texels.position).max() < FLOAT32
-    assert np.abs(poses[:, :3, 2] - item.texels.normal).max() < FLOAT32
+    assert np.abs(poses[:, :3, 3] - item.sensor.texels.position).max() < FLOAT32
+    assert np.abs(poses[:, :3, 2] - item.sensor.texels.normal).max() < FLOAT32
 
 
 @pytest.mark.parametrize("sample", SAMPLES)
@@ -68,8 +68,8 @@ def test_usd_core_reads_sample_scenes(item, tmp_path):
 
     stage = Usd.Stage.Open(str(export_sensors([item], "usd", tmp_path).files[0]))
     points = UsdGeom.Points(stage.GetPrimAtPath(stage.GetDefaultPrim().GetPath().AppendChild("texels")))
-    assert np.abs(np.array(points.GetPointsAttr().Get()) - item.texels.position).max() < FLOAT32
-    assert np.abs(np.array(points.GetNormalsAttr().Get()) - item.texels.normal).max() < FLOAT32
+    assert np.abs(np.array(points.GetPointsAttr().Get()) - item.sensor.texels.position).max() < FLOAT32
+    assert np.abs(np.array(points.GetNormalsAttr().Get()) - item.sensor.texels.normal).max() < FLOAT32
 
 
 def test_a_laid_sensor_brings_the_surface_that_carries_it(scene):
@@ -80,11 +80,11 @@ def test_a_laid_sensor_brings_the_surface_that_carries_it(scene):
     pattern |= {"angle": 0.0, "spacing": 0.004, "seed": 0, "lift": 0.0}
     skin = laid_sensors.lay_texels(bpy.context, ball, "MESH", pattern)
     (item,) = sensor_exchange.sensors_on_meshes(scene)
-    assert item.name == skin.name and len(item.texels) < len(item.surface.vertices)
+    assert item.name == skin.name and len(item.sensor.texels) < len(item.surface.vertices)
     centre = item.surface.vertices.mean(axis=0)
     assert np.linalg.norm(item.surface.vertices - centre, axis=1) == pytest.approx(0.04, rel=1e-5)
     # texels lie on the flat faces of the surface: between the radius and the apothem of a ball of 24 × 12 faces
-    away = np.linalg.norm(item.texels.position - centre, axis=1)
+    away = np.linalg.norm(item.sensor.texels.position - centre, axis=1)
     assert away.max() < 0.04 * (1 + 1e-6) and away.min() > 0.04 * np.cos(np.pi / 12)
 
 

@@ -76,12 +76,12 @@ def test_probe_lists_hold_every_number(item, tmp_path):
     assert listed["frame"]["position"] == item.position.tolist()
     with np.load(archive) as arrays:
         for name in ("position", "normal", "tangent", "area"):
-            ours = getattr(item.texels, name)
+            ours = getattr(item.sensor.texels, name)
             assert np.array_equal(np.array(listed[name]), ours) and np.array_equal(arrays[name], ours)
         assert listed["units"]["area"] == "m2"
-        assert ("row" in listed) == ("row" in arrays) == hasattr(item.texels.layout, "row")
+        assert ("row" in listed) == ("row" in arrays) == hasattr(item.sensor.texels.layout, "row")
         if "row" in listed:
-            assert listed["row"] == item.texels.layout.row.tolist()
+            assert listed["row"] == item.sensor.texels.layout.row.tolist()
         assert ("factor_k" in listed) == (item.sensor.painted.k is not None)
 
 
@@ -96,7 +96,7 @@ def origins(robot):
 def test_urdf_has_a_frame_at_every_texel(item, tmp_path):
     mesh, robot, macro, probes = export_sensors([item], "urdf", tmp_path).files
     position, turn = origins(ElementTree.parse(robot))
-    assert np.abs(position - item.texels.position).max() < 1e-12
+    assert np.abs(position - item.sensor.texels.position).max() < 1e-12
     assert np.abs(turn - item.frames).max() < 1e-10  # twelve digits of angles
     import trimesh
 
@@ -136,8 +136,8 @@ def test_urdf_is_read_by_a_urdf_library(item, tmp_path):
     robot = yourdfpy.URDF.load(str(export_sensors([item], "urdf", tmp_path).files[1]))
     link = robot.base_link
     poses = np.array([robot.get_transform(joint.child, link) for joint in robot.robot.joints])
-    assert len(poses) == len(item.texels)
-    assert np.abs(poses[:, :3, 3] - item.texels.position).max() < FLOAT32
+    assert len(poses) == len(item.sensor.texels)
+    assert np.abs(poses[:, :3, 3] - item.sensor.texels.position).max() < FLOAT32
     assert np.abs(poses[:, :3, :3] - item.frames).max() < FLOAT32
     assert np.abs(np.array(robot.scene.bounds)[1] - item.mesh.vertices.max(axis=0)).max() < FLOAT32
 
@@ -151,11 +151,11 @@ def test_usd_is_read_by_usd_core(item, tmp_path):
     root = stage.GetDefaultPrim()
     assert root.GetDisplayName() == item.name and UsdGeom.GetStageMetersPerUnit(stage) == 1.0
     points = UsdGeom.Points(stage.GetPrimAtPath(root.GetPath().AppendChild("texels")))
-    assert np.abs(np.array(points.GetPointsAttr().Get()) - item.texels.position).max() < FLOAT32
-    assert np.abs(np.array(points.GetNormalsAttr().Get()) - item.texels.normal).max() < FLOAT32
+    assert np.abs(np.array(points.GetPointsAttr().Get()) - item.sensor.texels.position).max() < FLOAT32
+    assert np.abs(np.array(points.GetNormalsAttr().Get()) - item.sensor.texels.normal).max() < FLOAT32
     primvars = UsdGeom.PrimvarsAPI(points)
-    assert np.abs(np.array(primvars.GetPrimvar("tangent").Get()) - item.texels.tangent).max() < FLOAT32
-    assert np.array(primvars.GetPrimvar("area").Get()) == pytest.approx(item.texels.area, rel=FLOAT32)
+    assert np.abs(np.array(primvars.GetPrimvar("tangent").Get()) - item.sensor.texels.tangent).max() < FLOAT32
+    assert np.array(primvars.GetPrimvar("area").Get()) == pytest.approx(item.sensor.texels.area, rel=FLOAT32)
     assert root.GetAttribute("palpate:k").Get() == item.sensor.parameters.k
     mesh = UsdGeom.Mesh(stage.GetPrimAtPath(root.GetPath().AppendChild("surface")))
     assert len(mesh.GetFaceVertexCountsAttr().Get()) == len(item.mesh.triangles)

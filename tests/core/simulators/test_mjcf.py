@@ -36,11 +36,11 @@ def texels_in(model, name):
 def test_mujoco_has_our_texels(item, tmp_path):
     model, _ = loaded(item, tmp_path)
     position, axes = texels_in(model, item.name)
-    assert len(position) == len(item.texels) == model.sensor_dim[0] // 3
-    assert np.abs(position - item.texels.position).max() < FLOAT32
-    assert np.abs(axes[:, 0] - item.texels.normal).max() < FLOAT32
-    assert np.abs(axes[:, 1] - item.texels.tangent).max() < FLOAT32
-    assert np.abs(axes[:, 2] - item.texels.bitangent).max() < FLOAT32
+    assert len(position) == len(item.sensor.texels) == model.sensor_dim[0] // 3
+    assert np.abs(position - item.sensor.texels.position).max() < FLOAT32
+    assert np.abs(axes[:, 0] - item.sensor.texels.normal).max() < FLOAT32
+    assert np.abs(axes[:, 1] - item.sensor.texels.tangent).max() < FLOAT32
+    assert np.abs(axes[:, 2] - item.sensor.texels.bitangent).max() < FLOAT32
     body = model.body(item.name)
     assert np.allclose(body.pos, item.position) and np.allclose(body.quat, item.quaternion)
 
@@ -59,14 +59,14 @@ def weighed(mass, folder, **parameters):
         wrench = np.zeros(6)
         mujoco.mj_contactForce(model, data, number, wrench)
         total += wrench[:3] @ data.contact[number].frame.reshape(3, 3)
-    depths = data.sensordata[: len(item.texels)]
+    depths = data.sensordata[: len(item.sensor.texels)]
     return 0.025 - data.qpos[2], depths, abs(total[2]), item
 
 
 def test_a_kilogram_sinks_in_as_far_as_on_ours(tmp_path):
     """The rule behind `solref`: (1 - d) g / (4 stiffness) is m g / (N k), which Palpate's texels give."""
     depth, depths, force, item = weighed(1.0, tmp_path)
-    ours = 9.81 / (len(item.texels) * item.sensor.parameters.k)
+    ours = 9.81 / (len(item.sensor.texels) * item.sensor.parameters.k)
     assert depth == pytest.approx(ours, rel=1e-4)  # it still settles by 1e-5 of the depth
     assert depths == pytest.approx(np.full(len(depths), ours), abs=FLOAT32)
     assert force == pytest.approx(9.81, rel=1e-4)
@@ -83,14 +83,16 @@ def test_a_body_that_is_not_convex_is_touched_where_it_is(tmp_path):
     """A ball rests in the middle of a hollow pad, 3 mm below the pad's convex hull."""
     item = pad(radius=-0.02, name="Hollow")
     item = type(item)(item.sensor, item.mesh)
-    lowest = item.texels.position[np.argmin(np.linalg.norm(item.texels.position[:, :2], axis=1))]
+    lowest = item.sensor.texels.position[np.argmin(np.linalg.norm(item.sensor.texels.position[:, :2], axis=1))]
     where = " ".join(map(str, lowest + [0.0, 0.0, 0.005 - 0.0005]))
     extra = f'<body pos="{where}"><freejoint/><geom type="sphere" size="0.005" mass="0.01"/></body>'
     model, written = loaded(item, tmp_path, extra)
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
     assert data.ncon > 0 and min(contact.dist for contact in data.contact) > -0.001
-    assert data.sensordata[: len(item.texels)].max() == pytest.approx(0.0005, abs=1e-4)  # the texel is not quite in the middle
+    assert data.sensordata[: len(item.sensor.texels)].max() == pytest.approx(
+        0.0005, abs=1e-4
+    )  # the texel is not quite in the middle
     assert any("not convex" in note for note in written.notes)
 
 

@@ -1,0 +1,36 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A cube of 1 kg comes to rest on a sensor in MuJoCo, carried by Palpate's texels.
+
+palpate sensor export sample_blends/weighing.blend --to probes --out sensors
+python examples/mujoco_loop.py sensors/Finger.json
+"""
+
+import sys
+
+import mujoco
+import numpy as np
+import trimesh
+
+from palpate.core.geometry.mesh import TriangleMesh
+from palpate.core.simulators.pressed_sensor import PressedSensor
+from palpate.core.simulators.probe_list import read_probe_list
+
+XML = """<mujoco><option timestep="0.0005"/><worldbody><body name="cube" pos="{} {} {}">
+<freejoint/><geom type="box" size="0.025 0.025 0.025" mass="1"/></body></worldbody></mujoco>"""
+finger = read_probe_list(sys.argv[1])
+model = mujoco.MjModel.from_xml_string(XML.format(*finger.position + [0.0, 0.0, 0.0255]))
+data = mujoco.MjData(model)
+mujoco.mj_forward(model, data)
+shape, cube = trimesh.creation.box([0.05, 0.05, 0.05]), data.body("cube")
+sensor_pose = finger.position, finger.quaternion  # the sensor stays where it is in the scene
+pressed = PressedSensor(
+    finger, TriangleMesh(shape.vertices, shape.faces), model.opt.timestep, sensor_pose, (cube.xpos, cube.xquat)
+)
+for _ in range(2000):
+    mujoco.mj_step1(model, data)  # poses in
+    contact = pressed.step(sensor_pose, (cube.xpos, cube.xquat))  # texel forces out
+    data.qfrc_applied[:] = 0.0  # wrench back
+    mujoco.mj_applyFT(model, data, contact.force, contact.torque, cube.xpos, cube.id, data.qfrc_applied)
+    mujoco.mj_step2(model, data)
+print(f"on the cube {contact.force[2]:.6f} N, sum of {np.count_nonzero(contact.texels.contact)} texels ", end="")
+print(f"{contact.texels.normal_force.sum():.6f} N, weight {1.0 * 9.81:.6f} N")
