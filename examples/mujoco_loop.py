@@ -30,7 +30,7 @@ for _ in range(2000):
     mujoco.mj_step1(model, data)  # poses in
     contact = pressed.step(sensor_pose, (cube.xpos, cube.xquat))  # texel forces out
     data.qfrc_applied[:] = 0.0  # wrench back
-    mujoco.mj_applyFT(model, data, contact.force, contact.torque, cube.xpos, cube.id, data.qfrc_applied)
+    mujoco.mj_applyFT(model, data, contact.force_on_target, contact.torque_on_target, cube.xpos, cube.id, data.qfrc_applied)
     mujoco.mj_step2(model, data)
-print(f"on the cube {contact.force[2]:.6f} N, sum of {np.count_nonzero(contact.texels.contact)} texels ", end="")
+print(f"on the cube {contact.force_on_target[2]:.6f} N, sum of {np.count_nonzero(contact.texels.contact)} texels ", end="")
 print(f"{contact.texels.normal_force.sum():.6f} N, weight {1.0 * 9.81:.6f} N")

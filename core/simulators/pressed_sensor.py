@@ -33,14 +33,13 @@ class Contact:
     ----------
     texels : SensorFrame
         Force, shear, depth, slip and reading of each texel, on the sensor, in the frame of the sensor.
-    force, torque : (3,) float, N and N·m
-        On the target, in the world; the torque is about the origin of the target's frame. On the sensor's body acts the
-        opposite.
+    force_on_target, torque_on_target : (3,) float, N and N·m
+        In the world; the torque is about the origin of the target's frame. On the sensor's body acts the opposite.
     """
 
     texels: SensorFrame
-    force: np.ndarray
-    torque: np.ndarray
+    force_on_target: np.ndarray
+    torque_on_target: np.ndarray
 
 
 class PressedSensor:

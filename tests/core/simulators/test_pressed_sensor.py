@@ -46,10 +46,10 @@ def test_force_and_torque_are_those_of_springs(turn):
     assert contact.texels.normal_force == pytest.approx(np.where(under, K * DEPTH, 0.0), abs=1e-12)
     up = turn.apply([0.0, 0.0, 1.0])
     forces = contact.texels.normal_force[:, None] * up
-    assert contact.force == pytest.approx(forces.sum(axis=0), abs=1e-10)
+    assert contact.force_on_target == pytest.approx(forces.sum(axis=0), abs=1e-10)
     # texels touch the lower side of the box, which is `DEPTH` below them: the arm along the force does not count
     arms = turn.apply(position) + place - poses[1][0]
-    assert contact.torque == pytest.approx(np.cross(arms, forces).sum(axis=0), abs=1e-10)
+    assert contact.torque_on_target == pytest.approx(np.cross(arms, forces).sum(axis=0), abs=1e-10)
 
 
 def test_poses_that_are_none_are_refused():
