@@ -2,8 +2,9 @@
 """From measurements of a real sensor to what its model misses.
 
 The packages stand in the order of the data: ``dataset`` reads a rig, ``forward`` predicts its recordings, ``data_faults`` finds
-what loggers did to them, ``fitting`` fits the model's parameters, ``selection`` finds the effects that are missing, ``report``
-writes the result. ``calibration`` finds single parameters, stiffness and friction, from measurements of their own.
+what loggers did to them, ``fitting`` fits the model's parameters, ``kinds`` finds which kinds of effects act, ``selection``
+finds their formulas, ``report`` writes the result. ``calibration`` finds single parameters, stiffness and friction, from
+measurements of their own.
 """
 
-__all__ = ["calibration", "data_faults", "dataset", "fitting", "forward", "report", "selection"]
+__all__ = ["calibration", "data_faults", "dataset", "fitting", "forward", "kinds", "report", "selection"]

@@ -101,6 +101,11 @@ class ResponseModel:
         self._totals: _Recent[np.ndarray] = _Recent(readings_kept)
         self._readings: _Recent[np.ndarray] = _Recent(readings_kept)
 
+    @property
+    def texel_stimulus(self) -> Stimulus:
+        """The stimulus of the texels, which under a cover are not the points of the surface."""
+        return of_texels(self.stimulus, self.rig)
+
     def reading(self, model: Model, subset: np.ndarray | None = None) -> np.ndarray:
         """Return the readings of each texel, or of some, (T, n) in the sensor's unit."""
         p = model.parameters
@@ -239,13 +244,22 @@ class Predictor:
     rig : Rig
     session : Session, optional
         The session that the trial belongs to; without it the trial begins with an untouched sensor.
+
+    Attributes
+    ----------
+    responses : ResponseModel
+        Forces and readings along the stimulus of the trial, or of its whole session.
+    stimulus : Stimulus
+        Of the texels, during the trial.
+    samples : slice
+        The trial's samples among those of `responses`.
     """
 
     def __init__(self, trial: Trial, rig: Rig, session: Session | None = None):
         self.trial, self.rig, self.session = trial, rig, session
-        self._responses = ResponseModel(rig, surface_stimulus_of(trial, rig)) if session is None else session
-        self.stimulus = of_texels(self._responses.stimulus, rig) if session is None else session.stimulus_in(trial)
-        self._samples = slice(None) if session is None else session.samples_of(trial)
+        self.responses = ResponseModel(rig, surface_stimulus_of(trial, rig)) if session is None else session
+        self.stimulus = of_texels(self.responses.stimulus, rig) if session is None else session.stimulus_in(trial)
+        self.samples = slice(None) if session is None else session.samples_of(trial)
 
     def predict(self, model: Model, subset: np.ndarray | None = None, with_forces: bool = True) -> Prediction:
         """Return the prediction of a model. Its arrays are kept and must not be written to.
@@ -259,8 +273,8 @@ class Predictor:
             Whether the net force is wanted, if it was measured.
         """
         wanted = with_forces and self.trial.force is not None
-        reading = self._responses.reading(model, subset)[self._samples]
-        force = self._responses.total_force(model)[self._samples] if wanted else None
+        reading = self.responses.reading(model, subset)[self.samples]
+        force = self.responses.total_force(model)[self.samples] if wanted else None
         if self.trial.tared:
             reading, force = reading - reading[:1], None if force is None else force - force[:1]
         return self._of_recording(model, Prediction(reading, force), subset)
@@ -323,7 +337,7 @@ class Predictor:
 
     def normal_force(self, model: Model) -> np.ndarray:
         """Return the normal force of each texel, (T, n) N."""
-        return self._responses.normal_force(model)[self._samples]
+        return self.responses.normal_force(model)[self.samples]
 
 
 def predictors_of(trials: Sequence[Trial], rig: Rig) -> list[Predictor]:

@@ -1,0 +1,74 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a search by kinds says: which kinds act, how well each is supported, and which others would do as well.
+
+Of all sets that come near the best score the smallest counts. A kind's support is by how much the best set without it is worse
+than the best set with it. Kinds that can take its place, beside the same others, at hardly a worse score are its rivals; they
+and the kind are one group of which the recordings do not tell the member.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from .decision_numbers import LEAST_SUPPORT, RIVAL_MARGIN, TIE
+from .search import KindSearch, ScoredSet
+
+
+@dataclass(frozen=True)
+class NamedKind:
+    """A kind that acts.
+
+    Attributes
+    ----------
+    kind : str
+    support : float
+        By how much the best score without it is worse.
+    rivals : tuple of str
+        Kinds that would do nearly as well in its place.
+    """
+
+    kind: str
+    support: float
+    rivals: tuple[str, ...]
+
+    @property
+    def is_clear(self) -> bool:
+        """Whether it is supported and has no rival."""
+        return self.support >= LEAST_SUPPORT and not self.rivals
+
+
+@dataclass(frozen=True)
+class Decision:
+    """The set of kinds that acts.
+
+    Attributes
+    ----------
+    chosen : ScoredSet
+    named : tuple of NamedKind
+    """
+
+    chosen: ScoredSet
+    named: tuple[NamedKind, ...]
+
+    @property
+    def kinds(self) -> frozenset[str]:
+        """Names of all of them."""
+        return self.chosen.kinds
+
+    @property
+    def is_clear(self) -> bool:
+        """Whether each of them is supported and has no rival."""
+        return all(one.is_clear for one in self.named)
+
+
+def decided(search: KindSearch) -> Decision:
+    """Return what a finished search says."""
+    near = [one for one in search.fitted if one.score <= search.best.score + TIE]
+    chosen = min(near, key=lambda one: (len(one.kinds), one.score))
+    named = []
+    for kind in sorted(chosen.kinds):
+        beside = chosen.kinds - {kind}
+        others = [one for one in search.fitted if len(one.kinds) == len(chosen.kinds) and beside < one.kinds]
+        rivals = [one for one in others if kind not in one.kinds and one.score <= chosen.score + RIVAL_MARGIN]
+        named.append(NamedKind(kind, search.support(kind), tuple(next(iter(one.kinds - beside)) for one in rivals)))
+    return Decision(chosen, tuple(named))

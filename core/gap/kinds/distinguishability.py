@@ -1,0 +1,195 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Which kinds some recordings can tell apart, computed from their stimulus and noise before any effect is fitted.
+
+A kind's signal is what it would add to the readings and net forces. Another kind imitates a part of it, together with the base
+model's own parameters. The share that is left, of the signal's square beside the base model, says whether these recordings tell
+the two apart: next to nothing for a height error and a dead zone under a flat indenter, most for creep and hysteresis where
+loads were held.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence, Set
+from dataclasses import dataclass
+
+import numpy as np
+
+from .bounded_least_squares import bounded_minimum
+from .cascade import TEXEL, Cascade, Point
+from .decision_numbers import DEFAULT_COST, PRIORS, TOLD_APART, TYPICAL_SIZE
+from .dictionaries import MISALIGNMENT, Variant
+from .normal_equations import BOUNDS, NormalEquations, normal_equations
+from .recorded import Recorded
+from .search import floor_of, possible_variants
+
+
+@dataclass(frozen=True)
+class Signal:
+    """What a kind adds to the recordings, as products with all columns of some normal equations.
+
+    Attributes
+    ----------
+    kind, label : str
+        Of which kind, and which of its directions.
+    right : (p,) float
+    square : float
+        Sum of squares, in units of the noise.
+    texel_right : (q, n) float
+        Products with the columns of parameters of single texels.
+    """
+
+    kind: str
+    label: str
+    right: np.ndarray
+    square: float
+    texel_right: np.ndarray
+
+    def scaled(self, factor: float) -> Signal:
+        """Return a signal that is so many times as large."""
+        return Signal(self.kind, self.label, factor * self.right, factor * factor * self.square, factor * self.texel_right)
+
+
+@dataclass(frozen=True)
+class Distinction:
+    """Whether recordings tell one kind from another.
+
+    Attributes
+    ----------
+    signal, other : str
+        Direction of the kind that acts, as "hysteresis/leading", and the kind that is taken for it.
+    share : float
+        Of the square of its signal, that the other kind cannot imitate: 0 to 1.
+    smallest : float
+        Least effect that is told from the other kind: root mean square of what it does to the readings, full load being 1.
+    """
+
+    signal: str
+    other: str
+    share: float
+    smallest: float
+
+    @property
+    def is_told(self) -> bool:
+        """Whether an effect of a usual size is told from the other kind."""
+        return self.smallest <= TOLD_APART
+
+
+def distinctions(recorded: Recorded, possible: Set[str]) -> list[Distinction]:
+    """Return for each kind, in each of its directions, how well it is told from each other kind.
+
+    Parameters
+    ----------
+    recorded : Recorded
+    possible : set of str
+        Names of the kinds to compare.
+    """
+    variants = possible_variants(recorded, possible)
+    equations = normal_equations(Cascade(recorded), Point(), variants)
+    kinds = list(dict.fromkeys(variant.kind for variant in variants))
+    found = []
+    for signal in [one for variant in variants for one in signals_of(equations, variant)]:
+        alone = left_by(equations, signal, ())
+        for kind in kinds:
+            if kind != signal.kind:
+                others = [variant for variant in variants if variant.kind == kind]
+                left = min(left_by(equations, one, (other,)) for one in _both_signs(signal, variants) for other in others)
+                share = min(left / alone, 1.0) if alone > 0.0 else 0.0
+                found.append(Distinction(signal.label, kind, share, _smallest(recorded, share * alone / signal.square)))
+    return found
+
+
+def _both_signs(signal: Signal, variants: Sequence[Variant]) -> list[Signal]:
+    """A signal, and its negative if the kind has either sign: one of them may be easier to imitate."""
+    is_signed = any(variant.kind == signal.kind and (variant.low < 0.0 or variant.texel_columns) for variant in variants)
+    return [signal, signal.scaled(-1.0)] if is_signed else [signal]
+
+
+def _smallest(recorded: Recorded, share: float) -> float:
+    """Root mean square, as a share of full load, from which on the excess that is left decides; the rest is imitated."""
+    least = floor_of(recorded) * float(np.expm1(DEFAULT_COST))
+    return float(recorded.noise[0] * np.sqrt(least / share)) if share > 1e-9 else np.inf
+
+
+def signals_of(equations: NormalEquations, variant: Variant) -> list[Signal]:
+    """Return what a variant adds: the sum of its columns, each as large as the others beside the base model.
+
+    A displacement of the texels has three signals: sideways, in height, and turned. Parameters of single texels are drawn with
+    a fixed seed. All are as large as a usual effect.
+    """
+    width = equations.at[variant.label].stop - equations.at[variant.label].start
+    first = equations.at[variant.label].start
+    parts = {variant.label: list(range(first, first + width))}
+    if variant is MISALIGNMENT:
+        parts = {f"misalignment/{name}": [first + i for i in picked] for name, picked in _POSE_SIGNALS.items()}
+    found = []
+    for label, columns in parts.items():
+        signal = _signal(equations, variant, label, columns)
+        if signal.square > 0.0:
+            found.append(signal.scaled(np.sqrt(TYPICAL_SIZE**2 * float(equations.count.sum()) / signal.square)))
+    return found
+
+
+_POSE_SIGNALS = {"sideways": (0, 1), "height": (2,), "turned": (3, 4, 5)}
+
+
+def _signal(equations: NormalEquations, variant: Variant, label: str, columns: list[int]) -> Signal:
+    gram, coupling = equations.gram.sum(axis=0), equations.coupling.sum(axis=0)
+    texel_gram = equations.texel_gram.sum(axis=0)
+    weights = np.zeros(len(gram))
+    for column in columns:
+        unit = Signal(variant.kind, label, gram[:, column], float(gram[column, column]), coupling[:, column])
+        beside = left_by(equations, unit, ())
+        if beside > 1e-12 * max(unit.square, 1e-300):
+            weights[column] = beside**-0.5
+    pattern = np.zeros(texel_gram.shape[1:])
+    if variant.texel_columns:
+        index = TEXEL.index(variant.texel_columns)
+        size = np.sqrt(len(columns)) / np.sqrt(max(float(texel_gram[index, index].sum()), 1e-300))
+        pattern[index] = size * np.random.default_rng(0).normal(size=pattern.shape[1])
+    right = gram @ weights + np.einsum("qpn,qn->p", coupling, pattern)
+    square = float(weights @ gram @ weights + 2.0 * weights @ np.einsum("qpn,qn->p", coupling, pattern))
+    square += float(np.einsum("qn,qrn,rn->", pattern, texel_gram, pattern))
+    texel_right = np.einsum("qpn,p->qn", coupling, weights) + np.einsum("qrn,rn->qn", texel_gram, pattern)
+    return Signal(variant.kind, label, right, square, texel_right)
+
+
+def left_by(equations: NormalEquations, signal: Signal, others: Sequence[Variant]) -> float:
+    """Return the sum of squares of a signal that the base model and some variants leave.
+
+    Parameters
+    ----------
+    equations : NormalEquations
+        About the base model alone.
+    signal : Signal
+    others : sequence of Variant
+        With coefficients of any size on their own side of zero: how much of a small effect they imitate does not depend on it.
+    """
+    names = [*(name for name in BOUNDS if name in equations.at), *(variant.label for variant in others)]
+    picked = np.concatenate([np.arange(equations.at[n].start, equations.at[n].stop) for n in names]).astype(int)
+    low = np.concatenate(
+        [
+            np.full(equations.at[n].stop - equations.at[n].start, -np.inf if _has_both_signs(equations, n) else 0.0)
+            for n in names
+        ]
+    )
+    own = [TEXEL.index(variant.texel_columns) for variant in others if variant.texel_columns]
+    gram, right, square = equations.gram.sum(axis=0)[np.ix_(picked, picked)], signal.right[picked], signal.square
+    if own:
+        coupling = equations.coupling.sum(axis=0)[own][:, picked]
+        block = equations.texel_gram.sum(axis=0)[np.ix_(own, own)].copy()
+        for i, index in enumerate(own):
+            block[i, i] += PRIORS[TEXEL[index]] ** -2
+        inverse = np.moveaxis(np.linalg.inv(np.moveaxis(block, 2, 0)), 0, 2)
+        across = np.einsum("qrn,rpn->qpn", inverse, coupling)
+        gram = gram - np.einsum("qpn,qsn->ps", coupling, across)
+        right = right - np.einsum("qpn,qn->p", across, signal.texel_right[own])
+        square -= float(np.einsum("qn,qrn,rn->", signal.texel_right[own], inverse, signal.texel_right[own]))
+    base = sum(equations.at[n].stop - equations.at[n].start for n in names if n in BOUNDS)
+    start = np.zeros(len(low))
+    start[:base] = np.linalg.lstsq(gram[:base, :base], right[:base], rcond=None)[0]
+    x = bounded_minimum(gram, right, low, np.full(len(low), np.inf), start)
+    return max(float(square - 2.0 * x @ right + x @ gram @ x), 0.0)
+
+
+def _has_both_signs(equations: NormalEquations, name: str) -> bool:
+    return name in BOUNDS or equations.variants[name].low < 0.0
