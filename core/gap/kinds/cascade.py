@@ -27,8 +27,9 @@ POSE_SCALE = np.array([1e-3, 1e-3, 1e-3, 0.1, 0.1, 0.1])
 """Coefficients of misalignment are in these units, m and rad."""
 BASE = ("k", "damping", "gain", "zero")
 """Corrections of the base model's own parameters: shares of the stiffness, the damping and the gain, and a zero."""
-TEXEL = ("gain", "offset", "rate")
-"""Parameters of single texels: a share of the gain, an offset, and a rate of the offset per duration of the recordings."""
+TEXEL = ("gain", "offset", "rate", "fading")
+"""Parameters of single texels: a share of the gain, an offset, a rate of the offset per duration of the recordings, and the part
+of an offset that the load takes over, as of a cover that is stretched over the texels."""
 GAIN_AT = next(i for i, variant in enumerate(VARIANTS) if variant.kind == "gain-mismatch")
 DAMPED_AT = next(i for i, variant in enumerate(VARIANTS) if variant.kind == "adhesion")
 """The first variant that comes behind the damping."""
@@ -127,8 +128,7 @@ class Cascade:
             if index == DAMPED_AT - 1:
                 factor = (1.0 + point.base.get("k", 0.0)) * (1.0 + point.base.get("damping", 0.0))
                 x = np.where(run.elastic > 0.0, np.maximum(x + factor * (run.load - run.elastic), 0.0), 0.0)
-        share = ((run.time - run.time[0]) / self.recorded.duration)[:, None]
-        for name, shape in (("offset", 1.0), ("rate", share)):
+        for name, shape in self._offset_shapes(run).items():
             if name in point.texel:
                 x = x + point.texel[name] * shape
         return [*signals, x + point.base.get("zero", 0.0)]
@@ -182,10 +182,19 @@ class Cascade:
 
     def texel_columns(self, point: Point, number: int) -> dict[str, np.ndarray]:
         """Return derivatives of a run's readings by the parameters of their own texels, (T, n) each."""
-        run, here = self.recorded.runs[number], self.course(point, number)
-        share = ((run.time - run.time[0]) / self.recorded.duration)[:, None]
+        here = self.course(point, number)
         gain = self._behind(point, number, here, here.signals[GAIN_AT], GAIN_AT + 1)[0]
-        return {"gain": gain, "offset": np.ones_like(gain), "rate": share + np.zeros_like(gain)}
+        return {"gain": gain, **self._offset_shapes(self._run(point, number))}
+
+    def _offset_shapes(self, run: Run) -> dict[str, np.ndarray]:
+        """What parameters of single texels add to their readings, (T, n) each."""
+
+        def shapes() -> dict[str, np.ndarray]:
+            share = ((run.time - run.time[0]) / self.recorded.duration)[:, None] + np.zeros_like(run.load)
+            return {"offset": np.ones_like(run.load), "rate": share, "fading": -run.load / (1.0 + run.load)}
+
+        found: dict[str, np.ndarray] = run.keep("offsets", shapes)
+        return found
 
     def _behind(
         self, point: Point, number: int, here: Course, direction: np.ndarray, start: int

@@ -11,7 +11,7 @@ MOST_VALUES, LEAST_RATE = 160_000, 20.0
 is 0.03 s. With half as many values the development cases take as long, because of the contact search."""
 FORCE_RESOLUTION = 0.01
 """Noise of the net force, at least, as a share of its range: the friction in it is that of the base model."""
-PRIORS = {"gain": 0.3, "offset": 0.1, "rate": 0.1}
+PRIORS = {"gain": 0.3, "offset": 0.1, "rate": 0.1, "fading": 0.1}
 """Standard deviation of parameters of single texels; full load is 1. Sensors differ by 10 to 30 % from texel to texel."""
 DEFAULT_COST = 0.25
 """Price of a kind: a further one must leave less than 78 % (exp -0.25) of what the others leave, as one that joins a model has

@@ -36,8 +36,8 @@ class Variant:
         Bounds of each coefficient.
     in_contact : bool
         Whether it acts on forces, so that the net force shows it as well.
-    texel_columns : str
-        Of which parameters of single texels it consists besides: "gain", "offset", "rate" or none.
+    texel_columns : tuple of str
+        Of which parameters of single texels it consists besides: "gain", "offset", "rate", "fading".
     """
 
     kind: str
@@ -46,7 +46,7 @@ class Variant:
     low: float = 0.0
     high: float = 1.0
     in_contact: bool = False
-    texel_columns: str = ""
+    texel_columns: tuple[str, ...] = ()
 
     @property
     def label(self) -> str:
@@ -227,14 +227,14 @@ VARIANTS: tuple[Variant, ...] = (
     Variant("adhesion", "steady", steady_pull, in_contact=True),
     Variant("load-spreading", "", load_spreading),
     Variant("crosstalk", "", crosstalk),
-    Variant("gain-mismatch", "", no_columns, texel_columns="gain"),
+    Variant("gain-mismatch", "", no_columns, texel_columns=("gain",)),
     Variant("dead-zone", "", dead_zone),
     Variant("saturation", "", saturation),
     Variant("creep", "rising", rising, 0.0, 2.0),
     Variant("hysteresis", "reading", trailing),
     Variant("lag", "", lag),
-    Variant("drift", "", drift, -1.0, 1.0, texel_columns="rate"),
-    Variant("offset", "", no_columns, texel_columns="offset"),
+    Variant("drift", "", drift, -1.0, 1.0, texel_columns=("rate",)),
+    Variant("offset", "", no_columns, texel_columns=("offset", "fading")),
 )
 """All kinds in the order in which they act. Misalignment is none of these: it changes what the base model is told."""
 MISALIGNMENT = Variant("misalignment", "", no_columns, -1.0, 1.0, in_contact=True)

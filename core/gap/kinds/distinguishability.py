@@ -100,7 +100,7 @@ def distinctions(recorded: Recorded, possible: Set[str]) -> list[Distinction]:
 
 def _both_signs(signal: Signal, variants: Sequence[Variant]) -> list[Signal]:
     """A signal, and its negative if the kind has either sign: one of them may be easier to imitate."""
-    is_signed = any(variant.kind == signal.kind and (variant.low < 0.0 or variant.texel_columns) for variant in variants)
+    is_signed = any(variant.kind == signal.kind and (variant.low < 0.0 or bool(variant.texel_columns)) for variant in variants)
     return [signal, signal.scaled(-1.0)] if is_signed else [signal]
 
 
@@ -142,10 +142,10 @@ def _signal(equations: NormalEquations, variant: Variant, label: str, columns: l
         if beside > 1e-12 * max(unit.square, 1e-300):
             weights[column] = beside**-0.5
     pattern = np.zeros(texel_gram.shape[1:])
-    if variant.texel_columns:
-        index = TEXEL.index(variant.texel_columns)
+    for name in variant.texel_columns:
+        index = TEXEL.index(name)
         size = np.sqrt(len(columns)) / np.sqrt(max(float(texel_gram[index, index].sum()), 1e-300))
-        pattern[index] = size * np.random.default_rng(0).normal(size=pattern.shape[1])
+        pattern[index] = size * np.random.default_rng(index).normal(size=pattern.shape[1])
     right = gram @ weights + np.einsum("qpn,qn->p", coupling, pattern)
     square = float(weights @ gram @ weights + 2.0 * weights @ np.einsum("qpn,qn->p", coupling, pattern))
     square += float(np.einsum("qn,qrn,rn->", pattern, texel_gram, pattern))
@@ -172,7 +172,7 @@ def left_by(equations: NormalEquations, signal: Signal, others: Sequence[Variant
             for n in names
         ]
     )
-    own = [TEXEL.index(variant.texel_columns) for variant in others if variant.texel_columns]
+    own = [TEXEL.index(name) for variant in others for name in variant.texel_columns]
     gram, right, square = equations.gram.sum(axis=0)[np.ix_(picked, picked)], signal.right[picked], signal.square
     if own:
         coupling = equations.coupling.sum(axis=0)[own][:, picked]

@@ -85,7 +85,7 @@ class NormalEquations:
         """
         names = [*(name for name in BASE if name in self.at), *(m.label for m in members if self.at[m.label].start is not None)]
         picked = np.concatenate([np.arange(self.at[n].start, self.at[n].stop) for n in names]).astype(int)
-        own = tuple(TEXEL.index(m.texel_columns) for m in members if m.texel_columns)
+        own = tuple(TEXEL.index(name) for m in members for name in m.texel_columns)
         gram, right, square = self._without_texels(own)
         gram, right = gram[np.ix_(picked, picked)], right[picked]
         low, high = self._bounds(names)

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from .cascade import POSE_SCALE, Cascade, Point
+from .cascade import POSE_SCALE, TEXEL, Cascade, Point
 from .decision_numbers import (
     BEST_PAIRS,
     BEST_SINGLES,
@@ -183,13 +183,13 @@ def _as_it_is(equations: NormalEquations, point: Point) -> float:
             x[equations.at[name]] = value
     gram, right = equations.gram.sum(axis=0), equations.right.sum(axis=0)
     total = float(equations.square.sum() - 2.0 * x @ right + x @ gram @ x)
-    for index, name in enumerate(("gain", "offset", "rate")):
+    for index, name in enumerate(TEXEL):
         if name in point.texel:
             own = point.texel[name]
             coupling = np.einsum("pn,p->n", equations.coupling.sum(axis=0)[index], x)
             total += float(2.0 * own @ (coupling - equations.texel_right.sum(axis=0)[index]))
             total += float(own @ (equations.texel_gram.sum(axis=0)[index, index] * own))
-            for other, other_name in enumerate(("gain", "offset", "rate")[:index]):
+            for other, other_name in enumerate(TEXEL[:index]):
                 if other_name in point.texel:
                     total += float(2.0 * own @ (equations.texel_gram.sum(axis=0)[index, other] * point.texel[other_name]))
     return total / float(equations.count.sum())
