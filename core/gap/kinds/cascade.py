@@ -17,7 +17,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from .dictionaries import MISALIGNMENT, VARIANTS, Variant
-from .recorded import Recorded, Run
+from .recorded import Recorded, RecordedRun
 
 STEP = 1e-4
 """Step of the derivatives, of coefficients and of signals whose full load is 1."""
@@ -99,7 +99,7 @@ class Cascade:
         signals = self._advance(point, run, (1.0 + point.base.get("k", 0.0)) * run.elastic, 0)
         return Course(signals, signals[-1], self._net_force(number, signals[CONTACT_ENDS]))
 
-    def _run(self, point: Point, number: int) -> Run:
+    def _run(self, point: Point, number: int) -> RecordedRun:
         """A run with the loads of displaced texels."""
         run = self.recorded.runs[number]
         if not any(point.displacement):
@@ -111,7 +111,7 @@ class Cascade:
         total: np.ndarray = (x * self.recorded.runs[number].towards_normal).sum(axis=1)
         return total
 
-    def _advance(self, point: Point, run: Run, x: np.ndarray, start: int) -> list[np.ndarray]:
+    def _advance(self, point: Point, run: RecordedRun, x: np.ndarray, start: int) -> list[np.ndarray]:
         """Signals before the variants from `start` on, and at the end."""
         signals = []
         for index in range(start, len(VARIANTS)):
@@ -186,7 +186,7 @@ class Cascade:
         gain = self._behind(point, number, here, here.signals[GAIN_AT], GAIN_AT + 1)[0]
         return {"gain": gain, **self._offset_shapes(self._run(point, number))}
 
-    def _offset_shapes(self, run: Run) -> dict[str, np.ndarray]:
+    def _offset_shapes(self, run: RecordedRun) -> dict[str, np.ndarray]:
         """What parameters of single texels add to their readings, (T, n) each."""
 
         def shapes() -> dict[str, np.ndarray]:
@@ -239,7 +239,7 @@ def _combined(coefficients: np.ndarray, columns: list[np.ndarray]) -> np.ndarray
     return total
 
 
-def _is_pressed(x: np.ndarray, run: Run, variant: Variant) -> np.ndarray:
+def _is_pressed(x: np.ndarray, run: RecordedRun, variant: Variant) -> np.ndarray:
     """Where a force acts: while there is contact; only adhesion pulls."""
     touching: np.ndarray = run.elastic > 0.0
     return touching if variant.kind == "adhesion" else touching & (x >= 0.0)

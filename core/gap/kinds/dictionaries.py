@@ -15,9 +15,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from . import operators
-from .recorded import Recorded, Run
+from .recorded import Recorded, RecordedRun
 
-Columns = Callable[[np.ndarray, Run, Recorded], list[np.ndarray]]
+Columns = Callable[[np.ndarray, RecordedRun, Recorded], list[np.ndarray]]
 """From the signal (T, n) before a kind, the columns (T, n) that it can add to it."""
 
 
@@ -67,13 +67,13 @@ class Variant:
 # --- contact
 
 
-def stiffening(x: np.ndarray, run: Run, recorded: Recorded) -> list[np.ndarray]:
+def stiffening(x: np.ndarray, run: RecordedRun, recorded: Recorded) -> list[np.ndarray]:
     """Convex powers of the load: each rises the steeper, the larger the load, and begins with slope zero."""
     load = np.maximum(x, 0.0)
     return [load**power for power in (1.5, 2.0, 3.0, 5.0)]
 
 
-def softening(x: np.ndarray, run: Run, recorded: Recorded) -> list[np.ndarray]:
+def softening(x: np.ndarray, run: RecordedRun, recorded: Recorded) -> list[np.ndarray]:
     """Force lost by the largest load so far; at all loads, or only below it (Mullins)."""
     load = np.maximum(x, 0.0)
     most = np.maximum(np.maximum.accumulate(load, axis=0), 1e-9)
@@ -83,7 +83,7 @@ def softening(x: np.ndarray, run: Run, recorded: Recorded) -> list[np.ndarray]:
     return lost + [-x * shape for shape in (below, np.tanh(below / 0.2), np.tanh(below / 0.6))]
 
 
-def creep(x: np.ndarray, run: Run, recorded: Recorded) -> list[np.ndarray]:
+def creep(x: np.ndarray, run: RecordedRun, recorded: Recorded) -> list[np.ndarray]:
     """Stress that relaxes: a Prony series."""
     return [-operators.low_pass(x, run.time, constant, at_rest=True) for constant in _relaxation_times(recorded)]
 
@@ -94,24 +94,24 @@ def _relaxation_times(recorded: Recorded) -> list[float]:
     return [float(t) for t in np.geomspace(0.15, longest, max(3, round(np.log(longest / 0.15) / np.log(3.0)) + 1))]
 
 
-def rising(x: np.ndarray, run: Run, recorded: Recorded) -> list[np.ndarray]:
+def rising(x: np.ndarray, run: RecordedRun, recorded: Recorded) -> list[np.ndarray]:
     """Readings that go on rising under a constant load."""
     return [operators.low_pass(x, run.time, t, at_rest=True) for t in _relaxation_times(recorded) if t > 0.6]
 
 
-def leading(x: np.ndarray, run: Run, recorded: Recorded) -> list[np.ndarray]:
+def leading(x: np.ndarray, run: RecordedRun, recorded: Recorded) -> list[np.ndarray]:
     """Loops that lie below on the way out: elements that stick and slip, and endochronic loops that grow with the load."""
     loops = [operators.stop(x, threshold) for threshold in (0.04, 0.09, 0.18, 0.36)]
     return loops + [x * operators.branch(x, length) for length in (0.04, 0.1, 0.25)]
 
 
-def trailing(x: np.ndarray, run: Run, recorded: Recorded) -> list[np.ndarray]:
+def trailing(x: np.ndarray, run: RecordedRun, recorded: Recorded) -> list[np.ndarray]:
     """Loops that lie above on the way out: relays that switch off at a smaller load than they switch on at."""
     relays = [operators.relays(x, width) - np.maximum(x, 0.0) for width in (0.04, 0.1, 0.2, 0.4)]
     return relays + [-x * operators.branch(x, length) for length in (0.04, 0.1, 0.25)]
 
 
-def wear(x: np.ndarray, run: Run, recorded: Recorded) -> list[np.ndarray]:
+def wear(x: np.ndarray, run: RecordedRun, recorded: Recorded) -> list[np.ndarray]:
     """Force lost by work of pressing and sliding, or by pressing alone."""
 
     def losses() -> list[np.ndarray]:
@@ -122,12 +122,12 @@ def wear(x: np.ndarray, run: Run, recorded: Recorded) -> list[np.ndarray]:
     return [x * loss for loss in run.keep("wear", losses)]
 
 
-def _put_on(run: Run) -> np.ndarray:
+def _put_on(run: RecordedRun) -> np.ndarray:
     """Load that was put on each texel so far, (T, n)."""
     return np.cumsum(np.maximum(np.diff(run.load, axis=0, prepend=0.0), 0.0), axis=0)
 
 
-def unloading_pull(x: np.ndarray, run: Run, recorded: Recorded) -> list[np.ndarray]:
+def unloading_pull(x: np.ndarray, run: RecordedRun, recorded: Recorded) -> list[np.ndarray]:
     """Adhesion that pulls on the way out, at all loads or near the release."""
 
     def columns() -> list[np.ndarray]:
@@ -143,7 +143,7 @@ def unloading_pull(x: np.ndarray, run: Run, recorded: Recorded) -> list[np.ndarr
     return run.keep("adhesion", columns)
 
 
-def steady_pull(x: np.ndarray, run: Run, recorded: Recorded) -> list[np.ndarray]:
+def steady_pull(x: np.ndarray, run: RecordedRun, recorded: Recorded) -> list[np.ndarray]:
     """Adhesion that pulls as long as there is contact."""
     return [np.expm1(-np.maximum(run.elastic, 0.0) / width) for width in (0.015, 0.03, 0.06)]
 
@@ -151,7 +151,7 @@ def steady_pull(x: np.ndarray, run: Run, recorded: Recorded) -> list[np.ndarray]
 # --- from texel to texel
 
 
-def load_spreading(x: np.ndarray, run: Run, recorded: Recorded) -> list[np.ndarray]:
+def load_spreading(x: np.ndarray, run: RecordedRun, recorded: Recorded) -> list[np.ndarray]:
     """Isotropic kernels that pass load on and keep its sum."""
     apart = np.linalg.norm(recorded.place[:, None] - recorded.place[None], axis=2)
     columns = []
@@ -161,7 +161,7 @@ def load_spreading(x: np.ndarray, run: Run, recorded: Recorded) -> list[np.ndarr
     return columns
 
 
-def crosstalk(x: np.ndarray, run: Run, recorded: Recorded) -> list[np.ndarray]:
+def crosstalk(x: np.ndarray, run: RecordedRun, recorded: Recorded) -> list[np.ndarray]:
     """Readings that couple into neighbours and into texels of the same row or column, on top of their own."""
     columns = []
     if recorded.rows is not None:
@@ -184,29 +184,29 @@ def crosstalk(x: np.ndarray, run: Run, recorded: Recorded) -> list[np.ndarray]:
 # --- readings
 
 
-def no_columns(x: np.ndarray, run: Run, recorded: Recorded) -> list[np.ndarray]:
+def no_columns(x: np.ndarray, run: RecordedRun, recorded: Recorded) -> list[np.ndarray]:
     """For kinds that are parameters of single texels alone."""
     return []
 
 
-def dead_zone(x: np.ndarray, run: Run, recorded: Recorded) -> list[np.ndarray]:
+def dead_zone(x: np.ndarray, run: RecordedRun, recorded: Recorded) -> list[np.ndarray]:
     """What is missing below thresholds."""
     load = np.maximum(x, 0.0)
     return [-np.minimum(load, threshold) for threshold in (0.02, 0.035, 0.06, 0.09, 0.13, 0.18, 0.24, 0.31, 0.4, 0.52)]
 
 
-def saturation(x: np.ndarray, run: Run, recorded: Recorded) -> list[np.ndarray]:
+def saturation(x: np.ndarray, run: RecordedRun, recorded: Recorded) -> list[np.ndarray]:
     """What is missing above levels."""
     return [-np.maximum(x - level, 0.0) for level in (0.05, 0.15, 0.25, 0.35, 0.45, 0.55, 0.65, 0.75, 0.85, 0.93)]
 
 
-def lag(x: np.ndarray, run: Run, recorded: Recorded) -> list[np.ndarray]:
+def lag(x: np.ndarray, run: RecordedRun, recorded: Recorded) -> list[np.ndarray]:
     """Low passes and delays, of which each takes a share of the reading."""
     filters = [operators.low_pass(x, run.time, constant, at_rest=False) for constant in (0.03, 0.06, 0.12, 0.25)]
     return [late - x for late in (*filters, *(operators.delayed(x, run.time, d) for d in (0.04, 0.08, 0.15, 0.25)))]
 
 
-def drift(x: np.ndarray, run: Run, recorded: Recorded) -> list[np.ndarray]:
+def drift(x: np.ndarray, run: RecordedRun, recorded: Recorded) -> list[np.ndarray]:
     """Smooth functions of the time."""
 
     def columns() -> list[np.ndarray]:

@@ -18,13 +18,13 @@ from .bounded_least_squares import bounded_minimum
 from .cascade import TEXEL, Cascade, Point
 from .decision_numbers import DEFAULT_COST, PRIORS, TOLD_APART, TYPICAL_SIZE
 from .dictionaries import MISALIGNMENT, Variant
-from .normal_equations import BOUNDS, NormalEquations, normal_equations
+from .normal_equations import BOUNDS, CascadeEquations, normal_equations
 from .recorded import Recorded
 from .search import floor_of, possible_variants
 
 
 @dataclass(frozen=True)
-class Signal:
+class KindSignal:
     """What a kind adds to the recordings, as products with all columns of some normal equations.
 
     Attributes
@@ -44,9 +44,9 @@ class Signal:
     square: float
     texel_right: np.ndarray
 
-    def scaled(self, factor: float) -> Signal:
+    def scaled(self, factor: float) -> KindSignal:
         """Return a signal that is so many times as large."""
-        return Signal(self.kind, self.label, factor * self.right, factor * factor * self.square, factor * self.texel_right)
+        return KindSignal(self.kind, self.label, factor * self.right, factor * factor * self.square, factor * self.texel_right)
 
 
 @dataclass(frozen=True)
@@ -98,7 +98,7 @@ def distinctions(recorded: Recorded, possible: Set[str]) -> list[Distinction]:
     return found
 
 
-def _both_signs(signal: Signal, variants: Sequence[Variant]) -> list[Signal]:
+def _both_signs(signal: KindSignal, variants: Sequence[Variant]) -> list[KindSignal]:
     """A signal, and its negative if the kind has either sign: one of them may be easier to imitate."""
     is_signed = any(variant.kind == signal.kind and (variant.low < 0.0 or bool(variant.texel_columns)) for variant in variants)
     return [signal, signal.scaled(-1.0)] if is_signed else [signal]
@@ -110,7 +110,7 @@ def _smallest(recorded: Recorded, share: float) -> float:
     return float(recorded.noise[0] * np.sqrt(least / share)) if share > 1e-9 else np.inf
 
 
-def signals_of(equations: NormalEquations, variant: Variant) -> list[Signal]:
+def signals_of(equations: CascadeEquations, variant: Variant) -> list[KindSignal]:
     """Return what a variant adds: the sum of its columns, each as large as the others beside the base model.
 
     A displacement of the texels has three signals: sideways, in height, and turned. Parameters of single texels are drawn with
@@ -132,12 +132,12 @@ def signals_of(equations: NormalEquations, variant: Variant) -> list[Signal]:
 _POSE_SIGNALS = {"sideways": (0, 1), "height": (2,), "turned": (3, 4, 5)}
 
 
-def _signal(equations: NormalEquations, variant: Variant, label: str, columns: list[int]) -> Signal:
+def _signal(equations: CascadeEquations, variant: Variant, label: str, columns: list[int]) -> KindSignal:
     gram, coupling = equations.gram.sum(axis=0), equations.coupling.sum(axis=0)
     texel_gram = equations.texel_gram.sum(axis=0)
     weights = np.zeros(len(gram))
     for column in columns:
-        unit = Signal(variant.kind, label, gram[:, column], float(gram[column, column]), coupling[:, column])
+        unit = KindSignal(variant.kind, label, gram[:, column], float(gram[column, column]), coupling[:, column])
         beside = left_by(equations, unit, ())
         if beside > 1e-12 * max(unit.square, 1e-300):
             weights[column] = beside**-0.5
@@ -150,17 +150,17 @@ def _signal(equations: NormalEquations, variant: Variant, label: str, columns: l
     square = float(weights @ gram @ weights + 2.0 * weights @ np.einsum("qpn,qn->p", coupling, pattern))
     square += float(np.einsum("qn,qrn,rn->", pattern, texel_gram, pattern))
     texel_right = np.einsum("qpn,p->qn", coupling, weights) + np.einsum("qrn,rn->qn", texel_gram, pattern)
-    return Signal(variant.kind, label, right, square, texel_right)
+    return KindSignal(variant.kind, label, right, square, texel_right)
 
 
-def left_by(equations: NormalEquations, signal: Signal, others: Sequence[Variant]) -> float:
+def left_by(equations: CascadeEquations, signal: KindSignal, others: Sequence[Variant]) -> float:
     """Return the sum of squares of a signal that the base model and some variants leave.
 
     Parameters
     ----------
-    equations : NormalEquations
+    equations : CascadeEquations
         About the base model alone.
-    signal : Signal
+    signal : KindSignal
     others : sequence of Variant
         With coefficients of any size on their own side of zero: how much of a small effect they imitate does not depend on it.
     """
@@ -191,5 +191,5 @@ def left_by(equations: NormalEquations, signal: Signal, others: Sequence[Variant
     return max(float(square - 2.0 * x @ right + x @ gram @ x), 0.0)
 
 
-def _has_both_signs(equations: NormalEquations, name: str) -> bool:
+def _has_both_signs(equations: CascadeEquations, name: str) -> bool:
     return name in BOUNDS or equations.variants[name].low < 0.0

@@ -46,7 +46,7 @@ class Solution:
 
 
 @dataclass
-class NormalEquations:
+class CascadeEquations:
     """Sums of products of the columns at a point, by blocks (halves of recordings).
 
     Attributes
@@ -172,7 +172,7 @@ class NormalEquations:
         return Point(tuple(members), coefficients, base, values)
 
 
-def normal_equations(cascade: Cascade, point: Point, variants: Sequence[Variant]) -> NormalEquations:
+def normal_equations(cascade: Cascade, point: Point, variants: Sequence[Variant]) -> CascadeEquations:
     """Return the normal equations at a point.
 
     Parameters
@@ -193,7 +193,7 @@ def normal_equations(cascade: Cascade, point: Point, variants: Sequence[Variant]
                 start += len(columns)
         blocks += _blocks(cascade, point, number, made, at)
     stacked = {key: np.stack([block[key] for block in blocks]) for key in blocks[0]}
-    return NormalEquations(at, {v.label: v for v in (*VARIANTS, MISALIGNMENT)}, **stacked)
+    return CascadeEquations(at, {v.label: v for v in (*VARIANTS, MISALIGNMENT)}, **stacked)
 
 
 def _blocks(

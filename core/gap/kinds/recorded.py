@@ -2,7 +2,7 @@
 """Recordings as the search by kinds sees them: the base model's forces, what was measured, and the noise, without units.
 
 Forces and readings are in units of the base model's largest force, so that 1 is full load. A recording that begins with an
-untouched sensor is one :class:`Run`; the recordings of a session are one together, with samples in the pauses that nothing was
+untouched sensor is one :class:`RecordedRun`; the recordings of a session are one together, with samples in the pauses that nothing was
 measured at. Samples are thinned, because each kind is a set of smooth functions.
 """
 
@@ -27,7 +27,7 @@ POSE = ("x", "y", "z", "about_x", "about_y", "about_z")
 
 
 @dataclass(frozen=True)
-class Run:
+class RecordedRun:
     """What one untouched sensor did: a recording, or the recordings of a session.
 
     Attributes
@@ -70,7 +70,7 @@ class Recorded:
 
     Attributes
     ----------
-    runs : tuple of Run
+    runs : tuple of RecordedRun
     noise : (float, float)
         Standard deviation of readings and of the net force.
     correlation : (float, float)
@@ -87,7 +87,7 @@ class Recorded:
         From which loads at other places are computed.
     """
 
-    runs: tuple[Run, ...]
+    runs: tuple[RecordedRun, ...]
     noise: tuple[float, float]
     correlation: tuple[float, float]
     place: np.ndarray
@@ -233,7 +233,7 @@ def _run(
     work: np.ndarray,
     scale: float,
     silent: np.ndarray | None,
-) -> Run:
+) -> RecordedRun:
     """A run from the predictors of its trials."""
     load, elastic = pair
     stimulus = group[0].responses.texel_stimulus
@@ -256,7 +256,9 @@ def _run(
     if silent is not None:
         reading[:, silent] = np.nan
     middle = len(load) // 2
-    return Run(stimulus.time, load, elastic, work, reading, force, towards, (slice(0, middle), slice(middle, len(load))))
+    return RecordedRun(
+        stimulus.time, load, elastic, work, reading, force, towards, (slice(0, middle), slice(middle, len(load)))
+    )
 
 
 def _in_forces(trial: Trial, model: Model) -> np.ndarray:

@@ -30,7 +30,7 @@ from .decision_numbers import (
     STARTING_SHIFTS,
 )
 from .dictionaries import MISALIGNMENT, VARIANTS, Variant
-from .normal_equations import NormalEquations, Solution, normal_equations
+from .normal_equations import CascadeEquations, Solution, normal_equations
 from .recorded import Recorded
 
 
@@ -175,7 +175,7 @@ def refined(cascade: Cascade, point: Point, turns: int = MOST_TURNS) -> Solution
     return best
 
 
-def _as_it_is(equations: NormalEquations, point: Point) -> float:
+def _as_it_is(equations: CascadeEquations, point: Point) -> float:
     """Mean square of the residual at the point itself."""
     x = np.zeros(equations.gram.shape[1])
     for name, value in [*((k, np.array([v])) for k, v in point.base.items()), *point.coefficients.items()]:
