@@ -2,8 +2,8 @@
 """Recordings as the search by kinds sees them: the base model's forces, what was measured, and the noise, without units.
 
 Forces and readings are in units of the base model's largest force, so that 1 is full load. A recording that begins with an
-untouched sensor is one :class:`RecordedRun`; the recordings of a session are one together, with samples in the pauses that nothing was
-measured at. Samples are thinned, because each kind is a set of smooth functions.
+untouched sensor is one :class:`RecordedRun`; the recordings of a session are one together, with samples in the pauses that
+nothing was measured at. Samples are thinned, because each kind is a set of smooth functions.
 """
 
 from __future__ import annotations
