@@ -137,7 +137,7 @@ class Cascade:
         """Factor of each texel's reading; None if all are 1."""
         common, own = point.base.get("gain", 0.0), point.texel.get("gain")
         if own is None:
-            return None if common == 0.0 else np.full(self.recorded.texels, 1.0 + common)
+            return None if common == 0.0 else np.full(self.recorded.texel_count, 1.0 + common)
         return 1.0 + common + own
 
     def columns(self, point: Point, number: int, variants: Iterable[Variant]) -> dict[str, list[tuple[np.ndarray, np.ndarray]]]:

@@ -208,7 +208,7 @@ def _blocks(
     here, own = cascade.course(point, number), cascade.texel_columns(point, number)
     known, known_force = np.isfinite(run.reading), np.isfinite(run.force)
     weight, force_weight = known / recorded.noise[0], known_force / recorded.noise[1]
-    n, columns = recorded.texels, [pair for pairs in made.values() for pair in pairs]
+    n, columns = recorded.texel_count, [pair for pairs in made.values() for pair in pairs]
     table = np.empty((len(columns), len(run.time), n + 1))
     for row, (reading, force) in zip(table, columns, strict=True):
         np.multiply(reading, weight, out=row[:, :n])

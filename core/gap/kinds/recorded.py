@@ -97,7 +97,7 @@ class Recorded:
     source: Source
 
     @property
-    def texels(self) -> int:
+    def texel_count(self) -> int:
         """Number of texels."""
         return len(self.place)
 

@@ -148,7 +148,7 @@ def search_kinds(recorded: Recorded, possible: Set[str]) -> Iterator[tuple[str, 
 
 def possible_variants(recorded: Recorded, possible: Set[str]) -> list[Variant]:
     """Return the variants of the kinds that recordings could show."""
-    several = recorded.texels > 1
+    several = recorded.texel_count > 1
     read = any(np.isfinite(run.reading).any() for run in recorded.runs)
     found = [v for v in VARIANTS if v.kind in possible and (several or not v.needs_neighbours) and (read or v.in_contact)]
     if recorded.source.can_move and MISALIGNMENT.kind in possible:

@@ -46,7 +46,7 @@ def _point(recorded_trials) -> Point:
     run = recorded_trials.runs[0]
     widths = {m.label: len(m.columns(run.elastic, run, recorded_trials)) for m in members}
     coefficients = {label: rng.uniform(0.01, 0.05, width) for label, width in widths.items()}
-    texel = {name: 0.05 * rng.normal(size=recorded_trials.texels) for name in TEXEL}
+    texel = {name: 0.05 * rng.normal(size=recorded_trials.texel_count) for name in TEXEL}
     return Point(members, coefficients, {"k": 0.1, "damping": -0.2, "zero": 0.01}, texel)
 
 
@@ -81,7 +81,7 @@ def test_parameters_of_single_texels_change_their_own_texel(plain):
         moved = point.texel[name].copy()
         moved[5] += 1e-3
         change = (cascade.course(replace(point, texel={**point.texel, name: moved}), 0).reading - here) / 1e-3
-        assert not change[:, np.arange(plain.texels) != 5].any()
+        assert not change[:, np.arange(plain.texel_count) != 5].any()
         assert (np.abs(change[:, 5] - made[name][:, 5]) < 0.02).mean() > 0.98
 
 
@@ -95,14 +95,14 @@ def test_eliminated_texels_give_the_solution_of_all_unknowns_at_once(plain):
         made = cascade.columns(Point(), number, members)
         pairs = [(name, pair) for name, columns in made.items() for pair in columns]
         reading = np.stack([pair[0].ravel() for _, pair in pairs], axis=1) / plain.noise[0]
-        gains = np.zeros((run.load.size, plain.texels))
-        gains[np.arange(run.load.size), np.tile(np.arange(plain.texels), len(run.time))] = run.load.ravel() / plain.noise[0]
+        gains = np.zeros((run.load.size, plain.texel_count))
+        gains[np.arange(run.load.size), np.tile(np.arange(plain.texel_count), len(run.time))] = run.load.ravel() / plain.noise[0]
         rows.append(np.hstack([reading, gains]))
         targets.append((run.reading - run.load).ravel() / plain.noise[0])
         bounds = [BOUNDS.get(name, (0.0, 1.0)) for name, _ in pairs]
-        low, high = [b[0] for b in bounds] + [-9.0] * plain.texels, [b[1] for b in bounds] + [9.0] * plain.texels
-    prior = np.hstack([np.zeros((plain.texels, len(pairs))), np.eye(plain.texels) / PRIORS["gain"]])
-    matrix, target = np.vstack([*rows, prior]), np.concatenate([*targets, np.zeros(plain.texels)])
+        low, high = [b[0] for b in bounds] + [-9.0] * plain.texel_count, [b[1] for b in bounds] + [9.0] * plain.texel_count
+    prior = np.hstack([np.zeros((plain.texel_count, len(pairs))), np.eye(plain.texel_count) / PRIORS["gain"]])
+    matrix, target = np.vstack([*rows, prior]), np.concatenate([*targets, np.zeros(plain.texel_count)])
     exact = lsq_linear(matrix, target, (low, high), method="bvls", tol=1e-12)
     count = sum(run.load.size for run in plain.runs)
     assert solution.fitted == pytest.approx(2.0 * exact.cost / count, rel=1e-4)
