@@ -96,7 +96,8 @@ def test_eliminated_texels_give_the_solution_of_all_unknowns_at_once(plain):
         pairs = [(name, pair) for name, columns in made.items() for pair in columns]
         reading = np.stack([pair[0].ravel() for _, pair in pairs], axis=1) / plain.noise[0]
         gains = np.zeros((run.load.size, plain.texel_count))
-        gains[np.arange(run.load.size), np.tile(np.arange(plain.texel_count), len(run.time))] = run.load.ravel() / plain.noise[0]
+        texel = np.tile(np.arange(plain.texel_count), len(run.time))
+        gains[np.arange(run.load.size), texel] = run.load.ravel() / plain.noise[0]
         rows.append(np.hstack([reading, gains]))
         targets.append((run.reading - run.load).ravel() / plain.noise[0])
         bounds = [BOUNDS.get(name, (0.0, 1.0)) for name, _ in pairs]
