@@ -5,7 +5,6 @@ import bpy
 from bpy.props import BoolProperty, StringProperty
 
 from ..addon.measured import gap_results
-from ..core.jobs.job_runner import run_job
 from . import modal_job, support
 from .fits import show_image
 
@@ -50,7 +49,7 @@ class PALPATE_OT_gap_find(modal_job.ModalJob, bpy.types.Operator):
         if not context.object.palpate.measured:
             cls.poll_message_set("Choose the sensor's measurements first: Open Rig")
             return False
-        return True
+        return cls.poll_not_running()
 
     def job(self, context):
         return gap_results.find(context.object)
@@ -112,31 +111,42 @@ class PALPATE_OT_gap_show(support.ErrorReporting, bpy.types.Operator):
         self.report({"INFO"}, f"The brightest texel errs by {top:.2%} of the range")
 
 
-class PALPATE_OT_gap_report(support.ErrorReporting, bpy.types.Operator):
-    """Write the report, the amended sensor and the plots into a folder"""
+class PALPATE_OT_gap_report(modal_job.ModalJob, bpy.types.Operator):
+    """Write the report, the amended sensor and the plots into a folder. ESC stops it and keeps an earlier report"""
 
     bl_idname = "palpate.gap_report"
     bl_label = "Write Report…"
     bl_options = {"REGISTER"}
+    stopped = "Stopped; an earlier report is unchanged"
 
     directory: StringProperty(subtype="DIR_PATH", options={"SKIP_SAVE"})
 
     @classmethod
     def poll(cls, context):
-        return support.poll_gap_found(cls, context)
+        return support.poll_gap_found(cls, context) and cls.poll_not_running()
 
     def invoke(self, context, _event):
+        self._asked = True
         context.window_manager.fileselect_add(self)
         return {"RUNNING_MODAL"}
 
-    def run(self, context):
+    def execute(self, context):
+        """Write beside the window once the user has chosen a folder; in one go for scripts, which name it themselves."""
+        if getattr(self, "_asked", False):
+            return self.report_errors_of(lambda: self._start(context))
+        return super().execute(context)
+
+    def job(self, context):
         from ..core.gap.report import summary
         from ..core.io.file_writing import writable_folder
 
         folder = writable_folder(bpy.path.abspath(self.directory), create=True)
         result = gap_results.of(context.object)
-        run_job(summary.write_report(result.diagnosis, folder, result.errors))
-        self.report({"INFO"}, f"Wrote {folder / 'report.html'}")
+        yield from summary.write_report(result.diagnosis, folder, result.errors)
+        return folder / "report.html"
+
+    def done(self, result):
+        self.report({"INFO"}, f"Wrote {result}")
 
 
 CLASSES = (

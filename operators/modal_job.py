@@ -17,6 +17,15 @@ class ModalJob(support.ErrorReporting):
     """
 
     stopped = "Stopped"
+    _in_window = 0
+    """How many runs of this operator are going on beside the window."""
+
+    @classmethod
+    def poll_not_running(cls) -> bool:
+        """Poll: this operator is not running already, so that its button is grey meanwhile."""
+        if cls._in_window:
+            cls.poll_message_set("It is running; ESC stops it")
+        return not cls._in_window
 
     def invoke(self, context, _event):
         if bpy.app.background:
@@ -37,6 +46,7 @@ class ModalJob(support.ErrorReporting):
         self._timer = manager.event_timer_add(0.01, window=context.window)
         manager.progress_begin(0.0, 1.0)
         manager.modal_handler_add(self)
+        type(self)._in_window += 1
         return {"RUNNING_MODAL"}
 
     def modal(self, context, event):
@@ -74,6 +84,7 @@ class ModalJob(support.ErrorReporting):
 
     def _end(self, context):
         """Remove timer and progress."""
+        type(self)._in_window -= 1
         self._running.cancel()
         context.window_manager.event_timer_remove(self._timer)
         context.window_manager.progress_end()

@@ -109,22 +109,24 @@ def _request(obj) -> None:
 
 
 def _work() -> float | None:
-    """Timer: compute the requested reports, unless something plays or bakes."""
+    """Timer: compute the requested reports. While something plays only those of sensors that have none yet; none during a bake."""
     global _last_duration
-    window = bpy.context.window_manager.windows[0] if bpy.context.window_manager.windows else None
-    if session_state.session.bake_progress is not None or (window and window.screen.is_animation_playing):
-        return DELAY
+    manager = bpy.context.window_manager
+    playing = any(window.screen.is_animation_playing for window in manager.windows)
+    wanted = _requested.difference(_reports) if playing else set(_requested)
+    if session_state.is_baking() or not wanted:
+        return DELAY if _requested else None
     scene, start = bpy.context.scene, time.perf_counter()
     for obj in scene.objects:
-        if obj.session_uid in _requested and obj.palpate.role in {"SENSOR", "PAD"}:
+        if obj.session_uid in wanted and obj.palpate.role in {"SENSOR", "PAD"}:
             fresh_report(obj, scene)
-    _requested.clear()
+    _requested.difference_update(wanted)
     _last_duration = time.perf_counter() - start
-    for window in bpy.context.window_manager.windows:
+    for window in manager.windows:
         for area in window.screen.areas:
             if area.type in {"VIEW_3D", "PROPERTIES"}:
                 area.tag_redraw()
-    return None
+    return DELAY if _requested else None
 
 
 def _compute(obj, scene) -> Report:

@@ -41,10 +41,9 @@ def clear_scene(scene) -> None:
 
 
 def remove_orphans() -> None:
-    """Remove the markers, materials, nodes and images of sensors that were deleted."""
-    uids = {obj.palpate.uid for obj in bpy.data.objects}
-    markers.remove_orphans(uids)
-    materials.remove_orphans(uids)
+    """Remove the markers, materials, nodes and images of sensors that were deleted, and markers that only a copied scene has."""
+    markers.remove_orphans()
+    materials.remove_orphans({obj.palpate.uid for obj in bpy.data.objects})
 
 
 def has_bake(scene) -> bool:

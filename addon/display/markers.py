@@ -39,6 +39,14 @@ def find_marker(objects, uid: str, kind: str):
     return next((obj for obj in objects if obj.get(materials.SENSOR_KEY) == uid and obj.get(KIND_KEY, "FORCE") == kind), None)
 
 
+def only_marker(objects, uid: str, kind: str):
+    """Return a sensor's marker among some objects, or None, and remove its duplicates: they would show an earlier bake."""
+    found = [obj for obj in objects if obj.get(materials.SENSOR_KEY) == uid and obj.get(KIND_KEY, "FORCE") == kind]
+    for duplicate in found[1:]:
+        remove(duplicate)
+    return found[0] if found else None
+
+
 def keyframe_markers(scene, sensor: BakedSensor, kinds, lengths: dict[str, float]) -> None:
     """Keyframe the markers of one sensor and remove those that are not wanted.
 
@@ -50,7 +58,7 @@ def keyframe_markers(scene, sensor: BakedSensor, kinds, lengths: dict[str, float
         Scale of the arrows: Blender units per newton (FORCE) and per newton metre (TORQUE).
     """
     for kind in KINDS:
-        marker = find_marker(scene.objects, sensor.obj.palpate.uid, kind)
+        marker = only_marker(scene.objects, sensor.obj.palpate.uid, kind)
         if kind not in kinds:
             if marker is not None:
                 remove(marker)
@@ -116,18 +124,25 @@ def clear(scene, uid: str) -> None:
         remove(marker)
 
 
-def remove_orphans(uids) -> None:
-    """Remove the markers of sensors that were deleted; `uids` are the identities of all objects."""
-    for marker in orphans(bpy.data.objects, uids):
+def remove_orphans() -> None:
+    """Remove the markers of sensors that were deleted, and copies of markers in scenes without their sensor."""
+    for marker in orphans(bpy.data.objects):
         remove(marker)
 
 
-def orphans(objects, uids=None) -> list:
-    """Return the markers among some objects whose sensor was deleted; `uids` are the identities of all objects, if known."""
+def orphans(objects) -> list:
+    """Return the markers among some objects whose sensor is in none of the marker's scenes.
+
+    It was deleted, or the scene is a full copy: there the copied sensor has an identity of its own, and the copied marker names
+    the original.
+    """
     found = [obj for obj in objects if materials.SENSOR_KEY in obj and obj.library is None]
-    if found and uids is None:
-        uids = {obj.palpate.uid for obj in bpy.data.objects}
-    return [marker for marker in found if marker[materials.SENSOR_KEY] not in uids]
+    uids: dict = {}
+    for marker in found:
+        for scene in marker.users_scene:
+            if scene not in uids:
+                uids[scene] = {obj.palpate.uid for obj in scene.objects}
+    return [marker for marker in found if not any(marker[materials.SENSOR_KEY] in uids[scene] for scene in marker.users_scene)]
 
 
 def remove(marker) -> None:

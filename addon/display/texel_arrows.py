@@ -45,7 +45,7 @@ def build_arrows(scene, sensor: BakedSensor, image, kinds, lengths: dict, longes
     frames = int(sensor.frames[0]), int(sensor.frames[-1])
     for kind, (name, material) in KINDS.items():
         uid = sensor.obj.palpate.uid
-        found = markers.find_marker(scene.objects, uid, kind)
+        found = markers.only_marker(scene.objects, uid, kind)
         if found is not None:
             markers.remove(found)
         if kind not in kinds:

@@ -12,6 +12,7 @@ import numpy as np
 from ...figures.figure_canvas import new_figure, save_figure, tidy_axes
 from ...figures.figure_style import GREY, INK, NORMAL_COLOUR, SHEAR_COLOUR, WIDTHS
 from ...geometry.layout.grid_layout import GridLayout
+from ...jobs.progress import Job, Progress
 from ..forward.contact_phases import PHASES
 from ..forward.predictor import Model, Predictor
 from ..selection.findings import Diagnosis
@@ -246,14 +247,18 @@ def picture(name: str, result: Diagnosis, errors: GapErrors) -> Figure:
     return drawings[name]()
 
 
-def draw(result: Diagnosis, errors: GapErrors, folder: Path) -> list[str]:
-    """Write every picture that makes sense for a rig as PNG and PDF; return their names."""
-    names = []
-    for name in CAPTIONS:
-        if name == "map" and len(result.rig.texels) == 1:
-            continue
+def draw(result: Diagnosis, errors: GapErrors, folder: Path) -> Job[list[str]]:
+    """Write every picture that makes sense for a rig as PNG and PDF; return their names.
+
+    Yields
+    ------
+    Progress
+        Before each picture; its total is the number of pictures.
+    """
+    names = [name for name in CAPTIONS if name != "map" or len(result.rig.texels) > 1]
+    for done, name in enumerate(names):
+        yield Progress("drawing", done, len(names))
         figure = picture(name, result, errors)
         for kind in FILE_TYPES:
             save_figure(figure, folder / f"{name}.{kind}", 200)
-        names.append(name)
     return names

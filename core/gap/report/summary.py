@@ -11,6 +11,7 @@ from ...io.disk_space import require_space
 from ...io.file_list import FileList
 from ...io.file_writing import atomic_write
 from ...io.sensor_toml import write_sensor
+from ...jobs.job_runner import part_of_job
 from ...jobs.progress import Job, Progress
 from ..dataset.rig import Rig
 from ..fitting.least_squares import BASE, RECORDING
@@ -163,9 +164,8 @@ def write_report(result: Diagnosis, folder: Path, errors: GapErrors | None = Non
     with files.new_files("report") as new:
         yield Progress("writing the amended sensor", 0, 1000)
         write_sensor(new / "sensor.toml", amended_sensor(result))
-        yield Progress("drawing", 100, 1000)
         errors = errors or gap_errors(result)
-        pictures = draw(result, errors, new)
+        pictures = yield from part_of_job(draw(result, errors, new), lambda step: Progress(step.stage, 100 + 800 * step.done // step.total, 1000))
         yield Progress("writing the report", 900, 1000)
         found = summary(result, errors)
         with atomic_write(new / "report.html") as temporary:

@@ -35,6 +35,7 @@ def report(monkeypatch):
             for kind in summary.FILE_TYPES:
                 write_text(folder / f"{name}.{kind}", result.age)
         return PICTURES[result.age]
+        yield  # as the real one is a job
 
     monkeypatch.setattr(summary, "draw", draw)
     monkeypatch.setattr(summary, "amended_sensor", lambda result: result)

@@ -42,6 +42,8 @@ def road(ui):
 
     # 3. Find Gap, stopped and begun again
     yield from ui.press("palpate.gap_find()")
+    yield from ui.wait_until(lambda: ui.works("palpate.gap_find"), "Find Gap is at work")
+    ui.check(not bpy.ops.palpate.gap_find.poll(), "its button is grey meanwhile")
     yield 1.0
     yield from ui.stop("palpate.gap_find")
     ui.check(found() is None, "and nothing is said")
@@ -77,13 +79,29 @@ def road(ui):
         bpy.ops.wm.window_close()
     yield 1.0
 
-    # 6. Add to Sensor
+    # 6. Write Report, beside the window
+    folder = ui.out / "report"
+    folder.mkdir()
+    bpy.context.preferences.view.filebrowser_display_type = "SCREEN"
+    yield from ui.press("palpate.gap_report()")
+    yield 1.0
+    browser = ui.area("FILE_BROWSER")
+    browser.spaces.active.params.directory = str(folder).encode()
+    yield 1.0
+    buttons = ui.region(browser, "EXECUTE")
+    yield from ui.click(buttons.x + buttons.width - 70, buttons.y + buttons.height // 2)
+    yield from ui.wait_until(lambda: ui.works("palpate.gap_report"), "the report is written beside the window")
+    yield from ui.screenshot("6a-writing")
+    yield from ui.wait_until(lambda: (folder / "report.html").exists(), "the report is there", timeout=120)
+    yield 1.0
+
+    # 7. Add to Sensor
     yield from ui.press("palpate.gap_add()")
     yield 0.5
     ui.value("effects", [effect.kind for effect in pad().palpate.effects])
     ui.value("gain", pad().palpate.gain)
     yield from ui.filter("Effects")
-    yield from ui.screenshot("6-added")
+    yield from ui.screenshot("7-added")
     yield from ui.filter("")
     yield from ui.move(*ui.centre(view))
     yield from ui.key("Z", ctrl=True)
