@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Build the extension zips: the package, its manifest and its wheels, one zip per platform and Python.
 
+A zip for this machine's platform also carries the solver's machine code (tools/machine_code.py), if its Python is installed
+here: its first use then takes a second instead of a minute. Build each platform's zip on that platform to have it everywhere.
+
 Blender's installer picks wheels by platform only, so wheels for two Pythons must not share a zip. The same
 sources and wheels give the same bytes. Each zip is validated by Blender's own tool, which comes with bpy.
 
@@ -20,6 +23,7 @@ import platform
 import shutil
 import subprocess
 import sys
+import tempfile
 import tomllib
 import zipfile
 from pathlib import Path
@@ -31,6 +35,8 @@ from packaging.utils import canonicalize_name, parse_wheel_filename
 ROOT = Path(__file__).resolve().parents[1]
 WHEEL_LIST = ROOT / "tools" / "wheels.txt"
 WHEEL_CACHE = ROOT / "build" / "wheels"
+CODE_CACHE = ROOT / "build" / "machine-code"
+MACHINE_CODE = "core/compiled/machine_code.bin"
 
 # Blender's name of a platform → tags its wheels may carry; Blender too asks for glibc 2.28 and macOS 12.
 PLATFORMS = {
@@ -98,6 +104,49 @@ def wheels_for(platform_name: str, python: str) -> list[Path]:
             )
         stamp.write_text(wanted)
     return sorted(folder.glob("*.whl"))
+
+
+def machine_code(platform_name: str, python: str, wheels: list[Path]) -> bytes | None:
+    """Return the kernels' machine code, made once and kept under build/; None where it cannot be made on this machine.
+
+    It is made by the zip's Python and wheels, and with the oldest numpy of its Blenders.
+    """
+    interpreter = _interpreter(python) if platform_name == _platform_here() else None
+    if interpreter is None:
+        return None
+    digest = hashlib.sha256(WHEEL_LIST.read_bytes())
+    for file in package_files():
+        if file.parts[0] == "core" and file.suffix == ".py":
+            digest.update((ROOT / file).read_bytes())
+    kept = CODE_CACHE / f"{platform_name}-cp{python.replace('.', '')}-{digest.hexdigest()[:16]}.bin"
+    if not kept.is_file():
+        kept.parent.mkdir(parents=True, exist_ok=True)
+        partial = kept.with_suffix(".partial")
+        with tempfile.TemporaryDirectory() as folder:
+            own = Path(folder) / ("Scripts" if platform_name == "windows-x64" else "bin") / "python"
+            numpy = f"numpy=={NUMPY.get(python, NUMPY['3.13'])}"
+            _run([interpreter, "-m", "venv", folder])
+            _run([own, "-m", "pip", "install", "--quiet", "--no-deps", *wheels])
+            _run([own, "-m", "pip", "install", "--quiet", "--only-binary=:all:", numpy])
+            _run([own, "-I", ROOT / "tools" / "machine_code.py", partial])
+        partial.replace(kept)
+    return kept.read_bytes()
+
+
+def _interpreter(python: str) -> str | None:
+    """Return a Python of this version on this machine; None if there is none."""
+    if sys.version_info[:2] == tuple(int(part) for part in python.split(".")):
+        return sys.executable
+    found = shutil.which(f"python{python}")
+    if found is None or subprocess.run([found, "-c", "import venv, ensurepip"], capture_output=True).returncode != 0:
+        return None
+    return found
+
+
+def _run(command: list[Path | str]) -> None:
+    run = subprocess.run([str(part) for part in command], capture_output=True, text=True)
+    if run.returncode != 0:
+        raise BuildError(f"The solver's machine code could not be made ('{command[-1]}'):\n{run.stderr.strip()}")
 
 
 def check_complete(wheels: list[Path], platform_name: str, python: str) -> None:
@@ -168,6 +217,7 @@ def build(
     *,
     blender_range: tuple[str, str | None] | None = None,
     suffix: str = "",
+    with_machine_code: bool = True,
 ) -> Path:
     """Build and validate one zip.
 
@@ -183,6 +233,8 @@ def build(
         First Blender it fits and first it no longer fits; by default the official ones with that Python.
     suffix : str
         Added to the file's name.
+    with_machine_code : bool
+        Whether the zip carries the kernels' machine code, where it can be made here (:func:`machine_code`).
 
     Returns
     -------
@@ -202,6 +254,9 @@ def build(
     check_complete(wheels, platform_name, python)
     entries = {f"wheels/{wheel.name}": wheel.read_bytes() for wheel in wheels}
     entries |= {file.as_posix(): (ROOT / file).read_bytes() for file in package_files()}
+    code = machine_code(platform_name, python, wheels) if with_machine_code else None
+    if code is not None:
+        entries[MACHINE_CODE] = code
     entries["blender_manifest.toml"] = manifest_for(platform_name, wheels, *blender_range)
 
     version = tomllib.loads(entries["blender_manifest.toml"].decode())["version"]
@@ -213,8 +268,8 @@ def build(
             info = zipfile.ZipInfo(name, FIXED_TIME)
             info.external_attr = 0o644 << 16
             info.create_system = 3  # Unix, wherever it is built
-            # wheels are compressed already
-            info.compress_type = zipfile.ZIP_STORED if name.endswith(".whl") else zipfile.ZIP_DEFLATED
+            # wheels and machine code are compressed already
+            info.compress_type = zipfile.ZIP_STORED if name.endswith((".whl", ".bin")) else zipfile.ZIP_DEFLATED
             archive.writestr(info, entries[name])
     try:
         validate(partial)
@@ -226,15 +281,15 @@ def build(
 
 def local_platform() -> str:
     """Blender's name of the platform this runs on."""
-    names = {
-        ("Linux", "x86_64"): "linux-x64",
-        ("Windows", "AMD64"): "windows-x64",
-        ("Darwin", "arm64"): "macos-arm64",
-    }
-    here = (platform.system(), platform.machine())
-    if here not in names:
-        raise BuildError(f"There are no wheels for {' '.join(here)}; name a target with --platform.")
-    return names[here]
+    found = _platform_here()
+    if found is None:
+        raise BuildError(f"There are no wheels for {platform.system()} {platform.machine()}; name a target with --platform.")
+    return found
+
+
+def _platform_here() -> str | None:
+    here = {"sys_platform": sys.platform, "platform_machine": platform.machine()}
+    return next((name for name, markers in MARKERS.items() if here.items() <= markers.items()), None)
 
 
 def main(argv: list[str] | None = None) -> int:
@@ -249,6 +304,7 @@ def main(argv: list[str] | None = None) -> int:
     add("--python-version", metavar="X.Y", help=f"one Python only (default: {' and '.join(BLENDER_RANGE)})")
     add("--local", action="store_true", help="for a distribution's Blender, whatever its Python")
     add("--blender-min", default="4.2.0", metavar="X.Y.Z", help="with --local: first Blender it fits")
+    add("--no-machine-code", action="store_true", help="let the solver be compiled at first use, which takes a minute")
     add("--out", type=Path, default=ROOT / "dist", metavar="DIR", help="folder for the zips (default: dist/)")
     args = parser.parse_args(argv)
     if args.local and not args.python_version:
@@ -260,7 +316,8 @@ def main(argv: list[str] | None = None) -> int:
         platforms = [local_platform()] if args.local else list(PLATFORMS)
         for name in [args.platform] if args.platform else platforms:
             for python in pythons:
-                path = build(name, python, args.out, blender_range=blender_range, suffix=suffix)
+                code = not args.no_machine_code
+                path = build(name, python, args.out, blender_range=blender_range, suffix=suffix, with_machine_code=code)
                 print(f"{path}  {path.stat().st_size / 1e6:.0f} MB", flush=True)
     except BuildError as error:
         print(error, file=sys.stderr)

@@ -39,7 +39,48 @@ if not COMPILED:
     lower_getattr_generic = AttributeTemplate = infer_getattr = None
     NativeValue = intrinsic = register_model = typeof_impl = unbox = None
 
+CAN_PACK = False
+"""Whether machine code can be packed and unpacked; without that, kernels are compiled at first use."""
+if COMPILED:
+    try:
+        from llvmlite.binding import get_host_cpu_features
+        from numba.core import environment, serialize
+
+        dumps: Any = serialize.dumps
+        rebuild_environment: Any = environment._rebuild_env
+        CAN_PACK = True
+    except (ImportError, AttributeError):
+        pass
+if not CAN_PACK:
+    dumps = rebuild_environment = get_host_cpu_features = None
+
 
 def known_options(**options: bool) -> dict[str, bool]:
     """Return those options of ``numba.njit`` that this release of numba knows; the others only make kernels faster."""
     return {name: value for name, value in options.items() if hasattr(CPUTargetOptions, name)}
+
+
+def processor_features() -> dict[str, bool]:
+    """Return LLVM's names of this processor's features, and whether it has them."""
+    return dict(get_host_cpu_features())
+
+
+def reduced_overloads(kernel: Any) -> list[tuple[Any, Any]]:
+    """Return what numba keeps of the compiled forms of a kernel: signature and content, without the paths of source files."""
+    found = []
+    for signature, compiled in kernel.overloads.items():
+        content = list(kernel._cache._impl.reduce(compiled))
+        content[TYPE_ANNOTATION] = ""
+        found.append((signature, tuple(content)))
+    return found
+
+
+def save_overload(kernel: Any, signature: Any, content: Any) -> None:
+    """Put a compiled form of a kernel into numba's cache, as if it had been compiled here."""
+    cache = kernel._cache
+    cache._impl.locator.ensure_cache_path()
+    cache._cache_file.save(cache._index_key(signature, kernel.targetctx.codegen()), content)
+
+
+TYPE_ANNOTATION = 6
+"""Where numba's tuple of a compiled form holds the listing of its source with types, in which paths stand."""

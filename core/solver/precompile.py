@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Compile the solver before it is needed: a tiny scene is solved once, and numba keeps what it compiled.
 
-That takes a minute, once for each version. While Blender's window is open a process of its own does it (:func:`main`): a thread
-would share the interpreter with the window, and could not be stopped when Blender closes.
+That takes a minute, once for each version; a second where the extension carries machine code for the processor. While
+Blender's window is open a process of its own does it (:func:`main`): a thread would share the interpreter with the window, and
+could not be stopped when Blender closes.
 """
 
 from __future__ import annotations
@@ -70,8 +71,12 @@ def compile_solver(report: Report = lambda done, total: None) -> None:
     with _lock:
         if _done:
             return
+        from ..compiled import machine_code
         from ..compiled.kernels import KERNELS
+        from . import simulation  # noqa: F401 (it imports all kernels)
 
+        with suppress(OSError):  # no place to keep it: it is compiled, and kept for this session only
+            machine_code.install(KERNELS)
         with _PeriodicReport(lambda: report(sum(bool(kernel.signatures) for kernel in list(KERNELS)), max(1, len(KERNELS)))):
             _solve()
         _done = True
@@ -82,9 +87,13 @@ def compile_solver(report: Report = lambda done, total: None) -> None:
 
 def compile_solver_with_notice() -> None:
     """Compile the solver unless that was done before, and say so on stderr first; for commands, which have no window."""
-    if is_needed():
+    if not is_needed():
+        return
+    from ..compiled import machine_code
+
+    if not machine_code.fits():
         print("Palpate is preparing its solver (first use only), which takes about a minute …", file=sys.stderr, flush=True)
-        compile_solver()
+    compile_solver()
 
 
 class _PeriodicReport:

@@ -5,6 +5,7 @@ python -I -S zip_life.py FOLDER_WITH_BPY_ONLY ZIP REPORT.json
 """
 
 import json
+import os
 import sys
 
 only_blender, zip_path, report_path = sys.argv[1:]
@@ -120,12 +121,15 @@ def road():
     files = sorted(path.name for path in (folder / "palpate" / pad.name).iterdir())
     archive = sys.modules[f"{MODULE}.core.io.recording_npz"]
     recording = archive.load_recording(folder / "palpate" / pad.name / "recording.npz")
+    kernels = sys.modules[f"{MODULE}.core.compiled.kernels"].KERNELS
     compiled = Path(bpy.utils.extension_path_user(MODULE, path="numba")).rglob("*.nbi")
     return {
         "played": played,
         "baked": float(recording.sensors[pad.name].normal_force[-1].sum()),
         "files": files,
         "compiled": len(list(compiled)),
+        "loaded": sum(sum(kernel.stats.cache_hits.values()) for kernel in kernels),
+        "compiled here": sorted(kernel.__name__ for kernel in kernels if sum(kernel.stats.cache_misses.values())),
     }
 
 
@@ -151,3 +155,6 @@ def main():
 
 
 main()
+sys.stdout.flush()
+sys.stderr.flush()
+os._exit(0)  # Blender as a Python module may hang at exit, in a destructor of its own

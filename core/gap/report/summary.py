@@ -165,7 +165,9 @@ def write_report(result: Diagnosis, folder: Path, errors: GapErrors | None = Non
         yield Progress("writing the amended sensor", 0, 1000)
         write_sensor(new / "sensor.toml", amended_sensor(result))
         errors = errors or gap_errors(result)
-        pictures = yield from part_of_job(draw(result, errors, new), lambda step: Progress(step.stage, 100 + 800 * step.done // step.total, 1000))
+        pictures = yield from part_of_job(
+            draw(result, errors, new), lambda step: Progress(step.stage, 100 + 800 * step.done // step.total, 1000)
+        )
         yield Progress("writing the report", 900, 1000)
         found = summary(result, errors)
         with atomic_write(new / "report.html") as temporary:

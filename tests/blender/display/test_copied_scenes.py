@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Scene › New › Full Copy of a baked scene: the copy's bake and its removal leave no arrow of the original, which stays whole."""
+"""Scene › New › Full Copy of a baked scene: the copy's bake and its removal leave no copied arrow; the original stays whole."""
 
 import bpy
 import pytest
