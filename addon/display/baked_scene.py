@@ -41,7 +41,7 @@ def clear_scene(scene) -> None:
 
 
 def remove_orphans() -> None:
-    """Remove the markers, materials, nodes and images of sensors that were deleted, and markers that only a copied scene has."""
+    """Remove the markers, materials, nodes and images of sensors that were deleted, and copied markers in copied scenes."""
     markers.remove_orphans()
     materials.remove_orphans({obj.palpate.uid for obj in bpy.data.objects})
 
