@@ -109,7 +109,7 @@ def _request(obj) -> None:
 
 
 def _work() -> float | None:
-    """Timer: compute the requested reports. While something plays only those of sensors that have none yet; none during a bake."""
+    """Timer: compute the requested reports; while something plays only those of sensors without one, and none during a bake."""
     global _last_duration
     manager = bpy.context.window_manager
     playing = any(window.screen.is_animation_playing for window in manager.windows)
