@@ -28,6 +28,7 @@ COMMANDS = {
     "export": "write a bake as CSV, NPZ, HDF5, PNG, MCAP or LeRobot dataset",
     "fit": "estimate stiffness and friction from measurements",
     "gap": "find what the model misses against a real sensor",
+    "rig": "make a rig for gap from logs of a real sensor: CSV, MCAP, ROS bags, HDF5, NPZ, MAT",
     "paper": "repeat the experiments of the paper",
     "sweep": "compute a scene thousands of times with varied numbers, resumable",
     "sensor": "write sensors for other simulators",

@@ -4,7 +4,7 @@
 The packages stand in the order of the data: ``dataset`` reads a rig, ``forward`` predicts its recordings, ``data_faults`` finds
 what loggers did to them, ``fitting`` fits the model's parameters, ``kinds`` finds which kinds of effects act, ``selection``
 finds their formulas, ``report`` writes the result. ``calibration`` finds single parameters, stiffness and friction, from
-measurements of their own.
+measurements of their own. ``logs`` makes a rig from the files of other people's loggers.
 """
 
-__all__ = ["calibration", "data_faults", "dataset", "fitting", "forward", "kinds", "report", "selection"]
+__all__ = ["calibration", "data_faults", "dataset", "fitting", "forward", "kinds", "logs", "report", "selection"]

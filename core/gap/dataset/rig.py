@@ -25,6 +25,7 @@ from .column_names import ColumnRule, read_column_rules, translated
 from .cover import COVER_WORDS, Cover, read_cover
 from .fault_kinds import FAULT_KINDS
 from .own_numbers import force_zero_of, own_numbers, with_contact_heights
+from .second_logger import SecondLogger, joined, second_logger_of
 from .sessions import CLOCKS, TrialHistory, on_common_clocks, read_history
 from .trial import Trial
 
@@ -35,7 +36,7 @@ SMALLEST_RESPONSE = 1e-30
 """Responses of a smaller magnitude, in any unit, count as zero."""
 TRIAL_WORDS = {
     *("file", "use", "name", "session", "started", "tared", "specimen", "factor", "zero", "force_zero"),
-    *("contact_height", "probe", "repeats"),
+    *("contact_height", "probe", "repeats", "readings"),
 }
 """Words of a [[trial]]."""
 RIG_WORDS = {"format", "name", "clock", "columns", "data", "sensor", "indenter", "probe", "trial"}
@@ -425,15 +426,29 @@ class _TrialReader:
         if "probe" in entry and probe not in self.probes:
             known = ", ".join(sorted(self.probes)) or "none"
             raise FileError(f"probe of {where_in_rig} is {probe!r:.60}: write the name of a [[probe]] of the rig ({known}).")
-        trial, said = self._recorded(file, use, self.has_indenter or bool(probe))
+        columns = self._columns(file, second_logger_of(entry, where_in_rig), where)
+        trial, said = self._recorded(columns, file, use, self.has_indenter or bool(probe))
         repeats = checked_name(entry["repeats"], f"repeats of {where_in_rig}") if "repeats" in entry else ""
         trial = replace(trial, probe=probe, repeats=repeats)
         return replace(trial, tared=tared, factor=own["factor"], zero=own["zero"], force_zero=force_zero), history, said
 
-    def _recorded(self, file: Path, use: str, has_indenter: bool) -> tuple[Trial, list[str]]:
-        """The trial of a CSV file, and remarks about it."""
-        table = read_table(file)
-        columns = translated(table.names, table.values, self.rules, self.texels, file)
+    def _columns(self, file: Path, second: SecondLogger | None, where: str) -> dict[str, np.ndarray]:
+        """The columns of a trial, from its CSV file or from those of two loggers."""
+        if second is None:
+            table = read_table(file)
+            return translated(table.names, table.values, self.rules, self.texels, file)
+        other = _inside(second.file, self.folder, f"{where}'s readings", self.path)
+        files = (file, other)
+        parts = []
+        for one in files:
+            table = read_table(one)  # a rule of [columns] holds in the file that has its column
+            rules = {name: rule for name, rule in self.rules.items() if name == "texel" or rule.source in table.names}
+            parts.append(translated(table.names, table.values, rules, self.texels, one))
+            _clock(parts[-1], one)
+        return joined(parts[0], parts[1], second.late, files)
+
+    def _recorded(self, columns: dict[str, np.ndarray], file: Path, use: str, has_indenter: bool) -> tuple[Trial, list[str]]:
+        """The trial of a CSV file with these columns, and remarks about it."""
         time = _clock(columns, file)
         kind = _stimulus_kind(columns, file, has_indenter)
         reading, force = _readings(columns, self.texels, file), _vector(columns, FORCE, partial=True)

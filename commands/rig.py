@@ -1,0 +1,101 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""``palpate rig new``: a rig for ``palpate gap`` from logs of a real sensor."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ..core.errors import FileError
+from . import checks, console, log_questions
+
+if TYPE_CHECKING:
+    from ..core.gap.logs.answers import Answers
+    from ..core.gap.logs.log_table import LogFile
+
+ANSWERS_NAME, PLOT_NAME = "answers.toml", "recordings.png"
+"""The template of the answers, and the picture of what was read, in the folder of the rig."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    what = parser.add_subparsers(dest="what", metavar="new", required=True)
+    new = what.add_parser(
+        "new", help="make a rig from logs", description="Make a rig from logs of a real sensor (docs/logs.md)."
+    )
+    new.add_argument(
+        "logs",
+        metavar="LOG",
+        nargs="+",
+        help="CSV and other tables of text, MCAP, a bag of ROS 1 or ROS 2, HDF5, NPZ or MAT; several files become trials",
+    )
+    new.add_argument("--out", metavar="DIR", required=True, help="folder for rig.toml and its CSV files")
+    new.add_argument(
+        "--answers", metavar="FILE", help="what the columns are and what no log says; without it a template is written"
+    )
+    new.add_argument("--yes", action="store_true", help="take what is marked CHECK in the template as it is")
+    new.add_argument("--preview", action="store_true", help="list the columns of the logs and write nothing")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    from ..core.gap.logs import answers as log_answers
+    from ..core.gap.logs.log_file import read_log
+    from ..core.gap.logs.preview import preview_rows
+    from ..core.gap.logs.proposal import propose
+
+    with console.Interrupt.raised_at_once():
+        logs = [read_log(path) for path in arguments.logs]
+        print(console.text_table(preview_rows(logs), "<<<>>>"))
+        if arguments.preview:
+            for note in dict.fromkeys(note for log in logs for note in log.notes):
+                print(f"note: {note}")
+            return 0
+        if arguments.answers:
+            found = log_answers.read_answers(arguments.answers)
+        else:
+            found = propose(logs, Path(arguments.out).resolve().name or "rig")
+            found = log_answers.confirmed(found) if arguments.yes else found
+            if sys.stdin is not None and sys.stdin.isatty() and sys.stdout.isatty():
+                found = log_questions.asked(found)
+            _require_complete(found, arguments.out)
+        checks.outputs_are_no_inputs((Path(arguments.out) / name for name in (ANSWERS_NAME, PLOT_NAME)), arguments.logs)
+        _write(logs, found, arguments.out)
+    return 0
+
+
+def _require_complete(found: Answers, out: str) -> None:
+    """Write a template of the answers and raise FileError where questions are open."""
+    from ..core.gap.logs.answers import answers_text
+    from ..core.io.file_writing import atomic_write, writable_folder
+
+    questions = list(found.open_questions())
+    if not questions:
+        return
+    path = writable_folder(out, create=True) / ANSWERS_NAME
+    if path.exists():
+        raise FileError(f"'{path}' has answers already: give it with --answers, or remove it for a new template.")
+    with atomic_write(path) as temporary:
+        temporary.write_text(answers_text(found), encoding="utf-8", newline="\n")
+    for question in questions:
+        print(f"question: {question}")
+    raise FileError(
+        f"The logs leave {len(questions)} questions open: answer them in '{path}', and give the command again with --answers "
+        f"'{path}'."
+    )
+
+
+def _write(logs: list[LogFile], found: Answers, out: str) -> None:
+    from ..core.gap.dataset.rig import read_rig
+    from ..core.gap.logs.new_rig import write_rig
+    from ..core.gap.logs.preview import plot_rig
+
+    written = console.run_with_progress_bar("rig new", write_rig(logs, found, out), unit="recording")
+    rig = read_rig(written.path)
+    plot_rig(rig, written.path.parent / PLOT_NAME)
+    for note in [*written.notes, *rig.warnings]:
+        print(f"note: {note}")
+    uses = [trial.use for trial in rig.trials]
+    print(f"{len(uses)} recordings, {uses.count('fit')} to fit and {uses.count('check')} to check; {len(rig.texels)} texels")
+    print(f"rig:  {written.path}")
+    print(f"plot: {written.path.parent / PLOT_NAME}")

@@ -1,0 +1,190 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How much later one logger's clock shows the same event than another's, by correlation.
+
+Changes and not values are correlated, because creep, drift and hysteresis hardly move a change. An indenter moves before it
+touches, so its position is also compared beyond several heights, and the height at which both agree best counts.
+"""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass
+
+import numpy as np
+
+HEIGHTS = (0.0, 0.2, 0.4, 0.6, 0.8)
+"""Shares of the way of the stimulus below which it may not touch."""
+MOST_SAMPLES = 40_000
+"""Samples of the common grid."""
+SMOOTHING = (0.05, 0.2, 0.8)
+"""Seconds over which changes are taken, and at least two samples. Slow presses show in slow changes, under which noise is
+small; that which tells the shift most clearly counts."""
+LEAST_OVERLAP = 0.5
+"""Least share of the changes of each logger that must lie where both recorded."""
+LEAST_CORRELATION, MOST_RIVAL = 0.5, 0.6
+"""The shift is sure if the correlation of changes is at least this, and that at any other shift less than this share of it.
+Of 100 recordings of six presses with noise 98 pass, and 3 are off by more than four standard errors and 0.05 s. Of 200 pairs of
+unrelated recordings of six presses 61 pass, because presses look alike: the correlation cannot tell whose files they are."""
+WINDOWS = 8
+"""Parts of a recording whose shifts tell the uncertainty."""
+
+
+@dataclass(frozen=True)
+class ClockShift:
+    """The shift of two clocks.
+
+    Attributes
+    ----------
+    late : float, s
+        The second clock's time of an event minus the first one's.
+    uncertainty : float, s
+        Standard error, from the scatter of the shift between parts of the recording.
+    correlation : float
+        Of the changes with this shift.
+    rival : float
+        Largest correlation at any other shift, as a share of it.
+    """
+
+    late: float
+    uncertainty: float
+    correlation: float
+    rival: float
+
+    @property
+    def is_sure(self) -> bool:
+        """True if the recordings tell the shift."""
+        return self.correlation >= LEAST_CORRELATION and self.rival < MOST_RIVAL
+
+
+def clock_shift(
+    first: tuple[np.ndarray, np.ndarray], second: tuple[np.ndarray, np.ndarray], reach: float = np.inf
+) -> ClockShift | None:
+    """Return how late the second clock is.
+
+    Parameters
+    ----------
+    first, second : (times (T,) s, values (T,))
+        What drove the sensor, and what answered, each by its own clock.
+    reach : float, s
+        Largest shift that is looked for.
+
+    Returns
+    -------
+    ClockShift or None
+        None if one of them does not change.
+    """
+    spans = [float(np.ptp(times)) for times, _ in (first, second)]
+    steps = [float(np.median(np.diff(times))) for times, _ in (first, second)]
+    step = max(*steps, max(spans) / MOST_SAMPLES)
+    driven, answered = _on_grid(*first, step), _on_grid(*second, step)
+    offset = float(second[0][0] - first[0][0])
+    best: tuple[float, ClockShift] | None = None
+    for seconds in SMOOTHING:
+        width = max(2, round(seconds / step))
+        if seconds != SMOOTHING[0] and 8 * width > min(len(driven), len(answered)):
+            break
+        answer = _changes(answered, width)
+        for sign, height in itertools.product((1.0, -1.0), HEIGHTS):
+            least, most = np.percentile(sign * driven, [1.0, 99.0])
+            cause = _changes(np.maximum(sign * driven - least - height * (most - least), 0.0), width)
+            found = _shift_of(cause, answer, step, offset, reach)
+            if found is not None and (best is None or _clearness(found) > best[0] + 1e-9):
+                best = _clearness(found), found
+    return None if best is None else best[1]
+
+
+def _clearness(found: ClockShift) -> float:
+    return found.correlation * (1.0 - found.rival)
+
+
+def _shift_of(cause: np.ndarray, answer: np.ndarray, step: float, offset: float, reach: float) -> ClockShift | None:
+    """Return the shift at which two series of changes agree best, None if one of them is constant."""
+    if not cause.any() or not answer.any():
+        return None
+    lags, correlation = _correlation(cause, answer)
+    size = np.where(np.abs(offset + lags * step) <= reach, np.abs(correlation), 0.0)
+    top = int(size.argmax())
+    if size[top] <= 0.0:
+        return None
+    width = _lobe(size, top)
+    elsewhere = size.copy()
+    elsewhere[max(0, top - width) : top + width + 1] = 0.0
+    lag = lags[top] + _vertex(size, top)
+    error = _scatter(cause, answer, int(lags[top]), width, float(np.sign(correlation[top]))) * step
+    rival = float(elsewhere.max()) / float(size[top])
+    return ClockShift(offset + lag * step, max(error, 0.1 * step), float(size[top]), rival)
+
+
+def _on_grid(times: np.ndarray, values: np.ndarray, step: float) -> np.ndarray:
+    known = np.isfinite(values) & np.isfinite(times)
+    grid = np.arange(times[0], times[-1] + 0.5 * step, step)
+    return np.interp(grid, times[known], values[known]) if known.any() else np.zeros(len(grid))
+
+
+def _changes(values: np.ndarray, width: int) -> np.ndarray:
+    """Return changes over so many samples, without their mean."""
+    if len(values) <= width:
+        return np.zeros(1)
+    total = np.concatenate([[0.0], np.cumsum(values)])
+    half = max(1, width // 2)
+    means = (total[half:] - total[:-half]) / half
+    change = means[half:] - means[:-half]
+    found: np.ndarray = change - change.mean()
+    return found
+
+
+def _correlation(cause: np.ndarray, answer: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return all shifts in samples at which both overlap enough, and the correlation at each."""
+    count = len(cause) + len(answer) - 1
+    length = 1 << (count - 1).bit_length()
+    product = np.fft.irfft(np.conj(np.fft.rfft(cause, length)) * np.fft.rfft(answer, length), length)
+    lags = np.arange(-(len(cause) - 1), len(answer))
+    product = product[lags % length]
+    causes, answers = np.concatenate([[0.0], np.cumsum(cause**2)]), np.concatenate([[0.0], np.cumsum(answer**2)])
+    begin, end = np.maximum(0, -lags), np.minimum(len(cause), len(answer) - lags)
+    shared_cause = causes[end] - causes[begin]
+    shared_answer = answers[end + lags] - answers[begin + lags]
+    enough = (shared_cause >= LEAST_OVERLAP * causes[-1]) & (shared_answer >= LEAST_OVERLAP * answers[-1])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        found = np.where(enough, product / np.sqrt(shared_cause * shared_answer), 0.0)
+    return lags, np.nan_to_num(found)
+
+
+def _lobe(size: np.ndarray, top: int) -> int:
+    """Return half the width of the peak, in samples: to where it falls below half of its height, and twice as far."""
+    right = np.flatnonzero(size[top:] < 0.5 * size[top])
+    left = np.flatnonzero(size[top::-1] < 0.5 * size[top])
+    return 2 * max(3, int(min(right[0] if len(right) else len(size), left[0] if len(left) else len(size))))
+
+
+def _vertex(size: np.ndarray, top: int) -> float:
+    """Return where between samples the peak is, by a parabola."""
+    if not 0 < top < len(size) - 1:
+        return 0.0
+    before, here, after = size[top - 1 : top + 2]
+    bend = before - 2.0 * here + after
+    return float(0.5 * (before - after) / bend) if bend < 0.0 else 0.0
+
+
+def _scatter(cause: np.ndarray, answer: np.ndarray, lag: int, width: int, sign: float) -> float:
+    """Return the standard error of the shift in samples, from parts of the recording."""
+    begin, end = max(0, -lag), min(len(cause), len(answer) - lag)
+    edges = np.linspace(begin, end, WINDOWS + 1).astype(int)
+    shifts, weights = [], []
+    for one, other in zip(edges[:-1], edges[1:]):
+        near = np.arange(-width, width + 1)
+        near = near[(one + lag + near >= 0) & (other + lag + near <= len(answer))]
+        part = cause[one:other]
+        if len(near) < 3 or not part.any():
+            continue
+        products = np.array([sign * float(part @ answer[one + lag + k : other + lag + k]) for k in near])
+        top = int(products.argmax())
+        if products[top] > 0.0 and 0 < top < len(near) - 1:
+            shifts.append(near[top] + _vertex(products, top))
+            weights.append(float(part @ part))
+    if len(shifts) < 2:
+        return float(width)
+    share = np.array(weights) / np.sum(weights)
+    mean = float(share @ np.array(shifts))
+    parts = 1.0 / float(share @ share)
+    return float(np.sqrt(share @ (np.array(shifts) - mean) ** 2 / max(parts - 1.0, 0.5)))

@@ -1,0 +1,248 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a column seems to be, by its name, its unit and the size of its values.
+
+A name tells a quantity; a unit is what the file states, or stands in the name. Where neither tells the unit, the size of the
+values does, and the answer is not sure: a person has to confirm it.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...io.csv_table import UNITS
+from ..dataset.column_names import QUANTITIES
+
+GRAVITY = 9.80665
+"""m/s²: a gram on a scale is a force."""
+LOG_UNITS: dict[str, dict[str, float]] = {
+    "m": {**UNITS["m"], "nm": 1e-9, "in": 0.0254, "inch": 0.0254},
+    "s": {**UNITS["s"], "us": 1e-6, "µs": 1e-6, "ns": 1e-9, "min": 60.0},
+    "N": {
+        **UNITS["N"],
+        **{"uN": 1e-6, "g": 1e-3 * GRAVITY, "gf": 1e-3 * GRAVITY, "kg": GRAVITY, "kgf": GRAVITY, "lbf": 4.4482216152605},
+    },
+    "": {},
+}
+"""SI unit → units that a log may be in, and the SI value of one of them. Those of a reading are in :data:`READING_UNITS`."""
+PRESSURES = {**UNITS["Pa"], "hPa": 1e2, "mbar": 1e2, "bar": 1e5, "psi": 6894.757293168}
+"""Pressures: a force follows with the area on which they act."""
+READING_UNITS = {**LOG_UNITS["N"]}
+"""Units of readings that become newtons. Readings in any other unit keep it."""
+KNOWN_UNITS = (
+    {unit for units in LOG_UNITS.values() for unit in units}
+    | set(PRESSURES)
+    | {
+        *(
+            "counts",
+            "count",
+            "V",
+            "mV",
+            "ohm",
+            "kohm",
+            "Ohm",
+            "kOhm",
+            "Ω",
+            "kΩ",
+            "F",
+            "pF",
+            "raw",
+            "LSB",
+            "ADC",
+            "deg",
+            "rad",
+            "%",
+        ),
+    }
+)
+TEXEL_WORDS = {
+    *(
+        "texel",
+        "taxel",
+        "tactel",
+        "cell",
+        "sensor",
+        "tactile",
+        "tac",
+        "tactip",
+        "pressure",
+        "adc",
+        "reading",
+        "readings",
+        "raw",
+    ),
+    *("resistance", "capacitance", "voltage", "ch", "channel", "r", "c", "s", "p", "v", "value", "values", "signal", "hall"),
+}
+"""Words in the names of columns that hold the sensor's response."""
+_AXIS_WORDS = {
+    "position": (
+        "position",
+        "pos",
+        "pose",
+        "translation",
+        "tcp",
+        "tip",
+        "probe",
+        "indenter",
+        "tool",
+        "ee",
+        "motion",
+        "p",
+        "robot",
+    ),
+    "force": ("force", "f", "wrench", "load", "ft"),
+    "torque": ("torque", "moment", "t", "m", "tau"),
+    "rotation": ("orientation", "rotation", "quaternion", "quat", "q", "rot"),
+    "velocity": ("velocity", "vel", "v", "speed", "acceleration", "accel", "acc", "jerk", "gyro", "angular", "twist", "twists"),
+}
+_TIME_WORDS = {"time", "t", "timestamp", "stamp", "sec", "secs", "seconds", "elapsed", "clock", "tim", "tim2", "zeit"}
+_SINGLE = {
+    "force": {"force", "load", "weight", "mass", "normal_force", "fn", "loadcell", "scale", "futek"},
+    "depth": {"depth", "indentation", "penetration", "compression", "deflection"},
+}
+LEAST_SPAN, LARGEST_METRES = 1e-7, 0.3
+"""Metres: the smallest motion that a rig measures, and the largest that is taken for metres where no unit is known. Rigs for
+touch move by millimetres to some decimetres, so larger numbers are millimetres."""
+_BRACKETS = re.compile(r"^(?P<name>.*?)\s*[\[(]\s*(?P<unit>[^\])]+?)\s*[\])]\s*$")
+
+
+@dataclass(frozen=True)
+class Meaning:
+    """What a name says.
+
+    Attributes
+    ----------
+    quantity : str
+        One of :data:`..dataset.column_names.QUANTITIES`, or empty.
+    unit : str
+        Empty if the name has none.
+    weight : int
+        How sure the name is: 3 for a full word, 2 for a letter with an axis, 1 for a single letter.
+    """
+
+    quantity: str
+    unit: str = ""
+    weight: int = 0
+
+
+def name_and_unit(column: str) -> tuple[str, str]:
+    """Return the name of a column without its unit, and the unit: ``Fz (N)``, ``Fz [N]``, ``Fz_N``, ``height mm``."""
+    found = _BRACKETS.match(column)
+    if found:
+        return found["name"], found["unit"]
+    stem, mark, last = re.match(r"^(.*?)([_ .]?)([^_ .]*)$", column).groups()  # type: ignore[union-attr]
+    if mark and stem and last in KNOWN_UNITS - {"m", "s", "g", "V", "F", "N", "in"}:
+        return stem, last
+    if mark == "_" and stem and last in {"m", "s", "g", "N", "V"} and len(stem) > 1:
+        return stem, last
+    return column, ""
+
+
+def meaning_of(column: str) -> Meaning:
+    """Return what the name of a column says."""
+    plain, unit = name_and_unit(column)
+    if plain.lower() in QUANTITIES and plain.lower() != "texel":
+        return Meaning(plain.lower(), unit, 3)
+    words = [word.lower() for word in re.findall(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+", plain)]
+    if not words:
+        return Meaning("")
+    has = {kind: bool(set(words) & set(names)) for kind, names in _AXIS_WORDS.items()}
+    last = words[-1]
+    joined = re.fullmatch(r"(f|force|p|pos|position|q|t|m|v|a|slide)([xyzw])", last)
+    if joined and len(words[-1]) > 1:
+        kind = {"f": "force", "force": "force", "p": "position", "pos": "position", "position": "position", "q": "rotation"}
+        if joined[1] == "slide":
+            return Meaning(f"slide_{joined[2]}", unit, 3) if joined[2] in "xy" else Meaning("")
+        return _of_axis(kind.get(joined[1], ""), joined[2], unit, 2)
+    if last in ("x", "y", "z", "w"):
+        if has["velocity"] or (has["torque"] and "torque" in words):
+            return Meaning("")
+        kind_of = next((kind for kind in ("rotation", "force", "torque", "position") if has[kind]), "")
+        if kind_of == "" and len(words) == 1:
+            return Meaning(last, unit, 1) if last in "xyz" else Meaning("")
+        return _of_axis(kind_of, last, unit, 3 if kind_of else 0)
+    if set(words) & _TIME_WORDS and not has["velocity"]:
+        return Meaning("time", unit, 3 if words[0] in _TIME_WORDS else 2)
+    for quantity, known in _SINGLE.items():
+        if set(words) & known or "_".join(words) in known:
+            return Meaning(quantity, unit, 2)
+    return Meaning("", unit)
+
+
+def _of_axis(kind: str, axis: str, unit: str, weight: int) -> Meaning:
+    if kind == "force" and axis in "xyz":
+        return Meaning(f"force_{axis}", unit, weight)
+    if kind == "position" and axis in "xyz":
+        return Meaning(axis, unit, weight)
+    if kind == "rotation":
+        return Meaning(f"q{axis}", unit, weight)
+    return Meaning("")
+
+
+def texel_family(columns: list[str]) -> tuple[list[str], bool]:
+    """Return the columns that seem to be texels, in the order of their numbers, and whether their name says so.
+
+    A family is what differs by a number alone. The largest one whose name is a word for readings is taken, else the largest of
+    three or more.
+    """
+    families: dict[str, list[tuple[int, str]]] = {}
+    for column in columns:
+        plain, unit = name_and_unit(column)
+        for found in re.finditer(r"\d+", plain):
+            key = f"{plain[: found.start()]}\0{plain[found.end() :]} {unit}"
+            families.setdefault(key, []).append((int(found[0]), column))
+    best: tuple[bool, int, list[str]] = (False, 2, [])
+    for key, members in families.items():
+        numbers = [number for number, _ in members]
+        if len(set(numbers)) != len(members) or max(numbers) - min(numbers) != len(members) - 1:
+            continue
+        words = {word.lower() for word in re.findall(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+", key)}
+        named = bool(words & TEXEL_WORDS) and not words & set(_AXIS_WORDS["velocity"][4:])
+        if (named, len(members)) > best[:2] and (named or len(members) > 2):
+            best = (named, len(members), [column for _, column in sorted(members)])
+    if not best[2]:
+        single = [
+            name
+            for name in columns
+            if {word.lower() for word in re.findall(r"[A-Za-z]+", name)} & TEXEL_WORDS - {"p", "v", "s", "c"}
+        ]
+        return single, bool(single)
+    return best[2], best[0]
+
+
+def time_unit(values: np.ndarray, stated: str) -> tuple[str, str, bool]:
+    """Return the unit of time stamps, why, and whether that is sure."""
+    if stated in LOG_UNITS["s"]:
+        return stated, "the file says so", True
+    known = values[np.isfinite(values)]
+    steps = np.diff(known)
+    step = float(np.median(steps[steps > 0])) if (steps > 0).any() else 0.0
+    size = float(np.abs(known).max()) if len(known) else 0.0
+    for unit, seconds in (("ns", 1e-9), ("us", 1e-6), ("ms", 1e-3), ("s", 1.0)):
+        if 1e9 <= size * seconds < 3e9 and step * seconds < 10.0:
+            return unit, "such numbers count from 1970", True
+    if 0.0 < step <= 0.5:
+        return "s", f"samples are {step:.3g} s apart", True
+    if step <= 500.0:
+        return "ms", f"samples are {step:.4g} apart", False
+    return "us", f"samples are {step:.4g} apart", False
+
+
+def length_unit(span: float, stated: str) -> tuple[str, str, bool]:
+    """Return the unit of a length whose values span so much, why, and whether that is sure."""
+    if stated in LOG_UNITS["m"]:
+        return stated, "the file says so", True
+    if span > LARGEST_METRES:
+        return "mm", f"it moves by {span:.4g}, too much for metres", False
+    return "m", f"it moves by {span:.4g}", False
+
+
+def force_unit(stated: str) -> tuple[str, str, bool]:
+    """Return the unit of a force, why, and whether that is sure."""
+    if stated in LOG_UNITS["N"] or stated in PRESSURES:
+        return stated, "the file says so", True
+    if stated:
+        return "?", f"it is in {stated}: write N, and the newtons per {stated} as factor", False
+    return "N", "no unit is stated", False

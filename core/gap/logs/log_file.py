@@ -1,0 +1,77 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Reads a log, whatever its format."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+from ...errors import FileError
+from ...io.file_writing import os_error_reason
+from ...io.regular_file import open_regular
+from .log_table import LARGEST_FILE, LogFile
+from .readers.array_files import read_hdf5, read_mat, read_npz
+from .readers.mcap_log import read_mcap
+from .readers.ros_bag import read_bag
+from .readers.text_table import read_text
+
+READERS: dict[str, Callable[[Path], LogFile]] = {
+    ".csv": read_text,
+    ".tsv": read_text,
+    ".txt": read_text,
+    ".dat": read_text,
+    ".log": read_text,
+    ".mcap": read_mcap,
+    ".bag": read_bag,
+    ".db3": read_bag,
+    ".h5": read_hdf5,
+    ".hdf5": read_hdf5,
+    ".npz": read_npz,
+    ".mat": read_mat,
+}
+"""Readers by the ending of the name."""
+_BEGINNINGS: dict[bytes, Callable[[Path], LogFile]] = {
+    b"\x89MCAP0\r\n": read_mcap,
+    b"#ROSBAG V2.0": read_bag,
+    b"SQLite format 3": read_bag,
+    b"\x89HDF\r\n\x1a\n": read_hdf5,
+    b"PK\x03\x04": read_npz,
+    b"MATLAB 5.0": read_mat,
+}
+"""Readers by the first bytes, for files whose name does not tell."""
+
+
+def read_log(path: str | os.PathLike) -> LogFile:
+    """Read a log: a file, or the folder of a ROS 2 bag.
+
+    Raises
+    ------
+    FileError
+        There is no such file, it is none of the known formats, it is damaged, or too large.
+    """
+    path = Path(path)
+    try:
+        if path.is_dir():
+            return read_bag(path)
+        size = path.stat().st_size
+        if size > LARGEST_FILE:
+            raise FileError(
+                f"'{path.name}' holds {size / 1e9:.1f} GB and at most {LARGEST_FILE / 1e9:.1f} GB are read: cut it."
+            )
+        with open_regular(path) as file:
+            beginning = file.read(16)
+        if not beginning:
+            raise FileError(f"'{path.name}' is empty: copy it again.")
+        reader = READERS.get(path.suffix.lower())
+        if reader is None:
+            reader = next((found for mark, found in _BEGINNINGS.items() if beginning.startswith(mark)), None)
+        if reader is None:
+            raise FileError(f"'{path.name}' is no log that is known: give one of {', '.join(READERS)}, or the folder of a bag.")
+        return reader(path)
+    except FileNotFoundError as error:
+        raise FileError(f"There is no file '{path}': check its name and folder.") from error
+    except OSError as error:
+        raise FileError(f"'{path}' could not be read ({os_error_reason(error)}): check its name and permissions.") from error
+    except ValueError as error:  # a NUL in the name
+        raise FileError(f"{str(path)!r} could not be read ({error}): check its name.") from error

@@ -1,0 +1,467 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Writes a rig from logs and answers: ``rig.toml`` and CSV files in SI units, and in comments what was taken for what."""
+
+from __future__ import annotations
+
+import fnmatch
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from ...errors import FileError
+from ...io.csv_table import LARGEST_NUMBER
+from ...io.file_list import FileList
+from ...io.file_writing import atomic_write, writable_folder
+from ...jobs.progress import Job, Progress
+from ..dataset.column_names import INVERSE, QUANTITIES
+from ..dataset.rig import FORMAT, read_rig
+from ..dataset.second_logger import interpolated, with_steady_signs
+from .answers import Answers, ColumnAnswer, LoggerAnswer, RecordingAnswer, toml_value
+from .clock_alignment import ClockShift, clock_shift
+from .column_meaning import LOG_UNITS, PRESSURES, READING_UNITS
+from .log_table import LogFile, LogTable
+from .proposal import table_of
+
+RIG_NAME = "rig.toml"
+MOST_REPEATED = 0.02
+"""Share of repeated time stamps up to which their samples are averaged without being asked."""
+LONGEST_PAUSE = 10.0
+"""Pause between two samples, in usual steps, from which on it is mentioned."""
+LARGEST_MOTION, LARGEST_FORCE, SMALLEST_MOTION = 1.5, 1e4, 1e-7
+"""Metres and newtons beyond which a unit must be wrong: rigs for touch move by less than 1.5 m and press with less than a ton."""
+LEAST_CONTACT = 6.0
+"""How many times the noise from sample to sample a response must rise above it. Of 1000 recordings of white noise of 20 to
+20,000 samples, none reaches it after the mean over five samples that is taken here."""
+SINCE_1970, COMPUTERS_APART = 1e9, 5.0
+"""Seconds: stamps above the first are times of day, which two computers or two programs of one show alike to the second."""
+SMALLEST_INVERTED = 1e-30
+"""A resistance below it counts as missing: it has no inverse."""
+DIGITS = 10
+"""Significant digits of the numbers in the CSV files."""
+
+
+@dataclass(frozen=True)
+class NewRig:
+    """What was written.
+
+    Attributes
+    ----------
+    path : Path
+        Of the rig.
+    files : tuple of Path
+    notes : tuple of str
+        What a user should know, a sentence each; they stand in the rig as comments, too.
+    """
+
+    path: Path
+    files: tuple[Path, ...]
+    notes: tuple[str, ...]
+
+
+def write_rig(logs: Sequence[LogFile], answers: Answers, folder: str | os.PathLike) -> Job[NewRig]:
+    """Write a rig.
+
+    Parameters
+    ----------
+    logs : sequence of LogFile
+    answers : Answers
+        Complete: a question that is open raises an error.
+    folder : path
+        Created if it is missing. The rig of an earlier call in it is replaced.
+
+    Yields
+    ------
+    Progress
+        Before each recording.
+
+    Raises
+    ------
+    PalpateError
+        The answers and the logs do not fit together, a unit must be wrong, a recording shows no contact, time stamps cannot be
+        used, or a file cannot be written. An earlier rig is then as it was.
+    """
+    for question in answers.open_questions():
+        raise FileError(f"{question[:-1]}: answer it before the rig is written.")
+    folder = writable_folder(folder, create=True)
+    recordings = [one for one in answers.recordings if one.use != "leave out"]
+    if not recordings:
+        raise FileError("All recordings are to be left out: keep at least one.")
+    names = _file_names(recordings, folder, logs)
+    by_name = {log.path.name: log for log in logs}
+    files = FileList(folder)
+    with files.new_files("rig") as new:
+        written: list[Path] = []
+        notes: list[str] = []
+        trials = []
+        for number, recording in enumerate(recordings, start=1):
+            yield Progress(recording.name, number, len(recordings) + 1)
+            tables = [_columns_of(by_name, file, answers, notes) for file in recording.files]
+            lines = _trial(recording, tables, names[recording.name], new, written, notes)
+            trials.append(lines)
+        text = _rig_text(logs, answers, trials, notes)
+        with atomic_write(new / RIG_NAME) as temporary:
+            temporary.write_text(text, encoding="utf-8", newline="\n")
+        read_rig(new / RIG_NAME)
+        places = files.replace(new, {"rig": [*written, new / RIG_NAME]})
+    return NewRig(folder / RIG_NAME, tuple(places), tuple(dict.fromkeys(notes)))
+
+
+def _file_names(recordings: Sequence[RecordingAnswer], folder: Path, logs: Sequence[LogFile]) -> dict[str, str]:
+    """Return the name of the CSV file of each recording; none of them is a log itself."""
+    found: dict[str, str] = {}
+    for recording in recordings:
+        if recording.name in found:
+            raise FileError(f"Two recordings are called '{recording.name}': give each a name of its own.")
+        plain = "".join(c if c.isalnum() or c in "-_." else "_" for c in recording.name).strip(".") or "recording"
+        while plain.lower() in {name.lower() for name in found.values()}:
+            plain += "_"
+        found[recording.name] = plain
+    for log in logs:
+        for name in (RIG_NAME, *(f"{one}{end}.csv" for one in found.values() for end in ("", "_readings"))):
+            if (folder / name).exists() and log.path.exists() and os.path.samefile(folder / name, log.path):
+                raise FileError(f"'{log.path}' is read and would be overwritten: write the rig into another folder.")
+    return found
+
+
+# --- one recording
+
+
+def _columns_of(logs: Mapping[str, LogFile], file: str, answers: Answers, notes: list[str]) -> dict[str, np.ndarray]:
+    """Return the columns of a file by the names and in the units of a rig, on one clock."""
+    log = logs.get(file)
+    if log is None:
+        raise FileError(f"The answers name the file '{file}', which was not given: give it, or remove its [[recording]].")
+    logger = next((one for one in answers.loggers if any(fnmatch.fnmatchcase(file, pattern) for pattern in one.files)), None)
+    if logger is None:
+        raise FileError(f"No [[logger]] of the answers has the file '{file}': add its name to files of one.")
+    tables: dict[str, tuple[LogTable, dict[str, np.ndarray]]] = {}
+    for quantity, answer in logger.columns.items():
+        if quantity != "time":
+            for i, name in enumerate(answer.names):
+                found = table_of(log.tables, name)
+                if found is None:
+                    raise FileError(f"'{file}' has no column '{name}', which the answers name for {quantity}: check its name.")
+                table, own = found
+                column = f"texel_{i}" if quantity == "texel" else quantity
+                tables.setdefault(table.name, (table, {}))[1][column] = _in_si(quantity, answer, table.columns[own])
+    if not tables:
+        raise FileError(f"The answers use no column of '{file}': name its columns, or leave the file out.")
+    parts = [
+        _on_clock(columns, _clock_of(log, table, logger, columns), logger.columns.get("time"), log, notes)
+        for table, columns in tables.values()
+    ]
+    return _on_one_clock(parts, log, notes)
+
+
+def _in_si(quantity: str, answer: ColumnAnswer, values: np.ndarray) -> np.ndarray:
+    unit = QUANTITIES[quantity]
+    factor = LOG_UNITS.get(unit, {}).get(answer.unit, 1.0)
+    if answer.unit in PRESSURES and quantity == "force":
+        factor = PRESSURES[answer.unit] * answer.area
+    if quantity == "texel":
+        factor = READING_UNITS.get(answer.unit, 1.0)
+    found: np.ndarray = (values - answer.zero) * (factor * answer.factor)
+    if quantity == "texel" and answer.unit == INVERSE:
+        with np.errstate(divide="ignore"):
+            found = np.where(np.abs(found) < SMALLEST_INVERTED, np.nan, 1.0 / found)
+    return found
+
+
+def _clock_of(log: LogFile, table: LogTable, logger: LoggerAnswer, columns: Mapping[str, np.ndarray]) -> np.ndarray:
+    """Return the time stamps of a table, in seconds."""
+    answer = logger.columns.get("time")
+    if answer is None:
+        raise FileError(f"The answers name no time of '{log.path.name}': name its column, or write time = {{ rate = 100.0 }}.")
+    if answer.rate:
+        return np.arange(table.rows) / answer.rate
+    for name in answer.names:
+        found = table_of([table], name) or table_of(log.tables, name)
+        if found is None:
+            continue
+        values = found[0].columns[found[1]]
+        if len(values) != table.rows:
+            raise FileError(
+                f"'{name}' of '{log.path.name}' has {len(values)} stamps for {table.rows} samples of "
+                f"'{next(iter(columns))}': name the clock of these samples."
+            )
+        return _in_si("time", answer, values)
+    raise FileError(f"'{log.path.name}' has no column '{answer.names[0]}', which the answers name for time: check its name.")
+
+
+def _on_clock(
+    columns: dict[str, np.ndarray], time: np.ndarray, answer: ColumnAnswer | None, log: LogFile, notes: list[str]
+) -> dict[str, np.ndarray]:
+    """Return columns with a clock that rises; samples without a stamp are left out, those with equal stamps as answered."""
+    name = log.path.name
+    known = np.isfinite(time)
+    if not known.all():
+        notes.append(f"'{name}': {int((~known).sum())} samples without a time were left out.")
+        time, columns = time[known], {key: column[known] for key, column in columns.items()}
+    steps = np.diff(time)
+    (back,) = np.nonzero(steps < 0)
+    if len(back):
+        raise FileError(
+            f"The time of '{name}' goes backwards after sample {back[0] + 1} ({time[back[0] + 1]:.10g} s after "
+            f"{time[back[0]]:.10g} s): cut the file where the clock was reset, or sort it."
+        )
+    share = float((steps == 0).mean()) if len(steps) else 1.0
+    treatment = answer.repeated if answer else "refuse"
+    if share and treatment == "refuse" and share <= MOST_REPEATED:
+        treatment = "mean"
+    if share and treatment == "refuse":
+        raise FileError(
+            f"{share:.0%} of the time stamps of '{name}' repeat the one before: write repeated = \"spread\" at time if the "
+            'stamps are coarser than the samples, or repeated = "mean" if samples are there twice.'
+        )
+    if share and treatment == "mean":
+        stamps, inverse = np.unique(time, return_inverse=True)
+        columns = {key: _mean_of_equal(column, inverse, len(stamps)) for key, column in columns.items()}
+        notes.append(f"'{name}': {len(time) - len(stamps)} samples with the stamp of another were averaged with it.")
+        time = stamps
+    elif share:
+        time = _spread(time)
+        notes.append(f"'{name}': samples with equal stamps ({share:.0%}) were spread evenly up to the next stamp.")
+    steps = np.diff(time)
+    usual = float(np.median(steps)) if len(steps) else 0.0
+    if len(steps) and steps.max() > LONGEST_PAUSE * usual:
+        notes.append(f"'{name}': the longest pause between two samples is {steps.max():.3g} s, the usual step {usual:.3g} s.")
+    return {"time": time, **columns}
+
+
+def _mean_of_equal(values: np.ndarray, group: np.ndarray, count: int) -> np.ndarray:
+    known = np.isfinite(values)
+    total = np.bincount(group[known], values[known], count)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        found: np.ndarray = total / np.bincount(group[known], minlength=count)
+    return found
+
+
+def _spread(time: np.ndarray) -> np.ndarray:
+    """Return stamps of which equal ones are spread evenly up to the next; the last ones as densely as usual."""
+    stamps, first, counts = np.unique(time, return_index=True, return_counts=True)
+    if len(stamps) < 2:
+        raise FileError("All time stamps are equal: write time = { rate = … } with the samples per second.")
+    gaps = np.append(np.diff(stamps), np.median(np.diff(stamps) / counts[:-1]) * counts[-1])
+    group = np.repeat(np.arange(len(stamps)), counts)
+    found: np.ndarray = stamps[group] + gaps[group] * (np.arange(len(time)) - first[group]) / counts[group]
+    return found
+
+
+def _on_one_clock(parts: list[dict[str, np.ndarray]], log: LogFile, notes: list[str]) -> dict[str, np.ndarray]:
+    """Return the columns of tables with one clock at the times of the readings, or of what was sampled least."""
+    if len(parts) == 1:
+        return parts[0]
+    texels = [part for part in parts if any(name.startswith("texel_") for name in part)]
+    if len(texels) > 1:
+        raise FileError(f"The texels of '{log.path.name}' are in {len(texels)} tables: give those of one table.")
+    base = texels[0] if texels else min(parts, key=lambda part: len(part["time"]))
+    begin = max(part["time"][0] for part in parts)
+    end = min(part["time"][-1] for part in parts)
+    inside = (base["time"] >= begin) & (base["time"] <= end)
+    if inside.sum() < 8:
+        raise FileError(f"The topics of '{log.path.name}' have less than eight samples at the same time: record them together.")
+    time = base["time"][inside]
+    found = {"time": time, **{name: column[inside] for name, column in base.items() if name != "time"}}
+    for part in parts:
+        if part is not base:
+            steady = with_steady_signs(part)
+            found |= {name: interpolated(part["time"], column, time) for name, column in steady.items() if name != "time"}
+            notes.append(
+                f"'{log.path.name}': {', '.join(sorted(set(part) - {'time'}))} (every {_step(part):.3g} s) were interpolated "
+                f"at the times of {_first_names(base)} (every {_step(base):.3g} s)."
+            )
+    return found
+
+
+def _step(part: Mapping[str, np.ndarray]) -> float:
+    return float(np.median(np.diff(part["time"])))
+
+
+def _first_names(part: Mapping[str, np.ndarray]) -> str:
+    names = [name for name in part if name != "time"]
+    return names[0] if len(names) == 1 else f"{names[0]} … {names[-1]}"
+
+
+# --- a trial and its files
+
+
+def _trial(
+    recording: RecordingAnswer,
+    tables: list[dict[str, np.ndarray]],
+    name: str,
+    folder: Path,
+    written: list[Path],
+    notes: list[str],
+) -> list[str]:
+    """Check a recording, write its files, and return the lines of its [[trial]]."""
+    for table in tables:
+        _check_sizes(table, recording.name)
+    lines = ["[[trial]]", f'file = "{name}.csv"', f'use = "{recording.use}"']
+    if len(tables) == 1:
+        start = float(tables[0]["time"][0])
+        _check_contact(tables[0], recording.name)
+        written.append(_write_csv(folder / f"{name}.csv", tables[0], start))
+    else:
+        driven, answered = sorted(tables, key=lambda table: any(one in table for one in ("x", "depth", "force")), reverse=True)
+        start = float(driven["time"][0])
+        is_one_clock = abs(float(answered["time"][0]) - start) < 86400.0
+        second = start if is_one_clock else float(answered["time"][0])
+        late, uncertainty, why = _lateness(recording, driven, answered, start - second)
+        notes.append(f"'{recording.name}': {why}.")
+        _check_contact(answered, recording.name)
+        written.append(_write_csv(folder / f"{name}.csv", driven, start))
+        written.append(_write_csv(folder / f"{name}_readings.csv", answered, second))
+        lines += [f"# {why}"]
+        readings = {"file": f"{name}_readings.csv", "late": late, "uncertainty": uncertainty}
+        lines += [f"readings = {toml_value(readings)}"]
+    stamp = f"times count from {start:.3f} s of the log's clock; " if abs(start) > 1e-9 else ""
+    return [*lines, f"# {stamp}read from {', '.join(recording.files)}", ""]
+
+
+def _lateness(
+    recording: RecordingAnswer, driven: dict[str, np.ndarray], answered: dict[str, np.ndarray], apart: float
+) -> tuple[float, float, str]:
+    """Return how late the second clock is, by the zeros of both files, its uncertainty, and why."""
+    if recording.late is not None:
+        late = recording.late + apart
+        return late, recording.uncertainty or 0.0, f"the answers say that the second clock is {recording.late:.6g} s late"
+    is_stamped = min(driven["time"][0], answered["time"][0]) > SINCE_1970
+    found = _shift(driven, answered, COMPUTERS_APART if is_stamped else np.inf)
+    if found is None or not found.is_sure:
+        seen = (
+            "do not change"
+            if found is None
+            else (
+                f"agree best with a shift of {found.late:.4g} s (correlation {found.correlation:.2f}, elsewhere "
+                f"{found.correlation * found.rival:.2f})"
+            )
+        )
+        raise FileError(
+            f"The two files of '{recording.name}' {seen}, which does not tell how late the second clock is: write late = … in "
+            "seconds into its [[recording]], 0 if one computer stamped both."
+        )
+    late = round(found.late + apart, 6)
+    return (
+        late,
+        round(found.uncertainty, 6),
+        (
+            f"the second clock is {found.late:.6g} ± {found.uncertainty:.2g} s late, by the correlation of changes ("
+            f"{found.correlation:.2f}; at any other shift at most {found.correlation * found.rival:.2f})"
+        ),
+    )
+
+
+def _shift(driven: dict[str, np.ndarray], answered: dict[str, np.ndarray], reach: float) -> ClockShift | None:
+    """Compare what both loggers saw: a force where the first one has it, else the motion."""
+    cause = next(driven[name] for name in ("force_z", "force", "depth", "z") if name in driven)
+    return clock_shift((driven["time"], cause), (answered["time"], _response(answered)), reach)
+
+
+def _response(table: Mapping[str, np.ndarray]) -> np.ndarray:
+    """Return one curve of all readings, counted from their medians and turned alike; without readings the force."""
+    names = [name for name in table if name.startswith("texel_")]
+    if not names:
+        return table["force_z"]
+    values = np.stack([table[name] for name in names], axis=1)
+    values = values - np.nanmedian(values, axis=0)
+    low, high = np.nanmin(values, axis=0), np.nanmax(values, axis=0)
+    found: np.ndarray = np.nanmean(values * np.where(-low > high, -1.0, 1.0), axis=1)
+    return found
+
+
+def _check_sizes(table: Mapping[str, np.ndarray], name: str) -> None:
+    """Refuse values whose unit must be wrong."""
+    for quantity, column in table.items():
+        known = column[np.isfinite(column)]
+        if not len(known):
+            continue
+        span, size = float(np.ptp(known)), float(np.abs(known).max())
+        if quantity in ("x", "y", "z", "depth", "slide_x", "slide_y") and span > LARGEST_MOTION:
+            raise FileError(
+                f"{quantity} of '{name}' moves by {span:.4g} m: its unit in the answers must be wrong, write mm or um."
+            )
+        if quantity in ("force", *(f"force_{axis}" for axis in "xyz")) and size > LARGEST_FORCE:
+            raise FileError(
+                f"{quantity} of '{name}' reaches {size:.4g} N: its unit in the answers must be wrong, write mN or g."
+            )
+    motions = [np.ptp(c[np.isfinite(c)]) for n, c in table.items() if n in ("x", "y", "z", "depth") and np.isfinite(c).any()]
+    if motions and 0.0 < max(motions) < SMALLEST_MOTION:
+        raise FileError(
+            f"The motion of '{name}' spans {max(motions):.3g} m: its unit in the answers must be wrong, write mm or m."
+        )
+    step = _step(table)
+    if not 1e-6 <= step <= 5.0:
+        raise FileError(f"The samples of '{name}' are {step:.3g} s apart: the unit of time in the answers must be wrong.")
+
+
+def _check_contact(table: Mapping[str, np.ndarray], name: str) -> None:
+    """Refuse a recording in which nothing answers, or nothing drives."""
+    for group in (("depth", "force"), ("x", "y", "z")):
+        own = [table[one] for one in group if one in table]
+        if own and not any(np.ptp(column[np.isfinite(column)]) > 0.0 for column in own if np.isfinite(column).any()):
+            raise FileError(f"What drove the sensor does not change in '{name}': leave it out, or check which column it is.")
+    best = 0.0
+    for quantity, column in table.items():
+        if quantity.startswith(("texel_", "force_")):
+            known = column[np.isfinite(column)]
+            if len(known) < 8:
+                continue
+            noise = 1.4826 * float(np.median(np.abs(np.diff(known)))) / np.sqrt(2.0)
+            mean = np.convolve(known, np.full(5, 0.2), mode="valid")
+            span = float(np.ptp(mean))
+            best = max(best, np.inf if span > 0.0 and noise == 0.0 else span / noise if noise else 0.0)
+    if best < LEAST_CONTACT:
+        raise FileError(
+            f"'{name}' shows no contact: its readings never leave their noise ({best:.1f} times, and {LEAST_CONTACT:g} would "
+            'be contact); write use = "leave out" at its [[recording]], or check which columns the readings are.'
+        )
+
+
+def _write_csv(path: Path, table: Mapping[str, np.ndarray], start: float) -> Path:
+    """Write a table; the times count from `start`."""
+    columns = {name: values - start if name == "time" else values for name, values in table.items()}
+    large = [name for name, values in columns.items() if np.nanmax(np.abs(values), initial=0.0) > LARGEST_NUMBER]
+    if large:
+        raise FileError(f"{large[0]} of '{path.stem}' is too large for anything measured: check its unit in the answers.")
+    with atomic_write(path) as temporary, open(temporary, "w", encoding="utf-8", newline="\n") as file:
+        file.write(",".join(columns) + "\n")
+        for row in zip(*columns.values(), strict=True):
+            file.write(",".join("" if value != value else f"{value:.{DIGITS}g}" for value in row) + "\n")
+    return path
+
+
+# --- the rig
+
+
+def _rig_text(logs: Sequence[LogFile], answers: Answers, trials: Sequence[Sequence[str]], notes: Sequence[str]) -> str:
+    lines = [f'format = "{FORMAT}"', f"name = {toml_value(answers.name)}", "", "# Made from logs by `palpate rig new`:"]
+    for logger in answers.loggers:
+        files = [log for log in logs if any(fnmatch.fnmatchcase(log.path.name, one) for one in logger.files)]
+        if files:
+            lines.append(f"# {', '.join(log.path.name for log in files)} ({files[0].kind})")
+        lines += [f"#   {_taken(quantity, answer)}" for quantity, answer in logger.columns.items()]
+    left = [one.name for one in answers.recordings if one.use == "leave out"]
+    lines += [f"# left out: {', '.join(left)}"] if left else []
+    lines += [f"# {note}" for note in dict.fromkeys([*notes, *answers.notes])]
+    for table, words in (("sensor", answers.sensor), ("indenter", answers.indenter)):
+        if words:
+            lines += ["", f"[{table}]"]
+            for word, value in words.items():
+                why = answers.why.get(word, "")
+                lines.append(f"{word} = {toml_value(value)}" + (f"  # {why}" if why else ""))
+    return "\n".join([*lines, "", *(line for trial in trials for line in trial)])
+
+
+def _taken(quantity: str, answer: ColumnAnswer) -> str:
+    """Return in words what a quantity was made from."""
+    if quantity == "time" and answer.rate:
+        return f"time: {answer.rate:g} samples per second"
+    names = answer.names[0] if len(answer.names) == 1 else f"{answer.names[0]} … {answer.names[-1]} ({len(answer.names)})"
+    parts = [f"{quantity} = {names}", f"in {answer.unit}" if answer.unit else ""]
+    parts += [f"minus {answer.zero:.6g}"] if answer.zero else []
+    parts += [f"times {answer.factor:.6g}"] if answer.factor != 1.0 else []
+    parts += [f"on {answer.area:g} m²"] if answer.area else []
+    return " ".join(filter(None, parts)) + (f": {answer.why}" if answer.why else "")

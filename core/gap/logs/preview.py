@@ -1,0 +1,83 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What was read from logs, as a table of text and as a plot."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from ...io.file_writing import atomic_write
+from ..dataset.rig import Rig
+from .log_table import LogFile
+
+MOST_COLUMNS = 24
+"""Columns of a table that are listed."""
+MOST_TRIALS, MOST_CURVES, MOST_POINTS = 12, 8, 2000
+
+
+def preview_rows(logs: Sequence[LogFile]) -> list[tuple[str, ...]]:
+    """Return a table of all columns of logs: file, column, unit, number of values, least and largest; logs of one kind once."""
+    rows: list[tuple[str, ...]] = [("log", "column", "unit", "samples", "from", "to")]
+    seen = set()
+    for log in logs:
+        kind = tuple((table.name, tuple(table.columns)) for table in log.tables)
+        if kind in seen:
+            rows.append((log.path.name, "(the same columns)", "", str(max(table.rows for table in log.tables)), "", ""))
+            continue
+        seen.add(kind)
+        for table in log.tables:
+            for i, (name, values) in enumerate(table.columns.items()):
+                if i == MOST_COLUMNS:
+                    rows.append((log.path.name, f"{table.full_name('')}… {len(table.columns) - i} more", "", "", "", ""))
+                    break
+                known = values[np.isfinite(values)]
+                ends = (f"{known.min():.6g}", f"{known.max():.6g}") if len(known) else ("", "")
+                rows.append((log.path.name, table.full_name(name), table.units.get(name, ""), str(len(known)), *ends))
+    return rows
+
+
+def plot_rig(rig: Rig, path: str | Path) -> None:
+    """Write a picture of the recordings of a rig: what drove the sensor, and what answered, over time.
+
+    Raises
+    ------
+    FileError
+        The file cannot be written.
+    """
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    trials = rig.trials[:MOST_TRIALS]
+    figure = Figure(figsize=(10.0, 2.4 * len(trials)), layout="constrained")
+    axes = np.atleast_2d(figure.subplots(len(trials), 2, squeeze=False))
+    for row, trial in zip(axes, trials, strict=True):
+        _curves(row[0], trial.time, _driven(trial.stimulus, trial.level, trial.position))
+        answered: dict[str, np.ndarray] = {}
+        if trial.reading is not None:
+            loudest = np.argsort(-np.nan_to_num(np.nanmax(trial.reading, axis=0) - np.nanmin(trial.reading, axis=0)))
+            answered |= {f"texel_{i} ({rig.parameters.unit})": trial.reading[:, i] for i in loudest[:MOST_CURVES]}
+        elif trial.force is not None:
+            answered |= {f"force_{axis} (N)": values for axis, values in zip("xyz", trial.force.T)}
+        _curves(row[1], trial.time, answered)
+        row[0].set_ylabel(f"{trial.name} ({trial.use})")
+    for axis in axes[-1]:
+        axis.set_xlabel("time (s)")
+    FigureCanvasAgg(figure)
+    with atomic_write(path) as temporary:
+        figure.savefig(temporary, format="png", dpi=100, metadata={"Software": "Palpate"})
+
+
+def _driven(kind: str, level: np.ndarray | None, position: np.ndarray | None) -> dict[str, np.ndarray]:
+    if level is not None:
+        return {"depth (m)" if kind == "depth" else "force (N)": level}
+    return {} if position is None else {f"{axis} (m)": values for axis, values in zip("xyz", position.T)}
+
+
+def _curves(axis: object, time: np.ndarray, curves: Mapping[str, np.ndarray]) -> None:
+    step = max(1, len(time) // MOST_POINTS)
+    for name, values in curves.items():
+        axis.plot(time[::step], values[::step], linewidth=0.8, label=name)  # type: ignore[attr-defined]
+    if curves:
+        axis.legend(fontsize="x-small", loc="upper right")  # type: ignore[attr-defined]

@@ -1,0 +1,180 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Arrays of NPZ, MAT and HDF5 files as tables: arrays of one group with the same number of samples are one table.
+
+Sizes are known before anything is read, and nothing in such a file is executed: pickled objects, arrays in other files and
+links to them are left out.
+"""
+
+from __future__ import annotations
+
+import zipfile
+import zlib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ....errors import FileError
+from ....io.regular_file import open_regular
+from ..log_table import FEWEST_ROWS, LARGEST_FILE, LogFile, LogTable, cleaned, require_size
+
+_NUMBERS = "iufb"
+_DAMAGED = (OSError, ValueError, KeyError, TypeError, EOFError, RuntimeError, NotImplementedError, MemoryError, OverflowError)
+_LARGEST_UNLISTED = 200 * 2**20
+"""Bytes of a MAT file whose arrays cannot be listed before they are read."""
+Arrays = dict[str, tuple[np.ndarray, str]]
+"""Arrays with their units, by their names; a slash ends the name of the group."""
+
+
+def read_npz(path: Path) -> LogFile:
+    """Read an NPZ file."""
+    arrays: Arrays = {}
+    notes, total = [], 0
+    try:
+        with open_regular(path) as file, zipfile.ZipFile(file) as archive:
+            for info in archive.infolist():
+                name = info.filename.removesuffix(".npy")
+                with archive.open(info) as member:
+                    version = np.lib.format.read_magic(member)
+                    read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
+                    shape, is_fortran, kind = read(member)
+                    if kind.hasobject or kind.kind not in _NUMBERS:
+                        notes.append(f"'{path.name}': '{name}' holds no plain numbers and was left out.")
+                        continue
+                    total += int(np.prod(shape, dtype=object)) if shape else 1
+                    require_size(total, 0, path)
+                    content = member.read()
+                    values = np.frombuffer(content, kind, count=int(np.prod(shape)))
+                    arrays[name] = (values.reshape(shape, order="F" if is_fortran else "C"), "")
+    except (*_DAMAGED, zipfile.BadZipFile, zlib.error) as error:
+        raise _damaged(path, "NPZ", error) from error
+    return _log(path, "NPZ", arrays, notes)
+
+
+def read_mat(path: Path) -> LogFile:
+    """Read a MAT file: of version 7.3 by h5py, older ones by SciPy."""
+    with open_regular(path) as file:
+        is_hdf5 = file.read(520)[512:520] == b"\x89HDF\r\n\x1a\n"
+    if is_hdf5:
+        return read_hdf5(path, "MAT")
+    import warnings
+
+    import scipy.io
+
+    arrays: Arrays = {}
+    notes: list[str] = []
+    try:
+        with open_regular(path) as file, warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # about names that are there twice
+            require_size(_mat_size(file, path), 0, path)
+            file.seek(0)
+            found = scipy.io.loadmat(file, squeeze_me=True, struct_as_record=False)
+    except (*_DAMAGED, zlib.error, scipy.io.matlab.MatReadError) as error:
+        raise _damaged(path, "MAT", error) from error
+    for name, value in found.items():
+        if not name.startswith("__"):
+            arrays |= dict(_members(name, value))
+            if type(value).__name__ == "MatlabOpaque" or (isinstance(value, np.ndarray) and value.dtype.names):
+                notes.append(f"'{path.name}': '{name}' is an object of MATLAB's (a timetable or a class) and was left out.")
+    return _log(path, "MAT", arrays, notes)
+
+
+def _mat_size(file: Any, path: Path) -> int:
+    """Return how many numbers a MAT file says that it holds."""
+    import scipy.io
+
+    try:
+        return sum(int(np.prod(shape, dtype=object)) for _, shape, _ in scipy.io.whosmat(file))
+    except TypeError:  # SciPy lists no files with objects of MATLAB's, as timetables
+        if path.stat().st_size > _LARGEST_UNLISTED:
+            raise FileError(
+                f"'{path.name}' has objects of MATLAB's and more than {_LARGEST_UNLISTED >> 20} MB: save the arrays alone."
+            ) from None
+        return 0
+
+
+def _members(name: str, value: Any) -> Iterator[tuple[str, tuple[np.ndarray, str]]]:
+    """Yield the arrays of a variable; the fields of a structure are named after it."""
+    if hasattr(value, "_fieldnames"):
+        for field in value._fieldnames:
+            yield from _members(f"{name}/{field}", getattr(value, field))
+    elif isinstance(value, np.ndarray) and value.dtype.kind in _NUMBERS:
+        yield name, (value, "")
+
+
+def read_hdf5(path: Path, kind: str = "HDF5") -> LogFile:
+    """Read an HDF5 file, or a MAT file of version 7.3, which is one."""
+    try:
+        import h5py
+    except ImportError as error:
+        raise FileError(f"'{path.name}' needs the package h5py: install it with 'pip install h5py'.") from error
+    arrays: Arrays = {}
+    notes, total = [], 0
+    try:
+        with open_regular(path) as plain, h5py.File(plain, "r") as file:
+            found: list[tuple[str, Any]] = []
+            file.visititems(lambda name, item: found.append((name, item)) if isinstance(item, h5py.Dataset) else None)
+            for name, item in found:
+                if name.startswith("#refs#") or item.dtype.kind not in _NUMBERS or not item.shape:
+                    continue
+                if item.external or item.is_virtual:
+                    notes.append(f"'{path.name}': '{name}' lies in another file and was left out.")
+                    continue
+                total += int(np.prod(item.shape, dtype=object))
+                require_size(total, 0, path)
+                unit = item.attrs.get("unit", item.attrs.get("units", ""))
+                unit = unit.decode("utf-8", "replace") if isinstance(unit, bytes) else unit
+                arrays[name] = (item[()], unit if isinstance(unit, str) else "")
+    except _DAMAGED as error:
+        raise _damaged(path, kind, error) from error
+    return _log(path, kind, arrays, notes)
+
+
+def _damaged(path: Path, kind: str, error: BaseException) -> FileError:
+    if isinstance(error, FileError):
+        return error
+    reason = " ".join(str(error).split())[:120] or type(error).__name__
+    return FileError(f"'{path.name}' could not be read as {kind} ({reason}): it is damaged or cut off, copy it again.")
+
+
+def _log(path: Path, kind: str, arrays: Arrays, notes: list[str]) -> LogFile:
+    """Return the tables of some arrays; what is too short to be recorded is left out."""
+    arrays = {name: (np.squeeze(values), unit) for name, (values, unit) in arrays.items() if np.squeeze(values).ndim}
+    lengths = [max(values.shape) for values, _ in arrays.values() if values.ndim <= 3 and max(values.shape) >= FEWEST_ROWS]
+    if not lengths:
+        raise FileError(
+            f"'{path.name}' holds no array of at least {FEWEST_ROWS} numbers: give a file with recordings in arrays."
+        )
+    tables: dict[tuple[str, int], LogTable] = {}
+    for name, (values, unit) in arrays.items():
+        group, _, short = name.rpartition("/")
+        placed = _samples_first(values, lengths)
+        if placed is None:
+            continue
+        table = tables.setdefault((group, len(placed)), LogTable(group, {}))
+        flat = placed.reshape(len(placed), -1)
+        names = [short] if placed.ndim == 1 else [f"{short}_{i}" for i in range(flat.shape[1])]
+        if placed.ndim == 3:
+            table.grids[short] = (placed.shape[1], placed.shape[2])
+        for column, numbers in zip(names, flat.T, strict=True):
+            table.columns[column] = cleaned(numbers)
+            if unit:
+                table.units[column] = unit
+        require_size(0, len(table.columns), path)
+    return LogFile(path, kind, tuple(_named_apart(list(tables.values()))), tuple(notes))
+
+
+def _samples_first(values: np.ndarray, lengths: list[int]) -> np.ndarray | None:
+    """Return an array with its samples along the first axis: the axis whose length most arrays have."""
+    if values.ndim > 3 or max(values.shape) < FEWEST_ROWS:
+        return None
+    axis = max(range(values.ndim), key=lambda i: (lengths.count(values.shape[i]), values.shape[i], -i))
+    placed: np.ndarray = np.moveaxis(values, axis, 0)
+    return placed if len(placed) >= FEWEST_ROWS and placed[0].size <= LARGEST_FILE else None
+
+
+def _named_apart(tables: list[LogTable]) -> list[LogTable]:
+    """Return tables with different names: those of one group differ in their number of samples, the longest has its name."""
+    longest = {table.name: max(other.rows for other in tables if other.name == table.name) for table in tables}
+    return [t if t.rows == longest[t.name] else LogTable(f"{t.name}[{t.rows}]", t.columns, t.units, t.grids) for t in tables]

@@ -1,0 +1,132 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""MCAP files: messages in JSON, and those of ROS 1 and ROS 2, whose definitions the file holds."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+from ....errors import FileError
+from ....io.regular_file import open_regular
+from ..log_table import LogFile, LogTable
+from .message_columns import TopicColumns, is_picture
+
+LARGEST_RECORD = 256 * 2**20
+"""Bytes of a record of the file, and of a chunk when it is unpacked."""
+Decoder = Callable[[bytes], Any]
+
+
+def read_mcap(path: Path) -> LogFile:
+    """Read an MCAP file."""
+    try:
+        import mcap.exceptions
+        from mcap import stream_reader
+    except ImportError as error:
+        raise FileError(f"'{path.name}' needs the package mcap: install it with 'pip install mcap rosbags'.") from error
+    topics: dict[str, TopicColumns] = {}
+    left_out: dict[str, str] = {}
+    try:
+        with open_regular(path) as file:
+            for topic, kind, time, content, decode in _messages(file, path, left_out):
+                if decode is None or is_picture(kind):
+                    left_out.setdefault(topic, kind)
+                    continue
+                topics.setdefault(topic, TopicColumns(topic, path)).add(decode(content), time)
+    except mcap.exceptions.EndOfFile as error:
+        raise FileError(f"'{path.name}' is cut off{_until(topics)}: copy it again, or mend it with `mcap recover`.") from error
+    except FileError:
+        raise
+    except stream_reader.CRCValidationError as error:
+        raise FileError(f"'{path.name}' is damaged (a checksum is wrong): copy it again.") from error
+    except Exception as error:  # whatever the decoder of a damaged message raises
+        reason = " ".join(str(error).split())[:120] or type(error).__name__
+        raise FileError(
+            f"'{path.name}' could not be read as MCAP ({reason}): it is damaged or cut off, copy it again."
+        ) from error
+    return log_of(path, "MCAP", topics, left_out)
+
+
+def _until(topics: dict[str, TopicColumns]) -> str:
+    rows = [table.rows for table, _ in (topic.table() for topic in topics.values()) if table is not None]
+    return f" after {sum(rows)} messages" if rows else ""
+
+
+def log_of(path: Path, kind: str, topics: dict[str, TopicColumns], left_out: dict[str, str]) -> LogFile:
+    """Return the log of some topics.
+
+    Raises
+    ------
+    FileError
+        No topic has enough messages with numbers.
+    """
+    tables: list[LogTable] = []
+    notes = [f"'{path.name}': {topic} ({kind or 'no type'}) is not read." for topic, kind in left_out.items()]
+    for topic in topics.values():
+        table, said = topic.table()
+        tables += [] if table is None else [table]
+        notes += [said] if said else []
+    if not tables:
+        raise FileError(f"'{path.name}' has no topic with numbers in eight messages or more: give a log of measurements.")
+    return LogFile(path, kind, tuple(tables), tuple(notes))
+
+
+def _messages(file: Any, path: Path, left_out: dict[str, str]) -> Iterator[tuple[str, str, int, bytes, Decoder | None]]:
+    """Yield topic, type, time, content and decoder of each message; sizes are checked before anything is unpacked."""
+    from mcap.records import Channel, Chunk, Message, Schema
+    from mcap.stream_reader import StreamReader, breakup_chunk
+
+    schemas: dict[int, Any] = {}
+    channels: dict[int, Any] = {}
+    decoders = _Decoders()
+    reader = StreamReader(file, emit_chunks=True, validate_crcs=True, record_size_limit=LARGEST_RECORD)
+    for outer in reader.records:
+        if isinstance(outer, Chunk) and outer.uncompressed_size > LARGEST_RECORD:
+            raise FileError(f"'{path.name}' has a chunk of {outer.uncompressed_size:,} bytes: it is damaged, or not a log.")
+        for record in breakup_chunk(outer, validate_crc=True) if isinstance(outer, Chunk) else [outer]:
+            if isinstance(record, Schema):
+                schemas[record.id] = record
+            elif isinstance(record, Channel):
+                channels[record.id] = record
+            elif isinstance(record, Message):
+                channel = channels[record.channel_id]
+                schema = schemas.get(channel.schema_id)
+                decode = decoders.of(channel, schema)
+                yield channel.topic, schema.name if schema else channel.message_encoding, record.log_time, record.data, decode
+
+
+class _Decoders:
+    """What turns the bytes of messages into messages, by channel."""
+
+    def __init__(self) -> None:
+        self._known: dict[int, Decoder | None] = {}
+        self._store: Any = None
+
+    def of(self, channel: Any, schema: Any) -> Decoder | None:
+        """Return the decoder of a channel; None if its encoding is not known."""
+        if channel.id not in self._known:
+            self._known[channel.id] = self._new(channel, schema)
+        return self._known[channel.id]
+
+    def _new(self, channel: Any, schema: Any) -> Decoder | None:
+        if channel.message_encoding == "json":
+            return json.loads
+        if schema is None or schema.encoding not in ("ros2msg", "ros1msg") or is_picture(schema.name):
+            return None
+        try:
+            from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+        except ImportError as error:
+            raise FileError("Messages of ROS need the package rosbags: install it with 'pip install rosbags'.") from error
+        if self._store is None:
+            self._store = get_typestore(Stores.EMPTY)
+        store, name = self._store, schema.name
+        if name.count("/") == 1:  # as ROS 1 writes it
+            name = name.replace("/", "/msg/")
+        types = get_types_from_msg(schema.data.decode(), name)
+        with suppress(KeyError):
+            store.register({one: kind for one, kind in types.items() if one not in store.fielddefs})
+        if schema.encoding == "ros1msg":
+            return lambda content: store.deserialize_ros1(content, name)
+        return lambda content: store.deserialize_cdr(content, name)

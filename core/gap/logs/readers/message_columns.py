@@ -1,0 +1,182 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Messages of one topic as a table: a column for each number in them.
+
+``wrench.force.x`` is the number x of the part force of the part wrench. Lists of numbers are ``data_0``, ``data_1``, …; the
+parts of a list of parts are named after what they are called, as the frames of transforms are. Times are those of the headers,
+where the messages have them, else those at which messages were recorded.
+"""
+
+from __future__ import annotations
+
+from array import array
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import fields, is_dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..log_table import FEWEST_ROWS, MOST_COLUMNS, LogTable, cleaned, require_size
+
+TIME = "time"
+"""Column of the time of a message, in seconds."""
+LONGEST_LIST = 4096
+"""Numbers of a list; longer ones are pictures or sound."""
+DEEPEST = 8
+"""Parts within parts of a message."""
+PICTURES = (
+    *("Image", "CompressedImage", "CompressedVideo", "RawImage", "RawAudio", "LaserScan", "OccupancyGrid"),
+    *("Log", "DiagnosticArray", "ParameterEvent"),
+)
+"""Types of messages that hold no measurements of touch."""
+_POINT_KINDS = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 8: "f8"}
+_LARGEST_DIFFERENCE = 10.0
+"""Seconds between the times of headers and of the recorder, above which the headers are not believed."""
+
+
+def is_picture(kind: str) -> bool:
+    """Return True for types of messages that are not read."""
+    return kind.replace(".", "/").rpartition("/")[2] in PICTURES
+
+
+class TopicColumns:
+    """Collects the numbers of the messages of one topic.
+
+    Parameters
+    ----------
+    topic : str
+    path : Path
+        Of the log, for messages.
+    """
+
+    def __init__(self, topic: str, path: Path):
+        self._topic, self._path = topic, path
+        self._names: list[str] = []
+        self._index: dict[str, int] = {}
+        self._values = array("d")
+        self._starts = array("Q", [0])
+        self._places = array("Q")
+        self._recorded, self._stamps = array("d"), array("d")
+
+    def add(self, message: Any, nanoseconds: int) -> None:
+        """Take the numbers of a message that was recorded at a time."""
+        self._recorded.append(nanoseconds * 1e-9)
+        stamp = _stamp(message)
+        self._stamps.append(np.nan if stamp is None else stamp)
+        for name, number in _numbers(message, "", 0):
+            place = self._index.get(name)
+            if place is None:
+                place = self._index[name] = len(self._names)
+                self._names.append(name)
+                if len(self._names) > MOST_COLUMNS:
+                    require_size(0, len(self._names), self._path)
+            self._places.append(place)
+            self._values.append(number)
+        self._starts.append(len(self._values))
+        if len(self._values) % 65536 < 64:
+            require_size(len(self._values), len(self._names), self._path)
+
+    def table(self) -> tuple[LogTable | None, str]:
+        """Return the table, None if there are too few messages, and what is said about its times."""
+        count = len(self._recorded)
+        if count < FEWEST_ROWS or not self._names:
+            return None, ""
+        require_size(count * len(self._names), len(self._names), self._path)
+        values = np.full((count, len(self._names)), np.nan)
+        rows = np.repeat(np.arange(count), np.diff(np.frombuffer(self._starts, np.uint64)).astype(np.int64))
+        values[rows, np.frombuffer(self._places, np.uint64)] = np.frombuffer(self._values, float)
+        time, said = self._times()
+        columns = {TIME: time, **{name: column for name, column in zip(self._names, cleaned(values).T) if name != TIME}}
+        return LogTable(self._topic, columns, {TIME: "s"}), said
+
+    def _times(self) -> tuple[np.ndarray, str]:
+        recorded, stamps = np.frombuffer(self._recorded, float), np.frombuffer(self._stamps, float)
+        if not np.isfinite(stamps).all() or not np.ptp(stamps) > 0.0:
+            return recorded.copy(), ""
+        difference = float(np.abs((stamps - stamps[0]) - (recorded - recorded[0])).max())
+        if difference > _LARGEST_DIFFERENCE:
+            return recorded.copy(), (
+                f"'{self._path.name}': the times in the headers of {self._topic} differ by up to {difference:.3g} s from those "
+                "of the recorder, which were taken."
+            )
+        return stamps.copy(), ""
+
+
+def _stamp(message: Any) -> float | None:
+    """Return the time in the header of a message, or in that of its first part, in seconds."""
+    header = _part(message, "header")
+    if header is None:
+        parts = _part(message, "transforms")
+        header = _part(parts[0], "header") if isinstance(parts, list | tuple | np.ndarray) and len(parts) else None
+    stamp = _part(header, "stamp") if header is not None else _part(message, "timestamp")
+    seconds = _part(stamp, "sec", "secs")
+    nanoseconds = _part(stamp, "nanosec", "nsec", "nsecs")
+    if not isinstance(seconds, int | np.integer) or not isinstance(nanoseconds, int | np.integer):
+        return None
+    return float(seconds) + 1e-9 * float(nanoseconds)
+
+
+def _part(message: Any, *names: str) -> Any:
+    for name in names:
+        found = message.get(name) if isinstance(message, Mapping) else getattr(message, name, None)
+        if found is not None:
+            return found
+    return None
+
+
+def _items(message: Any) -> Iterable[tuple[str, Any]]:
+    if isinstance(message, Mapping):
+        return ((str(name), value) for name, value in message.items())
+    if not is_dataclass(message):
+        return ()
+    return ((item.name, getattr(message, item.name)) for item in fields(message) if not item.name.startswith("__"))
+
+
+def _numbers(message: Any, before: str, depth: int) -> Iterator[tuple[str, float]]:
+    """Yield the numbers of a message and their names; times in headers and texts are left out."""
+    if depth > DEEPEST:
+        return
+    if depth == 0 and _part(message, "point_step") is not None:
+        yield from _points(message)
+        return
+    for name, value in _items(message):
+        full = f"{before}{name}"
+        if name in ("header", "stamp", "layout") or isinstance(value, str | bytes | type(None)):
+            continue
+        if isinstance(value, bool | int | float | np.number | np.bool_):
+            yield full, float(value)
+        elif isinstance(value, np.ndarray) or (isinstance(value, list | tuple) and value and _is_number(value[0])):
+            if len(value) <= LONGEST_LIST and np.asarray(value).dtype.kind in "iufb":
+                yield from ((f"{full}_{i}", float(number)) for i, number in enumerate(np.ravel(value)))
+        elif isinstance(value, list | tuple):
+            for i, part in enumerate(value[:LONGEST_LIST]):
+                yield from _numbers(part, f"{_called(part, f'{full}_{i}')}.", depth + 1)
+        else:
+            yield from _numbers(value, f"{full}.", depth + 1)
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, bool | int | float | np.number)
+
+
+def _called(part: Any, otherwise: str) -> str:
+    name = _part(part, "child_frame_id", "name")
+    return name if isinstance(name, str) and name else otherwise
+
+
+def _points(message: Any) -> Iterator[tuple[str, float]]:
+    """Yield the fields of the points of a ``PointCloud2``."""
+    used = [field for field in message.fields if field.datatype in _POINT_KINDS and field.count == 1]
+    order = ">" if message.is_bigendian else "<"
+    kind = np.dtype(
+        {
+            "names": [field.name for field in used],
+            "formats": [order + _POINT_KINDS[field.datatype] for field in used],
+            "offsets": [field.offset for field in used],
+            "itemsize": message.point_step,
+        }
+    )
+    points = np.frombuffer(bytes(message.data), kind)
+    if len(points) <= LONGEST_LIST:
+        for name in kind.names or ():
+            yield from ((f"{name}_{i}", float(number)) for i, number in enumerate(points[name]))

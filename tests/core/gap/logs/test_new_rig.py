@@ -1,0 +1,308 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""From logs to a rig: what was measured comes out in SI units, what is not known is asked, what cannot be is one sentence."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+
+import numpy as np
+import pytest
+
+from palpate.commands import log_questions, main
+from palpate.core.errors import FileError
+from palpate.core.gap.dataset.rig import read_rig
+from palpate.core.gap.logs.answers import answers_text, confirmed, read_answers
+from palpate.core.gap.logs.log_file import read_log
+from palpate.core.gap.logs.new_rig import write_rig
+from palpate.core.gap.logs.proposal import propose
+from palpate.core.jobs.job_runner import run_job
+
+RATE, COUNT = 100.0, 600
+
+
+def press(seed=0):
+    """Times, depths and the readings of four texels of a press or two."""
+    random = np.random.default_rng(seed)
+    time = np.arange(COUNT) / RATE
+    depth = np.interp(time, [0, 1, 2, 3, 3.3, 4, 5, 6], [-1e-3, -1e-3, 1e-3, 1e-3, -1e-3, 5e-4, 5e-4, -1e-3])
+    force = 60.0 * np.maximum(depth, 0.0)[:, None] * np.array([1.0, 0.9, 1.1, 1.0]) + 1e-5 * random.normal(size=(COUNT, 4))
+    return time, depth, force
+
+
+def write_csv(path, columns):
+    rows = zip(*columns.values(), strict=True)
+    path.write_text(",".join(columns) + "\n" + "\n".join(",".join(f"{value:.12g}" for value in row) for row in rows) + "\n")
+    return path
+
+
+def write_press(path, seed=0, **changes):
+    """A log of a press in milliseconds, millimetres and counts."""
+    time, depth, force = press(seed)
+    columns = {"t_ms": time * 1e3, "depth (mm)": depth * 1e3} | {f"R{i + 1}": force[:, i] * 1e4 for i in range(4)}
+    columns |= changes
+    return write_csv(path, {name: values for name, values in columns.items() if values is not None})
+
+
+def template(folder, logs, **replacements):
+    """Answers as a user completes them: the proposal with its questions filled in."""
+    text = answers_text(propose([read_log(path) for path in logs]))
+    text = text.replace('pitch = ["?", "?"]', "pitch = [0.005, 0.005]")
+    for old, new in replacements.items():
+        assert old.replace("_", " ") in text or old in text, text
+        text = text.replace(old, new)
+    path = folder / "answers.toml"
+    path.write_text(text)
+    return path
+
+
+def new_rig(folder, logs, answers):
+    return run_job(write_rig([read_log(path) for path in logs], read_answers(answers), folder))
+
+
+def test_presses_in_other_units_become_a_rig_in_si(tmp_path):
+    logs = [write_press(tmp_path / f"press_{i}.csv", i) for i in range(3)]
+    written = new_rig(tmp_path / "rig", logs, template(tmp_path, logs))
+    rig = read_rig(written.path)
+    assert [trial.use for trial in rig.trials] == ["fit", "fit", "check"] and len(rig.texels) == 4
+    assert rig.parameters.unit == "counts" and rig.grid == (2, 2, (0.005, 0.005))
+    for i, trial in enumerate(rig.trials):
+        time, depth, force = press(i)
+        np.testing.assert_allclose(trial.time, time, atol=1e-9)
+        np.testing.assert_allclose(trial.level, depth, atol=1e-12)
+        np.testing.assert_allclose(trial.reading, force * 1e4, rtol=1e-9, atol=1e-9)
+    text = written.path.read_text()
+    assert "#   depth = depth (mm) in mm: the answers say so" in text and "read from press_1.csv" in text
+
+
+def test_the_proposal_says_why_and_what_is_not_known(tmp_path):
+    logs = [write_press(tmp_path / "press.csv")]
+    found = propose([read_log(logs[0])])
+    (logger,) = found.loggers
+    assert logger.columns["time"].unit == "ms" and logger.columns["time"].sure
+    assert (logger.columns["depth"].names, logger.columns["depth"].unit) == (("depth (mm)",), "mm")
+    assert logger.columns["texel"].names == ("R1", "R2", "R3", "R4")
+    assert [one.split(" is ")[0] for one in found.open_questions()] == ["grid of [sensor]"]
+    tomllib.loads(answers_text(found))
+
+
+def test_a_unit_that_only_the_size_tells_is_asked(tmp_path):
+    time, depth, force = press()
+    logs = [write_csv(tmp_path / "a.csv", {"time": time, "indentation": depth * 1e3, "reading": force[:, 0]})]
+    found = propose([read_log(logs[0])])
+    column = found.loggers[0].columns["depth"]
+    assert column.unit == "mm" and not column.sure and "too much for metres" in column.why
+    with pytest.raises(FileError, match="depth is 'indentation' in mm, because it moves by 2, too much for metres: answer it"):
+        run_job(write_rig([read_log(logs[0])], found, tmp_path / "rig"))
+    run_job(write_rig([read_log(logs[0])], confirmed(found), tmp_path / "rig"))
+    assert "too much for metres" in (tmp_path / "rig" / "rig.toml").read_text()
+
+
+def test_a_pose_and_a_force_turned_to_the_sensor(tmp_path):
+    time, depth, force = press()
+    pose = {"x (mm)": 0.1 * time, "y (mm)": 0 * time, "z (mm)": (8e-3 - depth) * 1e3}
+    (log,) = [write_csv(tmp_path / "a.csv", {"time": time, **pose, "Fx [N]": 0 * time, "Fz [N]": force.sum(axis=1)})]
+    answers = template(tmp_path, [log], **{'sphere = "?"': "sphere = 0.008"})
+    rig = read_rig(new_rig(tmp_path / "rig", [log], answers).path)
+    (trial,) = rig.trials
+    np.testing.assert_allclose(trial.position[:, 2], 8e-3 - depth, atol=1e-12)
+    np.testing.assert_allclose(trial.force[:, 2], -force.sum(axis=1), rtol=1e-9)
+    assert np.isnan(trial.force[:, 1]).all() and (trial.force[:, 0] == 0).all()
+
+
+@pytest.mark.parametrize(("unit", "newtons"), [("g", 9.80665e-3), ("mN", 1e-3), ("kPa", 0.2)])
+def test_grams_and_pressures_become_newtons(tmp_path, unit, newtons):
+    time, _, force = press()
+    load = force.sum(axis=1) / newtons
+    log = write_csv(tmp_path / "a.csv", {"time": time, f"load ({unit})": load, "adc_0": force[:, 0] * 1e4})
+    changes = {f'unit = "{unit}"': f'unit = "{unit}", area = 2e-4'} if unit == "kPa" else {}
+    answers = template(tmp_path, [log], **changes)
+    (trial,) = read_rig(new_rig(tmp_path / "rig", [log], answers).path).trials
+    assert trial.stimulus == "force"
+    np.testing.assert_allclose(trial.level, force.sum(axis=1), atol=1e-8)
+
+
+def test_resistances_are_inverted_where_the_answers_say_so(tmp_path):
+    time, depth, force = press()
+    ohm = 1.0 / (1e-4 + force)
+    log = write_csv(tmp_path / "a.csv", {"time": time, "depth (m)": depth} | {f"R{i}": ohm[:, i] for i in range(4)})
+    answers = template(tmp_path, [log], **{"count = 4 }": 'count = 4, unit = "1/x" }'})
+    (trial,) = read_rig(new_rig(tmp_path / "rig", [log], answers).path).trials
+    np.testing.assert_allclose(trial.reading, 1e-4 + force, rtol=1e-8)
+
+
+# --- two loggers
+
+
+def two_loggers(folder, late=3.217, start=0.0):
+    time, depth, force = press()
+    clock = np.arange(0.0, 5.9, 0.017)
+    answer = np.stack([np.interp(clock, time, force[:, i]) for i in range(4)], axis=1)
+    stage = write_csv(folder / "stage_1.csv", {"time": start + time, "depth (mm)": depth * 1e3})
+    pad = write_csv(folder / "pad_1.csv", {"seconds": start + clock + late} | {f"s{i}": answer[:, i] for i in range(4)})
+    return stage, pad
+
+
+def test_clocks_of_two_loggers_are_aligned_and_the_shift_is_a_parameter(tmp_path):
+    logs = two_loggers(tmp_path)
+    written = new_rig(tmp_path / "rig", logs, template(tmp_path, logs))
+    words = tomllib.loads(written.path.read_text())["trial"][0]["readings"]
+    assert words["late"] == pytest.approx(3.217, abs=0.02) and 0.0 < words["uncertainty"] < 0.05
+    assert re.search(r"the second clock is 3\.2\d+ ± 0\.0\d+ s late", "\n".join(written.notes))
+    (trial,) = read_rig(written.path).trials
+    late = words["late"]
+    expected = np.interp(trial.time - trial.time[0] + max(0.0, 3.217 - late), *press()[:2])
+    assert np.abs(trial.level - expected).max() < 1e-4 and len(trial.time) > 330
+    text = written.path.read_text().replace(f"late = {late}", "late = 3.217")
+    written.path.write_text(text)  # whoever knows better writes it
+    (trial,) = read_rig(written.path).trials
+    depth, reading = trial.level, trial.reading[:, 0]
+    np.testing.assert_allclose(reading, 60.0 * np.maximum(depth, 0.0), atol=3e-4)
+
+
+def test_a_shift_that_the_recordings_do_not_tell_is_asked(tmp_path):
+    time = np.arange(COUNT) / RATE
+    wave = 1e-3 * np.maximum(np.sin(2 * np.pi * time), 0.0)
+    stage = write_csv(tmp_path / "stage_1.csv", {"time": time, "depth (m)": wave})
+    pad = write_csv(tmp_path / "pad_1.csv", {"time": time, "s0": 60 * wave, "s1": 50 * wave})
+    answers = template(tmp_path, [stage, pad])
+    with pytest.raises(FileError, match="does not tell how late the second clock is: write late = …"):
+        new_rig(tmp_path / "rig", [stage, pad], answers)
+    answers.write_text(answers.read_text().replace('use = "fit"', 'use = "fit"\nlate = 0.25\nuncertainty = 0.01'))
+    (trial,) = read_rig(new_rig(tmp_path / "rig", [stage, pad], answers).path).trials
+    assert trial.time[0] == pytest.approx(0.0) and trial.time[-1] == pytest.approx(5.74)
+
+
+def test_two_computers_are_not_taken_to_be_minutes_apart(tmp_path):
+    logs = two_loggers(tmp_path, late=0.4, start=1.7e9)
+    written = new_rig(tmp_path / "rig", logs, template(tmp_path, logs))
+    assert tomllib.loads(written.path.read_text())["trial"][0]["readings"]["late"] == pytest.approx(0.4, abs=0.02)
+    assert "times count from 1700000000.000 s" in written.path.read_text()
+
+
+@pytest.mark.parametrize(
+    ("words", "sentence"),
+    [
+        ('readings = "a.csv"', "readings of Trial 1"),
+        ('readings = { file = "gone.csv" }', "gone.csv', which is not there"),
+        ('readings = { file = "../x.csv" }', "outside the rig's folder"),
+        ('readings = { file = "press_readings.csv", late = "soon" }', "late of the readings of Trial 1"),
+        ('readings = { file = "press_readings.csv", late = 1e6 }', "0 samples at the same time"),
+        ('readings = { file = "press_readings.csv", uncertainty = -1.0 }', "uncertainty of the readings"),
+        ('readings = { file = "press_readings.csv", early = 1.0 }', "early"),
+        ('readings = { file = "press.csv" }', "have a column 'depth'"),
+    ],
+)
+def test_a_rig_with_a_second_logger_that_cannot_be_used_is_one_sentence(tmp_path, words, sentence):
+    time, depth, force = press()
+    write_csv(tmp_path / "press.csv", {"time": time, "depth": depth})
+    write_csv(tmp_path / "press_readings.csv", {"time": time, "texel_0": force[:, 0]})
+    sensor = "[sensor]\ngrid = { rows = 1, columns = 1, pitch = 0.01 }\n"
+    (tmp_path / "rig.toml").write_text(f'format = "palpate-rig/1"\n{sensor}[[trial]]\nfile = "press.csv"\n{words}\n')
+    with pytest.raises(FileError, match=re.escape(sentence)):
+        read_rig(tmp_path / "rig.toml")
+
+
+# --- bad input
+
+
+@pytest.mark.parametrize(
+    ("changes", "replaced", "sentence"),
+    [
+        ({}, {'depth (mm)", unit = "mm"': 'depth (mm)", unit = "m"'}, "depth of 'press_0' moves by 2 m: its unit"),
+        ({}, {'depth (mm)", unit = "mm"': 'depth (mm)", unit = "nm"'}, "spans 2e-09 m: its unit"),
+        ({}, {'name = "t_ms", unit = "ms"': 'name = "t_ms", unit = "s"'}, "samples of 'press_0' are 10 s apart"),
+        ({}, {"rows = 2, columns = 2": "rows = 3, columns = 2"}, "has 4 texel columns and the sensor has 6 texels"),
+        ({}, {'name = "R{}"': 'name = "Q{}"'}, "no column 'Q1', which the answers name for texel"),
+        ({}, {'use = "fit"': 'use = "maybe"'}, "write one of fit, check, leave out"),
+        ({}, {"press_0.csv": "press_9.csv"}, "which was not given"),
+        ({"t_ms": np.r_[np.arange(300), np.arange(300)] * 10.0}, {}, "goes backwards after sample 300"),
+        (
+            {"t_ms": np.arange(COUNT) // 4 * 40.0},
+            {', repeated = "spread"': ""},
+            "75% of the time stamps of 'press_0.csv' repeat",
+        ),
+        ({"depth (mm)": np.where(np.arange(COUNT) == 9, 1e-9, 0.0)}, {}, "its unit in the answers must be wrong"),
+    ],
+)
+def test_what_cannot_be_is_one_sentence(tmp_path, changes, replaced, sentence):
+    log = write_press(tmp_path / "press_0.csv", **changes)
+    answers = template(tmp_path, [log], **replaced)
+    with pytest.raises(FileError, match=re.escape(sentence)) as caught:
+        new_rig(tmp_path / "rig", [log], answers)
+    assert str(caught.value).count(". ") == 0
+    assert not (tmp_path / "rig" / "rig.toml").exists()
+
+
+def test_a_log_without_contact_is_one_sentence(tmp_path):
+    noise = np.random.default_rng(5).normal(size=(COUNT, 4))
+    log = write_press(tmp_path / "press_0.csv", **{f"R{i + 1}": 500.0 + noise[:, i] for i in range(4)})
+    answers = template(tmp_path, [log])
+    with pytest.raises(FileError, match="'press_0' shows no contact: its readings never leave their noise"):
+        new_rig(tmp_path / "rig", [log], answers)
+
+
+def test_repeated_and_uneven_time_stamps_are_put_right_and_said(tmp_path):
+    time = np.floor(np.arange(COUNT) / 4) * 40.0
+    time[400:] += 2000.0
+    log = write_press(tmp_path / "press_0.csv", t_ms=time)
+    written = new_rig(tmp_path / "rig", [log], template(tmp_path, [log]))
+    (trial,) = read_rig(written.path).trials
+    np.testing.assert_allclose(trial.time[:396], np.arange(396) / RATE, atol=1e-9)
+    assert any("spread evenly" in note for note in written.notes)
+    assert any("longest pause between two samples is 0.51 s" in note for note in written.notes)
+    time = np.arange(COUNT) * 10.0
+    time[7] = time[6]
+    log = write_press(tmp_path / "press_0.csv", t_ms=time)
+    written = new_rig(tmp_path / "rig", [log], template(tmp_path, [log]))
+    assert len(read_rig(written.path).trials[0].time) == COUNT - 1 and "averaged" in written.notes[0]
+
+
+def test_a_rig_is_not_written_over_its_logs(tmp_path):
+    log = write_press(tmp_path / "press_0.csv")
+    before = log.read_bytes()
+    with pytest.raises(FileError, match="would be overwritten"):
+        new_rig(tmp_path, [log], template(tmp_path, [log]))
+    assert log.read_bytes() == before
+
+
+@pytest.mark.parametrize("text", ["", "format = 3", 'format = "palpate-log-answers/1"', "[" * 5000])
+def test_answers_that_are_none_are_one_sentence(tmp_path, text):
+    (tmp_path / "answers.toml").write_text(text)
+    with pytest.raises(FileError, match="answers"):
+        read_answers(tmp_path / "answers.toml")
+
+
+# --- the command
+
+
+def test_without_answers_a_template_is_written_and_the_same_command_goes_on_with_it(tmp_path, capsys):
+    logs = [str(write_press(tmp_path / f"press_{i}.csv", i)) for i in range(2)]
+    out = tmp_path / "rig"
+    assert main(["rig", "new", *logs, "--out", str(out)]) == 1
+    said = capsys.readouterr()
+    assert "leave 1 questions open: answer them in" in said.err and "depth (mm)" in said.out
+    answers = out / "answers.toml"
+    assert main(["rig", "new", *logs, "--out", str(out), "--answers", str(answers)]) == 1
+    assert 'still "?"' in capsys.readouterr().err
+    answers.write_text(answers.read_text().replace('["?", "?"]', "[0.005, 0.005]"))
+    assert main(["rig", "new", *logs, "--out", str(out), "--answers", str(answers)]) == 0
+    said = capsys.readouterr().out
+    assert "2 recordings, 1 to fit and 1 to check; 4 texels" in said
+    assert (out / "recordings.png").read_bytes().startswith(b"\x89PNG") and read_rig(out / "rig.toml").trials
+    assert main(["rig", "new", *logs, "--out", str(out)]) == 1  # answers that were filled in are kept
+    assert "has answers already" in capsys.readouterr().err and "0.005" in answers.read_text()
+
+
+def test_questions_at_the_terminal_are_answered_as_in_the_file(tmp_path):
+    time, depth, force = press()
+    log = write_csv(tmp_path / "a.csv", {"time": time, "way": depth * 1e3, "indentation": depth * 1e3, "reading": force[:, 0]})
+    typed = iter(["", "way mm"])
+    found = propose([read_log(log)])
+    column = found.loggers[0].columns["depth"]
+    assert not column.sure
+    answered = log_questions.asked(found, lambda question: "way mm")
+    assert answered.loggers[0].columns["depth"].names == ("way",) and not list(answered.open_questions())
+    answered = log_questions.asked(found, lambda question: "")
+    assert answered.loggers[0].columns["depth"].names == ("indentation",)
+    assert next(typed) == ""
