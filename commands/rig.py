@@ -30,7 +30,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         nargs="+",
         help="CSV and other tables of text, MCAP, a bag of ROS 1 or ROS 2, HDF5, NPZ or MAT; several files become trials",
     )
-    new.add_argument("--out", metavar="DIR", required=True, help="folder for rig.toml and its CSV files")
+    new.add_argument("--out", metavar="DIR", help="folder for rig.toml and its CSV files")
     new.add_argument(
         "--answers", metavar="FILE", help="what the columns are and what no log says; without it a template is written"
     )
@@ -51,6 +51,8 @@ def run(arguments: argparse.Namespace) -> int:
             for note in dict.fromkeys(note for log in logs for note in log.notes):
                 print(f"note: {note}")
             return 0
+        if not arguments.out:
+            raise FileError("A rig needs a folder: give one with --out, or --preview to see what is in the logs.")
         if arguments.answers:
             found = log_answers.read_answers(arguments.answers)
         else:

@@ -23,8 +23,10 @@ LEAST_OVERLAP = 0.5
 """Least share of the changes of each logger that must lie where both recorded."""
 LEAST_CORRELATION, MOST_RIVAL = 0.5, 0.6
 """The shift is sure if the correlation of changes is at least this, and that at any other shift less than this share of it.
-Of 100 recordings of six presses with noise 98 pass, and 3 are off by more than four standard errors and 0.05 s. Of 200 pairs of
-unrelated recordings of six presses 61 pass, because presses look alike: the correlation cannot tell whose files they are."""
+Of 100 recordings of six presses with noise 98 pass, and 3 are off by more than four standard errors and 0.05 s. Of 200 pairs
+of unrelated recordings of six presses 61 pass, as presses look alike: the correlation cannot tell whose files they are."""
+LEAST_UNCERTAINTY = 0.5
+"""Samples of the slower logger: the parts of a recording share the error that the model makes, as where the force is no line."""
 WINDOWS = 8
 """Parts of a recording whose shifts tell the uncertainty."""
 
@@ -112,7 +114,7 @@ def _shift_of(cause: np.ndarray, answer: np.ndarray, step: float, offset: float,
     lag = lags[top] + _vertex(size, top)
     error = _scatter(cause, answer, int(lags[top]), width, float(np.sign(correlation[top]))) * step
     rival = float(elsewhere.max()) / float(size[top])
-    return ClockShift(offset + lag * step, max(error, 0.1 * step), float(size[top]), rival)
+    return ClockShift(offset + lag * step, max(error, LEAST_UNCERTAINTY * step), float(size[top]), rival)
 
 
 def _on_grid(times: np.ndarray, values: np.ndarray, step: float) -> np.ndarray:

@@ -31,7 +31,7 @@ MOST_REPEATED = 0.02
 LONGEST_PAUSE = 10.0
 """Pause between two samples, in usual steps, from which on it is mentioned."""
 LARGEST_MOTION, LARGEST_FORCE, SMALLEST_MOTION = 1.5, 1e4, 1e-7
-"""Metres and newtons beyond which a unit must be wrong: rigs for touch move by less than 1.5 m and press with less than a ton."""
+"""Metres and newtons beyond which a unit must be wrong: rigs for touch move by less and press with less than a ton."""
 LEAST_CONTACT = 6.0
 """How many times the noise from sample to sample a response must rise above it. Of 1000 recordings of white noise of 20 to
 20,000 samples, none reaches it after the mean over five samples that is taken here."""

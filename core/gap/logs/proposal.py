@@ -20,6 +20,11 @@ BEGINNING = 0.05
 """Share of a recording at its beginning whose median counts as the value without load."""
 ZERO_SHARE = 0.02
 """Share of its range by which a known force must be off zero without load, for a zero to be proposed."""
+SAME_COLUMNS = 0.5
+"""Share of the columns of two files that both have, from which on they are of one kind: settings that were saved with them, and
+topics that were silent, differ from file to file; two loggers share no more than the name of the time."""
+MOST_NAMED = 12
+"""Names in a sentence."""
 CHECK_EVERY = 3
 """One recording in so many is proposed for `check`, as whole recordings; of two recordings the second."""
 
@@ -61,11 +66,17 @@ def propose(logs: Sequence[LogFile], name: str = "rig") -> Answers:
 
 
 def _loggers(logs: Sequence[LogFile]) -> list[list[LogFile]]:
-    """Return the files by kind: those with the same columns."""
-    groups: dict[Any, list[LogFile]] = {}
+    """Return the files by kind: those that share most of their columns."""
+    found: list[list[LogFile]] = []
     for log in logs:
-        groups.setdefault(tuple((table.name, tuple(table.columns)) for table in log.tables), []).append(log)
-    found = list(groups.values())
+        own = _column_names(log)
+        for group in found:
+            other = _column_names(group[0])
+            if len(own & other) >= SAME_COLUMNS * len(own | other):
+                group.append(log)
+                break
+        else:
+            found.append([log])
     if len(found) == 1 and len(logs) > 1 and all(re.match(r"column_\d+$", name) for t in logs[0].tables for name in t.columns):
         apart: dict[tuple[str, ...], list[LogFile]] = {}
         for log in logs:
@@ -80,6 +91,10 @@ def _loggers(logs: Sequence[LogFile]) -> list[list[LogFile]]:
             f"The logs have {len(found)} kinds of columns ({kinds}): give those of one sensor, of at most two loggers."
         )
     return found
+
+
+def _column_names(log: LogFile) -> set[str]:
+    return {table.full_name(name) for table in log.tables for name in table.columns}
 
 
 def _recordings(groups: Sequence[Sequence[LogFile]]) -> tuple[RecordingAnswer, ...]:
@@ -152,7 +167,7 @@ class _Columns:
             for name in table.columns
             if table.full_name(name) == full
         ]
-        return np.concatenate(parts)
+        return np.concatenate(parts) if parts else np.zeros(0)
 
     def span(self, full: str) -> float:
         """Return how far the values of a column reach, without the outermost thousandth."""
@@ -206,6 +221,9 @@ class _Columns:
         rising = [name for name in names if self._rises(name)] or [
             name for name in self.names if self._rises(name, strictly=True)
         ]
+        if not rising and names:
+            unit = time_unit(self.values(names[0], self.logs[0]), self.meanings[names[0]].unit)[0]
+            return ColumnAnswer((names[0],), unit, why="of its name")
         if not rising:
             return ColumnAnswer(
                 (UNKNOWN,), why="no column rises like a clock; write its name, or { rate = … } in Hz", sure=False
@@ -237,6 +255,8 @@ class _Columns:
     def _rises(self, name: str, strictly: bool = False) -> bool:
         for log in self.logs:
             values = self.values(name, log)
+            if not len(values):
+                continue  # not in this file
             steps = np.diff(values[np.isfinite(values)])
             if len(steps) < 7 or (steps < 0).any() or not steps.any() or (strictly and (steps == 0).mean() > 0.3):
                 return False
@@ -300,8 +320,7 @@ class _Columns:
         rest = [name for name in self.names if name not in used and name.rpartition("/")[2] not in used]
         if not rest:
             return []
-        more = f" and {len(rest) - 8} more" if len(rest) > 8 else ""
-        return [f"'{self.logs[0].path.name}': not used: {', '.join(rest[:8])}{more}."]
+        return [f"'{self.logs[0].path.name}': not used: {listed(rest)}."]
 
 
 # --- what drove the sensor, and what answered
@@ -369,14 +388,14 @@ def _read_in_newtons(found: list[dict[str, ColumnAnswer]]) -> None:
 def _say_what_lacks(columns: Sequence[_Columns], found: list[dict[str, ColumnAnswer]]) -> None:
     """Ask for what no column seems to be."""
     owner = {quantity for own in found for quantity in own}
-    names = ", ".join(columns[0].names[:12])
+    names, others = listed(columns[0].names), listed(columns[-1].names)
     if not owner & {"depth", "force"} and not set(POSE) <= owner:
         own = ColumnAnswer(
             (UNKNOWN,), "m", why=f"nothing looks like what drove the sensor; depth, force or x y z ({names})", sure=False
         )
         found[0]["depth"] = own
     if not owner & {"texel", "force_z"}:
-        own = ColumnAnswer((UNKNOWN,), why=f"nothing looks like readings; name the column of each texel ({names})", sure=False)
+        own = ColumnAnswer((UNKNOWN,), why=f"nothing looks like readings; name the column of each texel ({others})", sure=False)
         found[-1]["texel"] = own
 
 
@@ -415,6 +434,15 @@ def _grid_of(count: int, columns: Sequence[_Columns]) -> tuple[int, int, str, se
         return 1, 1, "one texel", set()
     rows = max(i for i in range(1, int(count**0.5) + 1) if count % i == 0)
     return count // rows, rows, f"{count} texels; the number of rows is a guess", {"grid"}
+
+
+def listed(names: Sequence[str]) -> str:
+    """Return names for a sentence; those that differ by their last number are one, and of many the first are named."""
+    families: dict[str, list[str]] = {}
+    for name in names:
+        families.setdefault(re.sub(r"\d+(?=\D*$)", "#", name), []).append(name)
+    found = [own[0] if len(own) == 1 else f"{own[0]} … {own[-1]}" for own in families.values()]
+    return ", ".join(found[:MOST_NAMED]) + (f" and {len(found) - MOST_NAMED} more" if len(found) > MOST_NAMED else "")
 
 
 def table_of(tables: Sequence[LogTable], name: str) -> tuple[LogTable, str] | None:

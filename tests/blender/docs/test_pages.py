@@ -18,7 +18,10 @@ from pathlib import Path
 import pytest
 
 from palpate.commands import COMMANDS, READY, _parser, main
+from palpate.core.export.registry import export
 from palpate.core.gap.dataset.rig import read_rig
+from palpate.core.io.bake_reader import read_bake
+from palpate.core.jobs.job_runner import run_job
 
 ROOT = Path(__file__).resolve().parents[3]
 PAGES = [
@@ -108,7 +111,7 @@ def test_options_that_are_told_of_are_in_the_help(page, capsys):
     for code in inline_code(page.read_text(encoding="utf-8").replace("\\|", "|")):
         words = re.match(r"palpate (\w+)", code)
         if words and words.group(1) in READY:
-            told = re.match(r"palpate (\w+(?: (?:stiffness|friction|show|import|export)\b)?)", code).group(1).split()
+            told = re.match(r"palpate (\w+(?: (?:stiffness|friction|show|import|export|new)\b)?)", code).group(1).split()
             assert main([*told, "--help"]) == 0
             text = capsys.readouterr().out
             for option in re.findall(r"--[a-z][a-z-]*", code):
@@ -146,6 +149,8 @@ def bake_folder(tmp_path_factory):
         str(folder / "palpate"),
     ]
     subprocess.run(command, check=True, capture_output=True, timeout=300)
+    pytest.importorskip("mcap")
+    run_job(export(read_bake(folder / "palpate"), "mcap", folder))
     return folder
 
 
