@@ -26,7 +26,7 @@ LEAST_CORRELATION, MOST_RIVAL = 0.5, 0.6
 Of 100 recordings of six presses with noise 98 pass, and 3 are off by more than four standard errors and 0.05 s. Of 200 pairs
 of unrelated recordings of six presses 61 pass, as presses look alike: the correlation cannot tell whose files they are."""
 LEAST_UNCERTAINTY = 0.5
-"""Samples of the slower logger: the parts of a recording share the error that the model makes, as where the force is no line."""
+"""Samples of the slower logger: the parts of a recording share the error of the model, as where the force is no line."""
 WINDOWS = 8
 """Parts of a recording whose shifts tell the uncertainty."""
 
