@@ -43,7 +43,7 @@ class LogTable:
     grids: dict[str, tuple[int, int]] = field(default_factory=dict)
 
     @property
-    def rows(self) -> int:
+    def sample_count(self) -> int:
         """Number of samples."""
         return len(next(iter(self.columns.values())))
 

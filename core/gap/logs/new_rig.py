@@ -176,15 +176,15 @@ def _clock_of(log: LogFile, table: LogTable, logger: LoggerAnswer, columns: Mapp
     if answer is None:
         raise FileError(f"The answers name no time of '{log.path.name}': name its column, or write time = {{ rate = 100.0 }}.")
     if answer.rate:
-        return np.arange(table.rows) / answer.rate
+        return np.arange(table.sample_count) / answer.rate
     for name in answer.names:
         found = table_of([table], name) or table_of(log.tables, name)
         if found is None:
             continue
         values = found[0].columns[found[1]]
-        if len(values) != table.rows:
+        if len(values) != table.sample_count:
             raise FileError(
-                f"'{name}' of '{log.path.name}' has {len(values)} stamps for {table.rows} samples of "
+                f"'{name}' of '{log.path.name}' has {len(values)} stamps for {table.sample_count} samples of "
                 f"'{next(iter(columns))}': name the clock of these samples."
             )
         return _in_si("time", answer, values)

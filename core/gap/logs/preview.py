@@ -24,7 +24,7 @@ def preview_rows(logs: Sequence[LogFile]) -> list[tuple[str, ...]]:
     for log in logs:
         kind = tuple((table.name, tuple(table.columns)) for table in log.tables)
         if kind in seen:
-            rows.append((log.path.name, "(the same columns)", "", str(max(table.rows for table in log.tables)), "", ""))
+            rows.append((log.path.name, "(the same columns)", "", str(max(table.sample_count for table in log.tables)), "", ""))
             continue
         seen.add(kind)
         for table in log.tables:

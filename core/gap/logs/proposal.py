@@ -209,8 +209,8 @@ class _Columns:
         if len(self.tables) < 2:
             return
         clocks = {table.name: [n for n in table.columns if self._rises(table.full_name(n))] for table in self.tables}
-        lengths = {table.rows for table in self.tables if clocks[table.name]}
-        kept = [table for table in self.tables if clocks[table.name] or table.rows in lengths]
+        lengths = {table.sample_count for table in self.tables if clocks[table.name]}
+        kept = [table for table in self.tables if clocks[table.name] or table.sample_count in lengths]
         if kept:
             self.tables = tuple(kept)
             self.names = [table.full_name(name) for table in kept for name in table.columns]

@@ -176,5 +176,8 @@ def _samples_first(values: np.ndarray, lengths: list[int]) -> np.ndarray | None:
 
 def _named_apart(tables: list[LogTable]) -> list[LogTable]:
     """Return tables with different names: those of one group differ in their number of samples, the longest has its name."""
-    longest = {table.name: max(other.rows for other in tables if other.name == table.name) for table in tables}
-    return [t if t.rows == longest[t.name] else LogTable(f"{t.name}[{t.rows}]", t.columns, t.units, t.grids) for t in tables]
+    longest = {table.name: max(other.sample_count for other in tables if other.name == table.name) for table in tables}
+    return [
+        t if t.sample_count == longest[t.name] else LogTable(f"{t.name}[{t.sample_count}]", t.columns, t.units, t.grids)
+        for t in tables
+    ]

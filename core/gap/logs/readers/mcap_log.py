@@ -50,7 +50,7 @@ def read_mcap(path: Path) -> LogFile:
 
 
 def _until(topics: dict[str, TopicColumns]) -> str:
-    rows = [table.rows for table, _ in (topic.table() for topic in topics.values()) if table is not None]
+    rows = [table.sample_count for table, _ in (topic.table() for topic in topics.values()) if table is not None]
     return f" after {sum(rows)} messages" if rows else ""
 
 
