@@ -18,6 +18,10 @@ from . import sensor_report
 APPROACH, PRESS, HOLD = 0.04, 0.2, 0.75
 """Shares of the frame range at which the probe arrives, is deepest, and begins to leave."""
 SIDES = 64
+MATERIAL_KEY = "palpate_probe"
+"""Custom property of the material of all probes."""
+OPACITY = 0.2
+"""Of a probe in a render: its outline and lights are seen, and the colours behind it remain."""
 
 
 def add_probe(context, obj, shape: str, size: float, depth: float):
@@ -58,9 +62,28 @@ def add_probe(context, obj, shape: str, size: float, depth: float):
     around = (texels.position - foot) / unit @ rotation.T @ transforms.as_array(turn.to_matrix())
     ground = ground + _first_contact(probe.data, around, size / unit) * normal
     _animate(context.scene, probe, ground, normal, size / unit, depth / unit)
-    probe.display_type = "WIRE"  # the texels under it are what one wants to see
+    _show_sparsely(probe, shape)
     probe.palpate.role = "TARGET"
     return probe
+
+
+def _show_sparsely(probe, shape: str) -> None:
+    """Let the texels under a probe be seen: a few lines in the 3D view, and clear as thin glass in a render."""
+    if shape == "ROD":  # Blender draws bounding cylinders along z only
+        probe.display_type = "WIRE"
+    else:
+        probe.display_type, probe.display_bounds_type = "BOUNDS", "SPHERE" if shape == "BALL" else "BOX"
+    material = next((found for found in bpy.data.materials if MATERIAL_KEY in found), None)
+    if material is None:
+        material = bpy.data.materials.new("Palpate Probe")
+        material[MATERIAL_KEY] = 1
+        if material.node_tree is None:
+            material.use_nodes = True
+        surface = next(node for node in material.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
+        surface.inputs["Alpha"].default_value = OPACITY
+        surface.inputs["Roughness"].default_value = 0.1
+        material.diffuse_color = (0.8, 0.8, 0.8, OPACITY)
+    probe.data.materials.append(material)
 
 
 def _middle(texels) -> tuple[np.ndarray, np.ndarray]:

@@ -217,7 +217,7 @@ class _PixelPainter:
         self.scale = scale
         self._flat = gpu.shader.from_builtin("UNIFORM_COLOR")
         self._lines = gpu.shader.from_builtin("POLYLINE_UNIFORM_COLOR")
-        self._image = gpu.shader.from_builtin("IMAGE")
+        self._image = _image_shader()
         self._viewport = gpu.state.viewport_get()[2:]
 
     def rectangle(self, x, y, width, height, color) -> None:
@@ -256,6 +256,16 @@ class _PixelPainter:
             shader.uniform_float(name, value)
         gpu.state.blend_set("ALPHA")  # drawing text switches blending off
         batch.draw(shader)
+
+
+def _image_shader():
+    """Return the shader that shows textures with scene-linear colours as they are; Blender 5.0 gave it a name of its own."""
+    import gpu
+
+    try:
+        return gpu.shader.from_builtin("IMAGE_SCENE_LINEAR_TO_REC709_SRGB")
+    except ValueError:
+        return gpu.shader.from_builtin("IMAGE")
 
 
 def _corners(x, y, width, height):

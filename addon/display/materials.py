@@ -28,6 +28,9 @@ SENSOR_KEY = "palpate_sensor"
 RAMP_STOPS = 32
 MISSING_COLOR = (1.0, 0.0, 1.0)
 """Colour that Blender shows for an image that it does not find. Forces of exactly these values (N) do not occur in practice."""
+GLOW = 0.8
+"""Share of a heat map's colour that is its own light; the scene's light adds the rest, so that the shape is seen. Under light
+that shows white as white the colours are those of the colour bar; without any light they are 9 % darker on the screen."""
 MIX_SOCKETS = ("Factor_Float", "A_Color", "B_Color")
 
 
@@ -202,12 +205,15 @@ def _add_missing_color(add, color, missing):
 
 
 def _add_surface(add, color) -> None:
-    """Add a surface that shows a colour with little gloss and some light of its own."""
+    """Add a surface that shows a colour mostly by its own light, and its shape by little of the scene's light."""
     surface = add("ShaderNodeBsdfPrincipled")
-    surface.inputs["Roughness"].default_value = 0.6
-    surface.inputs["Specular IOR Level"].default_value = 0.1  # gloss would brighten the dark end of the colours
-    surface.inputs["Emission Strength"].default_value = 0.4
-    add.tree.links.new(color, surface.inputs["Base Color"])
+    surface.inputs["Roughness"].default_value = 1.0
+    surface.inputs["Specular IOR Level"].default_value = 0.0  # gloss would brighten the dark end of the colours
+    surface.inputs["Emission Strength"].default_value = GLOW
+    shaded = add("ShaderNodeVectorMath", operation="SCALE")
+    shaded.inputs["Scale"].default_value = 1.0 - GLOW
+    add.tree.links.new(color, shaded.inputs[0])
+    add.tree.links.new(shaded.outputs["Vector"], surface.inputs["Base Color"])
     add.tree.links.new(color, surface.inputs["Emission Color"])
     output = add("ShaderNodeOutputMaterial")
     add.tree.links.new(surface.outputs["BSDF"], output.inputs["Surface"])

@@ -35,7 +35,7 @@ class SensorOverlay:
     line : (2, 3) float32 or None
         Ends of the net-force arrow.
     plain_only : bool
-        Drawn only in views that show no materials, because these show the same.
+        Drawn only in views whose materials do not show the same.
     """
 
     corners: np.ndarray
@@ -198,10 +198,14 @@ def _draw() -> None:
         return
     import gpu
 
-    gpu.state.depth_test_set("LESS_EQUAL")
+    scene = bpy.context.scene
+    through = scene.palpate.show_through
+    materials_suffice = space.shading.type in SHOWING_MATERIALS and shows_colors_as_they_are(scene) and not through
+    gpu.state.depth_test_set("ALWAYS" if through else "LESS_EQUAL")
+    gpu.state.face_culling_set("BACK" if through else "NONE")  # of a closed sensor, its far side does not show
     gpu.state.depth_mask_set(True)
     for overlay in overlays:
-        if overlay.plain_only and space.shading.type in SHOWING_MATERIALS:
+        if overlay.plain_only and materials_suffice:
             continue
         if overlay.batches is None:
             overlay.batches = _batches(overlay)
@@ -211,7 +215,14 @@ def _draw() -> None:
                 shader.uniform_float(name, value)
             batch.draw(shader)
     gpu.state.depth_mask_set(False)
+    gpu.state.face_culling_set("NONE")
     gpu.state.depth_test_set("NONE")
+
+
+def shows_colors_as_they_are(scene) -> bool:
+    """Return True when materials have the colours of their bar in a 3D view: other view transforms change them."""
+    view = scene.view_settings
+    return (view.view_transform, view.look, view.exposure, view.gamma) == ("Standard", "None", 0.0, 1.0)
 
 
 def _batches(overlay: SensorOverlay) -> list:

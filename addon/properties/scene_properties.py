@@ -102,6 +102,12 @@ class PALPATE_PG_scene(bpy.types.PropertyGroup):
         default=True,
         **SETTING,
     )
+    show_through: BoolProperty(
+        name="Through Objects",
+        description="Draw the heat map over what covers it in the 3D view",
+        default=False,
+        **SETTING,
+    )
     show_inset: BoolProperty(
         name="Live Images and Curves",
         description="Tactile images, their scale and the force over time in a corner of the 3D view",

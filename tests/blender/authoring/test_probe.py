@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from blender_scenes import ball, grid
 
+from palpate.addon.authoring import probes
 from palpate.addon.scene import scene_reader
 from palpate.core.jobs.job_runner import run_job
 from palpate.core.solver.simulation import run
@@ -87,3 +88,18 @@ def test_without_a_sensor_there_is_no_probe():
     bpy.context.object.palpate.region = "GROUP"
     with pytest.raises(RuntimeError, match="no vertex group"):
         bpy.ops.palpate.probe_add()
+
+
+@pytest.mark.parametrize(
+    ("shape", "lines"), [("BALL", ("BOUNDS", "SPHERE")), ("BOX", ("BOUNDS", "BOX")), ("ROD", ("WIRE", "BOX"))]
+)
+def test_a_probe_hides_no_texels(shape, lines):
+    pad = grid()
+    pad.palpate.role = "SENSOR"
+    probes_made = [probes.add_probe(bpy.context, pad, shape, 0.0, 0.0) for _ in range(2)]
+    for probe in probes_made:
+        assert (probe.display_type, probe.display_bounds_type) == lines
+        (material,) = probe.data.materials
+        surface = material.node_tree.nodes["Principled BSDF"]
+        assert surface.inputs["Alpha"].default_value == pytest.approx(probes.OPACITY) and not probe.hide_render
+    assert probes_made[0].data.materials[0] == probes_made[1].data.materials[0]

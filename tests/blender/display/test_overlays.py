@@ -7,7 +7,7 @@ import pytest
 from blender_scenes import changes, cube, dump, press_and_drop, save
 
 from palpate.addon.bake.bake import bake
-from palpate.addon.display import bake_display, baked_scene, markers, materials, texel_arrows
+from palpate.addon.display import bake_display, baked_scene, markers, materials, overlays, texel_arrows
 from palpate.addon.session import transforms
 from palpate.core.errors import PalpateError
 from palpate.core.jobs.job_runner import run_job
@@ -131,6 +131,16 @@ def test_display_settings_are_applied_to_a_bake_without_computing(baked, monkeyp
     assert not [name for name in kinds["materials"] if "Arrow" in name]
     nodes = pad.material_slots[-1].material.node_tree.nodes
     assert next(node.inputs[1].default_value for node in nodes if "maximum" in node.label) == pytest.approx(0.25)
+
+
+def test_views_that_change_colours_get_the_overlay(baked):
+    scene, *_ = baked
+    scene.view_settings.view_transform = "Standard"
+    assert overlays.shows_colors_as_they_are(scene)
+    scene.view_settings.exposure = 1.0
+    assert not overlays.shows_colors_as_they_are(scene)
+    scene.view_settings.exposure, scene.view_settings.view_transform = 0.0, "AgX"
+    assert not overlays.shows_colors_as_they_are(scene)
 
 
 def test_applying_without_the_files_says_so(baked, tmp_path):

@@ -12,6 +12,7 @@ import pytest
 from blender_scenes import cube, press_and_drop, save
 
 from palpate.addon.bake.bake import bake
+from palpate.addon.display import materials
 from palpate.core.figures import color_maps
 from palpate.core.jobs.job_runner import run_job
 from palpate.core.response import metrics
@@ -109,7 +110,7 @@ def test_outside_of_the_bake_and_without_its_files_nothing_passes_for_a_force(sc
 
 
 def test_every_texel_has_the_colour_of_its_force(scene_file, tmp_path):
-    """Seen from above in the dark, a pixel shows emission 0.4 times the colour of the texel under it."""
+    """Seen from above in the dark, a pixel shows the share of the colour that glows of the texel under it."""
     path, recording = scene_file
     seen = watch(path, tmp_path, "seen", False)
     force = recording.sensors["Pad"].normal_force
@@ -123,7 +124,7 @@ def test_every_texel_has_the_colour_of_its_force(scene_file, tmp_path):
         row = np.clip(np.round((np.arange(14) / 13) * height - 0.5), 1, height - 2).astype(int)
         found = pixels[np.ix_(row, column)][..., :3].reshape(-1, 3)
         colors = color_maps.colors("VIRIDIS", force[frame - 1] / end)
-        glow = 0.4 * color_maps.linear(colors)
+        glow = materials.GLOW * color_maps.linear(colors)
         expected = np.where(glow <= 0.0031308, 12.92 * glow, 1.055 * glow ** (1 / 2.4) - 0.055)
         assert np.abs(found - expected).max() < 0.03, frame
     assert len({tuple(shot["pixels"]) for shot in seen["frames"].values()}) == 3
