@@ -27,8 +27,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=int,
         action="append",
         help="frame of pictures and numbers, two or more also of the strip; may be given again "
-        "(default: the frame with the largest force)",
+        "(default: that at which the settled forces are largest)",
     )
+    parser.add_argument("--peak", action="store_true", help="without --frame: the frame with the largest force")
     parser.add_argument(
         "--format",
         metavar="KIND",
@@ -49,9 +50,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--samples", metavar="N", type=figure_options.pixels, help="samples per pixel of renders (default: the scene's)"
     )
     parser.add_argument(
-        "--view", metavar=("AZIMUTH", "ELEVATION"), nargs=2, type=float, help="direction of the camera, degrees"
+        "--view",
+        metavar=("AZIMUTH", "ELEVATION"),
+        nargs=2,
+        type=float,
+        help="direction of the camera, degrees (default: towards the loaded texels)",
     )
     parser.add_argument("--own-camera", action="store_true", help="leave the scene's camera where it is")
+    parser.add_argument(
+        "--own-light", action="store_true", help="keep the scene's lamps, world and backdrop (default: studio light)"
+    )
     parser.add_argument(
         "--opaque-targets",
         action="store_true",
@@ -78,7 +86,9 @@ def run(arguments: argparse.Namespace) -> int:
             view=tuple(arguments.view) if arguments.view else None,
             transparent=arguments.transparent,
             own_camera=arguments.own_camera,
+            own_light=arguments.own_light,
             see_through=not arguments.opaque_targets,
+            at_peak=arguments.peak,
             size=tuple(arguments.size),
             samples=arguments.samples,
             **({"kinds": tuple(arguments.only)} if arguments.only else {}),

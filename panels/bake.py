@@ -49,7 +49,11 @@ class Display(Subpanel):
 
     def draw_part(self, layout, _settings, context):
         own = context.scene.palpate
-        layout.prop(own, "show_overlay")
+        row = layout.row()
+        row.prop(own, "show_overlay")
+        part = row.row()
+        part.active = own.show_overlay
+        part.prop(own, "show_through")
         layout.prop(own, "show_inset")
         draw_named(layout, own, "color_map", "Colours")
         draw_named(layout, own, "quantity")
@@ -94,6 +98,7 @@ class Figures(Subpanel):
                 column.prop(own, "view", text="")
             column.prop(own, "size")
             column.prop(own, "samples")
+            column.prop(own, "own_light")
             column.prop(own, "see_through")
             column.prop(own, "transparent")
         layout.use_property_split = False

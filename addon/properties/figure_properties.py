@@ -63,7 +63,7 @@ class PALPATE_PG_figures(bpy.types.PropertyGroup):
     frames: StringProperty(
         name="Frames",
         description="Frames of the scene and the numbers, as in 12, 40-44; two or more are also the frames of the strip. "
-        "Empty: the frame with the largest force",
+        "Empty: the frame at which the settled forces are largest; peak: that with the largest force",
         **_plain,
     )
     width: EnumProperty(
@@ -93,7 +93,7 @@ class PALPATE_PG_figures(bpy.types.PropertyGroup):
         name="Camera",
         description="Where the camera stands",
         items=(
-            ("FRAMED", "Framed", "In the direction of the scene's camera, as near as everything fits"),
+            ("FRAMED", "Framed", "Turned to the texels that carry force, as near as everything fits"),
             ("VIEW", "Direction", "In the direction given below, as near as everything fits"),
             ("OWN", "As It Is", "The scene's camera, unchanged"),
         ),
@@ -106,6 +106,11 @@ class PALPATE_PG_figures(bpy.types.PropertyGroup):
         default=(-55.0, 30.0),
         min=-360.0,
         max=360.0,
+        **_plain,
+    )
+    own_light: BoolProperty(
+        name="Scene's Own Light",
+        description="Keep the lamps, the world and the backdrop of the scene. Without: studio light and a plain background",
         **_plain,
     )
     see_through: BoolProperty(

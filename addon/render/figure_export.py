@@ -10,6 +10,8 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
+import numpy as np
+
 from ...core.errors import SceneError
 from ...core.export.registry import export, exporters
 from ...core.figures.side_by_side import side_by_side
@@ -24,10 +26,13 @@ from ...core.io.file_writing import writable_folder
 from ...core.io.temporary_folder import temporary_folder
 from ...core.jobs.job_runner import run_job
 from ...core.jobs.progress import Job, Progress
+from ...core.response import metrics
 from ..display import bake_identity, baked_scene
 from . import figure_size, loaded_texels, render, render_setup, see_through, video, workbench_colors
 from .figure_request import FigureRequest
 
+SIGHTS = 12
+"""Frames of a video, at most, whose loaded texels the camera is turned to."""
 DRAWN = {"strip", "curves", "numbers"}
 """Kinds of figures that need no render."""
 
@@ -73,7 +78,7 @@ def make_figures(scene, folder, request: FigureRequest) -> Job[list[Path]]:
     bake = read_scene_bake(scene)
     if request.sensors:
         bake = bake.select(request.sensors)
-    frames = request.frames or (_frame_of_largest_force(bake),)
+    frames = request.frames or (_default_frame(bake, request.at_peak),)
     for number in frames:
         frame_index(bake.recording, number)
     data = sum(exporters()[kind].size(bake) for kind in request.exports)
@@ -127,7 +132,7 @@ def _render_pictures(scene, folder, request, bake, frames, steps) -> Job[list[Pa
     written = []
     with _prepared_scene(scene, request, bake, frames, request.size) as show_frame:
         for number in frames:
-            yield steps.next("Rendering", number)
+            yield steps.next(_rendering(scene), number)
             show_frame(number)
             plain = folder / f"scene_{number:04d}.png"
             written.append(_render(scene, plain, number, request, bake, request.size))
@@ -166,7 +171,9 @@ def _make_video(scene, folder, request, bake, steps) -> Job[list[Path]]:
 @contextmanager
 def _prepared_scene(scene, request: FigureRequest, bake: Bake, frames, size) -> Iterator[Callable[[int], None]]:
     """Prepare a scene for its pictures; yield the function to call with the frame before each of them."""
-    with render_setup.render_setup(scene, frames, request.render_options(size)), ExitStack() as stack:
+    some = [int(frames[place]) for place in np.linspace(0, len(frames) - 1, min(len(frames), SIGHTS)).round().astype(int)]
+    loaded = {number: loaded_texels.loaded_texels(scene, bake, number) for number in some}
+    with render_setup.render_setup(scene, frames, request.render_options(size), loaded), ExitStack() as stack:
         show_frame = _draw_nothing
         if scene.render.engine == "BLENDER_WORKBENCH":
             folders = baked_scene.bake_folders(scene)
@@ -174,14 +181,19 @@ def _prepared_scene(scene, request: FigureRequest, bake: Bake, frames, size) -> 
         yield show_frame
 
 
+def _rendering(scene) -> str:
+    """Return the name of the step that renders, and why it takes longer where that is so."""
+    slow = scene.render.engine == "CYCLES" and not render.can_denoise()
+    return f"Rendering ({render.SAMPLES_WITHOUT_DENOISER} × samples: no denoiser here)" if slow else "Rendering"
+
+
 def _draw_nothing(_number: int) -> None:
     """Do nothing: Cycles and EEVEE draw the materials of the heat maps."""
 
 
-def _frame_of_largest_force(bake: Bake) -> int:
-    """Return the frame with the largest sum of the normal forces of all sensors."""
-    total = sum(readings.normal_force.sum(axis=1) for readings in bake.recording.sensors.values())
-    return int(bake.recording.frames[total.argmax()])
+def _default_frame(bake: Bake, at_peak: bool) -> int:
+    """Return the frame of the pictures where none is named."""
+    return metrics.peak_frame(bake.recording) if at_peak else metrics.settled_frame(bake.recording)
 
 
 class _StepCounter:

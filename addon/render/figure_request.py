@@ -30,18 +30,20 @@ class FigureRequest:
         From :data:`KINDS`.
     style : FigureStyle
     frames : tuple of int
-        Frames of the pictures and numbers; two or more are also the columns of the strip. Empty: the frame with the largest
-        force.
+        Frames of the pictures and numbers; two or more are also the columns of the strip. Empty: the frame at which the
+        settled forces are largest.
     sensors : tuple of str
         Names; empty: all sensors.
     formats : tuple of str
         File formats of the figures that are not renders.
     exports : tuple of str
         Names from :func:`.registry.exporters`; each is written into a folder of its own.
-    engine, view, transparent, own_camera
+    engine, view, transparent, own_camera, own_light
         See :class:`.render_setup.RenderOptions`.
     see_through : bool
         Targets become see-through where they cover loaded texels.
+    at_peak : bool
+        Without `frames`: the frame with the largest force, settled or not.
     size : (2,) int, pixels
         Width and height of the renders.
     samples : int or None
@@ -58,7 +60,9 @@ class FigureRequest:
     view: tuple[float, float] | None = None
     transparent: bool = False
     own_camera: bool = False
+    own_light: bool = False
     see_through: bool = True
+    at_peak: bool = False
     size: tuple[int, int] = (1280, 960)
     samples: int | None = None
 
@@ -70,7 +74,7 @@ class FigureRequest:
 
     def render_options(self, size: tuple[int, int]) -> RenderOptions:
         """Return how the scene's pictures are to be taken, in this size (pixels)."""
-        return RenderOptions(self.engine, self.view, self.transparent, self.own_camera, size)
+        return RenderOptions(self.engine, self.view, self.transparent, self.own_camera, self.own_light, self.see_through, size)
 
 
 def requested_figures(scene, active=None) -> FigureRequest:
@@ -97,7 +101,8 @@ def requested_figures(scene, active=None) -> FigureRequest:
     return FigureRequest(
         kinds=_chosen(figure_properties.KINDS, own.kinds),
         style=bake_display.figure_style(scene, width=own.width.lower(), dpi=own.dpi),
-        frames=frames_of(own.frames),
+        frames=() if asks_for_peak(own.frames) else frames_of(own.frames),
+        at_peak=asks_for_peak(own.frames),
         sensors=sensors,
         formats=_chosen(figure_properties.FORMATS, own.formats) or ("png",),
         exports=_chosen(figure_properties.EXPORTS, own.exports),
@@ -105,6 +110,7 @@ def requested_figures(scene, active=None) -> FigureRequest:
         view=tuple(own.view) if own.camera == "VIEW" else None,
         transparent=own.transparent,
         own_camera=own.camera == "OWN",
+        own_light=own.own_light,
         see_through=own.see_through,
         size=tuple(own.size),
         samples=own.samples or None,
@@ -113,6 +119,11 @@ def requested_figures(scene, active=None) -> FigureRequest:
 
 def _chosen(items, names: set[str]) -> tuple[str, ...]:
     return tuple(key.lower() for key, *_ in items if key in names)
+
+
+def asks_for_peak(text: str) -> bool:
+    """Return True for the word that stands for the frame with the largest force."""
+    return text.strip().lower() == "peak"
 
 
 def frames_of(text: str) -> tuple[int, ...]:
@@ -127,7 +138,7 @@ def frames_of(text: str) -> tuple[int, ...]:
     for part in filter(None, re.split(r"[,;\s]+", text.strip())):
         match = re.fullmatch(r"(-?\d{1,7})(?:-(-?\d{1,7}))?", part)
         if match is None:
-            raise ParameterError(f"'{part}' in Figures › Frames is no frame: write numbers as in 12, 40-44.")
+            raise ParameterError(f"'{part}' in Figures › Frames is no frame: write numbers as in 12, 40-44, or peak.")
         first = int(match[1])
         found += range(first, (int(match[2]) if match[2] else first) + 1)
     return tuple(dict.fromkeys(found))

@@ -45,6 +45,7 @@ def figures_bytes(bake: Bake, request: FigureRequest, pictures: int) -> float:
     if "scene" in request.kinds:
         width, height = request.size
         needed += pictures * PICTURE_BYTES * (2 * width * height + SIDE * height**2)
+        needed += PICTURE_BYTES * width * height * request.see_through  # the second render of one picture at a time
     if "video" in request.kinds:
         width, height = video_size(request)
         pixels = len(bake.recording.frames) * (width * height + SIDE * height**2)

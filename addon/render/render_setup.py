@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 
@@ -14,7 +14,8 @@ from mathutils import Euler, Vector
 
 from ...core.errors import ParameterError
 from ..display import materials
-from . import render
+from . import camera_direction, render, studio
+from .loaded_texels import LoadedTexels
 
 ENGINES = {"cycles": ("CYCLES",), "eevee": ("BLENDER_EEVEE_NEXT", "BLENDER_EEVEE"), "workbench": ("BLENDER_WORKBENCH",)}
 """Engines by the name that users give; Blender's own names depend on its version."""
@@ -26,8 +27,10 @@ _BACKDROP_SIZE_RATIO = 3.0
 """An object that takes no part is a backdrop if it is larger than the subjects by this factor."""
 _MAX_FRAMED_FRAMES = 60
 """Number of frames, at most, at which the subjects are measured for the camera."""
-_LAMPS = (((-35.0, 50.0), 3.2, (1.0, 0.97, 0.93)), ((70.0, 30.0), 1.2, (0.9, 0.95, 1.0)), ((170.0, 45.0), 2.0, (1.0, 1.0, 1.0)))
-"""Sun lamps: azimuth relative to the camera and elevation, degrees; strength; colour."""
+NEARBY_RATIO = 2.0
+"""An object that takes no part but touches the subjects, as a gripper's housing, is framed up to this ratio of sizes."""
+NEARBY = 0.05
+"""Distance at which an object counts as touching, as a share of the subjects' size."""
 
 
 def engine_of(scene, name: str) -> str:
@@ -74,11 +77,16 @@ class RenderOptions:
     engine : {"cycles", "eevee", "workbench"}, optional
         Default: the scene's.
     view : (2,) float, degrees, optional
-        Azimuth and elevation of the camera. Default: the direction of the scene's camera, or :data:`DEFAULT_VIEW`.
+        Azimuth and elevation of the camera. Default: the direction of the scene's camera, or :data:`DEFAULT_VIEW`, unless
+        another one shows more of the loaded texels.
     transparent : bool
         No background: no world, and no floor or backdrop that is much larger than everything else.
     own_camera : bool
         The scene's camera stays where it is.
+    own_light : bool
+        The scene's lamps, world and backdrop count; only a scene without lamps gets some. Default: studio light.
+    see_through : bool
+        Targets will be see-through where they cover loaded texels.
     size : (2,) int, pixels, optional
         Width and height of the pictures. Default: the scene's.
     """
@@ -87,6 +95,8 @@ class RenderOptions:
     view: tuple[float, float] | None = None
     transparent: bool = False
     own_camera: bool = False
+    own_light: bool = False
+    see_through: bool = False
     size: tuple[int, int] | None = None
 
 
@@ -113,7 +123,9 @@ class _TemporaryChanges:
 
 
 @contextmanager
-def render_setup(scene, frames: Sequence[int], options: RenderOptions) -> Iterator[None]:
+def render_setup(
+    scene, frames: Sequence[int], options: RenderOptions, loaded: Mapping[int, LoadedTexels] | None = None
+) -> Iterator[None]:
     """Prepare a scene for pictures, and restore it afterwards.
 
     Parameters
@@ -122,21 +134,33 @@ def render_setup(scene, frames: Sequence[int], options: RenderOptions) -> Iterat
     frames : sequence of int
         At all these frames the :func:`subjects` have to be in the picture.
     options : RenderOptions
+    loaded : mapping of int to LoadedTexels, optional
+        Loaded texels at some of the frames, which the camera is turned to.
     """
     changes = _TemporaryChanges()
     now = scene.frame_current, scene.frame_subframe
     try:
         _set_output(scene, options, changes)
-        _set_camera(scene, frames, options, changes)
-        _set_lights(scene, options, changes)
+        _set_colors(scene, changes)
+        _set_camera(scene, frames, options, loaded or {}, changes)
+        _set_lights(scene, frames, options, changes)
         if scene.render.engine == "BLENDER_WORKBENCH":
             _set_workbench(scene, changes)
-        if scene.view_settings.view_transform != "Standard":  # others would change the colours of the heat maps
-            changes.set(scene.view_settings, "view_transform", "Standard")
         yield
     finally:
         changes.undo()
         scene.frame_set(now[0], subframe=now[1])
+
+
+def _set_colors(scene, changes: _TemporaryChanges) -> None:
+    """Show colours as they are: everything else would make a heat map differ from its colour bar."""
+    view = scene.view_settings
+    for name, value in (("view_transform", "Standard"), ("look", "None"), ("exposure", 0.0), ("gamma", 1.0)):
+        if getattr(view, name) != value:
+            changes.set(view, name, value)
+    changes.set(view, "use_curve_mapping", False)
+    changes.set(scene.render, "use_compositing", False)
+    changes.set(scene.render, "use_sequencer", False)
 
 
 def _set_output(scene, options: RenderOptions, changes: _TemporaryChanges) -> None:
@@ -150,29 +174,39 @@ def _set_output(scene, options: RenderOptions, changes: _TemporaryChanges) -> No
         changes.set(scene.render, "film_transparent", True)
         for obj in _backdrops(scene):
             changes.set(obj, "hide_render", True)
+    if scene.render.engine == "CYCLES":
+        changes.set(scene.cycles, "use_denoising", True)
 
 
-def _set_camera(scene, frames: Sequence[int], options: RenderOptions, changes: _TemporaryChanges) -> None:
+def _set_camera(scene, frames: Sequence[int], options: RenderOptions, loaded, changes: _TemporaryChanges) -> None:
     """Add a camera that frames the subjects, unless the scene's own is to stay."""
     own = scene.camera if scene.camera is not None and scene.camera.data.type == "PERSP" else None
     if own is not None and options.view is None and options.own_camera:
         return
-    camera = changes.add(_camera(scene, own, options.view))
+    view = options.view
+    if view is None:
+        towards = DEFAULT_VIEW if own is None else camera_direction.view_of(own.matrix_world.to_3x3() @ Vector((0.0, 0.0, 1.0)))
+        view = camera_direction.best_view(scene, loaded, towards, options.see_through)
+    camera = changes.add(_camera(scene, own, view))
     changes.set(scene, "camera", camera)
     render.fit_camera(scene, _corners(scene, frames), (MARGIN, MARGIN, 1 - MARGIN, 1 - MARGIN))
     _set_clipping(scene, camera)
 
 
-def _set_lights(scene, options: RenderOptions, changes: _TemporaryChanges) -> None:
-    """Add lamps and a bright world to a scene without light."""
+def _set_lights(scene, frames: Sequence[int], options: RenderOptions, changes: _TemporaryChanges) -> None:
+    """Set studio light; where the scene's own light counts, add lamps and a bright world to a scene without light."""
+    if not options.own_light:
+        scene.frame_set(frames[-1])
+        corners = render.bounding_box_corners(_in_picture(scene))
+        low, high = corners.min(axis=0), corners.max(axis=0)
+        bottom = np.array([*(0.5 * (low + high))[:2], low[2], np.linalg.norm(high - low)])
+        studio.set_studio(scene, changes, _backdrops(scene), frames[-1], bottom, options.transparent)
+        return
     if any(obj.type == "LIGHT" and not obj.hide_render for obj in scene.objects):
         return
-    for lamp in _lamps(scene, scene.camera):
-        changes.add(lamp)
+    studio.add_lamps(scene, changes)
     if scene.world is None or not options.transparent and _is_dark(scene.world):
-        world = _world()
-        changes.set(scene, "world", world)
-        changes.add(world)
+        changes.set(scene, "world", changes.add(studio.bright_world()))
 
 
 def _set_workbench(scene, changes: _TemporaryChanges) -> None:
@@ -184,6 +218,28 @@ def _set_workbench(scene, changes: _TemporaryChanges) -> None:
     changes.set(shading, "cavity_type", "BOTH")
     changes.set(shading, "show_object_outline", True)
     changes.set(scene.display, "render_aa", "16")
+
+
+def _in_picture(scene) -> list:
+    """Return the subjects and what touches them without being much larger, as the housing of a gripper or a stand."""
+    seen = subjects(scene)
+    if not seen:
+        return seen
+    corners = render.bounding_box_corners(seen)
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    size = float(np.linalg.norm(high - low))
+    others = {obj: _box(obj) for obj in scene.objects if _is_rendered(obj) and obj not in seen}
+    small = {obj: box for obj, box in others.items() if np.linalg.norm(box[1] - box[0]) <= NEARBY_RATIO * size}
+    touching = {
+        obj for obj, box in small.items() if (box[0] <= high + NEARBY * size).all() and (box[1] >= low - NEARBY * size).all()
+    }
+    return [*seen, *(obj for obj in small if obj in touching or touching & set(_ancestors(obj)))]
+
+
+def _box(obj) -> tuple[np.ndarray, np.ndarray]:
+    """Return the lower and upper corner of an object's bounding box, (3,) each, world."""
+    corners = render.bounding_box_corners([obj])
+    return corners.min(axis=0), corners.max(axis=0)
 
 
 def _backdrops(scene) -> list:
@@ -224,7 +280,7 @@ def _corners(scene, frames) -> np.ndarray:
     found = []
     for number in chosen:
         scene.frame_set(number)
-        found.append(render.bounding_box_corners(subjects(scene)))
+        found.append(render.bounding_box_corners(_in_picture(scene)))
     return np.concatenate(found)
 
 
@@ -232,21 +288,6 @@ def _set_clipping(scene, camera) -> None:
     """Set the clipping distances by the distance of the farthest subject."""
     distance = max((camera.matrix_world.translation - obj.matrix_world.translation).length for obj in subjects(scene))
     camera.data.clip_start, camera.data.clip_end = 0.005 * distance, 20.0 * distance
-
-
-def _lamps(scene, camera) -> list:
-    """Add three sun lamps around the direction of the camera."""
-    back = camera.matrix_world.to_3x3() @ Vector((0.0, 0.0, 1.0))
-    heading = math.atan2(back.y, back.x)
-    made = []
-    for (azimuth, elevation), strength, color in _LAMPS:
-        lamp = bpy.data.lights.new("Palpate Light", "SUN")
-        lamp.energy, lamp.color, lamp.angle = strength, color, math.radians(15.0)
-        obj = bpy.data.objects.new("Palpate Light", lamp)
-        scene.collection.objects.link(obj)
-        obj.rotation_euler = (math.pi / 2 - math.radians(elevation), 0.0, heading + math.radians(azimuth) + math.pi / 2)
-        made.append(obj)
-    return made
 
 
 def _is_dark(world) -> bool:
@@ -258,20 +299,11 @@ def _is_dark(world) -> bool:
     return len(nodes) == 1 and not nodes[0].inputs["Color"].is_linked and max(nodes[0].inputs["Color"].default_value[:3]) < 0.1
 
 
-def _world():
-    world = bpy.data.worlds.new("Palpate World")
-    if world.node_tree is None:
-        world.use_nodes = True
-    background = next(node for node in world.node_tree.nodes if node.type == "BACKGROUND")
-    background.inputs["Color"].default_value = (0.86, 0.88, 0.92, 1.0)
-    background.inputs["Strength"].default_value = 0.7
-    return world
-
-
 def _remove(block) -> None:
-    if isinstance(block, bpy.types.World):
-        bpy.data.worlds.remove(block)
+    if isinstance(block, bpy.types.World | bpy.types.Material):
+        (bpy.data.worlds if isinstance(block, bpy.types.World) else bpy.data.materials).remove(block)
         return
     data = block.data
     bpy.data.objects.remove(block)
-    (bpy.data.cameras if isinstance(data, bpy.types.Camera) else bpy.data.lights).remove(data)
+    kinds = {bpy.types.Camera: bpy.data.cameras, bpy.types.Light: bpy.data.lights, bpy.types.Mesh: bpy.data.meshes}
+    next(blocks for kind, blocks in kinds.items() if isinstance(data, kind)).remove(data)

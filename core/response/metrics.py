@@ -11,6 +11,10 @@ from ..geometry.texels import Texels
 from ..model.recording import Recording, SensorFrame, SensorRecording
 from ..model.sensor_parameters import Painted, SensorParameters
 
+SETTLED_CHANGE, SETTLED_SPAN = 0.05, 0.02
+"""Forces are settled where their sum changes by no more than this share over this share of the frames before and after."""
+LOADED = 0.5
+"""Share of the median load from which a settled frame is worth a picture."""
 AT_LIMIT = 0.9
 """Share of the friction limit above which a moving texel counts as slipping."""
 CREEPING = 1e-6
@@ -135,6 +139,35 @@ def rounded_limit(value: float) -> float:
 def scale_limit(peak: float) -> float:
     """Return the end of a scale: a round number at least 5 % above the largest value."""
     return rounded_limit(1.05 * peak)
+
+
+def peak_frame(recording: Recording) -> int:
+    """Return the number of the frame with the largest sum of the normal forces of all sensors."""
+    return int(recording.frames[_total_force(recording).argmax()])
+
+
+def settled_frame(recording: Recording) -> int:
+    """Return the number of the frame at which settled forces are largest: not an impact, but what comes to rest after it.
+
+    Among frames with nearly the same load it is the middle one. Where no loaded frame is settled it is :func:`peak_frame`.
+    """
+    total = _total_force(recording)
+    if not total.max() > 0.0:
+        return peak_frame(recording)
+    half = max(1, round(SETTLED_SPAN * len(total)))
+    around = np.lib.stride_tricks.sliding_window_view(np.pad(total, half, mode="edge"), 2 * half + 1)
+    typical = float(np.median(total[total > SETTLED_CHANGE * total.max()]))
+    settled = (np.ptp(around, axis=1) <= SETTLED_CHANGE * total) & (total >= LOADED * typical)
+    if not settled.any():
+        return peak_frame(recording)
+    (best,) = np.nonzero(settled & (total >= (1.0 - SETTLED_CHANGE) * total[settled].max()))
+    return int(recording.frames[best[len(best) // 2]])
+
+
+def _total_force(recording: Recording) -> np.ndarray:
+    """Return the sum of the normal forces of all texels, (F,) float, N."""
+    parts = (sum(sensor.normal_force.sum(axis=1) for sensor in part.sensors.values()) for part in recording.blocks())
+    return np.concatenate([np.asarray(part, dtype=float) for part in parts])
 
 
 def choose_frames(recording: Recording, count: int) -> np.ndarray:

@@ -118,7 +118,7 @@ def test_a_full_disk_is_found_before_a_render(baked, tmp_path, monkeypatch):
     scene, _ = baked
     monkeypatch.setattr(figure_export.render, "render_frame", None)
     monkeypatch.setattr(disk_space.shutil, "disk_usage", lambda _: SimpleNamespace(free=8e6))
-    with pytest.raises(FileError, match=r"The set of figures needs up to 9 MB and the disk of .* has 8 MB left"):
+    with pytest.raises(FileError, match=r"The set of figures needs up to 13 MB and the disk of .* has 8 MB left"):
         run_job(figure_export.make_figures(scene, tmp_path / "out", FigureRequest(("scene",))))
     assert not (tmp_path / "out").exists()
 
@@ -222,7 +222,7 @@ def test_a_transparent_picture_leaves_the_backdrop_out_but_not_what_carries_a_se
     robot = bpy.context.object
     scene.objects["Pad"].parent = robot
     for transparent, hidden in ((False, set()), (True, {floor})):
-        with render_setup.render_setup(scene, [1], render_setup.RenderOptions(transparent=transparent)):
+        with render_setup.render_setup(scene, [1], render_setup.RenderOptions(transparent=transparent, own_light=True)):
             assert {obj for obj in scene.objects if obj.hide_render} == hidden
     assert not floor.hide_render
 

@@ -175,7 +175,7 @@ def test_a_blender_without_denoiser_takes_more_samples(scene, tmp_path, monkeypa
     demo.build(scene)
     monkeypatch.setattr(render, "can_denoise", lambda: False)
     with render._settings(scene, tmp_path / "a.png", 3, 8, None):
-        assert (scene.cycles.use_denoising, scene.cycles.samples) == (False, 16)
+        assert (scene.cycles.use_denoising, scene.cycles.samples) == (False, 32)
     assert scene.cycles.use_denoising
 
 

@@ -1,0 +1,186 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""An automatic picture shows the loaded texels, whole and in the colours of the colour bar, whatever the scene looks like."""
+
+import bpy
+import numpy as np
+import pytest
+from blender_scenes import ball, changes, cube, dump, grid, press, save
+
+from palpate.addon.bake.bake import bake
+from palpate.addon.render import camera_direction, figure_export, loaded_texels, render, render_setup, studio
+from palpate.addon.render.figure_request import FigureRequest
+from palpate.core.figures import color_maps
+from palpate.core.jobs.job_runner import run_job
+
+SIZE = (96, 72)
+
+
+def wall(tmp_path, color=(0.02, 0.02, 0.02, 1.0)):
+    """A pad whose texels face −x, a ball that presses on it from there, and a camera behind the pad."""
+    scene = bpy.context.scene
+    scene.frame_start, scene.frame_end = 1, 3
+    pad = grid(columns=12, rows=12)
+    pad.rotation_euler = (0.0, -np.pi / 2, 0.0)
+    target = ball(location=(-0.0085, 0.0, 0.0), radius=0.01)
+    pad.palpate.role, target.palpate.role = "SENSOR", "TARGET"
+    material = bpy.data.materials.new("Own")
+    material.use_nodes = True
+    material.node_tree.nodes["Principled BSDF"].inputs["Base Color"].default_value = color
+    for obj in (pad, target):
+        obj.data.materials.append(material)
+    bpy.ops.object.camera_add(location=(0.5, 0.0, 0.1), rotation=(1.3, 0.0, np.pi / 2))
+    scene.camera = bpy.context.object
+    scene.render.engine, scene.cycles.samples = "CYCLES", 4
+    save(tmp_path)
+    run_job(bake(scene))
+    save(tmp_path)
+    return scene
+
+
+def test_the_camera_is_turned_to_the_loaded_texels(tmp_path):
+    scene = wall(tmp_path)
+    before = dump()
+    loaded = loaded_texels.loaded_texels(scene, figure_export.read_scene_bake(scene), 3)
+    assert len(loaded) >= 4 and loaded.normals[:, 0] == pytest.approx(np.full(len(loaded), -1.0), abs=1e-5)
+    assert loaded.points[:, 0].max() > 5e-4  # they lie on the indented surface
+    options = render_setup.RenderOptions(size=SIZE, see_through=True)
+    with render_setup.render_setup(scene, [3], options, {3: loaded}):
+        back = np.array(scene.camera.matrix_world)[:3, 2]
+        assert (loaded.normals @ back).min() > camera_direction.FACING - 0.02
+        places = np.array([render.image_position(scene, point) for point in loaded.points])
+        assert (places > 0.05).all() and (places < 0.95).all()
+    with render_setup.render_setup(scene, [3], options):  # nothing is known of loads: as the scene's camera
+        assert np.array(scene.camera.matrix_world)[:3, 2] @ np.array((1.0, 0.0, 0.0)) > 0.9
+    assert [line for line in changes(before, dump()) if "Render Result" not in line] == []  # Blender's own
+
+
+def test_a_camera_that_shows_the_texels_keeps_its_direction(tmp_path):
+    scene = wall(tmp_path)
+    loaded = {3: loaded_texels.loaded_texels(scene, figure_export.read_scene_bake(scene), 3)}
+    view = camera_direction.best_view(scene, loaded, (75.0, 20.0), True)
+    assert view is not None and np.cos(np.radians(view[0])) < -0.5
+    for azimuth in (150.0, -160.0):
+        assert camera_direction.best_view(scene, loaded, (azimuth, 30.0), True) is None
+    assert camera_direction.view_of(camera_direction.direction_of((75.0, 20.0))) == pytest.approx((75.0, 20.0))
+
+
+def test_what_stands_before_the_texels_blocks_the_sight_unless_it_is_a_target(tmp_path):
+    scene = wall(tmp_path)
+    loaded = {3: loaded_texels.loaded_texels(scene, figure_export.read_scene_bake(scene), 3)}
+    bpy.ops.mesh.primitive_plane_add(size=0.2, location=(-0.03, 0.1, 0.0), rotation=(0.0, np.pi / 2, 0.0))
+    screen = bpy.context.object  # from y = 0 to the left
+    bpy.context.view_layer.update()
+    blocked = camera_direction.best_view(scene, loaded, (0.0, 30.0), True)
+    assert blocked is not None and blocked[0] < 0.0
+    screen.location.y = -0.1
+    bpy.context.view_layer.update()
+    assert camera_direction.best_view(scene, loaded, (0.0, 30.0), True)[0] > 0.0
+
+
+def test_what_touches_the_subjects_is_in_the_picture_and_a_backdrop_is_not(tmp_path):
+    scene = wall(tmp_path)
+    housing = cube("Housing", (0.012, 0.0, 0.03), size=0.02)
+    knob = cube("Knob", (0.012, 0.0, 0.05), size=0.01)
+    knob.parent = housing
+    knob.matrix_parent_inverse = housing.matrix_world.inverted()
+    bpy.ops.mesh.primitive_plane_add(size=5.0, location=(0.0, 0.0, -0.06))
+    floor = bpy.context.object
+    with render_setup.render_setup(scene, [3], render_setup.RenderOptions(size=SIZE)):
+        corners = render.bounding_box_corners([housing, knob])
+        places = np.array([render.image_position(scene, point) for point in corners])
+        assert floor.hide_render and not housing.hide_render
+    assert (places > 0.0).all() and (places < 1.0).all()
+    assert not floor.hide_render
+
+
+@pytest.mark.parametrize(("color", "background"), [(0.02, studio.LIGHT_BACKGROUND), (0.9, studio.DARK_BACKGROUND)])
+def test_the_subject_stands_out_from_the_background(tmp_path, color, background):
+    """The scene's own lamp is far too bright and its world green; with own light both count."""
+    from matplotlib.image import imread
+
+    bpy.context.scene.palpate.color_map = "VIRIDIS" if color < 0.5 else "PAPER"  # dark or white without force
+    scene = wall(tmp_path, (color, color, color, 1.0))
+    bpy.ops.object.light_add(type="SUN")
+    bpy.context.object.data.energy = 1000.0
+    scene.world = bpy.data.worlds.new("Green")
+    scene.world.use_nodes = True
+    scene.world.node_tree.nodes["Background"].inputs["Color"].default_value = (0.0, 1.0, 0.0, 1.0)
+    before, counts = dump(), [len(blocks) for blocks in (bpy.data.worlds, bpy.data.lights, bpy.data.meshes, bpy.data.materials)]
+    corner = {}
+    for own_light in (False, True):
+        request = FigureRequest(("scene",), frames=(3,), size=SIZE, samples=4, view=(160.0, 20.0), own_light=own_light)
+        run_job(figure_export.make_figures(scene, tmp_path / f"{own_light}", request))
+        corner[own_light] = imread(tmp_path / f"{own_light}" / "scene_0003.png")[2, 2, :3]
+    expected = 1.055 * background ** (1 / 2.4) - 0.055
+    assert corner[False] == pytest.approx(np.full(3, expected), abs=0.05)
+    assert corner[True][1] > 0.9 > 0.1 > corner[True][0]
+    assert [line for line in changes(before, dump()) if "Render Result" not in line] == []
+    assert counts == [len(blocks) for blocks in (bpy.data.worlds, bpy.data.lights, bpy.data.meshes, bpy.data.materials)]
+
+
+def test_a_settled_frame_is_shown_unless_the_peak_is_asked_for(tmp_path):
+    scene, _, target = press(frames=12)
+    for frame, height in ((3, 0.004), (4, 0.0052), (12, 0.0052)):  # an impact, then rest
+        target.location.z = height
+        target.keyframe_insert("location", frame=frame)
+    scene.frame_set(1)
+    save(tmp_path)
+    run_job(bake(scene))
+    found = figure_export.read_scene_bake(scene)
+    assert figure_export._default_frame(found, at_peak=True) == 3
+    assert 6 <= figure_export._default_frame(found, at_peak=False) <= 11
+
+
+def test_without_denoiser_there_are_more_samples_and_it_is_said(tmp_path, monkeypatch):
+    scene = wall(tmp_path)
+    scene.cycles.use_denoising = False
+    samples = []
+    monkeypatch.setattr(render, "run_render", lambda scene, file, **_: samples.append(_settings(scene)) or file.touch())
+    monkeypatch.setattr(figure_export, "side_by_side", lambda source, path, *_: path.touch())
+    stages = []
+    request = FigureRequest(("scene",), frames=(3,), size=SIZE, see_through=False, own_light=True)
+    for can in (True, False):
+        monkeypatch.setattr(render, "can_denoise", lambda can=can: can)
+        run_job(figure_export.make_figures(scene, tmp_path / f"{can}", request), lambda step: stages.append(step.stage))
+    assert samples == [(True, 4), (False, 16)]
+    assert "Rendering (4 × samples: no denoiser here)" in stages and "Rendering" in stages
+
+
+def _settings(scene):
+    return scene.cycles.use_denoising, scene.cycles.samples
+
+
+@pytest.mark.parametrize("engine", ["cycles", "workbench"])  # EEVEE takes Mesa minutes, for its shaders
+def test_colours_are_those_of_the_colour_bar(tmp_path, engine):
+    """Every loaded texel that is seen has the colour of its force, in light that shows its shape, too."""
+    from matplotlib.image import imread
+
+    if engine != "cycles" and not render.has_opengl():
+        pytest.skip("Workbench needs OpenGL, which this machine has not")
+    scene = wall(tmp_path)
+    scene.view_settings.view_transform = "AgX"  # as in every new file
+    scene.view_settings.exposure = 0.5
+    scene.palpate.color_map = "MAGMA"
+    size = (320, 240)
+    request = FigureRequest(("scene",), frames=(3,), size=size, samples=16, engine=engine, see_through=True, view=(180.0, 20.0))
+    run_job(figure_export.make_figures(scene, tmp_path / "out", request))
+    picture = imread(tmp_path / "out" / "scene_0003.png")
+    found = figure_export.read_scene_bake(scene)
+    texels, readings = found.texels["Pad"], found.recording.at(3).sensors["Pad"]
+    style = request.style
+    values = style.values(readings, texels) / style.scale_limit(found.recording, found.texels)
+    scene.frame_set(3)
+    matrix = np.array(scene.objects["Pad"].matrix_world)
+    free = readings.normal_force == 0.0
+    with render_setup.render_setup(scene, [3], request.render_options(size), {}):
+        points = texels.position @ matrix[:3, :3].T + matrix[:3, 3]
+        places = np.array([render.image_position(scene, point) for point in points])
+    columns, rows = (places * size).astype(int).T
+    seen = picture[size[1] - 1 - rows, columns, :3]
+    expected = color_maps.colors("VIRIDIS", values)
+    radius = np.linalg.norm(texels.position - texels.position.mean(axis=0), axis=1)
+    clear = (free & (radius > 0.019)) & (np.abs(texels.position).max(axis=1) < 0.0249)  # beside the ball and its shadow
+    assert clear.sum() >= 20
+    assert np.median(np.abs(seen - expected)[clear]) < 0.04
+    touched = ~free & (radius < 0.004)
+    assert touched.any() and np.median(np.abs(seen - expected)[touched]) < 0.2  # through the ball's faint image
