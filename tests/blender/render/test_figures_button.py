@@ -45,6 +45,7 @@ def test_the_window_offers_what_the_command_offers():
     render.add_arguments(parser)
     here = {
         "out": "folder", "only": "kinds", "sensor": "sensors", "frame": "frames", "format": "formats", "own_camera": "camera",
+        "peak": "frames", "opaque_targets": "see_through",
     }  # fmt: skip
     display = {"colour_map": "color_map", "quantity": "quantity", "limit": "range_max"}
     scene = bpy.context.scene.palpate
