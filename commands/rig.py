@@ -15,9 +15,6 @@ if TYPE_CHECKING:
     from ..core.gap.logs.answers import Answers
     from ..core.gap.logs.log_table import LogFile
 
-ANSWERS_NAME, PLOT_NAME = "answers.toml", "recordings.png"
-"""The template of the answers, and the picture of what was read, in the folder of the rig."""
-
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     what = parser.add_subparsers(dest="what", metavar="new", required=True)
@@ -43,6 +40,7 @@ def run(arguments: argparse.Namespace) -> int:
     from ..core.gap.logs.log_file import read_log
     from ..core.gap.logs.preview import preview_rows
     from ..core.gap.logs.proposal import propose
+    from ..core.gap.logs.template import ANSWERS_NAME, PLOT_NAME
 
     with console.Interrupt.raised_at_once():
         logs = [read_log(path) for path in arguments.logs]
@@ -68,17 +66,15 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _require_complete(found: Answers, out: str) -> None:
     """Write a template of the answers and raise FileError where questions are open."""
-    from ..core.gap.logs.answers import answers_text
-    from ..core.io.file_writing import atomic_write, writable_folder
+    from ..core.gap.logs.template import ANSWERS_NAME, write_template
 
     questions = list(found.open_questions())
     if not questions:
         return
-    path = writable_folder(out, create=True) / ANSWERS_NAME
+    path = Path(out) / ANSWERS_NAME
     if path.exists():
         raise FileError(f"'{path}' has answers already: give it with --answers, or remove it for a new template.")
-    with atomic_write(path) as temporary:
-        temporary.write_text(answers_text(found), encoding="utf-8", newline="\n")
+    write_template(found, out)
     for question in questions:
         print(f"question: {question}")
     raise FileError(
@@ -91,6 +87,7 @@ def _write(logs: list[LogFile], found: Answers, out: str) -> None:
     from ..core.gap.dataset.rig import read_rig
     from ..core.gap.logs.new_rig import write_rig
     from ..core.gap.logs.preview import plot_rig
+    from ..core.gap.logs.template import PLOT_NAME
 
     written = console.run_with_progress_bar("rig new", write_rig(logs, found, out), unit="recording")
     rig = read_rig(written.path)

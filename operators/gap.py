@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Measured data: choose a rig, find the gap, show it, add what is missing."""
 
-import bpy
-from bpy.props import BoolProperty, StringProperty
+from pathlib import Path
 
-from ..addon.measured import gap_results
+import bpy
+from bpy.props import BoolProperty, CollectionProperty, StringProperty
+
+from ..addon.measured import gap_results, log_rigs
 from . import modal_job, support
 from .fits import show_image
 
@@ -32,6 +34,36 @@ class PALPATE_OT_measured_open(support.ErrorReporting, support.FileChooser, bpy.
         for warning in rig.warnings:
             self.report({"WARNING"}, warning)
         self.report({"INFO"}, f"'{rig.name}': {len(rig.trials)} trials on {len(rig.texels)} texels")
+
+
+class PALPATE_OT_measured_logs(support.ErrorReporting, support.FileChooser, bpy.types.Operator):
+    """Make a rig from logs of the real sensor (CSV, NPZ, MAT; HDF5, MCAP and bags where their packages are installed) in the
+    folder rig beside them, and show what was read. What no log says is asked in answers.toml there: complete it and choose the
+    logs again"""
+
+    bl_idname = "palpate.measured_logs"
+    bl_label = "Rig from Logs…"
+    bl_options = {"REGISTER", "UNDO"}
+
+    files: CollectionProperty(type=bpy.types.OperatorFileListElement, options={"HIDDEN", "SKIP_SAVE"})
+    directory: StringProperty(subtype="DIR_PATH", options={"HIDDEN", "SKIP_SAVE"})
+    accept: BoolProperty(
+        name="Accept Proposals", description="Take what seems to be true as it is; what no log says is asked nevertheless"
+    )
+
+    @classmethod
+    def poll(cls, context):
+        return support.poll_editable_sensor(cls, context)
+
+    def run(self, context):
+        names = [item.name for item in self.files if item.name]
+        paths = [Path(self.directory) / name for name in names] if names else [Path(self.filepath)]
+        written, plot = log_rigs.make(paths, paths[0].parent / "rig", self.accept)
+        context.object.palpate.measured = bpy.path.relpath(str(written.path)) if bpy.data.filepath else str(written.path)
+        show_image(context, plot, "Palpate Recordings")
+        for note in written.notes:
+            self.report({"WARNING"}, note)
+        self.report({"INFO"}, f"Wrote {written.path}")
 
 
 class PALPATE_OT_gap_find(modal_job.ModalJob, bpy.types.Operator):
@@ -151,6 +183,7 @@ class PALPATE_OT_gap_report(modal_job.ModalJob, bpy.types.Operator):
 
 CLASSES = (
     PALPATE_OT_measured_open,
+    PALPATE_OT_measured_logs,
     PALPATE_OT_gap_find,
     PALPATE_OT_gap_add,
     PALPATE_OT_gap_curves,

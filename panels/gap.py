@@ -16,6 +16,7 @@ class Measured(Subpanel):
         row = layout.row(align=True)
         row.prop(settings, "measured", text="")
         row.operator("palpate.measured_open", text="", icon="FILE_FOLDER")
+        row.operator("palpate.measured_logs", text="", icon="FILE_NEW")
         layout.operator("palpate.gap_find", icon="VIEWZOOM")
         result = gap_results.of(context.object)
         if result is None:

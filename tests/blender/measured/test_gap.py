@@ -107,3 +107,23 @@ def test_the_command_says_that_it_compiles(rig_file, tmp_path, monkeypatch, caps
     monkeypatch.setattr(precompile, "compile_solver", stop)
     assert main(["gap", str(rig_file), "--out", str(tmp_path)]) == 1
     assert capsys.readouterr().err.splitlines()[0].startswith("Palpate is preparing its solver (first use only)")
+
+
+def test_logs_become_a_rig_with_the_answers_beside_it(scene, tmp_path):
+    obj = pad(columns=2, rows=2)
+    time = np.arange(600) * 10.0
+    depth = np.interp(time, [0, 1000, 2000, 4000, 5000], [-1.0, -1.0, 1.0, 1.0, -1.0])
+    names = [f"press_{i}.csv" for i in range(2)]
+    for name in names:
+        rows = [",".join(f"{one:.6g}" for one in (t, d, *[max(d, 0.0) * k for k in (1, 2, 3, 4)])) for t, d in zip(time, depth)]
+        (tmp_path / name).write_text("t_ms,depth (mm),R1,R2,R3,R4\n" + "\n".join(rows))
+    chosen = {"filepath": str(tmp_path / names[0]), "directory": str(tmp_path), "files": [{"name": name} for name in names]}
+    with pytest.raises(RuntimeError, match="leave 1 questions open, the first: grid of .sensor. is not known"):
+        bpy.ops.palpate.measured_logs(**chosen)
+    assert not obj.palpate.measured
+    answers = tmp_path / "rig" / "answers.toml"
+    answers.write_text(answers.read_text().replace('["?", "?"]', "[0.005, 0.005]"))
+    assert bpy.ops.palpate.measured_logs(**chosen) == {"FINISHED"}
+    assert obj.palpate.measured == str(tmp_path / "rig" / "rig.toml")
+    assert bpy.data.images["Palpate Recordings"].size[0] > 500
+    assert bpy.ops.palpate.measured_open(filepath=obj.palpate.measured) == {"FINISHED"}

@@ -1,0 +1,44 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A rig from logs, as the button in the panel makes it: with the answers in the rig's folder, or with a template of them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from ...core.errors import FileError
+
+
+def make(paths, folder: Path, accept: bool):
+    """Write a rig and a picture of its recordings; return the rig that was written and the path of the picture.
+
+    Raises
+    ------
+    FileError
+        A log cannot be used, or questions are open: then `answers.toml` in the folder asks them.
+    """
+    from ...core.gap.dataset.rig import read_rig
+    from ...core.gap.logs.answers import confirmed, read_answers
+    from ...core.gap.logs.log_file import read_log
+    from ...core.gap.logs.new_rig import write_rig
+    from ...core.gap.logs.preview import plot_rig
+    from ...core.gap.logs.proposal import propose
+    from ...core.gap.logs.template import ANSWERS_NAME, PLOT_NAME, write_template
+    from ...core.jobs.job_runner import run_job
+
+    logs = [read_log(path) for path in paths]
+    if (folder / ANSWERS_NAME).exists():
+        answers = read_answers(folder / ANSWERS_NAME)
+    else:
+        answers = propose(logs, folder.parent.name or "rig")
+        answers = confirmed(answers) if accept else answers
+        questions = list(answers.open_questions())
+        if questions:
+            path = write_template(answers, folder)
+            raise FileError(
+                f"The logs leave {len(questions)} questions open, the first: {questions[0][:-1]}; answer them in '{path}' with "
+                "a text editor, and choose the logs again."
+            )
+    written = run_job(write_rig(logs, answers, folder))
+    plot = folder / PLOT_NAME
+    plot_rig(read_rig(written.path), plot)
+    return written, plot
