@@ -31,7 +31,7 @@ COMMANDS = {
     "rig": "make a rig for gap from logs of a real sensor: CSV, MCAP, ROS bags, HDF5, NPZ, MAT",
     "paper": "repeat the experiments of the paper",
     "sweep": "compute a scene thousands of times with varied numbers, resumable",
-    "sensor": "write sensors for other simulators",
+    "sensor": "write sensors for other simulators, and read theirs",
     "openrave": "read and write OpenRAVE sensor definitions",
 }
 """Commands in the order of the help. A command is ready once this package has a module of its name."""

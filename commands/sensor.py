@@ -1,18 +1,20 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""``palpate sensor``: sensors of a scene as files of other simulators."""
+"""``palpate sensor``: sensors of a scene as files of other simulators, and sensors from them."""
 
 from __future__ import annotations
 
 import argparse
 import sys
+from pathlib import Path
 
 from ..core.io.file_writing import writable_folder
+from ..core.io.regular_file import require_regular
 from ..core.simulators.registry import export_sensors, written_formats
 from . import blender, checks, console
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    kinds = parser.add_subparsers(dest="kind", metavar="export", required=True)
+    kinds = parser.add_subparsers(dest="kind", metavar="export | import", required=True)
     save = kinds.add_parser("export", help="write the sensors of a .blend for another simulator")
     save.add_argument("scene", metavar="SCENE.blend")
     formats = written_formats()
@@ -21,6 +23,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     save.add_argument("--sensor", metavar="NAME", action="append", help="only this sensor; may be given again")
     blender.add_script_arguments(save)
     save.set_defaults(action=_export)
+    load = kinds.add_parser("import", help="put the sensors of a file of another program into a .blend")
+    load.add_argument("file", metavar="FILE", help="MJCF, URDF, probe list (.json), OpenRAVE's XML, or a .blend of GenTact")
+    load.add_argument("scene", metavar="SCENE.blend")
+    load.add_argument("--sensor", metavar="NAME", action="append", help="only this sensor of the file; may be given again")
+    load.add_argument("--save-as", metavar="OUT.blend", help="save into another .blend (default: SCENE.blend itself)")
+    blender.add_script_arguments(load)
+    load.set_defaults(action=_import)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -41,3 +50,23 @@ def _export(arguments: argparse.Namespace) -> None:
         print(f"note: {note}", file=sys.stderr)
     for path in written.files:
         print(path)
+
+
+def _import(arguments: argparse.Namespace) -> None:
+    path = Path(arguments.scene if arguments.save_as is None else arguments.save_as)
+    checks.outputs_are_no_inputs((path,), (arguments.file,))
+    blender.check_writable(path)
+    require_regular(arguments.file)
+    with console.blender_output_hidden():
+        scene = blender.open_scene(arguments.scene, arguments.scripts)
+        import bpy
+
+        from ..addon.authoring import sensor_import
+
+        with bpy.context.temp_override(scene=scene):
+            objects, notes = sensor_import.import_file(bpy.context, arguments.file, arguments.sensor or ())
+        lines = [f"'{obj.name}': {len(obj.data.vertices)} vertices" for obj in objects]
+        blender.save_blend(path)
+    for note in notes:
+        print(f"note: {note}", file=sys.stderr)
+    print(*lines, f"saved: {path}", sep="\n")

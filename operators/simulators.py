@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Operators that write sensors for other simulators."""
+"""Operators that write sensors for other simulators and read theirs."""
 
 import bpy
 from bpy.props import EnumProperty, StringProperty
 
-from ..addon.authoring import sensor_exchange
+from ..addon.authoring import sensor_exchange, sensor_import
 from . import support
 
 
@@ -47,4 +47,26 @@ class PALPATE_OT_sensor_export(support.ErrorReporting, bpy.types.Operator):
         self.report({"INFO"}, f"Wrote {len(written.files)} files of {len(sensors)} sensors to '{self.directory}'")
 
 
-CLASSES = (PALPATE_OT_sensor_export,)
+class PALPATE_OT_sensor_import(support.ErrorReporting, support.FileChooser, bpy.types.Operator):
+    """Read sensors of MuJoCo's MJCF, a URDF, a probe list, OpenRAVE's XML or a .blend of GenTact into the scene"""
+
+    bl_idname = "palpate.sensor_import"
+    bl_label = "Import Sensor"
+    bl_options = {"REGISTER", "UNDO"}
+
+    filename_ext = ".xml"
+    filter_glob: StringProperty(default="*.xml;*.mjcf;*.urdf;*.json;*.blend", options={"HIDDEN"})
+
+    @classmethod
+    def poll(cls, context):
+        return support.poll_scene(cls, context)
+
+    def run(self, context):
+        support.leave_edit_mode(context)
+        objects, notes = sensor_import.import_file(context, self.filepath)
+        for note in notes:
+            self.report({"WARNING"}, note)
+        self.report({"INFO"}, f"Read {', '.join(obj.name for obj in objects)}")
+
+
+CLASSES = (PALPATE_OT_sensor_export, PALPATE_OT_sensor_import)

@@ -72,6 +72,7 @@ def _draw_add(self, _context):
 def _draw_import(self, _context):
     self.layout.operator("palpate.openrave_import")
     self.layout.operator("palpate.sensor_toml_import")
+    self.layout.operator("palpate.sensor_import", text="Palpate Sensor of Another Program")
 
 
 def _draw_export(self, _context):

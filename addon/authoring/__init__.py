@@ -11,6 +11,7 @@ __all__ = [
     "probes",
     "problems",
     "sensor_exchange",
+    "sensor_import",
     "sensor_presets",
     "sensor_report",
     "sensors",

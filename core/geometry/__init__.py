@@ -3,7 +3,7 @@
 
 :mod:`.mesh` checks meshes and computes their normals, areas and mass properties; :mod:`.bvh` finds where segments meet them.
 :mod:`.texels` makes texels of a region's vertices. :mod:`.layout` arranges texels as images, and :mod:`.sampling` places texels
-on a surface that has none.
+on a surface that has none. :mod:`.point_surface` joins points of a surface by triangles.
 """
 
-__all__ = ["bvh", "contact_points", "layout", "mesh", "rotations", "sampling", "texels"]
+__all__ = ["bvh", "contact_points", "layout", "mesh", "point_surface", "rotations", "sampling", "texels"]

@@ -10,6 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
+from ..geometry.mesh import TriangleMesh
+from ..model.effect import Effect
 from ..model.sensor_parameters import SensorParameters
 from .sensor_on_mesh import SensorOnMesh
 
@@ -39,11 +41,14 @@ class FoundSensor:
     position, normal : (n, 3) float, metres, and unit vectors, or None
         Of the texels, in the frame of the sensor. None where the file has parameters only.
     faces : (m, 3) int or None
-        Texels at the corners of triangles; None where the file has none, and they are made from the points.
+        Texels at the corners of triangles; those of the file, or made from the points.
     row, column : (n,) int or None
         Where the texels form a grid.
+    surface : TriangleMesh or None
+        What carries the texels, where the file has it.
     parameters : SensorParameters
         Those that the file does not hold have their defaults.
+    effects : tuple of Effect
     frame_position, frame_quaternion : (3,) float, metres, and (4,) float
         Of the sensor's frame in the world of the file.
     notes : list of str
@@ -56,9 +61,11 @@ class FoundSensor:
     faces: np.ndarray | None = None
     row: np.ndarray | None = None
     column: np.ndarray | None = None
+    surface: TriangleMesh | None = None
     parameters: SensorParameters = field(default_factory=SensorParameters)
     frame_position: np.ndarray = field(default_factory=lambda: np.zeros(3))
     frame_quaternion: np.ndarray = field(default_factory=lambda: np.array([1.0, 0.0, 0.0, 0.0]))
+    effects: tuple[Effect, ...] = ()
     notes: list[str] = field(default_factory=list)
 
 

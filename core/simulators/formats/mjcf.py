@@ -16,6 +16,7 @@ import numpy as np
 
 from ...geometry.mesh import TriangleMesh
 from ...io.bake_folder import folder_names
+from ..mjcf_reading import is_mjcf, read_mjcf
 from ..sensor_format import SensorFormat, Written
 from ..sensor_on_mesh import SensorOnMesh, unmodelled
 from ..xml_writing import add, comment, numbers, write_xml
@@ -110,4 +111,6 @@ def _depth_under_hull(solid: TriangleMesh, points: np.ndarray) -> float:
     return float(max(0.0, (-(points @ planes[:, :3].T + planes[:, 3]).max(axis=1)).max()))
 
 
-FORMAT = SensorFormat("mjcf", "MuJoCo (MJCF)", "A body with a collision mesh and a tactile sensor, for MuJoCo", write_mjcf)
+FORMAT = SensorFormat(
+    "mjcf", "MuJoCo (MJCF)", "A body with a collision mesh and a tactile sensor, for MuJoCo", write_mjcf, read_mjcf, is_mjcf
+)

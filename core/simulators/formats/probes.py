@@ -3,15 +3,18 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
+from dataclasses import fields, replace
 from pathlib import Path
 
 import numpy as np
 
+from ...geometry.layout.grid_layout import GridLayout
 from ...io.bake_folder import folder_names
 from ...io.npz import write_arrays
-from ..probe_list import PROBES_FORMAT, write_probe_list
-from ..sensor_format import SensorFormat, Written
+from ..probe_list import PROBES_FORMAT, is_probe_list, read_probe_list, write_probe_list
+from ..sensor_format import FoundSensor, SensorFormat, Written
 from ..sensor_on_mesh import SensorOnMesh, texel_arrays
 
 
@@ -27,6 +30,25 @@ def write_probes(sensors: Sequence[SensorOnMesh], folder: Path) -> Written:
     return Written(files, [f"'{item.name}': {note}" for item in sensors])
 
 
+def read_probes(path: str | os.PathLike) -> list[FoundSensor]:
+    """Return the sensor of a probe list, in the JSON file."""
+    item = read_probe_list(path)
+    sensor, notes = item.sensor, []
+    painted = [entry.name for entry in fields(sensor.painted) if getattr(sensor.painted, entry.name) is not None]
+    if painted:
+        notes.append(f"'{item.name}': painted factors ({', '.join(painted)}) were not taken over.")
+    layout = sensor.texels.layout
+    row, column = (layout.row, layout.column) if isinstance(layout, GridLayout) else (None, None)
+    found = FoundSensor(item.name, sensor.texels.position, sensor.texels.normal, item.faces, row, column)
+    found = replace(found, frame_position=item.position, frame_quaternion=item.quaternion, notes=notes)
+    return [replace(found, parameters=sensor.parameters, effects=sensor.effects)]
+
+
 FORMAT = SensorFormat(
-    "probes", "Probe List (JSON, NPZ)", "Positions, normals and areas of the texels, for any code", write_probes
+    "probes",
+    "Probe List (JSON, NPZ)",
+    "Positions, normals and areas of the texels, for any code",
+    write_probes,
+    read_probes,
+    is_probe_list,
 )

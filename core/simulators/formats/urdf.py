@@ -18,6 +18,7 @@ from ...io.file_writing import write_file
 from ..probe_list import write_probe_list
 from ..sensor_format import SensorFormat, Written
 from ..sensor_on_mesh import SensorOnMesh, identifiers, unmodelled
+from ..urdf_reading import is_urdf, read_urdf
 from ..xml_writing import add, comment, numbers, write_xml
 
 XACRO = "http://www.ros.org/wiki/xacro"
@@ -112,4 +113,4 @@ def write_stl(path: Path, mesh: TriangleMesh) -> None:
         place.write_bytes(b"Palpate".ljust(80) + np.array(len(facets), "<u4").tobytes() + facets.tobytes())
 
 
-FORMAT = SensorFormat("urdf", "URDF", "A link with the mesh, and a fixed frame for each texel", write_urdf)
+FORMAT = SensorFormat("urdf", "URDF", "A link with the mesh, and a fixed frame for each texel", write_urdf, read_urdf, is_urdf)

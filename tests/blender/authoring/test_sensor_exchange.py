@@ -12,6 +12,7 @@ import pytest
 from exported_sensors import FLOAT32
 
 from palpate.addon.authoring import laid_sensors, sensor_exchange
+from palpate.addon.scene import participants, sensor_reader
 from palpate.commands import main
 from palpate.core.errors import SceneError
 from palpate.core.simulators.registry import export_sensors, written_formats
@@ -114,4 +115,102 @@ def test_the_command_says_what_is_not_expressed(tmp_path, capsys):
     assert printed.out.splitlines()[-1] == str(tmp_path / "out" / "Pad.xml")
     assert "note: 'Pad': MuJoCo's stiffness is per mass" in printed.err
     assert main(["sensor", "export", str(path), "--to", "mjcf", "--out", str(path)]) == 1
+    assert "would be overwritten" in capsys.readouterr().err
+
+
+def read_texels(obj):
+    return sensor_reader.sensor_in_own_frame(bpy.context.scene, obj, participants.depsgraph_of(bpy.context.scene))[0].texels
+
+
+@pytest.mark.parametrize("kind", ["mjcf", "urdf", "probes"])
+def test_an_exported_sensor_comes_back_in_its_place(kind, tmp_path):
+    scenes.press()
+    pad = bpy.data.objects["Pad"]
+    pad.location, pad.rotation_euler, pad.palpate.k = (0.1, 0.2, 0.3), (0.1, 0.2, 0.3), 70.0
+    bpy.context.view_layer.update()
+    (item,) = sensor_exchange.sensors_on_meshes(bpy.context.scene, ["Pad"])
+    path = export_sensors([item], kind, tmp_path).files[1 if kind == "urdf" else 0]
+    before = set(bpy.data.objects)
+    assert bpy.ops.palpate.sensor_import(filepath=str(path)) == {"FINISHED"}
+    new = bpy.context.object
+    assert new not in before and new.palpate.role == "SENSOR"
+    texels = read_texels(new)
+    assert np.abs(texels.position - item.sensor.texels.position).max() < FLOAT32
+    assert np.abs(texels.normal - item.sensor.texels.normal).max() < FLOAT32
+    if kind == "urdf":  # the file says where texels are on the link, and not where the link is
+        assert new.parent.name == "Pad Surface" and new.palpate.body == "PARENT"
+    else:
+        assert np.allclose(np.array(new.matrix_world), np.array(pad.matrix_world), atol=FLOAT32)
+        assert texels.layout.shape == item.sensor.texels.layout.shape
+    assert new.palpate.k == pytest.approx(70.0 if kind == "probes" else 58.5)
+
+
+def gentact(folder, flagged=9):
+    """Save a .blend as GenTact makes it: flagged points of a mesh, with positions and normals of their own."""
+    ball = scenes.ball(name="Skin", radius=0.05, location=(1.0, 0.0, 0.0))
+    mesh = ball.data
+    kinds = {"is_sensor": "BOOLEAN", "radii": "FLOAT", "sensor_pos": "FLOAT_VECTOR", "sensor_normal": "FLOAT_VECTOR"}
+    for name, kind in kinds.items():
+        mesh.attributes.new(name, kind, "POINT")
+    points = np.array([vertex.co for vertex in mesh.vertices])
+    top = np.argsort(-points[:, 2])[:flagged]
+    for index in top:
+        mesh.attributes["is_sensor"].data[index].value = True
+    mesh.attributes["sensor_pos"].data.foreach_set("vector", (1.1 * points).ravel())
+    mesh.attributes["sensor_normal"].data.foreach_set("vector", points.ravel())
+    path = scenes.save(folder, "gentact.blend")
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    return path, 1.1 * points[np.sort(top)]
+
+
+def test_gentacts_file_gives_its_sensors_and_leaves_nothing_else(tmp_path):
+    path, points = gentact(tmp_path)
+    assert bpy.ops.palpate.sensor_import(filepath=str(path)) == {"FINISHED"}
+    assert [obj.name for obj in bpy.data.objects] == ["Skin"]
+    assert not bpy.data.libraries and not bpy.data.collections
+    texels = read_texels(bpy.context.object)
+    assert np.abs(texels.position - points).max() < FLOAT32
+    assert (texels.normal @ [0.0, 0.0, 1.0] > 0.5).all()
+    assert bpy.context.object.location.x == pytest.approx(1.0)
+
+
+def test_a_file_without_flagged_points_changes_nothing(tmp_path):
+    path, _ = gentact(tmp_path, flagged=2)
+    with pytest.raises(RuntimeError, match="no object with three or more points"):
+        bpy.ops.palpate.sensor_import(filepath=str(path))
+    (tmp_path / "broken.blend").write_bytes(b"BLENDER")
+    with pytest.raises(RuntimeError, match="cannot be opened by Blender"):
+        bpy.ops.palpate.sensor_import(filepath=str(tmp_path / "broken.blend"))
+    assert not bpy.data.objects and not bpy.data.libraries and not bpy.data.collections
+
+
+def test_openraves_parameters_go_onto_the_object_that_is_named(tmp_path):
+    scenes.press()
+    path = tmp_path / "robot.xml"
+    path.write_text('<AttachedSensor><link>Pad</link><sensor type="SimTactileSensor"><k>70</k></sensor></AttachedSensor>')
+    bpy.context.view_layer.objects.active = None
+    assert bpy.ops.palpate.sensor_import(filepath=str(path)) == {"FINISHED"}
+    assert bpy.data.objects["Pad"].palpate.k == pytest.approx(70.0)
+    path.write_text(path.read_text().replace("Pad", "Ball"))
+    with pytest.raises(RuntimeError, match="make the sensor that gets its parameters active first"):
+        bpy.ops.palpate.sensor_import(filepath=str(path))
+
+
+def test_the_command_imports_into_a_scene_that_then_bakes(tmp_path, capsys):
+    scenes.press()
+    pad = scenes.save(tmp_path)
+    assert main(["sensor", "export", str(pad), "--to", "probes", "--out", str(tmp_path / "out")]) == 0
+    bpy.data.objects.remove(bpy.data.objects["Pad"])
+    rest = scenes.save(tmp_path, "rest.blend")
+    capsys.readouterr()
+    listed = str(tmp_path / "out" / "Pad.json")
+    assert main(["sensor", "import", listed, str(rest), "--save-as", str(tmp_path / "new.blend")]) == 0
+    assert "'Pad': 84 vertices" in capsys.readouterr().out
+    scene = scenes.reopen(tmp_path / "new.blend")
+    scene.frame_set(8)
+    (item,) = sensor_exchange.sensors_on_meshes(scene)
+    assert len(item.sensor.texels) == 84
+    assert main(["sensor", "import", listed, str(rest), "--sensor", "Skin"]) == 1
+    assert "no sensor 'Skin' in 'Pad.json': choose from 'Pad'" in capsys.readouterr().err
+    assert main(["sensor", "import", str(rest), str(rest)]) == 1
     assert "would be overwritten" in capsys.readouterr().err

@@ -15,14 +15,14 @@ from palpate.core.errors import FileError, PalpateError
 from palpate.core.geometry.mesh import is_closed, mass_properties
 from palpate.core.model.sensor_parameters import SensorParameters
 from palpate.core.simulators.formats.urdf import roll_pitch_yaw
-from palpate.core.simulators.registry import export_sensors, formats
+from palpate.core.simulators.registry import export_sensors, formats, written_formats
 from palpate.core.simulators.sensor_on_mesh import identifiers, thickened
 
 SENSORS = (pad(), pad(radius=0.02, name="Bent"), ball())
 
 
 def test_every_format_is_registered_once():
-    assert list(formats()) == ["mjcf", "probes", "urdf", "usd"]
+    assert list(formats()) == ["mjcf", "openrave", "probes", "urdf", "usd"]
     assert all(item.title and item.description and (item.write or item.read) for item in formats().values())
 
 
@@ -31,7 +31,7 @@ def test_an_unknown_format_is_refused(tmp_path):
         export_sensors(SENSORS, "dae", tmp_path)
 
 
-@pytest.mark.parametrize("kind", formats())
+@pytest.mark.parametrize("kind", written_formats())
 def test_all_sensors_are_written_and_the_next_export_replaces_them(kind, tmp_path):
     written = export_sensors(SENSORS, kind, tmp_path)
     assert all(path.is_file() for path in written.files)
@@ -47,7 +47,7 @@ def test_all_sensors_are_written_and_the_next_export_replaces_them(kind, tmp_pat
     )
 
 
-@pytest.mark.parametrize("kind", formats())
+@pytest.mark.parametrize("kind", written_formats())
 def test_a_full_disk_leaves_the_earlier_export(kind, tmp_path, monkeypatch):
     export_sensors(SENSORS, kind, tmp_path)
     before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
