@@ -51,7 +51,8 @@ SPEED = 0.1
 """Of the approach, m/s: short runs are mostly contact then."""
 LENGTHS = {"50_ms": 0.02, "500_ms": 0.47}
 """Rest after the press, s, by the length of a run."""
-DATASET_RUNS = 60
+DATASET_RUNS = 300
+"""Enough that what a dataset has once, as its statistics, is small beside its frames."""
 STIFFNESS = 1000.0
 """Of a texel, N/m."""
 STEP = 1e-3
@@ -204,11 +205,24 @@ def against_mujoco() -> Iterator[dict]:
     yield {"name": f"sweep.static_error.{TEXELS}", "value": error, "unit": "1", "peer": peer, "peer_value": their_error}
 
 
-def dataset_share() -> Iterator[dict]:
-    """What writing the dataset and the table costs of the whole time, and its size by that of the numbers, compressed."""
+def compressed_size(folder: Path, runs: list[Run]) -> int:
+    """Return the bytes of what is recorded of all runs, as a dataset has it: an array for each quantity, in one .npz file."""
     import io
 
     from palpate.core.io.recording_npz import load_recording
+
+    recordings = [load_recording(folder / "runs" / run.digest / "pad" / "recording.npz") for run in runs]
+    names = ("normal_force", "shear", "reading", "contact", "net_force", "net_torque", "centre_of_pressure")
+    columns = [np.concatenate([getattr(one.sensors["pad"], name) for one in recordings]) for name in names]
+    columns += [np.concatenate([getattr(one, name) for one in recordings]) for name in ("poses", "times")]
+    small = (values.astype(np.float32) if values.dtype.kind == "f" else values for values in columns)
+    with io.BytesIO() as packed:
+        np.savez_compressed(packed, *small)
+        return len(packed.getvalue())
+
+
+def dataset_share() -> Iterator[dict]:
+    """What writing the dataset and the table costs of the whole time, and its size by that of the numbers, compressed."""
     from palpate.sweep.dataset import publish
 
     with tempfile.TemporaryDirectory() as place:
@@ -224,21 +238,15 @@ def dataset_share() -> Iterator[dict]:
         publish(folder, runs)
         writing = time.process_time() - start
         size = sum(file.stat().st_size for file in (folder / "dataset").rglob("*") if file.is_file())
-        raw = 0
-        for run in runs:
-            sensor = load_recording(folder / "runs" / run.digest / "pad" / "recording.npz").sensors["pad"]
-            with io.BytesIO() as packed:
-                np.savez_compressed(
-                    packed, *(np.asarray(getattr(sensor, key), np.float32) for key in ("normal_force", "shear"))
-                )
-                raw += len(packed.getvalue())
+        raw = compressed_size(folder, runs)
     yield {
         "name": "sweep.dataset.share", "value": writing / (writing + computing), "unit": "1",
         "peer": "a tenth", "peer_value": 0.1, "ratio": writing / (writing + computing) / 0.1, "goal": 1.0,
     }  # fmt: skip
     yield {
         "name": "sweep.dataset.size", "value": size / DATASET_RUNS, "unit": "bytes per run",
-        "peer": "normal force and shear in 32 bits, compressed", "peer_value": raw / DATASET_RUNS, "ratio": size / raw,
+        "peer": "the same numbers in 32 bits, in one compressed archive", "peer_value": raw / DATASET_RUNS,
+        "ratio": size / raw, "goal": 1.2,
     }  # fmt: skip
 
 

@@ -20,6 +20,7 @@ from typing import Any, TextIO
 
 from ..core.errors import FileError, PalpateError
 from ..core.model.scenario import Scenario
+from ..core.model.shared_results import SharedResults
 from ..core.study.metrics import metrics_of
 from ..core.study.presses import Press
 from ..core.study.run_files import STUDY_NAME, write_failure, write_run
@@ -34,7 +35,16 @@ DONE, FAILED, UNWRITABLE = "done", "failed", "unwritable"
 
 
 class Scenes:
-    """The scenes of a study, each read when a run first needs it."""
+    """The scenes of a study, each read when a run first needs it.
+
+    Attributes
+    ----------
+    folder : Path
+        Of the study.
+    study : Study
+    shared : SharedResults
+        What the runs of this process have in common.
+    """
 
     def __init__(self, folder: Path, scripts: str = REFUSE):
         self.folder = folder
@@ -42,6 +52,7 @@ class Scenes:
         self._reader = SceneReader(folder, scripts)
         self._meshes = frozen_meshes(self.study, folder)
         self._plans: dict[str, Plan] = {}
+        self.shared = SharedResults()
 
     def plan(self, scene: str) -> Plan:
         """Return what the study means on a scene."""
@@ -54,7 +65,7 @@ class Scenes:
         plan, read_with = self.plan(scene), scene_values(values)
         scenario = at_rate(self._reader.read(scene, read_with), self.study.fps) if read_with else plan.scenario
         rest = {name: value for name, value in values.items() if not is_scene_property(name)}
-        return varied_scenario(scenario, rest, plan.press, plan.meshes)
+        return varied_scenario(scenario, rest, plan.press, plan.meshes, self.shared)
 
 
 def compute_run(scenes: Scenes, run: Run) -> None:
@@ -74,14 +85,15 @@ def compute_run(scenes: Scenes, run: Run) -> None:
     plan = scenes.plan(run.scene)
     values = {**plan.fixed, **{name: value for name, value in run.values.items() if name != SCENE}}
     scenario = scenes.scenario(run.scene, values)
-    recording = run_job(solve(scenario, Simulation(scenario, threads=1)))
+    recording = run_job(solve(scenario, Simulation(scenario, threads=1, shared=scenes.shared)))
     made: Press | None = plan.press
     if made is not None:
         start = f"{PRESS}."
         own: dict[str, Any] = {name[len(start) :]: value for name, value in values.items() if name.startswith(start)}
         made = replace(made, **own)
     metrics = metrics_of(scenario, recording, made)
-    write_run(scenes.folder, run, scenario, recording, metrics, time.perf_counter() - began, scenes.study.images)
+    seconds = time.perf_counter() - began
+    write_run(scenes.folder, run, scenario, recording, metrics, seconds, scenes.study.images, scenes.shared)
 
 
 def answer_to(scenes: Scenes, run: Run) -> dict[str, Any]:

@@ -13,6 +13,7 @@ from pathlib import Path
 from ..core.errors import FileError
 from ..core.io.file_writing import os_error_reason
 from ..core.io.temporary_folder import remove_unfinished, temporary_folder
+from ..core.model.shared_results import SharedResults
 from ..core.study.run_files import RUNS
 from ..core.study.run_record import read_run_record
 from ..core.study.study_file import Run
@@ -48,7 +49,7 @@ def publish(folder: Path, planned: Sequence[Run] = ()) -> None:
     require_pyarrow()
     remove_unfinished(folder)
     require_own(folder / DATASET_FOLDER, DATASET_FILES)
-    order = run_order(folder)
+    order = run_order(folder, planned)
     try:
         write_run_table(folder, order, failures(folder, planned))
         with temporary_folder(folder, "dataset") as hidden:
@@ -74,10 +75,11 @@ def _write_parts(folder: Path, order: list[tuple[int, str]], hidden: Path) -> Pa
     task = study_name(folder)
     parts = hidden / "parts"
     writers: dict[str, LeRobotWriter] = {}
+    shared = SharedResults()
     try:
         for _, digest in order:
             run = read_run_record(folder / RUNS / digest)
-            frames = read_frames(run)
+            frames = read_frames(run, shared)
             writer = writers.get(frames.layout_digest)
             if writer is None:
                 writer = LeRobotWriter(parts / f"part-{len(writers):03d}", frames, task)

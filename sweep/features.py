@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -20,11 +21,14 @@ from ..core.geometry.texels import Texels
 from ..core.io.bake_check import checked_parameters
 from ..core.io.bake_folder import MANIFEST_NAME, RECORDING_NAME, folder_names, read_manifest
 from ..core.io.bake_reader import Bake
+from ..core.io.npz import DAMAGED
 from ..core.io.recording_npz import load_recording
-from ..core.io.sensor_npz import SENSOR_NAME, load_sensor
+from ..core.io.regular_file import read_bytes
+from ..core.io.sensor_npz import SENSOR_NAME, load_sensor, unpack_sensor
 from ..core.model.digest import digest_of
 from ..core.model.recording import Recording, SensorRecording
 from ..core.model.sensor_parameters import Painted, SensorParameters
+from ..core.model.shared_results import SharedResults
 from ..core.response import metrics
 from ..core.study.run_record import RunRecord
 
@@ -105,19 +109,26 @@ class RunFrames:
     layout_digest: str = ""
 
 
-def read_frames(run: RunRecord) -> RunFrames:
+def read_frames(run: RunRecord, shared: SharedResults | None = None) -> RunFrames:
     """Read the recordings of a run.
+
+    Parameters
+    ----------
+    run : RunRecord
+    shared : SharedResults, optional
+        Of the runs that are read one after the other.
 
     Raises
     ------
     FileError
         A file of it is missing or damaged, or holds a number that 32 bits cannot.
     """
+    shared = shared or SharedResults()
     # The names of their folders are unique and have no slash, which LeRobot does not allow in names.
-    sensors = {own: _read_sensor(run.folder / own) for own in folder_names(run.sensors).values()}
+    sensors = {own: _read_sensor(run.folder / own, shared) for own in folder_names(run.sensors).values()}
     if not sensors:
         raise FileError(f"The run '{run.folder}' has no sensor: delete the folder and run the sweep again.")
-    return _frames(sensors, run.values, f"the run '{run.folder}' is no 32-bit number: delete the run and sweep again.")
+    return _frames(shared, sensors, run.values, f"the run '{run.folder}' is no 32-bit number: delete the run and sweep again.")
 
 
 def bake_frames(bake: Bake) -> RunFrames:
@@ -140,10 +151,10 @@ def bake_frames(bake: Bake) -> RunFrames:
         )
         for name, texels in bake.texels.items()
     }
-    return _frames(sensors, {}, "the bake is no 32-bit number: export it as HDF5 or NPZ.")
+    return _frames(SharedResults(), sensors, {}, "the bake is no 32-bit number: export it as HDF5 or NPZ.")
 
 
-def _frames(sensors: dict[str, SensorRun], varied: Mapping[str, Any], too_large: str) -> RunFrames:
+def _frames(shared: SharedResults, sensors: dict[str, SensorRun], varied: Mapping[str, Any], too_large: str) -> RunFrames:
     """Return the frames of some sensors of one run; `too_large` ends the sentence about a number that 32 bits cannot hold."""
     first = next(iter(sensors.values())).recording
     features: list[Feature] = []
@@ -153,13 +164,18 @@ def _frames(sensors: dict[str, SensorRun], varied: Mapping[str, Any], too_large:
         columns[feature.name] = values if isinstance(values, str) else _narrowed(too_large, feature, values)
     fps = _frame_rate(first.times)
     texels = {name: sensor.texels for name, sensor in sensors.items()}
-    digest = digest_of((tuple(features), fps, tuple(texels), tuple(texels.values())))
+    digest = _layout_digest(tuple(features), fps, tuple(texels), tuple(shared.of(digest_of, own) for own in texels.values()))
     return RunFrames(tuple(features), columns, first.times - first.times[0], fps, texels, digest)
 
 
-def _read_sensor(folder: Path) -> SensorRun:
+@lru_cache(maxsize=64)
+def _layout_digest(features: tuple[Feature, ...], fps: float, names: tuple[str, ...], texels: tuple[str, ...]) -> str:
+    return digest_of((features, fps, names, texels))
+
+
+def _read_sensor(folder: Path, shared: SharedResults) -> SensorRun:
     recording = load_recording(folder / RECORDING_NAME)
-    texels, painted = load_sensor(folder / SENSOR_NAME)
+    texels, painted = _read_texels(folder / SENSOR_NAME, shared)
     if len(recording.sensors) != 1 or len(recording.frames) == 0:
         raise FileError(f"'{folder / RECORDING_NAME}' is no recording of one sensor: delete the run and sweep again.")
     (arrays,) = recording.sensors.values()
@@ -170,6 +186,14 @@ def _read_sensor(folder: Path) -> SensorRun:
         manifest = read_manifest(folder)
         parameters, unit = checked_parameters(folder, manifest), manifest.unit
     return SensorRun(texels, painted, recording, arrays, parameters, unit)
+
+
+def _read_texels(path: Path, shared: SharedResults) -> tuple[Texels, Painted]:
+    """Return what ``sensor.npz`` says; runs whose files are equal get the same objects."""
+    try:
+        return shared.of(unpack_sensor, read_bytes(path))
+    except (OSError, *DAMAGED):
+        return load_sensor(path)  # it says what is wrong
 
 
 def _frame_rate(times: np.ndarray) -> float:

@@ -28,10 +28,17 @@ class FailedRun:
     values: dict[str, Value] = field(default_factory=dict)
 
 
-def run_order(folder: Path) -> list[tuple[int, str]]:
+def run_order(folder: Path, planned: Sequence[Run] = ()) -> list[tuple[int, str]]:
     """Return index and digest of each finished run, in the order of the design, whatever the order of finishing.
 
     This is all of a study that is in memory at once.
+
+    Parameters
+    ----------
+    folder : Path
+        Of the study.
+    planned : sequence of Run
+        All runs of the study, as far as they are known. The places of others are read from their files.
 
     Raises
     ------
@@ -40,7 +47,10 @@ def run_order(folder: Path) -> list[tuple[int, str]]:
     """
     if not (folder / STUDY_NAME).is_file():
         raise FileError(f"'{folder}' holds no study: give the folder that `palpate sweep` wrote.")
-    return sorted((read_run_record(folder / RUNS / digest).index, digest) for digest in done_runs(folder))
+    done = done_runs(folder)
+    order = [(run.index, run.digest) for run in planned if run.digest in done]
+    known = {digest for _, digest in order}
+    return sorted(order + [(read_run_record(folder / RUNS / digest).index, digest) for digest in done - known])
 
 
 def finished_runs(folder: Path, order: list[tuple[int, str]] | None = None) -> Iterator[RunRecord]:

@@ -65,7 +65,7 @@ class LeRobotWriter:
         self._data = _FileSeries(root, DATA_PATH, self._schema, first.features)
         self._episodes: _FileSeries | None = None
         self._episode_rows: list[dict[str, Any]] = []
-        self._waiting: list[pyarrow.RecordBatch] = []
+        self._waiting: list[dict[str, Any]] = []
         self._waiting_bytes = 0
         self._statistics = {item.name: RunningStatistics() for item in first.features if item.dtype != "string"}
         self._statistics |= {name: RunningStatistics() for name in INDEX_COLUMNS}
@@ -76,7 +76,7 @@ class LeRobotWriter:
     def add(self, run: RunRecord, frames: RunFrames) -> None:
         """Append the frames of a run."""
         count = len(frames.times)
-        columns = {
+        columns: dict[str, Any] = {
             "timestamp": frames.times.astype(np.float32),
             "frame_index": np.arange(count),
             "episode_index": np.full(count, self._runs),
@@ -84,10 +84,8 @@ class LeRobotWriter:
             "task_index": np.zeros(count, dtype=np.int64),
             **frames.columns,
         }
-        for name, statistics in self._statistics.items():
-            statistics.add(columns[name])
-        self._waiting.append(_batch(self._schema, self._features, columns, count))
-        self._waiting_bytes += self._waiting[-1].nbytes
+        self._waiting.append(columns)
+        self._waiting_bytes += sum(values.nbytes for values in columns.values() if isinstance(values, np.ndarray))
         chunk, file = self._data.place
         episode = {
             "episode_index": self._runs,
@@ -129,11 +127,22 @@ class LeRobotWriter:
         _write_json(meta / "stats.json", {name: found.result() for name, found in self._statistics.items()})
 
     def _flush_frames(self) -> None:
+        """Write the waiting runs as one group of rows, and take them into account in the statistics."""
         import pyarrow
 
-        if self._waiting:
-            self._data.write(pyarrow.Table.from_batches(self._waiting))
-            self._waiting, self._waiting_bytes = [], 0
+        if not self._waiting:
+            return
+        columns: dict[str, Any] = {}
+        for name in [*INDEX_COLUMNS, *(item.name for item in self._features)]:
+            parts = [one[name] for one in self._waiting]
+            if isinstance(parts[0], str):
+                columns[name] = [part for one, part in zip(self._waiting, parts) for _ in range(len(one["index"]))]
+            else:
+                columns[name] = np.concatenate(parts)
+        self._waiting, self._waiting_bytes = [], 0
+        for name, statistics in self._statistics.items():
+            statistics.add(columns[name])
+        self._data.write(pyarrow.Table.from_batches([_batch(self._schema, self._features, columns)]))
 
     def _flush_episodes(self) -> None:
         import pyarrow
@@ -225,12 +234,15 @@ def _encodings(features: tuple[Feature, ...]) -> dict[str, Any]:
     """Return how columns are encoded.
 
     The bytes of numbers that change from frame to frame are split by their place in the number, which makes them compress
-    better; numbers that repeat become a dictionary.
+    better; of numbers that count up, the differences are stored; numbers that repeat become a dictionary.
     """
+    if not features:
+        return {}
     floats = [item for item in features if item.dtype == "float32"]
-    split = [item.name + ".list.element" * len(item.shape) for item in floats]
+    encodings = {item.name + ".list.element" * len(item.shape): "BYTE_STREAM_SPLIT" for item in floats}
+    encodings |= dict.fromkeys(("index", "frame_index"), "DELTA_BINARY_PACKED")
     names = [item.name for item in features if item.is_constant] + ["episode_index", "task_index"]
-    return {"use_dictionary": names, "use_byte_stream_split": split} if features else {}
+    return {"use_dictionary": names, "column_encoding": encodings}
 
 
 def _schema(features: tuple[Feature, ...]) -> pyarrow.Schema:
@@ -253,16 +265,13 @@ def _arrow_type(feature: Feature) -> pyarrow.DataType:
     return kind
 
 
-def _batch(schema: pyarrow.Schema, features: tuple[Feature, ...], columns: dict[str, Any], count: int) -> pyarrow.RecordBatch:
+def _batch(schema: pyarrow.Schema, features: tuple[Feature, ...], columns: dict[str, Any]) -> pyarrow.RecordBatch:
     import pyarrow
 
     arrays = [pyarrow.array(columns[name]) for name in INDEX_COLUMNS]
     for feature in features:
         values = columns[feature.name]
-        if isinstance(values, str):
-            arrays.append(pyarrow.array([values] * count, pyarrow.string()))
-        else:
-            arrays.append(_nested(values, feature))
+        arrays.append(pyarrow.array(values, pyarrow.string()) if feature.dtype == "string" else _nested(values, feature))
     return pyarrow.record_batch(arrays, schema=schema)
 
 

@@ -63,7 +63,7 @@ def write_report(folder: Path, planned: Sequence[Run] = ()) -> None:
     FileError
         There is no study, a run is damaged, or the page cannot be written.
     """
-    order, failed = run_order(folder), failures(folder, planned)
+    order, failed = run_order(folder, planned), failures(folder, planned)
     columns = _columns(folder, order)
     found = dependencies(columns.values, columns.metrics)
     with temporary_folder(folder, "report") as hidden:

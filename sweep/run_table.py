@@ -8,12 +8,15 @@ from __future__ import annotations
 
 import csv
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ..core.errors import FileError
 from ..core.io.file_writing import atomic_write
 from ..core.study.run_record import RunRecord, Value
 from .finished_runs import FailedRun, finished_runs
+
+if TYPE_CHECKING:
+    import pyarrow
 
 TABLE_NAME, TIMINGS_NAME = "runs.parquet", "timings.csv"
 FINISHED, FAILED = "finished", "failed"
@@ -35,41 +38,46 @@ def write_run_table(folder: Path, order: list[tuple[int, str]], failed: list[Fai
     import pyarrow
     from pyarrow import parquet
 
-    schema = _schema(folder, order, failed)
-    with (
-        atomic_write(folder / TABLE_NAME) as table_path,
-        atomic_write(folder / TIMINGS_NAME) as timings_path,
-        open(timings_path, "w", newline="", encoding="utf-8") as timings,
-        parquet.ParquetWriter(table_path, schema, compression="zstd") as writer,
-    ):
+    varied: dict[str, Any] = {}
+    metrics: set[str] = set()
+    parts: list[pyarrow.Table] = []
+    waiting: list[dict[str, Any]] = []
+    with atomic_write(folder / TIMINGS_NAME) as timings_path, open(timings_path, "w", newline="", encoding="utf-8") as timings:
         lines = csv.writer(timings, lineterminator="\n")
         lines.writerow(["run", "digest", "seconds"])
-        waiting: list[dict[str, Any]] = []
         for run in finished_runs(folder, order):
             lines.writerow([run.index, run.digest, f"{run.seconds:.6g}"])
+            _note_kinds(varied, run.values, run.folder)
+            metrics.update(run.metrics)
             waiting.append(_row(run))
             if len(waiting) >= ROWS_AT_ONCE:
-                writer.write_table(pyarrow.Table.from_pylist(waiting, schema))
+                parts.append(pyarrow.Table.from_pylist(waiting, _schema(varied, metrics)))
                 waiting = []
-        waiting += [_failed_row(run) for run in failed]
-        writer.write_table(pyarrow.Table.from_pylist(waiting, schema))
+        for lost in failed:
+            _note_kinds(varied, lost.values, folder)
+            waiting.append(_failed_row(lost))
+    schema = _schema(varied, metrics)  # of all: names that no run had before are null in the parts before
+    parts.append(pyarrow.Table.from_pylist(waiting, schema))
+    with atomic_write(folder / TABLE_NAME) as path, parquet.ParquetWriter(path, schema, compression="zstd") as writer:
+        for part in parts:
+            writer.write_table(_with_columns(part, schema))
 
 
-def _schema(folder: Path, order: list[tuple[int, str]], failed: list[FailedRun]) -> Any:
-    """Return the columns: all names that occur in any run, in the order in which they first occur."""
+def _schema(varied: dict[str, Any], metrics: set[str]) -> pyarrow.Schema:
+    """Return the columns: what was varied in the order of the study, and metrics by name, as runs differ in which they have."""
     import pyarrow
 
-    varied: dict[str, Any] = {}
-    metrics: dict[str, Any] = {}
-    for run in finished_runs(folder, order):
-        _note_kinds(varied, run.values, run.folder)
-        metrics |= dict.fromkeys(run.metrics)
-    for lost in failed:
-        _note_kinds(varied, lost.values, folder)
     fixed = [("run", pyarrow.int64()), *((name, pyarrow.string()) for name in ("digest", "status", "message"))]
     own = [(f"varied.{name}", kind) for name, kind in varied.items()]
-    # The names of metrics are sorted, because the first run need not have all of them.
     return pyarrow.schema([*fixed, *own, *((f"metric.{name}", pyarrow.float64()) for name in sorted(metrics))])
+
+
+def _with_columns(table: pyarrow.Table, schema: pyarrow.Schema) -> pyarrow.Table:
+    """Return a table with all columns of a schema, in its order."""
+    import pyarrow
+
+    columns = [table[item.name] if item.name in table.column_names else pyarrow.nulls(len(table), item.type) for item in schema]
+    return pyarrow.table(columns, schema=schema)
 
 
 def _note_kinds(kinds: dict[str, Any], values: dict[str, Value], folder: Path) -> None:

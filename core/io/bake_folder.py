@@ -14,7 +14,7 @@ import os
 import re
 import zlib
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
@@ -194,16 +194,22 @@ def write_manifest(folder: str | os.PathLike, manifest: Manifest, atomic: bool =
     ValueError
         A number is not finite or a parameter is no JSON value (a fault of the program, not of the user).
     """
-    content = {"format": MANIFEST_FORMAT, **asdict(manifest)}
+    path = Path(folder) / MANIFEST_NAME
+    content = manifest_bytes(manifest)
+    with write_file(path, atomic) as temporary:
+        temporary.write_bytes(content)
+    return path
+
+
+def manifest_bytes(manifest: Manifest) -> bytes:
+    """Return the content of ``manifest.json``; raises ValueError as :func:`write_manifest`."""
+    content = {"format": MANIFEST_FORMAT, **{item.name: getattr(manifest, item.name) for item in fields(manifest)}}
     try:
         content[OWN_DIGEST] = _own_digest(content)
         text = json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False)
     except TypeError as error:
         raise ValueError(f"the manifest of '{manifest.sensor}' holds something that is not JSON: {error}") from error
-    path = Path(folder) / MANIFEST_NAME
-    with write_file(path, atomic) as temporary:
-        temporary.write_bytes((text + "\n").encode("utf-8", "surrogatepass"))
-    return path
+    return (text + "\n").encode("utf-8", "surrogatepass")
 
 
 def read_manifest(folder: str | os.PathLike) -> Manifest:

@@ -266,6 +266,21 @@ def sync_file(path: Path) -> None:
         os.fsync(file.fileno())
 
 
+def write_synced(path: Path, content: bytes) -> str:
+    """Write a new file in a folder that nobody reads yet, bring it onto the disk, and return the SHA-256 of its content.
+
+    Raises
+    ------
+    OSError
+        It cannot be written.
+    """
+    with open(path, "wb") as file:
+        file.write(content)
+        file.flush()
+        os.fsync(file.fileno())
+    return hashlib.sha256(content).hexdigest()
+
+
 def file_sha256(path: Path) -> str:
     """Return the SHA-256 of a file's content, 64 hexadecimal digits."""
     digest = hashlib.sha256()

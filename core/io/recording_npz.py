@@ -17,7 +17,7 @@ import numpy as np
 from ..errors import FileError
 from ..model.recording import SENSOR_FIELDS, Recording, SensorRecording, row_blocks
 from .file_writing import os_error_reason
-from .npz import DAMAGED, read_array, write_arrays
+from .npz import DAMAGED, open_archive, read_array, write_arrays
 from .regular_file import open_regular
 
 RECORDING_FORMAT = "palpate-recording/2"
@@ -30,6 +30,17 @@ def save_recording(path: str | os.PathLike, recording: Recording, atomic: bool =
     ------
     FileError
         The file cannot be written.
+    ValueError
+        As :func:`recording_arrays`.
+    """
+    write_arrays(path, recording_arrays(recording), atomic)
+
+
+def recording_arrays(recording: Recording) -> dict[str, np.ndarray]:
+    """Return the members of a recording's file by name.
+
+    Raises
+    ------
     ValueError
         A number is not finite or an array has another number of frames (a fault of the program, not of the user).
     """
@@ -46,8 +57,7 @@ def save_recording(path: str | os.PathLike, recording: Recording, atomic: bool =
             raise ValueError(f"'{name}' of the recording has values that are not finite")
         if array.dtype.kind not in "fiubU":
             raise ValueError(f"'{name}' of the recording has type {array.dtype}")
-
-    write_arrays(path, arrays, atomic)
+    return arrays
 
 
 def load_recording(path: str | os.PathLike) -> Recording:
@@ -62,8 +72,8 @@ def load_recording(path: str | os.PathLike) -> Recording:
     if not file.exists():
         raise FileError(f"'{path}' does not exist: bake first, or choose another file.")
     try:
-        with open_regular(file) as opened, np.load(opened, allow_pickle=False) as members:
-            if not isinstance(members, np.lib.npyio.NpzFile) or "header" not in members.files:
+        with open_regular(file) as opened, open_archive(opened) as members:
+            if "header" not in members.files:
                 raise FileError(f"'{path}' is not a recording of Palpate: choose a recording.npz of a bake.")
             return _recording(path, members)
     except OSError as error:

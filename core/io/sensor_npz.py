@@ -16,7 +16,7 @@ from ..geometry.layout.texture_maps import UVLayout
 from ..geometry.texels import Texels
 from ..model.sensor_parameters import Painted
 from .file_writing import os_error_reason
-from .npz import DAMAGED, write_arrays
+from .npz import DAMAGED, PackedArchive, open_archive, write_arrays
 from .regular_file import open_regular
 
 SENSOR_FORMAT = "palpate-sensor/1"
@@ -34,6 +34,11 @@ def save_sensor(path: str | os.PathLike, texels: Texels, painted: Painted | None
     FileError
         The file cannot be written.
     """
+    write_arrays(path, sensor_arrays(texels, painted), atomic)
+
+
+def sensor_arrays(texels: Texels, painted: Painted | None = None) -> dict[str, np.ndarray]:
+    """Return the members of the file by name."""
     kind = next(name for name, cls in _LAYOUTS.items() if isinstance(texels.layout, cls))
     arrays = {"format": np.array(SENSOR_FORMAT), "layout": np.array(kind)}
     arrays |= {name: np.asarray(getattr(texels, name)) for name in _ARRAYS}
@@ -42,7 +47,7 @@ def save_sensor(path: str | os.PathLike, texels: Texels, painted: Painted | None
         values = getattr(painted, item.name, None)
         if values is not None:
             arrays[f"painted/{item.name}"] = np.asarray(values)
-    write_arrays(path, arrays, atomic)
+    return arrays
 
 
 def load_sensor(path: str | os.PathLike) -> tuple[Texels, Painted]:
@@ -56,19 +61,28 @@ def load_sensor(path: str | os.PathLike) -> tuple[Texels, Painted]:
     if not Path(path).exists():
         raise FileError(f"'{path}' does not exist: bake again with this version.")
     try:
-        with open_regular(path) as opened, np.load(opened, allow_pickle=False) as members:
-            if str(members["format"]) != SENSOR_FORMAT:
-                raise FileError(f"'{path}' is not a '{SENSOR_FORMAT}' file: bake again with this version.")
-            cls = _LAYOUTS[str(members["layout"])]
-            stored = {item.name: f"layout/{item.name}" for item in fields(cls)}
-            layout: Any = cls(**{name: _plain(members[key]) for name, key in stored.items() if key in members.files})
-            texels = Texels(**{name: members[name] for name in _ARRAYS}, layout=layout)
-            found = {item.name: f"painted/{item.name}" for item in fields(Painted)}
-            return texels, Painted(**{name: members[key] for name, key in found.items() if key in members.files})
+        with open_regular(path) as opened, open_archive(opened) as members:
+            return _sensor_in(members)
     except OSError as error:
         raise FileError(f"'{path}' could not be read ({os_error_reason(error)}): choose another file.") from error
     except DAMAGED as error:
         raise FileError(f"'{path}' is damaged or no sensor ({error}): bake again.") from error
+
+
+def unpack_sensor(content: bytes) -> tuple[Texels, Painted]:
+    """Read the content of a small file that :func:`save_sensor` wrote; raises what :data:`.npz.DAMAGED` lists."""
+    return _sensor_in(PackedArchive(content))
+
+
+def _sensor_in(members: Any) -> tuple[Texels, Painted]:
+    if str(members["format"]) != SENSOR_FORMAT:
+        raise ValueError(f"its format is not '{SENSOR_FORMAT}'")
+    cls = _LAYOUTS[str(members["layout"])]
+    stored = {item.name: f"layout/{item.name}" for item in fields(cls)}
+    layout: Any = cls(**{name: _plain(members[key]) for name, key in stored.items() if key in members.files})
+    texels = Texels(**{name: members[name] for name in _ARRAYS}, layout=layout)
+    found = {item.name: f"painted/{item.name}" for item in fields(Painted)}
+    return texels, Painted(**{name: members[key] for name, key in found.items() if key in members.files})
 
 
 def _plain(value: np.ndarray) -> Any:

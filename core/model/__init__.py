@@ -20,5 +20,6 @@ __all__ = [
     "scenario",
     "sensor",
     "sensor_parameters",
+    "shared_results",
     "target",
 ]

@@ -85,9 +85,14 @@ def slip_share(sensor: SensorRecording, parameters: SensorParameters, painted: P
     -------
     (F,) float
     """
+    return share_on(slipping(sensor, parameters, painted), sensor)
+
+
+def share_on(chosen: np.ndarray, sensor: SensorRecording) -> np.ndarray:
+    """Return the share (F,) of the normal force that acts on the texels that `chosen` (F, n) tells; zero without contact."""
     total = sensor.normal_force.sum(axis=1)
-    loose = np.where(slipping(sensor, parameters, painted), sensor.normal_force, 0.0).sum(axis=1)
-    return np.divide(loose, total, out=np.zeros_like(total), where=total > 0)
+    own = np.where(chosen, sensor.normal_force, 0.0).sum(axis=1)
+    return np.divide(own, total, out=np.zeros_like(total), where=total > 0)
 
 
 def free_moment(sensor: SensorRecording | SensorFrame) -> np.ndarray:

@@ -8,12 +8,13 @@ import numpy as np
 from ..effects.engine.compiled_program import compile_program
 from ..effects.engine.sensor_effects import mounted_texels
 from ..geometry.contact_points import ContactPoints
+from ..geometry.mesh import TriangleMesh
 from ..geometry.rotations import rotation_matrices
 from ..laws.contact_law import ContactLaw, contact_law
 from ..laws.series_compliance import coupling
 from ..model.scenario import Scenario
 from ..model.sensor import Sensor
-from ..model.target import Target
+from ..model.shared_results import SharedResults
 from .detection.deforming_surfaces import bounding_sphere, point_rows
 from .detection.neighbour_lists import MAX_RADIUS_SHARE
 from .dynamics.actuators import drive_table
@@ -23,7 +24,9 @@ MAX_PAIR_POINTS = 512
 """Most contact points of a pair, which is what a thread takes at a time."""
 
 
-def build_model(scenario: Scenario, center: np.ndarray, points: list[ContactPoints], dt: float) -> SolverModel:
+def build_model(
+    scenario: Scenario, center: np.ndarray, points: list[ContactPoints], dt: float, shared: SharedResults
+) -> SolverModel:
     """Flatten a scenario into the kernels' arrays.
 
     Parameters
@@ -35,6 +38,7 @@ def build_model(scenario: Scenario, center: np.ndarray, points: list[ContactPoin
         Of each sensor.
     dt : float, seconds
         Length of a step.
+    shared : SharedResults
     """
     rows = [point_rows(mounted_texels(s), p, center[s.body]) for s, p in zip(scenario.sensors, points, strict=True)]
     first_point = np.cumsum([0] + [len(block) for block in rows])
@@ -45,7 +49,7 @@ def build_model(scenario: Scenario, center: np.ndarray, points: list[ContactPoin
         bodies=_bodies(scenario, kind, first_unknown, unknowns),
         sensors=_sensors(scenario, rows, first_point),
         points=_points(scenario, rows, points),
-        pairs=_pairs(scenario, first_point),
+        pairs=_pairs(scenario, first_point, shared),
         drives=_drives(scenario, drive_of, drive_unknown, gains),
         effects=compile_program([sensor.effects for sensor in scenario.sensors], [dt, 0.0]),  # STEP and NOW of effect_kernels
     )
@@ -124,7 +128,7 @@ def _painted_multipliers(sensors: tuple[Sensor, ...], points: list[ContactPoints
     return np.ascontiguousarray(np.column_stack(columns), dtype=float)
 
 
-def _pairs(scenario: Scenario, first_point: np.ndarray) -> Pairs:
+def _pairs(scenario: Scenario, first_point: np.ndarray, shared: SharedResults) -> Pairs:
     sensors, targets = scenario.sensors, scenario.targets
     parts = [  # sensor, target, first point, and the one after the last
         (i, j, first, min(first + MAX_PAIR_POINTS, first_point[i + 1]))
@@ -150,15 +154,18 @@ def _pairs(scenario: Scenario, first_point: np.ndarray) -> Pairs:
         force_share=np.array(share, dtype=float),
         overlap_share=np.array(overlap, dtype=float),
         max_tube_radius=np.array([MAX_RADIUS_SHARE * sensors[i].parameters.max_penetration for i, _, _, _ in parts]),
-        max_list_radius=np.array([_list_radius(sensors[i], targets[j]) for i, j, _, _ in parts]),
+        max_list_radius=np.array([_list_radius(sensors[i], shared.of(_median_edge, targets[j].mesh)) for i, j, _, _ in parts]),
     )
 
 
-def _list_radius(sensor: Sensor, target: Target) -> float:
+def _list_radius(sensor: Sensor, edge: float) -> float:
     """How far around a texel triangles are listed at the most: a tenth of the target's median edge, so that they are few."""
-    a, b, _ = target.mesh.triangles.T
-    edge = np.median(np.linalg.norm(target.mesh.vertices[b] - target.mesh.vertices[a], axis=1))
-    return float(min(0.1 * edge, 0.1 * sensor.parameters.max_penetration))
+    return min(0.1 * edge, 0.1 * sensor.parameters.max_penetration)
+
+
+def _median_edge(mesh: TriangleMesh) -> float:
+    a, b, _ = mesh.triangles.T
+    return float(np.median(np.linalg.norm(mesh.vertices[b] - mesh.vertices[a], axis=1)))
 
 
 def _drives(scenario: Scenario, drive_of: np.ndarray, unknown: np.ndarray, gains: np.ndarray) -> Drives:

@@ -26,7 +26,7 @@ from ..geometry.rotations import rotation_matrices
 from ..model.recording import Recording, SensorRecording
 from ..model.scenario import Scenario
 from ..model.sensor import Sensor
-from ..response.metrics import net_shear, slip_share, slipping
+from ..response.metrics import net_shear, share_on, slipping
 from .presses import Press, place_of
 
 
@@ -65,7 +65,7 @@ def _sensor_metrics(sensor: Sensor, measured: SensorRecording, times: np.ndarray
         "max_shear": float(np.linalg.norm(net_shear(measured, sensor.texels), axis=1).max()),
         "max_depth": float(measured.depth.max()),
         "max_contact_texels": float(touching.sum(axis=1).max()),
-        "max_slip_share": float(slip_share(measured, sensor.parameters, sensor.painted).max()),
+        "max_slip_share": float(share_on(slips, measured).max()),
         "end_normal_force": float(normal[-1]),
     }
     for name, happens in (("first_contact", touching), ("first_slip", slips)):

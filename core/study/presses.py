@@ -16,6 +16,7 @@ import numpy as np
 from ..errors import SceneError
 from ..geometry.mesh import mass_properties
 from ..geometry.rotations import quaternion_product, quaternions_from_vectors, rotation_matrices
+from ..geometry.texels import Texels
 from ..model.body import Body
 from ..model.drive import Drive
 from ..model.motion import Motion, Signal
@@ -119,7 +120,7 @@ def with_press(scenario: Scenario, press: Press) -> Scenario:
 
 def place_of(scenario: Scenario, press: Press) -> np.ndarray:
     """Return the (3,) place of a press, metres, in the frame of the sensor's body."""
-    return _Frame.at(scenario, _sensor_of(scenario, press), press).place
+    return _place_on(_sensor_of(scenario, press).texels, press)[1]
 
 
 @dataclass(frozen=True)
@@ -134,26 +135,50 @@ class _Frame:
     @classmethod
     def at(cls, scenario: Scenario, sensor: Sensor, press: Press) -> _Frame:
         texels = sensor.texels
-        reached = np.cumsum(texels.area)
-        texel = min(int(np.searchsorted(reached, press.place * reached[-1], side="right")), len(texels) - 1)
-        normal, x_axis, y_axis = texels.normal[texel], texels.tangent[texel], texels.bitangent[texel]
-        side = math.sqrt(float(texels.area[texel]))
-        place = texels.position[texel] + side * ((press.across - 0.5) * x_axis + (press.along - 0.5) * y_axis)
+        texel, place = _place_on(texels, press)
+        normal, x_axis, y_axis = _axes_of(texels, texel)
         leaning = math.cos(press.tilt_direction) * x_axis + math.sin(press.tilt_direction) * y_axis
         # The object stands on the texel's frame and is turned about the axis that leans it.
         lean = quaternions_from_vectors((press.tilt * np.cross(normal, leaning))[None])[0]
         axis = math.cos(press.tilt) * normal + math.sin(press.tilt) * leaning
         sideways = math.cos(press.slide_direction) * x_axis + math.sin(press.slide_direction) * y_axis
-        standing = _quaternion(np.column_stack([x_axis, y_axis, normal]))
+        standing = _quaternion(x_axis, y_axis, normal)
         return cls(place, axis, sideways, quaternion_product(lean[None], standing[None])[0])
 
 
-def _quaternion(rotation: np.ndarray) -> np.ndarray:
-    """Return the (4,) quaternion (w, x, y, z) of a (3, 3) rotation matrix."""
-    from scipy.spatial.transform import Rotation
+def _place_on(texels: Texels, press: Press) -> tuple[int, np.ndarray]:
+    """Return the texel that is pressed, and the (3,) place, m."""
+    reached = np.cumsum(texels.area)
+    texel = min(int(np.searchsorted(reached, press.place * reached[-1], side="right")), len(texels) - 1)
+    side = math.sqrt(float(texels.area[texel]))
+    _, x_axis, y_axis = _axes_of(texels, texel)
+    place = texels.position[texel] + side * ((press.across - 0.5) * x_axis + (press.along - 0.5) * y_axis)
+    return texel, place
 
-    x, y, z, w = Rotation.from_matrix(rotation).as_quat()
-    return np.array([w, x, y, z])
+
+def _axes_of(texels: Texels, texel: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return normal, x axis and y axis of a texel, (3,) each; :attr:`.Texels.bitangent` has the last one of all texels."""
+    normal, x_axis = texels.normal[texel], texels.tangent[texel]
+    return normal, x_axis, np.cross(normal, x_axis)
+
+
+def _quaternion(x_axis: np.ndarray, y_axis: np.ndarray, z_axis: np.ndarray) -> np.ndarray:
+    """Return the (4,) unit quaternion of the rotation that takes the coordinate axes to three (3,) orthogonal unit vectors.
+
+    Of four formulas, the one that divides by the largest number is taken (Shepperd, J. Guidance and Control 1, 1978).
+    """
+    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = x_axis.tolist(), y_axis.tolist(), z_axis.tolist()
+    trace = xx + yy + zz
+    largest = max(trace, xx, yy, zz)
+    if largest == trace:
+        found = (1.0 + trace, yz - zy, zx - xz, xy - yx)
+    elif largest == xx:
+        found = (yz - zy, 1.0 + xx - yy - zz, yx + xy, zx + xz)
+    elif largest == yy:
+        found = (zx - xz, yx + xy, 1.0 - xx + yy - zz, zy + yz)
+    else:
+        found = (xy - yx, zx + xz, zy + yz, 1.0 - xx - yy + zz)
+    return np.array(found) / math.sqrt(sum(one * one for one in found))
 
 
 def _phases(press: Press) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

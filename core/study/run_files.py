@@ -21,15 +21,29 @@ from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
+
 from ..errors import FileError
-from ..io.bake_folder import MANIFEST_NAME, RECORDING_NAME, folder_names, write_manifest
-from ..io.file_writing import atomic_write, file_sha256, os_error_reason, sync_file, sync_folder, writable_folder
-from ..io.recording_npz import save_recording
+from ..geometry.texels import Texels
+from ..io.bake_folder import MANIFEST_NAME, RECORDING_NAME, folder_names, manifest_bytes
+from ..io.file_writing import (
+    atomic_write,
+    file_sha256,
+    os_error_reason,
+    sync_file,
+    sync_folder,
+    writable_folder,
+    write_synced,
+)
+from ..io.npz import PACKED_BYTES, pack_arrays, write_arrays
+from ..io.recording_npz import recording_arrays
 from ..io.sensor_manifest import manifest_of
-from ..io.sensor_npz import SENSOR_NAME, save_sensor
+from ..io.sensor_npz import SENSOR_NAME, sensor_arrays
 from ..io.temporary_folder import remove_unfinished, temporary_folder
 from ..model.recording import Recording
 from ..model.scenario import Scenario
+from ..model.sensor_parameters import Painted
+from ..model.shared_results import SharedResults
 from .run_images import write_run_images
 from .run_record import RUN_NAME, RunRecord, write_run_record
 from .study_file import Run
@@ -79,6 +93,7 @@ def write_run(
     metrics: Mapping[str, float],
     seconds: float,
     images: bool = False,
+    shared: SharedResults | None = None,
 ) -> None:
     """Write a run as a whole; a failure of it that was written earlier is removed.
 
@@ -95,6 +110,8 @@ def write_run(
         That computing took.
     images : bool
         Whether each frame of each sensor also gets a tactile image.
+    shared : SharedResults, optional
+        Of the runs of this process, in which files that are alike are kept.
 
     Raises
     ------
@@ -116,7 +133,7 @@ def write_run(
         )
         try:
             place.mkdir()
-            _write_sensors(place, scenario, recording, images)
+            _write_sensors(place, scenario, recording, images, shared or SharedResults())
             write_run_record(record)
             sync_folder(place)
             os.rename(place, runs / run.digest)
@@ -131,7 +148,7 @@ def write_run(
         (folder / FAILED / f"{run.digest}.txt").unlink(missing_ok=True)
 
 
-def _write_sensors(place: Path, scenario: Scenario, recording: Recording, images: bool) -> None:
+def _write_sensors(place: Path, scenario: Scenario, recording: Recording, images: bool, shared: SharedResults) -> None:
     """Write the files of each sensor and bring them onto the disk."""
     names = folder_names(recording.sensors)
     for sensor in scenario.sensors:
@@ -139,15 +156,31 @@ def _write_sensors(place: Path, scenario: Scenario, recording: Recording, images
             continue
         own = place / names[sensor.name]
         own.mkdir()
-        save_recording(own / RECORDING_NAME, replace(recording, sensors={sensor.name: recording.sensors[sensor.name]}), False)
-        save_sensor(own / SENSOR_NAME, sensor.texels, sensor.painted, atomic=False)
-        pictures = write_run_images(own, sensor, recording) if images else []
-        written = (RECORDING_NAME, SENSOR_NAME, *pictures[-1:])  # the last one lists the others
-        files = {name: file_sha256(own / name) for name in written}
-        write_manifest(own, manifest_of(scenario, sensor, recording, files), atomic=False)
-        for name in (RECORDING_NAME, SENSOR_NAME, MANIFEST_NAME, *pictures):
-            sync_file(own / name)
+        arrays = recording_arrays(replace(recording, sensors={sensor.name: recording.sensors[sensor.name]}))
+        files = {
+            RECORDING_NAME: _write_recording(own / RECORDING_NAME, arrays),
+            SENSOR_NAME: write_synced(own / SENSOR_NAME, shared.of(_sensor_bytes, sensor.texels, sensor.painted)),
+        }
+        if images:
+            pictures = write_run_images(own, sensor, recording)
+            files[pictures[-1]] = file_sha256(own / pictures[-1])  # it lists the others
+            for name in pictures:
+                sync_file(own / name)
+        write_synced(own / MANIFEST_NAME, manifest_bytes(manifest_of(scenario, sensor, recording, files)))
         sync_folder(own)
+
+
+def _write_recording(path: Path, arrays: Mapping[str, np.ndarray]) -> str:
+    """Write a recording, bring it onto the disk, and return its SHA-256."""
+    if sum(array.nbytes for array in arrays.values()) <= PACKED_BYTES:
+        return write_synced(path, pack_arrays(arrays))
+    write_arrays(path, arrays, atomic=False)
+    sync_file(path)
+    return file_sha256(path)
+
+
+def _sensor_bytes(texels: Texels, painted: Painted) -> bytes:
+    return pack_arrays(sensor_arrays(texels, painted))
 
 
 def write_failure(folder: Path, digest: str, sentence: str, details: str = "") -> None:

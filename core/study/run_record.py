@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import FileError
-from ..io.file_writing import os_error_reason, sync_file
+from ..io.file_writing import os_error_reason, write_synced
 from ..io.regular_file import read_bytes
 
 RUN_FORMAT = "palpate-run/1"
@@ -70,10 +70,8 @@ def write_run_record(record: RunRecord) -> None:
         "frames": record.frames,
         "sensors": list(record.sensors),
     }
-    file = record.folder / RUN_NAME
     text = json.dumps(content, ensure_ascii=False, allow_nan=False) + "\n"
-    file.write_bytes(text.encode("utf-8", "surrogatepass"))
-    sync_file(file)
+    write_synced(record.folder / RUN_NAME, text.encode("utf-8", "surrogatepass"))
 
 
 def read_run_record(folder: Path) -> RunRecord:

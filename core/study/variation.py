@@ -42,6 +42,7 @@ from ..model.parameter import ChoiceParameter, Parameter, Specification, TextPar
 from ..model.scenario import Scenario
 from ..model.sensor import Sensor
 from ..model.sensor_parameters import SENSOR_PARAMETERS
+from ..model.shared_results import SharedResults
 from .presses import PRESS_PARAMETERS, Press, with_press
 
 AXES = ("x", "y", "z")
@@ -201,6 +202,7 @@ def varied_scenario(
     values: Mapping[str, Any],
     press: Press | None = None,
     meshes: Mapping[str, TriangleMesh] | None = None,
+    shared: SharedResults | None = None,
 ) -> Scenario:
     """Return a scenario with the values of one run.
 
@@ -214,13 +216,15 @@ def varied_scenario(
         The numbers of the study's press that do not vary.
     meshes : mapping of str to TriangleMesh, optional
         The shapes of targets by the names of their files.
+    shared : SharedResults, optional
+        Of the runs of this process.
 
     Raises
     ------
     PalpateError
         A value is not possible, or the scenario does not make a run with it.
     """
-    known = variables_of(scenario, press is not None)
+    known = (shared or SharedResults()).of(variables_of, scenario, press is not None)
     grouped: dict[str, list[tuple[tuple[str, ...], Any]]] = {}
     for name, value in values.items():
         found = variable(name, known, scenario)
@@ -282,7 +286,8 @@ def _with_shapes(scenario: Scenario, grouped: Mapping[str, list], meshes: Mappin
         if target.deformation is not None:
             raise PalpateError(f"'{target.name}' deforms, so its {' and '.join(own)} cannot vary: leave it out of the study.")
         mesh = _mesh_called(own["mesh"], target.name, meshes) if "mesh" in own else target.mesh
-        mesh = replace(mesh, vertices=mesh.vertices * own.get("scale", 1.0))
+        if own.get("scale", 1.0) != 1.0:
+            mesh = replace(mesh, vertices=mesh.vertices * own["scale"])
         targets[index] = target = replace(target, mesh=mesh)
         body = bodies[target.body]
         if body.moved_by_forces and body.name == target.name:

@@ -26,7 +26,7 @@ from palpate.core.geometry.layout.grid_layout import GridLayout
 from palpate.core.geometry.layout.texture_maps import uv_layout
 from palpate.core.geometry.mesh import TriangleMesh
 from palpate.core.geometry.texels import texels_from_region
-from palpate.core.io import exr_backend, exr_codec, exr_library, file_writing
+from palpate.core.io import exr_backend, exr_codec, exr_library, file_writing, npz
 from palpate.core.io.bake_folder import (
     OWN_DIGEST,
     Manifest,
@@ -58,6 +58,24 @@ def one_sentence(error, *words):
 
 
 # --- writing whole files
+
+
+def test_archives_made_in_memory_are_those_that_are_written_member_by_member(tmp_path, monkeypatch):
+    """`zipfile` is the reference: large archives are written by it, and small ones have the same bytes."""
+    random = np.random.default_rng(5)
+    arrays = {
+        "header": np.array("Ü"), "sensor_0/force": random.random((7, 84, 2)), "empty": np.zeros((0, 3)),
+        "number": np.array(3.0), "ü": np.arange(5), "touch": random.random(9) > 0.5, "turned": random.random((4, 5)).T,
+    }  # fmt: skip
+    for compress in (True, False):
+        npz.write_arrays(tmp_path / "small.npz", arrays, compress=compress)
+        with monkeypatch.context() as patch:
+            patch.setattr(npz, "PACKED_BYTES", -1)
+            npz.write_arrays(tmp_path / "large.npz", arrays, compress=compress)
+        assert (tmp_path / "small.npz").read_bytes() == (tmp_path / "large.npz").read_bytes()
+    with np.load(tmp_path / "small.npz") as members:
+        for name, array in arrays.items():
+            np.testing.assert_array_equal(members[name], array)
 
 
 def test_new_and_replaced_file(tmp_path):

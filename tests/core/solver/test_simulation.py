@@ -12,11 +12,14 @@ from solver_scenes import GRAVITY, LEVEL, about, box, cube_on_pad, free_body, pa
 
 from palpate.core.errors import PalpateError
 from palpate.core.geometry.rotations import quaternion_product, rotation_matrices
+from palpate.core.jobs.job_runner import run_job
 from palpate.core.model.body import Body
 from palpate.core.model.motion import Motion
 from palpate.core.model.sensor import Sensor
 from palpate.core.model.sensor_parameters import SensorParameters
+from palpate.core.model.shared_results import SharedResults
 from palpate.core.model.target import Target
+from palpate.core.solver import simulation as simulation_module
 from palpate.core.solver.simulation import Simulation, run, solve
 
 STIFF_FRICTION = {"sigma0": 1e3, "sigma1": 10.0, "x0": 0.01}
@@ -417,6 +420,46 @@ def test_learning_the_motion_frame_by_frame_gives_the_same_bits():
         assert np.array_equal(frame.sensors["pad"].shear, known.sensors["pad"].shear[i])
         assert np.array_equal(frame.sensors["pad"].normal_force, known.sensors["pad"].normal_force[i])
         assert np.array_equal(frame.poses, known.poses[i])
+
+
+@pytest.mark.parametrize("interpolation", ["linear", "smooth"])
+def test_poses_of_many_frames_at_once_are_those_of_each_frame(monkeypatch, interpolation):
+    """Bit by bit, also where a frame has a single step and where the last block is not full."""
+    times = np.array([0.0, 0.03, 0.1, 0.35])
+    positions = np.cumsum(np.random.default_rng(3).normal(0, 0.01, (4, 3)), axis=0)
+    quaternions = np.array([about((1, 2, 3), angle) for angle in (0.0, 20.0, -70.0, 10.0)])
+    scenario = pressed(box(0.03, 0.02, 0.02), [[0.0, 0.0, 0.0093]])
+    moving = replace(scenario.bodies[1], motion=Motion(times, positions, quaternions))
+    bodies = (scenario.bodies[0], moving, *scenario.bodies[2:])
+    for dt in (None, 1.0):
+        scenario = replace(scenario, bodies=bodies, frame_end=9, dt=dt, interpolation=interpolation)
+        paths = []
+        for rows in (0, 30, 10_000):
+            monkeypatch.setattr(simulation_module, "PATH_ROWS", rows)
+            simulation = Simulation(scenario)
+            paths.append([simulation._prescribed_motion(frame) for frame in range(scenario.frame_start, scenario.frame_end)])
+        for path in paths[1:]:
+            for own, alone in zip(path, paths[0], strict=True):
+                for values, expected in zip(own, alone, strict=True):
+                    np.testing.assert_array_equal(values, expected)
+
+
+def test_simulations_that_share_what_is_alike_give_the_same_bits():
+    """Trees of the targets are built once; another stiffness, and another shape in between, are not mixed up."""
+    base, shared = cube_on_pad(1.0, frames=3), SharedResults()
+    softer = replace(base, sensors=(replace(base.sensors[0], parameters=replace(base.sensors[0].parameters, k=500.0)),))
+    mesh = replace(base.targets[0].mesh, vertices=1.1 * base.targets[0].mesh.vertices)
+    larger = replace(base, targets=(replace(base.targets[0], mesh=mesh),))
+    trees = []
+    for scenario in (base, softer, larger, base):
+        simulation = Simulation(scenario, shared=shared)
+        trees.append(simulation.arrays[1].tree)
+        together, alone = run_job(solve(scenario, simulation)), run(scenario)
+        for name in ("normal_force", "shear", "depth"):
+            values, expected = (getattr(found.sensors["pad"], name) for found in (together, alone))
+            np.testing.assert_array_equal(values, expected)
+        np.testing.assert_array_equal(together.poses, alone.poses)
+    assert trees[0] is trees[1] is trees[3] is not trees[2]
 
 
 def test_neighbour_lists_change_nothing():
