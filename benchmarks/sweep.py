@@ -22,14 +22,13 @@ from solver_scenes import shape
 
 from palpate.core.geometry.texels import texels_from_region
 from palpate.core.io.scenario_npz import save_scenario
-from palpate.core.jobs.job_runner import run_job
 from palpate.core.model.body import Body
 from palpate.core.model.motion import Motion
 from palpate.core.model.scenario import Scenario
 from palpate.core.model.sensor import Sensor
 from palpate.core.model.sensor_parameters import SensorParameters
 from palpate.core.model.target import Target
-from palpate.core.solver.simulation import Simulation, solve
+from palpate.core.solver.simulation import Simulation
 from palpate.core.study.design import points_of
 from palpate.core.study.run_files import SCENES, STUDY_NAME, make_folders
 from palpate.core.study.study_file import Run, plan_for, read_study
@@ -116,7 +115,7 @@ def shares(name: str, hold: float) -> Iterator[dict]:
         def bare(number: int) -> float:
             part = slice(number * RUNS, (number + 1) * RUNS)
             for scenario in scenarios[part]:
-                run_job(solve(scenario, Simulation(scenario, threads=1)))
+                Simulation(scenario, threads=1).advance_all()
             return sum(lengths[part])
 
         def whole(number: int) -> float:

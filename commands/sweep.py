@@ -82,6 +82,7 @@ def run(arguments: argparse.Namespace) -> int:
         if not place.is_dir() or arguments.begin or arguments.dry_run or arguments.list:
             raise PalpateError("--part computes runs of a study that has begun: give its folder, and --begin before that.")
         return _compute(_opened(place, folder, arguments), arguments)
+    is_new = not folder.exists()
     lock = FolderLock(writable_folder(folder, create=not place.is_dir()), "sweep")
     try:
         opened = _opened(place, folder, arguments)
@@ -94,6 +95,8 @@ def run(arguments: argparse.Namespace) -> int:
         return _estimate(opened, arguments) if arguments.dry_run else _compute(opened, arguments)
     finally:
         lock.release()
+        if is_new:
+            _remove_unless_begun(folder)
 
 
 def _count(text: str) -> int:
@@ -132,6 +135,18 @@ def _opened(place: Path, folder: Path, arguments: argparse.Namespace) -> OpenStu
     if place.is_dir():
         return study_folder.resume_study(folder)
     return study_folder.begin_study(place, folder, read)
+
+
+def _remove_unless_begun(folder: Path) -> None:
+    """Remove the folder that was made for a study which was then refused, if nothing but Palpate's own mark is in it."""
+    from contextlib import suppress
+
+    from ..core.io.private_folder import PRIVATE_FOLDER, find_private_folder, remove_tree
+
+    if [path.name for path in folder.iterdir()] == [PRIVATE_FOLDER] and find_private_folder(folder) is not None:
+        remove_tree(folder / PRIVATE_FOLDER)
+        with suppress(OSError):
+            folder.rmdir()
 
 
 def _print_names(opened: OpenStudy) -> None:

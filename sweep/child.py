@@ -78,14 +78,13 @@ def compute_run(scenes: Scenes, run: Run) -> None:
     """
     from dataclasses import replace
 
-    from ..core.jobs.job_runner import run_job
-    from ..core.solver.simulation import Simulation, solve
+    from ..core.solver.simulation import Simulation
 
     began = time.perf_counter()
     plan = scenes.plan(run.scene)
     values = {**plan.fixed, **{name: value for name, value in run.values.items() if name != SCENE}}
     scenario = scenes.scenario(run.scene, values)
-    recording = run_job(solve(scenario, Simulation(scenario, threads=1, shared=scenes.shared)))
+    recording = Simulation(scenario, threads=1, shared=scenes.shared).advance_all()
     made: Press | None = plan.press
     if made is not None:
         start = f"{PRESS}."

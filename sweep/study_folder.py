@@ -4,14 +4,16 @@
 from __future__ import annotations
 
 import glob
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from ..core.errors import FileError
 from ..core.io.bake_folder import folder_names
 from ..core.io.file_writing import atomic_write, file_sha256
+from ..core.io.private_folder import remove_tree
 from ..core.io.scenario_npz import load_scenario, save_scenario
 from ..core.study.mesh_choices import MESHES, StudyMeshes, find_meshes, freeze_meshes
 from ..core.study.run_files import FAILED, RUNS, SCENES, STUDY_NAME, make_folders
@@ -68,9 +70,15 @@ def begin_study(file: Path, folder: Path, read_blend: ReadBlend) -> OpenStudy:
         if changed:
             raise FileError(f"'{folder}' belongs to another study ({'; '.join(changed)}): give another folder with --out.")
         _check_sources(opened, sources, file.parent, read_blend)
-        return opened
+        return replace(opened, study=replace(opened.study, run_limit=study.run_limit))  # no result depends on it
     if folder.exists() and (not folder.is_dir() or {path.name for path in folder.iterdir()} - _OWN):
         raise FileError(f"'{folder}' holds other files and no study: give a new or empty folder with --out.")
+    with _whole_or_nothing(folder):
+        return _frozen(study, file, folder, sources, read_blend)
+
+
+def _frozen(study: Study, file: Path, folder: Path, sources: Mapping[str, Path], read_blend: ReadBlend) -> OpenStudy:
+    """Freeze a study with its scenes and meshes in a folder; its own file comes last."""
     mesh_files = find_meshes(study.vary, file.parent)
     make_folders(folder)
     meshes = StudyMeshes(folder / SCENES / MESHES, freeze_meshes(mesh_files, folder / SCENES / MESHES))
@@ -89,6 +97,18 @@ def begin_study(file: Path, folder: Path, read_blend: ReadBlend) -> OpenStudy:
     with atomic_write(folder / STUDY_NAME) as fresh:
         fresh.write_text(text, encoding="utf-8", newline="\n")
     return OpenStudy(folder, study, plans, runs)
+
+
+@contextmanager
+def _whole_or_nothing(folder: Path) -> Iterator[None]:
+    """Remove what a beginning has written when it is refused: what was in the folder before stays."""
+    made = [folder / name for name in (RUNS, FAILED, SCENES) if not (folder / name).exists()]
+    try:
+        yield
+    except BaseException:
+        for path in made:
+            remove_tree(path)
+        raise
 
 
 def resume_study(folder: Path) -> OpenStudy:

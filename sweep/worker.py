@@ -67,6 +67,11 @@ class Child:
         return json.loads(line) if line else None
 
     @property
+    def process_id(self) -> int:
+        """Number of the process."""
+        return self._process.pid
+
+    @property
     def is_alive(self) -> bool:
         """Whether it can take a run."""
         return self._process.poll() is None

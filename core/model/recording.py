@@ -169,6 +169,20 @@ class Recording:
             step_reason=step_reason,
         )
 
+    @classmethod
+    def joined(cls, parts: Sequence[Recording]) -> Recording:
+        """Return the recording of parts that follow each other; what concerns the whole run is that of the first part."""
+        sensors = {
+            name: SensorRecording(
+                **{key: np.concatenate([getattr(part.sensors[name], key) for part in parts]) for key in SENSOR_FIELDS}
+            )
+            for name in parts[0].sensors
+        }
+        own = {
+            key: np.concatenate([getattr(part, key) for part in parts]) for key in ("frames", "times", "poses", "velocities")
+        }
+        return replace(parts[0], sensors=sensors, **own)
+
     def at(self, frame: int) -> Frame:
         """Return one recorded frame by its frame number; raises KeyError when it was not recorded."""
         (found,) = np.nonzero(self.frames == frame)

@@ -21,15 +21,16 @@ class SharedResults:
     """
 
     def __init__(self) -> None:
-        self._kept: dict[Callable[..., Any], dict[tuple[Any, ...], tuple[tuple[Any, ...], Any]]] = {}
+        self._kept: dict[Callable[..., Any], dict[tuple[Any, ...], tuple[Any, Any]]] = {}
 
-    def of(self, function: Callable[Parameters, Result], *arguments: Parameters.args, **_none: Parameters.kwargs) -> Result:
-        """Return ``function(*arguments)``, which is computed if it is none of its last results."""
+    def of(self, function: Callable[Parameters, Result], *arguments: Parameters.args, **named: Parameters.kwargs) -> Result:
+        """Return the function's result for the arguments, which is computed if it is none of the last ones."""
         kept = self._kept.setdefault(function, {})
-        key = tuple(one if isinstance(one, (int, float, str, bytes)) else id(one) for one in arguments)
+        key = tuple(one if isinstance(one, (int, float, str, bytes)) else id(one) for one in (*arguments, *named.values()))
         found = kept.pop(key, None)
         if found is None:
-            found = arguments, function(*arguments)  # the arguments are kept, so that no other object gets their identity
+            # The arguments are kept, so that no other object gets their identity.
+            found = (arguments, named), function(*arguments, **named)
         kept[key] = found  # the last one now
         if len(kept) > MOST_OF_EACH:
             del kept[next(iter(kept))]

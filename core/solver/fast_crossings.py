@@ -43,6 +43,26 @@ class BodiesInFrame(NamedTuple):
     radius: np.ndarray
 
 
+class CrossingLimits(NamedTuple):
+    """How far the bodies of p pairs may move in a step.
+
+    Attributes
+    ----------
+    pairs : (p, 2) int
+        Bodies of the sensor and of the target.
+    limits : (p,) float, metres
+    moved : (b,) bool
+        Bodies that forces move.
+    radius : (b,) float, metres
+        Distance of a body's farthest point from its centre.
+    """
+
+    pairs: np.ndarray
+    limits: np.ndarray
+    moved: np.ndarray
+    radius: np.ndarray
+
+
 class FastCrossings:
     """Looks for targets that cross the surface of a sensor too fast, frame by frame.
 
@@ -57,17 +77,20 @@ class FastCrossings:
 
     def __init__(self, scenario: Scenario, center: np.ndarray):
         self._scenario, self._center = scenario, center
-        self._radius = np.zeros(len(scenario.bodies))
+        radius = np.zeros(len(scenario.bodies))
         for body, points in [(t.body, t.mesh.vertices) for t in scenario.targets] + [
             (s.body, s.texels.position) for s in scenario.sensors
         ]:
             reach = float(np.linalg.norm(points - center[body], axis=1).max())
-            self._radius[body] = max(self._radius[body], reach)
+            radius[body] = max(radius[body], reach)
         self._pairs = [(s, t) for s in scenario.sensors for t in scenario.targets if s.body != t.body]
         self._warned = np.zeros(len(self._pairs), np.bool_)
-        self._bodies = np.array([(s.body, t.body) for s, t in self._pairs], np.int64).reshape(-1, 2)
-        self._limits = np.array([_limit_of(s) for s, _ in self._pairs], float)
-        self._moved = np.array([body.moved_by_forces for body in scenario.bodies])
+        self.limits = CrossingLimits(
+            pairs=np.array([(s.body, t.body) for s, t in self._pairs], np.int64).reshape(-1, 2),
+            limits=np.array([_limit_of(s) for s, _ in self._pairs], float),
+            moved=np.array([body.moved_by_forces for body in scenario.bodies], np.bool_),
+            radius=radius,
+        )
 
     def may_occur(
         self,
@@ -86,8 +109,8 @@ class FastCrossings:
             Positions and quaternions at the beginning and the end of the frame.
         dt : float, seconds
         """
-        bodies = BodiesInFrame(velocities, *before, *after, self._moved, self._radius)
-        return bool(_may_cross(bodies, self._bodies, self._limits, dt))
+        bodies = BodiesInFrame(velocities, *before, *after, self.limits.moved, self.limits.radius)
+        return bool(may_cross(bodies, self.limits.pairs, self.limits.limits, dt))
 
     def warnings(self, frame: int, positions: np.ndarray, quaternions: np.ndarray, dt: float) -> list[str]:
         """Return a sentence for each pair of a sensor and a target that is too fast in this frame and was not before.
@@ -102,7 +125,7 @@ class FastCrossings:
         """
         travel = np.linalg.norm(np.diff(positions, axis=0), axis=2).max(axis=0)
         cosines = np.abs(np.einsum("sbi,sbi->sb", quaternions[1:], quaternions[:-1])).min(axis=0)
-        travel = travel + 2.0 * np.arccos(np.minimum(cosines, 1.0)) * self._radius
+        travel = travel + 2.0 * np.arccos(np.minimum(cosines, 1.0)) * self.limits.radius
         found = []
         for i, (sensor, target) in enumerate(self._pairs):
             limit = _limit_of(sensor)
@@ -151,7 +174,7 @@ def _limit_of(sensor: Sensor) -> float:
 
 
 @kernel
-def _may_cross(bodies: BodiesInFrame, pairs: np.ndarray, limits: np.ndarray, dt: float) -> bool:
+def may_cross(bodies: BodiesInFrame, pairs: np.ndarray, limits: np.ndarray, dt: float) -> bool:
     """Return whether the bodies of any pair (p, 2) together move by its limit (m) in a step: compiled, as each frame asks."""
     for pair in range(len(pairs)):
         if _travel(pairs[pair, 0], bodies, dt) + _travel(pairs[pair, 1], bodies, dt) >= limits[pair]:

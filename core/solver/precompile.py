@@ -121,6 +121,7 @@ def _solve() -> None:
 
     for threads in (1, 2):
         Simulation(scenario(), threads).advance()
+    Simulation(scenario(), 1).advance_all()
 
 
 def compile_effect_laws() -> None:

@@ -22,7 +22,7 @@ from ..geometry.rotations import quaternion_product, rotation_matrices, rotation
 from ..jobs.job_runner import run_job
 from ..jobs.progress import Job, Progress
 from ..model.pose_interpolation import poses_at
-from ..model.recording import Frame, Recording, SensorFrame
+from ..model.recording import BLOCK_BYTES, Frame, Recording, SensorFrame, SensorRecording
 from ..model.scenario import Scenario
 from ..model.shared_results import SharedResults
 from ..response.readings import ReadoutChain
@@ -38,12 +38,14 @@ from .found_contacts import contacts_of
 from .model_builder import build_model, initial_state, texel_starts
 from .parallel_loops import find_all_contacts, help_with_loops
 from .solver_model import DRIVEN, SolverModel, State
-from .substep import FramePath, advance_steps
+from .substep import FramePath, FrameRows, advance_frames, advance_steps
 from .texel_readout import TexelReadout, read_texels
 from .time_step_adviser import plan
 from .workspace import Workspace
 from .workspace_builder import workspace_for
 
+TEXEL_BYTES = 8 * 8
+"""What a frame of a texel takes in memory: forces, friction, depth, slip, contact and reading."""
 PATH_ROWS = 4096
 """Poses of bodies in steps that are computed at once: few enough to stay in a processor's cache."""
 
@@ -172,8 +174,100 @@ class Simulation:
                 self._most_too_deep[:] = self._workspace.contacts.most_too_deep
         self.frame += 1
         if self._fast_crossings.may_occur(velocities, before, (self._state.position, self._state.quaternion), self.dt):
-            self._warn_of_fast_crossings(positions, quaternions, before)
+            self._warn_of_fast_crossings(positions, quaternions, before, (self._state.position, self._state.quaternion))
         return self.observe()
+
+    def advance_all(self) -> Recording:
+        """Go through all frames that are left, and return the recording with the present frame as its first one.
+
+        The numbers are those of :meth:`advance`, bit by bit. Where Python has nothing to do in between, many frames are
+        computed in one call.
+        """
+        if self._deforming_surfaces.any_deforms or self._drive_commands.reads_sensors or self._helpers:
+            frames = [self.observe()]
+            while self.frame < self.scenario.frame_end:
+                frames.append(self.advance())
+            return self._stacked(frames)
+        parts = [self._stacked([self.observe()])]
+        while self.frame < self.scenario.frame_end:
+            parts.append(self._advance_block())
+        parts[0].warnings = tuple(self.warnings)
+        return Recording.joined(parts)
+
+    def _stacked(self, frames: list[Frame]) -> Recording:
+        scenario = self.scenario
+        names = [body.name for body in scenario.bodies]
+        return Recording.stack(frames, names, self.dt, scenario.digest(), self.warnings, self.step_reason)
+
+    def _advance_block(self) -> Recording:
+        """Bring the state some frames on in one call, and return their recording, without what concerns the whole run."""
+        first = self.frame
+        bodies, pairs, texels = len(self._motions), len(self._model.pairs.sensor), int(self._texel_start[-1])
+        most = max(1, BLOCK_BYTES // (texels * TEXEL_BYTES))
+        count = min(most, max(1, PATH_ROWS // ((self.substeps + 1) * bodies)), self.scenario.frame_end - first)
+        times = np.stack([self._step_times(frame) for frame in range(first, first + count)])
+        motion = self._path_along(times)
+        commands = np.stack([self._commands_at(own) for own in times])
+        if first == self.scenario.frame_start:
+            find_all_contacts(-self.dt, *self.arrays)
+            credit_initial_contacts(self._model, self._state, self._workspace)
+        before = self._state.position.copy(), self._state.quaternion.copy()
+        rows = FrameRows.zero(count, texels, len(self.scenario.sensors), bodies, pairs)
+        closed = np.array(self._closed, np.bool_)
+        advance_frames(self.dt, FramePath(*motion, commands), closed, self._fast_crossings.limits, *self.arrays, rows)
+        for i in range(count):
+            self.frame += 1
+            after = rows.position[i], rows.quaternion[i]
+            if rows.may_cross[i]:
+                self._warn_of_fast_crossings(motion[0][i], motion[1][i], before, after)
+            self._warn_of_too_deep(rows.too_deep[i], rows.too_deep_between[i])
+            before = after
+        return self._recorded(first + 1 + np.arange(count), rows)
+
+    def _commands_at(self, times: np.ndarray) -> np.ndarray:
+        """Commands (steps, d, 4) to the drives of a frame, where no controller reads a sensor."""
+        ((_, _, commands),) = self._drive_commands.control_intervals(times, self.dt, self._normal_forces)
+        return commands
+
+    def _readings(self, i: int, times: np.ndarray, force: np.ndarray) -> np.ndarray:
+        """Readings (F, n) of a sensor; frame by frame where effects act on them, whose sums of many frames round otherwise."""
+        if not self.scenario.sensors[i].effects:
+            return self._readers[i].read(times, force)
+        return np.stack([self._readers[i].step(time, own) for time, own in zip(times.tolist(), force, strict=True)])
+
+    def _recorded(self, frames: np.ndarray, rows: FrameRows) -> Recording:
+        """Return the recording of frames that were observed in one call."""
+        times = (frames - self.scenario.frame_start) / self.scenario.fps
+        sensors = {
+            sensor.name: self._sensor_rows(i, times, rows) for i, sensor in enumerate(self.scenario.sensors) if sensor.readout
+        }
+        origin = rows.position
+        if self._center.any():  # as in `observe`, whose sums have an order of their own
+            origin = origin - np.stack([np.einsum("bij,bj->bi", own, self._center) for own in rows.rotation])
+        poses = np.concatenate([origin, rows.quaternion], axis=2)
+        names = tuple(body.name for body in self.scenario.bodies)
+        return Recording(frames, times, sensors, names, poses, rows.velocity, self.dt)
+
+    def _sensor_rows(self, i: int, times: np.ndarray, rows: FrameRows) -> SensorRecording:
+        """Return what one sensor measures in frames that were observed in one call; see :meth:`_sensor_frame`."""
+        own = slice(self._texel_start[i], self._texel_start[i + 1])
+        center, net, moment = self._center[self.scenario.sensors[i].body], rows.net[:, i], rows.moment[:, i]
+        centre_of_pressure = np.zeros((len(times), 3))
+        pressed = moment[:, 3] > 0.0
+        centre_of_pressure[pressed] = moment[pressed, :3] / moment[pressed, 3:] + center
+        force = np.ascontiguousarray(rows.force[:, own])
+        return SensorRecording(
+            normal_force=force,
+            shear=np.ascontiguousarray(rows.shear[:, own]),
+            friction=np.ascontiguousarray(rows.friction[:, own]),
+            depth=np.ascontiguousarray(rows.depth[:, own]),
+            slip=np.ascontiguousarray(rows.slip[:, own]),
+            contact=np.ascontiguousarray(rows.contact[:, own]),
+            reading=self._readings(i, times, force),
+            net_force=net[:, :3].copy(),
+            net_torque=net[:, 3:] + np.cross(center, net[:, :3]),
+            centre_of_pressure=centre_of_pressure,
+        )
 
     def follow_state(self) -> None:
         """Bring to the state what follows from it, after the state of a later frame was put into a new simulation."""
@@ -197,14 +291,18 @@ class Simulation:
         return times
 
     def _warn_of_fast_crossings(
-        self, positions: np.ndarray, quaternions: np.ndarray, before: tuple[np.ndarray, np.ndarray]
+        self,
+        positions: np.ndarray,
+        quaternions: np.ndarray,
+        before: tuple[np.ndarray, np.ndarray],
+        after: tuple[np.ndarray, np.ndarray],
     ) -> None:
-        """Warn of targets that were too fast in the last frame; `before` is where the bodies were at its beginning."""
+        """Warn of targets that were too fast in the last frame; `before` and `after` are where the bodies were around it."""
         positions, quaternions = positions.copy(), quaternions.copy()
         moved = [index for index, body in enumerate(self.scenario.bodies) if body.moved_by_forces]
         if moved:
-            after = self._state.position[moved], self._state.quaternion[moved]
-            path = path_of_moved_bodies((before[0][moved], before[1][moved]), after, self.substeps)
+            ends = ((before[0][moved], before[1][moved]), (after[0][moved], after[1][moved]))
+            path = path_of_moved_bodies(*ends, self.substeps)
             positions[:, moved], quaternions[:, moved] = path
         self.warnings += self._fast_crossings.warnings(self.frame, positions, quaternions, self.dt)
 
@@ -282,17 +380,22 @@ class Simulation:
     def _time_of(self, frame: float) -> float:
         return (frame - self.scenario.frame_start) / self.scenario.fps
 
-    def _warn_of_too_deep(self) -> None:
-        """Say once, at the first frame where it happens, that texels are pressed too deep to act."""
+    def _warn_of_too_deep(self, now: np.ndarray, between: np.ndarray) -> None:
+        """Say once, at the first frame where it happens, that texels are pressed too deep to act.
+
+        Parameters
+        ----------
+        now, between : (q,) int
+            How many contact points of each pair are, at the present frame and in the worst step before it.
+        """
         if any("maximum penetration" in warning for warning in self.warnings):
             return
         sensors, targets, pairs = self.scenario.sensors, self.scenario.targets, self._model.pairs
-        now = np.array([self._count_too_deep(pair) for pair in range(len(pairs.sensor))], np.int64)
-        total = max(now.sum(), self._most_too_deep.sum())
+        total = max(now.sum(), between.sum())
         if total:
             pressed = [  # between frames as well; a large sensor has several pairs with one target
                 f"'{targets[pairs.target[pair]].name}' into '{sensors[pairs.sensor[pair]].name}'"
-                for pair in np.flatnonzero(now + self._most_too_deep)
+                for pair in np.flatnonzero(now + between)
             ]
             what = "texels" if all(sensor.parameters.points_per_texel == 1 for sensor in sensors) else "contact points"
             self.warnings.append(
@@ -318,7 +421,8 @@ class Simulation:
     def observe(self) -> Frame:
         """Return what the sensors measure in the present state."""
         find_all_contacts(-self.dt, *self.arrays)
-        self._warn_of_too_deep()
+        pairs = range(len(self._model.pairs.sensor))
+        self._warn_of_too_deep(np.array([self._count_too_deep(pair) for pair in pairs], np.int64), self._most_too_deep)
         readout = self._read_texels()
         sensors = {
             sensor.name: self._sensor_frame(i, readout) for i, sensor in enumerate(self.scenario.sensors) if sensor.readout
@@ -358,7 +462,8 @@ def _cross(arm: np.ndarray, force: np.ndarray) -> tuple[float, float, float]:
 
 def _prepared_targets(scenario: Scenario, center: np.ndarray, shared: SharedResults) -> tuple[Tree, list[bool]]:
     """Return the tree of all targets, and which of them are closed; the tree of what deforms is the simulation's own."""
-    deforms = any(one.deformation is not None for one in (*scenario.targets, *scenario.sensors))
+    deforms = any(target.deformation is not None for target in scenario.targets)
+    deforms = deforms or any(sensor.deformation is not None for sensor in scenario.sensors)
     centers = np.array([center[target.body] for target in scenario.targets]).tobytes()
     meshes = [target.mesh for target in scenario.targets]
     closed = [shared.of(_is_closed, mesh) for mesh in meshes]

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One frame's substeps (kernels).
+"""The substeps of one frame, or of many frames with what is observed at the end of each (kernels).
 
 In each substep, contacts are found where the bodies are, the velocities at its end are solved for, the bristles are brought
-forward, and the positions follow with those velocities.
+forward, and the positions follow with those velocities. :func:`advance_frames` does what :meth:`.Simulation.advance` does frame
+by frame, where nothing in between needs Python: a frame of a small sensor takes less time than the Python around it.
 """
 
 from __future__ import annotations
@@ -15,11 +16,14 @@ from ..compiled.kernels import inlined, kernel
 from ..geometry.rotations import write_backward_step_motion, write_world_inertia
 from .detection.deformation import refit_boxes, set_moment
 from .detection.detection_data import DetectionData
+from .detection.narrow_phase import count_too_deep
 from .dynamics.actuators import move_drives, place_driven, prepare_driven
 from .dynamics.effect_memory import commit_effect_memory
+from .fast_crossings import BodiesInFrame, CrossingLimits, may_cross
 from .implicit_velocities import solve_velocities
 from .parallel_loops import UPDATE_FRICTION, find_all_contacts, run_parallel_loop
 from .solver_model import DRIVEN, FREE, KEYFRAMED, SolverModel, State
+from .texel_readout import TexelReadout, read_texels
 from .workspace import Workspace
 
 
@@ -40,6 +44,65 @@ class FramePath(NamedTuple):
     quaternion: np.ndarray
     velocity: np.ndarray
     commands: np.ndarray
+
+
+class FrameRows(NamedTuple):
+    """What is observed at the end of each of F frames.
+
+    The first nine are those of :class:`.TexelReadout` with a leading axis of length F; `strongest` is scratch. The others:
+
+    Attributes
+    ----------
+    position, quaternion, velocity : (F, b, 3), (F, b, 4) and (F, b, 6) float
+        Of the :class:`.State`.
+    rotation : (F, b, 3, 3) float
+        Of the bodies.
+    too_deep, too_deep_between : (F, q) int
+        Contact points of each pair that are pressed past their maximum penetration: at the frame, and in the worst step before.
+    may_cross : (F,) bool
+        Whether a target may have been too fast (see :mod:`.fast_crossings`).
+    """
+
+    force: np.ndarray
+    shear: np.ndarray
+    friction: np.ndarray
+    depth: np.ndarray
+    slip: np.ndarray
+    contact: np.ndarray
+    strongest: np.ndarray
+    net: np.ndarray
+    moment: np.ndarray
+    position: np.ndarray
+    quaternion: np.ndarray
+    velocity: np.ndarray
+    rotation: np.ndarray
+    too_deep: np.ndarray
+    too_deep_between: np.ndarray
+    may_cross: np.ndarray
+
+    @classmethod
+    def zero(cls, frames: int, texels: int, sensors: int, bodies: int, pairs: int) -> FrameRows:
+        """Return the rows of frames in which nothing touches."""
+        f, n, b = frames, texels, bodies
+        force, friction, depth, slip = (np.zeros((f, n)) for _ in range(4))
+        return cls(
+            force=force,
+            shear=np.zeros((f, n, 2)),
+            friction=friction,
+            depth=depth,
+            slip=slip,
+            contact=np.zeros((f, n), np.bool_),
+            strongest=np.zeros(n),
+            net=np.zeros((f, sensors, 6)),
+            moment=np.zeros((f, sensors, 4)),
+            position=np.zeros((f, b, 3)),
+            quaternion=np.zeros((f, b, 4)),
+            velocity=np.zeros((f, b, 6)),
+            rotation=np.zeros((f, b, 3, 3)),
+            too_deep=np.zeros((f, pairs), np.int64),
+            too_deep_between=np.zeros((f, pairs), np.int64),
+            may_cross=np.zeros(f, np.bool_),
+        )
 
 
 @kernel
@@ -105,6 +168,76 @@ def advance_steps(
     for body in range(len(model.bodies.kind)):
         write_backward_step_motion(state.velocity[body], dt, workspace.bodies.step_motion[body])
     return worst
+
+
+@kernel
+def advance_frames(
+    dt: float,
+    path: FramePath,
+    closed: np.ndarray,
+    limits: CrossingLimits,
+    model: SolverModel,
+    detection: DetectionData,
+    state: State,
+    workspace: Workspace,
+    rows: FrameRows,
+) -> None:
+    """Run the steps of F frames and observe each; the state is brought forward in place.
+
+    Parameters
+    ----------
+    dt : float, seconds
+    path : FramePath
+        With a leading axis of length F in each array.
+    closed : (T,) bool
+        Which targets are closed.
+    limits : CrossingLimits
+    model : SolverModel
+    detection : DetectionData
+    state : State
+    workspace : Workspace
+    rows : FrameRows
+        Zero at first; written.
+    """
+    steps = path.velocity.shape[1]
+    for frame in range(len(rows.force)):
+        before = max(frame - 1, 0)
+        if frame == 0:  # the first row is free until the frame is observed
+            _copy(state.position, rows.position[0])
+            _copy(state.quaternion, rows.quaternion[0])
+        own = FramePath(path.position[frame], path.quaternion[frame], path.velocity[frame], path.commands[frame])
+        if advance_steps(dt, 0, steps, own, model, detection, state, workspace) > 0:
+            for pair in range(len(model.pairs.sensor)):
+                rows.too_deep_between[frame, pair] = workspace.contacts.most_too_deep[pair]
+        moved = BodiesInFrame(
+            own.velocity, rows.position[before], rows.quaternion[before], state.position, state.quaternion, limits.moved,
+            limits.radius,
+        )  # fmt: skip
+        rows.may_cross[frame] = may_cross(moved, limits.pairs, limits.limits, dt)
+        find_all_contacts(-dt, model, detection, state, workspace)
+        for pair in range(len(model.pairs.sensor)):
+            is_closed = closed[model.pairs.target[pair]]
+            rows.too_deep[frame, pair] = count_too_deep(pair, is_closed, model, detection, state, workspace)
+        for texel in range(len(rows.strongest)):
+            rows.strongest[texel] = -1.0
+        out = TexelReadout(
+            rows.force[frame], rows.shear[frame], rows.friction[frame], rows.depth[frame], rows.slip[frame],
+            rows.contact[frame], rows.strongest, rows.net[frame], rows.moment[frame],
+        )  # fmt: skip
+        read_texels(model, state, workspace, out)
+        _copy(state.position, rows.position[frame])
+        _copy(state.quaternion, rows.quaternion[frame])
+        _copy(state.velocity, rows.velocity[frame])
+        for body in range(len(state.position)):
+            _copy(workspace.bodies.rotation[body], rows.rotation[frame, body])
+
+
+@kernel
+def _copy(values: np.ndarray, out: np.ndarray) -> None:
+    """Write the values (r, c) into `out`, without a temporary array."""
+    for i in range(values.shape[0]):
+        for j in range(values.shape[1]):
+            out[i, j] = values[i, j]
 
 
 @inlined

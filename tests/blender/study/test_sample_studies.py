@@ -28,6 +28,20 @@ def finished(folder, tmp_path, name: str, order, count: int) -> list[dict]:
     return [json.loads((opened.folder / "runs" / run.digest / "run.json").read_bytes()) for run in chosen]
 
 
+def test_presses_are_at_many_places_of_the_fingertip(repository, tmp_path):
+    """Deep and shallow ones: each touches, with the force that its depth gives, and slides as far as it was told."""
+    runs = finished(repository / "docs" / "sample-study", tmp_path, "presses", lambda values: values["press.depth"], 3)
+    places = {tuple(run["metrics"][f"press.{axis}"] for axis in "xyz") for run in runs}
+    assert len(places) == len(runs)
+    for run in runs:
+        values, metrics = run["values"], run["metrics"]
+        assert metrics["max_contact_texels"] >= 1.0 and metrics["max_normal_force"] > 0.0
+        assert 0.0 < metrics["max_depth"] <= values["press.depth"] * 1.001
+        assert metrics["end_normal_force"] == pytest.approx(0.0, abs=1e-9)  # it has gone back
+    shallow, deep = (max(run["metrics"]["max_normal_force"] for run in part) for part in (runs[:3], runs[3:]))
+    assert deep > 2.0 * shallow
+
+
 def test_a_grasp_holds_where_friction_can_bear_the_weight(repository, tmp_path):
     """The fingers bear the weight by friction: it slides where their friction is less, and is held where it is more."""
 

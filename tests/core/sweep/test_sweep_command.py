@@ -22,6 +22,7 @@ from palpate.core.io.recording_npz import load_recording
 from palpate.core.io.scenario_npz import save_scenario
 from palpate.core.io.tactile_exr import read_exr
 from palpate.core.study.run_files import SCENES, done_runs, make_folders, write_failure
+from palpate.sweep.study_folder import begin_study
 from palpate.sweep.worker import compute_batch, end_children
 
 pytest.importorskip("distributed")
@@ -172,7 +173,23 @@ def test_a_misspelt_name_is_one_line_and_begins_nothing(tmp_path):
     refused = sweep(write_study(tmp_path, STUDY.replace("Pad.k", "Pad.kk")))
     assert refused.returncode == 1
     assert refused.stderr == "palpate sweep: There is no 'Pad.kk' to vary in 'tiny': did you mean 'Pad.k'?\n"
-    assert not (tmp_path / "study" / "study.toml").exists()
+    assert not (tmp_path / "study").exists()
+
+
+def test_a_study_of_a_billion_runs_is_one_line_and_begins_nothing(tmp_path):
+    refused = sweep(write_study(tmp_path, STUDY.replace("samples = 24", "samples = 1000000000")), "--out", tmp_path / "out")
+    assert refused.returncode == 1
+    (line,) = refused.stderr.splitlines()
+    assert "asks for 1e+09 runs, at most 1000000 are possible" in line
+    assert not (tmp_path / "out").exists()
+
+
+def test_another_time_limit_holds_for_the_same_study(undisturbed, tmp_path):
+    """No result depends on it, and the message of a run that was too slow advises to raise it."""
+    folder = tmp_path / "out"
+    shutil.copytree(undisturbed, folder)
+    file = write_study(tmp_path, STUDY.replace("fps = 200", "fps = 200\nrun_limit = 77"))
+    assert begin_study(file, folder, lambda blend, target: None).study.run_limit == 77.0
 
 
 @pytest.fixture
