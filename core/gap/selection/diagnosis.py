@@ -40,7 +40,7 @@ from .candidates import FittedCandidate, candidates, scales_of
 from .check_recordings import check_views, checked
 from .confidence import EXPLAINED, UNSURE_CONFIDENCE
 from .contact_heights import with_starting_heights
-from .findings import Diagnosis
+from .findings import Diagnosis, Finding
 from .forward_selection import ForwardSelection, SelectionState
 from .gap_sizes import FORCES, READINGS, UNRESOLVED_SQUARE, GapSizes, friction_kinds
 from .harmful_effects import without_harmful_effects
@@ -219,12 +219,18 @@ def _name_differences(own: _Search, plain: _Search, session: _Search | None) -> 
     if result.between.rival:
         named.append(result.between.rival)
         result.ambiguous.append(tuple(named))
+        result.findings = [_in_doubt(one) if one.name in (*LOAD_HISTORY, "drift") else one for one in result.findings]
     result.ruled_out = [(name, why) for name, why in result.ruled_out if name not in named]
     if result.misleading_faults or result.between.rival:
         result.between = replace(result.between, confidence=min(result.between.confidence, UNSURE_CONFIDENCE))
     most = 1.0 - own.left / plain.left_of_base
     if result.verdict == "no gap" or (most >= EXPLAINED and not result.check.is_refuted):
         result.verdict = "explained"
+
+
+def _in_doubt(one: Finding) -> Finding:
+    """A finding that is not sure: what falls within recordings as from one to the next is wear or drift as that is."""
+    return replace(one, confidence=min(one.confidence, UNSURE_CONFIDENCE))
 
 
 def _with_base_model(
