@@ -19,7 +19,7 @@ from ..dataset.rig import Rig
 from ..dataset.sessions import TrialHistory, on_common_clocks
 from ..dataset.trial import Trial
 from ..forward.predictor import Model, Predictor, number_name
-from .wear_or_drift import NOTHING, TEXELS, USE, told_by_recordings
+from .wear_or_drift import NOTHING, TEXELS, USE, texels_can_tell, told_by_recordings
 
 LEAST_RECORDINGS = 3
 """Number of fitted recordings from which on they are compared: of two, each may be the odd one."""
@@ -130,7 +130,9 @@ def differences(
     falls = float(np.corrcoef(np.argsort(np.argsort(gain)), np.arange(len(gain)))[0, 1]) < WEAR_ORDER
     if not falls or float(gain.std()) * full <= float(level.std()):
         return drift
-    told_by = told_by_recordings([one.stimulus for one in order], factors) or (TEXELS if texels_alike else NOTHING)
+    stimuli = [one.stimulus for one in order]
+    by_texels = TEXELS if texels_alike and texels_can_tell(stimuli) else NOTHING
+    told_by = told_by_recordings(stimuli, factors) or by_texels
     if told_by == NOTHING:
         return replace(drift, rival="wear")
     return replace(drift, name="wear" if told_by == USE else "drift", told_by=told_by)

@@ -32,6 +32,22 @@ POWERS = (0.5, 1.0)
 """Powers of a measure along which gains fall."""
 
 
+LEAST_RATIO_OF_LOADS = 2.0
+"""Least ratio of what the more and the less loaded texels carried (90th and 10th percentile) from which on texels can tell. Under
+equal loads the wear of each texel is a gain that all share: then two formulas are compared, not wear and drift, and of six
+recordings under a plate that were alike three were called drift for it (``make bench ONLY=wear_or_drift``)."""
+
+
+def texels_can_tell(order: Sequence[Stimulus]) -> bool:
+    """Return whether wear would change texels differently: some carried far more than others over all recordings."""
+    rises = sum(np.maximum(np.diff(one.load, axis=0), 0.0).sum(axis=0) for one in order)
+    used = np.atleast_1d(rises)[np.atleast_1d(rises) > 0.0]
+    if len(used) < 2:
+        return False
+    low, high = np.percentile(used, [10.0, 90.0])
+    return bool(high >= LEAST_RATIO_OF_LOADS * low)
+
+
 def told_by_recordings(order: Sequence[Stimulus], gains: dict[str, float]) -> str:
     """Return whether gains of recordings follow use or clock, as :func:`told_by_courses` does.
 

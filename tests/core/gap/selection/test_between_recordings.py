@@ -2,6 +2,7 @@
 """What carries over from recording to recording is named as that, and never as a property of the texels."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import gap_cases as cases
 import numpy as np
@@ -11,7 +12,7 @@ from palpate.core.gap.forward.predictor import Model, Predictor, number_name
 from palpate.core.gap.report.comparison import gap_errors
 from palpate.core.gap.report.sentences import headline
 from palpate.core.gap.report.summary import summary
-from palpate.core.gap.selection import screening
+from palpate.core.gap.selection import between_recordings, screening
 from palpate.core.gap.selection.between_recordings import (
     as_one_session,
     differences,
@@ -20,7 +21,7 @@ from palpate.core.gap.selection.between_recordings import (
     with_own_numbers,
 )
 from palpate.core.gap.selection.diagnosis import diagnose
-from palpate.core.gap.selection.wear_or_drift import CLOCK, NOTHING, TEXELS, USE, told_by_courses
+from palpate.core.gap.selection.wear_or_drift import CLOCK, NOTHING, TEXELS, USE, texels_can_tell, told_by_courses
 from palpate.core.jobs.job_runner import run_job
 from palpate.core.model.sensor_parameters import SensorParameters
 
@@ -88,11 +89,22 @@ def differing(gains, amounts, texels_alike):
     return differences(Model(SMALL.parameters, recordings=numbers), order, 0.9, 0.05, 1.0, texels_alike)
 
 
-def test_gains_that_fall_alike_in_recordings_that_are_alike_are_wear_or_drift():
+def test_texels_can_tell_wear_from_drift_only_where_they_carry_unequal_loads():
+    up_and_down = np.maximum(np.sin(np.linspace(0.0, 12.0, 100)), 0.0)[:, None]
+    for shares, told in (([1.0, 1.0, 1.0], False), ([1.0, 0.8, 0.7], False), ([1.0, 0.3, 0.2], True), ([1.0, 0.0, 0.0], False)):
+        order = [SimpleNamespace(load=up_and_down * np.array(shares)) for _ in range(3)]
+        assert texels_can_tell(order) is told, shares
+
+
+def test_gains_that_fall_alike_in_recordings_that_are_alike_are_wear_or_drift(monkeypatch):
     falling = 1.0 - 0.06 * np.arange(6)
     alike = differing(falling, [4] * 6, False)
     assert (alike.name, alike.rival, alike.told_by) == ("drift", "wear", NOTHING)
-    of_all_texels = differing(falling, [4] * 6, True)
+    equal_loads = differing(falling, [4] * 6, True)
+    assert (equal_loads.rival, equal_loads.told_by) == ("wear", NOTHING), "wear of texels that carry the same is alike, too"
+    with monkeypatch.context() as patch:
+        patch.setattr(between_recordings, "texels_can_tell", lambda order: True)
+        of_all_texels = differing(falling, [4] * 6, True)
     assert (of_all_texels.name, of_all_texels.rival, of_all_texels.told_by) == ("drift", "", TEXELS)
     amounts = [2, 16, 2, 2, 20, 4]
     used = (np.cumsum(amounts) - 0.5 * np.array(amounts)) / sum(amounts)
