@@ -33,9 +33,11 @@ POWERS = (0.5, 1.0)
 
 
 LEAST_RATIO_OF_LOADS = 2.0
-"""Least ratio of what the more and the less loaded texels carried (90th and 10th percentile) from which on texels can tell. Under
-equal loads the wear of each texel is a gain that all share: then two formulas are compared, not wear and drift, and of six
-recordings under a plate that were alike three were called drift for it (``make bench ONLY=wear_or_drift``)."""
+"""Least ratio of what the more and the less loaded texels carried (90th and 10th percentile) from which on texels can tell.
+
+Under equal loads the wear of each texel is a gain that all share: two formulas are compared, not wear and drift, and of six
+sets of recordings under a plate that were alike three were called drift for it (``make bench ONLY=wear_or_drift``).
+"""
 
 
 def texels_can_tell(order: Sequence[Stimulus]) -> bool:
