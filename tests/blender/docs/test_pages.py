@@ -15,6 +15,7 @@ import sys
 import tomllib
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from palpate.commands import COMMANDS, READY, _parser, main
@@ -149,6 +150,9 @@ def bake_folder(tmp_path_factory):
         str(folder / "palpate"),
     ]
     subprocess.run(command, check=True, capture_output=True, timeout=300)
+    for target in ("probes", "mjcf"):
+        scene = str(ROOT / "sample_blends" / "weighing.blend")
+        assert main(["sensor", "export", scene, "--to", target, "--sensor", "Finger", "--out", str(folder / "sensors")]) == 0
     pytest.importorskip("mcap")
     run_job(export(read_bake(folder / "palpate"), "mcap", folder))
     return folder
@@ -170,8 +174,13 @@ def test_python_blocks_run(block, bake_folder, monkeypatch, capsys):
 
     from solver_scenes import cube_on_pad
 
+    for package in re.findall(r"^import (genesis|torch)\b", block, re.MULTILINE):
+        pytest.importorskip(package, reason=f"{package} is not among what the tests install: this block of the page is not run")
     monkeypatch.chdir(bake_folder)
-    names = {"dataclasses": dataclasses, "sensor": cube_on_pad().sensors[0]}
+    cube = cube_on_pad()
+    at_rest = np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0])
+    names = {"dataclasses": dataclasses, "sensor": cube.sensors[0], "mesh": cube.targets[0].mesh, "dt": 1e-3}
+    names |= {"sensor_pose": at_rest, "target_pose": (np.array([0.0, 0.0, 0.02]), at_rest[1])}
     given = set(names)
     exec(compile(block, "page", "exec"), names)
     assert set(names) - given - {"__builtins__"}
