@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import NoReturn
 
 from ..core.errors import Cancelled, PalpateError
-from ..core.io.file_writing import os_error_reason
+from ..core.io.os_errors import os_error_reason
 from ..core.version import VERSION
 from . import console, limits
 

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 from ..core.errors import FileError, PalpateError
 from ..core.io import bake_switch
 from ..core.io.file_writing import back_up, exchange_file, remove_leftovers_of, sync_file, writable_file
+from ..core.io.os_errors import read_errors_said
 from ..core.io.regular_file import open_regular, require_regular
 from . import console
 
@@ -105,13 +106,8 @@ def open_blend(path: str | os.PathLike, scripts: str = REFUSE) -> None:
     if os.path.isdir(path):
         raise FileError(f"'{path}' is a folder: give the name of a .blend file in it.")
     bake_switch.settle_blend(path)
-    try:
-        with open_regular(path) as file:
-            magic = file.read(7)
-    except FileNotFoundError as error:
-        raise FileError(f"There is no file '{path}': check its name and folder.") from error
-    except OSError as error:
-        raise FileError(f"'{path}' cannot be read ({error.strerror}): check its permissions.") from error
+    with read_errors_said(path), open_regular(path) as file:
+        magic = file.read(7)
     if magic != b"BLENDER" and not magic.startswith(_COMPRESSED):
         raise FileError(f"'{path}' is not a .blend file: give a file that was saved by Blender.")
     try:

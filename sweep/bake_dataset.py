@@ -9,7 +9,7 @@ from ..core.errors import FileError
 from ..core.export.exporter import Exporter, sensor_progress
 from ..core.figures.figure_style import FigureStyle
 from ..core.io.bake_reader import Bake
-from ..core.io.file_writing import os_error_reason
+from ..core.io.os_errors import os_error_reason
 from ..core.jobs.progress import Job
 from ..core.study.run_record import RunRecord
 from .dataset import require_pyarrow

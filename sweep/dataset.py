@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from ..core.errors import FileError
-from ..core.io.file_writing import os_error_reason
+from ..core.io.os_errors import os_error_reason
 from ..core.io.temporary_folder import remove_unfinished, temporary_folder
 from ..core.model.shared_results import SharedResults
 from ..core.study.run_files import RUNS

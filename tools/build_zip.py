@@ -26,6 +26,7 @@ import sys
 import tempfile
 import tomllib
 import zipfile
+from collections.abc import Mapping
 from pathlib import Path
 
 import tomli_w
@@ -263,7 +264,18 @@ def build(
     out.mkdir(parents=True, exist_ok=True)
     target = out / f"palpate-{version}-{platform_name}-cp{python.replace('.', '')}{suffix}.zip"
     partial = target.with_suffix(".partial.zip")
-    with zipfile.ZipFile(partial, "w") as archive:
+    write_zip(partial, entries)
+    try:
+        validate(partial)
+    except BuildError:
+        partial.unlink()
+        raise
+    return partial.replace(target)
+
+
+def write_zip(path: Path, entries: Mapping[str, bytes]) -> None:
+    """Write files, by their names, so that the same files give the same bytes."""
+    with zipfile.ZipFile(path, "w") as archive:
         for name in sorted(entries):
             info = zipfile.ZipInfo(name, FIXED_TIME)
             info.external_attr = 0o644 << 16
@@ -271,12 +283,6 @@ def build(
             # wheels and machine code are compressed already
             info.compress_type = zipfile.ZIP_STORED if name.endswith((".whl", ".bin")) else zipfile.ZIP_DEFLATED
             archive.writestr(info, entries[name])
-    try:
-        validate(partial)
-    except BuildError:
-        partial.unlink()
-        raise
-    return partial.replace(target)
 
 
 def local_platform() -> str:

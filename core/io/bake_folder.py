@@ -20,7 +20,8 @@ from typing import Any
 
 from ..errors import FileError
 from .checksum_list import read_checksums
-from .file_writing import file_sha256, os_error_reason, write_file
+from .file_writing import file_sha256, write_file
+from .os_errors import os_error_reason
 from .regular_file import read_bytes
 from .sensor_npz import SENSOR_NAME
 

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from ..errors import FileError
-from .file_writing import os_error_reason
+from .os_errors import os_error_reason
 from .regular_file import open_regular
 
 _LINE = re.compile(rb"([0-9a-f]{64})  ([!-~]{1,200})\n")

@@ -21,6 +21,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import FileError
+from .os_errors import read_errors_said
 from .regular_file import open_regular
 
 UNITS: dict[str, dict[str, float]] = {
@@ -102,31 +103,31 @@ def read_table(
     """
     path = Path(path)
     try:
-        size = path.stat().st_size
-        if size > form.largest:
-            raise FileError(
-                f"'{path.name}' holds {size / 1e9:.1f} GB and at most {form.largest / 1e9:.1f} GB are read: "
-                "cut it into several files, or keep fewer samples per second."
-            )
-        with open_regular(path, "r", encoding="utf-8-sig", newline="") as file:
-            lines = _lines(file, form)
-            names, separator = _header(lines, path, form)
-            chosen = None if choose is None else list(choose(names))
-            if chosen is None:
-                _check_names(names, path)
-            values = _values(lines, names, chosen, separator, _Context(path, form))
-    except FileNotFoundError as error:
-        raise FileError(f"There is no file '{path}': check its name and folder.") from error
+        with read_errors_said(path):
+            table = _read(path, form, choose)
     except UnicodeDecodeError as error:
         raise FileError(f"'{path.name}' is not a text file in UTF-8: export the table as CSV.") from error
-    except OSError as error:
-        raise FileError(f"'{path}' could not be read ({error.strerror}): check its name and permissions.") from error
     except csv.Error as error:
         raise FileError(f"'{path.name}' is not a table ({error}): export it as CSV, with quotation marks closed.") from error
-    except ValueError as error:  # a NUL in the name
-        raise FileError(f"{str(path)!r} cannot be the name of a file: check it.") from error
-    if len(values) == 0:
+    if len(table.values) == 0:
         raise FileError(f"'{path.name}' has a header and no data: there are no measurements below its header, add them.")
+    return table
+
+
+def _read(path: Path, form: CsvFormat, choose: Callable[[list[str]], Sequence[int]] | None) -> Table:
+    size = path.stat().st_size
+    if size > form.largest:
+        raise FileError(
+            f"'{path.name}' holds {size / 1e9:.1f} GB and at most {form.largest / 1e9:.1f} GB are read: "
+            "cut it into several files, or keep fewer samples per second."
+        )
+    with open_regular(path, "r", encoding="utf-8-sig", newline="") as file:
+        lines = _lines(file, form)
+        names, separator = _header(lines, path, form)
+        chosen = None if choose is None else list(choose(names))
+        if chosen is None:
+            _check_names(names, path)
+        values = _values(lines, names, chosen, separator, _Context(path, form))
     return Table(names if chosen is None else [names[i] for i in chosen], values)
 
 

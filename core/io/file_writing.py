@@ -21,6 +21,7 @@ from pathlib import Path
 
 from ..errors import FileError
 from .file_lock import try_lock
+from .os_errors import os_error_reason
 from .regular_file import open_regular
 
 
@@ -351,11 +352,6 @@ def _open_new_file(folder: Path, stem: str, suffix: str) -> tuple[Path, int]:
         raise FileError(
             f"No file can be made in the folder '{folder}' ({os_error_reason(error)}): {_remedy(error)}."
         ) from error
-
-
-def os_error_reason(error: OSError) -> str:
-    """Return the operating system's words for an error, in lower case, as they stand inside our sentences."""
-    return (error.strerror or str(error) or type(error).__name__).lower()
 
 
 def _remedy(error: OSError) -> str:

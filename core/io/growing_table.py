@@ -10,7 +10,7 @@ from typing import IO
 import numpy as np
 
 from ..errors import FileError
-from .file_writing import os_error_reason
+from .os_errors import os_error_reason
 
 IN_MEMORY_BYTES = 1 << 22
 """Bytes of a table that stay in memory: hours of animation of a rigid body."""

@@ -21,7 +21,8 @@ import numpy as np
 from ..errors import FileError
 from ..model.recording import row_blocks
 from .disk_space import require_space
-from .file_writing import os_error_reason, write_file
+from .file_writing import write_file
+from .os_errors import os_error_reason
 
 DAMAGED = (
     ValueError,

@@ -14,7 +14,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 from ..errors import FileError
-from .file_writing import atomic_write, os_error_reason, remove_leftovers
+from .file_writing import atomic_write, remove_leftovers
+from .os_errors import os_error_reason
 
 PRIVATE_FOLDER = ".palpate"
 MARKER_NAME = "palpate-folder.json"

@@ -16,8 +16,8 @@ import numpy as np
 
 from ..errors import FileError
 from ..model.recording import SENSOR_FIELDS, Recording, SensorRecording, row_blocks
-from .file_writing import os_error_reason
 from .npz import DAMAGED, open_archive, read_array, write_arrays
+from .os_errors import os_error_reason
 from .regular_file import open_regular
 
 RECORDING_FORMAT = "palpate-recording/2"

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import IO, Any
 
 from ..errors import FileError
+from .os_errors import read_errors_said
 
 _KINDS = {
     stat.S_IFIFO: "a FIFO",
@@ -62,6 +63,31 @@ def read_bytes(path: str | os.PathLike) -> bytes:
     """Return the content of a regular file; raises what :func:`open_regular` raises."""
     with open_regular(path) as file:
         return file.read()
+
+
+def read_bounded(path: str | os.PathLike, limit: int, what: str = "file", advice: str = "give a smaller file") -> bytes:
+    """Return the content of a regular file that is not larger than it may be.
+
+    Parameters
+    ----------
+    path : path
+    limit : int
+        Bytes; no more are read.
+    what : str
+        What the file should be, for messages, as in "rig".
+    advice : str
+        What the user of a larger file should know or do.
+
+    Raises
+    ------
+    FileError
+        There is no such file, it cannot be read, or it is larger.
+    """
+    with read_errors_said(path, what), open_regular(path) as file:
+        content: bytes = file.read(limit + 1)
+    if len(content) > limit:
+        raise FileError(f"'{path}' is larger than {limit >> 20} MB: {advice}.")
+    return content
 
 
 def _open_without_waiting(path: str, flags: int) -> int:

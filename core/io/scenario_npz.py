@@ -29,8 +29,8 @@ from ..model.scenario import Scenario
 from ..model.sensor import Sensor
 from ..model.sensor_parameters import Painted, SensorParameters
 from ..model.target import Target
-from .file_writing import os_error_reason
 from .npz import DAMAGED, read_array, write_arrays
+from .os_errors import os_error_reason
 from .regular_file import open_regular
 
 SCENARIO_FORMAT = "palpate-scenario/1"

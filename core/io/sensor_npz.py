@@ -15,8 +15,8 @@ from ..geometry.layout.grid_layout import GridLayout
 from ..geometry.layout.texture_maps import UVLayout
 from ..geometry.texels import Texels
 from ..model.sensor_parameters import Painted
-from .file_writing import os_error_reason
 from .npz import DAMAGED, PackedArchive, open_archive, write_arrays
+from .os_errors import os_error_reason
 from .regular_file import open_regular
 
 SENSOR_FORMAT = "palpate-sensor/1"

@@ -21,7 +21,8 @@ from ..model.recording import Frame, SensorFrame
 from ..model.sensor import Sensor
 from .exr_backend import backend
 from .exr_codec import FormatError, in_order
-from .file_writing import atomic_write, os_error_reason, write_file
+from .file_writing import atomic_write, write_file
+from .os_errors import os_error_reason
 
 CHANNELS = ("R", "G", "B", "reading", "depth", "slip", "contact")
 """Names of the channels, in the order in which :func:`read_exr` returns them."""

@@ -17,7 +17,8 @@ from pathlib import Path
 
 from ..errors import FileError
 from .file_lock import try_lock
-from .file_writing import os_error_reason, remove_leftovers
+from .file_writing import remove_leftovers
+from .os_errors import os_error_reason
 from .private_folder import MARKER_FORMAT, MARKER_NAME, remove_tree
 
 NAME = r"\.palpate-[a-z]+\.[0-9a-f]{8}\.partial"

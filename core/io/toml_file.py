@@ -9,8 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import FileError
-from .file_writing import os_error_reason
-from .regular_file import open_regular
+from .regular_file import read_bounded
 
 LARGEST_FILE = 16 * 2**20
 """Bytes; people write these files, and a rig or a sensor has some kilobytes."""
@@ -33,17 +32,7 @@ def read_toml(path: str | os.PathLike, what: str) -> dict[str, Any]:
         There is no such file, it cannot be read, or it is not TOML.
     """
     name = Path(path).name
-    try:
-        with open_regular(path) as file:
-            content = file.read(LARGEST_FILE + 1)
-    except FileNotFoundError as error:
-        raise FileError(f"There is no {what} '{path}': check its name and folder.") from error
-    except OSError as error:
-        raise FileError(f"The {what} '{path}' could not be read ({os_error_reason(error)}): give a .toml file.") from error
-    except ValueError as error:  # a NUL in the name
-        raise FileError(f"{str(path)!r} cannot be the name of a file: check it.") from error
-    if len(content) > LARGEST_FILE:
-        raise FileError(f"'{name}' is larger than {LARGEST_FILE >> 20} MB: a {what} has some kilobytes, give another file.")
+    content = read_bounded(path, LARGEST_FILE, what, f"a {what} has some kilobytes, give another file")
     try:
         return tomllib.loads(content.decode("utf-8"))
     except UnicodeDecodeError as error:

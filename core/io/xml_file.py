@@ -8,7 +8,7 @@ import re
 from xml.etree import ElementTree
 
 from ..errors import FileError
-from .regular_file import open_regular
+from .regular_file import read_bounded
 
 LARGEST_FILE = 256 * 2**20
 """Bytes. A mesh of a million vertices, written out with its normals, has about 100 MB."""
@@ -36,7 +36,7 @@ def read_xml(path: str | os.PathLike, what: str) -> ElementTree.Element:
     FileError
         There is no such file, it is too large, or it is not XML.
     """
-    text = _read(path)
+    text = read_bounded(path, LARGEST_FILE)
     if text.startswith(_UTF_16):  # "<!ENTITY" would be spelt in other bytes
         raise FileError(f"'{path}' is not in UTF-8: save it so.")
     if b"<!ENTITY" in text or b"<!DOCTYPE" in text:
@@ -49,21 +49,6 @@ def read_xml(path: str | os.PathLike, what: str) -> ElementTree.Element:
         raise FileError(
             f"Line {line} of '{path}' is no XML ({error}): a tag may have no space behind its '<' and must be closed."
         ) from error
-
-
-def _read(path: str | os.PathLike) -> bytes:
-    try:
-        with open_regular(path) as file:
-            text: bytes = file.read(LARGEST_FILE + 1)
-    except FileNotFoundError as error:
-        raise FileError(f"There is no file '{path}': check its name and folder.") from error
-    except OSError as error:
-        raise FileError(f"'{path}' cannot be read ({error.strerror}): check its name and permissions.") from error
-    except ValueError as error:  # a NUL in the name
-        raise FileError(f"{str(path)!r} cannot be the name of a file: check it.") from error
-    if len(text) > LARGEST_FILE:
-        raise FileError(f"'{path}' is larger than {LARGEST_FILE >> 20} MB: give a smaller file.")
-    return text
 
 
 def require_xml_text(name: str) -> None:

@@ -18,8 +18,8 @@ from ..geometry.layout.grid_layout import GridLayout
 from ..geometry.layout.texture_maps import uv_layout
 from ..geometry.mesh import TriangleMesh, checked_mesh
 from ..geometry.texels import Texels
-from ..io.file_writing import os_error_reason, write_file
-from ..io.regular_file import open_regular
+from ..io.file_writing import write_file
+from ..io.regular_file import read_bounded
 from ..io.sensor_toml import MOST_TEXELS, known_words, stated_parameters
 from ..io.toml_file import checked_name
 from ..model.sensor import Sensor
@@ -84,17 +84,7 @@ def is_probe_list(path: str | os.PathLike) -> bool:
 
 
 def _read_json(path: str | os.PathLike) -> dict[str, Any]:
-    try:
-        with open_regular(path) as file:
-            text = file.read(LARGEST_FILE + 1)
-    except FileNotFoundError as error:
-        raise FileError(f"There is no probe list '{path}': check its name and folder.") from error
-    except OSError as error:
-        raise FileError(f"'{path}' cannot be read ({os_error_reason(error)}): check its permissions.") from error
-    except ValueError as error:  # a NUL in the name
-        raise FileError(f"{str(path)!r} cannot be the name of a file: check it.") from error
-    if len(text) > LARGEST_FILE:
-        raise FileError(f"'{path}' is larger than {LARGEST_FILE >> 20} MB: give a smaller file.")
+    text = read_bounded(path, LARGEST_FILE, "probe list")
     try:
         content = json.loads(text.decode("utf-8"))
     except (ValueError, RecursionError) as error:

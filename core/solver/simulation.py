@@ -38,7 +38,7 @@ from .found_contacts import contacts_of
 from .model_builder import build_model, initial_state, texel_starts
 from .parallel_loops import find_all_contacts, help_with_loops
 from .solver_model import DRIVEN, SolverModel, State
-from .substep import FramePath, FrameRows, advance_frames, advance_steps
+from .substep import FramePath, ObservedFrames, advance_frames, advance_steps
 from .texel_readout import TexelReadout, read_texels
 from .time_step_adviser import plan
 from .workspace import Workspace
@@ -212,17 +212,17 @@ class Simulation:
             find_all_contacts(-self.dt, *self.arrays)
             credit_initial_contacts(self._model, self._state, self._workspace)
         before = self._state.position.copy(), self._state.quaternion.copy()
-        rows = FrameRows.zero(count, texels, len(self.scenario.sensors), bodies, pairs)
+        seen = ObservedFrames.zero(count, texels, len(self.scenario.sensors), bodies, pairs)
         closed = np.array(self._closed, np.bool_)
-        advance_frames(self.dt, FramePath(*motion, commands), closed, self._fast_crossings.limits, *self.arrays, rows)
+        advance_frames(self.dt, FramePath(*motion, commands), closed, self._fast_crossings.limits, *self.arrays, seen)
         for i in range(count):
             self.frame += 1
-            after = rows.position[i], rows.quaternion[i]
-            if rows.may_cross[i]:
+            after = seen.position[i], seen.quaternion[i]
+            if seen.may_cross[i]:
                 self._warn_of_fast_crossings(motion[0][i], motion[1][i], before, after)
-            self._warn_of_too_deep(rows.too_deep[i], rows.too_deep_between[i])
+            self._warn_of_too_deep(seen.too_deep[i], seen.too_deep_between[i])
             before = after
-        return self._recorded(first + 1 + np.arange(count), rows)
+        return self._recorded(first + 1 + np.arange(count), seen)
 
     def _commands_at(self, times: np.ndarray) -> np.ndarray:
         """Commands (steps, d, 4) to the drives of a frame, where no controller reads a sensor."""
@@ -235,34 +235,34 @@ class Simulation:
             return self._readers[i].read(times, force)
         return np.stack([self._readers[i].step(time, own) for time, own in zip(times.tolist(), force, strict=True)])
 
-    def _recorded(self, frames: np.ndarray, rows: FrameRows) -> Recording:
+    def _recorded(self, frames: np.ndarray, seen: ObservedFrames) -> Recording:
         """Return the recording of frames that were observed in one call."""
         times = (frames - self.scenario.frame_start) / self.scenario.fps
         sensors = {
-            sensor.name: self._sensor_rows(i, times, rows) for i, sensor in enumerate(self.scenario.sensors) if sensor.readout
+            sensor.name: self._sensor_rows(i, times, seen) for i, sensor in enumerate(self.scenario.sensors) if sensor.readout
         }
-        origin = rows.position
+        origin = seen.position
         if self._center.any():  # as in `observe`, whose sums have an order of their own
-            origin = origin - np.stack([np.einsum("bij,bj->bi", own, self._center) for own in rows.rotation])
-        poses = np.concatenate([origin, rows.quaternion], axis=2)
+            origin = origin - np.stack([np.einsum("bij,bj->bi", own, self._center) for own in seen.rotation])
+        poses = np.concatenate([origin, seen.quaternion], axis=2)
         names = tuple(body.name for body in self.scenario.bodies)
-        return Recording(frames, times, sensors, names, poses, rows.velocity, self.dt)
+        return Recording(frames, times, sensors, names, poses, seen.velocity, self.dt)
 
-    def _sensor_rows(self, i: int, times: np.ndarray, rows: FrameRows) -> SensorRecording:
+    def _sensor_rows(self, i: int, times: np.ndarray, seen: ObservedFrames) -> SensorRecording:
         """Return what one sensor measures in frames that were observed in one call; see :meth:`_sensor_frame`."""
         own = slice(self._texel_start[i], self._texel_start[i + 1])
-        center, net, moment = self._center[self.scenario.sensors[i].body], rows.net[:, i], rows.moment[:, i]
+        center, net, moment = self._center[self.scenario.sensors[i].body], seen.texels.net[:, i], seen.texels.moment[:, i]
         centre_of_pressure = np.zeros((len(times), 3))
         pressed = moment[:, 3] > 0.0
         centre_of_pressure[pressed] = moment[pressed, :3] / moment[pressed, 3:] + center
-        force = np.ascontiguousarray(rows.force[:, own])
+        force = np.ascontiguousarray(seen.texels.force[:, own])
         return SensorRecording(
             normal_force=force,
-            shear=np.ascontiguousarray(rows.shear[:, own]),
-            friction=np.ascontiguousarray(rows.friction[:, own]),
-            depth=np.ascontiguousarray(rows.depth[:, own]),
-            slip=np.ascontiguousarray(rows.slip[:, own]),
-            contact=np.ascontiguousarray(rows.contact[:, own]),
+            shear=np.ascontiguousarray(seen.texels.shear[:, own]),
+            friction=np.ascontiguousarray(seen.texels.friction[:, own]),
+            depth=np.ascontiguousarray(seen.texels.depth[:, own]),
+            slip=np.ascontiguousarray(seen.texels.slip[:, own]),
+            contact=np.ascontiguousarray(seen.texels.contact[:, own]),
             reading=self._readings(i, times, force),
             net_force=net[:, :3].copy(),
             net_torque=net[:, 3:] + np.cross(center, net[:, :3]),

@@ -46,13 +46,13 @@ class FramePath(NamedTuple):
     commands: np.ndarray
 
 
-class FrameRows(NamedTuple):
+class ObservedFrames(NamedTuple):
     """What is observed at the end of each of F frames.
-
-    The first nine are those of :class:`.TexelReadout` with a leading axis of length F; `strongest` is scratch. The others:
 
     Attributes
     ----------
+    texels : TexelReadout
+        With a leading axis of length F in each array.
     position, quaternion, velocity : (F, b, 3), (F, b, 4) and (F, b, 6) float
         Of the :class:`.State`.
     rotation : (F, b, 3, 3) float
@@ -63,15 +63,7 @@ class FrameRows(NamedTuple):
         Whether a target may have been too fast (see :mod:`.fast_crossings`).
     """
 
-    force: np.ndarray
-    shear: np.ndarray
-    friction: np.ndarray
-    depth: np.ndarray
-    slip: np.ndarray
-    contact: np.ndarray
-    strongest: np.ndarray
-    net: np.ndarray
-    moment: np.ndarray
+    texels: TexelReadout
     position: np.ndarray
     quaternion: np.ndarray
     velocity: np.ndarray
@@ -81,20 +73,11 @@ class FrameRows(NamedTuple):
     may_cross: np.ndarray
 
     @classmethod
-    def zero(cls, frames: int, texels: int, sensors: int, bodies: int, pairs: int) -> FrameRows:
-        """Return the rows of frames in which nothing touches."""
-        f, n, b = frames, texels, bodies
-        force, friction, depth, slip = (np.zeros((f, n)) for _ in range(4))
+    def zero(cls, frames: int, texels: int, sensors: int, bodies: int, pairs: int) -> ObservedFrames:
+        """Return what is observed where nothing touches."""
+        f, b = frames, bodies
         return cls(
-            force=force,
-            shear=np.zeros((f, n, 2)),
-            friction=friction,
-            depth=depth,
-            slip=slip,
-            contact=np.zeros((f, n), np.bool_),
-            strongest=np.zeros(n),
-            net=np.zeros((f, sensors, 6)),
-            moment=np.zeros((f, sensors, 4)),
+            texels=TexelReadout.zero(texels, sensors, f),
             position=np.zeros((f, b, 3)),
             quaternion=np.zeros((f, b, 4)),
             velocity=np.zeros((f, b, 6)),
@@ -150,9 +133,7 @@ def advance_steps(
             worst = too_deep
             for pair in range(len(model.pairs.sensor)):
                 workspace.contacts.most_too_deep[pair] = workspace.contacts.too_deep[pair]
-        for body in range(len(model.bodies.kind)):
-            if model.bodies.kind[body] == FREE:
-                write_world_inertia(workspace.bodies.rotation[body], model.bodies.inertia[body], workspace.bodies.inertia[body])
+        _write_world_inertias(model, workspace)
         solve_velocities(dt, path.commands[step], model, detection, state, workspace)
         if len(workspace.effects.contacts.force) > 0:
             commit_effect_memory(dt, model, state, workspace)
@@ -180,7 +161,7 @@ def advance_frames(
     detection: DetectionData,
     state: State,
     workspace: Workspace,
-    rows: FrameRows,
+    seen: ObservedFrames,
 ) -> None:
     """Run the steps of F frames and observe each; the state is brought forward in place.
 
@@ -196,40 +177,39 @@ def advance_frames(
     detection : DetectionData
     state : State
     workspace : Workspace
-    rows : FrameRows
+    seen : ObservedFrames
         Zero at first; written.
     """
     steps = path.velocity.shape[1]
-    for frame in range(len(rows.force)):
+    for frame in range(len(seen.may_cross)):
         before = max(frame - 1, 0)
         if frame == 0:  # the first row is free until the frame is observed
-            _copy(state.position, rows.position[0])
-            _copy(state.quaternion, rows.quaternion[0])
+            _copy(state.position, seen.position[0])
+            _copy(state.quaternion, seen.quaternion[0])
         own = FramePath(path.position[frame], path.quaternion[frame], path.velocity[frame], path.commands[frame])
         if advance_steps(dt, 0, steps, own, model, detection, state, workspace) > 0:
             for pair in range(len(model.pairs.sensor)):
-                rows.too_deep_between[frame, pair] = workspace.contacts.most_too_deep[pair]
+                seen.too_deep_between[frame, pair] = workspace.contacts.most_too_deep[pair]
         moved = BodiesInFrame(
-            own.velocity, rows.position[before], rows.quaternion[before], state.position, state.quaternion, limits.moved,
+            own.velocity, seen.position[before], seen.quaternion[before], state.position, state.quaternion, limits.moved,
             limits.radius,
         )  # fmt: skip
-        rows.may_cross[frame] = may_cross(moved, limits.pairs, limits.limits, dt)
+        seen.may_cross[frame] = may_cross(moved, limits.pairs, limits.limits, dt)
         find_all_contacts(-dt, model, detection, state, workspace)
         for pair in range(len(model.pairs.sensor)):
             is_closed = closed[model.pairs.target[pair]]
-            rows.too_deep[frame, pair] = count_too_deep(pair, is_closed, model, detection, state, workspace)
-        for texel in range(len(rows.strongest)):
-            rows.strongest[texel] = -1.0
+            seen.too_deep[frame, pair] = count_too_deep(pair, is_closed, model, detection, state, workspace)
+        t = seen.texels
         out = TexelReadout(
-            rows.force[frame], rows.shear[frame], rows.friction[frame], rows.depth[frame], rows.slip[frame],
-            rows.contact[frame], rows.strongest, rows.net[frame], rows.moment[frame],
+            t.force[frame], t.shear[frame], t.friction[frame], t.depth[frame], t.slip[frame], t.contact[frame],
+            t.strongest[frame], t.net[frame], t.moment[frame],
         )  # fmt: skip
         read_texels(model, state, workspace, out)
-        _copy(state.position, rows.position[frame])
-        _copy(state.quaternion, rows.quaternion[frame])
-        _copy(state.velocity, rows.velocity[frame])
+        _copy(state.position, seen.position[frame])
+        _copy(state.quaternion, seen.quaternion[frame])
+        _copy(state.velocity, seen.velocity[frame])
         for body in range(len(state.position)):
-            _copy(workspace.bodies.rotation[body], rows.rotation[frame, body])
+            _copy(workspace.bodies.rotation[body], seen.rotation[frame, body])
 
 
 @kernel
@@ -257,6 +237,14 @@ def _set_prescribed_velocities(
         elif bodies.kind[body] == DRIVEN:
             after = path.quaternion[step + 1, body]
             prepare_driven(body, dt, after, path.velocity[step, body], model, state, workspace)
+
+
+@inlined
+def _write_world_inertias(model: SolverModel, workspace: Workspace) -> None:
+    """Turn the inertia of free bodies into the world's frame."""
+    for body in range(len(model.bodies.kind)):
+        if model.bodies.kind[body] == FREE:
+            write_world_inertia(workspace.bodies.rotation[body], model.bodies.inertia[body], workspace.bodies.inertia[body])
 
 
 @inlined

@@ -55,12 +55,12 @@ class TexelReadout(NamedTuple):
     moment: np.ndarray
 
     @classmethod
-    def zero(cls, texels: int, sensors: int) -> TexelReadout:
-        """Return the readout of sensors that nothing touches."""
-        n, m = texels, sensors
-        force, friction, depth, slip = np.zeros((4, n))
+    def zero(cls, texels: int, sensors: int, *frames: int) -> TexelReadout:
+        """Return the readout of sensors that nothing touches; with a leading axis in each array if `frames` are given."""
+        n, m = (*frames, texels), (*frames, sensors)
+        force, friction, depth, slip = (np.zeros(n) for _ in range(4))
         contact, strongest = np.zeros(n, dtype=np.bool_), np.full(n, -1.0)
-        return cls(force, np.zeros((n, 2)), friction, depth, slip, contact, strongest, np.zeros((m, 6)), np.zeros((m, 4)))
+        return cls(force, np.zeros((*n, 2)), friction, depth, slip, contact, strongest, np.zeros((*m, 6)), np.zeros((*m, 4)))
 
 
 @kernel

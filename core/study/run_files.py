@@ -121,16 +121,8 @@ def write_run(
     runs = folder / RUNS
     with temporary_folder(runs, "run") as hidden:
         place = hidden / "run"
-        record = RunRecord(
-            place,
-            run.digest,
-            run.index,
-            dict(run.values),
-            dict(metrics),
-            seconds,
-            tuple(recording.sensors),
-            len(recording.frames),
-        )
+        names, frames = tuple(recording.sensors), len(recording.frames)
+        record = RunRecord(place, run.digest, run.index, dict(run.values), dict(metrics), seconds, names, frames)
         try:
             place.mkdir()
             _write_sensors(place, scenario, recording, images, shared or SharedResults())

@@ -10,7 +10,8 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import FileError
-from ..io.file_writing import os_error_reason, write_synced
+from ..io.file_writing import write_synced
+from ..io.os_errors import os_error_reason
 from ..io.regular_file import read_bytes
 
 RUN_FORMAT = "palpate-run/1"

@@ -18,8 +18,9 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import FileError, ParameterError
-from ..io.file_writing import atomic_write, os_error_reason
+from ..io.file_writing import atomic_write
 from ..io.npz import DAMAGED
+from ..io.os_errors import os_error_reason
 from ..io.regular_file import read_bytes
 from ..io.toml_file import read_toml
 from ..model.parameter import Choice, ChoiceParameter, Parameter, Specification

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from ...errors import FileError
-from ...io.file_writing import os_error_reason
+from ...io.os_errors import read_errors_said
 from ...io.regular_file import open_regular
 from .log_table import LARGEST_FILE, LogFile
 from .readers.array_files import read_hdf5, read_mat, read_npz
@@ -51,27 +51,20 @@ def read_log(path: str | os.PathLike) -> LogFile:
         There is no such file, it is none of the known formats, it is damaged, or too large.
     """
     path = Path(path)
-    try:
-        if path.is_dir():
-            return read_bag(path)
-        size = path.stat().st_size
-        if size > LARGEST_FILE:
-            raise FileError(
-                f"'{path.name}' holds {size / 1e9:.1f} GB and at most {LARGEST_FILE / 1e9:.1f} GB are read: cut it."
-            )
-        with open_regular(path) as file:
-            beginning = file.read(16)
-        if not beginning:
-            raise FileError(f"'{path.name}' is empty: copy it again.")
-        reader = READERS.get(path.suffix.lower())
-        if reader is None:
-            reader = next((found for mark, found in _BEGINNINGS.items() if beginning.startswith(mark)), None)
-        if reader is None:
-            raise FileError(f"'{path.name}' is no log that is known: give one of {', '.join(READERS)}, or the folder of a bag.")
-        return reader(path)
-    except FileNotFoundError as error:
-        raise FileError(f"There is no file '{path}': check its name and folder.") from error
-    except OSError as error:
-        raise FileError(f"'{path}' could not be read ({os_error_reason(error)}): check its name and permissions.") from error
-    except ValueError as error:  # a NUL in the name
-        raise FileError(f"{str(path)!r} could not be read ({error}): check its name.") from error
+    with read_errors_said(path):
+        return read_bag(path) if path.is_dir() else _reader_of(path)(path)
+
+
+def _reader_of(path: Path) -> Callable[[Path], LogFile]:
+    """Return the reader of a file, by the ending of its name or by its first bytes."""
+    size = path.stat().st_size
+    if size > LARGEST_FILE:
+        raise FileError(f"'{path.name}' holds {size / 1e9:.1f} GB and at most {LARGEST_FILE / 1e9:.1f} GB are read: cut it.")
+    with open_regular(path) as file:
+        beginning = file.read(16)
+    if not beginning:
+        raise FileError(f"'{path.name}' is empty: copy it again.")
+    for reader in (READERS.get(path.suffix.lower()), *(r for mark, r in _BEGINNINGS.items() if beginning.startswith(mark))):
+        if reader is not None:
+            return reader
+    raise FileError(f"'{path.name}' is no log that is known: give one of {', '.join(READERS)}, or the folder of a bag.")

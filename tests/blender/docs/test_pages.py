@@ -174,7 +174,7 @@ def test_python_blocks_run(block, bake_folder, monkeypatch, capsys):
 
     from solver_scenes import cube_on_pad
 
-    for package in re.findall(r"^import (genesis|torch)\b", block, re.MULTILINE):
+    for package in re.findall(r"^import (genesis|mujoco|torch)\b", block, re.MULTILINE):
         pytest.importorskip(package, reason=f"{package} is not among what the tests install: this block of the page is not run")
     monkeypatch.chdir(bake_folder)
     cube = cube_on_pad()

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Machine code of kernels that was packed elsewhere is loaded where it fits, and only there."""
 
+import importlib.util
 import json
 import os
 import subprocess
@@ -9,10 +10,10 @@ import zlib
 
 import pytest
 
-from palpate.core.compiled import kernels, machine_code, processors
+from palpate.core.compiled import kernels, machine_code, numba_internals, processors
 from palpate.core.geometry import rotations
 
-if not kernels.COMPILED:
+if importlib.util.find_spec("numba") is None or os.environ.get("PALPATE_NUMBA") == "0":
     pytest.skip("needs numba: without it there is no machine code", allow_module_level=True)
 
 COMMON = """
@@ -68,6 +69,12 @@ def packed(made, monkeypatch):
     path.write_bytes(made[0].read_bytes())
     monkeypatch.setattr(machine_code, "PACKED_FILE", path)
     return path
+
+
+def test_the_installed_numba_compiles_and_its_code_can_be_packed():
+    """Otherwise everything here would be tested by nothing: an import that numba no longer knows turns compiling off."""
+    assert kernels.COMPILED, numba_internals.REASON
+    assert numba_internals.CAN_PACK
 
 
 @pytest.mark.parametrize("package", ["palpate", "bl_ext.user_default.palpate"])

@@ -8,8 +8,8 @@ links to them are left out.
 from __future__ import annotations
 
 import zipfile
-import zlib
 from collections.abc import Iterator
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
@@ -18,9 +18,9 @@ import numpy as np
 from ....errors import FileError
 from ....io.regular_file import open_regular
 from ..log_table import FEWEST_ROWS, LARGEST_FILE, LogFile, LogTable, cleaned, require_size
+from .damaged_file import damage_said
 
 _NUMBERS = "iufb"
-_DAMAGED = (OSError, ValueError, KeyError, TypeError, EOFError, RuntimeError, NotImplementedError, MemoryError, OverflowError)
 _LARGEST_UNLISTED = 200 * 2**20
 """Bytes of a MAT file whose arrays cannot be listed before they are read."""
 Arrays = dict[str, tuple[np.ndarray, str]]
@@ -31,24 +31,22 @@ def read_npz(path: Path) -> LogFile:
     """Read an NPZ file."""
     arrays: Arrays = {}
     notes, total = [], 0
-    try:
-        with open_regular(path) as file, zipfile.ZipFile(file) as archive:
-            for info in archive.infolist():
-                name = info.filename.removesuffix(".npy")
-                with archive.open(info) as member:
-                    version = np.lib.format.read_magic(member)
-                    read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
-                    shape, is_fortran, kind = read(member)
-                    if kind.hasobject or kind.kind not in _NUMBERS:
-                        notes.append(f"'{path.name}': '{name}' holds no plain numbers and was left out.")
-                        continue
-                    total += int(np.prod(shape, dtype=object)) if shape else 1
-                    require_size(total, 0, path)
-                    content = member.read()
-                    values = np.frombuffer(content, kind, count=int(np.prod(shape)))
-                    arrays[name] = (values.reshape(shape, order="F" if is_fortran else "C"), "")
-    except (*_DAMAGED, zipfile.BadZipFile, zlib.error) as error:
-        raise _damaged(path, "NPZ", error) from error
+    with open_regular(path) as file, ExitStack() as stack:
+        with damage_said(path, "NPZ"):
+            archive = stack.enter_context(zipfile.ZipFile(file))
+        for info in archive.infolist():
+            name = info.filename.removesuffix(".npy")
+            with damage_said(path, "NPZ"), archive.open(info) as member:
+                version = np.lib.format.read_magic(member)
+                read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
+                shape, is_fortran, kind = read(member)
+                if kind.hasobject or kind.kind not in _NUMBERS:
+                    notes.append(f"'{path.name}': '{name}' holds no plain numbers and was left out.")
+                    continue
+                total += int(np.prod(shape, dtype=object)) if shape else 1
+                require_size(total, 0, path)
+                values = np.frombuffer(member.read(), kind, count=int(np.prod(shape)))
+                arrays[name] = (values.reshape(shape, order="F" if is_fortran else "C"), "")
     return _log(path, "NPZ", arrays, notes)
 
 
@@ -64,14 +62,11 @@ def read_mat(path: Path) -> LogFile:
 
     arrays: Arrays = {}
     notes: list[str] = []
-    try:
-        with open_regular(path) as file, warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # about names that are there twice
-            require_size(_mat_size(file, path), 0, path)
-            file.seek(0)
-            found = scipy.io.loadmat(file, squeeze_me=True, struct_as_record=False)
-    except (*_DAMAGED, zlib.error, scipy.io.matlab.MatReadError) as error:
-        raise _damaged(path, "MAT", error) from error
+    with open_regular(path) as file, warnings.catch_warnings(), damage_said(path, "MAT"):
+        warnings.simplefilter("ignore")  # about names that are there twice
+        require_size(_mat_size(file, path), 0, path)
+        file.seek(0)
+        found = scipy.io.loadmat(file, squeeze_me=True, struct_as_record=False)
     for name, value in found.items():
         if not name.startswith("__"):
             arrays |= dict(_members(name, value))
@@ -111,11 +106,13 @@ def read_hdf5(path: Path, kind: str = "HDF5") -> LogFile:
         raise FileError(f"'{path.name}' needs the package h5py: install it with 'pip install h5py'.") from error
     arrays: Arrays = {}
     notes, total = [], 0
-    try:
-        with open_regular(path) as plain, h5py.File(plain, "r") as file:
+    with open_regular(path) as plain, ExitStack() as stack:
+        with damage_said(path, kind):
+            file = stack.enter_context(h5py.File(plain, "r"))
             found: list[tuple[str, Any]] = []
             file.visititems(lambda name, item: found.append((name, item)) if isinstance(item, h5py.Dataset) else None)
-            for name, item in found:
+        for name, item in found:
+            with damage_said(path, kind):
                 if name.startswith("#refs#") or item.dtype.kind not in _NUMBERS or not item.shape:
                     continue
                 if item.external or item.is_virtual:
@@ -124,18 +121,14 @@ def read_hdf5(path: Path, kind: str = "HDF5") -> LogFile:
                 total += int(np.prod(item.shape, dtype=object))
                 require_size(total, 0, path)
                 unit = item.attrs.get("unit", item.attrs.get("units", ""))
-                unit = unit.decode("utf-8", "replace") if isinstance(unit, bytes) else unit
-                arrays[name] = (item[()], unit if isinstance(unit, str) else "")
-    except _DAMAGED as error:
-        raise _damaged(path, kind, error) from error
+                arrays[name] = item[()], _text(unit)
     return _log(path, kind, arrays, notes)
 
 
-def _damaged(path: Path, kind: str, error: BaseException) -> FileError:
-    if isinstance(error, FileError):
-        return error
-    reason = " ".join(str(error).split())[:120] or type(error).__name__
-    return FileError(f"'{path.name}' could not be read as {kind} ({reason}): it is damaged or cut off, copy it again.")
+def _text(value: Any) -> str:
+    if isinstance(value, bytes):
+        return value.decode("utf-8", "replace")
+    return value if isinstance(value, str) else ""
 
 
 def _log(path: Path, kind: str, arrays: Arrays, notes: list[str]) -> LogFile:

@@ -12,6 +12,7 @@ from typing import Any
 from ....errors import FileError
 from ....io.regular_file import open_regular
 from ..log_table import LogFile, LogTable
+from .damaged_file import damage_said, read_by
 from .message_columns import TopicColumns, is_picture
 
 LARGEST_RECORD = 256 * 2**20
@@ -28,24 +29,20 @@ def read_mcap(path: Path) -> LogFile:
         raise FileError(f"'{path.name}' needs the package mcap: install it with 'pip install mcap rosbags'.") from error
     topics: dict[str, TopicColumns] = {}
     left_out: dict[str, str] = {}
+    known = (mcap.exceptions.EndOfFile, stream_reader.CRCValidationError)
     try:
         with open_regular(path) as file:
-            for topic, kind, time, content, decode in _messages(file, path, left_out):
+            for topic, kind, time, content, decode in _messages(file, path, known):
                 if decode is None or is_picture(kind):
                     left_out.setdefault(topic, kind)
                     continue
-                topics.setdefault(topic, TopicColumns(topic, path)).add(decode(content), time)
+                with damage_said(path, "MCAP"):
+                    message = decode(content)
+                topics.setdefault(topic, TopicColumns(topic, path)).add(message, time)
     except mcap.exceptions.EndOfFile as error:
         raise FileError(f"'{path.name}' is cut off{_until(topics)}: copy it again, or mend it with `mcap recover`.") from error
-    except FileError:
-        raise
     except stream_reader.CRCValidationError as error:
         raise FileError(f"'{path.name}' is damaged (a checksum is wrong): copy it again.") from error
-    except Exception as error:  # whatever the decoder of a damaged message raises
-        reason = " ".join(str(error).split())[:120] or type(error).__name__
-        raise FileError(
-            f"'{path.name}' could not be read as MCAP ({reason}): it is damaged or cut off, copy it again."
-        ) from error
     return log_of(path, "MCAP", topics, left_out)
 
 
@@ -73,34 +70,49 @@ def log_of(path: Path, kind: str, topics: dict[str, TopicColumns], left_out: dic
     return LogFile(path, kind, tuple(tables), tuple(notes))
 
 
-def _messages(file: Any, path: Path, left_out: dict[str, str]) -> Iterator[tuple[str, str, int, bytes, Decoder | None]]:
-    """Yield topic, type, time, content and decoder of each message; sizes are checked before anything is unpacked."""
-    from mcap.records import Channel, Chunk, Message, Schema
-    from mcap.stream_reader import StreamReader, breakup_chunk
+def _messages(
+    file: Any, path: Path, known: tuple[type[Exception], ...]
+) -> Iterator[tuple[str, str, int, bytes, Decoder | None]]:
+    """Yield topic, type, time, content and decoder of each message."""
+    from mcap.records import Channel, Message, Schema
 
     schemas: dict[int, Any] = {}
     channels: dict[int, Any] = {}
-    decoders = _Decoders()
+    decoders = _Decoders(path)
+    for record in read_by(_records(file, path), path, "MCAP", *known):
+        if isinstance(record, Schema):
+            schemas[record.id] = record
+        elif isinstance(record, Channel):
+            channels[record.id] = record
+        elif isinstance(record, Message):
+            channel = channels.get(record.channel_id)
+            if channel is None:
+                raise FileError(f"'{path.name}' is damaged (a message of channel {record.channel_id}, unknown): copy it again.")
+            schema = schemas.get(channel.schema_id)
+            decode = decoders.of(channel, schema)
+            yield channel.topic, schema.name if schema else channel.message_encoding, record.log_time, record.data, decode
+
+
+def _records(file: Any, path: Path) -> Iterator[Any]:
+    """Yield what the library reads; sizes are checked before anything is unpacked."""
+    from mcap.records import Chunk
+    from mcap.stream_reader import StreamReader, breakup_chunk
+
     reader = StreamReader(file, emit_chunks=True, validate_crcs=True, record_size_limit=LARGEST_RECORD)
     for outer in reader.records:
-        if isinstance(outer, Chunk) and outer.uncompressed_size > LARGEST_RECORD:
-            raise FileError(f"'{path.name}' has a chunk of {outer.uncompressed_size:,} bytes: it is damaged, or not a log.")
-        for record in breakup_chunk(outer, validate_crc=True) if isinstance(outer, Chunk) else [outer]:
-            if isinstance(record, Schema):
-                schemas[record.id] = record
-            elif isinstance(record, Channel):
-                channels[record.id] = record
-            elif isinstance(record, Message):
-                channel = channels[record.channel_id]
-                schema = schemas.get(channel.schema_id)
-                decode = decoders.of(channel, schema)
-                yield channel.topic, schema.name if schema else channel.message_encoding, record.log_time, record.data, decode
+        if isinstance(outer, Chunk):
+            if outer.uncompressed_size > LARGEST_RECORD:
+                raise FileError(f"'{path.name}' has a chunk of {outer.uncompressed_size:,} bytes: it is damaged, or not a log.")
+            yield from breakup_chunk(outer, validate_crc=True)
+        else:
+            yield outer
 
 
 class _Decoders:
     """What turns the bytes of messages into messages, by channel."""
 
-    def __init__(self) -> None:
+    def __init__(self, path: Path) -> None:
+        self._path = path
         self._known: dict[int, Decoder | None] = {}
         self._store: Any = None
 
@@ -124,8 +136,9 @@ class _Decoders:
         store, name = self._store, schema.name
         if name.count("/") == 1:  # as ROS 1 writes it
             name = name.replace("/", "/msg/")
-        types = get_types_from_msg(schema.data.decode(), name)
-        with suppress(KeyError):
+        with damage_said(self._path, "MCAP"):
+            types = get_types_from_msg(schema.data.decode(), name)
+        with damage_said(self._path, "MCAP"), suppress(KeyError):
             store.register({one: kind for one, kind in types.items() if one not in store.fielddefs})
         if schema.encoding == "ros1msg":
             return lambda content: store.deserialize_ros1(content, name)

@@ -3,11 +3,13 @@
 
 from __future__ import annotations
 
+from contextlib import ExitStack
 from pathlib import Path
 
 from ....errors import FileError
 from ....io.regular_file import require_regular
 from ..log_table import LARGEST_FILE, LogFile
+from .damaged_file import damage_said, read_by
 from .mcap_log import log_of, read_mcap
 from .message_columns import TopicColumns, is_picture
 
@@ -42,20 +44,13 @@ def _read_with_rosbags(path: Path) -> LogFile:
         raise FileError(f"'{path.name}' needs the package rosbags: install it with 'pip install rosbags'.") from error
     topics: dict[str, TopicColumns] = {}
     left_out: dict[str, str] = {}
-    try:
-        with AnyReader([path], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as reader:
-            known = [
-                one for one in reader.connections if not is_picture(one.msgtype) and one.msgtype in reader.typestore.fielddefs
-            ]
-            left_out |= {one.topic: one.msgtype for one in reader.connections if one not in known}
-            for connection, time, content in reader.messages(connections=known) if known else ():
+    with ExitStack() as stack:
+        with damage_said(path, "a bag"):
+            reader = stack.enter_context(AnyReader([path], default_typestore=get_typestore(Stores.ROS2_HUMBLE)))
+        known = [one for one in reader.connections if not is_picture(one.msgtype) and one.msgtype in reader.typestore.fielddefs]
+        left_out |= {one.topic: one.msgtype for one in reader.connections if one not in known}
+        for connection, time, content in read_by(reader.messages(connections=known), path, "a bag") if known else ():
+            with damage_said(path, "a bag"):
                 message = reader.deserialize(content, connection.msgtype)
-                topics.setdefault(connection.topic, TopicColumns(connection.topic, path)).add(message, time)
-    except FileError:
-        raise
-    except Exception as error:  # the library raises what its decoders and SQLite raise
-        reason = " ".join(str(error).split())[:120] or type(error).__name__
-        raise FileError(
-            f"'{path.name}' could not be read as a bag ({reason}): it is damaged or cut off, copy it again."
-        ) from error
+            topics.setdefault(connection.topic, TopicColumns(connection.topic, path)).add(message, time)
     return log_of(path, "ROS 1 bag" if path.suffix == ".bag" else "ROS 2 bag", topics, left_out)

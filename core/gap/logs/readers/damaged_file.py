@@ -1,0 +1,57 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What libraries raise on damaged files, as one sentence.
+
+Their readers meet bytes that nobody foresaw and raise whatever their code comes upon, so no list of errors is complete. Only
+the library's own calls stand inside :func:`damage_said`: a fault of ours keeps its traceback.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TypeVar
+
+from ....errors import FileError
+
+Item = TypeVar("Item")
+
+
+@contextmanager
+def damage_said(path: Path, kind: str, *passing: type[Exception]) -> Iterator[None]:
+    """Turn what a library raises on a damaged file into one sentence.
+
+    Parameters
+    ----------
+    path : Path
+    kind : str
+        What the file should be, as in "MCAP".
+    *passing
+        Errors that the caller knows how to explain.
+
+    Raises
+    ------
+    FileError
+        The library raised an error. Too little memory and what the system says of files keep their own sentences.
+    """
+    try:
+        yield
+    except (FileError, FileNotFoundError, PermissionError, MemoryError, *passing):
+        raise
+    except Exception as error:
+        reason = " ".join(str(error).split())[:120] or type(error).__name__
+        raise FileError(
+            f"'{path.name}' could not be read as {kind} ({reason}): it is damaged or cut off, copy it again."
+        ) from error
+
+
+def read_by(items: Iterable[Item], path: Path, kind: str, *passing: type[Exception]) -> Iterator[Item]:
+    """Yield what a library reads; what it raises meanwhile is said by :func:`damage_said`, what the caller raises is not."""
+    iterator = iter(items)
+    while True:
+        with damage_said(path, kind, *passing):
+            try:
+                item = next(iterator)
+            except StopIteration:
+                return
+        yield item
