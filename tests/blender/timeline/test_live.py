@@ -145,6 +145,7 @@ def test_sub_frames_loops_steps_and_handlers_off_give_the_same_pictures(tmp_path
 
 def test_steps_loops_and_handlers_off_render_the_same_pixels(tmp_path):
     scene, pad, _, _, free = press_and_drop(frames=16)
+    scene.palpate.use_auto_range, scene.palpate.range_max = False, 0.035  # N; so that the colours of these frames differ
     save(tmp_path)
     run_job(bake(scene))
     bpy.ops.object.light_add(type="SUN")
@@ -188,7 +189,7 @@ def test_steps_loops_and_handlers_off_render_the_same_pixels(tmp_path):
     for number, expected in stills.items():
         assert (pixels(tmp_path / f"step_00{number}.png") == expected).all()
     assert (alone == between).all()
-    assert all(np.abs(stills[a] - stills[b]).max() > 0.05 for a, b in ((12, 14), (14, 16)))  # 0.09 in 5.0
+    assert all(np.abs(stills[a] - stills[b]).max() > 0.1 for a, b in ((12, 14), (14, 16)))
 
 
 def test_time_stretching_shows_the_same_bake_slower(tmp_path):

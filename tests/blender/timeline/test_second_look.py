@@ -110,20 +110,27 @@ def test_nothing_changed_is_left_as_it_is():
     assert live_cache.get(scene) is run and frame_status.status_of(scene) is status
 
 
-def test_views_without_materials_show_the_colours_of_a_bake_on_both_sides(tmp_path):
+@pytest.mark.parametrize("indented", [False, True])
+def test_views_without_materials_show_the_colours_of_a_bake_on_both_sides(tmp_path, indented):
     scene, pad, _ = press(frames=4)
-    scene.palpate.show_indentation = False  # the overlay lies where the surface is shown
+    scene.palpate.show_indentation = indented
     save(tmp_path)
     run_job(bake(scene))
     scene.frame_set(4)
     bake_read = read_sensors(list(baked_frames._folders(scene)), images=False)
     (overlay,) = overlays.baked_overlays(scene, bake_read, 4, 0.5)
-    texels, force = bake_read.texels["Pad"], bake_read.recording.at(4).sensors["Pad"].normal_force
+    texels, readings = bake_read.texels["Pad"], bake_read.recording.at(4).sensors["Pad"]
     corner = texels.layout.triangles.ravel()
     assert overlay.plain_only and overlay.line is None
-    expected = color_maps.colors(scene.palpate.color_map, force / 0.5)[corner]
+    expected = color_maps.colors(scene.palpate.color_map, readings.normal_force / 0.5)[corner]
     np.testing.assert_allclose(overlay.colors[:, :3], np.tile(expected, (2, 1)), atol=1e-6)
     above, below = np.split(overlay.corners, 2)
     away = np.einsum("ij,ij->i", above - below, texels.normal[corner])
     assert (away > 0).all()  # the pad stands at the origin, unturned
-    np.testing.assert_allclose(0.5 * (above + below), texels.position[corner], atol=1e-7)
+    deepest = readings.depth.max()
+    assert deepest > 1e-4
+    surface = texels.position - indented * readings.depth[:, None] * texels.normal
+    shift = 0.5 * (above + below) - surface[corner]
+    lift = np.einsum("ij,ij->i", shift, texels.normal[corner])  # where the pad is indented, it lies a little above its curve
+    np.testing.assert_allclose(shift, lift[0] * texels.normal[corner], atol=1e-7)
+    assert 0.0 < lift[0] <= deepest / 8 if indented else abs(lift[0]) < 1e-7
