@@ -36,9 +36,9 @@ def damage_said(path: Path, kind: str, *passing: type[Exception]) -> Iterator[No
     """
     try:
         yield
-    except (FileError, FileNotFoundError, PermissionError, MemoryError, *passing):
-        raise
     except Exception as error:
+        if isinstance(error, (FileError, FileNotFoundError, PermissionError, MemoryError, *passing)):
+            raise
         reason = " ".join(str(error).split())[:120] or type(error).__name__
         raise FileError(
             f"'{path.name}' could not be read as {kind} ({reason}): it is damaged or cut off, copy it again."
