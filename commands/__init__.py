@@ -16,8 +16,7 @@ from contextlib import nullcontext, suppress
 from pathlib import Path
 from typing import NoReturn
 
-from ..core.errors import Cancelled, PalpateError
-from ..core.io.os_errors import os_error_reason
+from ..core.errors import Cancelled, PalpateError, os_error_reason
 from ..core.version import VERSION
 from . import console, limits
 

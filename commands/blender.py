@@ -14,10 +14,9 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..core.errors import FileError, PalpateError
+from ..core.errors import FileError, PalpateError, read_errors_said
 from ..core.io import bake_switch
 from ..core.io.file_writing import back_up, exchange_file, remove_leftovers_of, sync_file, writable_file
-from ..core.io.os_errors import read_errors_said
 from ..core.io.regular_file import open_regular, require_regular
 from . import console
 

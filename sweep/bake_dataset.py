@@ -5,11 +5,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from ..core.errors import FileError
+from ..core.errors import FileError, os_error_reason
 from ..core.export.exporter import Exporter, sensor_progress
 from ..core.figures.figure_style import FigureStyle
 from ..core.io.bake_reader import Bake
-from ..core.io.os_errors import os_error_reason
 from ..core.jobs.progress import Job
 from ..core.study.run_record import RunRecord
 from .dataset import require_pyarrow

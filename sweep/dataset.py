@@ -10,8 +10,7 @@ import re
 from collections.abc import Sequence
 from pathlib import Path
 
-from ..core.errors import FileError
-from ..core.io.os_errors import os_error_reason
+from ..core.errors import FileError, os_error_reason
 from ..core.io.temporary_folder import remove_unfinished, temporary_folder
 from ..core.model.shared_results import SharedResults
 from ..core.study.run_files import RUNS

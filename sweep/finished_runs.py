@@ -7,8 +7,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from ..core.errors import FileError
-from ..core.io.os_errors import os_error_reason
+from ..core.errors import FileError, os_error_reason
 from ..core.io.regular_file import read_bytes
 from ..core.study.run_files import FAILED, RUNS, STUDY_NAME, done_runs, failed_runs
 from ..core.study.run_record import RunRecord, Value, read_run_record, values_read

@@ -18,10 +18,9 @@ from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
-from ..errors import FileError
+from ..errors import FileError, os_error_reason
 from .checksum_list import read_checksums
 from .file_writing import file_sha256, write_file
-from .os_errors import os_error_reason
 from .regular_file import read_bytes
 from .sensor_npz import SENSOR_NAME
 

@@ -10,8 +10,7 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 
-from ..errors import FileError
-from .os_errors import os_error_reason
+from ..errors import FileError, os_error_reason
 from .regular_file import open_regular
 
 _LINE = re.compile(rb"([0-9a-f]{64})  ([!-~]{1,200})\n")

@@ -20,8 +20,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..errors import FileError
-from .os_errors import read_errors_said
+from ..errors import FileError, read_errors_said
 from .regular_file import open_regular
 
 UNITS: dict[str, dict[str, float]] = {

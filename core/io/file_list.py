@@ -21,9 +21,8 @@ from contextlib import contextmanager, suppress
 from pathlib import Path, PurePosixPath
 from typing import Any
 
-from ..errors import FileError
+from ..errors import FileError, os_error_reason
 from .file_writing import atomic_write, file_sha256, require_replaceable, sync_folder, writable_folder
-from .os_errors import os_error_reason
 from .regular_file import read_bytes
 from .temporary_folder import NAME, remove_unfinished, temporary_folder
 

@@ -19,9 +19,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from ..errors import FileError
+from ..errors import FileError, os_error_reason
 from .file_lock import try_lock
-from .os_errors import os_error_reason
 from .regular_file import open_regular
 
 

@@ -9,8 +9,7 @@ from typing import IO
 
 import numpy as np
 
-from ..errors import FileError
-from .os_errors import os_error_reason
+from ..errors import FileError, os_error_reason
 
 IN_MEMORY_BYTES = 1 << 22
 """Bytes of a table that stay in memory: hours of animation of a rigid body."""

@@ -18,11 +18,10 @@ from typing import IO, Any
 
 import numpy as np
 
-from ..errors import FileError
+from ..errors import FileError, os_error_reason
 from ..model.recording import row_blocks
 from .disk_space import require_space
 from .file_writing import write_file
-from .os_errors import os_error_reason
 
 DAMAGED = (
     ValueError,

@@ -13,9 +13,8 @@ import secrets
 from collections.abc import Callable
 from pathlib import Path
 
-from ..errors import FileError
+from ..errors import FileError, os_error_reason
 from .file_writing import atomic_write, remove_leftovers
-from .os_errors import os_error_reason
 
 PRIVATE_FOLDER = ".palpate"
 MARKER_NAME = "palpate-folder.json"

@@ -14,10 +14,9 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import FileError
+from ..errors import FileError, os_error_reason
 from ..model.recording import SENSOR_FIELDS, Recording, SensorRecording, row_blocks
 from .npz import DAMAGED, open_archive, read_array, write_arrays
-from .os_errors import os_error_reason
 from .regular_file import open_regular
 
 RECORDING_FORMAT = "palpate-recording/2"

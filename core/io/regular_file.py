@@ -12,8 +12,7 @@ import stat
 from pathlib import Path
 from typing import IO, Any
 
-from ..errors import FileError
-from .os_errors import read_errors_said
+from ..errors import FileError, read_errors_said
 
 _KINDS = {
     stat.S_IFIFO: "a FIFO",

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import FileError
+from ..errors import FileError, os_error_reason
 from ..geometry.layout.grid_layout import GridLayout
 from ..geometry.layout.texture_maps import UVLayout
 from ..geometry.mesh import TriangleMesh
@@ -30,7 +30,6 @@ from ..model.sensor import Sensor
 from ..model.sensor_parameters import Painted, SensorParameters
 from ..model.target import Target
 from .npz import DAMAGED, read_array, write_arrays
-from .os_errors import os_error_reason
 from .regular_file import open_regular
 
 SCENARIO_FORMAT = "palpate-scenario/1"

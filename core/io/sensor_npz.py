@@ -10,13 +10,12 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import FileError
+from ..errors import FileError, os_error_reason
 from ..geometry.layout.grid_layout import GridLayout
 from ..geometry.layout.texture_maps import UVLayout
 from ..geometry.texels import Texels
 from ..model.sensor_parameters import Painted
 from .npz import DAMAGED, PackedArchive, open_archive, write_arrays
-from .os_errors import os_error_reason
 from .regular_file import open_regular
 
 SENSOR_FORMAT = "palpate-sensor/1"

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..errors import FileError
+from ..errors import FileError, os_error_reason
 from ..geometry.layout.grid_layout import GridLayout
 from ..geometry.layout.texture_maps import UVLayout
 from ..model.recording import Frame, SensorFrame
@@ -22,7 +22,6 @@ from ..model.sensor import Sensor
 from .exr_backend import backend
 from .exr_codec import FormatError, in_order
 from .file_writing import atomic_write, write_file
-from .os_errors import os_error_reason
 
 CHANNELS = ("R", "G", "B", "reading", "depth", "slip", "contact")
 """Names of the channels, in the order in which :func:`read_exr` returns them."""

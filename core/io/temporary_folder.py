@@ -15,10 +15,9 @@ from collections.abc import Callable, Container, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from ..errors import FileError
+from ..errors import FileError, os_error_reason
 from .file_lock import try_lock
 from .file_writing import remove_leftovers
-from .os_errors import os_error_reason
 from .private_folder import MARKER_FORMAT, MARKER_NAME, remove_tree
 
 NAME = r"\.palpate-[a-z]+\.[0-9a-f]{8}\.partial"

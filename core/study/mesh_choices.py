@@ -13,11 +13,10 @@ from functools import lru_cache
 from pathlib import Path, PurePath
 from typing import Any
 
-from ..errors import FileError
+from ..errors import FileError, os_error_reason
 from ..geometry.mesh import TriangleMesh
 from ..io.file_writing import atomic_write, file_sha256
 from ..io.mesh_file import load_mesh
-from ..io.os_errors import os_error_reason
 from .design import CHOICE
 from .scene_property import is_scene_property
 

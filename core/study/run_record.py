@@ -9,9 +9,8 @@ from math import isfinite
 from pathlib import Path
 from typing import Any
 
-from ..errors import FileError
+from ..errors import FileError, os_error_reason
 from ..io.file_writing import write_synced
-from ..io.os_errors import os_error_reason
 from ..io.regular_file import read_bytes
 
 RUN_FORMAT = "palpate-run/1"

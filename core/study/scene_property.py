@@ -17,10 +17,9 @@ from math import inf
 from pathlib import Path
 from typing import Any
 
-from ..errors import FileError, ParameterError
+from ..errors import FileError, ParameterError, os_error_reason
 from ..io.file_writing import atomic_write
 from ..io.npz import DAMAGED
-from ..io.os_errors import os_error_reason
 from ..io.regular_file import read_bytes
 from ..io.toml_file import read_toml
 from ..model.parameter import Choice, ChoiceParameter, Parameter, Specification

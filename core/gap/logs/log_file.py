@@ -7,8 +7,7 @@ import os
 from collections.abc import Callable
 from pathlib import Path
 
-from ...errors import FileError
-from ...io.os_errors import read_errors_said
+from ...errors import FileError, read_errors_said
 from ...io.regular_file import open_regular
 from .log_table import LARGEST_FILE, LogFile
 from .readers.array_files import read_hdf5, read_mat, read_npz
