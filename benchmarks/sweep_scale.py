@@ -2,50 +2,55 @@
 """What limits large studies: the driver's memory and time, files per folder, the scheduler, and the memory of a worker.
 
 Finished runs are played: a folder with its ``run.json``, as many as a driver has to look through when it goes on. Each figure
-is per run, to be multiplied.
+is per run, to be multiplied. So are batches: a worker answers at once, so that what is left is the driver and the scheduler.
 """
 
 from __future__ import annotations
 
 import gc
 import json
-import os
 import tempfile
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict
 from pathlib import Path
+from typing import Any
+from unittest import mock
 
 from palpate.core.study.run_files import RUNS, done_runs
 from palpate.core.study.run_record import RUN_FORMAT, RUN_NAME
 from palpate.core.study.study_file import Run
+from palpate.sweep.child import DONE, Scenes, compute_run
 from palpate.sweep.finished_runs import run_order
+from palpate.sweep.report import write_report
 from palpate.sweep.run_table import write_run_table
-from palpate.sweep.worker import Child
+from palpate.sweep.worker import Child, Limits
 
 from .sweep import LENGTHS, begun
 
 PLAYED = 100_000
 """Finished runs that are played."""
 TASKS = 2_000
-"""Empty tasks that the scheduler passes on."""
+"""Empty tasks that the scheduler passes on, and batches that the driver gives out."""
+WORKERS = 16
+"""Workers to which batches are given, as on a larger machine."""
 WORKED, WARM = 10_000, 1_000
 """Runs that a worker computes, and after how many of them its memory is measured first."""
 
 
-def resident(process: int | str = "self") -> int:
-    """Return the bytes of memory that a process has (Linux)."""
-    return int(Path(f"/proc/{process}/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
+def resident(process: int | str = "self", word: str = "VmRSS") -> int:
+    """Return the bytes of memory that a process has, or had at most (word VmHWM); Linux."""
+    lines = Path(f"/proc/{process}/status").read_text().splitlines()
+    return 1024 * next(int(line.split()[1]) for line in lines if line.startswith(f"{word}:"))
 
 
 def measured(work: Callable[[], object]) -> tuple[float, int]:
-    """Return the seconds of the processor that work takes, and the bytes by which this process has grown with its result."""
+    """Return the seconds of the processor that work takes, and the bytes by which this process grows meanwhile at most."""
     gc.collect()
+    Path("/proc/self/clear_refs").write_text("5")  # the most from now on
     before, start = resident(), time.process_time()
-    kept = work()
-    taken = time.process_time() - start, resident() - before
-    del kept
-    return taken
+    work()
+    return time.process_time() - start, resident(word="VmHWM") - before
 
 
 def play_finished(folder: Path, runs: list[Run]) -> None:
@@ -53,8 +58,8 @@ def play_finished(folder: Path, runs: list[Run]) -> None:
     for run in runs:
         place = folder / RUNS / run.digest
         place.mkdir()
-        metrics = {f"metric_{i}": 0.1 * i for i in range(12)}
-        about = {"values": dict(run.values), "metrics": metrics, "seconds": 0.004, "frames": 6, "sensors": ["pad"]}
+        metrics = {f"metric_{i}": run.index * 0.1**i for i in range(12)}
+        about = {"values": dict(run.values), "metrics": metrics, "seconds": 0.004, "frames": 6, "sensors": []}
         words = {"format": RUN_FORMAT, "digest": run.digest, "index": run.index, **about}
         (place / RUN_NAME).write_text(json.dumps(words), encoding="utf-8")
 
@@ -70,6 +75,7 @@ def driver() -> Iterator[dict]:
             "looking": lambda: done_runs(folder),
             "ordering": lambda: run_order(folder, plans[0]),
             "table": lambda: write_run_table(folder, run_order(folder, plans[0]), []),
+            "report": lambda: write_report(folder, plans[0]),
         }
         taken = {"planning": planning} | {name: measured(work) for name, work in works.items()}
     for name, (seconds, grown) in taken.items():
@@ -77,31 +83,57 @@ def driver() -> Iterator[dict]:
         yield {"name": f"sweep_scale.{name}.memory", "value": max(0, grown) / PLAYED, "unit": "bytes per run"}
 
 
+def files() -> Iterator[dict]:
+    """Files and folders of a run, which all lie in one folder, and what they take on the disk."""
+    with tempfile.TemporaryDirectory() as place:
+        folder = Path(place)
+        (run,) = begun(folder, LENGTHS["50_ms"], 1)
+        compute_run(Scenes(folder), run)
+        found = [path for path in (folder / RUNS / run.digest).rglob("*")]
+        taken = sum(path.stat().st_blocks * 512 for path in (folder / RUNS / run.digest, *found))
+    yield {"name": "sweep_scale.files", "value": len(found) + 1, "unit": "files and folders per run"}
+    yield {"name": "sweep_scale.disk", "value": taken / 1e3, "unit": "kB per run"}
+
+
 def _empty(number: int) -> int:
     return number
 
 
+def _played_batch(_folder: str, runs: Sequence[dict[str, Any]], *_rest: object) -> list[dict[str, Any]]:
+    return [{"digest": run["digest"], "status": DONE, "seconds": 0.0} for run in runs]
+
+
 def scheduler() -> Iterator[dict]:
     """Tasks that a scheduler on this machine passes to a worker and back, in a second; a batch of a study is one task."""
-    from palpate.sweep.driver import dask_client
+    from palpate.sweep import driver
 
-    with dask_client(None, 1) as client:
+    with driver.dask_client(None, 1) as client:
         client.gather(client.map(_empty, range(10), pure=False))
         start = time.perf_counter()
         client.gather(client.map(_empty, range(TASKS), pure=False))
         seconds = time.perf_counter() - start
     yield {"name": "sweep_scale.scheduler", "value": TASKS / seconds, "unit": "tasks/s"}
+    runs = [Run(i, "pad", {"press.depth": 1e-3}, f"{i:024x}") for i in range(TASKS)]
+    with driver.dask_client(None, WORKERS) as client, mock.patch.object(driver, "compute_batch", _played_batch):
+        client.wait_for_workers(WORKERS)
+        driver.run_study(client, Path(), runs[:WORKERS], Limits(), lambda tally: None)
+        start, used = time.perf_counter(), time.process_time()
+        driver.run_study(client, Path(), runs, Limits(), lambda tally: None)  # at once, so batches stay at one run
+        seconds, used = time.perf_counter() - start, time.process_time() - used
+    yield {"name": f"sweep_scale.batches.{WORKERS}_workers", "value": TASKS / seconds, "unit": "batches/s"}
+    yield {"name": f"sweep_scale.driver.{WORKERS}_workers", "value": used / TASKS * 1e3, "unit": "CPU ms per batch"}
 
 
 def worker_memory() -> Iterator[dict]:
     """By how much a process that computes runs grows from its first thousand to its ten thousandth run."""
     with tempfile.TemporaryDirectory() as place:
         runs = begun(Path(place), LENGTHS["50_ms"], WORKED)
+        Child(place).kill()  # compiles the solver where nothing has yet, which takes memory of its own
         child = Child(place)
         sizes = []
         try:
             for number, run in enumerate(runs, 1):
-                answer = child.compute(asdict(run), None)
+                answer = child.compute(asdict(run))
                 if answer is None or answer["status"] != "done":
                     raise RuntimeError(f"run {number} is not done: {answer}")
                 if number in (WARM, WORKED):
@@ -116,7 +148,8 @@ def worker_memory() -> Iterator[dict]:
 
 
 def run() -> Iterator[dict]:
-    """Driver, scheduler and worker."""
+    """Driver, files, scheduler and worker."""
     yield from driver()
+    yield from files()
     yield from scheduler()
     yield from worker_memory()

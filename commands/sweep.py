@@ -24,6 +24,10 @@ MOST_NAMED = 3
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.set_defaults(stopped="stopped; the same command goes on where it was.")
+    parser.epilog = (
+        "Limits of the command concern its own process. In the study's file run_limit (seconds) and run_memory (MB) are those "
+        "of each run: one that takes more is ended and counts as failed, and the others go on."
+    )
     parser.add_argument("study", metavar="STUDY.toml|DIR", help="file of a study, or the folder of one that goes on")
     parser.add_argument("--out", metavar="DIR", help="output folder (default: beside the study, with its name)")
     parser.add_argument("--workers", metavar="N", type=_count, help="processes on this machine (default: one per core)")
@@ -175,13 +179,14 @@ def _slurm(arguments: argparse.Namespace) -> Callable[[], Any] | None:
 
 def _estimate(opened: OpenStudy, arguments: argparse.Namespace) -> int:
     from ..sweep.trial import try_runs
+    from ..sweep.worker import Limits
 
     print(_kind_of_runs(opened))
     if arguments.slurm:
         from ..sweep import slurm
 
         print(slurm.job_script(slurm.options_of(arguments.slurm_option)))
-    found = try_runs(opened.folder, opened.runs, opened.study.run_limit, arguments.scripts)
+    found = try_runs(opened.folder, opened.runs, Limits.of(opened.study), arguments.scripts)
     workers = _workers(arguments)
     seconds = found.seconds * len(opened.runs) / workers
     print(f"{len(opened.runs)} runs, {found.seconds:.3g} s and {found.size / 1e6:.3g} MB each")
@@ -212,6 +217,7 @@ def _compute(opened: OpenStudy, arguments: argparse.Namespace) -> int:
     from ..core.study.run_files import done_runs, failed_runs, make_folders
     from ..sweep import driver
     from ..sweep.status import status_of
+    from ..sweep.worker import Limits
 
     make_folders(opened.folder)
     number, count = arguments.part or (1, 1)
@@ -230,7 +236,7 @@ def _compute(opened: OpenStudy, arguments: argparse.Namespace) -> int:
 
             workers = min(_workers(arguments), len(left))
             with driver.dask_client(arguments.scheduler, workers, _slurm(arguments)) as client:
-                tally = driver.run_study(client, opened.folder, left, opened.study.run_limit, show, arguments.scripts)
+                tally = driver.run_study(client, opened.folder, left, Limits.of(opened.study), show, arguments.scripts)
         for index, sentence in tally.failures[:MOST_FAILURES_NAMED]:
             print(f"run {index} failed: {sentence}")
     found = status_of(opened.folder)

@@ -31,6 +31,9 @@ class Study(Subpanel):
         layout.prop(own, "use_limit")
         if own.use_limit:
             layout.prop(own, "run_limit")
+        layout.prop(own, "use_memory_limit")
+        if own.use_memory_limit:
+            layout.prop(own, "run_memory")
         layout.prop(own, "workers")
         layout.prop(own, "file", text="")
         progress = session_state.session.study_progress

@@ -15,6 +15,7 @@ import threading
 import time
 import traceback
 from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, TextIO
 
@@ -143,9 +144,16 @@ def _own_output() -> TextIO:
     return output
 
 
+def _end_first_without_memory() -> None:
+    """Let Linux end this process, and not its worker or the scheduler, where the machine's memory is used up."""
+    with suppress(OSError):
+        Path("/proc/self/oom_score_adj").write_text("500", encoding="ascii")
+
+
 def main() -> None:
     """Answer lines until there are no more."""
     output = _own_output()
+    _end_first_without_memory()
     try:
         scenes = Scenes(Path(sys.argv[1]), *sys.argv[2:3])
     except PalpateError as error:

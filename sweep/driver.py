@@ -17,7 +17,7 @@ from ..core.study.study_file import Run
 from . import local_worker
 from .child import DONE, FAILED, UNWRITABLE
 from .scene_evaluation import REFUSE
-from .worker import compute_batch
+from .worker import Limits, compute_batch
 
 BATCH_SECONDS = 2.0
 """Length of a batch: long beside the milliseconds that Dask needs for a task, short for who waits for Ctrl-C."""
@@ -131,7 +131,7 @@ def run_study(
     client: Any,
     folder: Path,
     runs: Sequence[Run],
-    limit: float | None,
+    limits: Limits,
     on_progress: Callable[[Tally], object],
     scripts: str = REFUSE,
 ) -> Tally:
@@ -144,8 +144,8 @@ def run_study(
         Of the study, under the same path on all machines.
     runs : sequence of Run
         Those that are not done.
-    limit : float or None
-        Seconds that a run may take.
+    limits : Limits
+        What a run may take.
     on_progress : callable
         Called several times a second. An exception that it raises, KeyboardInterrupt included, stops the study.
     scripts : str
@@ -158,14 +158,14 @@ def run_study(
     PalpateError
         Workers are lost again and again.
     """
-    return _Dispatch(client, folder, runs, limit, scripts).run(on_progress)
+    return _Dispatch(client, folder, runs, limits, scripts).run(on_progress)
 
 
 class _Dispatch:
     """Batches at the workers and those to come."""
 
-    def __init__(self, client: Any, folder: Path, runs: Sequence[Run], limit: float | None, scripts: str):
-        self.client, self.folder, self.runs, self.limit, self.scripts = client, folder, runs, limit, scripts
+    def __init__(self, client: Any, folder: Path, runs: Sequence[Run], limits: Limits, scripts: str):
+        self.client, self.folder, self.runs, self.limits, self.scripts = client, folder, runs, limits, scripts
         self.index_of = {run.digest: run.index for run in runs}
         self.next = 0
         self.batch = 1
@@ -211,7 +211,7 @@ class _Dispatch:
 
     def _send(self, runs: Sequence[Run], losses: int) -> None:
         words = [asdict(run) for run in runs]
-        future = self.client.submit(compute_batch, os.fspath(self.folder), words, self.limit, self.scripts, pure=False)
+        future = self.client.submit(compute_batch, os.fspath(self.folder), words, self.limits, self.scripts, pure=False)
         self.waiting[future] = runs, losses
 
     def _take(self, future: Any) -> None:

@@ -70,7 +70,8 @@ def begin_study(file: Path, folder: Path, read_blend: ReadBlend) -> OpenStudy:
         if changed:
             raise FileError(f"'{folder}' belongs to another study ({'; '.join(changed)}): give another folder with --out.")
         _check_sources(opened, sources, file.parent, read_blend)
-        return replace(opened, study=replace(opened.study, run_limit=study.run_limit))  # no result depends on it
+        # No result depends on the limits.
+        return replace(opened, study=replace(opened.study, run_limit=study.run_limit, run_memory=study.run_memory))
     if folder.exists() and (not folder.is_dir() or {path.name for path in folder.iterdir()} - _OWN):
         raise FileError(f"'{folder}' holds other files and no study: give a new or empty folder with --out.")
     with _whole_or_nothing(folder):

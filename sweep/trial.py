@@ -13,7 +13,7 @@ from pathlib import Path
 from ..core.study.run_files import RUNS, SCENES, STUDY_NAME, make_folders
 from ..core.study.study_file import Run
 from .scene_evaluation import REFUSE
-from .worker import compute_batch, end_children
+from .worker import Limits, compute_batch, end_children
 
 RUNS_TRIED = 5
 
@@ -37,7 +37,7 @@ class Estimate:
     failures: list[str]
 
 
-def try_runs(folder: Path, runs: Sequence[Run], limit: float | None, scripts: str = REFUSE) -> Estimate:
+def try_runs(folder: Path, runs: Sequence[Run], limits: Limits, scripts: str = REFUSE) -> Estimate:
     """Compute some runs, spread over a study, away from its folder.
 
     Parameters
@@ -46,8 +46,8 @@ def try_runs(folder: Path, runs: Sequence[Run], limit: float | None, scripts: st
         Of the study.
     runs : sequence of Run
         All of them.
-    limit : float or None
-        Seconds that a run may take.
+    limits : Limits
+        What a run may take.
     scripts : str
         What is done about the Python in a .blend.
     """
@@ -59,10 +59,10 @@ def try_runs(folder: Path, runs: Sequence[Run], limit: float | None, scripts: st
         shutil.copy(folder / STUDY_NAME, trial)
         shutil.copytree(folder / SCENES, trial / SCENES, dirs_exist_ok=True)
         try:
-            compute_batch(name, chosen[:1], limit, scripts)  # the first run loads what was compiled
+            compute_batch(name, chosen[:1], limits, scripts)  # the first run loads what was compiled
             shutil.rmtree(trial / RUNS)
             make_folders(trial)
-            answers = compute_batch(name, chosen, limit, scripts)
+            answers = compute_batch(name, chosen, limits, scripts)
         finally:
             end_children()
         written = sum(file.stat().st_size for file in (trial / RUNS).rglob("*") if file.is_file())

@@ -18,12 +18,14 @@ import threading
 import time
 from collections.abc import Sequence
 from contextlib import suppress
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ..core.errors import FileError
+from ..core.errors import FileError, PalpateError
 from ..core.study.run_files import RUNS, write_failure
 from ..core.study.run_record import RUN_NAME
+from ..core.study.study_file import Study
 from .child import DONE, FAILED, UNWRITABLE
 from .scene_evaluation import REFUSE
 
@@ -31,10 +33,49 @@ MOST_DEATHS = 3
 """How often a process may die on a run before the run counts as failed: once may be an accident or an administrator."""
 START_LIMIT = 900.0
 """Seconds that a process may take to start; the first one on a machine compiles the solver, about a minute."""
+LOOK = 0.1
+"""Seconds between two looks at the memory of a run, in which it grows by less than what a machine should have left."""
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What a run may take.
+
+    Attributes
+    ----------
+    seconds : float or None
+    memory : float or None
+        MB that the process of the run holds, and a Blender that it has started.
+    """
+
+    seconds: float | None = None
+    memory: float | None = None
+
+    @classmethod
+    def of(cls, study: Study) -> Limits:
+        """Return those that a study's file gives."""
+        return cls(study.run_limit, study.run_memory)
+
+
+NO_LIMITS = Limits()
+
+
+class LimitReached(PalpateError):
+    """A run has reached its limit of time or memory; the message goes on from "Run N"."""
+
+
+class MemoryReached(LimitReached):
+    """It was that of memory."""
 
 
 class Child:
-    """A process that computes runs of one study."""
+    """A process that computes runs of one study.
+
+    Attributes
+    ----------
+    begun : int
+        Runs that it was given.
+    """
 
     def __init__(self, folder: str, scripts: str = REFUSE):
         environment = {**os.environ, "NUMBA_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
@@ -50,7 +91,8 @@ class Child:
         )
         self._answers: queue.Queue[str] = queue.Queue()
         threading.Thread(target=self._read, daemon=True).start()
-        first = self._answer(START_LIMIT)
+        self.begun = 0
+        first = self._answer(Limits(START_LIMIT))
         if first is None or first["status"] != "ready":
             self.kill()
             raise FileError("A process for runs did not start" + (f": {first['sentence']}" if first else "."))
@@ -61,10 +103,35 @@ class Child:
             self._answers.put(line)
         self._answers.put("")
 
-    def _answer(self, limit: float | None) -> dict[str, Any] | None:
-        """Return the next answer, None when the process has died; raises queue.Empty after `limit` seconds."""
-        line = self._answers.get(timeout=limit)
-        return json.loads(line) if line else None
+    def _answer(self, limits: Limits) -> dict[str, Any] | None:
+        """Return the next answer, None when the process has died; raises :class:`LimitReached`."""
+        until = None if limits.seconds is None else time.monotonic() + limits.seconds
+        while True:
+            left = None if until is None else max(0.0, until - time.monotonic())
+            wait = left if limits.memory is None else LOOK if left is None else min(LOOK, left)
+            try:
+                line = self._answers.get(timeout=wait)
+            except queue.Empty:
+                if until is not None and time.monotonic() >= until:
+                    raise LimitReached(f"was ended after its limit of {limits.seconds:g} s: raise run_limit") from None
+                if limits.memory is not None and self.memory() > limits.memory * 1e6:
+                    raise MemoryReached(
+                        f"was ended because it held more than its limit of {limits.memory:g} MB: raise run_memory"
+                    ) from None
+            else:
+                return json.loads(line) if line else None
+
+    def memory(self) -> int:
+        """Return the bytes of memory that the process and those that it has started hold; 0 when it has ended."""
+        import psutil  # of Dask
+
+        held = 0
+        with suppress(psutil.Error):
+            own = psutil.Process(self._process.pid)
+            for process in (own, *own.children(recursive=True)):
+                with suppress(psutil.Error):
+                    held += process.memory_info().rss
+        return held
 
     @property
     def process_id(self) -> int:
@@ -76,15 +143,16 @@ class Child:
         """Whether it can take a run."""
         return self._process.poll() is None
 
-    def compute(self, words: dict[str, Any], limit: float | None) -> dict[str, Any] | None:
-        """Compute a run; return the answer, None if the process died, and raise queue.Empty when the limit is over."""
+    def compute(self, words: dict[str, Any], limits: Limits = NO_LIMITS) -> dict[str, Any] | None:
+        """Compute a run; return the answer, None if the process died, and raise :class:`LimitReached` at a limit."""
         assert self._process.stdin is not None
+        self.begun += 1
         try:
             self._process.stdin.write(json.dumps(words) + "\n")
             self._process.stdin.flush()
         except OSError:
             return None
-        return self._answer(limit)
+        return self._answer(limits)
 
     def kill(self) -> int:
         """End the process, and a Blender that it has started, and return its exit status."""
@@ -119,7 +187,7 @@ def end_children() -> None:
 
 
 def compute_batch(
-    folder: str, runs: Sequence[dict[str, Any]], limit: float | None = None, scripts: str = REFUSE
+    folder: str, runs: Sequence[dict[str, Any]], limits: Limits = NO_LIMITS, scripts: str = REFUSE
 ) -> list[dict[str, Any]]:
     """Compute runs of a study that are not done yet; called by Dask.
 
@@ -129,8 +197,8 @@ def compute_batch(
         Of the study, as this machine sees it.
     runs : sequence of dict
         Fields of :class:`.Run`.
-    limit : float, optional
-        Seconds that each may take.
+    limits : Limits
+        What each may take.
     scripts : str
         What is done about the Python in a .blend, one of :data:`.scene_evaluation.SCRIPTS`.
 
@@ -145,22 +213,25 @@ def compute_batch(
         if (Path(folder) / RUNS / str(words["digest"]) / RUN_NAME).is_file():  # by a worker that Dask had lost
             answers.append({"digest": words["digest"], "status": DONE, "seconds": 0.0})
             continue
-        answers.append(_computed(folder, words, limit, scripts))
+        answers.append(_computed(folder, words, limits, scripts))
         if answers[-1]["status"] == UNWRITABLE:
             break
     return answers
 
 
-def _computed(folder: str, words: dict[str, Any], limit: float | None, scripts: str) -> dict[str, Any]:
+def _computed(folder: str, words: dict[str, Any], limits: Limits, scripts: str) -> dict[str, Any]:
     """Return what became of a run; the process is started again where it dies."""
     sentence = ""
     began = time.monotonic()
     for _ in range(MOST_DEATHS):
         try:
-            answer = _child_for(folder, scripts).compute(words, limit)
-        except queue.Empty:
+            child = _child_for(folder, scripts)
+            answer = child.compute(words, limits)
+        except LimitReached as reached:
             _children.pop((folder, scripts)).kill()
-            sentence = f"Run {words['index']} was ended after its limit of {limit:g} s: raise run_limit, or vary less widely."
+            if isinstance(reached, MemoryReached) and child.begun > 1:
+                continue  # earlier runs of the process may have left something; it fails only by what it needs itself
+            sentence = f"Run {words['index']} {reached}, or vary less widely."
             break
         except FileError as error:
             return {"digest": words["digest"], "status": UNWRITABLE, "sentence": str(error), "seconds": 0.0}

@@ -83,6 +83,16 @@ class PALPATE_PG_study(bpy.types.PropertyGroup):
     run_limit: FloatProperty(
         name="Longest Run (s)", description="Time after which a run counts as failed, s", default=60.0, min=0.1, options=set()
     )
+    use_memory_limit: BoolProperty(
+        name="Limit Memory", description="Runs that hold too much memory count as failed", options=set()
+    )
+    run_memory: FloatProperty(
+        name="Most Memory (MB)",
+        description="Memory of its process above which a run counts as failed, MB",
+        default=4000.0,
+        min=1.0,
+        options=set(),
+    )
     workers: IntProperty(
         name="Processes", description="Processes that compute runs; 0: one for each core", min=0, max=4096, options=set()
     )

@@ -197,6 +197,8 @@ def study_tables(scene) -> dict[str, Any]:
         tables["images"] = True
     if own.use_limit:
         tables["run_limit"] = units.as_typed(own.run_limit)
+    if own.use_memory_limit:
+        tables["run_memory"] = units.as_typed(own.run_memory)
     tables["vary"] = {item.name: _distribution(item, own.design) for item in own.variables if item.use}
     if own.use_press:
         tables["press"] = _press(own)

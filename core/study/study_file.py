@@ -65,7 +65,8 @@ FROZEN = "frozen"
 SCENE = "scene"
 """Name of the column that tells the scene of a run, where a study has several."""
 _WORDS = (
-    *("format", "name", "scene", "scenes", "design", "samples", "seed", "fps", "run_limit", "images", "vary", "press", FROZEN),
+    *("format", "name", "scene", "scenes", "design", "samples", "seed", "fps", "run_limit", "run_memory", "images", "vary"),
+    *("press", FROZEN),
 )
 _DIRECTIONS = {"tilt_direction": "tilt", "slide_direction": "slide"}
 """Directions of a press, which are any as long as the study says nothing else, and what they direct."""
@@ -91,6 +92,8 @@ class Study:
         Frames per second instead of those of the scene.
     run_limit : float or None
         Seconds that a run may take.
+    run_memory : float or None
+        MB that the process of a run may hold.
     name : str
         For the report and the dataset; empty if the file gives none.
     images : bool
@@ -105,6 +108,7 @@ class Study:
     press: Mapping[str, Any] | None = None
     fps: float | None = None
     run_limit: float | None = None
+    run_memory: float | None = None
     name: str = ""
     images: bool = False
     frozen: Mapping[str, Any] = field(default_factory=dict)
@@ -199,6 +203,7 @@ def study_of(table: Mapping[str, Any], name: str) -> Study:
         press=table.get("press"),
         fps=_positive(table, "fps", name),
         run_limit=_positive(table, "run_limit", name),
+        run_memory=_positive(table, "run_memory", name),
         name=checked_name(table["name"], f"name of '{name}'") if "name" in table else "",
         images=_switch(table, "images", name),
         frozen=table.get(FROZEN, {}),

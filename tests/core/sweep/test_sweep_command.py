@@ -23,7 +23,7 @@ from palpate.core.io.scenario_npz import save_scenario
 from palpate.core.io.tactile_exr import read_exr
 from palpate.core.study.run_files import SCENES, done_runs, make_folders, write_failure
 from palpate.sweep.study_folder import begin_study
-from palpate.sweep.worker import compute_batch, end_children
+from palpate.sweep.worker import Child, Limits, compute_batch, end_children
 
 pytest.importorskip("distributed")
 parquet = pytest.importorskip("pyarrow.parquet")
@@ -184,12 +184,13 @@ def test_a_study_of_a_billion_runs_is_one_line_and_begins_nothing(tmp_path):
     assert not (tmp_path / "out").exists()
 
 
-def test_another_time_limit_holds_for_the_same_study(undisturbed, tmp_path):
-    """No result depends on it, and the message of a run that was too slow advises to raise it."""
+def test_other_limits_hold_for_the_same_study(undisturbed, tmp_path):
+    """No result depends on them, and the message of a run that was too slow or too large advises to raise one."""
     folder = tmp_path / "out"
     shutil.copytree(undisturbed, folder)
-    file = write_study(tmp_path, STUDY.replace("fps = 200", "fps = 200\nrun_limit = 77"))
-    assert begin_study(file, folder, lambda blend, target: None).study.run_limit == 77.0
+    file = write_study(tmp_path, STUDY.replace("fps = 200", "fps = 200\nrun_limit = 77\nrun_memory = 999"))
+    study = begin_study(file, folder, lambda blend, target: None).study
+    assert (study.run_limit, study.run_memory) == (77.0, 999.0)
 
 
 @pytest.fixture
@@ -218,9 +219,36 @@ def test_a_run_that_fails_leaves_the_others_alone(by_hand):
 
 def test_a_run_that_never_ends_is_ended(by_hand):
     slow = words_of(1, **{"press.speed": 1e-9})  # frames for weeks
-    answers = compute_batch(str(by_hand), [slow, words_of(2)], 5.0)
+    answers = compute_batch(str(by_hand), [slow, words_of(2)], Limits(5.0))
     assert [answer["status"] for answer in answers] == ["failed", "done"]
     assert "ended after its limit of 5 s" in answers[0]["sentence"]
+
+
+def test_a_run_that_eats_memory_is_ended(by_hand):
+    """It gets a second, fresh process, since the first one has computed another run before; the worker goes on."""
+    hungry = words_of(1, **{"press.speed": 1e-9})  # its frames fill some 40 MB a second
+    child = Child(str(by_hand))
+    try:
+        child.compute(words_of(0))
+        limit = round(child.memory() / 1e6) + 60
+    finally:
+        child.kill()
+    answers = compute_batch(str(by_hand), [words_of(3), hungry, words_of(2)], Limits(LONGEST, limit))
+    assert [answer["status"] for answer in answers] == ["done", "failed", "done"]
+    said = (by_hand / "failed" / f"{hungry['digest']}.txt").read_text(encoding="utf-8")
+    assert said == (
+        f"Run 1 was ended because it held more than its limit of {limit} MB: raise run_memory, or vary less widely.\n"
+    )
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="how Linux chooses what it ends")
+def test_the_system_ends_a_run_before_its_worker(by_hand):
+    child = Child(str(by_hand))
+    try:
+        own, worker = (int(Path(f"/proc/{name}/oom_score_adj").read_text()) for name in (child.process_id, "self"))
+    finally:
+        child.kill()
+    assert own > worker
 
 
 def test_a_run_that_is_done_is_not_computed_again(by_hand):
