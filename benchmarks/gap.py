@@ -12,7 +12,8 @@ Environment:
 ``PALPATE_GAP_FIRST``      number of the first case of each kind; below 1000 are those to develop on, from 5000 on those that
                            nobody looks at before the figures are drawn (5000)
 ``PALPATE_GAP_BASELINES``  on how many of them the baselines run as well (a quarter)
-``PALPATE_GAP_RESULTS``    a file of results: nothing is run, its figures are printed
+``PALPATE_GAP_RESULTS``    a file of results, or the folder of the study docs/sample-study/hidden-effects.toml: nothing is run,
+                           its figures are printed
 """
 
 from __future__ import annotations
@@ -40,6 +41,8 @@ MIX = {"own": 60, "other": 60, "none": 30, "two": 40, "outside": 30, "poor": 20}
 FAILED: dict[str, Any] = {"outcome": "failed", "sure": [], "said": [], "verdict": "failed", "ambiguous": [], "experiment": ""}
 FAILED |= {"closed": None, "inside": []}
 """The score of a case that raised."""
+CASE_NAME = "case.json"
+"""Name of the file in which a run of the study has its case."""
 QUIET = ("noise",)
 """Effects that leave no gap which a model could close."""
 
@@ -51,7 +54,7 @@ def run() -> Iterator[dict]:
     plan = plan_of(total, first)
     baselines = int(os.environ.get("PALPATE_GAP_BASELINES", str(total // 4)))
     kept = os.environ.get("PALPATE_GAP_RESULTS")
-    results = _kept(Path(kept)) if kept else _results(plan, set(_spread(plan, baselines)))
+    results = results_in(Path(kept)) if kept else _results(plan, set(_spread(plan, baselines)))
     matrix, rows = confusion(results), table(results)
     print(matrix, rows, sep="\n\n", file=sys.stderr)
     (_folder() / "confusion.txt").write_text(matrix + "\n", encoding="utf-8")
@@ -81,8 +84,8 @@ def _folder() -> Path:
     return folder
 
 
-def _fingerprint() -> str:
-    """Of all that a result depends on; how it is shown is not of it."""
+def fingerprint() -> str:
+    """Return a hash of all that a result depends on; how it is shown is not of it."""
     seen = hashlib.sha256()
     for part in ("core/gap", "core/effects", "benchmarks/_hidden"):
         for path in sorted((HOUSE / part).rglob("*.py")):
@@ -91,14 +94,15 @@ def _fingerprint() -> str:
     return seen.hexdigest()[:12]
 
 
-def _kept(path: Path) -> list[dict]:
-    """The results in a file, the last of each case."""
-    lines = map(json.loads, path.read_text(encoding="utf-8").splitlines())
+def results_in(path: Path) -> list[dict]:
+    """Return the results in a file or in the folder of a study, the last of each case."""
+    files = sorted(path.glob(f"runs/*/{CASE_NAME}")) if path.is_dir() else [path]
+    lines = [json.loads(line) for file in files for line in file.read_text(encoding="utf-8").splitlines()]
     return list({(r["kind"], r["number"]): r for r in lines}.values())
 
 
 def _results(plan: list[tuple[str, int]], compared: set[tuple[str, int]]) -> list[dict]:
-    path = _folder() / f"results-{_fingerprint()}.jsonl"
+    path = _folder() / f"results-{fingerprint()}.jsonl"
     lines = path.read_text(encoding="utf-8").splitlines() if path.is_file() else []
     done = {(r["kind"], r["number"]): r for r in map(json.loads, lines)}
     todo = [entry for entry in plan if entry not in done or (entry in compared and "baselines" not in done[entry])]

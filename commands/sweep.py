@@ -26,7 +26,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.set_defaults(stopped="stopped; the same command goes on where it was.")
     parser.epilog = (
         "Limits of the command concern its own process. In the study's file run_limit (seconds) and run_memory (MB) are those "
-        "of each run: one that takes more is ended and counts as failed, and the others go on."
+        "of each run: one that takes more is ended and counts as failed, and the others go on. --allow-scripts also runs the "
+        "Python of a study that has a job instead of a scene."
     )
     parser.add_argument("study", metavar="STUDY.toml|DIR", help="file of a study, or the folder of one that goes on")
     parser.add_argument("--out", metavar="DIR", help="output folder (default: beside the study, with its name)")
@@ -138,7 +139,7 @@ def _opened(place: Path, folder: Path, arguments: argparse.Namespace) -> OpenStu
 
     if place.is_dir():
         return study_folder.resume_study(folder)
-    return study_folder.begin_study(place, folder, read)
+    return study_folder.begin_study(place, folder, read, arguments.scripts)
 
 
 def _remove_unless_begun(folder: Path) -> None:
@@ -159,6 +160,9 @@ def _print_names(opened: OpenStudy) -> None:
 
     for name, plan in opened.plans.items():
         print(f"{name}:")
+        if plan.scenario is None:
+            print("  any name that the job knows, for a number, a text, or true and false")
+            continue
         print("  " + owners_text(plan.scenario).replace("\n", "\n  "))
         print(f"  {PREFIX}…: a property of a .blend by its path, which Copy Full Data Path gives; each run needs Blender then")
 
@@ -178,9 +182,11 @@ def _slurm(arguments: argparse.Namespace) -> Callable[[], Any] | None:
 
 
 def _estimate(opened: OpenStudy, arguments: argparse.Namespace) -> int:
+    from ..sweep.job import require_allowed
     from ..sweep.trial import try_runs
     from ..sweep.worker import Limits
 
+    require_allowed(opened.study, arguments.scripts)
     print(_kind_of_runs(opened))
     if arguments.slurm:
         from ..sweep import slurm
@@ -199,6 +205,8 @@ def _estimate(opened: OpenStudy, arguments: argparse.Namespace) -> int:
 
 def _kind_of_runs(opened: OpenStudy) -> str:
     """Say whether runs need Blender, and why."""
+    if opened.study.is_job:
+        return f"runs by the Python of '{opened.study.scenes[0]}'"
     properties = list(dict.fromkeys(path for plan in opened.plans.values() for path in plan.scene_properties))
     if not properties:
         return "runs without Blender: all that varies is known to the solver"
@@ -216,6 +224,7 @@ def _duration(seconds: float) -> str:
 def _compute(opened: OpenStudy, arguments: argparse.Namespace) -> int:
     from ..core.study.run_files import done_runs, failed_runs, make_folders
     from ..sweep import driver
+    from ..sweep.job import require_allowed
     from ..sweep.status import status_of
     from ..sweep.worker import Limits
 
@@ -225,6 +234,7 @@ def _compute(opened: OpenStudy, arguments: argparse.Namespace) -> int:
     over = done_runs(opened.folder) | (set() if arguments.retry_failed else failed_runs(opened.folder))
     left = [run for run in runs if run.digest not in over]
     if left:
+        require_allowed(opened.study, arguments.scripts)
         with console.progress_bar("sweep", len(runs), "run") as bar:
             bar.update(len(runs) - len(left))
 

@@ -13,9 +13,9 @@ from pathlib import Path
 from ..core.errors import FileError, os_error_reason
 from ..core.io.temporary_folder import remove_unfinished, temporary_folder
 from ..core.model.shared_results import SharedResults
-from ..core.study.run_files import RUNS
+from ..core.study.run_files import RUNS, STUDY_NAME
 from ..core.study.run_record import read_run_record
-from ..core.study.study_file import Run
+from ..core.study.study_file import Run, read_study
 from .exchange import exchange_folder, require_own
 from .features import read_frames
 from .finished_runs import failures, run_order, study_name
@@ -32,6 +32,7 @@ def publish(folder: Path, planned: Sequence[Run] = ()) -> None:
 
     The dataset is written into a hidden folder and renamed into its place last; that of before is removed then. Runs whose
     sensors or rates differ cannot share the columns of one dataset: each kind becomes one, ``dataset/part-000`` and so on.
+    The runs of a job have no sensors, and it becomes no dataset.
 
     Parameters
     ----------
@@ -52,7 +53,7 @@ def publish(folder: Path, planned: Sequence[Run] = ()) -> None:
     try:
         write_run_table(folder, order, failures(folder, planned))
         with temporary_folder(folder, "dataset") as hidden:
-            new = _write_parts(folder, order, hidden)
+            new = None if read_study(folder / STUDY_NAME).is_job else _write_parts(folder, order, hidden)
             exchange_folder(new, folder / DATASET_FOLDER, hidden / "before", DATASET_FILES)
     except OSError as error:
         raise FileError(

@@ -19,6 +19,8 @@ from ..core.study.mesh_choices import MESHES, StudyMeshes, find_meshes, freeze_m
 from ..core.study.run_files import FAILED, RUNS, SCENES, STUDY_NAME, make_folders
 from ..core.study.study_file import Plan, Run, Study, differences, frozen_text, read_study, runs_of
 from ..core.version import VERSION
+from . import job
+from .scene_evaluation import REFUSE
 from .study_scenes import FROZEN_MESHES, frozen_meshes, plan_of
 
 BLEND, SCENARIO = ".blend", ".npz"
@@ -47,7 +49,7 @@ class OpenStudy:
     runs: list[Run]
 
 
-def begin_study(file: Path, folder: Path, read_blend: ReadBlend) -> OpenStudy:
+def begin_study(file: Path, folder: Path, read_blend: ReadBlend, scripts: str = REFUSE) -> OpenStudy:
     """Open a study by its file: freeze it in an empty folder, or go on in the folder of the same study.
 
     Parameters
@@ -56,11 +58,14 @@ def begin_study(file: Path, folder: Path, read_blend: ReadBlend) -> OpenStudy:
     folder : Path
         Made if it is missing.
     read_blend : callable
+    scripts : str
+        What is done about the Python of a job, one of :data:`.scene_evaluation.SCRIPTS`.
 
     Raises
     ------
     PalpateError
-        The file or a scene cannot be read, the folder holds something else, or another study, or this one with another scene.
+        The file or a scene cannot be read, a job is not allowed, the folder holds something else, or another study, or this
+        one with another scene.
     """
     study = read_study(file)
     sources = _sources(study, file.parent)
@@ -74,6 +79,7 @@ def begin_study(file: Path, folder: Path, read_blend: ReadBlend) -> OpenStudy:
         return replace(opened, study=replace(opened.study, run_limit=study.run_limit, run_memory=study.run_memory))
     if folder.exists() and (not folder.is_dir() or {path.name for path in folder.iterdir()} - _OWN):
         raise FileError(f"'{folder}' holds other files and no study: give a new or empty folder with --out.")
+    job.require_allowed(study, scripts)
     with _whole_or_nothing(folder):
         return _frozen(study, file, folder, sources, read_blend)
 
@@ -85,10 +91,8 @@ def _frozen(study: Study, file: Path, folder: Path, sources: Mapping[str, Path],
     meshes = StudyMeshes(folder / SCENES / MESHES, freeze_meshes(mesh_files, folder / SCENES / MESHES))
     plans, entries = {}, []
     for name, source in sources.items():
-        target = folder / SCENES / f"{name}.npz"
-        _freeze_scene(source, target, read_blend)
+        digest = _freeze_scene(source, folder / SCENES / name, read_blend)
         plans[name] = plan_of(study, folder, name, meshes)
-        digest = load_scenario(target).digest()
         entries.append({"name": name, "file": source.name, "sha256": file_sha256(source), "digest": digest})
     runs = runs_of(study, plans, _digests(plans, entries))
     frozen: dict[str, Any] = {"version": VERSION, "runs": len(runs), "scenes": entries}
@@ -131,11 +135,22 @@ def resume_study(folder: Path) -> OpenStudy:
         )
     plans, meshes = {}, frozen_meshes(study, folder)
     for entry in entries:
-        scenario = load_scenario(folder / SCENES / f"{entry['name']}.npz")
-        if scenario.digest() != entry["digest"]:
+        if not _is_as_frozen(study, folder, entry):
             raise FileError(f"The scene '{entry['name']}' in '{folder}' is not the one that the study began with: begin anew.")
         plans[entry["name"]] = plan_of(study, folder, entry["name"], meshes)
     return OpenStudy(folder, study, plans, runs_of(study, plans, _digests(plans, entries)))
+
+
+def _is_as_frozen(study: Study, folder: Path, entry: Mapping[str, str]) -> bool:
+    """Whether a scene or the job in a study's folder is the one that the study began with."""
+    start = folder / SCENES / entry["name"]
+    if study.is_job:
+        return file_sha256(_with(start, job.SUFFIX)) == entry["sha256"]  # the processes that run it look at the rest
+    return load_scenario(_with(start, SCENARIO)).digest() == entry["digest"]
+
+
+def _with(start: Path, suffix: str) -> Path:
+    return start.parent / f"{start.name}{suffix}"
 
 
 def _digests(plans: Mapping[str, Plan], entries: list[dict[str, Any]]) -> dict[str, str]:
@@ -169,7 +184,9 @@ def _sources(study: Study, base: Path) -> dict[str, Path]:
     for file in files:
         if not file.is_file():
             raise FileError(f"There is no scene '{file}': check its name; it is counted from the study's folder.")
-        if file.suffix not in (BLEND, SCENARIO):
+        if study.is_job and file.suffix != job.SUFFIX:
+            raise FileError(f"The job '{file}' is no Python file: give one that ends with {job.SUFFIX}.")
+        if not study.is_job and file.suffix not in (BLEND, SCENARIO):
             raise FileError(f"The scene '{file}' is neither a .blend nor a scenario (.npz): give one of these.")
     stems: dict[str, Path] = {}
     for file in files:
@@ -181,11 +198,16 @@ def _sources(study: Study, base: Path) -> dict[str, Path]:
     return {names[stem]: file for stem, file in stems.items()}
 
 
-def _freeze_scene(source: Path, target: Path, read_blend: ReadBlend) -> None:
+def _freeze_scene(source: Path, start: Path, read_blend: ReadBlend) -> str:
+    """Write a scene, or a job, into a study's folder, under a name that begins with `start`, and return its digest."""
+    if source.suffix == job.SUFFIX:
+        return job.freeze_job(source, _with(start, job.SUFFIX))
+    target = _with(start, SCENARIO)
     if source.suffix == BLEND:
         read_blend(source, target)
     else:
         save_scenario(target, load_scenario(source))
+    return load_scenario(target).digest()
 
 
 def _check_sources(opened: OpenStudy, sources: Mapping[str, Path], base: Path, read_blend: ReadBlend) -> None:
@@ -199,14 +221,13 @@ def _check_sources(opened: OpenStudy, sources: Mapping[str, Path], base: Path, r
     for name, source in sources.items():
         if file_sha256(source) == before[name]["sha256"]:
             continue
-        if opened.plans[name].scene_properties:
+        if opened.study.is_job or opened.plans[name].scene_properties:
             raise _changed(source, opened)
-        target = opened.folder / SCENES / f"now-{name}.npz"
+        start = opened.folder / SCENES / f"now-{name}"
         try:
-            _freeze_scene(source, target, read_blend)
-            digest = load_scenario(target).digest()
+            digest = _freeze_scene(source, start, read_blend)
         finally:
-            target.unlink(missing_ok=True)
+            _with(start, SCENARIO).unlink(missing_ok=True)
         if digest != before[name]["digest"]:
             raise _changed(source, opened)
     for name, file in find_meshes(opened.study.vary, base).items():

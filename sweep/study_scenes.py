@@ -6,6 +6,7 @@
     scenes/<scene>.npz      the scene as the solver sees it
     scenes/<scene>.json     what the properties of the scene are that the study names, if any
     scenes/<scene>.blend    the scene, which runs with other values of these are read from
+    scenes/<job>.py         the job of a study that has no scene
     scenes/meshes/          the mesh files of targets
 """
 
@@ -18,7 +19,7 @@ from ..core.io.scenario_npz import load_scenario
 from ..core.study.mesh_choices import MESHES, StudyMeshes
 from ..core.study.run_files import SCENES, STUDY_NAME
 from ..core.study.scene_property import read_properties
-from ..core.study.study_file import Plan, Study, plan_for
+from ..core.study.study_file import Plan, Study, plan_for, plan_for_job
 
 FROZEN_MESHES = "meshes"
 """Key of the meshes in the table [frozen]."""
@@ -32,6 +33,8 @@ def plan_of(study: Study, folder: Path, scene: str, meshes: StudyMeshes) -> Plan
     PalpateError
         A file is damaged, or the study does not fit the scene.
     """
+    if study.is_job:
+        return plan_for_job(study)
     start = folder / SCENES / f"{scene}.npz"
     return plan_for(study, load_scenario(start), read_properties(start.with_suffix(".json")), meshes)
 

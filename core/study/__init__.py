@@ -3,7 +3,8 @@
 
 :mod:`.study_file` reads what varies, :mod:`.design` chooses the values of every run, :mod:`.variation` and :mod:`.presses` put
 them into a scenario, :mod:`.metrics` sums a run up, and :mod:`.run_files` writes it, its numbers as a
-:mod:`.run_record`. Nothing here starts processes: the package ``sweep`` does.
+:mod:`.run_record`; :mod:`.run_placement` writes what no solver has computed. Nothing here starts
+processes: the package ``sweep`` does.
 """
 
 __all__ = [
@@ -13,6 +14,7 @@ __all__ = [
     "presses",
     "run_files",
     "run_images",
+    "run_placement",
     "run_record",
     "scene_property",
     "study_file",

@@ -18,6 +18,8 @@
     depth = { uniform = [0.5e-3, 2e-3] }
     slide = { uniform = [0.0, 3e-3] }
 
+Instead of a scene a study may name a job, a Python file that computes its runs: ``job = "count.py"``.
+
 The output folder keeps the file with a table ``[frozen]`` at its end: the version, and digests of the scenes.
 """
 
@@ -38,7 +40,7 @@ import numpy as np
 from ..errors import FileError, ParameterError
 from ..geometry.mesh import TriangleMesh
 from ..io.toml_file import checked_name, is_number, read_toml
-from ..model.parameter import Parameter
+from ..model.parameter import Parameter, Specification, TextParameter
 from ..model.scenario import Scenario
 from .design import (
     CHOICE,
@@ -61,13 +63,15 @@ from .scene_property import SceneProperty, WholeNumber, is_scene_property
 from .variation import PRESS, Variable, variable, variables_of
 
 FORMAT = "palpate-sweep/1"
-FROZEN = "frozen"
+FROZEN, JOB = "frozen", "job"
 SCENE = "scene"
 """Name of the column that tells the scene of a run, where a study has several."""
 _WORDS = (
     *("format", "name", "scene", "scenes", "design", "samples", "seed", "fps", "run_limit", "run_memory", "images", "vary"),
-    *("press", FROZEN),
+    *(JOB, "press", FROZEN),
 )
+_OF_SCENES = ("fps", "images", "press")
+"""Words that mean nothing beside a job."""
 _DIRECTIONS = {"tilt_direction": "tilt", "slide_direction": "slide"}
 """Directions of a press, which are any as long as the study says nothing else, and what they direct."""
 LARGEST_LEVELS = 10_000
@@ -82,7 +86,7 @@ class Study:
     Attributes
     ----------
     scenes : tuple of str
-        Files or patterns, relative to the file of the study.
+        Files or patterns, relative to the file of the study; with `is_job` one Python file.
     design : Design
     vary : mapping
         By names of variables: a table with a distribution, or a value that is the same in all runs.
@@ -98,6 +102,8 @@ class Study:
         For the report and the dataset; empty if the file gives none.
     images : bool
         Whether runs have tactile images.
+    is_job : bool
+        Whether a Python file computes the runs, and no solver a scene.
     frozen : mapping
         What the output folder's copy says beside it.
     """
@@ -111,6 +117,7 @@ class Study:
     run_memory: float | None = None
     name: str = ""
     images: bool = False
+    is_job: bool = False
     frozen: Mapping[str, Any] = field(default_factory=dict)
 
 
@@ -120,8 +127,8 @@ class Plan:
 
     Attributes
     ----------
-    scenario : Scenario
-        As the scene says, with the study's frame rate.
+    scenario : Scenario or None
+        As the scene says, with the study's frame rate; None for a job.
     varied : dict of str to Distribution
     fixed : dict of str to value
     press : Press or None
@@ -132,7 +139,7 @@ class Plan:
         Names whose value follows that of another name, and the factor of numbers.
     """
 
-    scenario: Scenario
+    scenario: Scenario | None
     varied: Mapping[str, Distribution]
     fixed: Mapping[str, Value]
     press: Press | None
@@ -188,11 +195,7 @@ def study_of(table: Mapping[str, Any], name: str) -> Study:
     if table.get("format") != FORMAT:
         raise FileError(f"The format of '{name}' is {table.get('format')!r:.60}: a study begins with format = \"{FORMAT}\".")
     _known(table, _WORDS, f"'{name}'")
-    scenes = table.get("scenes", [table["scene"]] if "scene" in table else [])
-    if ("scene" in table) == ("scenes" in table) or not isinstance(scenes, list) or not scenes:
-        raise FileError(f'\'{name}\' needs scene = "file.blend" or scenes = ["*.blend"], one of the two.')
-    for scene in scenes:
-        checked_name(scene, f"the scenes of '{name}'")
+    scenes = _scenes(table, name)
     for word in ("vary", "press", FROZEN):
         if not isinstance(table.get(word, {}), Mapping):
             raise FileError(f"{word} of '{name}' is {table[word]!r:.60}: write it as a table, [{word}].")
@@ -206,8 +209,23 @@ def study_of(table: Mapping[str, Any], name: str) -> Study:
         run_memory=_positive(table, "run_memory", name),
         name=checked_name(table["name"], f"name of '{name}'") if "name" in table else "",
         images=_switch(table, "images", name),
+        is_job=JOB in table,
         frozen=table.get(FROZEN, {}),
     )
+
+
+def _scenes(table: Mapping[str, Any], name: str) -> list[str]:
+    """Return the files of scenes that a study names, or the file of its job."""
+    given = [word for word in ("scene", "scenes", JOB) if word in table]
+    scenes = table[given[0]] if given == ["scenes"] else [table[word] for word in given]
+    if len(given) != 1 or not isinstance(scenes, list) or not scenes:
+        raise FileError(f'\'{name}\' needs scene = "file.blend" or scenes = ["*.blend"] or job = "file.py", one of them.')
+    for scene in scenes:
+        checked_name(scene, f"the {given[0]} of '{name}'")
+    for word in _OF_SCENES if given == [JOB] else ():
+        if word in table:
+            raise FileError(f"{word} of '{name}' means nothing beside a job: leave it out.")
+    return scenes
 
 
 def _known(table: Mapping[str, Any], words: Iterable[str], where: str) -> None:
@@ -307,14 +325,53 @@ def plan_for(
             varied[name] = _distribution(found, _with_files(found, entry, meshes))
         else:
             fixed[name] = found.read(entry)
-    if not varied and study.design.kind == GRID:
-        raise ParameterError("The study varies nothing: give [vary] or [press] at least one distribution.")
+    _check_varies(study, varied)
     plan = Plan(scenario, varied, fixed, press, meshes, tied)
     for name, (other, factor) in tied.items():
         ends = varied[other].words if other in varied and varied[other].kind != NORMAL else (fixed.get(other),)
         for end in ends if ends != (None,) else ():
             variable(name, known, scenario).read(_times(end, factor))  # refuses what some run could not have
     return plan
+
+
+def plan_for_job(study: Study) -> Plan:
+    """Return what a study means for its job, which takes any names: numbers, texts, and switches.
+
+    Raises
+    ------
+    ParameterError, FileError
+        Its values are not possible.
+    """
+    varied: dict[str, Distribution] = {}
+    fixed: dict[str, Value] = {}
+    tied: dict[str, tuple[str, float | None]] = {}
+    for name, entry in study.vary.items():
+        found = _free_variable(name, entry)
+        if isinstance(entry, Mapping) and SAME in entry:
+            tied[name] = _tie(found, entry, study.vary)
+        elif isinstance(entry, Mapping):
+            varied[name] = _distribution(found, entry)
+        else:
+            fixed[name] = found.read(entry)
+    _check_varies(study, varied)
+    return Plan(None, varied, fixed, None, {}, tied)
+
+
+def _free_variable(name: str, entry: Any) -> Variable:
+    """Return the variable of a name that only a job knows; the first of its values tells what it is."""
+    words = entry.get(CHOICE) if isinstance(entry, Mapping) else [entry]
+    first = words[0] if isinstance(words, list) and words else 0.0
+    specification: Specification | None = Parameter(name, "", 0.0, -math.inf, math.inf, "Number of the job")
+    if isinstance(first, bool):
+        specification = None
+    elif isinstance(first, str):
+        specification = TextParameter(name, "", "Text of the job")
+    return Variable(name, name, (JOB,), specification)
+
+
+def _check_varies(study: Study, varied: Mapping[str, Distribution]) -> None:
+    if not varied and study.design.kind == GRID:
+        raise ParameterError("The study varies nothing: give [vary] or [press] at least one distribution.")
 
 
 def _tie(found: Variable, entry: Mapping[str, Any], entries: Mapping[str, Any]) -> tuple[str, float | None]:
@@ -434,7 +491,9 @@ def runs_of(study: Study, plans: Mapping[str, Plan], digests: Mapping[str, str])
     check_count(sum(study.design.count(plan.varied) for plan in plans.values()))
     runs: list[Run] = []
     for scene, plan in plans.items():
-        same = {"scene": digests[scene], "fixed": dict(plan.fixed), "fps": plan.scenario.fps, "press": _words_of(plan.press)}
+        fps = None if plan.scenario is None else plan.scenario.fps
+        fixed = dict(plan.fixed)
+        same: dict[str, Any] = {"scene": digests[scene], "fixed": fixed, "fps": fps, "press": _words_of(plan.press)}
         if isinstance(plan.meshes, StudyMeshes) and plan.meshes:
             same["meshes"] = plan.meshes.digests
         if plan.tied:

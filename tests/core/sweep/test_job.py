@@ -1,0 +1,200 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Studies whose runs a Python file computes, and the hidden-effect benchmark as one of them."""
+
+import importlib.util
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from palpate.benchmarks import gap
+from palpate.core.errors import PalpateError
+from palpate.core.study.run_files import done_runs
+from palpate.core.study.study_file import Run, study_of
+from palpate.sweep.child import Scenes, answer_to
+from palpate.sweep.scene_evaluation import ALLOW, REFUSE
+from palpate.sweep.study_folder import OpenStudy, begin_study, resume_study
+
+pytest.importorskip("distributed")
+parquet = pytest.importorskip("pyarrow.parquet")
+
+STUDY = """format = "palpate-sweep/1"
+name = "counts"
+job = "count.py"
+design = "grid"
+[vary]
+number = { choice = [1, 2, 3] }
+word = { choice = ["ab", "abc"] }
+twice = { same = "number", factor = 2 }
+loud = true
+"""
+JOB = """
+import json
+from palpate.core.errors import PalpateError
+
+def fingerprint():
+    return "as it was"
+
+def run(values, folder):
+    if values["number"] == 3 and values["word"] == "ab":
+        raise PalpateError("Three is too many.")
+    (folder / "more").mkdir()
+    (folder / "more" / "values.json").write_text(json.dumps(values))
+    return {"product": values["number"] * len(values["word"]), "nothing": None}
+"""
+
+
+def write(folder: Path, text: str = STUDY, job: str = JOB) -> Path:
+    (folder / "count.py").write_text(job, encoding="utf-8")
+    (folder / "study.toml").write_text(text, encoding="utf-8")
+    return folder / "study.toml"
+
+
+def sweep(*words) -> subprocess.CompletedProcess:
+    command = [sys.executable, "-m", "palpate.commands", "sweep", *map(str, words)]
+    return subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
+
+
+def begun(file: Path) -> OpenStudy:
+    return begin_study(file, file.parent / "out", lambda blend, target: None, ALLOW)
+
+
+def answers_of(opened: OpenStudy) -> list[dict]:
+    scenes = Scenes(opened.folder, ALLOW)
+    return [answer_to(scenes, run) for run in opened.runs]
+
+
+def test_a_job_computes_its_runs(tmp_path):
+    finished = sweep(write(tmp_path), "--out", tmp_path / "out", "--allow-scripts", "--workers", 1)
+    assert (finished.returncode, finished.stderr) == (0, "")
+    assert "6 runs: 5 done, 1 failed, 0 left" in finished.stdout
+    assert "Three is too many." in finished.stdout
+    table = parquet.read_table(tmp_path / "out" / "runs.parquet").to_pylist()
+    done = [row for row in table if row["status"] == "finished"]
+    assert [row["metric.product"] for row in done] == [2.0, 3.0, 4.0, 6.0, 9.0]
+    for row in done:
+        assert row["varied.twice"] == 2 * row["varied.number"]
+        written = json.loads((tmp_path / "out" / "runs" / row["digest"] / "more" / "values.json").read_text())
+        assert written == {
+            "loud": True,
+            "number": row["varied.number"],
+            "word": row["varied.word"],
+            "twice": row["varied.twice"],
+        }
+    assert "metric.nothing" not in table[0]
+    assert not (tmp_path / "out" / "dataset").exists()
+    assert (tmp_path / "out" / "report.html").is_file()
+    again = sweep(tmp_path / "out")  # nothing is left to run, so no Python is
+    assert (again.returncode, again.stderr) == (0, "")
+    refused = sweep(tmp_path / "out", "--retry-failed")
+    assert (refused.returncode, refused.stderr.count("\n")) == (1, 1)
+    assert "--allow-scripts" in refused.stderr
+
+
+def test_a_job_needs_permission_and_nothing_of_it_is_run_before(tmp_path):
+    refused = sweep(write(tmp_path, job="open('mine', 'w')\n" + JOB), "--out", tmp_path / "out")
+    assert refused.returncode == 1
+    assert refused.stderr == (
+        "palpate sweep: The study runs the Python of 'count.py': add --allow-scripts if you trust the file.\n"
+    )
+    assert not (tmp_path / "out").exists()
+    assert not Path("mine").exists()
+    folder = begun(write(tmp_path)).folder
+    with pytest.raises(PalpateError, match="--allow-scripts"):
+        Scenes(folder, REFUSE)
+
+
+@pytest.mark.parametrize(
+    ("returned", "sentence"),
+    [
+        ("{'product': float('nan')}", "Metric 'product' of run 0 is nan: give finite numbers, or None."),
+        ("{'product': 'many'}", "Metric 'product' of run 0 is 'many': give finite numbers, or None."),
+        ("[1]", "The job gave [1] for run 0: let its run() return metrics by name."),
+        ("1 / 0", "A fault of the program: ZeroDivisionError: division by zero"),
+        ("open(folder / 'missing')", "A fault of the program: RuntimeError: FileNotFoundError: "),
+    ],
+)
+def test_what_a_job_does_wrong_is_a_failed_run(tmp_path, returned, sentence):
+    opened = begun(write(tmp_path, job=f"def run(values, folder):\n    return {returned}\n"))
+    answers = answers_of(opened)
+    assert {answer["status"] for answer in answers} == {"failed"}
+    assert answers[0]["sentence"].startswith(sentence)
+    assert not done_runs(opened.folder)
+    assert not list((opened.folder / "runs").iterdir())
+
+
+def test_a_job_that_is_none_begins_nothing(tmp_path):
+    for job, word in (("raise ValueError('no')", "ValueError: no"), ("run = 3", "has no function run"), ("def", "SyntaxError")):
+        with pytest.raises(PalpateError, match=word):
+            begun(write(tmp_path, job=job))
+        assert not any((tmp_path / "out").iterdir())
+
+
+def test_a_changed_job_is_refused(tmp_path):
+    file = write(tmp_path)
+    opened = begun(file)
+    assert resume_study(opened.folder).runs == begun(file).runs == opened.runs
+    write(tmp_path, job=JOB.replace("Three", "3"))
+    with pytest.raises(PalpateError, match=r"count.py' has changed since the study"):
+        begun(file)
+    (opened.folder / "scenes" / "count.py").write_text(JOB.replace("Three", "3"), encoding="utf-8")
+    with pytest.raises(PalpateError, match="is not the one that the study began with"):
+        resume_study(opened.folder)
+
+
+def test_what_a_job_calls_may_not_change_either(tmp_path):
+    (tmp_path / "state").write_text("1")
+    job = JOB.replace('"as it was"', f"open({str(tmp_path / 'state')!r}).read()")
+    opened = begun(write(tmp_path, job=job))
+    assert answers_of(opened)[0]["status"] == "done"
+    (tmp_path / "state").write_text("2")
+    answer = answer_to(Scenes(opened.folder, ALLOW), opened.runs[1])
+    assert answer["status"] == "unwritable"  # no other run can be, so the study stops
+    assert answer["sentence"].startswith("What the job 'count.py' computes with is not what the study in ")
+
+
+def test_words_of_scenes_mean_nothing_to_a_job():
+    table = {"format": "palpate-sweep/1", "job": "count.py", "design": "random", "samples": 1}
+    assert study_of(table, "s").is_job
+    for word, value in (("fps", 10), ("images", True), ("press", {})):
+        with pytest.raises(PalpateError, match=f"{word} of 's' means nothing beside a job"):
+            study_of({**table, word: value}, "s")
+    with pytest.raises(PalpateError, match="one of them"):
+        study_of({**table, "scene": "a.blend"}, "s")
+
+
+def module_of(path: Path):
+    spec = importlib.util.spec_from_file_location("hidden_effects", path)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_hidden_effects_as_a_study_say_what_the_benchmark_says(repository, tmp_path):
+    """Two small cases: the table of the study's folder is that of the benchmark, but for the seconds."""
+    folder = repository / "docs" / "sample-study"
+    module = module_of(folder / "hidden_effects.py")
+    assert (folder / "hidden-effects.toml").read_text(encoding="utf-8") == module.study()
+    plan = [("other", 14), ("poor", 3)]
+    names = "\n".join(f'    "{kind} {number}",' for kind, number in plan)
+    (tmp_path / "hidden_effects.py").write_bytes((folder / "hidden_effects.py").read_bytes())
+    (tmp_path / "study.toml").write_text(module.STUDY.format(cases=names), encoding="utf-8")
+    opened = begun(tmp_path / "study.toml")
+    assert [answer["status"] for answer in answers_of(opened)] == ["done", "done"]
+    kept = {(one["kind"], one["number"]): one for one in gap.results_in(opened.folder)}
+    expected = [gap.examine(kind, number) for kind, number in plan]
+    for one in expected:
+        assert kept[one["kind"], one["number"]].pop("seconds") > 0.0
+        cpu = kept[one["kind"], one["number"]].pop("cpu_seconds")
+        assert (
+            json.loads(json.dumps({key: value for key, value in one.items() if key not in ("seconds", "cpu_seconds")}))
+            == (kept[one["kind"], one["number"]])
+        )
+        one["cpu_seconds"] = kept[one["kind"], one["number"]]["cpu_seconds"] = cpu
+    assert gap.table([kept[entry] for entry in plan]) == gap.table(expected)
+    run: Run = opened.runs[0]
+    record = json.loads((opened.folder / "runs" / run.digest / "run.json").read_text())
+    assert record["values"] == {"case": "other 14"}
+    assert record["metrics"]["right"] == 1.0
