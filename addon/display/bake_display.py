@@ -139,13 +139,10 @@ def show_bake(scene, baked_sensors: list[BakedSensor]) -> None:
         obj, frames = item.obj, (int(item.frames[0]), int(item.frames[-1]))
         image = materials.load_sequence(obj.palpate.uid, item.folder / frame_file(frames[0]), relative)
         heat_map.apply(obj, item.texels, image, frames, colors)
-        if settings.show_indentation:
-            indentation.apply(item, settings.indentation_factor)
-        else:
-            indentation.clear(obj)
         markers.keyframe_markers(scene, item, settings.overlays, {"FORCE": scales.force, "TORQUE": scales.moment})
         texel_arrows.build_arrows(scene, item, image, settings.overlays, scales.texel, scales.longest)
         obj.palpate.bake_folder = bpy.path.relpath(str(item.folder)) if relative else str(item.folder)
+    indentation.show(baked_sensors, settings.indentation_factor if settings.show_indentation else None)
 
 
 def refresh(scene, places: dict) -> None:

@@ -11,6 +11,7 @@ without it.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import bpy
@@ -62,23 +63,36 @@ class _Names:
         return f"palpate_channel:{self.uid}"
 
 
-def apply(sensor: BakedSensor, factor: float) -> None:
-    """Let a sensor's surface follow its bake; it replaces the indentation of an earlier one.
+def show(sensors: Sequence[BakedSensor], factor: float | None) -> None:
+    """Let the surfaces of sensors follow their bakes; it replaces their earlier indentation.
 
     Nothing is done where nothing ever touched the sensor, where modifiers change the number of its vertices, and where it is
     laid onto the surface of another object, below which it would disappear.
 
     Parameters
     ----------
-    sensor : BakedSensor
-    factor : float
-        Displacement over penetration.
+    sensors : sequence of BakedSensor
+    factor : float, optional
+        Displacement over penetration; without it, indentation is only removed.
     """
-    obj, uid = sensor.obj, sensor.obj.palpate.uid
-    clear(obj)
-    touched = _touched(sensor)
-    if not touched.any() or obj.palpate.skin.method != "NONE" or not _keeps_vertices(obj):
+    for sensor in sensors:
+        clear(sensor.obj)
+    if factor is None:
         return
+    touched = [_touched(sensor) for sensor in sensors]
+    # asked for all of them before the first is changed: Blender evaluates the scene anew after a change
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    follows = [
+        own.any() and sensor.obj.palpate.skin.method == "NONE" and _keeps_vertices(sensor.obj, depsgraph)
+        for sensor, own in zip(sensors, touched, strict=True)
+    ]
+    for sensor, own, is_indented in zip(sensors, touched, follows, strict=True):
+        if is_indented:
+            _apply(sensor, own, factor)
+
+
+def _apply(sensor: BakedSensor, touched: np.ndarray, factor: float) -> None:
+    obj, uid = sensor.obj, sensor.obj.palpate.uid
     step = _frame_step(len(sensor.frames), int(touched.sum()))
     image = _depth_image(uid, obj.name, sensor.readings.depth[::step], touched)
     _store_attributes(obj.data, _Names(uid), sensor, touched, image.size[0])
@@ -133,9 +147,9 @@ def _touched(sensor: BakedSensor) -> np.ndarray:
     return found
 
 
-def _keeps_vertices(obj) -> bool:
+def _keeps_vertices(obj, depsgraph) -> bool:
     """Return True when the object's modifiers leave the number of its vertices as it is."""
-    with mesh_arrays.evaluated_mesh(obj, bpy.context.evaluated_depsgraph_get()) as mesh:
+    with mesh_arrays.evaluated_mesh(obj, depsgraph) as mesh:
         return len(mesh.vertices) == len(obj.data.vertices)
 
 

@@ -101,7 +101,9 @@ class BodyPlacement:
         stretch, basis_before, unturned = self._start
         moved = np.tile(np.eye(4), (len(poses), 1, 1))
         moved[:, :3, :3], moved[:, :3, 3] = transforms.rotation(poses[:, 3:]), poses[:, :3] / self.metres_per_unit
-        basis = np.linalg.inv(parents) @ moved @ stretch
+        # Most parents never move; the first inversion of many small matrices wakes the threads of the linear algebra.
+        is_still = (parents == parents[:1]).all()
+        basis = np.linalg.inv(parents[:1] if is_still else parents) @ moved @ stretch
         return self.channels[:3] + basis[:, :3, 3] - basis_before[:3, 3], basis[:, :3, :3] @ unturned
 
     @cached_property
