@@ -11,6 +11,7 @@ def _classes():
 
         chosen = (
             sensor.Root,
+            bake.Bake,
             *texels.SUBPANELS,
             *sensor.SUBPANELS,
             *effects.SUBPANELS,

@@ -107,4 +107,4 @@ class Figures(Subpanel):
         layout.operator("palpate.figures_make", icon="RENDER_STILL")
 
 
-SUBPANELS = (Bake, Display, Figures)
+SUBPANELS = (Display, Figures)

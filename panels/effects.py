@@ -10,7 +10,6 @@ class Effects(Subpanel):
 
     name = "effects"
     bl_label = "Effects"
-    bl_options = set()
     roles = {"SENSOR", "PAD"}
 
     def draw_part(self, layout, settings, _context):

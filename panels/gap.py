@@ -33,8 +33,12 @@ class Measured(Subpanel):
             layout.operator("palpate.gap_add", icon="ADD")
         layout.operator("palpate.gap_curves", icon="FCURVE")
         row = layout.row(align=True)
-        row.operator("palpate.gap_show", text="Error: Base", icon="COLOR").amended = False
-        row.operator("palpate.gap_show", text="Amended").amended = True
+        shown = gap_results.shown_on(context.object)
+        for text, amended in (("Error: Base", False), ("Amended", True)):
+            is_shown = shown is not None and shown.amended == amended
+            row.operator("palpate.gap_show", text=text, icon="COLOR", depress=is_shown).amended = amended
+        if shown is not None:
+            draw_sentences(layout, f"Black: no error. Bright yellow: {shown.top:.2%} of the range.", "COLOR", context)
         layout.operator("palpate.gap_report", icon="EXPORT")
 
 

@@ -3,6 +3,7 @@
 
 import bpy
 
+from ..addon.scene import participants
 from ..addon.study import property_path
 
 
@@ -82,6 +83,17 @@ def _draw_export(self, _context):
     self.layout.operator_menu_enum("palpate.sensor_export", "to", text="Palpate Sensors for a Simulator")
 
 
+def _draw_physics(self, context):
+    """Add and remove as Blender's own kinds of physics are, among their buttons."""
+    obj = context.object
+    if obj is None or obj.type not in participants.OBJECT_TYPES:
+        return
+    if obj.palpate.role == "NONE":
+        self.layout.operator("palpate.sensor_add", text="Tactile Sensor", icon="PHYSICS")
+    else:
+        self.layout.operator("palpate.sensor_remove", text="Tactile Sensor", icon="X")
+
+
 VARIABLE_TYPES = {"BOOLEAN", "INT", "FLOAT", "ENUM"}
 """Types of properties that a study may vary."""
 
@@ -109,6 +121,7 @@ ENTRIES = (
     ("VIEW3D_MT_paint_weight", _draw),
     ("VIEW3D_MT_sculpt", _draw),
     ("UI_MT_button_context_menu", _draw_button),
+    ("PHYSICS_PT_add", _draw_physics),
 )
 
 

@@ -210,16 +210,26 @@ class Readout(Subpanel):
         status = frame_status.status_of(context.scene)
         readings = status.frame.sensors.get(context.object.name) if status.frame is not None else None
         box = layout.box().column()
-        if readings is None:
-            draw_sentences(box, status.text, "INFO", context)
-            return
-        net = ", ".join(f"{round(value, 3) + 0.0:.3f}" for value in readings.net_force)  # adding zero turns -0.0 into 0.0
-        box.label(text=f"Frame {status.frame.frame}: {int(readings.contact.sum())} of {len(readings.contact)} texels touch")
-        box.label(text=f"Sum of normals: {readings.normal_force.sum():.4f} N")
-        box.label(text=f"Largest normal: {readings.normal_force.max():.4f} N")
-        box.label(text=f"Largest shear: {(readings.shear**2).sum(axis=1).max() ** 0.5:.4f} N")
-        box.label(text=f"Net: {net} N")
-        box.label(text=f"Reading: {readings.reading.min():.4g} to {readings.reading.max():.4g} {settings.unit}")
+        box.label(text=f"Frame {context.scene.frame_current}:" + ("" if readings else " not computed"))
+        for name, value in _measured(readings, settings.unit):  # as many lines without numbers: what is below does not jump
+            box.label(text=f"{name}: {value}")
+
+
+def _measured(readings, unit: str) -> list[tuple[str, str]]:
+    """Return names and values of what a sensor measures at a frame; dashes where there is nothing."""
+    names = "Texels that touch", "Sum of normals", "Largest normal", "Largest shear", "Net", "Reading"
+    if readings is None:
+        return [(name, "–") for name in names]
+    net = ", ".join(f"{round(value, 3) + 0.0:.3f}" for value in readings.net_force)  # adding zero turns -0.0 into 0.0
+    values = (
+        f"{int(readings.contact.sum())} of {len(readings.contact)}",
+        f"{readings.normal_force.sum():.4f} N",
+        f"{readings.normal_force.max():.4f} N",
+        f"{(readings.shear**2).sum(axis=1).max() ** 0.5:.4f} N",
+        f"{net} N",
+        f"{readings.reading.min():.4g} to {readings.reading.max():.4g} {unit}",
+    )
+    return list(zip(names, values, strict=True))
 
 
 SUBPANELS = (Region, Skins, Contact, Friction, Readout)

@@ -46,12 +46,27 @@ class Result:
     pictures: dict[str, Path]
 
 
+@dataclass(frozen=True)
+class Shown:
+    """What the colours of a sensor show: the error of which model, and the error where they end, as a share of the range."""
+
+    amended: bool
+    top: float
+
+
 _results: dict[str, Result] = {}
+_shown: dict[str, Shown] = {}
 
 
 def of(obj) -> Result | None:
     """Return what is known about a sensor's measurements."""
     return _results.get(identity.key(obj))
+
+
+def shown_on(obj) -> Shown | None:
+    """Return which errors the colours of a sensor show; None if they show none, as after an undo."""
+    layer = obj.data.color_attributes.active_color
+    return _shown.get(identity.key(obj)) if layer is not None and layer.name == ATTRIBUTE else None
 
 
 def rig_path(obj) -> Path:
@@ -96,6 +111,7 @@ def find(obj):
     headline, evidence = sentences.headline(diagnosis, errors), sentences.evidence(diagnosis, errors)
     advice, caution = next_experiment(diagnosis), sentences.caution(diagnosis)
     result = Result(diagnosis, errors, headline, evidence, advice, caution, pictures)
+    _shown.pop(identity.key(obj), None)
     _results[identity.key(obj)] = result
     return result
 
@@ -162,6 +178,7 @@ def show_on_sensor(context, obj, amended: bool) -> float:
     colours[texels.vertex, :3] = color_maps.linear(color_maps.colors("INFERNO", values / max(top, 1e-300)))
     layer.data.foreach_set("color", colours.ravel())
     mesh.color_attributes.active_color = layer
+    _shown[identity.key(obj)] = Shown(amended, top)
     for area in context.screen.areas if context.screen else ():
         if area.type == "VIEW_3D":  # the colours of the scale, not those of a lit surface
             area.spaces.active.shading.color_type = "VERTEX"

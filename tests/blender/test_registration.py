@@ -36,7 +36,7 @@ def traces() -> dict:
         },
         "menus": sum(
             "palpate" in function.__module__
-            for kind in set(kinds_of(bpy.types.Menu))
+            for kind in {*kinds_of(bpy.types.Menu), *kinds_of(bpy.types.Panel)}
             for function in getattr(getattr(kind, "draw", None), "_draw_funcs", ())
         ),
     }
@@ -71,7 +71,7 @@ def test_disabling_leaves_nothing_and_enabling_again_works(commands):
     assert not any(without["handlers"].values())
     palpate.register()
     first = traces()
-    assert first["object"] and first["scene"] and first["menus"] == 10
+    assert first["object"] and first["scene"] and first["menus"] == 11
     assert "PALPATE_PT_physics" in first["classes"] and "bake" in first["operators"]
     assert list(commands.values()) == ["palpate"]
     palpate.unregister()

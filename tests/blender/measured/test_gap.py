@@ -41,7 +41,9 @@ def test_from_a_rig_to_an_amended_sensor(scene, rig_file, tmp_path):
     assert [item.kind for item in obj.palpate.effects] == ["creep"]
     assert obj.palpate.k == pytest.approx(80.0, rel=0.1)
 
+    assert gap_results.shown_on(obj) is None
     assert bpy.ops.palpate.gap_show(amended=False) == {"FINISHED"}
+    assert not gap_results.shown_on(obj).amended and 0.0 < gap_results.shown_on(obj).top < 1.0
     layer = obj.data.color_attributes[gap_results.ATTRIBUTE]
     colours = np.zeros(4 * len(obj.data.vertices))
     layer.data.foreach_get("color", colours)
@@ -49,8 +51,12 @@ def test_from_a_rig_to_an_amended_sensor(scene, rig_file, tmp_path):
     names = {marker.name for marker in scene.timeline_markers}
     assert {"gap: approach", "gap: loading", "gap: unloading"} <= names
     bpy.ops.palpate.gap_show(amended=True)
+    assert gap_results.shown_on(obj).amended
     obj.data.color_attributes[gap_results.ATTRIBUTE].data.foreach_get("color", colours)
     assert colours.reshape(-1, 4)[:, 0].max() < before  # on one scale the amended sensor is darker
+    other = obj.data.color_attributes.new("Own", "FLOAT_COLOR", "POINT")
+    obj.data.color_attributes.active_color = other
+    assert gap_results.shown_on(obj) is None  # other colours are seen
 
     assert bpy.ops.palpate.gap_curves() == {"FINISHED"}
     assert bpy.data.images["Palpate Gap Curves"].size[0] > 500
