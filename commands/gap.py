@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""``palpate gap``: what the model of a sensor misses against measurements, as a report and as an amended sensor."""
+"""``palpate gap``: what the model of a sensor misses against measurements, as a report and as an amended sensor.
+
+With ``--plan``: what the recordings can tell at all, and the trajectory that tells what they cannot.
+"""
 
 from __future__ import annotations
 
@@ -22,13 +25,28 @@ if TYPE_CHECKING:
 
 OUTPUTS = ("gap.json", "sensor.toml", "report.html")
 """Files that are written beside the plots."""
+WISHES = ("between", "depth", "speed", "duration", "area")
+"""Options that say what the next recording is to be like."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("rig", metavar="RIG.toml", help="what was measured (docs/gap.md); its CSV files lie beside it")
-    parser.add_argument("--out", metavar="DIR", required=True, help="folder for gap.json, sensor.toml, report.html and plots")
+    parser.add_argument("--out", metavar="DIR", help="folder for gap.json, sensor.toml, report.html and plots, or for the plan")
     parser.add_argument("--blend", metavar="SCENE.blend", help="also put the amended sensor into this file")
     parser.add_argument("--sensor", metavar="NAME", help="the sensor in it (default: the only one)")
+    plan = parser.add_argument_group("before anything is fitted")
+    plan.add_argument(
+        "--plan", action="store_true", help="say which effects the recordings can tell apart, and what to record next"
+    )
+    plan.add_argument("--between", nargs=2, metavar="EFFECT", help="the effects that the next recording is to tell apart")
+    plan.add_argument("--depth", type=float, metavar="M", help="how deep it may press (m; N where the rig knows forces)")
+    plan.add_argument(
+        "--speed", type=float, metavar="M/S", help="how fast the probe may move (m/s; N/s where the rig knows forces)"
+    )
+    plan.add_argument("--duration", type=float, metavar="S", help="how long it may last")
+    plan.add_argument(
+        "--area", type=float, nargs=4, metavar=("X0", "X1", "Y0", "Y1"), help="where it may press, in the sensor's frame, m"
+    )
     blender.add_script_arguments(parser)
 
 
@@ -41,6 +59,9 @@ def run(arguments: argparse.Namespace) -> int:
     from ..core.gap.report.amended_sensor import amended_sensor
     from ..core.solver import precompile
 
+    _check(arguments)
+    if arguments.plan:
+        return _plan(arguments)
     if arguments.sensor and not arguments.blend:
         raise SceneError("--sensor names a sensor of a scene: give the scene with --blend.")
     with console.Interrupt.raised_at_once():
@@ -57,6 +78,47 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.blend:
         _put_into_scene(arguments, amended_sensor(result))
     _print_report(arguments, rig, result, errors, folder)
+    return 0
+
+
+def _check(arguments: argparse.Namespace) -> None:
+    """Raise if options do not go with each other."""
+    wishes = [name for name in WISHES if getattr(arguments, name) is not None]
+    if arguments.plan and (arguments.blend or arguments.sensor):
+        raise SceneError("--plan only looks at the recordings: leave out --blend and --sensor.")
+    if wishes and not arguments.plan:
+        raise SceneError(f"--{wishes[0]} says what to plan: give --plan as well.")
+    if not arguments.plan and not arguments.out:
+        raise SceneError("Give the folder for the results with --out DIR.")
+
+
+def _plan(arguments: argparse.Namespace) -> int:
+    """Say which kinds of effects the recordings can tell apart, and write the next experiment."""
+    from ..core.gap.dataset.rig import read_rig
+    from ..core.gap.planning.experiment_plan import Wishes, plan_experiment
+    from ..core.gap.report import plan_files
+
+    between, area = tuple(arguments.between or ()), tuple(arguments.area) if arguments.area else None
+    wishes = Wishes(between, arguments.depth, arguments.speed, arguments.duration, area)
+    with console.Interrupt.raised_at_once():
+        rig = read_rig(arguments.rig)
+        folder = writable_folder(arguments.out, create=True) if arguments.out else None
+        if folder is not None:
+            names = (plan_files.PLAN, plan_files.TRAJECTORY)
+            checks.outputs_are_no_inputs((folder / name for name in names), (arguments.rig,))
+        plan = console.run_with_progress_bar("plan", plan_experiment(rig, wishes))
+    print(console.text_table([("effect", "may be taken for"), *plan_files.table_rows(plan)], "<<"))
+    print()
+    if plan.experiment is None:
+        print("These recordings tell all of these effects from each other: no further one is planned.")
+    else:
+        print(plan_files.planned_sentence(plan_files.experiment_words(plan.experiment, plan_files.TRAJECTORY)))
+    for text in rig.warnings:
+        print(f"note: {text}")
+    if folder is None and plan.experiment is not None:
+        print("note: --out DIR writes it.")
+    for path in plan_files.write_plan(plan, folder) if folder is not None else ():
+        print(f"wrote:  {path}")
     return 0
 
 

@@ -50,7 +50,18 @@ def _rooms_of(package: str) -> tuple[str, ...]:
 ORDER: dict[str, tuple[str, ...]] = {
     "core": _rooms_of("core"),
     "core.effects": ("engine", "library"),
-    "core.gap": ("dataset", "forward", "data_faults", "fitting", "kinds", "selection", "report", "calibration", "logs"),
+    "core.gap": (
+        "dataset",
+        "forward",
+        "data_faults",
+        "fitting",
+        "kinds",
+        "selection",
+        "planning",
+        "report",
+        "calibration",
+        "logs",
+    ),
     "core.solver": ("detection", "dynamics"),
     "addon": _rooms_of("addon"),
 }

@@ -28,8 +28,8 @@ POSE_SCALE = np.array([1e-3, 1e-3, 1e-3, 0.1, 0.1, 0.1])
 BASE = ("k", "damping", "gain", "zero")
 """Corrections of the base model's own parameters: shares of the stiffness, the damping and the gain, and a zero."""
 TEXEL = ("gain", "offset", "rate", "fading")
-"""Parameters of single texels: a share of the gain, an offset, a rate of the offset per duration of the recordings, and the
-part of an offset that the load takes over, as of a cover that is stretched over the texels."""
+"""Parameters of single texels: a share of the gain, an offset, a rate of the offset per duration of the recordings, and an
+offset that the load takes over, as of a cover that is stretched over the texels."""
 GAIN_AT = next(i for i, variant in enumerate(VARIANTS) if variant.kind == "gain-mismatch")
 DAMPED_AT = next(i for i, variant in enumerate(VARIANTS) if variant.kind == "adhesion")
 """The first variant that comes behind the damping."""
@@ -191,7 +191,7 @@ class Cascade:
 
         def shapes() -> dict[str, np.ndarray]:
             share = ((run.time - run.time[0]) / self.recorded.duration)[:, None] + np.zeros_like(run.load)
-            return {"offset": np.ones_like(run.load), "rate": share, "fading": -run.load / (1.0 + run.load)}
+            return {"offset": np.ones_like(run.load), "rate": share, "fading": 1.0 / (1.0 + run.load)}
 
         found: dict[str, np.ndarray] = run.keep("offsets", shapes)
         return found

@@ -10,8 +10,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from .decision_numbers import LEAST_SUPPORT, RIVAL_MARGIN, TIE
-from .search import KindSearch, ScoredSet
+from .search import KindSearch, ScoredSet, floor_of
 
 
 @dataclass(frozen=True)
@@ -25,11 +27,17 @@ class NamedKind:
         By how much the best score without it is worse.
     rivals : tuple of str
         Kinds that would do nearly as well in its place.
+    next_best : str
+        The kind that does best in its place; empty if none was fitted there.
+    leaves : float
+        How many times as much of the gap that one leaves.
     """
 
     kind: str
     support: float
     rivals: tuple[str, ...]
+    next_best: str = ""
+    leaves: float = np.inf
 
     @property
     def is_clear(self) -> bool:
@@ -68,7 +76,13 @@ def decided(search: KindSearch) -> Decision:
     named = []
     for kind in sorted(chosen.kinds):
         beside = chosen.kinds - {kind}
-        others = [one for one in search.fitted if len(one.kinds) == len(chosen.kinds) and beside < one.kinds]
-        rivals = [one for one in others if kind not in one.kinds and one.score <= chosen.score + RIVAL_MARGIN]
-        named.append(NamedKind(kind, search.support(kind), tuple(next(iter(one.kinds - beside)) for one in rivals)))
+        others = [
+            one for one in search.fitted if len(one.kinds) == len(chosen.kinds) and beside < one.kinds and kind not in one.kinds
+        ]
+        names = [next(iter(one.kinds - beside)) for one in others]
+        rivals = [name for name, one in zip(names, others, strict=True) if one.score <= chosen.score + RIVAL_MARGIN]
+        least = floor_of(search.recorded)
+        leaves = [(one.solution.excess + least) / (chosen.solution.excess + least) for one in others]
+        nearest = (names[0], leaves[0]) if names else ("", np.inf)
+        named.append(NamedKind(kind, search.support(kind), tuple(rivals), *nearest))
     return Decision(chosen, tuple(named))

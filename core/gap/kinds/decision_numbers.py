@@ -30,6 +30,8 @@ HOPELESS = 1.5
 """A linearised score that is worse than the best by more than this is not fitted."""
 STARTING_SHIFTS = ((0.8, 0.0), (-0.8, 0.0), (0.0, 0.8), (0.0, -0.8))
 """Shifts, in pitches, from which the fit of a displacement starts besides zero."""
+DISPLACED = 0.9
+"""A displacement is fitted if a linear one leaves less than this share of the gap: each of its turns searches for contacts."""
 LARGE_SHIFT = 0.15
 """The other starts are tried if the fit from zero ends at a larger shift than this, in pitches."""
 TIE = 0.1
@@ -38,5 +40,8 @@ LEAST_SUPPORT, RIVAL_MARGIN = 0.3, 0.3
 """Least support of a kind that is named, and the difference in score up to which another kind is its rival."""
 TYPICAL_SIZE = 5.0
 """Signals are compared at this size, in units of the noise: the hidden effects of the development cases have 4 to 20."""
+LEAST_SHARE_TOLD = 0.1
+"""Share of a signal that another kind has to leave. Of the development cases with another formula, the right kind leaves 1 to
+5 % of the gap, so that less tells nothing."""
 TOLD_APART = 0.04
 """An effect that changes readings by this share of full load should be told from others."""

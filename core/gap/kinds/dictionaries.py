@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from . import operators
-from .recorded import Recorded, RecordedRun
+from .recorded import Recorded, RecordedRun, load_put_on
 
 Columns = Callable[[np.ndarray, RecordedRun, Recorded], list[np.ndarray]]
 """From the signal (T, n) before a kind, the columns (T, n) that it can add to it."""
@@ -115,16 +115,10 @@ def wear(x: np.ndarray, run: RecordedRun, recorded: Recorded) -> list[np.ndarray
     """Force lost by work of pressing and sliding, or by pressing alone."""
 
     def losses() -> list[np.ndarray]:
-        most = max(float(_put_on(one)[-1].max()) for one in recorded.runs)
-        paths = (run.work, _put_on(run) / max(most, 1e-12))
+        paths = (run.work, load_put_on(run.load) / max(recorded.full_path, 1e-12))
         return [np.expm1(-path / size) for path in paths for size in (0.2, 0.7, 3.0)]
 
     return [x * loss for loss in run.keep("wear", losses)]
-
-
-def _put_on(run: RecordedRun) -> np.ndarray:
-    """Load that was put on each texel so far, (T, n)."""
-    return np.cumsum(np.maximum(np.diff(run.load, axis=0, prepend=0.0), 0.0), axis=0)
 
 
 def unloading_pull(x: np.ndarray, run: RecordedRun, recorded: Recorded) -> list[np.ndarray]:
@@ -234,7 +228,8 @@ VARIANTS: tuple[Variant, ...] = (
     Variant("hysteresis", "reading", trailing),
     Variant("lag", "", lag),
     Variant("drift", "", drift, -1.0, 1.0, texel_columns=("rate",)),
-    Variant("offset", "", no_columns, texel_columns=("offset", "fading")),
+    Variant("offset", "", no_columns, texel_columns=("offset",)),
+    Variant("offset", "fading", no_columns, texel_columns=("fading",)),
 )
 """All kinds in the order in which they act. Misalignment is none of these: it changes what the base model is told."""
 MISALIGNMENT = Variant("misalignment", "", no_columns, -1.0, 1.0, in_contact=True)

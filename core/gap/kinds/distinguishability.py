@@ -14,13 +14,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..dataset.trial import Trial
 from .bounded_least_squares import bounded_minimum
 from .cascade import TEXEL, Cascade, Point
-from .decision_numbers import DEFAULT_COST, PRIORS, TOLD_APART, TYPICAL_SIZE
-from .dictionaries import MISALIGNMENT, Variant
-from .normal_equations import BOUNDS, CascadeEquations, normal_equations
-from .recorded import Recorded
-from .search import floor_of, possible_variants
+from .decision_numbers import DEFAULT_COST, LEAST_SHARE_TOLD, PRIORS, TOLD_APART, TYPICAL_SIZE
+from .dictionaries import MISALIGNMENT, VARIANTS, Variant
+from .normal_equations import BOUNDS, CascadeEquations, joined, normal_equations
+from .recorded import Recorded, planned
+from .search import floor_for, possible_variants
 
 
 @dataclass(frozen=True)
@@ -70,12 +71,23 @@ class Distinction:
 
     @property
     def is_told(self) -> bool:
-        """Whether an effect of a usual size is told from the other kind."""
-        return self.smallest <= TOLD_APART
+        """Whether an effect of a usual size is told from the other kind, although its formula may be another one."""
+        return self.margin >= 1.0
+
+    @property
+    def margin(self) -> float:
+        """From 1 on it is told: the smaller one of the share and of the square of an effect's usual size, each by what it has
+        to be at least.
+        """
+        return min(self.share / LEAST_SHARE_TOLD, (TOLD_APART / max(self.smallest, 1e-12)) ** 2)
 
 
-def distinctions(recorded: Recorded, possible: Set[str]) -> list[Distinction]:
-    """Return for each kind, in each of its directions, how well it is told from each other kind.
+COMPARED_KINDS = frozenset(variant.kind for variant in (*VARIANTS, MISALIGNMENT))
+"""Names of all kinds that can be compared. Friction, noise, steps and dead texels are none of these."""
+
+
+class Comparison:
+    """Kinds that are compared on recordings, and on recordings with one more that was not made yet.
 
     Parameters
     ----------
@@ -83,18 +95,57 @@ def distinctions(recorded: Recorded, possible: Set[str]) -> list[Distinction]:
     possible : set of str
         Names of the kinds to compare.
     """
-    variants = possible_variants(recorded, possible)
-    equations = normal_equations(Cascade(recorded), Point(), variants)
+
+    def __init__(self, recorded: Recorded, possible: Set[str]):
+        self.recorded = recorded
+        self._variants = possible_variants(recorded, possible)
+        self._equations = normal_equations(Cascade(recorded), Point(), self._variants)
+
+    def distinctions(self, further: Trial | None = None, wanted: Set[tuple[str, str]] | None = None) -> list[Distinction]:
+        """Return for each kind, in each of its directions, how well it is told from each other kind.
+
+        Parameters
+        ----------
+        further : Trial, optional
+            One recording more, of which only the stimulus counts.
+        wanted : set of (str, str), optional
+            Directions of kinds and the other kinds that they are to be told from; all of them if it is left out.
+        """
+        equations = self._equations
+        if further is not None:
+            cascade = Cascade(planned(self.recorded, further))
+            equations = joined(equations, normal_equations(cascade, Point(), self._variants))
+        return _distinctions(equations, self._variants, self.recorded, wanted)
+
+
+def distinctions(recorded: Recorded, possible: Set[str]) -> list[Distinction]:
+    """Return for each kind, in each of its directions, how well recordings tell it from each other kind.
+
+    Parameters
+    ----------
+    recorded : Recorded
+    possible : set of str
+        Names of the kinds to compare.
+    """
+    return Comparison(recorded, possible).distinctions()
+
+
+def _distinctions(
+    equations: CascadeEquations, variants: Sequence[Variant], recorded: Recorded, wanted: Set[tuple[str, str]] | None
+) -> list[Distinction]:
+    """Distinctions from equations about the base model, whose units are those of some recordings."""
     kinds = list(dict.fromkeys(variant.kind for variant in variants))
+    floor = floor_for(max(float(equations.count.sum()), 1.0), recorded.correlation[0])
     found = []
     for signal in [one for variant in variants for one in signals_of(equations, variant)]:
-        alone = left_by(equations, signal, ())
-        for kind in kinds:
-            if kind != signal.kind:
-                others = [variant for variant in variants if variant.kind == kind]
-                left = min(left_by(equations, one, (other,)) for one in _both_signs(signal, variants) for other in others)
-                share = min(left / alone, 1.0) if alone > 0.0 else 0.0
-                found.append(Distinction(signal.label, kind, share, _smallest(recorded, share * alone / signal.square)))
+        against = [k for k in kinds if k != signal.kind and (wanted is None or (signal.label, k) in wanted)]
+        alone = left_by(equations, signal, ()) if against else 0.0
+        for kind in against:
+            others = [variant for variant in variants if variant.kind == kind]
+            left = min(left_by(equations, one, (other,)) for one in _both_signs(signal, variants) for other in others)
+            share = min(left / alone, 1.0) if alone > 0.0 else 0.0
+            smallest = _smallest(recorded.noise[0 if recorded.has_readings else 1], floor, share * alone / signal.square)
+            found.append(Distinction(signal.label, kind, share, smallest))
     return found
 
 
@@ -104,10 +155,10 @@ def _both_signs(signal: KindSignal, variants: Sequence[Variant]) -> list[KindSig
     return [signal, signal.scaled(-1.0)] if is_signed else [signal]
 
 
-def _smallest(recorded: Recorded, share: float) -> float:
+def _smallest(noise: float, floor: float, share: float) -> float:
     """Root mean square, as a share of full load, from which on the excess that is left decides; the rest is imitated."""
-    least = floor_of(recorded) * float(np.expm1(DEFAULT_COST))
-    return float(recorded.noise[0] * np.sqrt(least / share)) if share > 1e-9 else np.inf
+    least = floor * float(np.expm1(DEFAULT_COST))
+    return float(noise * np.sqrt(least / share)) if share > 1e-9 else np.inf
 
 
 def signals_of(equations: CascadeEquations, variant: Variant) -> list[KindSignal]:
@@ -144,7 +195,7 @@ def _signal(equations: CascadeEquations, variant: Variant, label: str, columns: 
     pattern = np.zeros(texel_gram.shape[1:])
     for name in variant.texel_columns:
         index = TEXEL.index(name)
-        size = np.sqrt(len(columns)) / np.sqrt(max(float(texel_gram[index, index].sum()), 1e-300))
+        size = np.sqrt(max(len(columns), 1)) / np.sqrt(max(float(texel_gram[index, index].sum()), 1e-300))
         pattern[index] = size * np.random.default_rng(index).normal(size=pattern.shape[1])
     right = gram @ weights + np.einsum("qpn,qn->p", coupling, pattern)
     square = float(weights @ gram @ weights + 2.0 * weights @ np.einsum("qpn,qn->p", coupling, pattern))

@@ -92,7 +92,7 @@ class CascadeEquations:
         x = bounded_minimum(gram, right, low, high)
         fitted = square - 2.0 * x @ right + x @ gram @ x
         texel = self._texel_values(own, picked, x)
-        count = float(self.count.sum())
+        count = max(float(self.count.sum()), 1.0)
         left_out = self._left_out(own, picked, x, texel, low, high) if with_left_out else fitted
         return Solution(self._point(members, names, x, own, texel), float(fitted) / count, float(left_out) / count)
 
@@ -170,6 +170,13 @@ class CascadeEquations:
             start += width
         values = {TEXEL[index]: texel[i] for i, index in enumerate(own)}
         return Point(tuple(members), coefficients, base, values)
+
+
+def joined(first: CascadeEquations, second: CascadeEquations) -> CascadeEquations:
+    """Return the equations of two sets of recordings together; both have the same columns, in the same units."""
+    names = ("gram", "right", "square", "count", "coupling", "texel_gram", "texel_right")
+    both = {name: np.concatenate([getattr(first, name), getattr(second, name)]) for name in names}
+    return CascadeEquations(first.at, first.variants, **both)
 
 
 def normal_equations(cascade: Cascade, point: Point, variants: Sequence[Variant]) -> CascadeEquations:

@@ -81,6 +81,8 @@ class Recorded:
         Row and column of each texel; None if they are not in a grid.
     duration : float, s
         Of the longest run.
+    full_path : float
+        Load that was put on the texel that was pressed most, over all of its presses; full load is 1.
     free : frozenset of str
         Which of "k", "damping", "gain" and "zero" the base model has free.
     source : Source
@@ -93,6 +95,7 @@ class Recorded:
     place: np.ndarray
     rows: np.ndarray | None
     duration: float
+    full_path: float
     free: frozenset[str]
     source: Source
 
@@ -100,6 +103,11 @@ class Recorded:
     def texel_count(self) -> int:
         """Number of texels."""
         return len(self.place)
+
+    @property
+    def has_readings(self) -> bool:
+        """Whether any texel was read, rather than net forces alone."""
+        return any(bool(np.isfinite(run.reading).any()) for run in self.runs)
 
     @property
     def count(self) -> float:
@@ -117,6 +125,8 @@ class Source:
     scale: float
     can_move: bool
     heights_free: bool
+    most_work: float
+    stride: int
     kept: dict[tuple[float, ...], list[tuple[np.ndarray, np.ndarray]]] = field(default_factory=dict)
 
     def loads(self, displacement: tuple[float, ...] = (0.0,) * 6) -> list[tuple[np.ndarray, np.ndarray]]:
@@ -168,13 +178,11 @@ def recorded(
     scale = max(max(float(p.normal_force(model).max(initial=0.0)) for p in predictors), 1e-12)
     posed = all(p.trial.stimulus == "pose" for p in predictors)
     heights_free = any(isinstance(p.trial.contact_height, str) for p in predictors)
-    source = Source(rig, model, groups, scale, posed, heights_free)
+    source = Source(rig, model, groups, scale, posed, heights_free, 1.0, stride)
     loads = source.loads()
     works = [_work(group, load * scale) for group, (load, _) in zip(groups, loads, strict=True)]
-    most = max(max(float(work.max(initial=0.0)) for work in works), 1e-300)
-    runs = tuple(
-        _run(group, model, pair, work / most, scale, silent) for group, pair, work in zip(groups, loads, works, strict=True)
-    )
+    source = replace(source, most_work=max(max(float(work.max(initial=0.0)) for work in works), 1e-300))
+    runs = tuple(_run(group, source, pair, work, silent) for group, pair, work in zip(groups, loads, works, strict=True))
     ranges = [np.ptp(run.force[np.isfinite(run.force)]) for run in runs if np.isfinite(run.force).any()]
     read = any(np.isfinite(run.reading).any() for run in runs)
     level = max(noise[1].deviation / scale, FORCE_RESOLUTION * float(max(ranges, default=1.0)) if read else 0.0)
@@ -187,9 +195,42 @@ def recorded(
         place,
         rows,
         max(float(np.ptp(run.time)) for run in runs),
+        max(float(load_put_on(run.load)[-1].max()) for run in runs),
         frozenset(names),
         source,
     )
+
+
+def planned(recorded: Recorded, trial: Trial) -> Recorded:
+    """Return a recording that was not made yet, in the units of those that were; all its samples count as measured.
+
+    Parameters
+    ----------
+    recorded : Recorded
+        Those that were made.
+    trial : Trial
+        Its stimulus. Responses have no meaning.
+
+    Returns
+    -------
+    Recorded
+        With this run alone.
+    """
+    before = recorded.source
+    group = tuple(predictors_of([_thinned(replace(trial, reading=None, force=None), before.stride)], before.rig))
+    source = replace(before, predictors=(group,), kept={})
+    (pair,) = source.loads()
+    run = _run(group, source, pair, _work(group, pair[0] * source.scale), None)
+    weighs = any(np.isfinite(one.force).any() for one in recorded.runs)
+    silent = np.all([~np.isfinite(one.reading).any(axis=0) for one in recorded.runs], axis=0)
+    reading = np.where(silent, np.nan, np.zeros_like(run.reading)) if recorded.has_readings else run.reading
+    force = np.zeros_like(run.force) if weighs else run.force
+    return replace(recorded, runs=(replace(run, reading=reading, force=force),), source=source)
+
+
+def load_put_on(load: np.ndarray) -> np.ndarray:
+    """Return the load that was put on each texel so far, (T, n)."""
+    return np.cumsum(np.maximum(np.diff(load, axis=0, prepend=0.0), 0.0), axis=0)
 
 
 def _stride(predictors: Sequence[Predictor]) -> int:
@@ -228,14 +269,13 @@ def _work(group: tuple[Predictor, ...], force: np.ndarray) -> np.ndarray:
 
 def _run(
     group: tuple[Predictor, ...],
-    model: Model,
+    source: Source,
     pair: tuple[np.ndarray, np.ndarray],
     work: np.ndarray,
-    scale: float,
     silent: np.ndarray | None,
 ) -> RecordedRun:
-    """A run from the predictors of its trials."""
-    load, elastic = pair
+    """A run from the predictors of its trials; `work` is in joules."""
+    (load, elastic), model, scale = pair, source.model, source.scale
     stimulus = group[0].responses.texel_stimulus
     normals = group[0].rig.texels.normal
     axis = normals.mean(axis=0) / max(float(np.linalg.norm(normals.mean(axis=0))), 1e-12)
@@ -257,7 +297,14 @@ def _run(
         reading[:, silent] = np.nan
     middle = len(load) // 2
     return RecordedRun(
-        stimulus.time, load, elastic, work, reading, force, towards, (slice(0, middle), slice(middle, len(load)))
+        stimulus.time,
+        load,
+        elastic,
+        work / source.most_work,
+        reading,
+        force,
+        towards,
+        (slice(0, middle), slice(middle, len(load))),
     )
 
 

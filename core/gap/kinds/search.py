@@ -8,7 +8,7 @@ and a price for each of its kinds.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence, Set
+from collections.abc import Generator, Sequence, Set
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -20,12 +20,14 @@ from .decision_numbers import (
     COST_OF_SECOND_CURVE,
     COSTS,
     DEFAULT_COST,
+    DISPLACED,
     FLOOR,
     FLOOR_DEVIATIONS,
     HOPELESS,
     LARGE_SHIFT,
     MOST_TURNS,
     PARTNERS,
+    RIVAL_MARGIN,
     SETTLED,
     STARTING_SHIFTS,
 )
@@ -102,18 +104,27 @@ class KindSearch:
 
 def score_of(recorded: Recorded, members: Sequence[Variant], solution: Solution) -> float:
     """Return ``log(excess + u) + Σ cost`` of a set of kinds."""
+    return float(np.log(solution.excess + floor_of(recorded)) + price_of(members))
+
+
+def price_of(members: Sequence[Variant]) -> float:
+    """Return the sum of the costs of a set of kinds."""
     price = sum(COSTS.get(member.label, COSTS.get(member.kind, DEFAULT_COST)) for member in members)
-    price += COST_OF_SECOND_CURVE * max(sum(member.is_static for member in members) - 1, 0)
-    return float(np.log(solution.excess + floor_of(recorded)) + price)
+    return price + COST_OF_SECOND_CURVE * max(sum(member.is_static for member in members) - 1, 0)
 
 
 def floor_of(recorded: Recorded) -> float:
     """Return u: what no fit resolves, a share of the noise and the scatter of its mean square over the recordings."""
-    independent = recorded.count / recorded.correlation[0]
+    return floor_for(recorded.count, recorded.correlation[0])
+
+
+def floor_for(count: float, correlation: float) -> float:
+    """Return the same for so many measured values whose noise has a memory of `correlation` samples."""
+    independent = count / correlation
     return FLOOR + FLOOR_DEVIATIONS * float(np.sqrt(2.0 / max(independent, 1.0)))
 
 
-def search_kinds(recorded: Recorded, possible: Set[str]) -> Iterator[tuple[str, float, KindSearch]]:
+def search_kinds(recorded: Recorded, possible: Set[str]) -> Generator[tuple[str, float], None, KindSearch]:
     """Look for the best set of kinds.
 
     Parameters
@@ -127,30 +138,35 @@ def search_kinds(recorded: Recorded, possible: Set[str]) -> Iterator[tuple[str, 
     what : str
     share : float
         How much of the work is done.
-    search : KindSearch
-        As far as it is.
+
+    Returns
+    -------
+    KindSearch
     """
     cascade, search = Cascade(recorded), KindSearch(recorded)
     variants = possible_variants(recorded, possible)
-    yield "kinds alone", 0.0, search
+    yield "kinds alone", 0.0
     singles = _singles(cascade, search, variants)
     order = sorted(singles, key=lambda one: one.score)[:BEST_SINGLES]
     tried: set[frozenset[str]] = set()
     for number, one in enumerate(order):
-        yield f"kinds beside {one.members[0].kind}", 0.1 + 0.6 * number / len(order), search
+        yield f"kinds beside {one.members[0].kind}", 0.1 + 0.6 * number / len(order)
         _extend(cascade, search, one, variants, tried)
     pairs = [one for one in search.fitted if len(one.kinds) == 2]
     for number, one in enumerate(pairs[:BEST_PAIRS]):
-        yield "three kinds", 0.7 + 0.3 * number / BEST_PAIRS, search
+        yield "three kinds", 0.7 + 0.3 * number / BEST_PAIRS
         _extend(cascade, search, one, variants, tried)
-    yield "kinds", 1.0, search
+    return search
 
 
 def possible_variants(recorded: Recorded, possible: Set[str]) -> list[Variant]:
     """Return the variants of the kinds that recordings could show."""
     several = recorded.texel_count > 1
-    read = any(np.isfinite(run.reading).any() for run in recorded.runs)
-    found = [v for v in VARIANTS if v.kind in possible and (several or not v.needs_neighbours) and (read or v.in_contact)]
+    found = [
+        v
+        for v in VARIANTS
+        if v.kind in possible and (several or not v.needs_neighbours) and (recorded.has_readings or v.in_contact)
+    ]
     if recorded.source.can_move and MISALIGNMENT.kind in possible:
         found.append(MISALIGNMENT)
     return found
@@ -192,7 +208,7 @@ def _as_it_is(equations: CascadeEquations, point: Point) -> float:
             for other, other_name in enumerate(TEXEL[:index]):
                 if other_name in point.texel:
                     total += float(2.0 * own @ (equations.texel_gram.sum(axis=0)[index, other] * point.texel[other_name]))
-    return total / float(equations.count.sum())
+    return total / max(float(equations.count.sum()), 1.0)
 
 
 def _singles(cascade: Cascade, search: KindSearch, variants: Sequence[Variant]) -> list[ScoredSet]:
@@ -201,15 +217,19 @@ def _singles(cascade: Cascade, search: KindSearch, variants: Sequence[Variant]) 
     equations = normal_equations(cascade, empty, variants)
     nothing = equations.solve(())
     search.add(ScoredSet((), nothing, score_of(recorded, (), nothing), True))
+    least = float(np.log(floor_of(recorded)))  # the score of a set that leaves nothing, without its price
+    if all(least + price_of((variant,)) > search.none.score for variant in variants):
+        return []
     found = []
     for variant in variants:
         solution = equations.solve((variant,))
-        if variant is MISALIGNMENT:
+        if variant is MISALIGNMENT and solution.excess < DISPLACED * nothing.excess:
             solution = _displaced(cascade)
         found.append(ScoredSet((variant,), solution, score_of(recorded, (variant,), solution), True))
     found.sort(key=lambda one: one.score)
     for number, one in enumerate(found):
-        if number < BEST_SINGLES and one.members[0] is not MISALIGNMENT:
+        near = one.score < found[0].score + HOPELESS
+        if number < BEST_SINGLES and near and one.members[0] is not MISALIGNMENT:
             solution = refined(cascade, one.solution.point)
             found[number] = ScoredSet(one.members, solution, score_of(recorded, one.members, solution), True)
         search.add(found[number])
@@ -234,7 +254,11 @@ def _extend(
     cascade: Cascade, search: KindSearch, one: ScoredSet, variants: Sequence[Variant], tried: set[frozenset[str]]
 ) -> None:
     """Screen every partner of a set about its fit, and fit the best of them."""
-    others = [v for v in variants if v.kind not in one.kinds]
+    least = float(np.log(floor_of(cascade.recorded)))  # the score of a set that leaves nothing, without its price
+    worst = search.best.score + RIVAL_MARGIN
+    others = [v for v in variants if v.kind not in one.kinds and least + price_of((*one.members, v)) < worst]
+    if not others:
+        return
     point = one.solution.point
     equations = normal_equations(cascade, point, (*one.members, *others))
     screened = []

@@ -13,6 +13,7 @@ from ...io.html_templates import render_html
 from ...model.sensor_parameters import unit_of
 from ..forward.contact_phases import FEATURES
 from ..selection.findings import Diagnosis
+from .plan_files import planned_sentence
 from .plots import CAPTIONS
 
 TEMPLATE = Path(__file__).parent / "templates" / "report.html"
@@ -160,10 +161,13 @@ def _interval(value: float, low: float, high: float) -> str:
 
 
 def _open_questions(found: dict[str, Any]) -> list[str]:
-    """Rivals, the next experiment and warnings."""
+    """Rivals, the next experiment with its file, and warnings."""
     lines = [f"These recordings do not tell {' from '.join(names)}." for names in found["ambiguous"]]
     if found["next_experiment"]:
         lines.append(found["next_experiment"])
+    planned = found["planned_experiment"]
+    if planned:
+        lines.append(planned_sentence(planned))
     return lines + found["warnings"]
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Write what `palpate gap` leaves behind: gap.json, sensor.toml, report.html and its pictures (docs/gap.md describes them)."""
+"""Write what `palpate gap` leaves behind (docs/gap.md): gap.json, sensor.toml, report.html, pictures, the next trajectory."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from ...jobs.progress import Job, Progress
 from ..dataset.rig import Rig
 from ..fitting.least_squares import BASE, RECORDING
 from ..forward.predictor import Model
+from ..planning.experiment_plan import PlannedExperiment, plan_after
 from ..selection.check_recordings import CheckedRecording
 from ..selection.findings import Diagnosis, Finding
 from ..selection.gap_sizes import FORCES, READINGS
@@ -23,6 +24,7 @@ from .amended_sensor import amended_sensor, with_mean_gain_moved
 from .comparison import GapErrors, error_location, gap_errors
 from .experiments import next_experiment
 from .html_report import html_report
+from .plan_files import NEXT_TRAJECTORY, experiment_words, write_trajectory
 from .plots import FILE_TYPES, draw
 from .recording_differences import recording_differences
 from .sentences import headline, warnings
@@ -36,7 +38,7 @@ TEXEL_BYTES = 200.0
 """Bytes of a texel in the map of errors and in the amended sensor."""
 
 
-def summary(result: Diagnosis, errors: GapErrors) -> dict[str, Any]:
+def summary(result: Diagnosis, errors: GapErrors, experiment: PlannedExperiment | None = None) -> dict[str, Any]:
     """Return the contents of gap.json."""
     model = with_mean_gain_moved(result)
     base_free = [item for item in result.base.free if item.effect == BASE]
@@ -66,6 +68,7 @@ def summary(result: Diagnosis, errors: GapErrors) -> dict[str, Any]:
         "ruled_out": [{"effect": name, "why": why} for name, why in result.ruled_out],
         "ambiguous": [list(names) for names in result.ambiguous],
         "next_experiment": next_experiment(result),
+        "planned_experiment": None if experiment is None else experiment_words(experiment, NEXT_TRAJECTORY),
         "data_faults": [
             {"kind": fault.kind, "trials": list(fault.trials), "evidence": fault.evidence, "put_right": fault.put_right}
             for fault in result.faults
@@ -166,15 +169,21 @@ def write_report(result: Diagnosis, folder: Path, errors: GapErrors | None = Non
         write_sensor(new / "sensor.toml", amended_sensor(result))
         errors = errors or gap_errors(result)
         pictures = yield from part_of_job(
-            draw(result, errors, new), lambda step: Progress(step.stage, 100 + 800 * step.done // step.total, 1000)
+            draw(result, errors, new), lambda step: Progress(step.stage, 100 + 500 * step.done // step.total, 1000)
+        )
+        experiment = yield from part_of_job(
+            plan_after(result), lambda step: Progress(step.stage, 600 + 300 * step.done // step.total, 1000)
         )
         yield Progress("writing the report", 900, 1000)
-        found = summary(result, errors)
+        found = summary(result, errors, experiment)
         with atomic_write(new / "report.html") as temporary:
             text = html_report(result, found, headline(result, errors), pictures, new)
             temporary.write_text(text, encoding="utf-8")
         with atomic_write(new / "gap.json") as temporary:
             temporary.write_text(json.dumps(found, indent=2, ensure_ascii=False, allow_nan=False) + "\n", encoding="utf-8")
-        drawn = [f"{name}.{kind}" for name in pictures for kind in FILE_TYPES]
-        files.replace(new, {"gap": [new / name for name in ("sensor.toml", *drawn, "report.html", "gap.json")]})
+        made = [f"{name}.{kind}" for name in pictures for kind in FILE_TYPES]
+        if experiment is not None:
+            write_trajectory(experiment.design.trajectory, new / NEXT_TRAJECTORY)
+            made.append(NEXT_TRAJECTORY)
+        files.replace(new, {"gap": [new / name for name in ("sensor.toml", *made, "report.html", "gap.json")]})
     yield Progress("done", 1000, 1000)

@@ -5,4 +5,14 @@
 has seen. ``findings`` holds the result.
 """
 
-__all__ = ["check_recordings", "diagnosis", "findings", "gap_sizes", "identifiability", "wear_or_drift"]
+__all__ = [
+    "base_model",
+    "candidates",
+    "check_recordings",
+    "contact_heights",
+    "diagnosis",
+    "findings",
+    "gap_sizes",
+    "identifiability",
+    "wear_or_drift",
+]
