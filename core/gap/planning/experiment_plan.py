@@ -13,16 +13,11 @@ from ...errors import ParameterError
 from ...jobs.progress import Job, Progress
 from ..dataset.rig import Rig
 from ..fitting.least_squares import BASE
-from ..fitting.noise_floor import coverage
-from ..forward.predictor import Predictor, predictors_of
+from ..forward.predictor import Predictor
 from ..kinds.distinguishability import COMPARED_KINDS
 from ..kinds.recorded import recorded
-from ..selection.base_model import identified_base_parameters, prepared, start_model, with_recording_numbers
-from ..selection.candidates import DIRECTLY_ESTIMATED, NOT_FITTED, candidates
-from ..selection.contact_heights import with_starting_heights
 from ..selection.findings import Diagnosis
-from ..selection.gap_sizes import friction_kinds
-from ..selection.identifiability import unidentifiable
+from ..selection.unfitted import unfitted
 from .design import Design, DesignSpace, Question, best_design
 from .limits import Limits, limits_of
 from .outlook import Outlook, least_sureness
@@ -100,9 +95,11 @@ class Wishes:
     ----------
     between : tuple of str
         Kinds that it is to tell apart.
-    depth, speed, duration : float or None
+    depth : float or None
+        See :class:`.limits.Limits`, as for those below.
+    speed : float or None
+    duration : float or None
     area : (float, float, float, float) or None
-        See :class:`.limits.Limits`.
     """
 
     between: tuple[str, ...] = ()
@@ -141,27 +138,19 @@ def plan_experiment(rig: Rig, wishes: Wishes | None = None) -> Job[ExperimentPla
     """
     wishes = wishes or Wishes()
     yield Progress("contacts of every trial", 0, TOTAL)
-    rig = with_starting_heights(rig)
-    predictors = predictors_of(rig.trials, rig)
-    noise, _ = prepared(rig, predictors)
-    fitted = [predictor for predictor in predictors if predictor.trial.use == "fit"]
-    model = with_recording_numbers(start_model(rig, fitted), fitted)
-    reasons = unidentifiable(coverage(fitted))
-    shown = {candidate.name for candidate in candidates(fitted, model)}
-    apart = {*shown, *DIRECTLY_ESTIMATED, *NOT_FITTED, *friction_kinds()}
-    missing = {name: reasons.get(name, "these recordings cannot show it") for name in library() if name not in apart}
-    compared = (shown | reasons.keys()) & COMPARED_KINDS
+    known = unfitted(rig)
+    compared = (known.shown | known.cannot_show.keys()) & COMPARED_KINDS
     _check_kinds(wishes.between, compared)
     yield Progress("signals of every kind", 100, TOTAL)
-    seen = recorded(fitted, model, {*identified_base_parameters(rig, fitted)}, noise)
-    ground = Ground(predictors, wishes.limits(predictors))
-    space = DesignSpace(seen, fitted, ground, sorted(compared))
+    seen = recorded(known.fitted, known.start, known.free, known.channels)
+    ground = Ground(known.predictors, wishes.limits(known.predictors))
+    space = DesignSpace(seen, known.fitted, ground, sorted(compared))
     yield Progress("pairs that an experiment can tell", 300, TOTAL)
     question = _question_of(space, wishes.between) if wishes.between else _open_question(space)
     experiment = None
     if question:
         experiment = yield from _planned(space, question, 500)
-    return ExperimentPlan(tuple(space.before), missing, experiment)
+    return ExperimentPlan(tuple(space.before), known.cannot_show, experiment)
 
 
 def plan_after(result: Diagnosis, wishes: Wishes | None = None) -> Job[PlannedExperiment | None]:
@@ -217,7 +206,7 @@ def _planned(space: DesignSpace, question: Question, begins: int) -> Generator[P
         yield Progress(f"a trajectory that tells {' from '.join(kinds)}", begins + int((TOTAL - begins) * share), TOTAL)
 
 
-def _check_kinds(names: Sequence[str], compared: set[str]) -> None:
+def _check_kinds(names: Sequence[str], compared: frozenset[str]) -> None:
     """Raise if some kinds cannot be told apart by any planned trajectory."""
     for name in names:
         if name not in library():

@@ -17,7 +17,7 @@ from ..dataset.trial import Trial
 from ..forward.predictor import Predictor
 from ..forward.stimulus import stimulus_of
 from .limits import Limits
-from .programmes import SLOWEST, Press, Programme, Range, Step
+from .programmes import SLOWEST, PlannedPress, PlannedStep, Programme, Range
 
 Knot = tuple[float, int, float]
 """Time (s), place and depth."""
@@ -143,7 +143,7 @@ class Ground:
         if self.is_posed:
             heights = self.places @ self.up + self.touch
             self._clear = heights - float(heights.max()) - CLEARANCE * limits.depth
-        self._fallback = Press(0, (Step(1.0, 1.0, 0.0),), 1.0, 0.0)
+        self._fallback = PlannedPress(0, (PlannedStep(1.0, 1.0, 0.0),), 1.0, 0.0)
         needed = self._with_press([(0.0, 0, self._clear[0]), (FIRST_REST, 0, self._clear[0])], self._fallback)[-1][0]
         if needed + FIRST_REST > limits.duration:
             raise ParameterError(
@@ -177,7 +177,7 @@ class Ground:
         time, place, depth = (np.array(column) for column in zip(*knots, strict=True))
         return self._through(time, place, depth)
 
-    def _with_press(self, knots: list[Knot], press: Press) -> list[Knot]:
+    def _with_press(self, knots: list[Knot], press: PlannedPress) -> list[Knot]:
         """Knots with those of one press more: travel, steps, release, rest."""
         time, before, depth = knots[-1]
         made, clear = list(knots), float(self._clear[press.place])

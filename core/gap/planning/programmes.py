@@ -21,7 +21,7 @@ MOST_STEPS = 5
 
 
 @dataclass(frozen=True)
-class Step:
+class PlannedStep:
     """A depth of a press, how fast it is reached, and how long it is held.
 
     Attributes
@@ -37,14 +37,14 @@ class Step:
 
 
 @dataclass(frozen=True)
-class Press:
+class PlannedPress:
     """What is done at one place, from the first contact until the probe is clear again.
 
     Attributes
     ----------
     place : int
         Index of the place.
-    steps : tuple of Step
+    steps : tuple of PlannedStep
     release : float
         Speed of the way out, as a share of the limit.
     rest : float, s
@@ -52,12 +52,12 @@ class Press:
     """
 
     place: int
-    steps: tuple[Step, ...]
+    steps: tuple[PlannedStep, ...]
     release: float
     rest: float
 
 
-Programme = tuple[Press, ...]
+Programme = tuple[PlannedPress, ...]
 
 
 @dataclass(frozen=True)
@@ -88,13 +88,13 @@ def random_programme(span: Range, rng: np.random.Generator) -> Programme:
     return tuple(presses)
 
 
-def _random_press(span: Range, rng: np.random.Generator) -> Press:
+def _random_press(span: Range, rng: np.random.Generator) -> PlannedPress:
     steps = tuple(_random_step(span, rng) for _ in range(rng.integers(1, MOST_STEPS)))
-    return Press(int(rng.integers(span.places)), steps, _speed(span, rng), _rest(span, rng))
+    return PlannedPress(int(rng.integers(span.places)), steps, _speed(span, rng), _rest(span, rng))
 
 
-def _random_step(span: Range, rng: np.random.Generator) -> Step:
-    return Step(rng.uniform(LEAST_DEPTH, 1.0), _speed(span, rng), _hold(span, rng))
+def _random_step(span: Range, rng: np.random.Generator) -> PlannedStep:
+    return PlannedStep(rng.uniform(LEAST_DEPTH, 1.0), _speed(span, rng), _hold(span, rng))
 
 
 def _speed(span: Range, rng: np.random.Generator) -> float:
@@ -115,19 +115,36 @@ def usual_programmes(span: Range) -> list[Programme]:
     quick, slow, long = 0.7, max(span.slowest, 0.05), 0.3 * span.duration
     many = range(span.places)
     ramp = max(span.slowest, 0.02)
-    stairs = tuple(Step(share, quick, span.duration / 16.0) for share in (0.25, 0.5, 0.75, 1.0, 0.75, 0.5, 0.25))
-    growing = tuple(Press(0, (Step(share, quick, 0.0),), quick, 0.3) for share in (0.4, 0.4, 0.7, 0.7, 1.0, 1.0, 0.4) * 3)
-    partial = tuple(Step(share, slow, 0.0) for share in (1.0, 0.3, 0.9, 0.2, 0.7, 0.1, 1.0))
+    stairs = tuple(PlannedStep(share, quick, span.duration / 16.0) for share in (0.25, 0.5, 0.75, 1.0, 0.75, 0.5, 0.25))
+    growing = tuple(
+        PlannedPress(0, (PlannedStep(share, quick, 0.0),), quick, 0.3) for share in (0.4, 0.4, 0.7, 0.7, 1.0, 1.0, 0.4) * 3
+    )
+    partial = tuple(PlannedStep(share, slow, 0.0) for share in (1.0, 0.3, 0.9, 0.2, 0.7, 0.1, 1.0))
     return [
-        (Press(0, (Step(1.0, quick, long),), quick, long), Press(0, (Step(0.4, quick, long),), quick, long)),
-        tuple(Press(i, (Step(1.0, quick, 0.3),), quick, 0.2) for i in many),
-        tuple(Press(i, (Step(1.0, quick, 0.0), Step(0.3, quick, 0.2), Step(0.8, slow, 0.3)), slow, 0.3) for i in many),
-        (Press(0, stairs, quick, 1.0), Press(span.places // 2, stairs, quick, 1.0)),
+        (
+            PlannedPress(0, (PlannedStep(1.0, quick, long),), quick, long),
+            PlannedPress(0, (PlannedStep(0.4, quick, long),), quick, long),
+        ),
+        tuple(PlannedPress(i, (PlannedStep(1.0, quick, 0.3),), quick, 0.2) for i in many),
+        tuple(
+            PlannedPress(
+                i, (PlannedStep(1.0, quick, 0.0), PlannedStep(0.3, quick, 0.2), PlannedStep(0.8, slow, 0.3)), slow, 0.3
+            )
+            for i in many
+        ),
+        (PlannedPress(0, stairs, quick, 1.0), PlannedPress(span.places // 2, stairs, quick, 1.0)),
         growing,
-        tuple(Press(0, (Step(1.0, speed, 0.0),), speed, 0.3) for speed in (1.0, slow, 1.0, ramp, 0.3, 1.0, slow)),
-        (Press(0, partial, slow, 0.5), Press(span.places // 3, partial, quick, 0.5), Press(0, partial, quick, 0.5)),
-        (Press(0, (Step(1.0, ramp, 0.0),), ramp, long), Press(span.places // 2, (Step(1.0, ramp, 0.0),), 1.0, long)),
-        tuple(Press(i % min(2, span.places), (Step(0.5, quick, 0.2),), quick, long) for i in range(4)),
+        tuple(PlannedPress(0, (PlannedStep(1.0, speed, 0.0),), speed, 0.3) for speed in (1.0, slow, 1.0, ramp, 0.3, 1.0, slow)),
+        (
+            PlannedPress(0, partial, slow, 0.5),
+            PlannedPress(span.places // 3, partial, quick, 0.5),
+            PlannedPress(0, partial, quick, 0.5),
+        ),
+        (
+            PlannedPress(0, (PlannedStep(1.0, ramp, 0.0),), ramp, long),
+            PlannedPress(span.places // 2, (PlannedStep(1.0, ramp, 0.0),), 1.0, long),
+        ),
+        tuple(PlannedPress(i % min(2, span.places), (PlannedStep(0.5, quick, 0.2),), quick, long) for i in range(4)),
     ]
 
 
@@ -155,7 +172,7 @@ def changed(programme: Programme, span: Range, rng: np.random.Generator) -> Prog
     return tuple(presses)
 
 
-def _changed_steps(steps: tuple[Step, ...], span: Range, rng: np.random.Generator) -> tuple[Step, ...]:
+def _changed_steps(steps: tuple[PlannedStep, ...], span: Range, rng: np.random.Generator) -> tuple[PlannedStep, ...]:
     """Steps with one more, one less, or one that differs."""
     made, at, what = list(steps), int(rng.integers(len(steps))), rng.integers(5)
     if what == 0 and len(made) < 2 * MOST_STEPS:

@@ -6,13 +6,11 @@ has seen. ``findings`` holds the result.
 """
 
 __all__ = [
-    "base_model",
-    "candidates",
     "check_recordings",
-    "contact_heights",
     "diagnosis",
     "findings",
     "gap_sizes",
     "identifiability",
+    "unfitted",
     "wear_or_drift",
 ]
