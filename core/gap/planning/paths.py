@@ -52,8 +52,8 @@ class Trajectory:
         Depth (m) or force (N) at the knots, where the rig knows these.
     step : float, s
         Between the samples.
-    level_name : "depth" or "force"
-        What the levels are.
+    level_name : str
+        What the levels are: depth or force.
     """
 
     knots: np.ndarray
