@@ -26,8 +26,9 @@ class PlannedStep:
 
     Attributes
     ----------
-    depth, speed : float
-        Shares of the limits.
+    depth : float
+        Share of the limit, like the next one.
+    speed : float
     hold : float, s
     """
 
