@@ -14,6 +14,8 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from ._injected import CHANGES, SIZES, is_multiplexed, thinned_texels, with_effect, without_found_effects
 from ._recordings import LAST, SETS, Recording
 
@@ -93,14 +95,19 @@ def _friction_figures(name: str, result: Any) -> Iterator[dict]:
 def _recall_figures(data: Path) -> Iterator[dict]:
     """How many of the injected effects are found for sure, and how many others are.
 
-    Once of all of them, and once of those that the recordings can identify.
+    Once of all of them, once of those that the recordings can identify, and once of those among these that may have a name:
+    without the effect, at least half of the squared error of the check recordings would not be there.
     """
-    outcomes: dict[tuple[float, str], Counter[str]] = {(size, of): Counter() for size in SIZES for of in ("all", "told")}
+    from palpate.core.gap.selection.check_recordings import CHECK_CLOSED
+
+    groups = ("all", "told", "told.shown")
+    outcomes: dict[tuple[float, str], Counter[str]] = {(size, of): Counter() for size in SIZES for of in groups}
     alarms = 0
     for name, read in INJECTED.items():
         plain = read(data)
         cleaned = without_found_effects(plain, _diagnosed(plain, HOUSE / "build" / "real" / f"{name}-plain"))
-        alarms += bool(_sure_names(_diagnosed(cleaned.recording, HOUSE / "build" / "real" / f"{name}-freed")))
+        freed = _diagnosed(cleaned.recording, HOUSE / "build" / "real" / f"{name}-freed")
+        alarms += bool(_sure_names(freed))
         print(f"{name}: what was left unexplained is {cleaned.residual_share:.2%} of the range", file=sys.stderr, flush=True)
         for effect in CHANGES:
             for size in SIZES:
@@ -109,10 +116,12 @@ def _recall_figures(data: Path) -> Iterator[dict]:
                     continue
                 result = _diagnosed(changed, HOUSE / "build" / "real" / f"{name}-{effect}")
                 outcome, identifiable = _outcome(effect, result), _is_identifiable(effect, changed, result)
-                for of in ("all", "told") if identifiable else ("all",):
+                truth = _closed_by_truth(freed, result)
+                for of in groups[: 1 + identifiable + (identifiable and truth >= CHECK_CLOSED)]:
                     outcomes[size, of][outcome] += 1
                 said = ", ".join(f"{one.name} {one.confidence}" for one in result.findings) or result.verdict
                 note = "" if identifiable else " (these recordings cannot tell it)"
+                note += f" (the truth closes {truth:.0%} of the check)"
                 print(f"{name} with {size:g} x {effect}: {outcome}: {said}{note}", file=sys.stderr, flush=True)
     for (size, of), count in outcomes.items():
         for what, key, goal in (("recall", "right", 0.85), ("wrong", "wrong", 0.0)):
@@ -144,6 +153,24 @@ def _is_identifiable(effect: str, recording: Recording, result: Any) -> bool:
         return False
     curvature = curvature_ratio(result.of("fit"), result.best.model)
     return effect not in unidentifiable(result.coverage) and not indistinguishable(result.coverage, effect, curvature)
+
+
+def _closed_by_truth(freed: Any, result: Any) -> float:
+    """Share of the base model's squared error on the check recordings that is not there without the effect.
+
+    Channels that are not held against the amended model do not count.
+    """
+    outlying = {(one.recording, one.texel) for one in result.outlying}
+
+    def mean_square(diagnosis: Any) -> float:
+        parts = []
+        for predictor in diagnosis.of("check"):
+            miss = predictor.trial.reading - predictor.predict(diagnosis.base.model).reading
+            kept = [i for i in range(miss.shape[1]) if (predictor.trial.name, i) not in outlying]
+            parts.append(miss[:, kept].ravel())
+        return float(np.nanmean(np.concatenate(parts) ** 2))
+
+    return 1.0 - mean_square(freed) / mean_square(result)
 
 
 def _diagnosed(recording: Recording, folder: Path) -> Any:

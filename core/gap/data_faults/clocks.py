@@ -31,6 +31,10 @@ LEAST_SHIFT, LEAST_SHIFT_SAMPLES = 0.1, 3.0
 """Smallest shift that is a fault: seconds, and samples. Lag, creep and loops of a sensor move its changes less."""
 LONGEST_LAG = 0.3
 """Seconds by which a response may be late in all recordings: a sensor may be that slow (the effect `lag`)."""
+LAG_STAGES = (1, 2, 3)
+LAG_TIMES = np.geomspace(0.4, 2.5, 13)
+"""Numbers of equal low passes in turn, and their whole delays in units of the shift, with which a sensor that lags is compared.
+A lag smears the response, a shifted clock does not."""
 LEAST_GAIN = 0.1
 """Least increase of the correlation of the changes by a shift, a line or a step."""
 MOST_LEFT = 0.6
@@ -96,6 +100,8 @@ def find_clock_faults(rig: Rig, stimuli: Sequence[Stimulus]) -> list[DataFault]:
         least = max(LEAST_SHIFT, LEAST_SHIFT_SAMPLES * s.trial.step)
         gains = _is_clearly_better(course.correlation, course.unshifted)
         is_common = abs(course.start - typical) < least
+        if is_common and course.start > LONGEST_LAG and _is_clearly_better(_correlation_of_lag(s, course), course.correlation):
+            continue
         if gains and (course.start < -least or course.start > (max(LONGEST_LAG, least) if is_common else least)):
             shifts[s.trial.name] = course
     if shifts and "clock-shift" in rig.correct:
@@ -155,6 +161,26 @@ def course_of(stimulus: Stimulus) -> Course | None:
 def _is_clearly_better(new: float, old: float) -> bool:
     """Whether one correlation is so much larger than another one that this is no accident."""
     return new - old >= LEAST_GAIN and 1.0 - new < MOST_LEFT * (1.0 - old)
+
+
+def _correlation_of_lag(stimulus: Stimulus, course: Course) -> float:
+    """Largest correlation of the changes of response and load behind low passes that delay the load about as much."""
+    from scipy.signal import lfilter
+
+    prepared = _changes(stimulus)
+    if prepared is None:
+        return 0.0
+    _, load, response, step = prepared
+    size, best = float((response * response).sum()), 0.0
+    for stages in LAG_STAGES:
+        for tau in LAG_TIMES * course.start / stages:
+            keeps = float(np.exp(-step / tau))
+            late = load
+            for _ in range(stages):
+                late = lfilter([1.0 - keeps], [1.0, -keeps], late, axis=0)
+            product = abs(float((late * response).sum()))
+            best = max(best, product / max(np.sqrt(float((late * late).sum()) * size), 1e-300))
+    return best
 
 
 def _stays_quiet_without_load(

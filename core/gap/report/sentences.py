@@ -195,6 +195,11 @@ def evidence(result: Diagnosis, errors: GapErrors) -> list[str]:
 def warnings(result: Diagnosis) -> list[str]:
     """Return what a reader should know about the recordings, without the rig's own warnings."""
     said = [fault.sentence for fault in result.faults] + [text for text in (caution(result),) if text]
+    for one in result.outlying:
+        said.append(
+            f"Texel {one.texel} of the check recording '{one.recording}' has {one.times:.0f} times the squared error of any "
+            "texel in the fitted recordings, and keeps it: the errors contain it, but it is not held against the amended sensor."
+        )
     overpressed = max((p.stimulus.overpressed for p in result.predictors), default=0)
     if overpressed:
         said.append(

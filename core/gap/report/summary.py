@@ -117,7 +117,9 @@ def _checked(one: CheckedRecording, result: Diagnosis) -> dict[str, Any]:
             errors[name] = [float(x[quantity]) ** 0.5 * share for x in (one.before, one.after)]
     against = one.is_worse(READINGS) or one.is_worse(FORCES) or one is result.check.worst
     differs = recording_differences(result, one.name) if against and result.findings else []
-    return {"trial": one.name, "errors": errors, "worse": one.is_worse(READINGS) or one.is_worse(FORCES), "differs": differs}
+    outlying = [channel.texel for channel in result.outlying if channel.recording == one.name]
+    worse = one.is_worse(READINGS) or one.is_worse(FORCES)
+    return {"trial": one.name, "errors": errors, "worse": worse, "differs": differs, "outlying_texels": outlying}
 
 
 def _found(one: Finding, model: Model, result: Diagnosis, errors: GapErrors) -> dict[str, Any]:

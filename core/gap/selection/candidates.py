@@ -28,7 +28,8 @@ TIGHTER_BOUNDS = {
     ("hysteresis", "trailing", "width"): 0.5,
 }
 """Upper bounds below the effects' own. Beyond them a formula is still valid but describes another effect: a reading that rises
-fivefold is a lag, a softening that leaves nothing is wear."""
+fivefold is a lag, a softening that leaves nothing is wear. Where all other kinds leave far more, an amount is fitted anew up
+to its own bound (see :mod:`.forms_at_bounds`)."""
 SOFTENING_OVER = 0.4
 """Largest path of a softening, as a share of the path that texels are pressed in along a session: by its end 92 % of the loss
 is over. What still goes on is wear."""

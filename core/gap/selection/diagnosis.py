@@ -23,7 +23,7 @@ from ..fitting.noise_floor import SHORTEST_STRETCH, ChannelNoise, coverage
 from ..fitting.repeat_noise import is_scatter_of_repeats
 from ..fitting.residual_tests import LEAST_STRUCTURE, ResidualStructure, residual_structure
 from ..fitting.spectral_lines import strongest_line
-from ..forward.predictor import Model, Predictor, predictors_of
+from ..forward.predictor import Model, Predictor, number_name, predictors_of
 from .base_model import base_fit, identified_base_parameters, prepared
 from .between_recordings import (
     LEAST_CLOSED,
@@ -41,12 +41,15 @@ from .check_recordings import check_views, checked
 from .confidence import EXPLAINED, UNSURE_CONFIDENCE
 from .contact_heights import with_starting_heights
 from .findings import Diagnosis, Finding
+from .forms_at_bounds import without_bounds_of_forms
 from .forward_selection import ForwardSelection, SelectionState
 from .gap_sizes import FORCES, READINGS, UNRESOLVED_SQUARE, GapSizes, friction_kinds
 from .harmful_effects import without_harmful_effects
+from .outlying_channels import outlying_channels, without_channels
 from .screening import screen
 from .verdict import conclude
 from .view_set import ViewSet, view_set_of
+from .wear_or_drift import USE, texels_can_tell, told_by_recordings
 
 TOTAL_WORK = 1000
 BASE_MODEL_BEGINS, SELECTION_BEGINS = 40, 60
@@ -111,6 +114,7 @@ def _best_of_other_searches(plain: _Search) -> Generator[Progress, None, _Search
         yield from _selected(session, OTHER_SEARCHES_BEGIN, middle)
         if _is_one_session(session, plain):
             session.result.assumed_session, best = True, session
+            _doubt_wear(session, own)
             if session.left <= own.left_of_base:
                 return session
     if own.is_wanted:
@@ -209,6 +213,24 @@ def _is_one_session(session: _Search, plain: _Search) -> bool:
     return remembers and result.verdict == "explained" and session.left < MOST_LEFT * plain.left
 
 
+def _doubt_wear(session: _Search, own: _Search) -> None:
+    """Put the wear of an assumed session in doubt where nothing tells it from a drift from recording to recording.
+
+    The pauses are not known, so a gain that falls with the time was not looked for along the session.
+    """
+    result = session.result
+    stimuli = [one.stimulus for one in own.result.predictors]
+    factors = {
+        one.trial.name: own.result.base.model.recordings.get(number_name("factor", one.trial.name), 1.0)
+        for one in own.result.of("fit")
+    }
+    by_texels = texels_can_tell(stimuli) and session.left < MOST_LEFT * own.left_of_base
+    wears = any(one.name == "wear" and one.confidence > UNSURE_CONFIDENCE for one in result.findings)
+    if wears and not by_texels and told_by_recordings(stimuli, factors) != USE:
+        result.findings = [_in_doubt(one) if one.name == "wear" else one for one in result.findings]
+        result.ambiguous.append(("wear", "drift"))
+
+
 def _name_differences(own: _Search, plain: _Search, session: _Search | None) -> None:
     """Say in a result by which levels and gains its recordings differ."""
     result, before = own.result, plain.result
@@ -278,8 +300,11 @@ def _select_effects(result: Diagnosis, view_set: ViewSet) -> Iterator[tuple[str,
         state = base
     else:
         state = yield from selection.run(base, partial(_structure, view_set))
+        state = without_bounds_of_forms(view_set.whole, state, result.scales)
     deviations = result.noise[READINGS].deviation, result.noise[FORCES].deviation
     check = check_views(result.predictors, deviations)
+    result.outlying = outlying_channels(view_set.whole, check, result.base.model, state.fit.model)
+    check = without_channels(check, result.outlying)
     state = without_harmful_effects(view_set.whole, check, state, gap_sizes)
     state = replace(state, fit=_with_base_refitted(result, view_set, state.fit))
     result.best, result.structure = state.fit, _structure(view_set, state.fit)

@@ -18,6 +18,7 @@ from ..forward.predictor import Model, Predictor
 from .between_recordings import LOAD_HISTORY, RecordingDifferences
 from .candidates import Scales
 from .check_recordings import CheckedRecording, CheckOutcome
+from .outlying_channels import OutlyingChannel
 
 
 @dataclass(frozen=True)
@@ -120,6 +121,8 @@ class Diagnosis:
         Whether the recordings, of which the rig names no session, are explained as one session in their order.
     check : CheckOutcome
         What the check recordings say of the amended model, or of the base model if there are no effects.
+    outlying : list of OutlyingChannel
+        Channels of check recordings that jump: they are not held against the amended model.
     closed : ClosedShares
         How much of the gaps the amended model closes.
     unlike_fitted : list of CheckedRecording
@@ -147,6 +150,7 @@ class Diagnosis:
     between: RecordingDifferences | None = None
     assumed_session: bool = False
     check: CheckOutcome = field(default_factory=CheckOutcome)
+    outlying: list[OutlyingChannel] = field(default_factory=list)
     closed: ClosedShares = field(default_factory=ClosedShares)
     unlike_fitted: list[CheckedRecording] = field(default_factory=list)
 

@@ -82,6 +82,26 @@ def test_a_strip_that_relaxes_and_goes_slack_has_lost_no_samples(tmp_path):
     assert not find_faults(rig, stimuli_of(rig))
 
 
+@pytest.mark.parametrize(("late", "kinds"), [(False, []), (True, ["clock-shift"])])
+def test_a_sensor_that_lags_has_no_shifted_clock(tmp_path, late, kinds):
+    """Three low passes in turn delay and smear the response of all recordings; a clock that is as late does not smear it."""
+    rng, trials = np.random.default_rng(7), []
+    for name, use in (("a", "fit"), ("b", "fit"), ("c", "check")):
+        time = np.arange(0.0, 40.0, 0.05)
+        wide = rng.uniform(0.3, 1.2, 8)
+        depth = 0.002 * sum(np.abs(time - 5.0 * (i + 0.6)) < half for i, half in enumerate(wide))
+        felt = 1e3 * depth
+        if late:
+            felt = np.interp(time - 0.6, time, felt)
+        else:
+            for _ in range(3):
+                felt = low_pass(time, felt, 0.25)
+        trials.append((name, use, {"time": time, "depth": depth, "texel_0": felt + rng.normal(0.0, 0.01, len(time))}))
+    press = Recording("press", 'grid = { rows = 1, columns = 1, pitch = 0.01 }\nunit = "kPa"\nmax_penetration = 0.01', trials)
+    rig = read_rig(press.write(tmp_path))
+    assert [fault.kind for fault in find_faults(rig, stimuli_of(rig))] == kinds
+
+
 def test_a_press_that_is_felt_late_and_let_go_early_has_lost_no_samples(tmp_path):
     """Below a threshold nothing is read: the response to one press begins later and ends earlier than the press."""
     rng, trials = np.random.default_rng(6), []

@@ -8,9 +8,11 @@ import gap_cases as cases
 import numpy as np
 import pytest
 
+from palpate.benchmarks import wear_or_drift
+from palpate.core.gap.dataset.rig import read_rig
 from palpate.core.gap.forward.predictor import Model, Predictor, number_name
 from palpate.core.gap.report.comparison import gap_errors
-from palpate.core.gap.report.sentences import headline
+from palpate.core.gap.report.sentences import SURE, headline
 from palpate.core.gap.report.summary import summary
 from palpate.core.gap.selection import between_recordings, screening
 from palpate.core.gap.selection.between_recordings import (
@@ -158,3 +160,10 @@ def test_one_session_keeps_the_order_of_the_rig():
     ends = [float(trial.time[-1]) for trial in session.trials]
     assert all(trial.time[0] > end for trial, end in zip(session.trials[1:], ends[:-1], strict=True))
     assert [trial.name for trial in session.trials] == [trial.name for trial in rig.trials]
+
+
+def test_the_wear_of_an_assumed_session_is_in_doubt_where_it_may_be_a_drift(tmp_path):
+    """All texels carry the same, and gains fall along with use and with the clock alike."""
+    result = run_job(diagnose(read_rig(wear_or_drift.write("aged", 6004, tmp_path))))
+    assert result.assumed_session and ("wear", "drift") in result.ambiguous
+    assert not [one.name for one in result.findings if one.confidence >= SURE]
