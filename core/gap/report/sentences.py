@@ -198,7 +198,7 @@ def warnings(result: Diagnosis) -> list[str]:
     for one in result.outlying:
         said.append(
             f"Texel {one.texel} of the check recording '{one.recording}' has {one.times:.0f} times the squared error of any "
-            "texel in the fitted recordings, and keeps it: the errors contain it, but it is not held against the amended sensor."
+            "texel in the fitted recordings, and keeps it: it is in the errors, and is not held against the amended sensor."
         )
     overpressed = max((p.stimulus.overpressed for p in result.predictors), default=0)
     if overpressed:
