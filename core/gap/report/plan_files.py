@@ -21,6 +21,8 @@ PLAN, TRAJECTORY = "plan.json", "plan.csv"
 """Files of a plan in advance."""
 NEXT_TRAJECTORY = "next_experiment.csv"
 """File of the trajectory that is planned after a run."""
+LEAST_GAIN = 0.05
+"""Gain in sureness below which a trajectory is not worth its time. Chosen by eye."""
 
 
 def table_rows(plan: ExperimentPlan) -> list[tuple[str, str]]:
@@ -42,8 +44,14 @@ def _left(one: Outlook) -> str:
 
 def planned_sentence(words: Mapping[str, Any]) -> str:
     """Return what a planned experiment, as :func:`experiment_words` gives it, is good for, and how sure one will be."""
+    what = " from ".join(words["between"])
+    if words["sure_after"] - words["sure_before"] < LEAST_GAIN:
+        return (
+            f"No trajectory within these limits tells {what} better than the recordings do, about {words['sure_before']:.0%} "
+            f"sure: allow more depth, speed, duration or places. The best one found is {words['file']}."
+        )
     return (
-        f"{words['file']} is a trajectory of {words['limits']['duration']:.3g} s that tells {' from '.join(words['between'])}: "
+        f"{words['file']} is a trajectory of {words['limits']['duration']:.3g} s that tells {what}: "
         f"about {words['sure_after']:.0%} sure with it, {words['sure_before']:.0%} without."
     )
 

@@ -24,7 +24,7 @@ from palpate.core.gap.planning.limits import limits_of
 from palpate.core.gap.planning.outlook import least_sureness
 from palpate.core.gap.planning.paths import Ground
 from palpate.core.gap.planning.programmes import random_programme
-from palpate.core.gap.report.plan_files import table_rows, write_plan
+from palpate.core.gap.report.plan_files import planned_sentence, table_rows, write_plan
 from palpate.core.jobs.job_runner import run_job
 
 NOISE = ChannelNoise(0.005, 1.0, "given"), ChannelNoise(0.05, 1.0, "given")
@@ -162,6 +162,19 @@ def test_a_plan_names_the_open_pair_and_writes_a_recording_that_a_rig_can_have(r
     assert main(["gap", str(path), "--plan", "--between", "creep", "drift", "--out", str(out)]) == 0
     again = json.loads(written[0].read_text())  # the earlier plan is replaced
     assert again["experiment"]["between"] == ["creep", "drift"]
+
+
+def test_a_trajectory_that_tells_no_more_is_not_recommended():
+    words = {
+        "file": "plan.csv",
+        "between": ["creep", "lag"],
+        "limits": {"duration": 6.0},
+        "sure_before": 0.5,
+        "sure_after": 0.9,
+    }
+    assert planned_sentence(words).endswith("about 90% sure with it, 50% without.")
+    said = planned_sentence(words | {"sure_after": 0.52})
+    assert said.startswith("No trajectory within these limits tells creep from lag better") and "allow more depth" in said
 
 
 def test_options_of_a_plan_that_do_not_go_together_are_refused(rig, tmp_path, capsys):
