@@ -4,9 +4,9 @@
 from pathlib import Path
 
 import bpy
-from bpy.props import BoolProperty, CollectionProperty, StringProperty
+from bpy.props import BoolProperty, CollectionProperty, FloatProperty, StringProperty
 
-from ..addon.measured import gap_results, log_rigs
+from ..addon.measured import gap_results, log_rigs, planned_probe
 from . import modal_job, support
 from .fits import show_image
 
@@ -88,6 +88,57 @@ class PALPATE_OT_gap_find(modal_job.ModalJob, bpy.types.Operator):
 
     def done(self, result):
         self.report({"INFO"}, result.headline)
+
+
+class PALPATE_OT_gap_plan(modal_job.ModalJob, bpy.types.Operator):
+    """Plan the recording that tells apart what the measurements leave open, and put it on a probe as keyframes: on the selected
+    target, else on a new one with the shape of the rig's. ESC stops it"""
+
+    bl_idname = "palpate.gap_plan"
+    bl_label = "Plan Experiment"
+    bl_options = {"REGISTER", "UNDO"}
+    stopped = "Stopped; no probe has changed"
+
+    depth: FloatProperty(
+        name="Depth (m)", description="How deep it may press, m; 0: as deep as the recordings", min=0.0, precision=5, step=0.01
+    )
+    speed: FloatProperty(
+        name="Speed (m/s)",
+        description="How fast it may move, m/s; 0: as fast as the recordings",
+        min=0.0,
+        precision=4,
+        step=0.1,
+    )
+    duration: FloatProperty(
+        name="Duration (s)", description="How long it may last, s; 0: as long as the longest recording", min=0.0, precision=1
+    )
+
+    @classmethod
+    def poll(cls, context):
+        if not support.poll_editable_sensor(cls, context):
+            return False
+        if not context.object.palpate.measured:
+            cls.poll_message_set("Choose the sensor's measurements first: Open Rig")
+            return False
+        return cls.poll_not_running()
+
+    def job(self, context):
+        from ..core.gap.planning.experiment_plan import Wishes
+
+        support.leave_edit_mode(context)
+        self._sensor = context.object.name
+        wishes = Wishes(depth=self.depth or None, speed=self.speed or None, duration=self.duration or None)
+        return planned_probe.plan(context.object, wishes)
+
+    def done(self, result):
+        experiment, rig = result
+        if experiment is None:
+            self.report({"INFO"}, "The recordings tell all effects from each other: nothing is planned")
+            return
+        sensor = bpy.data.objects[self._sensor]
+        probe = planned_probe.put_on_probe(bpy.context, sensor, experiment, rig)
+        sure = f"about {experiment.sure_after:.0%} sure with it, {experiment.sure_before:.0%} without"
+        self.report({"INFO"}, f"'{probe.name}' tells {' from '.join(experiment.kinds)}: {sure}")
 
 
 class PALPATE_OT_gap_add(support.ErrorReporting, bpy.types.Operator):
@@ -185,6 +236,7 @@ CLASSES = (
     PALPATE_OT_measured_open,
     PALPATE_OT_measured_logs,
     PALPATE_OT_gap_find,
+    PALPATE_OT_gap_plan,
     PALPATE_OT_gap_add,
     PALPATE_OT_gap_curves,
     PALPATE_OT_gap_show,

@@ -17,7 +17,9 @@ class Measured(Subpanel):
         row.prop(settings, "measured", text="")
         row.operator("palpate.measured_open", text="", icon="FILE_FOLDER")
         row.operator("palpate.measured_logs", text="", icon="FILE_NEW")
-        layout.operator("palpate.gap_find", icon="VIEWZOOM")
+        row = layout.row(align=True)
+        row.operator("palpate.gap_find", icon="VIEWZOOM")
+        row.operator("palpate.gap_plan", icon="CON_FOLLOWPATH")
         result = gap_results.of(context.object)
         if result is None:
             return

@@ -47,6 +47,7 @@ class PALPATE_MT_object(bpy.types.Menu):
         layout.operator("palpate.measured_open")
         layout.operator("palpate.measured_logs")
         layout.operator("palpate.gap_find")
+        layout.operator("palpate.gap_plan")
         layout.operator("palpate.gap_add")
         layout.operator("palpate.gap_curves")
         layout.operator("palpate.gap_show")

@@ -6,6 +6,8 @@ Signals are dimensionless: 1 is the largest force of the base model. States are 
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from ...compiled.kernels import kernel
@@ -78,32 +80,25 @@ def run_low_pass(x, keep, new, first, out):  # type: ignore[no-untyped-def]
             out[t, i] = keep[t] * out[t - 1, i] + old * x[t - 1, i] + new[t] * x[t, i]
 
 
-def stop(x: np.ndarray, threshold: float) -> np.ndarray:
-    """Return the stop operator of a signal, (T, n)."""
-    out = np.empty_like(x)
-    run_stop(x, threshold, out)
-    return out
+def _operator(run: Callable[[np.ndarray, float, np.ndarray], None]) -> Callable[[np.ndarray, float], np.ndarray]:
+    """Return a kernel as a function of a signal (T, n) and its one number, which returns (T, n)."""
+
+    def apply(x: np.ndarray, size: float) -> np.ndarray:
+        out = np.empty_like(x)
+        run(x, size, out)
+        return out
+
+    return apply
 
 
-def relays(x: np.ndarray, width: float) -> np.ndarray:
-    """Return the sum of relays that switch off `width` below where they switch on, (T, n)."""
-    out = np.empty_like(x)
-    run_relays(x, width, out)
-    return out
-
-
-def branch(x: np.ndarray, length: float) -> np.ndarray:
-    """Return on which branch a signal is: 1 rising, -1 falling, in between for a path of `length` after a turn, (T, n)."""
-    out = np.empty_like(x)
-    run_branch(x, length, out)
-    return out
-
-
-def falling(x: np.ndarray, length: float) -> np.ndarray:
-    """Return how long a signal has been falling: 0 to 1, within a path of `length`, (T, n)."""
-    out = np.empty_like(x)
-    run_falling(x, length, out)
-    return out
+stop = _operator(run_stop)
+"""The stop operator of a signal for a threshold."""
+relays = _operator(run_relays)
+"""The sum of relays that switch off a width below where they switch on."""
+branch = _operator(run_branch)
+"""On which branch a signal is: 1 rising, -1 falling, in between for a path of some length after a turn."""
+falling = _operator(run_falling)
+"""How long a signal has been falling: 0 to 1, within a path of some length."""
 
 
 def low_pass(x: np.ndarray, time: np.ndarray, constant: float, at_rest: bool) -> np.ndarray:

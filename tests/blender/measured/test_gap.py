@@ -12,6 +12,7 @@ from blender_scenes import grid
 from palpate.addon.measured import gap_results
 from palpate.commands import main
 from palpate.core.errors import SceneError
+from palpate.core.gap.dataset.rig import read_rig
 from palpate.core.jobs.job_runner import SlicedJob
 from palpate.core.solver import precompile
 
@@ -80,6 +81,49 @@ def test_a_bad_rig_is_said_in_a_sentence(scene, tmp_path):
     with pytest.raises(RuntimeError, match="not a rig"):
         bpy.ops.palpate.measured_open(filepath=str(tmp_path / "rig.toml"))
     assert not obj.palpate.measured
+
+
+def test_a_planned_experiment_becomes_keyframes_of_a_probe_and_is_undone(scene, rig_file):
+    obj = pad()
+    assert not bpy.ops.palpate.gap_plan.poll()
+    obj.palpate.measured = str(rig_file)
+    obj.location, obj.rotation_euler = (0.1, -0.2, 0.3), (0.4, 0.2, -0.7)
+    scene.frame_start, scene.frame_end = 5, 20
+    bpy.context.view_layer.update()
+    bpy.ops.ed.undo_push(message="before")
+    assert bpy.ops.palpate.gap_plan("EXEC_DEFAULT", True, duration=8.0, depth=0.001) == {"FINISHED"}
+    probe, obj = bpy.data.objects["Planned Probe"], bpy.data.objects["Pad"]
+    assert probe.palpate.role == "TARGET" and scene.frame_end == 5 + 8 * scene.render.fps
+    radii = [vertex.co.length for vertex in probe.data.vertices]
+    assert max(radii) == pytest.approx(cases.RADIUS, rel=1e-5)  # the shape that pressed in the recordings
+    lowest, speeds, before = [], [], None
+    for frame in range(scene.frame_start, scene.frame_end + 1):
+        scene.frame_set(frame)
+        place = np.array(obj.matrix_world.inverted() @ probe.matrix_world.translation)
+        lowest.append(place[2] - cases.RADIUS)
+        speeds += [] if before is None else [np.linalg.norm(place - before) * scene.render.fps]
+        before = place
+    assert lowest[0] > 0.0 and lowest[-1] > 0.0 and -0.0011 < min(lowest) < -1e-4
+    recorded = max(np.abs(np.diff(t.position[:, 2])).max() * cases.RATE for t in read_rig(rig_file).trials)
+    assert max(speeds) <= recorded * 1.01  # single precision of keyframes
+    probe.select_set(True)
+    assert bpy.ops.palpate.gap_plan(duration=6.0) == {"FINISHED"}  # the selected target follows the next plan
+    assert len([one for one in bpy.data.objects if one.name.startswith("Planned Probe")]) == 1
+    bpy.ops.ed.undo()
+    assert "Planned Probe" not in bpy.data.objects and bpy.context.scene.frame_end == 20
+
+
+def test_recordings_without_poses_are_not_planned_on_a_probe(scene, tmp_path):
+    obj = pad()
+    rows = "\n".join(f"{i / 20},{0.001 * (i % 20) / 20},{-0.1 * (i % 20)}" for i in range(40))
+    (tmp_path / "t.csv").write_text("time,depth,force_z\n" + rows + "\n")
+    (tmp_path / "rig.toml").write_text(
+        'format = "palpate-rig/1"\n[sensor]\ngrid = { rows = 2, columns = 2, pitch = [0.003, 0.003] }\n'
+        '[[trial]]\nfile = "t.csv"\nuse = "fit"\n'
+    )
+    obj.palpate.measured = str(tmp_path / "rig.toml")
+    with pytest.raises(RuntimeError, match="no poses that a probe could follow"):
+        bpy.ops.palpate.gap_plan()
 
 
 def test_another_grid_shows_no_residual(scene, rig_file):

@@ -40,7 +40,16 @@ def report(monkeypatch):
     monkeypatch.setattr(summary, "draw", draw)
     monkeypatch.setattr(summary, "amended_sensor", lambda result: result)
     monkeypatch.setattr(summary, "write_sensor", lambda path, result: write_text(path, result.age))
-    monkeypatch.setattr(summary, "summary", lambda result, _errors: result.age)
+    monkeypatch.setattr(summary, "summary", lambda result, _errors, _experiment: result.age)
+
+    def plan_after(result):
+        """The old diagnosis leaves a pair open."""
+        trajectory = SimpleNamespace(age=result.age)
+        return SimpleNamespace(design=SimpleNamespace(trajectory=trajectory)) if result.age == "old" else None
+        yield
+
+    monkeypatch.setattr(summary, "plan_after", plan_after)
+    monkeypatch.setattr(summary, "write_trajectory", lambda trajectory, path: write_text(path, trajectory.age))
     monkeypatch.setattr(summary, "headline", lambda *_: "")
     monkeypatch.setattr(summary, "html_report", lambda result, *_: result.age)
 
@@ -67,6 +76,7 @@ def test_stopped_at_every_step(report, tmp_path, kind):
         report(count, "new")
     new = ages(count)
     assert {"sensor.toml", "report.html", "gap.json", "loops.png"} < set(new) and "map.png" not in new
+    assert "next_experiment.csv" in ages(start) and "next_experiment.csv" not in new
     stages = set()
     for number in range(1, len(injector.calls) + 1):
         copy = tmp_path / "copy"
