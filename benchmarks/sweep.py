@@ -30,7 +30,8 @@ from palpate.core.model.sensor_parameters import SensorParameters
 from palpate.core.model.target import Target
 from palpate.core.solver.simulation import Simulation
 from palpate.core.study.design import points_of
-from palpate.core.study.run_files import SCENES, STUDY_NAME, make_folders
+from palpate.core.study.metrics import metrics_of
+from palpate.core.study.run_files import SCENES, STUDY_NAME, make_folders, write_run
 from palpate.core.study.study_file import Run, plan_for, read_study
 from palpate.core.study.variation import varied_scenario
 from palpate.sweep.child import Scenes, compute_run
@@ -130,6 +131,34 @@ def shares(name: str, hold: float) -> Iterator[dict]:
             "name": f"sweep.share.{name}.{kind}", "value": 1.0 / ours, "unit": "simulated s/s",
             "peer": "the bare solver", "peer_value": 1.0 / theirs, "ratio": theirs / ours, "goal": 0.9,
         }  # fmt: skip
+
+
+def parts() -> Iterator[dict]:
+    """What a short run takes of the processor, by item; its files are in memory, where there is a folder for that."""
+    memory = Path("/dev/shm")
+    taken: dict[str, list[float]] = {name: [] for name in ("values", "arrays", "steps", "metrics", "files")}
+    with tempfile.TemporaryDirectory(dir=memory if memory.is_dir() else None) as place:
+        folder = Path(place)
+        runs = begun(folder, LENGTHS["50_ms"], RUNS * ROUNDS)
+        scenes = Scenes(folder)
+        plan = scenes.plan("pad")
+        compute_run(scenes, replace(runs[0], digest="f" * 24))  # loads what was compiled
+        for run in runs:
+            moments = [time.process_time()]
+            scenario = scenes.scenario("pad", {**plan.fixed, **run.values})
+            moments.append(time.process_time())
+            simulation = Simulation(scenario, threads=1, shared=scenes.shared)
+            moments.append(time.process_time())
+            recording = simulation.advance_all()
+            moments.append(time.process_time())
+            metrics = metrics_of(scenario, recording, plan.press)
+            moments.append(time.process_time())
+            write_run(folder, run, scenario, recording, metrics, 0.0, shared=scenes.shared)
+            moments.append(time.process_time())
+            for own, seconds in zip(taken.values(), np.diff(moments), strict=True):
+                own.append(float(seconds))
+    for name, own in taken.items():
+        yield {"name": f"sweep.part.{name}", "value": statistics.median(own) * 1e3, "unit": "CPU ms per run of 50 ms"}
 
 
 def mujoco_press(seconds: float):
@@ -250,8 +279,9 @@ def dataset_share() -> Iterator[dict]:
 
 
 def run() -> Iterator[dict]:
-    """Shares of short and of longer runs, the same presses with MuJoCo, and the dataset."""
+    """Shares of short and of longer runs, their parts, the same presses with MuJoCo, and the dataset."""
     for name, hold in LENGTHS.items():
         yield from shares(name, hold)
+    yield from parts()
     yield from against_mujoco()
     yield from dataset_share()

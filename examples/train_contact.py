@@ -68,15 +68,19 @@ def plot(path: Path, answers: np.ndarray, guesses: np.ndarray) -> None:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(9, 3.2), layout="constrained")
+    figure = Figure(figsize=(10, 3.8), layout="constrained")
     FigureCanvasAgg(figure)
+    figure.suptitle(f"{len(answers):,} frames of runs that were not learnt from", fontsize=10)
     widest = np.argsort(-np.ptp(answers[:, :3], axis=0))[:2]
-    shown = [(axis, f"{'xyz'[axis]} of the contact", "mm") for axis in sorted(widest)] + [(3, "force", "N")]
-    for axes, (column, title, unit) in zip(figure.subplots(1, 3), shown, strict=True):
-        ends = [answers[:, column].min(), answers[:, column].max()]
-        axes.plot(ends, ends, color="0.6", lw=1)
-        axes.plot(answers[:, column], guesses[:, column], ".", ms=2, alpha=0.3, mew=0)
-        axes.set(xlabel=f"true {title} ({unit})", ylabel=f"learnt ({unit})")
+    shown = [(axis, "xyz"[axis], "mm") for axis in sorted(widest)] + [(3, "force", "N")]
+    for axes, (column, name, unit) in zip(figure.subplots(1, 3), shown, strict=True):
+        true, learnt = answers[:, column], guesses[:, column]
+        ends = [min(true.min(), learnt.min()), max(true.max(), learnt.max())]
+        axes.plot(ends, ends, color="0.4", lw=1)
+        axes.plot(true, learnt, ".", ms=3, alpha=0.25, mew=0)
+        axes.set(xlabel=f"true {name} ({unit})", ylabel=f"learnt {name} ({unit})", aspect="equal")
+        axes.set_title(f"median error {np.median(np.abs(learnt - true)):.2g} {unit}", fontsize=9)
+        axes.locator_params(nbins=6)
     figure.savefig(path, dpi=150)
 
 

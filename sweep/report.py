@@ -94,9 +94,13 @@ def _columns(folder: Path, order: list[tuple[int, str]]) -> StudyColumns:
     for number, run in enumerate(finished_runs(folder, order)):
         seconds += run.seconds
         for name, value in run.values.items():
-            values.setdefault(name, [None] * len(order))[number] = value
+            if name not in values:  # a column for each name, not for each run
+                values[name] = [None] * len(order)
+            values[name][number] = value
         for name, metric in run.metrics.items():
-            metrics.setdefault(name, np.full(len(order), np.nan))[number] = metric
+            if name not in metrics:
+                metrics[name] = np.full(len(order), np.nan)
+            metrics[name][number] = metric
     return StudyColumns(values, metrics, seconds)
 
 

@@ -16,8 +16,8 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Mapping
-from contextlib import suppress
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
 
@@ -118,15 +118,29 @@ def write_run(
     FileError
         A file cannot be written.
     """
+    with placed_run(folder, run) as place:
+        names, frames = tuple(recording.sensors), len(recording.frames)
+        _write_sensors(place, scenario, recording, images, shared or SharedResults())
+        write_run_record(RunRecord(place, run.digest, run.index, dict(run.values), dict(metrics), seconds, names, frames))
+
+
+@contextmanager
+def placed_run(folder: Path, run: Run) -> Iterator[Path]:
+    """Yield a hidden folder for the files of a run, which takes its place when the body ends; an earlier failure is removed.
+
+    The files must be brought onto the disk by the body.
+
+    Raises
+    ------
+    FileError
+        A file cannot be written, which the body may also tell by OSError.
+    """
     runs = folder / RUNS
     with temporary_folder(runs, "run") as hidden:
         place = hidden / "run"
-        names, frames = tuple(recording.sensors), len(recording.frames)
-        record = RunRecord(place, run.digest, run.index, dict(run.values), dict(metrics), seconds, names, frames)
         try:
             place.mkdir()
-            _write_sensors(place, scenario, recording, images, shared or SharedResults())
-            write_run_record(record)
+            yield place
             sync_folder(place)
             os.rename(place, runs / run.digest)
         except OSError as error:

@@ -6,17 +6,14 @@ from __future__ import annotations
 import errno
 import os
 from collections.abc import Callable, Mapping
-from contextlib import suppress
-from dataclasses import replace
 from math import isfinite
 from pathlib import Path
 from typing import Any
 
-from ..errors import FileError, PalpateError
-from ..io.file_writing import os_error_reason, sync_file, sync_folder
-from ..io.temporary_folder import temporary_folder
-from .run_files import FAILED, RUNS
-from .run_record import RUN_NAME, RunRecord, write_run_record
+from ..errors import PalpateError
+from ..io.file_writing import sync_file, sync_folder
+from .run_files import placed_run
+from .run_record import RunRecord, write_run_record
 from .study_file import Run
 
 Compute = Callable[[Path], Mapping[str, Any]]
@@ -43,29 +40,11 @@ def place_run(folder: Path, run: Run, compute: Compute, clock: Callable[[], floa
     PalpateError
         The metrics are no finite numbers by name; and whatever `compute` raises.
     """
-    runs = folder / RUNS
-    with temporary_folder(runs, "run") as hidden:
-        place = hidden / "run"
-        try:
-            place.mkdir()
-            began = clock()
-            metrics = _checked(_computed(compute, place), run)
-            write_run_record(replace(_record(place, run), metrics=metrics, seconds=clock() - began))
-            _sync_tree(place)
-            os.rename(place, runs / run.digest)
-        except OSError as error:
-            if not (runs / run.digest / RUN_NAME).is_file():  # else another process was faster
-                raise FileError(
-                    f"Run {run.index} could not be written to '{runs}' ({os_error_reason(error)}): "
-                    "free some space or check the permissions, and give the same command again."
-                ) from error
-    sync_folder(runs)
-    with suppress(OSError):
-        (folder / FAILED / f"{run.digest}.txt").unlink(missing_ok=True)
-
-
-def _record(place: Path, run: Run) -> RunRecord:
-    return RunRecord(place, run.digest, run.index, dict(run.values))
+    with placed_run(folder, run) as place:
+        began = clock()
+        metrics = _checked(_computed(compute, place), run)
+        write_run_record(RunRecord(place, run.digest, run.index, dict(run.values), metrics, clock() - began))
+        _sync_tree(place)
 
 
 def _computed(compute: Compute, place: Path) -> Mapping[str, Any]:
