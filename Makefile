@@ -11,6 +11,8 @@ DEMO_OUT ?= demo-output
 PYTEST_ARGS ?=
 # One group of benchmarks, as in `make bench ONLY=solver`
 ONLY ?=
+# Address of documentation and support, for the zips that are uploaded to extensions.blender.org
+WEBSITE ?=
 # Arguments for the attack, as in `make attack ATTACK_ARGS='faults --tries 50'`; SHORT=1 takes less than ten minutes
 ATTACK_ARGS ?=
 
@@ -24,7 +26,8 @@ help:
 	@echo 'make bench    benchmarks, one JSON line per figure; ONLY=solver for one group'
 	@echo 'make attack   faults, kills, power cuts and bad input in thousands; SHORT=1 for ten minutes, ATTACK_ARGS=faults for one area'
 	@echo 'make docs     the documentation as a site, in build/site/'
-	@echo 'make zip      the extension zips for every platform and Python, in dist/'
+	@echo 'make zip      the extension zips for every platform and Python, in dist/, checked by the rules of extensions.blender.org;'
+	@echo '              WEBSITE=https://… makes those to upload, too, in dist/upload/'
 	@echo 'make lint     ruff and mypy alone'
 	@echo 'make clean    remove build products; distclean: the environments too'
 
@@ -82,6 +85,8 @@ docs: $(VENV)/.docs
 
 zip: env
 	$(BIN)/python tools/build_zip.py
+	$(BIN)/python tools/extension_rules.py dist/*.zip
+	$(if $(WEBSITE),$(BIN)/python tools/upload_zips.py --website '$(WEBSITE)' dist/*.zip)
 
 clean:
 	rm -rf build dist $(DEMO_OUT) *.egg-info .pytest_cache .ruff_cache .mypy_cache

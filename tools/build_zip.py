@@ -58,8 +58,8 @@ MARKERS = {
     "windows-x64": {"sys_platform": "win32", "platform_system": "Windows", "os_name": "nt", "platform_machine": "AMD64"},
     "macos-arm64": {"sys_platform": "darwin", "platform_system": "Darwin", "os_name": "posix", "platform_machine": "arm64"},
 }
-# Python → the oldest numpy that a Blender on it ships; another Python is newer than these.
-NUMPY = {"3.11": "1.24.3", "3.13": "2.2.4"}
+# Python → the oldest numpy that a Blender on it ships, or that exists for it
+NUMPY = {"3.11": "1.24.3", "3.13": "2.2.4", "3.14": "2.3.2"}
 # The licence travels with the zip; everything else is in the package folders that pyproject.toml lists.
 ROOT_FILES = ["__init__.py", "LICENSE"]
 NOT_IN_ZIP = {"sweep"}  # needs packages that the zip does not carry
@@ -85,6 +85,14 @@ def package_files() -> list[Path]:
     return files
 
 
+def wheel_list(python: str) -> list[str]:
+    """Return the wheels of a Python as ``name==version``; pip would judge the markers by the Python that runs it."""
+    lines = [line.split("#")[0].strip() for line in WHEEL_LIST.read_text(encoding="utf-8").splitlines()]
+    wanted = [Requirement(line) for line in lines if line]
+    environment = {"python_version": python, "python_full_version": f"{python}.0"}
+    return [f"{one.name}{one.specifier}" for one in wanted if one.marker is None or one.marker.evaluate(environment)]
+
+
 def wheels_for(platform_name: str, python: str) -> list[Path]:
     """Wheels of one platform and Python, fetched once and kept under build/."""
     folder = WHEEL_CACHE / f"{platform_name}-cp{python.replace('.', '')}"
@@ -97,7 +105,7 @@ def wheels_for(platform_name: str, python: str) -> list[Path]:
         command += ["--implementation", "cp", "--python-version", python, "--dest", str(folder)]
         for tag in PLATFORMS[platform_name]:
             command += ["--platform", tag]
-        run = subprocess.run([*command, "--requirement", str(WHEEL_LIST)], capture_output=True, text=True)
+        run = subprocess.run([*command, *wheel_list(python)], capture_output=True, text=True)
         if run.returncode != 0:
             raise BuildError(
                 f"The wheels for {platform_name} and Python {python} could not be fetched; check the network "
@@ -125,7 +133,7 @@ def machine_code(platform_name: str, python: str, wheels: list[Path]) -> bytes |
         partial = kept.with_suffix(".partial")
         with tempfile.TemporaryDirectory() as folder:
             own = Path(folder) / ("Scripts" if platform_name == "windows-x64" else "bin") / "python"
-            numpy = f"numpy=={NUMPY.get(python, NUMPY['3.13'])}"
+            numpy = f"numpy=={NUMPY.get(python, NUMPY['3.14'])}"
             _run([interpreter, "-m", "venv", folder])
             _run([own, "-m", "pip", "install", "--quiet", "--no-deps", *wheels])
             _run([own, "-m", "pip", "install", "--quiet", "--only-binary=:all:", numpy])
@@ -152,7 +160,7 @@ def _run(command: list[Path | str]) -> None:
 
 def check_complete(wheels: list[Path], platform_name: str, python: str) -> None:
     """Raise unless all that the wheels require is among them, or numpy, in a version that fits."""
-    versions = {"numpy": NUMPY.get(python, NUMPY["3.13"])}
+    versions = {"numpy": NUMPY.get(python, NUMPY["3.14"])}
     for wheel in wheels:
         name, version, _, _ = parse_wheel_filename(wheel.name)
         versions[name] = str(version)

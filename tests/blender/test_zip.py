@@ -34,20 +34,23 @@ def life(zip_path, tmp_path_factory):
         (blender / name).symlink_to(path)
     user = folder / "user"
     user.mkdir()
+    home = folder / "home"
+    home.mkdir()
+    own = {key: value for key, value in os.environ.items() if not key.startswith(("XDG_", "MPL", "NUMBA"))}
     report = folder / "report.json"
     script = Path(__file__).with_name("zip_life.py")
     # -I -S: this environment's own packages, among them our dependencies, are out of sight
     command = [sys.executable, "-I", "-S", str(script), str(blender), str(zip_path), str(report)]
     run = subprocess.run(
         command,
-        env=os.environ | {"BLENDER_USER_RESOURCES": str(user)},
+        env=own | {"BLENDER_USER_RESOURCES": str(user), "HOME": str(home)},
         capture_output=True,
         text=True,
         timeout=300,
     )
     assert run.returncode == 0, run.stdout + run.stderr
     assert "Traceback" not in run.stdout + run.stderr, run.stdout + run.stderr
-    return json.loads(report.read_text(encoding="utf-8")) | {"user": user}
+    return json.loads(report.read_text(encoding="utf-8")) | {"user": user, "home": home}
 
 
 def what_blender_brings() -> dict[str, Path]:
@@ -123,6 +126,15 @@ def test_the_wheels_are_the_ones_in_use(life):
     for name, origin in life["wheels"].items():
         assert origin.startswith(site_packages), name
     assert life["compiled"] == 45
+
+
+def test_nothing_is_written_outside_of_the_users_folder_for_the_extension(life):
+    """Blender's own folders in the home of the user are Blender's; it made them before the extension was installed."""
+    assert life["written beside the source"] == []
+    assert any(name.startswith("fontlist") for name in life["fonts"])
+    left = [path.relative_to(life["home"]).as_posix() for path in life["home"].rglob("*") if path.is_file()]
+    assert left == []
+    assert life["disabled"]["MPLCONFIGDIR"] is None
 
 
 def test_disabling_leaves_nothing_registered(life):

@@ -133,16 +133,41 @@ def road():
     }
 
 
+def files_of_extension():
+    """What is in the extension's own folder, where it must not write; Python's byte code is Python's."""
+    from pathlib import Path
+
+    root = Path(sys.modules[MODULE].__file__).parent
+    files = [path for path in root.rglob("*") if path.is_file() and path.suffix != ".pyc"]
+    return sorted((path.relative_to(root).as_posix(), path.stat().st_size) for path in files)
+
+
+def figure():
+    """Draw a figure, for which matplotlib looks for fonts and keeps their list."""
+    from pathlib import Path
+
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    drawn = Figure()
+    drawn.text(0.5, 0.5, "N")
+    FigureCanvasAgg(drawn).draw()
+    return sorted(path.name for path in Path(bpy.utils.extension_path_user(MODULE, path="matplotlib")).iterdir())
+
+
 def main():
     watch_commands()
     report = {"before": state()}
     done = bpy.ops.extensions.package_install_files(repo="user_default", filepath=zip_path, enable_on_install=True)
     assert done == {"FINISHED"}, done
     report["enabled"] = state()
+    files = files_of_extension()
     report["road"] = road()
+    report["fonts"] = figure()
+    report["written beside the source"] = sorted(set(files_of_extension()) ^ set(files))
     report["wheels"], report["compiled"] = wheels()
     bpy.ops.preferences.addon_disable(module=MODULE)
-    report["disabled"] = state()
+    report["disabled"] = state() | {"MPLCONFIGDIR": os.environ.get("MPLCONFIGDIR")}
     bpy.ops.preferences.addon_enable(module=MODULE)
     report["enabled_again"] = state()
     repos = bpy.context.preferences.extensions.repos

@@ -85,6 +85,8 @@ class RecordingAnswer:
         How much later the clock of the second logger shows the same event. None: as the correlation says.
     why : str
     sure : bool
+    begin, end : float or None, s
+        What is used of the file that has what drove the sensor, counted from its first sample. None: all of it.
     """
 
     name: str
@@ -94,6 +96,8 @@ class RecordingAnswer:
     uncertainty: float | None = None
     why: str = ""
     sure: bool = True
+    begin: float | None = None
+    end: float | None = None
 
 
 @dataclass(frozen=True)
@@ -176,6 +180,7 @@ def answers_text(answers: Answers) -> str:
         words: dict[str, Any] = {"name": recording.name, "files": list(recording.files), "use": recording.use}
         if recording.late is not None:
             words |= {"late": recording.late, "uncertainty": recording.uncertainty or 0.0}
+        words |= {word: value for word, value in (("from", recording.begin), ("to", recording.end)) if value is not None}
         lines.append("[[recording]]")
         lines += [f"{word} = {_value(value)}" for word, value in words.items()]
         lines += [f"# {'' if recording.sure else 'CHECK: '}{recording.why}"] if recording.why else []
@@ -361,18 +366,22 @@ def _column_names(quantity: str, words: Mapping[str, Any], where: str) -> tuple[
 
 def _recording(entry: dict[str, Any], number: int, path: Path) -> RecordingAnswer:
     where = f"[[recording]] {number} of '{path.name}'"
-    known_words(entry, {"name", "files", "use", "late", "uncertainty"}, where)
+    known_words(entry, {"name", "files", "use", "late", "uncertainty", "from", "to"}, where)
     files, use = _names(entry.get("files"), where), entry.get("use", "fit")
     if use not in USES:
         raise FileError(f"use of {where} is {use!r:.60}: write one of {', '.join(USES)}.")
     if len(files) > 2:
         raise FileError(f"{where} has {len(files)} files: give one, or one of each of two loggers.")
-    for word in ("late", "uncertainty"):
+    for word in ("late", "uncertainty", "from", "to"):
         if word in entry and not is_number(entry[word]):
             raise FileError(f"{word} of {where} is {entry[word]!r:.60}: write seconds.")
     late = float(entry["late"]) if "late" in entry else None
     name = checked_name(entry.get("name", Path(files[0]).stem), where)
-    return RecordingAnswer(name, files, use, late, float(entry.get("uncertainty", 0.0)) if late is not None else None)
+    begin, end = (float(entry[word]) if word in entry else None for word in ("from", "to"))
+    if begin is not None and end is not None and not begin < end:
+        raise FileError(f"{where} is used from {begin:g} s to {end:g} s: write a `to` that is later than `from`.")
+    uncertainty = float(entry.get("uncertainty", 0.0)) if late is not None else None
+    return RecordingAnswer(name, files, use, late, uncertainty, begin=begin, end=end)
 
 
 def confirmed(answers: Answers) -> Answers:

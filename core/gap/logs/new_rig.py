@@ -22,7 +22,7 @@ from ..dataset.second_logger import interpolated, with_steady_signs
 from .answers import Answers, ColumnAnswer, LoggerAnswer, RecordingAnswer, toml_value
 from .clock_alignment import ClockShift, clock_shift
 from .column_meaning import LOG_UNITS, PRESSURES, READING_UNITS
-from .log_table import LogFile, LogTable
+from .log_table import FEWEST_ROWS, LogFile, LogTable
 from .proposal import table_of
 
 RIG_NAME = "rig.toml"
@@ -298,6 +298,8 @@ def _trial(
     notes: list[str],
 ) -> list[str]:
     """Check a recording, write its files, and return the lines of its [[trial]]."""
+    tables.sort(key=lambda table: any(one in table for one in ("x", "depth", "force")), reverse=True)
+    tables[0] = _used_part(recording, tables[0])
     for table in tables:
         _check_sizes(table, recording.name)
     lines = ["[[trial]]", f'file = "{name}.csv"', f'use = "{recording.use}"']
@@ -306,7 +308,7 @@ def _trial(
         _check_contact(tables[0], recording.name)
         written.append(_write_csv(folder / f"{name}.csv", tables[0], start))
     else:
-        driven, answered = sorted(tables, key=lambda table: any(one in table for one in ("x", "depth", "force")), reverse=True)
+        driven, answered = tables
         start = float(driven["time"][0])
         is_one_clock = abs(float(answered["time"][0]) - start) < 86400.0
         second = start if is_one_clock else float(answered["time"][0])
@@ -320,6 +322,22 @@ def _trial(
         lines += [f"readings = {toml_value(readings)}"]
     stamp = f"times count from {start:.3f} s of the log's clock; " if abs(start) > 1e-9 else ""
     return [*lines, f"# {stamp}read from {', '.join(recording.files)}", ""]
+
+
+def _used_part(recording: RecordingAnswer, table: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Return the part of a recording that the answers name: what was recorded before and after is left out."""
+    if recording.begin is None and recording.end is None:
+        return table
+    since = table["time"] - table["time"][0]
+    begin = -np.inf if recording.begin is None else recording.begin
+    end = np.inf if recording.end is None else recording.end
+    used = (since >= begin) & (since <= end)
+    if np.count_nonzero(used) < FEWEST_ROWS:
+        raise FileError(
+            f"'{recording.name}' lasts {since[-1]:.6g} s and has fewer than {FEWEST_ROWS} samples from {max(begin, 0.0):g} s to "
+            f"{min(end, since[-1]):g} s: write other seconds."
+        )
+    return {name: column[used] for name, column in table.items()}
 
 
 def _lateness(

@@ -205,10 +205,21 @@ class _Columns:
         return found
 
     def _leave_out_what_has_no_clock(self) -> None:
-        """Forget tables that are shorter than those with a clock and have none: settings, and results of fits."""
+        """Forget tables that are shorter than those with a clock and have none: settings, and results of fits.
+
+        In a table that is not the longest a column has to be called a time: a planned path rises like a clock, too.
+        """
         if len(self.tables) < 2:
             return
-        clocks = {table.name: [n for n in table.columns if self._rises(table.full_name(n))] for table in self.tables}
+        longest = max(table.sample_count for table in self.tables)
+        clocks = {
+            table.name: [
+                full
+                for full in map(table.full_name, table.columns)
+                if self._rises(full) and (table.sample_count == longest or self.meanings[full].quantity == "time")
+            ]
+            for table in self.tables
+        }
         lengths = {table.sample_count for table in self.tables if clocks[table.name]}
         kept = [table for table in self.tables if clocks[table.name] or table.sample_count in lengths]
         if kept:

@@ -120,3 +120,23 @@ def test_the_example_weighs_a_cube_in_mujoco(repository, tmp_path, monkeypatch, 
     monkeypatch.setattr(sys, "argv", ["mujoco_loop.py", str(tmp_path / "pad.json")])
     runpy.run_path(str(repository / "examples" / "mujoco_loop.py"))
     assert capsys.readouterr().out == "on the cube 9.810000 N, sum of 84 texels 9.810000 N, weight 9.810000 N\n"
+
+
+def test_the_side_by_side_example_has_its_table_and_picture(repository, tmp_path, capsys):
+    """Under the load for which MuJoCo's contact is made both read the weight; under another only Palpate does."""
+    pytest.importorskip("mujoco", reason="MuJoCo moves the loads: pip install palpate[bench]")
+    from palpate.core.simulators.formats.mjcf import write_mjcf
+
+    item = replace(pad(), quaternion=np.array([1.0, 0.0, 0.0, 0.0]))
+    write_probe_list(tmp_path / "Pad.json", item)
+    write_mjcf([item], tmp_path)
+    example = runpy.run_path(str(repository / "examples" / "mujoco_side_by_side.py"))
+    example["main"].__globals__.update(LOADS=example["LOADS"][:2], SETTLING=0.4)
+    example["main"](str(tmp_path / "Pad"), str(tmp_path / "picture.png"))
+    rows = [[cell.strip() for cell in line.split("|")[1:-1]] for line in capsys.readouterr().out.splitlines()[2:]]
+    sums = [[float(number) for number in row[1].split("·")] for row in rows]
+    assert [row[0] for row in rows] == ["cube of 1 kg", "cube of 0.5 kg"]
+    assert sums[0][0] == pytest.approx(9.81, abs=0.02)
+    assert sums[0][1] == pytest.approx(9.81, abs=0.2), "MuJoCo's contact is still coming to rest after 0.4 s"
+    assert sums[1][0] == pytest.approx(4.905, abs=0.02) and sums[1][1] > 9.0
+    assert (tmp_path / "picture.png").stat().st_size > 20_000

@@ -136,9 +136,9 @@ def _log(path: Path, kind: str, arrays: Arrays, notes: list[str]) -> LogFile:
     arrays = {name: (np.squeeze(values), unit) for name, (values, unit) in arrays.items() if np.squeeze(values).ndim}
     lengths = [max(values.shape) for values, _ in arrays.values() if values.ndim <= 3 and max(values.shape) >= FEWEST_ROWS]
     if not lengths:
-        raise FileError(
-            f"'{path.name}' holds no array of at least {FEWEST_ROWS} numbers: give a file with recordings in arrays."
-        )
+        objects = any("object of MATLAB's" in note for note in notes)
+        what = ", only objects of MATLAB's: save their arrays" if objects else ": give a file with recordings in arrays"
+        raise FileError(f"'{path.name}' holds no array of at least {FEWEST_ROWS} numbers{what}.")
     tables: dict[tuple[str, int], LogTable] = {}
     for name, (values, unit) in arrays.items():
         group, _, short = name.rpartition("/")

@@ -129,7 +129,9 @@ def _items(message: Any) -> Iterable[tuple[str, Any]]:
         return ((str(name), value) for name, value in message.items())
     if not is_dataclass(message):
         return ()
-    return ((item.name, getattr(message, item.name)) for item in fields(message) if not item.name.startswith("__"))
+    # constants of a message's type are no measurements; rosbags marks them so, and the name of the type
+    own = [item.name for item in fields(message) if "ClassVar" not in str(item.type)]
+    return ((name, getattr(message, name)) for name in own)
 
 
 def _numbers(message: Any, before: str, depth: int) -> Iterator[tuple[str, float]]:

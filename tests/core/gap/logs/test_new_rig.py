@@ -203,6 +203,29 @@ def test_a_rig_with_a_second_logger_that_cannot_be_used_is_one_sentence(tmp_path
         read_rig(tmp_path / "rig.toml")
 
 
+def test_only_the_part_that_the_answers_name_is_used(tmp_path):
+    log = write_press(tmp_path / "press_0.csv")
+    answers = template(tmp_path, [log], **{'use = "fit"': 'use = "fit"\nfrom = 0.5\nto = 4.0'})
+    assert "from = 0.5" in answers_text(read_answers(answers)) and "to = 4.0" in answers_text(read_answers(answers))
+    [trial] = read_rig(new_rig(tmp_path / "rig", [log], answers).path).trials
+    _, depth, force = press()
+    np.testing.assert_allclose(trial.time, np.arange(351) / RATE, atol=1e-9)
+    np.testing.assert_allclose(trial.level, depth[50:401], atol=1e-12)
+    np.testing.assert_allclose(trial.reading, force[50:401] * 1e4, rtol=1e-9, atol=1e-9)
+
+
+def test_a_planned_path_is_no_recording(tmp_path):
+    """A MAT file may hold shorter arrays that rise steadily beside what was recorded; they have no clock."""
+    import scipy.io
+
+    time, depth, force = press()
+    planned = {"px": np.linspace(0.0, 11.0, 100), "pz": np.linspace(90.0, 80.0, 100), "path_z": np.linspace(81.0, 92.0, 71)}
+    scipy.io.savemat(tmp_path / "press.mat", {"stamp": time, "depth": depth * 1e3, "sensor": force} | planned)
+    answers = propose([read_log(tmp_path / "press.mat")])
+    columns = answers.loggers[0].columns
+    assert columns["depth"].names == ("depth",) and not {"x", "y", "z"} & set(columns)
+
+
 # --- bad input
 
 
@@ -216,6 +239,9 @@ def test_a_rig_with_a_second_logger_that_cannot_be_used_is_one_sentence(tmp_path
         ({}, {'name = "R{}"': 'name = "Q{}"'}, "no column 'Q1', which the answers name for texel"),
         ({}, {'use = "fit"': 'use = "maybe"'}, "write one of fit, check, leave out"),
         ({}, {"press_0.csv": "press_9.csv"}, "which was not given"),
+        ({}, {'use = "fit"': 'use = "fit"\nfrom = 2.0\nto = 1.0'}, "write a `to` that is later than `from`"),
+        ({}, {'use = "fit"': 'use = "fit"\nfrom = "later"'}, "is 'later': write seconds"),
+        ({}, {'use = "fit"': 'use = "fit"\nfrom = 5.98'}, "has fewer than 8 samples from 5.98 s to 5.99 s"),
         ({"t_ms": np.r_[np.arange(300), np.arange(300)] * 10.0}, {}, "goes backwards after sample 300"),
         (
             {"t_ms": np.arange(COUNT) // 4 * 40.0},

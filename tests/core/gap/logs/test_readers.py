@@ -7,12 +7,14 @@ import json
 import os
 import struct
 import zipfile
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from palpate.core.errors import FileError
 from palpate.core.gap.logs.log_file import read_log
+from palpate.core.gap.logs.readers.message_columns import TopicColumns
 
 TIME = np.arange(40) / 100.0
 FORCE = np.sin(TIME * 20.0) * 3.0
@@ -138,6 +140,17 @@ def test_bags_of_ros_2_without_ros(tmp_path, kind):
         np.testing.assert_allclose(force.columns["time"], 100.0 + TIME, atol=1e-9)  # of the header
         np.testing.assert_allclose(readings.columns["time"], 100.003 + TIME, atol=1e-6)  # of the recorder: it has no header
         assert readings.columns["data_3"].tolist() == [3.0 + i for i in range(40)]
+
+
+def test_constants_of_a_type_of_message_are_no_columns():
+    typesys = pytest.importorskip("rosbags.typesys")
+    kinds = typesys.get_typestore(typesys.Stores.ROS2_HUMBLE).types
+    columns = TopicColumns("/range", Path("a.mcap"))
+    header = kinds["std_msgs/msg/Header"](kinds["builtin_interfaces/msg/Time"](1, 0), "")
+    for i in range(10):
+        columns.add(kinds["sensor_msgs/msg/Range"](header, 1, 0.1, 0.0, 4.0, float(i)), i * 10**9)
+    table, _ = columns.table()
+    assert set(table.columns) == {"time", "radiation_type", "field_of_view", "min_range", "max_range", "range"}
 
 
 def write_json_mcap(path, count=40, compress=True):
