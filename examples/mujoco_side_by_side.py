@@ -39,11 +39,13 @@ class Load(NamedTuple):
 
     @property
     def geom(self) -> str:
+        """Attributes of MuJoCo's geom."""
         sides = f"{self.size} {self.size} {self.size}" if self.shape == "box" else f"{self.size}"
         return f'type="{self.shape}" size="{sides}" mass="{self.mass}"'
 
     @property
     def mesh(self) -> TriangleMesh:
+        """Its surface, about its middle, metres."""
         made = trimesh.creation.box([2 * self.size] * 3) if self.shape == "box" else trimesh.creation.icosphere(4, self.size)
         return TriangleMesh(made.vertices, made.faces)
 
@@ -88,9 +90,7 @@ def by_palpate(finger: SensorOnMesh, load: Load) -> Outcome:
         mujoco.mj_step1(model, data)
         contact = pressed.step(pose, (body.xpos, body.xquat))
         data.qfrc_applied[:] = [load.push, 0, 0, 0, 0, 0]
-        mujoco.mj_applyFT(
-            model, data, contact.force_on_target, contact.torque_on_target, body.xpos, body.id, data.qfrc_applied
-        )
+        mujoco.mj_applyFT(model, data, contact.force_on_target, contact.torque_on_target, body.xpos, body.id, data.qfrc_applied)
         mujoco.mj_step2(model, data)
     texels = contact.texels
     return Outcome(texels.normal_force, float(np.linalg.norm(texels.shear.sum(axis=0))), float(place[2] - body.xpos[2]))
@@ -144,7 +144,8 @@ def main(stem: str, picture: str) -> None:
     """Press, print the table and draw the picture."""
     finger = read_probe_list(f"{stem}.json")
     outcomes = [(by_palpate(finger, load), by_mujoco(finger, f"{stem}.xml", load)) for load in LOADS]
-    print("| load | texels' sum (N) | texels lit | largest (mN) | shear (N) | sunk in (µm) |\n| --- | --- | --- | --- | --- | --- |")
+    print("| load | texels' sum (N) | texels lit | largest (mN) | shear (N) | sunk in (µm) |")
+    print(f"|{' --- |' * 6}")
     for load, pair in zip(LOADS, outcomes, strict=True):
         cells = [" · ".join(f"{value:{form}}" for value in column) for form, column in (
             (".3f", [one.force.sum() for one in pair]),

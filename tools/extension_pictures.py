@@ -51,7 +51,20 @@ def feature(path: Path) -> None:
         scene.write_bytes((ROOT / "sample_blends" / "hand.blend").read_bytes())
         subprocess.run([*COMMAND, "bake", scene, "--save"], check=True)
         size = [str(side) for side in FEATURE]
-        render = ["render", scene, "--only", "scene", "--engine", "cycles", "--samples", "64", "--size", *size, "--format", "png"]
+        render = [
+            "render",
+            scene,
+            "--only",
+            "scene",
+            "--engine",
+            "cycles",
+            "--samples",
+            "64",
+            "--size",
+            *size,
+            "--format",
+            "png",
+        ]
         subprocess.run([*COMMAND, *render, "--out", folder], check=True)
         pictures = [Image.open(file) for file in Path(folder).rglob("*.png")]
         found = next(picture for picture in pictures if picture.size == FEATURE)

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Check extension zips by the published rules of extensions.blender.org; docs/extension-platform.md lists rules and sources.
 
-    python tools/extension_rules.py dist/*.zip                    # names what hinders an upload; fails on what is wrong anywhere
+    python tools/extension_rules.py dist/*.zip                    # names what hinders an upload, fails on other faults
     python tools/extension_rules.py --upload dist/upload/*.zip    # fails on either
 
 Blender's own tool, which tools/build_zip.py runs, judges the syntax of the manifest. This judges what the platform's reviewers
@@ -34,7 +34,11 @@ SHIPPED = {"numpy", "requests", "certifi", "charset-normalizer", "idna", "urllib
 """Packages that Blender brings; a wheel of them would shadow Blender's own."""
 COMPILED = {".pyc", ".pyo", ".so", ".pyd", ".dll", ".dylib", ".exe", ".bin", ".o", ".a"}
 NETWORK = {"socket", "urllib", "http", "requests", "ftplib", "smtplib", "ssl", "socketserver", "xmlrpc", "webbrowser"}
-PLATFORM_TAGS = {"linux-x64": r"manylinux.*_x86_64", "windows-x64": r"win_amd64", "macos-arm64": r"macosx_.*_(arm64|universal2)"}
+PLATFORM_TAGS = {
+    "linux-x64": r"manylinux.*_x86_64",
+    "windows-x64": r"win_amd64",
+    "macos-arm64": r"macosx_.*_(arm64|universal2)",
+}
 
 PROCESS, NETWORK_USE, SEARCH = "starts a process", "uses a network", "changes where all extensions search for modules"
 EXCUSED = {
@@ -126,7 +130,9 @@ def _wheels(manifest: dict[str, Any], names: list[str]) -> Iterator[Finding]:
             yield Finding(wheel, f"is not for {', '.join(platforms)}")
         pythons |= {t.interpreter for t in fits if t.platform != "any" and t.abi != "abi3"}
     if len(pythons) > 1:
-        yield Finding("wheels", f"are for several Pythons ({', '.join(sorted(pythons))}); Blender 4.2 does not choose among them")
+        yield Finding(
+            "wheels", f"are for several Pythons ({', '.join(sorted(pythons))}); Blender 4.2 does not choose among them"
+        )
 
 
 def _files(names: list[str]) -> Iterator[Finding]:
@@ -170,7 +176,9 @@ def _starts_process(node: ast.AST) -> bool:
     if not isinstance(node, ast.Call) or not isinstance(node.func, ast.Attribute) or not isinstance(node.func.value, ast.Name):
         return False
     module, name = node.func.value.id, node.func.attr
-    return module in ("subprocess", "multiprocessing") or (module == "os" and name.startswith(("exec", "spawn", "system", "popen")))
+    return module in ("subprocess", "multiprocessing") or (
+        module == "os" and name.startswith(("exec", "spawn", "posix_spawn", "system", "popen"))
+    )
 
 
 def _imported(node: ast.AST) -> list[str]:
@@ -192,7 +200,9 @@ def _changes_search(node: ast.AST) -> bool:
 
 
 def _is_sys_path(node: ast.AST) -> bool:
-    return isinstance(node, ast.Attribute) and node.attr == "path" and isinstance(node.value, ast.Name) and node.value.id == "sys"
+    return (
+        isinstance(node, ast.Attribute) and node.attr == "path" and isinstance(node.value, ast.Name) and node.value.id == "sys"
+    )
 
 
 def main(argv: list[str] | None = None) -> int:
@@ -212,7 +222,9 @@ def main(argv: list[str] | None = None) -> int:
     for name, finding in findings:
         counts = args.upload or not finding.for_upload_only
         wrong += counts
-        print(f"{'wrong' if counts else 'not for the platform'}: {name}{': ' if name else ''}{finding.where}: {finding.sentence}")
+        print(
+            f"{'wrong' if counts else 'not for the platform'}: {name}{': ' if name else ''}{finding.where}: {finding.sentence}"
+        )
     print(f"{len(args.zips)} zips, {wrong} against the rules of extensions.blender.org")
     return 1 if wrong else 0
 

@@ -3,9 +3,9 @@
 
     python tools/upload_zips.py --website https://… dist/*.zip      # into dist/upload/
 
-The platform wants a website in the manifest, source that can be reviewed and, for each platform, one zip per version. Machine code
-is therefore left out, and the version names the Python, as in 0.1.0+cp313. The zips are checked by tools/extension_rules.py. Those
-for a distribution's Blender (``-local``) are not for the platform.
+The platform wants a website in the manifest, source that can be reviewed and, for each platform, one zip per version. Machine
+code is therefore left out, and the version names the Python, as in 0.1.0+cp313. The zips are checked by
+tools/extension_rules.py. Those for a distribution's Blender (``-local``) are not for the platform.
 """
 
 from __future__ import annotations
@@ -74,7 +74,9 @@ def main(argv: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description="Make the zips for extensions.blender.org.")
     parser.add_argument("zips", nargs="+", type=Path, metavar="ZIP")
     parser.add_argument("--website", required=True, metavar="URL", help="address of documentation, source and support")
-    parser.add_argument("--out", type=Path, default=build_zip.ROOT / "dist" / "upload", metavar="DIR", help="folder for the zips")
+    parser.add_argument(
+        "--out", type=Path, default=build_zip.ROOT / "dist" / "upload", metavar="DIR", help="folder for the zips"
+    )
     args = parser.parse_args(argv)
     try:
         made = [make(path, args.website, args.out) for path in args.zips if not path.stem.endswith("-local")]

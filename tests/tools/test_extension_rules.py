@@ -101,7 +101,12 @@ def test_code_that_reviewers_refuse_is_found(good, tmp_path, fault):
 
 @pytest.mark.parametrize(
     "name, sentence",
-    [("core/fast.so", "is no source"), (MACHINE_CODE, "is no source"), (".git/config", "redundant"), ("a/__pycache__/x", "redundant")],
+    [
+        ("core/fast.so", "is no source"),
+        (MACHINE_CODE, "is no source"),
+        (".git/config", "redundant"),
+        ("a/__pycache__/x", "redundant"),
+    ],
 )
 def test_files_that_do_not_belong_are_found(good, tmp_path, name, sentence):
     assert [sentence in one.sentence for one in extension_rules.check(zipped(good | {name: b""}, tmp_path))] == [True]

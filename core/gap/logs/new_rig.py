@@ -333,9 +333,9 @@ def _used_part(recording: RecordingAnswer, table: dict[str, np.ndarray]) -> dict
     end = np.inf if recording.end is None else recording.end
     used = (since >= begin) & (since <= end)
     if np.count_nonzero(used) < FEWEST_ROWS:
+        part = f"from {max(begin, 0.0):g} s to {min(end, since[-1]):g} s"
         raise FileError(
-            f"'{recording.name}' lasts {since[-1]:.6g} s and has fewer than {FEWEST_ROWS} samples from {max(begin, 0.0):g} s to "
-            f"{min(end, since[-1]):g} s: write other seconds."
+            f"'{recording.name}' lasts {since[-1]:.6g} s and has fewer than {FEWEST_ROWS} samples {part}: write other seconds."
         )
     return {name: column[used] for name, column in table.items()}
 
