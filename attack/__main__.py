@@ -19,7 +19,7 @@ from pathlib import Path
 
 from .area import Area, Tally
 
-AREAS = ("faults", "power_cut", "kills", "readers", "commands", "numbers", "sweep")
+AREAS = ("faults", "power_cut", "kills", "readers", "logs", "imports", "commands", "numbers", "sweep")
 DEFAULT_SEED = 20261122
 
 

@@ -7,6 +7,7 @@ Bakes are also damaged in the ways of :mod:`.damaged_bakes` and read, exported i
 from __future__ import annotations
 
 import base64
+import importlib
 import shutil
 from collections.abc import Iterator
 from pathlib import Path
@@ -27,6 +28,10 @@ class Readers(Area):
     """Damaged files."""
 
     short, long = 1200, 6000
+    source = "damaged_files"
+    """Module with the readers."""
+    with_bakes = True
+    """Whether bakes are damaged, too."""
 
     def __init__(self, seed: int, tries: int, folder: Path):
         super().__init__(seed, tries, folder)
@@ -37,10 +42,12 @@ class Readers(Area):
         self._worker.close()
 
     def cases(self) -> Iterator[Case]:
-        names = self._worker.call("readers:names")
-        number = round(self.tries * (1 - BAKES_SHARE) / len(names))
+        names = self._worker.call("readers:names", source=self.source)
+        number = round(self.tries * (1 - BAKES_SHARE * self.with_bakes) / len(names))
         for name in names:
-            yield from self._in_blocks("readers:read", name, number)
+            yield from self._in_blocks("readers:read", f"{self.source}:{name}", number)
+        if not self.with_bakes:
+            return
         kinds = self._worker.call("readers:kinds")
         ways = self._worker.call("readers:number_of_ways")
         per_kind = min(ways, round(self.tries * BAKES_SHARE / len(kinds)))
@@ -60,7 +67,7 @@ class Readers(Area):
                 for i in range(first, last):
                     found += self._call(function, what, number, i, i + 1) or [self._gone]
             for i, (kind, words, files) in enumerate(found, start=first):
-                case = Case(f"{what}: {i}", {"files": files})
+                case = Case(f"{what.removeprefix(f'{self.source}:')}: {i}", {"files": files})
                 self._answers[case.name] = Outcome(kind, words)
                 yield case
 
@@ -79,24 +86,28 @@ class Readers(Area):
 # --- in the worker
 
 
-def names() -> list[str]:
-    """Return the names of all readers."""
-    from .damaged_files import readers
+def names(source: str) -> list[str]:
+    """Return the names of all readers of a module."""
+    return list(_readers(source))
 
-    return list(readers())
+
+def _readers(source: str) -> dict[str, Any]:
+    return importlib.import_module(f"{__package__}.{source}").readers()
 
 
 def read(name: str, number: int, seed: int, first: int, last: int) -> list[list[Any]]:
-    """Let a reader read some of its inputs; return outcome, words and, for a finding, the files."""
-    from .damaged_files import inputs_of, judge, readers
+    """Let a reader, ``module:name``, read some of its inputs; return outcome, words and, for a finding, the files."""
+    from .damaged_files import inputs_of, judge
 
+    source, _, short = name.partition(":")
+    reader = _readers(source)[short]
     key = (name, number, seed)
     if key not in _drawn:
         _drawn.clear()
-        _drawn[key] = inputs_of(readers()[name], number, seed)
+        _drawn[key] = inputs_of(reader, number, seed)
     found = []
     for files in _drawn[key][first:last]:
-        kind, words = judge(readers()[name], files)
+        kind, words = judge(reader, files)
         kept = {path: base64.b64encode(content).decode() for path, content in files.items()} if kind != CLEAR else {}
         found.append([kind, words, kept])
     return found

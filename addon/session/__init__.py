@@ -12,6 +12,7 @@ __all__ = [
     "first_use",
     "frame_status",
     "identity",
+    "library_folders",
     "openexr_check",
     "redraw",
     "session_state",

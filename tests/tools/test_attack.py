@@ -11,7 +11,21 @@ import threading
 import numpy as np
 import pytest
 
-from palpate.attack import commands, faults, kills, numbers, power_cut, readers, sweep, trees, unfinished_bakes
+from palpate.attack import (
+    commands,
+    damaged_logs,
+    damaged_sensors,
+    faults,
+    imports,
+    kills,
+    logs,
+    numbers,
+    power_cut,
+    readers,
+    sweep,
+    trees,
+    unfinished_bakes,
+)
 from palpate.attack.__main__ import AREAS, attack, main
 from palpate.attack.area import CLEAR, LOST, TRACEBACK, WRONG, Area, Case, Outcome, Tally
 from palpate.attack.injector import DONE, KILL, Injector, Stopped
@@ -54,6 +68,33 @@ def test_kills(tmp_path):
 def test_readers(tmp_path):
     tried, findings = found_by(readers.Readers(SEED, 120, scratch(tmp_path)), tmp_path)
     assert tried >= 100 and findings == []
+
+
+@pytest.mark.parametrize("area", [logs.Logs, imports.Imports])
+def test_logs_and_sensors_of_other_programs(tmp_path, area):
+    tried, findings = found_by(area(SEED, 90, scratch(tmp_path)), tmp_path)
+    assert tried >= 85 and findings == []
+
+
+def test_logs_that_are_not_damaged_become_rigs(tmp_path):
+    """Otherwise the area would only try what refuses everything."""
+    good = {"log.csv": damaged_logs.TABLE.encode(), "log.npz": damaged_logs.arrays_npz()}
+    good |= {"log.mat": damaged_logs.arrays_mat(True), "log.h5": damaged_logs.arrays_hdf5(True)}
+    good |= {"log.mcap": damaged_logs.json_mcap(True), **damaged_logs.ros_bag("bag"), **damaged_logs.ros_bag("db3")}
+    for name, content in good.items():
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_bytes(content)
+    for name in ("log.csv", "log.npz", "log.mat", "log.h5", "log.mcap", "log.bag", "log"):
+        damaged_logs.use(name, tmp_path)
+        rig = tmp_path / "rig" / "rig.toml"
+        assert rig.is_file(), name
+        rig.unlink()
+    for name, reader in damaged_sensors.readers().items():
+        assert reader.name == name
+    for kind, ending in (("mjcf", ".xml"), ("urdf", ".urdf"), ("probes", ".json")):
+        for name, content in damaged_sensors.exported(kind, ending).items():
+            (tmp_path / name).write_bytes(content)
+        damaged_sensors.read(f"Pad{ending}", tmp_path)
 
 
 def test_commands(tmp_path):

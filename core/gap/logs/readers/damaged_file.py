@@ -15,6 +15,8 @@ from typing import TypeVar
 from ....errors import FileError
 
 Item = TypeVar("Item")
+SMALL_FILE = 2**26
+"""Bytes. A library that finds too little memory for a file no larger follows a damaged length; chosen without an experiment."""
 
 
 @contextmanager
@@ -32,12 +34,15 @@ def damage_said(path: Path, kind: str, *passing: type[Exception]) -> Iterator[No
     Raises
     ------
     FileError
-        The library raised an error. Too little memory and what the system says of files keep their own sentences.
+        The library raised an error. What the system says of files keeps its own sentence, and so does too little memory for a
+        large file.
     """
     try:
         yield
     except Exception as error:
-        if isinstance(error, (FileError, FileNotFoundError, PermissionError, MemoryError, *passing)):
+        if isinstance(error, (FileError, FileNotFoundError, PermissionError, *passing)):
+            raise
+        if isinstance(error, MemoryError) and not (path.is_file() and path.stat().st_size <= SMALL_FILE):
             raise
         reason = " ".join(str(error).split())[:120] or type(error).__name__
         raise FileError(

@@ -14,6 +14,7 @@ import pytest
 
 from palpate.core.errors import FileError
 from palpate.core.gap.logs.log_file import read_log
+from palpate.core.gap.logs.readers.damaged_file import SMALL_FILE, damage_said
 from palpate.core.gap.logs.readers.message_columns import TopicColumns
 
 TIME = np.arange(40) / 100.0
@@ -151,6 +152,21 @@ def test_constants_of_a_type_of_message_are_no_columns():
         columns.add(kinds["sensor_msgs/msg/Range"](header, 1, 0.1, 0.0, 4.0, float(i)), i * 10**9)
     table, _ = columns.table()
     assert set(table.columns) == {"time", "radiation_type", "field_of_view", "min_range", "max_range", "range"}
+
+
+def test_a_damaged_length_that_asks_for_all_memory_is_damage(tmp_path):
+    """Of a small file; a large one may need more memory than there is."""
+    path = tmp_path / "log.mcap"
+    path.write_bytes(b"x")
+    with (
+        pytest.raises(FileError, match="^'log.mcap' could not be read as MCAP .MemoryError.: it is damaged"),
+        damage_said(path, "MCAP"),
+    ):
+        raise MemoryError
+    with path.open("r+b") as file:
+        file.truncate(SMALL_FILE + 1)
+    with pytest.raises(MemoryError), damage_said(path, "MCAP"):
+        raise MemoryError
 
 
 def write_json_mcap(path, count=40, compress=True):
