@@ -6,10 +6,11 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from ..core.figures import color_maps
+from ..core.figures import color_maps, gel_image
 from ..core.figures.figure_style import WIDTHS, FigureStyle
 
 STYLE_OPTIONS = ("colour_map", "quantity", "limit", "width", "dpi")
+GEL_OPTIONS = ("light_angle", "markers", "marker_pitch")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -25,6 +26,29 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--width", choices=WIDTHS, help="width of figures, as columns of a journal (default: double)")
     parser.add_argument("--dpi", metavar="N", type=int, help="resolution of PNG figures (default: 300)")
+
+
+def add_gel_arguments(parser: argparse.ArgumentParser) -> None:
+    low, high = gel_image.LIGHT_ANGLES
+    parser.add_argument(
+        "--light-angle",
+        metavar="DEGREES",
+        type=float,
+        help=f"gel: angle between the gel and the light of its three lamps, {low:g} to {high:g} degrees "
+        f"(default: {gel_image.GelStyle.light_angle:g})",
+    )
+    parser.add_argument("--no-markers", dest="markers", action="store_false", help="gel: print no markers on it")
+    parser.add_argument(
+        "--marker-pitch",
+        metavar="METRES",
+        type=float,
+        help=f"gel: distance between markers (default: a round one, about {gel_image.MARKERS_ALONG} along the gel)",
+    )
+
+
+def gel_options_from(arguments: argparse.Namespace) -> dict[str, Any]:
+    """Return the options of :func:`add_gel_arguments` that were given."""
+    return {key: value for key in GEL_OPTIONS if (value := getattr(arguments, key)) is not None}
 
 
 def pixels(text: str) -> int:

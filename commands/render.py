@@ -4,13 +4,14 @@
 from __future__ import annotations
 
 import argparse
+from typing import Any
 
 from ..core.figures.figure_canvas import FILE_TYPES as FORMATS
 from ..core.io.file_list import remove_unneeded
 from ..core.io.file_writing import writable_folder
 from . import blender, console, figure_options
 
-FIGURES = ("scene", "strip", "curves", "numbers", "video")
+FIGURES = ("scene", "strip", "curves", "numbers", "video", "gel")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -18,7 +19,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--out", metavar="DIR", default="palpate-figures", help="folder to write to (default: %(default)s)")
     parser.add_argument(
         "--only", metavar="FIGURE", action="append", choices=FIGURES,
-        help=f"{', '.join(FIGURES)}; may be given again (default: all but the video)",
+        help=f"{', '.join(FIGURES)}; may be given again (default: all but the video and the gel)",
     )  # fmt: skip
     parser.add_argument("--sensor", metavar="NAME", action="append", help="only this sensor; may be given again")
     parser.add_argument(
@@ -27,7 +28,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=int,
         action="append",
         help="frame of pictures and numbers, two or more also of the strip; may be given again "
-        "(default: that at which the settled forces are largest)",
+        "(default: that at which the settled forces are largest, of the gel every frame)",
     )
     parser.add_argument("--peak", action="store_true", help="without --frame: the frame with the largest force")
     parser.add_argument(
@@ -44,7 +45,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         nargs=2,
         type=figure_options.pixels,
         default=(1280, 960),
-        help="size of renders, pixels (default: 1280 960)",
+        help="size of renders, pixels; images of the gel fit into it (default: 1280 960)",
     )
     parser.add_argument(
         "--samples", metavar="N", type=figure_options.pixels, help="samples per pixel of renders (default: the scene's)"
@@ -66,6 +67,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="let targets hide the texels that they press (default: see-through there)",
     )
     parser.add_argument("--transparent", action="store_true", help="render without background")
+    figure_options.add_gel_arguments(parser)
     blender.add_script_arguments(parser)
     figure_options.add_arguments(parser)
 
@@ -78,6 +80,9 @@ def run(arguments: argparse.Namespace) -> int:
         from ..addon.render import figure_export
         from ..addon.render.figure_request import FigureRequest
 
+        given: dict[str, Any] = figure_options.gel_options_from(arguments)
+        given |= {"kinds": tuple(arguments.only)} if arguments.only else {}
+        given |= {"formats": tuple(arguments.format)} if arguments.format else {}
         request = FigureRequest(
             style=figure_options.figure_style_from(arguments, **vars(bake_display.figure_style(scene))),
             frames=tuple(arguments.frame or ()),
@@ -91,8 +96,7 @@ def run(arguments: argparse.Namespace) -> int:
             at_peak=arguments.peak,
             size=tuple(arguments.size),
             samples=arguments.samples,
-            **({"kinds": tuple(arguments.only)} if arguments.only else {}),
-            **({"formats": tuple(arguments.format)} if arguments.format else {}),
+            **given,
         )
         stopped = "palpate render: stopped; earlier figures are as they were."
         with console.exit_on_interrupt(stopped, lambda: remove_unneeded(folder)):

@@ -101,6 +101,14 @@ class Figures(Subpanel):
             column.prop(own, "own_light")
             column.prop(own, "see_through")
             column.prop(own, "transparent")
+        if "GEL" in own.kinds:
+            column = layout.column()
+            if not own.kinds & {"SCENE", "VIDEO"}:
+                column.prop(own, "size")
+            column.prop(own, "light_angle")
+            column.prop(own, "markers")
+            if own.markers:
+                column.prop(own, "marker_pitch")
         layout.use_property_split = False
         layout.label(text="Data:")
         layout.grid_flow(columns=1, even_columns=True, align=True).prop(own, "exports")

@@ -5,6 +5,7 @@ __all__ = [
     "build_samples",
     "demo",
     "fingertip",
+    "gel",
     "geometries",
     "grasp",
     "grasps",

@@ -22,6 +22,7 @@ SAMPLES = {
     **{f"grasp_{kind}": ("grasps", {"kind": kind}) for kind in ("sphere", "box", "cylinder", "bottle")},
     "pick_and_place": ("pick_and_place", {}),
     "hand": ("hand", {}),
+    "gel": ("gel", {}),
 }
 """Name of the file → module of this package, and further arguments of its function ``build(scene, …)``."""
 

@@ -3,7 +3,7 @@
 
 Geometry nodes subdivide the sensor's faces and move their vertices inwards. They read the penetration from an image that is
 packed into the .blend, with a row for each frame, so that the surface plays in any Blender and without the files of the bake.
-The user's mesh keeps its vertices.
+The user's mesh keeps its vertices. :mod:`....core.geometry.smooth_grid` says how the penetration is smoothed.
 
 What reads a scene must not take the indented surface for the sensor's shape: :func:`.mesh_arrays.evaluated_mesh` gives the mesh
 without it.
@@ -17,6 +17,7 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
+from ...core.geometry import smooth_grid
 from ..scene import mesh_arrays
 from ..scene.display_names import INDENTATION_MODIFIER, REST_POSITION
 from ..session import transforms
@@ -33,12 +34,6 @@ MOST_LEVELS = 3
 """A cell of a coarse grid becomes 8 × 8 faces, on which the outline of a ball looks round."""
 MOST_PIXELS = 4_000_000
 """Pixels of the image at most, 64 MB of memory; of longer bakes every second, third, … frame is kept."""
-SHARPENINGS = 4
-"""How often the values at the texels are corrected for what the smoothing takes from them. After four corrections the lowest
-point of the surface is at the depth of a wide contact within 3 %, and of a contact of a single texel within a quarter."""
-NEIGHBOUR_WEIGHT = 0.25
-"""Weight of a neighbour beside the texel's own in the correction: on a grid of quads the texel then counts a half, which is
-near the 4/9 of the limit surface of Catmull and Clark."""
 
 
 @dataclass(frozen=True)
@@ -257,10 +252,10 @@ def _depth(add, names: _Names, play: _Play):
 def _sharpened(add, depth):
     """Return values whose smoothed surface passes near the depths: each time, what the smoothing takes away is added."""
     link, values = add.tree.links.new, depth
-    for _ in range(SHARPENINGS):
+    for _ in range(smooth_grid.SHARPENINGS):
         blur = add("GeometryNodeBlurAttribute", data_type="FLOAT")
         blur.inputs["Iterations"].default_value = 1
-        blur.inputs["Weight"].default_value = NEIGHBOUR_WEIGHT
+        blur.inputs["Weight"].default_value = smooth_grid.NEIGHBOUR_WEIGHT
         link(values, blur.inputs["Value"])
         missing = add("ShaderNodeMath", operation="SUBTRACT")
         link(depth, missing.inputs[0])

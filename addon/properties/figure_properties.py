@@ -4,9 +4,18 @@
 from __future__ import annotations
 
 import bpy
-from bpy.props import BoolProperty, EnumProperty, FloatVectorProperty, IntProperty, IntVectorProperty, StringProperty
+from bpy.props import (
+    BoolProperty,
+    EnumProperty,
+    FloatProperty,
+    FloatVectorProperty,
+    IntProperty,
+    IntVectorProperty,
+    StringProperty,
+)
 
 from ...core.export.registry import exporters
+from ...core.figures.gel_image import LIGHT_ANGLES, MARKERS_ALONG, GelStyle
 
 KINDS = (
     ("SCENE", "Scene", "The scene with its overlays, alone and with the tactile images beside it"),
@@ -14,6 +23,7 @@ KINDS = (
     ("CURVES", "Curves", "Forces, slip and centre of pressure over time"),
     ("NUMBERS", "Numbers", "The number of every texel"),
     ("VIDEO", "Video", "Scene and tactile images side by side, MP4"),
+    ("GEL", "Gel", "What a camera behind the gel would see: an image for each frame, of sensors with rows and columns"),
 )
 FORMATS = (
     ("PNG", "PNG", "Pixels"),
@@ -63,7 +73,7 @@ class PALPATE_PG_figures(bpy.types.PropertyGroup):
     frames: StringProperty(
         name="Frames",
         description="Frames of the scene and the numbers, as in 12, 40-44; two or more are also the frames of the strip. "
-        "Empty: the frame at which the settled forces are largest; peak: that with the largest force",
+        "Empty: the frame at which the settled forces are largest, of the gel every frame; peak: that with the largest force",
         **_plain,
     )
     width: EnumProperty(
@@ -121,8 +131,37 @@ class PALPATE_PG_figures(bpy.types.PropertyGroup):
     )
     transparent: BoolProperty(name="Transparent", description="Render without a background", **_plain)
     size: IntVectorProperty(
-        name="Size", description="Width and height of renders, pixels", size=2, default=(1280, 960), min=16, max=16384, **_plain
+        name="Size",
+        description="Width and height of renders, pixels; images of the gel fit into it",
+        size=2,
+        default=(1280, 960),
+        min=16,
+        max=16384,
+        **_plain,
     )
     samples: IntProperty(
         name="Samples", description="Samples per pixel of renders; 0: as in the render properties", min=0, max=65536, **_plain
+    )
+    light_angle: FloatProperty(
+        name="Light Angle (°)",
+        description="Angle between the gel and the light of its three lamps, degrees; flat light makes slopes strong",
+        default=GelStyle.light_angle,
+        min=LIGHT_ANGLES[0],
+        max=LIGHT_ANGLES[1],
+        precision=1,
+        **_plain,
+    )
+    markers: BoolProperty(
+        name="Markers",
+        description="Print markers on the gel, which shear carries along: by the shear of a texel (N) over σ0 (N/m)",
+        default=GelStyle.markers,
+        **_plain,
+    )
+    marker_pitch: FloatProperty(
+        name="Marker Pitch (m)",
+        description=f"Distance between markers, m. 0: a round one, about {MARKERS_ALONG} along the gel",
+        min=0.0,
+        precision=5,
+        step=0.01,
+        **_plain,
     )

@@ -28,7 +28,7 @@ from ...core.jobs.job_runner import run_job
 from ...core.jobs.progress import Job, Progress
 from ...core.response import metrics
 from ..display import bake_identity, baked_scene
-from . import figure_size, loaded_texels, render, render_setup, see_through, video, workbench_colors
+from . import figure_size, gel_figures, loaded_texels, render, render_setup, see_through, video, workbench_colors
 from .figure_request import FigureRequest
 
 SIGHTS = 12
@@ -85,7 +85,7 @@ def make_figures(scene, folder, request: FigureRequest) -> Job[list[Path]]:
     require_space(folder, figure_size.figures_bytes(bake, request, len(frames)) + data, "The set of figures")
     folder = writable_folder(folder, create=True)
     files = FileList(folder)
-    steps = _StepCounter(request, frames, len(bake.recording.frames))
+    steps = _StepCounter(request, frames, bake)
     with files.new_files("figures") as new:
         written: dict[str, list[Path]] = {}
         if "scene" in request.kinds:
@@ -95,6 +95,8 @@ def make_figures(scene, folder, request: FigureRequest) -> Job[list[Path]]:
             written |= draw_figures(bake, new, request, frames)
         if "video" in request.kinds:
             written["video"] = yield from _make_video(scene, new, request, bake, steps)
+        if "gel" in request.kinds:
+            written["gel"] = yield from gel_figures.draw_gels(bake, new, request, steps.next)
         manifest = next(iter(bake.manifests.values()))
         kinds = {f"figures {kind}": paths for kind, paths in written.items()}
         made = files.replace(new, kinds, manifest.bake_id or manifest.digest)
@@ -199,11 +201,12 @@ def _default_frame(bake: Bake, at_peak: bool) -> int:
 class _StepCounter:
     """Counts the steps of a request for its progress."""
 
-    def __init__(self, request: FigureRequest, frames: Sequence[int], baked_frames: int):
+    def __init__(self, request: FigureRequest, frames: Sequence[int], bake: Bake):
         self.done = 0
         pictures = len(frames) if "scene" in request.kinds else 0
-        video_steps = baked_frames + 1 if "video" in request.kinds else 0
-        self.total = pictures + 1 + len(request.exports) + video_steps
+        video_steps = len(bake.recording.frames) + 1 if "video" in request.kinds else 0
+        gel_steps = len(gel_figures.gel_frames(bake, request)) if "gel" in request.kinds else 0
+        self.total = pictures + 1 + len(request.exports) + video_steps + gel_steps
 
     def next(self, stage: str, frame: int) -> Progress:
         self.done = min(self.done + 1, self.total)

@@ -11,11 +11,13 @@ import bpy
 
 from ...core.errors import FileError, ParameterError
 from ...core.figures.figure_style import FigureStyle
+from ...core.figures.gel_image import GelStyle
 from ..display import bake_display
 from ..properties import figure_properties
+from ..session import units
 from .render_setup import RenderOptions
 
-KINDS = ("scene", "strip", "curves", "numbers", "video")
+KINDS = ("scene", "strip", "curves", "numbers", "video", "gel")
 """Kinds of figures."""
 FORMATS = ("png", "pdf", "svg")
 
@@ -31,7 +33,7 @@ class FigureRequest:
     style : FigureStyle
     frames : tuple of int
         Frames of the pictures and numbers; two or more are also the columns of the strip. Empty: the frame at which the
-        settled forces are largest.
+        settled forces are largest, for the gel all frames.
     sensors : tuple of str
         Names; empty: all sensors.
     formats : tuple of str
@@ -48,6 +50,8 @@ class FigureRequest:
         Width and height of the renders.
     samples : int or None
         Samples per pixel; None: the scene's.
+    light_angle, markers, marker_pitch
+        See :class:`.gel_image.GelStyle`.
     """
 
     kinds: tuple[str, ...] = ("scene", "strip", "curves", "numbers")
@@ -65,16 +69,30 @@ class FigureRequest:
     at_peak: bool = False
     size: tuple[int, int] = (1280, 960)
     samples: int | None = None
+    light_angle: float = GelStyle.light_angle
+    markers: bool = True
+    marker_pitch: float | None = None
 
     def __post_init__(self) -> None:
         for what, chosen, known in (("figure", self.kinds, KINDS), ("format", self.formats, FORMATS)):
             for word in chosen:
                 if word not in known:
                     raise ParameterError(f"There is no {what} '{word}': choose from {', '.join(known)}.")
+        self.gel_style()
 
     def render_options(self, size: tuple[int, int]) -> RenderOptions:
         """Return how the scene's pictures are to be taken, in this size (pixels)."""
         return RenderOptions(self.engine, self.view, self.transparent, self.own_camera, self.own_light, self.see_through, size)
+
+    def gel_style(self) -> GelStyle:
+        """Return how images of gels are to be made.
+
+        Raises
+        ------
+        ParameterError
+            The light's angle or the distance between markers has no meaning.
+        """
+        return GelStyle(self.light_angle, self.markers, self.marker_pitch, self.size)
 
 
 def requested_figures(scene, active=None) -> FigureRequest:
@@ -114,6 +132,9 @@ def requested_figures(scene, active=None) -> FigureRequest:
         see_through=own.see_through,
         size=tuple(own.size),
         samples=own.samples or None,
+        light_angle=units.as_typed(own.light_angle),
+        markers=own.markers,
+        marker_pitch=units.as_typed(own.marker_pitch) or None,
     )
 
 

@@ -4,12 +4,15 @@
 from __future__ import annotations
 
 from ...core.io.bake_reader import Bake
+from . import gel_figures
 from .figure_request import FigureRequest
 
 PICTURE_BYTES = 3.0
 """Bytes of a rendered pixel: three colours of a noise that cannot be compressed."""
 VIDEO_BYTES = 1.0
 """Bytes of a pixel in a video; H.264 of such noise at Blender's high quality stays below."""
+GEL_BYTES = 1.0
+"""Bytes of a pixel in an image of a gel, whose colours are smooth."""
 PAGE_BYTES = 1.0
 """Bytes of a pixel of a drawing that is as high as wide for each sensor; most of it is white."""
 POINT_BYTES = 12.0
@@ -50,6 +53,8 @@ def figures_bytes(bake: Bake, request: FigureRequest, pictures: int) -> float:
         width, height = video_size(request)
         pixels = len(bake.recording.frames) * (width * height + SIDE * height**2)
         needed += (PICTURE_BYTES + VIDEO_BYTES) * pixels + PICTURE_BYTES * width * height
+    if "gel" in request.kinds:
+        needed += GEL_BYTES * gel_figures.gel_pixels_in_all(bake, request)
     page = PAGE_BYTES * (request.style.width_inches * request.style.dpi) ** 2
     lines = POINT_BYTES * LINES * len(bake.recording.frames)
     texels = [TEXEL_BYTES * len(one) for one in bake.texels.values()]

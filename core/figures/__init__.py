@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Figures of a recording: tactile images over time, curves, numbers of texels, and labels on rendered pictures.
+"""Figures of a recording: tactile images over time, curves, numbers of texels, labels on rendered pictures, images of a gel.
 
 Forces are in newtons, pressures in kilopascals, lengths in millimetres. No text is smaller than 8 pt at the size of the written
 figure. One :class:`.figure_style.FigureStyle` sets the style of all figures of a recording.
@@ -9,6 +9,7 @@ __all__ = [
     "color_maps",
     "figure_canvas",
     "figure_style",
+    "gel_image",
     "picture_labels",
     "side_by_side",
     "tactile_image",

@@ -49,6 +49,12 @@ def linear(srgb: np.ndarray) -> np.ndarray:
     return np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4)
 
 
+def srgb(linear_values: np.ndarray) -> np.ndarray:
+    """Return the sRGB values of scene-linear ones: the inverse of :func:`linear`."""
+    values = np.asarray(linear_values, float)
+    return np.where(values <= 0.0031308, 12.92 * values, 1.055 * np.maximum(values, 0.0) ** (1 / 2.4) - 0.055)
+
+
 def colors(name: str, share: np.ndarray) -> np.ndarray:
     """(n, 3) sRGB colours of (n,) values from 0 to 1; what lies outside has the colour of the nearer end."""
     stops = STOPS[name]

@@ -10,6 +10,8 @@ import io
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from ..errors import ParameterError
 from ..io.file_writing import atomic_write
 from .figure_style import FONT, INK, RULE, SMALL
@@ -88,6 +90,29 @@ def save_figure(figure: Figure, path: str | Path, dpi: float) -> None:
         for text in legend.get_texts() if legend else ():
             text.set_fontsize(8)
     _write(figure, path, dpi, kind, metadata)
+
+
+def save_pixels(pixels: np.ndarray, path: str | Path) -> None:
+    """Write an image as a PNG, pixel by pixel, whole or not at all. Equal pixels give equal bytes.
+
+    Parameters
+    ----------
+    pixels : (height, width, 3 or 4) uint8
+        sRGB, the upper row first; the fourth channel is the opacity.
+
+    Raises
+    ------
+    FileError
+        It cannot be written.
+    """
+    from PIL import Image
+    from PIL.PngImagePlugin import PngInfo
+
+    about, encoded = PngInfo(), io.BytesIO()  # a full disk breaks the encoder, so it writes into memory
+    about.add_text("Software", "Palpate")
+    Image.fromarray(pixels).save(encoded, format="png", pnginfo=about)
+    with atomic_write(path) as temporary:
+        temporary.write_bytes(encoded.getvalue())
 
 
 def _write(figure: Figure, path: Path, dpi: float, kind: str, metadata: dict[str, Any]) -> None:

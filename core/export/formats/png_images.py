@@ -3,13 +3,13 @@
 
 from __future__ import annotations
 
-import io
 import json
 from pathlib import Path
 
 import numpy as np
 
 from ...figures import color_maps
+from ...figures.figure_canvas import save_pixels
 from ...figures.figure_style import FigureStyle
 from ...io.bake_folder import folder_names
 from ...io.bake_reader import Bake
@@ -24,8 +24,6 @@ _LEAST_PIXELS = 256
 
 def write_png(bake: Bake, folder: Path, style: FigureStyle) -> Job[list[Path]]:
     """Write one picture per frame and ``scale.json`` into a folder per sensor; all sensors share one colour scale."""
-    from matplotlib.image import imsave
-
     recording = bake.recording
     written: list[Path] = []
     top = style.scale_limit(recording, bake.texels)
@@ -41,10 +39,8 @@ def write_png(bake: Bake, folder: Path, style: FigureStyle) -> Job[list[Path]]:
             color = color_maps.colors(style.colour_map, layout.image(own).ravel() / top).reshape(*layout.shape, 3)
             pixels = np.dstack([color, mask])[::-1]
             pixels = np.repeat(np.repeat(pixels, magnified, axis=0), magnified, axis=1)
-            path, encoded = own_folder / f"tactile_{frame:04d}.png", io.BytesIO()  # a full disk breaks the encoder
-            imsave(encoded, (pixels * 255 + 0.5).astype(np.uint8), format="png", metadata={"Software": "Palpate"})
-            with atomic_write(path) as temporary:
-                temporary.write_bytes(encoded.getvalue())
+            path = own_folder / f"tactile_{frame:04d}.png"
+            save_pixels((pixels * 255 + 0.5).astype(np.uint8), path)
             written.append(path)
         scale = {
             "quantity": " ".join(style.quantity_label),

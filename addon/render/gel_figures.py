@@ -1,0 +1,71 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Images of the gels of a bake: which sensors and frames, and their files."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+from ...core.errors import SensorError
+from ...core.figures.gel_image import image_size, require_grid, write_gel_image
+from ...core.geometry.layout.grid_layout import GridLayout
+from ...core.io.bake_folder import file_stems
+from ...core.io.bake_reader import Bake, frame_index
+from ...core.jobs.progress import Job, Progress
+from ...core.response import metrics
+from .figure_request import FigureRequest
+
+
+def gel_frames(bake: Bake, request: FigureRequest) -> tuple[int, ...]:
+    """Return the frames of which images are wanted: those that are named, that of the peak, or all of the bake."""
+    if request.frames:
+        return request.frames
+    return (metrics.peak_frame(bake.recording),) if request.at_peak else tuple(int(number) for number in bake.recording.frames)
+
+
+def gel_sensors(bake: Bake, request: FigureRequest) -> list[str]:
+    """Return the names of the sensors of which images can be made, those with rows and columns.
+
+    Raises
+    ------
+    SensorError
+        The request names another sensor, or there is no sensor with rows and columns.
+    """
+    if request.sensors:
+        for name in bake.texels:
+            require_grid(bake.texels[name], name)
+    names = [name for name, texels in bake.texels.items() if isinstance(texels.layout, GridLayout)]
+    if not names:
+        raise SensorError(
+            "No sensor of the bake has its texels in rows and columns, of which the gel's image is made: choose other figures, "
+            "or lay texels in rows on a sensor."
+        )
+    return names
+
+
+def gel_pixels_in_all(bake: Bake, request: FigureRequest) -> int:
+    """Return the number of pixels of all images."""
+    sizes = [image_size(bake.texels[name], request.size) for name in gel_sensors(bake, request)]
+    return len(gel_frames(bake, request)) * sum(width * height for width, height in sizes)
+
+
+def draw_gels(bake: Bake, folder: Path, request: FigureRequest, next_step: Callable[[str, int], Progress]) -> Job[list[Path]]:
+    """Draw the images, frame after frame, and return their files.
+
+    Parameters
+    ----------
+    next_step : callable
+        Returns the progress for what is done and the frame.
+    """
+    written = []
+    style, stems = request.gel_style(), file_stems(bake.texels)
+    names = gel_sensors(bake, request)
+    for number in gel_frames(bake, request):
+        yield next_step("Drawing the gel", number)
+        i = frame_index(bake.recording, number)
+        for name in names:
+            path = folder / f"gel_{stems[name]}_{number:04d}.png"
+            sensor, sigma0 = bake.recording.sensors[name].at(i), bake.parameters[name].sigma0
+            write_gel_image(path, sensor, bake.texels[name], name, sigma0, style)
+            written.append(path)
+    return written

@@ -1,0 +1,152 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Images of a baked gel: what they show is the surface that Blender shows, and the shear that was baked."""
+
+import math
+from types import SimpleNamespace
+
+import bpy
+import numpy as np
+import pytest
+from blender_scenes import ball, grid, press, save
+from scipy.interpolate import RegularGridInterpolator
+
+from palpate.addon.bake.bake import bake
+from palpate.addon.render import figure_export
+from palpate.addon.render.figure_request import FigureRequest
+from palpate.addon.scene import mesh_arrays
+from palpate.commands import main
+from palpate.core.errors import SensorError
+from palpate.core.figures import color_maps, gel_image
+from palpate.core.io.file_list import LIST_NAME
+from palpate.core.io.recording_npz import load_recording
+from palpate.core.jobs.job_runner import run_job
+
+SIDE, ANGLE = 0.05, 50.0
+"""Of the gel, m; of the lamps, degrees."""
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    return tmp_path_factory.mktemp("gel")
+
+
+@pytest.fixture
+def pressed(scene, folder):
+    """A ball of 40 mm is pressed 3 mm into a gel and drawn aside by 4 mm; the images are drawn by the command, once for all."""
+    if not (folder / "printed").exists():
+        path = press_gel(scene, folder)
+        command = ["render", str(path), "--only", "gel", "--size", "450", "300", "--light-angle", str(ANGLE)]
+        assert main([*command, "--no-markers", "--out", str(folder / "plain")]) == 0
+        assert main([*command, "--marker-pitch", "0.004", "--out", str(folder / "printed")]) == 0
+    bpy.ops.wm.open_mainfile(filepath=str(folder / "scene.blend"))
+    return SimpleNamespace(folder=folder, recording=load_recording(folder / "palpate" / "Gel" / "recording.npz"))
+
+
+def press_gel(scene, folder):
+    """Bake frames 1 to 6 of a gel of 16 × 16 texels and save the scene."""
+    scene.frame_start, scene.frame_end = 1, 6
+    gel = grid("Gel", columns=16, rows=16, size=SIDE)
+    target = ball(radius=0.04)
+    for face in target.data.polygons:
+        face.use_smooth = True
+    divide = target.modifiers.new("Round", "SUBSURF")
+    divide.levels = 2
+    gel.palpate.role, target.palpate.role, gel.palpate.sigma0 = "SENSOR", "TARGET", 30.0
+    for frame, place in ((1, (0.006, -0.003, 0.042)), (3, (0.006, -0.003, 0.036)), (6, (0.01, -0.003, 0.036))):
+        target.location = place
+        target.keyframe_insert("location", frame=frame)
+    scene.frame_set(1)
+    save(folder)
+    run_job(bake(scene))
+    return save(folder)
+
+
+def light(path):
+    """The linear light of the three colours, (300, 300, 3)."""
+    from matplotlib.image import imread
+
+    picture = imread(path)
+    assert picture.shape == (300, 300, 3)
+    return color_maps.linear(picture)
+
+
+def test_there_is_an_image_for_each_frame_or_for_those_that_are_named(pressed, tmp_path):
+    every = {f"gel_Gel_{number:04d}.png" for number in range(1, 7)} | {LIST_NAME}
+    for name in ("plain", "printed"):
+        assert {path.name for path in (pressed.folder / name).iterdir()} == every
+    for options, frames in (({"frames": (2, 5)}, (2, 5)), ({"at_peak": True}, None)):
+        request = FigureRequest(("gel",), size=(60, 40), **options)
+        stages = []
+        job = figure_export.make_figures(bpy.context.scene, tmp_path / str(frames), request)
+        written = run_job(job, lambda step, stages=stages: stages.append((step.done, step.total)))
+        total = [sensor.normal_force.sum(axis=1).argmax() + 1 for sensor in pressed.recording.sensors.values()]
+        assert [path.name for path in written] == [f"gel_Gel_{number:04d}.png" for number in frames or total]
+        assert stages[-1][0] <= stages[-1][1]
+
+
+def test_three_colours_tell_the_normals_of_the_surface_that_blender_shows(pressed):
+    """Median below 3 degrees where the ball presses, against the evaluated mesh of the indentation, faces being 0.8 mm wide."""
+    bpy.context.scene.frame_set(6)
+    mesh = bpy.data.objects["Gel"].evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+    assert len(mesh.vertices) > 3000
+    place = mesh_arrays.vertices(mesh)
+    shown = np.array([vertex.normal for vertex in mesh.vertices])
+    up, turn = math.radians(ANGLE), np.radians([90.0, 210.0, 330.0])
+    lamps = np.column_stack([math.cos(up) * np.cos(turn), math.cos(up) * np.sin(turn), [math.sin(up)] * 3])
+    picture = light(pressed.folder / "plain" / "gel_Gel_0006.png")
+    row = np.clip(np.round(300 * (0.5 - place[:, 1] / SIDE) - 0.5), 0, 299).astype(int)
+    column = np.clip(np.round(300 * (0.5 - place[:, 0] / SIDE) - 0.5), 0, 299).astype(int)
+    found = np.linalg.solve(lamps, picture[row, column].T).T
+    found /= np.linalg.norm(found, axis=1, keepdims=True)
+    error = np.degrees(np.arccos(np.clip((found * shown * (1.0, -1.0, 1.0)).sum(axis=1), -1.0, 1.0)))
+    touched = place[:, 2] < -1e-4
+    assert np.median(np.degrees(np.arccos(shown[touched, 2]))) > 10.0
+    assert np.median(error[touched]) < 3.0
+    assert np.percentile(error, 95) < 6.0
+
+
+def test_markers_follow_the_baked_shear(pressed):
+    """Each marker's middle, found in the image, moves by the shear of the four texels around it over σ0, linear between them."""
+    sensor = pressed.recording.sensors["Gel"]
+    texel = np.linspace(-0.5 * SIDE, 0.5 * SIDE, 16)
+    where = np.arange(12) * 0.004 - 0.022
+    shift_at = RegularGridInterpolator((texel, texel), sensor.shear[5].reshape(16, 16, 2) / 30.0)
+    moved, expected = [], []
+    dark = 1.0 - light(pressed.folder / "printed" / "gel_Gel_0006.png").mean(axis=2) / light(
+        pressed.folder / "plain" / "gel_Gel_0006.png"
+    ).mean(axis=2)
+    pixel = (0.5 - (np.arange(300) + 0.5) / 300) * SIDE  # x and y of the middles of pixels
+    for y in where:
+        for x in where:
+            guess = shift_at((y, x))
+            window = np.abs(pixel[:, None] - y - guess[1]) < 0.0015, np.abs(pixel[None] - x - guess[0]) < 0.0015
+            part = np.where(window[0] & window[1], np.maximum(dark, 0.0), 0.0)
+            assert part.sum() > 10.0
+            moved.append(((part * pixel[None]).sum() / part.sum() - x, (part * pixel[:, None]).sum() / part.sum() - y))
+            expected.append(guess)
+    moved, expected = np.array(moved), np.array(expected)
+    assert np.abs(expected).max() > 2e-3
+    for axis in (0, 1):
+        assert np.corrcoef(moved[:, axis], expected[:, axis])[0, 1] > 0.99
+        assert np.polyfit(expected[:, axis], moved[:, axis], 1)[0] == pytest.approx(1.0, abs=0.05)
+
+
+def test_before_contact_the_image_is_uniform(pressed):
+    picture = light(pressed.folder / "plain" / "gel_Gel_0001.png")
+    assert np.ptp(picture) == 0.0
+    printed = light(pressed.folder / "printed" / "gel_Gel_0001.png")
+    np.testing.assert_array_equal(printed, printed[::-1, ::-1])  # markers stand in the middle of the gel
+    assert printed.min() == pytest.approx(gel_image.MARKER_ALBEDO * gel_image.BRIGHTNESS, rel=0.05)
+
+
+def test_a_sensor_without_rows_and_columns_is_refused(tmp_path):
+    scene, pad, _ = press(frames=2)
+    group = pad.vertex_groups.new(name="with a hole")
+    group.add([vertex for vertex in range(84) if vertex != 40], 1.0, "REPLACE")
+    pad.palpate.region, pad.palpate.vertex_group = "GROUP", group.name
+    save(tmp_path)
+    run_job(bake(scene))
+    for sensors, words in (((), "No sensor of the bake has its texels in rows"), (("Pad",), "'Pad' form no rows and columns")):
+        with pytest.raises(SensorError, match=words):
+            run_job(figure_export.make_figures(scene, tmp_path / "out", FigureRequest(("gel",), sensors=sensors)))
+    assert not (tmp_path / "out").exists()
