@@ -106,7 +106,7 @@ def test_three_colours_tell_the_normals_of_the_surface_that_blender_shows(presse
 
 
 def test_markers_follow_the_baked_shear(pressed):
-    """Each marker's middle, found in the image, moves by the shear of the four texels around it over σ0, linear between them."""
+    """Each marker's middle, found in the image, moves by the shear of the texels around it (linear between them) over σ0."""
     sensor = pressed.recording.sensors["Gel"]
     texel = np.linspace(-0.5 * SIDE, 0.5 * SIDE, 16)
     where = np.arange(12) * 0.004 - 0.022
