@@ -144,7 +144,7 @@ class PALPATE_PG_figures(bpy.types.PropertyGroup):
     )
     light_angle: FloatProperty(
         name="Light Angle (°)",
-        description="Angle between the gel and the light of its three lamps, in ° from flat light, which makes slopes strong",
+        description="Angle (°) between the gel and the light of its three lamps; flat light makes slopes strong",
         default=GelStyle.light_angle,
         min=LIGHT_ANGLES[0],
         max=LIGHT_ANGLES[1],

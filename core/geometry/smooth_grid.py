@@ -49,7 +49,7 @@ def _blurred(values: np.ndarray) -> np.ndarray:
 
 
 def spline_weights(count: int, places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the weights of `count` values, one unit apart, in a uniform cubic B-spline and in its derivative.
+    """Return the weights of ``count`` values, one unit apart, in a uniform cubic B-spline and in its derivative.
 
     Beyond both ends the values go on in a straight line, which is the border of Catmull and Clark's surface.
 
