@@ -62,7 +62,7 @@ def spline_weights(count: int, places: np.ndarray) -> tuple[np.ndarray, np.ndarr
 
     Returns
     -------
-    weights, slopes : (m, count) float
+    weights, slopes : (m, c) float, one column for each value
     """
     places = np.asarray(places, float)
     cell = np.clip(np.floor(places).astype(int), 0, count - 2)
