@@ -36,7 +36,7 @@ def triangles_between(points: np.ndarray, normals: np.ndarray) -> np.ndarray:
     Raises
     ------
     SensorError
-        There are fewer than three points, two are at one place, or all lie on a line.
+        There are fewer than three points, two are at one place, one is further away than can be squared, or all lie on a line.
     """
     from scipy.spatial import cKDTree
 
@@ -44,6 +44,9 @@ def triangles_between(points: np.ndarray, normals: np.ndarray) -> np.ndarray:
     if count < 3:
         raise SensorError(f"{count} points span no surface: a sensor has at least three texels.")
     distance, near = cKDTree(points).query(points, min(NEIGHBOURS + 1, count))
+    if not np.isfinite(distance).all():
+        far = int(np.abs(points).max(axis=1).argmax())
+        raise SensorError(f"Texel {far} is immeasurably far from the others: check its position.")
     if distance[:, 1].min() == 0.0:
         raise SensorError(f"Texel {int(distance[:, 1].argmin())} is at the same place as another: leave one of them out.")
     reach = LONGEST_EDGE * np.median(distance[near[:, 1:], min(4, count - 1)], axis=1)

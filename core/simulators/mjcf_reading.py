@@ -178,7 +178,10 @@ def _touch_grid(model: _Model, sensor: ElementTree.Element, number: int) -> Foun
     azimuth, elevation = (_bin_middles(int(n), limit, gamma) for n, limit in zip((columns, rows), fov))
     y, x = np.meshgrid(elevation, azimuth, indexing="ij")
     direction = np.stack([np.cos(y) * np.sin(x), np.sin(y), -np.cos(y) * np.cos(x)], axis=-1).reshape(-1, 3)
-    radius = float(numbers_in(path, place[0], "size", str(SITE_SIZE))[0])
+    sizes = numbers_in(path, place[0], "size", str(SITE_SIZE))
+    if not len(sizes) or sizes[0] <= 0.0:
+        raise FileError(f"The site of sensor '{name}' in '{path}' has no size above zero: correct it.")
+    radius = float(sizes[0])
     row, column = (index.ravel() for index in np.indices((int(rows), int(columns))))
     notes = [
         *model.notes,

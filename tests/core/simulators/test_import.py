@@ -8,8 +8,9 @@ import pytest
 from exported_sensors import FLOAT32, ball, pad
 from scipy.spatial.transform import Rotation
 
-from palpate.core.errors import FileError, PalpateError
+from palpate.core.errors import FileError, PalpateError, SensorError
 from palpate.core.geometry.mesh import TriangleMesh, vertex_normals
+from palpate.core.geometry.point_surface import triangles_between
 from palpate.core.simulators.registry import export_sensors, import_sensors
 
 SENSORS = (pad(), pad(radius=0.02, name="Bent"), ball(painted=False))
@@ -145,3 +146,19 @@ def test_a_mesh_beside_the_file_is_read(tmp_path):
     (found,) = read(tmp_path, TACTILE.format(mesh='<mesh name="m" file="ball.stl" scale="0.1 0.1 0.1"/>'))
     assert len(found.position) == 42
     assert np.linalg.norm(found.position, axis=1) == pytest.approx(np.full(42, 0.05), abs=FLOAT32)
+
+
+@pytest.mark.parametrize("size", ["", "0", "-1 0.1"])
+def test_a_touch_grid_without_a_size_is_one_sentence(tmp_path, size):
+    from palpate.attack.damaged_sensors import TOUCH_GRID
+
+    path = tmp_path / "grid.xml"
+    path.write_text(TOUCH_GRID.replace('size="0.01"', f'size="{size}"'))
+    with pytest.raises(FileError, match="'grid' in '.*' has no size above zero"):
+        import_sensors(path)
+
+
+def test_a_texel_that_is_immeasurably_far_is_one_sentence():
+    points = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [1e308, 1.0, 0.0]])
+    with pytest.raises(SensorError, match="Texel 3 is immeasurably far"):
+        triangles_between(points, np.tile([0.0, 0.0, 1.0], (4, 1)))
