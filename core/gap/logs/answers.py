@@ -327,9 +327,11 @@ def _column(quantity: str, words: Any, where: str) -> ColumnAnswer:
     unit = words.get("unit", QUANTITIES[quantity])
     units = LOG_UNITS.get(QUANTITIES[quantity], {})
     may_be_pressure = quantity == "force" and "area" in words
-    if units and unit not in units and not (may_be_pressure and unit in PRESSURES):
-        hint = " (a pressure needs area = …, in m²)" if unit in PRESSURES else ""
-        raise FileError(f"unit of {where} is {unit!r:.60}: write one of {', '.join(units)}{hint}.")
+    known = isinstance(unit, str) and (not units or unit in units or (may_be_pressure and unit in PRESSURES))
+    if not known:
+        hint = " (a pressure needs area = …, in m²)" if isinstance(unit, str) and unit in PRESSURES else ""
+        choice = f"one of {', '.join(units)}{hint}" if units else "its name"
+        raise FileError(f"unit of {where} is {unit!r:.60}: write {choice}.")
     repeated = words.get("repeated", "refuse")
     if repeated not in REPEATED:
         raise FileError(f"repeated of {where} is {repeated!r:.60}: write one of {', '.join(REPEATED)}.")

@@ -239,6 +239,8 @@ def test_a_planned_path_is_no_recording(tmp_path):
         ({}, {'name = "R{}"': 'name = "Q{}"'}, "no column 'Q1', which the answers name for texel"),
         ({}, {'use = "fit"': 'use = "maybe"'}, "write one of fit, check, leave out"),
         ({}, {"press_0.csv": "press_9.csv"}, "which was not given"),
+        ({}, {'name = "t_ms", unit = "ms"': 'name = "t_ms", unit = ["ms"]'}, "is ['ms']: write one of s, ms"),
+        ({}, {'R{}", first = 1': 'R{}", unit = 3, first = 1'}, "is 3: write its name"),
         ({}, {'use = "fit"': 'use = "fit"\nfrom = 2.0\nto = 1.0'}, "write a `to` that is later than `from`"),
         ({}, {'use = "fit"': 'use = "fit"\nfrom = "later"'}, "is 'later': write seconds"),
         ({}, {'use = "fit"': 'use = "fit"\nfrom = 5.98'}, "has fewer than 8 samples from 5.98 s to 5.99 s"),
