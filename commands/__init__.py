@@ -13,7 +13,6 @@ import importlib
 import sys
 from collections.abc import Sequence
 from contextlib import nullcontext, suppress
-from pathlib import Path
 from typing import NoReturn
 
 from ..core.errors import Cancelled, PalpateError, os_error_reason
@@ -33,15 +32,13 @@ COMMANDS = {
     "sensor": "write sensors for other simulators, and read theirs",
     "openrave": "read and write OpenRAVE sensor definitions",
 }
-"""Commands in the order of the help. A command is ready once this package has a module of its name."""
+"""Commands in the order of the help. This package has a module of each name."""
 
 STOPPED, NO_READER = 130, 141
 """Exit statuses after Ctrl-C and after a closed pipe: 128 plus the number of the signal, as of other programs."""
 
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
 """Numbers of the errors that a stream raises when what was printed cannot be stored."""
-
-READY = tuple(name for name in COMMANDS if (Path(__file__).parent / f"{name}.py").is_file())
 
 
 def run_process() -> NoReturn:
@@ -110,9 +107,6 @@ def _parse(argv: Sequence[str] | None) -> argparse.Namespace:
     if arguments.command is None:
         parser.print_help(sys.stderr)
         raise SystemExit(2)
-    if arguments.command not in READY:
-        print(f"palpate {arguments.command}: not yet", file=sys.stderr)
-        raise SystemExit(1)
     if rest:
         _reject_unknown(parser, arguments.command, rest)
     return arguments
@@ -144,17 +138,10 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--version", action="version", version=f"palpate {VERSION}")
     subparsers = parser.add_subparsers(dest="command", metavar="COMMAND", title="commands")
     for name, summary in COMMANDS.items():
-        ready = name in READY
-        sub = subparsers.add_parser(
-            name,
-            help=summary if ready else f"{summary} (not yet)",
-            description=f"{summary[0].upper()}{summary[1:]}.",
-            add_help=ready,
-        )
-        if ready:
-            module = importlib.import_module(f".{name}", __package__)
-            module.add_arguments(sub)
-            if name in limits.COMMANDS:
-                limits.add_arguments(sub)
-            sub.set_defaults(run=module.run)
+        sub = subparsers.add_parser(name, help=summary, description=f"{summary[0].upper()}{summary[1:]}.")
+        module = importlib.import_module(f".{name}", __package__)
+        module.add_arguments(sub)
+        if name in limits.COMMANDS:
+            limits.add_arguments(sub)
+        sub.set_defaults(run=module.run)
     return parser

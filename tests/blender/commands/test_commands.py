@@ -15,7 +15,7 @@ import pytest
 from blender_scenes import contents, press, reopen, save, visible
 
 from palpate.addon.bake.bake import bake
-from palpate.commands import COMMANDS, READY, blender, console, main
+from palpate.commands import blender, console, main
 from palpate.commands.bake import report
 from palpate.core.errors import FileError
 from palpate.core.io.recording_npz import load_recording
@@ -51,12 +51,6 @@ def test_wrong_usage_is_status_2(words, capfd):
 def test_help_is_status_0(words, capfd):
     assert main(words) == 0
     assert "palpate" in capfd.readouterr().out
-
-
-@pytest.mark.parametrize("name", [name for name in COMMANDS if name not in READY])
-def test_what_is_planned_says_so(name, capfd):
-    assert main([name, "rig.toml", "--out", "somewhere"]) == 1
-    assert lines_of(capfd) == ([], [f"palpate {name}: not yet"])
 
 
 # --- mistakes

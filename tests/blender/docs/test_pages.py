@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from palpate.commands import COMMANDS, READY, _parser, main
+from palpate.commands import COMMANDS, _parser, main
 from palpate.core.export.registry import export
 from palpate.core.gap.dataset.rig import read_rig
 from palpate.core.io.bake_reader import read_bake
@@ -111,7 +111,7 @@ def test_options_that_are_told_of_are_in_the_help(page, capsys):
     """`palpate bake SCENE.blend [--out DIR]` in a sentence or a table names options of that command."""
     for code in inline_code(page.read_text(encoding="utf-8").replace("\\|", "|")):
         words = re.match(r"palpate (\w+)", code)
-        if words and words.group(1) in READY:
+        if words and words.group(1) in COMMANDS:
             told = re.match(r"palpate (\w+(?: (?:stiffness|friction|show|import|export|new)\b)?)", code).group(1).split()
             assert main([*told, "--help"]) == 0
             text = capsys.readouterr().out
