@@ -20,10 +20,10 @@ parquet = pytest.importorskip("pyarrow.parquet")
 
 
 def test_contact_is_learnt_from_presses(tmp_path, repository):
-    """Even thirty runs place a contact of an unseen run better than always answering the mean."""
+    """Seventy-five runs place a contact of an unseen run better than always answering the mean."""
     pytest.importorskip("sklearn", exc_type=ImportError)
     study = new_study(tmp_path / "study")
-    for index in range(40):
+    for index in range(100):
         write_press(study, index)
     publish(study)
     script = repository / "examples" / "train_contact.py"
