@@ -49,9 +49,9 @@ def road(ui):
     bpy.context.preferences.view.filebrowser_display_type = "SCREEN"
     yield from ui.tab("PHYSICS")
 
-    # A preset, from the header of the first panel below Blender's own eight buttons
+    # A preset, from the header of the first panel below Blender's own eight buttons and that of Palpate
     panel = ui.region(ui.area("PROPERTIES"))
-    x, y = panel.x + panel.width - 47, panel.y + panel.height - 250
+    x, y = panel.x + panel.width - 47, panel.y + panel.height - 276
     yield from ui.click(x, y)
     yield 0.5
     yield from ui.screenshot("presets")
