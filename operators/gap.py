@@ -76,12 +76,7 @@ class PALPATE_OT_gap_find(modal_job.ModalJob, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        if not support.poll_editable_sensor(cls, context):
-            return False
-        if not context.object.palpate.measured:
-            cls.poll_message_set("Choose the sensor's measurements first: Open Rig")
-            return False
-        return cls.poll_not_running()
+        return support.poll_measured_sensor(cls, context) and cls.poll_not_running()
 
     def job(self, context):
         return gap_results.find(context.object)
@@ -115,12 +110,7 @@ class PALPATE_OT_gap_plan(modal_job.ModalJob, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        if not support.poll_editable_sensor(cls, context):
-            return False
-        if not context.object.palpate.measured:
-            cls.poll_message_set("Choose the sensor's measurements first: Open Rig")
-            return False
-        return cls.poll_not_running()
+        return support.poll_measured_sensor(cls, context) and cls.poll_not_running()
 
     def job(self, context):
         from ..core.gap.planning.experiment_plan import Wishes

@@ -99,6 +99,16 @@ def leave_edit_mode(context) -> None:
         bpy.ops.object.mode_set(mode="OBJECT")
 
 
+def poll_measured_sensor(cls, context) -> bool:
+    """Poll: the active object is a sensor or a pad that can be changed, and a rig with its measurements was chosen."""
+    if not poll_editable_sensor(cls, context):
+        return False
+    if not context.object.palpate.measured:
+        cls.poll_message_set("Choose the sensor's measurements first: Open Rig")
+        return False
+    return True
+
+
 def poll_gap_found(cls, context) -> bool:
     """Poll: a gap was found for the active sensor."""
     if not poll_editable_sensor(cls, context):
