@@ -3,5 +3,6 @@
 
 Nothing of the package is imported here: contact, friction and effects are written down a second time, from their literature,
 so that a mistake in the library cannot hide itself. :mod:`.world` is the sensor and what presses on it, :mod:`.other` has
-effects in formulas that the library does not have, :mod:`.own` in those that it has, :mod:`.cases` draws cases and writes rigs.
+effects in formulas that the library does not have, :mod:`.own` in those that it has, :mod:`.third` in further ones on which no
+rule was ever set, :mod:`.cases` draws cases and writes rigs.
 """

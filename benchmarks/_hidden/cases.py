@@ -16,6 +16,7 @@ import numpy as np
 
 from .other import MAKERS, OUTSIDE
 from .own import OWN
+from .third import THIRD
 from .world import (
     COLUMNS,
     PITCH,
@@ -39,7 +40,9 @@ SHARE = (0.04, 0.12)
 """Of the full range: what a hidden effect does to the recording, root mean square."""
 IN_FORCE = ("stribeck", "viscous-friction")
 """Effects that show in the net force along the surface and not in the readings."""
-KINDS = ("other", "own", "none", "two", "outside", "poor")
+KINDS = ("other", "own", "none", "two", "outside", "poor", "third", "three")
+SEVERAL = {"two": 2, "three": 3}
+"""Kinds of cases in which several effects are hidden, in formulas of :mod:`.other`, and how many."""
 ORDER = list(MAKERS)
 """The way from the contact to the reading, in which several effects act."""
 VAGUE = ("creep", "hysteresis", "lag", "softening")
@@ -99,7 +102,7 @@ class Case:
 
 def names_for(kind: str) -> list[str]:
     """What can be hidden in a kind of case; a case's number runs through them."""
-    return list({"other": MAKERS, "own": OWN, "outside": OUTSIDE}.get(kind, {"": None}))
+    return list({"other": MAKERS, "own": OWN, "third": THIRD, "outside": OUTSIDE}.get(kind, {"": None}))
 
 
 def draw(kind: str, number: int) -> Case:
@@ -109,7 +112,7 @@ def draw(kind: str, number: int) -> Case:
     ball = bool(rng.integers(2)) if kind != "poor" else True
     probe = Probe(rng.uniform(9e-3, 16e-3), None) if ball else Probe(None, (0.04, 0.07, 0.02))
     names = _names(kind, number, rng, ball)
-    makers = OWN if kind == "own" else {**MAKERS, **OUTSIDE}
+    makers = {"own": OWN, "third": THIRD}.get(kind, {**MAKERS, **OUTSIDE})
     way = list(POOR)[number % len(POOR)] if kind == "poor" else ""
     times, paths = _poor(way, rng, probe) if way in PROGRAMMES else _trials(rng, probe, pad)
     plain = [touch(probe, pad, time, path) for time, path in zip(times, paths, strict=True)]
@@ -155,14 +158,14 @@ def _names(kind: str, number: int, rng, ball: bool) -> list[str]:
     if kind == "poor":
         choice = POOR[list(POOR)[number % len(POOR)]]
         return [choice[number // len(POOR) % len(choice)]]
-    pool = names_for(kind) if kind != "two" else list(MAKERS)
+    pool = names_for(kind) if kind not in SEVERAL else list(MAKERS)
     # A flat indenter loads all texels alike: where the pad sits, and what neighbours do, cannot show under it.
     blind = () if ball else ("misalignment", "load-spreading", "crosstalk")
-    if kind != "two":
+    if kind not in SEVERAL:
         name = pool[number % len(pool)]
         return [name if name not in blind else pool[(number + 7) % len(pool)]]
     clear = [name for name in pool if name not in (*blind, "noise", "quantization", "offset", "dead-texels")]
-    return sorted(map(str, rng.choice(clear, size=2, replace=False)), key=ORDER.index)
+    return sorted(map(str, rng.choice(clear, size=SEVERAL[kind], replace=False)), key=ORDER.index)
 
 
 def _words(rng, pad: Pad, kind: str, number: int) -> dict:

@@ -10,7 +10,7 @@ import pytest
 
 from palpate.benchmarks import gap
 from palpate.benchmarks import sessions as sessions_group
-from palpate.benchmarks._hidden import cases, mounting, other, own, sessions, world
+from palpate.benchmarks._hidden import cases, mounting, other, own, sessions, third, world
 from palpate.core.effects.engine.registry import effect, library
 from palpate.core.gap.dataset.rig import read_rig
 from palpate.core.gap.forward.predictor import Model, Predictor
@@ -29,7 +29,7 @@ def test_the_generator_shares_nothing_with_the_package(path):
 
 
 def test_every_effect_is_hidden_in_some_case():
-    assert set(other.MAKERS) == set(own.OWN) == set(library())
+    assert set(other.MAKERS) == set(own.OWN) == set(third.THIRD) == set(library())
     assert not set(other.OUTSIDE) & set(library())
 
 
@@ -38,7 +38,8 @@ def test_own_forms_have_the_librarys_names_and_others_do_not():
     for seed in range(6):
         for name in own.OWN:
             assert own.OWN[name](np.random.default_rng(seed), 0.3).form in forms[name]
-            assert other.MAKERS[name](np.random.default_rng(seed), 0.3).form not in forms[name]
+            foreign = [makers[name](np.random.default_rng(seed), 0.3).form for makers in (other.MAKERS, third.THIRD)]
+            assert not set(foreign) & forms[name] and len(set(foreign)) == 2
 
 
 def test_a_case_follows_from_kind_and_number(tmp_path):
@@ -59,7 +60,7 @@ def test_a_rig_is_read_and_does_not_tell_its_answer(tmp_path):
     assert not any(word in path.read_text(encoding="utf-8") for word in (*case.answer, case.hidden[0].form))
 
 
-@pytest.mark.parametrize("kind", ["own", "other"])
+@pytest.mark.parametrize("kind", ["own", "other", "third"])
 @pytest.mark.parametrize("number", [3, 9, 12, 18])
 def test_what_is_hidden_has_the_size_it_is_said_to_have(kind, number):
     case = cases.draw(kind, number)
@@ -67,6 +68,116 @@ def test_what_is_hidden_has_the_size_it_is_said_to_have(kind, number):
     assert all(0.9 * low < share < 1.6 * high for share in case.share)
     noise = np.std(np.concatenate([(r - c[0]).ravel() for r, c in zip(case.readings, case.clean, strict=True)]))
     np.testing.assert_allclose(noise, case.noise, rtol=0.02)
+
+
+PRESSED = np.array([[0, 1, 3, 4, 6, 9], [0, 0, 1e-3, -2e-3, 4e-3, 4e-3], [1e-3, -1e-3, -3e-3, -1e-3, -3e-3, 1e-3]])
+"""Time, y and height of a probe's lowest point: in, on, half out, on again with a slide, out."""
+
+
+def pressed_pad(radius=0.012):
+    """A pad, a contact along :data:`PRESSED` and a function that returns what is recorded with hidden effects."""
+    pad = world.Pad(60.0, 0.6, 0.6, 0.5, 0.01, 30.0, 0.3, 0.02, 500.0, 40.0, "counts")
+    probe = world.Probe(radius, None) if radius else world.Probe(None, (0.06, 0.4, 0.02))
+    time = np.arange(0, 9, 0.02)
+    y, z = (np.interp(time, PRESSED[0], PRESSED[i]) for i in (1, 2))
+    path = np.stack([np.zeros_like(time), y, probe.lowest + z], axis=1)
+
+    def record(*hidden):
+        signals = world.respond(world.touch(probe, pad, time, path, hidden), pad, hidden)
+        return signals, world.converted(signals.reading, pad, hidden), world.net_force(signals)
+
+    return pad, record
+
+
+@pytest.mark.parametrize("name", [name for name in third.THIRD if name != "dead-texels"])
+def test_a_formula_of_the_third_family_changes_what_is_recorded_and_stays_finite(name):
+    """Nothing at all as the strength goes to zero, more the stronger it is."""
+    pad, record = pressed_pad()
+    _, plain, plain_force = record()
+    changes = []
+    for strength in (0.02, 0.3, 3.0):
+        made = [record(third.THIRD[name](np.random.default_rng(5), strength)) for _ in range(2)]
+        assert all(np.isfinite(part).all() for part in made[0][1:])
+        np.testing.assert_array_equal(made[0][1], made[1][1])  # the same seed, the same recording
+        reading, force = made[0][1:]
+        shown = (reading - plain) / np.ptp(plain) if name not in cases.IN_FORCE else (force - plain_force) / np.ptp(plain_force)
+        changes.append(np.sqrt(np.mean(shown**2)))
+    assert changes[0] < 0.1 * changes[2] and changes[0] < changes[1] < changes[2] and changes[2] > 0.02
+
+
+def test_floating_inputs_forget_their_charge_and_feel_nothing():
+    pad, record = pressed_pad()
+    for strength, count in ((0.02, 1), (0.3, 2), (3.0, 8)):
+        hidden = third.dead_texels(np.random.default_rng(5), strength)
+        dead = hidden.values["texels"]
+        assert len(dead) == count and set(np.diff(dead)) <= {world.COLUMNS}
+        (_, plain, _), (_, reading, _) = record(), record(hidden)
+        alive = np.setdiff1d(np.arange(84), dead)
+        np.testing.assert_array_equal(reading[:, alive], plain[:, alive])
+        charge = np.abs(reading[:, dead] - pad.zero)
+        assert (np.diff(charge, axis=0) < 0).all() and charge.max() < 0.2 * third._full(pad)
+
+
+def test_a_fractional_solid_relaxes_as_the_complementary_error_function():
+    """E of order 1/2 is known: E(-√t) = exp(t) erfc(√t). The integral ends where r^(1/2) = 3e-7 of it is left."""
+    from scipy.special import erfcx
+
+    time = np.array([0.0, 0.01, 0.3, 2.0, 40.0])
+    np.testing.assert_allclose(third._mittag_leffler(time, 0.5), erfcx(np.sqrt(time)), atol=1e-6)
+
+
+def test_the_plate_hands_forces_on_and_loses_none():
+    pad, record = pressed_pad()
+    _, plain, _ = record()
+    _, spread, _ = record(third.load_spreading(np.random.default_rng(0), 1.0))
+    np.testing.assert_allclose((spread - pad.zero).sum(axis=1), (plain - pad.zero).sum(axis=1), atol=1e-9 * np.ptp(plain) * 84)
+
+
+def test_three_averages_delay_a_ramp_by_one_and_a_half_of_their_width():
+    pad, record = pressed_pad(radius=None)
+    effect_ = third.lag(np.random.default_rng(0), 0.8)
+    before, _, _ = record()
+    after, _, _ = record(effect_)
+    ramp = slice(round(2.2 / 0.02), round(2.9 / 0.02))  # 1 mm/s for longer than the 0.6 s that the filter remembers
+    slope = pad.gain * pad.k * 1e-3
+    late = (before.reading - after.reading)[ramp] / slope
+    # Boxes are whole sixteenths of a sample and end half of one early.
+    np.testing.assert_allclose(late, 1.5 * effect_.values["width"], atol=1.5 * 0.02 / 16 + 1e-9)
+
+
+def test_bergs_friction_is_a_hyperbola_from_each_reversal_and_turns_with_the_way():
+    pad, record = pressed_pad(radius=None)
+    hidden = third.hysteresis(np.random.default_rng(2), 0.4)
+    plain, loop = record()[0], record(hidden)[0]
+    friction = (loop.force - plain.force)[:, 0] / (hidden.values["share"] * pad.k * third.DEEP)
+    depth, length = plain.depth[:, 0], hidden.values["length"]
+    first = (plain.time > 1.1) & (plain.time < 2.9)
+    np.testing.assert_allclose(friction[first], depth[first] / (length + depth[first]), rtol=1e-9)
+    back = (plain.time > 3.1) & (plain.time < 3.9)
+    held, gone = 3e-3 / (length + 3e-3), 3e-3 - depth[back]
+    np.testing.assert_allclose(friction[back], held - (1 + held) * gone / (length * (1 + held) + gone), rtol=1e-9)
+
+
+def test_sneak_currents_show_on_the_fourth_corner_alone():
+    """Three loaded texels at the corners of a rectangle: the fourth reads a third of what each carries, times the share."""
+    pad, _ = pressed_pad()
+    contact = world.Contact(np.arange(2) * 0.02, *(np.zeros((2, 84)),) * 6)
+    reading = np.full((2, 84), pad.zero)
+    corners = [2 * world.COLUMNS + 1, 2 * world.COLUMNS + 4, 9 * world.COLUMNS + 4]
+    reading[1, corners] += 300.0
+    signals = world.Signals(contact, np.zeros((2, 84)), np.zeros((2, 84, 3)), reading.copy())
+    third.crosstalk(np.random.default_rng(0), 0.5).reading(signals, pad)
+    expected = reading.copy()
+    expected[1, 9 * world.COLUMNS + 1] += 0.5 * 0.2 * 100.0
+    np.testing.assert_allclose(signals.reading, expected, rtol=1e-12)
+
+
+def test_three_effects_are_three_and_act_in_their_order():
+    for number in range(3):
+        hidden = cases._names("three", number, np.random.default_rng(number), True)
+        assert len(set(hidden)) == 3 and hidden == sorted(hidden, key=cases.ORDER.index)
+    case = cases.draw("three", 1)
+    assert len(case.answer) == 3 and all(form.form not in third.THIRD for form in case.hidden) and len(case.share) == 3
 
 
 def test_friction_is_coulombs_once_it_slides():
@@ -116,6 +227,9 @@ def test_outcomes():
     assert say([], [], "no gap", False) == "no gap"
     assert say([], ["drift"], "explained", False) == "wrong"
     assert say(["creep", "lag"], ["lag"], "explained", False) == "part"
+    assert say(["creep", "lag", "drift"], ["lag"], "explained", False) == "part"
+    assert say(["creep", "lag", "drift"], ["lag", "drift"], "explained", True) == "right"
+    assert say(["creep", "lag", "drift"], ["lag", "drift", "wear"], "explained", False) == "wrong"
 
 
 def test_figures_and_confusion_from_results():
@@ -139,8 +253,8 @@ def test_figures_and_confusion_from_results():
 
 
 def test_a_whole_run_has_every_kind_and_grows_without_changing():
-    small, whole = gap.plan_of(20, 1000), gap.plan_of(240, 1000)
-    assert len(whole) == 240 and {kind for kind, _ in small} == set(gap.MIX)
+    small, whole = gap.plan_of(20, 1000), gap.plan_of(sum(gap.MIX.values()), 1000)
+    assert len(whole) == 390 and {kind for kind, _ in small} == set(gap.MIX)
     assert set(small) <= set(whole)
 
 
