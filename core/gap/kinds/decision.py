@@ -8,9 +8,7 @@ and the kind are one group of which the recordings do not tell the member.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
-import numpy as np
+from dataclasses import dataclass, field
 
 from .decision_numbers import LEAST_SUPPORT, RIVAL_MARGIN, TIE
 from .search import KindSearch, ScoredSet, floor_of
@@ -27,17 +25,14 @@ class NamedKind:
         By how much the best score without it is worse.
     rivals : tuple of str
         Kinds that would do nearly as well in its place.
-    next_best : str
-        The kind that does best in its place; empty if none was fitted there.
-    leaves : float
-        How many times as much of the gap that one leaves.
+    leaves : dict of str to float
+        How many times as much of the gap each other kind that was fitted in its place leaves.
     """
 
     kind: str
     support: float
     rivals: tuple[str, ...]
-    next_best: str = ""
-    leaves: float = np.inf
+    leaves: dict[str, float] = field(default_factory=dict)
 
     @property
     def is_clear(self) -> bool:
@@ -64,6 +59,11 @@ class Decision:
         return self.chosen.kinds
 
     @property
+    def clear(self) -> dict[str, NamedKind]:
+        """Those that are supported and have no rival, by name."""
+        return {one.kind: one for one in self.named if one.is_clear}
+
+    @property
     def is_clear(self) -> bool:
         """Whether each of them is supported and has no rival."""
         return all(one.is_clear for one in self.named)
@@ -82,7 +82,9 @@ def decided(search: KindSearch) -> Decision:
         names = [next(iter(one.kinds - beside)) for one in others]
         rivals = [name for name, one in zip(names, others, strict=True) if one.score <= chosen.score + RIVAL_MARGIN]
         least = floor_of(search.recorded)
-        leaves = [(one.solution.excess + least) / (chosen.solution.excess + least) for one in others]
-        nearest = (names[0], leaves[0]) if names else ("", np.inf)
-        named.append(NamedKind(kind, search.support(kind), tuple(rivals), *nearest))
+        leaves = {
+            name: (one.solution.excess + least) / (chosen.solution.excess + least)
+            for name, one in zip(names, others, strict=True)
+        }
+        named.append(NamedKind(kind, search.support(kind), tuple(rivals), leaves))
     return Decision(chosen, tuple(named))

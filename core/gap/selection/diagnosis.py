@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Generator, Iterator
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import TypeVar
 
 import numpy as np
 
@@ -36,7 +37,7 @@ from .between_recordings import (
     with_common_zero,
     with_own_numbers,
 )
-from .candidates import FittedCandidate, candidates, scales_of
+from .candidates import DIRECTLY_ESTIMATED, FittedCandidate, candidates, scales_of
 from .check_recordings import check_views, checked
 from .confidence import EXPLAINED, UNSURE_CONFIDENCE
 from .contact_heights import with_starting_heights
@@ -45,6 +46,8 @@ from .forms_at_bounds import without_bounds_of_forms
 from .forward_selection import ForwardSelection, SelectionState
 from .gap_sizes import FORCES, READINGS, UNRESOLVED_SQUARE, GapSizes, friction_kinds
 from .harmful_effects import without_harmful_effects
+from .identifiability import curvature_ratio, indistinguishable
+from .kind_choice import choose_kinds
 from .outlying_channels import outlying_channels, without_channels
 from .screening import screen
 from .verdict import conclude
@@ -56,10 +59,15 @@ BASE_MODEL_BEGINS, SELECTION_BEGINS = 40, 60
 """Share of the whole work, in thousandths, at which the fit of the base model and the selection of effects begin."""
 OTHER_SEARCHES_BEGIN = 500
 """The same for searches that ask how recordings differ."""
+SECOND_OPINION_BEGINS, FORMS_OF_KINDS_BEGIN = 800, 900
+"""The same for the search by kinds, where the first one leaves doubts, and for the forms of what it names."""
 SETTLED_SHARE = 0.05
 """Share of the base model's gap. If a search explains more than the rest of it, no search asks how recordings differ."""
 LEAST_NOISE = 0.8
 """Least mean square of the noise in units of its estimate: the estimate is not trusted to be too large by more than this."""
+NOT_NEEDED = "the kinds that were found explain the recordings without it"
+
+Outcome = TypeVar("Outcome")
 
 
 def diagnose(rig: Rig) -> Job[Diagnosis]:
@@ -79,17 +87,31 @@ def diagnose(rig: Rig) -> Job[Diagnosis]:
     noise, full = prepared(rig, predictors)
     yield Progress("base model", BASE_MODEL_BEGINS, TOTAL_WORK)
     plain = _search_of(rig, predictors, noise, full, faults)
-    yield from _selected(plain, SELECTION_BEGINS, OTHER_SEARCHES_BEGIN if may_differ(rig) else TOTAL_WORK)
+    yield from _selected(plain, SELECTION_BEGINS, OTHER_SEARCHES_BEGIN if may_differ(rig) else SECOND_OPINION_BEGINS)
     best = plain
     if may_differ(rig) and not _is_settled(plain):
         best = yield from _best_of_other_searches(plain)
+    if best is plain and _is_doubtful(plain.result):
+        best = yield from _second_opinion(plain)
     best.result.stages = _stages(best.result, best.views)
     return best.result
 
 
 def _selected(search: _Search, begins: int, ends: int) -> Iterator[Progress]:
     """Select the effects of a search, between two shares of the whole work."""
-    for what, share in _select_effects(search.result, search.views):
+    yield from _progress_of(_select_effects(search.result, search.views), begins, ends)
+
+
+def _progress_of(
+    work: Generator[tuple[str, float], None, Outcome], begins: int, ends: int
+) -> Generator[Progress, None, Outcome]:
+    """Progress of a work that says which share of it is done, between two shares of the whole work."""
+    while True:
+        try:
+            what, share = next(work)
+        except StopIteration as stop:
+            outcome: Outcome = stop.value
+            return outcome
         yield Progress(what, begins + int((ends - begins) * share), TOTAL_WORK)
 
 
@@ -109,7 +131,7 @@ def _best_of_other_searches(plain: _Search) -> Generator[Progress, None, _Search
         The best of them, or the plain one.
     """
     own, session, best = _search_with_own_numbers(plain), _search_of_one_session(plain), plain
-    middle = (OTHER_SEARCHES_BEGIN + TOTAL_WORK) // 2
+    middle = (OTHER_SEARCHES_BEGIN + SECOND_OPINION_BEGINS) // 2
     if session is not None and session.is_wanted:
         yield from _selected(session, OTHER_SEARCHES_BEGIN, middle)
         if _is_one_session(session, plain):
@@ -118,11 +140,48 @@ def _best_of_other_searches(plain: _Search) -> Generator[Progress, None, _Search
             if session.left <= own.left_of_base:
                 return session
     if own.is_wanted:
-        yield from _selected(own, middle, TOTAL_WORK)
+        yield from _selected(own, middle, SECOND_OPINION_BEGINS)
         if own.left < MOST_LEFT * plain.left and (best is plain or own.left < best.left):
             _name_differences(own, plain, session)
             best = own
     return best
+
+
+def _is_doubtful(result: Diagnosis) -> bool:
+    """Whether some effects are not sure, and recordings like these could tell them."""
+    curvature = curvature_ratio(result.of("fit"), result.best.model)
+    lacking = any(indistinguishable(result.coverage, one.name, curvature) for one in result.findings)
+    return not lacking and not result.misleading_faults and any(one.confidence <= UNSURE_CONFIDENCE for one in result.findings)
+
+
+def _sure_names(result: Diagnosis) -> set[str]:
+    """Names of the effects that are sure."""
+    return {one.name for one in result.findings if one.confidence > UNSURE_CONFIDENCE}
+
+
+def _second_opinion(plain: _Search) -> Generator[Progress, None, _Search]:
+    """Search with nothing but the kinds that the recordings show whatever their formulas.
+
+    Returns
+    -------
+    _Search
+        It, if the library's forms bear all of these kinds out, or if it is sure of more; else the plain search.
+    """
+    before, choice = plain.result, choose_kinds(plain.views, plain.result.base, plain.result.noise)
+    decision = yield from _progress_of(choice, SECOND_OPINION_BEGINS, FORMS_OF_KINDS_BEGIN)
+    if _sure_names(before).issuperset(decision.clear):
+        return plain
+    result = replace(before, best=before.base, structure=before.base_structure, chosen_kinds=decision.clear)
+    result.findings, result.ambiguous, result.ruled_out, result.intervals, result.outlying = [], [], [], [], []
+    second = _Search(result, plain.views)
+    yield from _selected(second, FORMS_OF_KINDS_BEGIN, TOTAL_WORK)
+    sure = _sure_names(result)
+    if result.verdict != "explained" or not (sure > _sure_names(before) or sure.issuperset(decision.clear)):
+        return plain
+    named = {one.name for one in result.findings}
+    reasons = {one.name: NOT_NEEDED for one in before.findings} | dict(before.ruled_out)
+    result.ruled_out = [(name, why) for name, why in reasons.items() if name not in named]
+    return second
 
 
 @dataclass
@@ -289,13 +348,14 @@ def _without_faults(rig: Rig) -> tuple[Rig, list[Predictor], list[DataFault]]:
     return rig, predictors_of(rig.trials, rig), faults
 
 
-def _select_effects(result: Diagnosis, view_set: ViewSet) -> Iterator[tuple[str, float]]:
+def _select_effects(result: Diagnosis, view_set: ViewSet) -> Generator[tuple[str, float], None, None]:
     """Add effects to the base model while each improves it enough; write the outcome into `result`."""
     base = SelectionState(result.base, held_out_squares(view_set.whole, result.base))
     start = base.means
     noise = np.array([min(1.0, start[READINGS]), min(_unloaded_force_noise(view_set, result.base), start[FORCES])])
     gap_sizes = GapSizes(start, noise, result.base.count.sum(axis=0).astype(float))
-    selection = ForwardSelection(view_set, result.scales, result.coverage, gap_sizes)
+    kinds = {*result.chosen_kinds, *friction_kinds(), *DIRECTLY_ESTIMATED} if result.chosen_kinds else None
+    selection = ForwardSelection(view_set, result.scales, result.coverage, gap_sizes, kinds)
     if is_scatter_of_repeats(result.noise, result.base.sse, result.base.count):
         state = base
     else:

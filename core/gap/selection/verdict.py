@@ -81,7 +81,10 @@ def _judge_effects(result: Diagnosis, state: SelectionState, gap_sizes: GapSizes
     is_open = any(gap_sizes.has_gap(quantity) and left_out[quantity] < EXPLAINED for quantity in (READINGS, FORCES))
     result.verdict = _verdict(result, gap_sizes, is_open or (bool(fitted) and result.check.is_refuted))
     for index, effect in enumerate(effects):
+        chosen = result.chosen_kinds.get(effect.name)
         times_worse, leaves = _alternatives(effect, state, {e.name for e in effects})
+        if chosen is not None:  # no formula has taken part in this comparison
+            times_worse = leaves = chosen.leaves
         rivals = _rivals(effect, state, result, times_worse, gap_sizes)
         weight = 1.0 / (1.0 + sum(ratio**RIVAL_EXPONENT for ratio in times_worse.values()))
         quantity = gap_sizes.quantity_for(effect.name)
@@ -89,9 +92,8 @@ def _judge_effects(result: Diagnosis, state: SelectionState, gap_sizes: GapSizes
         unsettled = unsettled_parameters(effect, index, result, min(leaves.values(), default=np.inf))
         confidence = weight * (0.5 + 0.5 * share if share >= least_share(effect.name, leaves) else 0.5 * share)
         absorbs = is_open and may_absorb_misfit(effect, state)
-        if unsettled or (fitted and result.check.refutes(quantity)):
-            confidence = min(confidence, UNSURE_CONFIDENCE)
-        if rivals or (len(fitted) > 1 and (absorbs or is_doubtful(effect, state, fitted, gap_sizes))):
+        misfits = chosen is None and len(fitted) > 1 and (absorbs or is_doubtful(effect, state, fitted, gap_sizes))
+        if rivals or misfits or (unsettled and chosen is None) or (fitted and result.check.refutes(quantity)):
             confidence = min(confidence, UNSURE_CONFIDENCE)
         if rivals:
             result.ambiguous.append((effect.name, *rivals))
