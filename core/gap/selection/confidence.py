@@ -99,9 +99,21 @@ def may_absorb_misfit(effect: Effect, state: SelectionState) -> bool:
     """
     mine = state.improvements[effect.name].of_gap if effect.name in state.improvements else 0.0
     larger = any(improvement.of_gap > mine for name, improvement in state.improvements.items() if name != effect.name)
-    return (
-        larger and effect.name not in DIRECTLY_ESTIMATED and any(isinstance(value, tuple) for value in effect.values.values())
-    )
+    return larger and effect.name not in DIRECTLY_ESTIMATED and _has_texel_numbers(effect)
+
+
+def kinds_can_settle(effect: Effect) -> bool:
+    """Return whether the search by kinds tells anything about an effect.
+
+    It knows no friction. Dead texels and steps are seen in the readings themselves. Numbers of single texels absorb what
+    another kind leaves, whether that is a formula or not.
+    """
+    return effect.name not in {*friction_kinds(), *DIRECTLY_ESTIMATED} and not _has_texel_numbers(effect)
+
+
+def _has_texel_numbers(effect: Effect) -> bool:
+    """Whether an effect has a parameter of which each texel has its own value."""
+    return any(isinstance(value, tuple) for value in effect.values.values())
 
 
 def unsettled_parameters(effect: Effect, index: int, result: Diagnosis, lead: float = 1.0) -> tuple[str, ...]:

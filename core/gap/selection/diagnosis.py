@@ -39,7 +39,7 @@ from .between_recordings import (
 )
 from .candidates import DIRECTLY_ESTIMATED, FittedCandidate, candidates, scales_of
 from .check_recordings import check_views, checked
-from .confidence import EXPLAINED, UNSURE_CONFIDENCE
+from .confidence import EXPLAINED, UNSURE_CONFIDENCE, kinds_can_settle
 from .contact_heights import with_starting_heights
 from .findings import Diagnosis, Finding
 from .forms_at_bounds import without_bounds_of_forms
@@ -148,10 +148,13 @@ def _best_of_other_searches(plain: _Search) -> Generator[Progress, None, _Search
 
 
 def _is_doubtful(result: Diagnosis) -> bool:
-    """Whether some effects are not sure, and recordings like these could tell them."""
+    """Whether some effects are not sure, of which the search by kinds can tell more with these recordings."""
+    effects = result.best.model.effects
+    doubts = [one for one in result.findings if one.confidence <= UNSURE_CONFIDENCE and kinds_can_settle(effects[one.effect])]
+    if not doubts or result.misleading_faults:
+        return False
     curvature = curvature_ratio(result.of("fit"), result.best.model)
-    lacking = any(indistinguishable(result.coverage, one.name, curvature) for one in result.findings)
-    return not lacking and not result.misleading_faults and any(one.confidence <= UNSURE_CONFIDENCE for one in result.findings)
+    return not any(indistinguishable(result.coverage, one.name, curvature) for one in result.findings)
 
 
 def _sure_names(result: Diagnosis) -> set[str]:

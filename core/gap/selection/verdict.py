@@ -17,6 +17,7 @@ from .confidence import (
     EXPLAINED,
     UNSURE_CONFIDENCE,
     is_doubtful,
+    kinds_can_settle,
     least_share,
     may_absorb_misfit,
     unsettled_parameters,
@@ -81,7 +82,7 @@ def _judge_effects(result: Diagnosis, state: SelectionState, gap_sizes: GapSizes
     is_open = any(gap_sizes.has_gap(quantity) and left_out[quantity] < EXPLAINED for quantity in (READINGS, FORCES))
     result.verdict = _verdict(result, gap_sizes, is_open or (bool(fitted) and result.check.is_refuted))
     for index, effect in enumerate(effects):
-        chosen = result.chosen_kinds.get(effect.name)
+        chosen = result.chosen_kinds.get(effect.name) if kinds_can_settle(effect) else None
         times_worse, leaves = _alternatives(effect, state, {e.name for e in effects})
         if chosen is not None:  # no formula has taken part in this comparison
             times_worse = leaves = chosen.leaves

@@ -1,12 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Doubts of the search by formulas are settled by kinds that need no formula, as far as the library's forms bear them out."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import gap_cases as cases
 import pytest
 
-from palpate.core.gap.fitting.noise_floor import Coverage
+from palpate.core.effects.engine.registry import effect
 from palpate.core.gap.forward.predictor import predictors_of
 from palpate.core.gap.kinds.decision import Decision, NamedKind
 from palpate.core.gap.selection import diagnosis
@@ -86,13 +87,24 @@ def test_of_several_kinds_those_are_named_that_the_forms_bear_out(creeping, monk
     assert _finished(diagnosis._second_opinion(creeping)) is creeping
 
 
-def test_no_kinds_are_searched_for_where_the_recordings_lack_what_tells_them(creeping, monkeypatch):
+@pytest.mark.parametrize(
+    ("name", "form", "confidence", "cycles", "asked"),
+    [
+        ("hysteresis", "play", UNSURE_CONFIDENCE, 5, True),
+        ("hysteresis", "play", 0.9, 5, False),  # it is sure
+        ("hysteresis", "play", UNSURE_CONFIDENCE, 1, False),  # the recordings lack what tells it
+        ("stribeck", "gaussian", UNSURE_CONFIDENCE, 5, False),  # the search by kinds knows no friction
+        ("gain-mismatch", "listed", UNSURE_CONFIDENCE, 5, False),  # numbers of single texels absorb what others leave
+    ],
+)
+def test_kinds_are_asked_only_for_doubts_that_they_can_settle(creeping, monkeypatch, name, form, confidence, cycles, asked):
     result = creeping.result
-    for confidence, cycles, asked in ((0.9, 5, False), (UNSURE_CONFIDENCE, 5, True), (UNSURE_CONFIDENCE, 1, False)):
-        monkeypatch.setattr(result, "findings", [Finding(0, "hysteresis", "play", confidence, ())])
-        said = {**vars(result.coverage), "cycles": cycles}
-        monkeypatch.setattr(result, "coverage", Coverage(**said))
-        assert diagnosis._is_doubtful(result) == asked
+    values = {"factor": (1.0,) * (cases.ROWS * cases.COLUMNS)} if name == "gain-mismatch" else {}
+    model = result.base.model.with_effect(effect(name, form, **values))
+    monkeypatch.setattr(result, "best", replace(result.base, model=model))
+    monkeypatch.setattr(result, "findings", [Finding(0, name, form, confidence, ())])
+    monkeypatch.setattr(result, "coverage", replace(result.coverage, cycles=cycles))
+    assert diagnosis._is_doubtful(result) == asked
 
 
 def test_what_is_sure_already_is_not_fitted_again(creeping, monkeypatch):
