@@ -293,7 +293,9 @@ DRAWN = {
         coloured={"spread": 0.06},
     ),
     "saturation": _reading_over_force(),
-    "quantization": _reading_over_force(round={"step": 0.25}, floor={"step": 0.25}, bits={"bits": 4, "range": 2.4}),
+    "quantization": _reading_over_force(
+        round={"step": 0.25}, floor={"step": 0.25}, bits={"bits": 4, "range": 2.4}, power={"first": 0.1}
+    ),
 }  # fmt: skip
 """The experiment that shows each effect."""
 

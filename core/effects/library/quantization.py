@@ -28,13 +28,23 @@ def converter(signal: np.ndarray, time: np.ndarray, values: Values, transducers:
 
 
 def companded(signal: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
-    """Round towards the reading without load, in steps that grow with the distance from it."""
+    """Round in steps that are even after a logarithm of the distance from the reading without load."""
     scale, growth = scalar(values, "scale"), scalar(values, "growth")
     if growth <= 0.0:
         return signal
     change = signal - transducers.zero
-    steps = np.floor(np.log1p(np.abs(change) / scale) / growth)
+    steps = np.floor(np.log1p(np.abs(change) / scale) / growth + scalar(values, "rounding"))
     return transducers.zero + np.sign(change) * scale * np.expm1(growth * steps)
+
+
+def power(signal: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
+    """Round in steps that are even after a power of the distance from the reading without load."""
+    first, exponent = scalar(values, "first"), scalar(values, "exponent")
+    if first <= 0.0:
+        return signal
+    change = signal - transducers.zero
+    steps = np.floor((np.abs(change) / first) ** exponent + scalar(values, "rounding"))
+    return transducers.zero + np.sign(change) * first * steps ** (1.0 / exponent)
 
 
 def _stepped(signal: np.ndarray, step: float, rounding: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
@@ -43,6 +53,9 @@ def _stepped(signal: np.ndarray, step: float, rounding: Callable[[np.ndarray], n
 
 
 _STEP = Parameter("step", "unit", 0.01, 0.0, 1e4, "Width Δ of a step.")
+_ROUNDING = Parameter(
+    "rounding", "1", 0.0, 0.0, 0.5, "Share h of a step that is rounded up: 0 cuts off, 0.5 rounds to the nearest."
+)
 
 KIND = Kind(
     name="quantization",
@@ -83,14 +96,28 @@ KIND = Kind(
         ),
         Form(
             "companding",
-            "r = A · (exp(b · floor(ln(1 + r₀/A) / b)) − 1)",
+            "r = A · (exp(b · floor(ln(1 + r₀/A) / b + h)) − 1)",
             "ITU-T Recommendation G.711 (1988): companding by a logarithm",
             (
                 Parameter("scale", "unit", 0.1, 1e-6, 1e5, "Reading A above which the steps grow with the reading.", log=True),
                 Parameter("growth", "1", 0.05, 0.0, 3.0, "Width b of a step, as a share of the sum of A and the reading."),
+                _ROUNDING,
             ),
             neutral={"growth": 0.0},
             memoryless=companded,
+            after_conversion=True,
+        ),
+        Form(
+            "power",
+            "r = s · floor((r₀/s)ᵖ + h)^(1/p)",
+            "Max, IRE Trans. Inf. Theory 6 (1960): uneven steps as even steps behind a compressor, here a power",
+            (
+                Parameter("first", "unit", 0.02, 0.0, 1e4, "Reading s at the end of the first step."),
+                Parameter("exponent", "1", 0.5, 0.1, 3.0, "Power p of the reading that the converter divides evenly."),
+                _ROUNDING,
+            ),
+            neutral={"first": 0.0},
+            memoryless=power,
             after_conversion=True,
         ),
     ),

@@ -12,6 +12,7 @@ from ..fitting.least_squares import TrialView
 from ..forward.contact_phases import relative_load
 from ..forward.predictor import Model
 from .candidates import Candidate
+from .companded_steps import CHARACTERISTIC_NOISE, LEAST_CHARACTERISTIC, companded_steps
 
 MOST_LEVELS = 48
 """Most distinct values of all readings for them to be quantization levels; noise alone makes thousands."""
@@ -36,8 +37,9 @@ COARSEST_FREQUENCY, FREQUENCY_STEP, STEP_IN_NOISE = 5.0, 0.12, 2.5
 """Frequencies of the search for fine steps, in units of one over the range: from a fifth of the range (coarser steps are seen
 as levels) to steps of 2.5 standard deviations of the noise."""
 MOST_FREQUENCIES = 20000
-LEAST_CHARACTERISTIC, CHARACTERISTIC_NOISE = 0.2, 5.0
-"""Least magnitude of the characteristic function at the frequency of the steps: 0.2 + 5 / √(number of readings)."""
+AS_CLEAR = 0.9
+"""Of a power and a logarithm the one counts behind which steps are seen best, and the other if its characteristic function
+reaches this share. Chosen by eye from 40 readings of ``python -m benchmarks companding``."""
 
 
 def unresponsive_texels(views: Sequence[TrialView], model: Model, candidate: Candidate, texels: int) -> Effect | None:
@@ -94,40 +96,88 @@ def quantization_starts(views: Sequence[TrialView], model: Model, candidate: Can
     values = moving_readings(views, model)
     if len(values) < LEAST_READINGS:
         return []
-    levels = few_levels(values)
+    levels, rest = few_levels(values), unloaded_reading(views) - model.parameters.zero
     if candidate.form.name == "companding":
-        return [] if levels is None else companding_starts(levels, unloaded_reading(views) - model.parameters.zero, candidate)
+        return _companding_starts(values - rest, candidate) if levels is None else companding_starts(levels, rest, candidate)
+    if candidate.form.name == "power":
+        return _power_starts(values - rest, candidate) if levels is None else power_starts(levels, rest, candidate)
     if levels is not None:
         apart = np.diff(levels)
         tried = np.unique([np.median(apart), apart.mean(), apart.max(), float(np.average(apart, weights=apart))])
         return [Effect(candidate.name, candidate.form.name, {"step": float(step)}) for step in tried]
-    noise, full = views[0].noise[0], float(np.ptp(values))
+    step = even_steps(values, views[0].noise[0])
+    return [] if step is None else [Effect(candidate.name, candidate.form.name, {"step": step})]
+
+
+def _companding_starts(above_rest: np.ndarray, candidate: Candidate) -> list[Effect]:
+    """Steps behind a logarithm that are seen in many levels."""
+    seen = companded_steps(above_rest)
+    found = [one for one in seen if one.logarithmic and one.strength >= AS_CLEAR * seen[0].strength and one.bend > 0.0]
+    return [effect for one in found for effect in _roundings(candidate, {"scale": one.scale, "growth": one.growth})]
+
+
+def _power_starts(above_rest: np.ndarray, candidate: Candidate) -> list[Effect]:
+    """Steps behind a power that are seen in many levels."""
+    seen = companded_steps(above_rest)
+    bounds = {p.name: p for p in candidate.form.parameters}["exponent"]
+    found = [one for one in seen if not one.logarithmic and one.strength >= AS_CLEAR * seen[0].strength]
+    found = [one for one in found if bounds.low <= one.exponent <= bounds.high]
+    return [effect for one in found for effect in _roundings(candidate, {"first": one.first, "exponent": one.exponent})]
+
+
+def _roundings(candidate: Candidate, values: dict[str, float]) -> list[Effect]:
+    """The effect of a converter that cuts off, and of one that rounds to the nearest."""
+    return [Effect(candidate.name, candidate.form.name, {**values, "rounding": share}) for share in (0.0, 0.5)]
+
+
+def even_steps(values: np.ndarray, noise: float) -> float | None:
+    """Return the even step of readings by their characteristic function, in the sensor's unit; None if none is seen."""
+    full = float(np.ptp(values))
     if full == 0.0:
-        return []
+        return None
     frequency = np.arange(COARSEST_FREQUENCY / full, 1.0 / (STEP_IN_NOISE * noise), FREQUENCY_STEP / full)
     if not 2 < len(frequency) < MOST_FREQUENCIES:
-        return []
+        return None
     size = np.array([abs(np.exp(2j * np.pi * f * values).mean()) for f in frequency])
     if size.max() < LEAST_CHARACTERISTIC + CHARACTERISTIC_NOISE / np.sqrt(len(values)):
-        return []
+        return None
     best = frequency[int(np.argmax(size))]  # harmonics are smaller, because noise blurs them more
     fine = best + np.linspace(-FREQUENCY_STEP, FREQUENCY_STEP, 49) / full
-    top = fine[int(np.argmax([abs(np.exp(2j * np.pi * f * values).mean()) for f in fine]))]
-    return [Effect(candidate.name, candidate.form.name, {"step": float(1.0 / top)})]
+    return float(1.0 / fine[int(np.argmax([abs(np.exp(2j * np.pi * f * values).mean()) for f in fine]))])
 
 
 def companding_starts(levels: np.ndarray, rest: float, candidate: Candidate) -> list[Effect]:
-    """Return the effect with the growing steps that fit some levels best: ``A (exp(b k) - 1)`` for the k-th level above
-    rest.
+    """Return the effect with the growing steps that fit a few levels best: ``A (exp(b k) - 1)`` for the k-th level above rest;
+    once cut off and once rounded. Empty if there are too few levels.
     """
     above = levels[levels > rest + 1e-9] - rest
     if len(above) < 3:
         return []
     growth = np.geomspace(0.01, 3.0, 200)
     lattice = np.expm1(growth[:, None] * np.arange(1, len(above) + 1))
+    scale, best = _nearest_lattice(lattice, above)
+    return _roundings(candidate, {"scale": scale, "growth": float(growth[best])})
+
+
+def power_starts(levels: np.ndarray, rest: float, candidate: Candidate) -> list[Effect]:
+    """Return the effect with the steps behind a power that fit a few levels best: ``s k^(1/p)`` for the k-th level above rest;
+    once cut off and once rounded. Empty if there are too few levels.
+    """
+    above = levels[levels > rest + 1e-9] - rest
+    if len(above) < 3:
+        return []
+    bounds = {p.name: p for p in candidate.form.parameters}["exponent"]
+    exponent = np.geomspace(max(bounds.low, 0.2), bounds.high, 200)
+    lattice = np.arange(1, len(above) + 1) ** (1.0 / exponent[:, None])
+    first, best = _nearest_lattice(lattice, above)
+    return _roundings(candidate, {"first": first, "exponent": float(exponent[best])})
+
+
+def _nearest_lattice(lattice: np.ndarray, above: np.ndarray) -> tuple[float, int]:
+    """Factor and number of the lattice (m, k) that comes nearest to levels (k,) after a factor."""
     scale = lattice @ above / (lattice * lattice).sum(axis=1)
     best = int(np.argmin(((above - scale[:, None] * lattice) ** 2).sum(axis=1)))
-    return [Effect(candidate.name, candidate.form.name, {"scale": float(scale[best]), "growth": float(growth[best])})]
+    return float(scale[best]), best
 
 
 def coarsest_step(views: Sequence[TrialView], model: Model) -> float:

@@ -50,6 +50,18 @@ def image(texel, value=1.0):
             {"scale": 0.5, "growth": np.log(2.0)},
             lambda f: np.sign(f) * np.choose(np.searchsorted([0.5, 1.5], np.abs(f), "right"), [0, 0.5, 1.5]),
         ),
+        (
+            "quantization",
+            "power",
+            {"first": 0.25, "exponent": 0.5},
+            lambda f: np.sign(f) * 0.25 * np.searchsorted([0.25, 1.0], np.abs(f), "right") ** 2.0,
+        ),
+        (
+            "quantization",
+            "power",
+            {"first": 0.25, "exponent": 1.0, "rounding": 0.5},
+            lambda f: np.sign(f) * 0.25 * np.floor(np.abs(f) / 0.25 + 0.5),
+        ),
         ("quantization", "bits", {"bits": 4, "range": 2.0}, lambda f: np.round(f * 8) / 8),
         ("drift", "linear", {"rate": 0.03}, lambda f: f + 0.03 * TIME[:, None]),
         ("drift", "warm-up", {"amount": 0.3, "time": 4.0}, lambda f: f + 0.3 * (1 - np.exp(-TIME[:, None] / 4))),

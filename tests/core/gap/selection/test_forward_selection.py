@@ -51,7 +51,8 @@ def test_a_handful_of_values_is_seen():
 def test_steps_that_grow_are_read_off():
     scale, growth = 0.02, 0.3
     levels = 7.0 + scale * np.expm1(growth * np.arange(-1, 12))
-    (found,) = companding_starts(levels, 7.0, Candidate(kind_of("quantization"), form_of("quantization", "companding")))
+    found, other = companding_starts(levels, 7.0, Candidate(kind_of("quantization"), form_of("quantization", "companding")))
+    assert (found.values["rounding"], other.values["rounding"]) == (0.0, 0.5)
     assert found.values["growth"] == pytest.approx(growth, rel=0.02) and found.values["scale"] == pytest.approx(scale, rel=0.05)
     assert not companding_starts(levels[:3], 7.0, Candidate(kind_of("quantization"), form_of("quantization", "companding")))
 
