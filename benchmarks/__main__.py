@@ -3,7 +3,8 @@
 
 A group is a module in this folder with `run()`, a generator of dictionaries:
 `name`, `value` and `unit`, and, where a peer was measured in turn with it, `peer`, `peer_value`, `ratio` and
-`goal`. Nothing is asserted here; a figure is a median and a reader judges it.
+`goal`. Nothing is asserted here; a figure is a median and a reader judges it. Options behind the name of one group go to its
+`command(arguments)`, if it has one.
 """
 
 from __future__ import annotations
@@ -43,6 +44,12 @@ def main(argv: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description="One JSON line per figure.")
     listed = ", ".join(known) or "none yet"
     parser.add_argument("group", nargs="*", help=f"what to measure (default: all): {listed}")
+    if argv is None:
+        argv = sys.argv[1:]
+    if argv and argv[0] in known and any(word.startswith("-") for word in argv[1:]):
+        command = getattr(importlib.import_module(f"{__package__}.{argv[0]}"), "command", None)
+        if command is not None:
+            return int(command(argv[1:]))
     chosen = parser.parse_args(argv).group or known
     for group in chosen:
         if group not in known:

@@ -66,7 +66,18 @@ def _size(free: Any, result: Any) -> int:
     return sum(len(result.rig.texels) if item.per_texel else 1 for item in free)
 
 
-def sindy(case: Any, result: Any, threshold: float = 0.1) -> tuple[list[str], float | None]:
+def sindy(case: Any, result: Any) -> tuple[list[str], float | None]:
+    """Return the name of the strongest term, and which share of the gap of the readings all of them close."""
+    strongest, weights = sindy_terms(result)
+    before = after = 0.0
+    for predictor in result.of("check"):
+        truth = case.clean[int(predictor.trial.name.removeprefix("trial_"))][0]
+        miss = (truth - predictor.predict(result.base.model).reading).ravel()
+        before, after = before + float(miss @ miss), after + float(((miss - _terms(predictor) @ weights) ** 2).sum())
+    return strongest, 1.0 - np.sqrt(after / before) if before > 0 else None
+
+
+def sindy_terms(result: Any, threshold: float = 0.1) -> tuple[list[str], np.ndarray]:
     """Sequentially thresholded least squares (Brunton, Proctor and Kutz, PNAS 113, 2016) on the residual of the readings."""
     rows = [(_terms(p), (p.trial.reading - p.predict(result.base.model).reading).ravel()) for p in result.of("fit")]
     gram = sum(x.T @ x for x, _ in rows)
@@ -82,13 +93,7 @@ def sindy(case: Any, result: Any, threshold: float = 0.1) -> tuple[list[str], fl
             break
         keep &= share >= threshold
     names = list(FEATURES.values())
-    strongest = [names[int(np.argmax(np.abs(weights) * size))]] if keep.any() else []
-    before = after = 0.0
-    for predictor in result.of("check"):
-        truth = case.clean[int(predictor.trial.name.removeprefix("trial_"))][0]
-        miss = (truth - predictor.predict(result.base.model).reading).ravel()
-        before, after = before + float(miss @ miss), after + float(((miss - _terms(predictor) @ weights) ** 2).sum())
-    return strongest, 1.0 - np.sqrt(after / before) if before > 0 else None
+    return [names[int(np.argmax(np.abs(weights) * size))]] if keep.any() else [], weights
 
 
 def _terms(predictor: Any) -> np.ndarray:

@@ -5,6 +5,9 @@ The confusion matrix goes to build/gap/confusion.txt, the table of docs/gap.md t
 
 The whole matrix is 390 cases, an hour and a half of one core; a fifth of it is run by default. Results are kept in build/gap/,
 one line a case, and a run goes on where the last one stopped, as long as neither the workflow nor the generator has changed.
+With options (``python -m benchmarks gap --help``) it writes the cases as rigs for other methods, scores their answers, and
+compares them with the baselines: docs/gap-benchmark.md.
+
 Environment:
 
 ``PALPATE_GAP_CASES``      how many cases (78), shared out over the kinds as in :data:`MIX`
@@ -38,6 +41,19 @@ from ._hidden import cases
 HOUSE = Path(__file__).resolve().parent.parent
 MIX = {"own": 60, "other": 60, "none": 30, "two": 40, "outside": 30, "poor": 20, "third": 100, "three": 50}
 """Cases of each kind in a whole run."""
+ROWS = {
+    "own": ("one effect, the library's own form", "95 %"),
+    "other": ("one effect, another formula", "85 %, ≤ 5 % wrong"),
+    "third": ("one effect, a formula on which no rule was set", "92 %, ≤ 2 % wrong"),
+    "none": ("nothing, wrong base and coloured noise", "≤ 2 % false alarms"),
+    "two": ("two effects", "75 % both, 90 % one and none wrong"),
+    "three": ("three effects", "60 % two or three and none wrong"),
+    "outside": ("outside the library", "90 % `unexplained`"),
+    "poor": ("too poor to tell", "none wrong"),
+}
+"""What is hidden in each kind of cases, in words, and the aim."""
+RIGHT = {"none": "no gap", "outside": "unexplained"}
+"""The outcome that is right where it is not that all is named."""
 FORMULAS = ("own", "other", "third")
 """Kinds of cases with one effect, by whose formula it has."""
 FAILED: dict[str, Any] = {"outcome": "failed", "sure": [], "said": [], "verdict": "failed", "ambiguous": [], "experiment": ""}
@@ -228,6 +244,16 @@ def _miss(case: cases.Case, result: Any, model: Any) -> float:
     return float(np.sqrt(square / count))
 
 
+# --- for other methods
+
+
+def command(arguments: list[str]) -> int:
+    """Write cases as rigs, have any method answer them, and score answers: docs/gap-benchmark.md."""
+    from . import _entry
+
+    return _entry.command(arguments)
+
+
 # --- figures
 
 
@@ -246,19 +272,9 @@ def confusion(results: list[dict]) -> str:
 
 def table(results: list[dict]) -> str:
     """Return what docs/gap.md says of a whole run, in Markdown."""
-    aims = {
-        "own": ("one effect, the library's own form", "95 %"),
-        "other": ("one effect, another formula", "85 %, ≤ 5 % wrong"),
-        "third": ("one effect, a formula on which no rule was set", "92 %, ≤ 2 % wrong"),
-        "none": ("nothing, wrong base and coloured noise", "≤ 2 % false alarms"),
-        "two": ("two effects", "75 % both, 90 % one and none wrong"),
-        "three": ("three effects", "60 % two or three and none wrong"),
-        "outside": ("outside the library", "90 % `unexplained`"),
-        "poor": ("too poor to tell", "none wrong"),
-    }
     words = {"right": "right", "part": "one of them", "wrong": "wrong", "ambiguous": "`ambiguous`"}
     text = ["| hidden | cases | outcome | aim |", "| --- | ---: | --- | --- |"]
-    for kind, (what, aim) in aims.items():
+    for kind, (what, aim) in ROWS.items():
         here = [r for r in results if r["kind"] == kind]
         counts = Counter(r["outcome"] for r in here)
         said = ", ".join(f"{count} {words.get(name, f'`{name}`')}" for name, count in counts.most_common())

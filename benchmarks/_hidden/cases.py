@@ -40,9 +40,12 @@ SHARE = (0.04, 0.12)
 """Of the full range: what a hidden effect does to the recording, root mean square."""
 IN_FORCE = ("stribeck", "viscous-friction")
 """Effects that show in the net force along the surface and not in the readings."""
-KINDS = ("other", "own", "none", "two", "outside", "poor", "third", "three")
+KINDS = ("other", "own", "none", "two", "outside", "poor", "third", "three", "simulated")
+"""The last one is for methods that learn from simulations: none to three effects in the library's own forms."""
 SEVERAL = {"two": 2, "three": 3}
 """Kinds of cases in which several effects are hidden, in formulas of :mod:`.other`, and how many."""
+SIMULATED = (0.1, 0.45, 0.3, 0.15)
+"""Shares of simulated cases with none to three effects."""
 ORDER = list(MAKERS)
 """The way from the contact to the reading, in which several effects act."""
 VAGUE = ("creep", "hysteresis", "lag", "softening")
@@ -107,12 +110,8 @@ def names_for(kind: str) -> list[str]:
 
 def draw(kind: str, number: int) -> Case:
     """Return case `number` of a kind; the same every time."""
-    rng = np.random.default_rng([zlib.crc32(kind.encode()), number])
-    pad = _pad(rng)
-    ball = bool(rng.integers(2)) if kind != "poor" else True
-    probe = Probe(rng.uniform(9e-3, 16e-3), None) if ball else Probe(None, (0.04, 0.07, 0.02))
-    names = _names(kind, number, rng, ball)
-    makers = {"own": OWN, "third": THIRD}.get(kind, {**MAKERS, **OUTSIDE})
+    rng, pad, probe, names = _begun(kind, number)
+    makers = {"own": OWN, "simulated": OWN, "third": THIRD}.get(kind, {**MAKERS, **OUTSIDE})
     way = list(POOR)[number % len(POOR)] if kind == "poor" else ""
     times, paths = _poor(way, rng, probe) if way in PROGRAMMES else _trials(rng, probe, pad)
     plain = [touch(probe, pad, time, path) for time, path in zip(times, paths, strict=True)]
@@ -122,7 +121,7 @@ def draw(kind: str, number: int) -> Case:
     signals = [respond(contact, pad, hidden) for contact in contacts]
     full = max(float(np.abs(s.reading - pad.zero).max()) for s in signals)
     noise = rng.uniform(0.003, 0.01) * full * (30.0 if way == "too noisy" else 1.0)
-    coloured = kind == "none" and number % 3 == 2
+    coloured = kind in ("none", "simulated") and number % 3 == 2
     readings = [converted(s.reading + noise * _noise(rng, s.reading.shape, coloured), pad, hidden) for s in signals]
     largest = max(float(np.abs(net_force(s)).max()) for s in signals)
     forces = [net_force(s) + 0.003 * largest * _noise(rng, (len(s.time), 3), coloured) for s in signals]
@@ -130,6 +129,20 @@ def draw(kind: str, number: int) -> Case:
     shares = tuple(share for _, share in found)
     words = _words(rng, pad, kind, number)
     return Case(kind, number, hidden, pad, probe, times, paths, readings, clean, shares, forces, noise, words)
+
+
+def answer_of(kind: str, number: int) -> list[str]:
+    """Return the names of what is hidden in a case, without drawing it."""
+    return _begun(kind, number)[-1]
+
+
+def _begun(kind: str, number: int) -> tuple[np.random.Generator, Pad, Probe, list[str]]:
+    """What a case is drawn from, in this order: random numbers, pad, probe, names of what is hidden."""
+    rng = np.random.default_rng([zlib.crc32(kind.encode()), number])
+    pad = _pad(rng)
+    ball = bool(rng.integers(2)) if kind != "poor" else True
+    probe = Probe(rng.uniform(9e-3, 16e-3), None) if ball else Probe(None, (0.04, 0.07, 0.02))
+    return rng, pad, probe, _names(kind, number, rng, ball)
 
 
 def _moved(hidden: tuple[Hidden, ...], pad: Pad, probe: Probe, plain: list[Contact]) -> list[Contact]:
@@ -161,6 +174,10 @@ def _names(kind: str, number: int, rng, ball: bool) -> list[str]:
     pool = names_for(kind) if kind not in SEVERAL else list(MAKERS)
     # A flat indenter loads all texels alike: where the pad sits, and what neighbours do, cannot show under it.
     blind = () if ball else ("misalignment", "load-spreading", "crosstalk")
+    if kind == "simulated":
+        known = [name for name in OWN if name not in blind]
+        count = rng.choice(len(SIMULATED), p=SIMULATED)
+        return sorted(map(str, rng.choice(known, size=count, replace=False)), key=ORDER.index)
     if kind not in SEVERAL:
         name = pool[number % len(pool)]
         return [name if name not in blind else pool[(number + 7) % len(pool)]]
@@ -170,7 +187,7 @@ def _names(kind: str, number: int, rng, ball: bool) -> list[str]:
 
 def _words(rng, pad: Pad, kind: str, number: int) -> dict:
     """What the rig says: rounded nominal values, now and then wrong ones."""
-    wrong = kind == "none" and number % 3 == 1
+    wrong = kind in ("none", "simulated") and number % 3 == 1
     k = pad.k * (rng.uniform(0.6, 1.6) if wrong else rng.uniform(0.95, 1.05))
     words = {
         "thickness": THICKNESS,
@@ -380,8 +397,8 @@ def _seen(effect: Hidden | None, name: str, signals: Signals, pad: Pad) -> np.nd
 # --- files
 
 
-def write(case: Case, folder: Path) -> Path:
-    """Write a case as a rig and return the path of its TOML file; nothing in the folder tells the answer."""
+def write(case: Case, folder: Path, name: str = "") -> Path:
+    """Write a case as a rig and return the path of its TOML file; only the number, in the name, says anything of the answer."""
     folder.mkdir(parents=True, exist_ok=True)
     if case.probe.radius is not None:
         shape = f"{{ sphere = {case.probe.radius!r} }}"
@@ -392,7 +409,7 @@ def write(case: Case, folder: Path) -> Path:
     )
     uses = [use for use, count in TRIALS for _ in range(count)]
     lines = [
-        'format = "palpate-rig/1"', f'name = "case {case.number}"', "[sensor]",
+        'format = "palpate-rig/1"', f'name = "{name or f"case {case.number}"}"', "[sensor]",
         f"grid = {{ rows = {ROWS}, columns = {COLUMNS}, pitch = [{PITCH!r}, {PITCH!r}] }}", words,
         "[indenter]", f"shape = {shape}",
     ]  # fmt: skip
