@@ -15,6 +15,7 @@ from .candidates import NOT_FITTED, candidates
 from .check_recordings import CheckedRecording
 from .confidence import (
     EXPLAINED,
+    UNLIKELY_CONFIDENCE,
     UNSURE_CONFIDENCE,
     is_doubtful,
     kinds_can_settle,
@@ -55,7 +56,19 @@ def conclude(result: Diagnosis, view_set: ViewSet, state: SelectionState, gap_si
         else one
         for one in result.findings
     ]
+    _doubt_without_rivals(result)
     _rule_out(result, state, gap_sizes)
+
+
+def _doubt_without_rivals(result: Diagnosis) -> None:
+    """Lower the confidence of names that are not sure and have no rival, unless faults of the data are why."""
+    if not result.misleading_faults:
+        groups = {name for group in result.ambiguous for name in group}
+        doubted = {one.name for one in result.findings if one.confidence <= UNSURE_CONFIDENCE} - groups
+        result.findings = [
+            replace(one, confidence=min(one.confidence, UNLIKELY_CONFIDENCE)) if one.name in doubted else one
+            for one in result.findings
+        ]
 
 
 def _closed_shares(result: Diagnosis, state: SelectionState, gap_sizes: GapSizes) -> ClosedShares:

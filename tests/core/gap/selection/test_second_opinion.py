@@ -12,9 +12,10 @@ from palpate.core.gap.forward.predictor import predictors_of
 from palpate.core.gap.kinds.decision import Decision, NamedKind
 from palpate.core.gap.selection import diagnosis
 from palpate.core.gap.selection.base_model import prepared
-from palpate.core.gap.selection.confidence import UNSURE_CONFIDENCE
+from palpate.core.gap.selection.confidence import UNLIKELY_CONFIDENCE, UNSURE_CONFIDENCE
 from palpate.core.gap.selection.findings import Finding
 from palpate.core.gap.selection.kind_choice import choose_kinds
+from palpate.core.gap.selection.verdict import _doubt_without_rivals
 
 
 def _finished(steps):
@@ -112,3 +113,12 @@ def test_what_is_sure_already_is_not_fitted_again(creeping, monkeypatch):
     monkeypatch.setattr(creeping.result, "findings", [Finding(0, "creep", "exponential", 0.9, ())])
     monkeypatch.setattr(diagnosis, "_select_effects", None)  # would fail if it was called
     assert _finished(diagnosis._second_opinion(creeping)) is creeping
+
+
+@pytest.mark.parametrize(("faults", "wear"), [([], UNLIKELY_CONFIDENCE), (["clock"], UNSURE_CONFIDENCE)])
+def test_a_doubted_name_without_a_rival_is_less_likely_than_one_of_a_group(faults, wear):
+    said = {"creep": UNSURE_CONFIDENCE, "wear": UNSURE_CONFIDENCE, "lag": 0.1, "drift": 0.9}
+    findings = [Finding(i, name, "form", confidence, ()) for i, (name, confidence) in enumerate(said.items())]
+    result = SimpleNamespace(findings=findings, ambiguous=[("creep", "softening")], misleading_faults=faults)
+    _doubt_without_rivals(result)
+    assert {one.name: one.confidence for one in result.findings} == {**said, "wear": wear}

@@ -1,0 +1,159 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How often the names that ``palpate gap`` says are right, by the confidence at which it says them.
+
+``python tools/reliability.py RESULTS.jsonl …`` takes results of ``make bench ONLY=gap`` (build/gap), prints the counts and
+draws docs/images/gap-reliability.png. Names below one half count, too: they are what cases without a sure name offer.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.optimize import minimize
+
+HOUSE = Path(__file__).resolve().parent.parent
+PICTURE = HOUSE / "docs" / "images" / "gap-reliability.png"
+BINS = (0.0, 0.3, 0.5, 0.8, 0.9, 0.95, 0.98, 1.0)
+"""Ends of the bins of confidence."""
+NEAREST = 1e-3
+"""Confidences nearer to 0 or 1 count as this near in the regression: a few hundred names say nothing of one in a thousand."""
+TICKS = (0.1, 0.3, 0.5, 0.8, 0.9, 0.95, 0.98, 0.995)
+"""Confidences that are written at the axis."""
+DEVIATIONS = 1.96
+"""Standard deviations of a 95 % interval."""
+FAMILIES = (
+    ("the library's formulas", ("own",), "#1f5fa8", "s"),
+    ("other formulas", ("other", "two", "three", "poor", "third"), "#c4541a", "o"),
+)
+"""Words, kinds of cases, colour and mark of what is drawn."""
+
+
+@dataclass(frozen=True)
+class Bin:
+    """Names of about one confidence: its ends, its mean, and how many of how many are right."""
+
+    low: float
+    high: float
+    mean: float
+    right: int
+    count: int
+
+    @property
+    def share(self) -> float:
+        """Share of the names that are right."""
+        return self.right / self.count
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """Wilson's 95 % interval of the share."""
+        square = DEVIATIONS**2 / self.count
+        half = DEVIATIONS * np.sqrt(self.share * (1.0 - self.share) / self.count + square / (4.0 * self.count))
+        middle = self.share + square / 2.0
+        return float((middle - half) / (1.0 + square)), float((middle + half) / (1.0 + square))
+
+
+def read(paths: Sequence[Path]) -> list[dict[str, Any]]:
+    """Return the results in some files, one for each case."""
+    return [json.loads(line) for path in paths for line in path.read_text(encoding="utf-8").splitlines()]
+
+
+def named(rows: Sequence[dict[str, Any]]) -> tuple[np.ndarray, np.ndarray]:
+    """Return of all names that were said the confidence, (N,) float, and whether it is right, (N,) bool."""
+    said = [(confidence, name in row["answer"]) for row in rows for name, _, confidence in row["said"]]
+    return np.array([one[0] for one in said], float), np.array([one[1] for one in said], bool)
+
+
+def binned(confidence: np.ndarray, right: np.ndarray) -> list[Bin]:
+    """Return the bins that have names."""
+    place = np.clip(np.searchsorted(BINS, confidence, side="right") - 1, 0, len(BINS) - 2)
+    found = []
+    for i in np.unique(place):
+        own = place == i
+        found.append(Bin(BINS[i], BINS[i + 1], float(confidence[own].mean()), int(right[own].sum()), int(own.sum())))
+    return found
+
+
+def calibration(confidence: np.ndarray, right: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return level and slope of a logistic regression on the log odds of the confidence, and their standard errors, (2,) each.
+
+    A level of 0 and a slope of 1 mean that names are right as often as the confidence says (Cox, Biometrika 45, 1958). The
+    targets are drawn towards one half by one name each (Platt, Probabilistic outputs for support vector machines, 1999).
+    """
+    inside = np.clip(confidence, NEAREST, 1.0 - NEAREST)
+    x = np.column_stack([np.ones(len(inside)), np.log(inside / (1.0 - inside))])
+    target = np.where(right, (right.sum() + 1.0) / (right.sum() + 2.0), 1.0 / ((~right).sum() + 2.0))
+
+    def loss(at: np.ndarray) -> float:
+        return float((np.logaddexp(0.0, x @ at) - target * (x @ at)).sum())
+
+    found = np.asarray(minimize(loss, [0.0, 1.0]).x)
+    p = 1.0 / (1.0 + np.exp(-x @ found))
+    return found, np.sqrt(np.diag(np.linalg.pinv((x.T * (p * (1.0 - p))) @ x)))
+
+
+def group_coverage(rows: Sequence[dict[str, Any]]) -> tuple[int, int]:
+    """Return how many groups that were called ambiguous contain a hidden effect, and how many groups there are."""
+    groups = [(row["answer"], group) for row in rows for group in row["ambiguous"]]
+    return sum(bool(set(answer) & set(group)) for answer, group in groups), len(groups)
+
+
+def table(rows: Sequence[dict[str, Any]]) -> str:
+    """Return counts as Markdown."""
+    text = ["| confidence | mean | right | share and its 95 % interval |", "| --- | ---: | ---: | --- |"]
+    for one in binned(*named(rows)):
+        low, high = one.interval
+        ends = f"{one.low:.2f} – {one.high:.2f} | {one.mean:.3f}"
+        text.append(f"| {ends} | {one.right} of {one.count} | {one.share:.0%} ({low:.0%} – {high:.0%}) |")
+    (level, slope), errors = calibration(*named(rows))
+    covered, groups = group_coverage(rows)
+    text += ["", f"Level {level:.2f} ± {errors[0]:.2f}, slope {slope:.2f} ± {errors[1]:.2f}."]
+    return "\n".join([*text, f"Of {groups} ambiguous groups {covered} contain a hidden effect."])
+
+
+def draw(rows: Sequence[dict[str, Any]], path: Path) -> None:
+    """Draw confidence against the share of names that are right."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(5.0, 4.4), dpi=150, layout="constrained")
+    FigureCanvasAgg(figure)
+    axes = figure.add_subplot()
+    line = np.linspace(0.02, 1.0 - NEAREST, 1000)
+    axes.plot(line, line, color="0.6", linewidth=1.0, label="right as often as said")
+    for words, kinds, colour, mark in FAMILIES:
+        bins = binned(*named([row for row in rows if row["kind"] in kinds]))
+        if bins:
+            share, ends = np.array([one.share for one in bins]), np.array([one.interval for one in bins]).T
+            mean, spread = [one.mean for one in bins], np.abs(ends - share)
+            axes.errorbar(mean, share, yerr=spread, fmt=mark, color=colour, markersize=4, capsize=2, elinewidth=1, label=words)
+            for one, below in zip(bins, ends[0], strict=True):
+                where = {"textcoords": "offset points", "xytext": (0, -9), "ha": "center"}
+                axes.annotate(f"{one.right}/{one.count}", (one.mean, below), fontsize=6, color=colour, **where)
+    axes.set_xscale("logit")  # most names are near 1
+    axes.set_xticks(TICKS, [f"{tick:g}" for tick in TICKS])
+    axes.set_xticks([], minor=True)
+    axes.set(xlabel="confidence that is said", ylabel="share of names that are right", xlim=(0.05, 0.9985), ylim=(-0.06, 1.05))
+    axes.legend(loc="upper left", frameon=False, fontsize=8, bbox_to_anchor=(0.0, 0.97))
+    figure.savefig(path, metadata={"Software": None})
+
+
+def main(arguments: Sequence[str]) -> None:
+    """Print the counts and draw them."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("results", nargs="+", type=Path)
+    parser.add_argument("--picture", type=Path, default=PICTURE)
+    options = parser.parse_args(arguments)
+    rows = read(options.results)
+    print(table(rows))
+    draw(rows, options.picture)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])
