@@ -30,8 +30,9 @@ UNITS: dict[str, dict[str, float]] = {
     "kg": {"kg": 1.0, "g": 1e-3},
     "N": {"N": 1.0, "mN": 1e-3, "kN": 1e3},
     "Pa": {"Pa": 1.0, "kPa": 1e3, "MPa": 1e6},
+    "°C": {"°C": 1.0, "degC": 1.0, "C": 1.0, "K": 1.0, "°F": 1.0 / 1.8, "degF": 1.0 / 1.8},
 }
-"""SI unit → units that a column may be written in, and the SI value of one of them."""
+"""SI unit → units that a column may be written in, and the SI value of one of them; of temperatures the value of one degree."""
 
 
 LARGEST_NUMBER = 1e30

@@ -98,6 +98,8 @@ class TransducerArray:
         Multiplies the gain of each texel.
     name : str
         Of the sensor, for messages.
+    temperature : pair of (m,) float, or None
+        Times (s, increasing) and temperatures (°C) that were recorded; None if none were.
     """
 
     position: np.ndarray
@@ -108,6 +110,7 @@ class TransducerArray:
     zero: float = 0.0
     painted: float | np.ndarray = 1.0
     name: str = "sensor"
+    temperature: tuple[np.ndarray, np.ndarray] | None = None
 
     def __len__(self) -> int:
         return len(self.position)

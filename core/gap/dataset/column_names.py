@@ -19,9 +19,12 @@ QUANTITIES = {
     "time": "s",
     **dict.fromkeys(("x", "y", "z", "depth", "slide_x", "slide_y"), "m"),
     **dict.fromkeys(("force", "force_x", "force_y", "force_z"), "N"),
+    "temperature": "°C",
     **dict.fromkeys(("qw", "qx", "qy", "qz", "texel"), ""),
 }
 """Columns that a rig can name, and the SI unit of each; `texel` stands for all texels."""
+ZEROS = {"K": -273.15, "°F": -32.0 / 1.8, "degF": -32.0 / 1.8}
+"""°C at which other scales of temperature are zero, where they have another zero."""
 INVERSE = "1/x"
 """Unit of a column whose inverse is wanted: the resistance of a piezoresistive sensor goes with one over the force."""
 NUMBER = "{}"
@@ -42,12 +45,15 @@ class ColumnRule:
         Whether one over the values is wanted, before the factor.
     first : int
         Number of the first texel.
+    shift : float
+        Added after the factor: zero of the kelvin scale and the like, in the SI unit.
     """
 
     source: str
     factor: float = 1.0
     inverse: bool = False
     first: int = 0
+    shift: float = 0.0
 
 
 def read_column_rules(table: Mapping[str, Any], path: Path) -> dict[str, ColumnRule]:
@@ -72,7 +78,8 @@ def read_column_rules(table: Mapping[str, Any], path: Path) -> dict[str, ColumnR
         first = words.get("first", 0)
         if not isinstance(first, int) or isinstance(first, bool) or not 0 <= first <= 1_000_000:
             raise FileError(f"first of {where} is {first!r:.60}: write the number of the first texel, 0 or 1.")
-        rules[column] = ColumnRule(source, *_scale(words, QUANTITIES[column], where), first)
+        shift = ZEROS.get(words.get("unit", ""), 0.0) if QUANTITIES[column] == "°C" else 0.0
+        rules[column] = ColumnRule(source, *_scale(words, QUANTITIES[column], where), first, shift)
     return rules
 
 
@@ -126,12 +133,12 @@ def translated(
     found = {}
     for column, rule in wanted.items():
         if rule.source not in columns:
-            if column in ("force_x", "force_y", "force_z", "slide_x", "slide_y"):
+            if column in ("force_x", "force_y", "force_z", "slide_x", "slide_y", "temperature"):
                 continue  # not every recording has them
             raise FileError(f"'{file.name}' has no column '{rule.source}', which [columns] names for {column}.")
         if column != rule.source and column in columns and column not in {other.source for other in wanted.values()}:
             raise FileError(f"'{file.name}' has '{rule.source}' and '{column}' for {column}: remove one of them.")
-        found[column] = rule.factor * _inverted(columns[rule.source], rule, file)
+        found[column] = rule.factor * _inverted(columns[rule.source], rule, file) + rule.shift
     taken = {rule.source for rule in wanted.values()}
     return {name: column for name, column in columns.items() if name not in taken} | found
 

@@ -30,6 +30,8 @@ from .sessions import CLOCKS, TrialHistory, on_common_clocks, read_history
 from .trial import Trial
 
 FORMAT = "palpate-rig/1"
+LOWEST_TEMPERATURE, HIGHEST_TEMPERATURE = -273.15, 2000.0
+"""°C: what a sensor can have."""
 POSE, TURN, SLIDE = ("x", "y", "z"), ("qw", "qx", "qy", "qz"), ("slide_x", "slide_y")
 FORCE = ("force_x", "force_y", "force_z")
 SMALLEST_RESPONSE = 1e-30
@@ -199,6 +201,7 @@ def _read_trials(
         warnings += said
     trials = with_contact_heights(trials, entries, sensor, path)
     trials, said = on_common_clocks(trials, histories, clock, path)
+    trials = [_on_own_clock(trial) for trial in trials]
     names = [trial.name for trial in trials]
     for name in names:
         if names.count(name) > 1:
@@ -476,12 +479,37 @@ class _TrialReader:
         if strangers:
             said.append(f"'{file.name}': {', '.join(map(repr, strangers))} mean nothing here and were left out.")
         slide = np.zeros((len(time), 2)) if slide is None else slide
-        return Trial(file.stem, use, time, kind, position, quaternion, level, slide, reading, force), said
+        temperature = _temperatures(columns, time, file)
+        found = Trial(file.stem, use, time, kind, position, quaternion, level, slide, reading, force, temperature=temperature)
+        return found, said
 
 
 def _meaning(name: str) -> bool:
     """Whether a column of this name is used."""
-    return name in ("time", "depth", "force", *POSE, *TURN, *SLIDE, *FORCE) or name.startswith("texel_")
+    return name in ("time", "depth", "force", "temperature", *POSE, *TURN, *SLIDE, *FORCE) or name.startswith("texel_")
+
+
+def _temperatures(columns: Mapping[str, np.ndarray], time: np.ndarray, file: Path) -> tuple[np.ndarray, np.ndarray] | None:
+    """Times and temperatures of the samples that have one; None without a column of them."""
+    values = columns.get("temperature")
+    if values is None or np.isnan(values).all():
+        return None
+    known = np.isfinite(values)
+    if (values[known] < LOWEST_TEMPERATURE).any() or (values[known] > HIGHEST_TEMPERATURE).any():
+        worst = values[known][np.argmax(np.abs(values[known]))]
+        raise FileError(
+            f"`temperature` in '{file.name}' reaches {worst:g} °C: check its unit, [columns] takes "
+            'temperature = { name = "…", unit = "K" }.'
+        )
+    return time[known] - time[0], values[known]
+
+
+def _on_own_clock(trial: Trial) -> Trial:
+    """The trial with the times of its temperatures on the clock of its samples, rather than since its first sample."""
+    if trial.temperature is None:
+        return trial
+    since, values = trial.temperature
+    return replace(trial, temperature=(trial.time[0] + since, values))
 
 
 def _clock(columns: Mapping[str, np.ndarray], file: Path) -> np.ndarray:

@@ -46,6 +46,8 @@ class Trial:
         Name of the probe that pressed; empty for the rig's indenter.
     repeats : str
         Name of a group of recordings of the same stimulus; empty if it belongs to none.
+    temperature : pair of (m,) float, or None
+        Times (s, on the clock of `time`) and temperatures of the sensor (°C); None if none were recorded.
     height_start : float, metres
         Where the fit of a free contact height starts; contacts are described with this height.
     """
@@ -69,6 +71,7 @@ class Trial:
     height_start: float = 0.0
     probe: str = ""
     repeats: str = ""
+    temperature: tuple[np.ndarray, np.ndarray] | None = None
 
     @property
     def step(self) -> float:

@@ -117,6 +117,7 @@ class ResponseModel:
     def _computed_reading(self, model: Model, subset: np.ndarray | None, effects: tuple[Effect, ...]) -> np.ndarray:
         """Return the readings under effects on the readout."""
         site = readout_chain.transducers_of(Sensor("sensor", 0, self.rig.texels, model.parameters))
+        site = replace(site, temperature=self._temperature())
         if subset is not None:
             site = replace(
                 site,
@@ -127,6 +128,10 @@ class ResponseModel:
             )
             effects = tuple(_effect_on_texels(effect, subset) for effect in effects)
         return readout_chain.readings(effects, site, self.stimulus.time, self.normal_force(model, subset))
+
+    def _temperature(self) -> tuple[np.ndarray, np.ndarray] | None:
+        """Times and temperatures that were recorded."""
+        return self.stimulus.trial.temperature
 
     def total_force(self, model: Model) -> np.ndarray:
         """Return the sum of normal and friction forces on the sensor, (T, 3) N."""
@@ -226,6 +231,13 @@ class Session(ResponseModel):
     def stimulus_in(self, trial: Trial) -> Stimulus:
         """Return the stimulus of one of its trials."""
         return next(stimulus for stimulus in self.stimuli if stimulus.trial is trial)
+
+    def _temperature(self) -> tuple[np.ndarray, np.ndarray] | None:
+        recorded = [trial.temperature for trial in self.trials if trial.temperature is not None]
+        if not recorded:
+            return None
+        times, values = zip(*recorded, strict=True)
+        return np.concatenate(times), np.concatenate(values)
 
     def _heights(self, model: Model | None) -> tuple[float, ...]:
         return tuple(_height_of(trial, model) for trial in self.trials)

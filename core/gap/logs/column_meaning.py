@@ -24,6 +24,7 @@ LOG_UNITS: dict[str, dict[str, float]] = {
         **UNITS["N"],
         **{"uN": 1e-6, "g": 1e-3 * GRAVITY, "gf": 1e-3 * GRAVITY, "kg": GRAVITY, "kgf": GRAVITY, "lbf": 4.4482216152605},
     },
+    "°C": UNITS["°C"],
     "": {},
 }
 """SI unit → units that a log may be in, and the SI value of one of them. Those of a reading are in :data:`READING_UNITS`."""
@@ -100,11 +101,14 @@ _AXIS_WORDS = {
 _TIME_WORDS = {"time", "t", "timestamp", "stamp", "sec", "secs", "seconds", "elapsed", "clock", "tim", "tim2", "zeit"}
 _SINGLE = {
     "force": {"force", "load", "weight", "mass", "normal_force", "fn", "loadcell", "scale", "futek"},
+    "temperature": {"temperature", "temp", "temperatur", "thermistor"},
     "depth": {"depth", "indentation", "penetration", "compression", "deflection"},
 }
 LEAST_SPAN, LARGEST_METRES = 1e-7, 0.3
 """Metres: the smallest motion that a rig measures, and the largest that is taken for metres where no unit is known. Rigs for
 touch move by millimetres to some decimetres, so larger numbers are millimetres."""
+COLDEST_KELVIN = 200.0
+"""Temperatures of a larger number are kelvins where no unit is known: nobody presses a sensor at 200 °C, or at 70 K."""
 _BRACKETS = re.compile(r"^(?P<name>.*?)\s*[\[(]\s*(?P<unit>[^\])]+?)\s*[\])]\s*$")
 
 
@@ -133,7 +137,7 @@ def name_and_unit(column: str) -> tuple[str, str]:
     if found:
         return found["name"], found["unit"]
     stem, mark, last = re.match(r"^(.*?)([_ .]?)([^_ .]*)$", column).groups()  # type: ignore[union-attr]
-    if mark and stem and last in KNOWN_UNITS - {"m", "s", "g", "V", "F", "N", "in"}:
+    if mark and stem and last in KNOWN_UNITS - {"m", "s", "g", "V", "F", "N", "in", "C", "K"}:
         return stem, last
     if mark == "_" and stem and last in {"m", "s", "g", "N", "V"} and len(stem) > 1:
         return stem, last
@@ -237,6 +241,17 @@ def length_unit(span: float, stated: str) -> tuple[str, str, bool]:
     if span > LARGEST_METRES:
         return "mm", f"it moves by {span:.4g}, too much for metres", False
     return "m", f"it moves by {span:.4g}", False
+
+
+def temperature_unit(values: np.ndarray, stated: str) -> tuple[str, str, bool]:
+    """Return the unit of temperatures, why, and whether that is sure."""
+    if stated in LOG_UNITS["°C"]:
+        return stated, "the file says so", True
+    known = values[np.isfinite(values)]
+    middle = float(np.median(known)) if len(known) else 0.0
+    if middle > COLDEST_KELVIN:
+        return "K", f"it is about {middle:.4g}", False
+    return "°C", f"it is about {middle:.4g}", False
 
 
 def force_unit(stated: str) -> tuple[str, str, bool]:

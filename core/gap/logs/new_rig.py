@@ -16,7 +16,7 @@ from ...io.csv_table import LARGEST_NUMBER
 from ...io.file_list import FileList
 from ...io.file_writing import atomic_write, writable_folder
 from ...jobs.progress import Job, Progress
-from ..dataset.column_names import INVERSE, QUANTITIES
+from ..dataset.column_names import INVERSE, QUANTITIES, ZEROS
 from ..dataset.rig import FORMAT, read_rig
 from ..dataset.second_logger import interpolated, with_steady_signs
 from .answers import Answers, ColumnAnswer, LoggerAnswer, RecordingAnswer, toml_value
@@ -164,7 +164,8 @@ def _in_si(quantity: str, answer: ColumnAnswer, values: np.ndarray) -> np.ndarra
         factor = PRESSURES[answer.unit] * answer.area
     if quantity == "texel":
         factor = READING_UNITS.get(answer.unit, 1.0)
-    found: np.ndarray = (values - answer.zero) * (factor * answer.factor)
+    shift = ZEROS.get(answer.unit, 0.0) if unit == "°C" else 0.0
+    found: np.ndarray = (values - answer.zero) * (factor * answer.factor) + shift
     if quantity == "texel" and answer.unit == INVERSE:
         with np.errstate(divide="ignore"):
             found = np.where(np.abs(found) < SMALLEST_INVERTED, np.nan, 1.0 / found)

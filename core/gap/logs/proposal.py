@@ -12,7 +12,17 @@ import numpy as np
 
 from ...errors import FileError
 from .answers import UNKNOWN, Answers, ColumnAnswer, LoggerAnswer, RecordingAnswer
-from .column_meaning import READING_UNITS, Meaning, force_unit, length_unit, meaning_of, name_and_unit, texel_family, time_unit
+from .column_meaning import (
+    READING_UNITS,
+    Meaning,
+    force_unit,
+    length_unit,
+    meaning_of,
+    name_and_unit,
+    temperature_unit,
+    texel_family,
+    time_unit,
+)
 from .log_table import LogFile, LogTable
 
 POSE, TURN, FORCE = ("x", "y", "z"), ("qw", "qx", "qy", "qz"), ("force_x", "force_y", "force_z")
@@ -197,7 +207,7 @@ class _Columns:
         self.texels, self.texels_named = texel_family([name for name in self.names if name not in taken])
         for group in (POSE, TURN, FORCE):
             found |= self._vector(group)
-        for quantity in ("depth", "force", "slide_x", "slide_y"):
+        for quantity in ("depth", "force", "slide_x", "slide_y", "temperature"):
             if names := self.candidates.get(quantity):
                 found[quantity] = self._one(quantity, names)
         if self.texels:
@@ -304,6 +314,8 @@ class _Columns:
             unit, why, sure = length_unit(max(self.span(one) for one in group), stated)
         elif quantity.startswith("q"):
             unit, why, sure = "", "of its name", True
+        elif quantity == "temperature":
+            unit, why, sure = temperature_unit(self.values(name, self.logs[0]), stated)
         else:
             unit, why, sure = force_unit(stated)
             if quantity in FORCE and self._is_ros(name):

@@ -47,6 +47,11 @@ LEAST_WIDTH = 0.25
 """Least width of load spreading in a fit, in pitches: below, nothing reaches the neighbours, and no derivative leads back."""
 AT_BOUND = 0.01
 """A parameter is at a bound if it differs from it by less than this share of the bound."""
+LEAST_WARMTH = 1.0
+"""Range of temperatures (K) from which on what follows them can be told from what does not. Chosen by eye."""
+FROM_THE_RIG = {"temperature": ("temperature", "reference")}
+"""Parameters that a fit leaves at their neutral values or defaults, by kinds: recordings hold the temperature, and the reference
+is that of gain and zero."""
 START_COUNT = 8
 """Number of starting points of a candidate."""
 COUPLING_PITCH, COUPLING_LOAD = 0.003, 0.05
@@ -70,6 +75,8 @@ class Scales:
     texels : int
     travel : float, m
         Path that texels are pressed in along the longest session; infinite without a session.
+    warmth : float, K
+        Range of the temperatures that were recorded; zero if they were not recorded with every trial.
     """
 
     depth: float
@@ -82,6 +89,7 @@ class Scales:
     speed: float
     texels: int
     travel: float = np.inf
+    warmth: float = 0.0
 
 
 def scales_of(predictors: Sequence[Predictor], model: Model) -> Scales:
@@ -103,7 +111,15 @@ def scales_of(predictors: Sequence[Predictor], model: Model) -> Scales:
         speed=max(max(float(q.stimulus.slide.max(initial=0.0)) for q in predictors), 1e-6),
         texels=len(p),
         travel=_travel(predictors),
+        warmth=_warmth(predictors),
     )
+
+
+def _warmth(predictors: Sequence[Predictor]) -> float:
+    """Range of the recorded temperatures, K; zero if a trial has none."""
+    recorded = [p.trial.temperature for p in predictors]
+    values = [one[1] for one in recorded if one is not None]
+    return float(np.ptp(np.concatenate(values))) if values and len(values) == len(recorded) else 0.0
 
 
 def _travel(predictors: Sequence[Predictor]) -> float:
@@ -118,6 +134,7 @@ def _travel(predictors: Sequence[Predictor]) -> float:
 
 def search_range(parameter: Parameter, scales: Scales) -> tuple[float, float]:
     """Return the range of values in which a parameter would show in recordings of these scales, inside its bounds."""
+    warmth = max(scales.warmth, LEAST_WARMTH)
     known = {
         "N": (SMALL * scales.force, LARGE * scales.force),
         "unit": (SMALL * scales.reading, LARGE * scales.reading),
@@ -131,6 +148,8 @@ def search_range(parameter: Parameter, scales: Scales) -> tuple[float, float]:
         "unit/s": (-0.5 * scales.reading / scales.seconds, 0.5 * scales.reading / scales.seconds),
         "rad": (-0.1, 0.1),
         "N·s/m": (0.02 * scales.force / scales.speed, 2.0 * scales.force / scales.speed),
+        "1/K": (-0.5 / warmth, 0.5 / warmth),
+        "unit/K": (-0.5 * scales.reading / warmth, 0.5 * scales.reading / warmth),
     }
     low, high = known.get(parameter.unit, (parameter.low, parameter.high))
     if parameter.low < 0.0 < low:  # either sign is possible
@@ -293,6 +312,7 @@ def candidates(predictors: Sequence[Predictor], model: Model) -> list[Candidate]
     in_rows = isinstance(predictors[0].rig.texels.layout, GridLayout)
     loaded = all(p.trial.stimulus == "force" for p in predictors)
     cannot = unidentifiable(coverage(predictors))
+    warmed = _warmth(predictors) >= LEAST_WARMTH
     heights_open = all(isinstance(p.trial.contact_height, str) for p in predictors if p.trial.stimulus == "pose")
     found = []
     for kind in library().values():
@@ -304,6 +324,7 @@ def candidates(predictors: Sequence[Predictor], model: Model) -> list[Candidate]
                 form.random
                 or form.name == "bits"
                 or (form.placement is not None and not posed)
+                or (kind.name == "temperature" and not warmed)
                 or (form.friction_law is not None and not dragged)
             ):
                 continue
@@ -311,7 +332,8 @@ def candidates(predictors: Sequence[Predictor], model: Model) -> list[Candidate]
                 continue  # with known loads the contact law does not matter
             if not acts_on_force and not read:
                 continue
-            one = Candidate(kind, _without_height(form) if heights_open else form)
+            fitted = _without(form, FROM_THE_RIG.get(kind.name, ()))
+            one = Candidate(kind, _without_height(fitted) if heights_open else fitted)
             if several and not in_rows and _needs_rows(form):
                 continue
             if not several and (one.has_texel_parameters or is_spatial(form)):
@@ -322,9 +344,12 @@ def candidates(predictors: Sequence[Predictor], model: Model) -> list[Candidate]
 
 def _without_height(form: Form) -> Form:
     """A form that moves texels without its height, which belongs to the base model if contact heights are free."""
-    if form.placement is None:
-        return form
-    return replace(form, parameters=tuple(p for p in form.parameters if p.name != "z"))
+    return form if form.placement is None else _without(form, ("z",))
+
+
+def _without(form: Form, names: Sequence[str]) -> Form:
+    """A form in which some parameters are not free."""
+    return replace(form, parameters=tuple(p for p in form.parameters if p.name not in names)) if names else form
 
 
 def _needs_rows(form: Form) -> bool:
