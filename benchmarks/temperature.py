@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """``palpate gap`` on recordings with a column of temperatures: what follows the temperature is named, and nothing else is.
 
-A ball presses a small pad while the room warms and cools. Gain, zero or both follow the temperature by formulas that the library does not have:
-a reciprocal gain with a square in it, a zero that bends and is a little different in each texel. In as many cases something
-else is hidden, or nothing: a zero that moves with the time, a lag, gains of texels. ``PALPATE_TEMPERATURE_CASES`` says how many
-there are (10 and 10), ``PALPATE_TEMPERATURE_FIRST`` the number of the first (0; from 5000 on those that nobody looked at).
+A ball presses a small pad while the room warms and cools. Gain, zero or both follow the temperature by formulas that the
+library does not have: a reciprocal gain with a square in it, a zero that bends and is a little different in each texel. In as
+many cases something else is hidden, or nothing: a zero that moves with the time, a lag, gains of texels.
+``PALPATE_TEMPERATURE_CASES`` says how many there are (10 and 10), ``PALPATE_TEMPERATURE_FIRST`` the number of the first (0;
+from 5000 on those that nobody looked at).
 """
 
 from __future__ import annotations

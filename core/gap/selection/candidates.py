@@ -50,8 +50,8 @@ AT_BOUND = 0.01
 LEAST_WARMTH = 1.0
 """Range of temperatures (K) from which on what follows them can be told from what does not. Chosen by eye."""
 FROM_THE_RIG = {"temperature": ("temperature", "reference")}
-"""Parameters that a fit leaves at their neutral values or defaults, by kinds: recordings hold the temperature, and the reference
-is that of gain and zero."""
+"""Parameters that a fit leaves at their neutral values, by kinds: recordings hold the temperature, and the reference is that of
+gain and zero."""
 START_COUNT = 8
 """Number of starting points of a candidate."""
 COUPLING_PITCH, COUPLING_LOAD = 0.003, 0.05
@@ -358,7 +358,7 @@ def _needs_rows(form: Form) -> bool:
         return False
     site = TransducerArray(np.zeros((1, 3)), np.full(1, 9e-6))
     try:
-        form.memoryless(np.zeros((2, 1)), np.zeros(2), form.defaults(), site, 0)
+        form.memoryless(np.zeros((2, 1)), np.zeros(2), {**form.neutral, **form.defaults()}, site, 0)
     except EffectError:
         return True
     return False
@@ -372,7 +372,7 @@ def is_spatial(form: Form) -> bool:
         return False
     position = np.array([[0.0, 0.0, 0.0], [COUPLING_PITCH, 0.0, 0.0], [2 * COUPLING_PITCH, 0.0, 0.0]])
     site = TransducerArray(position, np.full(3, 9e-6), np.zeros(3, int), np.arange(3))
-    values = form.defaults()
+    values = {**form.neutral, **form.defaults()}  # of a form in which some parameters are not free, too
     for p in form.parameters:
         if p.per_texel:
             values[p.name] = tuple([float(values[p.name])] * 3)  # type: ignore[arg-type]

@@ -63,6 +63,14 @@ def image(texel, value=1.0):
             lambda f: np.sign(f) * 0.25 * np.floor(np.abs(f) / 0.25 + 0.5),
         ),
         ("quantization", "bits", {"bits": 4, "range": 2.0}, lambda f: np.round(f * 8) / 8),
+        ("temperature", "gain", {"gain_change": 0.02, "temperature": 30.0}, lambda f: 1.1 * f),
+        ("temperature", "zero", {"zero_change": 0.02, "temperature": 10.0, "reference": 15.0}, lambda f: f - 0.1),
+        (
+            "temperature",
+            "gain-and-zero",
+            {"gain_change": -0.01, "zero_change": 0.02, "temperature": 35.0},
+            lambda f: 0.9 * f + 0.2,
+        ),
         ("drift", "linear", {"rate": 0.03}, lambda f: f + 0.03 * TIME[:, None]),
         ("drift", "warm-up", {"amount": 0.3, "time": 4.0}, lambda f: f + 0.3 * (1 - np.exp(-TIME[:, None] / 4))),
         (
@@ -76,6 +84,17 @@ def image(texel, value=1.0):
 def test_formulas(name, form, values, formula):
     force = np.linspace(-0.5, 2.0, len(TIME))[:, None] * np.ones(N)
     np.testing.assert_allclose(read(effect(name, form, **values), force), formula(force), rtol=1e-12, atol=1e-14)
+
+
+def test_a_recorded_temperature_counts_and_not_that_of_the_effect():
+    """The gain follows a straight line of temperatures between two samples, about the reading without load."""
+    array = TransducerArray(POSITION, GRID.area, gain=2.0, zero=5.0, temperature=(TIME[[0, -1]], np.array([25.0, 35.0])))
+    force = np.linspace(0.0, 3.0, len(TIME))[:, None] * np.ones(N)
+    warmth = (10.0 * (TIME - TIME[0]) / (TIME[-1] - TIME[0]))[:, None]
+    found = read(effect("temperature", "gain-and-zero", gain_change=0.01, zero_change=0.1, gain=2.0), force, transducers=array)
+    np.testing.assert_allclose(found, 5.0 + (1.0 + 0.01 * warmth) * 2.0 * force + 0.1 * warmth, rtol=1e-12)
+    found = read(effect("temperature", "gain", gain_change=0.01), force, transducers=array)
+    np.testing.assert_allclose(found, 5.0 + 2.0 * (1.0 + 0.01 * warmth) * force, rtol=1e-12)
 
 
 def test_saturation_counts_from_the_reading_without_load():
