@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import argparse
+from pathlib import Path
 from typing import Any
 
 from ..core.figures.figure_canvas import FILE_TYPES as FORMATS
@@ -15,7 +16,12 @@ FIGURES = ("scene", "strip", "curves", "numbers", "video", "gel")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("scene", metavar="SCENE.blend", help="a baked file")
+    parser.add_argument("scene", metavar="SCENE.blend", help="a baked file, or with --bake the file that was baked")
+    parser.add_argument(
+        "--bake",
+        metavar="DIR",
+        help="folder that 'palpate bake' has written of this file without --save (default: the bake that the file plays)",
+    )
     parser.add_argument("--out", metavar="DIR", default="palpate-figures", help="folder to write to (default: %(default)s)")
     parser.add_argument(
         "--only", metavar="FIGURE", action="append", choices=FIGURES,
@@ -80,6 +86,8 @@ def run(arguments: argparse.Namespace) -> int:
         from ..addon.render import figure_export
         from ..addon.render.figure_request import FigureRequest
 
+        if arguments.bake is not None:
+            _show_bake(scene, arguments.bake)
         given: dict[str, Any] = figure_options.gel_options_from(arguments)
         given |= {"kinds": tuple(arguments.only)} if arguments.only else {}
         given |= {"formats": tuple(arguments.format)} if arguments.format else {}
@@ -105,3 +113,12 @@ def run(arguments: argparse.Namespace) -> int:
     for path in written:
         print(path)
     return 0
+
+
+def _show_bake(scene: Any, folder: str) -> None:
+    """Put the bake in a folder into the open scene, which is not saved."""
+    from ..addon.bake import bake
+    from ..core.io.bake_reader import read_bake
+
+    blender.require_utf8(folder)
+    console.run_with_progress_bar("render", bake.show_bake(scene, read_bake(Path(folder).absolute())))

@@ -61,12 +61,12 @@ class Display(Subpanel):
         column.prop(own, "use_auto_range")
         if not own.use_auto_range:
             column.prop(own, "range_max_pressure" if own.quantity == "PRESSURE" else "range_max")
-        layout.label(text="On baked sensors:")
-        layout.grid_flow(even_columns=True, align=True).prop(own, "overlays")
         row = layout.row(align=True)
         row.prop(own, "show_indentation")
         if own.show_indentation:
             row.prop(own, "indentation_factor")
+        layout.label(text="On baked sensors:")
+        layout.grid_flow(even_columns=True, align=True).prop(own, "overlays")
         column = layout.column(align=True)
         column.prop(own, "use_auto_arrow")
         if not own.use_auto_arrow:

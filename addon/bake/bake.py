@@ -10,6 +10,7 @@ import bpy
 
 from ...core.errors import SceneError
 from ...core.io.bake_owner import BakeOwner
+from ...core.io.bake_reader import Bake
 from ...core.jobs.job_runner import part_of_job
 from ...core.jobs.progress import Job, Progress
 from ...core.model.recording import Recording
@@ -76,6 +77,57 @@ def bake(scene, into_scene: bool = True, images: bool = True, blend: bake_files.
             session_state.session.bake_progress = None
 
 
+def show_bake(scene, found: Bake) -> Job[None]:
+    """Put a bake that was written without its .blend (:func:`bake` without `into_scene`) into the scene; nothing is computed.
+
+    The scene gets the bake's frame range, and sensors that the bake has not become pads, as they were for it.
+
+    Parameters
+    ----------
+    scene : Scene
+    found : Bake
+        From :func:`.bake_reader.read_bake`, with tactile images.
+
+    Raises
+    ------
+    PalpateError
+        The bake is not of this scene as it is now, it has no images, or the scene cannot show it.
+    """
+    with session_state.suspended():
+        try:
+            yield from part_of_job(_show_existing(scene, found), _note_for_panel)
+        finally:
+            session_state.session.bake_progress = None
+
+
+def _show_existing(scene, found: Bake) -> Job[None]:
+    manifest = next(iter(found.manifests.values()))
+    place = next(iter(found.folders.values())).parent
+    sensors = {obj.name: obj for obj in scene.objects if obj.palpate.role == "SENSOR"}
+    for name, own in found.manifests.items():
+        if name not in sensors:
+            raise SceneError(f"The bake in '{place}' has a sensor '{name}', which '{scene.name}' has not: choose another.")
+        if not own.has_images:
+            raise SceneError(
+                f"The bake of sensor '{name}' in '{found.folders[name]}' has no tactile images, which the scene would show: "
+                "bake again with images."
+            )
+    if missing := [name for name in manifest.sensors if name not in found.manifests]:
+        raise SceneError(f"The bake in '{place}' also has the sensor '{missing[0]}': give the folder of the whole bake.")
+    for name, obj in sensors.items():
+        if name not in found.manifests:
+            obj.palpate.role = "PAD"
+    scene.frame_start, scene.frame_end = (int(found.recording.frames[end]) for end in (0, -1))
+    reading = yield from _read(scene)
+    if reading.scenario.digest() != manifest.digest:
+        raise SceneError(
+            f"The bake in '{place}' is not of '{scene.name}' as it is now: something that forces depend on has "
+            "changed since, or options of the bake changed it; bake again, or use a .blend that was saved with its bake."
+        )
+    scene_writer.check_writable(scene, reading)
+    _show(scene, reading, found.recording, _Shown(found.folders, manifest.bake_id, identity.scene_id(scene)))
+
+
 def _bake(scene, into_scene: bool, images: bool, blend: bake_files.BlendToSave | None) -> Job[BakeResult]:
     """Do the steps of a bake, each in the room that owns it."""
     name = scene.name
@@ -91,10 +143,10 @@ def _bake(scene, into_scene: bool, images: bool, blend: bake_files.BlendToSave |
         recording = yield from _solve(name, simulation, reading, files)
         files.complete(recording)
         if blend is not None:
-            _show(_scene_called(name), reading, recording, files, owner)
+            _show(_scene_called(name), reading, recording, _Shown(files.folders, files.bake_id, owner.scene_id))
         files.switch(blend)
     if into_scene and blend is None:
-        _show(_scene_called(name), reading, recording, files, owner)
+        _show(_scene_called(name), reading, recording, _Shown(files.folders, files.bake_id, owner.scene_id))
     return BakeResult(recording, reading.scenario, files.folders, tuple(files.notes))
 
 
@@ -135,13 +187,22 @@ def _owner(scene, into_scene: bool, blend: bake_files.BlendToSave | None) -> Bak
     return BakeOwner(scene_id, saved, opened, others)
 
 
-def _show(scene, reading: SceneReading, recording: Recording, files: bake_files.BakeFiles, owner: BakeOwner) -> None:
+@dataclass(frozen=True)
+class _Shown:
+    """Where a bake that a scene shows lies, by sensor; its id; and the scene's own."""
+
+    folders: dict[str, Path]
+    bake_id: str
+    scene_id: str
+
+
+def _show(scene, reading: SceneReading, recording: Recording, shown: _Shown) -> None:
     """Put the result into the scene and evaluate the present frame again, so that the new keyframes take effect."""
-    scene_writer.write(scene, reading, recording, files.folders)
-    scene.palpate.scene_id, scene.palpate.baked_id = owner.scene_id, files.bake_id
+    scene_writer.write(scene, reading, recording, shown.folders)
+    scene.palpate.scene_id, scene.palpate.baked_id = shown.scene_id, shown.bake_id
     scene.frame_set(scene.frame_current, subframe=scene.frame_subframe)
     scene.palpate.baked_fingerprint = scene_fingerprint.fingerprint(scene)
-    playback.show_new_bake(scene, recording, files.folders)
+    playback.show_new_bake(scene, recording, shown.folders)
 
 
 def _total_steps(frame_start: int, frame_end: int) -> int:

@@ -3,7 +3,8 @@
 
 Geometry nodes subdivide the sensor's faces and move their vertices inwards. They read the penetration from an image that is
 packed into the .blend, with a row for each frame, so that the surface plays in any Blender and without the files of the bake.
-The user's mesh keeps its vertices. :mod:`....core.geometry.smooth_grid` says how the penetration is smoothed.
+The user's mesh keeps its vertices. :mod:`....core.geometry.smooth_grid` says how the penetration is smoothed, and
+:mod:`.indented_surface` is the same surface for the overlay.
 
 What reads a scene must not take the indented surface for the sensor's shape: :func:`.mesh_arrays.evaluated_mesh` gives the mesh
 without it.
@@ -77,10 +78,7 @@ def show(sensors: Sequence[BakedSensor], factor: float | None) -> None:
     touched = [_touched(sensor) for sensor in sensors]
     # asked for all of them before the first is changed: Blender evaluates the scene anew after a change
     depsgraph = bpy.context.evaluated_depsgraph_get()
-    follows = [
-        own.any() and sensor.obj.palpate.skin.method == "NONE" and _keeps_vertices(sensor.obj, depsgraph)
-        for sensor, own in zip(sensors, touched, strict=True)
-    ]
+    follows = [own.any() and may_indent(sensor.obj, depsgraph) for sensor, own in zip(sensors, touched, strict=True)]
     for sensor, own, is_indented in zip(sensors, touched, follows, strict=True):
         if is_indented:
             _apply(sensor, own, factor)
@@ -93,7 +91,7 @@ def _apply(sensor: BakedSensor, touched: np.ndarray, factor: float) -> None:
     _store_attributes(obj.data, _Names(uid), sensor, touched, image.size[0])
     modifier = obj.modifiers.new(INDENTATION_MODIFIER, "NODES")
     play = _Play(image, int(sensor.frames[0]), int(sensor.frames[-1]), step)
-    modifier.node_group = _nodes(uid, obj.name, play, _levels(len(obj.data.vertices)), factor)
+    modifier.node_group = _nodes(uid, obj.name, play, levels_of(len(obj.data.vertices)), factor)
 
 
 def clear(obj) -> None:
@@ -123,6 +121,16 @@ def factor_of(obj) -> float:
     return 0.0 if node is None else node.inputs["Scale"].default_value
 
 
+def moving_vertices(obj) -> np.ndarray | None:
+    """(nv,) bool: vertices that an indented object's surface moves at any frame; None for one that is not indented."""
+    attribute = obj.data.attributes.get(_Names(obj.palpate.uid).inward)
+    if attribute is None:
+        return None
+    inward = np.empty(3 * len(obj.data.vertices), dtype=np.float32)
+    attribute.data.foreach_get("vector", inward)
+    return inward.reshape(-1, 3).any(axis=1)
+
+
 @dataclass(frozen=True)
 class _Play:
     """An image of depths, its first and last frame, and the frames from one of its rows to the next."""
@@ -142,8 +150,10 @@ def _touched(sensor: BakedSensor) -> np.ndarray:
     return found
 
 
-def _keeps_vertices(obj, depsgraph) -> bool:
-    """Return True when the object's modifiers leave the number of its vertices as it is."""
+def may_indent(obj, depsgraph) -> bool:
+    """Return True for a sensor with a surface of its own whose modifiers leave the number of its vertices as it is."""
+    if obj.palpate.skin.method != "NONE":
+        return False
     with mesh_arrays.evaluated_mesh(obj, depsgraph) as mesh:
         return len(mesh.vertices) == len(obj.data.vertices)
 
@@ -153,7 +163,7 @@ def _frame_step(frames: int, texels: int) -> int:
     return max(1, -(-frames * -(-texels // 3) // MOST_PIXELS))
 
 
-def _levels(vertices: int) -> int:
+def levels_of(vertices: int) -> int:
     """Return how often the faces are subdivided; each time their number becomes fourfold."""
     return next((level for level in range(MOST_LEVELS, 0, -1) if vertices * 4**level <= MOST_VERTICES), 0)
 

@@ -6,7 +6,8 @@ They show what playing computes, and a bake where its materials cannot be seen, 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from functools import lru_cache
 
 import bpy
 import numpy as np
@@ -14,7 +15,8 @@ import numpy as np
 from ...core.figures import color_maps
 from ...core.io.bake_reader import frame_index
 from ..session import redraw, transforms, units
-from . import bake_display, indentation, inset
+from . import bake_display, indentation, indented_surface, inset
+from .indented_surface import IndentedSurface
 
 LIFT = 0.004
 """Distance of the overlay from the sensor's surface, as a share of the sensor's size: at zero the two would flicker."""
@@ -30,8 +32,13 @@ class SensorOverlay:
 
     Attributes
     ----------
-    corners : (t, 3) float32
-    colors : (t, 4) float32
+    corners : (c, 3) float32
+    colors : (c, 4) float32
+    triangles : (t, 3) int32 or None
+        Corners of each triangle; None where they stand one after another.
+    at_rest : (c, 3) float32 or None
+        Where the corners would be on a surface that does not give way, as the one that Blender draws while playing. What hides
+        that surface hides the indentation, and that surface itself does not.
     line : (2, 3) float32 or None
         Ends of the net-force arrow.
     plain_only : bool
@@ -42,6 +49,8 @@ class SensorOverlay:
     colors: np.ndarray
     line: np.ndarray | None
     plain_only: bool = False
+    triangles: np.ndarray | None = None
+    at_rest: np.ndarray | None = None
     batches: list | None = None
 
 
@@ -70,9 +79,14 @@ def sensor_overlays(scene, run, frame) -> list[SensorOverlay]:
     """Return the heat maps and arrows of one frame of a live simulation; all sensors share one scale."""
     maximum, strongest = _scale(scene, run, frame)
     scale, overlays = run.reading.metres_per_unit, []
-    for sensor in _read_out(run):
+    settings = scene.palpate
+    factor = settings.indentation_factor if settings.show_indentation else 0.0
+    for sensor, obj in zip(run.scenario.sensors, run.reading.sensor_objects(scene), strict=True):
+        if not sensor.readout:
+            continue
         readings, pose = frame.sensors[sensor.name], frame.poses[sensor.body]
-        overlay = _heat_map(scene, sensor.texels, readings.normal_force, pose, maximum, scale)
+        surface = _indented_surface(scene, obj, sensor.texels, factor * readings.depth)
+        overlay = _heat_map(scene, sensor.texels, readings.normal_force, pose, maximum, scale, surface)
         overlay.line = _net_force(sensor.texels, readings, pose, strongest, scale)
         overlays.append(overlay)
     return overlays
@@ -103,9 +117,10 @@ def baked_overlays(scene, bake, number: int, maximum: float) -> list[SensorOverl
         if body in recording.body_names:
             pose = poses[recording.body_names.index(body)]
             readings = sensors[name]
-            shown = _indented(texels, indentation.factor_of(scene.objects.get(name)) * readings.depth)
-            overlay = _heat_map(scene, shown, readings.normal_force, pose, maximum, units.metres_per_unit(scene))
-            overlay.plain_only = True
+            obj = scene.objects.get(name)
+            surface = _indented_surface(scene, obj, texels, indentation.factor_of(obj) * readings.depth)
+            overlay = _heat_map(scene, texels, readings.normal_force, pose, maximum, units.metres_per_unit(scene), surface)
+            overlay.plain_only, overlay.at_rest = True, None  # the surface that Blender draws gives way, too
             overlays.append(overlay)
     return overlays
 
@@ -139,33 +154,60 @@ def _scale(scene, run, frame) -> tuple[float, float]:
     return (value if settings.use_auto_range else bake_display.user_range(settings)), net
 
 
-def _heat_map(scene, texels, force: np.ndarray, pose: np.ndarray, maximum: float, scale: float) -> SensorOverlay:
+@dataclass(frozen=True)
+class _Indented:
+    """A surface, how far its texels give way, (n,) metres, and which of them may, (n,) bool."""
+
+    surface: IndentedSurface
+    displacement: np.ndarray
+    touched: np.ndarray
+
+
+def _indented_surface(scene, obj, texels, displacement: np.ndarray) -> _Indented | None:
+    """Return the surface of a sensor that gives way; None where nothing does."""
+    if not (displacement > 0.0).any():
+        return None
+    surface = indented_surface.surface_of(scene, obj, texels)
+    if surface is None:
+        return None
+    moving = indentation.moving_vertices(obj)
+    return _Indented(surface, displacement, displacement > 0.0 if moving is None else moving[texels.vertex])
+
+
+def _heat_map(
+    scene, texels, force: np.ndarray, pose: np.ndarray, maximum: float, scale: float, indented: _Indented | None = None
+) -> SensorOverlay:
     """Return the heat map of a sensor at a pose, (7,) in metres; `scale` is the metres of a Blender unit.
 
     It lies on both sides of the surface, because the body of a sensor that is a sheet is seen from both.
     """
-    size = float(np.ptp(texels.position, axis=0).max())
-    lift = LIFT * size * texels.normal
+    lift = LIFT * float(np.ptp(texels.position, axis=0).max())
     rotation = transforms.rotation(pose[3:])
-    sides = [(pose[:3] + (texels.position + side * lift) @ rotation.T) / scale for side in (1.0, -1.0)]
     rgb = color_maps.colors(scene.palpate.color_map, bake_display.displayed_values(scene.palpate, force, texels) / maximum)
-    corner = texels.layout.triangles.ravel()
-    colors = np.column_stack([rgb, np.ones(len(rgb))])[corner]
-    corners = np.concatenate([points[corner] for points in sides])
-    return SensorOverlay(corners.astype(np.float32), np.tile(colors, (2, 1)).astype(np.float32), None)
+
+    def on_both_sides(position: np.ndarray, normal: np.ndarray) -> np.ndarray:
+        sides = [(pose[:3] + (position + side * lift * normal) @ rotation.T) / scale for side in (1.0, -1.0)]
+        return np.concatenate(sides).astype(np.float32)
+
+    if indented is None:
+        corner = texels.layout.triangles.ravel()
+        corners = on_both_sides(texels.position[corner], texels.normal[corner])
+        return SensorOverlay(corners, np.tile(_opaque(rgb[corner]), (2, 1)), None)
+    surface = indented.surface
+    position, shade = surface.displaced(indented.displacement, indented.touched)
+    colors = _opaque(surface.between(rgb) * shade[:, None])
+    halves = np.concatenate([surface.quads[:, [0, 1, 2]], surface.quads[:, [0, 2, 3]]])
+    return SensorOverlay(
+        on_both_sides(position, surface.normal),
+        np.tile(colors, (2, 1)),
+        None,
+        triangles=np.concatenate([halves, halves + len(position)]).astype(np.int32),
+        at_rest=on_both_sides(surface.position, surface.normal),
+    )
 
 
-def _indented(texels, displacement: np.ndarray):
-    """Return texels that are moved inwards by (n,) metres, as the surface of their sensor is.
-
-    That surface is smooth between the texels and the overlay is not, so the overlay is lifted by an eighth of the largest step
-    between two neighbours: the height of a parabola over the chord between two texels whose slopes differ by that step.
-    """
-    if not displacement.any():
-        return texels
-    corners = displacement[texels.layout.triangles]
-    lift = 0.125 * float(np.ptp(corners, axis=1).max())
-    return replace(texels, position=texels.position + (lift - displacement)[:, None] * texels.normal)
+def _opaque(rgb: np.ndarray) -> np.ndarray:
+    return np.column_stack([rgb, np.ones(len(rgb))]).astype(np.float32)
 
 
 def _net_force(texels, readings, pose: np.ndarray, strongest: float, scale: float) -> np.ndarray | None:
@@ -229,14 +271,44 @@ def _batches(overlay: SensorOverlay) -> list:
     import gpu
     from gpu_extras.batch import batch_for_shader
 
-    smooth = gpu.shader.from_builtin("SMOOTH_COLOR")
-    result = [(smooth, batch_for_shader(smooth, "TRIS", {"pos": overlay.corners, "color": overlay.colors}), {})]
+    content = {"pos": overlay.corners, "color": overlay.colors}
+    if overlay.at_rest is None:
+        smooth = gpu.shader.from_builtin("SMOOTH_COLOR")
+    else:
+        smooth, content = _indentation_shader(), {**content, "at_rest": overlay.at_rest}
+    result = [(smooth, batch_for_shader(smooth, "TRIS", content, indices=overlay.triangles), {})]
     if overlay.line is not None:
         lines = gpu.shader.from_builtin("POLYLINE_UNIFORM_COLOR")
         viewport = gpu.state.viewport_get()[2:]
         uniforms = {"color": (1.0, 0.35, 0.05, 1.0), "lineWidth": 4.0, "viewportSize": viewport}
         result.append((lines, batch_for_shader(lines, "LINES", {"pos": overlay.line.astype(np.float32)}), uniforms))
     return result
+
+
+@lru_cache
+def _indentation_shader():
+    """Return the shader of an indentation: each corner has the depth of its place at rest, or its own where that is nearer."""
+    import gpu
+
+    between = gpu.types.GPUStageInterfaceInfo("palpate_indentation")
+    between.smooth("VEC4", "finalColor")
+    info = gpu.types.GPUShaderCreateInfo()
+    info.push_constant("MAT4", "ModelViewProjectionMatrix")
+    for number, (kind, name) in enumerate((("VEC3", "pos"), ("VEC3", "at_rest"), ("VEC4", "color"))):
+        info.vertex_in(number, kind, name)
+    info.vertex_out(between)
+    info.fragment_out(0, "VEC4", "fragColor")
+    info.vertex_source(
+        "void main() {"
+        "  vec4 here = ModelViewProjectionMatrix * vec4(pos, 1.0);"
+        "  vec4 rest = ModelViewProjectionMatrix * vec4(at_rest, 1.0);"
+        "  here.z = min(here.z / here.w, rest.z / rest.w) * here.w;"
+        "  gl_Position = here;"
+        "  finalColor = color;"
+        "}"
+    )
+    info.fragment_source("void main() { fragColor = blender_srgb_to_framebuffer_space(finalColor); }")
+    return gpu.shader.create_from_info(info)
 
 
 def register() -> None:

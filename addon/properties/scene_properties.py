@@ -135,7 +135,8 @@ class PALPATE_PG_scene(bpy.types.PropertyGroup):
     )
     show_indentation: BoolProperty(
         name="Indentation",
-        description="The surface of a baked sensor gives way by its penetration, so that what presses does not cut into it",
+        description="The surface of a sensor gives way by its penetration, while playing and after a bake, "
+        "so that what presses does not cut into it",
         default=True,
         **SETTING,
     )

@@ -27,12 +27,15 @@ class LoadedTexels:
         Of discs as large as the texels.
     forces : (n,) float, N
         Normal forces.
+    sensors : (n,) int
+        Number of each texel's sensor, in the order of the bake.
     """
 
     points: np.ndarray
     normals: np.ndarray
     radii: np.ndarray
     forces: np.ndarray
+    sensors: np.ndarray
 
     def __len__(self) -> int:
         return len(self.points)
@@ -43,8 +46,8 @@ def loaded_texels(scene, bake: Bake, frame: int) -> LoadedTexels:
     recording, metres = bake.recording, units.metres_per_unit(scene)
     sensors, poses = recording.at(frame).sensors, recording.poses[frame_index(recording, frame)]
     largest = max((float(sensors[name].normal_force.max(initial=0.0)) for name in bake.texels), default=0.0)
-    parts = [(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0), np.zeros(0))]
-    for name, texels in bake.texels.items():
+    parts = [(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0), np.zeros(0), np.zeros(0, dtype=int))]
+    for number, (name, texels) in enumerate(bake.texels.items()):
         body, readings = bake.manifests[name].body or name, sensors[name]
         if body not in recording.body_names or largest <= 0.0:
             continue
@@ -55,5 +58,6 @@ def loaded_texels(scene, bake: Bake, frame: int) -> LoadedTexels:
         local = texels.position[chosen] - depth[:, None] * texels.normal[chosen]
         points = (pose[:3] + local @ rotation.T) / metres
         radii = np.sqrt(texels.area[chosen] / np.pi) / metres
-        parts.append((points, texels.normal[chosen] @ rotation.T, radii, readings.normal_force[chosen]))
+        normals = texels.normal[chosen] @ rotation.T
+        parts.append((points, normals, radii, readings.normal_force[chosen], np.full(len(points), number)))
     return LoadedTexels(*(np.concatenate(column) for column in zip(*parts, strict=True)))

@@ -88,6 +88,13 @@ def image_position(scene, point) -> tuple[float, float]:
     return 0.5 + 0.5 * x / (-z * width), 0.5 + 0.5 * y / (-z * height)
 
 
+def view_direction(scene, x: float, y: float) -> Vector:
+    """Return the direction in which a place in the picture is seen, (3,) in the world: :func:`image_position` backwards."""
+    camera = _camera(scene)
+    width, height = _half_angles(scene, camera)
+    return camera.matrix_world.normalized().to_3x3() @ Vector(((2.0 * x - 1.0) * width, (2.0 * y - 1.0) * height, -1.0))
+
+
 def pixels_per_unit(scene, point, width: int) -> float:
     """Return how many pixels a Blender unit across the view takes at a world point, in a picture of this width."""
     camera = _camera(scene)

@@ -186,7 +186,7 @@ def _set_camera(scene, frames: Sequence[int], options: RenderOptions, loaded, ch
     view = options.view
     if view is None:
         towards = DEFAULT_VIEW if own is None else camera_direction.view_of(own.matrix_world.to_3x3() @ Vector((0.0, 0.0, 1.0)))
-        view = camera_direction.best_view(scene, loaded, towards, options.see_through)
+        view = camera_direction.best_view(scene, loaded, towards, options.see_through, _corners(scene, frames))
     camera = changes.add(_camera(scene, own, view))
     changes.set(scene, "camera", camera)
     render.fit_camera(scene, _corners(scene, frames), (MARGIN, MARGIN, 1 - MARGIN, 1 - MARGIN))

@@ -18,14 +18,14 @@ from mathutils import Vector
 from ...core.io.file_writing import atomic_write
 from ...core.io.temporary_folder import temporary_folder
 from ..scene import participants
-from . import render
+from . import camera_direction, render
 from .loaded_texels import LoadedTexels
 
 CLEARNESS = 0.82
 """Share of the second render where targets are see-through; what is left of them shows their outline and their lights."""
-FULL_RADII, FADED_RADII = 1.6, 4.0
-"""Distance from a loaded texel, in radii of texels, up to which targets are see-through, and from which they are as they were.
-A radius of 1.6 reaches over the corner of a square texel."""
+FULL_RADII, FADED_RADII = 1.6, 2.6
+"""Distance from the loaded part of a sensor, in radii of texels, up to which targets are see-through, and from which they are
+as they were. A radius of 1.6 reaches over the corner of a square texel; how wide the fade is was chosen by eye."""
 MOST_RAYS = 60
 """Loaded texels, at most, from which it is tried whether a target covers them; evenly chosen."""
 LEAST_PIXELS = 2.0
@@ -109,19 +109,74 @@ def clear_weights(scene, loaded: LoadedTexels, size: tuple[int, int]) -> np.ndar
     width, height = size
     eye = np.array(scene.camera.matrix_world.translation)
     facing = np.einsum("ij,ij->i", eye - loaded.points, loaded.normals) > 0.0
+    places = np.array([render.image_position(scene, point) for point in loaded.points[facing]]).reshape(-1, 2)
+    seen = ((places >= 0.0) & (places < 1.0)).all(axis=1)
+    pixels = np.column_stack([places[:, 0] * width, (1.0 - places[:, 1]) * height])
     free = np.ones((height, width), dtype=bool)
-    radii = []
-    for point, radius in zip(loaded.points[facing], loaded.radii[facing], strict=True):
-        x, y = render.image_position(scene, point)
-        if 0.0 <= x < 1.0 and 0.0 <= y < 1.0:
-            free[min(int((1.0 - y) * height), height - 1), int(x * width)] = False
-            radii.append(radius * render.pixels_per_unit(scene, point, width))
+    for number in np.unique(loaded.sensors[facing]):
+        free &= ~_patch(pixels[loaded.sensors[facing] == number], width, height)
+    radii = [
+        radius * render.pixels_per_unit(scene, point, width)
+        for point, radius in zip(loaded.points[facing][seen], loaded.radii[facing][seen], strict=True)
+    ]
     if free.all():
         return np.zeros((height, width))
-    radius = max(float(np.median(radii)), 0.5)
+    radius = max(float(np.median(radii)), 0.5) if radii else 0.5
     full, faded = FULL_RADII * radius, max(FADED_RADII * radius, FULL_RADII * radius + LEAST_PIXELS)
     share = np.clip((faded - distance_transform_edt(free)) / (faded - full), 0.0, 1.0)
-    return CLEARNESS * share * share * (3.0 - 2.0 * share)
+    weights = CLEARNESS * share * share * (3.0 - 2.0 * share)
+    return weights * _shows_sensors(scene, (weights > 0.0) & free)
+
+
+def _shows_sensors(scene, asked: np.ndarray) -> np.ndarray:
+    """(height, width) float: 0 where no sensor is behind the targets, 1 elsewhere; beside a sensor its target stays as it is.
+
+    Parameters
+    ----------
+    asked : (height, width) bool
+        Pixels that are looked at; the others count as 1.
+    """
+    from scipy.ndimage import uniform_filter
+
+    height, width = asked.shape
+    depsgraph, eye = bpy.context.evaluated_depsgraph_get(), scene.camera.matrix_world.translation
+    shown = np.ones(asked.shape)
+    for y, x in zip(*np.nonzero(asked), strict=True):
+        way = render.view_direction(scene, (x + 0.5) / width, 1.0 - (y + 0.5) / height)
+        found = camera_direction.first_object(scene, depsgraph, eye, way)
+        shown[y, x] = found is not None and found.palpate.role == "SENSOR"
+    return np.minimum(shown, uniform_filter(shown, 3))  # a soft edge, as that of a render
+
+
+def _patch(pixels: np.ndarray, width: int, height: int) -> np.ndarray:
+    """(height, width) bool: the convex hull of places in a picture, so that a map has no hole between two places of contact.
+
+    Parameters
+    ----------
+    pixels : (n, 2) float
+        Pixels to the right and downwards; places beyond the picture's edge count for the hull alone.
+    """
+    from PIL import Image, ImageDraw
+
+    image = Image.new("1", (width, height))
+    corners = [(float(x), float(y)) for x, y in pixels[_hull(pixels)]]
+    if len(corners) > 2:
+        ImageDraw.Draw(image).polygon(corners, fill=1, outline=1)
+    inside = np.array(image, dtype=bool)
+    for x, y in np.floor(pixels).astype(int):
+        if 0 <= x < width and 0 <= y < height:
+            inside[y, x] = True
+    return inside
+
+
+def _hull(points: np.ndarray) -> np.ndarray:
+    """Return the indices of the corners of the convex hull of (n, 2) points in order; of points on a line, none."""
+    from scipy.spatial import ConvexHull, QhullError
+
+    try:
+        return ConvexHull(points).vertices
+    except (QhullError, ValueError):  # fewer than three points, or all on a line
+        return np.zeros(0, dtype=int)
 
 
 @contextmanager

@@ -3,8 +3,19 @@
 
 :mod:`.mesh` checks meshes and computes their normals, areas and mass properties; :mod:`.bvh` finds where segments meet them.
 :mod:`.texels` makes texels of a region's vertices. :mod:`.layout` arranges texels as images, and :mod:`.sampling` places texels
-on a surface that has none. :mod:`.point_surface` joins points of a surface by triangles, and :mod:`.smooth_grid` is the smooth
-surface of penetration between texels in rows and columns.
+on a surface that has none. :mod:`.point_surface` joins points of a surface by triangles. :mod:`.smooth_grid` is the smooth
+surface of penetration between texels in rows and columns, :mod:`.smooth_mesh` that between texels on any faces.
 """
 
-__all__ = ["bvh", "contact_points", "layout", "mesh", "point_surface", "rotations", "sampling", "smooth_grid", "texels"]
+__all__ = [
+    "bvh",
+    "contact_points",
+    "layout",
+    "mesh",
+    "point_surface",
+    "rotations",
+    "sampling",
+    "smooth_grid",
+    "smooth_mesh",
+    "texels",
+]

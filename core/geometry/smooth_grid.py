@@ -4,12 +4,17 @@
 The surface is the limit of Catmull and Clark's subdivision (1978), which on rows and columns is the bicubic B-spline, of values
 that were corrected beforehand for what the subdivision takes from them. The indented surface in Blender is made in the same
 way, of geometry nodes and with the numbers of this module, so that figures and scene show one surface. At the four corners of
-a grid, which the subdivision rounds, the two differ.
+a grid, which the subdivision rounds, the two differ. :mod:`.smooth_mesh` is the same surface on any faces.
 """
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_matrix
 
 SHARPENINGS = 4
 """How often the values at the texels are corrected for what the smoothing takes from them. After four corrections the lowest
@@ -20,32 +25,56 @@ near the 4/9 of the limit surface of Catmull and Clark."""
 
 
 def sharpened(values: np.ndarray) -> np.ndarray:
+    """Return the values of a grid, (r, c) float, sharpened by :func:`sharpened_by`; neighbours are those in rows and columns."""
+    values = np.asarray(values, float)
+    number = np.arange(values.size).reshape(values.shape)
+    along, up = (
+        np.column_stack([one.ravel(), other.ravel()])
+        for one, other in ((number[:, :-1], number[:, 1:]), (number[:-1], number[1:]))
+    )
+    return sharpened_by(blur_matrix(np.concatenate([along, up]), values.size), values.ravel()).reshape(values.shape)
+
+
+def sharpened_by(blur: csr_matrix, values: np.ndarray) -> np.ndarray:
     """Return values whose smoothed surface passes near the given ones: each time, what a blur takes away is added.
 
     Parameters
     ----------
-    values : (rows, columns) float
+    blur : (n, n) csr_matrix
+        From :func:`blur_matrix`.
+    values : (n,) float
 
     Returns
     -------
-    (rows, columns) float
+    (n,) float
     """
-    values = np.asarray(values, float)
     made = values
     for _ in range(SHARPENINGS):
-        made = made + (values - _blurred(made))
+        made = made + (values - blur @ made)
     return made
 
 
-def _blurred(values: np.ndarray) -> np.ndarray:
-    """Return the mean of each value, with weight one, and its two to four neighbours, with :data:`NEIGHBOUR_WEIGHT`."""
-    total, weight = values.copy(), np.ones_like(values)
-    for axis in (0, 1):
-        own, other = np.moveaxis(values, axis, 0), (np.moveaxis(total, axis, 0), np.moveaxis(weight, axis, 0))
-        for here, there in ((slice(1, None), slice(None, -1)), (slice(None, -1), slice(1, None))):
-            other[0][here] += NEIGHBOUR_WEIGHT * own[there]
-            other[1][here] += NEIGHBOUR_WEIGHT
-    return total / weight
+def blur_matrix(ends: np.ndarray, count: int) -> csr_matrix:
+    """Return the mean of each value, with weight one, and its neighbours, with :data:`NEIGHBOUR_WEIGHT`.
+
+    Parameters
+    ----------
+    ends : (m, 2) int
+        Pairs of neighbours, each pair once.
+    count : int
+        Number of values.
+
+    Returns
+    -------
+    (count, count) csr_matrix
+    """
+    from scipy.sparse import csr_matrix, identity
+
+    first, second = np.asarray(ends, np.int64).reshape(-1, 2).T
+    rows, columns = np.append(first, second), np.append(second, first)
+    beside = csr_matrix((np.full(len(rows), NEIGHBOUR_WEIGHT), (rows, columns)), shape=(count, count))
+    total = 1.0 + np.asarray(beside.sum(axis=1)).ravel()
+    return (identity(count, format="csr") + beside).multiply(1.0 / total[:, None]).tocsr()
 
 
 def spline_weights(count: int, places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

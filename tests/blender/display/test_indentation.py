@@ -7,10 +7,12 @@ import pytest
 from blender_scenes import ball, changes, dump, grid, press, press_and_drop, reopen, save
 
 from palpate.addon.bake.bake import bake
-from palpate.addon.display import indentation, overlays
+from palpate.addon.display import indentation, indented_surface, materials, overlays
 from palpate.addon.scene import mesh_arrays, mesh_fingerprint
 from palpate.addon.scene.display_names import INDENTATION_MODIFIER
 from palpate.addon.session import frame_status
+from palpate.addon.timeline import live_cache
+from palpate.core.figures import color_maps
 from palpate.core.jobs.job_runner import run_job
 
 
@@ -178,7 +180,96 @@ def test_the_overlay_of_solid_view_lies_on_the_surface(tmp_path):
     made.recording, made.texels = result.recording, {"Pad": result.scenario.sensors[0].texels}
     made.manifests = {"Pad": type("Manifest", (), {"body": ""})()}
     (overlay,) = overlays.baked_overlays(scene, made, 6, 1.0)
-    upper = overlay.corners[: len(overlay.corners) // 2]
-    depth = result.recording.at(6).sensors["Pad"].depth.max()
-    assert -upper[:, 2].min() == pytest.approx(depth, rel=0.15)
-    assert upper[:, 2].min() > surface(pad)[:, 2].min()
+    assert overlay.at_rest is None  # the surface that Blender draws is indented, too
+    assert_on_surface(overlay, surface(pad), result.recording.at(6).sensors["Pad"].depth.max())
+
+
+def assert_on_surface(overlay, expected, deepest):
+    """Both sides of an overlay are as far from the surface, and between them it is the one that Blender makes of its nodes.
+
+    To a hundred-thousandth of the penetration: Blender computes in single precision.
+    """
+    from scipy.spatial import cKDTree
+
+    above, below = np.split(overlay.corners.astype(float), 2)
+    assert np.linalg.norm(above - below, axis=1) == pytest.approx(2 * overlays.LIFT * 0.05, rel=1e-3)
+    distance, _ = cKDTree(expected).query(0.5 * (above + below))
+    assert len(above) == len(expected) and distance.max() < 1e-5 * deepest
+    shown = above[overlay.triangles[: len(overlay.triangles) // 2]]
+    area = 0.5 * np.linalg.norm(np.cross(shown[:, 1] - shown[:, 0], shown[:, 2] - shown[:, 0]), axis=1).sum()
+    assert area == pytest.approx(0.05**2 * 0.8, rel=0.05)  # each face once; the dent is a little larger than the flat part
+
+
+def playing(scene, last):
+    """Play to a frame; return the overlay of the only sensor and the run."""
+    for frame in range(scene.frame_start, last + 1):
+        scene.frame_set(frame)
+    run = live_cache.get(scene)
+    (overlay,) = overlays.sensor_overlays(scene, run, run.frames[last])
+    return overlay, run
+
+
+def test_while_playing_the_surface_gives_way_as_it_will_after_the_bake(tmp_path):
+    scene, pad, _ = press_wide()
+    save(tmp_path)
+    scene.frame_set(6)
+    scene.frame_set(1)
+    before = dump()
+    overlay, run = playing(scene, 6)
+    scene.frame_set(1)
+    assert (overlay.at_rest[:, 2] - overlay.corners[:, 2]).max() == pytest.approx(
+        run.frames[6].sensors["Pad"].depth.max(), rel=0.03
+    )
+    rest = overlay.at_rest.astype(float)
+    assert np.abs(np.abs(rest[:, 2]) - overlays.LIFT * 0.05).max() < 1e-6  # the undented pad lies in the plane z = 0
+    dark = overlay.colors[:, :3].max(axis=1) / np.maximum(flat_colors(scene, overlay, run), 1e-9)
+    assert dark.min() >= materials.GLOW - 1e-3 and dark.max() <= 1.0 + 1e-3 and np.ptp(dark) > 0.02
+    assert [line for line in changes(before, dump()) if "baked_" not in line and "settings" not in line] == []
+    run_job(bake(scene))
+    scene.frame_set(6)
+    assert_on_surface(overlay, surface(pad), run.frames[6].sensors["Pad"].depth.max())
+
+
+def flat_colors(scene, overlay, run):
+    """Return the largest of red, green and blue of each corner of an overlay without its shade."""
+    scene.palpate.show_indentation = False
+    (plain,) = overlays.sensor_overlays(scene, run, run.frames[6])
+    assert plain.at_rest is None and np.ptp(plain.corners[:, 2]) < 1.01 * 2 * overlays.LIFT * 0.05
+    scene.palpate.show_indentation = True
+    surface_of = indented_surface.surface_of(scene, scene.objects["Pad"], run.scenario.sensors[0].texels)
+    force = run.frames[6].sensors["Pad"].normal_force
+    own = color_maps.colors(scene.palpate.color_map, force / max(force.max(), 1e-9))
+    return np.tile(surface_of.between(own), (2, 1)).max(axis=1)
+
+
+def test_factor_undo_and_reopening_of_a_played_scene(tmp_path):
+    """What is drawn while playing is in no file and in no step of undo; the factor exaggerates it, zero leaves it out."""
+    scene, pad, _ = press()
+    once, _ = playing(scene, 8)
+    deepest = (once.at_rest[:, 2] - once.corners[:, 2]).max()
+    scene.palpate.indentation_factor = 3.0
+    (thrice,) = overlays.sensor_overlays(scene, live_cache.get(scene), live_cache.get(scene).frames[8])
+    assert (thrice.at_rest[:, 2] - thrice.corners[:, 2]).max() == pytest.approx(3.0 * deepest, rel=1e-4)
+    bpy.ops.ed.undo_push(message="played")
+    pad.location.x += 0.001
+    bpy.ops.ed.undo_push(message="moved")
+    bpy.ops.ed.undo()
+    save(tmp_path)
+    scene = reopen(tmp_path / "scene.blend")
+    pad = scene.objects["Pad"]
+    assert not pad.modifiers and not pad.data.attributes.get(materials.FORCE) and len(surface(pad)) == len(pad.data.vertices)
+    assert not [item.name for item in pad.data.attributes if item.name.startswith("palpate")]
+    again, _ = playing(scene, 8)
+    assert (again.at_rest[:, 2] - again.corners[:, 2]).max() == pytest.approx(3.0 * deepest, rel=1e-4)
+
+
+@pytest.mark.parametrize("how", ["modifier", "laid"])
+def test_sensors_whose_surface_stays_stay_while_playing(how):
+    scene, pad, _ = press()
+    if how == "modifier":
+        pad.modifiers.new("Subdivision", "SUBSURF")
+    else:
+        pad.palpate.skin.method = "VERTICES"
+    overlay, run = playing(scene, 8)
+    assert run.frames[8].sensors["Pad"].depth.max() > 0.0
+    assert overlay.at_rest is None and overlay.triangles is None

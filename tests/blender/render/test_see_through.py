@@ -106,3 +106,43 @@ def test_one_render_where_nothing_is_covered(baked, tmp_path, monkeypatch):
     request = FigureRequest(("scene",), frames=(3,), size=(32, 24), samples=1, view=(-90.0, -40.0), own_light=True)
     run_job(figure_export.make_figures(scene, tmp_path / "out", request))
     assert len(calls) == 1
+
+
+def test_a_map_has_no_hole_between_two_places_of_contact(tmp_path):
+    """A bar with two feet is seen through between its feet, too, and stays opaque where it stands over the pad's edge."""
+    scene = bpy.context.scene
+    scene.frame_start, scene.frame_end = 1, 3
+    pad = grid(columns=12, rows=24)
+    bpy.ops.mesh.primitive_cube_add(size=1.0, location=(0.0, 0.0, 0.011))
+    target = bpy.context.object
+    target.scale = (0.05, 0.2, 0.012)
+    for side in (-1.0, 1.0):
+        bpy.ops.mesh.primitive_cube_add(size=1.0, location=(0.0, side * 0.018, 0.0))
+        foot = bpy.context.object
+        foot.scale = (0.02, 0.006, 0.011)
+        foot.location.z = 0.0048
+        foot.palpate.role = "TARGET"
+    pad.palpate.role, target.palpate.role = "SENSOR", "TARGET"
+    save(tmp_path)
+    run_job(bake(scene))
+    found = figure_export.read_scene_bake(scene)
+    with render_setup.render_setup(scene, [3], FigureRequest(view=(-90.0, 60.0)).render_options(SIZE)):
+        scene.frame_set(3)
+        loaded = loaded_texels.loaded_texels(scene, found, 3)
+        weights = see_through.clear_weights(scene, loaded, SIZE)
+
+        def weight_at(point):
+            x, y = render.image_position(scene, point)
+            return weights[SIZE[1] - 1 - int(y * SIZE[1]), int(x * SIZE[0])]
+
+        assert np.abs(loaded.points[:, 1]).min() > 0.01  # nothing is loaded in the middle
+        assert weight_at((0.0, 0.0, 0.0)) == pytest.approx(see_through.CLEARNESS)
+        edge = np.abs(np.array(pad.dimensions)[:2]).max() / 2
+        assert weight_at((0.0, edge + 0.012, 0.017)) == 0.0  # behind the bar there is no pad
+
+
+@pytest.mark.parametrize("count", [0, 1, 2, 3])
+def test_few_loaded_texels_have_a_patch_of_their_pixels(count):
+    pixels = np.array([[3.5, 4.5], [6.5, 7.5], [9.5, 10.5]])[:count]  # on a line
+    inside = see_through._patch(pixels, 20, 16)
+    assert inside.sum() == count and inside[[4, 7, 10][:count], [3, 6, 9][:count]].all()

@@ -110,10 +110,9 @@ def test_nothing_changed_is_left_as_it_is():
     assert live_cache.get(scene) is run and frame_status.status_of(scene) is status
 
 
-@pytest.mark.parametrize("indented", [False, True])
-def test_views_without_materials_show_the_colours_of_a_bake_on_both_sides(tmp_path, indented):
+def test_views_without_materials_show_the_colours_of_a_bake_on_both_sides(tmp_path):
     scene, pad, _ = press(frames=4)
-    scene.palpate.show_indentation = indented
+    scene.palpate.show_indentation = False  # test_indentation.py tests the indented surface
     save(tmp_path)
     run_job(bake(scene))
     scene.frame_set(4)
@@ -127,10 +126,5 @@ def test_views_without_materials_show_the_colours_of_a_bake_on_both_sides(tmp_pa
     above, below = np.split(overlay.corners, 2)
     away = np.einsum("ij,ij->i", above - below, texels.normal[corner])
     assert (away > 0).all()  # the pad stands at the origin, unturned
-    deepest = readings.depth.max()
-    assert deepest > 1e-4
-    surface = texels.position - indented * readings.depth[:, None] * texels.normal
-    shift = 0.5 * (above + below) - surface[corner]
-    lift = np.einsum("ij,ij->i", shift, texels.normal[corner])  # where the pad is indented, it lies a little above its curve
-    np.testing.assert_allclose(shift, lift[0] * texels.normal[corner], atol=1e-7)
-    assert 0.0 < lift[0] < deepest / 8 + 1e-7 if indented else abs(lift[0]) < 1e-7
+    assert readings.depth.max() > 1e-4
+    np.testing.assert_allclose(0.5 * (above + below), texels.position[corner], atol=1e-7)
