@@ -25,7 +25,7 @@ near the 4/9 of the limit surface of Catmull and Clark."""
 
 
 def sharpened(values: np.ndarray) -> np.ndarray:
-    """Return the values of a grid, (r, c) float, sharpened by :func:`sharpened_by`; neighbours are those in rows and columns."""
+    """Return the values of a grid, (r, c) float, sharpened by :func:`sharpened_by`; neighbours share a row or column."""
     values = np.asarray(values, float)
     number = np.arange(values.size).reshape(values.shape)
     along, up = (

@@ -50,7 +50,7 @@ def test_the_window_offers_what_the_command_offers():
     display = {"colour_map": "color_map", "quantity": "quantity", "limit": "range_max"}
     scene = bpy.context.scene.palpate
     for action in parser._actions:
-        if action.dest in ("help", "scene", "scripts", "time_limit", "memory_limit"):  # of a run without a window
+        if action.dest in ("help", "scene", "bake", "scripts", "time_limit", "memory_limit"):  # of a run without a window
             continue
         owner = scene if action.dest in display else scene.figures
         name = display.get(action.dest) or here.get(action.dest, action.dest)
