@@ -307,7 +307,14 @@ def _indentation_shader():
         "  finalColor = color;"
         "}"
     )
-    info.fragment_source("void main() { fragColor = blender_srgb_to_framebuffer_space(finalColor); }")
+    info.push_constant("BOOL", "srgbTarget")  # set by Blender: the target takes linear light, as for its own shaders
+    info.fragment_source(
+        "void main() {"
+        "  vec3 linear = mix(finalColor.rgb / 12.92, pow((finalColor.rgb + 0.055) / 1.055, vec3(2.4)),"
+        "                    step(0.04045, finalColor.rgb));"
+        "  fragColor = vec4(srgbTarget ? linear : finalColor.rgb, finalColor.a);"
+        "}"
+    )
     return gpu.shader.create_from_info(info)
 
 
