@@ -39,6 +39,8 @@ class SensorOverlay:
     at_rest : (c, 3) float32 or None
         Where the corners would be on a surface that does not give way, as the one that Blender draws while playing. What hides
         that surface hides the indentation, and that surface itself does not.
+    normals : (c, 3) float32 or None
+        Of that surface.
     line : (2, 3) float32 or None
         Ends of the net-force arrow.
     plain_only : bool
@@ -51,6 +53,7 @@ class SensorOverlay:
     plain_only: bool = False
     triangles: np.ndarray | None = None
     at_rest: np.ndarray | None = None
+    normals: np.ndarray | None = None
     batches: list | None = None
 
 
@@ -201,8 +204,9 @@ def _heat_map(
         on_both_sides(position, surface.normal),
         np.tile(colors, (2, 1)),
         None,
-        triangles=np.concatenate([halves, halves + len(position)]).astype(np.int32),
+        triangles=np.ascontiguousarray(np.concatenate([halves, halves + len(position)]), dtype=np.int32),
         at_rest=on_both_sides(surface.position, surface.normal),
+        normals=np.tile(surface.normal @ rotation.T, (2, 1)).astype(np.float32),
     )
 
 
@@ -275,7 +279,7 @@ def _batches(overlay: SensorOverlay) -> list:
     if overlay.at_rest is None:
         smooth = gpu.shader.from_builtin("SMOOTH_COLOR")
     else:
-        smooth, content = _indentation_shader(), {**content, "at_rest": overlay.at_rest}
+        smooth, content = _indentation_shader(), {**content, "at_rest": overlay.at_rest, "normal": overlay.normals}
     result = [(smooth, batch_for_shader(smooth, "TRIS", content, indices=overlay.triangles), {})]
     if overlay.line is not None:
         lines = gpu.shader.from_builtin("POLYLINE_UNIFORM_COLOR")
@@ -287,22 +291,30 @@ def _batches(overlay: SensorOverlay) -> list:
 
 @lru_cache
 def _indentation_shader():
-    """Return the shader of an indentation: each corner has the depth of its place at rest, or its own where that is nearer."""
+    """Return the shader of an indentation: a corner is as near as the surface at rest before it, or as itself if that is nearer.
+
+    `place` is where the line of sight through the corner meets the plane of the surface at rest; seen edge-on it meets none.
+    """
     import gpu
 
     between = gpu.types.GPUStageInterfaceInfo("palpate_indentation")
     between.smooth("VEC4", "finalColor")
     info = gpu.types.GPUShaderCreateInfo()
     info.push_constant("MAT4", "ModelViewProjectionMatrix")
-    for number, (kind, name) in enumerate((("VEC3", "pos"), ("VEC3", "at_rest"), ("VEC4", "color"))):
+    for number, (kind, name) in enumerate((("VEC3", "pos"), ("VEC3", "at_rest"), ("VEC3", "normal"), ("VEC4", "color"))):
         info.vertex_in(number, kind, name)
     info.vertex_out(between)
     info.fragment_out(0, "VEC4", "fragColor")
     info.vertex_source(
         "void main() {"
         "  vec4 here = ModelViewProjectionMatrix * vec4(pos, 1.0);"
-        "  vec4 rest = ModelViewProjectionMatrix * vec4(at_rest, 1.0);"
-        "  here.z = min(here.z / here.w, rest.z / rest.w) * here.w;"
+        "  vec4 before = inverse(ModelViewProjectionMatrix) * vec4(here.xy / here.w, -1.0, 1.0);"
+        "  vec3 sight = normalize(pos - before.xyz / before.w);"
+        "  float facing = dot(sight, normal);"
+        "  if (abs(facing) > 0.05) {"
+        "    vec4 place = ModelViewProjectionMatrix * vec4(pos + sight * dot(at_rest - pos, normal) / facing, 1.0);"
+        "    here.z = min(here.z / here.w, place.z / place.w) * here.w;"
+        "  }"
         "  gl_Position = here;"
         "  finalColor = color;"
         "}"

@@ -220,6 +220,7 @@ def test_while_playing_the_surface_gives_way_as_it_will_after_the_bake(tmp_path)
     assert (overlay.at_rest[:, 2] - overlay.corners[:, 2]).max() == pytest.approx(
         run.frames[6].sensors["Pad"].depth.max(), rel=0.03
     )
+    assert overlay.triangles.flags.c_contiguous  # Blender's batches take no other
     rest = overlay.at_rest.astype(float)
     assert np.abs(np.abs(rest[:, 2]) - overlays.LIFT * 0.05).max() < 1e-6  # the undented pad lies in the plane z = 0
     dark = overlay.colors[:, :3].max(axis=1) / np.maximum(flat_colors(scene, overlay, run), 1e-9)
