@@ -291,7 +291,7 @@ def _batches(overlay: SensorOverlay) -> list:
 
 @lru_cache
 def _indentation_shader():
-    """Return the shader of an indentation: a corner is as near as the surface at rest before it, or as itself if that is nearer.
+    """Return the shader of an indentation: a corner is as near as the surface at rest before it, or as itself if nearer.
 
     `place` is where the line of sight through the corner meets the plane of the surface at rest; seen edge-on it meets none.
     """
