@@ -62,11 +62,11 @@ def blur_matrix(ends: np.ndarray, count: int) -> csr_matrix:
     ends : (m, 2) int
         Pairs of neighbours, each pair once.
     count : int
-        Number of values.
+        Number n of values.
 
     Returns
     -------
-    (count, count) csr_matrix
+    (n, n) csr_matrix
     """
     from scipy.sparse import csr_matrix, identity
 
