@@ -2,6 +2,7 @@
 """Panels of a scene: bake, display of results, figures."""
 
 from ..addon.display import baked_scene
+from ..addon.properties.scene_units import name_in_units
 from ..addon.session import frame_status, session_state
 from .subpanels import Subpanel, draw_named, draw_sentences
 
@@ -108,7 +109,7 @@ class Figures(Subpanel):
             column.prop(own, "light_angle")
             column.prop(own, "markers")
             if own.markers:
-                column.prop(own, "marker_pitch")
+                column.prop(own, name_in_units(own, "marker_pitch", context.scene))
         layout.use_property_split = False
         layout.label(text="Data:")
         layout.grid_flow(columns=1, even_columns=True, align=True).prop(own, "exports")

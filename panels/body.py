@@ -2,6 +2,7 @@
 """Panel of an object's body: what moves it."""
 
 from ..addon.properties import start_transforms
+from ..addon.properties.scene_units import name_in_units
 from ..addon.scene import drives
 from .subpanels import Subpanel, draw_named, draw_sentences
 
@@ -14,15 +15,15 @@ class Body(Subpanel):
     def draw_part(self, layout, settings, context):
         layout.prop(settings, "body", text="")
         if settings.body in start_transforms.MOVED_BY_FORCES:
-            layout.prop(settings, "mass")
+            layout.prop(settings, name_in_units(settings, "mass", context.scene))
         if settings.role in {"SENSOR", "PAD"}:
             layout.prop(settings, "presses")
         if settings.role == "TARGET" or settings.presses:
             draw_named(layout, settings, "contact_normals", "Normals")
         if settings.body == "DRIVEN":
-            _draw_drive(layout, settings)
+            _draw_drive(layout, settings, context.scene)
         if settings.body == "FREE":
-            layout.column().prop(settings, "velocity")
+            layout.column().prop(settings, name_in_units(settings, "velocity", context.scene))
             layout.column().prop(settings, "angular_velocity")
         if settings.body == "PARENT" and context.object.parent is None:
             draw_sentences(
@@ -30,7 +31,7 @@ class Body(Subpanel):
             )
 
 
-def _draw_drive(layout, settings) -> None:
+def _draw_drive(layout, settings, scene) -> None:
     draw_named(layout, settings, "drive_leader", "Coupled")
     draw_named(layout, settings, "drive_axis")
     draw_named(layout, settings, "drive_space")
@@ -42,7 +43,7 @@ def _draw_drive(layout, settings) -> None:
     column.prop(settings, drives.TARGET_PROPERTIES[settings.drive_control])
     column = layout.column(align=True)
     column.prop(settings, "drive_max_force")
-    column.prop(settings, "drive_max_speed")
+    column.prop(settings, name_in_units(settings, "drive_max_speed", scene))
     column.prop(settings, "drive_damping")
     if settings.drive_control != "VELOCITY":
         column.prop(settings, "drive_stiffness")

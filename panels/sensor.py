@@ -1,7 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Panels of one object: its role, and of a sensor or pad its region, its contact, its friction and what it reads."""
 
+import bpy
+
 from ..addon.authoring import laid_sensors
+from ..addon.properties.scene_units import name_in_units
 from ..addon.session import first_use, frame_status, session_state
 from ..core.model.sensor_parameters import CONTACT, FRICTION, HUNT_CROSSLEY, LINEAR, READOUT, SENSOR_PARAMETERS
 from ..operators import presets
@@ -69,7 +72,7 @@ class Skins(Subpanel):
             if obj.parent:
                 row.operator("palpate.object_activate", text="", icon="RESTRICT_SELECT_OFF").name = obj.parent.name
             for name in SKIN_FIELDS[own.method]:
-                box.prop(own, name)
+                box.prop(own, name_in_units(own, name, context.scene))
             layout.operator("palpate.skin_update", icon="FILE_REFRESH")
             return
         for skin in laid_sensors.laid_on(obj):
@@ -131,7 +134,7 @@ class ParameterRows:
     def draw(self, layout, *names: str) -> None:
         """Draw the parameters of these names."""
         for name in names:
-            layout.prop(self._settings, name)
+            layout.prop(self._settings, name_in_units(self._settings, name, bpy.context.scene))
         self.leave_out(*names)
 
     def draw_named(self, layout, name: str, text: str = "") -> None:

@@ -2,7 +2,8 @@
 """What a user says about objects and scenes: the properties that Blender shows in panels and saves with the file.
 
 Only what has to be saved lives here, no state of a simulation. Numbers are in SI units with the unit in the name, since Blender
-has no unit for N/m. Names of properties stand in saved files, so a property that is renamed needs a migration.
+has no unit for N/m; :mod:`.scene_units` shows lengths, masses and velocities in the units of the scene. Names of properties
+stand in saved files, so a property that is renamed needs a migration.
 """
 
 __all__ = [
@@ -14,6 +15,7 @@ __all__ = [
     "painted_maps",
     "parameter_properties",
     "registration",
+    "scene_units",
     "start_transforms",
     "study_properties",
 ]

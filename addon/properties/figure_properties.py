@@ -16,6 +16,7 @@ from bpy.props import (
 
 from ...core.export.registry import exporters
 from ...core.figures.gel_image import LIGHT_ANGLES, MARKERS_ALONG, GelStyle
+from .scene_units import in_units
 
 KINDS = (
     ("SCENE", "Scene", "The scene with its overlays, alone and with the tactile images beside it"),
@@ -156,6 +157,14 @@ class PALPATE_PG_figures(bpy.types.PropertyGroup):
         description="Print markers on the gel, which shear carries along: by the shear of a texel (N) over σ0 (N/m)",
         default=GelStyle.markers,
         **_plain,
+    )
+    marker_pitch_in_units: in_units(
+        "marker_pitch",
+        "m",
+        "Marker Pitch",
+        f"Distance between markers. 0: a round one, about {MARKERS_ALONG} along the gel",
+        min=0.0,
+        step=0.1,
     )
     marker_pitch: FloatProperty(
         name="Marker Pitch (m)",

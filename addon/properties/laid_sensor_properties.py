@@ -4,6 +4,8 @@
 import bpy
 from bpy.props import EnumProperty, FloatProperty, IntProperty, StringProperty
 
+from .scene_units import units_of_lengths
+
 SKIN_METHODS = (
     ("NONE", "None", "Not laid onto a surface"),
     ("ARRAY", "Array", "Rows and columns of a given pitch, wrapped around the surface"),
@@ -18,7 +20,22 @@ def _length(name: str, text: str, **more):
     return FloatProperty(name=name, description=text, precision=5, step=0.01, options=set(), **more)
 
 
-class PALPATE_PG_skin(bpy.types.PropertyGroup):
+class LengthsInUnits:
+    """The lengths of a pattern in the units of the scene."""
+
+    __annotations__ = units_of_lengths(
+        {
+            "pitch_x": ("Column Pitch", "Distance between columns"),
+            "pitch_y": ("Row Pitch", "Distance between rows"),
+            "shift_x": ("Shift Across", "Displacement of the middle of the array along its rows"),
+            "shift_y": ("Shift Along", "Displacement of the middle of the array across its rows"),
+            "spacing": ("Spacing", "Distance between texels"),
+            "lift": ("Lift", "Height of the texels above the surface; they are touched so much earlier"),
+        }
+    )
+
+
+class PALPATE_PG_skin(LengthsInUnits, bpy.types.PropertyGroup):
     """How the texels of a sensor were laid onto the surface of its parent: `Object.palpate.skin`"""
 
     method: EnumProperty(

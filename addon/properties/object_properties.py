@@ -18,6 +18,7 @@ from ..session import first_use, identity, session_state
 from . import effect_stack, laid_sensor_properties, start_transforms
 from .painted_maps import PaintedProperties
 from .parameter_properties import FIXED, DriveParameterProperties, SensorParameterProperties
+from .scene_units import in_units
 
 ROLES = (
     ("NONE", "None", "Not part of the simulation"),
@@ -145,6 +146,12 @@ class PALPATE_PG_object(SensorParameterProperties, PaintedProperties, DriveParam
         subtype="XYZ",
         precision=4,
         **FIXED,
+    )
+    mass_in_units: in_units(
+        "mass", "kg", "Mass", "Mass of a free or driven body; its inertia is that of a solid of uniform density", min=0.0
+    )
+    velocity_in_units: in_units(
+        "velocity", "m/s", "Velocity", "Velocity of a free body at the first frame, world axes", is_vector=True
     )
     angular_velocity: FloatVectorProperty(
         name="Spin (rad/s)",

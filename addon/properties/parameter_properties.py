@@ -1,12 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Properties of Blender made from the specifications of parameters in :mod:`..core.model`, and read back as plain data."""
 
+from collections.abc import Mapping
+
 from bpy.props import EnumProperty, FloatProperty, StringProperty
 
 from ...core.model.drive import DRIVE_PARAMETERS
 from ...core.model.parameter import ChoiceParameter, Parameter, Specification
 from ...core.model.sensor_parameters import SENSOR_PARAMETERS, SensorParameters
 from ..session import session_state, units
+from .scene_units import ENDING, KINDS, in_units
 
 FIXED: dict = {"options": set(), "override": {"LIBRARY_OVERRIDABLE"}, "update": session_state.settings_changed}
 """A parameter is constant during a run, so it has no keyframes; what is shown follows it."""
@@ -45,6 +48,14 @@ def float_property(parameter: Parameter, label: str, description: str, limits: d
     return FloatProperty(name=name, description=description, default=parameter.default, **limits, **more, **FIXED)
 
 
+def described(parameter: Parameter) -> str:
+    """Return a parameter's tooltip: meaning, SI unit, source and typical values."""
+    text = f"{parameter.text}, {unit_in_words(parameter)}"
+    if parameter.source:
+        text += f" ({parameter.source})"
+    return f"{text}. {parameter.note}" if parameter.note else text
+
+
 def property_of(specification: Specification):
     """Return the property of Blender that holds a parameter."""
     if isinstance(specification, ChoiceParameter):
@@ -53,19 +64,30 @@ def property_of(specification: Specification):
         return EnumProperty(name=specification.label, description=specification.text, items=items, default=default, **FIXED)
     if not isinstance(specification, Parameter):
         return StringProperty(name=specification.label, description=specification.text, default=specification.default, **FIXED)
-    description = f"{specification.text}, {unit_in_words(specification)}"
-    if specification.source:
-        description += f" ({specification.source})"
-    if specification.note:
-        description += f". {specification.note}"
+    description = described(specification)
     digits = {"precision": 5, "step": 0.1} if specification.unit == "m" else {"precision": 4, "step": 10}
     return float_property(specification, f"{specification.label} {specification.symbol}".strip(), description, **digits)
 
 
-class SensorParameterProperties:
-    """The parameters of a sensor, each under its own name."""
+def properties_in_units(specifications: Mapping[str, Specification]) -> dict:
+    """Return the properties that show parameters in the scene's units, for those that have a unit of Blender, by name."""
+    found = {}
+    for name, specification in specifications.items():
+        if isinstance(specification, Parameter) and specification.unit in KINDS:
+            label = f"{specification.label} {specification.symbol}".strip()
+            found[name + ENDING] = in_units(
+                name, specification.unit, label, described(specification), min=max(specification.low, LOWEST), step=0.1
+            )
+    return found
 
-    __annotations__ = {name: property_of(specification) for name, specification in SENSOR_PARAMETERS.items()}
+
+class SensorParameterProperties:
+    """The parameters of a sensor, each under its own name, and again in the scene's units where they have one."""
+
+    __annotations__ = {
+        **{name: property_of(specification) for name, specification in SENSOR_PARAMETERS.items()},
+        **properties_in_units(SENSOR_PARAMETERS),
+    }
 
 
 DRIVE_PARAMETER_PROPERTIES = {f"drive_{name}": name for name, item in DRIVE_PARAMETERS.items() if item.label}
@@ -75,7 +97,10 @@ DRIVE_PARAMETER_PROPERTIES = {f"drive_{name}": name for name, item in DRIVE_PARA
 class DriveParameterProperties:
     """The parameters of a drive."""
 
-    __annotations__ = {key: property_of(DRIVE_PARAMETERS[name]) for key, name in DRIVE_PARAMETER_PROPERTIES.items()}
+    __annotations__ = {
+        **{key: property_of(DRIVE_PARAMETERS[name]) for key, name in DRIVE_PARAMETER_PROPERTIES.items()},
+        **properties_in_units({key: DRIVE_PARAMETERS[name] for key, name in DRIVE_PARAMETER_PROPERTIES.items()}),
+    }
 
 
 def sensor_parameters(settings) -> SensorParameters:

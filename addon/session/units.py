@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Unit scale, gravity and frame rate of a scene. All of Palpate's own quantities are in SI units, also in the panels."""
+"""Unit scale, gravity and frame rate of a scene. All of Palpate's own quantities are in SI units."""
 
 from __future__ import annotations
 

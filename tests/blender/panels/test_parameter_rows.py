@@ -7,16 +7,17 @@ from unittest.mock import MagicMock
 import bpy
 import pytest
 
+from palpate.addon.properties.scene_units import ENDING
 from palpate.core.model.sensor_parameters import HUNT_CROSSLEY, LINEAR, SENSOR_PARAMETERS
 from palpate.panels import sensor
 
 
 def drawn(settings, part) -> Counter:
-    """How often a panel draws each property, on a layout that only writes down what it is asked for."""
+    """How often a panel draws each property, in whatever units, on a layout that only writes down what it is asked for."""
     found, layout = Counter(), MagicMock()
     for nested in ("column", "row", "split", "box"):
         getattr(layout, nested).return_value = layout
-    layout.prop.side_effect = lambda _owner, name, **_how: found.update([name])
+    layout.prop.side_effect = lambda _owner, name, **_how: found.update([name.removesuffix(ENDING)])
     context = MagicMock(scene=bpy.context.scene, object=bpy.context.object)
     context.region.width, context.preferences.system.ui_scale = 300, 1.0
     part.draw_part(None, layout, settings, context)
