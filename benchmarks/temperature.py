@@ -52,8 +52,8 @@ def loads(path: np.ndarray) -> np.ndarray:
     row, column = np.divmod(np.arange(ROWS * COLUMNS), COLUMNS)
     x, y = (column - 0.5 * (COLUMNS - 1)) * PITCH, (row - 0.5 * (ROWS - 1)) * PITCH
     across = (path[:, :1] - x) ** 2 + (path[:, 1:2] - y) ** 2
-    below = path[:, 2:] - np.sqrt(np.maximum(RADIUS**2 - across, 0.0))
-    return np.where(across < RADIUS**2, K * np.maximum(-below, 0.0), 0.0)
+    high = np.sqrt(np.maximum(RADIUS**2 - across, 0.0))  # of the ball's middle above the point where it meets the texel's line
+    return K * np.maximum(high - path[:, 2:], 0.0) * high / RADIUS  # across the ball's surface
 
 
 def follows(kind: str, rng: np.random.Generator, full: float) -> Reading:

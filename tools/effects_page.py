@@ -288,6 +288,7 @@ DRAWN = {
     "drift": _over_time(
         np.linspace(0, 120, 601), np.zeros(601), linear={"rate": 4e-4}, warm_up={}, random_walk={"spread": 0.004}
     ),
+    "warm-up": _over_time(np.linspace(0, 900, 601), np.full(601, 1e-3)),
     "temperature": _reading_over_force(gain={"gain_change": 0.02}, zero={"zero_change": 0.02}),
     "noise": _over_time(
         _SHORT, 0.001 * np.sin(np.pi * _SHORT) ** 2, white={"spread": 0.03}, proportional={"share": 0.05},

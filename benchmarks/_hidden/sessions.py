@@ -25,8 +25,8 @@ RECORDINGS, CHECKED = 7, 2
 CLOCKS = ("session", "own", "one")
 KINDS = ("wear", "drift", "softening", "warm-up", "healthy")
 FIRST_SEALED = 1000
-NAMES = {"wear": "wear", "drift": "drift", "softening": "softening", "warm-up": "drift"}
-"""What the library calls each of them: a gain that moves by itself while the sensor warms up is a drift."""
+NAMES = {"wear": "wear", "drift": "drift", "softening": "softening", "warm-up": "warm-up"}
+"""What the library calls each of them."""
 
 Act = Callable[[list[np.ndarray], list[np.ndarray]], list[np.ndarray]]
 """Forces and times (s since the session began) of all recordings, in order, to those that the sensor gives."""
@@ -69,6 +69,10 @@ def draw(kind: str, clock: str, number: int) -> Case:
     words = {"k": float(f"{k * rng.uniform(0.9, 1.1):.3g}"), "cn": float(f"{0.01 * k:.3g}"), "unit": "N"}
     checked = tuple(sorted(int(i) for i in rng.choice(np.arange(1, RECORDINGS), CHECKED, replace=False)))
     answer = (NAMES[kind],) if kind != "healthy" else ()
+    if kind == "warm-up" and clock == "own":
+        answer = ("drift",)  # without a clock, a gain that moves by itself is a drift
+    elif kind == "warm-up" and forms[number % len(forms)] is _warming_of_both:
+        answer = ("warm-up", "drift")
     if clock == "own" and kind == "softening":
         answer = ("softening", "wear")  # the gain falls from file to file; that it stops to do so, few files show
     return Case(kind, clock, number, answer, radius, words, list(starts), [time] * RECORDINGS, paths, readings, checked)

@@ -21,6 +21,18 @@ def listed(signal: np.ndarray, time: np.ndarray, values: Values, transducers: Tr
     return signal * np.asarray(values["factor"])
 
 
+def curved(signal: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
+    """Apply a curve of its own to each texel: a factor, and a share that grows with the force."""
+    return signal * (np.asarray(values["factor"]) * (1.0 + np.asarray(values["curvature"]) * np.abs(signal)))
+
+
+def random_power(signal: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
+    """Apply a power of its own to each texel; all agree at one force."""
+    force = scalar(values, "force")
+    exponent = np.exp(scalar(values, "spread") * normal("gain-mismatch", seed, np.arange(signal.shape[1])))
+    return np.sign(signal) * force * (np.abs(signal) / force) ** exponent
+
+
 def gradient(signal: np.ndarray, time: np.ndarray, values: Values, transducers: TransducerArray, seed: int) -> np.ndarray:
     """Multiply by a factor that is linear in x and y, from ``1 − g`` at one end to ``1 + g`` at the other."""
     middle = 0.5 * (transducers.position.min(axis=0) + transducers.position.max(axis=0))
@@ -63,6 +75,29 @@ KIND = Kind(
             ),
             neutral={"along_x": 0.0, "along_y": 0.0},
             memoryless=gradient,
+        ),
+        Form(
+            "curved",
+            "rᵢ = gᵢ · fᵢ · (1 + cᵢ fᵢ)",
+            "ISO/IEC Guide 99 (2007), 4.31: calibration curve, here to second order for each texel",
+            (
+                Parameter("factor", "1", 1.0, 0.0, 100.0, "Factor g of each texel at small forces.", per_texel=True),
+                Parameter("curvature", "1/N", 0.0, -1e4, 1e4, "Share c by which the factor grows per newton.", per_texel=True),
+            ),
+            neutral={"factor": 1.0, "curvature": 0.0},
+            memoryless=curved,
+        ),
+        Form(
+            "random-power",
+            "rᵢ = F · (fᵢ/F)^pᵢ,  pᵢ = exp(s εᵢ),  ε normal",
+            "ISO/IEC Guide 99 (2007), 4.31: calibration curve, here a power for each texel",
+            (
+                Parameter("spread", "1", 0.1, 0.0, 1.0, "Standard deviation s of the powers' logarithm."),
+                Parameter("force", "N", 1.0, 1e-6, 1e6, "Force F at which all texels agree.", log=True),
+            ),
+            neutral={"spread": 0.0},
+            memoryless=random_power,
+            random=True,
         ),
     ),
 )

@@ -31,6 +31,7 @@ EXPERIMENTS = {
     "stiffening": "go on to the largest depth that the sensor may bear, slowly",
     "lag": "press and release as fast as the rig can, and record at a high rate",
     "drift": "record an hour without touching the sensor",
+    "warm-up": "switch the sensor off for an hour, on again, and repeat one press every minute until it reads the same",
     "temperature": "record an unloaded hour and repeated presses while the sensor warms by ten kelvin, with its temperature",
     "offset": "record a minute without touching the sensor, before and after a trial",
     "quantization": "raise the load very slowly through its whole range",

@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from ..dataset.rig import Rig
-from ..dataset.sessions import TrialHistory, on_common_clocks
+from ..dataset.sessions import COMMON, TrialHistory, on_common_clocks
 from ..dataset.trial import Trial
 from ..forward.predictor import Model, Predictor, number_name
 from .wear_or_drift import NOTHING, TEXELS, USE, texels_can_tell, told_by_recordings
@@ -31,8 +31,6 @@ MOST_LEFT = 0.5
 """With factors and zeros, the search must leave less than this share of what it leaves without."""
 LOAD_HISTORY = ("wear", "softening")
 """Effects that need no clock to be found across recordings in a known order: they go with what was pressed."""
-COMMON = "all recordings"
-"""Name of what all recordings share."""
 WEAR_ORDER = -0.5
 """Rank correlation of the factors with the order of the recordings below which they fall as of wear."""
 

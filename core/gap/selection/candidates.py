@@ -14,6 +14,7 @@ from ...errors import EffectError
 from ...geometry.layout.grid_layout import GridLayout
 from ...model.effect import Effect
 from ...model.parameter import Parameter
+from ..dataset.sessions import COMMON
 from ..fitting.least_squares import Fit, FreeParameter, value_of
 from ..fitting.noise_floor import coverage
 from ..forward.predictor import Model, Predictor
@@ -35,6 +36,8 @@ SOFTENING_OVER = 0.4
 is over. What still goes on is wear."""
 NOT_FITTED = ("noise",)
 """Kinds that are not fitted but found in the final residual (see :mod:`.heteroscedastic_noise`)."""
+NOT_TRIED = (("gain-mismatch", "curved"),)
+"""Forms that no search takes. That two numbers per texel take no other effect's name has not been measured."""
 DIRECTLY_ESTIMATED = ("dead-texels", "quantization")
 """Kinds whose parameters are estimated directly from the readings (see :mod:`.direct_estimates`)."""
 SMALL, LARGE = 0.02, 4.0
@@ -49,9 +52,9 @@ AT_BOUND = 0.01
 """A parameter is at a bound if it differs from it by less than this share of the bound."""
 LEAST_WARMTH = 1.0
 """Range of temperatures (K) from which on what follows them can be told from what does not. Chosen by eye."""
-FROM_THE_RIG = {"temperature": ("temperature", "reference")}
-"""Parameters that a fit leaves at their neutral values, by kinds: recordings hold the temperature, and the reference is that of
-gain and zero."""
+FROM_THE_RIG = {"temperature": ("temperature", "reference"), "warm-up": ("since",)}
+"""Parameters that a fit leaves at their neutral values, by kinds: recordings hold the temperature, the reference is that of
+gain and zero, and the clock of a session begins with its first recording."""
 START_COUNT = 8
 """Number of starting points of a candidate."""
 COUPLING_PITCH, COUPLING_LOAD = 0.003, 0.05
@@ -304,7 +307,11 @@ def parameters_at_bounds(model: Model, free: Sequence[FreeParameter], index: int
 
 
 def candidates(predictors: Sequence[Predictor], model: Model) -> list[Candidate]:
-    """Return the candidates that could show in these recordings at all."""
+    """Return the candidates that could show in these recordings at all.
+
+    A gain that changes by itself is a warm-up where a session says how the time went on from recording to recording. Elsewhere
+    each recording begins anew, and such a gain is a form of drift.
+    """
     posed = any(p.trial.stimulus == "pose" for p in predictors)
     dragged = any(p.trial.force is not None and p.stimulus.slide.any() for p in predictors)
     read = any(p.trial.reading is not None for p in predictors)
@@ -312,6 +319,7 @@ def candidates(predictors: Sequence[Predictor], model: Model) -> list[Candidate]
     in_rows = isinstance(predictors[0].rig.texels.layout, GridLayout)
     loaded = all(p.trial.stimulus == "force" for p in predictors)
     cannot = unidentifiable(coverage(predictors))
+    on_clock = all(p.session is not None and p.trial.session != COMMON for p in predictors)
     warmed = _warmth(predictors) >= LEAST_WARMTH
     heights_open = all(isinstance(p.trial.contact_height, str) for p in predictors if p.trial.stimulus == "pose")
     found = []
@@ -323,8 +331,11 @@ def candidates(predictors: Sequence[Predictor], model: Model) -> list[Candidate]
             if (
                 form.random
                 or form.name == "bits"
+                or (kind.name, form.name) in NOT_TRIED
                 or (form.placement is not None and not posed)
                 or (kind.name == "temperature" and not warmed)
+                or (kind.name == "warm-up" and not on_clock)
+                or ((kind.name, form.name) == ("drift", "sensitivity") and on_clock)
                 or (form.friction_law is not None and not dragged)
             ):
                 continue

@@ -63,6 +63,18 @@ def image(texel, value=1.0):
             lambda f: np.sign(f) * 0.25 * np.floor(np.abs(f) / 0.25 + 0.5),
         ),
         ("quantization", "bits", {"bits": 4, "range": 2.0}, lambda f: np.round(f * 8) / 8),
+        (
+            "warm-up",
+            "exponential",
+            {"amount": 0.3, "time": 4.0, "since": 2.0},
+            lambda f: f * (1.3 - 0.3 * np.exp(-(TIME[:, None] + 2) / 4)),
+        ),
+        (
+            "warm-up",
+            "rational",
+            {"amount": -0.3, "time": 4.0, "since": 2.0},
+            lambda f: f * (1 - 0.3 * (TIME[:, None] + 2) / (TIME[:, None] + 6)),
+        ),
         ("temperature", "gain", {"gain_change": 0.02, "temperature": 30.0}, lambda f: 1.1 * f),
         ("temperature", "zero", {"zero_change": 0.02, "temperature": 10.0, "reference": 15.0}, lambda f: f - 0.1),
         (
@@ -249,6 +261,14 @@ def test_listed_values():
     factor = np.linspace(0.5, 1.5, N)
     force = np.random.default_rng(0).random((9, N))
     np.testing.assert_allclose(read(effect("gain-mismatch", "listed", factor=factor), force, TIME[:9]), force * factor)
+    curves = effect("gain-mismatch", "curved", factor=factor, curvature=factor - 1.0)
+    np.testing.assert_allclose(read(curves, force, TIME[:9]), factor * (force + (factor - 1.0) * force**2))
+    powers = effect("gain-mismatch", "random-power", spread=0.2, force=0.5, seed=3)
+    found = read(powers, force, TIME[:9])
+    exponent = np.log(found / 0.5) / np.log(force / 0.5)  # the same at all forces, another in each texel
+    np.testing.assert_allclose(exponent, np.broadcast_to(exponent[0], exponent.shape), rtol=1e-6)
+    assert np.log(exponent[0]).std() == pytest.approx(0.2, rel=0.25)
+    np.testing.assert_allclose(read(powers, np.full((2, N), 0.5), TIME[:2]), 0.5)
     np.testing.assert_allclose(read(effect("offset", "listed", offset=factor), force, TIME[:9]), force + factor)
     dead = (np.arange(N) % 5 == 0).astype(float)
     np.testing.assert_allclose(read(effect("dead-texels", "listed", dead=dead), force, TIME[:9]), force * (1 - dead))

@@ -1,0 +1,33 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A gain that changes after power-on is a warm-up where recordings share a clock, and elsewhere a form of drift."""
+
+from pathlib import Path
+
+from palpate.benchmarks import warm_up
+from palpate.core.gap.dataset.rig import read_rig
+from palpate.core.gap.forward.predictor import Model, predictors_of
+from palpate.core.gap.selection.between_recordings import as_one_session
+from palpate.core.gap.selection.candidates import candidates
+
+
+def gains_by_themselves(rig):
+    """Forms by which a gain may change by itself, among the candidates of a rig."""
+    forms = candidates(predictors_of(rig.trials, rig), Model(rig.parameters))
+    return {one.label for one in forms if one.name == "warm-up" or one.label == "drift/sensitivity"}
+
+
+def test_it_needs_a_clock_that_goes_on(tmp_path: Path):
+    path = warm_up.write("stretched", 1, tmp_path)
+    rig = read_rig(path)
+    assert gains_by_themselves(rig) == {"warm-up/exponential", "warm-up/rational"}
+    alone = "\n".join(line for line in path.read_text().splitlines() if not line.startswith(("session", "started")))
+    path.write_text(alone)
+    alone_rig = read_rig(path)
+    assert gains_by_themselves(alone_rig) == {"drift/sensitivity"}
+    assumed = as_one_session(alone_rig)  # nothing says how long its pauses were
+    assert assumed is not None and gains_by_themselves(assumed) == {"drift/sensitivity"}
+
+
+def test_a_gain_that_follows_two_exponentials_is_named():
+    sure, result = warm_up.examined("two exponentials", 0)
+    assert sure == {"warm-up"} and result.verdict == "explained"
