@@ -35,6 +35,9 @@ from .dictionaries import MISALIGNMENT, VARIANTS, Variant
 from .normal_equations import CascadeEquations, Solution, normal_equations
 from .recorded import Recorded
 
+KNOWN_KINDS = frozenset({MISALIGNMENT.kind, *(variant.kind for variant in VARIANTS)})
+"""Kinds that have a dictionary, so that a search by kinds can name them."""
+
 
 @dataclass(frozen=True)
 class ScoredSet:

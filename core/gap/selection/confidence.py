@@ -15,6 +15,7 @@ import numpy as np
 from ...effects.engine.registry import form_of
 from ...model.effect import Effect
 from ..fitting.least_squares import Fit
+from ..kinds.search import KNOWN_KINDS
 from .candidates import DIRECTLY_ESTIMATED, is_spatial, parameters_at_bounds
 from .direct_estimates import coarsest_step
 from .findings import Diagnosis
@@ -109,10 +110,10 @@ def may_absorb_misfit(effect: Effect, state: SelectionState) -> bool:
 def kinds_can_settle(effect: Effect) -> bool:
     """Return whether the search by kinds tells anything about an effect.
 
-    It knows no friction. Dead texels and steps are seen in the readings themselves. Numbers of single texels absorb what
-    another kind leaves, whether that is a formula or not.
+    It has no dictionary of friction, for example. Numbers of single texels absorb what another kind leaves, whether that is a
+    formula or not.
     """
-    return effect.name not in {*friction_kinds(), *DIRECTLY_ESTIMATED} and not _has_texel_numbers(effect)
+    return effect.name in KNOWN_KINDS and not _has_texel_numbers(effect)
 
 
 def _has_texel_numbers(effect: Effect) -> bool:

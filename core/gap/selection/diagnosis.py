@@ -13,6 +13,7 @@ from typing import TypeVar
 
 import numpy as np
 
+from ...effects.engine.registry import library
 from ...jobs.progress import Job, Progress
 from ..data_faults.data_fault import DataFault
 from ..data_faults.search import find_faults, put_right
@@ -25,6 +26,7 @@ from ..fitting.repeat_noise import is_scatter_of_repeats
 from ..fitting.residual_tests import LEAST_STRUCTURE, ResidualStructure, residual_structure
 from ..fitting.spectral_lines import strongest_line
 from ..forward.predictor import Model, Predictor, number_name, predictors_of
+from ..kinds.search import KNOWN_KINDS
 from .base_model import base_fit, identified_base_parameters, prepared
 from .between_recordings import (
     LEAST_CLOSED,
@@ -37,7 +39,7 @@ from .between_recordings import (
     with_common_zero,
     with_own_numbers,
 )
-from .candidates import DIRECTLY_ESTIMATED, FittedCandidate, candidates, scales_of
+from .candidates import FittedCandidate, candidates, scales_of
 from .check_recordings import check_views, checked
 from .confidence import EXPLAINED, UNSURE_CONFIDENCE, kinds_can_settle
 from .contact_heights import with_starting_heights
@@ -168,7 +170,8 @@ def _second_opinion(plain: _Search) -> Generator[Progress, None, _Search]:
     Returns
     -------
     _Search
-        It, if the library's forms bear all of these kinds out, or if it is sure of more; else the plain search.
+        It, if the library's forms bear all of these kinds out and no sure name is lost of which it knows nothing, or if it is
+        sure of all that was sure and of more; else the plain search.
     """
     before, choice = plain.result, choose_kinds(plain.views, plain.result.base, plain.result.noise)
     decision = yield from _progress_of(choice, SECOND_OPINION_BEGINS, FORMS_OF_KINDS_BEGIN)
@@ -178,8 +181,9 @@ def _second_opinion(plain: _Search) -> Generator[Progress, None, _Search]:
     result.findings, result.ambiguous, result.ruled_out, result.intervals, result.outlying = [], [], [], [], []
     second = _Search(result, plain.views)
     yield from _selected(second, FORMS_OF_KINDS_BEGIN, TOTAL_WORK)
-    sure = _sure_names(result)
-    if result.verdict != "explained" or not (sure > _sure_names(before) or sure.issuperset(decision.clear)):
+    sure, sure_before = _sure_names(result), _sure_names(before)
+    bears_out = sure.issuperset(decision.clear) and sure.issuperset(sure_before - KNOWN_KINDS)
+    if result.verdict != "explained" or not (sure > sure_before or bears_out):
         return plain
     named = {one.name for one in result.findings}
     reasons = {one.name: NOT_NEEDED for one in before.findings} | dict(before.ruled_out)
@@ -357,7 +361,7 @@ def _select_effects(result: Diagnosis, view_set: ViewSet) -> Generator[tuple[str
     start = base.means
     noise = np.array([min(1.0, start[READINGS]), min(_unloaded_force_noise(view_set, result.base), start[FORCES])])
     gap_sizes = GapSizes(start, noise, result.base.count.sum(axis=0).astype(float))
-    kinds = {*result.chosen_kinds, *friction_kinds(), *DIRECTLY_ESTIMATED} if result.chosen_kinds else None
+    kinds = result.chosen_kinds.keys() | (library().keys() - KNOWN_KINDS) if result.chosen_kinds else None
     selection = ForwardSelection(view_set, result.scales, result.coverage, gap_sizes, kinds)
     if is_scatter_of_repeats(result.noise, result.base.sse, result.base.count):
         state = base

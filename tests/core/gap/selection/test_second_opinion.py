@@ -88,6 +88,15 @@ def test_of_several_kinds_those_are_named_that_the_forms_bear_out(creeping, monk
     assert _finished(diagnosis._second_opinion(creeping)) is creeping
 
 
+def test_a_sure_name_of_which_the_kinds_know_nothing_is_not_given_up(creeping, monkeypatch):
+    """All kinds that are said are borne out, but nothing in these recordings shows the friction that was sure before."""
+    monkeypatch.setattr(diagnosis, "choose_kinds", _saying(("creep",)))
+    doubted = Finding(0, "lag", "second-order", UNSURE_CONFIDENCE, ())
+    for sure, kept in (("viscous-friction", True), ("stiffening", False)):
+        monkeypatch.setattr(creeping.result, "findings", [doubted, Finding(1, sure, "form", 0.9, ())])
+        assert (_finished(diagnosis._second_opinion(creeping)) is creeping) == kept
+
+
 @pytest.mark.parametrize(
     ("name", "form", "confidence", "cycles", "asked"),
     [
