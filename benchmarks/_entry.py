@@ -169,9 +169,11 @@ def method_named(word: str) -> Method:
     if not Path(file).is_file():
         listed = ", ".join(repr(known) for known in METHODS)
         raise SystemExit(f"There is no method {word!r}; name FILE.py:FUNCTION, or one of {listed}.")
-    spec = importlib.util.spec_from_file_location(Path(file).stem, file)
-    assert spec is not None and spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
+    spec = importlib.util.spec_from_file_location(f"entered_{Path(file).stem}", file)
+    if spec is None or spec.loader is None:
+        raise SystemExit(f"{file} is no Python file; name FILE.py:FUNCTION.")
+    module = sys.modules[spec.name] = importlib.util.module_from_spec(spec)  # data classes look their module up
+    sys.path.insert(0, str(Path(file).resolve().parent))  # as if it were run, so that it can import what stands beside it
     spec.loader.exec_module(module)
     if not hasattr(module, name):
         raise SystemExit(f"{file} has no function {name!r}.")

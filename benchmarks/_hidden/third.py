@@ -188,7 +188,7 @@ def crosstalk(rng, strength) -> Hidden:
 def gain_mismatch(rng, strength) -> Hidden:
     """An amplifier with a tolerance for each row and each column, and texels whose readings follow powers of the load near 1.
 
-    The power of printed texels: Flórez and Velásquez, IEEE Sensors J. 10 (2010).
+    The power of printed texels: Flórez and Velásquez, IEEE ANDESCON (2010).
     """
     row, column = rng.uniform(-1, 1, ROWS), rng.uniform(-1, 1, COLUMNS)
     gain = np.exp(0.45 * strength * (row[:, None] + column[None]).ravel())

@@ -4,6 +4,7 @@
 import csv
 import json
 import re
+import sys
 
 import numpy as np
 import pytest
@@ -14,8 +15,18 @@ from palpate.benchmarks._hidden import cases
 from palpate.core.gap.dataset.rig import read_rig
 
 METHOD = """
+from __future__ import annotations
+from dataclasses import dataclass
+from beside import NAMES
+
+
+@dataclass
+class Said:
+    names: list[str]
+
+
 def says_creep(rig):
-    return (["creep"], 0.8) if rig.parent.name != "000" else ((), None)
+    return (Said(NAMES).names, 0.8) if rig.parent.name != "000" else ((), None)
 
 
 def says_hum(rig):
@@ -80,8 +91,11 @@ def test_a_changed_file_of_what_is_hidden_is_refused(folder, tmp_path):
         _entry.write_cases(tmp_path, 4, 20)
 
 
-def test_a_method_from_a_file_answers_is_resumed_and_scored(folder, tmp_path, capsys):
+def test_a_method_from_a_file_answers_is_resumed_and_scored(folder, tmp_path, capsys, monkeypatch):
     (tmp_path / "mine.py").write_text(METHOD, encoding="utf-8")
+    (tmp_path / "beside.py").write_text('NAMES = ["creep"]\n', encoding="utf-8")
+    (tmp_path / "words.txt").write_text("no code\n", encoding="utf-8")
+    monkeypatch.setattr(sys, "path", [*sys.path])
     out = tmp_path / "mine.csv"
     arguments = ["gap", "--answer", f"{tmp_path / 'mine.py'}:says_creep", "--of", str(folder), "--out", str(out)]
     assert benchmarks.main(arguments) == 0
@@ -97,6 +111,8 @@ def test_a_method_from_a_file_answers_is_resumed_and_scored(folder, tmp_path, ca
         benchmarks.main([*arguments[:1], "--answer", f"{tmp_path / 'mine.py'}:says_hum", *arguments[3:5], "--out", "new.csv"])
     with pytest.raises(SystemExit, match="no function 'absent'"):
         _entry.method_named(f"{tmp_path / 'mine.py'}:absent")
+    with pytest.raises(SystemExit, match="is no Python file"):
+        _entry.method_named(f"{tmp_path / 'words.txt'}:says")
     with pytest.raises(SystemExit, match="no method 'divination'"):
         _entry.method_named("divination")
 
