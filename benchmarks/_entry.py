@@ -4,7 +4,7 @@
     python -m benchmarks gap --write DIR [--cases N] [--first N]
     python -m benchmarks gap --answer METHOD --of DIR --out ANSWERS.csv
     python -m benchmarks gap --score ANSWERS... --of DIR
-    python -m benchmarks gap --compare [--cases N] [--first N]
+    python -m benchmarks gap --compare [METHOD...] [--cases N] [--first N]
 
 A method is a function of the path of a rig. It returns names of effects and a probability or None: no names where it says that
 nothing is hidden, ``("unknown",)`` where something is that it cannot name.
@@ -320,7 +320,12 @@ def command(arguments: list[str]) -> int:
     doing.add_argument("--write", type=Path, metavar="DIR", help="write cases as rigs, and what is hidden in a file apart")
     doing.add_argument("--answer", metavar="METHOD", help="have FILE.py:FUNCTION, or one of the methods here, answer the cases")
     doing.add_argument("--score", type=Path, nargs="+", metavar="ANSWERS", help="print the table of files of answers")
-    doing.add_argument("--compare", action="store_true", help="write cases, have all methods here answer them, print the table")
+    doing.add_argument(
+        "--compare",
+        nargs="*",
+        metavar="METHOD",
+        help="write cases, have all methods here or those named answer them, print the table",
+    )
     parser.add_argument("--of", type=Path, metavar="DIR", help="the folder of the cases that --write has written")
     parser.add_argument("--out", type=Path, metavar="ANSWERS.csv", help="where --answer writes; it goes on where it stopped")
     parser.add_argument(
@@ -332,8 +337,8 @@ def command(arguments: list[str]) -> int:
         parser.error("--cases must be at least 1, and --first at least 0")
     if args.write is not None:
         print(f"{write_cases(args.write, args.cases, args.first)}  {HIDDEN}")
-    elif args.compare:
-        print(compare(args.cases, args.first))
+    elif args.compare is not None:
+        print(compare(args.cases, args.first, args.compare or list(METHODS)))
     elif args.of is None:
         parser.error("--of DIR is missing: the folder that --write has written")
     elif args.answer is not None:
@@ -346,15 +351,16 @@ def command(arguments: list[str]) -> int:
     return 0
 
 
-def compare(count: int, first: int) -> str:
-    """Return the table of all methods on some cases; what they answered is kept in build/gap and gone on with."""
+def compare(count: int, first: int, names: Iterable[str]) -> str:
+    """Return the table of some methods on some cases; what they answered is kept in build/gap and gone on with."""
+    methods = {Path(name).name.replace(":", " "): method_named(name) for name in names}
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
         os.environ.setdefault(name, "1")
     folder = gap.HOUSE / "build" / "gap" / f"compare-{first}-{count}-{gap.fingerprint()}"
     if not (folder / CHECKSUM).is_file():
         shutil.rmtree(folder, ignore_errors=True)
         write_cases(folder, count, first)
-    files = {name: folder / "answers" / f"{name}.csv" for name in METHODS}
-    answer_cases({name: (method, files[name]) for name, method in METHODS.items()}, folder, forgiving=True)
+    files = {name: folder / "answers" / f"{name}.csv" for name in methods}
+    answer_cases({name: (method, files[name]) for name, method in methods.items()}, folder, forgiving=True)
     hidden = read_hidden(folder)
     return table(hidden, {name: read_answers(path, hidden) for name, path in files.items()})

@@ -276,7 +276,7 @@ def test_all_methods_are_compared_and_one_that_raises_has_failed(monkeypatch, fo
     kept = tmp_path / "build" / "gap" / "compare-20-4-same"
     kept.parent.mkdir(parents=True)
     kept.symlink_to(folder)
-    text = _entry.compare(4, 20)
+    text = _entry.compare(4, 20, ["careful", "fails"])
     with (kept / "answers" / "fails.csv").open(encoding="utf-8", newline="") as file:
         assert {row["said"] for row in csv.DictReader(file)} == {"failed"}
     assert f"| {gap.ROWS['outside'][0]} | 1 | 1 / 0 | 0 / 0 |" in text and " / 1 |" not in text
