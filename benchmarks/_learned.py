@@ -70,11 +70,14 @@ def classifier(rig: Path) -> tuple[tuple[str, ...], float]:
     return _said(shares(features(*read(rig))), threshold)
 
 
-def neighbours_share(one: np.ndarray, values: np.ndarray, holds: np.ndarray, count: int) -> np.ndarray:
+def _spread(values: np.ndarray) -> np.ndarray:
+    """(p,) float: the median deviation of each feature, by which distances are measured."""
+    spread = np.median(np.abs(values - np.median(values, axis=0)), axis=0)
+    return np.where(spread > 1e-6, spread, values.std(axis=0) + 1e-6)
+
+
+def _votes(one: np.ndarray, values: np.ndarray, spread: np.ndarray, holds: np.ndarray, count: int) -> np.ndarray:
     """(labels,) float: votes of the nearest simulations, the nearer the more (Epanechnikov's kernel: Beaumont et al. 2002)."""
-    middle = np.median(values, axis=0)
-    spread = np.median(np.abs(values - middle), axis=0)
-    spread = np.where(spread > 1e-6, spread, values.std(axis=0) + 1e-6)
     apart = (np.clip((values - one) / spread, -10.0, 10.0) ** 2).mean(axis=1)
     near = np.argsort(apart)[: count + 1]
     weight = np.maximum(1.0 - apart[near[:-1]] / max(float(apart[near[-1]]), 1e-30), 1e-6)
@@ -83,28 +86,24 @@ def neighbours_share(one: np.ndarray, values: np.ndarray, holds: np.ndarray, cou
 
 
 @functools.lru_cache(maxsize=1)
-def _crowd() -> tuple[int, float]:
-    """How many neighbours vote, and the threshold, which do best on simulations that are left out."""
+def _crowd() -> tuple[Callable[[np.ndarray], np.ndarray], float]:
+    """Votes of as many simulations, and the threshold, as do best on simulations that are left out."""
     values, holds = simulations()
+    spread, numbers = _spread(values), np.arange(len(values))
     best = (0, 0.0, -1.0)
     for count in (4, 8, 16, 32):
-        numbers = np.arange(len(values))
-        shares = np.stack([neighbours_share(values[i], values[numbers != i], holds[numbers != i], count) for i in numbers])
-        threshold, exact = _threshold(shares, holds)
+        left_out = [_votes(values[i], values[numbers != i], spread, holds[numbers != i], count) for i in numbers]
+        threshold, exact = _threshold(np.stack(left_out), holds)
         best = max(best, (count, threshold, exact), key=lambda one: one[2])
-    print(
-        f"nearest simulated: {best[0]} vote, threshold {best[1]}, {best[2]:.0%} of simulations exact",
-        file=sys.stderr,
-        flush=True,
-    )
-    return best[:2]
+    said = f"nearest simulated: {best[0]} vote, threshold {best[1]}, {best[2]:.0%} of unseen simulations exact"
+    print(said, file=sys.stderr, flush=True)
+    return (lambda one: _votes(one, values, spread, holds, best[0])), best[1]
 
 
 def nearest_simulated(rig: Path) -> tuple[tuple[str, ...], float]:
     """Approximate Bayesian computation (Beaumont, Zhang and Balding 2002): the nearest simulations vote on what is hidden."""
-    count, threshold = _crowd()
-    values, holds = simulations()
-    return _said(neighbours_share(features(*read(rig)), values, holds, count), threshold)
+    shares, threshold = _crowd()
+    return _said(shares(features(*read(rig))), threshold)
 
 
 METHODS: dict[str, Callable[[Path], tuple[Iterable[str], float]]] = {
