@@ -312,8 +312,8 @@ def hum(rng, strength) -> Hidden:
     return Hidden("hum", "sine", strength, reading=act)
 
 
-def temperature(rng, strength) -> Hidden:
-    """A swing of temperature takes gain and zero with it."""
+def temperature_swing(rng, strength) -> Hidden:
+    """A swing of a temperature that nobody records takes gain and zero with it."""
     period, phase = rng.uniform(6, 14), rng.uniform(0, 6)
 
     def act(s, pad):
@@ -322,7 +322,7 @@ def temperature(rng, strength) -> Hidden:
             pad.zero + (s.reading - pad.zero) * (1 + 0.35 * strength * swing) + pad.gain * pad.k * 3e-3 * 0.1 * strength * swing
         )
 
-    return Hidden("temperature", "swing", strength, reading=act)
+    return Hidden("temperature-swing", "sine", strength, reading=act)
 
 
 def jitter(rng, strength) -> Hidden:
@@ -337,4 +337,4 @@ def jitter(rng, strength) -> Hidden:
     return Hidden("jitter", "wandering clock", strength, reading=act)
 
 
-OUTSIDE: dict[str, Maker] = {"hum": hum, "temperature": temperature, "jitter": jitter}
+OUTSIDE: dict[str, Maker] = {"hum": hum, "temperature-swing": temperature_swing, "jitter": jitter}

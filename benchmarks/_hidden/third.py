@@ -186,19 +186,20 @@ def crosstalk(rng, strength) -> Hidden:
 
 
 def gain_mismatch(rng, strength) -> Hidden:
-    """An amplifier with a tolerance for each row and each column, and texels whose readings follow powers of the load near 1.
+    """An amplifier with a tolerance for each row and each column, and a divider with a resistor of its own for each texel.
 
-    The power of printed texels: Flórez and Velásquez, IEEE ANDESCON (2010).
+    The divider's hyperbola: Interlink Electronics, FSR Integration Guide. Dividers agree at one load.
     """
     row, column = rng.uniform(-1, 1, ROWS), rng.uniform(-1, 1, COLUMNS)
     gain = np.exp(0.45 * strength * (row[:, None] + column[None]).ravel())
-    power = np.exp(0.1 * strength * rng.normal(size=N))
+    resistor = np.clip(0.15 * strength * rng.normal(size=N), -0.6, 0.6)
 
     def act(s, pad):
         x = (s.reading - pad.zero) / _full(pad)
-        s.reading = pad.zero + _full(pad) * gain / gain.mean() * np.sign(x) * np.abs(x) ** power
+        divided = x / np.maximum(1.0 + resistor * (np.abs(x) - 1.0), 0.2)
+        s.reading = pad.zero + _full(pad) * gain / gain.mean() * divided
 
-    return Hidden("gain-mismatch", "rows, columns and powers", strength, reading=act)
+    return Hidden("gain-mismatch", "rows, columns and dividers", strength, reading=act)
 
 
 def dead_texels(rng, strength) -> Hidden:

@@ -29,7 +29,8 @@ def test_the_generator_shares_nothing_with_the_package(path):
 
 
 def test_every_effect_is_hidden_in_some_case():
-    assert set(other.MAKERS) == set(own.OWN) == set(third.THIRD) == set(library())
+    """Warm-up needs recordings of one clock, and temperature a column: benchmarks/warm_up.py and temperature.py hide these."""
+    assert set(other.MAKERS) == set(own.OWN) == set(third.THIRD) == set(library()) - {"warm-up", "temperature"}
     assert not set(other.OUTSIDE) & set(library())
 
 
