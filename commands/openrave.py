@@ -10,6 +10,7 @@ from ..core.errors import SceneError
 from ..core.io.file_writing import writable_file
 from ..core.io.openrave import NUMBERS, OpenRaveSensor, openrave_xml, read_openrave, write_openrave
 from ..core.model.sensor_parameters import DEPTH_PER_THICKNESS
+from ..core.wording import counted
 from . import blender, checks, console
 
 
@@ -113,6 +114,6 @@ def _export(arguments: argparse.Namespace) -> None:
         sensors = [OpenRaveSensor(name, name, exchange.parameters_of(found[name])) for name in wanted]
     if arguments.out:
         write_openrave(arguments.out, sensors, arguments.robot)
-        print(f"{len(sensors)} sensors: {Path(arguments.out).absolute()}")
+        print(f"{counted(len(sensors), 'sensor')}: {Path(arguments.out).absolute()}")
     else:
         print(openrave_xml(sensors, arguments.robot), end="")

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..core.errors import FileError
+from ..core.wording import counted
 from . import checks, console, log_questions
 
 if TYPE_CHECKING:
@@ -78,8 +79,8 @@ def _require_complete(found: Answers, out: str) -> None:
     for question in questions:
         print(f"question: {question}")
     raise FileError(
-        f"The logs leave {len(questions)} questions open: answer them in '{path}', and give the command again with --answers "
-        f"'{path}'."
+        f"The logs leave {counted(len(questions), 'question')} open: answer them in '{path}', and give the command again with "
+        f"--answers '{path}'."
     )
 
 
@@ -95,6 +96,7 @@ def _write(logs: list[LogFile], found: Answers, out: str) -> None:
     for note in [*written.notes, *rig.warnings]:
         print(f"note: {note}")
     uses = [trial.use for trial in rig.trials]
-    print(f"{len(uses)} recordings, {uses.count('fit')} to fit and {uses.count('check')} to check; {len(rig.texels)} texels")
+    shares = f"{uses.count('fit')} to fit and {uses.count('check')} to check"
+    print(f"{counted(len(uses), 'recording')}, {shares}; {counted(len(rig.texels), 'texel')}")
     print(f"rig:  {written.path}")
     print(f"plot: {written.path.parent / PLOT_NAME}")

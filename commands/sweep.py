@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..core.errors import PalpateError
+from ..core.wording import counted
 from . import blender, console
 
 if TYPE_CHECKING:
@@ -95,7 +96,7 @@ def run(arguments: argparse.Namespace) -> int:
             _print_names(opened)
             return 0
         if arguments.begin:
-            print(f"{len(opened.runs)} runs have begun: {opened.folder}")
+            print(f"{counted(len(opened.runs), 'run')} begun: {opened.folder}")
             return 0
         return _estimate(opened, arguments) if arguments.dry_run else _compute(opened, arguments)
     finally:
@@ -195,7 +196,7 @@ def _estimate(opened: OpenStudy, arguments: argparse.Namespace) -> int:
     found = try_runs(opened.folder, opened.runs, Limits.of(opened.study), arguments.scripts)
     workers = _workers(arguments)
     seconds = found.seconds * len(opened.runs) / workers
-    print(f"{len(opened.runs)} runs, {found.seconds:.3g} s and {found.size / 1e6:.3g} MB each")
+    print(f"{counted(len(opened.runs), 'run')}, {found.seconds:.3g} s and {found.size / 1e6:.3g} MB each")
     size = found.size * len(opened.runs) / 1e9
     print(f"about {_duration(seconds)} with {workers} workers, {size:.3g} GB in '{opened.folder}'")
     for sentence in found.failures:

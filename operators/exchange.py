@@ -9,6 +9,7 @@ from bpy_extras.io_utils import ExportHelper
 
 from ..addon.authoring import exchange
 from ..core.errors import SceneError
+from ..core.wording import counted
 from . import support
 
 
@@ -59,10 +60,7 @@ class PALPATE_OT_openrave_export(support.ErrorReporting, ExportHelper, bpy.types
 
     @classmethod
     def poll(cls, context):
-        if not any(obj.palpate.role == "SENSOR" for obj in context.scene.objects):
-            cls.poll_message_set("There is no sensor in this scene: use Make Sensor first")
-            return False
-        return True
+        return support.poll_any_sensor(cls, context)
 
     def run(self, context):
         from ..core.io.openrave import OpenRaveSensor, write_openrave
@@ -70,7 +68,7 @@ class PALPATE_OT_openrave_export(support.ErrorReporting, ExportHelper, bpy.types
         sensors = [obj for obj in context.selected_objects if obj.palpate.role == "SENSOR"]
         sensors = sensors or [obj for obj in context.scene.objects if obj.palpate.role == "SENSOR"]
         write_openrave(self.filepath, [OpenRaveSensor(o.name, o.name, exchange.parameters_of(o)) for o in sensors])
-        self.report({"INFO"}, f"Wrote {len(sensors)} sensors to '{self.filepath}'")
+        self.report({"INFO"}, f"Wrote {counted(len(sensors), 'sensor')} to '{self.filepath}'")
 
 
 class PALPATE_OT_sensor_toml_import(support.ErrorReporting, support.FileChooser, bpy.types.Operator):
@@ -85,7 +83,8 @@ class PALPATE_OT_sensor_toml_import(support.ErrorReporting, support.FileChooser,
 
     def run(self, context):
         obj, effects = exchange.load_toml(context, self.filepath)
-        self.report({"INFO"}, f"'{obj.name}' has the parameters and {effects} effects of '{Path(self.filepath).name}'")
+        name = Path(self.filepath).name
+        self.report({"INFO"}, f"'{obj.name}' has the parameters and {counted(effects, 'effect')} of '{name}'")
 
 
 class PALPATE_OT_sensor_toml_export(support.ErrorReporting, ExportHelper, bpy.types.Operator):

@@ -7,6 +7,7 @@ import bpy
 from bpy.props import BoolProperty, CollectionProperty, FloatProperty, StringProperty
 
 from ..addon.measured import gap_results, log_rigs, planned_probe
+from ..core.wording import counted
 from . import modal_job, support
 from .fits import show_image
 
@@ -33,7 +34,7 @@ class PALPATE_OT_measured_open(support.ErrorReporting, support.FileChooser, bpy.
         context.object.palpate.measured = bpy.path.relpath(self.filepath) if blend else self.filepath
         for warning in rig.warnings:
             self.report({"WARNING"}, warning)
-        self.report({"INFO"}, f"'{rig.name}': {len(rig.trials)} trials on {len(rig.texels)} texels")
+        self.report({"INFO"}, f"'{rig.name}': {counted(len(rig.trials), 'trial')} on {counted(len(rig.texels), 'texel')}")
 
 
 class PALPATE_OT_measured_logs(support.ErrorReporting, support.FileChooser, bpy.types.Operator):
@@ -145,7 +146,7 @@ class PALPATE_OT_gap_add(support.ErrorReporting, bpy.types.Operator):
     def run(self, context):
         count = gap_results.add_found(context.object)
         caution = gap_results.of(context.object).caution
-        said = f"'{context.object.name}' has the fitted parameters and {count} effects"
+        said = f"'{context.object.name}' has the fitted parameters and {counted(count, 'effect')}"
         self.report({"WARNING"} if caution else {"INFO"}, f"{said}. {caution}" if caution else said)
 
 

@@ -10,6 +10,7 @@ from bpy.props import StringProperty
 
 from ..addon.authoring import exchange, sensor_presets
 from ..core.errors import FileError
+from ..core.wording import counted
 from . import support
 
 SUBDIR = "palpate/sensor"
@@ -116,7 +117,7 @@ class PALPATE_OT_parameters_copy(support.ErrorReporting, bpy.types.Operator):
         others = _others(context)
         for obj in others:
             sensor_presets.copy_parameters(context.object, obj)
-        self.report({"INFO"}, f"Copied the parameters of '{context.object.name}' to {len(others)} others")
+        self.report({"INFO"}, f"Copied the parameters of '{context.object.name}' to {counted(len(others), 'other')}")
 
 
 def _others(context) -> list:

@@ -5,6 +5,7 @@ import bpy
 from bpy.props import EnumProperty, StringProperty
 
 from ..addon.authoring import sensor_exchange, sensor_import
+from ..core.wording import counted
 from . import support
 
 
@@ -27,10 +28,7 @@ class PALPATE_OT_sensor_export(support.ErrorReporting, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        if not any(obj.palpate.role == "SENSOR" for obj in context.scene.objects):
-            cls.poll_message_set("There is no sensor in this scene: use Make Sensor first")
-            return False
-        return True
+        return support.poll_any_sensor(cls, context)
 
     def invoke(self, context, _event):
         context.window_manager.fileselect_add(self)
@@ -44,7 +42,8 @@ class PALPATE_OT_sensor_export(support.ErrorReporting, bpy.types.Operator):
         written = export_sensors(sensors, self.to, bpy.path.abspath(self.directory))
         for note in written.notes:
             self.report({"WARNING"}, note)
-        self.report({"INFO"}, f"Wrote {len(written.files)} files of {len(sensors)} sensors to '{self.directory}'")
+        files = f"{counted(len(written.files), 'file')} of {counted(len(sensors), 'sensor')}"
+        self.report({"INFO"}, f"Wrote {files} to '{self.directory}'")
 
 
 class PALPATE_OT_sensor_import(support.ErrorReporting, support.FileChooser, bpy.types.Operator):

@@ -77,6 +77,14 @@ def poll_mesh_object(cls, context) -> bool:
     return True
 
 
+def poll_any_sensor(cls, context) -> bool:
+    """Poll: the scene has a sensor."""
+    if not any(obj.palpate.role == "SENSOR" for obj in context.scene.objects):
+        cls.poll_message_set("There is no sensor in this scene: use Make Sensor first")
+        return False
+    return True
+
+
 def poll_editable_sensor(cls, context) -> bool:
     """Poll: the active object is a sensor or a pad, and can be changed."""
     return poll_surface_object(cls, context) and poll_sensor(cls, context)

@@ -21,6 +21,7 @@ from ..core.io.temporary_folder import temporary_folder
 from ..core.study.run_files import RUNS
 from ..core.study.run_record import read_run_record
 from ..core.study.study_file import Run
+from ..core.wording import counted
 from .dependencies import Dependency, dependencies
 from .finished_runs import FailedRun, failures, finished_runs, run_order, study_name
 from .report_figures import MOST_METRICS, MOST_PARAMETERS, RunImage, draw_image_sheet, draw_small_multiples
@@ -148,16 +149,12 @@ def _images(folder: Path, order: list[tuple[int, str]]) -> list[RunImage]:
 def _headline(runs: int, failed: list[FailedRun], columns: StudyColumns) -> str:
     if not runs and not failed:
         return "No run has finished yet."
-    text = f"{_count(runs, 'run') if runs else 'No run'} finished, {f'{len(failed):,}' if failed else 'none'} failed."
+    text = f"{counted(runs, 'run') if runs else 'No run'} finished, {f'{len(failed):,}' if failed else 'none'} failed."
     if columns.values:
-        text += f" {_count(len(columns.values), 'parameter')} varied."
+        text += f" {counted(len(columns.values), 'parameter')} varied."
     if columns.frames_seconds > 0:
         text += f" Computing took {_duration(columns.frames_seconds)} of processor time."
     return text
-
-
-def _count(number: int, what: str) -> str:
-    return f"{number:,} {what}" + ("" if number == 1 else "s")
 
 
 def _duration(seconds: float) -> str:
@@ -172,7 +169,7 @@ def _strongest_sentence(found: list[Dependency], columns: StudyColumns, runs: in
         return f"The strongest dependency is that of {strong[0].metric} on {strong[0].parameter}."
     if not found:
         return "There are too few runs, parameters or metrics to look for dependencies."
-    return f"No metric depends on any parameter as far as {_count(runs, 'run')} can tell."
+    return f"No metric depends on any parameter as far as {counted(runs, 'run')} can tell."
 
 
 def _shown_sentence(columns: StudyColumns) -> str:
@@ -180,7 +177,7 @@ def _shown_sentence(columns: StudyColumns) -> str:
     left = max(0, len(columns.values) - MOST_PARAMETERS), max(0, len(columns.metrics) - MOST_METRICS)
     if not any(left):
         return ""
-    parts = [_count(number, what) for number, what in zip(left, ("parameter", "metric")) if number]
+    parts = [counted(number, what) for number, what in zip(left, ("parameter", "metric")) if number]
     verb = "is" if sum(left) == 1 else "are"
     return f"Not drawn {verb} {' and '.join(parts)} with weaker dependencies; runs.parquet has all."
 

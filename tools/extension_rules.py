@@ -225,7 +225,11 @@ def main(argv: list[str] | None = None) -> int:
         print(
             f"{'wrong' if counts else 'not for the platform'}: {name}{': ' if name else ''}{finding.where}: {finding.sentence}"
         )
-    print(f"{len(args.zips)} zips, {wrong} against the rules of extensions.blender.org")
+    own_only = len(findings) - wrong
+    print(
+        f"{len(args.zips)} zips: {wrong} findings against the rules"
+        + (f"; {own_only} that matter only for extensions.blender.org, so keep these zips to your own site" if own_only else "")
+    )
     return 1 if wrong else 0
 
 

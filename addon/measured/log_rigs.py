@@ -6,6 +6,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from ...core.errors import FileError
+from ...core.wording import counted
 
 
 def make(paths, folder: Path, accept: bool):
@@ -35,8 +36,8 @@ def make(paths, folder: Path, accept: bool):
         if questions:
             path = write_template(answers, folder)
             raise FileError(
-                f"The logs leave {len(questions)} questions open, the first: {questions[0][:-1]}; answer them in '{path}' with "
-                "a text editor, and choose the logs again."
+                f"The logs leave {counted(len(questions), 'question')} open, the first: {questions[0][:-1]}; answer in "
+                f"'{path}' with a text editor, and choose the logs again."
             )
     written = run_job(write_rig(logs, answers, folder))
     plot = folder / PLOT_NAME

@@ -101,3 +101,11 @@ def test_study(play_road):
     assert 'scene = "scene.blend"' in result["values"]["file"]
     assert '"Cube.k"' in result["values"]["file"]
     assert result["screenshots"] == ["1-menu.png", "1-menu.png", "2-panel.png", "3-running.png", "4-done.png"]
+
+
+def test_exchange(play_road):
+    """A sensor goes to MuJoCo's file and comes back; two logs become a rig."""
+    values = play_road("exchange", timeout=600)["values"]
+    assert values["texels"] == [84, 84]
+    assert values["asked"] > 0
+    assert values["trials"] == 2

@@ -11,6 +11,7 @@ from typing import Any
 from ...effects.engine.registry import form_of, kind_of
 from ...io.html_templates import render_html
 from ...model.sensor_parameters import unit_of
+from ...wording import counted
 from ..forward.contact_phases import FEATURES
 from ..selection.findings import Diagnosis
 from .plan_files import planned_sentence
@@ -73,12 +74,8 @@ def _extent(result: Diagnosis) -> str:
     """How much was recorded."""
     trials = result.rig.trials
     seconds = sum(float(t.time[-1] - t.time[0]) for t in trials)
-    uses = f"{_count(len(result.of('fit')), 'trial')} fitted, {len(result.of('check'))} for checking only"
-    return f"{_count(len(result.rig.texels), 'texel')}, {uses}, {seconds:.0f} s in all."
-
-
-def _count(number: int, what: str) -> str:
-    return f"{number} {what}" + ("" if number == 1 else "s")
+    uses = f"{counted(len(result.of('fit')), 'trial')} fitted, {len(result.of('check'))} for checking only"
+    return f"{counted(len(result.rig.texels), 'texel')}, {uses}, {seconds:.0f} s in all."
 
 
 def _encoded(path: Path) -> str:

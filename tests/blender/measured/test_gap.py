@@ -168,7 +168,7 @@ def test_logs_become_a_rig_with_the_answers_beside_it(scene, tmp_path):
         rows = [",".join(f"{one:.6g}" for one in (t, d, *[max(d, 0.0) * k for k in (1, 2, 3, 4)])) for t, d in zip(time, depth)]
         (tmp_path / name).write_text("t_ms,depth (mm),R1,R2,R3,R4\n" + "\n".join(rows))
     chosen = {"filepath": str(tmp_path / names[0]), "directory": str(tmp_path), "files": [{"name": name} for name in names]}
-    with pytest.raises(RuntimeError, match="leave 1 questions open, the first: grid of .sensor. is not known"):
+    with pytest.raises(RuntimeError, match="leave 1 question open, the first: grid of .sensor. is not known"):
         bpy.ops.palpate.measured_logs(**chosen)
     assert not obj.palpate.measured
     answers = tmp_path / "rig" / "answers.toml"

@@ -309,7 +309,7 @@ def test_without_answers_a_template_is_written_and_the_same_command_goes_on_with
     out = tmp_path / "rig"
     assert main(["rig", "new", *logs, "--out", str(out)]) == 1
     said = capsys.readouterr()
-    assert "leave 1 questions open: answer them in" in said.err and "depth (mm)" in said.out
+    assert "leave 1 question open: answer them in" in said.err and "depth (mm)" in said.out
     answers = out / "answers.toml"
     assert main(["rig", "new", *logs, "--out", str(out), "--answers", str(answers)]) == 1
     assert 'still "?"' in capsys.readouterr().err
