@@ -79,6 +79,7 @@ class Sweep(Area):
         self._processes: list[subprocess.Popen] = []
         self._undisturbed: dict[str, dict[str, str]] = {}
         self._place = folder / "place"
+        self._begun = 0  # runs, up to the last kill
 
     def close(self) -> None:
         self._end_processes()
@@ -121,28 +122,30 @@ class Sweep(Area):
         shutil.rmtree(self._place, ignore_errors=True)
         study = write_study(self._place, self._runs, self.seed)
         (self.folder / "starts").unlink(missing_ok=True)
+        self._begun = 0
         options = ["--workers", "2"]
         cluster = Cluster(self.folder, self._start) if is_remote else None
         if cluster is not None:
             options = ["--scheduler", cluster.address]
         driver, restarts, hits, lost_to_kills = self._sweep(study, options), 0, [], 0
-        # Spread over the time that an undisturbed study took, with the starts of the drivers that are killed.
-        while len(hits) < case.data["kills"]:  # a moment at which no such process is there counts for none
-            time.sleep(dice.uniform(0.05, 2.0) * max(0.3, self._seconds / case.data["kills"]))
-            if driver.poll() is not None:
-                break
-            victim = dice.choice(VICTIMS)
+        for victim, is_working in _planned_kills(case.data["kills"], dice):
+            while driver.poll() is None and not self._can_be_hit(victim, is_working):
+                time.sleep(0.01)
+            time.sleep(dice.uniform(0.0, 0.1 if is_working else 0.3))
             children = len(_descendants(os.getpid(), "child"))
             pid = driver.pid if victim == "driver" else self._pick(victim, driver, cluster, dice)
+            if driver.poll() == 0:
+                break  # the study is done
             if pid is None:
                 continue
             lost_to_kills += children if victim in ("driver", "scheduler") else 1
             hits.append(victim)
+            self._begun = sum(count_starts(self.folder).values())
             with suppress(ProcessLookupError):
                 os.kill(pid, signal.SIGKILL)
             if cluster is not None and victim in ("scheduler", "worker"):
                 cluster.replace_dead()
-            if victim in ("driver", "scheduler") or driver.poll() is not None:
+            if victim in ("driver", "scheduler") or driver.poll():
                 said = driver.communicate(timeout=LONGEST)[1]
                 if "Traceback" in said:
                     return Outcome(TRACEBACK, f"after a kill of the {victim}: {said[-3000:]}")
@@ -177,6 +180,12 @@ class Sweep(Area):
             driver = self._sweep(study, options)
         return Outcome(WRONG, f"the command still fails: {said[-3000:]}")
 
+    def _can_be_hit(self, victim: str, is_working: bool) -> bool:
+        """Whether a process of a kind is there, and whether a run was begun since the last kill if that is asked for."""
+        if victim in ("child", "worker") and not _descendants(os.getpid(), victim):
+            return False
+        return not is_working or sum(count_starts(self.folder).values()) > self._begun
+
     @staticmethod
     def _pick(victim: str, driver: subprocess.Popen, cluster: Cluster | None, dice: random.Random) -> int | None:
         """Return a process of a kind; the scheduler of a local cluster is in the driver."""
@@ -186,16 +195,14 @@ class Sweep(Area):
         return dice.choice(found) if found else None
 
     def _expected(self, name: str, runs: int) -> dict[str, str]:
-        """Return the results of an undisturbed study; measures how long it takes, too."""
+        """Return the results of an undisturbed study."""
         if name not in self._undisturbed:
             place = self.folder / f"undisturbed {name}"
             precompile.compile_solver()  # else kills are spread over a minute of compiling, and most come too late
-            began = time.monotonic()
             driver = self._sweep(write_study(place, runs, self.seed), ["--workers", "2"])
             said = driver.communicate(timeout=LONGEST)[1]
             if driver.returncode:
                 raise RuntimeError(f"the undisturbed study fails: {said}")
-            self._seconds = time.monotonic() - began
             self._undisturbed[name] = results(place / "out")
         return self._undisturbed[name]
 
@@ -360,6 +367,16 @@ def _free_port() -> int:
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         return int(probe.getsockname()[1])
+
+
+def _planned_kills(count: int, dice: random.Random) -> list[tuple[str, bool]]:
+    """Return which kinds are killed in which order, and whether while runs are computed or at any moment.
+
+    At any moment alone, nearly all kills would hit a driver that starts, since a thousand runs take a few seconds.
+    """
+    plan = [(VICTIMS[number % len(VICTIMS)], number // len(VICTIMS) % 2 == 0) for number in range(count)]
+    dice.shuffle(plan)
+    return plan
 
 
 def _descendants(root: int, kind: str) -> list[int]:

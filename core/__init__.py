@@ -9,6 +9,7 @@ right-handed and quaternions are ordered (w, x, y, z).
 __all__ = [
     "errors",
     "version",
+    "wording",
     "compiled",
     "jobs",
     "geometry",

@@ -78,7 +78,7 @@ def dask_client(scheduler: str | None, workers: int, make_cluster: Callable[[], 
     Raises
     ------
     PalpateError
-        Dask is missing, or nothing answers at the address.
+        Dask is missing, nothing answers at the address, or the workers of this machine do not start.
     """
     require_dask()
     import dask
@@ -104,16 +104,22 @@ def dask_client(scheduler: str | None, workers: int, make_cluster: Callable[[], 
             with _closing(cluster, timeout=30), _closing(Client(cluster)) as client:
                 yield client
             return
-        cluster = LocalCluster(
-            n_workers=workers,
-            threads_per_worker=1,
-            processes=True,
-            dashboard_address="127.0.0.1:0",  # any free port: two studies on one machine would both take 8787
-            memory_limit=0,  # the runs are computed in processes of their own
-            local_directory=scratch,
-            silence_logs=logging.CRITICAL,
-            preload=[local_worker.__name__],
-        )
+        try:
+            cluster = LocalCluster(
+                n_workers=workers,
+                threads_per_worker=1,
+                processes=True,
+                dashboard_address="127.0.0.1:0",  # any free port: two studies on one machine would both take 8787
+                memory_limit=0,  # the runs are computed in processes of their own
+                local_directory=scratch,
+                silence_logs=logging.CRITICAL,
+                preload=[local_worker.__name__],
+            )
+        except (OSError, RuntimeError, TimeoutError) as error:  # Dask wraps what happened in a RuntimeError
+            raise PalpateError(
+                f"The {workers} worker processes did not start ({error}): look whether something ends processes on this "
+                "machine, as a limit of memory does, and give the same command again."
+            ) from error
         with _closing(cluster, timeout=10), _closing(Client(cluster)) as client:
             yield client
 

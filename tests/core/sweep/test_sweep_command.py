@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 from study_scenes import HEAD, tiny_scene
 
+from palpate.core.errors import PalpateError
 from palpate.core.io.bake_folder import IMAGE_LIST_NAME, check_sha256, frame_file, read_manifest
 from palpate.core.io.bake_reader import read_bake
 from palpate.core.io.checksum_list import read_checksums
@@ -22,6 +23,7 @@ from palpate.core.io.recording_npz import load_recording
 from palpate.core.io.scenario_npz import save_scenario
 from palpate.core.io.tactile_exr import read_exr
 from palpate.core.study.run_files import SCENES, done_runs, make_folders, write_failure
+from palpate.sweep.driver import dask_client
 from palpate.sweep.study_folder import begin_study
 from palpate.sweep.worker import Child, Limits, compute_batch, end_children
 
@@ -182,6 +184,18 @@ def test_a_study_of_a_billion_runs_is_one_line_and_begins_nothing(tmp_path):
     (line,) = refused.stderr.splitlines()
     assert "asks for 1e+09 runs, at most 1000000 are possible" in line
     assert not (tmp_path / "out").exists()
+
+
+def test_workers_that_do_not_start_are_one_sentence(monkeypatch):
+    """Dask says so by a RuntimeError, whatever ended them: a kill, or a limit of memory."""
+
+    def end_at_once(**_words):
+        raise RuntimeError("Nanny failed to start.")
+
+    monkeypatch.setattr("distributed.LocalCluster", end_at_once)
+    said = "The 2 worker processes did not start .Nanny failed to start.*same command again"
+    with pytest.raises(PalpateError, match=said), dask_client(None, 2):
+        pass
 
 
 def test_other_limits_hold_for_the_same_study(undisturbed, tmp_path):
