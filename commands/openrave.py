@@ -6,11 +6,10 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from ..core.errors import SceneError
+from ..core.errors import SceneError, counted
 from ..core.io.file_writing import writable_file
 from ..core.io.openrave import NUMBERS, OpenRaveSensor, openrave_xml, read_openrave, write_openrave
 from ..core.model.sensor_parameters import DEPTH_PER_THICKNESS
-from ..core.wording import counted
 from . import blender, checks, console
 
 

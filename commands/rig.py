@@ -8,8 +8,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..core.errors import FileError
-from ..core.wording import counted
+from ..core.errors import FileError, counted
 from . import checks, console, log_questions
 
 if TYPE_CHECKING:

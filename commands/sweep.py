@@ -9,8 +9,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..core.errors import PalpateError
-from ..core.wording import counted
+from ..core.errors import PalpateError, counted
 from . import blender, console
 
 if TYPE_CHECKING:

@@ -9,7 +9,6 @@ right-handed and quaternions are ordered (w, x, y, z).
 __all__ = [
     "errors",
     "version",
-    "wording",
     "compiled",
     "jobs",
     "geometry",

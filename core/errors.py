@@ -80,3 +80,8 @@ def read_errors_said(path: str | os.PathLike, what: str = "file") -> Iterator[No
 def os_error_reason(error: OSError) -> str:
     """Return the operating system's words for an error, in lower case, as they stand inside our sentences."""
     return (error.strerror or str(error) or type(error).__name__).lower()
+
+
+def counted(number: int, noun: str) -> str:
+    """Return a number with its noun in the singular or the plural, as "1 texel" or "1,024 texels"."""
+    return f"{number:,} {noun}" + ("" if number == 1 else "s")

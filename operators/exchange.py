@@ -8,8 +8,7 @@ from bpy.props import StringProperty
 from bpy_extras.io_utils import ExportHelper
 
 from ..addon.authoring import exchange
-from ..core.errors import SceneError
-from ..core.wording import counted
+from ..core.errors import SceneError, counted
 from . import support
 
 

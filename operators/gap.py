@@ -7,7 +7,7 @@ import bpy
 from bpy.props import BoolProperty, CollectionProperty, FloatProperty, StringProperty
 
 from ..addon.measured import gap_results, log_rigs, planned_probe
-from ..core.wording import counted
+from ..core.errors import counted
 from . import modal_job, support
 from .fits import show_image
 

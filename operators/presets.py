@@ -9,8 +9,7 @@ from bl_ui.utils import PresetPanel
 from bpy.props import StringProperty
 
 from ..addon.authoring import exchange, sensor_presets
-from ..core.errors import FileError
-from ..core.wording import counted
+from ..core.errors import FileError, counted
 from . import support
 
 SUBDIR = "palpate/sensor"

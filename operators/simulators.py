@@ -5,7 +5,7 @@ import bpy
 from bpy.props import EnumProperty, StringProperty
 
 from ..addon.authoring import sensor_exchange, sensor_import
-from ..core.wording import counted
+from ..core.errors import counted
 from . import support
 
 

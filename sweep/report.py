@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from ..core.errors import counted
 from ..core.io.bake_folder import RECORDING_NAME, folder_names
 from ..core.io.file_writing import atomic_write
 from ..core.io.html_templates import render_html
@@ -21,7 +22,6 @@ from ..core.io.temporary_folder import temporary_folder
 from ..core.study.run_files import RUNS
 from ..core.study.run_record import read_run_record
 from ..core.study.study_file import Run
-from ..core.wording import counted
 from .dependencies import Dependency, dependencies
 from .finished_runs import FailedRun, failures, finished_runs, run_order, study_name
 from .report_figures import MOST_METRICS, MOST_PARAMETERS, RunImage, draw_image_sheet, draw_small_multiples

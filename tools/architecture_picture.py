@@ -22,7 +22,6 @@ PICTURE = ROOT / "docs" / "images" / "architecture.svg"
 CAPTIONS = {
     "core.errors": "errors that a user can mend",
     "core.version": "number of this version",
-    "core.wording": "words for numbers of things",
     "core.compiled": "kernels and thread team (numba)",
     "core.jobs": "progress, cancel, long work",
     "core.geometry": "meshes, rays, texels, layouts",

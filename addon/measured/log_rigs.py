@@ -5,8 +5,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from ...core.errors import FileError
-from ...core.wording import counted
+from ...core.errors import FileError, counted
 
 
 def make(paths, folder: Path, accept: bool):

@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import Any
 
 from ...effects.engine.registry import form_of, kind_of
+from ...errors import counted
 from ...io.html_templates import render_html
 from ...model.sensor_parameters import unit_of
-from ...wording import counted
 from ..forward.contact_phases import FEATURES
 from ..selection.findings import Diagnosis
 from .plan_files import planned_sentence
