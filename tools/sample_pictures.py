@@ -1,0 +1,138 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Make the documentation's pictures of the sample scenes anew: python tools/sample_pictures.py [NAME …].
+
+Each sample is baked and drawn as `palpate bake` and `palpate render` do it for a user, without options that choose a camera or
+a light; the demo is what `palpate demo` makes. The gel's picture is drawn by the commands on its page, pictures of windows by
+the window tests.
+"""
+
+from __future__ import annotations
+
+import argparse
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+IMAGES = ROOT / "docs" / "images"
+COMMAND = [sys.executable, "-m", "palpate.commands"]
+SIZE = (960, 720)
+QUALITY = 88
+"""Of JPEG files."""
+PICK_FRAMES = (30, 60, 90, 130)
+"""Closing, lifting, carrying and released, in the sample of pick and place."""
+
+
+def palpate(*words: object) -> None:
+    """Run one of Palpate's commands."""
+    subprocess.run([*COMMAND, *map(str, words)], check=True)
+
+
+def baked(name: str, folder: Path) -> Path:
+    """Bake a sample into a folder; return its .blend."""
+    scene = folder / f"{name}.blend"
+    palpate("bake", ROOT / "sample_blends" / f"{name}.blend", "--save-as", scene, "--out", folder / name)
+    return scene
+
+
+def rendered(scene: Path, *options: object) -> Path:
+    """Return the folder with a scene's figures."""
+    out = scene.with_suffix(".figures")
+    palpate("render", scene, "--out", out, "--format", "png", *options)
+    return out
+
+
+def save_jpeg(picture, name: str, width: int | None = None) -> None:
+    """Write a picture, no wider than this, as a JPEG file of the documentation."""
+    picture = picture.convert("RGB")
+    if width is not None and picture.width > width:
+        picture = picture.resize((width, round(picture.height * width / picture.width)))
+    picture.save(IMAGES / name, quality=QUALITY, optimize=True)
+
+
+def page_of_pictures(sample: str, name: str, overlays: tuple[str, ...] = ()) -> Callable[[Path], None]:
+    """Return what makes the four pictures of a sample on the page about pictures."""
+
+    def make(folder: Path) -> None:
+        from PIL import Image
+
+        scene = baked(sample, folder)
+        if overlays:
+            add_overlays(scene, overlays)
+        out = rendered(scene, "--size", *SIZE)
+        save_jpeg(Image.open(next(out.glob("scene_and_touch_*.png"))), f"overlays-{name}.jpg")
+        for kind in ("strip", "curves"):
+            shrink(out / f"{kind}.png", f"{kind}-{name}.png")
+        shrink(sorted(out.glob("numbers_*.png"))[0], f"numbers-{name}.png")
+
+    return make
+
+
+def add_overlays(scene: Path, overlays: tuple[str, ...]) -> None:
+    """Bake a scene again with other arrows on its sensors."""
+    code = f"import bpy, palpate; palpate.register(); bpy.ops.wm.open_mainfile(filepath={str(scene)!r}); "
+    code += f"bpy.context.scene.palpate.overlays = set({overlays!r}); bpy.ops.wm.save_mainfile()"
+    subprocess.run([sys.executable, "-c", code], check=True)
+    palpate("bake", scene, "--save")
+
+
+def shrink(file: Path, name: str, share: float = 0.5) -> None:
+    """Write a figure into the documentation, with fewer pixels: the documentation is read on a screen."""
+    from PIL import Image
+
+    with Image.open(file) as figure:
+        size = round(figure.width * share), round(figure.height * share)
+        figure.convert("RGB").resize(size, Image.Resampling.LANCZOS).save(IMAGES / name, optimize=True)
+
+
+def demo(folder: Path) -> None:
+    """The picture, the tactile images and the forces of the demo, at the top of the README."""
+    from PIL import Image
+
+    palpate("demo", "--out", folder / "demo", "--size", 1280, 720)
+    save_jpeg(Image.open(folder / "demo" / "scene.png"), "demo.jpg", 1280)
+    for source, name in (("tactile-strip", "tactile-strip"), ("forces", "forces")):
+        with Image.open(folder / "demo" / f"{source}.png") as figure:
+            size = 1440, round(figure.height * 1440 / figure.width)
+            figure.convert("RGB").resize(size, Image.Resampling.LANCZOS).save(IMAGES / f"{name}.png", optimize=True)
+
+
+def hand(folder: Path) -> None:
+    """Index finger and thumb on the page about the paper."""
+    from PIL import Image
+
+    out = rendered(baked("hand", folder), "--only", "scene", "--size", *SIZE)
+    save_jpeg(Image.open(next(out.glob("scene_0*.png"))), "paper-hand.jpg", 800)
+
+
+def pick_and_place(folder: Path) -> None:
+    """Four frames of pick and place beside one another, on the page about the paper."""
+    from PIL import Image
+
+    scene = baked("pick_and_place", folder)
+    frames = [word for number in PICK_FRAMES for word in ("--frame", number)]
+    out = rendered(scene, "--only", "scene", "--size", 480, 480, *frames)
+    pictures = [Image.open(out / f"scene_{number:04d}.png").convert("RGB") for number in PICK_FRAMES]
+    sheet = Image.new("RGB", (sum(picture.width for picture in pictures), pictures[0].height))
+    for number, picture in enumerate(pictures):
+        sheet.paste(picture, (number * picture.width, 0))
+    save_jpeg(sheet, "paper-pick.jpg", 1440)
+
+
+PICTURES: dict[str, Callable[[Path], None]] = {
+    "demo": demo,
+    "pads": page_of_pictures("demo", "pads"),
+    "fingertip": page_of_pictures("fingertip", "fingertip", ("FORCE", "SHEARS")),
+    "grasp": page_of_pictures("grasp", "grasp", ("FORCE", "SHEARS")),
+    "hand": hand,
+    "pick": pick_and_place,
+}
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description="Make the documentation's pictures of the sample scenes anew.")
+    parser.add_argument("name", nargs="*", help=f"only these of {', '.join(PICTURES)} (default: all)")
+    for name in parser.parse_args().name or PICTURES:
+        with tempfile.TemporaryDirectory() as folder:
+            PICTURES[name](Path(folder))
