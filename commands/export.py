@@ -19,6 +19,7 @@ LEROBOT = "lerobot"
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     formats = [*exporters(), LEROBOT]
+    parser.epilog = "Colour map, quantity, limit, width and resolution concern the format png alone."
     parser.add_argument("bake", metavar="BAKE", help="a bake folder, the folder of one sensor in it, or a baked .blend")
     parser.add_argument(
         "--format", metavar="KIND", choices=formats, default="csv", help=f"{', '.join(formats)} (default: %(default)s)"
@@ -47,7 +48,9 @@ def _exporter(name: str) -> str | Exporter:
     if name != LEROBOT:
         return name
     if importlib.util.find_spec(f"{__package__.rpartition('.')[0]}.sweep") is None:  # as in the extension's zip
-        raise PalpateError("Blender's extension writes no datasets: run 'pip install palpate[sweep]' in a Python of its own.")
+        raise PalpateError(
+            "Blender's extension writes no datasets: run 'pip install .[sweep]' in a checkout of Palpate, with its own Python."
+        )
     from ..sweep import bake_dataset
 
     return bake_dataset.EXPORTER

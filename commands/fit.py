@@ -21,7 +21,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         description="Stiffness of one texel from foam measurements: a CSV with the columns compression (m) and pressure (Pa), "
         "force (N) or mass (kg). Other units are written into the header, as in 'compression (mm)'.",
     )
-    foam.add_argument("file", metavar="FOAM.csv")
+    foam.add_argument("file", metavar="FOAM.csv", help="compression under load")
     foam.add_argument("--area", type=float, required=True, metavar="M2", help="area of the whole sensor, m²")
     foam.add_argument("--texels", type=int, required=True, metavar="N", help="number of texels on it")
     foam.add_argument("--weight-area", type=float, metavar="M2", help="area on which the forces or masses rested, m²")
@@ -32,7 +32,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         description="Friction of one texel: a CSV with the columns velocity (m/s) and force (N), each line in steady "
         "sliding, or with a column time (s) as well, recorded from rest.",
     )
-    slide.add_argument("file", metavar="FRICTION.csv")
+    slide.add_argument("file", metavar="FRICTION.csv", help="friction force over velocity")
     slide.add_argument("--normal-force", type=float, required=True, metavar="N", help="normal force on one texel, N")
     slide.add_argument(
         "--texels", type=int, default=1, metavar="N", help="number of texels that shared the measured force (default: 1)"

@@ -31,7 +31,11 @@ WISHES = ("between", "depth", "speed", "duration", "area")
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("rig", metavar="RIG.toml", help="what was measured (docs/gap.md); its CSV files lie beside it")
-    parser.add_argument("--out", metavar="DIR", help="folder for gap.json, sensor.toml, report.html and plots, or for the plan")
+    parser.add_argument(
+        "--out",
+        metavar="DIR",
+        help="folder for gap.json, sensor.toml, report.html and plots; with --plan, which can do without, for the plan",
+    )
     parser.add_argument("--blend", metavar="SCENE.blend", help="also put the amended sensor into this file")
     parser.add_argument("--sensor", metavar="NAME", help="the sensor in it (default: the only one)")
     plan = parser.add_argument_group("before anything is fitted")

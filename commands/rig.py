@@ -27,7 +27,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         nargs="+",
         help="CSV and other tables of text, MCAP, a bag of ROS 1 or ROS 2, HDF5, NPZ or MAT; several files become trials",
     )
-    new.add_argument("--out", metavar="DIR", help="folder for rig.toml and its CSV files")
+    new.add_argument("--out", metavar="DIR", help="folder for rig.toml and its CSV files; needed without --preview")
     new.add_argument(
         "--answers", metavar="FILE", help="what the columns are and what no log says; without it a template is written"
     )

@@ -16,7 +16,7 @@ from . import blender, checks, console
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     kinds = parser.add_subparsers(dest="kind", metavar="export | import", required=True)
     save = kinds.add_parser("export", help="write the sensors of a .blend for another simulator")
-    save.add_argument("scene", metavar="SCENE.blend")
+    save.add_argument("scene", metavar="SCENE.blend", help="file with the sensors; it is only read")
     formats = written_formats()
     save.add_argument("--to", metavar="FORMAT", choices=formats, required=True, help=", ".join(formats))
     save.add_argument("--out", metavar="DIR", default="palpate-sensors", help="folder to write to (default: %(default)s)")
@@ -25,7 +25,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     save.set_defaults(action=_export)
     load = kinds.add_parser("import", help="put the sensors of a file of another program into a .blend")
     load.add_argument("file", metavar="FILE", help="MJCF, URDF, probe list (.json), OpenRAVE's XML, or a .blend of GenTact")
-    load.add_argument("scene", metavar="SCENE.blend")
+    load.add_argument("scene", metavar="SCENE.blend", help="existing file that gets the sensors")
     load.add_argument("--sensor", metavar="NAME", action="append", help="only this sensor of the file; may be given again")
     load.add_argument("--save-as", metavar="OUT.blend", help="save into another .blend (default: SCENE.blend itself)")
     blender.add_script_arguments(load)

@@ -29,7 +29,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "of each run: one that takes more is ended and counts as failed, and the others go on. --allow-scripts also runs the "
         "Python of a study that has a job instead of a scene."
     )
-    parser.add_argument("study", metavar="STUDY.toml|DIR", help="file of a study, or the folder of one that goes on")
+    parser.add_argument(
+        "study",
+        metavar="STUDY.toml|DIR",
+        help="file of a study, or the folder of one that goes on; with --list also a scene, .blend or .npz",
+    )
     parser.add_argument("--out", metavar="DIR", help="output folder (default: beside the study, with its name)")
     parser.add_argument("--workers", metavar="N", type=_count, help="processes on this machine (default: one per core)")
     where = parser.add_mutually_exclusive_group()
@@ -61,15 +65,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     what = parser.add_mutually_exclusive_group()
     what.add_argument("--begin", action="store_true", help="read the scenes and freeze the study, and compute no run yet")
-    what.add_argument("--dry-run", action="store_true", help="say from five runs how long all take and how big they are")
+    what.add_argument(
+        "--dry-run", action="store_true", help="say from five runs how long all take and how big they are, and keep nothing"
+    )
     what.add_argument("--status", action="store_true", help="say how far the study in the folder is; it may be running")
-    what.add_argument("--list", action="store_true", help="list what may vary in the scenes of the study")
+    what.add_argument("--list", action="store_true", help="list what may vary in the scenes of the study, or in one scene")
     blender.add_script_arguments(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
     if importlib.util.find_spec(f"{__package__.rpartition('.')[0]}.sweep") is None:  # as in the extension's zip
-        raise PalpateError("Blender's extension has no studies: run 'pip install palpate[sweep]' in a Python of its own.")
+        raise PalpateError(
+            "Blender's extension has no studies: run 'pip install .[sweep]' in a checkout of Palpate, with its own Python."
+        )
     place = Path(arguments.study)
     folder = _folder(place, arguments.out)
     if arguments.status:
@@ -79,7 +87,8 @@ def run(arguments: argparse.Namespace) -> int:
         return 0
     from ..core.io.file_writing import writable_folder
     from ..core.io.folder_lock import FolderLock
-    from ..sweep import driver, exports
+    from ..core.study.run_files import STUDY_NAME
+    from ..sweep import driver, exports, study_folder
 
     driver.require_dask()
     exports.require_packages(arguments.format)
@@ -87,19 +96,21 @@ def run(arguments: argparse.Namespace) -> int:
         if not place.is_dir() or arguments.begin or arguments.dry_run or arguments.list:
             raise PalpateError("--part computes runs of a study that has begun: give its folder, and --begin before that.")
         return _compute(_opened(place, folder, arguments), arguments)
-    is_new = not folder.exists()
+    if arguments.list:
+        _print_names(place, arguments)
+        return 0
+    is_new, was_begun = not folder.exists(), (folder / STUDY_NAME).exists()
     lock = FolderLock(writable_folder(folder, create=not place.is_dir()), "sweep")
     try:
         opened = _opened(place, folder, arguments)
-        if arguments.list:
-            _print_names(opened)
-            return 0
         if arguments.begin:
             print(f"{counted(len(opened.runs), 'run')} begun: {opened.folder}")
             return 0
         return _estimate(opened, arguments) if arguments.dry_run else _compute(opened, arguments)
     finally:
         lock.release()
+        if arguments.dry_run and not was_begun:
+            study_folder.forget_study(folder)  # so that the study may still be changed
         if is_new:
             _remove_unless_begun(folder)
 
@@ -154,16 +165,23 @@ def _remove_unless_begun(folder: Path) -> None:
             folder.rmdir()
 
 
-def _print_names(opened: OpenStudy) -> None:
+def _print_names(place: Path, arguments: argparse.Namespace) -> None:
+    """Print what may vary in the scenes of a study, or in one scene; nothing is begun, and names of the study may be wrong."""
     from ..core.study.scene_property import PREFIX
     from ..core.study.variation import owners_text
+    from ..sweep import study_folder
+    from ..sweep.scene_evaluation import read_blend
 
-    for name, plan in opened.plans.items():
+    def read(blend: Path, target: Path) -> None:
+        read_blend(blend, target, arguments.scripts)
+        console.Interrupt.check()
+
+    for name, scenario in study_folder.scenarios_of(place, read).items():
         print(f"{name}:")
-        if plan.scenario is None:
+        if scenario is None:
             print("  any name that the job knows, for a number, a text, or true and false")
             continue
-        print("  " + owners_text(plan.scenario).replace("\n", "\n  "))
+        print("  " + owners_text(scenario).replace("\n", "\n  "))
         print(f"  {PREFIX}…: a property of a .blend by its path, which Copy Full Data Path gives; each run needs Blender then")
 
 
@@ -195,12 +213,20 @@ def _estimate(opened: OpenStudy, arguments: argparse.Namespace) -> int:
     found = try_runs(opened.folder, opened.runs, Limits.of(opened.study), arguments.scripts)
     workers = _workers(arguments)
     seconds = found.seconds * len(opened.runs) / workers
-    print(f"{counted(len(opened.runs), 'run')}, {found.seconds:.3g} s and {found.size / 1e6:.3g} MB each")
-    size = found.size * len(opened.runs) / 1e9
-    print(f"about {_duration(seconds)} with {workers} workers, {size:.3g} GB in '{opened.folder}'")
+    print(f"{counted(len(opened.runs), 'run')}, {found.seconds:.3g} s and {_size(found.size)} each")
+    size = _size(found.size * len(opened.runs))
+    print(f"about {_duration(seconds)} with {counted(workers, 'worker')}, {size} in '{opened.folder}'")
     for sentence in found.failures:
-        print(f"failed: {sentence}")
+        print(f"one of the {found.tried} runs that were tried failed: {sentence}")
     return 0
+
+
+def _size(count: float) -> str:
+    """Return a number of bytes with the unit that suits it."""
+    for name, size in (("TB", 1e12), ("GB", 1e9), ("MB", 1e6)):
+        if count >= size:
+            return f"{count / size:.3g} {name}"
+    return f"{count / 1e3:.3g} kB"
 
 
 def _kind_of_runs(opened: OpenStudy) -> str:

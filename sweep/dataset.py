@@ -67,7 +67,9 @@ def require_pyarrow() -> None:
     try:
         import pyarrow  # noqa: F401
     except ImportError as error:
-        raise FileError("Datasets need the package pyarrow: install it with `pip install 'palpate[sweep]'`.") from error
+        raise FileError(
+            "Datasets need the package pyarrow: run \"pip install '.[sweep]'\" in a checkout of Palpate."
+        ) from error
 
 
 def _write_parts(folder: Path, order: list[tuple[int, str]], hidden: Path) -> Path | None:

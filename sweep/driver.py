@@ -59,7 +59,9 @@ def require_dask() -> None:
     try:
         import distributed  # noqa: F401
     except ImportError as error:
-        raise PalpateError(f"palpate sweep needs Dask ({error}): run 'pip install palpate[sweep]'.") from error
+        raise PalpateError(
+            f"palpate sweep needs Dask ({error}): run 'pip install .[sweep]' in a checkout of Palpate."
+        ) from error
 
 
 @contextmanager

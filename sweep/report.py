@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import base64
+import re
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -29,6 +30,9 @@ from .report_figures import MOST_METRICS, MOST_PARAMETERS, RunImage, draw_image_
 REPORT_NAME = "report.html"
 TEMPLATE = Path(__file__).parent / "templates" / "sweep_report.html"
 MOST_DEPENDENCIES, MOST_MESSAGES, MOST_IMAGES = 15, 12, 24
+PLACE_OF_PRESS = "press."
+"""First word of the metrics that say where a press was."""
+_NUMBER = re.compile(r"(?<![\w.])-?\d+(\.\d+)?(e[-+]?\d+)?(?!\w)", re.IGNORECASE)
 
 
 @dataclass(frozen=True)
@@ -78,7 +82,7 @@ def write_report(folder: Path, planned: Sequence[Run] = ()) -> None:
             left_off=sum(one.strength > 0 for one in found[MOST_DEPENDENCIES:]),
             ranges=[_range_row(f"{name}", values) for name, values in columns.values.items()],
             metrics=[_range_row(name, [x for x in values if np.isfinite(x)]) for name, values in columns.metrics.items()],
-            messages=Counter(run.sentence for run in failed).most_common(MOST_MESSAGES),
+            messages=_message_rows([run.sentence for run in failed]),
             failures=len(failed),
             failed_dependencies=_failed_rows(folder, order, columns, failed),
             pictures={path.stem: base64.b64encode(path.read_bytes()).decode() for path in pictures},
@@ -165,11 +169,27 @@ def _duration(seconds: float) -> str:
 
 def _strongest_sentence(found: list[Dependency], columns: StudyColumns, runs: int) -> str:
     strong = [one for one in found if one.strength > 0]
+    # Where a press was follows the numbers that chose it, and says nothing of the sensor.
+    measured = [one for one in strong if not one.metric.startswith(PLACE_OF_PRESS)]
+    strong = measured or strong
     if strong:
         return f"The strongest dependency is that of {strong[0].metric} on {strong[0].parameter}."
     if not found:
         return "There are too few runs, parameters or metrics to look for dependencies."
     return f"No metric depends on any parameter as far as {counted(runs, 'run')} can tell."
+
+
+def _message_rows(sentences: list[str]) -> list[tuple[str, int]]:
+    """Return the most frequent sentences with their numbers of runs; those that differ in numbers alone are one, the first."""
+    counts = Counter(_without_numbers(sentence) for sentence in sentences)
+    first: dict[str, str] = {}
+    for sentence in sentences:
+        first.setdefault(_without_numbers(sentence), sentence)
+    return [(first[kind], count) for kind, count in counts.most_common(MOST_MESSAGES)]
+
+
+def _without_numbers(sentence: str) -> str:
+    return _NUMBER.sub("0", sentence)
 
 
 def _shown_sentence(columns: StudyColumns) -> str:

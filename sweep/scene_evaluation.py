@@ -45,7 +45,7 @@ def read_blend(blend: Path, target: Path, scripts: str, *more: str) -> None:
     SceneError
         The scene makes no run, or this Python has no Blender.
     """
-    command = [sys.executable, "-m", _COMMANDS, "bake", str(blend), "--scenario", str(target), *more]
+    command = [sys.executable, "-P", "-m", _COMMANDS, "bake", str(blend), "--scenario", str(target), *more]
     command += [f"--{scripts}-scripts"] if scripts != REFUSE else []
     finished = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, text=True, errors="replace", check=False)
     if finished.returncode:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Workers as jobs of SLURM, by dask-jobqueue; ``pip install palpate[slurm]``.
+"""Workers as jobs of SLURM, by dask-jobqueue; ``pip install .[slurm]`` in a checkout.
 
 What a cluster wants said, such as its queue and account, stands in Dask's own file ``~/.config/dask/jobqueue.yaml`` or is given
 with the command.
@@ -92,4 +92,6 @@ def _require() -> None:
     try:
         import dask_jobqueue  # noqa: F401
     except ImportError as error:
-        raise PalpateError("--slurm needs the package dask-jobqueue: run 'pip install palpate[slurm]'.") from error
+        raise PalpateError(
+            "--slurm needs the package dask-jobqueue: run 'pip install .[slurm]' in a checkout of Palpate."
+        ) from error

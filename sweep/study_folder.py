@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import glob
+import tempfile
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -15,6 +16,7 @@ from ..core.io.bake_folder import folder_names
 from ..core.io.file_writing import atomic_write, file_sha256
 from ..core.io.private_folder import remove_tree
 from ..core.io.scenario_npz import load_scenario, save_scenario
+from ..core.model.scenario import Scenario
 from ..core.study.mesh_choices import MESHES, StudyMeshes, find_meshes, freeze_meshes
 from ..core.study.run_files import FAILED, RUNS, SCENES, STUDY_NAME, make_folders
 from ..core.study.study_file import Plan, Run, Study, differences, frozen_text, read_study, runs_of
@@ -114,6 +116,52 @@ def _whole_or_nothing(folder: Path) -> Iterator[None]:
         for path in made:
             remove_tree(path)
         raise
+
+
+def forget_study(folder: Path) -> None:
+    """Remove a study from its folder, as where it was only frozen for a trial; other files of the folder stay."""
+    (folder / STUDY_NAME).unlink(missing_ok=True)  # first: without it the rest is no study
+    for name in (RUNS, FAILED, SCENES):
+        remove_tree(folder / name)
+
+
+def scenarios_of(place: Path, read_blend: ReadBlend) -> dict[str, Scenario | None]:
+    """Return what may be varied, without beginning a study, whether or not the names that it varies are right.
+
+    Parameters
+    ----------
+    place : Path
+        The file of a study, the folder of one, or a scene.
+    read_blend : callable
+
+    Returns
+    -------
+    dict of str to Scenario or None
+        By the names of the scenes; None for a job.
+
+    Raises
+    ------
+    PalpateError
+        The study or a scene cannot be read.
+    """
+    if place.is_dir():
+        return {name: plan.scenario for name, plan in resume_study(place).plans.items()}
+    if place.suffix in (BLEND, SCENARIO):
+        sources = {place.stem: place}
+    else:
+        study = read_study(place)
+        sources = _sources(study, place.parent)
+        if study.is_job:
+            return dict.fromkeys(sources)
+    found: dict[str, Scenario | None] = {}
+    with tempfile.TemporaryDirectory(prefix="palpate-sweep-") as folder:
+        for number, (name, source) in enumerate(sources.items()):
+            scenario = source
+            if source.suffix == BLEND:
+                scenario = Path(folder) / f"{number}{SCENARIO}"
+                read_blend(source, scenario)
+            found[name] = load_scenario(scenario)
+    return found
 
 
 def resume_study(folder: Path) -> OpenStudy:

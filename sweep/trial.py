@@ -30,11 +30,14 @@ class Estimate:
         Bytes of one run.
     failures : list of str
         Sentences of the runs that failed.
+    tried : int
+        Number of runs that were computed.
     """
 
     seconds: float
     size: float
     failures: list[str]
+    tried: int
 
 
 def try_runs(folder: Path, runs: Sequence[Run], limits: Limits, scripts: str = REFUSE) -> Estimate:
@@ -68,7 +71,7 @@ def try_runs(folder: Path, runs: Sequence[Run], limits: Limits, scripts: str = R
         written = sum(file.stat().st_size for file in (trial / RUNS).rglob("*") if file.is_file())
     failures = [answer["sentence"] for answer in answers if "sentence" in answer]
     done = max(1, len(answers) - len(failures))
-    return Estimate(sum(answer["seconds"] for answer in answers) / len(answers), written / done, failures)
+    return Estimate(sum(answer["seconds"] for answer in answers) / len(answers), written / done, failures, len(answers))
 
 
 def count_of_cores() -> int:

@@ -80,7 +80,7 @@ class Child:
     def __init__(self, folder: str, scripts: str = REFUSE):
         environment = {**os.environ, "NUMBA_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
         self._process = subprocess.Popen(
-            [sys.executable, "-m", f"{__package__}.child", folder, scripts],
+            [sys.executable, "-P", "-m", f"{__package__}.child", folder, scripts],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,

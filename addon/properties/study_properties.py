@@ -128,7 +128,7 @@ class PALPATE_AP_preferences(bpy.types.AddonPreferences):
 
     study_command: StringProperty(
         name="Command of Palpate",
-        description="File of the command palpate in a Python where 'pip install palpate[sweep]' was run; it computes studies. "
+        description="File of the command palpate in a Python that has Palpate with its extra 'sweep'; it computes studies. "
         "Empty: the one on the path",
         subtype="FILE_PATH",
     )

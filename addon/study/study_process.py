@@ -47,12 +47,12 @@ def sweep_command() -> list[str]:
     root = __package__.removesuffix(".addon.study")
     has_sweep = importlib.util.find_spec(f"{root}.sweep") and importlib.util.find_spec("distributed")
     if not bpy.app.binary_path and has_sweep:  # bpy as a module: this Python is the one that pip installs into
-        return [sys.executable, "-m", f"{root}.commands", "sweep"]
+        return [sys.executable, "-P", "-m", f"{root}.commands", "sweep"]
     found = shutil.which("palpate")
     if found is None:
         raise PalpateError(
-            "No Palpate that computes studies is found: run pip install 'palpate[sweep]' in a Python of its own, and choose "
-            "its command palpate under Edit › Preferences › Add-ons › Palpate."
+            "No Palpate that computes studies is found: run pip install '.[sweep]' in a checkout of Palpate, in a Python of "
+            "its own, and choose its command palpate under Edit › Preferences › Add-ons › Palpate."
         )
     return [found, "sweep"]
 

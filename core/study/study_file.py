@@ -60,7 +60,7 @@ from .design import (
 from .mesh_choices import MESH, StudyMeshes, expanded
 from .presses import PLACE_PARAMETERS, PRESS_PARAMETERS, Press, with_press
 from .scene_property import SceneProperty, WholeNumber, is_scene_property
-from .variation import PRESS, Variable, variable, variables_of
+from .variation import MOTION_WORDS, PRESS, Variable, variable, variables_of
 
 FORMAT = "palpate-sweep/1"
 FROZEN, JOB = "frozen", "job"
@@ -319,6 +319,7 @@ def plan_for(
                 f"'{name}' is a property of Blender, and '{scenario.name}' is no .blend: give the .blend itself."
             )
         found = variable(name, known, scenario)
+        _check_acts(found, scenario, press)
         if isinstance(entry, Mapping) and SAME in entry:
             tied[name] = _tie(found, entry, entries)
         elif isinstance(entry, Mapping):
@@ -332,6 +333,14 @@ def plan_for(
         for end in ends if ends != (None,) else ():
             variable(name, known, scenario).read(_times(end, factor))  # refuses what some run could not have
     return plan
+
+
+def _check_acts(found: Variable, scenario: Scenario, press: Press | None) -> None:
+    """Refuse what a press replaces: the motion of the object that presses."""
+    if press is None or found.words[0] not in MOTION_WORDS:
+        return
+    if any(target.name == press.target and scenario.bodies[target.body].name == found.owner for target in scenario.targets):
+        raise ParameterError(f"'{found.name}' has no effect, because [press] moves '{found.owner}': leave it out of [vary].")
 
 
 def plan_for_job(study: Study) -> Plan:

@@ -51,6 +51,8 @@ PRESS = "press"
 
 _YES_NO = "true or false"
 _BODY_VECTORS = {"shift": "m", "turn": "rad", "velocity": "m/s", "angular_velocity": "rad/s"}
+MOTION_WORDS = (*_BODY_VECTORS, "drive", "mass")
+"""First words of the names of what decides how a body moves."""
 
 
 @dataclass(frozen=True)

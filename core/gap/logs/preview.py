@@ -33,9 +33,15 @@ def preview_rows(logs: Sequence[LogFile]) -> list[tuple[str, ...]]:
                     rows.append((log.path.name, f"{table.full_name('')}… {len(table.columns) - i} more", "", "", "", ""))
                     break
                 known = values[np.isfinite(values)]
-                ends = (f"{known.min():.6g}", f"{known.max():.6g}") if len(known) else ("", "")
+                ends = _ends(float(known.min()), float(known.max())) if len(known) else ("", "")
                 rows.append((log.path.name, table.full_name(name), table.units.get(name, ""), str(len(known)), *ends))
     return rows
+
+
+def _ends(least: float, largest: float) -> tuple[str, str]:
+    """Write the ends of a range with six digits, and with more where these are the same, as of clocks that count from 1970."""
+    short = f"{least:.6g}", f"{largest:.6g}"
+    return short if short[0] != short[1] else (f"{least:.14g}", f"{largest:.14g}")
 
 
 def plot_rig(rig: Rig, path: str | Path) -> None:

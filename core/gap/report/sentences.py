@@ -11,7 +11,7 @@ from ..selection.check_recordings import CHECK_CLOSED
 from ..selection.findings import Diagnosis, Finding
 from ..selection.gap_sizes import FORCES, READINGS
 from ..selection.wear_or_drift import CLOCK, NOTHING, TEXELS, USE
-from .comparison import GapErrors
+from .comparison import GapErrors, nrmse
 from .experiments import LOUD_NOISE
 from .recording_differences import recording_differences
 
@@ -192,6 +192,26 @@ def evidence(result: Diagnosis, errors: GapErrors) -> list[str]:
     return said
 
 
+def noise_sentence(share: float, left: float | None) -> str:
+    """Return what a reader should know of loud noise.
+
+    Parameters
+    ----------
+    share : float
+        Standard deviation of the readings without load, as a share of the range.
+    left : float or None
+        Error of the amended model on the fitted recordings, likewise. It contains the noise. Where it is less than half of
+        `share`, the readings without load were no noise: they had load, and the rig says otherwise.
+    """
+    if left is not None and left < 0.5 * share:
+        return (
+            f"Readings change by {share:.0%} of the range where poses and shapes say that nothing touches the sensor, and the "
+            f"amended sensor leaves {left:.2%}: contact begins elsewhere. "
+            'Try contact_height = "free" in [sensor], and check the shapes.'
+        )
+    return f"Noise is {share:.0%} of the range: an effect that is not much larger cannot be seen in these recordings."
+
+
 def warnings(result: Diagnosis) -> list[str]:
     """Return what a reader should know about the recordings, without the rig's own warnings."""
     said = [fault.sentence for fault in result.faults] + [text for text in (caution(result),) if text]
@@ -208,7 +228,7 @@ def warnings(result: Diagnosis) -> list[str]:
         )
     share = result.noise[0].deviation / result.full[0]
     if share > LOUD_NOISE:
-        said.append(f"Noise is {share:.0%} of the range: an effect that is not much larger cannot be seen in these recordings.")
+        said.append(noise_sentence(share, nrmse(result.of("fit"), result.best.model, result.full)))
     if not result.of("check"):
         said.append('No trial is for checking only: give one use = "check", so that the result can be judged on it.')
     if len(result.of("fit")) == 1:

@@ -20,6 +20,7 @@ from palpate.core.gap.forward.predictor import Model, Predictor
 from palpate.core.gap.report import summary
 from palpate.core.gap.report.comparison import nrmse
 from palpate.core.gap.report.experiments import next_experiment
+from palpate.core.gap.report.sentences import noise_sentence
 from palpate.core.gap.selection.candidates import Candidate, scales_of
 from palpate.core.gap.selection.diagnosis import diagnose
 from palpate.core.gap.selection.findings import Diagnosis
@@ -210,3 +211,12 @@ def test_noise_that_grows_with_the_reading_is_named():
     result = diagnosed(cases.rig(change=lambda r, t: r * (1 + 0.2 * rng.normal(size=r.shape)), noise=0.003, seed=12))
     assert [named.name for named in result.findings] == ["noise"] and result.verdict == "explained"
     assert result.best.model.effects[-1].values["share"] == pytest.approx(0.2, rel=0.1)
+
+
+def test_what_the_amended_sensor_explains_is_not_called_noise():
+    """Where contact begins earlier than the rig says, presses are among the readings "without load"."""
+    assert noise_sentence(0.06, 0.07).startswith("Noise is 6% of the range")
+    assert noise_sentence(0.06, None).startswith("Noise is 6% of the range")
+    said = noise_sentence(0.06, 0.0055)
+    assert "Noise" not in said
+    assert "0.55%" in said and "contact_height" in said

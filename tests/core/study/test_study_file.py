@@ -45,6 +45,10 @@ def plan(text):
         (RANDOM + "[press]", "does not say its target"),
         (RANDOM + "[press]\ntarget = 'Ball'\ndepht = 1", "did you mean 'depth'"),
         (RANDOM + "[press]\ntarget = 'Ball'\ndepth = 1\nforce = 1", "give one of the two"),
+        (
+            RANDOM + "[press]\ntarget = 'Ball'\n[vary]\n'Ball.shift.x' = { uniform = [0, 1] }",
+            "has no effect, because .press. moves",
+        ),
         (HEAD + "design = 'grid'\n[press]\ntarget = 'Ball'", "A grid has no random places"),
     ],
 )

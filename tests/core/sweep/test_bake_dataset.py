@@ -60,4 +60,4 @@ def test_the_extension_without_studies_says_so(tmp_path, capsys, monkeypatch):
     monkeypatch.setattr(export_command.importlib.util, "find_spec", lambda name: None)
     folder = str(bake.folders["pad"].parent)
     assert main(["export", folder, "--format", "lerobot", "--out", str(tmp_path / "two")]) == 1
-    assert "pip install palpate[sweep]" in capsys.readouterr().err
+    assert "pip install .[sweep]' in a checkout of Palpate" in capsys.readouterr().err

@@ -12,8 +12,8 @@ from sweep_runs import new_study, unit_sensor, write_failure, write_run
 
 from palpate.attack.sample_bake import grid_texels, recording_of, round_texels
 from palpate.core.errors import FileError
-from palpate.sweep.dependencies import dependencies
-from palpate.sweep.report import write_report
+from palpate.sweep.dependencies import Dependency, dependencies
+from palpate.sweep.report import StudyColumns, _strongest_sentence, write_report
 
 
 def study_of(tmp_path, runs=40):
@@ -43,6 +43,25 @@ def test_the_page_says_what_depends_on_what(tmp_path):
     write_report(study)
     assert (study / "report.html").read_text(encoding="utf-8") == before
     assert not list(study.glob(".palpate*"))
+
+
+def test_failures_that_differ_in_numbers_are_one_row(tmp_path):
+    study = study_of(tmp_path)
+    for index, number in enumerate((0.21, 1e-5, 0.20, 3)):
+        write_failure(study, 100 + index, f"mud of 'Pad 2' is larger than mus ({number:g}).")
+    write_failure(study, 200, "mud of 'Pad' is larger than mus (0.2).")
+    write_report(study)
+    page = (study / "report.html").read_text(encoding="utf-8")
+    rows = re.findall(r"<td>(mud of [^<]*)</td><td[^>]*>(\d+)</td>", page)
+    assert sorted((row[0].count("Pad 2"), row[1]) for row in rows) == [(0, "1"), (1, "4")]
+
+
+def test_where_a_press_was_is_not_the_headline():
+    """Its place follows the numbers that chose it, and says nothing of the sensor."""
+    place, force = (Dependency("press.place", "press.y", 0.98, 0.9, 0.0, 9), Dependency("Pad.k", "force", 0.6, 0.5, 0.0, 9))
+    columns = StudyColumns({}, {}, 1.0)
+    assert _strongest_sentence([place, force], columns, 9) == "The strongest dependency is that of force on Pad.k."
+    assert _strongest_sentence([place], columns, 9) == "The strongest dependency is that of press.y on press.place."
 
 
 def test_a_study_of_failures_alone_has_a_report(tmp_path):

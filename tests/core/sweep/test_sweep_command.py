@@ -178,6 +178,33 @@ def test_a_misspelt_name_is_one_line_and_begins_nothing(tmp_path):
     assert not (tmp_path / "study").exists()
 
 
+def test_names_are_listed_for_a_study_with_a_wrong_one_and_for_a_scene(tmp_path):
+    study = write_study(tmp_path, STUDY.replace("Pad.k", "Pad.kk"))
+    for place in (study, tmp_path / "tiny.npz"):
+        listed = sweep(place, "--list")
+        assert (listed.returncode, listed.stderr) == (0, "")
+        assert listed.stdout.startswith("tiny:\n  Pad.k N/m: a value above zero\n")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["study.toml", "tiny.npz"]
+
+
+def test_a_study_may_change_after_a_dry_run_and_a_folder_named_as_the_package_does_no_harm(tmp_path):
+    """A bake leaves a folder `palpate` beside its .blend, and Python looks in its working folder first."""
+    (tmp_path / "palpate").mkdir()
+    (tmp_path / "palpate" / "__init__.py").write_text("raise ImportError('this is a bake')\n", encoding="utf-8")
+    study = write_study(tmp_path)
+    script = "from palpate.commands import run_process; run_process()"
+    words = [sys.executable, "-P", "-c", script, "sweep", study.name]
+    options = {"cwd": tmp_path, "capture_output": True, "text": True, "timeout": LONGEST, "check": False}
+    tried = subprocess.run([*words, "--dry-run"], **options)
+    assert (tried.returncode, tried.stderr) == (0, "")
+    assert "24 runs, " in tried.stdout
+    assert not (tmp_path / "study").exists()
+    write_study(tmp_path, STUDY.replace("samples = 24", "samples = 2"))
+    done = subprocess.run([*words, "--workers", "1"], **options)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "2 runs: 2 done, 0 failed, 0 left" in done.stdout
+
+
 def test_a_study_of_a_billion_runs_is_one_line_and_begins_nothing(tmp_path):
     refused = sweep(write_study(tmp_path, STUDY.replace("samples = 24", "samples = 1000000000")), "--out", tmp_path / "out")
     assert refused.returncode == 1

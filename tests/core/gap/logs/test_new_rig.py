@@ -15,6 +15,7 @@ from palpate.core.gap.dataset.rig import read_rig
 from palpate.core.gap.logs.answers import answers_text, confirmed, read_answers
 from palpate.core.gap.logs.log_file import read_log
 from palpate.core.gap.logs.new_rig import write_rig
+from palpate.core.gap.logs.preview import preview_rows
 from palpate.core.gap.logs.proposal import propose
 from palpate.core.jobs.job_runner import run_job
 
@@ -84,6 +85,15 @@ def test_the_proposal_says_why_and_what_is_not_known(tmp_path):
     assert logger.columns["texel"].names == ("R1", "R2", "R3", "R4")
     assert [one.split(" is ")[0] for one in found.open_questions()] == ["grid of [sensor]"]
     tomllib.loads(answers_text(found))
+
+
+def test_the_preview_tells_the_ends_of_a_clock_that_counts_from_1970(tmp_path):
+    time = 1_780_000_000.25 + np.arange(100) * 0.5
+    lines = [f"{t:.3f},{0.001 * i}" for i, t in enumerate(time)]
+    (tmp_path / "a.csv").write_text("time,depth\n" + "\n".join(lines) + "\n", encoding="utf-8")
+    rows = {row[1]: row[4:] for row in preview_rows([read_log(tmp_path / "a.csv")])}
+    assert [float(end) for end in rows["time"]] == [1_780_000_000.25, 1_780_000_049.75]
+    assert rows["depth"] == ("0", "0.099")
 
 
 def test_a_unit_that_only_the_size_tells_is_asked(tmp_path):
