@@ -60,8 +60,9 @@ class Bin:
 
 
 def read(paths: Sequence[Path]) -> list[dict[str, Any]]:
-    """Return the results in some files, one for each case."""
-    return [json.loads(line) for path in paths for line in path.read_text(encoding="utf-8").splitlines()]
+    """Return the results in some files or folders of studies, one for each case."""
+    files = [file for path in paths for file in (sorted(path.glob("runs/*/case.json")) if path.is_dir() else [path])]
+    return [json.loads(line) for file in files for line in file.read_text(encoding="utf-8").splitlines()]
 
 
 def named(rows: Sequence[dict[str, Any]]) -> tuple[np.ndarray, np.ndarray]:
@@ -140,7 +141,7 @@ def draw(rows: Sequence[dict[str, Any]], path: Path) -> None:
     axes.set_xticks(TICKS, [f"{tick:g}" for tick in TICKS])
     axes.set_xticks([], minor=True)
     axes.set(xlabel="confidence that is said", ylabel="share of names that are right", xlim=(0.05, 0.9985), ylim=(-0.06, 1.05))
-    axes.legend(loc="upper left", frameon=False, fontsize=8, bbox_to_anchor=(0.0, 0.97))
+    axes.legend(loc="lower right", frameon=False, fontsize=8)
     figure.savefig(path, metadata={"Software": None})
 
 
