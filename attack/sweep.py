@@ -34,6 +34,8 @@ LONGEST = 900.0
 """Seconds after which a command counts as hung; the first one on a machine compiles the solver."""
 RUNS, KILLS = 1000, 20
 """Of a round of kills, unless there are few tries."""
+HOLD = 3.0
+"""Of its presses, s: shorter runs were done before the last kills on a busy machine."""
 VICTIMS = ("child", "worker", "scheduler", "driver")
 FAULTY_RUNS, EARLIER_RUNS = 4, 2
 """Runs of the study whose file operations fail, and how many of them were done and published before."""
@@ -118,9 +120,9 @@ class Sweep(Area):
     def _with_kills(self, case: Case) -> Outcome:
         """Kill processes at random moments, give the same command again whenever the driver is gone, and compare."""
         dice, is_remote = random.Random(case.data["seed"]), case.name.endswith("scheduler")
-        expected = self._expected("kills", self._runs)
+        expected = self._expected("kills", self._runs, HOLD)
         shutil.rmtree(self._place, ignore_errors=True)
-        study = write_study(self._place, self._runs, self.seed)
+        study = write_study(self._place, self._runs, self.seed, hold=HOLD)
         (self.folder / "starts").unlink(missing_ok=True)
         self._begun = 0
         options = ["--workers", "2"]
@@ -194,12 +196,12 @@ class Sweep(Area):
         found = _descendants(os.getpid(), victim)
         return dice.choice(found) if found else None
 
-    def _expected(self, name: str, runs: int) -> dict[str, str]:
+    def _expected(self, name: str, runs: int, hold: float = 0.0) -> dict[str, str]:
         """Return the results of an undisturbed study."""
         if name not in self._undisturbed:
             place = self.folder / f"undisturbed {name}"
             precompile.compile_solver()  # else kills are spread over a minute of compiling, and most come too late
-            driver = self._sweep(write_study(place, runs, self.seed), ["--workers", "2"])
+            driver = self._sweep(write_study(place, runs, self.seed, hold=hold), ["--workers", "2"])
             said = driver.communicate(timeout=LONGEST)[1]
             if driver.returncode:
                 raise RuntimeError(f"the undisturbed study fails: {said}")

@@ -40,7 +40,7 @@ fps = 100
 [press]
 depth = {{ uniform = [0.2e-3, 2e-3] }}
 speed = 0.1
-hold = 0.0
+hold = {hold}
 """
 FAILING = '"Pad.mud" = { choice = [0.2, 0.25, 2.0] }'
 """Every third value of the friction is above that at rest, which no sensor has: the run fails."""
@@ -55,12 +55,12 @@ def scenario() -> Scenario:
     return Scenario(bodies, (sensor,), (Target("Ball", 1, ball),), 1, 3, 50.0, name="pad")
 
 
-def write_study(folder: Path, runs: int, seed: int = 1, fails: bool = False, more: str = "") -> Path:
-    """Write scene and study into a folder that is made, and return the study's file."""
+def write_study(folder: Path, runs: int, seed: int = 1, fails: bool = False, more: str = "", hold: float = 0.0) -> Path:
+    """Write scene and study into a folder that is made, and return the study's file; presses are held for `hold` seconds."""
     folder.mkdir(parents=True, exist_ok=True)
     save_scenario(folder / "pad.npz", scenario())
     file = folder / "study.toml"
-    file.write_text(STUDY.format(runs=runs, seed=seed, more=FAILING if fails else more), encoding="utf-8")
+    file.write_text(STUDY.format(runs=runs, seed=seed, more=FAILING if fails else more, hold=hold), encoding="utf-8")
     return file
 
 
