@@ -46,7 +46,7 @@ def _forest() -> tuple[Callable[[np.ndarray], np.ndarray], float]:
     try:
         from sklearn.ensemble import ExtraTreesClassifier
     except ImportError:
-        raise SystemExit("The classifier needs scikit-learn; install it with pip install 'palpate[bench]'.") from None
+        raise SystemExit("The classifier needs scikit-learn: install it with `pip install scikit-learn`.") from None
     values, holds = simulations()
     forest = ExtraTreesClassifier(600, min_samples_leaf=2, max_features=0.3, bootstrap=True, oob_score=True, random_state=0)
     varied = holds.any(axis=0) & ~holds.all(axis=0)

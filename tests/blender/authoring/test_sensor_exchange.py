@@ -39,7 +39,7 @@ def test_probe_lists_of_sample_scenes(sample, item, tmp_path):
 
 @pytest.mark.parametrize("sample", SAMPLES)
 def test_mujoco_reads_sample_scenes(item, tmp_path):
-    mujoco = pytest.importorskip("mujoco", reason="MuJoCo reads the MJCF: pip install palpate[bench]")
+    mujoco = pytest.importorskip("mujoco", reason="MuJoCo reads the MJCF: pip install mujoco")
     model = mujoco.MjModel.from_xml_path(str(export_sensors([item], "mjcf", tmp_path).files[0]))
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
@@ -55,7 +55,7 @@ def test_mujoco_reads_sample_scenes(item, tmp_path):
 
 @pytest.mark.parametrize("sample", SAMPLES)
 def test_urdf_libraries_read_sample_scenes(item, tmp_path):
-    yourdfpy = pytest.importorskip("yourdfpy", reason="yourdfpy reads the URDF: pip install palpate[simulators]")
+    yourdfpy = pytest.importorskip("yourdfpy", reason="yourdfpy reads the URDF: pip install yourdfpy")
     robot = yourdfpy.URDF.load(str(export_sensors([item], "urdf", tmp_path).files[1]))
     poses = np.array([robot.get_transform(joint.child, robot.base_link) for joint in robot.robot.joints])
     assert np.abs(poses[:, :3, 3] - item.sensor.texels.position).max() < FLOAT32
@@ -64,7 +64,7 @@ def test_urdf_libraries_read_sample_scenes(item, tmp_path):
 
 @pytest.mark.parametrize("sample", SAMPLES)
 def test_usd_core_reads_sample_scenes(item, tmp_path):
-    pytest.importorskip("pxr", reason="usd-core reads the USD: pip install palpate[simulators]")
+    pytest.importorskip("pxr", reason="usd-core reads the USD: pip install usd-core")
     from pxr import Usd, UsdGeom
 
     stage = Usd.Stage.Open(str(export_sensors([item], "usd", tmp_path).files[0]))

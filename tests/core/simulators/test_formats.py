@@ -132,7 +132,7 @@ def test_identifiers_are_unique():
 
 @pytest.mark.parametrize("item", SENSORS, ids=lambda item: item.name)
 def test_urdf_is_read_by_a_urdf_library(item, tmp_path):
-    yourdfpy = pytest.importorskip("yourdfpy", reason="yourdfpy reads the URDF: pip install palpate[simulators]")
+    yourdfpy = pytest.importorskip("yourdfpy", reason="yourdfpy reads the URDF: pip install yourdfpy")
     robot = yourdfpy.URDF.load(str(export_sensors([item], "urdf", tmp_path).files[1]))
     link = robot.base_link
     poses = np.array([robot.get_transform(joint.child, link) for joint in robot.robot.joints])
@@ -144,7 +144,7 @@ def test_urdf_is_read_by_a_urdf_library(item, tmp_path):
 
 @pytest.mark.parametrize("item", [*SENSORS, pad(3, 3, name='a "quoted" \\ n\u00e4me')], ids=lambda item: item.name)
 def test_usd_is_read_by_usd_core(item, tmp_path):
-    pytest.importorskip("pxr", reason="usd-core reads the USD: pip install palpate[simulators]")
+    pytest.importorskip("pxr", reason="usd-core reads the USD: pip install usd-core")
     from pxr import Usd, UsdGeom
 
     stage = Usd.Stage.Open(str(export_sensors([item], "usd", tmp_path).files[0]))

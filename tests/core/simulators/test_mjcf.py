@@ -10,7 +10,7 @@ from exported_sensors import FLOAT32, ball, pad
 from palpate.core.simulators.formats import mjcf
 from palpate.core.simulators.registry import export_sensors
 
-mujoco = pytest.importorskip("mujoco", reason="MuJoCo reads the MJCF: pip install palpate[bench]")
+mujoco = pytest.importorskip("mujoco", reason="MuJoCo reads the MJCF: pip install mujoco")
 
 
 def loaded(item, folder, extra=""):

@@ -114,7 +114,7 @@ def test_what_is_no_list_is_one_sentence(text, tmp_path):
 
 def test_the_example_weighs_a_cube_in_mujoco(repository, tmp_path, monkeypatch, capsys):
     """In MuJoCo's loop the force on the cube is what the sensor reads, and its weight."""
-    pytest.importorskip("mujoco", reason="MuJoCo moves the cube: pip install palpate[bench]")
+    pytest.importorskip("mujoco", reason="MuJoCo moves the cube: pip install mujoco")
     item = pad()
     write_probe_list(tmp_path / "pad.json", replace(item, quaternion=np.array([1.0, 0.0, 0.0, 0.0])))
     monkeypatch.setattr(sys, "argv", ["mujoco_loop.py", str(tmp_path / "pad.json")])
@@ -124,7 +124,7 @@ def test_the_example_weighs_a_cube_in_mujoco(repository, tmp_path, monkeypatch, 
 
 def test_the_side_by_side_example_has_its_table_and_picture(repository, tmp_path, capsys):
     """Under the load for which MuJoCo's contact is made both read the weight; under another only Palpate does."""
-    pytest.importorskip("mujoco", reason="MuJoCo moves the loads: pip install palpate[bench]")
+    pytest.importorskip("mujoco", reason="MuJoCo moves the loads: pip install mujoco")
     from palpate.core.simulators.formats.mjcf import write_mjcf
 
     item = replace(pad(), quaternion=np.array([1.0, 0.0, 0.0, 0.0]))
