@@ -147,7 +147,10 @@ class Sweep(Area):
                 os.kill(pid, signal.SIGKILL)
             if cluster is not None and victim in ("scheduler", "worker"):
                 cluster.replace_dead()
-            if victim in ("driver", "scheduler") or driver.poll():
+            if victim in ("driver", "scheduler"):  # a driver may find its scheduler again, where that was started anew
+                with suppress(subprocess.TimeoutExpired):
+                    driver.wait(timeout=5)
+            if driver.poll():
                 said = driver.communicate(timeout=LONGEST)[1]
                 if "Traceback" in said:
                     return Outcome(TRACEBACK, f"after a kill of the {victim}: {said[-3000:]}")

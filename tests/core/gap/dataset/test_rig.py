@@ -204,8 +204,8 @@ def test_a_missing_rig_and_missing_stimulus_values(tmp_path):
 
 
 def test_columns_without_meaning_are_said(tmp_path):
-    rig = read_rig(write(tmp_path, press=table(names=("x", "y", "z", "temperature"))))
-    assert any("temperature" in warning for warning in rig.warnings)
+    rig = read_rig(write(tmp_path, press=table(names=("x", "y", "z", "humidity"))))
+    assert any("humidity" in warning for warning in rig.warnings)
     assert csv_table.RECORDINGS.largest < 10**9
 
 
