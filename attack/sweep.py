@@ -133,6 +133,8 @@ class Sweep(Area):
         for victim, is_working in _planned_kills(case.data["kills"], dice):
             while driver.poll() is None and not self._can_be_hit(victim, is_working):
                 time.sleep(0.01)
+                if cluster is not None:
+                    cluster.replace_dead()  # workers end where their scheduler is lost
             time.sleep(dice.uniform(0.0, 0.1 if is_working else 0.3))
             children = len(_descendants(os.getpid(), "child"))
             pid = driver.pid if victim == "driver" else self._pick(victim, driver, cluster, dice)
@@ -146,6 +148,7 @@ class Sweep(Area):
             with suppress(ProcessLookupError):
                 os.kill(pid, signal.SIGKILL)
             if cluster is not None and victim in ("scheduler", "worker"):
+                time.sleep(0.2)
                 cluster.replace_dead()
             if victim in ("driver", "scheduler"):  # a driver may find its scheduler again, where that was started anew
                 with suppress(subprocess.TimeoutExpired):
@@ -155,7 +158,7 @@ class Sweep(Area):
                 if "Traceback" in said:
                     return Outcome(TRACEBACK, f"after a kill of the {victim}: {said[-3000:]}")
                 driver, restarts = self._sweep(study, options), restarts + 1
-        found = self._until_done(driver, study, options)
+        found = self._until_done(driver, study, options, cluster)
         case.data.update({"hits": hits, "restarts": restarts})
         starts = count_starts(self.folder)
         case.data["computed twice"] = sum(starts.values()) - len(starts)
@@ -174,10 +177,12 @@ class Sweep(Area):
             return Outcome(WRONG, f"{case.data['computed twice']} runs computed twice, {lost_to_kills} were being computed")
         return Outcome(CLEAR)
 
-    def _until_done(self, driver: subprocess.Popen, study: Path, options: list[str]) -> Outcome | None:
+    def _until_done(
+        self, driver: subprocess.Popen, study: Path, options: list[str], cluster: Cluster | None = None
+    ) -> Outcome | None:
         """Let a driver end, and give the command again where a lost scheduler has stopped it; None if all is well."""
         for _ in range(3):
-            said = driver.communicate(timeout=LONGEST)[1]
+            said = _words_at_end(driver, cluster)
             if driver.returncode == 0:
                 return None
             if "Traceback" in said:
@@ -360,7 +365,6 @@ class Cluster:
 
     def replace_dead(self) -> None:
         """Start anew what has ended, as whoever looks after a cluster does."""
-        time.sleep(0.2)
         if self.scheduler.poll() is not None:
             self.scheduler = self._start_scheduler()
         self.workers = [worker if worker.poll() is None else self._start_worker() for worker in self.workers]
@@ -372,6 +376,16 @@ def _free_port() -> int:
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         return int(probe.getsockname()[1])
+
+
+def _words_at_end(driver: subprocess.Popen, cluster: Cluster | None) -> str:
+    """Wait for the end of a driver, keep the cluster alive meanwhile, and return what it printed to standard error."""
+    for _ in range(int(LONGEST)):
+        with suppress(subprocess.TimeoutExpired):
+            return str(driver.communicate(timeout=1)[1])
+        if cluster is not None:
+            cluster.replace_dead()
+    raise subprocess.TimeoutExpired(driver.args, LONGEST)
 
 
 def _planned_kills(count: int, dice: random.Random) -> list[tuple[str, bool]]:
