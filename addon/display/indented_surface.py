@@ -112,7 +112,9 @@ def surface_of(scene, obj, texels: Texels) -> IndentedSurface | None:
 def _follows(scene, obj, texels: Texels) -> bool:
     if obj.type != "MESH" or obj.mode == "EDIT" or len(obj.data.vertices) <= texels.vertex.max(initial=-1):
         return False
-    return indentation.may_indent(obj, participants.depsgraph_of(scene))
+    # As it is: bringing it up to date while playing would report changes, for which the run is dropped and computed again.
+    depsgraph = participants.view_layer_of(scene).depsgraph
+    return depsgraph is not None and indentation.may_indent(obj, depsgraph)
 
 
 def _surface(mesh, texels: Texels) -> IndentedSurface | None:
