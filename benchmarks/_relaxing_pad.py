@@ -10,10 +10,9 @@ from pathlib import Path
 
 import numpy as np
 
-from ._hidden.rig_text import csv_header, rig_head
-from .temperature import COLUMNS, PITCH, RADIUS, RATE, ROWS, K, loads
+from ._hidden.rig_text import rig_head
+from ._small_pad import COLUMNS, DEEP, PITCH, RADIUS, RATE, ROWS, K, loads, write_recording
 
-DEEP = 2.5e-3
 SHARE, TAU, POWER = 0.35, 2.5, 0.6
 """Of the stress that relaxes: by a stretched exponential (Kohlrausch), which the library does not have."""
 NOISE = 0.003
@@ -33,9 +32,7 @@ def measured(path: np.ndarray, rng: np.random.Generator) -> np.ndarray:
 def record(folder: Path, name: str, path: np.ndarray, rng: np.random.Generator) -> str:
     """Write a recording along a path and return its entry in the rig."""
     table = np.column_stack([np.arange(len(path)) / RATE, path, measured(path, rng)])
-    rows = "\n".join(",".join(f"{value:.8g}" for value in row) for row in table)
-    (folder / name).write_text(f"{csv_header(ROWS * COLUMNS)}\n{rows}\n", encoding="utf-8")
-    return f'[[trial]]\nfile = "{name}"\n'
+    return "\n".join([*write_recording(folder / name, table), ""])
 
 
 def slow_press() -> np.ndarray:

@@ -1,27 +1,22 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """``palpate gap`` on sessions of a sensor that is switched on with the first recording: a gain that changes until it is warm.
 
-The pad and the presses are those of :mod:`.temperature`, in a session of six recordings with pauses of up to ten minutes. The
+The pad and the presses are those of :mod:`._small_pad`, in a session of six recordings with pauses of up to ten minutes. The
 gain follows two exponentials, a stretched one, or a first-order lag with dead time: the library has none of them. In as many
 cases something else goes on through the session: a zero that moves with the root of the time, gains that fall with the work of
-pressing, or nothing. ``PALPATE_WARM_UP_CASES`` says how many there are (10 and 10), ``PALPATE_WARM_UP_FIRST`` the number of the
-first (0; from 5000 on those that nobody looked at).
+pressing, or nothing. ``PALPATE_WARM_UP_CASES`` and ``PALPATE_WARM_UP_FIRST`` say which cases
+(:func:`._small_pad.count_named`).
 """
 
 from __future__ import annotations
 
-import os
-import sys
-import tempfile
-import time as clock
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from ._hidden.rig_text import csv_header, rig_head
-from .temperature import COLUMNS, PITCH, RADIUS, RATE, ROWS, TRIALS, K, loads, presses
+from ._hidden.rig_text import rig_head
+from ._small_pad import COLUMNS, PITCH, RADIUS, RATE, ROWS, TRIALS, K, count_named, loads, presses, write_recording
 
 WARMING = ("two exponentials", "stretched", "late")
 OTHERS = {"nothing": (), "zero": ("drift",), "use": ("wear", "softening")}
@@ -70,47 +65,13 @@ def write(kind: str, number: int, folder: Path) -> Path:
     checked = set(order[: TRIALS.count("check")].tolist())
     for i, (path, force, time) in enumerate(zip(paths, shown, own, strict=True)):
         table = np.column_stack([time, path, force + 0.005 * full * rng.normal(size=force.shape)])
-        rows = "\n".join(",".join(f"{value:.7g}" for value in row) for row in table.tolist())
-        (folder / f"trial_{i}.csv").write_text(f"{csv_header(ROWS * COLUMNS)}\n{rows}\n", encoding="utf-8")
-        lines += ["[[trial]]", f'file = "trial_{i}.csv"', f'use = "{"check" if i in checked else "fit"}"']
+        lines += [*write_recording(folder / f"trial_{i}.csv", table), f'use = "{"check" if i in checked else "fit"}"']
         lines += ['session = "day"', f"started = {starts[i]:.3f}"]
     path_of_rig = folder / "rig.toml"
     path_of_rig.write_text("\n".join(lines) + "\n", encoding="utf-8")
     return path_of_rig
 
 
-def examined(kind: str, number: int) -> tuple[set[str], Any]:
-    """Return what is surely named in a case, and the diagnosis."""
-    from palpate.core.gap.dataset.rig import read_rig
-    from palpate.core.gap.report.sentences import SURE
-    from palpate.core.gap.selection.diagnosis import diagnose
-    from palpate.core.jobs.job_runner import run_job
-
-    with tempfile.TemporaryDirectory() as folder:
-        result = run_job(diagnose(read_rig(write(kind, number, Path(folder)))))
-    return {one.name for one in result.findings if one.confidence >= SURE}, result
-
-
 def run() -> Iterator[dict]:
     """Count the cases in which a warm-up is named, alone, and those in which it is named wrongly."""
-    count, first = (int(os.environ.get(f"PALPATE_WARM_UP_{key}", value)) for key, value in (("CASES", "10"), ("FIRST", "0")))
-    started, named, wrong, others = clock.process_time(), 0, 0, 0
-    for number in range(first, first + count):
-        kind = WARMING[number % len(WARMING)]
-        sure, result = examined(kind, number)
-        named += sure == {"warm-up"}
-        wrong += bool(sure - {"warm-up"})
-        _say(kind, number, result)
-        kind = list(OTHERS)[number % len(OTHERS)]
-        sure, result = examined(kind, number)
-        others += bool(sure - set(OTHERS[kind]))
-        _say(kind, number, result)
-    for what, value in (("named", named), ("something else named", wrong)):
-        yield {"name": f"warm-up, {what}, of {count} that warm up", "value": value, "unit": "cases"}
-    yield {"name": f"warm-up, wrongly named, of {count} that do not", "value": others, "unit": "cases"}
-    yield {"name": "warm-up, CPU per case", "value": (clock.process_time() - started) / (2 * count), "unit": "s"}
-
-
-def _say(kind: str, number: int, result: Any) -> None:
-    said = ", ".join(f"{one.name}/{one.form} {one.confidence}" for one in result.findings) or "nothing"
-    print(f"{kind} {number}: {said}; {result.verdict}; {result.ambiguous}", file=sys.stderr, flush=True)
+    yield from count_named("warm-up", write, WARMING, OTHERS)

@@ -44,6 +44,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         choices=FORMATS,
         help="file format of figures: png, pdf, svg (default: png and pdf)",
     )
+    _add_picture_arguments(parser)
+    figure_options.add_gel_arguments(parser)
+    blender.add_script_arguments(parser)
+    figure_options.add_arguments(parser)
+
+
+def _add_picture_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add what concerns renders of the scene."""
     parser.add_argument("--engine", choices=("cycles", "eevee", "workbench"), help="render engine (default: the scene's)")
     parser.add_argument(
         "--size",
@@ -73,9 +81,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="let targets hide the texels that they press (default: see-through there)",
     )
     parser.add_argument("--transparent", action="store_true", help="render without background")
-    figure_options.add_gel_arguments(parser)
-    blender.add_script_arguments(parser)
-    figure_options.add_arguments(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:

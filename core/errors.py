@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Errors a user can cause, and the warnings that do not stop the work.
+"""Errors a user can cause, the warnings that do not stop the work, and what their sentences share.
 
 Every message is one sentence that says what is wrong, where, and what to do about it. Drivers (operators, command line) show
 ``str(error)`` and nothing else; anything that is not a :class:`PalpateError` is our fault and shows its traceback.

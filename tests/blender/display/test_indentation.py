@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The surface of a baked sensor gives way by its penetration; what reads the scene, and the user's mesh, know nothing of it."""
 
+import dataclasses
+
 import bpy
 import numpy as np
 import pytest
@@ -274,3 +276,20 @@ def test_sensors_whose_surface_stays_stay_while_playing(how):
     overlay, run = playing(scene, 8)
     assert run.frames[8].sensors["Pad"].depth.max() > 0.0
     assert overlay.at_rest is None and overlay.triangles is None
+
+
+def test_playing_reads_the_surface_without_bringing_the_scene_up_to_date():
+    """An update inside a frame change is reported as a change of its own, for which a window drops the run and starts again."""
+    scene, pad, target = press_wide()
+    _, run = playing(scene, 3)
+    texels = dataclasses.replace(run.scenario.sensors[0].texels)  # new ones, as at the first contact
+    reports = []
+    bpy.app.handlers.depsgraph_update_post.append(lambda *_: reports.append(1))
+    try:
+        target.location.x = 0.01
+        assert indented_surface.surface_of(scene, pad, texels) is not None
+        assert not reports
+        bpy.context.view_layer.update()
+        assert reports  # the change was waiting
+    finally:
+        bpy.app.handlers.depsgraph_update_post.pop()

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from rig_files import RIG, table, write
 
-from palpate.benchmarks import temperature
+from palpate.benchmarks import _small_pad, temperature
 from palpate.core.errors import PalpateError
 from palpate.core.gap.dataset.rig import read_rig
 from palpate.core.gap.forward.predictor import Model, predictors_of
@@ -72,5 +72,5 @@ def test_what_a_log_calls_a_temperature():
 
 
 def test_a_gain_and_a_zero_that_follow_it_are_named():
-    sure, result = temperature.examined("both", 2)
+    sure, result = _small_pad.examined(temperature.write, "both", 2)
     assert sure == {"temperature"} and result.verdict == "explained"

@@ -3,7 +3,7 @@
 
 from pathlib import Path
 
-from palpate.benchmarks import warm_up
+from palpate.benchmarks import _small_pad, warm_up
 from palpate.core.gap.dataset.rig import read_rig
 from palpate.core.gap.forward.predictor import Model, predictors_of
 from palpate.core.gap.selection.between_recordings import as_one_session
@@ -29,5 +29,5 @@ def test_it_needs_a_clock_that_goes_on(tmp_path: Path):
 
 
 def test_a_gain_that_follows_two_exponentials_is_named():
-    sure, result = warm_up.examined("two exponentials", 0)
+    sure, result = _small_pad.examined(warm_up.write, "two exponentials", 0)
     assert sure == {"warm-up"} and result.verdict == "explained"
