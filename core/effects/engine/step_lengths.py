@@ -3,7 +3,13 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
+
+SERIES_KEPT, LONGEST_KEPT = 64, 20_000
+"""Number of series whose steps are kept, and how many samples they have at most: as many recordings as a rig may have, without
+holding on to memory."""
 
 
 def steps_of(time: np.ndarray, before: float | None = None) -> tuple[np.ndarray, np.ndarray]:
@@ -23,6 +29,20 @@ def steps_of(time: np.ndarray, before: float | None = None) -> tuple[np.ndarray,
     step : (t,) int
         Index of the length of the step that leads to each sample.
     """
+    time = np.asarray(time, float)
+    if len(time) > LONGEST_KEPT:
+        return _computed_steps(time, before)
+    lengths, step = _steps_kept(time.tobytes(), before)
+    return lengths.copy(), step.copy()
+
+
+@lru_cache(maxsize=SERIES_KEPT)
+def _steps_kept(stamps: bytes, before: float | None) -> tuple[np.ndarray, np.ndarray]:
+    """Steps of time stamps that are given as bytes: a fit asks thousands of times for the same few series."""
+    return _computed_steps(np.frombuffer(stamps), before)
+
+
+def _computed_steps(time: np.ndarray, before: float | None) -> tuple[np.ndarray, np.ndarray]:
     start = time[0] if before is None else before
     lengths = np.diff(time, prepend=start)
     rounding = 1e-9 * max(abs(float(time[-1])), abs(float(start)), 1e-9)

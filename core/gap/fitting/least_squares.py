@@ -19,6 +19,7 @@ from typing import Any
 
 import numpy as np
 
+from ...compiled.kernels import kernel
 from ...model.sensor_parameters import SensorParameters
 from ..forward.predictor import Model, Predictor
 
@@ -165,31 +166,25 @@ class TrialView:
 
     @cached_property
     def _measured(self) -> tuple[np.ndarray | None, np.ndarray | None]:
-        """Measured readings of the texels, and a mask of missing values or None if there are none."""
-        reading = self.predictor.trial.reading
-        if reading is None:
-            return None, None
-        reading = reading[:, self.texels][self.samples]
-        missing = ~np.isfinite(reading)
-        return reading, missing if missing.any() else None
+        """Measured readings of the texels, and net forces; None for what was not measured."""
+        reading, force = self.predictor.trial.reading, self.predictor.trial.force
+        if reading is not None:
+            reading = np.ascontiguousarray(reading[:, self.texels][self.samples], dtype=float)
+        return reading, None if force is None else np.ascontiguousarray(force[self.samples], dtype=float)
 
     def residual(self, model: Model) -> np.ndarray:
         """Return measured minus predicted values in units of the noise, (T, c + 3); zero if a value is missing.
 
         The first c columns are readings of the texels, the last three components of the net force.
         """
-        trial = self.predictor.trial
         predicted = self.predictor.predict(model, self.subset, self.with_forces)
-        reading, missing = self._measured
+        reading, force = self._measured
         width = len(self.texels)
-        out = np.zeros((len(trial.time[self.samples]), width + 3))
+        out = np.zeros((len(self.predictor.trial.time[self.samples]), width + 3))
         if reading is not None:
-            np.subtract(reading, predicted.reading[self.samples], out=out[:, :width])
-            out[:, :width] /= self.noise[0]
-            if missing is not None:
-                out[:, :width][missing] = 0.0
-        if predicted.force is not None:
-            out[:, width:] = np.nan_to_num((trial.force - predicted.force)[self.samples] / self.noise[1])
+            write_differences(reading, np.ascontiguousarray(predicted.reading[self.samples]), self.noise[0], out, 0)
+        if predicted.force is not None and force is not None:
+            write_differences(force, np.ascontiguousarray(predicted.force[self.samples]), self.noise[1], out, width)
         return out
 
     @cached_property
@@ -208,6 +203,15 @@ class TrialView:
         return np.array([_sum_of_squares(residual[:, :width]), _sum_of_squares(residual[:, width:])])
 
 
+@kernel
+def write_differences(measured, predicted, noise, out, first):  # type: ignore[no-untyped-def]
+    """Write measured minus predicted values in units of the noise into the columns from `first` on, zero for missing ones."""
+    for i in range(measured.shape[0]):
+        for j in range(measured.shape[1]):
+            value = measured[i, j]
+            out[i, first + j] = (value - predicted[i, j]) / noise if np.isfinite(value) else 0.0
+
+
 @dataclass
 class NormalEquations:
     """Normal equations ``A x = g`` of one stretch of a trial, for p common parameters and m parameters of each of n texels.
@@ -223,7 +227,8 @@ class NormalEquations:
     sse : float
         Sum of squares of the residual.
     gradients : (blocks, n + 3, p) float
-        Parts of `common_gradient` from each texel and each component of the force, by blocks of time.
+        Parts of `common_gradient` from each texel and each component of the force, by blocks of time. There are no blocks in
+        the steps of a fit, which does not need them.
     """
 
     common: np.ndarray
@@ -363,7 +368,7 @@ def _final_equations(
     for view, residual, table in zip(views, point.residuals, tables, strict=True):
         derivatives(view, point.model, free, point.at, residual, table, 0)
         rows = view.stretches(residual)
-        equations.append([_equations_of(view, free, table[:, part], residual[part]) for part in rows])
+        equations.append([_equations_of(view, free, table[:, part], residual[part], GRADIENT_BLOCKS) for part in rows])
     return equations
 
 
@@ -433,7 +438,10 @@ def derivatives(
             table[i] /= float(change) if float(change) != 0.0 else np.inf
 
 
-def _equations_of(view: TrialView, free: tuple[FreeParameter, ...], table: np.ndarray, residual: np.ndarray) -> NormalEquations:
+def _equations_of(
+    view: TrialView, free: tuple[FreeParameter, ...], table: np.ndarray, residual: np.ndarray, blocks: int = 0
+) -> NormalEquations:
+    """Normal equations of some rows of a trial, with the gradients of so many blocks of time."""
     own_each = np.array([item.per_texel for item in free], bool)
     common, local = (table[~own_each], table[own_each]) if own_each.any() else (table, table[:0])
     flat = common.reshape(len(common), residual.size)  # there may be none, where all of the base model is known
@@ -445,10 +453,11 @@ def _equations_of(view: TrialView, free: tuple[FreeParameter, ...], table: np.nd
         h[texels] = np.einsum("mtn,tn->nm", own, residual[:, :width])
         c[texels] = np.einsum("mtn,ktn->nmk", own, own)
         b[texels] = np.einsum("mtn,ptn->nmp", own, common[:, :, :width])
-    starts = np.unique(np.linspace(0, len(residual), GRADIENT_BLOCKS, endpoint=False).astype(int))
+    starts = np.unique(np.linspace(0, len(residual), blocks, endpoint=False).astype(int))
     gradients = np.zeros((len(starts), n + 3, len(common)))
-    per_column = np.add.reduceat(common * residual, starts, axis=1).transpose(1, 2, 0)
-    gradients[:, texels], gradients[:, n:] = per_column[:, :width], per_column[:, width:]
+    if blocks:
+        per_column = np.add.reduceat(common * residual, starts, axis=1).transpose(1, 2, 0)
+        gradients[:, texels], gradients[:, n:] = per_column[:, :width], per_column[:, width:]
     return NormalEquations(flat @ flat.T, flat @ residual.ravel(), b, c, h, _sum_of_squares(residual), gradients)
 
 

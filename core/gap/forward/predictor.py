@@ -7,6 +7,7 @@ from collections import OrderedDict
 from collections.abc import Callable, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Generic, TypeVar
 
 import numpy as np
@@ -49,6 +50,32 @@ class Model:
     parameters: SensorParameters
     effects: tuple[Effect, ...] = ()
     recordings: Mapping[str, float] = field(default_factory=dict)
+
+    @cached_property
+    def readout_effects(self) -> tuple[Effect, ...]:
+        """Effects on readings, without noise: a prediction is the expected value."""
+        return tuple(e for e in self.effects if site_of_action(e) == "readout" and e.name != "noise")
+
+    @cached_property
+    def normal_force_effects(self) -> tuple[Effect, ...]:
+        """Effects on normal forces, and effects that move the texels."""
+        return tuple(e for e in self.effects if site_of_action(e) != "readout" and not _acts_through(e, "friction_law"))
+
+    @cached_property
+    def friction_effects(self) -> tuple[Effect, ...]:
+        """Effects on the friction law."""
+        return tuple(e for e in self.effects if _acts_through(e, "friction_law"))
+
+    @cached_property
+    def placing_effects(self) -> tuple[Effect, ...]:
+        """Effects that move the texels."""
+        return tuple(e for e in self.effects if _acts_through(e, "placement"))
+
+    @cached_property
+    def normal_force_key(self) -> tuple[object, ...]:
+        """All on which normal forces depend, but for the contact heights of recordings."""
+        law = (getattr(self.parameters, name) for name in NORMAL_LAW_PARAMETERS)
+        return (*law, _effects_key(self.normal_force_effects))
 
     def with_effect(self, effect: Effect) -> Model:
         """Return the model with one more effect."""
@@ -109,10 +136,8 @@ class ResponseModel:
     def reading(self, model: Model, subset: np.ndarray | None = None) -> np.ndarray:
         """Return the readings of each texel, or of some, (T, n) in the sensor's unit."""
         p = model.parameters
-        # Without noise: the prediction is the expected value.
-        reading = tuple(e for e in model.effects if site_of_action(e) == "readout" and e.name != "noise")
-        key = (self._force_key(model, subset), p.gain, p.zero, _effects_key(reading))
-        return self._readings.get_or(key, lambda: self._computed_reading(model, subset, reading))
+        key = (self._force_key(model, subset), p.gain, p.zero, _effects_key(model.readout_effects))
+        return self._readings.get_or(key, lambda: self._computed_reading(model, subset, model.readout_effects))
 
     def _computed_reading(self, model: Model, subset: np.ndarray | None, effects: tuple[Effect, ...]) -> np.ndarray:
         """Return the readings under effects on the readout."""
@@ -135,7 +160,7 @@ class ResponseModel:
 
     def total_force(self, model: Model) -> np.ndarray:
         """Return the sum of normal and friction forces on the sensor, (T, 3) N."""
-        p, rubbing = model.parameters, tuple(effect for effect in model.effects if _acts_through(effect, "friction_law"))
+        p, rubbing = model.parameters, model.friction_effects
         slides = (*(getattr(p, name) for name in FRICTION_LAW_PARAMETERS), _effects_key(rubbing))
         key = (self._force_key(model, None), slides)
         return self._totals.get_or(
@@ -144,9 +169,7 @@ class ResponseModel:
 
     def placed(self, model: Model) -> Stimulus:
         """Return the stimulus of the points of the surface at the places where effects move them."""
-        moving = tuple(effect for effect in model.effects if _acts_through(effect, "placement"))
-        if self.stimulus.trial.stimulus != "pose":
-            moving = ()
+        moving = model.placing_effects if self.stimulus.trial.stimulus == "pose" else ()
         heights = self._heights(model)
         if not moving and heights == self._heights(None):
             return self.stimulus
@@ -190,18 +213,15 @@ class ResponseModel:
             return whole[:, subset]
         return self._forces.get_or(
             self._force_key(model, subset),
-            lambda: self._contact_history(model, subset).force(model.parameters, _effects_on_normal_force(model)),
+            lambda: self._contact_history(model, subset).force(model.parameters, model.normal_force_effects),
         )
 
     def _force_key(self, model: Model, subset: np.ndarray | None) -> object:
-        p, which = model.parameters, None if subset is None else subset.tobytes()
-        law = (*(getattr(p, name) for name in NORMAL_LAW_PARAMETERS), self._heights(model))
-        return which, *law, _effects_key(_effects_on_normal_force(model))
+        return None if subset is None else subset.tobytes(), self._heights(model), model.normal_force_key
 
     def _contact_history(self, model: Model, subset: np.ndarray | None) -> ContactHistory:
         which = None if subset is None else subset.tobytes()
-        moving = tuple(effect for effect in model.effects if _acts_through(effect, "placement"))
-        key = which, _effects_key(moving), self._heights(model)
+        key = which, _effects_key(model.placing_effects), self._heights(model)
         return self._histories.get_or(key, lambda: ContactHistory.of(self.placed(model), subset, self.rig))
 
 
@@ -372,11 +392,6 @@ def _height_of(trial: Trial, model: Model | None) -> float:
         return trial.contact_height
     numbers = {} if model is None else model.recordings
     return numbers.get(number_name(CONTACT_HEIGHT, trial.contact_height), trial.height_start)
-
-
-def _effects_on_normal_force(model: Model) -> tuple[Effect, ...]:
-    """Effects on normal forces, and effects that move the texels."""
-    return tuple(e for e in model.effects if site_of_action(e) != "readout" and not _acts_through(e, "friction_law"))
 
 
 def _acts_through(effect: Effect, mechanism: str) -> bool:

@@ -13,8 +13,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ...compiled.kernels import kernel
 from ...errors import SceneError
-from ...geometry.rotations import quaternion_product, rotation_matrices, rotation_vectors
+from ...geometry.rotations import quaternion_product, rotation_vectors
 from ...geometry.texels import Texels
 from ...model.body import Body
 from ...model.motion import Motion
@@ -24,6 +25,7 @@ from ...model.target import Target
 from ...solver.simulation import Simulation
 from ..dataset.rig import Rig
 from ..dataset.trial import Trial
+from .closed_form_contact import Contact, box_contact, sphere_contact
 
 BISECTIONS, WEIGHT_ERROR = 26, 1e-3
 """Halvings of the height at which an indenter rests, and the largest relative error of the force that is carried there."""
@@ -247,23 +249,55 @@ def _posed(trial: Trial, rig: Rig, texels: Texels, along: np.ndarray | None) -> 
             f"The indenter of '{trial.name}.csv' goes right through the sensor (by more than {0.5e3 * reach:.3g} mm): "
             "check the pose's unit, its origin (the shape's centre) and the sign of z."
         )
-    velocity = np.gradient(trial.position, trial.time, axis=0)[:, None, :]
-    spin = _spin(trial.quaternion, trial.time)
-    if spin.any():
-        velocity = velocity + np.cross(spin[:, None, :], point - trial.position[:, None, :])
-    if along is not None:
-        velocity = velocity + along
-    touching = depth > 0
-    rate = np.where(touching, _dot(velocity, normal), 0.0)
-    slide = np.sqrt(np.maximum(np.where(touching, _dot(velocity, velocity), 0.0) - rate * rate, 0.0))
-    slip = None
-    if trial.force is not None:
-        slip = np.where(touching[:, :, None], velocity - rate[:, :, None] * normal, 0.0)
+    travel, spin = np.gradient(trial.position, trial.time, axis=0), _spin(trial.quaternion, trial.time)
+    rate, slide = np.zeros_like(depth), np.zeros_like(depth)
+    slip = None if trial.force is None else np.zeros_like(normal)
+    motion = tuple(np.ascontiguousarray(one, dtype=float) for one in (travel, spin, trial.position))
+    nothing = np.zeros((0, 0, 3))
+    surface, kept = (nothing if one is None else np.ascontiguousarray(one) for one in (along, slip))
+    split_velocities(motion, surface, depth, normal, point, (rate, slide, kept))
     overpressed = int((depth > limit).sum(axis=1).max(initial=0))
     return Stimulus(trial, depth, rate, None, normal, slide, slip, overpressed)
 
 
-def _contact(trial: Trial, rig: Rig, texels: Texels, reach: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, int]:
+@kernel
+def split_velocities(motion, along, depth, normal, point, split):  # type: ignore[no-untyped-def]
+    """Split the velocity of the indenter where it touches texels into the rate of the depth, and sliding.
+
+    Parameters
+    ----------
+    motion : tuple of three (T, 3) float
+        Velocity, angular velocity and position of the indenter.
+    along : (T, n, 3) or (0, 0, 3) float, m/s
+        Velocity of a surface that slides by itself, if it does.
+    depth : (T, n) float
+    normal, point : (T, n, 3) float
+    split : tuple of (T, n), (T, n) and (T, n, 3) or (0, 0, 3) float
+        Rate of the depth, speed of sliding, and sliding velocity if it is wanted; written to, zero before.
+    """
+    travel, spin, centre = motion
+    rate, slide, slip = split
+    moves = along.shape[0] > 0
+    for i in range(depth.shape[0]):
+        wx, wy, wz = spin[i, 0], spin[i, 1], spin[i, 2]
+        for j in range(depth.shape[1]):
+            if depth[i, j] <= 0.0:
+                continue
+            x, y, z = point[i, j, 0] - centre[i, 0], point[i, j, 1] - centre[i, 1], point[i, j, 2] - centre[i, 2]
+            vx = travel[i, 0] + (wy * z - wz * y)
+            vy = travel[i, 1] + (wz * x - wx * z)
+            vz = travel[i, 2] + (wx * y - wy * x)
+            if moves:
+                vx, vy, vz = vx + along[i, j, 0], vy + along[i, j, 1], vz + along[i, j, 2]
+            nx, ny, nz = normal[i, j, 0], normal[i, j, 1], normal[i, j, 2]
+            inward = vx * nx + vy * ny + vz * nz
+            rate[i, j] = inward
+            slide[i, j] = np.sqrt(max(vx * vx + vy * vy + vz * vz - inward * inward, 0.0))
+            if slip.shape[0] > 0:
+                slip[i, j, 0], slip[i, j, 1], slip[i, j, 2] = vx - inward * nx, vy - inward * ny, vz - inward * nz
+
+
+def _contact(trial: Trial, rig: Rig, texels: Texels, reach: float) -> Contact:
     """Contact of texels with what pressed in a trial; returns as of :func:`sphere_contact`."""
     indenter = rig.indenter_of(trial)
     assert trial.position is not None and trial.quaternion is not None and indenter is not None
@@ -329,81 +363,7 @@ def _spin(quaternion: np.ndarray, time: np.ndarray) -> np.ndarray:
     return turn / (time[after] - time[before])[:, None]
 
 
-def sphere_contact(
-    center: np.ndarray, radius: float, position: np.ndarray, outward: np.ndarray, reach: float
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, int]:
-    """Return the contact of texels with a sphere, in closed form (paper, Eq. 4: intersection of a segment with the surface).
-
-    Parameters
-    ----------
-    center : (T, 3) float, metres
-    radius : float, metres
-    position, outward : (n, 3) float
-        Texels and their unit normals.
-    reach : float, metres
-        Length of the segment behind each texel: the maximum penetration.
-
-    Returns
-    -------
-    depth : (T, n) float, metres
-    normal : (T, n, 3) float
-        The sphere's outward normal where the segment enters it; minus the texel's normal without contact.
-    point : (T, n, 3) float, metres
-        Where the segment enters the sphere; the texel without contact.
-    overpressed : int
-        Most texels at once whose segment begins inside the sphere.
-    """
-    # From the segment's base, along the texel's normal: |base + s·n - c| = radius, the smaller root.
-    offset = position - reach * outward - center[:, None, :]
-    along = _dot(offset, outward)
-    inside = _dot(offset, offset) - radius * radius
-    root = along * along - inside
-    hit = root > 0
-    s = -along - np.sqrt(np.where(hit, root, 0.0))
-    touching = hit & (s >= 0) & (s < reach)
-    normal = np.where(touching[:, :, None], (offset + s[:, :, None] * outward) / radius, -outward)
-    depth = np.where(touching, (reach - s) * np.abs(_dot(normal, outward)), 0.0)
-    point = position - np.where(touching, reach - s, 0.0)[:, :, None] * outward
-    overpressed = (inside < 0).sum(axis=1).max(initial=0)
-    return depth, normal, point, int(overpressed)
-
-
-def box_contact(
-    center: np.ndarray, quaternion: np.ndarray, edges: np.ndarray, position: np.ndarray, outward: np.ndarray, reach: float
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, int]:
-    """Return the contact of texels with a box, in closed form: intersection of a segment with three pairs of planes.
-
-    Parameters
-    ----------
-    center : (T, 3) float, metres
-    quaternion : (T, 4) float
-        Orientation of the box, (w, x, y, z).
-    edges : (3,) float, metres
-        Full sizes of the box.
-    position, outward, reach
-        As in :func:`sphere_contact`, like the returns.
-    """
-    frame = rotation_matrices(quaternion)  # box → sensor
-    base = position - reach * outward - center[:, None, :]
-    base, way = base @ frame, np.broadcast_to(outward, base.shape) @ frame  # rows by the matrix: into the box's frame
-    with np.errstate(divide="ignore", invalid="ignore"):
-        ends = [(np.sign(way) * side * 0.5 * edges - base) / way for side in (-1.0, 1.0)]
-    beside = way == 0.0  # along a pair of planes: always between them, or never
-    between = np.abs(base) < 0.5 * edges
-    enter = np.where(beside, np.where(between, -np.inf, np.inf), ends[0])
-    leave = np.where(beside, np.where(between, np.inf, -np.inf), ends[1])
-    s, face = enter.max(axis=2), enter.argmax(axis=2)
-    touching = (s <= leave.min(axis=2)) & (s >= 0) & (s < reach)
-    hit = np.arange(3) == face[:, :, None]
-    own = np.where(hit, -np.sign(way), 0.0) @ frame.transpose(0, 2, 1)
-    normal = np.where(touching[:, :, None], own, -outward)
-    left = np.where(touching, reach - s, 0.0)
-    depth = left * np.abs(_dot(normal, outward))
-    overpressed = between.all(axis=2).sum(axis=1).max(initial=0)
-    return depth, normal, position - left[:, :, None] * outward, int(overpressed)
-
-
-def _mesh_contact(trial: Trial, rig: Rig, texels: Texels, reach: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, int]:
+def _mesh_contact(trial: Trial, rig: Rig, texels: Texels, reach: float) -> Contact:
     """The same as :func:`sphere_contact` for any mesh, through the solver's contact search."""
     assert trial.position is not None and trial.quaternion is not None
     indenter = rig.indenter_of(trial)

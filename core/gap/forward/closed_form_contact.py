@@ -1,0 +1,152 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Contact of texels with a sphere and with a box in closed form (paper, Eq. 4: intersection of a segment with a surface).
+
+A segment leads from behind each texel along its normal to the texel. Where it enters the indenter, the texel is pressed.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...compiled.kernels import kernel
+from ...geometry.rotations import rotation_matrices
+
+Contact = tuple[np.ndarray, np.ndarray, np.ndarray, int]
+
+
+def sphere_contact(center: np.ndarray, radius: float, position: np.ndarray, outward: np.ndarray, reach: float) -> Contact:
+    """Return the contact of texels with a sphere.
+
+    Parameters
+    ----------
+    center : (T, 3) float, metres
+    radius : float, metres
+    position, outward : (n, 3) float
+        Texels and their unit normals.
+    reach : float, metres
+        Length of the segment behind each texel: the maximum penetration.
+
+    Returns
+    -------
+    depth : (T, n) float, metres
+    normal : (T, n, 3) float
+        The indenter's outward normal where the segment enters it; minus the texel's normal without contact.
+    point : (T, n, 3) float, metres
+        Where the segment enters the indenter; the texel without contact.
+    overpressed : int
+        Most texels at once whose segment begins inside the indenter.
+    """
+    depth, normal, point = _untouched(len(center), position, outward)
+    most = meet_sphere(np.ascontiguousarray(center), float(radius), *_plain(position, outward), float(reach), depth, normal, point)
+    return depth, normal, point, int(most)
+
+
+def box_contact(
+    center: np.ndarray, quaternion: np.ndarray, edges: np.ndarray, position: np.ndarray, outward: np.ndarray, reach: float
+) -> Contact:
+    """Return the contact of texels with a box: intersection of a segment with three pairs of planes.
+
+    Parameters
+    ----------
+    center : (T, 3) float, metres
+    quaternion : (T, 4) float
+        Orientation of the box, (w, x, y, z).
+    edges : (3,) float, metres
+        Full sizes of the box.
+    position, outward, reach
+        As in :func:`sphere_contact`, like the returns.
+    """
+    depth, normal, point = _untouched(len(center), position, outward)
+    frame = np.ascontiguousarray(rotation_matrices(quaternion))  # box → sensor
+    half = 0.5 * np.asarray(edges, float)
+    most = meet_box(np.ascontiguousarray(center), frame, half, *_plain(position, outward), float(reach), depth, normal, point)
+    return depth, normal, point, int(most)
+
+
+def _untouched(samples: int, position: np.ndarray, outward: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """What nothing touches: depth, normal and point."""
+    shape = (samples, *position.shape)
+    return np.zeros(shape[:2]), np.broadcast_to(-outward, shape).copy(), np.broadcast_to(position, shape).copy()
+
+
+def _plain(position: np.ndarray, outward: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Contiguous arrays, so that the kernels are compiled only once."""
+    return np.ascontiguousarray(position, dtype=float), np.ascontiguousarray(outward, dtype=float)
+
+
+@kernel
+def meet_sphere(center, radius, position, outward, reach, depth, normal, point):  # type: ignore[no-untyped-def]
+    """Write the contacts with a sphere into `depth`, `normal` and `point`; return the most texels overpressed at once."""
+    most = 0
+    for i in range(center.shape[0]):
+        deep = 0
+        for j in range(position.shape[0]):
+            nx, ny, nz = outward[j, 0], outward[j, 1], outward[j, 2]
+            # From the segment's base, along the texel's normal: |base + s·n - c| = radius, the smaller root.
+            ox = position[j, 0] - reach * nx - center[i, 0]
+            oy = position[j, 1] - reach * ny - center[i, 1]
+            oz = position[j, 2] - reach * nz - center[i, 2]
+            along = ox * nx + oy * ny + oz * nz
+            inside = ox * ox + oy * oy + oz * oz - radius * radius
+            if inside < 0.0:
+                deep += 1
+            root = along * along - inside
+            if root <= 0.0:
+                continue
+            s = -along - np.sqrt(root)
+            if s < 0.0 or s >= reach:
+                continue
+            ax, ay, az = (ox + s * nx) / radius, (oy + s * ny) / radius, (oz + s * nz) / radius
+            left = reach - s
+            depth[i, j] = left * abs(ax * nx + ay * ny + az * nz)
+            normal[i, j, 0], normal[i, j, 1], normal[i, j, 2] = ax, ay, az
+            point[i, j, 0], point[i, j, 1], point[i, j, 2] = (
+                position[j, 0] - left * nx,
+                position[j, 1] - left * ny,
+                position[j, 2] - left * nz,
+            )
+        most = max(most, deep)
+    return most
+
+
+@kernel
+def meet_box(center, frame, half, position, outward, reach, depth, normal, point):  # type: ignore[no-untyped-def]
+    """Write the contacts with a box of these half edges into `depth`, `normal` and `point`; return as :func:`meet_sphere`."""
+    most = 0
+    for i in range(center.shape[0]):
+        deep = 0
+        for j in range(position.shape[0]):
+            nx, ny, nz = outward[j, 0], outward[j, 1], outward[j, 2]
+            ox = position[j, 0] - reach * nx - center[i, 0]
+            oy = position[j, 1] - reach * ny - center[i, 1]
+            oz = position[j, 2] - reach * nz - center[i, 2]
+            enters, leaves, face, sign, within = -np.inf, np.inf, 0, 0.0, 0
+            for axis in range(3):  # into the box's frame, whose axes are columns
+                fx, fy, fz = frame[i, 0, axis], frame[i, 1, axis], frame[i, 2, axis]
+                base, way = ox * fx + oy * fy + oz * fz, nx * fx + ny * fy + nz * fz
+                between = abs(base) < half[axis]
+                if between:
+                    within += 1
+                if way == 0.0:  # along a pair of planes: always between them, or never
+                    first, last = (-np.inf, np.inf) if between else (np.inf, -np.inf)
+                else:
+                    side = half[axis] if way > 0.0 else -half[axis]
+                    first, last = (-side - base) / way, (side - base) / way
+                if first > enters:
+                    enters, face, sign = first, axis, -1.0 if way > 0.0 else 1.0
+                leaves = min(leaves, last)
+            if within == 3:
+                deep += 1
+            if not (0.0 <= enters < reach and enters <= leaves):
+                continue
+            ax, ay, az = sign * frame[i, 0, face], sign * frame[i, 1, face], sign * frame[i, 2, face]
+            left = reach - enters
+            depth[i, j] = left * abs(ax * nx + ay * ny + az * nz)
+            normal[i, j, 0], normal[i, j, 1], normal[i, j, 2] = ax, ay, az
+            point[i, j, 0], point[i, j, 1], point[i, j, 2] = (
+                position[j, 0] - left * nx,
+                position[j, 1] - left * ny,
+                position[j, 2] - left * nz,
+            )
+        most = max(most, deep)
+    return most
