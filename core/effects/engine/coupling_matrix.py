@@ -5,12 +5,16 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
 LARGEST_DENSE = 1500
 """Up to this number of texels every pair counts. Of more texels only pairs within reach count, since the matrix would not fit
 into memory."""
+
+LARGEST_KEPT = 256
+"""Up to this number of texels all distances are kept: a fit asks thousands of times for those of the same texels."""
 
 
 @dataclass(frozen=True)
@@ -58,9 +62,10 @@ def coupling_matrix(
         With areas, the load of each texel is distributed in proportion to weight and area, and its sum is preserved. Without
         areas the weights are used as they are.
     """
+    position = np.asarray(position, float)
     n = len(position)
     if n <= LARGEST_DENSE:
-        matrix = weight(np.linalg.norm(position[:, None] - position[None], axis=2))
+        matrix = weight(_distances_kept(position.tobytes()) if n <= LARGEST_KEPT else _distances(position))
         if area is not None:
             matrix = matrix * area[:, None]
             matrix = matrix / matrix.sum(axis=0)
@@ -72,6 +77,20 @@ def coupling_matrix(
         values = values * area[target]
         values = values / np.bincount(source, values, n)[source]
     return CouplingMatrix(None, target, source, values)
+
+
+def _distances(position: np.ndarray) -> np.ndarray:
+    """Distances of all pairs of texels, (n, n) float, m."""
+    distance: np.ndarray = np.linalg.norm(position[:, None] - position[None], axis=2)
+    return distance
+
+
+@lru_cache(maxsize=8)
+def _distances_kept(position: bytes) -> np.ndarray:
+    """The same; positions are given as bytes. Nobody may write to the result."""
+    distance = _distances(np.frombuffer(position).reshape(-1, 3))
+    distance.setflags(write=False)
+    return distance
 
 
 def pairs_within(position: np.ndarray, reach: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -37,7 +37,9 @@ def sphere_contact(center: np.ndarray, radius: float, position: np.ndarray, outw
         Most texels at once whose segment begins inside the indenter.
     """
     depth, normal, point = _untouched(len(center), position, outward)
-    most = meet_sphere(np.ascontiguousarray(center), float(radius), *_plain(position, outward), float(reach), depth, normal, point)
+    most = meet_sphere(
+        np.ascontiguousarray(center), float(radius), *_plain(position, outward), float(reach), depth, normal, point
+    )
     return depth, normal, point, int(most)
 
 
@@ -58,9 +60,8 @@ def box_contact(
     """
     depth, normal, point = _untouched(len(center), position, outward)
     frame = np.ascontiguousarray(rotation_matrices(quaternion))  # box → sensor
-    half = 0.5 * np.asarray(edges, float)
-    most = meet_box(np.ascontiguousarray(center), frame, half, *_plain(position, outward), float(reach), depth, normal, point)
-    return depth, normal, point, int(most)
+    texels, center, half = _plain(position, outward), np.ascontiguousarray(center, dtype=float), 0.5 * np.asarray(edges, float)
+    return depth, normal, point, int(meet_box(center, frame, half, *texels, float(reach), depth, normal, point))
 
 
 def _untouched(samples: int, position: np.ndarray, outward: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -68,6 +68,14 @@ class ContactSamples(NamedTuple):
     mean_slip_squared: np.ndarray
     time_step: np.ndarray
 
+    @classmethod
+    def of_size(cls, m: int) -> ContactSamples:
+        """Return room for m samples."""
+        vectors = (np.empty((m, 3)) for _ in range(3))
+        return cls(
+            np.empty(m, int), np.empty(m, int), np.empty(m, bool), np.empty(m), *vectors, *(np.empty(m) for _ in range(3))
+        )
+
 
 @dataclass(frozen=True)
 class ContactHistory:
@@ -104,15 +112,17 @@ class ContactHistory:
         (touched,) = np.nonzero(load[:, chosen].any(axis=0))
         touched_texels = chosen[touched]
         normal = -rig.surface.normal[None] if stimulus.normal is None else stimulus.normal
-        normal = np.broadcast_to(normal, (*load.shape, 3))
-        slip = np.zeros_like(normal) if stimulus.slip is None else stimulus.slip
+        normal = np.ascontiguousarray(np.broadcast_to(normal, (*load.shape, 3)), dtype=float)
+        slip = np.zeros_like(normal) if stimulus.slip is None else np.ascontiguousarray(stimulus.slip)
         arrays = [load, stimulus.rate, stimulus.slide, *np.moveaxis(normal, 2, 0), *np.moveaxis(slip, 2, 0)]
-        first, group = _equal_columns([values[:, touched_texels] for values in arrays])
+        first, group = _equal_columns(arrays, touched_texels)
         one = touched_texels[first]
         share = None if rig.cover is None else rig.cover.share[touched_texels]
-        count = np.bincount(group, share, minlength=len(one))
+        count = np.bincount(group, share, minlength=len(one)).astype(float)
         step = np.diff(stimulus.time, prepend=stimulus.time[0])
-        samples = _contact_samples(load[:, one] > 0, count, normal[:, one], slip[:, one], step)
+        pressed = np.ascontiguousarray(load[:, one] > 0)
+        samples = ContactSamples.of_size(int(pressed.sum()))
+        write_samples(pressed, one, count, normal, slip, step, samples)
         depth, rate, slide = (values[:, one].copy() for values in (stimulus.depth, stimulus.rate, stimulus.slide))
         return cls(stimulus.time, len(chosen), touched, group, depth, slide * step[:, None], rate, samples)
 
@@ -149,31 +159,63 @@ class ContactHistory:
         return total
 
 
-def _equal_columns(arrays: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
-    """First column of each group of columns that are equal in all arrays (g,), and the group of each column (p,)."""
-    words = []
+def _equal_columns(arrays: list[np.ndarray], columns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """First of each group of columns that are equal in all arrays (g,), and the group of each column (p,).
+
+    Both count the given columns. An array is looked at only in columns that are equal in all arrays before it.
+    """
+    group = np.zeros(len(columns), dtype=int)
     for values in arrays:
-        size = max(float(np.abs(values).max(initial=0.0)), 1e-300)
-        words.append(np.round(values / (EQUAL_WITHIN * size)).astype(np.int64))
-    subset = np.ascontiguousarray(np.concatenate(words).T)
-    seen: dict[bytes, int] = {}
-    group = np.array([seen.setdefault(column.tobytes(), len(seen)) for column in subset], dtype=int)
+        (shared,) = np.nonzero(np.bincount(group)[group] > 1)
+        if not len(shared):
+            break
+        quantum = EQUAL_WITHIN * max(float(np.abs(values[:, columns]).max(initial=0.0)), 1e-300)
+        words = np.ascontiguousarray(np.round(values[:, columns[shared]] / quantum).astype(np.int64).T)
+        keys: list[object] = [(int(number),) for number in group]
+        for place, column in zip(shared, words, strict=True):
+            keys[place] = int(group[place]), column.tobytes()
+        seen: dict[object, int] = {}
+        group = np.array([seen.setdefault(key, len(seen)) for key in keys], dtype=int)
     _, first = np.unique(group, return_index=True)
     return first, group
 
 
-def _contact_samples(
-    touching: np.ndarray, count: np.ndarray, normal: np.ndarray, slip: np.ndarray, step: np.ndarray
-) -> ContactSamples:
-    texel, sample = np.nonzero(touching.T)
-    before = np.maximum(sample - 1, 0)
-    continues = (sample > 0) & touching[before, texel]
-    now = slip[sample, texel]
-    mean_slip = 0.5 * (now + slip[before, texel])
-    squares = ((now * now).sum(axis=1), (mean_slip * mean_slip).sum(axis=1))
-    return ContactSamples(
-        sample, texel, continues, count[texel].astype(float), normal[sample, texel], now, mean_slip, *squares, step[sample]
-    )
+@kernel
+def write_samples(pressed, column, count, normal, slip, step, samples):  # type: ignore[no-untyped-def]
+    """Write the samples in contact, column after column.
+
+    Parameters
+    ----------
+    pressed : (T, g) bool
+    column : (g,) int
+        Index in `normal` and `slip` of each column.
+    count : (g,) float
+        Weight of each column.
+    normal, slip : (T, n, 3) float
+    step : (T,) float, s
+        Since the sample before.
+    samples : ContactSamples
+        Written to.
+    """
+    i = 0
+    for texel in range(pressed.shape[1]):
+        own = column[texel]
+        for sample in range(pressed.shape[0]):
+            if not pressed[sample, texel]:
+                continue
+            before = max(sample - 1, 0)
+            samples.sample[i], samples.texel[i], samples.weight[i] = sample, texel, count[texel]
+            samples.continues[i] = sample > 0 and pressed[before, texel]
+            samples.time_step[i] = step[sample]
+            now_squared, mean_squared = 0.0, 0.0
+            for axis in range(3):
+                now = slip[sample, own, axis]
+                mean = 0.5 * (now + slip[before, own, axis])
+                samples.normal[i, axis], samples.slip[i, axis] = normal[sample, own, axis], now
+                samples.mean_slip[i, axis] = mean
+                now_squared, mean_squared = now_squared + now * now, mean_squared + mean * mean
+            samples.slip_squared[i], samples.mean_slip_squared[i] = now_squared, mean_squared
+            i += 1
 
 
 @kernel
