@@ -57,7 +57,7 @@ def build(scene) -> None:
     _slide(ball, pad_a)
 
     cube = scene_builder.box(scene, CUBE, (CUBE_EDGE,) * 3, bevel=1.2, flat_bottom=True)
-    cube.data.materials.append(scene_builder.see_through_steel("Steel, seen through", clear=0.86, edge=0.3))
+    cube.data.materials.append(scene_builder.clear_block("Steel, seen through"))
     cube.data.materials.append(scene_builder.material("Steel", scene_builder.STEEL, metallic=1.0, roughness=0.16))
     cube.modifiers["Bevel"].material = 1  # its edges stay solid
     cube.location = (pad_b.location.x, pad_b.location.y, PAD_HEIGHT + CUBE_EDGE / 2 + DROP)

@@ -24,13 +24,16 @@ START = 10.0  # mm, between object and pads at the first frame
 
 @dataclass(frozen=True)
 class Object:
-    """An object to grasp: how it is built, its half width between the fingers and its lowest point (mm), and its mass (kg)."""
+    """An object to grasp: how it is built, its half width between the fingers and its lowest point (mm), its mass (kg), and
+    by how much longer the fingers are so that it does not touch the gripper (mm).
+    """
 
     name: str
     make: Callable
     reach: float
     foot: float
     mass: float
+    room: float = 0.0
 
 
 def _sphere(scene, name):
@@ -55,7 +58,7 @@ OBJECTS = {
     "sphere": Object("Sphere", _sphere, 20.0, -20.0, 0.10),
     "box": Object("Box", _box, 15.0, -32.0, 0.16),
     "cylinder": Object("Cylinder", _cylinder, 16.0, -35.0, 0.14),
-    "bottle": Object("Spray bottle", gripper.spray_bottle, 16.5, -48.0, 0.15),
+    "bottle": Object("Spray bottle", gripper.spray_bottle, 16.5, -48.0, 0.15, 22.0),
 }
 
 TEXT = """\
@@ -71,9 +74,9 @@ def build(scene, kind: str) -> None:
     scene_builder.prepare(scene, FRAME_END, FPS)
     look = gripper.materials()
     thing = OBJECTS[kind]
-    fingers = [gripper.finger(scene, side, thing.reach + START, HEIGHT, look) for side in (-1, 1)]
+    fingers = [gripper.finger(scene, side, thing.reach + START, HEIGHT, look, thing.room) for side in (-1, 1)]
     gripper.close(fingers, FORCE, SPEED, MAX_FORCE)
-    gripper.housing(scene, HEIGHT, look)
+    gripper.housing(scene, HEIGHT + thing.room, look)
     obj = thing.make(scene, thing.name)
     obj.location = (0.0, 0.0, HEIGHT)
     obj.palpate.role, obj.palpate.body, obj.palpate.mass = "TARGET", "FREE", thing.mass

@@ -34,7 +34,7 @@ def materials() -> dict:
     }
 
 
-def finger(scene, side: int, gap: float, height: float, look: dict):
+def finger(scene, side: int, gap: float, height: float, look: dict, room: float = 0.0):
     """Return one finger's pad, a sensor, with its block as a child.
 
     Parameters
@@ -45,6 +45,8 @@ def finger(scene, side: int, gap: float, height: float, look: dict):
         Distance from the pad's surface to the middle plane.
     height : float, mm
         Height of the pad's centre.
+    room : float, mm
+        By which the finger is longer, for an object that is high above the pads.
     """
     from mathutils import Matrix
 
@@ -60,11 +62,11 @@ def finger(scene, side: int, gap: float, height: float, look: dict):
     pad.location = (side * gap, 0.0, height)
 
     tall = PAD_TALL + 2 * MARGIN
-    block = scene_builder.box(scene, f"{name} block", (PAD_WIDE + 2 * MARGIN + 3, tall + 34, 9.0), bevel=1.6)
-    block.parent, block.location = pad, (0.0, 15.0, -THICKNESS - 4.0)
+    block = scene_builder.box(scene, f"{name} block", (PAD_WIDE + 2 * MARGIN + 3, tall + 34 + room, 9.0), bevel=1.6)
+    block.parent, block.location = pad, (0.0, 15.0 + 0.5 * room, -THICKNESS - 4.0)
     block.data.materials.append(look["black"])
     foot = scene_builder.box(scene, f"{name} foot", (PAD_WIDE + 2 * MARGIN + 3, 14.0, 26.0), bevel=1.6)
-    foot.parent, foot.location = pad, (0.0, tall / 2 + 27.0, -THICKNESS - 6.0)
+    foot.parent, foot.location = pad, (0.0, tall / 2 + 27.0 + room, -THICKNESS - 6.0)
     foot.data.materials.append(look["aluminium"])
 
     settings = pad.palpate

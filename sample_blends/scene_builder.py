@@ -240,6 +240,31 @@ def see_through_steel(name: str, clear: float, edge: float = 1.0, groove: float 
     return made
 
 
+def clear_block(name: str):
+    """Return a material like a block of clear acrylic: transparent, with the reflections of its surface and nothing else.
+
+    Flat sides need it: :func:`see_through_steel` is more opaque on a side that is seen at a flatter angle, which then
+    looks like a lid.
+    """
+    made = material(name, (0.8, 0.85, 0.9), roughness=0.08)
+    nodes, links = made.node_tree.nodes, made.node_tree.links
+    clear, shine = nodes.new("ShaderNodeBsdfTransparent"), nodes.new("ShaderNodeBsdfAnisotropic")
+    clear.inputs["Color"].default_value, shine.inputs["Roughness"].default_value = (0.96, 0.98, 1.0, 1.0), 0.08
+    facing, geometry = nodes.new("ShaderNodeFresnel"), nodes.new("ShaderNodeNewGeometry")
+    facing.inputs["IOR"].default_value = 1.3
+    share, mix = nodes.new("ShaderNodeMath"), nodes.new("ShaderNodeMixShader")
+    share.operation = "MULTIPLY_ADD"  # sides that face away reflect nothing
+    share.use_clamp = True
+    links.new(geometry.outputs["Backfacing"], share.inputs[0])
+    share.inputs[1].default_value = -1.0
+    links.new(facing.outputs[0], share.inputs[2])
+    links.new(share.outputs[0], mix.inputs[0])
+    links.new(clear.outputs[0], mix.inputs[1])
+    links.new(shine.outputs[0], mix.inputs[2])
+    links.new(mix.outputs[0], nodes["Material Output"].inputs["Surface"])
+    return made
+
+
 def backdrop(scene, width: float = 4000.0, front: float = -1500.0, back: float = 350.0, height: float = 1500.0):
     """Return a floor that curves upwards into a wall behind the scene."""
     radius = 400.0

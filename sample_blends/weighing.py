@@ -47,7 +47,7 @@ def weigh(scene, mass: float, tilt: float, frame_end: int = FRAME_END, fps: int 
     pad.location, pad.rotation_euler = (0.0, 0.0, HEIGHT), (turn, 0.0, 0.0)
 
     cube = scene_builder.box(scene, CUBE, (EDGE,) * 3, bevel=1.2, flat_bottom=True)
-    cube.data.materials.append(scene_builder.see_through_steel("Steel, seen through", clear=0.86, edge=0.3))
+    cube.data.materials.append(scene_builder.clear_block("Steel, seen through"))
     cube.data.materials.append(scene_builder.material("Steel", scene_builder.STEEL, metallic=1.0, roughness=0.16))
     cube.modifiers["Bevel"].material = 1
     up = EDGE / 2 + 0.1

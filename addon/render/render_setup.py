@@ -31,6 +31,11 @@ NEARBY_RATIO = 2.0
 """An object that takes no part but touches the subjects, as a gripper's housing, is framed up to this ratio of sizes."""
 NEARBY = 0.05
 """Distance at which an object counts as touching, as a share of the subjects' size."""
+MOST_ROOM = 1.25
+"""How much farther the camera stands, at most, to have what surrounds sensors and targets in the picture. What would make them
+smaller than that, as the housing of a gripper, is cropped. Chosen by eye."""
+_HALVINGS = 12
+"""Steps of the search for how much is cropped: to 1 / 4,096 of what surrounds."""
 
 
 def engine_of(scene, name: str) -> str:
@@ -184,13 +189,41 @@ def _set_camera(scene, frames: Sequence[int], options: RenderOptions, loaded, ch
     if own is not None and options.view is None and options.own_camera:
         return
     view = options.view
+    corners, surroundings = _corners(scene, frames)
     if view is None:
         towards = DEFAULT_VIEW if own is None else camera_direction.view_of(own.matrix_world.to_3x3() @ Vector((0.0, 0.0, 1.0)))
-        view = camera_direction.best_view(scene, loaded, towards, options.see_through, _corners(scene, frames))
+        view = camera_direction.best_view(scene, loaded, towards, options.see_through, corners)
     camera = changes.add(_camera(scene, own, view))
     changes.set(scene, "camera", camera)
-    render.fit_camera(scene, _corners(scene, frames), (MARGIN, MARGIN, 1 - MARGIN, 1 - MARGIN))
+    _frame(scene, corners, surroundings)
     _set_clipping(scene, camera)
+
+
+def _frame(scene, corners: np.ndarray, surroundings: np.ndarray) -> None:
+    """Move the camera so that it shows points, and of other points around them as much as :data:`MOST_ROOM` leaves room for.
+
+    Parameters
+    ----------
+    corners, surroundings : (n, 3) and (m, 3) float, Blender units, world
+    """
+    region = (MARGIN, MARGIN, 1 - MARGIN, 1 - MARGIN)
+    middle = corners.mean(axis=0)
+    nearest = np.clip(surroundings, corners.min(axis=0), corners.max(axis=0))
+
+    def distance(share: float) -> float:
+        """Frame this share of the way from the subjects' box to the points around; return the camera's distance."""
+        render.fit_camera(scene, np.concatenate([corners, nearest + share * (surroundings - nearest)]), region)
+        matrix = np.array(scene.camera.matrix_world)
+        return float((matrix[:3, 3] - middle) @ matrix[:3, 2])
+
+    most = MOST_ROOM * distance(0.0)
+    if distance(1.0) <= most:
+        return
+    low, high = 0.0, 1.0
+    for _ in range(_HALVINGS):
+        share = 0.5 * (low + high)
+        low, high = (share, high) if distance(share) <= most else (low, share)
+    distance(low)
 
 
 def _set_lights(scene, frames: Sequence[int], options: RenderOptions, changes: _TemporaryChanges) -> None:
@@ -273,15 +306,41 @@ def _camera(scene, own, view):
     return camera
 
 
-def _corners(scene, frames) -> np.ndarray:
-    """Return the corners of the subjects' bounding boxes at the frames; of many frames, at evenly spaced ones."""
+def _corners(scene, frames) -> tuple[np.ndarray, np.ndarray]:
+    """Return corners of the bounding boxes of sensors, targets and markers, and of what surrounds them: (n, 3) and (m, 3).
+
+    They are those of all frames; of many frames, of evenly spaced ones.
+    """
     places = np.linspace(0, len(frames) - 1, min(len(frames), _MAX_FRAMED_FRAMES)).round().astype(int)
     chosen = sorted({int(frames[place]) for place in places})
-    found = []
+    found, around = [], [np.zeros((0, 3))]
     for number in chosen:
         scene.frame_set(number)
-        found.append(render.bounding_box_corners(_in_picture(scene)))
-    return np.concatenate(found)
+        seen = _in_picture(scene)
+        central = [obj for obj in seen if _is_central(obj)] or seen
+        found.append(render.bounding_box_corners(central))
+        others = _near([obj for obj in seen if obj not in central], found[-1])
+        around += [render.bounding_box_corners(others)] if others else []
+    return np.concatenate(found), np.concatenate(around)
+
+
+def _near(objects, corners: np.ndarray) -> list:
+    """Return objects without the pads whose bounding boxes are away from (n, 3) corners, as a table that sinks away."""
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    room = NEARBY * float(np.linalg.norm(high - low))
+    boxes = {obj: _box(obj) for obj in objects if obj.palpate.role == "PAD"}
+    away = {obj for obj, box in boxes.items() if (box[0] > high + room).any() or (box[1] < low - room).any()}
+    return [obj for obj in objects if obj not in away]
+
+
+def _is_central(obj) -> bool:
+    """Return True for sensors, targets with what hangs on them, and arrows and markers of a bake."""
+    hangs_on_target = any(parent.palpate.role == "TARGET" for parent in _ancestors(obj))
+    return (
+        obj.palpate.role in {"SENSOR", "TARGET"}
+        or materials.SENSOR_KEY in obj
+        or (obj.palpate.role == "NONE" and hangs_on_target)
+    )
 
 
 def _set_clipping(scene, camera) -> None:

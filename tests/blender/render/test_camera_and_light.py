@@ -91,8 +91,8 @@ def test_what_stands_before_the_texels_blocks_the_sight_unless_it_is_a_target(tm
 
 def test_what_touches_the_subjects_is_in_the_picture_and_a_backdrop_is_not(tmp_path):
     scene = wall(tmp_path)
-    housing = cube("Housing", (0.012, 0.0, 0.03), size=0.02)
-    knob = cube("Knob", (0.012, 0.0, 0.05), size=0.01)
+    housing = cube("Housing", (0.012, 0.0, 0.018), size=0.02)
+    knob = cube("Knob", (0.012, 0.0, 0.030), size=0.004)
     knob.parent = housing
     knob.matrix_parent_inverse = housing.matrix_world.inverted()
     bpy.ops.mesh.primitive_plane_add(size=5.0, location=(0.0, 0.0, -0.06))
@@ -103,6 +103,39 @@ def test_what_touches_the_subjects_is_in_the_picture_and_a_backdrop_is_not(tmp_p
         assert floor.hide_render and not housing.hide_render
     assert (places > 0.0).all() and (places < 1.0).all()
     assert not floor.hide_render
+
+
+def test_a_large_housing_is_cropped_so_that_the_pad_stays_large(tmp_path):
+    scene = wall(tmp_path)
+    options = render_setup.RenderOptions(size=SIZE, view=(180.0, 20.0))
+    central = render.bounding_box_corners([scene.objects["Pad"], scene.objects["Ball"]])
+
+    def height() -> float:
+        with render_setup.render_setup(scene, [3], options):
+            places = np.array([render.image_position(scene, point) for point in central])
+            assert (places > 0.0).all() and (places < 1.0).all()
+            return np.ptp(places[:, 1])
+
+    alone = height()
+    housing = cube("Housing", (0.012, 0.0, 0.073), size=0.09)
+    assert alone / (render_setup.MOST_ROOM + 0.1) < height() < 0.95 * alone
+    with render_setup.render_setup(scene, [3], options):
+        tops = render.bounding_box_corners([housing])[:, 2].max()
+        assert render.image_position(scene, (0.012, 0.0, tops))[1] > 1.0
+
+
+def test_a_pad_that_nothing_touches_takes_no_room(tmp_path):
+    scene = wall(tmp_path)
+    options = render_setup.RenderOptions(size=SIZE, view=(180.0, 20.0))
+    with render_setup.render_setup(scene, [3], options):
+        before = np.array(scene.camera.matrix_world)
+    table = cube("Table", (0.0, 0.0, -0.09), size=0.06)
+    table.palpate.role = "PAD"
+    with render_setup.render_setup(scene, [3], options):
+        assert np.array(scene.camera.matrix_world) == pytest.approx(before, abs=1e-6)
+    table.location.z = -0.056
+    with render_setup.render_setup(scene, [3], options):
+        assert not np.allclose(np.array(scene.camera.matrix_world), before, atol=1e-3)
 
 
 @pytest.mark.parametrize(("color", "background"), [(0.02, studio.LIGHT_BACKGROUND), (0.9, studio.DARK_BACKGROUND)])

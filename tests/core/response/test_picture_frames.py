@@ -28,6 +28,15 @@ def test_after_an_impact_the_middle_of_the_rest():
     assert metrics.settled_frame(Loads(force)) == pytest.approx(10 + 17, abs=2)
 
 
+def test_the_turning_point_of_an_overshoot_is_no_rest():
+    """Two fingers under force control, frame by frame: above 6 N for ten frames, at 6 N for fifty."""
+    overshoot = [5.19, 6.63, 6.68, 6.48, 6.3, 6.18, 6.1, 6.06, 6.03, 6.02, 6.01, 6.01]
+    force = [*[0.0] * 9, *overshoot, *[6.0] * 51]
+    assert metrics.peak_frame(Loads(force)) == 10 + 11
+    shown = metrics.settled_frame(Loads(force)) - 10
+    assert shown >= 30 and force[shown] == 6.0
+
+
 def test_the_largest_of_two_plateaus():
     force = [*[1.0] * 30, *np.linspace(1.0, 4.0, 10), *[4.0] * 30, *np.linspace(4.0, 0.0, 10)]
     assert 52 <= metrics.settled_frame(Loads(force)) <= 78
