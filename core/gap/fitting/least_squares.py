@@ -307,23 +307,26 @@ def fit(
         known = frozen
         for table, first in zip(tables, initial_derivatives, strict=True):
             table[:frozen] = first[:frozen]
+    complete = False  # whether the tables hold all derivatives at the point, or a step away that changed next to nothing
     for _ in range(max_steps):
         parts = list(zip(views, point.residuals, tables, strict=True))
         for view, residual, table in parts:
             derivatives(view, point.model, free, point.at, residual, table, known)
+        complete = known == 0
         total = summed_equations([_equations_of(view, free, table, residual) for view, residual, table in parts])
         better, damping = _better_point(views, free, point, total, damping)
         if better is None:
-            if known == 0:
+            if complete:
                 break
             known, damping = 0, FIRST_DAMPING
             continue
         little = point.objective - better.objective < tolerance * better.objective
         point, damping = better, max(damping * DAMPING_DOWN, LEAST_DAMPING)
-        if little and (known == 0 or not with_equations):
+        if little and (complete or not with_equations):
             break
+        complete = False
         known = 0 if little else frozen  # with frozen derivatives steps may become small long before the minimum
-    equations = _final_equations(views, free, point, tables) if with_equations else None
+    equations = _final_equations(views, free, point, tables, complete) if with_equations else None
     squares = np.array([view.squares(r) for view, r in zip(views, point.residuals, strict=True)])
     return Fit(point.model, free, squares, np.array([view.counts for view in views]), equations)
 
@@ -361,12 +364,15 @@ def _better_point(
 
 
 def _final_equations(
-    views: Sequence[TrialView], free: tuple[FreeParameter, ...], point: _Point, tables: list[np.ndarray]
+    views: Sequence[TrialView], free: tuple[FreeParameter, ...], point: _Point, tables: list[np.ndarray], complete: bool
 ) -> list[list[NormalEquations]]:
-    """Normal equations of each stretch of each trial at a point; the tables are overwritten."""
+    """Normal equations of each stretch of each trial at a point. Unless the tables are `complete`, the derivatives there are
+    computed.
+    """
     equations = []
     for view, residual, table in zip(views, point.residuals, tables, strict=True):
-        derivatives(view, point.model, free, point.at, residual, table, 0)
+        if not complete:
+            derivatives(view, point.model, free, point.at, residual, table, 0)
         rows = view.stretches(residual)
         equations.append([_equations_of(view, free, table[:, part], residual[part], GRADIENT_BLOCKS) for part in rows])
     return equations
