@@ -28,6 +28,7 @@ from .findings import ClosedShares, Diagnosis, Finding
 from .forward_selection import SelectionState, SelectionStep, means_of
 from .gap_sizes import FORCES, LEAST_IMPROVEMENT, READINGS, GapSizes
 from .identifiability import SPREADING, curvature_ratio, hardly_distinguishable, indistinguishable, unidentifiable
+from .plausibility import HEIGHT_ALONE, is_height_alone
 from .view_set import ViewSet
 
 RIVAL_RATIO = 1.35
@@ -48,7 +49,7 @@ def conclude(result: Diagnosis, view_set: ViewSet, state: SelectionState, gap_si
     """Write verdict, findings, groups of rivals and ruled-out kinds into a result that has its models already."""
     result.closed = _closed_shares(result, state, gap_sizes)
     result.unlike_fitted = _unlike_fitted(result, gap_sizes)
-    _judge_effects(result, state, gap_sizes)
+    _judge_effects(result, view_set, state, gap_sizes)
     unsure = unsure_names(result, view_set, state, gap_sizes)
     result.findings = [
         replace(one, confidence=min(one.confidence, UNSURE_CONFIDENCE))
@@ -86,7 +87,7 @@ def _closed_shares(result: Diagnosis, state: SelectionState, gap_sizes: GapSizes
     return ClosedShares((fitted[0], fitted[1]), (left_out[0], left_out[1]), result.check.closed)
 
 
-def _judge_effects(result: Diagnosis, state: SelectionState, gap_sizes: GapSizes) -> None:
+def _judge_effects(result: Diagnosis, view_set: ViewSet, state: SelectionState, gap_sizes: GapSizes) -> None:
     """Write the verdict and, for each effect of the model, a finding with its confidence and rivals."""
     effects = result.best.model.effects
     fitted = [effect for effect in effects if effect.name != "noise"]
@@ -104,10 +105,13 @@ def _judge_effects(result: Diagnosis, state: SelectionState, gap_sizes: GapSizes
         quantity = gap_sizes.quantity_for(effect.name)
         share = closed[quantity] if fitted else 1.0
         unsettled = unsettled_parameters(effect, index, result, min(leaves.values(), default=np.inf))
+        only_height = is_height_alone(result.best.model, index, view_set)
+        unsettled += (HEIGHT_ALONE,) if only_height else ()
         confidence = weight * (0.5 + 0.5 * share if share >= least_share(effect.name, leaves) else 0.5 * share)
         absorbs = is_open and may_absorb_misfit(effect, state)
         misfits = chosen is None and len(fitted) > 1 and (absorbs or is_doubtful(effect, state, fitted, gap_sizes))
-        if rivals or misfits or (unsettled and chosen is None) or (fitted and result.check.refutes(quantity)):
+        unborne = (unsettled and chosen is None) or only_height or (fitted and result.check.refutes(quantity))
+        if rivals or misfits or unborne:
             confidence = min(confidence, UNSURE_CONFIDENCE)
         if rivals:
             result.ambiguous.append((effect.name, *rivals))
