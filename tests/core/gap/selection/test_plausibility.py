@@ -89,9 +89,7 @@ def test_a_softening_comes_to_its_end_within_its_session(share_of_way, is_one):
 )
 def test_a_height_alone_is_no_displacement(hidden, expected):
     rig = cases.rig(seed=4, trials=2)
-    displaced = effect(
-        "misalignment", **{name: hidden.get(name, 0.0) for name in ("x", "y", "z", "about_x", "about_y", "about_z")}
-    )
+    displaced = effect("misalignment", "rigid", **{**dict.fromkeys(form_of("misalignment", "rigid").neutral, 0.0), **hidden})
     model = Model(rig.parameters, (displaced,))
     felt = [replace(one.trial, reading=one.predict(model).reading) for one in predictors_of(rig.trials, rig)]
     felt_rig = replace(rig, trials=felt)
