@@ -19,7 +19,7 @@ from ..kinds.search import KNOWN_KINDS
 from .candidates import DIRECTLY_ESTIMATED, is_spatial, parameters_at_bounds
 from .direct_estimates import coarsest_step
 from .findings import Diagnosis
-from .forward_selection import SelectionState
+from .forward_selection import SelectionState, means_of
 from .gap_sizes import FORCES, READINGS, GapSizes, friction_kinds
 from .identifiability import (
     LEAST_UNLOADED_SHARE,
@@ -192,7 +192,7 @@ def unsure_names(result: Diagnosis, view_set: ViewSet, state: SelectionState, ga
     curvature = curvature_ratio(result.of("fit"), result.best.model)
     ambiguous = {name for name in names if indistinguishable(result.coverage, name, curvature)}
     if ambiguous:
-        main = {name for name in names - ambiguous if _closes_most(name, ambiguous, state)}
+        main = {name for name in names - ambiguous if _closes_most(name, ambiguous, state, gap_sizes)}
         unsure |= names - set(DIRECTLY_ESTIMATED) - main
     if result.coverage.unloaded_share < LEAST_UNLOADED_SHARE and {name for pair in result.ambiguous for name in pair} & set(
         MOVING_BY_THEMSELVES
@@ -212,10 +212,20 @@ def unsure_names(result: Diagnosis, view_set: ViewSet, state: SelectionState, ga
     return unsure
 
 
-def _closes_most(name: str, others: set[str], state: SelectionState) -> bool:
-    """Whether an effect closes most of the gap, and each of some others little of it."""
+def _closes_most(name: str, others: set[str], state: SelectionState, gap_sizes: GapSizes) -> bool:
+    """Whether an effect closes most of the gap, and each of some others little of it beside the rest.
+
+    What it closes alone counts as well: beside an effect that imitates a part of it, it closes less.
+    """
     shares = {key: improvement.of_gap for key, improvement in state.improvements.items()}
-    return shares.get(name, 0.0) >= MOST_OF_THE_GAP and all(shares.get(other, 1.0) < SMALL_SHARE for other in others)
+    quantity = gap_sizes.quantity_for(name)
+    alone = [
+        gap_sizes.improvement(gap_sizes.base, means_of(one.held_out, one.fit), quantity).of_gap
+        for one in state.first.ranked
+        if one.candidate.name == name
+    ]
+    most = max([shares.get(name, 0.0), *alone])
+    return most >= MOST_OF_THE_GAP and all(shares.get(other, 1.0) < SMALL_SHARE for other in others)
 
 
 def _normal_squares(view_set: ViewSet, found: Fit, noise: float) -> float:

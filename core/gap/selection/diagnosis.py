@@ -41,7 +41,7 @@ from .between_recordings import (
 )
 from .candidates import FittedCandidate, candidates, scales_of
 from .check_recordings import check_views, checked
-from .confidence import EXPLAINED, UNSURE_CONFIDENCE, kinds_can_settle
+from .confidence import CLEAR_LEAD, EXPLAINED, UNSURE_CONFIDENCE, kinds_can_settle
 from .contact_heights import with_starting_heights
 from .findings import Diagnosis, Finding
 from .forms_at_bounds import without_bounds_of_forms
@@ -171,7 +171,8 @@ def _second_opinion(plain: _Search) -> Generator[Progress, None, _Search]:
     -------
     _Search
         It, if the library's forms bear all of these kinds out and no sure name is lost of which it knows nothing, or if it is
-        sure of all that was sure and of more; else the plain search.
+        sure of all that was sure and of more; else the plain search. Not if it leaves far more without an effect that the plain
+        search and the best set of kinds both have.
     """
     before, choice = plain.result, choose_kinds(plain.views, plain.result.base, plain.result.noise)
     decision = yield from _progress_of(choice, SECOND_OPINION_BEGINS, FORMS_OF_KINDS_BEGIN)
@@ -186,6 +187,9 @@ def _second_opinion(plain: _Search) -> Generator[Progress, None, _Search]:
     if result.verdict != "explained" or not (sure > sure_before or bears_out):
         return plain
     named = {one.name for one in result.findings}
+    lost = {one.name for one in before.findings} & decision.kinds - named
+    if lost and second.left > CLEAR_LEAD * plain.left:
+        return plain
     reasons = {one.name: NOT_NEEDED for one in before.findings} | dict(before.ruled_out)
     result.ruled_out = [(name, why) for name, why in reasons.items() if name not in named]
     return second

@@ -3,6 +3,7 @@
 
 import json
 from dataclasses import replace
+from types import SimpleNamespace
 
 import gap_cases as cases
 import numpy as np
@@ -18,7 +19,7 @@ from palpate.core.gap.selection.candidates import parameters_at_bounds
 from palpate.core.gap.selection.check_recordings import CheckedRecording, CheckOutcome, checked
 from palpate.core.gap.selection.confidence import CLEAR_LEAD, _closes_most, unsettled_parameters
 from palpate.core.gap.selection.diagnosis import diagnose
-from palpate.core.gap.selection.forward_selection import SelectionState
+from palpate.core.gap.selection.forward_selection import SelectionState, SelectionStep
 from palpate.core.gap.selection.gap_sizes import GapSizes, Improvement
 from palpate.core.gap.selection.harmful_effects import without_harmful_effects
 from palpate.core.jobs.job_runner import run_job
@@ -132,8 +133,22 @@ def test_an_extra_that_makes_the_check_worse_is_dropped(stays):
 def test_what_closes_most_stays_sure_beside_little_that_is_ambiguous():
     shares = {"stiffening": Improvement(0.95, 0.95), "hysteresis": Improvement(0.03, 0.6), "creep": Improvement(0.3, 0.9)}
     state = SelectionState(None, None, {}, shares)
-    assert _closes_most("stiffening", {"hysteresis"}, state)
-    assert not _closes_most("stiffening", {"hysteresis", "creep"}, state) and not _closes_most("creep", {"hysteresis"}, state)
+    assert _closes_most("stiffening", {"hysteresis"}, state, GAP_SIZES)
+    assert not _closes_most("stiffening", {"hysteresis", "creep"}, state, GAP_SIZES)
+    assert not _closes_most("creep", {"hysteresis"}, state, GAP_SIZES)
+
+
+@pytest.mark.parametrize(("left", "most"), [(2.0, True), (6.0, False)])
+def test_what_an_effect_closes_alone_counts_where_another_one_imitates_it(left, most):
+    """Of a gap of 9 the creep closes 8 alone, or 4, and 1.5 beside a hysteresis that takes most of its work."""
+    shares = {"creep": Improvement(1.5 / 9.0, 0.5), "hysteresis": Improvement(0.03, 0.1)}
+    alone = SimpleNamespace(
+        candidate=SimpleNamespace(name="creep"),
+        held_out=np.array([[left * 900.0, 0.0]]),
+        fit=SimpleNamespace(count=np.array([[900.0, 0.0]])),
+    )
+    state = SelectionState(None, None, {}, shares, SelectionStep([alone], [left - 1.0]))
+    assert _closes_most("creep", {"hysteresis"}, state, GAP_SIZES) is most
 
 
 @pytest.mark.parametrize(("values", "interval", "why"), [

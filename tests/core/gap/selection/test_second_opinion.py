@@ -88,6 +88,24 @@ def test_of_several_kinds_those_are_named_that_the_forms_bear_out(creeping, monk
     assert _finished(diagnosis._second_opinion(creeping)) is creeping
 
 
+@pytest.mark.parametrize(("unclear", "times", "kept"), [("drift", 1.5, False), ("drift", 2.5, True), ("lag", 2.5, False)])
+def test_an_effect_that_both_searches_have_is_not_lost_where_much_more_is_left(creeping, monkeypatch, unclear, times, kept):
+    """As where a drift explains recordings, in doubt, and the kinds are clear about a creep alone that does half of it."""
+    choose = _saying(("creep",))
+
+    def with_unclear(*_):
+        decision = yield from choose()
+        yield "kinds", 1.0
+        return replace(decision, chosen=SimpleNamespace(kinds=frozenset(("creep", unclear))))
+
+    monkeypatch.setattr(diagnosis, "choose_kinds", with_unclear)
+    doubted = Finding(0, "drift", "linear", UNSURE_CONFIDENCE, ("creep",))
+    monkeypatch.setattr(creeping.result, "findings", [doubted])
+    plain = creeping.result.best
+    monkeypatch.setattr(diagnosis, "_left", lambda _, found: 1.0 if found is plain else times)
+    assert (_finished(diagnosis._second_opinion(creeping)) is creeping) == kept
+
+
 def test_a_sure_name_of_which_the_kinds_know_nothing_is_not_given_up(creeping, monkeypatch):
     """All kinds that are said are borne out, but nothing in these recordings shows the friction that was sure before."""
     monkeypatch.setattr(diagnosis, "choose_kinds", _saying(("creep",)))
@@ -128,6 +146,7 @@ def test_what_is_sure_already_is_not_fitted_again(creeping, monkeypatch):
 def test_a_doubted_name_without_a_rival_is_less_likely_than_one_of_a_group(faults, wear):
     said = {"creep": UNSURE_CONFIDENCE, "wear": UNSURE_CONFIDENCE, "lag": 0.1, "drift": 0.9}
     findings = [Finding(i, name, "form", confidence, ()) for i, (name, confidence) in enumerate(said.items())]
-    result = SimpleNamespace(findings=findings, ambiguous=[("creep", "softening")], misleading_faults=faults)
+    words = {"misleading_faults": faults, "contact_is_early": False}
+    result = SimpleNamespace(findings=findings, ambiguous=[("creep", "softening")], **words)
     _doubt_without_rivals(result)
     assert {one.name: one.confidence for one in result.findings} == {**said, "wear": wear}
