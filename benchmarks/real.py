@@ -2,7 +2,8 @@
 """``palpate gap`` on published recordings of real sensors: the family it names, and by how much the gap shrinks.
 
 The recordings are looked for in the folder ``PALPATE_REAL_DATA`` (../shared/data beside the checkout); ``PALPATE_REAL_SETS``
-names some of them. Rigs, reports and pictures go to build/real/. docs/gap-real.md says what each set is known to contain.
+names some of them, and ``PALPATE_REAL_SIZES`` the sizes of what is put on top of them. Rigs, reports and pictures go to
+build/real/. docs/gap-real.md says what each set is known to contain.
 """
 
 from __future__ import annotations
@@ -14,10 +15,9 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from ._injected import CHANGES, SIZES, is_multiplexed, thinned_texels, with_effect, without_found_effects
+from ._injected import CHANGES, SIZES, thinned_texels, with_effect, without_found_effects
 from ._recordings import LAST, SETS, Recording
+from ._tellable import tellable
 
 HOUSE = Path(__file__).resolve().parent.parent
 GOALS = {
@@ -95,13 +95,12 @@ def _friction_figures(name: str, result: Any) -> Iterator[dict]:
 def _recall_figures(data: Path) -> Iterator[dict]:
     """How many of the injected effects are found for sure, and how many others are.
 
-    Once of all of them, once of those that the recordings can identify, and once of those among these that may have a name:
-    without the effect, at least half of the squared error of the check recordings would not be there.
+    Once of all of them, once of those whose signature the recordings show, and once of those that can be told (see
+    :mod:`._tellable`), which does not depend on what was found.
     """
-    from palpate.core.gap.selection.check_recordings import CHECK_CLOSED
-
-    groups = ("all", "told", "told.shown")
-    outcomes: dict[tuple[float, str], Counter[str]] = {(size, of): Counter() for size in SIZES for of in groups}
+    groups = ("all", "shown", "told")
+    sizes = [float(size) for size in os.environ.get("PALPATE_REAL_SIZES", ",".join(map(str, SIZES))).split(",")]
+    outcomes: dict[tuple[float, str], Counter[str]] = {(size, of): Counter() for size in sizes for of in groups}
     alarms = 0
     for name, read in INJECTED.items():
         plain = read(data)
@@ -110,18 +109,16 @@ def _recall_figures(data: Path) -> Iterator[dict]:
         alarms += bool(_sure_names(freed))
         print(f"{name}: what was left unexplained is {cleaned.residual_share:.2%} of the range", file=sys.stderr, flush=True)
         for effect in CHANGES:
-            for size in SIZES:
+            for size in sizes:
                 changed = with_effect(cleaned, effect, size)
                 if changed is None:
                     continue
                 result = _diagnosed(changed, HOUSE / "build" / "real" / f"{name}-{effect}")
-                outcome, identifiable = _outcome(effect, result), _is_identifiable(effect, changed, result)
-                truth = _closed_by_truth(freed, result)
-                for of in groups[: 1 + identifiable + (identifiable and truth >= CHECK_CLOSED)]:
+                outcome, can = _outcome(effect, result), tellable(effect, cleaned, freed, changed)
+                for of in groups[: 1 + can.is_shown + (not can.fails)]:
                     outcomes[size, of][outcome] += 1
                 said = ", ".join(f"{one.name} {one.confidence}" for one in result.findings) or result.verdict
-                note = "" if identifiable else " (these recordings cannot tell it)"
-                note += f" (the truth closes {truth:.0%} of the check)"
+                note = f" (cannot be told: {can.fails})" if can.fails else ""
                 print(f"{name} with {size:g} x {effect}: {outcome}: {said}{note}", file=sys.stderr, flush=True)
     for (size, of), count in outcomes.items():
         for what, key, goal in (("recall", "right", 0.85), ("wrong", "wrong", 0.0)):
@@ -143,34 +140,6 @@ def _outcome(effect: str, result: Any) -> str:
     if sure:
         return "right" if effect in sure and len(sure) == 1 else "wrong"
     return "ambiguous" if any(effect in (one.name, *one.rivals) for one in result.findings) else "missed"
-
-
-def _is_identifiable(effect: str, recording: Recording, result: Any) -> bool:
-    """Whether recordings can identify an effect by what was done to the sensor, whatever was found."""
-    from palpate.core.gap.selection.identifiability import curvature_ratio, indistinguishable, unidentifiable
-
-    if effect == "drift" and is_multiplexed(recording):
-        return False
-    curvature = curvature_ratio(result.of("fit"), result.best.model)
-    return effect not in unidentifiable(result.coverage) and not indistinguishable(result.coverage, effect, curvature)
-
-
-def _closed_by_truth(freed: Any, result: Any) -> float:
-    """Share of the base model's squared error on the check recordings that is not there without the effect.
-
-    Channels that are not held against the amended model do not count.
-    """
-    outlying = {(one.recording, one.texel) for one in result.outlying}
-
-    def mean_square(diagnosis: Any) -> float:
-        parts = []
-        for predictor in diagnosis.of("check"):
-            miss = predictor.trial.reading - predictor.predict(diagnosis.base.model).reading
-            kept = [i for i in range(miss.shape[1]) if (predictor.trial.name, i) not in outlying]
-            parts.append(miss[:, kept].ravel())
-        return float(np.nanmean(np.concatenate(parts) ** 2))
-
-    return 1.0 - mean_square(freed) / mean_square(result)
 
 
 def _diagnosed(recording: Recording, folder: Path) -> Any:
