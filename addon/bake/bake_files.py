@@ -15,6 +15,7 @@ import secrets
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import bpy
@@ -52,6 +53,10 @@ from .bake_images import BakeImages
 
 CAN_SYNC_ALL = hasattr(os, "sync")
 """True where one call brings all written files onto the disk; elsewhere each file is synchronised by itself."""
+
+THREADED_ROW_BYTES = 1 << 14
+"""Size of a frame's row from which a thread writes it: its SHA-256 and its way to the disk then take the solver no time. For
+smaller ones, handing over costs what it saves (5 kB are written in 12 µs, 23 kB in 33 µs, 900 kB in 2 ms)."""
 
 
 def bake_folder(scene) -> Path:
@@ -149,8 +154,9 @@ class BakeFiles:
         self._scenario, self._digest = scenario, scenario.digest()
         self.folder = Path(os.path.abspath(folder))
         self.folders = {name: self.folder / self._names[name] for name in self._sensors}
-        self._writer = BackgroundWriter()
+        self._writer, self._row_writer = BackgroundWriter(), BackgroundWriter()
         self._has_images = images
+        self._frames = 0
         self._files: dict[str, dict[str, str]] = {name: {} for name in self._sensors}
         self._run = ""
         self._growing: Path | None = None
@@ -207,18 +213,23 @@ class BakeFiles:
                 self._images.rewrite_damaged(self._rows.frame)
         except OSError as error:
             raise _write_error(self.folder, error) from error
+        self._frames = frames
         return frames
 
     def write_frame(self, frame: Frame) -> None:
         """Write a frame: its row, and the tactile image of every sensor, some frames together, while the solver continues."""
         with _refusals_named(self.folder):
-            self._rows.append(frame)
+            self._frames += 1
+            if self._rows.row_bytes < THREADED_ROW_BYTES:
+                self._rows.append(frame)
+            else:
+                self._row_writer.submit(partial(self._rows.append, frame))
             if self._images is not None:
                 self._images.write(frame)
 
     def save_checkpoint(self, simulation) -> None:
         """Save the frames and the state of the solver, if the last checkpoint is some seconds old."""
-        if self._checkpoint.is_due(len(self._rows)):
+        if self._checkpoint.is_due(self._frames):
             self._checkpoint.save(simulation, self._sync_frames)
 
     def recording(self, simulation, warnings: Sequence[str]) -> Recording:
@@ -229,10 +240,9 @@ class BakeFiles:
         FileError
             It cannot be written or read.
         """
-        try:
+        with _refusals_named(self.folder):
+            self._row_writer.finish()
             return self._rows.recording(simulation.dt, self._digest, warnings, simulation.step_reason)
-        except OSError as error:
-            raise _write_error(self.folder, error) from error
 
     def complete(self, recording: Recording) -> None:
         """Write the recordings and bring all files onto the disk; the old bake stays the present one.
@@ -246,14 +256,19 @@ class BakeFiles:
             if self._images is not None:
                 self._images.submit()
         for name in self._sensors:
+            self._files[name] |= dict.fromkeys((RECORDING_NAME, SENSOR_NAME), "")  # in this order, whichever is done first
+            self._row_writer.submit(partial(self._write_sensor, name))
+        for name in self._sensors:
             self._write_recording(name, recording)
+        with _refusals_named(self.folder):
+            self._row_writer.finish()
         written = [self._new_folder(name) / file for name in self._sensors for file in (RECORDING_NAME, SENSOR_NAME)]
         if self._images is not None:
             with _refusals_named(self.folder):
                 written += self._images.finish()
             for name, (_, sha256) in self._images.states().items():
                 self._files[name][IMAGE_LIST_NAME] = sha256
-        self._writer.stop()
+        self._stop_writers()
         table = json.dumps([self._digest, *(sorted(files.items()) for files in self._files.values())])
         self.bake_id = hashlib.sha256(table.encode("utf-8", "surrogatepass")).hexdigest()[:32]
         for name, sensor in self._sensors.items():
@@ -284,11 +299,15 @@ class BakeFiles:
 
     def discard(self) -> None:
         """Remove the unfinished files and release the folder."""
-        self._writer.stop()
+        self._stop_writers()
         self._close()
         if self._growing is not None and bake_switch.pending_switch(self.folder) is None:
             bake_switch.remove_growing(self._growing)
         self._lock.release()
+
+    def _stop_writers(self) -> None:
+        self._writer.stop()
+        self._row_writer.stop()
 
     def _check_replaceable(self) -> None:
         for folder in self.folders.values():
@@ -361,6 +380,7 @@ class BakeFiles:
         """Bring all frames and images so far onto the disk."""
         with _refusals_named(self.folder):
             files = [] if self._images is None else self._images.finish()
+            self._row_writer.finish()
             self._rows.flush()
         self._sync([*files, self._growing / CHECKPOINT_FOLDER / FRAMES_FILE])
         images = {} if self._images is None else self._images.states()
@@ -378,14 +398,17 @@ class BakeFiles:
             raise _write_error(self.folder, error) from error
 
     def _write_recording(self, name: str, recording: Recording) -> None:
-        """Write the recording of one sensor, and what its texels are."""
-        sensor, folder, atomic = self._sensors[name], self._new_folder(name), not CAN_SYNC_ALL
-        save_recording(folder / RECORDING_NAME, replace(recording, sensors={name: recording.sensors[name]}), atomic=atomic)
-        save_sensor(folder / SENSOR_NAME, sensor.texels, sensor.painted, atomic=atomic)
-        try:
-            self._files[name] |= {file: file_sha256(folder / file) for file in (RECORDING_NAME, SENSOR_NAME)}
-        except OSError as error:
-            raise _write_error(self.folder, error) from error
+        """Write the recording of one sensor."""
+        path = self._new_folder(name) / RECORDING_NAME
+        save_recording(path, replace(recording, sensors={name: recording.sensors[name]}), atomic=not CAN_SYNC_ALL)
+        with _refusals_named(self.folder):
+            self._files[name][RECORDING_NAME] = file_sha256(path)
+
+    def _write_sensor(self, name: str) -> None:
+        """Write what the texels of one sensor are."""
+        sensor, path = self._sensors[name], self._new_folder(name) / SENSOR_NAME
+        save_sensor(path, sensor.texels, sensor.painted, atomic=not CAN_SYNC_ALL)
+        self._files[name][SENSOR_NAME] = file_sha256(path)
 
     def _manifest(self, sensor: Sensor, recording: Recording) -> Manifest:
         return replace(

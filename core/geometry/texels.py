@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,6 +15,11 @@ from .mesh import TriangleMesh, vertex_areas, vertex_normals
 
 FRAME_POSITION, FRAME_NORMAL, FRAME_TANGENT = slice(0, 3), slice(3, 6), slice(6, 9)
 """Columns of :attr:`Texels.local_frames`."""
+
+KEPT_LAYOUTS = 8
+"""Layouts of texels that are kept: a scene is read again whenever something in it has changed, and mostly not its sensors."""
+_last_layouts: dict[bytes, tuple[GridLayout | UVLayout, np.ndarray]] = {}
+"""By a digest of what they were made of, the last one last."""
 
 
 @dataclass(frozen=True)
@@ -124,7 +130,23 @@ def _triangles_inside(mesh: TriangleMesh, region: np.ndarray, name: str) -> np.n
 def _layout(
     position: np.ndarray, normals: np.ndarray, triangles: np.ndarray, quads: np.ndarray | None
 ) -> tuple[GridLayout | UVLayout, np.ndarray]:
-    """Return a grid where the texels form one, a texture map otherwise; and (n, 3) directions of the image's x axis."""
+    """Return a grid where the texels form one, a texture map otherwise; and (n, 3) directions of the image's x axis.
+
+    Of a region that is as it was at one of the last calls, the result is that of then. It must not be changed.
+    """
+    digest = hashlib.blake2b(digest_size=32)
+    for array in (position, normals, triangles, quads):
+        digest.update(b"" if array is None else f"{array.dtype}{array.shape}".encode() + array.tobytes())
+    found = _last_layouts.pop(digest.digest(), None) or _new_layout(position, normals, triangles, quads)
+    _last_layouts[digest.digest()] = found
+    while len(_last_layouts) > KEPT_LAYOUTS:
+        _last_layouts.pop(next(iter(_last_layouts)), None)
+    return found
+
+
+def _new_layout(
+    position: np.ndarray, normals: np.ndarray, triangles: np.ndarray, quads: np.ndarray | None
+) -> tuple[GridLayout | UVLayout, np.ndarray]:
     grid, along = grid_layout(position, normals, triangles, quads)
     if grid is not None and along is not None:
         return grid, along

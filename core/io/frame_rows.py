@@ -66,10 +66,19 @@ class FrameRows:
         self._bodies, self._sensors = tuple(bodies), tuple(texels)
         self._type = row_type(len(bodies), texels)
         self._row = np.zeros(1, self._type)
+        self._parts = {name: self._row[name] for name in self._type.names or ()}
+        # All of a row but the number of the frame. As floats, the bytes of truth values and of gaps are finite.
+        self._numbers = self._row.view(np.float64)[1:]
+        self._bytes = self._row.view(np.uint8).data
 
     def __len__(self) -> int:
         """Return how many frames were written."""
         return self._file.length // self._type.itemsize
+
+    @property
+    def row_bytes(self) -> int:
+        """Size of a row."""
+        return self._type.itemsize
 
     @property
     def sha256(self) -> str:
@@ -106,13 +115,14 @@ class FrameRows:
         ValueError
             A number is not finite (a fault of the program, not of the user).
         """
-        row = self._row[0]
-        row["frames"] = frame.frame
-        for name, values in self._values(frame):
-            if not np.isfinite(values).all():
-                raise ValueError(f"'{name}' of frame {frame.frame} has values that are not finite")
-            row[name] = values
-        self._file.append(self._row.tobytes())
+        values = self._values(frame)
+        self._parts["frames"][0] = frame.frame
+        for name, own in values:
+            self._parts[name][0] = own
+        if not np.isfinite(self._numbers).all():
+            name = next((name for name, own in values if not np.isfinite(own).all()), "frames")
+            raise ValueError(f"'{name}' of frame {frame.frame} has values that are not finite")
+        self._file.append(self._bytes)
 
     def flush(self) -> None:
         """Hand what was written to the operating system."""

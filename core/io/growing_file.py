@@ -59,7 +59,7 @@ class GrowingFile:
         self._take_over(open(self.path, "r+b"), length, digest)  # noqa: SIM115 - close() does
         return True
 
-    def append(self, content: bytes) -> None:
+    def append(self, content: bytes | memoryview) -> None:
         """Write at the end."""
         assert self._file is not None, "begin or restore comes first"
         self._file.write(content)

@@ -12,6 +12,7 @@ import tempfile
 import zipfile
 import zlib
 from collections.abc import Iterator, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from functools import lru_cache
 from typing import IO, Any
@@ -45,7 +46,11 @@ SMALL_BYTES = 1 << 16
 """Size up to which an array is held in memory nevertheless."""
 _COPIED = 1 << 20
 PACKED_BYTES = 1 << 22
+"""Size of all arrays up to which an archive is read into memory at once."""
+WRITTEN_BYTES = 1 << 25
 """Size of all arrays up to which an archive is made in memory and written at once."""
+THREADED_BYTES = 1 << 20
+"""Size of all arrays from which two threads compress them; starting the threads takes as long as compressing some 10 kB."""
 LEVEL = 3
 """Of the compression."""
 _LONG_AGO = (1980, 1, 1, 0, 0, 0)  # the earliest date of a zip archive; the current time would change the bytes
@@ -69,7 +74,7 @@ def write_arrays(path: str | os.PathLike, arrays: Mapping[str, np.ndarray], atom
     FileError
         The file cannot be written.
     """
-    if sum(array.nbytes for array in arrays.values()) <= PACKED_BYTES:
+    if sum(array.nbytes for array in arrays.values()) <= WRITTEN_BYTES:
         content = pack_arrays(arrays, compress)
         with write_file(path, atomic) as temporary:
             temporary.write_bytes(content)
@@ -94,18 +99,12 @@ def pack_arrays(arrays: Mapping[str, np.ndarray], compress: bool = True) -> byte
     parts: list[bytes] = []
     directory: list[bytes] = []
     place = 0
-    for name, array in arrays.items():
-        content = _npy_bytes(array)
+    for name, (packed, checksum, size) in zip(arrays, _packed_members(arrays, compress), strict=True):
         called = f"{name}.npy".encode()
-        if compress:
-            deflate = zlib.compressobj(LEVEL, zlib.DEFLATED, -15)
-            packed = deflate.compress(content) + deflate.flush()
-        else:
-            packed = content
         flags = 0 if called.isascii() else 0x800  # the name is UTF-8
         about = struct.pack(
-            "<5H3L2H", 20, flags, zipfile.ZIP_DEFLATED if compress else zipfile.ZIP_STORED, *_DOS_TIME, zlib.crc32(content),
-            len(packed), len(content), len(called), 0,
+            "<5H3L2H", 20, flags, zipfile.ZIP_DEFLATED if compress else zipfile.ZIP_STORED, *_DOS_TIME, checksum,
+            len(packed), size, len(called), 0,
         )  # fmt: skip
         parts += [b"PK\3\4", about, called, packed]
         directory += [b"PK\1\2", bytes((20, _UNIX)), about, struct.pack("<3H2L", 0, 0, 0, _PERMISSIONS, place), called]
@@ -114,6 +113,23 @@ def pack_arrays(arrays: Mapping[str, np.ndarray], compress: bool = True) -> byte
     count = len(arrays)
     end = struct.pack("<4s4H2LH", b"PK\5\6", 0, 0, count, count, len(listed), place, 0)
     return b"".join((*parts, listed, end))
+
+
+def _packed_members(arrays: Mapping[str, np.ndarray], compress: bool) -> Iterator[tuple[bytes, int, int]]:
+    """Yield the bytes of each array in the archive, the CRC-32 of what they hold, and its size."""
+    if not compress or sum(array.nbytes for array in arrays.values()) < THREADED_BYTES:
+        yield from (_packed_member(array, compress) for array in arrays.values())
+        return
+    with ThreadPoolExecutor(2, "palpate-packer") as pool:
+        yield from pool.map(_packed_member, arrays.values())
+
+
+def _packed_member(array: np.ndarray, compress: bool = True) -> tuple[bytes, int, int]:
+    content = _npy_bytes(array)
+    if not compress:
+        return content, zlib.crc32(content), len(content)
+    deflate = zlib.compressobj(LEVEL, zlib.DEFLATED, -15)
+    return deflate.compress(content) + deflate.flush(), zlib.crc32(content), len(content)
 
 
 def _npy_bytes(array: np.ndarray) -> bytes:

@@ -116,6 +116,20 @@ def test_the_next_bake_goes_on(killed, tmp_path):
     assert load_recording(tmp_path / "palpate" / "Pad" / "recording.npz").frames.tolist() == list(range(1, 9))
 
 
+def test_rows_that_a_thread_writes_are_the_same(tmp_path, monkeypatch):
+    """Those of large sensors: a bake that was killed ends with the bytes of a whole one whose rows no thread wrote."""
+    always_due(monkeypatch)
+    scene, *_ = press_and_drop(frames=8)
+    save(tmp_path)
+    monkeypatch.setattr(bake_files, "THREADED_ROW_BYTES", 1 << 40)
+    expected = contents_of_a_whole_bake(scene, tmp_path)
+    monkeypatch.setattr(bake_files, "THREADED_ROW_BYTES", 0)
+    scene.palpate.folder = str(tmp_path / "palpate")
+    abandon(scene, 8 + 6)
+    assert computed(scene)[0] == 6
+    assert contents(tmp_path / "palpate") == expected
+
+
 @pytest.mark.parametrize("what", ["parameter", "damaged state", "lost frames", "lost images"])
 def test_what_does_not_fit_is_begun_anew(killed, tmp_path, what):
     scene, pad = killed

@@ -70,9 +70,13 @@ def test_archives_made_in_memory_are_those_that_are_written_member_by_member(tmp
     for compress in (True, False):
         npz.write_arrays(tmp_path / "small.npz", arrays, compress=compress)
         with monkeypatch.context() as patch:
-            patch.setattr(npz, "PACKED_BYTES", -1)
+            patch.setattr(npz, "WRITTEN_BYTES", -1)
             npz.write_arrays(tmp_path / "large.npz", arrays, compress=compress)
-        assert (tmp_path / "small.npz").read_bytes() == (tmp_path / "large.npz").read_bytes()
+        with monkeypatch.context() as patch:
+            patch.setattr(npz, "THREADED_BYTES", 0)
+            npz.write_arrays(tmp_path / "threads.npz", arrays, compress=compress)
+        for name in ("small", "threads"):
+            assert (tmp_path / f"{name}.npz").read_bytes() == (tmp_path / "large.npz").read_bytes()
     with np.load(tmp_path / "small.npz") as members:
         for name, array in arrays.items():
             np.testing.assert_array_equal(members[name], array)
