@@ -9,6 +9,8 @@ BIN := $(VENV)/bin
 DEMO_OUT ?= demo-output
 # Arguments for pytest, as in `make test PYTEST_ARGS='-k friction'`
 PYTEST_ARGS ?=
+# Which Blender `make test-ui` opens: 4.3 or 5.2
+BLENDER ?= 4.3
 # One group of benchmarks, as in `make bench ONLY=solver`
 ONLY ?=
 # Address of documentation and support, for the zips that are uploaded to extensions.blender.org
@@ -22,7 +24,8 @@ ATTACK_ARGS ?=
 help:
 	@echo 'make demo     set up and run the demo: a picture, tactile images and the forces, in $(DEMO_OUT)/'
 	@echo 'make test     lint, type check, and all tests in bpy $(BPY45) and $(BPY50)'
-	@echo 'make test-ui  the extension in a real Blender window (Debian, as root: it sets up a Blender of its own)'
+	@echo 'make test-ui  the extension in a real Blender window (Debian, as root: it sets up a Blender of its own);'
+	@echo '              BLENDER=5.2 for that one (default $(BLENDER))'
 	@echo 'make bench    benchmarks, one JSON line per figure; ONLY=solver for one group'
 	@echo 'make attack   faults, kills, power cuts and bad input in thousands; SHORT=1 for ten minutes, ATTACK_ARGS=faults for one area'
 	@echo 'make docs     the documentation as a site, in build/site/'
@@ -62,8 +65,8 @@ test: lint env50
 	$(VENV50)/bin/python -m pytest tests/blender $(PYTEST_ARGS)
 
 test-ui: env
-	$(BIN)/python tools/provision_blender.py
-	$(BIN)/python -m pytest tests/ui $(PYTEST_ARGS)
+	$(BIN)/python tools/provision_blender.py --blender $(BLENDER)
+	$(BIN)/python -m pytest tests/ui --blender $(BLENDER) $(PYTEST_ARGS)
 
 $(VENV)/.bench: $(VENV)/.ready
 	$(BIN)/python -m pip install --quiet --editable '.[bench]'

@@ -7,8 +7,9 @@ with chroot, inside a mount and process namespace of its own: nothing is install
 kept, so a second run takes a moment and an interrupted one goes on. The package mirror is the one that this
 system's apt is configured with.
 
-    python tools/provision_blender.py            set it up (as root, on Debian; one to three minutes, 2 GB)
-    python tools/provision_blender.py --shell    a shell inside
+    python tools/provision_blender.py                  set up Blender 4.3 (as root, on Debian; one to three minutes, 2 GB)
+    python tools/provision_blender.py --blender 5.2    Blender 5.2, in a folder of its own
+    python tools/provision_blender.py --shell          a shell inside
 """
 
 from __future__ import annotations
@@ -24,11 +25,9 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
-# Debian 13: Blender 4.3, on Python 3.13 and numpy 2
-SUITE = "trixie"
-PYTHON_VERSION = "3.13"
 KEYRING = Path("/usr/share/keyrings/debian-archive-keyring.gpg")
 PACKAGES = [
     # python3-…: what an official Blender brings along and Debian's takes from the system
@@ -40,25 +39,48 @@ PACKAGES = [
 ]
 
 
+@dataclass(frozen=True)
+class Debian:
+    """A Debian suite that carries a Blender, and what that Blender needs beyond PACKAGES."""
+
+    suite: str
+    python: str
+    more: tuple[str, ...] = ()
+
+    @property
+    def packages(self) -> list[str]:
+        """What is installed."""
+        return [*PACKAGES, *self.more]
+
+
+# Blender → the Debian that has it; both run on Debian's Python and on numpy 2
+DEBIAN = {
+    "4.3": Debian("trixie", "3.13"),
+    # cattr: the extensions' own module imports it since 5.0
+    "5.2": Debian("sid", "3.14", ("python3-cattr",)),
+}
+DEFAULT = "4.3"
+
+
 class ProvisionError(Exception):
     """Blender cannot be set up here; the message says why and what to do."""
 
 
-def folder() -> Path:
-    """Folder of the small Debian system."""
+def folder(blender: str) -> Path:
+    """Folder of the small Debian system with this Blender, as in "4.3"."""
     cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
-    return cache / "palpate" / f"blender-{SUITE}"
+    return cache / "palpate" / f"blender-{DEBIAN[blender].suite}"
 
 
-def inside(argv: Sequence[str], *, root: Path | None = None, binds: Mapping[Path, str] | None = None) -> list[str]:
+def inside(argv: Sequence[str], root: Path, *, binds: Mapping[Path, str] | None = None) -> list[str]:
     """Return the command that runs `argv` inside the small system.
 
     Parameters
     ----------
     argv : sequence of str
         Command and arguments, with paths as seen inside.
-    root : Path, optional
-        The system's folder, by default `folder()`.
+    root : Path
+        The system's folder.
     binds : mapping of Path to str, optional
         Folders of this system and where inside they appear.
 
@@ -67,7 +89,6 @@ def inside(argv: Sequence[str], *, root: Path | None = None, binds: Mapping[Path
     list of str
         For `subprocess`. Ending that process ends everything it started inside.
     """
-    root = root or folder()
     script = ['root="$1"; shift', 'mount --rbind /dev "$root/dev"']
     script += [f'mount -t {kind} {kind} "$root/{name}"' for kind, name in (("proc", "proc"), ("tmpfs", "tmp"))]
     arguments = [str(root)]
@@ -134,8 +155,40 @@ def locked(path: Path) -> Iterator[None]:
         yield
 
 
-def provision() -> Path:
+def install_debootstrap(log: Path) -> None:
+    """Install what unpacks a Debian, unless it is there."""
+    if shutil.which("debootstrap") and KEYRING.is_file():
+        return
+    say("Installing debootstrap …")
+    call(["apt-get", "update", "-q"], log, "Updating the package lists")
+    install = ["apt-get", "install", "-qy", "--no-install-recommends", "debootstrap", "debian-archive-keyring"]
+    call(["env", "DEBIAN_FRONTEND=noninteractive", *install], log, "Installing debootstrap")
+
+
+def check_candidate(blender: str, root: Path) -> None:
+    """Raise unless the archive that the small system knows has this Blender, with the Python that is expected.
+
+    Debian's sid moves on, and a mirror may lag behind or leave it out.
+    """
+    debian = DEBIAN[blender]
+    for package, version in (("blender", blender), ("python3", debian.python)):
+        query = subprocess.run(inside(["apt-cache", "policy", package], root), capture_output=True, text=True)
+        found = re.search(r"Candidate: (?:\d+:)?(\S+)", query.stdout)
+        there = found[1] if found else "none"
+        if not there.startswith(f"{version}."):
+            raise ProvisionError(
+                f"Blender {blender} needs {package} {version}, but Debian {debian.suite} at {mirror()} has {there}; "
+                f"use another mirror, or another Blender ({', '.join(DEBIAN)}), or amend DEBIAN in {Path(__file__).name}."
+            )
+
+
+def provision(blender: str = DEFAULT) -> Path:
     """Set up the small system with its Blender, or what is missing of it.
+
+    Parameters
+    ----------
+    blender : str
+        One of DEBIAN.
 
     Returns
     -------
@@ -148,59 +201,62 @@ def provision() -> Path:
         If this is not Debian, not root, or a package cannot be had.
     """
     check_system()
-    root = folder()
+    debian, root = DEBIAN[blender], folder(blender)
     with locked(root.with_suffix(".lock")):
         log = root.with_suffix(".log")
         unpacked, installed = root / ".palpate-unpacked", root / ".palpate-installed"
-        wanted = hashlib.sha256(" ".join(PACKAGES).encode()).hexdigest()
+        wanted = hashlib.sha256(" ".join(debian.packages).encode()).hexdigest()
         if installed.is_file() and installed.read_text() == wanted:
             return root
         log.unlink(missing_ok=True)
         if not unpacked.is_file():
-            if not shutil.which("debootstrap") or not KEYRING.is_file():
-                say("Installing debootstrap …")
-                call(["apt-get", "update", "-q"], log, "Updating the package lists")
-                install = ["apt-get", "install", "-qy", "--no-install-recommends"]
-                install += ["debootstrap", "debian-archive-keyring"]
-                call(["env", "DEBIAN_FRONTEND=noninteractive", *install], log, "Installing debootstrap")
+            install_debootstrap(log)
             if root.exists():
                 say("Removing what an interrupted run left …")
                 shutil.rmtree(root)
-            say(f"Unpacking a small Debian {SUITE} into {root} …")
+            say(f"Unpacking a small Debian {debian.suite} into {root} …")
             start = time.monotonic()
-            strap = ["debootstrap", "--variant=minbase", f"--keyring={KEYRING}", SUITE, str(root), mirror()]
+            strap = ["debootstrap", "--variant=minbase", f"--keyring={KEYRING}", debian.suite, str(root), mirror()]
             call(["unshare", "--mount", *strap], log, "Unpacking Debian")
             unpacked.touch()
             say(f"  {time.monotonic() - start:.0f} s")
         say("Installing Blender and a virtual screen in it …")
         start = time.monotonic()
-        for step in (
-            ["dpkg", "--configure", "-a"],
-            ["apt-get", "update", "-q"],
-            ["apt-get", "install", "-qy", "--no-install-recommends", *PACKAGES],
-            ["apt-get", "clean"],
-        ):
-            command = inside(["env", "DEBIAN_FRONTEND=noninteractive", *step], root=root)
-            call(command, log, "Installing Blender")
+        install_blender(blender, root, log)
         installed.write_text(wanted)
         say(f"  {time.monotonic() - start:.0f} s")
     return root
 
 
+def install_blender(blender: str, root: Path, log: Path) -> None:
+    """Install Blender and the rest, if the archive has that Blender."""
+
+    def step(*argv: str) -> None:
+        call(inside(["env", "DEBIAN_FRONTEND=noninteractive", *argv], root), log, "Installing Blender")
+
+    step("dpkg", "--configure", "-a")
+    # sid's lists are good for a week, and some mirrors stand still for longer; their signature is checked all the same
+    step("apt-get", "update", "-q", "-o", "Acquire::Check-Valid-Until=false")
+    check_candidate(blender, root)
+    step("apt-get", "install", "-qy", "--no-install-recommends", *DEBIAN[blender].packages)
+    step("apt-get", "clean")
+
+
 def main(argv: list[str] | None = None) -> int:
     """Set it up, and say what is there."""
     parser = argparse.ArgumentParser(description="Set up a real Blender for the window tests.")
+    parser.add_argument("--blender", choices=list(DEBIAN), default=DEFAULT, help="which one (default: %(default)s)")
     parser.add_argument("--shell", action="store_true", help="then open a shell inside")
     args = parser.parse_args(argv)
     try:
-        root = provision()
+        root = provision(args.blender)
     except ProvisionError as error:
         print(error, file=sys.stderr)
         return 1
-    version = subprocess.run(inside(["blender", "--version"]), capture_output=True, text=True, check=True)
+    version = subprocess.run(inside(["blender", "--version"], root), capture_output=True, text=True, check=True)
     say(f"{version.stdout.splitlines()[0]} in {root}")
     if args.shell:
-        return subprocess.run(inside(["bash"])).returncode
+        return subprocess.run(inside(["bash"], root)).returncode
     return 0
 
 

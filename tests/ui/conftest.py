@@ -19,6 +19,11 @@ SCREEN = (1600, 1000)
 WORK, HERE = "/palpate-work", "/palpate-ui"
 
 
+def pytest_addoption(parser):
+    versions = list(provision_blender.DEBIAN)
+    parser.addoption("--blender", choices=versions, default=provision_blender.DEFAULT, help="which Blender opens its window")
+
+
 @dataclass
 class RealBlender:
     """Debian's Blender in its own small system, with a user folder that holds nothing but the extension."""
@@ -30,7 +35,8 @@ class RealBlender:
     def run(self, command: list[str], log: Path, timeout: float) -> int:
         """Run a command inside, output into a log; return its status."""
         environment = ["env", f"BLENDER_USER_RESOURCES={WORK}/user", "LIBGL_ALWAYS_SOFTWARE=1"]
-        inside = provision_blender.inside([*environment, *command], root=self.root, binds={self.work: WORK, self.here: HERE})
+        folders = {self.work: WORK, self.here: HERE}
+        inside = provision_blender.inside([*environment, *command], self.root, binds=folders)
         with log.open("w", encoding="utf-8") as out:
             return subprocess.run(
                 inside, stdout=out, stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL, timeout=timeout
@@ -50,10 +56,12 @@ class RealBlender:
                 raise RuntimeError(f"Installing {zip_path.name} failed with status {code}:\n{text}")
 
     def give_brushes(self) -> None:
-        """Debian leaves out Blender's brushes (assets); those that come with bpy are the same."""
-        spec = importlib.util.find_spec("bpy")
-        assets = next(Path(spec.submodule_search_locations[0]).glob("*/datafiles/assets"))
-        shutil.copytree(assets, self.root / "usr/share/blender/datafiles/assets", dirs_exist_ok=True)
+        """Debian's 4.3 leaves out Blender's brushes (assets); those that come with bpy are the same."""
+        there = self.root / "usr/share/blender/datafiles/assets"
+        if not (there / "brushes").is_dir():
+            spec = importlib.util.find_spec("bpy")
+            assets = next(Path(spec.submodule_search_locations[0]).glob("*/datafiles/assets"))
+            shutil.copytree(assets, there, dirs_exist_ok=True)
 
     def play(self, road: Path, out: Path, timeout: float) -> dict:
         """Play a road in a window on a virtual screen; return its results.
@@ -114,14 +122,20 @@ def blank(picture: Path) -> bool:
 
 
 @pytest.fixture(scope="session")
-def real_blender(repository):
+def blender_version(request):
+    """Return which Blender opens its window, as in "4.3"."""
+    return request.config.getoption("--blender")
+
+
+@pytest.fixture(scope="session")
+def real_blender(repository, blender_version):
     """Return a real Blender with the zip of this very work tree installed."""
-    work = repository / "build" / "ui"
+    work = repository / "build" / "ui" / blender_version
     with provision_blender.locked(repository / "build" / "ui.lock"):  # a second run waits for the first
         shutil.rmtree(work, ignore_errors=True)
         work.mkdir(parents=True)
-        blender = RealBlender(provision_blender.provision(), work, Path(__file__).parent)
-        python = provision_blender.PYTHON_VERSION
+        blender = RealBlender(provision_blender.provision(blender_version), work, Path(__file__).parent)
+        python = provision_blender.DEBIAN[blender_version].python
         blender.give_brushes()
         made = {"blender_range": ("4.2.0", None), "suffix": "-local"}
         # one road watches the compiler at work
@@ -130,14 +144,14 @@ def real_blender(repository):
 
 
 @pytest.fixture
-def play_road(real_blender, repository):
+def play_road(real_blender, blender_version, repository):
     """Return a function that plays a road by name and returns its results; pictures go to build/ui-screenshots."""
 
     def play(name: str, timeout: float = 300.0) -> dict:
         return real_blender.play(Path(__file__).parent / "roads" / f"{name}.py", real_blender.work / name, timeout)
 
     yield play
-    shots = repository / "build" / "ui-screenshots"
+    shots = repository / "build" / "ui-screenshots" / blender_version
     shots.mkdir(parents=True, exist_ok=True)
     for picture in real_blender.work.glob("*/*.png"):
         shutil.copy(picture, shots / f"{picture.parent.name}-{picture.name}")
