@@ -18,6 +18,8 @@ MAX_SENSORS = 4
 IMAGE, SPACING, CURVE, BAR = 120.0, 12.0, 56.0, 10.0
 """Longest side of an image, space between parts, height of the curves and width of the colour bar; pixels at a resolution scale
 of one."""
+NO_LOAD = 1e-9
+"""End of the colours (N or Pa) as long as nothing has been touched, so that no load has the colour of zero."""
 MAX_IMAGE_SIDE = 256
 """Pixels along a side of an image: larger images are subsampled, images of few texels are enlarged."""
 COLORS = ((0.34, 0.7, 0.91), (1.0, 0.62, 0.25), (0.4, 0.85, 0.6), (0.9, 0.6, 0.8))
@@ -119,7 +121,9 @@ def inset_content(scene, frame, texels: dict, frames: np.ndarray, loads: dict, m
 
 
 def range_label(settings, maximum: float) -> str:
-    """Return the value at the end of the colours with its unit."""
+    """Return the value at the end of the colours with its unit; nothing as long as nothing has been touched."""
+    if maximum <= NO_LOAD:
+        return ""
     return f"{maximum / 1e3:.3g} kPa" if settings.quantity == "PRESSURE" else f"{maximum:.3g} N"
 
 

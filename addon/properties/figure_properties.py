@@ -16,6 +16,7 @@ from bpy.props import (
 
 from ...core.export.registry import exporters
 from ...core.figures.gel_image import LIGHT_ANGLES, MARKERS_ALONG, GelStyle
+from . import path_options
 from .scene_units import in_units
 
 KINDS = (
@@ -43,7 +44,7 @@ class PALPATE_PG_figures(bpy.types.PropertyGroup):
         description="Folder of the figures; // is the folder of the .blend",
         default="//figures",
         subtype="DIR_PATH",
-        **_plain,
+        options=path_options.OUTPUT,
     )
     kinds: EnumProperty(
         name="Figures",

@@ -6,7 +6,7 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, Po
 
 from ...core.figures import color_maps
 from ..session import session_state
-from . import figure_properties, study_properties
+from . import figure_properties, path_options, study_properties
 
 SETTING: dict = {"options": set(), "update": session_state.settings_changed}
 """A setting of a scene has no keyframes; what is shown follows it."""
@@ -34,7 +34,7 @@ class PALPATE_PG_scene(bpy.types.PropertyGroup):
         description="Tactile images and recordings go here, in one folder per sensor; // is the folder of the .blend",
         default="//palpate",
         subtype="DIR_PATH",
-        **SETTING,
+        **{**SETTING, "options": path_options.OUTPUT},
     )
     use_auto_dt: BoolProperty(
         name="Auto Time Step",

@@ -11,6 +11,8 @@ from bpy.props import (
     StringProperty,
 )
 
+from . import path_options
+
 NUMBER, WORDS = "NUMBER", "WORDS"
 """Kinds of what varies: numbers have every distribution, switches, words and whole numbers only a choice."""
 DESIGNS = (
@@ -69,7 +71,7 @@ class PALPATE_PG_study(bpy.types.PropertyGroup):
         "// is the folder of the .blend",
         default="//study.toml",
         subtype="FILE_PATH",
-        options=set(),
+        options=path_options.OUTPUT,
     )
     design: EnumProperty(name="Design", description="How the values of the runs are chosen", items=DESIGNS, options=set())
     samples: IntProperty(

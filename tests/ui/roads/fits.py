@@ -59,6 +59,7 @@ def road(ui):
     yield 0.5
     ui.value("preset", {"k": pad().palpate.k, "mus": pad().palpate.mus})
     yield from ui.screenshot("preset-chosen")
+    yield from ui.key("ESC")  # Blender 5.2 leaves the list open
     yield from ui.move(*ui.centre(view))
     yield from ui.key("Z", ctrl=True)
     yield 0.5

@@ -72,7 +72,7 @@ def road(ui):
     yield from ui.filter("unit")
     yield from ui.screenshot("readout")
     yield from ui.filter("")
-    yield from ui.filter("arrow")
+    yield from ui.filter("Indentation")
     yield from ui.screenshot("display")
     yield from ui.filter("")
 
