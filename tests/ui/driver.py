@@ -266,9 +266,9 @@ class UI:
 
     def filter(self, words: str) -> Steps:
         """Search the Properties editor (Ctrl F): shows only what matches and opens closed panels for it; "" ends it."""
-        region = self.region(self.area("PROPERTIES"))
-        # where no panel is: in Blender 5.2 Enter closes the one that is under the mouse
-        yield from self.move(region.x + region.width // 2, region.y + region.height - 8)
+        area = self.area("PROPERTIES")
+        # beside the panels: in Blender 5.2 the keys also close the one whose header is under the mouse
+        yield from self.move(self.region(area).x + 4, self.centre(area)[1])
         yield from self.key("F", alt=True)
         if words:
             yield from self.key("F", ctrl=True)
