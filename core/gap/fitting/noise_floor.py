@@ -18,18 +18,6 @@ SHORTEST_STRETCH = 8
 SMALLEST_NOISE = 1e-4
 """Least standard deviation of the noise, as a share of the range."""
 AUTOCOVARIANCE_LAGS = 64
-EARLY_RATIO = 2.0
-"""Contact begins earlier than the rig says if readings before the first contact vary by more than this many times (standard
-deviation) as in the part of that time that is farthest from contact. Chosen by eye; halves of noise with a memory of half the
-stretch differ by 1.4."""
-FARTHEST_SHARES = (0.5, 0.25, 0.125)
-"""Shares of the time before the first contact that are tried as that part, in turn. The next one counts if it is again so much
-quieter. Chosen by eye."""
-BEFORE_EARLY_CONTACT = "the beginning of recordings, before readings rise"
-"""Source of the noise where contact begins earlier than the rig says."""
-NEIGHBOURING_SAMPLES = "differences between samples"
-NOTHING_UNLOADED = f"{NEIGHBOURING_SAMPLES}, because no part without contact is long enough"
-"""Sources of the noise where readings do not change at all without load, and where no part is without load."""
 MANY_TEXELS = 8
 """Number of texels from which on their common mode is removed before their noise is measured."""
 OUTLIER_VARIANCE = 2.0
@@ -82,24 +70,39 @@ def reading_noise(predictors: Sequence[Predictor], full: float) -> ChannelNoise:
     result is the weighted median of these samples, so that a few texels that respond to their neighbours do not matter. If no
     stretch is long enough, second differences of the readings are used, which assumes white noise.
 
-    Contact may begin earlier than the rig says, as where a height is off. Then readings rise in time that counts as unloaded,
-    and only the beginning of the recordings is used, which is farthest from the first contact.
-
     Parameters
     ----------
     predictors : sequence of Predictor
     full : float
         Range of the readings; smaller noise than a ten-thousandth of it is taken as that.
     """
+    variances: list[float] = []
+    weights: list[float] = []
+    curves: list[np.ndarray] = []
+    for predictor in predictors:
+        reading = predictor.trial.reading
+        if reading is None:
+            continue
+        for start, stop in _unloaded_stretches(predictor):
+            for texels in _unloaded_texels(predictor, start, stop):
+                part = reading[start:stop][:, texels]
+                part = part[:, np.isfinite(part).all(axis=0)]
+                if part.shape[1]:
+                    variance, curve = _variance_and_autocovariance(part)
+                    variances += list(variance)
+                    weights += [float(stop - start)] * len(variance)
+                    curves.append(curve * (stop - start) * part.shape[1])
     smallest = SMALLEST_NOISE * full
-    stretches = [(p, start, stop) for p in predictors for start, stop in _unloaded_stretches(p)]
-    whole = _noise_of(stretches, smallest)
-    if whole is not None:
-        return _before_early_contact(predictors, smallest) or whole
+    alive = np.array(variances) > smallest**2
+    if alive.sum() >= 1:
+        values, weight = np.array(variances)[alive], np.array(weights)[alive]
+        order = np.argsort(values)
+        share = np.cumsum(weight[order]) / weight.sum()
+        middle = values[order][np.searchsorted(share, 0.5)]
+        return ChannelNoise(float(np.sqrt(middle)), integral_time(curves), "stretches without load")
     second = [_white_noise_deviation(p.trial.reading) for p in predictors if p.trial.reading is not None]
     deviation = float(np.median(np.concatenate(second))) if second else 0.0
-    rests = any(_unloaded_texels(p, start, stop) for p, start, stop in stretches)
-    return ChannelNoise(max(deviation, smallest), 1.0, NEIGHBOURING_SAMPLES if rests else NOTHING_UNLOADED)
+    return ChannelNoise(max(deviation, smallest), 1.0, "differences between samples")
 
 
 def force_noise(predictors: Sequence[Predictor], full: float) -> ChannelNoise:
@@ -107,50 +110,7 @@ def force_noise(predictors: Sequence[Predictor], full: float) -> ChannelNoise:
     second = [_white_noise_deviation(p.trial.force) for p in predictors if p.trial.force is not None]
     deviation = float(np.nanmedian(np.concatenate(second))) if second else 0.0
     smallest = SMALLEST_NOISE * full
-    return ChannelNoise(max(deviation if np.isfinite(deviation) else 0.0, smallest), 1.0, NEIGHBOURING_SAMPLES)
-
-
-def _noise_of(
-    stretches: Sequence[tuple[Predictor, int, int]], smallest: float, source: str = "stretches without load"
-) -> ChannelNoise | None:
-    """Noise of unloaded texels in stretches of samples; None if none is there. Smaller deviations are those of no channel."""
-    variances: list[float] = []
-    weights: list[float] = []
-    curves: list[np.ndarray] = []
-    for predictor, start, stop in stretches:
-        reading = predictor.trial.reading
-        if reading is None:
-            continue
-        for texels in _unloaded_texels(predictor, start, stop):
-            part = reading[start:stop][:, texels]
-            part = part[:, np.isfinite(part).all(axis=0)]
-            if part.shape[1]:
-                variance, curve = _variance_and_autocovariance(part)
-                variances += list(variance)
-                weights += [float(stop - start)] * len(variance)
-                curves.append(curve * (stop - start) * part.shape[1])
-    alive = np.array(variances) > smallest**2
-    if not alive.any():
-        return None
-    values, weight = np.array(variances)[alive], np.array(weights)[alive]
-    order = np.argsort(values)
-    share = np.cumsum(weight[order]) / weight.sum()
-    middle = values[order][np.searchsorted(share, 0.5)]
-    return ChannelNoise(float(np.sqrt(middle)), integral_time(curves), source)
-
-
-def _before_early_contact(predictors: Sequence[Predictor], smallest: float) -> ChannelNoise | None:
-    """Noise at the beginning of recordings whose contact begins earlier than the rig says; None if it does not."""
-    ends = [(p, int(np.argmax((p.stimulus.load > 0).any(axis=1)))) for p in predictors]
-    ends = [(p, end) for p, end in ends if end >= SHORTEST_STRETCH]
-    before = _noise_of([(p, 0, end) for p, end in ends], smallest)
-    found = None
-    for share in FARTHEST_SHARES if before is not None else ():
-        kept = [(p, 0, int(share * end)) for p, end in ends if share * end >= SHORTEST_STRETCH]
-        quieter = _noise_of(kept, smallest, BEFORE_EARLY_CONTACT) if kept else None
-        if quieter is not None and before is not None and before.deviation > EARLY_RATIO * quieter.deviation:
-            found = before = quieter
-    return found
+    return ChannelNoise(max(deviation if np.isfinite(deviation) else 0.0, smallest), 1.0, "differences between samples")
 
 
 def _unloaded_stretches(predictor: Predictor) -> list[tuple[int, int]]:

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from ..dataset.fault_kinds import FAULT_KINDS
 from ..fitting.intervals import ParameterInterval
-from ..fitting.noise_floor import NOTHING_UNLOADED
 from ..fitting.residual_tests import LEAST_STRUCTURE
 from ..forward.contact_phases import FEATURES
 from ..selection.check_recordings import CHECK_CLOSED
@@ -193,17 +192,6 @@ def evidence(result: Diagnosis, errors: GapErrors) -> list[str]:
     return said
 
 
-EARLY_CONTACT = (
-    "Readings rise before poses, depths or forces say that anything touches the sensor, so that no name is sure: contact "
-    'begins earlier. Try contact_height = "free" in [sensor], and check shapes, clocks and the zero of the forces. The noise '
-    "was measured before they rise."
-)
-NEVER_WITHOUT_CONTACT = (
-    "No recording has a part without contact that is long enough to measure the noise in, so it was taken from differences "
-    "between neighbouring samples, which is too little for slow noise: begin recordings with half a second without contact."
-)
-
-
 def noise_sentence(share: float, left: float | None) -> str:
     """Return what a reader should know of loud noise.
 
@@ -238,10 +226,6 @@ def warnings(result: Diagnosis) -> list[str]:
             f"Up to {overpressed} texels were pressed past the maximum penetration of "
             f"{result.rig.parameters.max_penetration * 1e3:.3g} mm; here they go on acting, in a simulation they would not."
         )
-    if result.contact_is_early:
-        said.append(EARLY_CONTACT)
-    if result.noise[0].source == NOTHING_UNLOADED and any(p.trial.reading is not None for p in result.predictors):
-        said.append(NEVER_WITHOUT_CONTACT)
     share = result.noise[0].deviation / result.full[0]
     if share > LOUD_NOISE:
         said.append(noise_sentence(share, nrmse(result.of("fit"), result.best.model, result.full)))

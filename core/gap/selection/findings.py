@@ -11,7 +11,7 @@ from ..data_faults.data_fault import DataFault
 from ..dataset.rig import Rig
 from ..fitting.intervals import ParameterInterval
 from ..fitting.least_squares import Fit
-from ..fitting.noise_floor import BEFORE_EARLY_CONTACT, ChannelNoise, Coverage
+from ..fitting.noise_floor import ChannelNoise, Coverage
 from ..fitting.residual_tests import ResidualStructure
 from ..fitting.spectral_lines import SpectralLine
 from ..forward.predictor import Model, Predictor
@@ -170,16 +170,6 @@ class Diagnosis:
         A unit that is wrong in all recordings alike is none of these: the stiffness is fitted.
         """
         return [fault for fault in self.faults if not fault.put_right and not self._is_scale(fault)]
-
-    @property
-    def contact_is_early(self) -> bool:
-        """Whether readings rise before the models say that anything touches: an effect may have been fitted to that.
-
-        A free contact height, or a misalignment, is what says it, so that it misleads no more.
-        """
-        is_free = any(isinstance(predictor.trial.contact_height, str) for predictor in self.predictors)
-        is_found = any(effect.name == "misalignment" for effect in self.best.model.effects)
-        return self.noise[0].source == BEFORE_EARLY_CONTACT and not is_free and not is_found
 
     def _is_scale(self, fault: DataFault) -> bool:
         return fault.kind == "unit" and len(fault.trials) == len(self.predictors)

@@ -53,7 +53,7 @@ def conclude(result: Diagnosis, view_set: ViewSet, state: SelectionState, gap_si
     unsure = unsure_names(result, view_set, state, gap_sizes)
     result.findings = [
         replace(one, confidence=min(one.confidence, UNSURE_CONFIDENCE))
-        if one.name in unsure or result.misleading_faults or result.contact_is_early
+        if one.name in unsure or result.misleading_faults
         else one
         for one in result.findings
     ]
@@ -62,8 +62,8 @@ def conclude(result: Diagnosis, view_set: ViewSet, state: SelectionState, gap_si
 
 
 def _doubt_without_rivals(result: Diagnosis) -> None:
-    """Lower the confidence of names that are not sure and have no rival, unless the recordings are why."""
-    if not result.misleading_faults and not result.contact_is_early:
+    """Lower the confidence of names that are not sure and have no rival, unless faults of the data are why."""
+    if not result.misleading_faults:
         groups = {name for group in result.ambiguous for name in group}
         doubted = {one.name for one in result.findings if one.confidence <= UNSURE_CONFIDENCE} - groups
         result.findings = [
