@@ -45,14 +45,14 @@ def build(scene) -> None:
     paper = scene_builder.material("Backdrop", (0.30, 0.32, 0.35), roughness=0.85)
     scene_builder.add_stage(scene, paper, aim=(0.0, 0.0, 15.0), camera=(60.0, -230.0, 150.0), size=0.6)
     scene.frame_set(scene.frame_start)
-    scene_builder.frame_objects(scene, [sensor for sensor, _ in sensors], region=(0.06, 0.06, 0.94, 0.62), size=(1100, 600))
+    scene_builder.frame_objects(scene, [sensor for sensor, _ in sensors], region=(0.06, 0.06, 0.94, 0.70), size=(1100, 600))
     scene_builder.add_readme(TEXT)
 
 
 def _grid(scene):
     vertices, faces, texels = scene_builder.pad_mesh(10, 10, 3.0, 4.0, 6.0)
     sensor = scene_builder.mesh_object(scene, GRID, vertices, faces)
-    sensor.location = (-46.0, 0.0, 14.0)
+    sensor.location = (-26.0, 16.0, 14.0)
     _choose(sensor, texels)
     return sensor, 14.0
 
@@ -66,7 +66,7 @@ def _sphere(scene):
         scene, SPHERE, [v.co for v in made.verts], [[v.index for v in f.verts] for f in made.faces]
     )
     made.free()
-    sensor.location = (0.0, 0.0, 14.0)
+    sensor.location = (25.0, 20.0, 14.0)
     up = [v.index for v in sensor.data.vertices if v.co.z > -0.2 * SPHERE_RADIUS]
     _choose(sensor, up)
     return sensor, 14.0 + SPHERE_RADIUS
@@ -75,7 +75,7 @@ def _sphere(scene):
 def _tip(scene):
     vertices, faces = fingertip.capsule()
     sensor = scene_builder.mesh_object(scene, TIP, vertices, faces)
-    sensor.location, sensor.rotation_euler = (44.0, 0.0, 14.0), (0.0, 0.0, math.radians(-125.0))
+    sensor.location, sensor.rotation_euler = (2.0, -24.0, 14.0), (0.0, 0.0, math.radians(-110.0))
     _choose(sensor, np.flatnonzero((vertices[:, 2] > 0.2 * fingertip.RADIUS) & (vertices[:, 1] > -14.0)))
     return sensor, 14.0 + fingertip.RADIUS
 

@@ -37,11 +37,11 @@ def build(scene) -> None:
     """Fill `scene`, which is emptied first; the add-on's classes must be registered."""
     scene_builder.prepare(scene, FRAME_END, FPS)
     rubber = scene_builder.material("Rubber", (0.035, 0.036, 0.04), roughness=0.55)
-    black = scene_builder.material("Black anodised", (0.012, 0.012, 0.014), metallic=0.6, roughness=0.32)
+    grey = scene_builder.material("Grey anodised", (0.21, 0.22, 0.24), metallic=0.6, roughness=0.4)
     paper = scene_builder.material("Backdrop", (0.30, 0.32, 0.35), roughness=0.85)
 
     for name, side in ((LEFT, -1), (RIGHT, 1)):
-        _finger(scene, name, side, rubber, black)
+        _finger(scene, name, side, rubber, grey)
     cylinder = scene_builder.cylinder(scene, CYLINDER, RADIUS, HEIGHT, bevel=0.0)
     cylinder.modifiers.clear()  # its rim stays sharp: the lower one stands on the table
     cylinder.data.materials.append(scene_builder.see_through_steel("Steel, seen through", clear=0.8, edge=0.5))
@@ -72,7 +72,7 @@ def build(scene) -> None:
     scene.frame_set(scene.frame_start)
 
 
-def _finger(scene, name: str, side: int, rubber, black) -> None:
+def _finger(scene, name: str, side: int, rubber, grey) -> None:
     """Add a finger at x < 0 (side −1) or x > 0 whose pad faces the middle; it closes and lifts."""
     vertices, faces, texels = scene_builder.pad_mesh(ROWS, COLUMNS, PITCH, 2.5, THICKNESS)
     pad = scene_builder.mesh_object(scene, name, vertices, faces)
@@ -88,4 +88,4 @@ def _finger(scene, name: str, side: int, rubber, black) -> None:
     long = ROWS * PITCH + 5.0
     back = scene_builder.box(scene, f"{name} back", (COLUMNS * PITCH + 6.0, long + 30.0, 9.0), bevel=2.2)
     back.location, back.parent = (0.0, 14.0, -THICKNESS - 4.0), pad
-    back.data.materials.append(black)
+    back.data.materials.append(grey)

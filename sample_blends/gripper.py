@@ -29,7 +29,7 @@ def materials() -> dict:
     """Return the gripper's materials by name."""
     return {
         "rubber": scene_builder.material("Rubber", (0.035, 0.036, 0.04), roughness=0.55),
-        "black": scene_builder.material("Black anodised", (0.012, 0.012, 0.014), metallic=0.6, roughness=0.32),
+        "grey": scene_builder.material("Grey anodised", (0.21, 0.22, 0.24), metallic=0.6, roughness=0.4),
         "aluminium": scene_builder.material("Aluminium", (0.55, 0.57, 0.6), metallic=1.0, roughness=0.34),
     }
 
@@ -64,7 +64,7 @@ def finger(scene, side: int, gap: float, height: float, look: dict, room: float 
     tall = PAD_TALL + 2 * MARGIN
     block = scene_builder.box(scene, f"{name} block", (PAD_WIDE + 2 * MARGIN + 3, tall + 34 + room, 9.0), bevel=1.6)
     block.parent, block.location = pad, (0.0, 15.0 + 0.5 * room, -THICKNESS - 4.0)
-    block.data.materials.append(look["black"])
+    block.data.materials.append(look["grey"])
     foot = scene_builder.box(scene, f"{name} foot", (PAD_WIDE + 2 * MARGIN + 3, 14.0, 26.0), bevel=1.6)
     foot.parent, foot.location = pad, (0.0, tall / 2 + 27.0 + room, -THICKNESS - 6.0)
     foot.data.materials.append(look["aluminium"])
@@ -83,10 +83,10 @@ def housing(scene, height: float, look: dict):
     body.data.materials.append(look["aluminium"])
     rail = scene_builder.box(scene, "Gripper rail", (140.0, 30.0, 8.0), bevel=1.0)
     rail.parent, rail.location = body, (0.0, 0.0, -20.0)
-    rail.data.materials.append(look["black"])
+    rail.data.materials.append(look["grey"])
     flange = scene_builder.cylinder(scene, "Gripper flange", 24.0, 20.0, bevel=1.5)
     flange.parent, flange.location = body, (0.0, 0.0, 30.0)
-    flange.data.materials.append(look["black"])
+    flange.data.materials.append(look["grey"])
     return body
 
 

@@ -255,6 +255,8 @@ def clear_block(name: str):
     share, mix = nodes.new("ShaderNodeMath"), nodes.new("ShaderNodeMixShader")
     share.operation = "MULTIPLY_ADD"  # sides that face away reflect nothing
     share.use_clamp = True
+    for node in (facing, shine):  # smooth shading bends the other normal at sharp edges, where the side would be a dark mirror
+        links.new(geometry.outputs["True Normal"], node.inputs["Normal"])
     links.new(geometry.outputs["Backfacing"], share.inputs[0])
     share.inputs[1].default_value = -1.0
     links.new(facing.outputs[0], share.inputs[2])

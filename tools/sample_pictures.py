@@ -22,7 +22,7 @@ SIZE = (960, 720)
 QUALITY = 88
 """Of JPEG files."""
 PICK_FRAMES = (30, 60, 90, 130)
-"""Closing, lifting, carrying and released, in the sample of pick and place."""
+"""Before the touch, held, lifted and about to be let go, in the sample of pick and place."""
 
 
 def palpate(*words: object) -> None:
