@@ -75,7 +75,7 @@ def _sphere(scene):
 def _tip(scene):
     vertices, faces = fingertip.capsule()
     sensor = scene_builder.mesh_object(scene, TIP, vertices, faces)
-    sensor.location, sensor.rotation_euler = (2.0, -24.0, 14.0), (0.0, 0.0, math.radians(-110.0))
+    sensor.location, sensor.rotation_euler = (10.0, -26.0, 14.0), (0.0, 0.0, math.radians(-110.0))
     _choose(sensor, np.flatnonzero((vertices[:, 2] > 0.2 * fingertip.RADIUS) & (vertices[:, 1] > -14.0)))
     return sensor, 14.0 + fingertip.RADIUS
 
