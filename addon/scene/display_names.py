@@ -12,5 +12,7 @@ INDENTATION_MODIFIER = "Palpate Indentation"
 MODIFIERS = {HEAT_MAP_MODIFIER, INDENTATION_MODIFIER}
 REST_POSITION = "palpate_rest"
 """Vertex attribute of an indented mesh: where its vertices are without indentation; those of its own mesh come first."""
+SMOOTH_VALUE = "palpate_smooth"
+"""Vertex attribute of an indented mesh: the penetration, which is smoothed from subdivision to subdivision."""
 OLD_MATERIAL = ".palpate_old_material"
 """Face attribute of a baked sensor: the material index before the heat map; −1 on faces that kept theirs."""
