@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The choice between the OpenEXR library and Palpate's own codec, made once per process.
+"""The choice between the OpenEXR library and Palpate's own codec for reading images, made once per process.
 
 The library is used wherever it can be loaded safely. In some Blenders it cannot: Blender carries the same library, and when the
 dynamic linker mixes the symbols of the two, the first file written ends in a segmentation fault (seen in Debian's Blender 4.3).
@@ -55,7 +55,7 @@ def set_safety_check(check: Callable[[], bool] | None) -> None:
     Parameters
     ----------
     check : callable
-        Called at most once, when the first image is written or read, from any thread.
+        Called at most once, when the first image is read, from any thread.
     """
     global _chosen, _is_safe
     with _lock:
@@ -63,7 +63,7 @@ def set_safety_check(check: Callable[[], bool] | None) -> None:
 
 
 def backend() -> Backend:
-    """Return what writes and reads images in this process; the first call decides and may wait for the safety check."""
+    """Return what reads images in this process; the first call decides and may wait for the safety check."""
     global _chosen
     with _lock:
         if _chosen is None:

@@ -672,12 +672,22 @@ def test_images_written_together_are_those_written_one_by_one(image_backend, tmp
         assert read_exr(path)[1]["frame"] == own["frame"]
 
 
-def test_failing_writer_leaves_nothing(image_backend, tmp_path, monkeypatch):
+@pytest.mark.parametrize("is_safe", [True, False])
+def test_the_own_codec_writes_in_every_process(tmp_path, monkeypatch, is_safe):
+    """Also where the library reads: it keeps memory for each image that it writes. The same frame gives the same bytes."""
+    monkeypatch.setattr(exr_backend, "_chosen", None)
+    monkeypatch.setattr(exr_backend, "_is_safe", lambda: is_safe)
+    monkeypatch.setattr(exr_library, "write_all", lambda *_: pytest.fail("the library wrote"))
+    write_exr(tmp_path / "a.exr", grid_of(3, 4), tactile_frame(12), METADATA)
+    assert read_exr(tmp_path / "a.exr")[1] == METADATA
+
+
+def test_failing_writer_leaves_nothing(tmp_path, monkeypatch):
     def half(paths, *_):
         Path(paths[0]).write_bytes(b"half")
         raise OSError(errno.ENOSPC, "No space left on device")
 
-    monkeypatch.setattr(image_backend, "write_all", half)
+    monkeypatch.setattr(exr_codec, "write_all", half)
     with pytest.raises(FileError) as error:
         write_exr(tmp_path / "a.exr", grid_of(2, 2), tactile_frame(4), METADATA)
     one_sentence(error, tmp_path / "a.exr", "no space left")
