@@ -68,7 +68,7 @@ def road(ui):
 
     # 2. In: the same file
     yield from ui.search("Sensor of Another Program")
-    yield 1.0
+    yield from ui.wait_until(lambda: any(a.type == "FILE_BROWSER" for a in ui.window.screen.areas), "a file is asked for")
     browser = ui.area("FILE_BROWSER")
     browser.spaces.active.params.directory = str(folder).encode()
     browser.spaces.active.params.filename = next(name for name in written if name.endswith(".xml"))

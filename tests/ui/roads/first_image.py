@@ -32,7 +32,7 @@ def road(ui):
     press.obj("Pad").palpate.role = "SENSOR"
     with ui.context(view):
         bpy.ops.view3d.view_selected()
-    bpy.context.scene.frame_end = 100_000
+    # it plays in a loop: what is passed while the solver is being prepared is computed the next time
     yield from ui.move(*ui.centre(view))
     yield from ui.key("SPACE")
     yield from ui.wait_until(is_seen, "the first tactile image is seen", timeout=600.0)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What is shown follows what is changed at the same frame: live numbers, a bake, after undo and in another scene."""
+"""What is shown follows what is changed at the same frame: live numbers, a bake, after undo, in another scene, file or copy."""
 
 import importlib
 
@@ -56,8 +56,55 @@ def road(ui):
     frame_status().forget_all()
     ui.window.scene = scene
     yield from ui.becomes(says(scene, "of the bake."), "so does a change of the scene")
+    yield from ui.move(*ui.centre(ui.area("VIEW_3D")))
+    yield from ui.key("S", ctrl=True)
+    yield from ui.becomes(lambda: not bpy.data.is_dirty, "Ctrl S saves the file")
 
     press.obj("Pad").palpate.mus = 0.123
     yield from ui.becomes(says(scene, "out of date"), "a changed friction makes it out of date at once")
     yield 1.0
     yield from ui.screenshot("out-of-date")
+
+    yield from open_again(ui)
+    yield from copy_whole(ui)
+
+
+def open_again(ui):
+    """Open the baked file anew."""
+    frame_status().forget_all()
+    bpy.ops.wm.open_mainfile(filepath=bpy.data.filepath)
+    scene = bpy.context.scene
+    frame = scene.frame_current
+    yield from ui.becomes(says(scene, f"Frame {frame} of the bake."), "a baked file that is opened shows its numbers at once")
+    ui.check(scene.frame_current == frame, "at its own frame")
+    yield 1.0
+    yield from ui.screenshot("opened")
+
+
+def arrows():
+    """Return the names of the present scene's force arrows."""
+    return sorted(thing.name for thing in bpy.context.scene.objects if "Net Force" in thing.name)
+
+
+def copy_whole(ui):
+    """Bake a full copy of the scene, and clear its bake: no arrow of the original stays in it."""
+    count = len(arrows())
+    with ui.context(ui.area("VIEW_3D")):
+        bpy.ops.scene.new(type="FULL_COPY")
+    yield 1.0
+    copy = bpy.context.scene
+    for thing in copy.objects:
+        thing.select_set(thing.name == "Pad.001")
+    ui.window.view_layer.objects.active = copy.objects["Pad.001"]
+    yield from ui.tab("PHYSICS")
+    yield from ui.press("palpate.bake()")
+    yield from ui.wait_until(lambda: ui.works("palpate.bake") or len(arrows()) == count, "the copy is being baked")
+    yield from ui.wait_until(lambda: not ui.works("palpate.bake"), "the copy is baked", timeout=120.0)
+    yield from ui.becomes(says(bpy.context.scene, "of the bake."), "and its numbers are shown")
+    ui.check(len(arrows()) == count, "it has as many arrows as the original")
+    yield from ui.search("Clear Bake")
+    yield from ui.becomes(lambda: not arrows(), "Clear Bake takes every arrow out of the copy")
+    ui.check(not bpy.context.scene.objects["Pad.001"].palpate.is_baked, "and its bake")
+    ui.window.scene = bpy.data.scenes["Scene"]
+    yield 1.0
+    ui.check(len(arrows()) == count, "the original keeps its own")
