@@ -92,7 +92,7 @@ def test_gap(play_road, real_blender, repository):
 
 def test_out_of_date(play_road):
     """Numbers that are no longer true are taken away or named so, at once."""
-    assert play_road("out_of_date", timeout=900)["screenshots"] == ["solid.png", "out-of-date.png"]
+    assert play_road("out_of_date", timeout=900)["screenshots"] == ["solid.png", "out-of-date.png", "opened.png"]
 
 
 def test_study(play_road):
