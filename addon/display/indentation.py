@@ -109,6 +109,7 @@ def clear(obj) -> None:
         block = materials.find_block(blocks, f"{uid}:{MARK}")
         if block is not None:
             blocks.remove(block)
+    smooth_subdivision.remove_unused()
 
 
 def factor_of(obj) -> float:

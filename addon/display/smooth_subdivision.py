@@ -46,6 +46,13 @@ def smooth_subdivision(add, geometry, value, levels: int):
     return mesh, _use(add, "limit")
 
 
+def remove_unused() -> None:
+    """Remove the shared groups of nodes that no sensor uses any more."""
+    for group in list(bpy.data.node_groups):
+        if str(group.get(materials.SENSOR_KEY, "")).startswith(f"{MARK}:") and group.library is None and not group.users:
+            bpy.data.node_groups.remove(group)
+
+
 def _use(add, kind: str, *given):
     """Return the output of a shared group of nodes, which is made where the .blend has none yet."""
     sockets, fill = {

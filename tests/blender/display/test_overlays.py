@@ -127,7 +127,7 @@ def test_display_settings_are_applied_to_a_bake_without_computing(baked, monkeyp
     left = [obj.name for obj in scene.objects if materials.SENSOR_KEY in obj]
     assert sorted(left) == ["Centre of Pressure Pad", "Centre of Pressure Pad 2"]
     kinds = {name: [block.name for block in getattr(bpy.data, name)] for name in ("node_groups", "materials")}
-    assert all("indentation" in name for name in kinds["node_groups"])
+    assert all("indentation" in name or "smoothing" in name for name in kinds["node_groups"])  # no group of arrows
     assert not [name for name in kinds["materials"] if "Arrow" in name]
     nodes = pad.material_slots[-1].material.node_tree.nodes
     assert next(node.inputs[1].default_value for node in nodes if "maximum" in node.label) == pytest.approx(0.25)
@@ -162,6 +162,7 @@ def test_clearing_takes_all_overlays_away(tmp_path):
     run_job(bake(scene))
     assert len([obj for obj in scene.objects if materials.SENSOR_KEY in obj]) == 18
     assert bpy.ops.palpate.bake_clear() == {"FINISHED"}
+    assert not [group.name for group in bpy.data.node_groups if materials.SENSOR_KEY in group]
     assert [line for line in changes(before, dump()) if "baked_" not in line and "settings" not in line] == []
 
 
