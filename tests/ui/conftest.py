@@ -42,12 +42,11 @@ class RealBlender:
                 inside, stdout=out, stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL, timeout=timeout
             ).returncode
 
-    def install(self, zip_path: Path, *, enable: bool = True) -> None:
+    def install(self, zip_path: Path) -> None:
         """Install and enable a zip by Blender's own command, as a user would."""
         log = self.work / "install.log"
         shutil.copy(zip_path, self.work / "palpate.zip")
-        enabling = ["--enable"] if enable else []
-        install = ["extension", "install-file", "--repo", "user_default", *enabling, f"{WORK}/palpate.zip"]
+        install = ["extension", "install-file", "--repo", "user_default", "--enable", f"{WORK}/palpate.zip"]
         # the splash screen would take the first click
         quiet = "import bpy; bpy.context.preferences.view.show_splash = False; bpy.ops.wm.save_userpref()"
         for command in (["--command", *install], ["--background", "--python-exit-code", "1", "--python-expr", quiet]):

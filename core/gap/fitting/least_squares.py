@@ -302,11 +302,9 @@ def fit(
     start = with_values(model, free, [item.from_coordinate(x) for item, x in zip(free, at, strict=True)])
     point = _Point.at_model(views, start, free, at)
     tables = [np.empty((len(free), *residual.shape)) for residual in point.residuals]
-    damping, known = FIRST_DAMPING, 0
-    if initial_derivatives is not None:
-        known = frozen
-        for table, first in zip(tables, initial_derivatives, strict=True):
-            table[:frozen] = first[:frozen]
+    damping, known = FIRST_DAMPING, 0 if initial_derivatives is None else frozen
+    for table, first in zip(tables, initial_derivatives or (), strict=initial_derivatives is not None):
+        table[:frozen] = first[:frozen]
     complete = False  # whether the tables hold all derivatives at the point, or a step away that changed next to nothing
     for _ in range(max_steps):
         parts = list(zip(views, point.residuals, tables, strict=True))

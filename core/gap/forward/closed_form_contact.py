@@ -76,6 +76,21 @@ def _plain(position: np.ndarray, outward: np.ndarray) -> tuple[np.ndarray, np.nd
 
 
 @kernel
+def write_contact(i, j, left, entered, position, outward, contact):  # type: ignore[no-untyped-def]
+    """Write where the segment of texel `j` enters the indenter in sample `i`, with so much of its length left.
+
+    `entered` is the indenter's outward normal there, `contact` are depth, normal and point.
+    """
+    depth, normal, point = contact
+    along = 0.0
+    for axis in range(3):
+        along += entered[axis] * outward[j, axis]
+        normal[i, j, axis] = entered[axis]
+        point[i, j, axis] = position[j, axis] - left * outward[j, axis]
+    depth[i, j] = left * abs(along)
+
+
+@kernel
 def meet_sphere(center, radius, position, outward, reach, depth, normal, point):  # type: ignore[no-untyped-def]
     """Write the contacts with a sphere into `depth`, `normal` and `point`; return the most texels overpressed at once."""
     most = 0
@@ -98,14 +113,7 @@ def meet_sphere(center, radius, position, outward, reach, depth, normal, point):
             if s < 0.0 or s >= reach:
                 continue
             ax, ay, az = (ox + s * nx) / radius, (oy + s * ny) / radius, (oz + s * nz) / radius
-            left = reach - s
-            depth[i, j] = left * abs(ax * nx + ay * ny + az * nz)
-            normal[i, j, 0], normal[i, j, 1], normal[i, j, 2] = ax, ay, az
-            point[i, j, 0], point[i, j, 1], point[i, j, 2] = (
-                position[j, 0] - left * nx,
-                position[j, 1] - left * ny,
-                position[j, 2] - left * nz,
-            )
+            write_contact(i, j, reach - s, (ax, ay, az), position, outward, (depth, normal, point))
         most = max(most, deep)
     return most
 
@@ -141,13 +149,6 @@ def meet_box(center, frame, half, position, outward, reach, depth, normal, point
             if not (0.0 <= enters < reach and enters <= leaves):
                 continue
             ax, ay, az = sign * frame[i, 0, face], sign * frame[i, 1, face], sign * frame[i, 2, face]
-            left = reach - enters
-            depth[i, j] = left * abs(ax * nx + ay * ny + az * nz)
-            normal[i, j, 0], normal[i, j, 1], normal[i, j, 2] = ax, ay, az
-            point[i, j, 0], point[i, j, 1], point[i, j, 2] = (
-                position[j, 0] - left * nx,
-                position[j, 1] - left * ny,
-                position[j, 2] - left * nz,
-            )
+            write_contact(i, j, reach - enters, (ax, ay, az), position, outward, (depth, normal, point))
         most = max(most, deep)
     return most

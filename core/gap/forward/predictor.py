@@ -137,10 +137,11 @@ class ResponseModel:
         """Return the readings of each texel, or of some, (T, n) in the sensor's unit."""
         p = model.parameters
         key = (self._force_key(model, subset), p.gain, p.zero, _effects_key(model.readout_effects))
-        return self._readings.get_or(key, lambda: self._computed_reading(model, subset, model.readout_effects))
+        return self._readings.get_or(key, lambda: self._computed_reading(model, subset))
 
-    def _computed_reading(self, model: Model, subset: np.ndarray | None, effects: tuple[Effect, ...]) -> np.ndarray:
+    def _computed_reading(self, model: Model, subset: np.ndarray | None) -> np.ndarray:
         """Return the readings under effects on the readout."""
+        effects = model.readout_effects
         site = readout_chain.transducers_of(Sensor("sensor", 0, self.rig.texels, model.parameters))
         site = replace(site, temperature=self._temperature())
         if subset is not None:
