@@ -175,8 +175,8 @@ class Injector:
         return buffered if "b" in mode else io.TextIOWrapper(buffered, encoding, errors, newline)
 
     def _wrap_images(self) -> None:
-        """Wrap the libraries that write tactile images, whose writing Python does not see."""
-        from palpate.core.io import exr_codec, exr_library
+        """Wrap the writing of tactile images, many at a time."""
+        from palpate.core.io import exr_codec
 
         def write_all(original: Callable[..., Any], paths: Any, *arguments: Any, **options: Any) -> Any:
             inside = self._counts(paths[0])
@@ -191,8 +191,7 @@ class Injector:
             return self._operation("write", inside, function, spoil)
 
         os_truncate = os.truncate.__wrapped__ if hasattr(os.truncate, "__wrapped__") else os.truncate
-        for module in (exr_codec, exr_library):
-            self._wrap(module, "write_all", write_all)
+        self._wrap(exr_codec, "write_all", write_all)
 
 
 class _WatchedFile(io.FileIO):

@@ -4,7 +4,7 @@
 The library is used wherever it can be loaded safely. In some Blenders it cannot: Blender carries the same library, and when the
 dynamic linker mixes the symbols of the two, the first file written ends in a segmentation fault (seen in Debian's Blender 4.3).
 Inside Blender the library is therefore loaded only after a check in a process of its own has passed. The add-on installs that
-check with :func:`set_safety_check`. Both backends write equal pixels and equal headers; only the compressed bytes differ.
+check with :func:`set_safety_check`.
 """
 
 from __future__ import annotations
@@ -26,12 +26,12 @@ HOST = "bpy"
 
 @dataclass(frozen=True)
 class Backend:
-    """What writes and reads images in this process.
+    """What reads images in this process.
 
     Attributes
     ----------
     module : module
-        :mod:`.exr_library` or :mod:`.exr_codec`, which have the same ``write_all`` and ``read``.
+        :mod:`.exr_library` or :mod:`.exr_codec`, which have the same ``read``.
     reason : str
         Why it was chosen, for people.
     """

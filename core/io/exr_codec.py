@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The part of the OpenEXR file format that tactile images need, in plain Python: scan lines, one part, ZIP compression.
 
-This codec is for Blenders in which the OpenEXR library cannot be loaded, see :mod:`.exr_backend`. Format:
+It writes all images, so that a scene gives the same bytes in every Blender. It reads them where the OpenEXR library cannot be
+loaded, see :mod:`.exr_backend`. Format:
 https://openexr.com/en/latest/OpenEXRFileLayout.html
 """
 
