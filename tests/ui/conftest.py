@@ -22,6 +22,7 @@ WORK, HERE = "/palpate-work", "/palpate-ui"
 def pytest_addoption(parser):
     versions = list(provision_blender.DEBIAN)
     parser.addoption("--blender", choices=versions, default=provision_blender.DEFAULT, help="which Blender opens its window")
+    parser.addoption("--long", action="store_true", help="use for an hour, and three first images of each kind")
 
 
 @dataclass
@@ -42,11 +43,21 @@ class RealBlender:
                 inside, stdout=out, stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL, timeout=timeout
             ).returncode
 
-    def install(self, zip_path: Path) -> None:
-        """Install and enable a zip by Blender's own command, as a user would."""
+    @classmethod
+    def fresh(cls, root: Path, work: Path) -> RealBlender:
+        """Return a Blender whose user folder is empty."""
+        shutil.rmtree(work, ignore_errors=True)
+        work.mkdir(parents=True)
+        blender = cls(root, work, Path(__file__).parent)
+        blender.give_brushes()
+        return blender
+
+    def install(self, zip_path: Path, *, enable: bool = True) -> None:
+        """Install a zip by Blender's own command, as a user would, and enable it."""
         log = self.work / "install.log"
         shutil.copy(zip_path, self.work / "palpate.zip")
-        install = ["extension", "install-file", "--repo", "user_default", "--enable", f"{WORK}/palpate.zip"]
+        enabling = ["--enable"] if enable else []
+        install = ["extension", "install-file", "--repo", "user_default", *enabling, f"{WORK}/palpate.zip"]
         # the splash screen would take the first click
         quiet = "import bpy; bpy.context.preferences.view.show_splash = False; bpy.ops.wm.save_userpref()"
         for command in (["--command", *install], ["--background", "--python-exit-code", "1", "--python-expr", quiet]):
@@ -132,15 +143,23 @@ def real_blender(repository, blender_version):
     """Return a real Blender with the zip of this very work tree installed."""
     work = repository / "build" / "ui" / blender_version
     with provision_blender.locked(repository / "build" / "ui.lock"):  # a second run waits for the first
-        shutil.rmtree(work, ignore_errors=True)
-        work.mkdir(parents=True)
-        blender = RealBlender(provision_blender.provision(blender_version), work, Path(__file__).parent)
+        blender = RealBlender.fresh(provision_blender.provision(blender_version), work)
         python = provision_blender.DEBIAN[blender_version].python
-        blender.give_brushes()
         made = {"blender_range": ("4.2.0", None), "suffix": "-local"}
         # one road watches the compiler at work
         blender.install(build_zip.build("linux-x64", python, work, with_machine_code=False, **made))
         yield blender
+
+
+@pytest.fixture
+def unseen_blender(blender_version, repository):
+    """Return a function that makes a Blender whose profile has never seen Palpate, in a folder of a name."""
+
+    def make(name: str) -> RealBlender:
+        work = repository / "build" / "ui-unseen" / blender_version / name
+        return RealBlender.fresh(provision_blender.provision(blender_version), work)
+
+    return make
 
 
 @pytest.fixture

@@ -1,0 +1,69 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""One plays, scrubs, changes a number, bakes, undoes and saves, again and again; the memory of Blender is written down."""
+
+import gc
+import time
+from pathlib import Path
+
+import bpy
+import press
+import solver
+
+KINDS = "objects", "meshes", "images", "materials", "node_groups", "curves", "texts"
+
+
+def resident():
+    """MB of memory that the process holds."""
+    pages = int(Path("/proc/self/statm").read_text().split()[1])
+    return pages * 4096 / 1e6
+
+
+def play_a_while(ui, seconds):
+    yield from ui.move(*ui.centre(ui.area("VIEW_3D")))
+    yield from ui.key("SPACE")
+    yield seconds
+    yield from ui.key("SPACE")
+    for _ in range(5):
+        yield from ui.key("LEFT_ARROW")
+
+
+def bake_and_undo(ui):
+    yield from ui.press("palpate.bake()")
+    yield from ui.wait_until(lambda: press.obj("Pad").palpate.is_baked, "the bake is done", timeout=300.0)
+    yield from play_a_while(ui, 3.0)
+    yield from ui.key("Z", ctrl=True)
+    yield from ui.wait_until(lambda: not press.obj("Pad").palpate.is_baked, "Ctrl Z takes the bake away")
+    yield from ui.key("Z", ctrl=True, shift=True)
+    yield from ui.wait_until(lambda: press.obj("Pad").palpate.is_baked, "Ctrl Shift Z brings it back")
+    yield from ui.press("palpate.bake_clear")
+    yield from ui.wait_until(lambda: not press.obj("Pad").palpate.is_baked, "Clear Bake clears it")
+
+
+def road(ui):
+    minutes = float((ui.out.parent / "minutes.txt").read_text())
+    press.build(ui.out)
+    press.obj("Pad").palpate.role = "SENSOR"
+    yield from ui.tab("PHYSICS")
+    yield from solver.wait(ui)
+    end = time.monotonic() + 60 * minutes
+    began, rounds = time.monotonic(), []
+    while time.monotonic() < end:
+        yield from play_a_while(ui, 8.0)
+        press.obj("Pad").palpate.k = 900.0 + 10 * (len(rounds) % 20)
+        bpy.ops.ed.undo_push(message="Stiffness")
+        yield 1.0
+        ui.area("VIEW_3D").spaces.active.shading.type = ("SOLID", "MATERIAL")[len(rounds) % 2]
+        with ui.context(ui.area("PROPERTIES")):  # what a click leaves active
+            bpy.context.view_layer.objects.active = press.obj("Pad")
+        yield from bake_and_undo(ui)
+        yield from ui.move(*ui.centre(ui.area("VIEW_3D")))
+        yield from ui.key("S", ctrl=True)
+        blocks = {kind: len(getattr(bpy.data, kind)) for kind in KINDS}
+        gc.collect()
+        now = {"minutes": (time.monotonic() - began) / 60, "MB": resident(), "Python objects": len(gc.get_objects())}
+        rounds.append(now | blocks)
+        ui.value("rounds", rounds)
+        ui.say(f"round {len(rounds)}: {resident():.0f} MB")
+    yield from ui.screenshot("after")
+    ui.check(len(rounds) > 1, "more than one round")
+    ui.check({kind: rounds[-1][kind] for kind in KINDS} == {kind: rounds[0][kind] for kind in KINDS}, "no data is left behind")
