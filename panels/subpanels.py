@@ -14,6 +14,8 @@ PLACES = {
     "side_": {"bl_space_type": "VIEW_3D", "bl_region_type": "UI", "bl_category": "Palpate"},
 }
 ROOT = "physics"
+WIDE = 400
+"""Pixels from which the longest name with its unit, of 21 letters, fits beside its field."""
 
 
 class Subpanel:
@@ -25,7 +27,7 @@ class Subpanel:
     bl_options = {"DEFAULT_CLOSED"}
     roles = {"SENSOR", "TARGET", "PAD"}
     split = True
-    """False draws names inside the number fields. Beside the fields of a narrow editor, names with units would be cut off."""
+    """False draws names inside the number fields of a narrow editor. Beside the fields they would be cut off there."""
 
     @classmethod
     def poll(cls, context):
@@ -34,7 +36,7 @@ class Subpanel:
 
     def draw(self, context):
         layout = self.layout
-        layout.use_property_split = self.split
+        layout.use_property_split = self.split or context.region.width >= WIDE * context.preferences.system.ui_scale
         layout.use_property_decorate = False
         self.draw_part(layout, context.object.palpate, context)
 

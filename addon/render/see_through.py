@@ -136,7 +136,7 @@ def _shows_sensors(scene, asked: np.ndarray) -> np.ndarray:
     asked : (height, width) bool
         Pixels that are looked at; the others count as 1.
     """
-    from scipy.ndimage import uniform_filter
+    from scipy.ndimage import median_filter, uniform_filter
 
     height, width = asked.shape
     depsgraph, eye = bpy.context.evaluated_depsgraph_get(), scene.camera.matrix_world.translation
@@ -145,6 +145,7 @@ def _shows_sensors(scene, asked: np.ndarray) -> np.ndarray:
         way = render.view_direction(scene, (x + 0.5) / width, 1.0 - (y + 0.5) / height)
         found = camera_direction.first_object(scene, depsgraph, eye, way)
         shown[y, x] = found is not None and found.palpate.role == "SENSOR"
+    shown = median_filter(shown, 3)  # a ray that leaves a target within a hair of the sensor misses the sensor: lone pixels
     return np.minimum(shown, uniform_filter(shown, 3))  # a soft edge, as that of a render
 
 
