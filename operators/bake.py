@@ -2,6 +2,7 @@
 """Operators for bakes and for the live simulation: bake, clear, display, compute missing frames, reset."""
 
 import bpy
+from bpy.props import BoolProperty
 
 from ..addon.bake.bake import bake
 from ..addon.bake.scene_writer import keyframe_warning
@@ -41,6 +42,11 @@ class PALPATE_OT_bake(modal_job.ModalJob, bpy.types.Operator):
         self.report({"INFO"}, f"Baked frames {frames[0]} to {frames[-1]} of {names}")
 
 
+def is_of_hands(event) -> bool:
+    """Return True for the press of a key or of a mouse button, but not of ESC."""
+    return event.value == "PRESS" and event.type not in {"ESC", "TIMER"}
+
+
 class PALPATE_OT_catch_up(modal_job.ModalJob, bpy.types.Operator):
     """Compute the frames that are missing up to the present one, and show it. ESC stops and keeps what was computed"""
 
@@ -48,6 +54,12 @@ class PALPATE_OT_catch_up(modal_job.ModalJob, bpy.types.Operator):
     bl_label = "Compute to Here"
     bl_options = {"REGISTER"}
     stopped = "Stopped; what was computed is kept"
+
+    by_itself: BoolProperty(
+        name="By Itself",
+        description="Begun by a jump on the timeline: any key or click ends it and does what it always does",
+        options={"HIDDEN", "SKIP_SAVE"},
+    )
 
     @classmethod
     def poll(cls, context):
@@ -65,6 +77,8 @@ class PALPATE_OT_catch_up(modal_job.ModalJob, bpy.types.Operator):
     def modal(self, context, event):
         if event.type == "SPACE" and event.value == "PRESS":  # the user does not want to go on playing afterwards
             self._was_playing = False
+        elif self.by_itself and is_of_hands(event):
+            return self.stop(context) | {"PASS_THROUGH"}  # nobody asked for the computation
         return super().modal(context, event)
 
     def done(self, result):

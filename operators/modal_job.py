@@ -51,10 +51,7 @@ class ModalJob(support.ErrorReporting):
 
     def modal(self, context, event):
         if event.type == "ESC" and event.value == "PRESS":
-            self._running.cancel()
-            self._end(context)
-            self.report({"WARNING"}, self.stopped)
-            return {"CANCELLED"}
+            return self.stop(context)
         if event.type != "TIMER":
             return {"RUNNING_MODAL"}  # other events must not change the scene while the job runs
         result = None
@@ -64,6 +61,13 @@ class ModalJob(support.ErrorReporting):
             if result != {"RUNNING_MODAL"}:
                 self._end(context)
         return result
+
+    def stop(self, context):
+        """Stop the job on the user's word."""
+        self._running.cancel()
+        self._end(context)
+        self.report({"WARNING"}, self.stopped)
+        return {"CANCELLED"}
 
     def _work(self, context):
         """Run a slice of the job and show its progress."""

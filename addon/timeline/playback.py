@@ -159,7 +159,7 @@ def _offer_to_compute() -> None:
     """Timer after a jump on the timeline: compute the missing frames with progress. The handler itself must return at once."""
     scene = bpy.context.scene
     if scene is not None and not session_state.is_baking() and not session_state.session.catching_up and missing_frames(scene):
-        bpy.ops.palpate.catch_up("INVOKE_DEFAULT")
+        bpy.ops.palpate.catch_up("INVOKE_DEFAULT", by_itself=True)
 
 
 def _is_on(scene) -> bool:

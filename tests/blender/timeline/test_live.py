@@ -2,6 +2,7 @@
 """The timeline: playing computes what a bake computes, scrubbing shows it, and files hold none of it."""
 
 from dataclasses import fields
+from types import SimpleNamespace
 
 import bpy
 import numpy as np
@@ -15,6 +16,7 @@ from palpate.addon.session import frame_status, session_state
 from palpate.addon.timeline import live_cache, playback
 from palpate.core.jobs.job_runner import run_job
 from palpate.core.model.recording import SensorFrame
+from palpate.operators import bake as bake_operators
 
 
 def play(scene, *frames):
@@ -100,6 +102,15 @@ def test_a_jump_ahead_is_computed_with_progress(tmp_path):
     bpy.ops.palpate.reset()
     play(scene, 7)  # from nothing
     assert bpy.ops.palpate.catch_up() == {"FINISHED"} and sorted(live_cache.get(scene).frames) == list(range(1, 8))
+
+
+def test_hands_come_before_frames_that_nobody_asked_for():
+    """Played with real events in tests/ui/roads/press.py."""
+    events = {("G", "PRESS"): True, ("LEFTMOUSE", "PRESS"): True, ("G", "RELEASE"): False, ("MOUSEMOVE", "NOTHING"): False}
+    events |= {("ESC", "PRESS"): False, ("TIMER", "NOTHING"): False}
+    for (kind, value), expected in events.items():
+        assert bake_operators.is_of_hands(SimpleNamespace(type=kind, value=value)) is expected
+    assert bpy.ops.palpate.catch_up.get_rna_type().properties["by_itself"].is_hidden
 
 
 def test_a_stopped_jump_keeps_what_was_computed():

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import bpy
 import solver
+from tutorial import timeline
 
 
 def build(folder: Path, sensors: bool = True) -> None:
@@ -81,6 +82,17 @@ def road(ui):
     ui.check(scene.frame_current == frame - 1, "an arrow key goes one frame back")
     yield from ui.key("RIGHT_ARROW")
     ui.check(obj("Cube").location.z == height, "and forward again shows the same")
+
+    # A jump computes what is missing, and a key ends that and does what it always does
+    yield from timeline(ui, "frame_current", 90_000)
+    yield from ui.wait_until(lambda: ui.works("palpate.catch_up"), "the frames up to the jump are computed")
+    yield from ui.move(*ui.centre(view))
+    yield from ui.key("G")
+    ui.check(ui.works("transform.translate"), "G moves the pad meanwhile")
+    ui.check(not ui.works("palpate.catch_up"), "and ends the computation")
+    ui.check(scene.frame_current == 90_000, "at the frame that was jumped to")
+    yield from ui.key("ESC")
+    scene.frame_set(frame)
 
     yield from ui.press("palpate.bake()")
     yield from ui.stop("palpate.bake")
