@@ -144,6 +144,25 @@ def read_answers(path: Path, known: Iterable[str]) -> dict[str, Answer]:
     return found
 
 
+def answers_of_study(folder: Path, hidden: dict[str, Hidden]) -> dict[str, Answer]:
+    """Return what the runs of docs/sample-study/hidden-effects.toml say of these cases, as far as the study has them."""
+    runs = {(one["kind"], one["number"]): one for one in gap.results_in(folder)}
+    if not runs:
+        raise SystemExit(f"{folder} has no runs/*/{gap.CASE_NAME}: it is no folder of the study of hidden effects.")
+    words = {verdict: word for word, verdict in VERDICTS.items()}
+    found = {}
+    for case, one in hidden.items():
+        run = runs.get((one.kind, one.number))
+        if run is None:
+            continue
+        sure = {name: confidence for name, _, confidence in run["said"] if name in run["sure"]}
+        if sure:
+            found[case] = Answer(tuple(sure), min(sure.values()))
+        else:
+            found[case] = Answer((words.get(run["verdict"], "unknown"),))
+    return found
+
+
 def _answer(row: dict[str, Any], where: str) -> Answer:
     said = row.get("said")
     listed = said if isinstance(said, list) else str("" if said is None else said).split(AND.strip())
@@ -225,20 +244,23 @@ def answer_cases(methods: dict[str, tuple[Method, Path]], folder: Path, forgivin
 
 
 @functools.lru_cache(maxsize=1)
-def _diagnosis(rig: Path) -> Any:
-    """What palpate gap finds; the methods that begin with the base model it fitted ask for it one after the other."""
+def _base(rig: Path) -> Any:
+    """Return the fitted base model, with which two methods begin one after the other."""
     from palpate.core.gap.dataset.rig import read_rig
-    from palpate.core.gap.selection.diagnosis import diagnose
+    from palpate.core.gap.selection.diagnosis import fit_base
     from palpate.core.jobs.job_runner import run_job
 
-    return run_job(diagnose(read_rig(rig)))
+    return run_job(fit_base(read_rig(rig)))
 
 
 def palpate_gap(rig: Path) -> tuple[Iterable[str], float | None]:
     """Say what ``palpate gap`` is sure of; the probability is its smallest confidence."""
+    from palpate.core.gap.dataset.rig import read_rig
     from palpate.core.gap.report.sentences import SURE as ENOUGH
+    from palpate.core.gap.selection.diagnosis import diagnose
+    from palpate.core.jobs.job_runner import run_job
 
-    result = _diagnosis(rig)
+    result = run_job(diagnose(read_rig(rig)))
     sure = [finding for finding in result.findings if finding.confidence >= ENOUGH]
     if sure:
         return [finding.name for finding in sure], min(finding.confidence for finding in sure)
@@ -247,12 +269,12 @@ def palpate_gap(rig: Path) -> tuple[Iterable[str], float | None]:
 
 def stepwise_bic(rig: Path) -> tuple[Iterable[str], float | None]:
     """Add the form of the library that lowers the BIC most, until none does."""
-    return _gap_baselines.stepwise(_diagnosis(rig))[0], None
+    return _gap_baselines.stepwise(_base(rig))[0], None
 
 
 def sindy(rig: Path) -> tuple[Iterable[str], float | None]:
     """Name the strongest term of a sparse regression on the residual of the base model."""
-    return _gap_baselines.sindy_terms(_diagnosis(rig))[0], None
+    return _gap_baselines.sindy_terms(_base(rig))[0], None
 
 
 METHODS: dict[str, Method] = {
@@ -319,7 +341,13 @@ def command(arguments: list[str]) -> int:
     doing = parser.add_mutually_exclusive_group(required=True)
     doing.add_argument("--write", type=Path, metavar="DIR", help="write cases as rigs, and what is hidden in a file apart")
     doing.add_argument("--answer", metavar="METHOD", help="have FILE.py:FUNCTION, or one of the methods here, answer the cases")
-    doing.add_argument("--score", type=Path, nargs="+", metavar="ANSWERS", help="print the table of files of answers")
+    doing.add_argument(
+        "--score",
+        type=Path,
+        nargs="+",
+        metavar="ANSWERS",
+        help="print the table of files of answers, or of folders of the study docs/sample-study/hidden-effects.toml",
+    )
     doing.add_argument(
         "--compare",
         nargs="*",
@@ -347,7 +375,8 @@ def command(arguments: list[str]) -> int:
         answer_cases({args.answer: (method_named(args.answer), args.out)}, args.of)
     else:
         hidden = read_hidden(args.of)
-        print(table(hidden, {path.stem: read_answers(path, hidden) for path in args.score}))
+        read = {path: answers_of_study if path.is_dir() else read_answers for path in args.score}
+        print(table(hidden, {path.stem: reading(path, hidden) for path, reading in read.items()}))
     return 0
 
 

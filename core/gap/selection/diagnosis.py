@@ -84,11 +84,7 @@ def diagnose(rig: Rig) -> Job[Diagnosis]:
     -------
     Diagnosis
     """
-    yield Progress("contacts of every trial", 0, TOTAL_WORK)
-    rig, predictors, faults = _without_faults(with_starting_heights(rig))
-    noise, full = prepared(rig, predictors)
-    yield Progress("base model", BASE_MODEL_BEGINS, TOTAL_WORK)
-    plain = _search_of(rig, predictors, noise, full, faults)
+    plain = yield from _begun(rig)
     yield from _selected(plain, SELECTION_BEGINS, OTHER_SEARCHES_BEGIN if may_differ(rig) else SECOND_OPINION_BEGINS)
     best = plain
     if may_differ(rig) and not _is_settled(plain):
@@ -97,6 +93,20 @@ def diagnose(rig: Rig) -> Job[Diagnosis]:
         best = yield from _second_opinion(plain)
     best.result.stages = _stages(best.result, best.views)
     return best.result
+
+
+def fit_base(rig: Rig) -> Job[Diagnosis]:
+    """Fit the base model as :func:`diagnose` does before it looks for effects; what it returns names none."""
+    return (yield from _begun(rig)).result
+
+
+def _begun(rig: Rig) -> Generator[Progress, None, _Search]:
+    """Prepare recordings and fit the base model."""
+    yield Progress("contacts of every trial", 0, TOTAL_WORK)
+    rig, predictors, faults = _without_faults(with_starting_heights(rig))
+    noise, full = prepared(rig, predictors)
+    yield Progress("base model", BASE_MODEL_BEGINS, TOTAL_WORK)
+    return _search_of(rig, predictors, noise, full, faults)
 
 
 def _selected(search: _Search, begins: int, ends: int) -> Iterator[Progress]:

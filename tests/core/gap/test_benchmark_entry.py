@@ -280,3 +280,29 @@ def test_all_methods_are_compared_and_one_that_raises_has_failed(monkeypatch, fo
     with (kept / "answers" / "fails.csv").open(encoding="utf-8", newline="") as file:
         assert {row["said"] for row in csv.DictReader(file)} == {"failed"}
     assert f"| {gap.ROWS['outside'][0]} | 1 | 1 / 0 | 0 / 0 |" in text and " / 1 |" not in text
+
+
+def test_runs_of_the_study_are_answers(folder, tmp_path, capsys):
+    hidden = _entry.read_hidden(folder)
+    for i, one in enumerate(hidden.values()):
+        run = tmp_path / "hidden" / "runs" / str(i)
+        run.mkdir(parents=True)
+        names = one.names if one.kind == "own" else []
+        said = [[name, "form", 0.9] for name in names] + [["offset", "common", 0.25]]
+        verdict = "no gap" if one.kind == "none" else "explained"
+        case = {"kind": one.kind, "number": one.number, "sure": names, "said": said, "verdict": verdict}
+        (run / gap.CASE_NAME).write_text(json.dumps(case) + "\n", encoding="utf-8")
+    answers = _entry.answers_of_study(tmp_path / "hidden", hidden)
+    by_kind = {one.kind: answers[case] for case, one in hidden.items()}
+    assert by_kind["own"].said == tuple(next(one.names for one in hidden.values() if one.kind == "own"))
+    assert by_kind["own"].probability == 0.9
+    assert by_kind["none"].said == ("nothing",) and by_kind["two"].said == by_kind["outside"].said == ("unknown",)
+    assert benchmarks.main(["gap", "--score", str(tmp_path / "hidden"), "--of", str(folder)]) == 0
+    assert f"| {gap.ROWS['own'][0]} | 1 | 1 / 0 |" in capsys.readouterr().out
+    with pytest.raises(SystemExit, match="no folder of the study"):
+        _entry.answers_of_study(tmp_path, hidden)
+
+
+def test_the_base_model_that_other_methods_begin_with_names_nothing(folder):
+    base = _entry._base(next((folder / "rigs").glob("*/rig.toml")))
+    assert base.findings == [] and base.base.model.effects == () and base.base.sse.sum() > 0.0
