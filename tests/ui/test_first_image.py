@@ -32,4 +32,4 @@ def test_first_image(request, unseen_blender, blender_version, with_code):
         road = Path(__file__).parent / "roads" / "first_image.py"
         figures.append(blender.play(road, blender.work / "road", timeout=1200)["values"])
         print(f"{name}, Blender {blender_version}, run {i + 1}: {figures[-1]}")
-    assert len(figures[-1]) == 4
+    assert len(figures[-1]) == 6

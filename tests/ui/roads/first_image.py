@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """From enabling the extension to the first tactile image, by a script that does not wait for a person's hands."""
 
+import importlib
 import os
 import time
 
@@ -12,6 +13,10 @@ MODULE = "bl_ext.user_default.palpate"
 def processor_time():
     """Seconds of this process and of its children that have ended."""
     return sum(os.times()[:4])
+
+
+def is_ready():
+    return importlib.import_module(f"{MODULE}.addon.session.first_use").is_ready()
 
 
 def largest_force():
@@ -35,9 +40,12 @@ def road(ui):
         bpy.ops.palpate.probe_add()
         bpy.ops.view3d.view_selected()
     bpy.ops.screen.animation_play()
+    yield from ui.wait_until(is_ready, "the solver is ready", timeout=900.0)
+    ui.value("seconds until the solver is ready", time.monotonic() - began)
     yield from ui.wait_until(lambda: largest_force() > 0.0, "the pad shows forces", timeout=900.0)
     ui.redraw()
     yield None
+    ui.value("frame", bpy.context.scene.frame_current)
     ui.value("seconds to the first image", time.monotonic() - began)
     ui.value("CPU seconds to the first image", processor_time() - worked)
     bpy.ops.screen.animation_play()  # ends it
