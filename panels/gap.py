@@ -17,9 +17,9 @@ class Measured(Subpanel):
         row.prop(settings, "measured", text="")
         row.operator("palpate.measured_open", text="", icon="FILE_FOLDER")
         row.operator("palpate.measured_logs", text="", icon="FILE_NEW")
-        row = layout.row(align=True)
-        row.operator("palpate.gap_find", icon="VIEWZOOM")
-        row.operator("palpate.gap_plan", icon="CON_FOLLOWPATH")
+        column = layout.column(align=True)  # beside one another their names are cut off in a narrow editor
+        column.operator("palpate.gap_find", icon="VIEWZOOM")
+        column.operator("palpate.gap_plan", icon="CON_FOLLOWPATH")
         result = gap_results.of(context.object)
         if result is None:
             return
