@@ -78,7 +78,8 @@ def on_frame(scene, depsgraph) -> None:
     else:
         overlays.clear(scene)
         frame_status.set_status(scene, _not_computed(scene, run))
-        if not bpy.app.background and not session_state.session.rendering and missing_frames(scene):
+        is_busy = session_state.session.rendering or session_state.session.catching_up
+        if not bpy.app.background and not is_busy and missing_frames(scene):
             bpy.app.timers.register(_offer_to_compute, first_interval=0.0)
 
 
@@ -150,9 +151,9 @@ def compute_to_present_frame(scene) -> Generator[Progress, None, None]:
                     break  # the panel says why
                 yield Progress("Computing forces", done, len(frames), number)
     finally:
-        session_state.session.catching_up = False
         with suppress(ReferenceError):  # the scene was deleted meanwhile
-            scene.frame_set(wanted[0], subframe=wanted[1])
+            scene.frame_set(wanted[0], subframe=wanted[1])  # while this still catches up: what was stopped does not begin anew
+        session_state.session.catching_up = False
 
 
 def _offer_to_compute() -> None:
