@@ -65,6 +65,7 @@ def road(ui):
     ui.value("written", written)
     ui.check(any(name.endswith(".xml") for name in written), "File › Export writes MuJoCo's XML")
     yield from ui.screenshot("1-exported")
+    yield from ui.key("ESC")  # puts the box with what MuJoCo does not have away, which takes all keys in Blender 5.2
 
     # 2. In: the same file
     yield from ui.search("Sensor of Another Program")
@@ -76,6 +77,7 @@ def road(ui):
     ui.check(len(sensors()) == 2, "File › Import makes a second sensor of it")
     ui.value("texels", [len(obj.data.vertices) for obj in sensors()])
     yield from ui.screenshot("2-imported")
+    yield from ui.key("ESC")
     yield from ui.move(*ui.centre(ui.area("VIEW_3D")))
     yield from ui.key("Z", ctrl=True)
     yield 0.5

@@ -30,11 +30,12 @@ def play_a_while(ui, seconds):
 def bake_and_undo(ui):
     yield from ui.press("palpate.bake()")
     yield from ui.wait_until(lambda: press.obj("Pad").palpate.is_baked, "the bake is done", timeout=300.0)
-    yield from play_a_while(ui, 3.0)
+    yield from ui.move(*ui.centre(ui.area("VIEW_3D")))
     yield from ui.key("Z", ctrl=True)
     yield from ui.wait_until(lambda: not press.obj("Pad").palpate.is_baked, "Ctrl Z takes the bake away")
     yield from ui.key("Z", ctrl=True, shift=True)
     yield from ui.wait_until(lambda: press.obj("Pad").palpate.is_baked, "Ctrl Shift Z brings it back")
+    yield from play_a_while(ui, 3.0)
     yield from ui.press("palpate.bake_clear")
     yield from ui.wait_until(lambda: not press.obj("Pad").palpate.is_baked, "Clear Bake clears it")
 
