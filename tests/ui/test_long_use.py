@@ -15,7 +15,8 @@ def test_long_use(play_road, real_blender, request):
     minutes = request.config.getoption("--minutes")
     (real_blender.work / "minutes.txt").write_text(str(minutes))
     rounds = play_road("long_use", timeout=120.0 * minutes + 900.0)["values"]["rounds"]
-    assert rounds[-1]["MB"] < rounds[0]["MB"] + 500.0
+    filled = max(row["MB"] for row in rounds[:2])  # the second round is the first in Material Preview, which takes over 1 GB
+    assert max(row["MB"] for row in rounds) < filled + 300.0
     if minutes >= ENOUGH:
         third = len(rounds) // 3
         early, late = (statistics.fmean(row["MB"] for row in part) for part in (rounds[third : 2 * third], rounds[2 * third :]))
