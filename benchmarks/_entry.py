@@ -149,18 +149,21 @@ def answers_of_study(folder: Path, hidden: dict[str, Hidden]) -> dict[str, Answe
     runs = {(one["kind"], one["number"]): one for one in gap.results_in(folder)}
     if not runs:
         raise SystemExit(f"{folder} has no runs/*/{gap.CASE_NAME}: it is no folder of the study of hidden effects.")
-    words = {verdict: word for word, verdict in VERDICTS.items()}
     found = {}
     for case, one in hidden.items():
         run = runs.get((one.kind, one.number))
-        if run is None:
-            continue
-        sure = {name: confidence for name, _, confidence in run["said"] if name in run["sure"]}
-        if sure:
-            found[case] = Answer(tuple(sure), min(sure.values()))
-        else:
-            found[case] = Answer((words.get(run["verdict"], "unknown"),))
+        if run is not None:
+            sure = {name: confidence for name, _, confidence in run["said"] if name in run["sure"]}
+            found[case] = answer_of(run["verdict"], sure)
     return found
+
+
+def answer_of(verdict: str, sure: dict[str, float]) -> Answer:
+    """Return what ``palpate gap`` says by its verdict and by the names it is sure of, with their confidences."""
+    if sure:
+        return Answer(tuple(sure), min(sure.values()))
+    words = {meant: word for word, meant in VERDICTS.items()}
+    return Answer((words.get(verdict, "unknown"),))
 
 
 def _answer(row: dict[str, Any], where: str) -> Answer:
@@ -261,10 +264,9 @@ def palpate_gap(rig: Path) -> tuple[Iterable[str], float | None]:
     from palpate.core.jobs.job_runner import run_job
 
     result = run_job(diagnose(read_rig(rig)))
-    sure = [finding for finding in result.findings if finding.confidence >= ENOUGH]
-    if sure:
-        return [finding.name for finding in sure], min(finding.confidence for finding in sure)
-    return (() if result.verdict == "no gap" else _learned.UNKNOWN), None
+    sure = {finding.name: finding.confidence for finding in result.findings if finding.confidence >= ENOUGH}
+    answer = answer_of(result.verdict, sure)
+    return answer.said, answer.probability
 
 
 def stepwise_bic(rig: Path) -> tuple[Iterable[str], float | None]:

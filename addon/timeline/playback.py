@@ -151,9 +151,11 @@ def compute_to_present_frame(scene) -> Generator[Progress, None, None]:
                     break  # the panel says why
                 yield Progress("Computing forces", done, len(frames), number)
     finally:
-        with suppress(ReferenceError):  # the scene was deleted meanwhile
-            scene.frame_set(wanted[0], subframe=wanted[1])  # while this still catches up: what was stopped does not begin anew
-        session_state.session.catching_up = False
+        try:  # still catching up, so that what was stopped does not begin anew
+            with suppress(ReferenceError):  # the scene was deleted meanwhile
+                scene.frame_set(wanted[0], subframe=wanted[1])
+        finally:
+            session_state.session.catching_up = False
 
 
 def _offer_to_compute() -> None:

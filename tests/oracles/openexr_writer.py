@@ -8,25 +8,19 @@ not, so that the headers can be compared byte by byte.
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 import Imath
 import numpy as np
 import OpenEXR
 
 
-def write_all(
-    paths: Sequence[str | os.PathLike],
-    names: tuple[str, ...],
-    table: np.ndarray,
-    attributes: Sequence[Mapping[str, str]],
-) -> None:
-    """Write images of one size with the same channels, as ``exr_codec.write_all`` does."""
-    _, height, _, width = table.shape
-    beginning = OpenEXR.Header(width, height)
-    beginning["channels"] = {name: Imath.Channel(Imath.PixelType(Imath.PixelType.FLOAT)) for name in names}
-    for path, own, picture in zip(paths, attributes, table, strict=True):
-        header = beginning | {name: value.encode("utf-8", "surrogatepass") for name, value in own.items()}
-        file = OpenEXR.OutputFile(os.fspath(path), header)
-        file.writePixels({name: picture[:, i].tobytes() for i, name in enumerate(names)}, height)
-        file.close()
+def write(path: str | os.PathLike, channels: Mapping[str, np.ndarray], attributes: Mapping[str, str]) -> None:
+    """Write one image of 32-bit floats; `channels` are (height, width) with the first row at the top."""
+    height, width = next(iter(channels.values())).shape
+    header = OpenEXR.Header(width, height)
+    header["channels"] = {name: Imath.Channel(Imath.PixelType(Imath.PixelType.FLOAT)) for name in channels}
+    header |= {name: value.encode("utf-8", "surrogatepass") for name, value in attributes.items()}
+    file = OpenEXR.OutputFile(os.fspath(path), header)
+    file.writePixels({name: picture.tobytes() for name, picture in channels.items()}, height)
+    file.close()

@@ -22,8 +22,8 @@ WORK, HERE = "/palpate-work", "/palpate-ui"
 def pytest_addoption(parser):
     versions = list(provision_blender.DEBIAN)
     parser.addoption("--blender", choices=versions, default=provision_blender.DEFAULT, help="which Blender opens its window")
-    parser.addoption("--long", action="store_true", help="measure three first images of each kind")
-    parser.addoption("--minutes", type=float, default=2.0, help="how long the window is used while its memory is watched")
+    parser.addoption("--long", action="store_true", help="measure three first images with machine code and three without")
+    parser.addoption("--minutes", type=float, default=0.0, help="how long the window is used at least, beyond five rounds")
 
 
 @dataclass

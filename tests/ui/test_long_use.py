@@ -1,23 +1,18 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The memory of a window in which one works: two minutes by default, an hour with ``--minutes 60``."""
+"""The memory of a window in which one works: five rounds by default, an hour with ``--minutes 60``."""
 
 from __future__ import annotations
 
-import statistics
-
-GROWTH = 60.0
-"""MB per hour that are taken for none; what was measured is in docs/speed.md."""
-ENOUGH = 30.0
-"""Minutes from which growth is judged: Blender keeps 32 steps for undo, which fill up at first."""
+MOST_GROWTH = 100.0
+"""MB that Blender may hold more after a round than after the first like it. Five rounds of Blender 4.3 differed by 16 and 39
+(docs/speed.md)."""
 
 
 def test_long_use(play_road, real_blender, request):
     minutes = request.config.getoption("--minutes")
     (real_blender.work / "minutes.txt").write_text(str(minutes))
-    rounds = play_road("long_use", timeout=120.0 * minutes + 900.0)["values"]["rounds"]
-    filled = max(row["MB"] for row in rounds[:2])  # the second round is the first in Material Preview, which takes over 1 GB
-    assert max(row["MB"] for row in rounds) < filled + 300.0
-    if minutes >= ENOUGH:
-        third = len(rounds) // 3
-        early, late = (statistics.fmean(row["MB"] for row in part) for part in (rounds[third : 2 * third], rounds[2 * third :]))
-        assert late - early < GROWTH * minutes / 60.0 / 3.0, f"{early:.0f} MB in the second third, {late:.0f} MB in the last"
+    rounds = play_road("long_use", timeout=120.0 * minutes + 1800.0)["values"]["rounds"]
+    for shading, first in (("MATERIAL", 1), ("SOLID", 2)):  # Material Preview takes over 1 GB when it is first shown
+        held = [row["MB"] for row in rounds[first:] if row["shading"] == shading]
+        assert len(held) > 1
+        assert max(held) - held[0] < MOST_GROWTH, f"{shading}: {held}"
