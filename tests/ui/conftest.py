@@ -140,20 +140,32 @@ def blender_version(request):
 
 
 @pytest.fixture(scope="session")
-def real_blender(repository, blender_version):
-    """Return a real Blender with the zip of this very work tree installed."""
-    work = repository / "build" / "ui" / blender_version
-    with provision_blender.locked(repository / "build" / "ui.lock"):  # a second run waits for the first
-        blender = RealBlender.fresh(provision_blender.provision(blender_version), work)
-        python = provision_blender.DEBIAN[blender_version].python
-        made = {"blender_range": ("4.2.0", None), "suffix": "-local"}
-        # one road watches the compiler at work
-        blender.install(build_zip.build("linux-x64", python, work, with_machine_code=False, **made))
-        yield blender
+def one_at_a_time(repository):
+    """Hold the lock of this repository's Blenders: a second run waits for the first."""
+    with provision_blender.locked(repository / "build" / "ui.lock"):
+        yield
+
+
+@pytest.fixture(scope="session")
+def local_zip(repository, blender_version, one_at_a_time):
+    """Return the zip of this very work tree, without machine code: some roads watch the compiler at work."""
+    out = repository / "build" / "ui-zip" / blender_version
+    out.mkdir(parents=True, exist_ok=True)
+    made = {"blender_range": ("4.2.0", None), "suffix": "-local", "with_machine_code": False}
+    return build_zip.build("linux-x64", provision_blender.DEBIAN[blender_version].python, out, **made)
+
+
+@pytest.fixture(scope="session")
+def real_blender(repository, blender_version, local_zip):
+    """Return a real Blender with the extension installed, the same for all roads: the first of them compiles the solver."""
+    root = provision_blender.provision(blender_version)
+    blender = RealBlender.fresh(root, repository / "build" / "ui" / blender_version)
+    blender.install(local_zip)
+    return blender
 
 
 @pytest.fixture
-def unseen_blender(blender_version, repository):
+def unseen_blender(blender_version, repository, one_at_a_time):
     """Return a function that makes a Blender whose profile has never seen Palpate, in a folder of a name."""
 
     def make(name: str) -> RealBlender:
@@ -164,14 +176,39 @@ def unseen_blender(blender_version, repository):
 
 
 @pytest.fixture
-def play_road(real_blender, blender_version, repository):
-    """Return a function that plays a road by name and returns its results; pictures go to build/ui-screenshots."""
+def play_in(repository, blender_version):
+    """Return a function that plays a road by name in a Blender and copies its pictures to build/ui-screenshots."""
+
+    def play(blender: RealBlender, name: str, timeout: float) -> dict:
+        out = blender.work / name
+        try:
+            return blender.play(Path(__file__).parent / "roads" / f"{name}.py", out, timeout)
+        finally:
+            shots = repository / "build" / "ui-screenshots" / blender_version
+            shots.mkdir(parents=True, exist_ok=True)
+            for picture in out.glob("*.png"):
+                shutil.copy(picture, shots / f"{name}-{picture.name}")
+
+    return play
+
+
+@pytest.fixture
+def play_road(real_blender, play_in):
+    """Return a function that plays a road by name in the Blender that all roads share, and returns its results."""
 
     def play(name: str, timeout: float = 300.0) -> dict:
-        return real_blender.play(Path(__file__).parent / "roads" / f"{name}.py", real_blender.work / name, timeout)
+        return play_in(real_blender, name, timeout)
 
-    yield play
-    shots = repository / "build" / "ui-screenshots" / blender_version
-    shots.mkdir(parents=True, exist_ok=True)
-    for picture in real_blender.work.glob("*/*.png"):
-        shutil.copy(picture, shots / f"{picture.parent.name}-{picture.name}")
+    return play
+
+
+@pytest.fixture
+def play_unseen(unseen_blender, local_zip, play_in):
+    """Return a function that plays a road by name in a Blender of its own that has never compiled the solver."""
+
+    def play(name: str, timeout: float = 300.0) -> dict:
+        blender = unseen_blender(name)
+        blender.install(local_zip)
+        return play_in(blender, name, timeout)
+
+    return play

@@ -8,14 +8,14 @@ import shutil
 import pytest
 
 
-def test_early_end(play_road):
+def test_early_end(play_unseen):
     """Blender closes at once while the solver is being compiled, and nothing goes on."""
-    assert play_road("early_end")["finished"]
+    assert play_unseen("early_end")["finished"]
 
 
-def test_first_use(play_road):
+def test_first_use(play_unseen):
     """The solver is compiled beside the window, with nothing in numba's cache."""
-    result = play_road("first_use", timeout=1200)
+    result = play_unseen("first_use", timeout=1200)
     assert result["screenshots"] == ["preparing.png", "playing.png", "bake-waits.png", "computed.png"]
 
 
