@@ -34,5 +34,6 @@ def test_first_image(request, unseen_blender, blender_version, capsys):
             figures = blender.play(ROAD, blender.work / "road", timeout=1800)["values"]
             assert len(figures) == FIGURES
             with capsys.disabled():
-                solver = "machine code" if carries_code else f"compiled, since no Python {python} here makes machine code"
+                why = f", since no Python {python} here makes machine code" if with_code else ""
+                solver = "machine code" if carries_code else f"compiled{why}"
                 print(f"\nfirst image, Blender {blender_version}, {solver}: {figures}")
