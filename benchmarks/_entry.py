@@ -259,7 +259,7 @@ def _base(rig: Path) -> Any:
 def palpate_gap(rig: Path) -> tuple[Iterable[str], float | None]:
     """Say what ``palpate gap`` is sure of; the probability is its smallest confidence."""
     from palpate.core.gap.dataset.rig import read_rig
-    from palpate.core.gap.report.sentences import SURE as ENOUGH
+    from palpate.core.gap.selection.confidence import SURE as ENOUGH
     from palpate.core.gap.selection.diagnosis import diagnose
     from palpate.core.jobs.job_runner import run_job
 

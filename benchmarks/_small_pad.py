@@ -61,7 +61,7 @@ def write_recording(file: Path, table: np.ndarray, more: Sequence[str] = ()) -> 
 def examined(write: Write, kind: str, number: int) -> tuple[set[str], Any]:
     """Return what is surely named in a case, and the diagnosis."""
     from palpate.core.gap.dataset.rig import read_rig
-    from palpate.core.gap.report.sentences import SURE
+    from palpate.core.gap.selection.confidence import SURE
     from palpate.core.gap.selection.diagnosis import diagnose
     from palpate.core.jobs.job_runner import run_job
 

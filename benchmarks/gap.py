@@ -173,7 +173,7 @@ def score(case: cases.Case, result: Any) -> dict[str, Any]:
     """Return what was said of a case and how right it is."""
     from palpate.core.gap.report.amended_sensor import with_mean_gain_moved
     from palpate.core.gap.report.experiments import next_experiment
-    from palpate.core.gap.report.sentences import SURE
+    from palpate.core.gap.selection.confidence import SURE
 
     model = with_mean_gain_moved(result)
     sure = [named.name for named in result.findings if named.confidence >= SURE]

@@ -37,7 +37,7 @@ def _examined(kind: str, number: int) -> tuple[str, bool]:
     """One word for what was said of a case, and whether something was named although the check error rose."""
     from palpate.core.gap.dataset.rig import read_rig
     from palpate.core.gap.report.comparison import gap_errors
-    from palpate.core.gap.report.sentences import SURE
+    from palpate.core.gap.selection.confidence import SURE
     from palpate.core.gap.selection.diagnosis import diagnose
     from palpate.core.jobs.job_runner import run_job
 

@@ -120,7 +120,7 @@ def _after(case: cases.Case, rig: Any, trajectory: Any, seed: int) -> tuple[str,
 
 def _said(case: cases.Case, result: Any) -> tuple[str, list]:
     """The outcome in a word; the names with their confidences, and the groups that are ambiguous."""
-    from palpate.core.gap.report.sentences import SURE
+    from palpate.core.gap.selection.confidence import SURE
 
     sure = [named.name for named in result.findings if named.confidence >= SURE]
     said = [[one.name, one.confidence] for one in result.findings]

@@ -129,7 +129,7 @@ def _recall_figures(data: Path) -> Iterator[dict]:
 
 
 def _sure_names(result: Any) -> list[str]:
-    from palpate.core.gap.report.sentences import SURE
+    from palpate.core.gap.selection.confidence import SURE
 
     return [one.name for one in result.findings if one.confidence >= SURE]
 

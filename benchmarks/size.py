@@ -45,7 +45,7 @@ def run() -> Iterator[dict]:
 def _examined(size: str, case: mounting.Mounting) -> tuple[bool, float, float]:
     """Whether the one effect alone is named, with which confidence, and in how many CPU seconds."""
     from palpate.core.gap.dataset.rig import read_rig
-    from palpate.core.gap.report.sentences import SURE
+    from palpate.core.gap.selection.confidence import SURE
     from palpate.core.gap.selection.diagnosis import diagnose
     from palpate.core.jobs.job_runner import run_job
 

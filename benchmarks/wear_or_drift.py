@@ -48,7 +48,7 @@ def run() -> Iterator[dict]:
 def _examined(kind: str, number: int) -> tuple[set[str], list[tuple[str, ...]], str]:
     """Sure names, names not told apart, and the verdict."""
     from palpate.core.gap.dataset.rig import read_rig
-    from palpate.core.gap.report.sentences import SURE
+    from palpate.core.gap.selection.confidence import SURE
     from palpate.core.gap.selection.diagnosis import diagnose
     from palpate.core.jobs.job_runner import run_job
 

@@ -8,6 +8,7 @@ from ..fitting.intervals import ParameterInterval
 from ..fitting.residual_tests import LEAST_STRUCTURE
 from ..forward.contact_phases import FEATURES
 from ..selection.check_recordings import CHECK_CLOSED
+from ..selection.confidence import SURE
 from ..selection.findings import Diagnosis, Finding
 from ..selection.gap_sizes import FORCES, READINGS
 from ..selection.wear_or_drift import CLOCK, NOTHING, TEXELS, USE
@@ -15,8 +16,6 @@ from .comparison import GapErrors, nrmse
 from .experiments import LOUD_NOISE
 from .recording_differences import recording_differences
 
-SURE = 0.5
-"""Confidence from which on an effect counts as found."""
 MANY_FLOORS = 3.0
 """The headline says how much stays in the check recordings from this many times the noise floor on."""
 LEAST_SHARE = 0.01

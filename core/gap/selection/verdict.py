@@ -21,6 +21,7 @@ from .confidence import (
     kinds_can_settle,
     least_share,
     may_absorb_misfit,
+    probability,
     unsettled_parameters,
     unsure_names,
 )
@@ -107,12 +108,11 @@ def _judge_effects(result: Diagnosis, view_set: ViewSet, state: SelectionState, 
         unsettled = unsettled_parameters(effect, index, result, min(leaves.values(), default=np.inf))
         only_height = is_height_alone(result.best.model, index, view_set)
         unsettled += (HEIGHT_ALONE,) if only_height else ()
-        confidence = weight * (0.5 + 0.5 * share if share >= least_share(effect.name, leaves) else 0.5 * share)
+        support = weight * (0.5 + 0.5 * share if share >= least_share(effect.name, leaves) else 0.5 * share)
         absorbs = is_open and may_absorb_misfit(effect, state)
         misfits = chosen is None and len(fitted) > 1 and (absorbs or is_doubtful(effect, state, fitted, gap_sizes))
         unborne = (unsettled and chosen is None) or only_height or (fitted and result.check.refutes(quantity))
-        if rivals or misfits or unborne:
-            confidence = min(confidence, UNSURE_CONFIDENCE)
+        confidence = min(support, UNSURE_CONFIDENCE) if rivals or misfits or unborne else probability(support)
         if rivals:
             result.ambiguous.append((effect.name, *rivals))
         nearest = min(times_worse, key=lambda name: times_worse[name], default="")

@@ -12,6 +12,7 @@ from palpate.core.gap.forward.predictor import Model, Predictor
 from palpate.core.gap.report import sentences, summary
 from palpate.core.gap.report.comparison import gap_errors
 from palpate.core.gap.selection.base_model import base_fit
+from palpate.core.gap.selection.confidence import SURE
 from palpate.core.gap.selection.diagnosis import diagnose
 from palpate.core.jobs.job_runner import run_job
 from palpate.core.model.sensor_parameters import SensorParameters
@@ -39,7 +40,7 @@ def test_the_report_says_what_friction_does_and_what_is_left(tmp_path):
     result = run_job(diagnose(brake(backlash=2.0)))
     errors = gap_errors(result)
     assert all(errors.frictionless[use] > 3.0 * errors.base[use] for use in ("fit", "check"))
-    assert not any(named.confidence >= sentences.SURE for named in result.findings)
+    assert not any(named.confidence >= SURE for named in result.findings)
     assert result.structure.strongest == "turning"
     said = sentences.headline(result, errors)
     assert "slid since it last turned" in said and "Friction is not missing" in said

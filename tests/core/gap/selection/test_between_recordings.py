@@ -12,7 +12,7 @@ from palpate.benchmarks import wear_or_drift
 from palpate.core.gap.dataset.rig import read_rig
 from palpate.core.gap.forward.predictor import Model, Predictor, number_name
 from palpate.core.gap.report.comparison import gap_errors
-from palpate.core.gap.report.sentences import SURE, headline
+from palpate.core.gap.report.sentences import headline
 from palpate.core.gap.report.summary import summary
 from palpate.core.gap.selection import between_recordings, screening
 from palpate.core.gap.selection.between_recordings import (
@@ -22,6 +22,7 @@ from palpate.core.gap.selection.between_recordings import (
     with_common_zero,
     with_own_numbers,
 )
+from palpate.core.gap.selection.confidence import SURE
 from palpate.core.gap.selection.diagnosis import diagnose
 from palpate.core.gap.selection.wear_or_drift import CLOCK, NOTHING, TEXELS, USE, texels_can_tell, told_by_courses
 from palpate.core.jobs.job_runner import run_job

@@ -13,6 +13,7 @@ from palpate.core.gap.fitting.least_squares import TrialView
 from palpate.core.gap.forward.predictor import Model, Predictor
 from palpate.core.gap.report import sentences, summary
 from palpate.core.gap.report.comparison import gap_errors
+from palpate.core.gap.selection.confidence import SURE
 from palpate.core.gap.selection.diagnosis import diagnose
 from palpate.core.gap.selection.outlying_channels import outlying_channels, without_channels
 from palpate.core.jobs.job_runner import run_job
@@ -80,7 +81,7 @@ def test_a_name_stays_sure_beside_a_texel_that_jumps_in_a_check_recording():
     rig = changed(saturating(trials=4, seconds=8.0), "t3", [TEXEL], jumps)
     result = run_job(diagnose(rig))
     assert [(one.recording, one.texel) for one in result.outlying] == [("t3", TEXEL)]
-    assert [one.name for one in result.findings if one.confidence >= sentences.SURE] == ["saturation"]
+    assert [one.name for one in result.findings if one.confidence >= SURE] == ["saturation"]
     assert result.verdict == "explained" and result.check.closed[0] > 0.9
     errors = gap_errors(result)
     said = [text for text in sentences.warnings(result) if f"Texel {TEXEL} of the check recording 't3'" in text]
