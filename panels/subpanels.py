@@ -55,8 +55,11 @@ def _panel(subpanel, prefix: str, place: dict):
 
 
 def draw_named(layout, settings, key: str, text: str = "") -> None:
-    """Draw a list or a pointer with its name beside it, so that the name also fits into a narrow editor."""
+    """Draw a list or a pointer with its name beside it, so that the name also fits where other names stand in their fields."""
     name = text or settings.bl_rna.properties[key].name
+    if layout.use_property_split:
+        layout.prop(settings, key, text=name)
+        return
     split = layout.split(factor=0.42)
     split.label(text=f"{name}:")
     split.prop(settings, key, text="")

@@ -15,19 +15,19 @@ def road(ui):
     ui.check(cube().palpate.role == "SENSOR", "Make Sensor makes the cube a sensor")
     yield from ui.screenshot("sensor")
 
-    # A wide editor has the names beside the fields
-    yield from ui.maximize(ui.area("PROPERTIES"))
-    yield from ui.filter("e")  # opens the panels
-    yield from ui.screenshot("wide")
-    yield from ui.filter("")
-    yield from ui.maximize(ui.area("PROPERTIES"))
-
     yield from ui.filter("Stiffness k")
     yield from ui.screenshot("filtered")
     yield from ui.fill("palpate.k", "1234.5")
     ui.value("k", cube().palpate.k)
     yield from ui.screenshot("stiffness")
     yield from ui.filter("")
+
+    # A wide editor has the names beside the fields
+    yield from ui.maximize(ui.area("PROPERTIES"))
+    yield from ui.filter("e")  # opens the panels
+    yield from ui.screenshot("wide")
+    yield from ui.filter("")
+    yield from ui.maximize(ui.area("PROPERTIES"))
 
     yield from ui.move(*ui.centre(ui.area("VIEW_3D")))
     yield from ui.key("Z", ctrl=True)
