@@ -15,6 +15,8 @@ import numpy as np
 
 LEAST_RUNS = 8
 """Runs with a value below which nothing is said of a dependency."""
+LEAST_RUNS_PER_NAME = 2
+"""Runs that each name of a choice needs on average: what names its run alone tells nothing."""
 RUNS_PER_CELL, MOST_BINS = 5, 10
 """Runs that a cell of the table of bins should hold on average, and bins at most."""
 DETECTED = 1e-3
@@ -66,9 +68,14 @@ def dependencies(values: Mapping[str, Sequence[object]], metrics: Mapping[str, n
         for metric, numbers in metrics.items():
             known = np.isfinite(numbers) & np.array([value is not None for value in column], bool)
             own = [value for value, is_known in zip(column, known) if is_known]
-            if len(own) >= LEAST_RUNS and len(set(own)) > 1 and np.ptp(numbers[known]) > 0:
+            if len(own) >= LEAST_RUNS and _is_repeated(own) and len(set(own)) > 1 and np.ptp(numbers[known]) > 0:
                 found.append(_dependency(parameter, metric, own, numbers[known]))
     return sorted(found, key=lambda one: (-one.strength, one.probability, one.metric, one.parameter))
+
+
+def _is_repeated(own: Sequence[object]) -> bool:
+    """Return False for names that hardly come twice."""
+    return not any(isinstance(value, str) for value in own) or LEAST_RUNS_PER_NAME * len(set(own)) <= len(own)
 
 
 def _dependency(parameter: str, metric: str, own: list[object], numbers: np.ndarray) -> Dependency:

@@ -23,9 +23,9 @@ from ..core.io.temporary_folder import temporary_folder
 from ..core.study.run_files import RUNS
 from ..core.study.run_record import read_run_record
 from ..core.study.study_file import Run
-from .dependencies import Dependency, dependencies
+from .dependencies import LEAST_RUNS, LEAST_RUNS_PER_NAME, Dependency, dependencies
 from .finished_runs import FailedRun, failures, finished_runs, run_order, study_name
-from .report_figures import MOST_METRICS, MOST_PARAMETERS, RunImage, draw_image_sheet, draw_small_multiples
+from .report_figures import MOST_METRICS, MOST_NAMES, MOST_PARAMETERS, RunImage, draw_image_sheet, draw_small_multiples
 
 REPORT_NAME = "report.html"
 TEMPLATE = Path(__file__).parent / "templates" / "sweep_report.html"
@@ -81,7 +81,7 @@ def write_report(folder: Path, planned: Sequence[Run] = ()) -> None:
             dependencies=[_dependency_row(one) for one in found[:MOST_DEPENDENCIES] if one.strength > 0],
             left_off=sum(one.strength > 0 for one in found[MOST_DEPENDENCIES:]),
             ranges=[_range_row(f"{name}", values) for name, values in columns.values.items()],
-            metrics=[_range_row(name, [x for x in values if np.isfinite(x)]) for name, values in columns.metrics.items()],
+            metrics=[_metric_row(name, values[np.isfinite(values)]) for name, values in columns.metrics.items()],
             messages=_message_rows([run.sentence for run in failed]),
             failures=len(failed),
             failed_dependencies=_failed_rows(folder, order, columns, failed),
@@ -130,9 +130,17 @@ def _draw(
 
 def _most_dependent(columns: StudyColumns, found: list[Dependency]) -> tuple[list[str], list[str]]:
     """Return the parameters and metrics that are drawn: those in the strongest dependencies first, then in their order."""
-    parameters = list(dict.fromkeys([*(one.parameter for one in found if one.strength > 0), *columns.values]))
+    drawable = [name for name, own in columns.values.items() if _has_few_names(own)]
+    strong = [one.parameter for one in found if one.strength > 0 and one.parameter in drawable]
+    parameters = list(dict.fromkeys([*strong, *drawable]))
     metrics = list(dict.fromkeys([*(one.metric for one in found if one.strength > 0), *columns.metrics]))
     return parameters[:MOST_PARAMETERS], metrics[:MOST_METRICS]
+
+
+def _has_few_names(values: list[Any]) -> bool:
+    """Return False for a choice of more names than a picture has room for."""
+    names = {value for value in values if isinstance(value, str)}
+    return len(names) <= MOST_NAMES
 
 
 def _images(folder: Path, order: list[tuple[int, str]]) -> list[RunImage]:
@@ -175,7 +183,8 @@ def _strongest_sentence(found: list[Dependency], columns: StudyColumns, runs: in
     if strong:
         return f"The strongest dependency is that of {strong[0].metric} on {strong[0].parameter}."
     if not found:
-        return "There are too few runs, parameters or metrics to look for dependencies."
+        least = f"{LEAST_RUNS} runs in which both vary, and {LEAST_RUNS_PER_NAME} for each name of a choice"
+        return f"No dependency of a metric on a parameter was looked for, as that takes {least}."
     return f"No metric depends on any parameter as far as {counted(runs, 'run')} can tell."
 
 
@@ -194,12 +203,16 @@ def _without_numbers(sentence: str) -> str:
 
 def _shown_sentence(columns: StudyColumns) -> str:
     """Say what the small multiples leave out."""
-    left = max(0, len(columns.values) - MOST_PARAMETERS), max(0, len(columns.metrics) - MOST_METRICS)
-    if not any(left):
-        return ""
+    drawable = sum(map(_has_few_names, columns.values.values()))
+    left = max(0, drawable - MOST_PARAMETERS), max(0, len(columns.metrics) - MOST_METRICS)
+    named = len(columns.values) - drawable
     parts = [counted(number, what) for number, what in zip(left, ("parameter", "metric")) if number]
-    verb = "is" if sum(left) == 1 else "are"
-    return f"Not drawn {verb} {' and '.join(parts)} with weaker dependencies; runs.parquet has all."
+    weaker = [f"{' and '.join(parts)} with weaker dependencies"] if parts else []
+    crowded = [f"{counted(named, 'choice')} of more than {MOST_NAMES} names"] if named else []
+    if not weaker + crowded:
+        return ""
+    verb = "is" if sum(left) + named == 1 else "are"
+    return f"Not drawn {verb} {', and '.join(weaker + crowded)}; runs.parquet has all."
 
 
 def _dependency_row(one: Dependency) -> list[str]:
@@ -216,11 +229,17 @@ def _range_row(name: str, values: Any) -> list[str]:
         return [name, shown, "", "", f"{len(known):,}"]
     if not known:
         return [name, "", "", "", "0"]
-    return [
-        name,
-        *(f"{part:.4g}".replace("-", "−") for part in (min(known), float(np.median(known)), max(known))),
-        f"{len(known):,}",
-    ]
+    return [name, *map(_digits, (min(known), float(np.median(known)), max(known))), f"{len(known):,}"]
+
+
+def _metric_row(name: str, known: np.ndarray) -> list[str]:
+    """Return name, mean, smallest, median and largest value, and how many runs have one."""
+    ranges = _range_row(name, known.tolist())
+    return [name, _digits(float(known.mean())) if len(known) else "", *ranges[1:]]
+
+
+def _digits(number: float) -> str:
+    return f"{number:.4g}".replace("-", "−")
 
 
 def _failed_rows(folder: Path, order: list[tuple[int, str]], columns: StudyColumns, failed: list[FailedRun]) -> list[list[str]]:

@@ -22,6 +22,10 @@ if TYPE_CHECKING:
 
 MOST_PARAMETERS, MOST_METRICS = 6, 6
 """Columns and rows of the small multiples."""
+MOST_NAMES = 12
+"""Names of a choice that have room below one column."""
+MOST_LETTERS = 14
+"""Of a name below its box; the end of a longer one tells more, as of files."""
 MOST_POINTS = 2000
 """Runs that are drawn as points; of more, as many are chosen evenly."""
 MEDIAN_BINS, LEAST_PER_BIN = 10, 4
@@ -53,7 +57,8 @@ def draw_small_multiples(
         Pairs whose median is drawn in colour, because a dependency was detected.
     """
     columns, rows = len(values), len(metrics)
-    cell_width, cell_height, left, below = 1.75, 1.3, 0.85, 0.55
+    has_names = any(isinstance(value, str) for own in values.values() for value in own)
+    cell_width, cell_height, left, below = 1.75, 1.3, 0.85, 1.25 if has_names else 0.55
     width, height = left + cell_width * columns + 0.1, below + cell_height * rows + 0.1
     figure = new_figure(width, height)
     for column, (parameter, own) in enumerate(values.items()):
@@ -111,7 +116,8 @@ def _draw_choices(axes: Axes, own: Sequence[object], numbers: np.ndarray, chosen
     drawn = axes.boxplot(groups, widths=0.5, showfliers=False, medianprops={"color": colour, "lw": 1.6})
     for line in (*drawn["boxes"], *drawn["whiskers"], *drawn["caps"]):
         line.set(color=NORMAL_COLOUR, lw=0.8)
-    axes.set_xticks(range(1, len(names) + 1), names)
+    shown = [name if len(name) <= MOST_LETTERS else f"…{name[1 - MOST_LETTERS :]}" for name in names]
+    axes.set_xticks(range(1, len(names) + 1), shown, rotation=90 if len("".join(shown)) > MOST_LETTERS else 0)
 
 
 def _is_logarithmic(column: np.ndarray) -> bool:

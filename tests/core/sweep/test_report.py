@@ -117,3 +117,34 @@ def test_missing_values_count_as_missing():
     (one,) = dependencies({"x": x}, {"y": y})
     assert one.runs == 15 and one.rank_correlation == pytest.approx(1.0)
     assert dependencies({"x": x[:10]}, {"y": y[:10]}) == [], "five runs say nothing"
+
+
+def test_a_choice_that_names_each_run_is_neither_drawn_nor_judged(tmp_path):
+    study = new_study(tmp_path / "study", "cases")
+    texels = grid_texels()
+    for index in range(40):
+        recording = recording_of(texels)
+        recording.sensors["pad"].net_force = recording.sensors["pad"].net_force + [0.0, 0.0, -1.0 - index / 40]
+        write_run(study, index, [unit_sensor("pad", texels)], recording, {"case": f"case {index}"})
+    write_report(study)
+    page = (study / "report.html").read_text(encoding="utf-8")
+    assert "Metrics over each parameter" not in page
+    assert "No dependency of a metric on a parameter was looked for" in page and "Strongest dependencies" not in page
+
+
+def test_names_are_judged_from_two_runs_each():
+    half = np.repeat([0.0, 1.0], 20)
+    names = [f"name {number // 2}" for number in range(40)]
+    assert not dependencies({"case": [f"case {number}" for number in range(40)]}, {"half": half})
+    (found,) = dependencies({"name": names}, {"half": half})
+    assert found.information > 0.5
+
+
+def test_means_of_metrics_are_given(tmp_path):
+    study = study_of(tmp_path)
+    write_report(study)
+    page = (study / "report.html").read_text(encoding="utf-8")
+    row = re.findall(r"<tr><td>largest_force</td>(.*?)</tr>", page)[-1]  # the table of dependencies comes before
+    mean, smallest, _, largest, runs = (float(cell) for cell in re.findall(r">([\d.]+)<", row))
+    assert runs == 40 and smallest < mean < largest
+    assert mean == pytest.approx((smallest + largest) / 2, rel=1e-3)  # evenly from the smallest to the largest
