@@ -15,10 +15,10 @@ import numpy as np
 
 LEAST_RUNS = 8
 """Runs with a value below which nothing is said of a dependency."""
-LEAST_RUNS_PER_NAME = 2
-"""Runs that each name of a choice needs on average: what names its run alone tells nothing."""
 RUNS_PER_CELL, MOST_BINS = 5, 10
 """Runs that a cell of the table of bins should hold on average, and bins at most."""
+RUNS_PER_NAME = 2 * RUNS_PER_CELL
+"""Runs that each name of a choice needs on average: two bins of enough runs. What comes once tells nothing."""
 DETECTED = 1e-3
 """Probability below which a dependency counts as detected: one in a thousand pairs is a false one."""
 
@@ -74,15 +74,20 @@ def dependencies(values: Mapping[str, Sequence[object]], metrics: Mapping[str, n
 
 
 def _is_repeated(own: Sequence[object]) -> bool:
-    """Return False for names that hardly come twice."""
-    return not any(isinstance(value, str) for value in own) or LEAST_RUNS_PER_NAME * len(set(own)) <= len(own)
+    """Return False for names that come too seldom for a test."""
+    return not _are_names(own) or RUNS_PER_NAME * len(set(own)) <= len(own)
+
+
+def _are_names(own: Sequence[object]) -> bool:
+    return any(isinstance(value, str) for value in own)
 
 
 def _dependency(parameter: str, metric: str, own: list[object], numbers: np.ndarray) -> Dependency:
     from scipy.stats import chi2_contingency, spearmanr
 
-    bins = int(np.clip(np.sqrt(len(own) / RUNS_PER_CELL), 2, MOST_BINS))
-    is_text = any(isinstance(value, str) for value in own)
+    is_text = _are_names(own)
+    cells = len(own) / RUNS_PER_CELL
+    bins = int(np.clip(cells / len(set(own)) if is_text else np.sqrt(cells), 2, MOST_BINS))
     correlation, probability = None, 1.0
     if is_text:
         _, place = np.unique([str(value) for value in own], return_inverse=True)

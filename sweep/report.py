@@ -23,7 +23,7 @@ from ..core.io.temporary_folder import temporary_folder
 from ..core.study.run_files import RUNS
 from ..core.study.run_record import read_run_record
 from ..core.study.study_file import Run
-from .dependencies import LEAST_RUNS, LEAST_RUNS_PER_NAME, Dependency, dependencies
+from .dependencies import LEAST_RUNS, RUNS_PER_NAME, Dependency, dependencies
 from .finished_runs import FailedRun, failures, finished_runs, run_order, study_name
 from .report_figures import MOST_METRICS, MOST_NAMES, MOST_PARAMETERS, RunImage, draw_image_sheet, draw_small_multiples
 
@@ -139,8 +139,8 @@ def _most_dependent(columns: StudyColumns, found: list[Dependency]) -> tuple[lis
 
 def _has_few_names(values: list[Any]) -> bool:
     """Return False for a choice of more names than a picture has room for."""
-    names = {value for value in values if isinstance(value, str)}
-    return len(names) <= MOST_NAMES
+    known = {value for value in values if value is not None}
+    return len(known) <= MOST_NAMES or not any(isinstance(value, str) for value in known)
 
 
 def _images(folder: Path, order: list[tuple[int, str]]) -> list[RunImage]:
@@ -183,9 +183,11 @@ def _strongest_sentence(found: list[Dependency], columns: StudyColumns, runs: in
     if strong:
         return f"The strongest dependency is that of {strong[0].metric} on {strong[0].parameter}."
     if not found:
-        least = f"{LEAST_RUNS} runs in which both vary, and {LEAST_RUNS_PER_NAME} for each name of a choice"
+        least = f"{LEAST_RUNS} runs in which both vary, and {RUNS_PER_NAME} for each name of a choice"
         return f"No dependency of a metric on a parameter was looked for, as that takes {least}."
-    return f"No metric depends on any parameter as far as {counted(runs, 'run')} can tell."
+    judged = {one.parameter for one in found}
+    these = "any parameter" if judged >= set(columns.values) else " or ".join(sorted(judged))
+    return f"No metric depends on {these} as far as {counted(runs, 'run')} can tell."
 
 
 def _message_rows(sentences: list[str]) -> list[tuple[str, int]]:

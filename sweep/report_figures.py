@@ -117,6 +117,8 @@ def _draw_choices(axes: Axes, own: Sequence[object], numbers: np.ndarray, chosen
     for line in (*drawn["boxes"], *drawn["whiskers"], *drawn["caps"]):
         line.set(color=NORMAL_COLOUR, lw=0.8)
     shown = [name if len(name) <= MOST_LETTERS else f"…{name[1 - MOST_LETTERS :]}" for name in names]
+    if len(set(shown)) < len(names):
+        shown = names
     axes.set_xticks(range(1, len(names) + 1), shown, rotation=90 if len("".join(shown)) > MOST_LETTERS else 0)
 
 

@@ -20,8 +20,8 @@ from scipy.optimize import minimize
 
 HOUSE = Path(__file__).resolve().parent.parent
 PICTURE = HOUSE / "docs" / "images" / "gap-reliability.png"
-BINS = (0.0, 0.3, 0.5, 0.8, 0.9, 0.95, 0.98, 1.0)
-"""Ends of the bins of confidence."""
+BINS = (0.0, 0.4, 0.5, 0.8, 0.9, 0.95, 0.98, 1.0)
+"""Ends of the bins of confidence. Doubts without a rival are below 0.4, those with one above."""
 NEAREST = 1e-3
 """Confidences nearer to 0 or 1 count as this near in the regression: a few hundred names say nothing of one in a thousand."""
 TICKS = (0.1, 0.3, 0.5, 0.8, 0.9, 0.95, 0.98, 0.995)

@@ -53,7 +53,7 @@ def run(values: dict[str, Any], folder: Path) -> dict[str, float | None]:
         "no_gap": float(found["outcome"] == "no gap"),
         "named": float(len(found["sure"])),
         "closed": found["closed"],
-        f"right.{kind}": outcomes["right"],  # the mean of each row in the report
+        f"right.{kind}": float(found["outcome"] == gap.RIGHT.get(kind, "right")),  # the mean of each row in the report
         f"wrong.{kind}": outcomes["wrong"],
     }
 

@@ -1,8 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Colours of heat maps in a real window, pixel by pixel; see roads/colors.py.
-
-The name of this file comes after test_roads.py, of which the first two want a Blender in which nothing has been compiled.
-"""
+"""Colours of heat maps in a real window, pixel by pixel; see roads/colors.py."""
 
 from __future__ import annotations
 

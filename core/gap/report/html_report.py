@@ -16,6 +16,7 @@ from ..forward.contact_phases import FEATURES
 from ..selection.findings import Diagnosis
 from .plan_files import planned_sentence
 from .plots import CAPTIONS
+from .sentences import said_confidence
 
 TEMPLATE = Path(__file__).parent / "templates" / "report.html"
 
@@ -109,7 +110,7 @@ def _effect(one: dict[str, Any]) -> dict[str, str]:
     return {
         "title": kind.title,
         "form": one["form"],
-        "confidence": f"{one['confidence']:.0%}",
+        "confidence": said_confidence(one["confidence"]),
         "text": kind.text,
         "formula": form.formula,
         "reference": form.reference,
@@ -125,7 +126,8 @@ def _evidence_table(found: dict[str, Any]) -> Table:
         if rival:
             much = "as much" if rival["leaves"] < AS_MUCH else f"{rival['leaves']:.2g} times as much"
             near = f"{rival['effect']}, which leaves {much}"
-        rows.append([one["effect"], f"{one['gap_before']:.3%}", f"{one['gap_after']:.3%}", f"{one['confidence']:.0%}", near])
+        errors = [f"{one[key]:.3%}" for key in ("gap_before", "gap_after")]
+        rows.append([one["effect"], *errors, said_confidence(one["confidence"]), near])
     return Table(["effect", "without", "with", "confidence", "next best in its place"], rows, {1, 2, 3})
 
 

@@ -16,6 +16,8 @@ from .comparison import GapErrors, nrmse
 from .experiments import LOUD_NOISE
 from .recording_differences import recording_differences
 
+MOST_SAID = 0.99
+"""Largest confidence that is said as a number: a few hundred cases do not tell one wrong name in a thousand from none."""
 MANY_FLOORS = 3.0
 """The headline says how much stays in the check recordings from this many times the noise floor on."""
 LEAST_SHARE = 0.01
@@ -171,6 +173,11 @@ def _friction(errors: GapErrors) -> str:
     return f" Friction is not missing: the base model has it, and without it the error would be {frictionless:.2%}."
 
 
+def said_confidence(confidence: float) -> str:
+    """Return a confidence in percent."""
+    return f"{confidence:.0%}" if confidence <= MOST_SAID else f"over {MOST_SAID:.0%}"
+
+
 def evidence(result: Diagnosis, errors: GapErrors) -> list[str]:
     """Return a sentence for each effect that was found, and one for the trials that were never fitted."""
     left = [error or 0.0 for error in errors.stages]
@@ -178,7 +185,8 @@ def evidence(result: Diagnosis, errors: GapErrors) -> list[str]:
     for one in by_share_closed(result):
         rivals = f"; it could as well be {' or '.join(one.rivals)}" if one.rivals else ""
         before, after = left[one.effect], left[min(one.effect + 1, len(left) - 1)]
-        said.append(f"{one.name} ({one.form}): {before:.2%} → {after:.2%}, confidence {one.confidence:.0%}{rivals}")
+        confidence = said_confidence(one.confidence)
+        said.append(f"{one.name} ({one.form}): {before:.2%} → {after:.2%}, confidence {confidence}{rivals}")
         said += [f"{one.name}: {why}, so its name is not sure" for why in one.unsettled]
     if result.of("check") and result.findings:
         before, after = errors.base["check"] or 0.0, errors.amended["check"] or 0.0

@@ -197,4 +197,13 @@ def test_hidden_effects_as_a_study_say_what_the_benchmark_says(repository, tmp_p
     run: Run = opened.runs[0]
     record = json.loads((opened.folder / "runs" / run.digest / "run.json").read_text())
     assert record["values"] == {"case": "other 14"}
-    assert record["metrics"]["right"] == 1.0
+    assert record["metrics"]["right"] == record["metrics"]["right.other"] == 1.0
+
+
+@pytest.mark.parametrize(("kind", "outcome"), [("none", "no gap"), ("outside", "unexplained"), ("two", "right")])
+def test_a_row_of_hidden_effects_has_a_metric_of_what_is_right_there(repository, tmp_path, monkeypatch, kind, outcome):
+    """Where nothing, or nothing that has a name, is hidden, to say so is right."""
+    module = module_of(repository / "docs" / "sample-study" / "hidden_effects.py")
+    monkeypatch.setattr(gap, "examine", lambda *_: {"outcome": outcome, "sure": [], "closed": None})
+    metrics = module.run({"case": f"{kind} 1"}, tmp_path)
+    assert metrics[f"right.{kind}"] == 1.0 and metrics[f"wrong.{kind}"] == 0.0

@@ -25,6 +25,7 @@ def road(ui):
     # A wide editor has the names beside the fields
     yield from ui.maximize(ui.area("PROPERTIES"))
     yield from ui.filter("e")  # opens the panels
+    ui.check(ui.region(ui.area("PROPERTIES")).width > 1000, "the editor is wide")
     yield from ui.screenshot("wide")
     yield from ui.filter("")
     yield from ui.maximize(ui.area("PROPERTIES"))
