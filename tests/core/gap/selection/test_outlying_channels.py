@@ -13,7 +13,8 @@ from palpate.core.gap.fitting.least_squares import TrialView
 from palpate.core.gap.forward.predictor import Model, Predictor
 from palpate.core.gap.report import sentences, summary
 from palpate.core.gap.report.comparison import gap_errors
-from palpate.core.gap.selection.confidence import SURE
+from palpate.core.gap.selection import verdict
+from palpate.core.gap.selection.confidence import SURE, probability
 from palpate.core.gap.selection.diagnosis import diagnose
 from palpate.core.gap.selection.outlying_channels import outlying_channels, without_channels
 from palpate.core.jobs.job_runner import run_job
@@ -77,11 +78,17 @@ def test_an_error_that_rises_is_never_hidden():
     assert not outlying_channels(fitted, check, base, base)  # and without an effect there is nothing to hold it against
 
 
-def test_a_name_stays_sure_beside_a_texel_that_jumps_in_a_check_recording():
+def test_a_name_stays_sure_beside_a_texel_that_jumps_in_a_check_recording(monkeypatch):
     rig = changed(saturating(trials=4, seconds=8.0), "t3", [TEXEL], jumps)
+    supports = []
+    monkeypatch.setattr(verdict, "probability", lambda support: supports.append(support) or probability(support))
     result = run_job(diagnose(rig))
     assert [(one.recording, one.texel) for one in result.outlying] == [("t3", TEXEL)]
-    assert [one.name for one in result.findings if one.confidence >= SURE] == ["saturation"]
+    (found,) = result.findings
+    assert found.name == "saturation" and found.confidence >= SURE
+    assert found.confidence in [round(probability(support), 3) for support in supports], (
+        "a sure name has a calibrated confidence"
+    )
     assert result.verdict == "explained" and result.check.closed[0] > 0.9
     errors = gap_errors(result)
     said = [text for text in sentences.warnings(result) if f"Texel {TEXEL} of the check recording 't3'" in text]
