@@ -30,7 +30,8 @@ DEVIATIONS = 1.96
 """Standard deviations of a 95 % interval."""
 FAMILIES = (
     ("the library's formulas", ("own",), "#1f5fa8", "s"),
-    ("other formulas", ("other", "two", "three", "poor", "third"), "#c4541a", "o"),
+    ("other formulas", ("other", "two", "three", "poor"), "#c4541a", "o"),
+    ("a third family, on which nothing was set", ("third",), "#2a7f3f", "^"),
 )
 """Words, kinds of cases, colour and mark of what is drawn."""
 
