@@ -24,7 +24,9 @@ BINS = (0.0, 0.4, 0.5, 0.8, 0.9, 0.95, 0.98, 1.0)
 """Ends of the bins of confidence. Doubts without a rival are below 0.4, those with one above."""
 NEAREST = 1e-3
 """Confidences nearer to 0 or 1 count as this near in the regression: a few hundred names say nothing of one in a thousand."""
-TICKS = (0.1, 0.3, 0.5, 0.8, 0.9, 0.95, 0.98, 0.995)
+LEAST_DRAWN = 5
+"""Names in a bin that is drawn; the table has the others, too."""
+TICKS = (0.1, 0.3, 0.5, 0.8, 0.9, 0.95, 0.98, 0.995, 0.999)
 """Confidences that are written at the axis."""
 DEVIATIONS = 1.96
 """Standard deviations of a 95 % interval."""
@@ -130,7 +132,8 @@ def draw(rows: Sequence[dict[str, Any]], path: Path) -> None:
     line = np.linspace(0.02, 1.0 - NEAREST, 1000)
     axes.plot(line, line, color="0.6", linewidth=1.0, label="right as often as said")
     for words, kinds, colour, mark in FAMILIES:
-        bins = binned(*named([row for row in rows if row["kind"] in kinds]))
+        found = binned(*named([row for row in rows if row["kind"] in kinds]))
+        bins = [one for one in found if one.count >= LEAST_DRAWN]
         if bins:
             share, ends = np.array([one.share for one in bins]), np.array([one.interval for one in bins]).T
             mean, spread = [one.mean for one in bins], np.abs(ends - share)
@@ -141,7 +144,7 @@ def draw(rows: Sequence[dict[str, Any]], path: Path) -> None:
     axes.set_xscale("logit")  # most names are near 1
     axes.set_xticks(TICKS, [f"{tick:g}" for tick in TICKS])
     axes.set_xticks([], minor=True)
-    axes.set(xlabel="confidence that is said", ylabel="share of names that are right", xlim=(0.05, 0.9985), ylim=(-0.06, 1.05))
+    axes.set(xlabel="confidence that is said", ylabel="share of names that are right", xlim=(0.05, 0.9996), ylim=(-0.06, 1.05))
     axes.legend(loc="lower right", frameon=False, fontsize=8)
     figure.savefig(path, metadata={"Software": None})
 
