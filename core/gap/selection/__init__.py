@@ -7,6 +7,7 @@ has seen. ``findings`` holds the result.
 
 __all__ = [
     "check_recordings",
+    "confidence",
     "diagnosis",
     "findings",
     "gap_sizes",
