@@ -31,6 +31,8 @@ class ParameterInterval:
         Index of the effect in the model's stack; -1 for the base model.
     name : str
     value, low, high : float
+    bounds : (float, float)
+        Within which the parameter was fitted.
     """
 
     effect: int
@@ -38,6 +40,12 @@ class ParameterInterval:
     value: float
     low: float
     high: float
+    bounds: tuple[float, float] = (-np.inf, np.inf)
+
+    @property
+    def fills_bounds(self) -> bool:
+        """Whether the recordings tell no more of the parameter than its bounds do."""
+        return self.low <= self.bounds[0] and self.high >= self.bounds[1]
 
 
 def parameter_intervals(found: Fit) -> list[ParameterInterval]:
@@ -68,7 +76,8 @@ def parameter_intervals(found: Fit) -> list[ParameterInterval]:
         at = float(item.to_coordinate(value_of(found.model, item)))
         spread = NORMAL_QUANTILE * max(float(np.sqrt(max(kind[i, i], 0.0))) for kind in kinds)
         ends = sorted((float(item.from_coordinate(at - spread)), float(item.from_coordinate(at + spread))))
-        made.append(ParameterInterval(item.effect, item.name, float(value_of(found.model, item)), ends[0], ends[1]))
+        value = float(value_of(found.model, item))
+        made.append(ParameterInterval(item.effect, item.name, value, ends[0], ends[1], (item.low, item.high)))
     return made
 
 

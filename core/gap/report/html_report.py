@@ -12,16 +12,15 @@ from ...effects.engine.registry import form_of, kind_of
 from ...errors import counted
 from ...io.html_templates import render_html
 from ...model.sensor_parameters import unit_of
+from ..fitting.least_squares import BASE
 from ..forward.contact_phases import FEATURES
 from ..selection.findings import Diagnosis
 from .plan_files import planned_sentence
 from .plots import CAPTIONS
-from .sentences import said_confidence
+from .sentences import interval_ends, said_confidence
 
 TEMPLATE = Path(__file__).parent / "templates" / "report.html"
 
-WIDE_INTERVAL = 20.0
-"""If an interval reaches this many times below and above its value, the recordings do not identify the value."""
 CLOSED_FROM = 0.2
 """A closed share is shown if the gap, noise removed, is at least this share of the noise floor."""
 AS_MUCH = 1.05
@@ -134,11 +133,11 @@ def _evidence_table(found: dict[str, Any]) -> Table:
 def _parameter_table(result: Diagnosis, found: dict[str, Any]) -> Table:
     """Fitted parameters with their intervals."""
     unit = result.rig.parameters.unit
+    ends = {(one.effect, one.name): interval_ends(one) for one in result.intervals}
     rows = []
     for name, value in found["base"]["parameters"].items():
-        low, high = found["base"]["intervals"][name]
-        rows.append(["base model", name, f"{value:.4g}", _interval(value, low, high), unit_of(name, unit)])
-    for one in found["found"]:
+        rows.append(["base model", name, f"{value:.4g}", ends[BASE, name], unit_of(name, unit)])
+    for index, one in zip((finding.effect for finding in result.findings), found["found"], strict=True):
         for parameter in form_of(one["effect"], one["form"]).parameters:
             value = one["parameters"].get(parameter.name)
             own = parameter.unit_of(unit)
@@ -146,17 +145,8 @@ def _parameter_table(result: Diagnosis, found: dict[str, Any]) -> Table:
                 span = f"{len(value)} numbers, {min(value):.3g} … {max(value):.3g}"
                 rows.append([one["effect"], parameter.name, span, "", own])
             elif value is not None:
-                low, high = one["intervals"].get(parameter.name, (value, value))
-                rows.append([one["effect"], parameter.name, f"{value:.4g}", _interval(value, low, high), own])
+                rows.append([one["effect"], parameter.name, f"{value:.4g}", ends.get((index, parameter.name), ""), own])
     return Table(["", "parameter", "value", "95 % interval", "unit"], rows, {2, 3})
-
-
-def _interval(value: float, low: float, high: float) -> str:
-    """An interval in words, or a remark if it leaves even the order of magnitude open."""
-    on_both_sides = low >= 0.0 and high > WIDE_INTERVAL * value and low * WIDE_INTERVAL <= value
-    if on_both_sides or high - low > WIDE_INTERVAL**2 * abs(value) > 0.0:
-        return "not told by these recordings"
-    return f"{low:.4g} … {high:.4g}"
 
 
 def _open_questions(found: dict[str, Any]) -> list[str]:

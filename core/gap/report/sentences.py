@@ -18,6 +18,8 @@ from .recording_differences import recording_differences
 
 MOST_SAID = 0.99
 """Largest confidence that is said as a number: a few hundred cases do not tell one wrong name in a thousand from none."""
+WIDE_INTERVAL = 20.0
+"""If an interval reaches this many times below and above its value, the recordings do not identify the value."""
 MANY_FLOORS = 3.0
 """The headline says how much stays in the check recordings from this many times the noise floor on."""
 LEAST_SHARE = 0.01
@@ -245,7 +247,15 @@ def warnings(result: Diagnosis) -> list[str]:
 
 def interval_text(one: ParameterInterval) -> str:
     """Return a number with its interval, for the terminal."""
-    return f"{one.value:.4g} ({one.low:.4g} … {one.high:.4g})"
+    return f"{one.value:.4g} ({interval_ends(one)})"
+
+
+def interval_ends(one: ParameterInterval) -> str:
+    """Return an interval, or a remark if it fills the bounds of its parameter or leaves the order of magnitude open."""
+    on_both_sides = one.low >= 0.0 and one.high > WIDE_INTERVAL * one.value and one.low * WIDE_INTERVAL <= one.value
+    if one.fills_bounds or on_both_sides or one.high - one.low > WIDE_INTERVAL**2 * abs(one.value) > 0.0:
+        return "not told by these recordings"
+    return f"{one.low:.4g} … {one.high:.4g}"
 
 
 def _listed(names: list[str]) -> str:

@@ -163,9 +163,9 @@ def unsettled_parameters(effect: Effect, index: int, result: Diagnosis, lead: fl
     units = {parameter.name: parameter.unit_of(unit) for parameter in form.parameters}
     at = parameters_at_bounds(result.best.model, result.best.free, index)
     said = [f"{name} is at its bound of {end:.3g} {units[name]}".removesuffix(" 1") for name, end in at.items()]
-    bounds = {item.name: (item.low, item.high) for item in result.best.free if item.effect == index}
-    own = [one for one in result.intervals if one.effect == index and one.name in bounds]
-    open_names = [one.name for one in own if one.low <= bounds[one.name][0] and one.high >= bounds[one.name][1]]
+    fitted = {item.name for item in result.best.free if item.effect == index}
+    own = [one for one in result.intervals if one.effect == index and one.name in fitted]
+    open_names = [one.name for one in own if one.fills_bounds]
     if own and len(open_names) == len(own) and lead < CLEAR_LEAD:
         said.append(f"these recordings leave {' and '.join(open_names)} open")
     return tuple(said)

@@ -164,7 +164,7 @@ def test_numbers_at_their_bounds_and_open_ones_do_not_make_a_sure_name(values, i
     rig = cases.rig(seed=1, trials=1, seconds=2.0)
     result = type("Result", (), {})()
     result.rig, result.best = rig, Fit(model, free, np.zeros((1, 2)), np.zeros((1, 2), int))
-    result.intervals = [ParameterInterval(0, "z", values["z"], *interval)]
+    result.intervals = [ParameterInterval(0, "z", values["z"], *interval, (-0.02, 0.02))]
     said = unsettled_parameters(one, 0, result)
     assert len(said) == bool(why) and all(why in text for text in said)
     assert ("open" in why) == (why != "" and not unsettled_parameters(one, 0, result, CLEAR_LEAD) and bool(said))
