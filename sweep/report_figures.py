@@ -25,7 +25,7 @@ MOST_PARAMETERS, MOST_METRICS = 6, 6
 MOST_NAMES = 12
 """Names of a choice that have room below one column."""
 MOST_LETTERS = 14
-"""Of a name below its box; the end of a longer one tells more, as of files."""
+"""Letters that have room below one column: of all names in a row, or of each upright. The end of a longer one tells more."""
 MOST_POINTS = 2000
 """Runs that are drawn as points; of more, as many are chosen evenly."""
 MEDIAN_BINS, LEAST_PER_BIN = 10, 4

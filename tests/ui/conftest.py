@@ -147,12 +147,21 @@ def one_at_a_time(repository):
 
 
 @pytest.fixture(scope="session")
-def local_zip(repository, blender_version, one_at_a_time):
-    """Return the zip of this very work tree, without machine code: some roads watch the compiler at work."""
-    out = repository / "build" / "ui-zip" / blender_version
-    out.mkdir(parents=True, exist_ok=True)
-    made = {"blender_range": ("4.2.0", None), "suffix": "-local", "with_machine_code": False}
-    return build_zip.build("linux-x64", provision_blender.DEBIAN[blender_version].python, out, **made)
+def build_local_zip(blender_version):
+    """Return a function that builds the zip of this very work tree for the Blender, into a folder."""
+
+    def build(out: Path, with_machine_code: bool) -> Path:
+        python = provision_blender.DEBIAN[blender_version].python
+        made = {"blender_range": ("4.2.0", None), "suffix": "-local", "with_machine_code": with_machine_code}
+        return build_zip.build("linux-x64", python, out, **made)
+
+    return build
+
+
+@pytest.fixture(scope="session")
+def local_zip(repository, blender_version, build_local_zip, one_at_a_time):
+    """Return the zip that roads install, without machine code: some of them watch the compiler at work."""
+    return build_local_zip(repository / "build" / "ui-zip" / blender_version, with_machine_code=False)
 
 
 @pytest.fixture(scope="session")

@@ -18,14 +18,13 @@ ROAD = Path(__file__).parent / "roads" / "first_image.py"
 FIGURES = 6
 
 
-def test_first_image(request, unseen_blender, blender_version, capsys):
+def test_first_image(request, unseen_blender, build_local_zip, blender_version, capsys):
     is_long = request.config.getoption("--long")
     for with_code in (True, False) if is_long else (True,):
         for run in range(3 if is_long else 1):
             blender = unseen_blender(f"{'with-code' if with_code else 'compiled'}-{run}")
             python = provision_blender.DEBIAN[blender_version].python
-            options = {"blender_range": ("4.2.0", None), "suffix": "-local", "with_machine_code": with_code}
-            path = build_zip.build("linux-x64", python, blender.work, **options)
+            path = build_local_zip(blender.work, with_code)
             with zipfile.ZipFile(path) as archive:
                 carries_code = build_zip.MACHINE_CODE in archive.namelist()
             if is_long and carries_code != with_code:

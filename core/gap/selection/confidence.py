@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Reasons to lower an effect's confidence: model misfit or uninformative recordings.
+"""An effect's confidence: from its support to a probability, and reasons to lower it, model misfit or uninformative recordings.
 
 An effect may be in the model only because the formula of another one does not quite fit, or because the recordings contain too
 little to distinguish it. The thresholds were set on simulated sensors whose hidden effects follow other formulas than the
