@@ -23,6 +23,7 @@ ATTACK_ARGS ?=
 
 help:
 	@echo 'make demo     set up and run the demo: a picture, tactile images and the forces, in $(DEMO_OUT)/'
+	@echo 'make env      set up all that the commands below need, without running anything'
 	@echo 'make test     lint, type check, and all tests in bpy $(BPY45) and $(BPY50)'
 	@echo 'make test-ui  the extension in a real Blender window (Debian, as root: it sets up a Blender of its own);'
 	@echo '              BLENDER=5.2 for that one (default $(BLENDER))'
@@ -35,9 +36,15 @@ help:
 	@echo 'make clean    remove build products; distclean: the environments too'
 
 # --- environments: a stamp each, renewed when what they are made from changes
-$(VENV)/.ready: pyproject.toml Makefile tools/system_packages.sh
+# Enough for `make demo`; $(VENV)/.ready adds what tests, benchmarks, studies and bags need.
+$(VENV)/.runtime: pyproject.toml Makefile tools/system_packages.sh
 	tools/system_packages.sh $(PYTHON)
 	test -x $(VENV)/bin/python || $(PYTHON) -m venv $(VENV)
+	$(VENV)/bin/python -m pip install --quiet --editable . bpy==$(BPY45)
+	touch $@
+
+# bpy is named again, so that pip keeps NumPy within what bpy accepts.
+$(VENV)/.ready: $(VENV)/.runtime
 	$(VENV)/bin/python -m pip install --quiet --editable '.[test,bench]' bpy==$(BPY45)
 	touch $@
 
@@ -51,7 +58,7 @@ env: $(VENV)/.ready
 env50: $(VENV50)/.ready
 
 # --- what a user runs
-demo: env
+demo: $(VENV)/.runtime
 	$(BIN)/palpate demo --out $(DEMO_OUT)
 
 # --- what a developer runs
