@@ -135,7 +135,7 @@ def _bake(scene, into_scene: bool, images: bool, blend: bake_files.BlendToSave |
     reading = yield from _read(scene)
     if into_scene:
         scene_writer.check_writable(scene, reading)
-    yield from first_use.wait()
+    yield from first_use.wait(reading.scenario)
     bake_files.check_space(folder, reading.scenario, images)
     simulation = dependencies.load_solver().Simulation(reading.scenario)
     owner = _owner(scene, into_scene, blend)
