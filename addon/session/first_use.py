@@ -3,7 +3,7 @@
 
 Meanwhile kernels are interpreted, which gives the same numbers slowly: small scenes are played and baked at once, and change
 over to compiled code between two frames. Scenes whose frames would take too long wait. Without a window the solver is compiled
-in place, with a line on stderr (:func:`.dependencies.load_solver`). Only the main thread touches Blender: a timer reads what
+in place, with a line on stderr (:func:`load_solver`). Only the main thread touches Blender: a timer reads what
 the other process wrote.
 """
 
@@ -123,6 +123,24 @@ def _stage(share: float) -> str:
     passed = time.monotonic() - _compilation.started
     total = passed / share if share > 0.1 else max(USUAL_SECONDS, passed)
     return f"{SLOWLY if _interprets else STAGE}, about {max(1.0, total - passed):.0f} s more"
+
+
+def load_solver():
+    """Import the solver, compile it if needed, and return the module :mod:`.simulation`.
+
+    The first call after installation compiles for about half a minute. With a window open, a process compiles
+    earlier, and kernels are interpreted meanwhile.
+    """
+    dependencies.choose_numba_cache()
+    from ...core.compiled import kernels
+    from ...core.solver import simulation
+
+    if not is_ready():
+        kernels.interpret_kernels()
+    else:
+        kernels.compile_kernels()
+        precompile.compile_solver_with_notice()
+    return simulation
 
 
 def wait(scenario: Scenario | None = None) -> Generator[Progress, None, None]:

@@ -17,7 +17,7 @@ from ...core.model.recording import Frame
 from ...core.model.scenario import Scenario
 from ..properties import start_transforms
 from ..scene import mesh_fingerprint, moved_bodies, participants, scene_fingerprint, scene_reader, scene_reading
-from ..session import animation_time, dependencies, first_use, session_state
+from ..session import animation_time, first_use, session_state
 
 
 @dataclass
@@ -104,7 +104,7 @@ def start(scene, depsgraph) -> LiveRun | None:
     }
     run = LiveRun(
         reading=reading,
-        simulation=dependencies.load_solver().Simulation(reading.scenario),
+        simulation=first_use.load_solver().Simulation(reading.scenario),
         placements=placements,
         settings=scene_fingerprint.settings_of(scene, everyone),
         mesh_fingerprints={obj.name: mesh_fingerprint.evaluated_fingerprint(obj, depsgraph) for obj in everyone},

@@ -62,7 +62,7 @@ def _give_up(error: Exception) -> None:
 if COMPILED:
     from .numba_internals import COMPILER_FAULTS, FunctionCache
 
-    class _Cache(FunctionCache):  # type: ignore[misc]
+    class _Cache(FunctionCache):
         """Numba's cache of one kernel. What cannot be kept is used in this process alone."""
 
         def load_overload(self, sig: Any, target_context: Any) -> Any:
@@ -90,14 +90,14 @@ if COMPILED:
                 file=sys.stderr,
             )
 
-    class _LinkedLibrary(JITCodeLibrary):  # type: ignore[misc]
+    class _LinkedLibrary(JITCodeLibrary):
         """Intermediate code of a kernel that is only linked into others; what it calls is linked there as well."""
 
         def finalize(self) -> None:
             """Count as complete, without optimisation and machine code."""
             self._finalized = True
 
-    class _Flags(compiler.Flags):  # type: ignore[misc]
+    class _Flags(compiler.Flags):
         """Numba's options of a compilation. Comparing them by what was set, not option by option, saves a tenth of the time."""
 
         def __eq__(self, other: object) -> bool:
@@ -106,7 +106,7 @@ if COMPILED:
         def __hash__(self) -> int:
             return len(self._values)
 
-    class KernelDispatcher(CPUDispatcher):  # type: ignore[misc]
+    class KernelDispatcher(CPUDispatcher):
         """A kernel that runs compiled."""
 
         plain_form: Callable[..., Any] | None = None

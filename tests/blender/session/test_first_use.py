@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from palpate.addon.bake import bake as baking
-from palpate.addon.session import dependencies, first_use, frame_status
+from palpate.addon.session import first_use, frame_status
 from palpate.addon.timeline import live_cache, playback
 from palpate.core.compiled import kernels
 from palpate.core.jobs.job_runner import run_job
@@ -168,10 +168,10 @@ def test_without_a_window_it_is_compiled_in_place_with_a_line_on_stderr(monkeypa
     monkeypatch.setattr(precompile, "completion_file", lambda: tmp_path / "stamp")
     make_sensor()
     assert first_use._compilation is None and first_use.is_ready()
-    dependencies.load_solver()
+    first_use.load_solver()
     assert "first use only" in capfd.readouterr().err
     assert (tmp_path / "stamp").exists() and not precompile.is_needed()
-    dependencies.load_solver()
+    first_use.load_solver()
     assert capfd.readouterr().err == ""
 
 
