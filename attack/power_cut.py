@@ -379,10 +379,10 @@ def bake_slowly(folder: str) -> None:
     from .worker import checkpoints_always
 
     checkpoints_always()
-    from palpate.addon.session import dependencies
+    from palpate.addon.session import first_use
     from palpate.core.io import bake_switch
 
-    dependencies.load_solver()
+    first_use.load_solver()
     os.chdir(folder)
     print("begins", flush=True)
     status = commands.main(["bake", BLEND])

@@ -327,7 +327,7 @@ class Sweep(Area):
             case.data.update({"said": said, "status": driver.returncode})
             if "Traceback" in said:
                 return Outcome(TRACEBACK, said[-3000:])
-            lines = [line for line in said.splitlines() if "preparing its solver" not in line]
+            lines = [line for line in said.splitlines() if "compiling its solver" not in line]
             if driver.returncode not in (0, 1) or (driver.returncode and len(lines) != 1):
                 return Outcome(WRONG, f"status {driver.returncode} and not one sentence: {said[-1000:]!r}")
             subprocess.run(["mount", "-o", "remount,rw,size=64m", str(self._place)], check=True, capture_output=True)

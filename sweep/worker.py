@@ -32,7 +32,7 @@ from .scene_evaluation import REFUSE
 MOST_DEATHS = 3
 """How often a process may die on a run before the run counts as failed: once may be an accident or an administrator."""
 START_LIMIT = 900.0
-"""Seconds that a process may take to start; the first one on a machine compiles the solver, about a minute."""
+"""Seconds that a process may take to start; the first one on a machine compiles the solver, about half a minute."""
 LOOK = 0.1
 """Seconds between two looks at the memory of a run, in which it grows by less than what a machine should have left."""
 

@@ -2,7 +2,8 @@
 """Build the extension zips: the package, its manifest and its wheels, one zip per platform and Python.
 
 A zip for this machine's platform also carries the solver's machine code (tools/machine_code.py), if its Python is installed
-here: its first use then takes a second instead of a minute. Build each platform's zip on that platform to have it everywhere.
+here: its first use then takes a second instead of half a minute. Build each platform's zip on that platform to have it
+everywhere.
 
 Blender's installer picks wheels by platform only, so wheels for two Pythons must not share a zip. The same
 sources and wheels give the same bytes. Each zip is validated by Blender's own tool, which comes with bpy.
@@ -318,7 +319,7 @@ def main(argv: list[str] | None = None) -> int:
     add("--python-version", metavar="X.Y", help=f"one Python only (default: {' and '.join(BLENDER_RANGE)})")
     add("--local", action="store_true", help="for a distribution's Blender, whatever its Python")
     add("--blender-min", default="4.2.0", metavar="X.Y.Z", help="with --local: first Blender it fits")
-    add("--no-machine-code", action="store_true", help="let the solver be compiled at first use, which takes a minute")
+    add("--no-machine-code", action="store_true", help="let the solver be compiled at first use, which takes half a minute")
     add("--out", type=Path, default=ROOT / "dist", metavar="DIR", help="folder for the zips (default: dist/)")
     args = parser.parse_args(argv)
     if args.local and not args.python_version:

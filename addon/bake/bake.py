@@ -18,7 +18,7 @@ from ...core.model.scenario import Scenario
 from ..display import texel_arrows
 from ..scene import scene_fingerprint, scene_reader
 from ..scene.scene_reading import SceneReading
-from ..session import dependencies, first_use, identity, session_state
+from ..session import first_use, identity, session_state
 from ..timeline import playback
 from . import bake_files, scene_writer
 
@@ -135,9 +135,9 @@ def _bake(scene, into_scene: bool, images: bool, blend: bake_files.BlendToSave |
     reading = yield from _read(scene)
     if into_scene:
         scene_writer.check_writable(scene, reading)
-    yield from first_use.wait()
+    yield from first_use.wait(reading.scenario)
     bake_files.check_space(folder, reading.scenario, images)
-    simulation = dependencies.load_solver().Simulation(reading.scenario)
+    simulation = first_use.load_solver().Simulation(reading.scenario)
     owner = _owner(scene, into_scene, blend)
     with bake_files.BakeFiles(folder, reading.scenario, owner, images) as files:
         recording = yield from _solve(name, simulation, reading, files)
@@ -172,7 +172,7 @@ def _solve(name: str, simulation, reading: SceneReading, files: bake_files.BakeF
         reading.objects(_scene_called(name))  # raises if the user has deleted one
         return replace(step, done=total // 2 + step.done, total=total)
 
-    job = dependencies.load_solver().solve_frames(simulation, files.write_frame, done)
+    job = first_use.load_solver().solve_frames(simulation, files.write_frame, done)
     yield from part_of_job(job, save_checkpoint)
     reading.objects(_scene_called(name))
     return files.recording(simulation, (*reading.warnings, *simulation.warnings))

@@ -66,16 +66,3 @@ def choose_numba_cache() -> None:
     import bpy
 
     os.environ["NUMBA_CACHE_DIR"] = bpy.utils.extension_path_user(package, path="numba", create=True)
-
-
-def load_solver():
-    """Import the solver, compile it if needed, and return the module :mod:`.simulation`.
-
-    The first call after installation compiles for about a minute. With a window open, :mod:`.first_use` compiles earlier, in
-    the background.
-    """
-    choose_numba_cache()
-    from ...core.solver import precompile, simulation
-
-    precompile.compile_solver_with_notice()
-    return simulation

@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Compile the solver before its first use, in another process, so that Blender's window stays usable and shows progress.
 
-Without a window the solver is compiled in place, with a line on stderr (:func:`.dependencies.load_solver`). Only the main
-thread touches Blender: a timer reads what the other process wrote.
+Meanwhile kernels are interpreted, which gives the same numbers slowly: small scenes are played and baked at once, and change
+over to compiled code between two frames. Scenes whose frames would take too long wait. Without a window the solver is compiled
+in place, with a line on stderr (:func:`load_solver`). Only the main thread touches Blender: a timer reads what
+the other process wrote.
 """
 
 from __future__ import annotations
@@ -17,6 +19,7 @@ from collections.abc import Callable, Generator
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import bpy
 
@@ -24,7 +27,16 @@ from ...core.jobs.progress import Progress
 from ...core.solver import precompile, precompile_process
 from . import dependencies, redraw
 
-STAGE = "Palpate is preparing its solver (first use only)"
+if TYPE_CHECKING:
+    from ...core.model.scenario import Scenario
+
+STAGE = "Palpate is compiling its solver (first use only)"
+SLOWLY = "Palpate computes slowly until its solver is compiled (first use only)"
+USUAL_SECONDS = 40.0
+"""How long the compiler usually takes beside a window that is in use; what the first seconds promise."""
+MAX_START, MAX_FRAME = 3.0, 1.5
+"""Scenes are computed by interpreted kernels if they are prepared and if each frame is computed within so many seconds, for
+which the window does not answer."""
 POLL_INTERVAL = 0.5
 """Seconds between two looks at the process."""
 
@@ -40,6 +52,7 @@ class _Compilation:
 
 _compilation: _Compilation | None = None
 _gave_up = False
+_interprets = False
 when_ready: list[Callable[[], None]] = []
 """Called in the main thread when the solver is ready."""
 
@@ -55,6 +68,19 @@ def is_ready() -> bool:
         return True
     dependencies.choose_numba_cache()
     return not precompile.is_needed()
+
+
+def can_compute(scenario: Scenario) -> bool:
+    """Return True if a scenario can be computed now, by compiled kernels or, if it is small, by interpreted ones."""
+    global _interprets
+    begin()
+    if is_ready():
+        return True
+    start, frame = precompile.interpreted_seconds(scenario)
+    if start > MAX_START or frame > MAX_FRAME:
+        return False
+    _interprets = True
+    return True
 
 
 def begin() -> None:
@@ -87,17 +113,43 @@ def progress() -> Progress | None:
         return None
     with suppress(OSError, ValueError, IndexError):  # nothing has been written yet
         written = json.loads(_compilation.log.read_bytes().splitlines()[-1])
-        return Progress(_stage(f"{written['done']} of {written['total']} parts, "), written["done"], written["total"])
-    return Progress(_stage(""), 0, 1)
+        return Progress(_stage(written["done"] / written["total"]), written["done"], written["total"])
+    return Progress(_stage(0.0), 0, 1)
 
 
-def _stage(parts: str) -> str:
+def _stage(share: float) -> str:
+    """Return what is going on and how much longer, from the share of the work that is done."""
     assert _compilation is not None
-    return f"{STAGE}: {parts}{time.monotonic() - _compilation.started:.0f} s"
+    passed = time.monotonic() - _compilation.started
+    total = passed / share if share > 0.1 else max(USUAL_SECONDS, passed)
+    return f"{SLOWLY if _interprets else STAGE}, about {max(1.0, total - passed):.0f} s more"
 
 
-def wait() -> Generator[Progress, None, None]:
-    """Yield progress until the solver is ready. Every job that uses the solver begins with this."""
+def load_solver():
+    """Import the solver, compile it if needed, and return the module :mod:`.simulation`.
+
+    The first call after installation compiles for about half a minute. With a window open, a process compiles
+    earlier, and kernels are interpreted meanwhile.
+    """
+    dependencies.choose_numba_cache()
+    from ...core.compiled import kernels
+    from ...core.solver import simulation
+
+    if not is_ready():
+        kernels.interpret_kernels()
+    else:
+        kernels.compile_kernels()
+        precompile.compile_solver_with_notice()
+    return simulation
+
+
+def wait(scenario: Scenario | None = None) -> Generator[Progress, None, None]:
+    """Yield progress until the solver is ready, or until `scenario`, if it is given, can be computed by interpreted kernels.
+
+    Every job that uses the solver begins with this.
+    """
+    if scenario is not None and can_compute(scenario):
+        return
     begin()
     while (now := progress()) is not None:
         _check()
@@ -128,9 +180,20 @@ def _poll() -> float | None:
     redraw.panels()
     if now is not None:
         return POLL_INTERVAL
+    _change_over()
     for function in when_ready:
         function()
     return None
+
+
+def _change_over() -> None:
+    """Use compiled kernels from now on, if kernels were interpreted; a run goes on with its next frame."""
+    global _interprets
+    if _interprets:
+        from ...core.compiled import kernels
+
+        kernels.compile_kernels()
+    _interprets = False
 
 
 def _show(text: str | None) -> None:
@@ -143,6 +206,7 @@ def stop() -> None:
     """End the process, because the add-on is being disabled or Blender closes. What was compiled is kept for the next time."""
     global _compilation, _gave_up
     compilation, _compilation, _gave_up = _compilation, None, False
+    _change_over()
     if compilation is None:
         return
     compilation.process.kill()

@@ -17,7 +17,7 @@ from ...core.model.recording import Frame
 from ...core.model.scenario import Scenario
 from ..properties import start_transforms
 from ..scene import mesh_fingerprint, moved_bodies, participants, scene_fingerprint, scene_reader, scene_reading
-from ..session import animation_time, dependencies, session_state
+from ..session import animation_time, first_use, session_state
 
 
 @dataclass
@@ -85,8 +85,8 @@ def drop_all() -> None:
     _runs.clear()
 
 
-def start(scene, depsgraph) -> LiveRun:
-    """Start a run. Blender must have evaluated the first frame.
+def start(scene, depsgraph) -> LiveRun | None:
+    """Start a run, or return None if it has to wait for the solver. Blender must have evaluated the first frame.
 
     Raises
     ------
@@ -95,6 +95,8 @@ def start(scene, depsgraph) -> LiveRun:
     """
     drop(scene)
     reading = scene_reader.read_start(scene, depsgraph)
+    if not first_use.can_compute(reading.scenario):
+        return None
     objects, everyone = reading.objects(scene), reading.all_objects(scene)
     placements = {
         index: moved_bodies.BodyPlacement.of(objects[index], matrix, reading.parent_matrices[index][0], reading.metres_per_unit)
@@ -102,7 +104,7 @@ def start(scene, depsgraph) -> LiveRun:
     }
     run = LiveRun(
         reading=reading,
-        simulation=dependencies.load_solver().Simulation(reading.scenario),
+        simulation=first_use.load_solver().Simulation(reading.scenario),
         placements=placements,
         settings=scene_fingerprint.settings_of(scene, everyone),
         mesh_fingerprints={obj.name: mesh_fingerprint.evaluated_fingerprint(obj, depsgraph) for obj in everyone},

@@ -48,7 +48,7 @@ def has_participants(scene) -> bool:
 
 def before_frame(scene) -> None:
     """Start a run at the frame that is being left: pressing Play on the first frame evaluates the second frame next."""
-    if not _is_on(scene) or scene.frame_current != scene.frame_start + 1 or not first_use.is_ready():
+    if not _is_on(scene) or scene.frame_current != scene.frame_start + 1 or _waits_for_solver(scene):
         return
     depsgraph = participants.view_layer_of(scene).depsgraph
     if depsgraph is None or depsgraph.scene_eval.frame_current != scene.frame_start or depsgraph.scene_eval.frame_subframe:
@@ -75,7 +75,7 @@ def on_frame(scene, depsgraph) -> None:
         run = _updated_run(scene, depsgraph, run, frame)
     if run is not None and frame in run.frames:
         show(scene, run)
-    else:
+    elif not _waits_for_solver(scene):
         overlays.clear(scene)
         frame_status.set_status(scene, _not_computed(scene, run))
         is_busy = session_state.session.rendering or session_state.session.catching_up
@@ -96,13 +96,14 @@ def _updated_run(scene, depsgraph, run, frame: int):
 
 
 def _waits_for_solver(scene) -> bool:
-    """Return True when the solver is still being compiled, so that nothing can be computed yet."""
+    """Return True when a scene is too large to be computed before the solver is compiled."""
     if first_use.is_ready():
         return False
     first_use.begin()
-    _waiting.add(scene.session_uid)
+    if scene.session_uid not in _waiting:
+        return False
     overlays.clear(scene)
-    frame_status.set_status(scene, "Frames are computed as soon as the solver is ready.")
+    frame_status.set_status(scene, "Frames are computed as soon as the solver is compiled.")
     return True
 
 
@@ -139,13 +140,17 @@ def missing_frames(scene) -> range:
 
 def compute_to_present_frame(scene) -> Generator[Progress, None, None]:
     """Compute the missing frames up to the present one, and return to it. Closing the generator keeps what was computed."""
-    yield from first_use.wait()
+    if scene.session_uid in _waiting:
+        yield from first_use.wait()
     wanted, frames = (scene.frame_current, scene.frame_subframe), missing_frames(scene)
     session_state.session.catching_up = True
     try:
         with animation_time.without_time_stretching(scene):
             for done, number in enumerate(frames, 1):
                 scene.frame_set(number)
+                if scene.session_uid in _waiting:
+                    yield from first_use.wait()
+                    scene.frame_set(number)
                 run = live_cache.get(scene)
                 if run is None or number not in run.frames:
                     break  # the panel says why
@@ -186,7 +191,10 @@ def _has_moved(scene, depsgraph, run) -> bool:
 
 
 def _start(scene, depsgraph):
-    return _attempt(scene, lambda: live_cache.start(scene, depsgraph))
+    run = _attempt(scene, lambda: live_cache.start(scene, depsgraph))
+    if run is None and scene.session_uid not in _errors:
+        _waiting.add(scene.session_uid)
+    return run
 
 
 def _attempt(scene, work):

@@ -19,7 +19,7 @@ KERNEL_MARKS = (
 """A file that holds one of these takes part in what is compiled.
 
 The laws of effects are compiled as well, and the specified parameters of a sensor are the fields of the contact law. Of the
-package laws every file takes part.
+packages laws and compiled every file takes part.
 """
 
 
@@ -36,6 +36,6 @@ def fingerprint() -> str:
     digest = hashlib.sha256()
     for path in sorted(CORE.rglob("*.py")):
         source = path.read_bytes()
-        if path.parent.name == "laws" or any(mark in source for mark in KERNEL_MARKS):
+        if path.parent.name in ("laws", "compiled") or any(mark in source for mark in KERNEL_MARKS):
             digest.update(source)
     return digest.hexdigest()[:12]

@@ -3,6 +3,9 @@
 
 ``PALPATE_NUMBA=0`` switches compilation off; the numbers are the same to rounding (a test holds them to 1e-12). The compiler
 may not reorder arithmetic: there is no fastmath, because "same seed, same bits" is worth more than a few per cent.
+
+Where numba is there, kernels can still be interpreted, until compiled code is ready or because the compiler failed
+(:func:`interpret_kernels`, :func:`compile_kernels`). A run may change over between two calls of kernels.
 """
 
 from __future__ import annotations
@@ -10,24 +13,33 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+from . import kernel_dispatcher
+from .kernel_dispatcher import KernelDispatcher, are_interpreted, compile_kernels, interpret_kernels
 from .kernel_fingerprint import fingerprint
-from .numba_internals import COMPILED, carray, intrinsic, ir, known_options, numba, types
+from .numba_internals import COMPILED, carray, intrinsic, ir, known_options, typeof, types
 
 __all__ = [
     "COMPILED",
     "KERNELS",
+    "address_of",
+    "addressed_kernel",
+    "allocating_addressed_kernel",
     "allocating_kernel",
+    "are_interpreted",
     "call_address",
     "carray",
-    "compiled_callback",
+    "compile_kernels",
     "inlined",
+    "interpret_kernels",
     "kernel",
     "plain",
+    "pointer_to",
+    "with_plain_form",
 ]
 
 FINGERPRINT = fingerprint() if COMPILED else ""
 
-KERNELS: list[Any] = []
+KERNELS: list[Any] = kernel_dispatcher.KERNELS
 """All functions that numba compiles when they are first called; their signatures tell how far that is."""
 
 
@@ -67,39 +79,43 @@ def plain(function: Callable[..., Any]) -> Callable[..., Any]:
 
 def _compiled(function: Callable[..., Any], **options: bool) -> Callable[..., Any]:
     function.__qualname__ += f"_{FINGERPRINT}"  # part of the name under which numba keeps the result
-    compiled: Callable[..., Any] = numba.njit(
-        cache=True, no_cfunc_wrapper=True, fastmath=False, error_model="numpy", nogil=True, **options
-    )(function)
-    KERNELS.append(compiled)
-    return compiled
+    settings = {"nopython": True, "fastmath": False, "error_model": "numpy", "nogil": True, "boundscheck": None}
+    return KernelDispatcher.of(function, {**settings, "no_cfunc_wrapper": True, **options})
 
 
-# --- functions that kernels call by their address, so that the kernel need not be compiled anew for each of them
+# --- functions that kernels call by their address: they are compiled once, and not inside each of their callers
 
 if COMPILED:
-    _POINTERS, _INTEGER_POINTERS, _NUMBERS = range(7), (6,), 13
-    """Which arguments of such a function are addresses of arrays, which of those arrays hold integers, and how many arguments
-    there are."""
 
-    def compiled_callback(function: Callable[..., Any]) -> Any:
-        """Compile `function` for calls by its `address`, with pointers to arrays first and integers after them."""
-        function.__qualname__ += f"_{FINGERPRINT}"
-        kinds = [types.int64 if i in _INTEGER_POINTERS else types.float64 for i in _POINTERS]
-        arguments = [types.CPointer(kind) for kind in kinds] + [types.int64] * (_NUMBERS - len(kinds))
-        return numba.cfunc(types.void(*arguments), cache=True, error_model="numpy")(function)
+    def addressed_kernel(function: Callable[..., Any]) -> Callable[..., Any]:
+        """Do as :func:`kernel` for a function without result that kernels call by its address (:func:`address_of`)."""
+        return _compiled(function, no_cfunc_wrapper=False, **known_options(_nrt=False))
+
+    def allocating_addressed_kernel(function: Callable[..., Any]) -> Callable[..., Any]:
+        """Do as :func:`addressed_kernel` for a function that makes arrays, also of pointers."""
+        return _compiled(function, no_cfunc_wrapper=False)
+
+    def address_of(function: Any, *arguments: Any) -> int:
+        """Compile an :func:`addressed_kernel` for arguments such as these, and return the address of its machine code.
+
+        Zero if kernels are interpreted, or are from now on because the compiler failed.
+        """
+        kinds = tuple(one if isinstance(one, types.Type) else typeof(one) for one in arguments)
+        return int(function.address(kinds))
+
+    def pointer_to(integers: bool = False) -> Any:
+        """Return the type of a pointer to floats or integers, as an argument of :func:`address_of`."""
+        return types.CPointer(types.int64 if integers else types.float64)
 
     @intrinsic
-    def call_address(_context, address, *numbers):  # type: ignore[no-untyped-def]
-        """Call a function that :func:`compiled_callback` made, from a kernel."""
-        signature = types.void(types.int64, types.StarArgTuple.from_types([types.int64] * _NUMBERS))
+    def call_address(_context, address, *arguments):  # type: ignore[no-untyped-def]
+        """Call an :func:`addressed_kernel` from a kernel; an array is given as its address."""
+        kinds = [types.unliteral(one) for one in arguments]
+        signature = types.void(types.int64, types.StarArgTuple.from_types(kinds))
 
         def codegen(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
-            given = [builder.extract_value(arguments[1], i) for i in range(_NUMBERS)]
-            kinds = [ir.IntType(64)] * _NUMBERS
-            for i in _POINTERS:
-                kinds[i] = (ir.IntType(64) if i in _INTEGER_POINTERS else ir.DoubleType()).as_pointer()
-                given[i] = builder.inttoptr(given[i], kinds[i])
-            kind = ir.FunctionType(ir.VoidType(), kinds)
+            given = [builder.extract_value(arguments[1], i) for i in range(len(kinds))]
+            kind = ir.FunctionType(ir.VoidType(), [one.type for one in given])
             builder.call(builder.inttoptr(arguments[0], kind.as_pointer()), given)
             return context.get_dummy_value()
 
@@ -107,12 +123,31 @@ if COMPILED:
 
 else:
 
-    def compiled_callback(function: Callable[..., Any]) -> Any:
-        """Raise: only compiled code has addresses."""
-        raise RuntimeError(
-            f"'{function.__name__}' has no address without numba: look at COMPILED first, and call the function itself."
-        )
+    def addressed_kernel(function: Callable[..., Any]) -> Callable[..., Any]:
+        """Return the function: without numba nothing has an address."""
+        return function
 
-    def call_address(_address: int, *_numbers: int) -> None:
+    allocating_addressed_kernel = addressed_kernel
+
+    def address_of(function: Any, *arguments: Any) -> int:
+        """Return zero: only compiled code has addresses."""
+        return 0
+
+    def pointer_to(integers: bool = False) -> Any:
+        """Return None: only compiled code has pointers."""
+
+    def call_address(_address: int, *_arguments: Any) -> None:
         """Raise: only compiled code has addresses."""
         raise RuntimeError("Nothing can be called by its address without numba: look at COMPILED first.")
+
+
+def with_plain_form(plain_form: Callable[..., Any]) -> Callable[[Any], Any]:
+    """Let a kernel that only works compiled, as one that calls addresses, run as `plain_form` where it is interpreted."""
+
+    def decorate(compiled: Any) -> Any:
+        if not COMPILED:
+            return plain_form
+        compiled.plain_form = plain_form
+        return compiled
+
+    return decorate

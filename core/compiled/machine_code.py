@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Machine code of the kernels that comes with the extension, so that its first use need not wait a minute for the compiler.
+"""Machine code of the kernels that comes with the extension, so that its first use need not wait for the compiler.
 
 ``tools/machine_code.py`` compiles all kernels for a processor that nearly all computers of an architecture contain
 (:mod:`.processors`) and packs them into one file, which a zip carries. :func:`install` puts them into numba's cache where the

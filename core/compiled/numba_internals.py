@@ -8,6 +8,7 @@ compiled: all kernels then run as plain Python, with the same numbers to roundin
 from __future__ import annotations
 
 import os
+import sys
 from typing import Any
 
 COMPILED = False
@@ -15,26 +16,41 @@ COMPILED = False
 REASON = "PALPATE_NUMBA is 0"
 """Why nothing is compiled; empty otherwise."""
 
+TRIED = ("0.68.",)
+"""Releases of numba with whose internals all tests passed. With others kernels are interpreted."""
+
 if os.environ.get("PALPATE_NUMBA", "1") != "0":
     try:
         import numba as _numba
+
+        if not _numba.__version__.startswith(TRIED):
+            raise ImportError(
+                f"Palpate computes slowly, as it was never tried with numba {_numba.__version__}: install numba {TRIED[-1]}*"
+            )
         from llvmlite import ir
         from numba import carray, typeof, types
-        from numba.core import cgutils
+        from numba.core import cgutils, compiler, typing
+        from numba.core.caching import FunctionCache
         from numba.core.cgutils import get_or_insert_function
+        from numba.core.codegen import JITCodeLibrary
         from numba.core.cpu import CPUTargetOptions
         from numba.core.datamodel import models
         from numba.core.imputils import impl_ret_borrowed, lower_getattr_generic
+        from numba.core.registry import CPUDispatcher
         from numba.core.typing.templates import AttributeTemplate, infer_getattr
         from numba.extending import NativeValue, intrinsic, register_model, typeof_impl, unbox
 
+        COMPILER_FAULTS = (OSError, RuntimeError, MemoryError, ValueError, AttributeError)
         numba: Any = _numba
         COMPILED, REASON = True, ""
     except (ImportError, AttributeError) as error:
         REASON = str(error)
+        if "numba" in sys.modules:  # it is there, but not as it was
+            print(REASON, file=sys.stderr)
 
 if not COMPILED:
     numba = ir = carray = typeof = types = CPUTargetOptions = cgutils = None
+    compiler = typing = FunctionCache = JITCodeLibrary = CPUDispatcher = None
     get_or_insert_function = models = impl_ret_borrowed = None
     lower_getattr_generic = AttributeTemplate = infer_getattr = None
     NativeValue = intrinsic = register_model = typeof_impl = unbox = None

@@ -24,7 +24,7 @@ from typing import Any
 
 import numpy as np
 
-from .kernels import COMPILED, inlined, kernel
+from .kernels import COMPILED, are_interpreted, inlined, kernel
 from .numba_internals import get_or_insert_function, intrinsic, ir, types
 
 POINTS_PER_THREAD = 2000
@@ -169,7 +169,7 @@ def make_queue(points: int, threads: int | None = None) -> tuple[np.ndarray, int
     helpers : int
     """
     threads = threads or int(os.environ.get("PALPATE_THREADS", "0")) or min(_processors(), 1 + points // POINTS_PER_THREAD)
-    if not COMPILED or threads < 2:
+    if are_interpreted() or threads < 2:
         return np.zeros(0, np.int64), 0
     queue = np.zeros(QUEUE_SIZE, np.int64)
     queue[YIELD_ADDRESS] = _address_of_yield()

@@ -3,7 +3,15 @@
 
 from __future__ import annotations
 
-from ..compiled.kernels import inlined, kernel
+from ..compiled.kernels import (
+    address_of,
+    addressed_kernel,
+    are_interpreted,
+    call_address,
+    inlined,
+    kernel,
+    with_plain_form,
+)
 from ..compiled.thread_team import (
     LATE_LOOPS,
     SPINS,
@@ -14,6 +22,7 @@ from ..compiled.thread_team import (
     is_stopped,
     wait_briefly,
 )
+from ..effects.engine.compiled_program import prepare_laws
 from ..geometry.rotations import write_rotation
 from .detection.detection_data import DetectionData
 from .detection.narrow_phase import find_contacts
@@ -27,6 +36,65 @@ FIND_CONTACTS, SUM_CONTACTS, UPDATE_FRICTION = 2, 3, 4
 """Numbers of the loops in the queue. :mod:`.thread_team` has the numbers 0 (idle) and 1 (stop)."""
 
 
+@addressed_kernel
+def find_pair_contacts(
+    pair: int, dt: float, model: SolverModel, detection: DetectionData, state: State, workspace: Workspace
+) -> None:
+    """Find the contacts of one pair."""
+    find_contacts(pair, model, detection, state, workspace)
+    if workspace.contacts.number[pair] > 0:
+        finish_contacts(pair, dt, model, detection, state, workspace)
+
+
+@addressed_kernel
+def sum_contacts(
+    pair: int, dt: float, model: SolverModel, detection: DetectionData, state: State, workspace: Workspace
+) -> None:
+    """Sum up the contacts of one pair."""
+    if workspace.contacts.number[pair] > 0:
+        sum_pair_contacts(pair, dt, model, state, workspace)
+
+
+@addressed_kernel
+def update_friction(
+    pair: int, dt: float, model: SolverModel, detection: DetectionData, state: State, workspace: Workspace
+) -> None:
+    """Bring the bristles of one pair forward."""
+    if workspace.contacts.number[pair] > 0:
+        update_pair_friction(pair, dt, model, detection.surfaces, state, workspace)
+
+
+PAIR_LOOPS = {FIND_CONTACTS: find_pair_contacts, SUM_CONTACTS: sum_contacts, UPDATE_FRICTION: update_friction}
+"""What each loop does with a pair. What it writes belongs to this pair alone."""
+
+
+def prepare_pair_loops(model: SolverModel, detection: DetectionData, state: State, workspace: Workspace) -> None:
+    """Compile what the loops do with a pair, unless that was done, and write the addresses into the workspace.
+
+    The laws of effects, which these functions call, are compiled as well. Kernels call these functions, which contain most of a
+    step's arithmetic, by address, so that they are compiled once and not inside each of their callers. A call takes no time
+    beside the work on a pair.
+    """
+    if workspace.pair_loops[FIND_CONTACTS] == 0 and not are_interpreted():
+        prepare_laws(model.effects)
+        for loop, function in PAIR_LOOPS.items():
+            workspace.pair_loops[loop] = address_of(function, 0, 0.0, model, detection, state, workspace)
+
+
+def _run_item_plain(
+    loop: int, pair: int, model: SolverModel, detection: DetectionData, state: State, workspace: Workspace
+) -> None:
+    """Do as :func:`_run_item` without compiled code."""
+    PAIR_LOOPS[loop](pair, workspace.step[0], model, detection, state, workspace)
+
+
+@with_plain_form(_run_item_plain)
+@kernel
+def _run_item(loop: int, pair: int, model: SolverModel, detection: DetectionData, state: State, workspace: Workspace) -> None:
+    """Run one pair of a loop."""
+    call_address(workspace.pair_loops[loop], pair, workspace.step[0], model, detection, state, workspace)
+
+
 @inlined
 def find_all_contacts(dt: float, model: SolverModel, detection: DetectionData, state: State, workspace: Workspace) -> int:
     """Find the contacts of all pairs where the bodies are now, and return how many points are pressed too deep to act.
@@ -37,7 +105,10 @@ def find_all_contacts(dt: float, model: SolverModel, detection: DetectionData, s
         write_rotation(state.quaternion[body], workspace.bodies.rotation[body])
     workspace.step[0] = dt
     run_parallel_loop(FIND_CONTACTS, model, detection, state, workspace)
-    return workspace.contacts.too_deep.sum()
+    too_deep = 0
+    for pair in range(len(model.pairs.sensor)):
+        too_deep += workspace.contacts.too_deep[pair]
+    return too_deep
 
 
 @inlined
@@ -79,18 +150,3 @@ def help_with_loops(model: SolverModel, detection: DetectionData, state: State, 
         else:
             wait_briefly(queue, waits)
             waits += 1
-
-
-@inlined
-def _run_item(loop: int, pair: int, model: SolverModel, detection: DetectionData, state: State, workspace: Workspace) -> None:
-    """Run one pair of a loop. What it writes belongs to this pair alone."""
-    dt = workspace.step[0]
-    if loop == FIND_CONTACTS:
-        find_contacts(pair, model, detection, state, workspace)
-        if workspace.contacts.number[pair] > 0:
-            finish_contacts(pair, dt, model, detection, state, workspace)
-    elif workspace.contacts.number[pair] > 0:
-        if loop == SUM_CONTACTS:
-            sum_pair_contacts(pair, dt, model, state, workspace)
-        else:  # UPDATE_FRICTION
-            update_pair_friction(pair, dt, model, detection.surfaces, state, workspace)

@@ -8,7 +8,7 @@ more and writes down what the sensors measure.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -22,7 +22,7 @@ from ..geometry.rotations import quaternion_product, rotation_matrices, rotation
 from ..jobs.job_runner import run_job
 from ..jobs.progress import Job, Progress
 from ..model.pose_interpolation import poses_at
-from ..model.recording import BLOCK_BYTES, Frame, Recording, SensorFrame, SensorRecording
+from ..model.recording import BLOCK_BYTES, Frame, Recording, SensorRecording
 from ..model.scenario import Scenario
 from ..model.shared_results import SharedResults
 from ..response.readings import ReadoutChain
@@ -36,10 +36,9 @@ from .dynamics.passivity import credit_initial_contacts
 from .fast_crossings import FastCrossings, path_of_moved_bodies
 from .found_contacts import contacts_of
 from .model_builder import build_model, initial_state, texel_starts
-from .parallel_loops import find_all_contacts, help_with_loops
+from .parallel_loops import find_all_contacts, help_with_loops, prepare_pair_loops
 from .solver_model import DRIVEN, SolverModel, State
-from .substep import FramePath, ObservedFrames, advance_frames, advance_steps
-from .texel_readout import TexelReadout, read_texels
+from .substep import FRAME, NOTHING, TEXELS, FramePath, ObservedFrames, Surroundings, advance_frames
 from .time_step_adviser import plan
 from .workspace import Workspace
 from .workspace_builder import workspace_for
@@ -48,6 +47,8 @@ TEXEL_BYTES = 8 * 8
 """What a frame of a texel takes in memory: forces, friction, depth, slip, contact and reading."""
 PATH_ROWS = 4096
 """Poses of bodies in steps that are computed at once: few enough to stay in a processor's cache."""
+NO_PATH = 0, (np.zeros((0, 0, 0, 3)), np.zeros((0, 0, 0, 4)), np.zeros((0, 0, 0, 6)))
+"""The first frame whose path is known, and the paths of it and of those that follow."""
 
 
 class Simulation:
@@ -90,7 +91,7 @@ class Simulation:
         self.dt, self.substeps, self.step_reason = chosen.dt, chosen.substeps, chosen.reason
         self.warnings = [chosen.warning] if chosen.warning else []
         self._motions = [body.motion for body in scenario.bodies]
-        self._known_path: dict[int, tuple[np.ndarray, np.ndarray, np.ndarray]] = {}
+        self._known_path = NO_PATH
         # Bodies that forces move are followed at their centre of mass, keyframed ones at their origin.
         self._center = np.array([body.center_of_mass if body.moved_by_forces else np.zeros(3) for body in scenario.bodies])
         self._tree, self._closed = _prepared_targets(scenario, self._center, shared)
@@ -109,6 +110,7 @@ class Simulation:
         self._texel_start = texel_starts(scenario)
         self._detection: DetectionData | None = None
         self._fast_crossings = FastCrossings(scenario, self._center)
+        self._surroundings = Surroundings(np.array(self._closed, np.bool_), self._fast_crossings.limits)
 
     @property
     def arrays(self) -> tuple[SolverModel, DetectionData, State, Workspace]:
@@ -116,7 +118,9 @@ class Simulation:
         parts = (self._tree, self._neighbour_lists, self._surface_motion)
         if self._detection is None or any(now is not then for now, then in zip(parts, self._detection, strict=True)):
             self._detection = DetectionData(*parts)
-        return self._model, self._detection, self._state, self._workspace
+        arrays = self._model, self._detection, self._state, self._workspace
+        prepare_pair_loops(*arrays)
+        return arrays
 
     @property
     def time(self) -> float:
@@ -145,7 +149,7 @@ class Simulation:
             Of the way to the next frame, for what is known in between: these come first, in order.
         """
         time = self._time_of(self.frame + share)
-        self._known_path.clear()
+        self._known_path = NO_PATH
         self._deforming_surfaces.extend(time, vertices or {}, texels or {})
         for body, (position, quaternion) in poses.items():
             motion = self._motions[body]
@@ -153,29 +157,13 @@ class Simulation:
                 self._motions[body] = motion.extended(time, position, quaternion)
         self._drive_commands.extend(time, targets or {})
 
+    def observe(self) -> Frame:
+        """Return what the sensors measure in the present state."""
+        return self._observed_now().at(self.frame)
+
     def advance(self) -> Frame:
         """Bring the state one frame on and return what the sensors measure there."""
-        times = self._step_times(self.frame)
-        positions, quaternions, velocities = self._prescribed_motion(self.frame)
-        if self._deforming_surfaces.any_deforms:
-            self._surface_motion = self._deforming_surfaces.at(times)
-            if self._drive_commands.reads_sensors:  # controllers read before the first step
-                self._place_surfaces(0, 1, 0.0)
-        if self.frame == self.scenario.frame_start:
-            find_all_contacts(-self.dt, *self.arrays)
-            credit_initial_contacts(self._model, self._state, self._workspace)
-        self._most_too_deep[:] = 0
-        before = self._state.position.copy(), self._state.quaternion.copy()
-        for first, last, commands in self._drive_commands.control_intervals(times, self.dt, self._normal_forces):
-            path = FramePath(positions, quaternions, velocities, commands)
-            with helper_threads(self._workspace.queue, self._helpers, help_with_loops, *self.arrays):
-                too_deep = advance_steps(self.dt, first, last, path, *self.arrays)
-            if too_deep > self._most_too_deep.sum():
-                self._most_too_deep[:] = self._workspace.contacts.most_too_deep
-        self.frame += 1
-        if self._fast_crossings.may_occur(velocities, before, (self._state.position, self._state.quaternion), self.dt):
-            self._warn_of_fast_crossings(positions, quaternions, before, (self._state.position, self._state.quaternion))
-        return self.observe()
+        return self._advance(1).at(self.frame)
 
     def advance_all(self) -> Recording:
         """Go through all frames that are left, and return the recording with the present frame as its first one.
@@ -183,46 +171,81 @@ class Simulation:
         The numbers are those of :meth:`advance`, bit by bit. Where Python has nothing to do in between, many frames are
         computed in one call.
         """
-        if self._deforming_surfaces.any_deforms or self._drive_commands.reads_sensors or self._helpers:
-            frames = [self.observe()]
-            while self.frame < self.scenario.frame_end:
-                frames.append(self.advance())
-            return self._stacked(frames)
-        parts = [self._stacked([self.observe()])]
+        parts = [self._observed_now()]
         while self.frame < self.scenario.frame_end:
-            parts.append(self._advance_block())
-        parts[0].warnings = tuple(self.warnings)
-        return Recording.joined(parts)
+            parts.append(self._advance(self._frames_at_once()))
+        found = Recording.joined(parts)
+        return replace(found, digest=self.scenario.digest(), warnings=tuple(self.warnings), step_reason=self.step_reason)
 
-    def _stacked(self, frames: list[Frame]) -> Recording:
-        scenario = self.scenario
-        names = [body.name for body in scenario.bodies]
-        return Recording.stack(frames, names, self.dt, scenario.digest(), self.warnings, self.step_reason)
+    def _frames_at_once(self) -> int:
+        """Return how many of the next frames one call of the kernels may compute."""
+        if self._deforming_surfaces.any_deforms or self._drive_commands.reads_sensors or self._helpers:
+            return 1
+        most = max(1, BLOCK_BYTES // (int(self._texel_start[-1]) * TEXEL_BYTES))
+        return min(most, self._path_frames(self.frame))
 
-    def _advance_block(self) -> Recording:
-        """Bring the state some frames on in one call, and return their recording, without what concerns the whole run."""
-        first = self.frame
-        bodies, pairs, texels = len(self._motions), len(self._model.pairs.sensor), int(self._texel_start[-1])
-        most = max(1, BLOCK_BYTES // (texels * TEXEL_BYTES))
-        count = min(most, max(1, PATH_ROWS // ((self.substeps + 1) * bodies)), self.scenario.frame_end - first)
-        times = np.stack([self._step_times(frame) for frame in range(first, first + count)])
-        motion = self._path_along(times)
-        commands = np.stack([self._commands_at(own) for own in times])
+    def _advance(self, count: int) -> Recording:
+        """Bring the state some frames on and return their recording, without what concerns the whole run."""
+        first, seen = self.frame, self._seen(count)
+        positions, quaternions, velocities = self._prescribed_motion(first, count)
+        times = [self._step_times(frame) for frame in range(first, first + count)]
+        self._place_deforming(times[0])
         if first == self.scenario.frame_start:
             find_all_contacts(-self.dt, *self.arrays)
             credit_initial_contacts(self._model, self._state, self._workspace)
-        before = self._state.position.copy(), self._state.quaternion.copy()
-        seen = ObservedFrames.zero(count, texels, len(self.scenario.sensors), bodies, pairs)
-        closed = np.array(self._closed, np.bool_)
-        advance_frames(self.dt, FramePath(*motion, commands), closed, self._fast_crossings.limits, *self.arrays, seen)
+        before = seen.position[0].copy(), seen.quaternion[0].copy()
+        for steps, commands in self._intervals(times):
+            path = FramePath(positions, quaternions, velocities, commands)
+            with helper_threads(self._workspace.queue, self._helpers, help_with_loops, *self.arrays):
+                self._run(steps, FRAME if steps[1] == self.substeps else NOTHING, path, seen)
         for i in range(count):
             self.frame += 1
             after = seen.position[i], seen.quaternion[i]
             if seen.may_cross[i]:
-                self._warn_of_fast_crossings(motion[0][i], motion[1][i], before, after)
+                self._warn_of_fast_crossings(positions[i], quaternions[i], before, after)
             self._warn_of_too_deep(seen.too_deep[i], seen.too_deep_between[i])
             before = after
+        self._most_too_deep = seen.too_deep_between[-1]
         return self._recorded(first + 1 + np.arange(count), seen)
+
+    def _observed_now(self) -> Recording:
+        """Return the recording of the present frame, without what concerns the whole run."""
+        seen = self._observed(FRAME)
+        self._warn_of_too_deep(seen.too_deep[0], self._most_too_deep)
+        return self._recorded(np.array([self.frame]), seen)
+
+    def _observed(self, what: int) -> ObservedFrames:
+        """Observe the present state: TEXELS, without a change of it, or FRAME."""
+        seen, b, d = self._seen(1), len(self._motions), len(self._model.drives.gains)
+        nowhere = FramePath(np.zeros((1, 1, b, 3)), np.zeros((1, 1, b, 4)), np.zeros((1, 0, b, 6)), np.zeros((1, 0, d, 4)))
+        self._run((0, 0), what, nowhere, seen)
+        return seen
+
+    def _seen(self, frames: int) -> ObservedFrames:
+        """Return room for what is observed at some frames, with the present poses."""
+        sensors, bodies, pairs = len(self.scenario.sensors), len(self._motions), len(self._model.pairs.sensor)
+        seen = ObservedFrames.zero(frames, int(self._texel_start[-1]), sensors, bodies, pairs)
+        seen.position[0], seen.quaternion[0] = self._state.position, self._state.quaternion
+        return seen
+
+    def _run(self, steps: tuple[int, int], observed: int, path: FramePath, seen: ObservedFrames) -> None:
+        """Call :func:`.advance_frames`."""
+        advance_frames(self.dt, steps, observed, path, self._surroundings, *self.arrays, seen)
+
+    def _place_deforming(self, times: np.ndarray) -> None:
+        """Bring surfaces that deform to the frame whose steps are at these times, (steps + 1,) s."""
+        if self._deforming_surfaces.any_deforms:
+            self._surface_motion = self._deforming_surfaces.at(times)
+            if self._drive_commands.reads_sensors:  # controllers read before the first step
+                self._place_surfaces(0, 1, 0.0)
+
+    def _intervals(self, times: list[np.ndarray]) -> Iterator[tuple[tuple[int, int], np.ndarray]]:
+        """Yield the steps of frames in intervals during which no controller is updated, with (F, steps, d, 4) commands."""
+        if self._drive_commands.reads_sensors:
+            for first, last, commands in self._drive_commands.control_intervals(times[0], self.dt, self._normal_forces):
+                yield (first, last), commands[None]
+        else:
+            yield (0, self.substeps), np.stack([self._commands_at(own) for own in times])
 
     def _commands_at(self, times: np.ndarray) -> np.ndarray:
         """Commands (steps, d, 4) to the drives of a frame, where no controller reads a sensor."""
@@ -242,14 +265,14 @@ class Simulation:
             sensor.name: self._sensor_rows(i, times, seen) for i, sensor in enumerate(self.scenario.sensors) if sensor.readout
         }
         origin = seen.position
-        if self._center.any():  # as in `observe`, whose sums have an order of their own
+        if self._center.any():
             origin = origin - np.stack([np.einsum("bij,bj->bi", own, self._center) for own in seen.rotation])
         poses = np.concatenate([origin, seen.quaternion], axis=2)
         names = tuple(body.name for body in self.scenario.bodies)
         return Recording(frames, times, sensors, names, poses, seen.velocity, self.dt)
 
     def _sensor_rows(self, i: int, times: np.ndarray, seen: ObservedFrames) -> SensorRecording:
-        """Return what one sensor measures in frames that were observed in one call; see :meth:`_sensor_frame`."""
+        """Return what one sensor measures in frames that were observed in one call."""
         own = slice(self._texel_start[i], self._texel_start[i + 1])
         center, net, moment = self._center[self.scenario.sensors[i].body], seen.texels.net[:, i], seen.texels.moment[:, i]
         centre_of_pressure = np.zeros((len(times), 3))
@@ -306,21 +329,26 @@ class Simulation:
             positions[:, moved], quaternions[:, moved] = path
         self.warnings += self._fast_crossings.warnings(self.frame, positions, quaternions, self.dt)
 
-    def _prescribed_motion(self, frame: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Positions (steps + 1, b, 3), quaternions (steps + 1, b, 4) and velocities (steps, b, 6) after a frame, by motions.
+    def _path_frames(self, frame: int) -> int:
+        """Return for how many frames after this one the path of the bodies is computed at once."""
+        rows = (self.substeps + 1) * len(self._motions)
+        return min(max(1, PATH_ROWS // rows), max(1, self.scenario.frame_end - frame))
 
-        Those of some frames to come are computed at once, which gives the same numbers in a fraction of the time.
+    def _prescribed_motion(self, frame: int, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Positions (F, steps + 1, b, 3), quaternions (F, steps + 1, b, 4) and velocities (F, steps, b, 6) of F frames.
+
+        They follow from motions. Those of some frames to come are computed at once, which gives the same numbers in a fraction
+        of the time.
         """
-        if frame not in self._known_path:
-            rows = (self.substeps + 1) * len(self._motions)
-            count = min(max(1, PATH_ROWS // rows), max(1, self.scenario.frame_end - frame))
-            frames = range(frame, frame + count)
-            path = self._path_along(np.stack([self._step_times(number) for number in frames]))
-            self._known_path = dict(zip(frames, zip(*path, strict=True), strict=True))
-        return self._known_path[frame]
+        start, path = self._known_path
+        if not start <= frame <= frame + count <= start + len(path[0]):
+            frames = range(frame, frame + max(count, self._path_frames(frame)))
+            start, path = self._known_path = frame, self._path_along(np.stack([self._step_times(number) for number in frames]))
+        own = slice(frame - start, frame - start + count)
+        return path[0][own], path[1][own], path[2][own]
 
     def _path_along(self, times: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """The same for F frames at once, with a leading axis of length F; `times` (F, steps + 1), s, are those of steps."""
+        """Compute :meth:`_prescribed_motion` for F frames; `times` (F, steps + 1), s, are those of steps."""
         path = [poses_at(motion, times.ravel(), self.scenario.interpolation) for motion in self._motions]
         quaternions = np.stack([quaternion for _, quaternion in path], axis=1).reshape(*times.shape, -1, 4)
         positions = np.stack([position for position, _ in path], axis=1).reshape(*times.shape, -1, 3)
@@ -409,55 +437,7 @@ class Simulation:
 
     def _normal_forces(self, sensor: int) -> np.ndarray:
         """(n,) normal forces of a sensor in the present state, for its controllers."""
-        find_all_contacts(-self.dt, *self.arrays)
-        return self._read_texels().force[self._texel_start[sensor] : self._texel_start[sensor + 1]]
-
-    def _read_texels(self) -> TexelReadout:
-        """Read all texels, from contacts that were just found."""
-        out = TexelReadout.zero(self._texel_start[-1], len(self.scenario.sensors))
-        read_texels(self._model, self._state, self._workspace, out)
-        return out
-
-    def observe(self) -> Frame:
-        """Return what the sensors measure in the present state."""
-        find_all_contacts(-self.dt, *self.arrays)
-        pairs = range(len(self._model.pairs.sensor))
-        self._warn_of_too_deep(np.array([self._count_too_deep(pair) for pair in pairs], np.int64), self._most_too_deep)
-        readout = self._read_texels()
-        sensors = {
-            sensor.name: self._sensor_frame(i, readout) for i, sensor in enumerate(self.scenario.sensors) if sensor.readout
-        }
-        origin = self._state.position - np.einsum("bij,bj->bi", self._workspace.bodies.rotation, self._center)
-        return Frame(
-            frame=self.frame,
-            time=self.time,
-            sensors=sensors,
-            poses=np.hstack([origin, self._state.quaternion]),
-            velocities=self._state.velocity.copy(),
-        )
-
-    def _sensor_frame(self, i: int, readout: TexelReadout) -> SensorFrame:
-        """Return what one sensor measures."""
-        own = slice(self._texel_start[i], self._texel_start[i + 1])
-        center, net, moment = self._center[self.scenario.sensors[i].body], readout.net[i], readout.moment[i]
-        return SensorFrame(
-            normal_force=readout.force[own].copy(),
-            shear=readout.shear[own].copy(),
-            friction=readout.friction[own].copy(),
-            depth=readout.depth[own].copy(),
-            slip=readout.slip[own].copy(),
-            contact=readout.contact[own].copy(),
-            reading=self._readers[i].step(self.time, readout.force[own]),
-            net_force=net[:3].copy(),
-            net_torque=net[3:] + _cross(center, net),
-            centre_of_pressure=moment[:3] / moment[3] + center if moment[3] > 0.0 else np.zeros(3),
-        )
-
-
-def _cross(arm: np.ndarray, force: np.ndarray) -> tuple[float, float, float]:
-    """Return the torque of a force on an arm, as ``np.cross``, which takes twenty times as long for a single vector."""
-    (x, y, z), (fx, fy, fz) = arm.tolist(), force[:3].tolist()
-    return y * fz - z * fy, z * fx - x * fz, x * fy - y * fx
+        return self._observed(TEXELS).texels.force[0, self._texel_start[sensor] : self._texel_start[sensor + 1]]
 
 
 def _prepared_targets(scenario: Scenario, center: np.ndarray, shared: SharedResults) -> tuple[Tree, list[bool]]:

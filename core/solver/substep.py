@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The substeps of one frame, or of many frames with what is observed at the end of each (kernels).
+"""The substeps of frames, and what is observed at the end of each frame (kernels).
 
 In each substep, contacts are found where the bodies are, the velocities at its end are solved for, the bristles are brought
-forward, and the positions follow with those velocities. :func:`advance_frames` does what :meth:`.Simulation.advance` does frame
-by frame, where nothing in between needs Python: a frame of a small sensor takes less time than the Python around it.
+forward, and the positions follow with those velocities. :func:`advance_frames` is the only driver. It runs one frame, a part of
+one, or many at once: a frame of a small sensor takes less time than the Python around it.
 """
 
 from __future__ import annotations
@@ -46,6 +46,10 @@ class FramePath(NamedTuple):
     commands: np.ndarray
 
 
+NOTHING, TEXELS, FRAME = range(3)
+"""What is observed after the steps: nothing; the texels alone, for controllers; or all of :class:`ObservedFrames`."""
+
+
 class ObservedFrames(NamedTuple):
     """What is observed at the end of each of F frames.
 
@@ -54,7 +58,7 @@ class ObservedFrames(NamedTuple):
     texels : TexelReadout
         With a leading axis of length F in each array.
     position, quaternion, velocity : (F, b, 3), (F, b, 4) and (F, b, 6) float
-        Of the :class:`.State`.
+        Of the :class:`.State`. Before the first frame is observed, its row holds the poses at its beginning.
     rotation : (F, b, 3, 3) float
         Of the bodies.
     too_deep, too_deep_between : (F, q) int
@@ -88,7 +92,21 @@ class ObservedFrames(NamedTuple):
         )
 
 
-@kernel
+class Surroundings(NamedTuple):
+    """What is asked about the bodies when a frame is observed.
+
+    Attributes
+    ----------
+    closed : (T,) bool
+        Which targets are closed.
+    limits : CrossingLimits
+    """
+
+    closed: np.ndarray
+    limits: CrossingLimits
+
+
+@inlined
 def advance_steps(
     dt: float,
     first: int,
@@ -154,57 +172,67 @@ def advance_steps(
 @kernel
 def advance_frames(
     dt: float,
+    steps: tuple[int, int],
+    observed: int,
     path: FramePath,
-    closed: np.ndarray,
-    limits: CrossingLimits,
+    surroundings: Surroundings,
     model: SolverModel,
     detection: DetectionData,
     state: State,
     workspace: Workspace,
     seen: ObservedFrames,
 ) -> None:
-    """Run the steps of F frames and observe each; the state is brought forward in place.
+    """Run steps of F frames and observe each; the state is brought forward in place.
 
     Parameters
     ----------
     dt : float, seconds
+    steps : (int, int)
+        Steps of each frame to run, the last one excluded; none where both are equal.
+    observed : int
+        NOTHING, TEXELS or FRAME.
     path : FramePath
         With a leading axis of length F in each array.
-    closed : (T,) bool
-        Which targets are closed.
-    limits : CrossingLimits
+    surroundings : Surroundings
     model : SolverModel
     detection : DetectionData
     state : State
     workspace : Workspace
     seen : ObservedFrames
-        Zero at first; written.
+        Zero at first, apart from the poses before the first frame; written.
     """
-    steps = path.velocity.shape[1]
+    first, last = steps
+    limits = surroundings.limits
     for frame in range(len(seen.may_cross)):
-        before = max(frame - 1, 0)
-        if frame == 0:  # the first row is free until the frame is observed
-            _copy(state.position, seen.position[0])
-            _copy(state.quaternion, seen.quaternion[0])
         own = FramePath(path.position[frame], path.quaternion[frame], path.velocity[frame], path.commands[frame])
-        if advance_steps(dt, 0, steps, own, model, detection, state, workspace) > 0:
+        if last > first:
+            worst = advance_steps(dt, first, last, own, model, detection, state, workspace)
+            before = 0
             for pair in range(len(model.pairs.sensor)):
-                seen.too_deep_between[frame, pair] = workspace.contacts.most_too_deep[pair]
-        moved = BodiesInFrame(
-            own.velocity, seen.position[before], seen.quaternion[before], state.position, state.quaternion, limits.moved,
-            limits.radius,
-        )  # fmt: skip
-        seen.may_cross[frame] = may_cross(moved, limits.pairs, limits.limits, dt)
+                before += seen.too_deep_between[frame, pair]
+            if worst > before:
+                for pair in range(len(model.pairs.sensor)):
+                    seen.too_deep_between[frame, pair] = workspace.contacts.most_too_deep[pair]
+        if observed == NOTHING:
+            continue
         find_all_contacts(-dt, model, detection, state, workspace)
-        for pair in range(len(model.pairs.sensor)):
-            is_closed = closed[model.pairs.target[pair]]
-            seen.too_deep[frame, pair] = count_too_deep(pair, is_closed, model, detection, state, workspace)
+        if observed == FRAME:
+            for pair in range(len(model.pairs.sensor)):
+                is_closed = surroundings.closed[model.pairs.target[pair]]
+                seen.too_deep[frame, pair] = count_too_deep(pair, is_closed, model, detection, state, workspace)
         t = seen.texels
         out = TexelReadout(
             t.force[frame], t.shear[frame], t.friction[frame], t.depth[frame], t.slip[frame], t.contact[frame],
             t.strongest[frame], t.net[frame], t.moment[frame],
         )  # fmt: skip
         read_texels(model, state, workspace, out)
+        if last > first:
+            previous = max(frame - 1, 0)
+            moved = BodiesInFrame(
+                own.velocity, seen.position[previous], seen.quaternion[previous], state.position, state.quaternion,
+                limits.moved, limits.radius,
+            )  # fmt: skip
+            seen.may_cross[frame] = may_cross(moved, limits.pairs, limits.limits, dt)
         _copy(state.position, seen.position[frame])
         _copy(state.quaternion, seen.quaternion[frame])
         _copy(state.velocity, seen.velocity[frame])

@@ -227,6 +227,8 @@ class Workspace(NamedTuple):
         The time step that helper threads reckon with.
     queue : (QUEUE_SIZE,) or (0,) int
         Where helper threads find work (see :mod:`.thread_team`).
+    pair_loops : (5,) int
+        Address of what each loop over pairs does with a pair (see :mod:`.parallel_loops`).
     """
 
     bodies: BodyWork
@@ -238,3 +240,4 @@ class Workspace(NamedTuple):
     energy: EnergyWork
     step: np.ndarray
     queue: np.ndarray
+    pair_loops: np.ndarray

@@ -16,7 +16,7 @@ def test_early_end(play_unseen):
 def test_first_use(play_unseen):
     """The solver is compiled beside the window, with nothing in numba's cache."""
     result = play_unseen("first_use", timeout=1200)
-    assert result["screenshots"] == ["preparing.png", "playing.png", "bake-waits.png", "computed.png"]
+    assert result["screenshots"] == ["preparing.png", "playing.png", "bake-slowly.png", "computed.png"]
 
 
 def test_window(play_road):

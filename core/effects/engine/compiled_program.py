@@ -20,7 +20,17 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...compiled.kernels import COMPILED, call_address, carray, compiled_callback, kernel
+from ...compiled.kernels import (
+    address_of,
+    allocating_addressed_kernel,
+    are_interpreted,
+    call_address,
+    carray,
+    kernel,
+    plain,
+    pointer_to,
+    with_plain_form,
+)
 from ...compiled.struct_reference import by_reference
 from ...laws.contact_law import ContactLaw
 from ...laws.normal_force import damped_force_derivatives, damping_coefficient, elastic_force, elastic_stiffness
@@ -78,7 +88,7 @@ def _friction_law_over_points(
 
 
 @kernel_template
-def _entry(  # type: ignore[no-untyped-def]  # addresses and numbers, as compiled_callback gives them
+def _entry(  # type: ignore[no-untyped-def]  # addresses and numbers, as `call_law` gives them
     a, b, c, d, constants, memory, rows, count, width, points, state_size, offset, commit
 ):  # fmt: skip
     """Make arrays of the addresses and numbers that :func:`call_address` hands over; `LAW` is one of the loops over points."""
@@ -110,76 +120,90 @@ def _over_time(law: Callable[..., Any]) -> Any:
 
 # --- Laws by number, for kernels that are compiled once for all sensors: which laws a sensor has is known only at run time.
 
-_UNCOMPILED: list[Callable[..., Any]] = []
-_ENTRIES: dict[int, Any] = {}
-"""Keeps the compiled entries alive, by their addresses."""
+_OVER_POINTS: list[Callable[..., Any]] = []
+"""The loops of all laws that were asked for, by number."""
+_ADDRESSES = np.zeros(1024, np.int64)
+"""Addresses of their machine code; zero before they are compiled."""
+_ARGUMENTS = (*(pointer_to(integers=i == 6) for i in range(7)), *[0] * 6)
+"""Arguments of :func:`_entry`: addresses of arrays, the last of which holds integers, and numbers."""
 
 
 @cache
 def _number_of(law: Callable[..., Any], loop: Any) -> int:
-    """Return the number by which :func:`call_law` finds a law: the address of its machine code, or without numba an index."""
-    over_points = _specialised(loop, _compiled(law), _name(law))
-    if not COMPILED:
-        _UNCOMPILED.append(over_points)
-        return len(_UNCOMPILED) - 1
-    entry = _specialised(_entry, over_points, _name(law), compiled_callback)
-    _ENTRIES[entry.address] = entry
-    return int(entry.address)
+    """Return the number by which :func:`call_law` finds a law."""
+    _OVER_POINTS.append(_specialised(loop, _compiled(law), _name(law)))
+    if len(_OVER_POINTS) > len(_ADDRESSES):
+        raise RuntimeError(f"More than {len(_ADDRESSES)} laws of effects in one process")
+    return len(_OVER_POINTS) - 1
 
 
-if COMPILED:
+@cache
+def _entry_of(number: int) -> Any:
+    over_points = _OVER_POINTS[number]
+    return _specialised(_entry, over_points, plain(over_points).__qualname__, allocating_addressed_kernel)
 
-    @kernel
-    def call_law(
-        number: int,
-        columns: Columns,
-        points: PointRange,
-        constants: np.ndarray,
-        row: int,
-        memory: np.ndarray,
-        first_state: int,
-        commit: bool,
-    ) -> None:
-        """Let a law act on a range of points.
 
-        Parameters
-        ----------
-        number : int
-            Of the law, see :func:`_number_of`.
-        columns : tuple of four (blocks, n) float
-            Inputs and outputs of the loop over points, of :class:`TexelContacts`.
-        points : PointRange
-        constants, row : (rows, c) float, int
-            The constants of the law are ``constants[row]``.
-        memory, first_state : (N, state_size) float, int
-            The state of the law begins in this column.
-        commit : bool
-        """
-        a, b, c, d = columns
-        start = 8 * (points.block * a.shape[1] + points.first)
-        call_address(
-            number, a.ctypes.data + start, b.ctypes.data + start, c.ctypes.data + start, d.ctypes.data + start,
-            constants.ctypes.data + 8 * row * constants.shape[1], memory.ctypes.data + 8 * first_state,
-            points.rows.ctypes.data + 8 * points.first_row, points.number, constants.shape[1], memory.shape[0], memory.shape[1],
-            points.offset, 1 if commit else 0,
-        )  # fmt: skip
-else:
+def prepare_laws(program: EffectProgram) -> None:
+    """Compile the laws of a program, unless that was done, so that kernels can call them."""
+    for number in (*program.law.tolist(), *program.friction_law.tolist()):
+        if _ADDRESSES[number] == 0 and not are_interpreted():
+            _ADDRESSES[number] = address_of(_entry_of(number), *_ARGUMENTS)
 
-    def call_law(
-        number: int,
-        columns: Columns,
-        points: PointRange,
-        constants: np.ndarray,
-        row: int,
-        memory: np.ndarray,
-        first_state: int,
-        commit: bool,
-    ) -> None:
-        """Let a law act on a range of points, without compilation."""
-        these = slice(points.first, points.first + points.number)
-        rows = points.rows.reshape(-1)[points.first_row : points.first_row + points.number]
-        parts = tuple(column[points.block, these] for column in columns)
-        _UNCOMPILED[number](parts, constants[row], memory[:, first_state:], rows, points.offset, commit)
+
+def _call_law_plain(
+    number: int,
+    columns: Columns,
+    points: PointRange,
+    program: EffectProgram,
+    row: int,
+    memory: np.ndarray,
+    first_state: int,
+    commit: bool,
+) -> None:
+    """Do as :func:`call_law` without compiled code."""
+    these = slice(points.first, points.first + points.number)
+    rows = points.rows.reshape(-1)[points.first_row : points.first_row + points.number]
+    parts = tuple(column[points.block, these] for column in columns)
+    _OVER_POINTS[number](parts, program.constants[row], memory[:, first_state:], rows, points.offset, commit)
+
+
+@with_plain_form(_call_law_plain)
+@kernel
+def call_law(
+    number: int,
+    columns: Columns,
+    points: PointRange,
+    program: EffectProgram,
+    row: int,
+    memory: np.ndarray,
+    first_state: int,
+    commit: bool,
+) -> None:
+    """Let a law act on a range of points.
+
+    Parameters
+    ----------
+    number : int
+        Of the law, see :func:`_number_of`.
+    columns : tuple of four (blocks, n) float
+        Inputs and outputs of the loop over points, of :class:`TexelContacts`.
+    points : PointRange
+    program : EffectProgram
+    row : int
+        The constants of the law are ``program.constants[row]``.
+    memory, first_state : (N, state_size) float, int
+        The state of the law begins in this column.
+    commit : bool
+    """
+    a, b, c, d = columns
+    constants = program.constants
+    start = 8 * (points.block * a.shape[1] + points.first)
+    call_address(
+        program.addresses[number], a.ctypes.data + start, b.ctypes.data + start, c.ctypes.data + start, d.ctypes.data + start,
+        constants.ctypes.data + 8 * row * constants.shape[1], memory.ctypes.data + 8 * first_state,
+        points.rows.ctypes.data + 8 * points.first_row, points.number, constants.shape[1], memory.shape[0], memory.shape[1],
+        points.offset, 1 if commit else 0,
+    )  # fmt: skip
 
 
 def law_over_time(
@@ -235,6 +259,8 @@ class EffectProgram(NamedTuple):
     first_friction_law : (m + 1,) int
     friction_law, friction_row : (friction laws,) int
     constants : (rows, c) float
+    addresses : (…) int
+        Of the machine code of all laws, by number (see :func:`prepare_laws`).
     state_size : int
         Number of columns that the memory of a point needs.
     """
@@ -248,6 +274,7 @@ class EffectProgram(NamedTuple):
     friction_law: np.ndarray
     friction_row: np.ndarray
     constants: np.ndarray
+    addresses: np.ndarray
     state_size: int
 
     @property
@@ -319,7 +346,7 @@ def compile_program(stacks: Sequence[Sequence[Effect]], dt: ArrayLike) -> Effect
         state_size = max(state_size, state)
     law, law_state, law_row = np.array(laws, dtype=np.int64).reshape(-1, 3).T.copy()
     friction_law, friction_row = np.array(friction_laws, dtype=np.int64).reshape(-1, 2).T.copy()
-    return EffectProgram(
+    program = EffectProgram(
         first_law=np.array(first_law, dtype=np.int64),
         first_unclipped=np.array(first_unclipped, dtype=np.int64),
         law=law,
@@ -329,8 +356,11 @@ def compile_program(stacks: Sequence[Sequence[Effect]], dt: ArrayLike) -> Effect
         friction_law=friction_law,
         friction_row=friction_row,
         constants=tables.joined(),
+        addresses=_ADDRESSES,
         state_size=state_size,
     )
+    prepare_laws(program)
+    return program
 
 
 class TexelMotion(NamedTuple):
@@ -459,7 +489,7 @@ def apply_force_laws(
     columns, block = (contacts.force, contacts.by_depth, contacts.depth, contacts.slide), points.block
     for i in range(program.first_law[sensor], program.first_unclipped[sensor]):
         row = program.row[i] + length
-        call_law(program.law[i], columns, points, program.constants, row, memory, program.state[i], commit)
+        call_law(program.law[i], columns, points, program, row, memory, program.state[i], commit)
     for i in range(points.first, points.first + points.number):
         force, by_depth, by_rate = damped_force_derivatives(
             contacts.force[block, i], contacts.by_depth[block, i], contacts.by_rate[block, i], contacts.rate[block, i], linear
@@ -469,7 +499,7 @@ def apply_force_laws(
         contacts.force[block, i], contacts.by_depth[block, i], contacts.by_rate[block, i] = force, by_depth, by_rate
     for i in range(program.first_unclipped[sensor], program.first_law[sensor + 1]):
         row = program.row[i] + length
-        call_law(program.law[i], columns, points, program.constants, row, memory, program.state[i], commit)
+        call_law(program.law[i], columns, points, program, row, memory, program.state[i], commit)
 
 
 @kernel
@@ -481,7 +511,7 @@ def apply_friction_laws(
         contacts.friction_factor[points.block, i], contacts.extra_viscosity[points.block, i] = 1.0, 0.0
     columns = contacts.speed, contacts.force, contacts.friction_factor, contacts.extra_viscosity
     for i in range(program.first_friction_law[sensor], program.first_friction_law[sensor + 1]):
-        call_law(program.friction_law[i], columns, points, program.constants, program.friction_row[i], memory, 0, False)
+        call_law(program.friction_law[i], columns, points, program, program.friction_row[i], memory, 0, False)
 
 
 @kernel

@@ -156,7 +156,7 @@ def test_the_command_says_that_it_compiles(rig_file, tmp_path, monkeypatch, caps
     monkeypatch.setattr(precompile, "is_needed", lambda: True)
     monkeypatch.setattr(precompile, "compile_solver", stop)
     assert main(["gap", str(rig_file), "--out", str(tmp_path)]) == 1
-    assert capsys.readouterr().err.splitlines()[0].startswith("Palpate is preparing its solver (first use only)")
+    assert capsys.readouterr().err.splitlines()[0].startswith("Palpate is compiling its solver (first use only)")
 
 
 def test_logs_become_a_rig_with_the_answers_beside_it(scene, tmp_path):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The solver's first use: a process compiles beside the window, and whoever needs the solver waits for it.
+"""The solver's first use: a process compiles it beside the window; small scenes are computed meanwhile, large ones wait.
 
 The window is played here: bpy as a module has none. The whole of it in a real one is in tests/ui/roads/first_use.py.
 """
@@ -11,13 +11,16 @@ import sys
 import time
 
 import bpy
+import numpy as np
 import pytest
 
 from palpate.addon.bake import bake as baking
-from palpate.addon.session import dependencies, first_use, frame_status
-from palpate.addon.timeline import playback
+from palpate.addon.session import first_use, frame_status
+from palpate.addon.timeline import live_cache, playback
+from palpate.core.compiled import kernels
 from palpate.core.jobs.job_runner import run_job
 from palpate.core.solver import precompile, precompile_process
+from palpate.core.solver.simulation import Simulation
 
 
 @pytest.fixture
@@ -75,19 +78,56 @@ def test_it_is_started_once(window):
     assert first_use._compilation.process is process
 
 
-def test_playing_waits_and_goes_on_when_it_is_ready(window):
+def test_a_small_scene_plays_at_once_and_changes_over_when_the_solver_is_compiled(window):
+    """The frames are the same, bit by bit, as those of compiled kernels alone."""
+    make_sensor()
+    scene = bpy.context.scene
+    for frame in (1, 2, 3):
+        scene.frame_set(frame)
+        assert frame_status.status_of(scene).frame is not None, frame
+    assert kernels.are_interpreted() and first_use.SLOWLY in first_use.progress().text
+    precompile.completion_file().touch()
+    assert first_use.is_ready() and first_use.progress() is None
+    first_use._poll()
+    assert not kernels.are_interpreted()
+    scene.frame_set(4)
+    run = live_cache.get(scene)
+    compiled = Simulation(run.scenario)
+    expected = [compiled.observe(), *(compiled.advance() for _ in range(3))]
+    for number, frame in enumerate(expected, 1):
+        for name, felt in frame.sensors.items():
+            np.testing.assert_array_equal(run.frames[number].sensors[name].normal_force, felt.normal_force)
+
+
+def test_a_large_scene_waits_and_goes_on_when_the_solver_is_compiled(window, monkeypatch):
+    monkeypatch.setattr(first_use, "MAX_FRAME", 0.0)
     make_sensor()
     scene = bpy.context.scene
     scene.frame_set(2)
-    assert "solver is ready" in frame_status.status_of(scene).text
-    assert not playback._errors
+    assert "solver is compiled" in frame_status.status_of(scene).text
+    assert not playback._errors and first_use.STAGE in first_use.progress().text
     precompile.completion_file().touch()
     assert first_use.is_ready() and first_use.progress() is None
     scene.frame_set(1)
     assert frame_status.status_of(scene).frame is not None
 
 
-def test_a_bake_waits_with_progress_and_can_be_stopped(window, tmp_path):
+def test_a_small_bake_does_not_wait(window, tmp_path):
+    make_sensor()
+    scene = bpy.context.scene
+    scene.palpate.folder = str(tmp_path / "bake")
+    scene.frame_end = 3
+    run_job(baking.bake(scene))
+    assert kernels.are_interpreted() and first_use.progress() is not None
+    slowly = {path.relative_to(tmp_path / "bake"): path.read_bytes() for path in (tmp_path / "bake").rglob("tactile_*.exr")}
+    precompile.completion_file().touch()
+    run_job(baking.bake(scene))
+    assert not kernels.are_interpreted()
+    assert len(slowly) == 3 and all((tmp_path / "bake" / path).read_bytes() == content for path, content in slowly.items())
+
+
+def test_a_large_bake_waits_with_progress_and_can_be_stopped(window, monkeypatch, tmp_path):
+    monkeypatch.setattr(first_use, "MAX_FRAME", 0.0)
     make_sensor()
     scene = bpy.context.scene
     scene.palpate.folder = str(tmp_path / "bake")
@@ -128,10 +168,10 @@ def test_without_a_window_it_is_compiled_in_place_with_a_line_on_stderr(monkeypa
     monkeypatch.setattr(precompile, "completion_file", lambda: tmp_path / "stamp")
     make_sensor()
     assert first_use._compilation is None and first_use.is_ready()
-    dependencies.load_solver()
+    first_use.load_solver()
     assert "first use only" in capfd.readouterr().err
     assert (tmp_path / "stamp").exists() and not precompile.is_needed()
-    dependencies.load_solver()
+    first_use.load_solver()
     assert capfd.readouterr().err == ""
 
 

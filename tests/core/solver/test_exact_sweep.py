@@ -51,7 +51,7 @@ def test_a_pad_that_rests_askew_brings_no_energy(degrees):
     scenario, _, words = random_case(498)
     turned = balance.turned_and_moved(scenario, about((3, -1, 2), degrees), np.zeros(3))
     simulation = Simulation(turned)
-    _, _, velocities = simulation._prescribed_motion(1)
-    assert (velocities[:, 0] == 0.0).all()
+    _, _, velocities = simulation._prescribed_motion(1, 1)
+    assert (velocities[0, :, 0] == 0.0).all()
     scale = thrown(498, 0)[0].scale
     assert energies(turned, 100, scale).growth <= 1e-9, words

@@ -437,7 +437,7 @@ def test_poses_of_many_frames_at_once_are_those_of_each_frame(monkeypatch, inter
         for rows in (0, 30, 10_000):
             monkeypatch.setattr(simulation_module, "PATH_ROWS", rows)
             simulation = Simulation(scenario)
-            paths.append([simulation._prescribed_motion(frame) for frame in range(scenario.frame_start, scenario.frame_end)])
+            paths.append([simulation._prescribed_motion(frame, 1) for frame in range(scenario.frame_start, scenario.frame_end)])
         for path in paths[1:]:
             for own, alone in zip(path, paths[0], strict=True):
                 for values, expected in zip(own, alone, strict=True):

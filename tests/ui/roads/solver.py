@@ -9,5 +9,5 @@ def is_ready():
 
 
 def wait(ui):
-    """Wait until the solver is compiled, which takes a minute in the first road of a run."""
+    """Wait until the solver is compiled, which takes half a minute in the first road of a run."""
     yield from ui.wait_until(is_ready, "the solver is ready", timeout=900)
