@@ -34,7 +34,7 @@ STAGE = "Palpate is compiling its solver (first use only)"
 SLOWLY = "Palpate computes slowly until its solver is compiled (first use only)"
 USUAL_SECONDS = 40.0
 """How long the compiler usually takes beside a window that is in use; what the first seconds promise."""
-MAX_START, MAX_FRAME = 3.0, 1.5
+MAX_START, MAX_FRAME = 3.0, 2.0
 """Scenes are computed by interpreted kernels if they are prepared and if each frame is computed within so many seconds, for
 which the window does not answer."""
 POLL_INTERVAL = 0.5
