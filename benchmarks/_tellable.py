@@ -127,9 +127,10 @@ def _left_by_kinds(effect: str, freed: Any, changes: dict[str, np.ndarray], left
 
 def _is_shown(effect: str, freed: Any, changes: dict[str, np.ndarray], changed: Recording) -> bool:
     """Whether the stimulus shows what an effect is known by; the curve that may be half a loop is the true one."""
+    from palpate.core.effects.engine.registry import kind_of
     from palpate.core.gap.selection.identifiability import curvature_of, indistinguishable, unidentifiable
 
-    if effect == "drift" and is_multiplexed(changed):
+    if "rest" in kind_of(effect).known_from and is_multiplexed(changed):
         return False
     deepest = max(freed.of("fit"), key=lambda one: float(one.stimulus.load.max(initial=0.0)))
     texel = int(np.argmax(deepest.stimulus.load.max(axis=0)))

@@ -61,8 +61,6 @@ FAILED |= {"closed": None, "inside": []}
 """The score of a case that raised."""
 CASE_NAME = "case.json"
 """Name of the file in which a run of the study has its case."""
-QUIET = ("noise",)
-"""Effects that leave no gap which a model could close."""
 
 
 def run() -> Iterator[dict]:
@@ -227,8 +225,11 @@ def closed(case: cases.Case, result: Any, model: Any) -> float | None:
 
     The gap is the root mean square of truth minus prediction, readings and forces each in units of their range.
     """
-    if case.kind not in (*FORMULAS, *cases.SEVERAL) or set(case.answer) & set(QUIET):
-        return None
+    from palpate.core.effects.engine.declarations import SCATTER
+    from palpate.core.effects.engine.registry import names_found_by
+
+    if case.kind not in (*FORMULAS, *cases.SEVERAL) or set(case.answer) & set(names_found_by(SCATTER)):
+        return None  # of noise no model could close a gap
     before, after = (_miss(case, result, one) for one in (result.base.model, model))
     return 1.0 - after / before
 

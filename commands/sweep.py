@@ -200,7 +200,7 @@ def _slurm(arguments: argparse.Namespace) -> Callable[[], Any] | None:
 
 
 def _estimate(opened: OpenStudy, arguments: argparse.Namespace) -> int:
-    from ..sweep.job import require_allowed
+    from ..sweep.program import require_allowed
     from ..sweep.trial import try_runs
     from ..sweep.worker import Limits
 
@@ -250,7 +250,7 @@ def _duration(seconds: float) -> str:
 def _compute(opened: OpenStudy, arguments: argparse.Namespace) -> int:
     from ..core.study.run_files import done_runs, failed_runs, make_folders
     from ..sweep import driver
-    from ..sweep.job import require_allowed
+    from ..sweep.program import require_allowed
     from ..sweep.status import status_of
     from ..sweep.worker import Limits
 

@@ -29,7 +29,7 @@ from ..core.study.run_placement import place_run
 from ..core.study.scene_property import is_scene_property, scene_values
 from ..core.study.study_file import SCENE, Plan, Run, Study, at_rate, read_study
 from ..core.study.variation import PRESS, varied_scenario
-from .job import Job, frozen_job, require_allowed
+from .program import Program, frozen_program, require_allowed
 from .scene_evaluation import REFUSE, SceneReader
 from .study_scenes import frozen_meshes, plan_of
 
@@ -56,7 +56,7 @@ class Scenes:
         self._meshes = frozen_meshes(self.study, folder)
         require_allowed(self.study, scripts)
         self._plans: dict[str, Plan] = {}
-        self._jobs: dict[str, Job] = {}
+        self._programs: dict[str, Program] = {}
         self.shared = SharedResults()
 
     def plan(self, scene: str) -> Plan:
@@ -65,16 +65,16 @@ class Scenes:
             self._plans[scene] = plan_of(self.study, self.folder, scene, self._meshes)
         return self._plans[scene]
 
-    def job(self, name: str) -> Job:
-        """Return the job of a study that has no scene."""
-        if name not in self._jobs:
-            self._jobs[name] = frozen_job(self.study, self.folder, name)
-        return self._jobs[name]
+    def program(self, name: str) -> Program:
+        """Return the program of a study that has no scene."""
+        if name not in self._programs:
+            self._programs[name] = frozen_program(self.study, self.folder, name)
+        return self._programs[name]
 
     def scenario(self, scene: str, values: Mapping[str, Any]) -> Scenario:
         """Return the scenario of a scene with the values of a run; it is read anew where they have properties of the scene."""
         plan, read_with = self.plan(scene), scene_values(values)
-        assert plan.scenario is not None  # but for a job
+        assert plan.scenario is not None  # but for a program
         scenario = at_rate(self._reader.read(scene, read_with), self.study.fps) if read_with else plan.scenario
         rest = {name: value for name, value in values.items() if not is_scene_property(name)}
         return varied_scenario(scenario, rest, plan.press, plan.meshes, self.shared)
@@ -96,7 +96,7 @@ def compute_run(scenes: Scenes, run: Run) -> None:
     plan = scenes.plan(run.scene)
     values = {**plan.fixed, **{name: value for name, value in run.values.items() if name != SCENE}}
     if scenes.study.is_job:
-        found = scenes.job(run.scene)
+        found = scenes.program(run.scene)
         place_run(scenes.folder, run, lambda place: found.run(values, place), time.perf_counter)
         return
     scenario = scenes.scenario(run.scene, values)

@@ -32,7 +32,7 @@ def publish(folder: Path, planned: Sequence[Run] = ()) -> None:
 
     The dataset is written into a hidden folder and renamed into its place last; that of before is removed then. Runs whose
     sensors or rates differ cannot share the columns of one dataset: each kind becomes one, ``dataset/part-000`` and so on.
-    The runs of a job have no sensors, and it becomes no dataset.
+    The runs of a program have no sensors, and it becomes no dataset.
 
     Parameters
     ----------

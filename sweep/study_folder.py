@@ -21,7 +21,7 @@ from ..core.study.mesh_choices import MESHES, StudyMeshes, find_meshes, freeze_m
 from ..core.study.run_files import FAILED, RUNS, SCENES, STUDY_NAME, make_folders
 from ..core.study.study_file import Plan, Run, Study, differences, frozen_text, read_study, runs_of
 from ..core.version import VERSION
-from . import job
+from . import program
 from .scene_evaluation import REFUSE
 from .study_scenes import FROZEN_MESHES, frozen_meshes, plan_of
 
@@ -61,12 +61,12 @@ def begin_study(file: Path, folder: Path, read_blend: ReadBlend, scripts: str = 
         Made if it is missing.
     read_blend : callable
     scripts : str
-        What is done about the Python of a job, one of :data:`.scene_evaluation.SCRIPTS`.
+        What is done about the Python of a program, one of :data:`.scene_evaluation.SCRIPTS`.
 
     Raises
     ------
     PalpateError
-        The file or a scene cannot be read, a job is not allowed, the folder holds something else, or another study, or this
+        The file or a scene cannot be read, a program is not allowed, the folder holds something else, or another study, or this
         one with another scene.
     """
     study = read_study(file)
@@ -81,7 +81,7 @@ def begin_study(file: Path, folder: Path, read_blend: ReadBlend, scripts: str = 
         return replace(opened, study=replace(opened.study, run_limit=study.run_limit, run_memory=study.run_memory))
     if folder.exists() and (not folder.is_dir() or {path.name for path in folder.iterdir()} - _OWN):
         raise FileError(f"'{folder}' holds other files and no study: give a new or empty folder with --out.")
-    job.require_allowed(study, scripts)
+    program.require_allowed(study, scripts)
     with _whole_or_nothing(folder):
         return _frozen(study, file, folder, sources, read_blend)
 
@@ -137,7 +137,7 @@ def scenarios_of(place: Path, read_blend: ReadBlend) -> dict[str, Scenario | Non
     Returns
     -------
     dict of str to Scenario or None
-        By the names of the scenes; None for a job.
+        By the names of the scenes; None for a program.
 
     Raises
     ------
@@ -190,10 +190,10 @@ def resume_study(folder: Path) -> OpenStudy:
 
 
 def _is_as_frozen(study: Study, folder: Path, entry: Mapping[str, str]) -> bool:
-    """Whether a scene or the job in a study's folder is the one that the study began with."""
+    """Whether a scene or the program in a study's folder is the one that the study began with."""
     start = folder / SCENES / entry["name"]
     if study.is_job:
-        return file_sha256(_with(start, job.SUFFIX)) == entry["sha256"]  # the processes that run it look at the rest
+        return file_sha256(_with(start, program.SUFFIX)) == entry["sha256"]  # the processes that run it look at the rest
     return load_scenario(_with(start, SCENARIO)).digest() == entry["digest"]
 
 
@@ -232,8 +232,8 @@ def _sources(study: Study, base: Path) -> dict[str, Path]:
     for file in files:
         if not file.is_file():
             raise FileError(f"There is no scene '{file}': check its name; it is counted from the study's folder.")
-        if study.is_job and file.suffix != job.SUFFIX:
-            raise FileError(f"The job '{file}' is no Python file: give one that ends with {job.SUFFIX}.")
+        if study.is_job and file.suffix != program.SUFFIX:
+            raise FileError(f"The job '{file}' is no Python file: give one that ends with {program.SUFFIX}.")
         if not study.is_job and file.suffix not in (BLEND, SCENARIO):
             raise FileError(f"The scene '{file}' is neither a .blend nor a scenario (.npz): give one of these.")
     stems: dict[str, Path] = {}
@@ -247,9 +247,9 @@ def _sources(study: Study, base: Path) -> dict[str, Path]:
 
 
 def _freeze_scene(source: Path, start: Path, read_blend: ReadBlend) -> str:
-    """Write a scene, or a job, into a study's folder, under a name that begins with `start`, and return its digest."""
-    if source.suffix == job.SUFFIX:
-        return job.freeze_job(source, _with(start, job.SUFFIX))
+    """Write a scene, or a program, into a study's folder, under a name that begins with `start`, and return its digest."""
+    if source.suffix == program.SUFFIX:
+        return program.freeze_program(source, _with(start, program.SUFFIX))
     target = _with(start, SCENARIO)
     if source.suffix == BLEND:
         read_blend(source, target)

@@ -6,7 +6,7 @@
     scenes/<scene>.npz      the scene as the solver sees it
     scenes/<scene>.json     what the properties of the scene are that the study names, if any
     scenes/<scene>.blend    the scene, which runs with other values of these are read from
-    scenes/<job>.py         the job of a study that has no scene
+    scenes/<program>.py     the program of a study that has no scene
     scenes/meshes/          the mesh files of targets
 """
 

@@ -89,8 +89,6 @@ def page() -> str:
 # --- the picture
 
 ROWS, COLUMNS, PITCH = 14, 6, 0.0034
-HEADROOM = {"creep": 2.3, "lag": 1.6, "wear": 1.4}
-"""Factors that make some plots higher, so that the legend has room above the curves."""
 
 
 def picture(path: Path) -> None:
@@ -105,7 +103,7 @@ def picture(path: Path) -> None:
     for axes in grid.ravel()[len(kinds) :]:
         axes.set_axis_off()
     for axes, kind in zip(grid.ravel(), kinds, strict=False):
-        DRAWN.get(kind.name, _over_time(_LONG, _HOLD))(axes, kind)
+        DRAWINGS[kind.drawing.over](axes, kind)
         axes.set_title(kind.title, fontsize=9.5, loc="left", color="#1c2430")
     figure.subplots_adjust(left=0.055, right=0.985, top=0.972, bottom=0.04, wspace=0.34, hspace=0.5)
     save_figure(figure, path, 110)
@@ -120,8 +118,8 @@ def _setting():
     return TransducerArray(position, np.full(len(position), PITCH**2), row, column), SensorParameters(k=1000.0, cn=0.0)
 
 
-def _curves(axes, kind, x, base, of_form, xlabel, ylabel, **values):
-    """Draw the base model in grey and each form in colour; `values` by name of the form replace defaults."""
+def _curves(axes, kind, x, base, of_form, xlabel, ylabel):
+    """Draw the base model in grey and each form in colour, with the values that the kind states for its drawing."""
     from palpate.core.effects.engine.registry import effect
     from palpate.core.figures.figure_canvas import tidy_axes
     from palpate.core.figures.figure_style import GREY, SERIES
@@ -131,13 +129,13 @@ def _curves(axes, kind, x, base, of_form, xlabel, ylabel, **values):
     for form, colour in zip(kind.forms, SERIES, strict=False):
         if any(parameter.per_texel for parameter in form.parameters):
             continue
-        item = effect(kind.name, form.name, **{"seed": 1, **values.get(form.name.replace("-", "_"), {})})
+        item = effect(kind.name, form.name, **{"seed": 1, **kind.drawing.values.get(form.name, {})})
         axes.plot(x, of_form(item), color=colour, lw=1.1, label=form.name)
     tidy_axes(axes)
     axes.set_xlabel(xlabel, labelpad=1)
     axes.set_ylabel(ylabel, labelpad=1)
-    axes.set_ylim(top=axes.get_ylim()[1] * HEADROOM.get(kind.name, 1.0))
-    place = "upper right" if kind.name in HEADROOM else "best"
+    axes.set_ylim(top=axes.get_ylim()[1] * kind.drawing.headroom)
+    place = "upper right" if kind.drawing.headroom > 1.0 else "best"
     axes.legend(fontsize=8, frameon=False, handlelength=1.0, borderpad=0.1, labelspacing=0.2, loc=place)
 
 
@@ -152,33 +150,25 @@ def _pressed(time, depth, slide=None):
     return lambda *items: readings(items, one, time, normal_forces(items, parameters, time, depth[:, None], slide))[:, 0]
 
 
-def _force_over_depth(depth, ylabel="force (N)", **values):
-    def draw(axes, kind):
-        time = np.linspace(0, 20, len(depth))
-        texel = _pressed(time, depth)
-        _curves(axes, kind, depth * 1e3, texel(), texel, "depth (mm)", ylabel, **values)
-
-    return draw
+def _force_over_depth(axes, kind):
+    depth = kind.drawing.depth
+    texel = _pressed(np.linspace(0, 20, len(depth)), depth)
+    _curves(axes, kind, depth * 1e3, texel(), texel, "depth (mm)", "force (N)")
 
 
-def _over_time(time, depth, ylabel="reading (N)", **values):
-    def draw(axes, kind):
-        texel = _pressed(time, depth)
-        _curves(axes, kind, time, texel(), texel, "time (s)", ylabel, **values)
-
-    return draw
+def _over_time(axes, kind):
+    time = kind.drawing.time
+    texel = _pressed(time, kind.drawing.depth)
+    _curves(axes, kind, time, texel(), texel, "time (s)", "reading (N)")
 
 
-def _reading_over_force(**values):
-    def draw(axes, kind):
-        from palpate.core.effects.engine.readout_chain import readings
+def _reading_over_force(axes, kind):
+    from palpate.core.effects.engine.readout_chain import readings
 
-        site, force = _setting()[0], np.linspace(0, 2, 801)
-        one = type(site)(np.zeros((1, 3)), np.ones(1))
-        texel = lambda item: readings((item,), one, force, force[:, None])[:, 0]  # noqa: E731
-        _curves(axes, kind, force, force, texel, "force (N)", "reading (N)", **values)
-
-    return draw
+    site, force = _setting()[0], np.linspace(0, 2, 801)
+    one = type(site)(np.zeros((1, 3)), np.ones(1))
+    texel = lambda item: readings((item,), one, force, force[:, None])[:, 0]  # noqa: E731
+    _curves(axes, kind, force, force, texel, "force (N)", "reading (N)")
 
 
 def _over_speed(axes, kind):
@@ -191,17 +181,17 @@ def _over_speed(axes, kind):
         factor, viscous = friction_factors(items, v, np.ones_like(v)) if items else (1.0, 0.0)
         return factor * (p.mud + (p.mus - p.mud) * np.exp(-((v / p.x0) ** 2))) + (viscous + p.ct) * v
 
-    more = {"linear": {"viscosity": 2.0}, "load": {"viscosity": 4.0}, "power": {"drag": 0.3}}
-    _curves(axes, kind, v * 1e3, drag(), drag, "sliding speed (mm/s)", "friction at 1 N (N)", **more)
+    _curves(axes, kind, v * 1e3, drag(), drag, "sliding speed (mm/s)", "friction at 1 N (N)")
 
 
 def _peaks(axes, kind):
     """Draw the peak reading of each of forty pressings under steady sliding."""
+    from palpate.core.effects.engine.declarations import cycles
+
     time = np.linspace(0, 40, 4001)
-    depth = _cycles(40)(time)
-    texel = _pressed(time, depth, np.full(len(time), 1e-3))
+    texel = _pressed(time, cycles(40, time), np.full(len(time), 1e-3))
     top = lambda *items: texel(*items)[1:].reshape(40, 100).max(axis=1)  # noqa: E731
-    _curves(axes, kind, np.arange(1, 41), top(), top, "pressing", "peak (N)", archard={"rate": 2e-4}, work={"life": 5.0})
+    _curves(axes, kind, np.arange(1, 41), top(), top, "pressing", "peak (N)")
 
 
 def _across(axes, kind):
@@ -212,21 +202,17 @@ def _across(axes, kind):
     force = np.zeros((1, ROWS * COLUMNS))
     force[0, 7 * COLUMNS + 3] = 1.0
     column = lambda *items: readings(items, site, np.zeros(1), force)[0].reshape(ROWS, COLUMNS)[:, 3]  # noqa: E731
-    more = {"neighbours": {"share": 0.2}, "lines": {"share": 1.0}, "common": {"share": 4.0}}
-    _curves(axes, kind, np.arange(ROWS), column(), column, "row", "reading (N)", **more)
+    _curves(axes, kind, np.arange(ROWS), column(), column, "row", "reading (N)")
 
 
-def _texels(**values):
-    def draw(axes, kind):
-        from palpate.core.effects.engine.readout_chain import readings
+def _texels(axes, kind):
+    from palpate.core.effects.engine.readout_chain import readings
 
-        site = _setting()[0]
-        force = np.ones((1, ROWS * COLUMNS))
-        even = lambda *items: readings(items, site, np.zeros(1), force)[0][:36]  # noqa: E731
-        _curves(axes, kind, np.arange(36), even(), even, "texel", "reading (N)", **values)
-        axes.set_ylim(bottom=0)
-
-    return draw
+    site = _setting()[0]
+    force = np.ones((1, ROWS * COLUMNS))
+    even = lambda *items: readings(items, site, np.zeros(1), force)[0][:36]  # noqa: E731
+    _curves(axes, kind, np.arange(36), even(), even, "texel", "reading (N)")
+    axes.set_ylim(bottom=0)
 
 
 def _ball(axes, kind):
@@ -243,63 +229,20 @@ def _ball(axes, kind):
         depth = np.maximum(position[:, 2] + 0.002 - 0.04 + np.sqrt(np.maximum(0.04**2 - r**2, 0)), 0)
         return 1000.0 * depth.reshape(ROWS, COLUMNS)[:, 3]
 
-    more = {"shift": {"x": 0.0, "y": 0.005}, "turn": {"x": 0.003, "y": 0.0, "about_z": 0.4}, "tilt": {"about_x": 0.08}}
-    _curves(axes, kind, np.arange(ROWS), forces_along_column(), forces_along_column, "row", "force of a ball (N)", **more)
+    _curves(axes, kind, np.arange(ROWS), forces_along_column(), forces_along_column, "row", "force of a ball (N)")
 
 
-def _cycles(turns, top=0.002):
-    return lambda time: top * 0.5 * (1 - np.cos(2 * np.pi * turns * time / time[-1]))
-
-
-_LONG, _SHORT = np.linspace(0, 20, 2001), np.linspace(0, 1, 501)
-_HOLD = 0.002 * np.interp(_LONG, [0, 1, 1.3, 12, 12.3, 20], [0, 0, 1, 1, 0, 0])
-_SMALL = 0.0002 * np.interp(_LONG, [0, 10, 20], [0.0, 1.0, 0.0])
-
-DRAWN = {
-    "misalignment": _ball,
-    "stiffening": _force_over_depth(np.linspace(0, 0.004, 400)),
-    "stribeck": _over_speed,
-    "viscous-friction": _over_speed,
-    "softening": _force_over_depth(_cycles(2)(_LONG) * np.where(_LONG < 10, 0.7, 1.0), peak={"depth": 0.001}),
-    "hysteresis": _force_over_depth(
-        _cycles(1)(_LONG),
-        bouc_wen={"force": 0.6, "share": 0.3},
-        maxwell_slip={"force": 0.3, "share": 0.6},
-        play={"force": 0.4},
-        preisach={"force": 0.5, "share": 0.8},
-    ),
-    "creep": _over_time(_LONG, _HOLD),
-    "wear": _peaks,
-    "adhesion": _force_over_depth(
-        _SMALL,
-        unloading={"depth": 3e-5},
-        constant={"depth": 3e-5},
-        dwell={"depth": 3e-5, "time": 30.0},
-        cohesive={"pull": 0.06, "depth": 4e-5},
-        relaxing={"pull": 0.06, "depth": 4e-5, "time": 2.0},
-    ),
-    "load-spreading": _across,
-    "dead-zone": _reading_over_force(hard={"threshold": 0.4}, soft={"threshold": 0.4}, step={"threshold": 0.4}),
-    "gain-mismatch": _texels(),
-    "dead-texels": _texels(random={"share": 0.12}, stuck={"share": 0.12, "level": 0.4, "seed": 2}),
-    "crosstalk": _across,
-    "lag": _over_time(_SHORT, 0.002 * (np.interp(_SHORT, [0.1, 0.12, 0.6, 0.62], [0, 1, 1, 0]))),
-    "offset": _over_time(_SHORT, 0.0002 * np.sin(np.pi * _SHORT) ** 2, common={"offset": 0.05}),
-    "drift": _over_time(
-        np.linspace(0, 120, 601), np.zeros(601), linear={"rate": 4e-4}, warm_up={}, random_walk={"spread": 0.004}
-    ),
-    "warm-up": _over_time(np.linspace(0, 900, 601), np.full(601, 1e-3)),
-    "temperature": _reading_over_force(gain={"gain_change": 0.02}, zero={"zero_change": 0.02}),
-    "noise": _over_time(
-        _SHORT, 0.001 * np.sin(np.pi * _SHORT) ** 2, white={"spread": 0.03}, proportional={"share": 0.05},
-        coloured={"spread": 0.06},
-    ),
-    "saturation": _reading_over_force(),
-    "quantization": _reading_over_force(
-        round={"step": 0.25}, floor={"step": 0.25}, bits={"bits": 4, "range": 2.4}, power={"first": 0.1}
-    ),
-}  # fmt: skip
-"""The experiment that shows each effect."""
+DRAWINGS = {
+    "time": _over_time,
+    "depth": _force_over_depth,
+    "force": _reading_over_force,
+    "speed": _over_speed,
+    "pressings": _peaks,
+    "row": _across,
+    "texel": _texels,
+    "ball": _ball,
+}
+"""What draws the experiments of core/effects/engine/declarations.py."""
 
 
 def main() -> int:

@@ -3,7 +3,7 @@
 
 import effects_page
 
-from palpate.core.effects.engine.registry import library
+from palpate.core.effects.engine.declarations import DRAWINGS
 
 
 def test_the_page_is_that_of_this_library():
@@ -11,8 +11,8 @@ def test_the_page_is_that_of_this_library():
     assert effects_page.PAGE.read_text(encoding="utf-8") == effects_page.page()
 
 
-def test_every_effect_is_in_the_picture():
-    assert set(effects_page.DRAWN) == set(library())
+def test_every_experiment_can_be_drawn():
+    assert set(effects_page.DRAWINGS) == set(DRAWINGS)
 
 
 def test_the_picture_can_be_drawn(tmp_path):

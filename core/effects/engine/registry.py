@@ -6,7 +6,7 @@ from __future__ import annotations
 import difflib
 import importlib
 import pkgutil
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from functools import cache
 from typing import Any
 
@@ -35,6 +35,35 @@ def kind_of(name: str) -> Kind:
     if name not in kinds:
         raise EffectError(f"There is no effect '{name}'{_suggestion(name, kinds)}; the library has {', '.join(kinds)}.")
     return kinds[name]
+
+
+def names_where(condition: Callable[[Kind], bool]) -> tuple[str, ...]:
+    """Return the names of the kinds for which a condition holds, in the order in which they act."""
+    return tuple(name for name, kind in library().items() if condition(kind))
+
+
+def only_name_where(condition: Callable[[Kind], bool]) -> str:
+    """Return the name of the one kind for which a condition holds; raise :class:`EffectError` if there is none or several."""
+    names = names_where(condition)
+    if len(names) != 1:
+        said = f"{' and '.join(names)} state" if names else "no effect states"
+        raise EffectError(f"Of the library {said} what exactly one effect has to state: compare their KINDs.")
+    return names[0]
+
+
+def names_known_from(feature: str) -> tuple[str, ...]:
+    """Return the names of the kinds that are known from a feature of recordings, one of :data:`.declarations.FEATURES`."""
+    return names_where(lambda kind: feature in kind.known_from)
+
+
+def names_in_family(family: str) -> tuple[str, ...]:
+    """Return the names of the kinds of a family, one of :data:`.declarations.FAMILIES`."""
+    return names_where(lambda kind: family in kind.families)
+
+
+def names_found_by(way: str) -> tuple[str, ...]:
+    """Return the names of the kinds that are found in one way, one of :data:`.declarations.FOUND_BY`."""
+    return names_where(lambda kind: kind.found_by == way)
 
 
 def form_of(name: str, form: str = "") -> Form:

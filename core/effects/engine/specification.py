@@ -15,19 +15,24 @@ for the same phenomenon, because publications differ. A form acts by exactly one
 
 Laws and friction laws are compiled, so they use only numbers, arrays and :mod:`math`. This module and those of the library
 import nothing heavy, because Blender's panels list them.
+
+Nothing outside the library names an effect. What others need to know of it is stated in its ``KIND``, in the words of
+:mod:`.declarations`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
 
+from ...errors import EffectError
 from ...model.effect import Value, Values
 from ...model.parameter import Parameter
 from .coupling_matrix import CouplingMatrix
+from .declarations import DRAWINGS, FAMILIES, FEATURES, FIT, FOUND_BY, GAIN_FALLS_WITH, NEEDS, SIGNATURES, Drawing, Variant
 
 SITES_OF_ACTION = ("contact", "pad", "readout")
 """Where an effect acts, in the order in which a load passes: `contact` changes the contact law itself and has no memory, `pad`
@@ -145,6 +150,17 @@ class Form:
         A law that acts after the normal force was clipped at zero, so that the texel can pull.
     random : bool
         Whether the form draws random numbers, which depend on the seed.
+    is_tried : bool
+        Whether the gap analysis takes the form as a candidate, if the form is not random.
+    fitted_up_to : dict of str to float
+        Upper bounds of parameters in a fit, below their own: beyond them the formula is valid but describes another effect.
+        Where all other kinds leave far more, a fit goes on up to the parameter's own bound.
+    over_within : dict of str to float
+        Upper bounds of paths (m) in a fit, as shares of the path that texels are pressed in along a session.
+    same_as : str
+        Parameter of the base model that does the same; the form is no candidate where that is free.
+    needs : str
+        What recordings must hold for this form, one of :data:`.declarations.NEEDS`, if it differs from the kind's.
     """
 
     name: str
@@ -164,6 +180,11 @@ class Form:
     after_conversion: bool = False
     after_clip: bool = False
     random: bool = False
+    is_tried: bool = True
+    fitted_up_to: dict[str, float] = field(default_factory=dict)
+    over_within: dict[str, float] = field(default_factory=dict)
+    same_as: str = ""
+    needs: str = ""
 
     @property
     def mechanism(self) -> str:
@@ -178,7 +199,7 @@ class Form:
 
 @dataclass(frozen=True)
 class Kind:
-    """An effect of the library.
+    """An effect of the library, and all that the rest of the package knows of it.
 
     Attributes
     ----------
@@ -194,6 +215,30 @@ class Kind:
         Rank among the effects with the same site of action: lower acts first.
     forms : tuple of Form
         The first is the usual one.
+    experiment : str
+        The recording that shows the effect most clearly, as a request.
+    drawing : Drawing
+        The experiment in which the documentation draws it.
+    known_from : tuple of str
+        Features of recordings without which they do not identify it, of :data:`.declarations.FEATURES`.
+    families : tuple of str
+        Which effects resemble it, of :data:`.declarations.FAMILIES`.
+    variants : tuple of Variant
+        What it can add to a signal whatever its formula. Without one, the search for kinds and the plans of experiments leave
+        it out.
+    cost : float, optional
+        Its price in that search, if it differs from the usual one: higher for what absorbs what others leave.
+    found_by : str
+        How it is found in recordings, one of :data:`.declarations.FOUND_BY`.
+    signature : str
+        What a fit must show, one of :data:`.declarations.SIGNATURES`; empty if nothing more is asked.
+    needs : str
+        What recordings must hold, one of :data:`.declarations.NEEDS`; empty if nothing more is asked.
+    known_parameters : tuple of str
+        Parameters that a fit leaves at their neutral values, because the recordings hold them.
+    gain_falls_with : str
+        With what it lowers the gain from recording to recording, one of :data:`.declarations.GAIN_FALLS_WITH`; at most one
+        kind for each. Empty if it does not, or not alone.
     """
 
     name: str
@@ -202,10 +247,46 @@ class Kind:
     site: str
     order: float
     forms: tuple[Form, ...]
+    experiment: str
+    drawing: Drawing = field(default_factory=Drawing)
+    known_from: tuple[str, ...] = ()
+    families: tuple[str, ...] = ()
+    variants: tuple[Variant, ...] = ()
+    cost: float | None = None
+    found_by: str = FIT
+    signature: str = ""
+    needs: str = ""
+    known_parameters: tuple[str, ...] = ()
+    gain_falls_with: str = ""
+
+    def __post_init__(self) -> None:
+        stated = (
+            ("known_from", self.known_from, FEATURES),
+            ("families", self.families, FAMILIES),
+            ("found_by", (self.found_by,), FOUND_BY),
+            ("signature", (self.signature,), SIGNATURES),
+            ("needs", (self.needs, *(form.needs for form in self.forms)), NEEDS),
+            ("gain_falls_with", (self.gain_falls_with,), GAIN_FALLS_WITH),
+            ("drawing", (self.drawing.over,), DRAWINGS),
+        )
+        for attribute, words, known in stated:
+            for word in words:
+                if word and word not in known:
+                    raise EffectError(f"{attribute} of effect '{self.name}' is '{word}': choose from {', '.join(known)}.")
+        object.__setattr__(self, "variants", tuple(replace(one, kind=self.name) for one in self.variants))
 
     def site_of(self, form: Form) -> str:
         """Return the site of action of a form of this kind."""
         return form.site or self.site
+
+    def needs_of(self, form: Form) -> str:
+        """Return what recordings must hold for a form of this kind."""
+        return form.needs or self.needs
+
+    @property
+    def is_gain_of_texels(self) -> bool:
+        """Whether it gives each texel a gain of its own."""
+        return any("gain" in variant.texel_columns for variant in self.variants)
 
 
 def scalar(values: Values, name: str) -> float:

@@ -13,6 +13,7 @@ import numpy as np
 
 from ...model.effect import Values
 from ...model.parameter import Parameter
+from ..engine.declarations import Drawing, Recordings, Run, Variant
 from ..engine.specification import Form, Kind, TexelInput, constants_from, scalar
 
 
@@ -94,6 +95,30 @@ _PULL = Parameter("pull", "N", 0.02, 0.0, 100.0, "Largest pull F of one texel.")
 _ZONE = Parameter("depth", "m", 2e-4, 1e-6, 0.02, "Depth D, before contact ends, at which the pull is largest.", log=True)
 _WAY = Parameter("depth", "m", 2e-4, 1e-6, 0.02, "Distance D on the way out after which the pull has reached 63 %.", log=True)
 
+
+def unloading_pull(x: np.ndarray, run: Run, recorded: Recordings) -> list[np.ndarray]:
+    """Adhesion that pulls on the way out, at all loads or near the release."""
+    from ..engine import signal_operators as operators
+
+    def columns() -> list[np.ndarray]:
+        touching, load = run.elastic > 0.0, np.maximum(run.elastic, 0.0)
+        held = operators.falling(run.elastic, 0.01) * touching
+        moving = (np.gradient(run.elastic, run.time, axis=0) < 0.0) & touching
+        found = [-operators.falling(run.elastic, length) * touching for length in (0.03, 0.1)]
+        for width in (0.08, 0.14, 0.25):
+            near = np.exp(-((load / width) ** 2)) * -np.expm1(-load / (0.1 * width))
+            found += [-held * near, moving * -near]
+        return found
+
+    pulls: list[np.ndarray] = run.keep("adhesion", columns)
+    return pulls
+
+
+def steady_pull(x: np.ndarray, run: Run, recorded: Recordings) -> list[np.ndarray]:
+    """Adhesion that pulls as long as there is contact."""
+    return [np.expm1(-np.maximum(run.elastic, 0.0) / width) for width in (0.015, 0.03, 0.06)]
+
+
 KIND = Kind(
     name="adhesion",
     title="Adhesion",
@@ -165,4 +190,22 @@ KIND = Kind(
             after_clip=True,
         ),
     ),
+    experiment="retract slowly after contacts of one second and of one minute, and record until well after release",
+    drawing=Drawing(
+        "depth",
+        depth=0.0002 * np.interp(np.linspace(0, 20, 2001), [0, 10, 20], [0.0, 1.0, 0.0]),
+        values={
+            "unloading": {"depth": 3e-5},
+            "constant": {"depth": 3e-5},
+            "dwell": {"depth": 3e-5, "time": 30.0},
+            "cohesive": {"pull": 0.06, "depth": 4e-5},
+            "relaxing": {"pull": 0.06, "depth": 4e-5, "time": 2.0},
+        },
+    ),
+    known_from=("unloading",),
+    variants=(
+        Variant(70, unloading_pull, name="unloading", in_contact=True, after_clip=True),
+        Variant(80, steady_pull, name="steady", in_contact=True, after_clip=True, is_static=True),
+    ),
+    signature="pull",
 )

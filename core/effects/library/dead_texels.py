@@ -7,6 +7,7 @@ import numpy as np
 
 from ...model.effect import Values
 from ...model.parameter import Parameter
+from ..engine.declarations import SILENT_TEXELS, Drawing
 from ..engine.random_streams import uniform
 from ..engine.specification import Form, Kind, TransducerArray, scalar
 
@@ -90,4 +91,7 @@ KIND = Kind(
             random=True,
         ),
     ),
+    experiment="press every texel once",
+    drawing=Drawing("texel", values={"random": {"share": 0.12}, "stuck": {"share": 0.12, "level": 0.4, "seed": 2}}),
+    found_by=SILENT_TEXELS,
 )

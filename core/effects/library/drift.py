@@ -7,6 +7,7 @@ import numpy as np
 
 from ...model.effect import Values
 from ...model.parameter import Parameter
+from ..engine.declarations import Drawing, Recordings, Run, Variant
 from ..engine.random_streams import random_walk
 from ..engine.specification import Form, Kind, TransducerArray, scalar
 
@@ -30,6 +31,17 @@ def walk(signal: np.ndarray, time: np.ndarray, values: Values, transducers: Tran
     """Perform a random walk, independently in each texel."""
     spread = scalar(values, "spread")
     return signal + spread * random_walk("drift", seed, time, signal.shape[1]) if spread else signal
+
+
+def functions_of_time(x: np.ndarray, run: Run, recorded: Recordings) -> list[np.ndarray]:
+    """Smooth functions of the time."""
+
+    def columns() -> list[np.ndarray]:
+        share = ((run.time - run.time[0]) / recorded.duration)[:, None] + np.zeros_like(x)
+        return [np.sqrt(share), share, share**2, -np.expm1(-share / 0.1)]
+
+    found: list[np.ndarray] = run.keep("drift", columns)
+    return found
 
 
 KIND = Kind(
@@ -70,6 +82,7 @@ KIND = Kind(
             ),
             neutral={"amount": 0.0},
             memoryless=sensitivity,
+            needs="no clock",  # on the clock of a session a gain that changes by itself is a warm-up
         ),
         Form(
             "random-walk",
@@ -82,4 +95,15 @@ KIND = Kind(
             random=True,
         ),
     ),
+    experiment="record an hour without touching the sensor",
+    drawing=Drawing(
+        time=np.linspace(0, 120, 601),
+        depth=np.zeros(601),
+        values={"linear": {"rate": 4e-4}, "random-walk": {"spread": 0.004}},
+    ),
+    known_from=("timing", "rest"),
+    families=("moving",),
+    variants=(Variant(90, functions_of_time, -1.0, 1.0, texel_columns=("rate",)),),
+    cost=0.3,
+    gain_falls_with="clock",
 )

@@ -7,6 +7,7 @@ import numpy as np
 
 from ...model.effect import Values
 from ...model.parameter import Parameter
+from ..engine.declarations import Drawing, Variant
 from ..engine.random_streams import normal
 from ..engine.specification import Form, Kind, TransducerArray, scalar
 
@@ -86,6 +87,7 @@ KIND = Kind(
             ),
             neutral={"factor": 1.0, "curvature": 0.0},
             memoryless=curved,
+            is_tried=False,  # that two numbers per texel take no other effect's name has not been measured
         ),
         Form(
             "random-power",
@@ -100,4 +102,9 @@ KIND = Kind(
             random=True,
         ),
     ),
+    experiment="press every texel with the same flat indenter to the same depth",
+    drawing=Drawing("texel"),
+    known_from=("places",),
+    variants=(Variant(30, texel_columns=("gain",)),),
+    cost=0.5,
 )

@@ -8,6 +8,7 @@ import numpy as np
 from ...model.effect import Values
 from ...model.parameter import Parameter
 from ..engine.coupling_matrix import CouplingMatrix, coupling_matrix
+from ..engine.declarations import Drawing, Recordings, Run, Variant
 from ..engine.specification import Form, Kind, TransducerArray, scalar
 
 
@@ -32,6 +33,17 @@ def half_space(values: Values, transducers: TransducerArray) -> CouplingMatrix:
 
 
 _WIDTH = Parameter("width", "m", 0.003, 0.0, 0.1, "How far a point load spreads, s.")
+
+
+def kernels(x: np.ndarray, run: Run, recorded: Recordings) -> list[np.ndarray]:
+    """Isotropic kernels that pass load on and keep its sum."""
+    apart = np.linalg.norm(recorded.place[:, None] - recorded.place[None], axis=2)
+    columns = []
+    for width in (0.4, 0.55, 0.75, 1.0, 1.4, 2.2):
+        kernel = np.exp(-0.5 * (apart / width) ** 2)
+        columns.append(x @ (kernel / kernel.sum(axis=0)).T - x)
+    return columns
+
 
 KIND = Kind(
     name="load-spreading",
@@ -65,4 +77,9 @@ KIND = Kind(
             coupling=half_space,
         ),
     ),
+    experiment="press single texels with a pin that is narrower than a texel",
+    drawing=Drawing("row"),
+    known_from=("places",),
+    families=("spreading",),
+    variants=(Variant(10, kernels, needs_neighbours=True),),
 )

@@ -10,6 +10,7 @@ import numpy as np
 
 from ...model.effect import Values
 from ...model.parameter import Parameter
+from ..engine.declarations import Drawing, Variant
 from ..engine.specification import Form, Kind, scalar
 
 
@@ -91,4 +92,12 @@ KIND = Kind(
             placement=displaced,
         ),
     ),
+    experiment="press at many known places, beyond the sensor's edges as well",
+    drawing=Drawing(
+        "ball",
+        values={"shift": {"x": 0.0, "y": 0.005}, "turn": {"x": 0.003, "y": 0.0, "about_z": 0.4}, "tilt": {"about_x": 0.08}},
+    ),
+    known_from=("places",),
+    variants=(Variant(0, low=-1.0, high=1.0, in_contact=True, displaces=True),),
+    cost=0.4,
 )

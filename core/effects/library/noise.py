@@ -7,6 +7,7 @@ import numpy as np
 
 from ...model.effect import Values
 from ...model.parameter import Parameter
+from ..engine.declarations import SCATTER, Drawing
 from ..engine.random_streams import normal, ticks
 from ..engine.specification import Form, Kind, TransducerArray, scalar
 
@@ -41,6 +42,9 @@ def _normal(seed: int, moments: np.ndarray, texels: int) -> np.ndarray:
 
 
 _SPREAD = Parameter("spread", "unit", 0.002, 0.0, 1e4, "Standard deviation s.")
+
+_SECOND = np.linspace(0, 1, 501)
+
 
 KIND = Kind(
     name="noise",
@@ -80,4 +84,11 @@ KIND = Kind(
             random=True,
         ),
     ),
+    experiment="record a minute at rest, unloaded and under a constant load",
+    drawing=Drawing(
+        time=_SECOND,
+        depth=0.001 * np.sin(np.pi * _SECOND) ** 2,
+        values={"white": {"spread": 0.03}, "proportional": {"share": 0.05}, "coloured": {"spread": 0.06}},
+    ),
+    found_by=SCATTER,
 )

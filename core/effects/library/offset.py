@@ -7,6 +7,7 @@ import numpy as np
 
 from ...model.effect import Values
 from ...model.parameter import Parameter
+from ..engine.declarations import Drawing, Variant
 from ..engine.random_streams import normal
 from ..engine.specification import Form, Kind, TransducerArray, scalar
 
@@ -26,6 +27,9 @@ def listed(signal: np.ndarray, time: np.ndarray, values: Values, transducers: Tr
     return signal + np.asarray(values["offset"])
 
 
+_SECOND = np.linspace(0, 1, 501)
+
+
 KIND = Kind(
     name="offset",
     title="Offset",
@@ -41,6 +45,7 @@ KIND = Kind(
             neutral={"offset": 0.0},
             memoryless=common,
             after_conversion=True,
+            same_as="zero",
         ),
         Form(
             "random",
@@ -62,4 +67,9 @@ KIND = Kind(
             after_conversion=True,
         ),
     ),
+    experiment="record a minute without touching the sensor, before and after a trial",
+    drawing=Drawing(time=_SECOND, depth=0.0002 * np.sin(np.pi * _SECOND) ** 2, values={"common": {"offset": 0.05}}),
+    variants=(Variant(100, texel_columns=("offset",)), Variant(110, name="fading", texel_columns=("fading",))),
+    cost=0.4,
+    signature="unloaded",
 )

@@ -9,6 +9,7 @@ import numpy as np
 
 from ...model.effect import Values
 from ...model.parameter import Parameter
+from ..engine.declarations import STEPS, Drawing
 from ..engine.specification import Form, Kind, TransducerArray, scalar
 
 
@@ -93,6 +94,7 @@ KIND = Kind(
             neutral={"range": 0.0},
             memoryless=converter,
             after_conversion=True,
+            is_tried=False,  # "round" has the same steps
         ),
         Form(
             "companding",
@@ -121,4 +123,15 @@ KIND = Kind(
             after_conversion=True,
         ),
     ),
+    experiment="raise the load very slowly through its whole range",
+    drawing=Drawing(
+        "force",
+        values={
+            "round": {"step": 0.25},
+            "floor": {"step": 0.25},
+            "bits": {"bits": 4, "range": 2.4},
+            "power": {"first": 0.1},
+        },
+    ),
+    found_by=STEPS,
 )

@@ -8,6 +8,7 @@ import math
 import numpy as np
 
 from ...model.parameter import Parameter
+from ..engine.declarations import Drawing, Recordings, Run, Variant, cycles
 from ..engine.specification import Form, Kind, TexelInput, constants_from
 
 
@@ -56,6 +57,23 @@ def path(texel: TexelInput, constants: np.ndarray, state: np.ndarray, commit: bo
 
 _SHARE = Parameter("share", "1", 0.25, 0.0, 0.9, "Share s of the force that is lost at most.")
 
+
+def losses(x: np.ndarray, run: Run, recorded: Recordings) -> list[np.ndarray]:
+    """Force lost by the largest load so far; at all loads, or only below it (Mullins)."""
+    load = np.maximum(x, 0.0)
+    most = np.maximum(np.maximum.accumulate(load, axis=0), 1e-9)
+    below = np.clip(1.0 - load / most, 0.0, 1.0)
+    lost = [-x * -np.expm1(-most / size) for size in (0.1, 0.3, 0.9)]
+    lost += [-x * shape * -np.expm1(-((most / 0.5) ** 1.5)) for shape in (below, np.sqrt(np.tanh(3.0 * below)))]
+    return lost + [-x * shape for shape in (below, np.tanh(below / 0.2), np.tanh(below / 0.6))]
+
+
+_TWICE = np.linspace(0, 20, 2001)
+OVER_WITHIN = 0.4
+"""Largest path of a softening, as a share of the path that texels are pressed in along a session: by its end 92 % of the loss
+is over. What still goes on is wear."""
+
+
 KIND = Kind(
     name="softening",
     title="Softening",
@@ -82,6 +100,7 @@ KIND = Kind(
             law=peak,
             constants=constants_from("share", "depth"),
             state_size=1,
+            fitted_up_to={"share": 0.6},  # a softening that leaves nothing is wear
         ),
         Form(
             "path",
@@ -95,6 +114,18 @@ KIND = Kind(
             law=path,
             constants=constants_from("share", "path"),
             state_size=2,
+            fitted_up_to={"share": 0.5},
+            over_within={"path": OVER_WITHIN},
         ),
     ),
+    experiment="press the same spot ten times equally deep, then deeper, and again after an hour",
+    drawing=Drawing(
+        "depth",
+        depth=cycles(2, _TWICE) * np.where(_TWICE < 10, 0.7, 1.0),
+        values={"peak": {"depth": 0.001}},
+    ),
+    known_from=("unloading", "cycles"),
+    families=("losing",),
+    variants=(Variant(20, losses, in_contact=True),),
+    signature="end",
 )

@@ -11,6 +11,7 @@ import math
 import numpy as np
 
 from ...model.parameter import Parameter
+from ..engine.declarations import Drawing, Recordings, Run, Variant
 from ..engine.specification import Form, Kind, TexelInput, constants_from
 
 
@@ -54,6 +55,13 @@ def foam(texel: TexelInput, constants: np.ndarray, state: np.ndarray, commit: bo
 _DOUBLE = Parameter("depth", "m", 0.004, 1e-4, 0.1, "Depth D at which the force is twice that of the linear spring.", log=True)
 _POWER = Parameter("exponent", "1", 1.0, 0.5, 4.0, "How suddenly it sets in: 1 adds a quadratic force, 2 a cubic one.")
 
+
+def powers_of_load(x: np.ndarray, run: Run, recorded: Recordings) -> list[np.ndarray]:
+    """Convex powers of the load: each rises the steeper, the larger the load, and begins with slope zero."""
+    load = np.maximum(x, 0.0)
+    return [load**power for power in (1.5, 2.0, 3.0, 5.0)]
+
+
 KIND = Kind(
     name="stiffening",
     title="Stiffening",
@@ -92,4 +100,8 @@ KIND = Kind(
             constants=constants_from("depth", "exponent"),
         ),
     ),
+    experiment="go on to the largest depth that the sensor may bear, slowly",
+    drawing=Drawing("depth", depth=np.linspace(0, 0.004, 400)),
+    families=("nonlinear",),
+    variants=(Variant(10, powers_of_load, 0.0, 3.0, in_contact=True, is_static=True),),
 )

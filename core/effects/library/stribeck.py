@@ -8,6 +8,7 @@ import math
 import numpy as np
 
 from ...model.parameter import Parameter
+from ..engine.declarations import Drawing
 from ..engine.specification import Form, Kind, constants_from
 
 
@@ -69,4 +70,6 @@ KIND = Kind(
             constants=_CONSTANTS,
         ),
     ),
+    experiment="slide at constant speeds from a tenth of a millimetre to a hundred millimetres per second",
+    drawing=Drawing("speed"),
 )

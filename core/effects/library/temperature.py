@@ -7,6 +7,7 @@ import numpy as np
 
 from ...model.effect import Values
 from ...model.parameter import Parameter
+from ..engine.declarations import Drawing
 from ..engine.specification import Form, Kind, TransducerArray, scalar
 
 REFERENCE = 25.0
@@ -78,4 +79,8 @@ KIND = Kind(
             after_conversion=True,
         ),
     ),
+    experiment="record an unloaded hour and repeated presses while the sensor warms by ten kelvin, with its temperature",
+    drawing=Drawing("force", values={"gain": {"gain_change": 0.02}, "zero": {"zero_change": 0.02}}),
+    needs="temperature",
+    known_parameters=("temperature", "reference"),  # recordings hold the temperature; the reference is that of gain and zero
 )

@@ -6,6 +6,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...model.parameter import Parameter
+from ..engine.declarations import Drawing
 from ..engine.specification import Form, Kind, constants_from
 
 
@@ -62,4 +63,6 @@ KIND = Kind(
             constants=constants_from("drag", "exponent"),
         ),
     ),
+    experiment="slide at constant speeds, up to the fastest that the rig can",
+    drawing=Drawing("speed", values={"linear": {"viscosity": 2.0}, "load": {"viscosity": 4.0}, "power": {"drag": 0.3}}),
 )

@@ -7,6 +7,7 @@ import numpy as np
 
 from ...model.effect import Values
 from ...model.parameter import Parameter
+from ..engine.declarations import Drawing
 from ..engine.specification import Form, Kind, TransducerArray, scalar
 
 
@@ -61,4 +62,8 @@ KIND = Kind(
             memoryless=rational,
         ),
     ),
+    experiment="switch the sensor off for an hour, on again, and repeat one press every minute until it reads the same",
+    drawing=Drawing(time=np.linspace(0, 900, 601), depth=np.full(601, 1e-3)),
+    needs="clock",
+    known_parameters=("since",),  # the clock of a session begins with its first recording
 )

@@ -12,9 +12,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...effects.engine.declarations import SCATTER
+from ...effects.engine.registry import only_name_where
 from ...model.effect import Effect
 from ..forward.predictor import Model
 from .least_squares import TrialView
+
+NOISE = only_name_where(lambda kind: kind.found_by == SCATTER)
 
 LEAST_VARIANCE_RATIO = 1.5
 """Least mean square of the residual at large readings, in units of that at rest."""
@@ -92,7 +96,7 @@ def proportional_noise(views: Sequence[TrialView], model: Model) -> Effect | Non
     texel_correlation = float(np.average([one.texel_correlation for one in found], weights=weight))
     if not (grows and steady and serial_correlation < MOST_CORRELATION and texel_correlation < MOST_CORRELATION):
         return None
-    return Effect("noise", "proportional", {"share": float(np.sqrt(pooled))})
+    return Effect(NOISE, "proportional", {"share": float(np.sqrt(pooled))})
 
 
 def _loaded_samples(size: np.ndarray, residual: np.ndarray, loaded: np.ndarray) -> _LoadedSamples:

@@ -425,7 +425,7 @@ def derivatives(
     known : int
         The first `known` derivatives are in the table already.
     """
-    step = QUANTIZED_DIFFERENCE_STEP if any(effect.name == "quantization" for effect in model.effects) else DIFFERENCE_STEP
+    step = QUANTIZED_DIFFERENCE_STEP if model.is_stepped else DIFFERENCE_STEP
     for i, item in list(enumerate(free))[known:]:
         ahead = item.to_coordinate(item.from_coordinate(at[i] + step))
         moved = list(at)

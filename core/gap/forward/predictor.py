@@ -13,8 +13,9 @@ from typing import Generic, TypeVar
 import numpy as np
 
 from ...effects.engine import readout_chain
+from ...effects.engine.declarations import SCATTER, STEPS
 from ...effects.engine.registry import actual_placement as placed_texels
-from ...effects.engine.registry import form_of, site_of_action
+from ...effects.engine.registry import form_of, kind_of, site_of_action
 from ...geometry.texels import Texels
 from ...model.effect import Effect
 from ...model.sensor import Sensor
@@ -52,9 +53,19 @@ class Model:
     recordings: Mapping[str, float] = field(default_factory=dict)
 
     @cached_property
+    def fitted_effects(self) -> tuple[Effect, ...]:
+        """Effects without noise, which is found in what is left."""
+        return tuple(e for e in self.effects if kind_of(e.name).found_by != SCATTER)
+
+    @cached_property
+    def is_stepped(self) -> bool:
+        """Whether readings come in steps."""
+        return any(kind_of(e.name).found_by == STEPS for e in self.effects)
+
+    @cached_property
     def readout_effects(self) -> tuple[Effect, ...]:
         """Effects on readings, without noise: a prediction is the expected value."""
-        return tuple(e for e in self.effects if site_of_action(e) == "readout" and e.name != "noise")
+        return tuple(e for e in self.fitted_effects if site_of_action(e) == "readout")
 
     @cached_property
     def normal_force_effects(self) -> tuple[Effect, ...]:

@@ -30,8 +30,8 @@ BASE = ("k", "damping", "gain", "zero")
 TEXEL = ("gain", "offset", "rate", "fading")
 """Parameters of single texels: a share of the gain, an offset, a rate of the offset per duration of the recordings, and an
 offset that the load takes over, as of a cover that is stretched over the texels."""
-GAIN_AT = next(i for i, variant in enumerate(VARIANTS) if variant.kind == "gain-mismatch")
-DAMPED_AT = next(i for i, variant in enumerate(VARIANTS) if variant.kind == "adhesion")
+GAIN_AT = next(i for i, variant in enumerate(VARIANTS) if "gain" in variant.texel_columns)
+DAMPED_AT = next(i for i, variant in enumerate(VARIANTS) if variant.after_clip)
 """The first variant that comes behind the damping."""
 CONTACT_ENDS = max(i for i, variant in enumerate(VARIANTS) if variant.in_contact) + 1
 
@@ -240,6 +240,6 @@ def _combined(coefficients: np.ndarray, columns: list[np.ndarray]) -> np.ndarray
 
 
 def _is_pressed(x: np.ndarray, run: RecordedRun, variant: Variant) -> np.ndarray:
-    """Where a force acts: while there is contact; only adhesion pulls."""
+    """Where a force acts: while there is contact; only what acts after the clip pulls."""
     touching: np.ndarray = run.elastic > 0.0
-    return touching if variant.kind == "adhesion" else touching & (x >= 0.0)
+    return touching if variant.after_clip else touching & (x >= 0.0)

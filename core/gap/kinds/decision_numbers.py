@@ -15,10 +15,10 @@ FORCE_RESOLUTION = 0.01
 PRIORS = {"gain": 0.3, "offset": 0.1, "rate": 0.1, "fading": 0.1}
 """Standard deviation of parameters of single texels; full load is 1. By eye."""
 DEFAULT_COST = 0.25
-"""Price of a kind: a further one must leave less than 78 % (exp -0.25) of what the others leave. By eye, near the fifth of the
-remaining gap that an effect has to close in the search of :mod:`..selection`."""
-COSTS = {"gain-mismatch": 0.5, "offset": 0.4, "drift": 0.3, "misalignment": 0.4}
-"""Price of kinds that absorb what others leave: parameters of single texels, and displacements. By eye."""
+"""Price of a kind that states no `cost` of its own: a further one must leave less than 78 % (exp -0.25) of what the others
+leave. By eye, near the fifth of the remaining gap that an effect has to close in the search of :mod:`..selection`. The costs
+that kinds state, 0.3 to 0.5 for those that absorb what others leave (parameters of single texels, and displacements), are by
+eye as well."""
 COST_OF_SECOND_CURVE = 0.4
 """Price of each static curve beside another one: poorly described curves are otherwise split into several.
 By eye."""

@@ -190,7 +190,7 @@ def signals_of(equations: CascadeEquations, variant: Variant) -> list[KindSignal
     first = equations.at[variant.label].start
     parts = {variant.label: list(range(first, first + width))}
     if variant is MISALIGNMENT:
-        parts = {f"misalignment/{name}": [first + i for i in picked] for name, picked in _POSE_SIGNALS.items()}
+        parts = {f"{variant.label}/{name}": [first + i for i in picked] for name, picked in _POSE_SIGNALS.items()}
     found = []
     for label, columns in parts.items():
         signal = _signal(equations, variant, label, columns)

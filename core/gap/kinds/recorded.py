@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from ...effects.engine.signal_operators import load_put_on
 from ...geometry.layout.grid_layout import GridLayout
 from ...model.effect import Effect
 from ..dataset.rig import Rig
@@ -21,6 +22,7 @@ from ..dataset.trial import Trial
 from ..fitting.noise_floor import ChannelNoise
 from ..forward.predictor import Model, Predictor, number_name, predictors_of
 from .decision_numbers import FORCE_RESOLUTION, LEAST_RATE, MOST_VALUES
+from .dictionaries import MISALIGNMENT
 
 POSE = ("x", "y", "z", "about_x", "about_y", "about_z")
 """Parameters of the effect that displaces the texels."""
@@ -134,7 +136,7 @@ class Source:
         if displacement not in self.kept:
             model = self.model
             if any(displacement):
-                model = model.with_effect(Effect("misalignment", "rigid", dict(zip(POSE, displacement, strict=True))))
+                model = model.with_effect(Effect(MISALIGNMENT.kind, "rigid", dict(zip(POSE, displacement, strict=True))))
             plain = replace(model, parameters=replace(model.parameters, cn=0.0))
             found = []
             for group in self.predictors:
@@ -226,11 +228,6 @@ def planned(recorded: Recorded, trial: Trial) -> Recorded:
     reading = np.where(silent, np.nan, np.zeros_like(run.reading)) if recorded.has_readings else run.reading
     force = np.zeros_like(run.force) if weighs else run.force
     return replace(recorded, runs=(replace(run, reading=reading, force=force),), source=source)
-
-
-def load_put_on(load: np.ndarray) -> np.ndarray:
-    """Return the load that was put on each texel so far, (T, n)."""
-    return np.cumsum(np.maximum(np.diff(load, axis=0, prepend=0.0), 0.0), axis=0)
 
 
 def _stride(predictors: Sequence[Predictor]) -> int:

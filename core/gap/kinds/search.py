@@ -13,12 +13,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from ...effects.engine.registry import kind_of
 from .cascade import POSE_SCALE, TEXEL, Cascade, Point
 from .decision_numbers import (
     BEST_PAIRS,
     BEST_SINGLES,
     COST_OF_SECOND_CURVE,
-    COSTS,
     DEFAULT_COST,
     DISPLACED,
     FLOOR,
@@ -112,7 +112,8 @@ def score_of(recorded: Recorded, members: Sequence[Variant], solution: Solution)
 
 def price_of(members: Sequence[Variant]) -> float:
     """Return the sum of the costs of a set of kinds."""
-    price = sum(COSTS.get(member.label, COSTS.get(member.kind, DEFAULT_COST)) for member in members)
+    costs = [kind_of(member.kind).cost for member in members]
+    price = sum(DEFAULT_COST if cost is None else cost for cost in costs)
     return price + COST_OF_SECOND_CURVE * max(sum(member.is_static for member in members) - 1, 0)
 
 

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ...effects.engine.registry import kind_of
 from ...io.sensor_toml import SHAPE_WORDS, SensorModel
 from ..forward.predictor import Model
 from ..selection.findings import Diagnosis
@@ -23,11 +24,11 @@ def with_mean_gain_moved(result: Diagnosis) -> Model:
     for predictor in result.of("fit"):
         touched |= (predictor.stimulus.load > 0).any(axis=0)
     for index, effect in enumerate(model.effects):
-        if effect.name != "gain-mismatch" or "factor" not in effect.values or not touched.any():
+        if not kind_of(effect.name).is_gain_of_texels or "factor" not in effect.values or not touched.any():
             continue
         factor = np.asarray(effect.values["factor"], float)
         mean = float(factor[touched].mean())
-        if mean <= 0 or any(other.name != "gain-mismatch" for other in model.effects):
+        if mean <= 0 or any(other.name != effect.name for other in model.effects):
             continue  # beside other effects a common factor is not the same as a stiffer sensor
         factor = np.where(touched, factor / mean, 1.0)
         p = model.parameters

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from ...effects.engine.registry import kind_of
 from ..fitting.residual_tests import LEAST_STRUCTURE
 from ..selection.findings import Diagnosis
 from ..selection.identifiability import LEAST_CYCLES
@@ -15,32 +16,6 @@ LEAST_HOLD = 2.0
 """Duration of a hold that shows creep, s."""
 LEAST_SPEED_RATIO = 5.0
 """Ratio of fast to slow loading that shows an effect of speed."""
-
-EXPERIMENTS = {
-    "creep": "hold one depth for at least a minute, then release and wait as long",
-    "softening": "press the same spot ten times equally deep, then deeper, and again after an hour",
-    "hysteresis": "load and unload to the same depth at speeds a hundredfold apart, with partial unloadings",
-    "adhesion": "retract slowly after contacts of one second and of one minute, and record until well after release",
-    "wear": "repeat one cycle several hundred times on the same texels",
-    "load-spreading": "press single texels with a pin that is narrower than a texel",
-    "crosstalk": "press single texels with a pin, along one row and along one column, at two loads",
-    "gain-mismatch": "press every texel with the same flat indenter to the same depth",
-    "dead-texels": "press every texel once",
-    "dead-zone": "approach slowly, with many samples at the first touch, with a flat and with a round indenter",
-    "saturation": "go on to the highest load that the sensor may bear",
-    "stiffening": "go on to the largest depth that the sensor may bear, slowly",
-    "lag": "press and release as fast as the rig can, and record at a high rate",
-    "drift": "record an hour without touching the sensor",
-    "warm-up": "switch the sensor off for an hour, on again, and repeat one press every minute until it reads the same",
-    "temperature": "record an unloaded hour and repeated presses while the sensor warms by ten kelvin, with its temperature",
-    "offset": "record a minute without touching the sensor, before and after a trial",
-    "quantization": "raise the load very slowly through its whole range",
-    "misalignment": "press at many known places, beyond the sensor's edges as well",
-    "stribeck": "slide at constant speeds from a tenth of a millimetre to a hundred millimetres per second",
-    "viscous-friction": "slide at constant speeds, up to the fastest that the rig can",
-    "noise": "record a minute at rest, unloaded and under a constant load",
-}
-"""The recording that shows each effect most clearly."""
 
 REPEAT = "repeat one trial exactly, to see which part of the difference repeats"
 HINTS = {
@@ -75,7 +50,7 @@ def _experiment_between_rivals(result: Diagnosis) -> str:
     """What distinguishes the kinds of effects that these recordings leave as rivals."""
     pairs = [f"{names[0]} from {' and '.join(names[1:])}" for names in result.ambiguous]
     involved = list(dict.fromkeys(name for names in result.ambiguous for name in names))
-    parts = [EXPERIMENTS[name] for name in involved if name in EXPERIMENTS]
+    parts = [kind_of(name).experiment for name in involved]
     return f"To tell {', and '.join(pairs)}: {'; and '.join(dict.fromkeys(parts))}."
 
 

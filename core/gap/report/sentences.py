@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from ...effects.engine.declarations import SCATTER
+from ...effects.engine.registry import kind_of
 from ..dataset.fault_kinds import FAULT_KINDS
 from ..fitting.intervals import ParameterInterval
 from ..fitting.residual_tests import LEAST_STRUCTURE
@@ -96,10 +98,15 @@ def by_share_closed(result: Diagnosis) -> list[Finding]:
     return sorted(result.findings, key=lambda one: -one.closes)
 
 
+def _is_noise(finding: Finding) -> bool:
+    """Whether a finding is noise, of which no model predicts a sample."""
+    return kind_of(finding.name).found_by == SCATTER
+
+
 def _what_stays(result: Diagnosis, errors: GapErrors) -> str:
     """A sentence on the error of the check recordings if it is many times the noise; empty otherwise."""
     left = errors.amended["check"]
-    if left is None or left < MANY_FLOORS * errors.noise_floor or any(one.name == "noise" for one in result.findings):
+    if left is None or left < MANY_FLOORS * errors.noise_floor or any(map(_is_noise, result.findings)):
         return ""
     return f" In the check recordings {left:.2%} of the range stays, {left / errors.noise_floor:.0f} times the noise."
 
@@ -107,7 +114,7 @@ def _what_stays(result: Diagnosis, errors: GapErrors) -> str:
 def check_failure(result: Diagnosis) -> str:
     """Return in a sentence why the check recordings do not bear the amended model out; empty if they do."""
     worst = result.check.worst
-    if worst is None or all(one.name == "noise" for one in result.findings):
+    if worst is None or all(map(_is_noise, result.findings)):
         return ""
     quantity = next(q for q in (READINGS, FORCES) if result.check.refutes(q) and worst.count[q])
     before, after = ((float(x[quantity]) ** 0.5) * _noise_share(result, quantity) for x in (worst.before, worst.after))

@@ -15,11 +15,13 @@ from pathlib import Path
 
 import numpy as np
 
+from ...effects.engine.registry import only_name_where
 from ..dataset.rig import Rig
 from ..dataset.sessions import COMMON, TrialHistory, on_common_clocks
 from ..dataset.trial import Trial
 from ..forward.predictor import Model, Predictor, number_name
-from .wear_or_drift import NOTHING, TEXELS, USE, texels_can_tell, told_by_recordings
+from .identifiability import LOSING
+from .wear_or_drift import CLOCK, NOTHING, TEXELS, USE, texels_can_tell, told_by_recordings
 
 LEAST_RECORDINGS = 3
 """Number of fitted recordings from which on they are compared: of two, each may be the odd one."""
@@ -29,8 +31,11 @@ LEAST_LOWERED = 0.1
 """Least mean square, in units of the noise's variance, by which they must lower the residual: noise is coloured."""
 MOST_LEFT = 0.5
 """With factors and zeros, the search must leave less than this share of what it leaves without."""
-LOAD_HISTORY = ("wear", "softening")
+LOAD_HISTORY = LOSING
 """Effects that need no clock to be found across recordings in a known order: they go with what was pressed."""
+WEAR = only_name_where(lambda kind: kind.gain_falls_with == USE)
+DRIFT = only_name_where(lambda kind: kind.gain_falls_with == CLOCK)
+"""The effect that lowers the gain with use, and the one that lowers it with time."""
 WEAR_ORDER = -0.5
 """Rank correlation of the factors with the order of the recordings below which they fall as of wear."""
 
@@ -42,7 +47,7 @@ class RecordingDifferences:
     Attributes
     ----------
     name : str
-        "wear" if gains fall with use, else "drift".
+        :data:`WEAR` if gains fall with use, else :data:`DRIFT`.
     closes : float
         Share of the gap that they close alone, on unseen stretches.
     confidence : float
@@ -123,7 +128,7 @@ def differences(
     factors = {name: model.recordings.get(number_name("factor", name), 1.0) for name in names}
     zeros = {name: model.recordings.get(number_name("zero", name), 0.0) for name in names}
     confidence = round(0.5 + 0.5 * float(np.clip(closes, 0.0, 1.0)), 3)
-    drift = RecordingDifferences("drift", closes, confidence, before, factors, zeros)
+    drift = RecordingDifferences(DRIFT, closes, confidence, before, factors, zeros)
     gain, level = np.array(list(factors.values())), np.array(list(zeros.values()))
     falls = float(np.corrcoef(np.argsort(np.argsort(gain)), np.arange(len(gain)))[0, 1]) < WEAR_ORDER
     if not falls or float(gain.std()) * full <= float(level.std()):
@@ -132,5 +137,5 @@ def differences(
     by_texels = TEXELS if texels_alike and texels_can_tell(stimuli) else NOTHING
     told_by = told_by_recordings(stimuli, factors) or by_texels
     if told_by == NOTHING:
-        return replace(drift, rival="wear")
-    return replace(drift, name="wear" if told_by == USE else "drift", told_by=told_by)
+        return replace(drift, rival=WEAR)
+    return replace(drift, name=WEAR if told_by == USE else DRIFT, told_by=told_by)

@@ -8,7 +8,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...effects.engine.registry import form_of, library
+from ...effects.engine.declarations import SCATTER, SILENT_TEXELS, STEPS
+from ...effects.engine.registry import form_of, library, names_found_by
 from ...effects.engine.specification import Form, Kind, TransducerArray
 from ...errors import EffectError
 from ...geometry.layout.grid_layout import GridLayout
@@ -20,25 +21,9 @@ from ..fitting.noise_floor import coverage
 from ..forward.predictor import Model, Predictor
 from .identifiability import unidentifiable
 
-TIGHTER_BOUNDS = {
-    ("creep", "rising-exponential", "amount"): 1.0,
-    ("creep", "rising-logarithmic", "amount"): 0.3,
-    ("softening", "path", "share"): 0.5,
-    ("softening", "peak", "share"): 0.6,
-    ("hysteresis", "duhem", "width"): 0.5,
-    ("hysteresis", "trailing", "width"): 0.5,
-}
-"""Upper bounds below the effects' own. Beyond them a formula is still valid but describes another effect: a reading that rises
-fivefold is a lag, a softening that leaves nothing is wear. Where all other kinds leave far more, an amount is fitted anew up
-to its own bound (see :mod:`.forms_at_bounds`)."""
-SOFTENING_OVER = 0.4
-"""Largest path of a softening, as a share of the path that texels are pressed in along a session: by its end 92 % of the loss
-is over. What still goes on is wear."""
-NOT_FITTED = ("noise",)
+NOT_FITTED = names_found_by(SCATTER)
 """Kinds that are not fitted but found in the final residual (see :mod:`.heteroscedastic_noise`)."""
-NOT_TRIED = (("gain-mismatch", "curved"),)
-"""Forms that no search takes. That two numbers per texel take no other effect's name has not been measured."""
-DIRECTLY_ESTIMATED = ("dead-texels", "quantization")
+DIRECTLY_ESTIMATED = (*names_found_by(SILENT_TEXELS), *names_found_by(STEPS))
 """Kinds whose parameters are estimated directly from the readings (see :mod:`.direct_estimates`)."""
 SMALL, LARGE = 0.02, 4.0
 """A parameter shows between these multiples of the quantity that it is compared with."""
@@ -52,9 +37,6 @@ AT_BOUND = 0.01
 """A parameter is at a bound if it differs from it by less than this share of the bound."""
 LEAST_WARMTH = 1.0
 """Range of temperatures (K) from which on what follows them can be told from what does not. Chosen by eye."""
-FROM_THE_RIG = {"temperature": ("temperature", "reference"), "warm-up": ("since",)}
-"""Parameters that a fit leaves at their neutral values, by kinds: recordings hold the temperature, the reference is that of
-gain and zero, and the clock of a session begins with its first recording."""
 START_COUNT = 8
 """Number of starting points of a candidate."""
 COUPLING_PITCH, COUPLING_LOAD = 0.003, 0.05
@@ -194,10 +176,9 @@ class Candidate:
             p = raw.scaled(gain)
             _, top = search_range(p, scales)
             size = max(abs(p.default), 0.1 * top) if p.unit == "1" else 0.3 * top
-            high = min(p.high, TIGHTER_BOUNDS.get((self.kind.name, self.form.name, p.name), p.high))
-            low = p.low
-            if (self.kind.name, p.name, p.unit) == ("softening", "path", "m"):
-                high = max(min(high, SOFTENING_OVER * scales.travel), low * LOG_RATIO)
+            low, high = p.low, min(p.high, self.form.fitted_up_to.get(p.name, p.high))
+            if p.name in self.form.over_within:
+                high = max(min(high, self.form.over_within[p.name] * scales.travel), low * LOG_RATIO)
             if self.form.coupling is not None and p.unit == "m":
                 low = min(max(low, LEAST_WIDTH * scales.pitch), high)
             rest = float(self.form.neutral.get(p.name, p.default)) if p.per_texel else 0.0
@@ -322,6 +303,7 @@ def candidates(predictors: Sequence[Predictor], model: Model) -> list[Candidate]
     on_clock = all(p.session is not None and p.trial.session != COMMON for p in predictors)
     warmed = _warmth(predictors) >= LEAST_WARMTH
     heights_open = all(isinstance(p.trial.contact_height, str) for p in predictors if p.trial.stimulus == "pose")
+    lacking = {"temperature": not warmed, "clock": not on_clock, "no clock": on_clock}
     found = []
     for kind in library().values():
         if kind.name in NOT_FITTED or kind.name in cannot:
@@ -330,12 +312,9 @@ def candidates(predictors: Sequence[Predictor], model: Model) -> list[Candidate]
             acts_on_force = kind.site_of(form) != "readout"
             if (
                 form.random
-                or form.name == "bits"
-                or (kind.name, form.name) in NOT_TRIED
+                or not form.is_tried
                 or (form.placement is not None and not posed)
-                or (kind.name == "temperature" and not warmed)
-                or (kind.name == "warm-up" and not on_clock)
-                or ((kind.name, form.name) == ("drift", "sensitivity") and on_clock)
+                or lacking.get(kind.needs_of(form), False)
                 or (form.friction_law is not None and not dragged)
             ):
                 continue
@@ -343,7 +322,7 @@ def candidates(predictors: Sequence[Predictor], model: Model) -> list[Candidate]
                 continue  # with known loads the contact law does not matter
             if not acts_on_force and not read:
                 continue
-            fitted = _without(form, FROM_THE_RIG.get(kind.name, ()))
+            fitted = _without(form, kind.known_parameters)
             one = Candidate(kind, _without_height(fitted) if heights_open else fitted)
             if several and not in_rows and _needs_rows(form):
                 continue

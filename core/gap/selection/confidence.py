@@ -12,7 +12,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ...effects.engine.registry import form_of
+from ...effects.engine.declarations import STEPS
+from ...effects.engine.registry import form_of, kind_of, names_found_by
 from ...model.effect import Effect
 from ..fitting.least_squares import Fit
 from ..kinds.search import KNOWN_KINDS
@@ -94,7 +95,7 @@ def least_share(name: str, leaves: dict[str, float]) -> float:
     leaves : dict of str to float
         How many times as much of the gap each other kind leaves in its place.
     """
-    if name == "quantization":
+    if kind_of(name).found_by == STEPS:
         return 0.0
     apart = min(leaves.values(), default=np.inf) > DISTINCT_RATIO and name not in friction_kinds()
     return PARTLY_EXPLAINED if apart else EXPLAINED
@@ -225,7 +226,7 @@ def unsure_names(result: Diagnosis, view_set: ViewSet, state: SelectionState, ga
         name: abs(improvement.of_gap) * gap_sizes.gap(gap_sizes.main_quantity)
         for name, improvement in state.improvements.items()
     }
-    if "quantization" not in names and gap_sizes.main_quantity == READINGS:
+    if not names & set(names_found_by(STEPS)) and gap_sizes.main_quantity == READINGS:
         unsure |= {name for name, square in size.items() if square < (step / result.noise[READINGS].deviation) ** 2}
     for name in names & set(friction_kinds()) if gap_sizes.both else ():
         closed = state.improvements[name].of_gap * gap_sizes.gap(FORCES) * gap_sizes.count[FORCES]

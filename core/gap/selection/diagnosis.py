@@ -29,10 +29,12 @@ from ..forward.predictor import Model, Predictor, number_name, predictors_of
 from ..kinds.search import KNOWN_KINDS
 from .base_model import base_fit, identified_base_parameters, prepared
 from .between_recordings import (
+    DRIFT,
     LEAST_CLOSED,
     LEAST_LOWERED,
     LOAD_HISTORY,
     MOST_LEFT,
+    WEAR,
     as_one_session,
     differences,
     may_differ,
@@ -305,10 +307,10 @@ def _doubt_wear(session: _Search, own: _Search) -> None:
         for one in own.result.of("fit")
     }
     by_texels = texels_can_tell(stimuli) and session.left < MOST_LEFT * own.left_of_base
-    wears = any(one.name == "wear" and one.confidence > UNSURE_CONFIDENCE for one in result.findings)
+    wears = any(one.name == WEAR and one.confidence > UNSURE_CONFIDENCE for one in result.findings)
     if wears and not by_texels and told_by_recordings(stimuli, factors) != USE:
-        result.findings = [_in_doubt(one) if one.name == "wear" else one for one in result.findings]
-        result.ambiguous.append(("wear", "drift"))
+        result.findings = [_in_doubt(one) if one.name == WEAR else one for one in result.findings]
+        result.ambiguous.append((WEAR, DRIFT))
 
 
 def _name_differences(own: _Search, plain: _Search, session: _Search | None) -> None:
@@ -321,7 +323,7 @@ def _name_differences(own: _Search, plain: _Search, session: _Search | None) -> 
     if result.between.rival:
         named.append(result.between.rival)
         result.ambiguous.append(tuple(named))
-        result.findings = [_in_doubt(one) if one.name in (*LOAD_HISTORY, "drift") else one for one in result.findings]
+        result.findings = [_in_doubt(one) if one.name in (*LOAD_HISTORY, DRIFT) else one for one in result.findings]
     result.ruled_out = [(name, why) for name, why in result.ruled_out if name not in named]
     if result.misleading_faults or result.between.rival:
         result.between = replace(result.between, confidence=min(result.between.confidence, UNSURE_CONFIDENCE))

@@ -3,7 +3,7 @@
 
 A number at its bound carries no sure name. But a bound may be where a formula turns into a simpler one of its kind, as a
 warming-up that takes for ever is a drift at one rate. Or it may be one that only keeps one kind from standing for another
-(:data:`.candidates.TIGHTER_BOUNDS`), and all other kinds leave far more. Neither changes which effects are in the model.
+(:attr:`.specification.Form.fitted_up_to`), and all other kinds leave far more. Neither changes which effects are in the model.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import numpy as np
 
 from ...effects.engine.registry import form_of
 from ..fitting.least_squares import Fit, FreeParameter, TrialView, fit, held_out_squares
-from .candidates import TIGHTER_BOUNDS, FittedCandidate, Scales, parameters_at_bounds
+from .candidates import FittedCandidate, Scales, parameters_at_bounds
 from .confidence import CLEAR_LEAD
 from .forward_selection import SelectionState, SelectionStep, means_of
 
@@ -78,10 +78,11 @@ def _with_own_bounds(whole: Sequence[TrialView], state: SelectionState, index: i
         return None
     at = parameters_at_bounds(model, state.fit.free, index)
     gain = abs(model.parameters.gain)
-    own = {p.name: p.scaled(gain).high for p in form_of(effect.name, effect.form).parameters}
+    form = form_of(effect.name, effect.form)
+    own = {p.name: p.scaled(gain).high for p in form.parameters}
     free = [
         replace(item, high=own[item.name])
-        if item.effect == index and (effect.name, effect.form, item.name) in TIGHTER_BOUNDS and at.get(item.name) == item.high
+        if item.effect == index and item.name in form.fitted_up_to and at.get(item.name) == item.high
         else item
         for item in state.fit.free
     ]

@@ -15,6 +15,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from ...effects.engine.declarations import SILENT_TEXELS, STEPS
 from ...effects.engine.registry import form_of
 from ..fitting.least_squares import Fit, FreeParameter, fit, held_out_squares
 from ..fitting.noise_floor import Coverage
@@ -285,7 +286,9 @@ class ForwardSelection:
         ]
         pairs = pairs or list(zip(step.ranked, step.remaining, strict=True))
         best, least = pairs[0]
-        listed = [one for one, left in pairs if one.candidate.name == "dead-texels" and left < DEAD_TEXELS_RATIO * least]
+        listed = [
+            one for one, left in pairs if one.candidate.kind.found_by == SILENT_TEXELS and left < DEAD_TEXELS_RATIO * least
+        ]
         if best.candidate.has_texel_parameters and listed:
             return listed[0]
         near = [
@@ -331,7 +334,7 @@ class ForwardSelection:
             return gained >= max(LEAST_FORCE_IMPROVEMENT * float(g.noise[quantity]), FIRST_LEAST_SHARE * left)
         if gained < LEAST_IMPROVEMENT:
             return False
-        if one.candidate.name == "quantization":
+        if one.candidate.kind.found_by == STEPS:
             return True  # the steps are seen in the readings, however small a part of the gap they are
         return gained >= (
             FIRST_LEAST_SHARE if first else NEXT_LEAST_SHARE
@@ -345,7 +348,7 @@ class ForwardSelection:
     def _is_gap_open(self, state: SelectionState, structure: StructureOfFit) -> bool:
         """Whether enough is left that a further effect could improve the model."""
         g, mean = self.gap_sizes, float(state.means[self.gap_sizes.main_quantity])
-        if any(effect.name == "quantization" for effect in state.fit.model.effects):
+        if state.fit.model.is_stepped:
             return False  # the rest lies within a quantization step
         left = mean - float(g.noise[g.main_quantity])
         if left < max(LEAST_IMPROVEMENT, NEXT_LEAST_SHARE_OF_GAP * g.sensor_gap(g.main_quantity)):
@@ -444,7 +447,8 @@ def may_repeat(candidate: Candidate) -> bool:
 
 def is_free_already(candidate: Candidate, free: Sequence[FreeParameter]) -> bool:
     """Return whether the base model has a candidate as a free parameter: a common offset is its `zero`."""
-    return candidate.label == "offset/common" and any(item.effect < 0 and item.name == "zero" for item in free)
+    same = candidate.form.same_as
+    return bool(same) and any(item.effect < 0 and item.name == same for item in free)
 
 
 def last_effect_first(found: Fit) -> Fit:

@@ -22,39 +22,28 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ...effects.engine.registry import names_in_family, names_known_from
 from ..fitting.noise_floor import Coverage
 from ..forward.predictor import Model, Predictor
 
 NEVER_UNLOADED = "no load was ever taken back, and this effect shows after unloading"
-KNOWN_FROM_UNLOADING = ("hysteresis", "softening", "adhesion", "wear")
-"""Effects that are known by what is different after unloading. Their formulas also bend the loading curve, but there they
-cannot be distinguished from a nonlinear spring."""
-KNOWN_FROM_TIMING = ("creep", "lag", "drift")
-"""Effects that are known by what happens at one depth at different times, or at one time after different speeds."""
+KNOWN_FROM_UNLOADING, KNOWN_FROM_TIMING = names_known_from("unloading"), names_known_from("timing")
+KNOWN_FROM_REST, KNOWN_FROM_PLACES = names_known_from("rest"), names_known_from("places")
+KNOWN_FROM_CYCLES = names_known_from("cycles")
+"""Effects that are known from a feature of recordings (see :data:`...effects.engine.declarations.FEATURES`)."""
+SPREADING, NONLINEAR, LOSING = names_in_family("spreading"), names_in_family("nonlinear"), names_in_family("losing")
+MOVING_BY_THEMSELVES, LATE, LOOPS = names_in_family("moving"), names_in_family("late"), names_in_family("loop")
+"""Effects that resemble each other (see :data:`...effects.engine.declarations.FAMILIES`)."""
 SINGLE_SPEED_RATIO = 1.5
 """Ratio of fast to slow loading below which all loading was at one speed."""
 NEVER_AT_REST = "no texel was long without load, and no two different loads were held, so that drift and creep look the same"
 LEAST_UNLOADED_SHARE = 0.1
 """Share of a trial, from the first to the last time that a texel is unloaded, from which on a drift would show there."""
-MOVING_BY_THEMSELVES = ("creep", "drift")
-"""Effects that let a reading move while nothing else does."""
 DISTINCT_LOAD_RATIO = 1.5
 """Ratio of the largest to the smallest load that was held, from which on creep, which is proportional to the load, differs from
 drift."""
-KNOWN_FROM_PLACES = ("load-spreading", "crosstalk", "gain-mismatch", "misalignment")
-"""Effects that are known by how neighbours differ as the load moves. At one place each is some pattern of texels that grows
-with the load."""
-KNOWN_FROM_CYCLES = ("hysteresis", "softening", "wear")
-"""Effects that are known by how a second cycle differs from the first. In a single cycle each lowers the unloading curve."""
 LEAST_CYCLES = 2
 """Number of loading cycles in one trial from which on a later cycle can be compared with the first."""
-SPREADING = ("load-spreading", "crosstalk")
-"""Effects that pass a part of a texel's load on to its neighbours. A sensor has a pattern of its own, so that it says little
-which of their formulas is nearer to it."""
-NONLINEAR = ("stiffening", "saturation", "dead-zone")
-"""Effects that bend the curve of reading over load. The loading curve of a hysteresis loop is bent as well."""
-LOSING = ("wear", "softening")
-"""Effects by which a sensor loses force with what was pressed. How fast the loss dies away is a matter of the formula."""
 LOOP_CURVATURE = 3.0
 """Ratio of a curve's steepest to its flattest eighth up to which it may be the loading curve of a hysteresis loop that takes
 two thirds of the force."""
@@ -68,7 +57,7 @@ def unidentifiable(coverage: Coverage) -> dict[str, str]:
     """Return the kinds of effects that recordings cannot identify, each with the reason."""
     said = {} if coverage.unloading else dict.fromkeys(KNOWN_FROM_UNLOADING, NEVER_UNLOADED)
     if coverage.unloaded_share < LEAST_UNLOADED_SHARE and coverage.held_load_ratio < DISTINCT_LOAD_RATIO:
-        said["drift"] = NEVER_AT_REST
+        said |= dict.fromkeys(KNOWN_FROM_REST, NEVER_AT_REST)
     return said
 
 
@@ -97,12 +86,12 @@ def indistinguishable(coverage: Coverage, name: str, curvature: float = np.inf) 
     """
     groups: list[tuple[str, ...]] = []
     if not coverage.unloading and name in NONLINEAR and curvature < LOOP_CURVATURE:
-        groups.append((name, "hysteresis"))
+        groups.append((name, *LOOPS))
     if not coverage.load_moves:
         groups.append(KNOWN_FROM_PLACES)
     if coverage.unloading and coverage.cycles < LEAST_CYCLES:
         still = coverage.speed_ratio < SINGLE_SPEED_RATIO and coverage.longest_hold < SHORT_HOLD
-        groups.append((*KNOWN_FROM_CYCLES, "creep", "lag") if still else KNOWN_FROM_CYCLES)
+        groups.append((*KNOWN_FROM_CYCLES, *LATE) if still else KNOWN_FROM_CYCLES)
     return tuple(dict.fromkeys(other for group in groups if name in group for other in group if other != name))
 
 

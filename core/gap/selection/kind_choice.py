@@ -14,6 +14,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ...effects.engine.declarations import SILENT_TEXELS
 from ..fitting.least_squares import BASE, Fit
 from ..fitting.noise_floor import ChannelNoise
 from ..kinds.decision import Decision, decided
@@ -60,7 +61,7 @@ def choose_kinds(
 def _silent_texels(view_set: ViewSet, base: Fit, forms: list[Candidate]) -> np.ndarray | None:
     """Which texels hardly follow the model although they are loaded, (n,) bool; None if all follow."""
     texels = len(view_set.whole[0].predictor.rig.texels)
-    listed = [form for form in forms if form.name == "dead-texels"]
+    listed = [form for form in forms if form.kind.found_by == SILENT_TEXELS]
     effects = [unresponsive_texels(view_set.whole, base.model, form, texels) for form in listed]
     found = [np.asarray(effect.values["dead"], float) > 0.5 for effect in effects if effect is not None]
     return np.any(found, axis=0) if found else None

@@ -38,13 +38,12 @@ HEIGHT_ALONE = "it is hardly more than a height: contact begins elsewhere than t
 
 def is_plausible(found: FittedCandidate, view_set: ViewSet) -> bool:
     """Return whether the recordings bear out a fitted effect; True if they do not contain its signature."""
-    if found.candidate.name == "adhesion":
+    signature = found.candidate.kind.signature
+    if signature == "pull":
         return _adhesion_pulls(found, view_set)
-    if found.candidate.name == "offset":
+    if signature == "unloaded":
         return _offset_is_present_unloaded(found, view_set)
-    if found.candidate.name == "softening":
-        return _loss_comes_to_an_end(found)
-    return True
+    return signature != "end" or _loss_comes_to_an_end(found)
 
 
 def is_height_alone(model: Model, index: int, view_set: ViewSet) -> bool:
@@ -67,10 +66,11 @@ def is_height_alone(model: Model, index: int, view_set: ViewSet) -> bool:
 
 
 def _loss_comes_to_an_end(found: FittedCandidate) -> bool:
-    """Whether a fitted softening is over when its session ends: its path is not at the bound that says so."""
-    index = len(found.fit.model.effects) - 1
-    high = [item.high for item in found.fit.free if item.effect == index and item.name == "path"]
-    return parameters_at_bounds(found.fit.model, found.fit.free, index).get("path") not in high
+    """Whether a fitted loss is over when its session ends: no path is at the bound that says so."""
+    index, paths = len(found.fit.model.effects) - 1, found.candidate.form.over_within
+    at = parameters_at_bounds(found.fit.model, found.fit.free, index)
+    own = (item for item in found.fit.free if item.effect == index and item.name in paths)
+    return all(at.get(item.name) != item.high for item in own)
 
 
 def _adhesion_pulls(found: FittedCandidate, view_set: ViewSet) -> bool:

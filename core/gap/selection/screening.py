@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...effects.engine.declarations import SILENT_TEXELS, STEPS
 from ...model.effect import Effect
 from ...model.sensor_parameters import FITTED_FRICTION_PARAMETERS
 from ..fitting.least_squares import Fit, FreeParameter, TrialView, fit, held_out_squares
@@ -292,10 +293,10 @@ def starting_points(
         All texels and samples, for direct estimates.
     scales : Scales
     """
-    if candidate.name == "dead-texels":
+    if candidate.kind.found_by == SILENT_TEXELS:
         effect = unresponsive_texels(whole, score_test.model, candidate, scales.texels)
         return [] if effect is None else [(score_test.score(score_test.model.with_effect(effect))[0], effect)]
-    if candidate.name == "quantization":
+    if candidate.kind.found_by == STEPS:
         return _quantization_starts(candidate, score_test, whole)
     if candidate.has_texel_parameters:
         return _texel_parameter_starts(candidate, score_test, scales)

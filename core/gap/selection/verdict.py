@@ -7,7 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...effects.engine.registry import library
+from ...effects.engine.declarations import SILENT_TEXELS
+from ...effects.engine.registry import kind_of, library
 from ...model.effect import Effect
 from ..fitting.repeat_noise import MEASURED_REPEATS, is_scatter_of_repeats
 from ..fitting.residual_tests import LEAST_STRUCTURE
@@ -75,7 +76,7 @@ def _doubt_without_rivals(result: Diagnosis) -> None:
 
 def _closed_shares(result: Diagnosis, state: SelectionState, gap_sizes: GapSizes) -> ClosedShares:
     """How much of the gaps the amended model closes."""
-    if all(effect.name == "noise" for effect in result.best.model.effects):
+    if not result.best.model.fitted_effects:
         return ClosedShares()
     before, after = (means_of(one.sse, one) for one in (result.base, result.best))
     fitted: list[float | None] = [None, None]
@@ -91,7 +92,7 @@ def _closed_shares(result: Diagnosis, state: SelectionState, gap_sizes: GapSizes
 def _judge_effects(result: Diagnosis, view_set: ViewSet, state: SelectionState, gap_sizes: GapSizes) -> None:
     """Write the verdict and, for each effect of the model, a finding with its confidence and rivals."""
     effects = result.best.model.effects
-    fitted = [effect for effect in effects if effect.name != "noise"]
+    fitted = result.best.model.fitted_effects
     left_out = [gap_sizes.closed_share(state.means, quantity) for quantity in (READINGS, FORCES)]
     closed = [_least_share_closed(result, left_out, quantity) for quantity in (READINGS, FORCES)]
     is_open = any(gap_sizes.has_gap(quantity) and left_out[quantity] < EXPLAINED for quantity in (READINGS, FORCES))
@@ -132,7 +133,7 @@ def _least_share_closed(result: Diagnosis, left_out: list[float], quantity: int)
 def _verdict(result: Diagnosis, gap_sizes: GapSizes, is_open: bool) -> str:
     """Verdict on the whole rig; `is_open` if the amended model leaves much of the gap."""
     effects = result.best.model.effects
-    if all(effect.name == "noise" for effect in effects) and effects:
+    if effects and not result.best.model.fitted_effects:
         return "explained"
     if effects:
         return "unexplained" if is_open else "explained"
@@ -163,7 +164,7 @@ def _alternatives(effect: Effect, state: SelectionState, taken: set[str]) -> tup
     leaves: dict[str, float] = {}
     for one, left in zip(step.ranked, step.remaining, strict=True):
         name = one.candidate.name
-        if name not in taken and not (effect.name == "dead-texels" and one.candidate.has_texel_parameters):
+        if name not in taken and not (kind_of(effect.name).found_by == SILENT_TEXELS and one.candidate.has_texel_parameters):
             times_worse[name] = min(step.times_worse(left, effect.name), times_worse.get(name, np.inf))
             leaves[name] = min(left / own, leaves.get(name, np.inf))
     return times_worse, leaves

@@ -7,7 +7,8 @@ import sys
 import pytest
 
 from palpate.core.effects import library as library_package
-from palpate.core.effects.engine.registry import effect, from_dict, library
+from palpate.core.effects.engine.declarations import Variant
+from palpate.core.effects.engine.registry import effect, from_dict, kind_of, library, names_where, only_name_where
 from palpate.core.errors import EffectError
 
 MODULE = """
@@ -19,7 +20,7 @@ def halved(signal, time, values, transducers, seed):
 
 KIND = Kind("halving", "Halving", "Halves the reading.", "readout", 1.0, (
     Form("half", "r = f / 2", "No one (2026)", (), {}, memoryless=halved),
-))
+), experiment="press")
 """
 
 
@@ -53,6 +54,35 @@ def test_wrong_words_get_a_hint():
         from_dict({"name": "creep", "seed": -1})
     with pytest.raises(EffectError, match="give it a number"):
         from_dict({"name": "creep", "amount": "much"})
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ({"known_from": ("unload",)}, "known_from of effect 'halving' is 'unload': choose from unloading"),
+        ({"families": ("big",)}, "families of effect 'halving'"),
+        ({"found_by": "guess"}, "choose from fit, silent texels"),
+        ({"needs": "a clock"}, "needs of effect 'halving'"),
+    ],
+)
+def test_a_kind_states_what_others_know(words, said):
+    """A misspelt word would otherwise leave an effect out of a table without a sound."""
+    with pytest.raises(EffectError, match=said):
+        dataclasses.replace(kind_of("offset"), name="halving", **words)
+
+
+def test_variants_know_their_kind():
+    made = dataclasses.replace(kind_of("offset"), name="halving", variants=(Variant(1.0), Variant(2.0, name="other")))
+    assert [one.label for one in made.variants] == ["halving", "halving/other"]
+
+
+def test_what_one_effect_alone_states_is_asked_for_by_it():
+    assert only_name_where(lambda kind: "rest" in kind.known_from) == "drift"
+    assert names_where(lambda kind: kind.site == "nowhere") == ()
+    with pytest.raises(EffectError, match="no effect states"):
+        only_name_where(lambda kind: kind.site == "nowhere")
+    with pytest.raises(EffectError, match="hysteresis and wear"):
+        only_name_where(lambda kind: kind.name in ("wear", "hysteresis"))
 
 
 def test_effects_are_plain_data():

@@ -55,6 +55,9 @@ def test_a_form_says_what_it_is(name, form):
     kind, found = kind_of(name), form_of(name, form)
     assert kind.site_of(found) in specification.SITES_OF_ACTION
     assert kind.text.endswith(".") and found.formula and found.reference
+    assert kind.experiment and not kind.experiment.endswith(".")
+    assert {*found.fitted_up_to, *found.over_within} <= {parameter.name for parameter in found.parameters}
+    assert set(kind.drawing.values) <= {one.name for one in kind.forms}
     mechanisms = [found.law, found.memoryless, found.coupling, found.delay, found.friction_law, found.placement]
     assert getattr(found, found.mechanism) is not None
     assert sum(mechanism is not None for mechanism in mechanisms) == 1

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Coordinate descent against scipy's bounded least squares, on columns that are nearly the same."""
+"""Bounded least squares from normal equations against those from the columns, which are nearly the same."""
 
 from __future__ import annotations
 
@@ -29,3 +29,12 @@ def test_a_column_of_zeros_stays_where_it_is():
     gram, right = np.diag([2.0, 0.0]), np.array([4.0, 0.0])
     found = bounded_minimum(gram, right, np.full(2, -9.0), np.full(2, 9.0))
     np.testing.assert_allclose(found, [2.0, 0.0], atol=1e-6)
+
+
+def test_what_the_equations_leave_open_stays_where_it_starts():
+    """A direction that only a left-out recording shows must not move: the error of that recording would be arbitrary."""
+    gram, right = np.array([[1.0, 1.0], [1.0, 1.0]]), np.array([3.0, 3.0])
+    found = bounded_minimum(gram, right, np.zeros(2), np.full(2, 9.0), np.array([2.0, 0.5]))
+    np.testing.assert_allclose(found, [2.25, 0.75], atol=1e-6)
+    at_a_bound = bounded_minimum(gram, right, np.zeros(2), np.array([2.0, 9.0]), np.array([2.0, 0.5]))
+    np.testing.assert_allclose(at_a_bound, [2.0, 1.0], atol=1e-6)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Operators with memory that the dictionaries of kinds are made of. Each takes a signal (T, n) of T samples and n channels.
+"""Operators with memory of which the columns of variants are made. Each takes a signal (T, n) of T samples and n channels.
 
 Signals are dimensionless: 1 is the largest force of the base model. States are zero before the first sample.
 """
@@ -127,3 +127,9 @@ def delayed(x: np.ndarray, time: np.ndarray, delay: float) -> np.ndarray:
     share = ((late - time[after - 1]) / (time[after] - time[after - 1]))[:, None]
     out: np.ndarray = (1.0 - share) * x[after - 1] + share * x[after]
     return out
+
+
+def load_put_on(load: np.ndarray) -> np.ndarray:
+    """Return the load that was put on each texel so far, (T, n)."""
+    total: np.ndarray = np.cumsum(np.maximum(np.diff(load, axis=0, prepend=0.0), 0.0), axis=0)
+    return total

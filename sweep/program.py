@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A study's job: a Python file that computes its runs where no solver and no scene do.
+"""A study's program: the Python file that its ``job = …`` names, which computes its runs where no solver and no scene do.
 
 It has a function ``run(values, folder)``, which may write files of its own into the folder and returns metrics, and perhaps a
 function ``fingerprint()``, which returns a text that changes with what its results depend on beside the file. The study's
@@ -25,8 +25,8 @@ SUFFIX = ".py"
 
 
 @dataclass(frozen=True)
-class Job:
-    """A loaded job.
+class Program:
+    """A loaded program.
 
     Attributes
     ----------
@@ -41,13 +41,13 @@ class Job:
 
 
 def require_allowed(study: Study, scripts: str) -> None:
-    """Raise SceneError where a study has a job and the command does not allow its Python."""
+    """Raise SceneError where a study has a program and the command does not allow its Python."""
     if study.is_job and scripts != ALLOW:
         raise SceneError(f"The study runs the Python of '{study.scenes[0]}': add --allow-scripts if you trust the file.")
 
 
-def load_job(file: Path) -> Job:
-    """Run the Python of a file and return its job.
+def load_program(file: Path) -> Program:
+    """Run the Python of a file and return its program.
 
     Raises
     ------
@@ -55,7 +55,7 @@ def load_job(file: Path) -> Job:
         It cannot be read or run, or has no ``run``.
     """
     sha256 = file_sha256(file)
-    spec = importlib.util.spec_from_file_location(f"palpate_job_{sha256[:16]}", file)
+    spec = importlib.util.spec_from_file_location(f"palpate_program_{sha256[:16]}", file)
     assert spec is not None and spec.loader is not None  # of a file that ends with .py
     module = importlib.util.module_from_spec(spec)
     try:
@@ -65,33 +65,33 @@ def load_job(file: Path) -> Job:
         raise PalpateError(f"The job '{file.name}' cannot be run ({type(error).__name__}: {error}): mend it.") from error
     if not callable(found):
         raise PalpateError(f"The job '{file.name}' has no function run(values, folder): write one.")
-    return Job(found, hashlib.sha256(f"{sha256} {more}".encode()).hexdigest())
+    return Program(found, hashlib.sha256(f"{sha256} {more}".encode()).hexdigest())
 
 
-def freeze_job(source: Path, target: Path) -> str:
-    """Copy the file of a job, and return the job's digest; raise :class:`PalpateError` where that is not possible."""
+def freeze_program(source: Path, target: Path) -> str:
+    """Copy the file of a program, and return the program's digest; raise :class:`PalpateError` where that is not possible."""
     try:
         content = source.read_bytes()
     except OSError as error:
         raise FileError(f"The job '{source}' could not be read ({os_error_reason(error)}): check it.") from error
     with atomic_write(target) as fresh:
         fresh.write_bytes(content)
-    return load_job(target).digest
+    return load_program(target).digest
 
 
-def frozen_job(study: Study, folder: Path, name: str) -> Job:
-    """Return the job of a study's folder.
+def frozen_program(study: Study, folder: Path, name: str) -> Program:
+    """Return the program of a study's folder.
 
     Raises
     ------
     PalpateError
         It is no longer the one that the study began with, or cannot be run.
     """
-    job = load_job(folder / SCENES / f"{name}{SUFFIX}")
+    program = load_program(folder / SCENES / f"{name}{SUFFIX}")
     entries = study.frozen.get("scenes", [])
-    if job.digest not in [entry.get("digest") for entry in entries if entry.get("name") == name]:
+    if program.digest not in [entry.get("digest") for entry in entries if entry.get("name") == name]:
         raise FileError(
             f"What the job '{study.scenes[0]}' computes with is not what the study in '{folder}' began with: go on with that, "
             "or give another folder with --out."
         )
-    return job
+    return program

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from palpate.core.gap.kinds import operators
+from palpate.core.effects.engine import signal_operators as operators
 
 
 def _up_and_down(count: int = 400) -> tuple[np.ndarray, np.ndarray]:
