@@ -1,26 +1,27 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Tables of files as typed values: msgspec reads and checks them, and a mistake becomes one sentence.
+"""Tables of files as dataclasses: msgspec checks each value by its annotation, and a mistake becomes one sentence.
 
-A class says what a table may have::
+::
 
-    class RecordingWords(Table):
+    @dataclass(frozen=True)
+    class SecondLogger:
         file: Name
-        tared: Switch = False
         late: Annotated[float, wanted("write seconds", ge=-1e10, le=1e10)] = 0.0
 
-and the sentence of a mistake is ``late of Trial 2 of 'rig.toml' is 'soon': write seconds.``
+refuses a table with the words ``late of readings of Trial 2 of 'rig.toml' is 'soon': write seconds.``
 
-A union must not hold a number with limits beside a tuple of fixed length: msgspec 0.22 then reads beyond its own memory. A list
-with `min_length` and `max_length` does the same and is safe.
+Never annotate a number with limits or a tuple of fixed length in one union: msgspec 0.22 mixes the two up and reads memory that
+is not its own. A list with `min_length` and `max_length` says the same and is safe.
 """
 
 from __future__ import annotations
 
 import json
 import os
-import re
-from collections.abc import Iterable, Iterator, Mapping
-from typing import Annotated, Any, Literal, TypeVar, get_args, get_type_hints
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import MISSING, fields
+from functools import cache
+from typing import Annotated, Any, Literal, TypeVar, get_args, get_origin, get_type_hints
 
 import msgspec
 
@@ -29,72 +30,93 @@ from .regular_file import read_bytes
 from .toml_file import checked_name
 
 T = TypeVar("T")
-Words = TypeVar("Words", bound="Table")
 
 LARGEST = 1.7e308
-"""Largest size of a number in a file; a larger one is infinite or nearly so."""
+"""Largest size of a number in a file."""
+WORD = "word"
+"""Key of a field's metadata: its name in the file, where that is no name of Python."""
 THIS_FORMAT = "this format"
+_NAME = "name"
 
 
-def wanted(advice: str, **limits: Any) -> msgspec.Meta:
-    """Return the annotation of a word: what to write, for its sentence, and limits as :class:`msgspec.Meta` takes them."""
-    return msgspec.Meta(description=advice, **limits)
+def wanted(advice: str, names: bool = False, **limits: Any) -> msgspec.Meta:
+    """Return the annotation of a word.
+
+    Parameters
+    ----------
+    advice : str
+        What to write, for the sentence of a mistake.
+    names : bool
+        Whether each text has to be a name (:func:`.checked_name`).
+    **limits
+        Of :class:`msgspec.Meta`.
+    """
+    return msgspec.Meta(description=advice, title=_NAME if names else None, **limits)
 
 
-_NAME = wanted("write a text")
-Name = Annotated[str, _NAME]
-"""A text that can be a name (:func:`.checked_name`)."""
+Name = Annotated[str, wanted("write a text", names=True)]
 Number = Annotated[float, wanted("give a number", ge=-LARGEST, le=LARGEST)]
+Positive = Annotated[float, wanted("give a number above zero", gt=0.0, le=LARGEST)]
+Seconds = Annotated[float, wanted("write seconds", ge=-LARGEST, le=LARGEST)]
 Switch = Annotated[bool, wanted("write true or false")]
-FREE: Literal["free"] = "free"
-"""What a rig writes for a number that is fitted."""
-
-
-class Table(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A table of a file that has no other words than its fields."""
 
 
 def known_words(table: Mapping[str, Any], words: Iterable[str], where: str, what: str = THIS_FORMAT) -> None:
     """Raise :class:`FileError` for the first key of a table that is not among the `words` of its format."""
-    known = sorted(words)
+    known = sorted(words) if isinstance(words, set) else list(words)
     for key in table:
         if key not in known:
-            advice = did_you_mean(key, known, f"it knows {', '.join(known)}.")
-            raise FileError(f"{key!r:.60} in {where} is not a word of {what}: {advice}")
+            near = did_you_mean(key, known, "")
+            hint = f" ({near})" if near else ""
+            raise FileError(f"{key!r:.60} in {where} is not a word of {what}{hint}: it knows {', '.join(known)}.")
 
 
-def read_table(table: Any, kind: type[Words], where: str, what: str = THIS_FORMAT) -> Words:
-    """Return a table as an object of its class.
+def read_words(
+    table: Any, kind: Callable[..., T], where: str, what: str = THIS_FORMAT, besides: Iterable[str] = (), **given: Any
+) -> T:
+    """Return a table of a file as an object of a dataclass.
 
     Parameters
     ----------
     table : mapping
         As TOML gives it.
     kind : type
-        A subclass of :class:`Table`.
+        The dataclass; its fields are the words of the table.
     where, what : str
         Which table of which file this is, and what its format is called, for messages.
+    besides : iterable of str
+        Words that the table may have and that are read elsewhere.
+    **given
+        Fields that are not in the file.
 
     Raises
     ------
     FileError
         A word is missing, is not known, or has a value that it cannot have.
     """
-    if isinstance(table, Mapping):
-        known_words(table, kind.__struct_encode_fields__, where, what)
+    if not isinstance(table, Mapping):
+        raise FileError(f"{where} is {table!r:.60}: write a table.")
+    known_words(table, [*(word for word, (name, *_) in _words(kind).items() if name not in given), *besides], where, what)
     try:
-        found = msgspec.convert(table, kind)
-    except msgspec.ValidationError as error:
-        raise FileError(_sentence(str(error), table, kind, where, what)) from error
-    for name, hint in _hints(kind).items():
-        if name in table and _NAME in _parts(hint):
+        found = _made(table, kind, given)
+    except _Fault as fault:
+        word, value = fault.word, table.get(fault.word)
+        above, advice = _in_brackets(word, fault.hint), _advice(fault.hint, value)
+        if word not in table:
+            raise FileError(f"{where} has no {above}: {advice}") from fault
+        if above != word:
+            raise FileError(f"{where} has no {above}, but {word} = {value!r:.60}: {advice}") from fault
+        raise FileError(f"{word} of {where} is {value!r:.60}: {advice}") from fault
+    for word, (name, hint, _) in _words(kind).items():
+        meta = _meta(hint)
+        if word in table and name not in given and meta is not None and meta.title == _NAME:
             value = getattr(found, name)
             for text in value if isinstance(value, tuple) else (value,):
-                checked_name(text, f"{name} of {where}")
+                checked_name(text, where if word == "name" else f"{word} of {where}")
     return found
 
 
-def read_json(path: str | os.PathLike, kind: type[T], format_name: str, advice: str) -> tuple[T, dict[str, Any]]:
+def read_json(path: str | os.PathLike, kind: Callable[..., T], format_name: str, advice: str) -> tuple[T, dict[str, Any]]:
     """Read a JSON file that Palpate wrote.
 
     Parameters
@@ -109,7 +131,7 @@ def read_json(path: str | os.PathLike, kind: type[T], format_name: str, advice: 
 
     Returns
     -------
-    found : object of the class
+    found : object of the dataclass
     content : dict
         All of the file.
 
@@ -134,69 +156,65 @@ def read_json(path: str | os.PathLike, kind: type[T], format_name: str, advice: 
     if said != format_name:
         raise FileError(f"'{path}' is not a '{format_name}' file but {said!r:.60}: {advice} with this version.")
     try:
-        return msgspec.convert(content, kind), content
-    except msgspec.ValidationError as error:
-        words, value = _place(str(error), content)
-        missing = _quoted(str(error), "Object missing required field")
-        place = ".".join(words).replace(".[", "[")
-        fault = f"'{missing}' is missing" if missing else f"{place} is {value!r:.60}"
-        raise FileError(f"'{path}' is damaged ({fault}): {advice}.") from error
+        return _made(content, kind, {}), content
+    except _Fault as fault:
+        raise FileError(f"'{path}' is damaged ({fault}): {advice}.") from fault
 
 
-def _sentence(message: str, table: Any, kind: type[Table], where: str, what: str) -> str:
-    """Return our sentence for a message of msgspec."""
-    words, value = _place(message, table)
-    advice = ""
-    for word in words:
-        where = f"{word} of {where}"
-        advice, kind = _advice(kind, word), _table_in(kind, word)
-    missing = _quoted(message, "Object missing required field")
-    if missing:
-        return f"{where} has no {missing}: {_advice(kind, missing)}."
-    if "unknown field" in message:
-        try:
-            known_words(value, kind.__struct_encode_fields__, where, what)
-        except FileError as error:
-            return str(error)
-    return f"{where} is {value!r:.60}: {advice or 'write a table'}."
+class _Fault(Exception):
+    """A word that is missing or has a wrong value, in words for the brackets of a message."""
+
+    def __init__(self, word: str, hint: Any, said: str):
+        super().__init__(said)
+        self.word, self.hint = word, hint
 
 
-def _place(message: str, content: Any) -> tuple[list[str], Any]:
-    """Return the words that lead to what a message is about, and its value; a list of plain values counts as one."""
-    words: list[str] = []
-    for name, index in re.findall(r"\.([^.\[]+)|\[(\d+)\]", message.rpartition(" - at `$")[2].removesuffix("`")):
-        if name and isinstance(content, Mapping) and name in content:
-            words.append(name)
-            content = content[name]
-        elif index and isinstance(content, list) and isinstance(content[int(index)], Mapping):
-            words.append(f"[{index}]")
-            content = content[int(index)]
-        else:
-            break
-    return words, content
+def _made(table: Mapping[str, Any], kind: Callable[..., T], given: Mapping[str, Any]) -> T:
+    values = dict(given)
+    for word, (name, hint, is_required) in _words(kind).items():
+        if name in given:
+            continue
+        if word in table:
+            try:
+                values[name] = msgspec.convert(table[word], hint)
+            except msgspec.ValidationError as error:
+                message, _, place = str(error).partition(" - at `$")
+                inside = f"{word}{place.rstrip('`')}: {message}"
+                is_in_list = place and "[...]" not in place  # a key is not told
+                raise _Fault(word, hint, inside if is_in_list else f"{word} is {table[word]!r:.60}") from error
+        elif is_required:
+            raise _Fault(word, hint, f"'{word}' is missing")
+    return kind(**values)
 
 
-def _quoted(message: str, begin: str) -> str:
-    return message.removeprefix(begin).split("`")[1] if message.startswith(begin) else ""
-
-
-def _hints(kind: type[Table]) -> dict[str, Any]:
-    """Return the annotations of a table by the words of the file."""
+@cache
+def _words(kind: Any) -> dict[str, tuple[str, Any, bool]]:
+    """Return the name, the annotation and the need of each field of a dataclass, by its word in the file."""
     hints = get_type_hints(kind, include_extras=True)
-    return {word: hints[name] for word, name in zip(kind.__struct_encode_fields__, kind.__struct_fields__, strict=True)}
+    return {
+        one.metadata.get(WORD, one.name): (one.name, hints[one.name], one.default is one.default_factory is MISSING)
+        for one in fields(kind)
+    }
 
 
-def _parts(hint: Any) -> Iterator[Any]:
-    """Yield an annotation and what it consists of, metadata too."""
-    yield hint
-    for part in get_args(hint):
-        yield from _parts(part)
+def _meta(hint: Any) -> msgspec.Meta | None:
+    """Return what :func:`wanted` said of a word, also of one that may be None."""
+    return next((meta for part in (hint, *get_args(hint)) for meta in getattr(part, "__metadata__", ())), None)
 
 
-def _advice(kind: type[Table], word: str) -> str:
-    metas = [part for part in _parts(_hints(kind)[word]) if isinstance(part, msgspec.Meta)]
-    return next((meta.description for meta in metas if meta.description), "give another value")
+def _in_brackets(word: str, hint: Any) -> str:
+    """Return a word as it stands above a table, or above each table of a list; other words as they are."""
+    kinds = [getattr(part, "__origin__", part) for part in (hint, *get_args(hint))]
+    if dict[str, Any] in kinds:
+        return f"[{word}]"
+    return f"[[{word}]]" if list[dict[str, Any]] in kinds else word
 
 
-def _table_in(kind: type[Table], word: str) -> type[Table]:
-    return next((part for part in _parts(_hints(kind)[word]) if isinstance(part, type) and issubclass(part, Table)), kind)
+def _advice(hint: Any, value: Any) -> str:
+    meta = _meta(hint)
+    if meta is not None:
+        return f"{meta.description}."
+    choices = [choice for part in (hint, *get_args(hint)) if get_origin(part) is Literal for choice in get_args(part)]
+    near = did_you_mean(str(value), choices, "")
+    listed = " or ".join(f'"{choice}"' for choice in choices) if len(choices) == 2 else f"one of {', '.join(choices)}"
+    return f"write {listed if choices else 'another value'}{f' ({near})' if near else ''}."

@@ -8,8 +8,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import msgspec
-
 from ..errors import FileError
 from ..io.file_writing import write_synced
 from ..io.schema import Number, read_json
@@ -93,7 +91,8 @@ def read_run_record(folder: Path) -> RunRecord:
     return RunRecord(folder, folder.name, found.index, values, metrics, found.seconds, found.sensors, found.frames)
 
 
-class _RunFile(msgspec.Struct):
+@dataclass
+class _RunFile:
     """What a ``run.json`` has to say."""
 
     index: int

@@ -16,8 +16,6 @@ from math import inf
 from pathlib import Path
 from typing import Any, Literal, get_args
 
-import msgspec
-
 from ..errors import FileError, ParameterError
 from ..io.file_writing import atomic_write
 from ..io.schema import read_json
@@ -141,7 +139,8 @@ def read_properties(path: str | os.PathLike) -> dict[str, SceneProperty]:
     return {row.name: row for row in found.properties}
 
 
-class _PropertiesFile(msgspec.Struct):
+@dataclass
+class _PropertiesFile:
     """What :func:`write_properties` wrote."""
 
     properties: tuple[SceneProperty, ...]
