@@ -118,6 +118,7 @@ def write_sensor(
         unit=parameters.unit,
         shape=tuple(texels.layout.shape),
         parameters=asdict(parameters),
+        warnings=(),
         complete=True,
         body="pad",
         sensors=sensors,

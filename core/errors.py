@@ -7,8 +7,9 @@ Every message is one sentence that says what is wrong, where, and what to do abo
 
 from __future__ import annotations
 
+import difflib
 import os
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 
 
@@ -85,3 +86,9 @@ def os_error_reason(error: OSError) -> str:
 def counted(number: int, noun: str) -> str:
     """Return a number with its noun in the singular or the plural, as "1 texel" or "1,024 texels"."""
     return f"{number:,} {noun}" + ("" if number == 1 else "s")
+
+
+def did_you_mean(word: str, known: Iterable[str], otherwise: str, cutoff: float = 0.6) -> str:
+    """Return the known word that is most like a wrong one as a question, or other advice if none is."""
+    near = difflib.get_close_matches(word, list(known), n=1, cutoff=cutoff)
+    return f"did you mean '{near[0]}'?" if near else otherwise

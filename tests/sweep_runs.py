@@ -72,6 +72,7 @@ def write_sensor_folder(folder: Path, sensor: Sensor, recording: Recording) -> N
         unit=sensor.parameters.unit,
         shape=tuple(sensor.texels.layout.shape),
         parameters=asdict(sensor.parameters),
+        warnings=(),
         complete=True,
     )
     write_manifest(folder, manifest, False)

@@ -285,7 +285,7 @@ class BakeFiles:
             The .blend cannot be written, or a folder cannot be replaced. The old bake and the old .blend are unchanged.
         """
         self._check_replaceable()  # again, because the user may have put files there during the bake
-        record = bake_switch.Switch(self._run, tuple(self._names[name] for name in self._sensors))
+        record = bake_switch.Switch(self._run, tuple(self._names[name] for name in self._sensors), "", 0)
         try:
             if blend is not None:
                 record = replace(record, blend=str(blend.path), backups=blend.backups)

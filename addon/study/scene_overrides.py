@@ -6,7 +6,6 @@ A path is walked step by step and never executed, so that a file of overrides fr
 
 from __future__ import annotations
 
-import difflib
 import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
@@ -15,7 +14,7 @@ from typing import Any
 
 import bpy
 
-from ...core.errors import ParameterError, SceneError
+from ...core.errors import ParameterError, SceneError, did_you_mean
 from ...core.study.scene_property import CHOICE, NUMBER, PREFIX, SWITCH, WHOLE_NUMBER, SceneProperty
 from ..session import fcurves
 
@@ -149,8 +148,7 @@ def _require(name: str, known: Iterable[str], where: str, path: str) -> None:
     names = [one for one in known if one != "rna_type"]
     if name in names:
         return
-    near = difflib.get_close_matches(name, names, n=1, cutoff=0.5)
-    advice = f"did you mean '{near[0]}'?" if near else "check its spelling, or copy it by Copy Full Data Path."
+    advice = did_you_mean(name, names, "check its spelling, or copy it by Copy Full Data Path.", 0.5)
     inside = "" if where == "bpy.data" else f" in '{where}'"
     raise ParameterError(f"There is no '{name}'{inside}, which the study names as '{path}': {advice}")
 
@@ -198,9 +196,9 @@ def _described_custom(found: Found, value: Any) -> SceneProperty:
     return SceneProperty(found.path, NUMBER if isinstance(value, float) else WHOLE_NUMBER, "", low, high)
 
 
-def _bounds(low: float, high: float) -> tuple[float, float]:
+def _bounds(low: float, high: float) -> tuple[float | None, float | None]:
     largest = 2**31 - 1 if isinstance(low, int) else LARGEST
-    return (-inf if low <= -largest else float(low)), (inf if high >= largest else float(high))
+    return (None if low <= -largest else float(low)), (None if high >= largest else float(high))
 
 
 def _refuse_animated(found: Found) -> None:

@@ -30,6 +30,7 @@ __all__ = [
     "recording_npz",
     "regular_file",
     "scenario_npz",
+    "schema",
     "sensor_manifest",
     "sensor_npz",
     "sensor_toml",

@@ -21,7 +21,7 @@ from typing import Any
 from ..errors import FileError, os_error_reason
 from .checksum_list import read_checksums
 from .file_writing import file_sha256, write_file
-from .regular_file import read_bytes
+from .schema import read_json
 from .sensor_npz import SENSOR_NAME
 
 MANIFEST_FORMAT = "palpate-bake/1"
@@ -131,9 +131,9 @@ class Manifest:
     digest: str
     unit: str
     shape: tuple[int, int]
-    parameters: dict[str, Any] = field(default_factory=dict)
-    warnings: tuple[str, ...] = ()
-    complete: bool = False
+    parameters: dict[str, Any]
+    warnings: tuple[str, ...]
+    complete: bool
     scene_file: str = ""
     body: str = ""
     step_reason: str = ""
@@ -222,73 +222,26 @@ def read_manifest(folder: str | os.PathLike) -> Manifest:
     """
     path = Path(folder) / MANIFEST_NAME
     try:
-        content = json.loads(read_bytes(path).decode("utf-8", "surrogatepass"))
+        manifest, content = read_json(path, Manifest, MANIFEST_FORMAT, "bake again")
     except FileNotFoundError:
         raise FileError(f"'{path}' does not exist: bake first, or choose a sensor's folder inside the bake folder.") from None
-    except OSError as error:
-        raise FileError(f"'{path}' could not be read ({os_error_reason(error)}): check its permissions.") from error
-    except (ValueError, RecursionError) as error:
-        raise FileError(f"'{path}' is damaged (not JSON): delete the folder and bake again.") from error
-    if not isinstance(content, dict) or content.get("format") != MANIFEST_FORMAT:
-        found = content.get("format") if isinstance(content, dict) else None
-        raise FileError(f"'{path}' is not a '{MANIFEST_FORMAT}' file but {found!r:.60}: bake again with this version.")
-    try:
-        own = _own_digest(content)
-        if content.get(OWN_DIGEST, own) != own:
-            raise ValueError("its content is not what was baked")
-        return _manifest(content)
-    except KeyError as error:
-        raise FileError(f"'{path}' is damaged ({error} is missing): bake again.") from error
-    except (TypeError, ValueError, OverflowError, RecursionError) as error:
-        raise FileError(f"'{path}' is damaged ({error}): bake again.") from error
+    own = _own_digest(content)
+    fault = ""
+    if content.get(OWN_DIGEST, own) != own:
+        fault = "its content is not what was baked"
+    elif "\0" in manifest.sensor + manifest.body:
+        fault = "a name has a NUL"
+    elif not (math.isfinite(manifest.fps) and math.isfinite(manifest.dt)):
+        fault = "fps and dt must be finite"
+    for name in manifest.files:
+        if not BAKE_FILE_NAMES.fullmatch(name):
+            fault = f"files has {name!r:.60}"
+    if fault:
+        raise FileError(f"'{path}' is damaged ({fault}): bake again.")
+    return manifest
 
 
 def _own_digest(content: Mapping[str, Any]) -> str:
     """Return the SHA-256 of a manifest's content without this digest, whatever the order of its keys."""
     rest = {key: value for key, value in content.items() if key != OWN_DIGEST}
     return hashlib.sha256(json.dumps(rest, sort_keys=True).encode()).hexdigest()
-
-
-def _manifest(content: dict[str, Any]) -> Manifest:
-    shape = _typed(content, "shape", list)
-    if len(shape) != 2 or not all(type(side) is int for side in shape):
-        raise TypeError(f"shape is {shape!r:.60}")
-    manifest = Manifest(
-        sensor=_typed(content, "sensor", str),
-        palpate=_typed(content, "palpate", str),
-        frame_start=_typed(content, "frame_start", int),
-        frame_end=_typed(content, "frame_end", int),
-        fps=float(_typed(content, "fps", (int, float))),
-        dt=float(_typed(content, "dt", (int, float))),
-        digest=_typed(content, "digest", str),
-        unit=_typed(content, "unit", str),
-        shape=(shape[0], shape[1]),
-        parameters=_typed(content, "parameters", dict),
-        warnings=tuple(str(warning) for warning in _typed(content, "warnings", list)),
-        complete=_typed(content, "complete", bool),
-        scene_file=_typed({"scene_file": "", **content}, "scene_file", str),
-        body=_typed({"body": "", **content}, "body", str),
-        step_reason=_typed({"step_reason": "", **content}, "step_reason", str),
-        bake_id=_typed({"bake_id": "", **content}, "bake_id", str),
-        scene_id=_typed({"scene_id": "", **content}, "scene_id", str),
-        scene_path=_typed({"scene_path": "", **content}, "scene_path", str),
-        sensors=tuple(_typed({"sensors": [], **content}, "sensors", list)),
-        files=_typed({"files": {}, **content}, "files", dict),
-    )
-    if not all(isinstance(name, str) for name in manifest.sensors):
-        raise TypeError(f"sensors is {content['sensors']!r:.60}")
-    if any("\0" in name for name in (manifest.sensor, manifest.body)):
-        raise ValueError("a name has a NUL")
-    for name, digest in manifest.files.items():
-        if not BAKE_FILE_NAMES.fullmatch(name) or not isinstance(digest, str):
-            raise ValueError(f"files has {name!r:.60}")
-    if not (math.isfinite(manifest.fps) and math.isfinite(manifest.dt)):
-        raise ValueError("fps and dt must be finite")
-    return manifest
-
-
-def _typed(content: dict[str, Any], key: str, kind: Any) -> Any:
-    value = content[key]
-    if not isinstance(value, kind) or (isinstance(value, bool) and kind is not bool):
-        raise TypeError(f"{key} is {value!r:.60}")
-    return value

@@ -27,7 +27,6 @@ from .bake_folder import BAKE_FILE_NAMES
 from .file_writing import (
     atomic_write,
     exchange_file,
-    os_error_reason,
     remove_leftovers,
     remove_leftovers_of,
     sync_file,
@@ -37,6 +36,7 @@ from .file_writing import (
 from .folder_lock import FolderLock
 from .private_folder import PRIVATE_FOLDER, find_private_folder, remove_tree
 from .regular_file import read_bytes
+from .schema import read_json
 
 SWITCH_NAME = "switch.json"
 SWITCH_FORMAT = "palpate-switch/1"
@@ -65,8 +65,8 @@ class Switch:
 
     run: str
     folders: tuple[str, ...]
-    blend: str = ""
-    backups: int = 0
+    blend: str
+    backups: int
 
     def new_blend(self) -> Path:
         """Return where the new .blend waits, beside the old one."""
@@ -172,14 +172,16 @@ def pending_switch(bake_folder: Path) -> Switch | None:
     if path is None or path.is_symlink() or not path.is_file():
         return None
     try:
-        content = json.loads(path.read_bytes().decode("utf-8", "surrogatepass"))
-        return _switch(content)
+        record, _ = read_json(path, Switch, SWITCH_FORMAT, "delete it and bake again")
     except FileNotFoundError:
         return None  # another process has just carried it out
-    except OSError as error:
-        raise FileError(f"'{path}' could not be read ({os_error_reason(error)}): check its permissions.") from error
-    except (KeyError, TypeError, ValueError, RecursionError) as error:
-        raise FileError(f"'{path}' is damaged ({error}): delete it and bake again.") from error
+    fault = "" if re.fullmatch(r"[0-9a-f]{16}", record.run) else "its run is no id"
+    for name in record.folders:
+        if name != os.path.basename(name) or name.startswith(".") or not name.strip("."):
+            fault = f"{name!r:.60} is no name of a folder"
+    if fault:
+        raise FileError(f"'{path}' is damaged ({fault}): delete it and bake again.")
+    return record
 
 
 def settle(bake_folder: Path) -> None:
@@ -271,21 +273,6 @@ def wait_for_removals() -> None:
     """Return once the folders of replaced bakes are removed."""
     while _removals:
         _removals.pop().join()
-
-
-def _switch(content: dict) -> Switch:
-    """Return the record in a JSON value; raises KeyError, TypeError or ValueError if it is not one."""
-    if content["format"] != SWITCH_FORMAT:
-        raise ValueError(f"its format is {content['format']!r}")
-    record = Switch(content["run"], tuple(content["folders"]), content["blend"], content["backups"])
-    if not re.fullmatch(r"[0-9a-f]{16}", record.run):
-        raise ValueError("its run is no id")
-    for name in record.folders:
-        if not isinstance(name, str) or name != os.path.basename(name) or name.startswith(".") or not name.strip("."):
-            raise ValueError(f"{name!r} is no name of a folder")
-    if not isinstance(record.blend, str) or not isinstance(record.backups, int):
-        raise TypeError("its .blend is no path")
-    return record
 
 
 def _places(bake_folder: Path, record: Switch, name: str) -> tuple[Path, Path, Path]:

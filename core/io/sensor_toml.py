@@ -26,13 +26,14 @@ import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 from ..effects.engine.registry import check, from_dict, to_dict
 from ..errors import FileError, PalpateError
 from ..model.effect import Effect
 from ..model.sensor_parameters import SENSOR_PARAMETERS, SensorParameters
 from .file_writing import atomic_write
+from .schema import Name, known_words, read_words, wanted
 from .toml_file import checked_name, is_number, read_toml
 
 FORMAT = "palpate-sensor-toml/1"
@@ -61,6 +62,13 @@ class SensorModel:
     parameters: SensorParameters = field(default_factory=SensorParameters)
     effects: tuple[Effect, ...] = ()
     shape: Mapping[str, Any] = field(default_factory=dict)
+
+
+@dataclass
+class _SensorFile:
+    name: Name = "sensor"
+    sensor: Annotated[dict[str, Any], wanted("write [sensor] with the sensor's words")] = field(default_factory=dict)
+    effect: Annotated[list[dict[str, Any]], wanted("write [[effect]], one for each")] = field(default_factory=list)
 
 
 def write_sensor(path: str | os.PathLike, model: SensorModel) -> None:
@@ -102,17 +110,12 @@ def sensor_of(table: Mapping[str, Any]) -> SensorModel:
     """Return the sensor that the tables of a file describe; raise the same errors as :func:`read_sensor`."""
     if table.get("format") != FORMAT:
         raise FileError(f'Its format is {table.get("format")!r}: a sensor\'s file begins with format = "{FORMAT}".')
-    known_words(table, {"format", "name", "sensor", "effect"}, "the file")
-    name, words, entries = table.get("name", "sensor"), table.get("sensor", {}), table.get("effect", [])
-    if not isinstance(name, str) or not isinstance(words, Mapping):
-        raise FileError('It needs name = "…" and [sensor] with the sensor\'s words.')
-    checked_name(name, "the file")
-    if not isinstance(entries, list) or not all(isinstance(entry, Mapping) for entry in entries):
-        raise FileError("Its effects have to be written as [[effect]], one for each.")
-    known_words(words, {*SENSOR_PARAMETERS, *SHAPE_WORDS}, "[sensor]")
+    found = read_words(table, _SensorFile, "the file", besides=("format",))
+    name, words = found.name, found.sensor
+    known_words(words, (*SENSOR_PARAMETERS, *SHAPE_WORDS), "[sensor]")
     parameters = SensorParameters(**stated_parameters(words, "[sensor]"))
     parameters.check(name)
-    effects = tuple(from_dict(entry, parameters.gain) for entry in entries)
+    effects = tuple(from_dict(entry, parameters.gain) for entry in found.effect)
     check(effects, name, gain=parameters.gain)
     return SensorModel(name, parameters, effects, _checked_shape(words))
 
@@ -190,13 +193,6 @@ def stated_parameters(words: Mapping[str, Any], where: str) -> dict[str, Any]:
             if values[name] is None:
                 raise FileError(f"{name} of {where} is {words[name]!r}: give {specification.wanted}.")
     return values
-
-
-def known_words(table: Mapping[str, Any], words: set[str], where: str) -> None:
-    """Raise :class:`FileError` for the first key of a table that is not among the `words` of its format."""
-    for key in table:
-        if key not in words:
-            raise FileError(f"{key!r:.60} in {where} is not a word of this format: it knows {', '.join(sorted(words))}.")
 
 
 def _plain(words: Mapping[str, Any]) -> dict[str, Any]:

@@ -20,7 +20,8 @@ from ..geometry.mesh import TriangleMesh, checked_mesh
 from ..geometry.texels import Texels
 from ..io.file_writing import write_file
 from ..io.regular_file import read_bounded
-from ..io.sensor_toml import MOST_TEXELS, known_words, stated_parameters
+from ..io.schema import known_words
+from ..io.sensor_toml import MOST_TEXELS, stated_parameters
 from ..io.toml_file import checked_name
 from ..model.sensor import Sensor
 from ..model.sensor_parameters import SENSOR_PARAMETERS, Painted, SensorParameters
@@ -101,7 +102,7 @@ def _sensor_of(content: Mapping[str, Any]) -> SensorOnMesh:
     words = content.get("parameters", {})
     if not isinstance(words, Mapping):
         raise FileError("Its parameters are no table: export it again.")
-    known_words(words, set(SENSOR_PARAMETERS), "parameters")
+    known_words(words, SENSOR_PARAMETERS, "parameters")
     parameters = SensorParameters(**stated_parameters(words, "parameters"))
     parameters.check(name)
     entries = content.get("effects", [])

@@ -9,13 +9,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Annotated, Literal, get_args
 
 import numpy as np
 
 from ..errors import ParameterError
+from ..io.schema import WORD, wanted
 
-GRID, RANDOM, LATIN_HYPERCUBE, SOBOL = DESIGNS = ("grid", "random", "latin-hypercube", "sobol")
+DesignKind = Literal["grid", "random", "latin-hypercube", "sobol"]
+GRID, RANDOM, LATIN_HYPERCUBE, SOBOL = DESIGNS = get_args(DesignKind)
 UNIFORM, LOG_UNIFORM, NORMAL, CHOICE = DISTRIBUTIONS = ("uniform", "log-uniform", "normal", "choice")
 MOST_RUNS = 1_000_000
 """Most runs of a study. The driver holds the values of all runs, 8 bytes each, and a folder has an entry for each run."""
@@ -94,9 +97,9 @@ class Design:
     seed : int
     """
 
-    kind: str
-    samples: int = 0
-    seed: int = 0
+    kind: DesignKind = field(metadata={WORD: "design"})
+    samples: Annotated[int, wanted("give a whole number of runs, above zero", ge=1, le=2**63 - 1)] = 0
+    seed: Annotated[int, wanted("give a whole number of zero or more", ge=0, le=2**63 - 1)] = 0
 
     def count(self, varied: Mapping[str, Distribution]) -> int:
         """Return the number of points."""

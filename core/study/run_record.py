@@ -5,13 +5,12 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass, field
-from math import isfinite
 from pathlib import Path
 from typing import Any
 
-from ..errors import FileError, os_error_reason
+from ..errors import FileError
 from ..io.file_writing import write_synced
-from ..io.regular_file import read_bytes
+from ..io.schema import Number, read_json
 
 RUN_FORMAT = "palpate-run/1"
 RUN_NAME = "run.json"
@@ -83,43 +82,27 @@ def read_run_record(folder: Path) -> RunRecord:
         It cannot be read, or it is not one that this version reads.
     """
     path = folder / RUN_NAME
-    content = _read_json(path)
-    if not isinstance(content, dict) or content.get("format") != RUN_FORMAT:
-        raise FileError(f"'{path}' is not a '{RUN_FORMAT}' file: delete the folder '{folder.name}' and run the sweep again.")
     try:
-        sensors = content["sensors"]
-        if not isinstance(sensors, list) or not all(isinstance(name, str) for name in sensors):
-            raise TypeError("its sensors are no names")
-        return RunRecord(
-            folder=folder,
-            digest=folder.name,
-            index=int(content["index"]),
-            values=values_read(content["values"]),
-            metrics={name: _finite(name, value) for name, value in content["metrics"].items() if value is not None},
-            seconds=float(content.get("seconds", 0.0)),
-            sensors=tuple(sensors),
-            frames=int(content.get("frames", 0)),
-        )
-    except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
-        raise FileError(f"'{path}' is damaged ({error}): delete the folder '{folder.name}' and run the sweep again.") from error
+        found, _ = read_json(path, _RunFile, RUN_FORMAT, f"delete the folder '{folder.name}' and run the sweep again")
+    except FileNotFoundError as error:
+        raise FileError(f"'{path}' is missing: delete the folder '{folder.name}' and run the sweep again.") from error
+    metrics = {name: value for name, value in found.metrics.items() if value is not None}
+    values = values_read(found.values)
+    return RunRecord(folder, folder.name, found.index, values, metrics, found.seconds, found.sensors, found.frames)
+
+
+@dataclass
+class _RunFile:
+    """What a ``run.json`` has to say."""
+
+    index: int
+    values: dict[str, bool | Number | str]
+    metrics: dict[str, Number | None]
+    sensors: tuple[str, ...]
+    seconds: float = 0.0
+    frames: int = 0
 
 
 def values_read(content: dict[str, Any]) -> dict[str, Value]:
-    """Return what was varied, with all numbers as floats; raise ValueError for one that is not finite."""
-    return {name: value if isinstance(value, str) else _finite(name, value) for name, value in content.items()}
-
-
-def _finite(name: str, value: Any) -> float:
-    number = float(value)
-    if not isfinite(number):
-        raise ValueError(f"{name} is {value}")
-    return number
-
-
-def _read_json(path: Path) -> Any:
-    try:
-        return json.loads(read_bytes(path).decode("utf-8", "surrogatepass"))
-    except OSError as error:
-        raise FileError(f"'{path}' could not be read ({os_error_reason(error)}): check its permissions.") from error
-    except (ValueError, RecursionError) as error:
-        raise FileError(f"'{path}' is damaged (no JSON): delete the folder '{path.parent.name}' and sweep again.") from error
+    """Return what was varied, with all numbers as floats."""
+    return {name: value if isinstance(value, str) else float(value) for name, value in content.items()}

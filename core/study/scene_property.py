@@ -9,18 +9,16 @@ are also checked where there is no Blender.
 from __future__ import annotations
 
 import json
-import math
 import os
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from math import inf
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal, get_args
 
-from ..errors import FileError, ParameterError, os_error_reason
+from ..errors import FileError, ParameterError
 from ..io.file_writing import atomic_write
-from ..io.npz import DAMAGED
-from ..io.regular_file import read_bytes
+from ..io.schema import read_json
 from ..io.toml_file import read_toml
 from ..model.parameter import Choice, ChoiceParameter, Parameter, Specification
 from .variation import Variable
@@ -29,7 +27,8 @@ PREFIX = "bpy.data."
 """How the path of a property begins; Blender copies it in this form (*Copy Full Data Path*)."""
 OVERRIDES_FORMAT, PROPERTIES_FORMAT = "palpate-overrides/1", "palpate-properties/1"
 OVERRIDES = "overrides"
-NUMBER, WHOLE_NUMBER, SWITCH, CHOICE = KINDS = ("number", "whole number", "switch", "choice")
+Kind = Literal["number", "whole number", "switch", "choice"]
+NUMBER, WHOLE_NUMBER, SWITCH, CHOICE = get_args(Kind)
 
 
 class WholeNumber(Parameter):
@@ -51,20 +50,19 @@ class SceneProperty:
     name : str
         Its path.
     kind : str
-        One of :data:`KINDS`.
     unit : str
         Of a number, as Blender stores it; "" where it has none.
-    low, high : float
-        Bounds of a number, inclusive.
+    low, high : float or None
+        Bounds of a number, inclusive; None where it has none.
     choices : tuple of str
         Words that a choice knows.
     """
 
     name: str
-    kind: str
+    kind: Kind
     unit: str = ""
-    low: float = -inf
-    high: float = inf
+    low: float | None = None
+    high: float | None = None
     choices: tuple[str, ...] = ()
 
     def variable(self) -> Variable:
@@ -72,7 +70,8 @@ class SceneProperty:
         specification: Specification | None = None
         if self.kind in (NUMBER, WHOLE_NUMBER):
             make = Parameter if self.kind == NUMBER else WholeNumber
-            specification = make(self.name, self.unit, 0.0, self.low, self.high, "Property of the scene")
+            low, high = (-inf if self.low is None else self.low), (inf if self.high is None else self.high)
+            specification = make(self.name, self.unit, 0.0, low, high, "Property of the scene")
         elif self.kind == CHOICE:
             items = tuple(Choice(word, word, "") for word in self.choices)
             specification = ChoiceParameter(self.name, self.choices[0] if self.choices else "", items, "Property of the scene")
@@ -119,17 +118,7 @@ def read_overrides(path: str | os.PathLike) -> dict[str, Any]:
 
 def write_properties(path: str | os.PathLike, properties: Iterable[SceneProperty]) -> None:
     """Write what properties of a scene are; :class:`FileError` if that fails."""
-    rows = [
-        {
-            "name": item.name,
-            "kind": item.kind,
-            "unit": item.unit,
-            "low": None if math.isinf(item.low) else item.low,
-            "high": None if math.isinf(item.high) else item.high,
-            "choices": list(item.choices),
-        }
-        for item in properties
-    ]
+    rows = [asdict(item) for item in properties]
     with atomic_write(path) as fresh:
         text = json.dumps({"format": PROPERTIES_FORMAT, "properties": rows}, ensure_ascii=False, indent=1)
         fresh.write_text(text + "\n", encoding="utf-8", newline="\n")
@@ -144,21 +133,14 @@ def read_properties(path: str | os.PathLike) -> dict[str, SceneProperty]:
         It cannot be read, or is damaged.
     """
     try:
-        content = json.loads(read_bytes(path))
-        if content["format"] != PROPERTIES_FORMAT:
-            raise ValueError(f"its format is {content['format']!r:.40}")
-        found = {}
-        for row in content["properties"]:
-            low, high = -inf if row["low"] is None else float(row["low"]), inf if row["high"] is None else float(row["high"])
-            if row["kind"] not in KINDS:
-                raise ValueError(f"kind {row['kind']!r:.40}")
-            found[str(row["name"])] = SceneProperty(
-                str(row["name"]), row["kind"], str(row["unit"]), low, high, tuple(map(str, row["choices"]))
-            )
+        found, _ = read_json(path, _PropertiesFile, PROPERTIES_FORMAT, "begin the study anew")
     except FileNotFoundError:
         return {}
-    except OSError as error:
-        raise FileError(f"'{path}' could not be read ({os_error_reason(error)}): check its permissions.") from error
-    except DAMAGED as error:
-        raise FileError(f"'{path}' is damaged ({error}): begin the study anew.") from error
-    return found
+    return {row.name: row for row in found.properties}
+
+
+@dataclass
+class _PropertiesFile:
+    """What :func:`write_properties` wrote."""
+
+    properties: tuple[SceneProperty, ...]

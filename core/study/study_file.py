@@ -25,7 +25,6 @@ The output folder keeps the file with a table ``[frozen]`` at its end: the versi
 
 from __future__ import annotations
 
-import difflib
 import hashlib
 import json
 import math
@@ -33,19 +32,19 @@ import os
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
-from ..errors import FileError, ParameterError
+from ..errors import FileError, ParameterError, did_you_mean
 from ..geometry.mesh import TriangleMesh
+from ..io.schema import LARGEST, WORD, Name, Number, Positive, Switch, known_words, read_words, wanted
 from ..io.toml_file import checked_name, is_number, read_toml
 from ..model.parameter import Parameter, Specification, TextParameter
 from ..model.scenario import Scenario
 from .design import (
     CHOICE,
     DEFAULT_LEVELS,
-    DESIGNS,
     DISTRIBUTIONS,
     GRID,
     LOG_UNIFORM,
@@ -64,19 +63,16 @@ from .variation import MOTION_WORDS, PRESS, Variable, variable, variables_of
 
 FORMAT = "palpate-sweep/1"
 FROZEN, JOB = "frozen", "job"
+A_STUDY = "a study"
 SCENE = "scene"
 """Name of the column that tells the scene of a run, where a study has several."""
-_WORDS = (
-    *("format", "name", "scene", "scenes", "design", "samples", "seed", "fps", "run_limit", "run_memory", "images", "vary"),
-    *(JOB, "press", FROZEN),
-)
 _OF_SCENES = ("fps", "images", "press")
 """Words that mean nothing beside a job."""
 _DIRECTIONS = {"tilt_direction": "tilt", "slide_direction": "slide"}
 """Directions of a press, which are any as long as the study says nothing else, and what they direct."""
 LARGEST_LEVELS = 10_000
-SAME, FACTOR = "same", "factor"
-"""Words of a number that follows another one: both fingers of a gripper have one stiffness."""
+SAME = "same"
+"""Word of a number that follows another one: both fingers of a gripper have one stiffness."""
 
 
 @dataclass(frozen=True)
@@ -108,17 +104,17 @@ class Study:
         What the output folder's copy says beside it.
     """
 
-    scenes: tuple[str, ...]
+    scenes: Annotated[tuple[str, ...], wanted('write files, as ["*.blend"]', names=True, min_length=1)]
     design: Design
-    vary: Mapping[str, Any] = field(default_factory=dict)
-    press: Mapping[str, Any] | None = None
-    fps: float | None = None
-    run_limit: float | None = None
-    run_memory: float | None = None
-    name: str = ""
-    images: bool = False
+    vary: Annotated[Mapping[str, Any], wanted("write it as a table, [vary]")] = field(default_factory=dict)
+    press: Annotated[Mapping[str, Any] | None, wanted("write it as a table, [press]")] = None
+    fps: Positive | None = None
+    run_limit: Positive | None = None
+    run_memory: Positive | None = None
+    name: Name = ""
+    images: Switch = False
     is_job: bool = False
-    frozen: Mapping[str, Any] = field(default_factory=dict)
+    frozen: Annotated[Mapping[str, Any], wanted("write it as a table, [frozen]")] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -194,77 +190,22 @@ def study_of(table: Mapping[str, Any], name: str) -> Study:
     """Return the study that the tables of a file say; raise what :func:`read_study` raises."""
     if table.get("format") != FORMAT:
         raise FileError(f"The format of '{name}' is {table.get('format')!r:.60}: a study begins with format = \"{FORMAT}\".")
-    _known(table, _WORDS, f"'{name}'")
-    scenes = _scenes(table, name)
-    for word in ("vary", "press", FROZEN):
-        if not isinstance(table.get(word, {}), Mapping):
-            raise FileError(f"{word} of '{name}' is {table[word]!r:.60}: write it as a table, [{word}].")
-    return Study(
-        scenes=tuple(scenes),
-        design=_design(table, name),
-        vary=dict(_flattened(table.get("vary", {}))),
-        press=table.get("press"),
-        fps=_positive(table, "fps", name),
-        run_limit=_positive(table, "run_limit", name),
-        run_memory=_positive(table, "run_memory", name),
-        name=checked_name(table["name"], f"name of '{name}'") if "name" in table else "",
-        images=_switch(table, "images", name),
-        is_job=JOB in table,
-        frozen=table.get(FROZEN, {}),
-    )
-
-
-def _scenes(table: Mapping[str, Any], name: str) -> list[str]:
-    """Return the files of scenes that a study names, or the file of its job."""
+    design = read_words(table, Design, f"'{name}'", A_STUDY, besides=table)
     given = [word for word in ("scene", "scenes", JOB) if word in table]
-    scenes = table[given[0]] if given == ["scenes"] else [table[word] for word in given]
-    if len(given) != 1 or not isinstance(scenes, list) or not scenes:
+    if len(given) != 1:
         raise FileError(f'\'{name}\' needs scene = "file.blend" or scenes = ["*.blend"] or job = "file.py", one of them.')
-    for scene in scenes:
-        checked_name(scene, f"the {given[0]} of '{name}'")
-    for word in _OF_SCENES if given == [JOB] else ():
+    words = {**table, "scenes": table[given[0]] if given == ["scenes"] else [table[given[0]]]}
+    others = ("format", "scene", JOB, "design", "samples", "seed")
+    study = read_words(words, Study, f"'{name}'", A_STUDY, others, design=design, is_job=JOB in table)
+    for word in _OF_SCENES if study.is_job else ():
         if word in table:
             raise FileError(f"{word} of '{name}' means nothing beside a job: leave it out.")
-    return scenes
-
-
-def _known(table: Mapping[str, Any], words: Iterable[str], where: str) -> None:
-    """Raise FileError for a word that is not known, with the known word that is most like it."""
-    for word in table:
-        if word not in words:
-            near = difflib.get_close_matches(word, list(words), n=1)
-            advice = f"did you mean '{near[0]}'?" if near else f"it knows {', '.join(words)}."
-            raise FileError(f"'{word:.60}' in {where} is not a word of a study: {advice}")
-
-
-def _positive(table: Mapping[str, Any], word: str, name: str) -> float | None:
-    value = table.get(word)
-    if value is not None and not (is_number(value) and value > 0):
-        raise FileError(f"{word} of '{name}' is {value!r:.60}: give a number above zero.")
-    return None if value is None else float(value)
-
-
-def _switch(table: Mapping[str, Any], word: str, name: str) -> bool:
-    value = table.get(word, False)
-    if not isinstance(value, bool):
-        raise FileError(f"{word} of '{name}' is {value!r:.60}: write true or false.")
-    return value
-
-
-def _design(table: Mapping[str, Any], name: str) -> Design:
-    kind, samples, seed = table.get("design"), table.get("samples", 0), table.get("seed", 0)
-    if kind not in DESIGNS:
-        near = difflib.get_close_matches(str(kind), DESIGNS, n=1)
-        advice = f"did you mean '{near[0]}'?" if near else f"choose one of {', '.join(DESIGNS)}."
-        raise FileError(f"design of '{name}' is {kind!r:.60}: {advice}")
-    if kind == GRID and "samples" in table:
+    if design.kind == GRID and "samples" in table:
         raise FileError(f"'{name}' has a grid and samples: a grid takes all combinations, so leave samples out, or use random.")
-    if kind != GRID and not (isinstance(samples, int) and not isinstance(samples, bool) and samples > 0):
-        raise FileError(f"samples of '{name}' is {samples!r:.60}: give a whole number of runs, above zero.")
-    if not isinstance(seed, int) or isinstance(seed, bool) or not 0 <= seed < 2**63:
-        raise FileError(f"seed of '{name}' is {seed!r:.60}: give a whole number of zero or more.")
-    check_count(samples)
-    return Design(str(kind), samples, seed)
+    if design.kind != GRID and not design.samples:
+        raise FileError(f"'{name}' has no samples: give a whole number of runs, above zero.")
+    check_count(design.samples)
+    return replace(study, vary=dict(_flattened(study.vary)))
 
 
 def _flattened(table: Mapping[str, Any], start: str = "") -> Iterable[tuple[str, Any]]:
@@ -383,17 +324,21 @@ def _check_varies(study: Study, varied: Mapping[str, Distribution]) -> None:
         raise ParameterError("The study varies nothing: give [vary] or [press] at least one distribution.")
 
 
+@dataclass(frozen=True)
+class _TieWords:
+    same: Name
+    factor: Annotated[float, wanted("give a number, or leave it out", ge=-LARGEST, le=LARGEST)] | None = None
+
+
 def _tie(found: Variable, entry: Mapping[str, Any], entries: Mapping[str, Any]) -> tuple[str, float | None]:
     """Return the name that a number follows, and the factor."""
-    _known(entry, (SAME, FACTOR), found.name)
-    other, factor = entry[SAME], entry.get(FACTOR)
-    if other not in entries or isinstance(entries[other], Mapping) and SAME in entries[other]:
-        near = difflib.get_close_matches(str(other), list(entries), n=1)
-        advice = f"did you mean '{near[0]}'?" if near else "give that a distribution or a value of its own."
-        raise ParameterError(f"{found.name} follows '{other!s:.60}', which the study does not vary: {advice}")
-    if factor is not None and not (is_number(factor) and isinstance(found.specification, Parameter)):
-        raise ParameterError(f"factor of {found.name} is {factor!r:.60}: give a number, or leave it out.")
-    return other, None if factor is None else float(factor)
+    words = read_words(entry, _TieWords, found.name, A_STUDY)
+    if words.same not in entries or isinstance(entries[words.same], Mapping) and SAME in entries[words.same]:
+        advice = did_you_mean(words.same, entries, "give that a distribution or a value of its own.")
+        raise ParameterError(f"{found.name} follows '{words.same:.60}', which the study does not vary: {advice}")
+    if words.factor is not None and not isinstance(found.specification, Parameter):
+        raise ParameterError(f"factor of {found.name} is {words.factor:g}, and this is no number: leave it out.")
+    return words.same, words.factor
 
 
 def _times(value: Any, factor: float | None) -> Any:
@@ -419,7 +364,7 @@ def at_rate(scenario: Scenario, fps: float | None) -> Scenario:
 def _press(study: Study, scenario: Scenario) -> Press:
     """Return the press of a study with default numbers; sensor and target may go unnamed where there is only one."""
     table = study.press or {}
-    _known(table, ("sensor", "target", *PRESS_PARAMETERS), "[press]")
+    known_words(table, ("sensor", "target", *PRESS_PARAMETERS), "[press]", A_STUDY)
     readable = [sensor.name for sensor in scenario.sensors if sensor.readout]
     carriers = {sensor.body for sensor in scenario.sensors}
     pressing = [target.name for target in scenario.targets if target.sensor is None and target.body not in carriers]
@@ -447,38 +392,44 @@ def _press_entries(study: Study) -> dict[str, Any]:
     return entries
 
 
+_Pair = Annotated[list[Number], wanted("give two numbers", min_length=2, max_length=2)]
+
+
+@dataclass(frozen=True)
+class _DistributionWords:
+    uniform: _Pair | None = None
+    log_uniform: _Pair | None = field(default=None, metadata={WORD: "log-uniform"})
+    normal: _Pair | None = None
+    choice: Annotated[list[Any], wanted("give a list of values", min_length=1)] | None = None
+    levels: Annotated[int, wanted(f"give a whole number from 1 to {LARGEST_LEVELS}", ge=1, le=LARGEST_LEVELS)] = DEFAULT_LEVELS
+
+
 def _distribution(found: Variable, entry: Mapping[str, Any]) -> Distribution:
     """Return the distribution that a table says, checked against the bounds of its variable."""
-    _known(entry, (*DISTRIBUTIONS, "levels"), found.name)
-    kinds = [word for word in entry if word in DISTRIBUTIONS]
-    if len(kinds) != 1:
-        raise ParameterError(f"{found.name} has {len(kinds)} distributions: give one of {', '.join(DISTRIBUTIONS)}.")
-    (kind,), words, levels = kinds, entry[kinds[0]], entry.get("levels", DEFAULT_LEVELS)
-    if not isinstance(levels, int) or isinstance(levels, bool) or not 1 <= levels <= LARGEST_LEVELS:
-        raise ParameterError(f"levels of {found.name} is {levels!r:.60}: give a whole number from 1 to {LARGEST_LEVELS}.")
+    words = read_words(entry, _DistributionWords, found.name, A_STUDY)
+    given = {kind: getattr(words, kind.replace("-", "_")) for kind in DISTRIBUTIONS if kind in entry}
+    if len(given) != 1:
+        raise ParameterError(f"{found.name} has {len(given)} distributions: give one of {', '.join(DISTRIBUTIONS)}.")
+    ((kind, numbers),) = given.items()
     if kind == CHOICE:
-        if not isinstance(words, list) or not words:
-            raise ParameterError(f"choice of {found.name} is {words!r:.60}: give a list of values.")
-        return Distribution(CHOICE, tuple(found.read(word) for word in words))
+        return Distribution(CHOICE, tuple(found.read(word) for word in numbers))
     if not isinstance(found.specification, Parameter):
         raise ParameterError(f"{found.name} is no number that can be {kind}: use choice.")
     if isinstance(found.specification, WholeNumber):
         raise ParameterError(f"{found.name} is a whole number, which cannot be {kind}: use choice.")
-    if not isinstance(words, list) or len(words) != 2 or not all(is_number(word) for word in words):
-        raise ParameterError(f"{kind} of {found.name} is {words!r:.60}: give two numbers.")
-    first, second = float(words[0]), float(words[1])
+    first, second = numbers
     low, high = found.bounds
     if found.specification.above_low:
         low = float(np.nextafter(low, math.inf))
     if kind == NORMAL:
         if not second > 0.0:
             raise ParameterError(f"normal of {found.name} has the deviation {second:g}: give mean and deviation, above zero.")
-        return Distribution(NORMAL, (found.read(first), second), levels, low, high)
+        return Distribution(NORMAL, (found.read(first), second), words.levels, low, high)
     if not first < second:
         raise ParameterError(f"{kind} of {found.name} runs from {first:g} to {second:g}: give the lower number first.")
     if kind == LOG_UNIFORM and not first > 0.0:
         raise ParameterError(f"log-uniform of {found.name} begins at {first:g}: give numbers above zero, or use uniform.")
-    return Distribution(kind, (found.read(first), found.read(second)), levels, low, high)
+    return Distribution(kind, (found.read(first), found.read(second)), words.levels, low, high)
 
 
 def runs_of(study: Study, plans: Mapping[str, Plan], digests: Mapping[str, str]) -> list[Run]:

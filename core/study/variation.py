@@ -21,7 +21,6 @@ Bounds and units come from the specifications that panels and files use.
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from math import inf
@@ -31,7 +30,7 @@ import numpy as np
 
 from ..effects.engine.registry import effect, form_of, kind_of, library
 from ..effects.engine.sensor_effects import check_scenario
-from ..errors import PalpateError, ParameterError
+from ..errors import PalpateError, ParameterError, did_you_mean
 from ..geometry.mesh import TriangleMesh, mass_properties
 from ..geometry.rotations import quaternion_product, quaternions_from_vectors, rotation_matrices
 from ..model.body import Body
@@ -159,8 +158,7 @@ def variable(name: str, known: Mapping[str, Variable], scenario: Scenario) -> Va
     for sensor in sorted(scenario.sensors, key=lambda sensor: -len(sensor.name)):
         if name.startswith(f"{sensor.name}.effect."):
             return _effect_variable(name, sensor)
-    near = difflib.get_close_matches(name, list(known), n=1, cutoff=0.5)
-    advice = f"did you mean '{near[0]}'?" if near else "--list shows the names of this scene."
+    advice = did_you_mean(name, known, "--list shows the names of this scene.", 0.5)
     raise ParameterError(f"There is no '{name}' to vary in '{scenario.name}': {advice}")
 
 
@@ -176,8 +174,7 @@ def _effect_variable(name: str, sensor: Sensor) -> Variable:
         return Variable(name, sensor.name, words, Parameter("seed", "1", 0.0, 0.0, 2**31 - 1, "Seed of random numbers"))
     known = {p.name: p.scaled(sensor.parameters.gain) for form in kind.forms for p in form.parameters}
     if len(words) > 3 or words[2] not in known:
-        near = difflib.get_close_matches(words[2], list(known), n=1)
-        advice = f"did you mean '{near[0]}'?" if near else f"it has {', '.join(known)}."
+        advice = did_you_mean(words[2], known, f"it has {', '.join(known)}.")
         raise ParameterError(f"There is no parameter '{'.'.join(words[2:])}' of effect '{kind.name}' in '{name}': {advice}")
     return Variable(name, sensor.name, words, known[words[2]])
 

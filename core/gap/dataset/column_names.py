@@ -12,7 +12,7 @@ import numpy as np
 
 from ...errors import FileError
 from ...io.csv_table import UNITS
-from ...io.sensor_toml import known_words
+from ...io.schema import known_words
 from ...io.toml_file import checked_name, is_number
 
 QUANTITIES = {
@@ -64,7 +64,7 @@ def read_column_rules(table: Mapping[str, Any], path: Path) -> dict[str, ColumnR
     FileError
         A word, a name, a unit or a factor is not valid.
     """
-    known_words(table, set(QUANTITIES), f"[columns] of '{path.name}'")
+    known_words(table, QUANTITIES, f"[columns] of '{path.name}'")
     rules = {}
     for column, words in table.items():
         where = f"{column} in [columns] of '{path.name}'"
@@ -78,8 +78,9 @@ def read_column_rules(table: Mapping[str, Any], path: Path) -> dict[str, ColumnR
         first = words.get("first", 0)
         if not isinstance(first, int) or isinstance(first, bool) or not 0 <= first <= 1_000_000:
             raise FileError(f"first of {where} is {first!r:.60}: write the number of the first texel, 0 or 1.")
+        scale = _scale(words, QUANTITIES[column], where)
         shift = ZEROS.get(words.get("unit", ""), 0.0) if QUANTITIES[column] == "°C" else 0.0
-        rules[column] = ColumnRule(source, *_scale(words, QUANTITIES[column], where), first, shift)
+        rules[column] = ColumnRule(source, *scale, first, shift)
     return rules
 
 
@@ -95,7 +96,7 @@ def _scale(words: Mapping[str, Any], quantity: str, where: str) -> tuple[float, 
                 "in [sensor]."
             )
         return float(factor), unit == INVERSE
-    if unit not in UNITS[quantity]:
+    if not isinstance(unit, str) or unit not in UNITS[quantity]:
         raise FileError(f"unit of {where} is {unit!r:.60}: write one of {', '.join(UNITS[quantity])}.")
     return float(factor) * UNITS[quantity][unit], False
 

@@ -16,7 +16,8 @@ import numpy as np
 from ...errors import FileError
 from ...geometry.layout.texture_maps import UVLayout
 from ...geometry.texels import Texels
-from ...io.sensor_toml import checked_lengths, known_words
+from ...io.schema import known_words
+from ...io.sensor_toml import checked_lengths
 from ...io.toml_file import is_number
 
 COVER_WORDS = {"sensors", "strips", "cover"}

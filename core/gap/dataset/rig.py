@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
 
@@ -18,16 +18,17 @@ from ...geometry.mesh import TriangleMesh, checked_mesh
 from ...geometry.texels import Texels, texels_from_region
 from ...io.csv_table import read_table
 from ...io.regular_file import require_regular
-from ...io.sensor_toml import SHAPE_WORDS, checked_grid, checked_lengths, known_words, stated_parameters
+from ...io.schema import Name, known_words, read_words, wanted
+from ...io.sensor_toml import SHAPE_WORDS, checked_grid, checked_lengths, stated_parameters
 from ...io.toml_file import LONGEST_NAME, checked_name, read_toml
 from ...model.sensor_parameters import DAMPING_PER_STIFFNESS, DEPTH_PER_THICKNESS, SENSOR_PARAMETERS, SensorParameters
 from .column_names import ColumnRule, read_column_rules, translated
 from .cover import COVER_WORDS, Cover, read_cover
 from .fault_kinds import FAULT_KINDS
-from .own_numbers import force_zero_of, own_numbers, with_contact_heights
-from .second_logger import SecondLogger, joined, second_logger_of
-from .sessions import CLOCKS, TrialHistory, on_common_clocks, read_history
+from .second_logger import SecondLogger, joined
+from .sessions import TrialHistory, on_common_clocks, read_history
 from .trial import Trial
+from .trial_words import FREE, SHARED_HEIGHT, SensorHeight, TrialWords, check_free_heights
 
 FORMAT = "palpate-rig/1"
 LOWEST_TEMPERATURE, HIGHEST_TEMPERATURE = -273.15, 2000.0
@@ -36,13 +37,6 @@ POSE, TURN, SLIDE = ("x", "y", "z"), ("qw", "qx", "qy", "qz"), ("slide_x", "slid
 FORCE = ("force_x", "force_y", "force_z")
 SMALLEST_RESPONSE = 1e-30
 """Responses of a smaller magnitude, in any unit, count as zero."""
-TRIAL_WORDS = {
-    *("file", "use", "name", "session", "started", "tared", "specimen", "factor", "zero", "force_zero"),
-    *("contact_height", "probe", "repeats", "readings"),
-}
-"""Words of a [[trial]]."""
-RIG_WORDS = {"format", "name", "clock", "columns", "data", "sensor", "indenter", "probe", "trial"}
-"""Words of a rig."""
 RIG_SENSOR_WORDS = {"name", "contact_height", *COVER_WORDS}
 """Words of a [sensor] that belong to the measurement and not to the sensor."""
 LONGEST_STEP = 5.0
@@ -68,6 +62,31 @@ class Indenter:
     radius: float | None = None
     name: str = "indenter"
     edges: tuple[float, ...] | None = None
+
+
+_Table = Annotated[dict[str, Any], wanted("describe it there")]
+
+
+@dataclass(frozen=True)
+class RigWords:
+    """The words of a rig's file, whose tables are read one by one.
+
+    Attributes
+    ----------
+    clock : "absolute", "own" or None
+        Whether one clock went on through all recordings, or each has its own.
+    """
+
+    sensor: _Table
+    trial: Annotated[list[dict[str, Any]], wanted("name at least one CSV file", min_length=1)]
+    name: Name = ""
+    clock: Literal["absolute", "own"] | None = None
+    columns: _Table | None = None
+    data: _Table = field(default_factory=dict)
+    indenter: _Table | None = None
+    probe: Annotated[list[dict[str, Any]], wanted("write [[probe]], with a name and a shape, for each")] = field(
+        default_factory=list
+    )
 
 
 @dataclass(frozen=True)
@@ -142,34 +161,34 @@ def read_rig(path: str | Path) -> Rig:
     words = read_toml(path, "rig")
     if words.get("format") != FORMAT:
         raise FileError(f"'{path.name}' is not a rig: its first line must be format = \"{FORMAT}\".")
-    known_words(words, RIG_WORDS, f"'{path.name}'")
-    clock = words.get("clock")
-    if clock is not None and clock not in CLOCKS:
-        raise FileError(f'clock of \'{path.name}\' is {clock!r:.60}: write "absolute" or "own".')
-    correct = _faults_to_correct(words, path)
-    rig_name = checked_name(words.get("name", path.stem), f"'{path.name}'")
-    folder = path.resolve().parent
-    sensor = _table(words, "sensor", path)
+    found = read_words(words, RigWords, f"'{path.name}'", besides=("format",))
+    folder, sensor = path.resolve().parent, found.sensor
     texels, grid, cover = _texels(sensor, folder, path)
     parameters, thickness = _parameters(sensor, path)
-    indenter = _indenter(_table(words, "indenter", path), folder, path) if "indenter" in words else None
-    probes = _probes(words.get("probe", []), folder, path)
-    rules = read_column_rules(_table(words, "columns", path), path) if "columns" in words else {}
-    reader = _TrialReader(path, folder, len(texels), indenter is not None, rules, frozenset(probes))
-    trials, warnings = _read_trials(words.get("trial"), reader, clock, sensor, path)
-    warnings += _channel_warnings(trials)
+    probes = _probes(found.probe, folder, path)
+    height = read_words(sensor, SensorHeight, f"[sensor] of '{path.name}'", besides=sensor).contact_height
+    reader = _TrialReader(
+        path=path,
+        folder=folder,
+        texels=len(texels),
+        has_indenter=found.indenter is not None,
+        rules=read_column_rules(found.columns or {}, path),
+        probes=frozenset(probes),
+        height=SHARED_HEIGHT if height == FREE else height,
+    )
+    trials, warnings = _read_trials(found, reader)
     rig = Rig(
-        name=rig_name,
+        name=found.name or checked_name(path.stem, f"'{path.name}'"),
         texels=texels,
         parameters=parameters,
         given=frozenset(set(sensor) & set(SENSOR_PARAMETERS)),
         thickness=thickness,
         grid=grid,
-        indenter=indenter,
+        indenter=None if found.indenter is None else _indenter(found.indenter, folder, path),
         trials=tuple(trials),
         words=sensor,
-        warnings=tuple(warnings),
-        correct=correct,
+        warnings=(*warnings, *_channel_warnings(trials)),
+        correct=_faults_to_correct(found.data, path),
         cover=cover,
         probes=probes,
     )
@@ -181,9 +200,7 @@ def read_rig(path: str | Path) -> Rig:
     return rig
 
 
-def _read_trials(
-    entries: Any, reader: _TrialReader, clock: str | None, sensor: Mapping[str, Any], path: Path
-) -> tuple[list[Trial], list[str]]:
+def _read_trials(words: RigWords, reader: _TrialReader) -> tuple[list[Trial], list[str]]:
     """Read the recordings that the [[trial]] tables name, and put those of one session on one clock.
 
     Returns
@@ -191,16 +208,15 @@ def _read_trials(
     trials : list of Trial
     warnings : list of str
     """
-    if not isinstance(entries, list) or not entries:
-        raise FileError(f"'{path.name}' has no [[trial]]: name at least one CSV file.")
+    path = reader.path
     trials, histories, warnings = [], [], []
-    for number, entry in enumerate(entries, start=1):
+    for number, entry in enumerate(words.trial, start=1):
         trial, history, said = reader.read(entry, number)
         trials.append(trial)
         histories.append(history)
         warnings += said
-    trials = with_contact_heights(trials, entries, sensor, path)
-    trials, said = on_common_clocks(trials, histories, clock, path)
+    check_free_heights(trials, path)
+    trials, said = on_common_clocks(trials, histories, words.clock, path)
     trials = [_on_own_clock(trial) for trial in trials]
     names = [trial.name for trial in trials]
     for name in names:
@@ -217,12 +233,9 @@ def _read_trials(
     return trials, [*warnings, *said]
 
 
-def _faults_to_correct(words: Mapping[str, Any], path: Path) -> tuple[str, ...]:
+def _faults_to_correct(table: Mapping[str, Any], path: Path) -> tuple[str, ...]:
     """Kinds of faults of the data that the rig's [data] wants to be put right."""
-    if "data" not in words:
-        return ()
-    table = _table(words, "data", path)
-    known_words(table, {"correct"}, f"[data] of '{path.name}'")
+    known_words(table, ("correct",), f"[data] of '{path.name}'")
     wanted = table.get("correct", [])
     if wanted == "all":
         return tuple(FAULT_KINDS)
@@ -231,14 +244,6 @@ def _faults_to_correct(words: Mapping[str, Any], path: Path) -> tuple[str, ...]:
             f"correct of [data] in '{path.name}' is {wanted!r:.80}: write \"all\", or a list of {', '.join(FAULT_KINDS)}."
         )
     return tuple(wanted)
-
-
-def _table(words: Mapping[str, Any], key: str, path: Path) -> dict[str, Any]:
-    """A table of the file that must be there."""
-    table = words.get(key)
-    if not isinstance(table, dict):
-        raise FileError(f"'{path.name}' has no [{key}]: describe it there.")
-    return table
 
 
 def _inside(name: Any, folder: Path, what: str, path: Path) -> Path:
@@ -350,10 +355,8 @@ def _parameters(sensor: dict[str, Any], path: Path) -> tuple[SensorParameters, f
 # --- the indenter
 
 
-def _probes(entries: Any, folder: Path, path: Path) -> dict[str, Indenter]:
+def _probes(entries: list[dict[str, Any]], folder: Path, path: Path) -> dict[str, Indenter]:
     """The probes that recordings may name."""
-    if not isinstance(entries, list) or not all(isinstance(entry, dict) for entry in entries):
-        raise FileError(f"probe of '{path.name}' is no list of tables: write [[probe]], with a name and a shape, for each.")
     found: dict[str, Indenter] = {}
     for number, entry in enumerate(entries, start=1):
         name = checked_name(entry.get("name", ""), f"[[probe]] {number} of '{path.name}'")
@@ -402,38 +405,38 @@ def _indenter(words: dict[str, Any], folder: Path, path: Path) -> Indenter:
 
 @dataclass(frozen=True)
 class _TrialReader:
-    """Reads the trials of one rig: its path and folder, its number of texels, and the rules for its columns."""
+    """Reads the trials of one rig: its path and folder, its number of texels, the rules for its columns, its contact height."""
 
     path: Path
     folder: Path
     texels: int
     has_indenter: bool
     rules: Mapping[str, ColumnRule]
-    probes: frozenset[str] = frozenset()
+    probes: frozenset[str]
+    height: str | float
 
     def read(self, entry: Any, number: int) -> tuple[Trial, TrialHistory, list[str]]:
         """Return a trial from its entry in the rig and its CSV file, its place in time, and remarks about it."""
         where = f"Trial {number}"
-        if not isinstance(entry, dict):
-            raise FileError(f"{where} of '{self.path.name}' is not a table: write [[trial]] above its file.")
         where_in_rig = f"{where} of '{self.path.name}'"
-        known_words(entry, TRIAL_WORDS, where_in_rig)
-        history, tared, use = read_history(entry, where_in_rig), entry.get("tared", False), entry.get("use", "fit")
-        if not isinstance(tared, bool):
-            raise FileError(f"tared of {where_in_rig} is {tared!r:.60}: write true or false.")
-        if use not in ("fit", "check"):
-            raise FileError(f'{where_in_rig} has use = {use!r}: write "fit" or "check".')
-        own, force_zero = own_numbers(entry, where_in_rig), force_zero_of(entry, where_in_rig)
-        file = _inside(entry.get("file"), self.folder, f"{where}'s file", self.path)
-        probe = entry.get("probe", "")
-        if "probe" in entry and probe not in self.probes:
+        words = read_words(entry, TrialWords, where_in_rig)
+        history, own = read_history(words.session, words.started, where_in_rig), words.own_numbers(where_in_rig)
+        file = _inside(words.file, self.folder, f"{where}'s file", self.path)
+        if words.probe is not None and words.probe not in list(self.probes):
             known = ", ".join(sorted(self.probes)) or "none"
-            raise FileError(f"probe of {where_in_rig} is {probe!r:.60}: write the name of a [[probe]] of the rig ({known}).")
-        columns = self._columns(file, second_logger_of(entry, where_in_rig), where)
-        trial, said = self._recorded(columns, file, use, self.has_indenter or bool(probe))
-        repeats = checked_name(entry["repeats"], f"repeats of {where_in_rig}") if "repeats" in entry else ""
-        trial = replace(trial, probe=probe, repeats=repeats)
-        return replace(trial, tared=tared, factor=own["factor"], zero=own["zero"], force_zero=force_zero), history, said
+            raise FileError(
+                f"probe of {where_in_rig} is {words.probe!r:.60}: write the name of a [[probe]] of the rig ({known})."
+            )
+        second = None
+        if words.readings is not None:
+            second = read_words(words.readings, SecondLogger, f"the readings of {where_in_rig}")
+        columns = self._columns(file, second, where)
+        trial, said = self._recorded(columns, file, words.use, self.has_indenter or bool(words.probe))
+        if own["contact_height"] is None:
+            own["contact_height"] = self.height
+        if trial.stimulus == "force":
+            own["contact_height"] = 0.0  # what presses is known, wherever contact begins
+        return replace(trial, probe=words.probe or "", repeats=words.repeats, tared=words.tared, **own), history, said
 
     def _columns(self, file: Path, second: SecondLogger | None, where: str) -> dict[str, np.ndarray]:
         """The columns of a trial, from its CSV file or from those of two loggers."""

@@ -16,13 +16,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
 from ...errors import FileError
-from ...io.sensor_toml import known_words
-from ...io.toml_file import is_number
+from ...io.schema import wanted
 
 TURN = {"qw", "qx", "qy", "qz"}
 LARGEST_SHIFT = 1e10
@@ -39,31 +38,13 @@ class SecondLogger:
         As the rig writes it; it is checked where it is opened.
     late : float, s
         The second clock's time of an event minus the first one's.
+    uncertainty : float, s
+        Of `late`.
     """
 
-    file: Any
-    late: float
-
-
-def second_logger_of(entry: Mapping[str, Any], where: str) -> SecondLogger | None:
-    """Return the second logger of a [[trial]], None if it has one file.
-
-    Raises
-    ------
-    FileError
-        A word or a value of it is not valid.
-    """
-    words = entry.get("readings")
-    if words is None:
-        return None
-    if not isinstance(words, dict):
-        raise FileError(f'readings of {where} is {words!r:.60}: write {{ file = "readings.csv", late = 0.0 }}.')
-    known_words(words, {"file", "late", "uncertainty"}, f"readings of {where}")
-    for word in ("late", "uncertainty"):
-        value = words.get(word, 0.0)
-        if not is_number(value) or abs(value) > LARGEST_SHIFT or (word == "uncertainty" and value < 0):
-            raise FileError(f"{word} of the readings of {where} is {value!r:.60}: write seconds.")
-    return SecondLogger(words.get("file"), float(words.get("late", 0.0)))
+    file: Any = None
+    late: Annotated[float, wanted("write seconds", ge=-LARGEST_SHIFT, le=LARGEST_SHIFT)] = 0.0
+    uncertainty: Annotated[float, wanted("write seconds", ge=0.0, le=LARGEST_SHIFT)] = 0.0
 
 
 def joined(

@@ -8,6 +8,7 @@ one clock went on through all recordings.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from datetime import datetime
 from pathlib import Path
@@ -16,11 +17,9 @@ from typing import Any
 import numpy as np
 
 from ...errors import FileError
-from ...io.toml_file import checked_name, is_number
+from ...io.toml_file import is_number
 from .trial import Trial
 
-CLOCKS = ("absolute", "own")
-"""What a rig may say of its time stamps: one clock went on through all recordings, or each recording has its own."""
 ONE_CLOCK = "one clock"
 """Name of the session of recordings whose time stamps go on."""
 COMMON = "all recordings"
@@ -50,33 +49,26 @@ class TrialHistory:
     has_date: bool | None = None
 
 
-def read_history(entry: dict[str, Any], where: str) -> TrialHistory:
+def read_history(session: str, started: Any, where: str) -> TrialHistory:
     """Return what the words `session` and `started` of a [[trial]] say; `where` names the trial in messages.
 
     Raises
     ------
     FileError
-        A word is not valid.
+        The start is no time, or there is one without a session.
     """
-    session: Any = entry.get("session", "")
-    started: Any = entry.get("started")
-    if "session" in entry:
-        session = checked_name(session, f"session of {where}")
     if started is None:
         return TrialHistory(session)
     if not session:
         raise FileError(f'{where} has started and no session: write session = "NAME" on all recordings that belong together.')
+    date = started
     if isinstance(started, str):
-        try:
-            started = datetime.fromisoformat(started.strip())
-        except ValueError:
-            started = None
-    if isinstance(started, datetime):
-        return TrialHistory(session, _seconds_of(started), True)
+        with suppress(ValueError):
+            date = datetime.fromisoformat(started.strip())
+    if isinstance(date, datetime):
+        return TrialHistory(session, _seconds_of(date), True)
     if not is_number(started) or abs(started) > LONGEST_TIME:
-        raise FileError(
-            f'started of {where} is {entry["started"]!r:.60}: write seconds, or a date and time as "2026-05-04T09:30:00".'
-        )
+        raise FileError(f'started of {where} is {started!r:.60}: write seconds, or a date and time as "2026-05-04T09:30:00".')
     return TrialHistory(session, float(started), False)
 
 

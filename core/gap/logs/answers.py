@@ -11,21 +11,25 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal
 
 from ...errors import FileError
-from ...io.sensor_toml import known_words
-from ...io.toml_file import checked_name, is_number, read_toml
+from ...io.schema import WORD, Name, Number, Positive, Seconds, known_words, read_words, wanted
+from ...io.toml_file import checked_name, read_toml
 from ..dataset.column_names import QUANTITIES
 from .column_meaning import LOG_UNITS, PRESSURES
 
 FORMAT = "palpate-log-answers/1"
 UNKNOWN = "?"
-USES = ("fit", "check", "leave out")
-REPEATED = ("refuse", "spread", "mean")
+Use = Literal["fit", "check", "leave out"]
+Repeated = Literal["refuse", "spread", "mean"]
 """What is done where time stamps repeat: they are evenly spread up to the next stamp, or their samples are averaged."""
 _COLUMN_WORDS = {"name", "unit", "factor", "zero"}
+_NAME_WORDS = {"name", "names", "first", "count"}
 _OWN_WORDS = {"time": {"rate", "repeated"}, "force": {"area"}, "texel": {"names", "first", "count"}}
+
+
+_Files = Annotated[tuple[str, ...], wanted('write a list of names, as ["press_1.csv"]', names=True, min_length=1)]
 
 
 @dataclass(frozen=True)
@@ -46,7 +50,7 @@ class ColumnAnswer:
     rate : float, Hz
         Of a clock without a column; 0 if it has one.
     repeated : str
-        One of :data:`REPEATED`.
+        What is done where time stamps repeat.
     why : str
         Why this is proposed.
     sure : bool
@@ -54,11 +58,11 @@ class ColumnAnswer:
 
     names: tuple[str, ...]
     unit: str = ""
-    factor: float = 1.0
-    zero: float = 0.0
-    area: float = 0.0
-    rate: float = 0.0
-    repeated: str = "refuse"
+    factor: Number = 1.0
+    zero: Number = 0.0
+    area: Positive = 0.0
+    rate: Positive = 0.0
+    repeated: Repeated = "refuse"
     why: str = ""
     sure: bool = True
 
@@ -67,8 +71,8 @@ class ColumnAnswer:
 class LoggerAnswer:
     """One kind of files: `files` are their names, `columns` where each quantity comes from."""
 
-    files: tuple[str, ...]
-    columns: dict[str, ColumnAnswer]
+    files: _Files
+    columns: Annotated[dict[str, Any], wanted("say in [logger.columns] what each column is")]
 
 
 @dataclass(frozen=True)
@@ -80,7 +84,6 @@ class RecordingAnswer:
     name : str
     files : tuple of str
     use : str
-        One of :data:`USES`.
     late, uncertainty : float or None, s
         How much later the clock of the second logger shows the same event. None: as the correlation says.
     why : str
@@ -89,15 +92,15 @@ class RecordingAnswer:
         What is used of the file that has what drove the sensor, counted from its first sample. None: all of it.
     """
 
-    name: str
-    files: tuple[str, ...]
-    use: str
-    late: float | None = None
-    uncertainty: float | None = None
+    name: Name
+    files: _Files
+    use: Use = "fit"
+    late: Seconds | None = None
+    uncertainty: Seconds | None = None
     why: str = ""
     sure: bool = True
-    begin: float | None = None
-    end: float | None = None
+    begin: Seconds | None = field(default=None, metadata={WORD: "from"})
+    end: Seconds | None = field(default=None, metadata={WORD: "to"})
 
 
 @dataclass(frozen=True)
@@ -267,48 +270,35 @@ def read_answers(path: str | Path) -> Answers:
     words = read_toml(path, "file of answers")
     if words.get("format") != FORMAT:
         raise FileError(f"'{path.name}' holds no answers about logs: its first line must be format = \"{FORMAT}\".")
-    known_words(words, {"format", "name", "sensor", "indenter", "logger", "recording"}, f"'{path.name}'")
-    for where in ("sensor", "indenter"):
-        table = words.get(where, {})
-        if not isinstance(table, dict):
-            raise FileError(f"{where} of '{path.name}' is no table: write [{where}].")
+    found = read_words(words, _Answers, f"'{path.name}'", besides=("format",))
+    for where, table in (("sensor", found.sensor), ("indenter", found.indenter)):
         for word, value in table.items():
             if has_unknown(value):
                 raise FileError(f"{word} of [{where}] in '{path.name}' is still \"?\": fill it in.")
-    return Answers(
-        name=checked_name(words.get("name", path.stem), f"'{path.name}'"),
-        sensor=dict(words.get("sensor", {})),
-        indenter=dict(words.get("indenter", {})),
-        loggers=tuple(_logger(entry, number, path) for number, entry in enumerate(_list(words, "logger", path), start=1)),
-        recordings=tuple(
-            _recording(entry, number, path) for number, entry in enumerate(_list(words, "recording", path), start=1)
-        ),
-    )
+    loggers = (_logger(entry, f"[[logger]] {i} of '{path.name}'") for i, entry in enumerate(found.logger, start=1))
+    recordings = (_recording(entry, f"[[recording]] {i} of '{path.name}'") for i, entry in enumerate(found.recording, start=1))
+    name = found.name or checked_name(path.stem, f"'{path.name}'")
+    return Answers(name, found.sensor, found.indenter, tuple(loggers), tuple(recordings))
 
 
-def _list(words: Mapping[str, Any], key: str, path: Path) -> list[dict[str, Any]]:
-    found = words.get(key)
-    if not isinstance(found, list) or not found or not all(isinstance(one, dict) for one in found):
-        raise FileError(f"'{path.name}' has no [[{key}]]: let `palpate rig new` write a template, and complete it.")
-    return found
+_Tables = Annotated[
+    list[dict[str, Any]], wanted("let `palpate rig new` write a template with [[logger]] and [[recording]]", min_length=1)
+]
 
 
-def _names(value: Any, where: str) -> tuple[str, ...]:
-    if not isinstance(value, list) or not value:
-        raise FileError(f'files of {where} is {value!r:.60}: write a list of names, as ["press_1.csv"].')
-    return tuple(checked_name(one, f"files of {where}") for one in value)
+@dataclass
+class _Answers:
+    logger: _Tables
+    recording: _Tables
+    name: Name = ""
+    sensor: Annotated[dict[str, Any], wanted("write [sensor]")] = field(default_factory=dict)
+    indenter: Annotated[dict[str, Any], wanted("write [indenter]")] = field(default_factory=dict)
 
 
-def _logger(entry: dict[str, Any], number: int, path: Path) -> LoggerAnswer:
-    where = f"[[logger]] {number} of '{path.name}'"
-    known_words(entry, {"files", "columns"}, where)
-    columns = entry.get("columns")
-    if not isinstance(columns, dict):
-        raise FileError(f"{where} has no [logger.columns]: say there what each column is.")
-    known_words(columns, set(QUANTITIES), where)
-    return LoggerAnswer(
-        _names(entry.get("files"), where), {name: _column(name, one, f"{name} in {where}") for name, one in columns.items()}
-    )
+def _logger(entry: dict[str, Any], where: str) -> LoggerAnswer:
+    found = read_words(entry, LoggerAnswer, where)
+    known_words(found.columns, QUANTITIES, where)
+    return replace(found, columns={name: _column(name, one, f"{name} in {where}") for name, one in found.columns.items()})
 
 
 def _column(quantity: str, words: Any, where: str) -> ColumnAnswer:
@@ -318,72 +308,49 @@ def _column(quantity: str, words: Any, where: str) -> ColumnAnswer:
     if has_unknown(words):
         raise FileError(f'{where} is still "?": fill it in, or remove the line if nothing was recorded.')
     known_words(words, _COLUMN_WORDS | _OWN_WORDS.get(quantity, set()), where)
-    for word in ("factor", "zero", "area", "rate"):
-        value = words.get(word, 1.0)
-        if not is_number(value) or (word != "zero" and value == 0) or (word in ("area", "rate") and value < 0):
-            raise FileError(
-                f"{word} of {where} is {value!r:.60}: write a number{'' if word == 'zero' else ' other than zero'}."
-            )
-    unit = words.get("unit", QUANTITIES[quantity])
-    units = LOG_UNITS.get(QUANTITIES[quantity], {})
-    may_be_pressure = quantity == "force" and "area" in words
-    known = isinstance(unit, str) and (not units or unit in units or (may_be_pressure and unit in PRESSURES))
-    if not known:
-        hint = " (a pressure needs area = …, in m²)" if isinstance(unit, str) and unit in PRESSURES else ""
+    unit, units = words.get("unit", QUANTITIES[quantity]), LOG_UNITS.get(QUANTITIES[quantity], {})
+    given = {word: words[word] for word in words if word not in _NAME_WORDS}
+    found = read_words(given, ColumnAnswer, where, besides=("unit",), names=(), unit=unit, why="the answers say so", sure=True)
+    if found.factor == 0.0:
+        raise FileError(f"factor of {where} is 0: write a number other than zero.")
+    is_pressure = isinstance(unit, str) and unit in PRESSURES
+    if not isinstance(unit, str) or (units and unit not in units and not (found.area and is_pressure)):
+        hint = " (a pressure needs area = …, in m²)" if is_pressure else ""
         choice = f"one of {', '.join(units)}{hint}" if units else "its name"
         raise FileError(f"unit of {where} is {unit!r:.60}: write {choice}.")
-    repeated = words.get("repeated", "refuse")
-    if repeated not in REPEATED:
-        raise FileError(f"repeated of {where} is {repeated!r:.60}: write one of {', '.join(REPEATED)}.")
-    return ColumnAnswer(
-        names=_column_names(quantity, words, where),
-        unit=str(unit),
-        factor=float(words.get("factor", 1.0)),
-        zero=float(words.get("zero", 0.0)),
-        area=float(words.get("area", 0.0)),
-        rate=float(words.get("rate", 0.0)),
-        repeated=repeated,
-        why="the answers say so",
-    )
+    return found if found.rate else replace(found, names=_column_names(quantity, words, where))
+
+
+@dataclass
+class _ColumnNames:
+    name: str | Annotated[tuple[str, ...], wanted("write a name, or a list of them", min_length=1)] | None = None
+    names: Annotated[tuple[str, ...], wanted('write a list of names, as ["R1", "R2"]', names=True, min_length=1)] = ()
+    first: Annotated[int, wanted("write a whole number", ge=0, le=65536)] = 0
+    count: Annotated[int, wanted("write a whole number above zero", ge=1, le=65536)] = 1
 
 
 def _column_names(quantity: str, words: Mapping[str, Any], where: str) -> tuple[str, ...]:
-    if quantity == "texel":
-        if "names" in words:
-            return _names(words["names"], where)
-        pattern, first, count = checked_name(words.get("name", ""), where), words.get("first", 0), words.get("count", 1)
-        if "{}" not in pattern:
-            return (pattern,)
-        if (
-            not all(isinstance(one, int) and not isinstance(one, bool) and 0 <= one <= 65536 for one in (first, count))
-            or not count
-        ):
-            raise FileError(f"first and count of {where} are {first!r:.20} and {count!r:.20}: write whole numbers.")
-        return tuple(pattern.replace("{}", str(first + i)) for i in range(count))
-    if quantity == "time" and "rate" in words:
-        return ()
-    name = words.get("name", quantity)
-    return _names(name, where) if isinstance(name, list) else (checked_name(name, where),)
+    found = read_words(words, _ColumnNames, where, besides=words)
+    name = ("" if quantity == "texel" else quantity) if found.name is None else found.name
+    if quantity == "texel" and isinstance(name, tuple):
+        raise FileError(f"name of {where} is {list(name)!r:.60}: write one name, or names = [...].")
+    names = found.names or (name if isinstance(name, tuple) else (name,))
+    for name in names:
+        checked_name(name, where)
+    if quantity == "texel" and not found.names and "{}" in names[0]:
+        return tuple(names[0].replace("{}", str(found.first + i)) for i in range(found.count))
+    return names
 
 
-def _recording(entry: dict[str, Any], number: int, path: Path) -> RecordingAnswer:
-    where = f"[[recording]] {number} of '{path.name}'"
-    known_words(entry, {"name", "files", "use", "late", "uncertainty", "from", "to"}, where)
-    files, use = _names(entry.get("files"), where), entry.get("use", "fit")
-    if use not in USES:
-        raise FileError(f"use of {where} is {use!r:.60}: write one of {', '.join(USES)}.")
-    if len(files) > 2:
-        raise FileError(f"{where} has {len(files)} files: give one, or one of each of two loggers.")
-    for word in ("late", "uncertainty", "from", "to"):
-        if word in entry and not is_number(entry[word]):
-            raise FileError(f"{word} of {where} is {entry[word]!r:.60}: write seconds.")
-    late = float(entry["late"]) if "late" in entry else None
-    name = checked_name(entry.get("name", Path(files[0]).stem), where)
-    begin, end = (float(entry[word]) if word in entry else None for word in ("from", "to"))
-    if begin is not None and end is not None and not begin < end:
-        raise FileError(f"{where} is used from {begin:g} s to {end:g} s: write a `to` that is later than `from`.")
-    uncertainty = float(entry.get("uncertainty", 0.0)) if late is not None else None
-    return RecordingAnswer(name, files, use, late, uncertainty, begin=begin, end=end)
+def _recording(entry: dict[str, Any], where: str) -> RecordingAnswer:
+    files = entry.get("files")
+    name = Path(files[0]).stem if isinstance(files, list) and files and isinstance(files[0], str) else "recording"
+    found = read_words({"name": name, **entry}, RecordingAnswer, where, why="", sure=True)
+    if len(found.files) > 2:
+        raise FileError(f"{where} has {len(found.files)} files: give one, or one of each of two loggers.")
+    if found.begin is not None and found.end is not None and not found.begin < found.end:
+        raise FileError(f"{where} is used from {found.begin:g} s to {found.end:g} s: write a `to` that is later than `from`.")
+    return replace(found, uncertainty=None if found.late is None else found.uncertainty or 0.0)
 
 
 def confirmed(answers: Answers) -> Answers:

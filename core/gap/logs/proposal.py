@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import FileError
-from .answers import UNKNOWN, Answers, ColumnAnswer, LoggerAnswer, RecordingAnswer
+from .answers import UNKNOWN, Answers, ColumnAnswer, LoggerAnswer, RecordingAnswer, Repeated, Use
 from .column_meaning import (
     READING_UNITS,
     Meaning,
@@ -109,7 +109,7 @@ def _column_names(log: LogFile) -> set[str]:
 
 def _recordings(groups: Sequence[Sequence[LogFile]]) -> tuple[RecordingAnswer, ...]:
     first = groups[0]
-    uses = [
+    uses: list[Use] = [
         "check" if len(first) > 1 and (i % CHECK_EVERY == CHECK_EVERY - 1 or len(first) == 2 and i == 1) else "fit"
         for i in range(len(first))
     ]
@@ -268,7 +268,7 @@ class _Columns:
             repeated=repeats,
         )
 
-    def _repeats(self, name: str) -> tuple[str, float]:
+    def _repeats(self, name: str) -> tuple[Repeated, float]:
         steps = np.concatenate([np.diff(self.values(name, log)) for log in self.logs])
         share = float((steps == 0).mean()) if len(steps) else 0.0
         return ("spread", share) if share > 0.02 else ("mean" if share else "refuse", 0.0)

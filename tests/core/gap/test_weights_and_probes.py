@@ -115,7 +115,7 @@ def test_each_recording_names_its_probe(tmp_path):
         ('probe = "ring"\n[[probe]]\nname = "block"\nshape = { sphere = 0.001 }\n', r"\(block\)"),
         ("[[probe]]\nshape = { sphere = 0.001 }\n", "name in"),
         ('[[probe]]\nname = "a"\nshape = { sphere = 0.001 }\n' * 2, "twice"),
-        ('[probe]\nname = "a"\n', "no list"),
+        ('[probe]\nname = "a"\n', r"has no \[\[probe"),
         ('[[probe]]\nname = "a"\n', "either a shape or a mesh"),
     ],
 )

@@ -30,6 +30,9 @@ def manifest(folder, owner):
         "digest": "d",
         "unit": "N",
         "shape": (1, 1),
+        "parameters": {},
+        "warnings": (),
+        "complete": True,
     }
     name = "" if owner.blend is None else owner.blend.name
     return Manifest("Pad", **about, scene_file=name, scene_id=owner.scene_id, scene_path=owner.scene_path(folder))
