@@ -29,8 +29,8 @@ class Root(Subpanel):
                 draw_sentences(layout, session_state.session.unreadable_settings[name], "ERROR", context)
         coming = first_use.progress()
         if coming is not None:
-            layout.progress(text="Preparing the solver", factor=coming.done / coming.total)
-            draw_sentences(layout, f"{coming.text}. Only the first use of this version has to wait.", "SORTTIME", context)
+            layout.progress(text="Compiling the solver", factor=coming.done / coming.total)
+            draw_sentences(layout, f"{coming.text}.", "SORTTIME", context)
         if settings.role == "NONE":
             column = layout.box().column()
             column.label(text=f"'{obj.name}' takes no part.")

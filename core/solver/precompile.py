@@ -32,8 +32,8 @@ Report = Callable[[int, int], None]
 INTERPRETED_POINT = 1.2e-5
 """Seconds in which interpreted kernels compute one step of one contact point, if a fifth of the points touch something.
 
-Measured: 6e-5 for points that touch something (the demo takes 0.4 s for a frame, 42 steps of 168 points), and 2.6 s for a frame of
-300 steps of a ball and a cube on 441 points, for which this says 3.2 s.
+Measured: 6e-5 for points that touch something (the demo takes 0.4 s for a frame, 42 steps of 168 points), and 2.6 s for a frame
+of 300 steps of a ball and a cube on 441 points, for which this says 3.2 s.
 """
 INTERPRETED_TRIANGLE = 2e-4
 """Seconds in which interpreted kernels prepare one triangle of a target."""
