@@ -26,7 +26,7 @@ class Bake(Subpanel):
         layout.prop(own, "use_live")
         progress = session_state.session.bake_progress
         if progress is not None:
-            text = "Preparing the solver" if progress.frame is None else progress.text
+            text = "Compiling the solver" if progress.frame is None else progress.text
             layout.progress(text=f"{text} (ESC: stop)", factor=progress.share)
             return
         row = layout.row(align=True)
