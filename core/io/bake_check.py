@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -19,9 +18,10 @@ from ..geometry.layout.grid_layout import GridLayout
 from ..geometry.layout.texture_maps import UVLayout
 from ..geometry.texels import Texels
 from ..model.recording import Recording, SensorRecording, row_blocks
-from ..model.sensor_parameters import SENSOR_PARAMETERS, Painted, SensorParameters
+from ..model.sensor_parameters import Painted, SensorParameters
 from .bake_folder import MANIFEST_NAME, RECORDING_NAME, Manifest
 from .sensor_npz import SENSOR_NAME
+from .sensor_toml import stated_parameters
 
 MOST_PIXELS = 1 << 26
 """Pixels of a tactile image above which its size is taken for damage."""
@@ -107,23 +107,11 @@ def checked_parameters(folder: Path, manifest: Manifest) -> SensorParameters:
     FileError
         A value is of another kind than its parameter, or has no meaning.
     """
-    values: dict[str, Any] = {}
-    for name, specification in SENSOR_PARAMETERS.items():
-        if name in manifest.parameters:
-            try:
-                values[name] = specification.read(manifest.parameters[name])
-            except OverflowError:
-                values[name] = None
-            if values[name] is None:
-                raise FileError(
-                    f"'{folder / MANIFEST_NAME}' is damaged ({name} is {manifest.parameters[name]!r:.60} and not "
-                    f"{specification.wanted}): bake again."
-                )
-    parameters = SensorParameters(**values)
     try:
+        parameters = SensorParameters(**stated_parameters(manifest.parameters, "its parameters"))
         parameters.check(manifest.sensor)
     except PalpateError as error:
-        raise FileError(f"'{folder / MANIFEST_NAME}' is damaged: {error}") from error
+        raise FileError(f"'{folder / MANIFEST_NAME}' is damaged ({str(error).rstrip('.')}): bake again.") from error
     return parameters
 
 

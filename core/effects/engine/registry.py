@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import difflib
 import importlib
 import pkgutil
 from collections.abc import Callable, Iterable, Mapping
@@ -12,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ...errors import EffectError
+from ...errors import EffectError, did_you_mean
 from ...model.effect import Effect, Value
 from .specification import SITES_OF_ACTION, Form, Kind
 
@@ -227,5 +226,5 @@ def _plain(value: Any) -> Value:
 
 def _suggestion(name: str, known: Iterable[str]) -> str:
     """Return a hint at the known name that is most like a wrong one, or nothing."""
-    near = difflib.get_close_matches(name, list(known), n=1)
-    return f" (did you mean '{near[0]}'?)" if near else ""
+    near = did_you_mean(name, known, "")
+    return f" ({near})" if near else ""

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..dataset.rig import Rig
+from ..dataset.shift_peak import peak_offset
 from ..dataset.trial import Trial
 from ..forward.stimulus import Stimulus, stimulus_of
 
@@ -143,12 +144,9 @@ def net_force_along_normal(stimulus: Stimulus) -> np.ndarray:
 def _peak(values: np.ndarray, shifts: np.ndarray) -> tuple[float, float]:
     """Place and value of the maximum, between the shifts by a parabola."""
     best = int(np.argmax(values))
-    if not 0 < best < len(values) - 1:
-        return float(shifts[best]), float(values[best])
-    a, b, c = (float(value) for value in values[best - 1 : best + 2])
-    curve = a - 2.0 * b + c
-    away = 0.5 * (a - c) / curve if curve < 0 else 0.0
-    return float(shifts[best] + away * (shifts[1] - shifts[0])), b - 0.25 * (a - c) * away
+    away = peak_offset(values, best)
+    above = 0.25 * (values[best + 1] - values[best - 1]) * away if away else 0.0
+    return float(shifts[best] + away * (shifts[1] - shifts[0])), float(values[best] + above)
 
 
 def _with_stimulus_at(trial: Trial, source: np.ndarray) -> Trial:

@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..dataset.rig import Rig
+from ..dataset.shift_peak import peak_offset
 from ..dataset.trial import Trial
 from ..forward.stimulus import Stimulus
 from .clock_corrections import moved, net_force_along_normal, refined_shifts, strongest_channels, with_shift
@@ -141,7 +142,8 @@ def course_of(stimulus: Stimulus) -> Course | None:
     total = table.sum(axis=0)
     best = int(np.argmax(total))
     unshifted = float(total[most])
-    constant = Course(_peak(total, best, shifts), 0.0, 0.0, np.inf, float(total[best]), unshifted)
+    peak = float(shifts[best] + peak_offset(total, best) * (shifts[1] - shifts[0]))
+    constant = Course(peak, 0.0, 0.0, np.inf, float(total[best]), unshifted)
     possible = _returns_on_both_sides(load)
     if not possible.any():  # one press: its two flanks are no evidence of a course
         return constant if constant.correlation >= LEAST_CORRELATION else None
@@ -249,15 +251,6 @@ def _windowed(load: np.ndarray, response: np.ndarray, most: int) -> np.ndarray:
     for k in range(2 * most + 1):
         table[:, k] = np.add.reduceat((load * padded[k : k + count]).sum(axis=1), edges)
     return table
-
-
-def _peak(total: np.ndarray, best: int, shifts: np.ndarray) -> float:
-    """Place of a maximum between the samples, by a parabola."""
-    if not 0 < best < len(total) - 1:
-        return float(shifts[best])
-    a, b, c = total[best - 1 : best + 2]
-    curve = a - 2.0 * b + c
-    return float(shifts[best] + (0.5 * (a - c) / curve if curve < 0 else 0.0) * (shifts[1] - shifts[0]))
 
 
 def _best_line(table: np.ndarray, shifts: np.ndarray, middles: np.ndarray, unshifted: float) -> Course:

@@ -12,6 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..dataset.shift_peak import peak_offset
+
 HEIGHTS = (0.0, 0.2, 0.4, 0.6, 0.8)
 """Shares of the way of the stimulus below which it may not touch."""
 MOST_SAMPLES = 40_000
@@ -113,7 +115,7 @@ def _shift_of(cause: np.ndarray, answer: np.ndarray, step: float, offset: float,
     width = _lobe(size, top)
     elsewhere = size.copy()
     elsewhere[max(0, top - width) : top + width + 1] = 0.0
-    lag = lags[top] + _vertex(size, top)
+    lag = lags[top] + peak_offset(size, top)
     error = _scatter(cause, answer, int(lags[top]), width, float(np.sign(correlation[top]))) * step
     rival = float(elsewhere.max()) / float(size[top])
     return ClockShift(offset + lag * step, max(error, LEAST_UNCERTAINTY * step), float(size[top]), rival)
@@ -161,15 +163,6 @@ def _lobe(size: np.ndarray, top: int) -> int:
     return 2 * max(3, int(min(right[0] if len(right) else len(size), left[0] if len(left) else len(size))))
 
 
-def _vertex(size: np.ndarray, top: int) -> float:
-    """Return where between samples the peak is, by a parabola."""
-    if not 0 < top < len(size) - 1:
-        return 0.0
-    before, here, after = size[top - 1 : top + 2]
-    bend = before - 2.0 * here + after
-    return float(0.5 * (before - after) / bend) if bend < 0.0 else 0.0
-
-
 def _scatter(cause: np.ndarray, answer: np.ndarray, lag: int, width: int, sign: float) -> float:
     """Return the standard error of the shift in samples, from parts of the recording."""
     begin, end = max(0, -lag), min(len(cause), len(answer) - lag)
@@ -184,7 +177,7 @@ def _scatter(cause: np.ndarray, answer: np.ndarray, lag: int, width: int, sign: 
         products = np.array([sign * float(part @ answer[one + lag + k : other + lag + k]) for k in near])
         top = int(products.argmax())
         if products[top] > 0.0 and 0 < top < len(near) - 1:
-            shifts.append(near[top] + _vertex(products, top))
+            shifts.append(near[top] + peak_offset(products, top))
             weights.append(float(part @ part))
     if len(shifts) < 2:
         return float(width)
