@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from palpate.benchmarks import gap
+from palpate.benchmarks import _rows, gap
 from palpate.core.errors import PalpateError
 from palpate.core.study.run_files import done_runs
 from palpate.core.study.study_file import Run, study_of
@@ -183,7 +183,7 @@ def test_hidden_effects_as_a_study_say_what_the_benchmark_says(repository, tmp_p
     (tmp_path / "study.toml").write_text(module.STUDY.format(cases=names), encoding="utf-8")
     opened = begun(tmp_path / "study.toml")
     assert [answer["status"] for answer in answers_of(opened)] == ["done", "done"]
-    kept = {(one["kind"], one["number"]): one for one in gap.results_in(opened.folder)}
+    kept = {(one["kind"], one["number"]): one for one in _rows.results_in(opened.folder)}
     expected = [gap.examine(kind, number) for kind, number in plan]
     for one in expected:
         assert kept[one["kind"], one["number"]].pop("seconds") > 0.0
