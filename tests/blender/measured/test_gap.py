@@ -83,6 +83,7 @@ def test_a_bad_rig_is_said_in_a_sentence(scene, tmp_path):
     assert not obj.palpate.measured
 
 
+@pytest.mark.long("a whole plan of the next recording")
 def test_a_planned_experiment_becomes_keyframes_of_a_probe_and_is_undone(scene, rig_file):
     obj = pad()
     assert not bpy.ops.palpate.gap_plan.poll()

@@ -49,6 +49,7 @@ def entry(cases_there, said):
     }
 
 
+@pytest.mark.slow("draws the cases that all tests of this file share")
 def test_every_row_is_written_and_no_rig_tells_which(folder):
     hidden = _entry.read_hidden(folder)
     assert sorted(one.kind for one in hidden.values()) == sorted(_rows.MIX)
@@ -64,6 +65,7 @@ def test_every_row_is_written_and_no_rig_tells_which(folder):
     )
 
 
+@pytest.mark.long("draws a case of each of the eight kinds")
 def test_an_answer_follows_from_kind_and_number_alone():
     for kind in _rows.MIX:
         assert cases.answer_of(kind, 7) == cases.draw(kind, 7).answer
