@@ -68,7 +68,7 @@ compiled: env
 	$(BIN)/python -c 'from palpate.core.solver import precompile as p; p.compile_solver_with_notice(); p.compile_effect_laws()'
 
 # The tiers are those of docs/testing.md.
-PYTEST := -m pytest --numprocesses=logical --dist=worksteal --durations=10
+PYTEST := -m pytest --numprocesses=logical --dist=loadfile --durations=10
 
 test: lint compiled
 	$(BIN)/python $(PYTEST) -m 'not long' tests/core tests/tools tests/blender $(PYTEST_ARGS)

@@ -294,6 +294,7 @@ def run(*words, **more):
     return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **more)
 
 
+@pytest.mark.slow("starts Blender in processes of their own")
 def test_a_process_of_its_own_says_only_our_words_and_ends(tmp_path, demo_blend):
     process = run("bake", str(demo_blend), "--frames", "1", "3", "--out", str(tmp_path / "out"))
     out, err = process.communicate(timeout=120)

@@ -138,6 +138,7 @@ def test_a_pad_that_nothing_touches_takes_no_room(tmp_path):
         assert not np.allclose(np.array(scene.camera.matrix_world), before, atol=1e-3)
 
 
+@pytest.mark.slow("two pictures by Cycles, at 4 samples")
 @pytest.mark.parametrize(("color", "background"), [(0.02, studio.LIGHT_BACKGROUND), (0.9, studio.DARK_BACKGROUND)])
 def test_the_subject_stands_out_from_the_background(tmp_path, color, background):
     """The scene's own lamp is far too bright and its world green; with own light both count."""

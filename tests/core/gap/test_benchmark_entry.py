@@ -230,6 +230,7 @@ def separable(count=240, seed=3):
     return holds[:, :-1] * 3.0 + 0.2 * rng.normal(size=(count, len(_simulated.LABELS) - 1)), holds
 
 
+@pytest.mark.slow("learns from simulations")
 @pytest.mark.parametrize("method", ["classifier", "nearest_simulated"])
 def test_methods_learn_what_can_be_learnt(monkeypatch, method):
     """Nine of ten cases that were not learnt from are named exactly, and a case of no known effect by chance alone."""

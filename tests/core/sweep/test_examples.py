@@ -19,6 +19,7 @@ from palpate.sweep.dataset import publish
 parquet = pytest.importorskip("pyarrow.parquet")
 
 
+@pytest.mark.long("learns from a data set")
 def test_contact_is_learnt_from_presses(tmp_path, repository):
     """Seventy-five runs place a contact of an unseen run better than always answering the mean."""
     pytest.importorskip("sklearn", exc_type=ImportError)

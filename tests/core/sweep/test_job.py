@@ -66,6 +66,7 @@ def answers_of(opened: OpenStudy) -> list[dict]:
     return [answer_to(scenes, run) for run in opened.runs]
 
 
+@pytest.mark.slow("the one study of a job from the command line in this tier")
 def test_a_job_computes_its_runs(tmp_path):
     finished = sweep(write(tmp_path), "--out", tmp_path / "out", "--allow-scripts", "--workers", 1)
     assert (finished.returncode, finished.stderr) == (0, "")
@@ -172,6 +173,7 @@ def module_of(path: Path):
     return module
 
 
+@pytest.mark.long("two cases of the hidden-effects study, each diagnosed twice")
 def test_hidden_effects_as_a_study_say_what_the_benchmark_says(repository, tmp_path):
     """Two small cases: the table of the study's folder is that of the benchmark, but for the seconds."""
     folder = repository / "docs" / "sample-study"

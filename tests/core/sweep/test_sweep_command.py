@@ -84,6 +84,7 @@ def undisturbed(tmp_path_factory):
     return folder / "out"
 
 
+@pytest.mark.slow("computes the study that the tests of this file share")
 def test_a_run_holds_what_it_promises(undisturbed):
     (place,) = [path for path in (undisturbed / "runs").iterdir() if json.loads((path / "run.json").read_bytes())["index"] == 5]
     run = json.loads((place / "run.json").read_bytes())
@@ -107,6 +108,7 @@ def test_the_dataset_of_a_study_knows_units_and_slip(undisturbed):
     assert parquet.read_table(undisturbed / "dataset" / "meta" / "tasks.parquet").to_pydict()["task"] == ["small presses"]
 
 
+@pytest.mark.slow("the one export of a study from the command line")
 def test_a_finished_study_is_exported(undisturbed):
     h5py = pytest.importorskip("h5py")
     finished = sweep(undisturbed, "--format", "hdf5")
@@ -116,6 +118,7 @@ def test_a_finished_study_is_exported(undisturbed):
         assert len(file["episodes/run"]) == 24
 
 
+@pytest.mark.long("computes a study twice")
 def test_failed_runs_are_left_alone_until_they_are_asked_for(undisturbed, tmp_path):
     folder = tmp_path / "study"
     shutil.copytree(undisturbed, folder)
@@ -138,6 +141,7 @@ def test_failed_runs_are_left_alone_until_they_are_asked_for(undisturbed, tmp_pa
     assert (folder / "runs.parquet").read_bytes() == (undisturbed / "runs.parquet").read_bytes()
 
 
+@pytest.mark.long("kills a study and computes it again")
 @pytest.mark.skipif(os.name == "nt", reason="signals of POSIX")
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGINT])
 def test_a_stopped_study_goes_on_where_it_was(undisturbed, tmp_path, number):
