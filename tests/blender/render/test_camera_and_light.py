@@ -196,7 +196,9 @@ def _settings(scene):
     return scene.cycles.use_denoising, scene.cycles.samples
 
 
-@pytest.mark.parametrize("engine", ["cycles", "workbench"])  # EEVEE takes Mesa minutes, for its shaders
+@pytest.mark.parametrize(  # EEVEE takes Mesa minutes, for its shaders
+    "engine", [pytest.param("cycles", marks=pytest.mark.long("a picture by Cycles at 16 samples")), "workbench"]
+)
 def test_colours_are_those_of_the_colour_bar(tmp_path, engine):
     """Every loaded texel that is seen has the colour of its force, in light that shows its shape, too."""
     from matplotlib.image import imread
