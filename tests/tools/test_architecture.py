@@ -6,13 +6,13 @@ import ast
 import architecture_counts
 import architecture_picture
 import pytest
-from import_graph import ORDER, Graph
+from import_graph import ORDER
 
 
 @pytest.fixture(scope="module")
-def rooms():
+def rooms(imports):
     """Rooms and imports of the source as it is."""
-    return architecture_picture.rooms_and_imports(Graph.read())
+    return architecture_picture.rooms_and_imports(imports)
 
 
 def test_the_picture_shows_the_imports_of_the_source(rooms):

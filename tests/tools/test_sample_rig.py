@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """docs/sample-rig is what its script writes, small, and read without complaint."""
 
-import pytest
 import numpy as np
+import pytest
 import sample_rig
 
 from palpate.core.gap.dataset.rig import read_rig
