@@ -135,6 +135,7 @@ def test_importing_core_loads_neither_blender_nor_numba():
 # --- rooms inside core and inside addon
 
 
+@pytest.mark.slow("reads the whole source, for all tests of imports")
 def test_rooms_keep_their_order(imports):
     """Each room imports only from rooms before it, only what they offer, and nothing goes in a circle."""
     found = breaches(imports)

@@ -75,6 +75,7 @@ def test_a_run_that_the_scene_cannot_make_fails_alone(tmp_path):
     assert "\n" not in first["sentence"]
 
 
+@pytest.mark.slow("opens a scene in processes of their own")
 def test_mistakes_are_found_before_anything_is_computed(tmp_path):
     with pytest.raises(PalpateError, match=r"did you mean 'scale'\?"):
         begun(tmp_path, STUDY.replace("scale[2]", "scal[2]"))
