@@ -20,6 +20,7 @@ import email
 import hashlib
 import importlib.util
 import platform
+import os
 import shutil
 import subprocess
 import sys

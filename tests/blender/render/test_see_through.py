@@ -109,7 +109,7 @@ def test_one_render_where_nothing_is_covered(baked, tmp_path, monkeypatch):
     assert len(calls) == 1
 
 
-@pytest.mark.long("pictures by Cycles")
+@pytest.mark.long("a map for every pixel of a picture")
 def test_a_map_has_no_hole_between_two_places_of_contact(tmp_path):
     """A bar with two feet is seen through between its feet, too, and stays opaque where it stands over the pad's edge."""
     scene = bpy.context.scene
