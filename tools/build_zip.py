@@ -19,8 +19,8 @@ import argparse
 import email
 import hashlib
 import importlib.util
-import platform
 import os
+import platform
 import shutil
 import subprocess
 import sys
