@@ -19,12 +19,15 @@ WEBSITE ?=
 ATTACK_ARGS ?=
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-ui bench attack docs zip lint clean distclean env env50
+.PHONY: help demo test test-long test-all test-ui compiled bench attack docs zip lint clean distclean env env50
+.NOTPARALLEL:
 
 help:
 	@echo 'make demo     set up and run the demo: a picture, tactile images and the forces, in $(DEMO_OUT)/'
 	@echo 'make env      set up all that the commands below need, without running anything'
-	@echo 'make test     lint, type check, and all tests in bpy $(BPY45) and $(BPY50)'
+	@echo 'make test     before each commit: lint, types and the quick tests in bpy $(BPY45), on all cores'
+	@echo 'make test-all everything: make test, test-long, docs and test-ui (the window needs Debian and root)'
+	@echo 'make test-long  the long tests in bpy $(BPY45), and all tests of Blender in bpy $(BPY50)'
 	@echo 'make test-ui  the extension in a real Blender window (Debian, as root: it sets up a Blender of its own);'
 	@echo '              BLENDER=5.2 for that one (default $(BLENDER))'
 	@echo 'make bench    benchmarks, one JSON line per figure; ONLY=solver for one group'
@@ -67,9 +70,21 @@ lint: env
 	$(BIN)/ruff format --check .
 	$(BIN)/python tools/check_types.py
 
-test: lint env50
-	$(BIN)/python -m pytest tests/core tests/tools tests/blender $(PYTEST_ARGS)
-	$(VENV50)/bin/python -m pytest tests/blender $(PYTEST_ARGS)
+# One process compiles the solver before the tests do, which otherwise compile it in each of theirs.
+compiled: env
+	$(BIN)/python -c 'from palpate.core.solver import precompile as p; p.is_needed() and (p.compile_solver_with_notice(), p.compile_effect_laws())'
+
+# The tiers are those of docs/testing.md.
+PYTEST := -m pytest --numprocesses=logical --dist=loadfile --durations=10
+
+test: lint compiled
+	$(BIN)/python $(PYTEST) -m 'not long' tests/core tests/tools tests/blender $(PYTEST_ARGS)
+
+test-long: compiled env50
+	$(BIN)/python $(PYTEST) -m long tests/core tests/tools tests/blender $(PYTEST_ARGS)
+	$(VENV50)/bin/python $(PYTEST) tests/blender $(PYTEST_ARGS)
+
+test-all: test test-long docs test-ui
 
 test-ui: env
 	$(BIN)/python tools/provision_blender.py --blender $(BLENDER)

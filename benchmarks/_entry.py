@@ -28,7 +28,7 @@ from typing import Any
 
 import numpy as np
 
-from . import _gap_baselines, _learned, gap
+from . import _gap_baselines, _learned, _rows
 from ._hidden import cases
 
 Method = Callable[[Path], tuple[Iterable[str], float | None]]
@@ -63,8 +63,8 @@ class Answer:
         return [] if self.said[0] in VERDICTS else list(self.said)
 
     def outcome(self, hidden: Hidden) -> str:
-        """Return one word, as :func:`.gap.outcome` does."""
-        return gap.outcome(hidden.names, self.names, VERDICTS.get(self.said[0], "explained"), False)
+        """Return one word, as :func:`._rows.outcome` does."""
+        return _rows.outcome(hidden.names, self.names, VERDICTS.get(self.said[0], "explained"), False)
 
 
 # --- the cases
@@ -89,7 +89,7 @@ def write_cases(folder: Path, count: int, first: int) -> str:
 
 
 def _plan(count: int, first: int) -> list[tuple[str, int]]:
-    plan = gap.plan_of(count, first)
+    plan = _rows.plan_of(count, first)
     return [plan[i] for i in np.random.default_rng(first).permutation(len(plan))]
 
 
@@ -146,9 +146,9 @@ def read_answers(path: Path, known: Iterable[str]) -> dict[str, Answer]:
 
 def answers_of_study(folder: Path, hidden: dict[str, Hidden]) -> dict[str, Answer]:
     """Return what the runs of docs/sample-study/hidden-effects.toml say of these cases, as far as the study has them."""
-    runs = {(one["kind"], one["number"]): one for one in gap.results_in(folder)}
+    runs = {(one["kind"], one["number"]): one for one in _rows.results_in(folder)}
     if not runs:
-        raise SystemExit(f"{folder} has no runs/*/{gap.CASE_NAME}: it is no folder of the study of hidden effects.")
+        raise SystemExit(f"{folder} has no runs/*/{_rows.CASE_NAME}: it is no folder of the study of hidden effects.")
     found = {}
     for case, one in hidden.items():
         run = runs.get((one.kind, one.number))
@@ -299,12 +299,12 @@ def table(hidden: dict[str, Hidden], answers: dict[str, dict[str, Answer]]) -> s
         "| --- | ---: |" + " ---: |" * len(answers),
     ]
     none = Answer(("unknown",))
-    for kind, (what, _) in gap.ROWS.items():
+    for kind, (what, _) in _rows.ROWS.items():
         here = {case: one for case, one in hidden.items() if one.kind == kind}
         cells = []
         for of in answers.values():
             outcomes = [of.get(case, none).outcome(one) for case, one in here.items()]
-            cells.append(f"{outcomes.count(gap.RIGHT.get(kind, 'right'))} / {outcomes.count('wrong')}")
+            cells.append(f"{outcomes.count(_rows.RIGHT.get(kind, 'right'))} / {outcomes.count('wrong')}")
         if here:
             text.append(f"| {what} | {len(here)} | " + " | ".join(cells) + " |")
     text.append(
@@ -387,7 +387,7 @@ def compare(count: int, first: int, names: Iterable[str]) -> str:
     methods = {Path(name).name.replace(":", " "): method_named(name) for name in names}
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
         os.environ.setdefault(name, "1")
-    folder = gap.HOUSE / "build" / "gap" / f"compare-{first}-{count}-{gap.fingerprint()}"
+    folder = _rows.HOUSE / "build" / "gap" / f"compare-{first}-{count}-{_rows.fingerprint()}"
     if not (folder / CHECKSUM).is_file():
         shutil.rmtree(folder, ignore_errors=True)
         write_cases(folder, count, first)

@@ -21,7 +21,6 @@ Environment:
 
 from __future__ import annotations
 
-import hashlib
 import json
 import multiprocessing
 import os
@@ -37,30 +36,13 @@ from typing import Any
 import numpy as np
 
 from ._hidden import cases
+from ._rows import HOUSE, MIX, ROWS, fingerprint, outcome, plan_of, results_in
 
-HOUSE = Path(__file__).resolve().parent.parent
-MIX = {"own": 60, "other": 60, "none": 30, "two": 40, "outside": 30, "poor": 20, "third": 100, "three": 50}
-"""Cases of each kind in a whole run."""
-ROWS = {
-    "own": ("one effect, the library's own form", "95 %"),
-    "other": ("one effect, another formula", "85 %, ≤ 5 % wrong"),
-    "third": ("one effect, a formula on which no rule was set", "92 %, ≤ 2 % wrong"),
-    "none": ("nothing, wrong base and coloured noise", "≤ 2 % false alarms"),
-    "two": ("two effects", "75 % both, 90 % one and none wrong"),
-    "three": ("three effects", "60 % two or three and none wrong"),
-    "outside": ("outside the library", "90 % `unexplained`"),
-    "poor": ("too poor to tell", "none wrong"),
-}
-"""What is hidden in each kind of cases, in words, and the aim."""
-RIGHT = {"none": "no gap", "outside": "unexplained"}
-"""The outcome that is right where it is not that all is named."""
 FORMULAS = ("own", "other", "third")
 """Kinds of cases with one effect, by whose formula it has."""
 FAILED: dict[str, Any] = {"outcome": "failed", "sure": [], "said": [], "verdict": "failed", "ambiguous": [], "experiment": ""}
 FAILED |= {"closed": None, "inside": []}
 """The score of a case that raised."""
-CASE_NAME = "case.json"
-"""Name of the file in which a run of the study has its case."""
 
 
 def run() -> Iterator[dict]:
@@ -78,13 +60,6 @@ def run() -> Iterator[dict]:
     yield from figures(results)
 
 
-def plan_of(total: int, first: int) -> list[tuple[str, int]]:
-    """Return kinds and numbers of that many cases; every kind has at least one."""
-    whole = sum(MIX.values())
-    counts = {kind: max(1, round(total * share / whole)) for kind, share in MIX.items()}
-    return [(kind, first + i) for i in range(max(counts.values())) for kind in MIX if i < counts[kind]]
-
-
 def _spread(plan: list[tuple[str, int]], count: int) -> list[tuple[str, int]]:
     """Some cases with one hidden effect, evenly from all of them."""
     single = [entry for entry in plan if entry[0] in FORMULAS]
@@ -98,23 +73,6 @@ def _folder() -> Path:
     folder = HOUSE / "build" / "gap"
     folder.mkdir(parents=True, exist_ok=True)
     return folder
-
-
-def fingerprint() -> str:
-    """Return a hash of all that a result depends on; how it is shown is not of it."""
-    seen = hashlib.sha256()
-    for part in ("core/gap", "core/effects", "benchmarks/_hidden"):
-        for path in sorted((HOUSE / part).rglob("*.py")):
-            if path.parent.name not in ("report", "calibration"):
-                seen.update(path.read_bytes())
-    return seen.hexdigest()[:12]
-
-
-def results_in(path: Path) -> list[dict]:
-    """Return the results in a file or in the folder of a study, the last of each case."""
-    files = sorted(path.glob(f"runs/*/{CASE_NAME}")) if path.is_dir() else [path]
-    lines = [json.loads(line) for file in files for line in file.read_text(encoding="utf-8").splitlines()]
-    return list({(r["kind"], r["number"]): r for r in lines}.values())
 
 
 def _results(plan: list[tuple[str, int]], compared: set[tuple[str, int]]) -> list[dict]:
@@ -191,20 +149,6 @@ def score(case: cases.Case, result: Any) -> dict[str, Any]:
         "closed": closed(case, result, model),
         "inside": inside,
     }
-
-
-def outcome(answer: list[str], sure: list[str], verdict: str, ambiguous: bool) -> str:
-    """Return one word for what was said: right, part, wrong, ambiguous, unexplained or no gap.
-
-    Of one or two effects all are `right`, of three at least two. `part` is fewer, and nothing wrong beside it.
-    """
-    if any(name not in answer for name in sure):
-        return "wrong"
-    if sure:
-        return "right" if len(set(sure)) >= min(len(answer), 2) else "part"
-    if verdict == "explained" and ambiguous:
-        return "ambiguous"
-    return "unexplained" if verdict == "explained" else verdict
 
 
 def _truth(case: cases.Case, one: Any, model: Any) -> float | None:

@@ -105,6 +105,8 @@ def _factors(node: ast.AST) -> Iterator[ast.AST]:
 
 def is_normal_law(node: ast.AST) -> bool:
     """True for a product with 3/2 and a dissipation: only who writes the normal law out needs it."""
+    if not (isinstance(node, ast.BinOp) and isinstance(node.op, ast.Mult)):
+        return False
     factors = list(_factors(node))
     constant = any(isinstance(f, ast.Constant) and f.value == 1.5 for f in factors) or any(
         ast.unparse(f) in ("3 / 2", "3.0 / 2.0") for f in factors

@@ -20,6 +20,7 @@ import argparse
 import email
 import hashlib
 import importlib.util
+import os
 import platform
 import shutil
 import subprocess
@@ -131,7 +132,7 @@ def machine_code(platform_name: str, python: str, wheels: list[Path]) -> bytes |
     kept = CODE_CACHE / f"{platform_name}-cp{python.replace('.', '')}-{digest.hexdigest()[:16]}.bin"
     if not kept.is_file():
         kept.parent.mkdir(parents=True, exist_ok=True)
-        partial = kept.with_suffix(".partial")
+        partial = kept.with_suffix(f".{os.getpid()}.partial")  # another process may make the same
         with tempfile.TemporaryDirectory() as folder:
             own = Path(folder) / ("Scripts" if platform_name == "windows-x64" else "bin") / "python"
             numpy = f"numpy=={NUMPY.get(python, NUMPY['3.14'])}"

@@ -16,7 +16,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from palpate.benchmarks import gap
+from palpate.benchmarks import _rows, gap
 
 CASES, FIRST = 78, 5000
 """Those of the benchmark where nobody says more."""
@@ -39,28 +39,28 @@ case = {{ choice = [
 
 def fingerprint() -> str:
     """Return what changes with the workflow and the generator of cases."""
-    return gap.fingerprint()
+    return _rows.fingerprint()
 
 
 def run(values: dict[str, Any], folder: Path) -> dict[str, float | None]:
     """Diagnose a case, write all that is said into `case.json`, and return how right it is."""
     kind, number = values["case"].split()
     found = gap.examine(kind, int(number))
-    (folder / gap.CASE_NAME).write_text(json.dumps(found) + "\n", encoding="utf-8")
+    (folder / _rows.CASE_NAME).write_text(json.dumps(found) + "\n", encoding="utf-8")
     outcomes = {word: float(found["outcome"] == word) for word in ("right", "part", "wrong", "ambiguous", "unexplained")}
     return {
         **outcomes,
         "no_gap": float(found["outcome"] == "no gap"),
         "named": float(len(found["sure"])),
         "closed": found["closed"],
-        f"right.{kind}": float(found["outcome"] == gap.RIGHT.get(kind, "right")),  # the mean of each row in the report
+        f"right.{kind}": float(found["outcome"] == _rows.RIGHT.get(kind, "right")),  # the mean of each row in the report
         f"wrong.{kind}": outcomes["wrong"],
     }
 
 
 def study(cases: int = CASES, first: int = FIRST) -> str:
     """Return the file of the study of some cases."""
-    names = [f'    "{kind} {number}",' for kind, number in gap.plan_of(cases, first)]
+    names = [f'    "{kind} {number}",' for kind, number in _rows.plan_of(cases, first)]
     return STUDY.format(cases="\n".join(names))
 
 

@@ -12,6 +12,8 @@ import pytest
 import palpate
 from palpate.addon.properties import registration
 
+pytestmark = pytest.mark.enabling
+
 
 def kinds_of(base):
     for kind in base.__subclasses__():
@@ -62,7 +64,7 @@ def commands(monkeypatch):
     monkeypatch.setattr(bpy.utils, "unregister_cli_command", remove)
     yield known
     monkeypatch.undo()
-    palpate.register()  # what the scene fixture left is disabled by the next one
+    palpate.register()
 
 
 def test_disabling_leaves_nothing_and_enabling_again_works(commands):

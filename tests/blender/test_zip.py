@@ -74,6 +74,7 @@ def what_blender_brings() -> dict[str, Path]:
     return found
 
 
+@pytest.mark.long("builds the zip with its machine code")
 def test_zip_holds_what_the_extension_needs_and_no_more(zip_path, repository):
     with zipfile.ZipFile(zip_path) as archive:
         names = set(archive.namelist())
@@ -89,6 +90,7 @@ def test_zip_holds_what_the_extension_needs_and_no_more(zip_path, repository):
     assert "wheels" not in tomllib.loads((repository / "blender_manifest.toml").read_text(encoding="utf-8"))
 
 
+@pytest.mark.long("builds the zip with its machine code, twice")
 def test_same_sources_give_the_same_zip(zip_path, tmp_path):
     assert build_zip.build("linux-x64", "3.11", tmp_path).read_bytes() == zip_path.read_bytes()
 
@@ -109,6 +111,7 @@ def test_a_missing_wheel_is_noticed(missing):
         build_zip.check_complete(wheels, "linux-x64", "3.11")
 
 
+@pytest.mark.long("builds the zip and installs it")
 def test_installs_and_enables(life):
     assert life["enabled"]["is_enabled"]
     assert life["enabled"]["has_properties"]
@@ -116,10 +119,12 @@ def test_installs_and_enables(life):
     assert life["enabled"]["classes"]
 
 
+@pytest.mark.long("builds the zip and installs it")
 def test_enabling_loads_nothing_heavy(life):
     assert not HEAVY & set(life["enabled"]["modules"])
 
 
+@pytest.mark.long("builds the zip and installs it")
 def test_the_wheels_are_the_ones_in_use(life):
     site_packages = str(life["user"] / "extensions" / ".local")
     assert set(life["wheels"]) >= {"numba", "trimesh", "tqdm", "matplotlib", "tomli_w", "jinja2", "markupsafe"}
@@ -128,6 +133,7 @@ def test_the_wheels_are_the_ones_in_use(life):
     assert life["compiled"] == 45
 
 
+@pytest.mark.long("builds the zip and installs it")
 def test_nothing_is_written_outside_of_the_users_folder_for_the_extension(life):
     """Blender's own folders in the home of the user are Blender's; it made them before the extension was installed."""
     assert life["written beside the source"] == []
@@ -137,6 +143,7 @@ def test_nothing_is_written_outside_of_the_users_folder_for_the_extension(life):
     assert life["disabled"]["MPLCONFIGDIR"] is None
 
 
+@pytest.mark.long("builds the zip and installs it")
 def test_disabling_leaves_nothing_registered(life):
     before, after = life["before"], life["disabled"]
     assert not after["is_enabled"]
@@ -149,11 +156,13 @@ def test_disabling_leaves_nothing_registered(life):
     assert after["keymap_items"] == before["keymap_items"]
 
 
+@pytest.mark.long("builds the zip and installs it")
 def test_enabling_again_works(life):
     assert life["enabled_again"]["is_enabled"]
     assert life["enabled_again"]["classes"] == life["enabled"]["classes"]
 
 
+@pytest.mark.long("builds the zip and installs it")
 def test_uninstalling_removes_the_files(life):
     left = [path for path in (life["user"] / "extensions").rglob("*") if "palpate" in path.name or path.name == "numba"]
     assert left == []
@@ -161,6 +170,7 @@ def test_uninstalling_removes_the_files(life):
     assert life["uninstalled"]["handlers"] == life["before"]["handlers"]
 
 
+@pytest.mark.long("builds the zip and installs it")
 def test_the_whole_road_runs_from_the_zip_alone(life):
     """1 kg on the pad weighs 9.81 N, played and baked."""
     road = life["road"]

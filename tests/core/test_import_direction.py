@@ -135,9 +135,10 @@ def test_importing_core_loads_neither_blender_nor_numba():
 # --- rooms inside core and inside addon
 
 
-def test_rooms_keep_their_order():
+@pytest.mark.slow("reads the whole source, for all tests of imports")
+def test_rooms_keep_their_order(imports):
     """Each room imports only from rooms before it, only what they offer, and nothing goes in a circle."""
-    found = breaches(Graph.read())
+    found = breaches(imports)
     count = Counter((breach.room, breach.kind) for breach in found)
     grown = {key for key, number in count.items() if number > KNOWN.get(key, 0)}
     assert not grown, "\n".join(breach.text for breach in found if (breach.room, breach.kind) in grown)
@@ -207,11 +208,11 @@ def test_depth_and_circles_of_a_graph():
     assert depth({}) == 0
 
 
-def test_every_room_exists():
-    packages = {package: Graph.read().children(package) for package in ORDER}
+def test_every_room_exists(imports):
+    packages = {package: imports.children(package) for package in ORDER}
     assert not [f"{package}.{room}" for package, rooms in ORDER.items() for room in rooms if room not in packages[package]]
 
 
 @pytest.mark.parametrize("package", ["core", "addon"])
-def test_every_child_of_core_and_addon_has_a_place_in_the_order(package):
-    assert sorted(ORDER[package]) == sorted(Graph.read().children(package))
+def test_every_child_of_core_and_addon_has_a_place_in_the_order(imports, package):
+    assert sorted(ORDER[package]) == sorted(imports.children(package))

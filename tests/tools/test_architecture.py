@@ -6,12 +6,18 @@ import ast
 import architecture_counts
 import architecture_picture
 import pytest
-from import_graph import ORDER, Graph
+from import_graph import ORDER
 
 
-def test_the_picture_shows_the_imports_of_the_source():
+@pytest.fixture(scope="module")
+def rooms(imports):
+    """Rooms and imports of the source as it is."""
+    return architecture_picture.rooms_and_imports(imports)
+
+
+def test_the_picture_shows_the_imports_of_the_source(rooms):
     """Otherwise run `python tools/architecture.py`."""
-    assert architecture_picture.drawn_data() == architecture_picture.rooms_and_imports(Graph.read()).as_json()
+    assert architecture_picture.drawn_data() == rooms.as_json()
 
 
 def test_every_room_of_the_picture_has_a_caption_and_every_step_a_room():
@@ -26,8 +32,7 @@ def test_imports_that_others_imply_are_left_out():
     assert architecture_picture.reduced(graph) == {"a": {"b"}, "b": {"c"}, "c": set()}
 
 
-def test_a_picture_is_written_with_its_data(tmp_path):
-    rooms = architecture_picture.rooms_and_imports(Graph.read())
+def test_a_picture_is_written_with_its_data(tmp_path, rooms):
     architecture_picture.draw(rooms, tmp_path / "picture.svg")
     assert architecture_picture.drawn_data(tmp_path / "picture.svg") == rooms.as_json()
 
@@ -56,6 +61,7 @@ def test_a_table_of_parameters_is_seen():
     assert list(architecture_counts.parameter_tables(ast.parse(table))) == [1]
 
 
+@pytest.mark.slow("reads and counts the whole source")
 def test_core_and_addon_hold_packages_only():
     counts = architecture_counts.count()
     assert counts.files_beside_packages == {"core": [], "addon": []}

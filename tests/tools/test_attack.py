@@ -50,26 +50,31 @@ def scratch(tmp_path):
     return tmp_path / "scratch"
 
 
+@pytest.mark.long("a short attack")
 def test_faults(tmp_path):
     area = faults.Faults(SEED, 14, scratch(tmp_path), (JOB["bake"], JOB["export npz"]))
     assert found_by(area, tmp_path) == (14, [])
 
 
+@pytest.mark.long("a short attack")
 def test_power_cuts(tmp_path):
     area = power_cut.PowerCut(SEED, 6, scratch(tmp_path), (JOB["bake"],))
     assert found_by(area, tmp_path) == (6, [])
 
 
+@pytest.mark.long("a short attack")
 def test_kills(tmp_path):
     area = kills.Kills(SEED, 1, scratch(tmp_path), (JOB["bake"],))
     assert found_by(area, tmp_path) == (1, [])
 
 
+@pytest.mark.long("a short attack")
 def test_readers(tmp_path):
     tried, findings = found_by(readers.Readers(SEED, 120, scratch(tmp_path)), tmp_path)
     assert tried >= 100 and findings == []
 
 
+@pytest.mark.long("a short attack")
 @pytest.mark.parametrize("area", [logs.Logs, imports.Imports])
 def test_logs_and_sensors_of_other_programs(tmp_path, area):
     tried, findings = found_by(area(SEED, 90, scratch(tmp_path)), tmp_path)
@@ -97,17 +102,20 @@ def test_logs_that_are_not_damaged_become_rigs(tmp_path):
         damaged_sensors.read(f"Pad{ending}", tmp_path)
 
 
+@pytest.mark.long("a short attack")
 def test_commands(tmp_path):
     area = commands.Commands(SEED, 20, scratch(tmp_path), disks=False, scenes=4)
     assert found_by(area, tmp_path) == (20, [])
 
 
+@pytest.mark.long("a short attack")
 def test_sweep(tmp_path):
     """Faults alone; kills start Dask several times and are left to `make attack`."""
     area = sweep.Sweep(SEED, 12, scratch(tmp_path), disks=False, with_kills=False)
     assert found_by(area, tmp_path) == (12, [])
 
 
+@pytest.mark.long("a short attack")
 def test_numbers(tmp_path):
     assert found_by(numbers.Numbers(SEED, 12, scratch(tmp_path)), tmp_path) == (12, [])
 

@@ -2,6 +2,7 @@
 """docs/sample-rig is what its script writes, small, and read without complaint."""
 
 import numpy as np
+import pytest
 import sample_rig
 
 from palpate.core.gap.dataset.rig import read_rig
@@ -23,6 +24,7 @@ def test_the_sample_rig_is_what_its_script_writes(tmp_path):
     assert sum(path.stat().st_size for path in sample_rig.FOLDER.iterdir()) < 500_000
 
 
+@pytest.mark.long("a whole diagnosis of the sample rig")
 def test_what_is_hidden_in_the_sample_rig_is_named_and_nothing_else():
     """What the library's creep and gain lack beside the generator's is no noise that grows with the reading."""
     found = run_job(diagnose(read_rig(sample_rig.FOLDER / "rig.toml")))

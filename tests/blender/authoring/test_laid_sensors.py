@@ -108,7 +108,7 @@ def test_texels_laid_beside_a_painted_region_leave_it_as_it_is():
     other = obj.vertex_groups.new(name="Other side")
     other.add([v.index for v in obj.data.vertices if v.index not in upper(obj)], 1.0, "REPLACE")
     obj.vertex_groups.active_index = other.index
-    assert bpy.ops.palpate.skin_add(source="GROUP", method="NOISE", spacing=0.002) == {"FINISHED"}
+    assert bpy.ops.palpate.skin_add(source="GROUP", method="NOISE", spacing=0.003) == {"FINISHED"}
     assert obj.palpate.role == "SENSOR"
 
 
@@ -171,7 +171,7 @@ def test_the_region_of_a_sensor_is_resampled_and_the_old_texels_go():
 def test_a_skin_is_laid_anew_when_the_surface_has_changed():
     obj = finger()
     select(obj, upper(obj))
-    bpy.ops.palpate.skin_add(source="SELECTION", method="NOISE", spacing=0.002)
+    bpy.ops.palpate.skin_add(source="SELECTION", method="NOISE", spacing=0.003)
     skin = bpy.context.object
     assert not laid_sensors.is_outdated(skin)
     for vertex in obj.data.vertices:
@@ -185,7 +185,7 @@ def test_a_skin_is_laid_anew_when_the_surface_has_changed():
     assert np.linalg.norm(points, axis=1) == pytest.approx(0.015, rel=0.01)
     assert len(points) == pytest.approx(1.5**2 * before, rel=0.2)
     assert skin.palpate.k == 99.0
-    skin.palpate.skin.spacing = 0.004
+    skin.palpate.skin.spacing = 0.006
     bpy.ops.palpate.skin_update()
     assert len(skin.data.vertices) == pytest.approx(len(points) / 4, rel=0.3)
 

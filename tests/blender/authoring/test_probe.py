@@ -31,9 +31,10 @@ def test_it_presses_as_deep_as_it_says_and_goes(shape):
     assert np.linalg.norm(side) < 0.003
 
 
+@pytest.mark.slow("lays a skin on a ball and presses on it")
 def test_a_probe_for_a_curved_sensor_of_any_size():
     ball(radius=0.05)
-    bpy.ops.palpate.skin_add(source="MESH", method="NOISE", spacing=0.01)
+    bpy.ops.palpate.skin_add(source="MESH", method="NOISE", spacing=0.02)
     finger = bpy.context.object
     bpy.context.scene.frame_end = 20
     bpy.ops.palpate.probe_add()

@@ -80,7 +80,7 @@ def test_a_mesh_inside_out_is_flipped():
 
 def test_a_skin_that_faces_into_its_carrier_is_flipped():
     ball(radius=0.02)
-    bpy.ops.palpate.skin_add(source="MESH", method="NOISE", spacing=0.004)
+    bpy.ops.palpate.skin_add(source="MESH", method="NOISE", spacing=0.008)
     skin = bpy.context.object
     skin.palpate.max_penetration = 0.001
     assert kinds(skin) == []
@@ -208,7 +208,7 @@ def test_what_is_not_the_regions_fault_leaves_the_region():
 
 def test_an_outdated_skin_is_laid_anew_and_an_orphan_stands_alone():
     carrier = ball(radius=0.02)
-    bpy.ops.palpate.skin_add(source="MESH", method="NOISE", spacing=0.005)
+    bpy.ops.palpate.skin_add(source="MESH", method="NOISE", spacing=0.008)
     skin = bpy.context.object
     skin.palpate.max_penetration = 0.001
     for vertex in carrier.data.vertices:

@@ -33,6 +33,7 @@ def start(path, report):
     return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
 
 
+@pytest.mark.long("kills five bakes at chance moments")
 def test_sigkill_at_any_moment(tmp_path):
     scene, *_ = press_and_drop(frames=FRAMES)
     scene.palpate.use_auto_dt, scene.palpate.dt = False, 5e-5

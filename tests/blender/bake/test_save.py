@@ -95,6 +95,7 @@ def check_next_bake(path):
     assert (folder / "Pad" / "notes.txt").read_text() == "mine"
 
 
+@pytest.mark.long("stops a bake at each of its steps")
 def test_stopped_at_every_step_of_the_switch(saved, tmp_path):
     path, old = saved
     digests, number = [], 1

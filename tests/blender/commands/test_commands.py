@@ -146,13 +146,20 @@ def test_a_full_disk_leaves_the_scene_as_it_was(tmp_path, demo_blend, capfd):
     blender.open_blend(mine)
 
 
-def test_scripts_in_a_file_do_not_run(tmp_path, demo_blend):
+@pytest.fixture
+def scripts_allowed():
+    """Have Blender run scripts of the files that it opens."""
+    bpy.context.preferences.filepaths.use_scripts_auto_execute = True
+    yield
+    bpy.context.preferences.filepaths.use_scripts_auto_execute = False
+
+
+def test_scripts_in_a_file_do_not_run(tmp_path, demo_blend, scripts_allowed):
     bpy.ops.wm.open_mainfile(filepath=str(demo_blend))
     text = bpy.data.texts.new("evil.py")
     text.write(f"open({str(tmp_path / 'evil')!r}, 'w').close()")
     text.use_module = True
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "a.blend"))
-    bpy.context.preferences.filepaths.use_scripts_auto_execute = True
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "a.blend"))
     assert (tmp_path / "evil").exists()  # Blender would
     (tmp_path / "evil").unlink()
@@ -287,6 +294,7 @@ def run(*words, **more):
     return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **more)
 
 
+@pytest.mark.slow("starts Blender in processes of their own")
 def test_a_process_of_its_own_says_only_our_words_and_ends(tmp_path, demo_blend):
     process = run("bake", str(demo_blend), "--frames", "1", "3", "--out", str(tmp_path / "out"))
     out, err = process.communicate(timeout=120)

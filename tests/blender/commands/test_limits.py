@@ -18,6 +18,7 @@ def palpate(*words):
     return subprocess.run(command, capture_output=True, text=True, timeout=120)
 
 
+@pytest.mark.long("a bake that goes on until its limit of four seconds or of memory")
 @pytest.mark.parametrize(("option", "value"), [("--time-limit", "4"), ("--memory-limit", "50")])
 def test_a_limit_ends_a_bake(option, value, tmp_path, repository):
     demo, out = repository / "sample_blends" / "demo.blend", tmp_path / "out"

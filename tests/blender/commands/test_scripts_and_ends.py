@@ -47,6 +47,7 @@ def test_a_driver_that_needs_python_is_named_and_refused(driven, tmp_path):
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.slow("starts Blender in two processes")
 @pytest.mark.parametrize("option", ["--allow-scripts", "--ignore-scripts"])
 def test_commands_end_after_a_driver_that_needs_python(driven, tmp_path, option):
     """With Blender 4.5 the interpreter itself would wait for ever."""
@@ -64,6 +65,7 @@ def test_commands_end_after_a_driver_that_needs_python(driven, tmp_path, option)
         assert done.returncode == 1 and "zero" in done.stderr
 
 
+@pytest.mark.slow("starts Blender in two processes")
 def test_a_script_that_was_not_run_is_named(tmp_path, repository):
     code = (
         "import bpy, os, sys; bpy.ops.wm.open_mainfile(filepath=sys.argv[1]); text = bpy.data.texts.new('rig_ui.py')\n"

@@ -79,6 +79,7 @@ def test_numbers_of_the_sphere(repository):
     assert k / area * volume == pytest.approx(promised, rel=0.15)
 
 
+@pytest.mark.slow("runs the page for scripts as it stands")
 def test_a_sensor_made_without_a_window(tmp_path, repository):
     """The script in docs/authoring.md runs in a Python of its own, and its scene is baked with another sensor's file."""
     page = (repository / "docs" / "authoring.md").read_text(encoding="utf-8")

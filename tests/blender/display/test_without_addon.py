@@ -67,6 +67,7 @@ def scene_file(tmp_path):
     return moved / path.name, recording
 
 
+@pytest.mark.slow("starts Blender twice and renders")
 def test_it_plays_without_the_addon(scene_file, tmp_path):
     path, recording = scene_file
     without = watch(path, tmp_path, "without", False)
@@ -95,6 +96,7 @@ def test_it_plays_without_the_addon(scene_file, tmp_path):
         assert matrix[:3, 3] == pytest.approx(recording.poses[frame - 1, cube_at, :3], abs=1e-6)
 
 
+@pytest.mark.long("starts Blender three times and renders")
 def test_outside_of_the_bake_and_without_its_files_nothing_passes_for_a_force(scene_file, tmp_path):
     """Before the first frame, and where a folder was lost, the pad is magenta; after the last frame it holds the last."""
     path, _ = scene_file

@@ -158,13 +158,17 @@ def bake_folder(tmp_path_factory):
     return folder
 
 
+LONG = pytest.mark.long("a whole diagnosis of the sample rig")
+
+
 def python_blocks() -> list:
     found = []
     for page in PAGES:
         for number, block in enumerate(blocks(page.read_text(encoding="utf-8"), "python")):
             # test_tutorial.py runs the block that needs Blender; tests/core/sweep reads a dataset by the libraries of its page
             if "bpy" not in block and page.stem != "dataset":
-                found.append(pytest.param(block, id=f"{page.stem}-{number}"))
+                marks = LONG if "diagnose(" in block else ()
+                found.append(pytest.param(block, id=f"{page.stem}-{number}", marks=marks))
     return found
 
 

@@ -29,6 +29,7 @@ def pad(columns=cases.COLUMNS, rows=cases.ROWS):
     return obj
 
 
+@pytest.mark.slow("a whole diagnosis, the one in Blender")
 def test_from_a_rig_to_an_amended_sensor(scene, rig_file, tmp_path):
     obj = pad()
     assert not bpy.ops.palpate.gap_find.poll() and not bpy.ops.palpate.gap_add.poll()
@@ -83,6 +84,7 @@ def test_a_bad_rig_is_said_in_a_sentence(scene, tmp_path):
     assert not obj.palpate.measured
 
 
+@pytest.mark.long("a whole plan of the next recording")
 def test_a_planned_experiment_becomes_keyframes_of_a_probe_and_is_undone(scene, rig_file):
     obj = pad()
     assert not bpy.ops.palpate.gap_plan.poll()
@@ -126,6 +128,7 @@ def test_recordings_without_poses_are_not_planned_on_a_probe(scene, tmp_path):
         bpy.ops.palpate.gap_plan()
 
 
+@pytest.mark.long("a whole diagnosis")
 def test_another_grid_shows_no_residual(scene, rig_file):
     obj = pad(columns=3)
     obj.palpate.measured = str(rig_file)
@@ -134,6 +137,7 @@ def test_another_grid_shows_no_residual(scene, rig_file):
         gap_results.show_on_sensor(bpy.context, obj, False)
 
 
+@pytest.mark.long("a whole diagnosis")
 def test_the_command_puts_the_amended_sensor_into_a_scene(scene, rig_file, tmp_path, capsys):
     obj = pad()
     blend = tmp_path / "scene.blend"

@@ -77,6 +77,7 @@ def test_the_slope_holds():
     assert np.abs(path - path[0]).max() < 1e-10
 
 
+@pytest.mark.long("an experiment of the paper")
 @pytest.mark.parametrize("kind", ["sphere", "bottle"])
 def test_each_object_is_held(kind):
     """Controlled sum within 1e-6 N, and not a micrometre in the last ten seconds."""
@@ -87,6 +88,7 @@ def test_each_object_is_held(kind):
     assert all(row.kept for row in rows), rows
 
 
+@pytest.mark.long("an experiment of the paper")
 def test_a_heavy_box_slips_at_coulombs_limit():
     """Held one per cent below 2 · mus · N, let go one per cent above it; palpate paper finds the limit by bisection."""
     scenario = grasping.slowly(experiment_tools.scenario_of(experiment_tools.new_scene(partial(grasps.build, kind="box"))))
@@ -95,6 +97,7 @@ def test_a_heavy_box_slips_at_coulombs_limit():
     assert grasping.slips(scenario, "Box", 1.01 * limit)
 
 
+@pytest.mark.long("an experiment of the paper")
 def test_pick_and_place_sets_the_cube_down_where_it_was():
     scene = experiment_tools.new_scene(pick_and_place.build)
     recording = run(experiment_tools.scenario_of(scene))
@@ -102,13 +105,22 @@ def test_pick_and_place_sets_the_cube_down_where_it_was():
     assert all(row.kept for row in rows), rows
 
 
+@pytest.mark.long("an experiment of the paper")
 def test_finger_and_thumb_hold():
     scene = experiment_tools.new_scene(hand.build)
     rows = grasping.held_rows(experiment_tools.scenario_of(scene), hand.CYLINDER, hand.INDEX, hand.FORCE, SECONDS)
     assert all(row.kept for row in rows), rows
 
 
-@pytest.mark.parametrize("build", [tilt.build, pick_and_place.build, hand.build, partial(grasps.build, kind="bottle")])
+@pytest.mark.parametrize(
+    "build",
+    [
+        tilt.build,
+        pick_and_place.build,
+        pytest.param(hand.build, marks=pytest.mark.long("models a hand")),
+        partial(grasps.build, kind="bottle"),
+    ],
+)
 def test_each_scene_explains_itself(build):
     experiment_tools.new_scene(build)
     assert "paper, section" in bpy.data.texts["Read me"].as_string()

@@ -2,6 +2,7 @@
 """Files of other versions of Palpate: older ones are brought forward, newer ones are left alone and it is said."""
 
 import bpy
+import pytest
 from blender_scenes import press, reopen, save
 
 from palpate.addon.properties import migrations
@@ -48,6 +49,7 @@ def test_a_newer_file_is_left_alone_and_it_is_said(tmp_path):
     assert session_state.session.unreadable_settings == {}
 
 
+@pytest.mark.enabling
 def test_a_file_that_is_open_when_the_add_on_is_enabled_is_looked_through_as_well(tmp_path):
     """At the first event, since Blender allows nothing while it enables an add-on."""
     _, pad, _ = press()

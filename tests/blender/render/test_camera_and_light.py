@@ -138,6 +138,7 @@ def test_a_pad_that_nothing_touches_takes_no_room(tmp_path):
         assert not np.allclose(np.array(scene.camera.matrix_world), before, atol=1e-3)
 
 
+@pytest.mark.slow("two pictures by Cycles, at 4 samples")
 @pytest.mark.parametrize(("color", "background"), [(0.02, studio.LIGHT_BACKGROUND), (0.9, studio.DARK_BACKGROUND)])
 def test_the_subject_stands_out_from_the_background(tmp_path, color, background):
     """The scene's own lamp is far too bright and its world green; with own light both count."""
@@ -195,7 +196,9 @@ def _settings(scene):
     return scene.cycles.use_denoising, scene.cycles.samples
 
 
-@pytest.mark.parametrize("engine", ["cycles", "workbench"])  # EEVEE takes Mesa minutes, for its shaders
+@pytest.mark.parametrize(  # EEVEE takes Mesa minutes, for its shaders
+    "engine", [pytest.param("cycles", marks=pytest.mark.long("a picture by Cycles at 16 samples")), "workbench"]
+)
 def test_colours_are_those_of_the_colour_bar(tmp_path, engine):
     """Every loaded texel that is seen has the colour of its force, in light that shows its shape, too."""
     from matplotlib.image import imread

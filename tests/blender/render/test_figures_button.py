@@ -23,6 +23,7 @@ def baked(tmp_path):
     return scene, pad, tmp_path
 
 
+@pytest.mark.long("makes figures of every kind, and a video")
 def test_everything_that_is_chosen_is_made(baked):
     scene, _, place = baked
     own = scene.palpate.figures

@@ -45,6 +45,7 @@ def image(path):
     return imread(path)
 
 
+@pytest.mark.long("pictures of every kind, and a video")
 def test_everything_at_once_and_nothing_left_behind(baked, tmp_path):
     scene, _ = baked
     before = dump()
@@ -237,6 +238,7 @@ def test_the_picture_is_filled_whatever_its_shape(baked, size):
     assert (places > 0.0).all() and (places < 1.0).all() and np.ptp(places, axis=0).max() > 0.7
 
 
+@pytest.mark.long("a Blender of its own without OpenGL")
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="hides Linux's EGL")
 def test_without_opengl_it_is_one_sentence(baked, tmp_path):
     """Blender itself would end the process at once."""

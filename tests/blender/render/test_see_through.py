@@ -54,6 +54,7 @@ def loaded_pixels(scene, pad):
     return loaded, SIZE[1] - 1 - rows, columns, weights
 
 
+@pytest.mark.slow("a picture by Cycles for each kind of material")
 @pytest.mark.parametrize("kind", KINDS)
 def test_loaded_texels_are_seen_through_what_presses_on_them(baked, tmp_path, kind):
     """The picture there is that of a scene without the target; at the target's top it is that of a scene with it."""
@@ -108,6 +109,7 @@ def test_one_render_where_nothing_is_covered(baked, tmp_path, monkeypatch):
     assert len(calls) == 1
 
 
+@pytest.mark.long("a map for every pixel of a picture")
 def test_a_map_has_no_hole_between_two_places_of_contact(tmp_path):
     """A bar with two feet is seen through between its feet, too, and stays opaque where it stands over the pad's edge."""
     scene = bpy.context.scene

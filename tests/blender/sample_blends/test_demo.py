@@ -106,6 +106,7 @@ def test_the_demo_s_scene_shows_its_bake(tmp_path):
     assert all(image.filepath.startswith("//palpate") for image in images)
 
 
+@pytest.mark.slow("a picture by Cycles of the demo itself")
 def test_demo_renders_heat_map_and_arrow(tmp_path):
     from matplotlib.image import imread
 
@@ -214,6 +215,7 @@ def described(scene):
     return found
 
 
+@pytest.mark.slow("builds each sample scene anew")
 @pytest.mark.parametrize("name", build_samples.SAMPLES)
 def test_samples_are_what_their_scripts_build(name, repository, tmp_path):
     path = repository / "sample_blends" / f"{name}.blend"
@@ -225,6 +227,7 @@ def test_samples_are_what_their_scripts_build(name, repository, tmp_path):
     assert described(bpy.context.scene) == committed
 
 
+@pytest.mark.slow("bakes each sample scene")
 @pytest.mark.parametrize("name", build_samples.SAMPLES)
 def test_samples_open_and_bake(name, repository, tmp_path):
     bpy.ops.wm.open_mainfile(filepath=str(repository / "sample_blends" / f"{name}.blend"))

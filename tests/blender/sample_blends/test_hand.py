@@ -35,6 +35,7 @@ def test_a_union_is_at_most_a_quarter_of_its_width_lower_than_its_parts_and_only
         assert blended[clear] == pytest.approx(least[clear], abs=1e-12) and (blended < least - 1e-6).any()
 
 
+@pytest.mark.long("models a hand")
 def test_the_skin_follows_the_fingers_and_stays_at_the_wrist(scene):
     index, thumb, _ = hand.bodies(scene)
     skin = scene.objects["Hand"]

@@ -58,6 +58,7 @@ def is_gone(process):
     return False
 
 
+@pytest.mark.enabling
 def test_the_first_sensor_starts_it_and_disabling_ends_it(window):
     assert first_use.progress() is None
     make_sensor()

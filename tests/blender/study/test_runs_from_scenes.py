@@ -49,6 +49,7 @@ def computed(opened):
     return compute_batch(str(opened.folder), words)
 
 
+@pytest.mark.slow("a study that reads its runs from a scene, in processes of its own")
 def test_a_run_is_what_the_scene_gives_with_these_values(tmp_path):
     opened = begun(tmp_path)
     assert [answer["status"] for answer in computed(opened)] == ["done"] * 4
@@ -65,6 +66,7 @@ def test_a_run_is_what_the_scene_gives_with_these_values(tmp_path):
     assert not [path for path in (opened.folder / "scenes").iterdir() if path.name.startswith(".")]
 
 
+@pytest.mark.long("a study that reads its runs from a scene, in processes of its own")
 def test_a_run_that_the_scene_cannot_make_fails_alone(tmp_path):
     opened = begun(tmp_path, STUDY.replace("[1.0, 1.2]", "[0.0, 1.0]").replace("[50.0, 80.0]", "[50.0]"))
     first, second = computed(opened)
@@ -73,6 +75,7 @@ def test_a_run_that_the_scene_cannot_make_fails_alone(tmp_path):
     assert "\n" not in first["sentence"]
 
 
+@pytest.mark.slow("opens a scene in processes of their own")
 def test_mistakes_are_found_before_anything_is_computed(tmp_path):
     with pytest.raises(PalpateError, match=r"did you mean 'scale'\?"):
         begun(tmp_path, STUDY.replace("scale[2]", "scal[2]"))
@@ -81,6 +84,7 @@ def test_mistakes_are_found_before_anything_is_computed(tmp_path):
         begun(tmp_path, STUDY.replace("scale[2]", "location[2]"))
 
 
+@pytest.mark.long("studies that read their runs from a scene, in processes of their own")
 def test_the_dry_run_says_why_blender_is_needed_and_a_changed_scene_is_refused(tmp_path):
     pytest.importorskip("distributed")
     begun(tmp_path)

@@ -28,6 +28,7 @@ def finished(folder, tmp_path, name: str, order, count: int) -> list[dict]:
     return [json.loads((opened.folder / "runs" / run.digest / "run.json").read_bytes()) for run in chosen]
 
 
+@pytest.mark.long("computes runs of a sample study")
 def test_presses_are_at_many_places_of_the_fingertip(repository, tmp_path):
     """Deep and shallow ones: each touches, with the force that its depth gives, and slides as far as it was told."""
     runs = finished(repository / "docs" / "sample-study", tmp_path, "presses", lambda values: values["press.depth"], 3)
@@ -42,6 +43,7 @@ def test_presses_are_at_many_places_of_the_fingertip(repository, tmp_path):
     assert deep > 2.0 * shallow
 
 
+@pytest.mark.long("computes runs of a sample study")
 def test_a_grasp_holds_where_friction_can_bear_the_weight(repository, tmp_path):
     """The fingers bear the weight by friction: it slides where their friction is less, and is held where it is more."""
 

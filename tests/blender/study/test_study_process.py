@@ -28,6 +28,7 @@ def study(tmp_path):
     return study_settings.write_study(scene)
 
 
+@pytest.mark.long("stops a study and computes it again")
 def test_a_study_is_stopped_and_goes_on(study):
     job = study_process.run_study(study, 1)
     end = time.monotonic() + LONGEST

@@ -19,17 +19,25 @@ except RuntimeError as error:
 """
 
 
-def test_plain_python_gives_the_same_numbers():
+@pytest.fixture(scope="module")
+def plain_run():
+    """Numbers of all scenes in plain Python, and seconds per step."""
+    return without_numba()
+
+
+@pytest.mark.slow("the solver in plain Python, in a process whose numbers two tests share")
+def test_plain_python_gives_the_same_numbers(plain_run):
     """To 1e-12 over poses, velocities and all readings; compiled and library functions may differ in the last place only."""
-    plain, seconds = without_numba()
+    plain, seconds = plain_run
     assert seconds > 0.0
     for name, scene in scenes().items():
         assert plain[name] == pytest.approx(numbers(scene), rel=0.0, abs=1e-12), name
 
 
-def test_without_the_internals_of_numba_everything_runs_as_plain_python():
+@pytest.mark.slow("the solver in plain Python, in a process of its own")
+def test_without_the_internals_of_numba_everything_runs_as_plain_python(plain_run):
     """As if a later release of numba had moved a part that is not documented."""
-    plain, _ = without_numba()
+    plain, _ = plain_run
     fallback, _ = without_numba("numba.core.datamodel")
     assert set(fallback) == set(plain)
     for name, values in plain.items():

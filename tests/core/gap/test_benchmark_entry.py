@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from palpate.benchmarks import __main__ as benchmarks
-from palpate.benchmarks import _entry, _learned, _simulated, gap
+from palpate.benchmarks import _entry, _learned, _rows, _simulated
 from palpate.benchmarks._hidden import cases
 from palpate.core.gap.dataset.rig import read_rig
 
@@ -49,10 +49,11 @@ def entry(cases_there, said):
     }
 
 
+@pytest.mark.slow("draws the cases that all tests of this file share")
 def test_every_row_is_written_and_no_rig_tells_which(folder):
     hidden = _entry.read_hidden(folder)
-    assert sorted(one.kind for one in hidden.values()) == sorted(gap.MIX)
-    assert [one.kind for one in hidden.values()] != [kind for kind, _ in gap.plan_of(4, 20)]
+    assert sorted(one.kind for one in hidden.values()) == sorted(_rows.MIX)
+    assert [one.kind for one in hidden.values()] != [kind for kind, _ in _rows.plan_of(4, 20)]
     for case, one in hidden.items():
         rig = folder / "rigs" / case / "rig.toml"
         text = rig.read_text(encoding="utf-8")
@@ -64,17 +65,18 @@ def test_every_row_is_written_and_no_rig_tells_which(folder):
     )
 
 
+@pytest.mark.long("draws a case of each of the eight kinds")
 def test_an_answer_follows_from_kind_and_number_alone():
-    for kind in gap.MIX:
+    for kind in _rows.MIX:
         assert cases.answer_of(kind, 7) == cases.draw(kind, 7).answer
 
 
 def test_the_page_has_the_checksums_of_the_public_part(repository):
     page = (repository / "docs" / "gap-benchmark.md").read_text(encoding="utf-8")
-    for count in (78, sum(gap.MIX.values())):
+    for count in (78, sum(_rows.MIX.values())):
         assert f"| {count} | `{_entry.checksum_of(_entry.hidden_text(count, 0))}` |" in page
     rows = {kind: int(cases_) for kind, cases_ in re.findall(r"^\| `(\w+)` \| (\d+) \|", page, re.MULTILINE)}
-    assert rows == gap.MIX
+    assert rows == _rows.MIX
 
 
 def test_a_changed_file_of_what_is_hidden_is_refused(folder, tmp_path):
@@ -130,7 +132,7 @@ def test_what_counts_as_right_in_each_row():
     text = _entry.table(hidden, answers)
     rows = {line.split(" | ")[0].strip("| "): line.split(" | ")[2:] for line in text.splitlines() if line.startswith("|")}
     one, nothing, two, three, outside, poor = (
-        [cell.strip(" |") for cell in rows[gap.ROWS[kind][0]]] for kind in ("own", "none", "two", "three", "outside", "poor")
+        [cell.strip(" |") for cell in rows[_rows.ROWS[kind][0]]] for kind in ("own", "none", "two", "three", "outside", "poor")
     )
     assert one == ["1 / 0", "0 / 1", "0 / 0"] and nothing == ["1 / 0", "0 / 1", "0 / 0"]
     assert two == ["1 / 0", "0 / 0", "0 / 0"] and three == ["1 / 0", "0 / 0", "0 / 0"]
@@ -215,7 +217,7 @@ def test_simulations_are_kept_gone_on_with_and_apart_from_all_tested_cases(tmp_p
     assert [_simulated.LABELS[row.argmax()] for row in holds] == ["nothing", "creep", "nothing"] and (
         holds.sum(axis=1) == 1
     ).all()
-    assert "simulated" not in gap.MIX  # a kind of its own: no number of it is tested
+    assert "simulated" not in _rows.MIX  # a kind of its own: no number of it is tested
 
 
 def separable(count=240, seed=3):
@@ -228,6 +230,7 @@ def separable(count=240, seed=3):
     return holds[:, :-1] * 3.0 + 0.2 * rng.normal(size=(count, len(_simulated.LABELS) - 1)), holds
 
 
+@pytest.mark.slow("learns from simulations")
 @pytest.mark.parametrize("method", ["classifier", "nearest_simulated"])
 def test_methods_learn_what_can_be_learnt(monkeypatch, method):
     """Nine of ten cases that were not learnt from are named exactly, and a case of no known effect by chance alone."""
@@ -271,15 +274,15 @@ def test_all_methods_are_compared_and_one_that_raises_has_failed(monkeypatch, fo
         raise RuntimeError("no")
 
     monkeypatch.setattr(_entry, "METHODS", {"careful": careful, "fails": fails})
-    monkeypatch.setattr(gap, "HOUSE", tmp_path)
-    monkeypatch.setattr(gap, "fingerprint", lambda: "same")
+    monkeypatch.setattr(_rows, "HOUSE", tmp_path)
+    monkeypatch.setattr(_rows, "fingerprint", lambda: "same")
     kept = tmp_path / "build" / "gap" / "compare-20-4-same"
     kept.parent.mkdir(parents=True)
     kept.symlink_to(folder)
     text = _entry.compare(4, 20, ["careful", "fails"])
     with (kept / "answers" / "fails.csv").open(encoding="utf-8", newline="") as file:
         assert {row["said"] for row in csv.DictReader(file)} == {"failed"}
-    assert f"| {gap.ROWS['outside'][0]} | 1 | 1 / 0 | 0 / 0 |" in text and " / 1 |" not in text
+    assert f"| {_rows.ROWS['outside'][0]} | 1 | 1 / 0 | 0 / 0 |" in text and " / 1 |" not in text
 
 
 def test_runs_of_the_study_are_answers(folder, tmp_path, capsys):
@@ -291,14 +294,14 @@ def test_runs_of_the_study_are_answers(folder, tmp_path, capsys):
         said = [[name, "form", 0.9] for name in names] + [["offset", "common", 0.25]]
         verdict = "no gap" if one.kind == "none" else "explained"
         case = {"kind": one.kind, "number": one.number, "sure": names, "said": said, "verdict": verdict}
-        (run / gap.CASE_NAME).write_text(json.dumps(case) + "\n", encoding="utf-8")
+        (run / _rows.CASE_NAME).write_text(json.dumps(case) + "\n", encoding="utf-8")
     answers = _entry.answers_of_study(tmp_path / "hidden", hidden)
     by_kind = {one.kind: answers[case] for case, one in hidden.items()}
     assert by_kind["own"].said == tuple(next(one.names for one in hidden.values() if one.kind == "own"))
     assert by_kind["own"].probability == 0.9
     assert by_kind["none"].said == ("nothing",) and by_kind["two"].said == by_kind["outside"].said == ("unknown",)
     assert benchmarks.main(["gap", "--score", str(tmp_path / "hidden"), "--of", str(folder)]) == 0
-    assert f"| {gap.ROWS['own'][0]} | 1 | 1 / 0 |" in capsys.readouterr().out
+    assert f"| {_rows.ROWS['own'][0]} | 1 | 1 / 0 |" in capsys.readouterr().out
     with pytest.raises(SystemExit, match="no folder of the study"):
         _entry.answers_of_study(tmp_path, hidden)
 

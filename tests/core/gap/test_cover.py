@@ -127,6 +127,7 @@ def test_strips_carry_what_lies_on_them(tmp_path):
     assert ((spread > 0).sum(axis=1) > (rig.cover.weights > 0).sum(axis=1)).all()
 
 
+@pytest.mark.long("a whole diagnosis under a cover")
 def test_eight_transducers_of_which_nothing_is_wrong_but_creep(tmp_path):
     text = RIG.replace(f"k = {K}", f"k = {1.2 * K}")
     assert len(read_rig(written(tmp_path, text)).surface) == 40 * 24  # points a quarter of the depth apart

@@ -179,6 +179,7 @@ def test_sneak_currents_show_on_the_fourth_corner_alone():
     np.testing.assert_allclose(signals.reading, expected, rtol=1e-12)
 
 
+@pytest.mark.long("draws a case with three hidden effects")
 def test_three_effects_are_three_and_act_in_their_order():
     for number in range(3):
         hidden = cases._names("three", number, np.random.default_rng(number), True)

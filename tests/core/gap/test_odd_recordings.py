@@ -79,6 +79,7 @@ def short_search(monkeypatch):
     monkeypatch.setattr(screening, "THOROUGH", few)
 
 
+@pytest.mark.slow("a whole diagnosis of a rig with one odd recording")
 @pytest.mark.filterwarnings("error")
 @pytest.mark.usefixtures("short_search")
 @pytest.mark.parametrize(("name", "where"), [*((name, "a") for name in FAULTS), ("no contact", "c"), ("stuck", "c")])

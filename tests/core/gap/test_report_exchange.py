@@ -64,6 +64,7 @@ def ages(folder):
     return {path.name: path.read_text().strip('"\n') for path in folder.iterdir() if path.is_file() and path.name[0] != "."}
 
 
+@pytest.mark.slow("writes a report once for each of its steps")
 @pytest.mark.parametrize("kind", [KILL, "EIO"])
 def test_stopped_at_every_step(report, tmp_path, kind):
     start = tmp_path / "start"

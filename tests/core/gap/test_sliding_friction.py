@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import gap_cases as cases
 import numpy as np
+import pytest
 
 from palpate.core.gap.fitting.least_squares import TrialView
 from palpate.core.gap.forward.contact_phases import TRAVEL_BANDS, features
@@ -36,6 +37,7 @@ def brake(backlash):
     return cases.grid_rig(1, 1, 0.01, PARAMETERS, trials)
 
 
+@pytest.mark.slow("a whole diagnosis with friction")
 def test_the_report_says_what_friction_does_and_what_is_left(tmp_path):
     result = run_job(diagnose(brake(backlash=2.0)))
     errors = gap_errors(result)

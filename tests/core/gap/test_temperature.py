@@ -71,6 +71,7 @@ def test_what_a_log_calls_a_temperature():
     assert temperature_unit(np.array([70.0]), "°F") == ("°F", "the file says so", True)
 
 
+@pytest.mark.long("a whole diagnosis of warm and cold recordings")
 def test_a_gain_and_a_zero_that_follow_it_are_named():
     sure, result = _small_pad.examined(temperature.write, "both", 2)
     assert sure == {"temperature"} and result.verdict == "explained"

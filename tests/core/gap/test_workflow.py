@@ -160,6 +160,7 @@ def test_nothing_hidden_but_wrong_parameters_is_no_gap():
     assert result.best.model.parameters.k == pytest.approx(80.0, rel=0.01)
 
 
+@pytest.mark.slow("a whole diagnosis, the one that names an effect in this tier")
 def test_creep_is_named_and_the_gap_closes(tmp_path):
     result = diagnosed(cases.rig(contact=cases.relaxing(), seed=7))
     assert [named.name for named in result.findings] == ["creep"]
@@ -184,12 +185,14 @@ def test_creep_is_named_and_the_gap_closes(tmp_path):
         assert (tmp_path / f"{name}.pdf").read_bytes().startswith(b"%PDF")
 
 
+@pytest.mark.long("a whole diagnosis that compares pairs of effects")
 def test_two_effects_are_named():
     gains = np.exp(np.random.default_rng(8).normal(0, 0.2, cases.ROWS * cases.COLUMNS))
     result = diagnosed(cases.rig(contact=cases.relaxing(0.35), change=lambda r, t: r * gains, seed=8, trials=6))
     assert {named.name for named in result.findings} == {"creep", "gain-mismatch"}
 
 
+@pytest.mark.long("a whole diagnosis")
 def test_hum_is_unexplained():
     result = diagnosed(cases.rig(change=lambda r, t: r + 0.01 * np.sin(2 * np.pi * 7.3 * t)[:, None], seed=9))
     assert result.verdict == "unexplained" and not result.findings
@@ -197,6 +200,7 @@ def test_hum_is_unexplained():
     assert "without touching" in next_experiment(result)
 
 
+@pytest.mark.long("a whole diagnosis")
 def test_intervals_hold_what_was_hidden():
     """The library's own form is hidden; its intervals should hold it, and be narrow enough to mean something."""
     rig = cases.rig(change=lambda r, t: 0.15 * np.tanh(r / 0.15), seed=10)
@@ -206,6 +210,7 @@ def test_intervals_hold_what_was_hidden():
     assert level.low < 0.15 < level.high and level.high - level.low < 0.03
 
 
+@pytest.mark.long("a whole diagnosis")
 def test_noise_that_grows_with_the_reading_is_named():
     rng = np.random.default_rng(12)
     result = diagnosed(cases.rig(change=lambda r, t: r * (1 + 0.2 * rng.normal(size=r.shape)), noise=0.003, seed=12))

@@ -20,7 +20,10 @@ fuzzed = settings(
 )
 
 
-@pytest.mark.parametrize("name", list(readers()))
+LONG = dict.fromkeys(("rig of any words", "unfinished bake"), pytest.mark.long(f"{EXAMPLES} tries at what reads many files"))
+
+
+@pytest.mark.parametrize("name", [pytest.param(name, marks=LONG.get(name, ())) for name in readers()])
 def test_a_damaged_file_is_one_sentence(name):
     reader = readers()[name]
 

@@ -112,6 +112,7 @@ def test_what_is_no_list_is_one_sentence(text, tmp_path):
         read_probe_list(path)
 
 
+@pytest.mark.long("a cube that comes to rest in MuJoCo's loop")
 def test_the_example_weighs_a_cube_in_mujoco(repository, tmp_path, monkeypatch, capsys):
     """In MuJoCo's loop the force on the cube is what the sensor reads, and its weight."""
     pytest.importorskip("mujoco", reason="MuJoCo moves the cube: pip install mujoco")
@@ -122,6 +123,7 @@ def test_the_example_weighs_a_cube_in_mujoco(repository, tmp_path, monkeypatch, 
     assert capsys.readouterr().out == "on the cube 9.810000 N, sum of 84 texels 9.810000 N, weight 9.810000 N\n"
 
 
+@pytest.mark.long("loads that come to rest in MuJoCo's loop")
 def test_the_side_by_side_example_has_its_table_and_picture(repository, tmp_path, capsys):
     """Under the load for which MuJoCo's contact is made both read the weight; under another only Palpate does."""
     pytest.importorskip("mujoco", reason="MuJoCo moves the loads: pip install mujoco")

@@ -5,6 +5,7 @@ import pytest
 from oracles.foundation import ORDERS, PRESSINGS, convergence
 
 
+@pytest.mark.slow("an order of convergence takes several sizes of texels")
 @pytest.mark.parametrize("name", PRESSINGS)
 def test_finer_texels_converge_to_the_closed_form_at_the_order_of_the_contacts_edge(name):
     """Orders are fitted over 8, 16, 32 and 64 texels a side; 0.15 is what 64 random places leave of scatter.

@@ -16,7 +16,13 @@ UNDAMPED = (161, 359, 553, 557, 991)
 """Edges run over texels whose damping is less than 1 % of their stiffness: what only the tanks hold back."""
 
 
-@pytest.mark.parametrize("start", range(0, 100, 25))
+@pytest.mark.parametrize(
+    "start",
+    [
+        pytest.param(0, marks=pytest.mark.slow("25 random bodies; a few say nothing of the rest")),
+        *(pytest.param(start, marks=pytest.mark.long("the other 75 of 100 random bodies")) for start in (25, 50, 75)),
+    ],
+)
 def test_thrown_bodies_gain_no_energy(start):
     """Kinetic energy and height never grow, to rounding; nor does their sum with what contacts may give back."""
     for seed in range(start, start + 25):

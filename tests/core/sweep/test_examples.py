@@ -19,6 +19,7 @@ from palpate.sweep.dataset import publish
 parquet = pytest.importorskip("pyarrow.parquet")
 
 
+@pytest.mark.long("learns from a data set")
 def test_contact_is_learnt_from_presses(tmp_path, repository):
     """Seventy-five runs place a contact of an unseen run better than always answering the mean."""
     pytest.importorskip("sklearn", exc_type=ImportError)
@@ -33,6 +34,7 @@ def test_contact_is_learnt_from_presses(tmp_path, repository):
     assert (study / "train_contact.png").read_bytes().startswith(b"\x89PNG")
 
 
+@pytest.mark.slow("opens the data set in a library that is loaded for it")
 def test_a_batch_is_drawn(tmp_path, repository):
     """Of a pad whose texels form a picture; the forces in the titles are those of the frames."""
     study = new_study(tmp_path / "study")

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from palpate.benchmarks import gap
+from palpate.benchmarks import _rows, gap
 from palpate.core.errors import PalpateError
 from palpate.core.study.run_files import done_runs
 from palpate.core.study.study_file import Run, study_of
@@ -66,6 +66,7 @@ def answers_of(opened: OpenStudy) -> list[dict]:
     return [answer_to(scenes, run) for run in opened.runs]
 
 
+@pytest.mark.slow("the one study of a job from the command line in this tier")
 def test_a_job_computes_its_runs(tmp_path):
     finished = sweep(write(tmp_path), "--out", tmp_path / "out", "--allow-scripts", "--workers", 1)
     assert (finished.returncode, finished.stderr) == (0, "")
@@ -172,6 +173,7 @@ def module_of(path: Path):
     return module
 
 
+@pytest.mark.long("two cases of the hidden-effects study, each diagnosed twice")
 def test_hidden_effects_as_a_study_say_what_the_benchmark_says(repository, tmp_path):
     """Two small cases: the table of the study's folder is that of the benchmark, but for the seconds."""
     folder = repository / "docs" / "sample-study"
@@ -183,7 +185,7 @@ def test_hidden_effects_as_a_study_say_what_the_benchmark_says(repository, tmp_p
     (tmp_path / "study.toml").write_text(module.STUDY.format(cases=names), encoding="utf-8")
     opened = begun(tmp_path / "study.toml")
     assert [answer["status"] for answer in answers_of(opened)] == ["done", "done"]
-    kept = {(one["kind"], one["number"]): one for one in gap.results_in(opened.folder)}
+    kept = {(one["kind"], one["number"]): one for one in _rows.results_in(opened.folder)}
     expected = [gap.examine(kind, number) for kind, number in plan]
     for one in expected:
         assert kept[one["kind"], one["number"]].pop("seconds") > 0.0

@@ -84,6 +84,7 @@ def undisturbed(tmp_path_factory):
     return folder / "out"
 
 
+@pytest.mark.slow("computes the study that the tests of this file share")
 def test_a_run_holds_what_it_promises(undisturbed):
     (place,) = [path for path in (undisturbed / "runs").iterdir() if json.loads((path / "run.json").read_bytes())["index"] == 5]
     run = json.loads((place / "run.json").read_bytes())
@@ -107,6 +108,7 @@ def test_the_dataset_of_a_study_knows_units_and_slip(undisturbed):
     assert parquet.read_table(undisturbed / "dataset" / "meta" / "tasks.parquet").to_pydict()["task"] == ["small presses"]
 
 
+@pytest.mark.slow("the one export of a study from the command line")
 def test_a_finished_study_is_exported(undisturbed):
     h5py = pytest.importorskip("h5py")
     finished = sweep(undisturbed, "--format", "hdf5")
@@ -116,6 +118,7 @@ def test_a_finished_study_is_exported(undisturbed):
         assert len(file["episodes/run"]) == 24
 
 
+@pytest.mark.long("computes a study twice")
 def test_failed_runs_are_left_alone_until_they_are_asked_for(undisturbed, tmp_path):
     folder = tmp_path / "study"
     shutil.copytree(undisturbed, folder)
@@ -138,6 +141,7 @@ def test_failed_runs_are_left_alone_until_they_are_asked_for(undisturbed, tmp_pa
     assert (folder / "runs.parquet").read_bytes() == (undisturbed / "runs.parquet").read_bytes()
 
 
+@pytest.mark.long("kills a study and computes it again")
 @pytest.mark.skipif(os.name == "nt", reason="signals of POSIX")
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGINT])
 def test_a_stopped_study_goes_on_where_it_was(undisturbed, tmp_path, number):
@@ -161,6 +165,7 @@ def test_a_stopped_study_goes_on_where_it_was(undisturbed, tmp_path, number):
     assert not list((folder / "runs").glob(".*"))
 
 
+@pytest.mark.slow("starts the command twice")
 def test_another_study_in_the_same_folder_is_refused(undisturbed, tmp_path):
     study = write_study(tmp_path, STUDY.replace("24", "25").replace("2e-3", "3e-3"))
     refused = sweep(study, "--out", undisturbed)
@@ -187,6 +192,7 @@ def test_names_are_listed_for_a_study_with_a_wrong_one_and_for_a_scene(tmp_path)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["study.toml", "tiny.npz"]
 
 
+@pytest.mark.long("a dry run and a study from the command line")
 def test_a_study_may_change_after_a_dry_run_and_a_folder_named_as_the_package_does_no_harm(tmp_path):
     """A bake leaves a folder `palpate` beside its .blend, and Python looks in its working folder first."""
     (tmp_path / "palpate").mkdir()
@@ -258,6 +264,7 @@ def test_a_run_that_fails_leaves_the_others_alone(by_hand):
     assert said.count("\n") == 1
 
 
+@pytest.mark.slow("computes until its limit of five seconds")
 def test_a_run_that_never_ends_is_ended(by_hand):
     slow = words_of(1, **{"press.speed": 1e-9})  # frames for weeks
     answers = compute_batch(str(by_hand), [slow, words_of(2)], Limits(5.0))
@@ -265,6 +272,7 @@ def test_a_run_that_never_ends_is_ended(by_hand):
     assert "ended after its limit of 5 s" in answers[0]["sentence"]
 
 
+@pytest.mark.long("fills memory until its limit")
 def test_a_run_that_eats_memory_is_ended(by_hand):
     """It gets a second, fresh process, since the first one has computed another run before; the worker goes on."""
     hungry = words_of(1, **{"press.speed": 1e-9})  # its frames fill some 40 MB a second
@@ -301,6 +309,7 @@ def test_a_run_that_is_done_is_not_computed_again(by_hand):
     assert (by_hand / "runs" / words_of(0)["digest"] / "run.json").stat().st_mtime_ns == before
 
 
+@pytest.mark.long("computes a study in five commands")
 def test_parts_make_the_whole(undisturbed, tmp_path):
     """As on a farm: the study is begun, its parts are computed by themselves, and a last command makes the dataset."""
     study, out = write_study(tmp_path), tmp_path / "out"

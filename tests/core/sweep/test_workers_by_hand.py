@@ -87,6 +87,7 @@ def address() -> str:
         return f"tcp://127.0.0.1:{probe.getsockname()[1]}"
 
 
+@pytest.mark.long("kills a worker of a study")
 def test_one_worker_joins_late_and_one_is_lost(tmp_path: Path, address: str):
     save_scenario(tmp_path / "tiny.npz", tiny_scene())
     study, out = tmp_path / "study.toml", tmp_path / "out"

@@ -35,6 +35,7 @@ def test_noise_has_no_line(colour, seed):
     assert line_in(cases.rig(seed=30 + seed, colour=colour), 1e-3) is None
 
 
+@pytest.mark.long("a whole diagnosis")
 def test_hum_of_many_phases_is_unexplained():
     result = run_job(diagnose(cases.rig(change=hum(0.01, 7.3), seed=22)))
     assert result.verdict == "unexplained" and not result.findings and result.line is not None

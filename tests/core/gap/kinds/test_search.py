@@ -93,6 +93,7 @@ def _told(kind, number, folder):
     return {(one.signal, one.other): one for one in distinctions(seen, kinds)}
 
 
+@pytest.mark.long("a whole search among pairs of kinds")
 def test_a_flat_indenter_cannot_tell_a_height_error_from_a_dead_zone_and_holds_tell_creep_from_hysteresis(tmp_path):
     flat = _told("two", 601, tmp_path)
     assert flat["misalignment/height", "dead-zone"].share < 0.1
@@ -101,6 +102,7 @@ def test_a_flat_indenter_cannot_tell_a_height_error_from_a_dead_zone_and_holds_t
     assert all(0.0 <= one.share <= 1.0 for one in flat.values())
 
 
+@pytest.mark.long("a whole search among pairs of kinds")
 def test_a_ball_can_hardly_tell_load_spreading_from_crosstalk(tmp_path):
     ball = _told("two", 600, tmp_path)
     assert ball["load-spreading", "crosstalk"].share < 0.2 < ball["load-spreading", "saturation"].share

@@ -31,6 +31,7 @@ def test_a_shift_is_found_from_a_motion_that_only_touches_at_times(late, rate, s
     assert found.uncertainty < 0.2
 
 
+@pytest.mark.slow("statistics of 24 recordings")
 def test_uncertainties_are_not_too_small():
     """Of 24 recordings with much noise not more than two are off by more than two of their standard errors."""
     off = []

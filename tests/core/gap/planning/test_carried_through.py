@@ -4,6 +4,7 @@
 import json
 
 import numpy as np
+import pytest
 
 from palpate.benchmarks import _relaxing_pad as pad
 from palpate.commands import main
@@ -14,6 +15,7 @@ def said(rig, out):
     return json.loads((out / "gap.json").read_text())
 
 
+@pytest.mark.long("palpate gap twice, from a rig to its report")
 def test_the_trajectory_that_is_written_resolves_what_was_ambiguous(tmp_path):
     rng = np.random.default_rng(5)
     rig = pad.write(tmp_path, rng)

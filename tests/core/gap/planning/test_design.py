@@ -111,6 +111,7 @@ def test_a_planned_recording_has_the_units_of_those_that_were_made():
     assert again.count == rig.trials[1].reading.size and again.full_path == both.full_path
 
 
+@pytest.mark.long("compares with random trajectories")
 def test_the_best_trajectory_tells_what_the_recordings_and_most_random_ones_do_not():
     space = _space(_with_one_press(), ("creep", "hysteresis"))
     question = frozenset((one.distinction.signal, one.other) for one in space.before)
@@ -141,6 +142,7 @@ def rig():
     return _with_one_press()
 
 
+@pytest.mark.long("a whole plan of the next recording")
 def test_a_plan_names_the_open_pair_and_writes_a_recording_that_a_rig_can_have(rig, tmp_path):
     plan = run_job(plan_experiment(rig, Wishes(between=("creep", "saturation"), duration=6.0)))
     one = plan.experiment

@@ -41,6 +41,7 @@ def changing(change):
     return cases.rig(lambda force, time: change(force, next(count)), seed=1, trials=5, seconds=6.0)
 
 
+@pytest.mark.long("a whole diagnosis of five recordings, twice over")
 @pytest.mark.parametrize(
     ("change", "name"),
     [
@@ -127,6 +128,7 @@ def test_a_zero_that_all_recordings_share_is_no_difference_between_them():
     assert result.between is None and not result.assumed_session
 
 
+@pytest.mark.long("a whole diagnosis of five recordings, twice over")
 def test_wear_without_a_session_is_found_as_one_session_in_the_order_of_the_rig():
     put_on = [np.zeros(cases.ROWS * cases.COLUMNS)]
 
@@ -163,6 +165,7 @@ def test_one_session_keeps_the_order_of_the_rig():
     assert [trial.name for trial in session.trials] == [trial.name for trial in rig.trials]
 
 
+@pytest.mark.slow("a whole diagnosis; the only quick one with an assumed session")
 def test_the_wear_of_an_assumed_session_is_in_doubt_where_it_may_be_a_drift(tmp_path):
     """All texels carry the same, and gains fall along with use and with the clock alike."""
     result = run_job(diagnose(read_rig(wear_or_drift.write("aged", 6004, tmp_path))))

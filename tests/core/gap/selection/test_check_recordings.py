@@ -77,6 +77,7 @@ def test_a_model_is_held_against_recordings_it_has_not_seen(factor, closes):
     assert outcome.closed[1] is None  # no forces were measured
 
 
+@pytest.mark.long("a whole diagnosis")
 def test_a_check_that_fails_is_said_with_what_differs(tmp_path):
     rig = with_check(cases.rig(contact=cases.relaxing(), seed=7, trials=4, seconds=9.0), 0.6)
     result = diagnosed(rig)

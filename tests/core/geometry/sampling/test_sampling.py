@@ -198,6 +198,7 @@ def test_rows_at_a_spacing_cover_the_region(surface):
     assert np.median(apart.min(axis=1)) == pytest.approx(spacing, rel=0.2)
 
 
+@pytest.mark.slow("statistics of hundreds of texels")
 @pytest.mark.parametrize(("surface", "spacing"), [("sheet", 0.003), ("dome", 0.0015), ("dome", 0.003)])
 def test_scattered_texels_are_even_in_distance_and_in_area(surface, spacing):
     mesh = {"sheet": sheet, "dome": dome}[surface]()
@@ -216,7 +217,7 @@ def test_scattered_texels_are_even_in_distance_and_in_area(surface, spacing):
 
 
 def test_a_seed_is_a_pattern_and_the_mesh_s_own_triangles_do_not_show():
-    one, two, other = scatter(sheet(), 0.004, 1), scatter(sheet(), 0.004, 1), scatter(sheet(), 0.004, 2)
+    one, two, other = scatter(sheet(), 0.006, 1), scatter(sheet(), 0.006, 1), scatter(sheet(), 0.006, 2)
     assert np.array_equal(one.vertices, two.vertices)
     assert one.faces == two.faces
     assert len(one.vertices) != len(other.vertices) or np.abs(one.vertices - other.vertices).max() > 1e-4
@@ -224,10 +225,10 @@ def test_a_seed_is_a_pattern_and_the_mesh_s_own_triangles_do_not_show():
 
 def test_both_sides_of_a_thin_finger_are_covered():
     """A slab ten times thinner than the spacing: each side gets as many texels as a sheet alone."""
-    slab = trimesh.creation.box((0.03, 0.03, 0.0003))
+    slab = trimesh.creation.box((0.02, 0.02, 0.0003))
     mesh = checked_mesh(np.asarray(slab.vertices), np.asarray(slab.faces), "slab")[0]
     skin = scatter(mesh, 0.003)
-    alone = len(scatter(sheet(0.03, 0.03), 0.003).vertices)
+    alone = len(scatter(sheet(0.02, 0.02), 0.003).vertices)
     for side in (skin.vertices[:, 2] > 1e-4, skin.vertices[:, 2] < -1e-4):
         assert side.sum() == pytest.approx(alone, rel=0.35)
 

@@ -158,6 +158,7 @@ def test_the_controller_needs_no_simulation():
     assert totals[-1] == 0.0
 
 
+@pytest.mark.slow("a gripper through its whole cycle")
 @pytest.mark.parametrize("coupled", [True, False])
 def test_a_gripper_reaches_its_force_lifts_holds_and_sets_down(coupled):
     """The work cycle of the paper's Fig. 12 in small: 10 N to 1e-6, no drift in the hand, the box where it was."""
