@@ -7,8 +7,9 @@ Every message is one sentence that says what is wrong, where, and what to do abo
 
 from __future__ import annotations
 
+import difflib
 import os
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 
 
@@ -42,6 +43,10 @@ class ParameterError(PalpateError):
 
 class EffectError(ParameterError):
     """An effect that the library does not have, or a parameter of one that means nothing."""
+
+
+class ArgumentError(ParameterError):
+    """An argument of a function for scripts that has a wrong type, shape or value; the message names the argument."""
 
 
 class SceneError(PalpateError):
@@ -85,3 +90,9 @@ def os_error_reason(error: OSError) -> str:
 def counted(number: int, noun: str) -> str:
     """Return a number with its noun in the singular or the plural, as "1 texel" or "1,024 texels"."""
     return f"{number:,} {noun}" + ("" if number == 1 else "s")
+
+
+def suggestion(name: str, known: Iterable[str]) -> str:
+    """Return a hint at the known name that is most similar to a wrong one, or nothing."""
+    near = difflib.get_close_matches(name, list(known), n=1)
+    return f" (did you mean '{near[0]}'?)" if near else ""
