@@ -14,6 +14,7 @@ from ..core.gap.planning.experiment_plan import ExperimentPlan, Wishes
 from ..core.gap.planning.experiment_plan import plan_experiment as plan
 from ..core.gap.report import plan_files
 from . import arguments
+from .arguments import ArgumentError
 from .gap import RigOrFile, rig_of
 from .running import ShowProgress, finished
 
@@ -95,9 +96,11 @@ def plan_experiment(
     words = dict(limits or {})
     arguments.known(words, LIMITS, "limit of an experiment called")
     area = words.pop("area", None)
-    bounds = {name: None if value is None else arguments.number(value, f"{name} of limits") for name, value in words.items()}
+    for name, value in words.items():
+        if value is not None and not isinstance(value, float | int | np.floating):
+            raise ArgumentError(f"{name} of limits is {arguments.brief(value)}: give a number.")
     if area is not None:
         x0, x1, y0, y1 = arguments.numbers(area, (4,), "area of limits").tolist()
         area = (x0, x1, y0, y1)
     found = rig_of(rig)
-    return Plan(finished(plan(found, Wishes(tuple(between), area=area, **bounds)), progress, "plan"))
+    return Plan(finished(plan(found, Wishes(tuple(between), area=area, **words)), progress, "plan"))

@@ -81,7 +81,7 @@ def test_the_first_bake_is_saved_with_the_blend(saved):
         "SEQUENCE",
         "Non-Color",
     )
-    assert sorted(name.name for name in path.parent.iterdir()) == ["palpate", "scene.blend", "scene.blend1"]
+    assert sorted(name.name for name in path.parent.iterdir()) == ["palpate-bake", "scene.blend", "scene.blend1"]
     assert visible(path.parent / "palpate-bake") == ["Pad"]
 
 
@@ -90,7 +90,7 @@ def check_next_bake(path):
     folder = path.parent / "palpate-bake"
     (folder / "Pad" / "notes.txt").write_text("mine")
     assert bake_and_save(path, k=88.0) == found(path)
-    assert sorted(item.name for item in path.parent.iterdir() if not item.name.startswith("scene.blend")) == ["palpate"]
+    assert sorted(item.name for item in path.parent.iterdir() if not item.name.startswith("scene.blend")) == ["palpate-bake"]
     assert [item.name for item in (folder / PRIVATE_FOLDER).iterdir()] == ["palpate-folder.json"]
     assert (folder / "Pad" / "notes.txt").read_text() == "mine"
 
