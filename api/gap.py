@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from html import escape
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -26,6 +27,9 @@ from .arguments import ArgumentError
 from .running import ShowProgress, finished, prepare_solver
 from .sensors import Sensor
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 RigOrFile = Rig | str | os.PathLike[str]
 
 
@@ -42,6 +46,11 @@ class Interval:
     value: Value
     low: float | None = None
     high: float | None = None
+
+    def __str__(self) -> str:
+        if isinstance(self.value, tuple):
+            return f"{len(self.value)} values from {min(self.value):.3g} to {max(self.value):.3g}"
+        return f"{self.value:.3g}" + ("" if self.low is None else f" ({self.low:.3g} to {self.high:.3g})")
 
 
 @dataclass(frozen=True)
@@ -126,11 +135,12 @@ class Gap:
 
         return sentences.headline(self.diagnosis, self.errors)
 
-    def plot(self, name: str = "curves") -> object:
-        """Return a figure of the report, which a notebook shows: "curves", "gap", "loops" and others."""
-        from ..core.gap.report.plots import picture
+    def plot(self, name: str = "curves") -> Figure:
+        """Return a figure of the report, which a notebook shows: "curves", "gap", "loops", "map" or "phases"."""
+        from ..core.gap.report.plots import CAPTIONS, picture
         from .drawings import shown_in_notebooks
 
+        arguments.known([name], list(CAPTIONS), "figure called")
         return shown_in_notebooks(picture(name, self.diagnosis, self.errors))
 
     def report(self, folder: str | os.PathLike[str], progress: ShowProgress = False) -> Path:

@@ -353,7 +353,7 @@ def test_a_swap_that_fails_is_taken_back(tmp_path, monkeypatch, failing):
         return rename(path, target)
 
     monkeypatch.setattr(Path, "rename", rename_but_one)
-    with pytest.raises(FileError, match=r"^The bake could not be written to '.*palpate' \(permission denied\)"):
+    with pytest.raises(FileError, match=r"^The bake could not be written to '.*palpate-bake' \(permission denied\)"):
         baked(scene)
     monkeypatch.undo()
     assert calls[:failing] == order[:failing]
@@ -378,7 +378,7 @@ def test_the_bake_of_another_blend_beside_it_is_not_replaced(tmp_path):
     assert set(stages) == {"Reading the scene"}
     assert contents(tmp_path / "palpate-bake") == files
     scene.palpate.folder = "//palpate-bake second"
-    assert baked(scene).folders["Pad"].parent.name == "palpate second"
+    assert baked(scene).folders["Pad"].parent.name == "palpate-bake second"
     scene.palpate.folder = "//palpate-bake"
     first.unlink()  # it was renamed
     baked(scene)

@@ -57,7 +57,7 @@ def test_who_finds_another_bake_in_the_folder_says_so(saved, tmp_path):
     baked(scene, into_scene=False)  # by a script, or by another Blender
     scene = reopen(path)  # not saved: it shows the old bake
     expected = (
-        f"'{tmp_path / 'palpate' / 'Pad'}' holds another bake than the one that 'Scene' shows: "
+        f"'{tmp_path / 'palpate-bake' / 'Pad'}' holds another bake than the one that 'Scene' shows: "
         "bake again, or open the .blend that was saved with that bake."
     )
     scene.frame_set(2)
@@ -100,7 +100,8 @@ def test_another_blend_is_refused_wherever_it_lies(saved, tmp_path):
         with pytest.raises(FileError) as caught:
             baked(scene, into_scene=into_scene)
         assert str(caught.value) == (
-            f"'{tmp_path / 'palpate' / 'Pad'}' holds the bake of '{first}': choose another bake folder, or rename this one."
+            f"'{tmp_path / 'palpate-bake' / 'Pad'}' holds the bake of '{first}': "
+            "choose another bake folder, or rename this one."
         )
     assert contents(tmp_path / "palpate-bake") == before
 

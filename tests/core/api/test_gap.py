@@ -49,6 +49,23 @@ def test_a_report_is_written_and_its_sensor_read(gap, tmp_path):
     assert read.effects == gap.sensor.effects and read.parameters == gap.sensor.parameters
 
 
+def test_an_interrupted_report_leaves_no_file(gap, tmp_path):
+    def stop(step):
+        if step.share > 0.5:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        gap.report(tmp_path / "out", progress=stop)
+    left = [path for path in (tmp_path / "out").rglob("*") if path.is_file() and ".palpate" not in path.parts]
+    assert left == []
+
+
+def test_figures_of_a_gap(gap):
+    assert gap.plot("gap")._repr_png_().startswith(b"\x89PNG")
+    with pytest.raises(pp.PalpateError, match=r"called 'lops' \(did you mean 'loops'\?\)"):
+        gap.plot("lops")
+
+
 def test_a_plan_is_written_and_can_be_simulated(rig, tmp_path):
     plan = pp.plan_experiment(rig, limits={"depth": 2e-3, "duration": 10.0})
     assert len(plan.rows) > 3 and repr(plan) == f"<Plan: {plan.sentence}>"
