@@ -16,4 +16,5 @@ __all__ = [
     "render",
     "measured",
     "events",
+    "scripting",
 ]

@@ -34,9 +34,9 @@ DISKS = (60, 900)
 NUMBERS = ("0", "-1", "1", "99999999999", "1e308", "nan", "inf", "-inf", "", " ", "1_0", "٣", "0x10", "--", "1e-320")
 NAMES = (
     "", " ", ".", "..", "/", "~", "a/b", "../../x", "A" * 300, "a\nb", "\u202etxt", "=cmd|' /C calc'!A0", "-", "--", "-rf", "*",
-    "Pad", "Pad.old", ".palpate", "palpate/.palpate", "/dev/null", "/dev/zero", "/dev/full", "/proc/self/mem", "fifo", "folder",
-    "link to nowhere", "link to itself", "socket", "empty", "noise", "scene.blend", "rig.toml", "palpate", "palpate/Pad",
-    "palpate/Pad/manifest.json", "locked", "\udcff\udcfe", "con", "ä" * 200,
+    "Pad", "Pad.old", ".palpate", "palpate-bake/.palpate", "/dev/null", "/dev/zero", "/dev/full", "/proc/self/mem", "fifo",
+    "folder", "link to nowhere", "link to itself", "socket", "empty", "noise", "scene.blend", "rig.toml", "palpate-bake",
+    "palpate-bake/Pad", "palpate-bake/Pad/manifest.json", "locked", "\udcff\udcfe", "con", "ä" * 200,
 )  # fmt: skip
 """Odd names: some of nothing, some of what :func:`furnish` has put there."""
 TEMPLATES: tuple[tuple[str, ...], ...] = (
@@ -49,11 +49,11 @@ TEMPLATES: tuple[tuple[str, ...], ...] = (
     ("bake", BLEND, "--out", "new", "--time-limit", "NUMBER", "--frames", "2", "3"),
     ("bake", BLEND, "--out", "new", "--memory-limit", "NUMBER", "--frames", "2", "3"),
     ("export", "NAME"),
-    ("export", "palpate", "--out", "NAME"),
-    ("export", "palpate", "--sensor", "NAME", "--out", "new"),
-    ("export", "palpate", "--format", "NAME", "--out", "new"),
-    ("export", "palpate", "--format", "png", "--color-map", "NAME", "--out", "new"),
-    ("export", "palpate", "--format", "hdf5", "--out", "NAME"),
+    ("export", "palpate-bake", "--out", "NAME"),
+    ("export", "palpate-bake", "--sensor", "NAME", "--out", "new"),
+    ("export", "palpate-bake", "--format", "NAME", "--out", "new"),
+    ("export", "palpate-bake", "--format", "png", "--color-map", "NAME", "--out", "new"),
+    ("export", "palpate-bake", "--format", "hdf5", "--out", "NAME"),
     ("render", "NAME", "--only", "curves", "--format", "png", "--out", "new"),
     ("render", BLEND, "--only", "curves", "--format", "png", "--out", "NAME"),
     ("render", BLEND, "--only", "numbers", "--format", "png", "--out", "new", "--frame", "NUMBER"),

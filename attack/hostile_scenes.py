@@ -137,7 +137,7 @@ def _changes() -> dict[str, Callable[[Any], None]]:
         "sin(frame)*1e300",
     ):
         found[f"driver {text}"] = _driver(text)
-    for text in ("//", "//.", "/", "/proc", "/dev/null", "//.palpate", "//palpate/Pad", "//x\n", "", "//" + "a" * 300):
+    for text in ("//", "//.", "/", "/proc", "/dev/null", "//.palpate", "//palpate-bake/Pad", "//x\n", "", "//" + "a" * 300):
         found[f"bake folder {text!r}"] = _folder(text)
     found |= {
         "frames 0 to 0": _frames(0, 0),

@@ -22,7 +22,7 @@ MINE = {
 }
 MINE[SAVED] = MINE[BAKES]
 """Files of the user's in each of them."""
-BLEND, FOLDER = "scene.blend", "palpate"
+BLEND, FOLDER = "scene.blend", "palpate-bake"
 EXPORT_LIST = ".palpate-export.json"
 
 

@@ -15,12 +15,14 @@ import sys
 import tempfile
 import threading
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import AbstractContextManager, contextmanager, suppress
 from typing import Any, NoReturn
 
 from ..core.errors import PalpateError
+from ..core.jobs import progress_bar as bars
 from ..core.jobs.job_runner import run_job
 from ..core.jobs.progress import Job, Progress, Result
+from ..core.jobs.progress_bar import progress_bar as progress_bar
 
 
 class Interrupt:
@@ -217,36 +219,28 @@ def exit_on_interrupt(message: str, clean_up: Callable[[], object]) -> Iterator[
         os.close(stderr)
 
 
-def progress_bar(label: str, total: int, unit: str = "frame") -> Any:
-    """Return a tqdm bar on stderr; it shows nothing if stderr is not a terminal."""
-    from tqdm import tqdm
-
-    return tqdm(total=total, desc=label, unit=unit, file=sys.stderr, leave=False, disable=None, dynamic_ncols=True)
-
-
-def run_with_progress_bar(
-    label: str, job: Job[Result], unit: str = "step", describe: Callable[[Progress], str] = lambda progress: progress.stage
-) -> Result:
-    """Run a job with a progress bar on stderr and return its result; Ctrl-C cancels the job.
+def shown_progress(
+    label: str, unit: str = "step", describe: Callable[[Progress], str] = lambda progress: progress.stage
+) -> AbstractContextManager[Callable[[Progress], None]]:
+    """Give a function that shows the progress of a job as a bar on stderr, and raises after Ctrl-C.
 
     Parameters
     ----------
     label : str
         Before the first progress.
-    job : Job
     unit : str
         What the job counts.
     describe : callable, optional
         Makes the words beside the bar out of a :class:`.Progress`; the default is its stage.
     """
-    with progress_bar(label, 1, unit) as bar:
+    return bars.shown_progress(label, unit, describe, Interrupt.check)
 
-        def show(progress: Progress) -> None:
-            Interrupt.check()
-            bar.total = progress.total
-            bar.set_description(describe(progress), refresh=False)
-            bar.update(progress.done - bar.n)
 
+def run_with_progress_bar(
+    label: str, job: Job[Result], unit: str = "step", describe: Callable[[Progress], str] = lambda progress: progress.stage
+) -> Result:
+    """Run a job as :func:`shown_progress` shows it, and return its result; Ctrl-C cancels the job."""
+    with shown_progress(label, unit, describe) as show:
         return run_job(job, show)
 
 

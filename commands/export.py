@@ -6,9 +6,10 @@ from __future__ import annotations
 import argparse
 import importlib.util
 
+from ..api.recordings import Recording
 from ..core.errors import PalpateError
 from ..core.export.exporter import Exporter
-from ..core.export.registry import export, exporters
+from ..core.export.registry import exporters
 from ..core.figures.figure_style import FigureStyle
 from ..core.io.bake_reader import Bake, read_bake
 from . import blender, checks, console, figure_options
@@ -35,9 +36,8 @@ def run(arguments: argparse.Namespace) -> int:
         bake = bake.select(arguments.sensor)
     checks.folder_is_no_bake(arguments.out, bake)
     style: FigureStyle = figure_options.figure_style_from(arguments)
-    with console.Interrupt.raised_at_once():
-        job = export(bake, _exporter(arguments.format), arguments.out, style)
-        written = console.run_with_progress_bar("export", job, unit="sensor")
+    with console.Interrupt.raised_at_once(), console.shown_progress("export", "sensor") as show:
+        written = Recording(bake).export(_exporter(arguments.format), arguments.out, style, show)
     for path in written:
         print(path)
     return 0

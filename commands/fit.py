@@ -9,7 +9,7 @@ from typing import Any
 
 from ..core.figures.figure_canvas import file_type
 from ..core.io.file_writing import writable_file
-from ..core.model.sensor_parameters import DAMPING_PER_STIFFNESS, SensorParameters, unit_of
+from ..core.model.sensor_parameters import DAMPING_PER_STIFFNESS, unit_of
 from . import checks, console
 
 
@@ -55,16 +55,16 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _stiffness(arguments: argparse.Namespace) -> None:
-    from ..core.gap.calibration.stiffness import fit_stiffness, read_foam
+    from ..api.fits import fit_stiffness
 
-    data = read_foam(arguments.file, arguments.weight_area)
-    fit = fit_stiffness(data, arguments.area, arguments.texels)
+    fit = fit_stiffness(arguments.file, arguments.area, arguments.texels, arguments.weight_area)
     rows = [
         ("line", "k of one texel", "95 % interval", "offset"),
         ("through zero", f"{fit.k.value:.4g} N/m", f"{fit.k.low:.4g} to {fit.k.high:.4g}", "0 Pa"),
         ("with offset", f"{fit.k_offset.value:.4g} N/m", f"{fit.k_offset.low:.4g} to {fit.k_offset.high:.4g}", _pascals(fit)),
     ]
-    print(f"{len(data.compression)} measurements from '{arguments.file}', {arguments.texels} texels on {arguments.area:g} m²\n")
+    number = len(fit.data.compression)
+    print(f"{number} measurements from '{arguments.file}', {arguments.texels} texels on {arguments.area:g} m²\n")
     print(console.text_table(rows, "<>>>"))
     if fit.offset_is_significant and fit.offset.value < 0:
         print(f"\nThe foam gives way by {fit.dead_zone * 1e3:.3g} mm before it carries: a dead zone, which the model's line")
@@ -81,10 +81,10 @@ def _pascals(fit: Any) -> str:
 
 
 def _friction(arguments: argparse.Namespace) -> None:
-    from ..core.gap.calibration.friction import fit_friction, read_friction
+    from ..api.fits import fit_friction
 
-    data = read_friction(arguments.file, arguments.texels)
-    fit = fit_friction(data, arguments.normal_force, SensorParameters())
+    fit = fit_friction(arguments.file, arguments.normal_force, arguments.texels)
+    data = fit.data
     kind = "steady sliding" if data.time is None else f"a recording of {data.time[-1] - data.time[0]:.3g} s from rest"
     print(f"{len(data.force)} measurements from '{arguments.file}' as {kind}, {arguments.normal_force:g} N on a texel\n")
     rows = [("parameter", "value", "95 % interval", "unit")]

@@ -7,7 +7,6 @@ With ``--plan``: what the recordings can tell at all, and the trajectory that te
 from __future__ import annotations
 
 import argparse
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,13 +14,10 @@ from ..core.errors import SceneError
 from ..core.io.disk_space import require_space
 from ..core.io.file_list import FileList
 from ..core.io.file_writing import writable_folder
-from ..core.jobs.job_runner import part_of_job
-from ..core.jobs.progress import Job
 from . import blender, checks, console
 
 if TYPE_CHECKING:
-    from ..core.gap.dataset.rig import Rig
-    from ..core.gap.selection.findings import Diagnosis
+    from ..api.gap import Gap
 
 OUTPUTS = ("gap.json", "sensor.toml", "report.html")
 """Files that are written beside the plots."""
@@ -58,10 +54,9 @@ def run(arguments: argparse.Namespace) -> int:
     from ..addon.session import dependencies
 
     dependencies.choose_numba_cache()
-    from ..core.gap.dataset.rig import read_rig
+    from ..api.gap import find_gap, read_rig
     from ..core.gap.report import summary
     from ..core.gap.report.amended_sensor import amended_sensor
-    from ..core.solver import precompile
 
     _check(arguments)
     if arguments.plan:
@@ -76,12 +71,12 @@ def run(arguments: argparse.Namespace) -> int:
         FileList(folder)  # it completes what a killed run has left
     if arguments.blend:
         _sensor_in_scene(arguments)  # wrong names and read-only files are found before the work
-    with console.Interrupt.raised_at_once():
-        precompile.compile_solver_with_notice()
-        result, errors = console.run_with_progress_bar("gap", _diagnose_and_report(rig, folder))
+    with console.Interrupt.raised_at_once(), console.shown_progress("gap") as show:
+        gap = find_gap(rig, show)
+        gap.report(folder, show)
     if arguments.blend:
-        _put_into_scene(arguments, amended_sensor(result))
-    _print_report(arguments, rig, result, errors, folder)
+        _put_into_scene(arguments, amended_sensor(gap.diagnosis))
+    _print_report(arguments, gap, folder)
     return 0
 
 
@@ -98,40 +93,38 @@ def _check(arguments: argparse.Namespace) -> None:
 
 def _plan(arguments: argparse.Namespace) -> int:
     """Say which kinds of effects the recordings can tell apart, and write the next experiment."""
-    from ..core.gap.dataset.rig import read_rig
-    from ..core.gap.planning.experiment_plan import Wishes, plan_experiment
+    from ..api.experiment import plan_experiment
+    from ..api.gap import read_rig
     from ..core.gap.report import plan_files
 
-    between, area = tuple(arguments.between or ()), tuple(arguments.area) if arguments.area else None
-    wishes = Wishes(between, arguments.depth, arguments.speed, arguments.duration, area)
     with console.Interrupt.raised_at_once():
         rig = read_rig(arguments.rig)
         folder = writable_folder(arguments.out, create=True) if arguments.out else None
         if folder is not None:
             names = (plan_files.PLAN, plan_files.TRAJECTORY)
             checks.outputs_are_no_inputs((folder / name for name in names), (arguments.rig,))
-        plan = console.run_with_progress_bar("plan", plan_experiment(rig, wishes))
-    print(console.text_table([("effect", "may be taken for"), *plan_files.table_rows(plan)], "<<"))
+        limits = {name: getattr(arguments, name) for name in WISHES if name != "between"}
+        with console.shown_progress("plan") as show:
+            plan = plan_experiment(rig, limits, tuple(arguments.between or ()), show)
+    print(console.text_table([("effect", "may be taken for"), *plan.rows], "<<"))
     print()
-    if plan.experiment is None:
-        print("These recordings tell all of these effects from each other: no further one is planned.")
-    else:
-        print(plan_files.planned_sentence(plan_files.experiment_words(plan.experiment, plan_files.TRAJECTORY)))
+    print(plan.sentence)
     for text in rig.warnings:
         print(f"note: {text}")
-    if folder is None and plan.experiment is not None:
+    if folder is None and not plan.is_complete:
         print("note: --out DIR writes it.")
-    for path in plan_files.write_plan(plan, folder) if folder is not None else ():
+    for path in plan.report(folder) if folder is not None else ():
         print(f"wrote:  {path}")
     return 0
 
 
-def _print_report(arguments: argparse.Namespace, rig: Rig, result: Diagnosis, errors: Any, folder: Path) -> None:
+def _print_report(arguments: argparse.Namespace, gap: Gap, folder: Path) -> None:
     """Print what was found and where it was written."""
     from ..core.gap.fitting import least_squares
     from ..core.gap.report import sentences
 
-    print(sentences.headline(result, errors))
+    result = gap.diagnosis
+    print(gap.headline)
     rows = [("", "parameter", "value (95 % interval)")]
     for one in result.intervals:
         owners = {least_squares.BASE: "base model", least_squares.RECORDING: "recordings"}
@@ -140,25 +133,12 @@ def _print_report(arguments: argparse.Namespace, rig: Rig, result: Diagnosis, er
     print()
     print(console.text_table(rows, "<<<"))
     print()
-    for text in [*rig.warnings, *sentences.warnings(result)]:
+    for text in [*gap.rig.warnings, *sentences.warnings(result)]:
         print(f"note: {text}")
     print(f"report: {folder / 'report.html'}")
     print(f"sensor: {folder / 'sensor.toml'}")
     if arguments.blend:
         print(f"saved:  {arguments.blend}")
-
-
-def _diagnose_and_report(rig: Rig, folder: Path) -> Job[tuple[Diagnosis, Any]]:
-    """Find the gap of a rig and write its report; return the diagnosis and its errors."""
-    from ..core.gap.report import summary
-    from ..core.gap.report.comparison import gap_errors
-    from ..core.gap.selection.diagnosis import diagnose
-
-    result = yield from part_of_job(diagnose(rig), lambda step: replace(step, done=int(950 * step.share), total=1000))
-    errors = gap_errors(result)
-    report = summary.write_report(result, folder, errors)
-    yield from part_of_job(report, lambda step: replace(step, done=950 + int(50 * step.share), total=1000))
-    return result, errors
 
 
 def _sensor_in_scene(arguments: argparse.Namespace) -> Any:

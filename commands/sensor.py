@@ -9,7 +9,7 @@ from pathlib import Path
 
 from ..core.io.file_writing import writable_folder
 from ..core.io.regular_file import require_regular
-from ..core.simulators.registry import export_sensors, written_formats
+from ..core.simulators.registry import written_formats
 from . import blender, checks, console
 
 
@@ -45,7 +45,9 @@ def _export(arguments: argparse.Namespace) -> None:
         from ..addon.authoring import sensor_exchange
 
         sensors = sensor_exchange.sensors_on_meshes(scene, arguments.sensor or ())
-    written = export_sensors(sensors, arguments.to, arguments.out)
+    from ..api.sensors import export_sensor
+
+    written = export_sensor(sensors, arguments.to, arguments.out)
     for note in written.notes:
         print(f"note: {note}", file=sys.stderr)
     for path in written.files:

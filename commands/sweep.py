@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import argparse
-import importlib.util
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -74,19 +73,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    if importlib.util.find_spec(f"{__package__.rpartition('.')[0]}.sweep") is None:  # as in the extension's zip
-        raise PalpateError(
-            "Blender's extension has no studies: run 'pip install .[sweep]' in a checkout of Palpate, with its own Python."
-        )
+    from ..api.study import require_studies
+
+    require_studies()
+    from ..sweep import studies
+
     place = Path(arguments.study)
-    folder = _folder(place, arguments.out)
+    folder = studies.output_folder(place, arguments.out)
     if arguments.status:
         from ..sweep.status import status_of
 
         print(status_of(folder))
         return 0
-    from ..core.io.file_writing import writable_folder
-    from ..core.io.folder_lock import FolderLock
     from ..core.study.run_files import STUDY_NAME
     from ..sweep import driver, exports, study_folder
 
@@ -99,20 +97,17 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.list:
         _print_names(place, arguments)
         return 0
-    is_new, was_begun = not folder.exists(), (folder / STUDY_NAME).exists()
-    lock = FolderLock(writable_folder(folder, create=not place.is_dir()), "sweep")
-    try:
-        opened = _opened(place, folder, arguments)
-        if arguments.begin:
-            print(f"{counted(len(opened.runs), 'run')} begun: {opened.folder}")
-            return 0
-        return _estimate(opened, arguments) if arguments.dry_run else _compute(opened, arguments)
-    finally:
-        lock.release()
-        if arguments.dry_run and not was_begun:
-            study_folder.forget_study(folder)  # so that the study may still be changed
-        if is_new:
-            _remove_unless_begun(folder)
+    was_begun = (folder / STUDY_NAME).exists()
+    with studies.locked_folder(place, folder):
+        try:
+            opened = _opened(place, folder, arguments)
+            if arguments.begin:
+                print(f"{counted(len(opened.runs), 'run')} begun: {opened.folder}")
+                return 0
+            return _estimate(opened, arguments) if arguments.dry_run else _compute(opened, arguments)
+        finally:
+            if arguments.dry_run and not was_begun:
+                study_folder.forget_study(folder)  # so that the study may still be changed
 
 
 def _count(text: str) -> int:
@@ -130,39 +125,10 @@ def _part(text: str) -> tuple[int, int]:
     return int(number), int(count)
 
 
-def _folder(place: Path, out: str | None) -> Path:
-    """Return the absolute output folder, as every machine has to see it."""
-    if place.is_dir():
-        if out is not None:
-            raise PalpateError(f"'{place}' is a folder, in which its study goes on: leave --out away, or give a study's file.")
-        return place.absolute()
-    return (Path(out) if out is not None else place.with_suffix("")).absolute()
-
-
 def _opened(place: Path, folder: Path, arguments: argparse.Namespace) -> OpenStudy:
-    """Open the study; a .blend is read in a Blender of its own, which is gone before the runs begin."""
-    from ..sweep import study_folder
-    from ..sweep.scene_evaluation import read_blend
+    from ..sweep import studies
 
-    def read(blend: Path, target: Path) -> None:
-        read_blend(blend, target, arguments.scripts, "--study", str(place))
-        console.Interrupt.check()
-
-    if place.is_dir():
-        return study_folder.resume_study(folder)
-    return study_folder.begin_study(place, folder, read, arguments.scripts)
-
-
-def _remove_unless_begun(folder: Path) -> None:
-    """Remove the folder that was made for a study which was then refused, if nothing but Palpate's own mark is in it."""
-    from contextlib import suppress
-
-    from ..core.io.private_folder import PRIVATE_FOLDER, find_private_folder, remove_tree
-
-    if [path.name for path in folder.iterdir()] == [PRIVATE_FOLDER] and find_private_folder(folder) is not None:
-        remove_tree(folder / PRIVATE_FOLDER)
-        with suppress(OSError):
-            folder.rmdir()
+    return studies.open_study(place, folder, arguments.scripts, console.Interrupt.check)
 
 
 def _print_names(place: Path, arguments: argparse.Namespace) -> None:
@@ -248,44 +214,26 @@ def _duration(seconds: float) -> str:
 
 
 def _compute(opened: OpenStudy, arguments: argparse.Namespace) -> int:
-    from ..core.study.run_files import done_runs, failed_runs, make_folders
-    from ..sweep import driver
-    from ..sweep.program import require_allowed
+    from ..sweep import studies
     from ..sweep.status import status_of
-    from ..sweep.worker import Limits
 
-    make_folders(opened.folder)
-    number, count = arguments.part or (1, 1)
-    runs = [run for run in opened.runs if run.index % count == number - 1]
-    over = done_runs(opened.folder) | (set() if arguments.retry_failed else failed_runs(opened.folder))
-    left = [run for run in runs if run.digest not in over]
-    if left:
-        require_allowed(opened.study, arguments.scripts)
-        with console.progress_bar("sweep", len(runs), "run") as bar:
-            bar.update(len(runs) - len(left))
-
-            def show(tally: driver.Tally) -> None:
-                console.Interrupt.check()
-                if tally.failed:
-                    bar.set_postfix(failed=tally.failed, refresh=False)
-                bar.update(len(runs) - len(left) + tally.finished - bar.n)
-
-            workers = min(_workers(arguments), len(left))
-            with driver.dask_client(arguments.scheduler, workers, _slurm(arguments)) as client:
-                tally = driver.run_study(client, opened.folder, left, Limits.of(opened.study), show, arguments.scripts)
-        for index, sentence in tally.failures[:MOST_FAILURES_NAMED]:
-            print(f"run {index} failed: {sentence}")
-    found = status_of(opened.folder)
-    written: list[Path] = []
-    if found.done and arguments.part is None:
-        from ..sweep.dataset import publish
-        from ..sweep.exports import EXPORTS
-        from ..sweep.report import write_report
-
+    how = studies.Computing(
+        workers=arguments.workers,
+        scheduler=arguments.scheduler,
+        make_cluster=_slurm(arguments),
+        scripts=arguments.scripts,
+        part=arguments.part or (1, 1),
+        retry_failed=arguments.retry_failed,
+    )
+    with console.shown_progress("sweep", "run") as show:
+        failures = studies.compute_runs(opened, how, show)
+    for index, sentence in failures[:MOST_FAILURES_NAMED]:
+        print(f"run {index} failed: {sentence}")
+    if arguments.part is None:
         with console.Interrupt.raised_at_once():  # all of these files are written whole or not at all
-            publish(opened.folder, opened.runs)
-            written = [path for kind in dict.fromkeys(arguments.format) for path in EXPORTS[kind](opened.folder)]
-            write_report(opened.folder, opened.runs)
+            found, written = studies.write_results(opened, arguments.format)
+    else:
+        found, written = status_of(opened.folder), []
     print(found)
     print(f"results: {opened.folder}")
     for path in written:

@@ -45,6 +45,10 @@ class EffectError(ParameterError):
     """An effect that the library does not have, or a parameter of one that means nothing."""
 
 
+class ArgumentError(ParameterError):
+    """An argument of a function for scripts that has a wrong type, shape or value; the message names the argument."""
+
+
 class SceneError(PalpateError):
     """A scene that does not add up to a simulation (nothing to touch, reversed frame range, zero scale)."""
 
@@ -92,3 +96,9 @@ def did_you_mean(word: str, known: Iterable[str], otherwise: str, cutoff: float 
     """Return the known word that is most like a wrong one as a question, or other advice if none is."""
     near = difflib.get_close_matches(word, list(known), n=1, cutoff=cutoff)
     return f"did you mean '{near[0]}'?" if near else otherwise
+
+
+def suggestion(name: str, known: Iterable[str]) -> str:
+    """Return a hint at the known name that is most similar to a wrong one, in brackets, or nothing."""
+    near = did_you_mean(name, known, "")
+    return f" ({near})" if near else ""

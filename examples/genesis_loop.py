@@ -9,23 +9,19 @@ import sys
 
 import genesis as gs
 import numpy as np
-import trimesh
 
-from palpate.core.geometry.mesh import TriangleMesh
-from palpate.core.simulators.pressed_sensor import PressedSensor
-from palpate.core.simulators.probe_list import read_probe_list
+import palpate as pp
 
 DT = 0.0005
-finger = read_probe_list(sys.argv[1])
+finger = pp.read_sensor(sys.argv[1])
 gs.init(backend=gs.cpu, precision="64", logging_level="warning")
 scene = gs.Scene(sim_options=gs.options.SimOptions(dt=DT), show_viewer=False)
 start = finger.position + [0.0, 0.0, 0.0255]
 cube = scene.add_entity(gs.morphs.Box(pos=tuple(start), size=(0.05,) * 3), material=gs.materials.Rigid(rho=1.0 / 0.05**3))
 scene.build()
-shape = trimesh.creation.box([0.05, 0.05, 0.05])
 sensor_pose = finger.position, finger.quaternion  # the sensor stays where it is in the scene
 cube_pose = cube.get_pos().numpy(), cube.get_quat().numpy()
-pressed = PressedSensor(finger, TriangleMesh(shape.vertices, shape.faces), DT, sensor_pose, cube_pose)
+pressed = pp.PressedSensor(finger, pp.Body.box(0.05), DT, sensor_pose, cube_pose)
 for _ in range(2000):
     cube_pose = cube.get_pos().numpy(), cube.get_quat().numpy()  # poses in
     contact = pressed.step(sensor_pose, cube_pose)  # texel forces out

@@ -9,23 +9,18 @@ import sys
 
 import mujoco
 import numpy as np
-import trimesh
 
-from palpate.core.geometry.mesh import TriangleMesh
-from palpate.core.simulators.pressed_sensor import PressedSensor
-from palpate.core.simulators.probe_list import read_probe_list
+import palpate as pp
 
 XML = """<mujoco><option timestep="0.0005"/><worldbody><body name="cube" pos="{} {} {}">
 <freejoint/><geom type="box" size="0.025 0.025 0.025" mass="1"/></body></worldbody></mujoco>"""
-finger = read_probe_list(sys.argv[1])
+finger = pp.read_sensor(sys.argv[1])
 model = mujoco.MjModel.from_xml_string(XML.format(*finger.position + [0.0, 0.0, 0.0255]))
 data = mujoco.MjData(model)
 mujoco.mj_forward(model, data)
-shape, cube = trimesh.creation.box([0.05, 0.05, 0.05]), data.body("cube")
+cube = data.body("cube")
 sensor_pose = finger.position, finger.quaternion  # the sensor stays where it is in the scene
-pressed = PressedSensor(
-    finger, TriangleMesh(shape.vertices, shape.faces), model.opt.timestep, sensor_pose, (cube.xpos, cube.xquat)
-)
+pressed = pp.PressedSensor(finger, pp.Body.box(0.05), model.opt.timestep, sensor_pose, (cube.xpos, cube.xquat))
 for _ in range(2000):
     mujoco.mj_step1(model, data)  # poses in
     contact = pressed.step(sensor_pose, (cube.xpos, cube.xquat))  # texel forces out

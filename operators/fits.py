@@ -89,14 +89,14 @@ class PALPATE_OT_stiffness_fit(MeasurementFit, bpy.types.Operator):
     fields = ("line", "weight_area", "with_damping")
 
     def run(self, context):
+        from ..api.fits import fit_stiffness
         from ..core.gap.calibration.plots import plot_stiffness
-        from ..core.gap.calibration.stiffness import fit_stiffness, read_foam
 
         obj = context.object
         report = sensor_report.fresh_report(obj, context.scene)
         if report.texels is None:
             raise SensorError(report.problems[0].text)
-        fit = fit_stiffness(read_foam(self.filepath, self.weight_area or None), report.area, len(report.texels))
+        fit = fit_stiffness(self.filepath, report.area, len(report.texels), self.weight_area or None)
         chosen = fit.k if self.line == "ZERO" else fit.k_offset
         obj.palpate.k = chosen.value
         if self.with_damping:
@@ -124,11 +124,11 @@ class PALPATE_OT_friction_fit(MeasurementFit, bpy.types.Operator):
     fields = ("normal_force", "texels")
 
     def run(self, context):
-        from ..core.gap.calibration.friction import fit_friction, read_friction
+        from ..api.fits import fit_friction
         from ..core.gap.calibration.plots import plot_friction
 
         obj = context.object
-        fit = fit_friction(read_friction(self.filepath, self.texels), self.normal_force, exchange.parameters_of(obj))
+        fit = fit_friction(self.filepath, self.normal_force, self.texels, exchange.parameters_of(obj))
         exchange.put_parameters(obj, fit.parameters)
         self.picture(context, plot_friction, fit, "Palpate Friction Fit")
         values = ", ".join(f"{name} = {e.value:.3g} ({e.low:.3g} to {e.high:.3g})" for name, e in fit.estimates.items())

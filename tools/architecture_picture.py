@@ -47,6 +47,8 @@ CAPTIONS = {
     "addon.render": "figures and videos",
     "addon.measured": "measured data and gaps",
     "addon.events": "Blender's handlers",
+    "addon.scripting": "objects for scripts",
+    "api": "what scripts call",
     "operators": "buttons",
     "panels": "user interface",
     "commands": "command line",
@@ -74,7 +76,7 @@ IDENTIFICATION = {
 INK, PALE, RED, BLUE, ORANGE = "#1d2733", "#8a96a3", "#d0342c", "#2563a8", "#c9650a"
 BACK = {"core": "#e8f0f8", "addon": "#fbf1e4", "drivers": "#eef3ec"}
 EDGE = {"core": "#9db8d2", "addon": "#dcb98c", "drivers": "#a9c0a2"}
-DRIVERS = ("panels", "operators", "commands", "paper", "sample_blends")
+DRIVERS = ("api", "panels", "operators", "commands", "paper", "sample_blends")
 WIDTH, HEIGHT, ROW = 2.35, 0.98, 1.5  # of a box, and from layer to layer, inches
 GAP_WIDTH = 5.4  # the room of the second way, which shows its steps
 
@@ -299,7 +301,11 @@ class _Canvas:
         for i, name in enumerate(DRIVERS):
             self.box(name, 0.4 + step * (i + 0.5), y + 0.72, "drivers")
         self.text(
-            width / 2, y + 0.03, "each uses addon and core; panels use operators, commands use paper and sample_blends", 9, PALE
+            width / 2,
+            y + 0.03,
+            "api uses core; addon and all others use api and core; panels use operators, commands use paper and sample_blends",
+            9,
+            PALE,
         )
 
     def between(self, middle: Mapping[str, float], wide: Mapping[str, float], top: float) -> None:

@@ -13,7 +13,7 @@ import sys
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
-PACKAGES = ("palpate.core", "palpate.sweep", "palpate.commands")
+PACKAGES = ("palpate.core", "palpate.api", "palpate.sweep", "palpate.commands")
 """What is checked; what these import of the other packages is read for its types alone."""
 
 

@@ -21,14 +21,15 @@ ROOT = Path(__file__).resolve().parents[1]
 # Which packages a package may import from; each may import from itself. The root package ("") registers everything.
 MAY_IMPORT: dict[str, set[str]] = {
     "core": set(),
-    "addon": {"core"},
-    "operators": {"core", "addon"},
+    "api": {"core", "sweep"},
+    "addon": {"core", "api"},
+    "operators": {"core", "api", "addon"},
     "panels": {"core", "addon", "operators"},
-    "commands": {"core", "addon", "paper", "sample_blends", "sweep"},
+    "commands": {"core", "api", "addon", "paper", "sample_blends", "sweep"},
     "paper": {"core", "addon", "sample_blends"},
     "sample_blends": {"core", "addon"},
     "sweep": {"core"},
-    "": {"core", "addon", "operators", "panels", "commands", "paper", "sample_blends"},
+    "": {"core", "api", "addon", "operators", "panels", "commands", "paper", "sample_blends"},
 }
 
 
@@ -178,8 +179,12 @@ class Graph:
 
     @cached_property
     def public(self) -> dict[str, list[str] | None]:
-        """The list `__all__` of each package, None where it has none."""
-        return {module_name(f): _all_of(source) for f, source in self.sources.items() if f.name == "__init__.py"}
+        """The list `__all__` of each package but the root, which makes its own; None where it has none."""
+        return {
+            module_name(f): _all_of(source)
+            for f, source in self.sources.items()
+            if len(f.parts) > 1 and f.name == "__init__.py"
+        }
 
     def targets(self, found: Import) -> Iterator[tuple[str, str]]:
         """Pairs (module, name) that an import inside the extension reaches; the name is empty for a whole module."""

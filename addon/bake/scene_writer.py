@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from ...core.errors import SceneError
+from ...core.io.settings_migration import VERSION
 from ...core.model.recording import Recording
 from ..display import bake_display, baked_scene
 from ..display.baked_sensor import BakedSensor
@@ -101,6 +102,7 @@ def write(scene, reading: SceneReading, recording: Recording, folders: dict[str,
     bake_display.show_bake(scene, baked_sensors)
     baked_scene.remove_orphans()
     settings = scene.palpate
+    settings.schema_version = VERSION
     settings.baked_digest = recording.digest
     settings.baked_shapes = scene_fingerprint.pack_fingerprints(reading.mesh_fingerprints)
     settings.baked_start, settings.baked_end = scenario.frame_start, scenario.frame_end

@@ -88,18 +88,16 @@ def find(obj):
     -------
     Result
     """
-    from ...core.gap.dataset.rig import read_rig
+    from ...api.gap import read_rig, search
     from ...core.gap.report import sentences
-    from ...core.gap.report.comparison import gap_errors
     from ...core.gap.report.experiments import next_experiment
     from ...core.gap.report.plots import picture
-    from ...core.gap.selection.diagnosis import diagnose
 
     yield from first_use.wait()
     yield Progress("Reading the recordings", 0, 1000)
     rig = read_rig(rig_path(obj))
-    diagnosis = yield from part_of_job(diagnose(rig), lambda step: replace(step, stage=f"Finding the gap: {step.stage}"))
-    errors = gap_errors(diagnosis)
+    gap = yield from part_of_job(search(rig), lambda step: replace(step, stage=f"Finding the gap: {step.stage}"))
+    diagnosis, errors = gap.diagnosis, gap.errors
     folder, pictures = Path(tempfile.mkdtemp(prefix="gap-", dir=bpy.app.tempdir)), {}
     from ...core.figures.figure_canvas import save_figure
 
@@ -108,9 +106,9 @@ def find(obj):
         pictures[name] = folder / f"{name}.png"
         save_figure(picture(name, diagnosis, errors), pictures[name], 150)
     identity.ensure_uid(obj)
-    headline, evidence = sentences.headline(diagnosis, errors), sentences.evidence(diagnosis, errors)
+    evidence = sentences.evidence(diagnosis, errors)
     advice, caution = next_experiment(diagnosis), sentences.caution(diagnosis)
-    result = Result(diagnosis, errors, headline, evidence, advice, caution, pictures)
+    result = Result(diagnosis, errors, gap.headline, evidence, advice, caution, pictures)
     _shown.pop(identity.key(obj), None)
     _results[identity.key(obj)] = result
     return result

@@ -3,11 +3,15 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import bpy
 
 from ...core.errors import FileError
+from ...core.io.private_folder import find_private_folder
 from ...core.io.settings_migration import VERSION, migrate
 from ..session import session_state
+from .scene_properties import EARLIER_FOLDER
 
 
 def apply(version: int = VERSION, steps=None) -> None:
@@ -16,6 +20,18 @@ def apply(version: int = VERSION, steps=None) -> None:
         for block in blocks:
             if block.palpate.schema_version not in (0, version):
                 _update(block, kind, version, steps)
+    for scene in bpy.data.scenes:
+        _keep_earlier_folder(scene)
+
+
+def _keep_earlier_folder(scene) -> None:
+    """Let a scene that an earlier version baked into its default folder go on there; new bakes note the settings' version."""
+    settings = scene.palpate
+    if settings.schema_version or settings.is_property_set("folder"):
+        return
+    saved = bool(bpy.data.filepath) and find_private_folder(Path(bpy.path.abspath(EARLIER_FOLDER))) is not None
+    if settings.baked_digest or saved:
+        settings.folder, settings.schema_version = EARLIER_FOLDER, VERSION
 
 
 def _update(block, kind: str, version: int, steps) -> None:

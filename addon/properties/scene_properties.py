@@ -10,6 +10,9 @@ from . import figure_properties, path_options, study_properties
 
 SETTING: dict = {"options": set(), "update": session_state.settings_changed}
 """A setting of a scene has no keyframes; what is shown follows it."""
+FOLDER, EARLIER_FOLDER = "//palpate-bake", "//palpate"
+"""Where scenes are baked unless they say otherwise, and where those of earlier versions were: a folder beside a .blend that has
+the name of the package would hide it from a Python that is started there."""
 COLOR_MAPS = tuple((name, *words) for name, words in color_maps.NAMES.items())
 OVERLAYS = (
     (
@@ -32,7 +35,7 @@ class PALPATE_PG_scene(bpy.types.PropertyGroup):
     folder: StringProperty(
         name="Bake Folder",
         description="Tactile images and recordings go here, in one folder per sensor; // is the folder of the .blend",
-        default="//palpate",
+        default=FOLDER,
         subtype="DIR_PATH",
         **{**SETTING, "options": path_options.OUTPUT},
     )

@@ -35,12 +35,21 @@ def tactile_strip(
     frames: Sequence[int] | np.ndarray | None = None,
     style: FigureStyle | None = None,
 ) -> None:
-    """Draw the tactile images of all sensors over time: normal force or pressure in colour, shear as arrows.
+    """Write :func:`strip_figure`, whose arguments these are, as PNG, PDF or SVG, by the ending of the path."""
+    style = style or FigureStyle()
+    save_figure(strip_figure(recording, texels, frames, style), path, style.dpi)
+
+
+def strip_figure(
+    recording: Recording,
+    texels: Mapping[str, Texels],
+    frames: Sequence[int] | np.ndarray | None = None,
+    style: FigureStyle | None = None,
+) -> Figure:
+    """Return a figure of the tactile images of all sensors over time: normal force or pressure in colour, shear as arrows.
 
     Parameters
     ----------
-    path : str or Path
-        PNG, PDF or SVG, by its ending.
     recording : Recording
     texels : mapping of str to Texels
         By sensor name; one row of images each, in this order.
@@ -70,7 +79,7 @@ def tactile_strip(
     x, y, across, up = page.colour_bar()
     bar = strip.figure.add_axes((x / page.width, y / page.height, across / page.width, up / page.height))
     draw_colour_bar(strip.figure, image, bar, style)
-    save_figure(strip.figure, path, style.dpi)
+    return strip.figure
 
 
 @dataclass(frozen=True)

@@ -36,12 +36,25 @@ def time_curves(
     style: FigureStyle | None = None,
     marks: Sequence[float] = (),
 ) -> None:
-    """Draw forces, slip and centre of pressure of all sensors over time, one panel of each kind, one colour per sensor.
+    """Write :func:`curves_figure`, whose arguments these are, as PNG, PDF or SVG, by the ending of the path."""
+    style = style or FigureStyle()
+    save_figure(curves_figure(recording, texels, parameters, kinds, style, marks), path, style.dpi)
+
+
+def curves_figure(
+    recording: Recording,
+    texels: Mapping[str, Texels],
+    parameters: Mapping[str, SensorParameters],
+    kinds: Sequence[str] = KINDS,
+    style: FigureStyle | None = None,
+    marks: Sequence[float] = (),
+) -> Figure:
+    """Return a figure of forces, slip and centre of pressure of all sensors over time.
+
+    There is one panel of each kind, and one colour per sensor.
 
     Parameters
     ----------
-    path : str or Path
-        PNG, PDF or SVG, by its ending.
     kinds : sequence of {"force", "slip", "pressure centre"}
         "slip" is the share of the normal force that rests on slipping texels (:func:`.metrics.slip_share`); the centre of
         pressure is along the sensor's x and y axes, from the origin of its body.
@@ -80,7 +93,7 @@ def time_curves(
     )
     figure.align_ylabels(list(grid))
     _sensor_legend(figure, names, (left / style.width_inches, 1 - 0.02 / height), legend_columns)
-    save_figure(figure, path, style.dpi)
+    return figure
 
 
 def _sensor_legend(figure: Figure, names: Sequence[str], corner: tuple[float, float], columns: int) -> None:

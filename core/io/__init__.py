@@ -27,6 +27,7 @@ __all__ = [
     "npz",
     "openrave",
     "private_folder",
+    "recording_file",
     "recording_npz",
     "regular_file",
     "scenario_npz",

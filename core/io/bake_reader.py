@@ -30,7 +30,7 @@ class Bake:
     ----------
     recording : Recording
     texels, painted, parameters, folders, manifests : dict
-        By sensor name.
+        By sensor name; the last two are empty for a recording that comes from no folder.
     """
 
     recording: Recording
@@ -49,10 +49,11 @@ class Bake:
             There is no such sensor.
         """
         for name in names:
-            if name not in self.texels:
-                raise FileError(f"There is no sensor '{name}' in this bake: choose from {', '.join(self.texels)}.")
+            if name not in self.recording.sensors:
+                raise FileError(f"There is no sensor '{name}' in this bake: choose from {', '.join(self.recording.sensors)}.")
         sensors = {name: self.recording.sensors[name] for name in names}
-        parts = {item.name: {name: getattr(self, item.name)[name] for name in names} for item in fields(self)[1:]}
+        tables = {item.name: getattr(self, item.name) for item in fields(self)[1:]}
+        parts = {key: {name: table[name] for name in names if name in table} for key, table in tables.items()}
         return Bake(recording=replace(self.recording, sensors=sensors), **parts)
 
 

@@ -61,7 +61,7 @@ def load_sensor(path: str | os.PathLike) -> tuple[Texels, Painted]:
         raise FileError(f"'{path}' does not exist: bake again with this version.")
     try:
         with open_regular(path) as opened, open_archive(opened) as members:
-            return _sensor_in(members)
+            return sensor_in(members)
     except OSError as error:
         raise FileError(f"'{path}' could not be read ({os_error_reason(error)}): choose another file.") from error
     except DAMAGED as error:
@@ -70,10 +70,11 @@ def load_sensor(path: str | os.PathLike) -> tuple[Texels, Painted]:
 
 def unpack_sensor(content: bytes) -> tuple[Texels, Painted]:
     """Read the content of a small file that :func:`save_sensor` wrote; raises what :data:`.npz.DAMAGED` lists."""
-    return _sensor_in(PackedArchive(content))
+    return sensor_in(PackedArchive(content))
 
 
-def _sensor_in(members: Any) -> tuple[Texels, Painted]:
+def sensor_in(members: Any) -> tuple[Texels, Painted]:
+    """Return the sensor whose members an archive gives by name; raises what :data:`.npz.DAMAGED` lists."""
     if str(members["format"]) != SENSOR_FORMAT:
         raise ValueError(f"its format is not '{SENSOR_FORMAT}'")
     cls = _LAYOUTS[str(members["layout"])]

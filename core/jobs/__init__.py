@@ -5,4 +5,4 @@ Long work is a job: a generator that yields :class:`.progress.Progress` and retu
 which then removes what it has begun. The functions of :mod:`.job_runner` run a job in one go or a slice at a time.
 """
 
-__all__ = ["job_runner", "progress"]
+__all__ = ["job_runner", "progress", "progress_bar"]

@@ -3,8 +3,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from math import inf
+from typing import Any
 
 import numpy as np
 
@@ -126,6 +128,24 @@ FITTED_FRICTION_PARAMETERS = tuple(
     p.name for p in sorted(numbers_of(SENSOR_PARAMETERS), key=lambda p: p.fit_place) if p.fit_place
 )
 """Those that the gap analysis fits; they show only in net forces."""
+
+
+def with_dependent_defaults(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Return given parameters with those that follow from them: damping from stiffness, friction of one kind from the other.
+
+    Parameters
+    ----------
+    values : mapping
+        Values by the names of parameters.
+    """
+    found = dict(values)
+    if "k" in found:
+        found.setdefault("cn", DAMPING_PER_STIFFNESS * found["k"])
+    if "mus" in found:
+        found.setdefault("mud", min(SensorParameters.mud, found["mus"]))
+    elif "mud" in found:
+        found["mus"] = max(SensorParameters.mus, found["mud"])
+    return found
 
 
 @dataclass(frozen=True)

@@ -118,9 +118,9 @@ def road():
         scene.frame_set(frame)
     played = sum(value.value for value in pad.data.attributes["palpate_force"].data)
     bpy.ops.palpate.bake()
-    files = sorted(path.name for path in (folder / "palpate" / pad.name).iterdir())
+    files = sorted(path.name for path in (folder / "palpate-bake" / pad.name).iterdir())
     archive = sys.modules[f"{MODULE}.core.io.recording_npz"]
-    recording = archive.load_recording(folder / "palpate" / pad.name / "recording.npz")
+    recording = archive.load_recording(folder / "palpate-bake" / pad.name / "recording.npz")
     kernels = sys.modules[f"{MODULE}.core.compiled.kernels"].KERNELS
     compiled = Path(bpy.utils.extension_path_user(MODULE, path="numba")).rglob("*.nbi")
     return {

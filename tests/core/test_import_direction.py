@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Imports point one way: core ← addon ← operators ← panels, and from room to room inside core and inside addon.
+"""Imports point one way: core ← api ← addon ← operators ← panels, and from room to room inside core and inside addon.
 
 The order of the rooms stands in tools/import_graph.py, which reads the source, so that an import inside a function, or under
 TYPE_CHECKING, is seen too. Enabling the add-on loads nothing heavy.

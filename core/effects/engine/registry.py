@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ...errors import EffectError, did_you_mean
+from ...errors import EffectError, suggestion
 from ...model.effect import Effect, Value
 from .specification import SITES_OF_ACTION, Form, Kind
 
@@ -32,7 +32,7 @@ def kind_of(name: str) -> Kind:
     """Return the kind with a standard name; raise :class:`EffectError` if there is none."""
     kinds = library()
     if name not in kinds:
-        raise EffectError(f"There is no effect '{name}'{_suggestion(name, kinds)}; the library has {', '.join(kinds)}.")
+        raise EffectError(f"There is no effect '{name}'{suggestion(name, kinds)}; the library has {', '.join(kinds)}.")
     return kinds[name]
 
 
@@ -71,7 +71,7 @@ def form_of(name: str, form: str = "") -> Form:
     if not form:
         return next(iter(forms.values()))
     if form not in forms:
-        raise EffectError(f"Effect '{name}' has no form '{form}'{_suggestion(form, forms)}; it has {', '.join(forms)}.")
+        raise EffectError(f"Effect '{name}' has no form '{form}'{suggestion(form, forms)}; it has {', '.join(forms)}.")
     return forms[form]
 
 
@@ -129,7 +129,7 @@ def check(effects: Iterable[Effect], sensor: str, texels: int | None = None, gai
         known = {parameter.name: parameter for parameter in form.parameters}
         for key, value in item.values.items():
             if key not in known:
-                raise EffectError(f"{key} is no parameter of {where}{_suggestion(key, known)}; it has {', '.join(known)}.")
+                raise EffectError(f"{key} is no parameter of {where}{suggestion(key, known)}; it has {', '.join(known)}.")
             parameter = known[key].scaled(gain)
             numbers = np.asarray(value, dtype=float)
             if numbers.ndim and not parameter.per_texel:
@@ -222,9 +222,3 @@ def _plain(value: Any) -> Value:
     """Return a number, or numbers as a tuple, from any kind of array."""
     numbers = np.asarray(value, dtype=float)
     return float(numbers) if numbers.ndim == 0 else tuple(float(number) for number in numbers.ravel())
-
-
-def _suggestion(name: str, known: Iterable[str]) -> str:
-    """Return a hint at the known name that is most like a wrong one, or nothing."""
-    near = did_you_mean(name, known, "")
-    return f" ({near})" if near else ""

@@ -82,7 +82,8 @@ class _Output:
 
     def _frame_of(self, sensor: str) -> str:
         """Name of the frame in which a sensor's texels are given: its body's."""
-        body = self._bake.manifests[sensor].body
+        manifest = self._bake.manifests.get(sensor)
+        body = manifest.body if manifest is not None else ""
         return self._bodies.get(body, sensor if sensor != WORLD else f"{sensor}_")
 
     def _channel(self, topic: str, kind: str) -> int:

@@ -12,6 +12,7 @@ least squares. For a recording over time it starts from several stiffnesses of t
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -134,20 +135,24 @@ def read_friction(path: str | os.PathLike, texels: int = 1) -> FrictionData:
     ParameterError
         The number of texels is not above zero.
     """
+    return friction_data(read_columns(path, {"velocity": "m/s", "force": "N", "time": "s"}), texels, os.fspath(path))
+
+
+def friction_data(columns: Mapping[str, np.ndarray], texels: int, source: str) -> FrictionData:
+    """Return a curve from its columns, as :func:`read_friction` does; `source` is where they come from, for messages."""
     if not 1 <= texels <= MOST_TEXELS:
         raise ParameterError(f"The number of texels is {texels}: give at least one and at most {MOST_TEXELS:g}.")
-    columns = read_columns(path, {"velocity": "m/s", "force": "N", "time": "s"})
     for name in ("velocity", "force"):
         if name not in columns:
             raise FileError(
-                f"'{path}' has no column '{name}': write that word above its numbers, the unit in brackets if it is not SI."
+                f"'{source}' has no column '{name}': write that word above its numbers, the unit in brackets if it is not SI."
             )
     if len(columns["force"]) < len(STEADY) + 1:
-        raise FileError(f"'{path}' has {len(columns['force'])} lines: friction needs {len(STEADY) + 1} or more.")
+        raise FileError(f"'{source}' has {len(columns['force'])} lines: friction needs {len(STEADY) + 1} or more.")
     time = columns.get("time")
     if time is not None and not np.all(np.diff(time) > 0):
         line = int(np.argmin(np.diff(time) > 0)) + 2
-        raise FileError(f"The time of '{path}' does not increase at measurement {line}: sort the lines and remove doubles.")
+        raise FileError(f"The time of '{source}' does not increase at measurement {line}: sort the lines and remove doubles.")
     return FrictionData(columns["velocity"], columns["force"] / texels, time)
 
 

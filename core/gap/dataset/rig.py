@@ -21,7 +21,7 @@ from ...io.regular_file import require_regular
 from ...io.schema import Name, known_words, read_words, wanted
 from ...io.sensor_toml import SHAPE_WORDS, checked_grid, checked_lengths, stated_parameters
 from ...io.toml_file import LONGEST_NAME, checked_name, read_toml
-from ...model.sensor_parameters import DAMPING_PER_STIFFNESS, DEPTH_PER_THICKNESS, SENSOR_PARAMETERS, SensorParameters
+from ...model.sensor_parameters import DEPTH_PER_THICKNESS, SENSOR_PARAMETERS, SensorParameters, with_dependent_defaults
 from .column_names import ColumnRule, read_column_rules, translated
 from .cover import COVER_WORDS, Cover, read_cover
 from .fault_kinds import FAULT_KINDS
@@ -339,14 +339,9 @@ def _parameters(sensor: dict[str, Any], path: Path) -> tuple[SensorParameters, f
     values = stated_parameters(sensor, where)
     if not values.get("unit", "N").strip():
         raise ParameterError(f"unit of '{path.name}' is empty: write the unit's name, \"N\" for newtons.")
-    if "k" in values and "cn" not in values:
-        values["cn"] = DAMPING_PER_STIFFNESS * values["k"]
+    values = with_dependent_defaults(values)
     if thickness is not None and "max_penetration" not in values:
         values["max_penetration"] = DEPTH_PER_THICKNESS * thickness
-    if "mus" in values and "mud" not in values:
-        values["mud"] = min(SensorParameters.mud, values["mus"])
-    if "mud" in values and "mus" not in values:
-        values["mus"] = max(SensorParameters.mus, values["mud"])
     parameters = SensorParameters(**values)
     parameters.check(f"sensor of {path.name}")
     return parameters, thickness

@@ -32,7 +32,7 @@ def test_one_folder_per_sensor(tmp_path):
     scene, *_ = press_and_drop(frames=4)
     save(tmp_path)
     result = baked(scene)
-    assert visible(tmp_path / "palpate") == ["Pad", "Pad 2"]
+    assert visible(tmp_path / "palpate-bake") == ["Pad", "Pad 2"]
     for name, folder in result.folders.items():
         files = sorted(path.name for path in folder.iterdir())
         own = ["images.sha256", "manifest.json", "recording.npz", "sensor.npz"]
@@ -52,7 +52,7 @@ def test_a_bake_without_images_has_the_same_recordings(tmp_path):
     save(tmp_path)
     with_images = baked(scene)
     assert all(read_manifest(folder).has_images for folder in with_images.folders.values())
-    expected = {path: content for path, content in contents(tmp_path / "palpate").items() if str(path).endswith(".npz")}
+    expected = {path: content for path, content in contents(tmp_path / "palpate-bake").items() if str(path).endswith(".npz")}
     scene.palpate.folder = str(tmp_path / "plain")
     found = run_job(bake(scene, into_scene=False, images=False))
     bake_switch.wait_for_removals()
@@ -138,7 +138,7 @@ def test_the_heat_map_is_on_the_region_only(tmp_path):
     assert [sorted(pad.data.polygons[i].vertices) for i in faces] == [[0, 1, 6, 7], [1, 2, 7, 8]]
     assert pad.material_slots[1].material.name == "Palpate Pad"
     image = next(node.image for node in pad.material_slots[1].material.node_tree.nodes if node.type == "TEX_IMAGE")
-    assert image.filepath == "//palpate/Pad/tactile_0001.exr"
+    assert image.filepath == "//palpate-bake/Pad/tactile_0001.exr"
     assert (image.source, image.colorspace_settings.name) == ("SEQUENCE", "Non-Color")
 
 
@@ -174,7 +174,7 @@ def test_reopened_and_baked_again_it_is_the_same_bit_for_bit(tmp_path):
     names = ("Pad", "Pad 2")
 
     def recordings():
-        return [(tmp_path / "palpate" / name / "recording.npz").read_bytes() for name in names]
+        return [(tmp_path / "palpate-bake" / name / "recording.npz").read_bytes() for name in names]
 
     for frame in range(1, 5):  # played before, as a user would
         scene.frame_set(frame)
@@ -209,7 +209,7 @@ def test_a_stopped_bake_leaves_the_old_one(tmp_path):
     scene, pad, *_ = press_and_drop(frames=4)
     save(tmp_path)
     baked(scene)
-    files = contents(tmp_path / "palpate")
+    files = contents(tmp_path / "palpate-bake")
     before = dump()
     pad.palpate.k = 70.0
     for steps in (1, 3, 5, 7):
@@ -217,7 +217,7 @@ def test_a_stopped_bake_leaves_the_old_one(tmp_path):
         for _ in range(steps):
             work.work(0.0)
         work.cancel()
-        assert contents(tmp_path / "palpate") == files
+        assert contents(tmp_path / "palpate-bake") == files
         assert [line for line in changes(before, dump()) if not line.startswith("Pad: settings")] == []
         assert not session_state.is_baking()
 
@@ -237,8 +237,8 @@ def test_names_of_sensors_cannot_collide_with_what_is_palpate_s_own(tmp_path):
     for _ in range(2):
         result = baked(scene)
         assert sorted(result.folders) == sorted(NAMES)
-        assert sorted(read_bake(tmp_path / "palpate").texels) == sorted(NAMES)
-        assert visible(tmp_path / "palpate") == sorted(folder_names(NAMES).values())
+        assert sorted(read_bake(tmp_path / "palpate-bake").texels) == sorted(NAMES)
+        assert visible(tmp_path / "palpate-bake") == sorted(folder_names(NAMES).values())
 
 
 def test_a_name_of_300_characters_has_a_folder():
@@ -258,10 +258,10 @@ def user_folders(folder):
 def test_folders_of_the_user_s_are_never_removed(tmp_path):
     scene, *_ = press(frames=2)
     save(tmp_path)
-    mine = user_folders(tmp_path / "palpate")
+    mine = user_folders(tmp_path / "palpate-bake")
     for _ in range(2):
         baked(scene)
-        found = contents(tmp_path / "palpate")
+        found = contents(tmp_path / "palpate-bake")
         assert {name: found[name] for name in mine} == mine
 
 
@@ -271,7 +271,7 @@ def test_a_refused_bake_has_touched_nothing(tmp_path, what):
     scene, pad, _ = press(frames=2)
     pad.name = "project"
     save(tmp_path)
-    folder = tmp_path / "palpate"
+    folder = tmp_path / "palpate-bake"
     user_folders(folder)
     hidden = folder / PRIVATE_FOLDER
     if what in ("project", "manifest"):
@@ -295,7 +295,7 @@ def test_a_refused_bake_has_touched_nothing(tmp_path, what):
 def test_a_folder_with_other_files_is_not_overwritten(tmp_path):
     scene, *_ = press(frames=3)
     save(tmp_path)
-    mine = tmp_path / "palpate" / "Pad" / "thesis.txt"
+    mine = tmp_path / "palpate-bake" / "Pad" / "thesis.txt"
     mine.parent.mkdir(parents=True)
     mine.write_text("years of work")
     stages = []
@@ -303,7 +303,7 @@ def test_a_folder_with_other_files_is_not_overwritten(tmp_path):
         run_job(bake(scene), lambda progress: stages.append(progress.stage))
     assert set(stages) == {"Reading the scene"}  # nobody waits for forces that cannot be kept
     assert mine.read_text() == "years of work"
-    assert [path.name for path in (tmp_path / "palpate").iterdir()] == ["Pad"]
+    assert [path.name for path in (tmp_path / "palpate-bake").iterdir()] == ["Pad"]
 
 
 def test_files_put_beside_the_images_outlive_the_next_bake(tmp_path):
@@ -340,7 +340,7 @@ def test_a_swap_that_fails_is_taken_back(tmp_path, monkeypatch, failing):
     save(tmp_path)
     folder = baked(scene).folders["Pad"]
     (folder / "notes.txt").write_text("years of work")
-    files = contents(tmp_path / "palpate")
+    files = contents(tmp_path / "palpate-bake")
     before = dump()
     pad.palpate.k *= 2.0
     rename, calls = Path.rename, []
@@ -353,12 +353,12 @@ def test_a_swap_that_fails_is_taken_back(tmp_path, monkeypatch, failing):
         return rename(path, target)
 
     monkeypatch.setattr(Path, "rename", rename_but_one)
-    with pytest.raises(FileError, match=r"^The bake could not be written to '.*palpate' \(permission denied\)"):
+    with pytest.raises(FileError, match=r"^The bake could not be written to '.*palpate-bake' \(permission denied\)"):
         baked(scene)
     monkeypatch.undo()
     assert calls[:failing] == order[:failing]
-    assert contents(tmp_path / "palpate") == files
-    assert visible(tmp_path / "palpate") == ["Pad", "Pad 2"]
+    assert contents(tmp_path / "palpate-bake") == files
+    assert visible(tmp_path / "palpate-bake") == ["Pad", "Pad 2"]
     assert [line for line in changes(before, dump()) if not line.startswith("Pad: settings")] == []
     baked(scene)
     assert (folder / "recording.npz").read_bytes() != files[str(Path("Pad", "recording.npz"))]
@@ -369,17 +369,17 @@ def test_the_bake_of_another_blend_beside_it_is_not_replaced(tmp_path):
     first = save(tmp_path, "first.blend")
     folder = baked(scene).folders["Pad"]
     assert read_manifest(folder).scene_file == "first.blend"
-    files = contents(tmp_path / "palpate")
+    files = contents(tmp_path / "palpate-bake")
     save(tmp_path, "second.blend")
     stages = []
     with pytest.raises(FileError) as caught:
         run_job(bake(scene), lambda progress: stages.append(progress.stage))
     assert str(caught.value) == (f"'{folder}' holds the bake of '{first}': choose another bake folder, or rename this one.")
     assert set(stages) == {"Reading the scene"}
-    assert contents(tmp_path / "palpate") == files
-    scene.palpate.folder = "//palpate second"
-    assert baked(scene).folders["Pad"].parent.name == "palpate second"
-    scene.palpate.folder = "//palpate"
+    assert contents(tmp_path / "palpate-bake") == files
+    scene.palpate.folder = "//palpate-bake second"
+    assert baked(scene).folders["Pad"].parent.name == "palpate-bake second"
+    scene.palpate.folder = "//palpate-bake"
     first.unlink()  # it was renamed
     baked(scene)
     assert read_manifest(folder).scene_file == "second.blend"

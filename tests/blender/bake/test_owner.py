@@ -38,7 +38,7 @@ def saved(tmp_path):
 
 def test_blend_and_bake_name_each_other(saved, tmp_path):
     scene, path = saved
-    manifest = read_manifest(tmp_path / "palpate" / "Pad")
+    manifest = read_manifest(tmp_path / "palpate-bake" / "Pad")
     own = scene.palpate
     assert len(own.scene_id) == 32 and (own.baked_digest, own.baked_id) == (manifest.digest, manifest.bake_id)
     assert (manifest.scene_id, manifest.scene_path) == (own.scene_id, "../first.blend")
@@ -49,15 +49,15 @@ def test_blend_and_bake_name_each_other(saved, tmp_path):
 
 def test_who_finds_another_bake_in_the_folder_says_so(saved, tmp_path):
     scene, path = saved
-    old, own_recording = tmp_path / "old", read_bake(tmp_path / "palpate").recording
-    shutil.copytree(tmp_path / "palpate", old)
+    old, own_recording = tmp_path / "old", read_bake(tmp_path / "palpate-bake").recording
+    shutil.copytree(tmp_path / "palpate-bake", old)
     scene.frame_set(2)
     assert frame_status.status_of(scene).text == "Frame 2 of the bake." and bake_identity.other_bake(scene) == ""
     scene.objects["Pad"].palpate.k *= 2.0
     baked(scene, into_scene=False)  # by a script, or by another Blender
     scene = reopen(path)  # not saved: it shows the old bake
     expected = (
-        f"'{tmp_path / 'palpate' / 'Pad'}' holds another bake than the one that 'Scene' shows: "
+        f"'{tmp_path / 'palpate-bake' / 'Pad'}' holds another bake than the one that 'Scene' shows: "
         "bake again, or open the .blend that was saved with that bake."
     )
     scene.frame_set(2)
@@ -70,8 +70,8 @@ def test_who_finds_another_bake_in_the_folder_says_so(saved, tmp_path):
         with pytest.raises(SceneError) as caught:
             read()
         assert str(caught.value) == expected
-    shutil.rmtree(tmp_path / "palpate")
-    old.rename(tmp_path / "palpate")  # its own bake is back while the file is open
+    shutil.rmtree(tmp_path / "palpate-bake")
+    old.rename(tmp_path / "palpate-bake")  # its own bake is back while the file is open
     scene = bpy.context.scene
     scene.frame_set(3)
     status = frame_status.status_of(scene)
@@ -90,30 +90,31 @@ def test_a_bake_with_the_same_forces_but_other_files_is_another_one(saved, tmp_p
 
 def test_another_blend_is_refused_wherever_it_lies(saved, tmp_path):
     _, first = saved
-    before = contents(tmp_path / "palpate")
+    before = contents(tmp_path / "palpate-bake")
     (tmp_path / "far").mkdir()
     bpy.ops.wm.read_homefile(use_empty=True)
     scene, *_ = press(frames=2)
     save(tmp_path / "far", "second.blend")
-    scene.palpate.folder = str(tmp_path / "palpate")
+    scene.palpate.folder = str(tmp_path / "palpate-bake")
     for into_scene in (True, False):
         with pytest.raises(FileError) as caught:
             baked(scene, into_scene=into_scene)
         assert str(caught.value) == (
-            f"'{tmp_path / 'palpate' / 'Pad'}' holds the bake of '{first}': choose another bake folder, or rename this one."
+            f"'{tmp_path / 'palpate-bake' / 'Pad'}' holds the bake of '{first}': "
+            "choose another bake folder, or rename this one."
         )
-    assert contents(tmp_path / "palpate") == before
+    assert contents(tmp_path / "palpate-bake") == before
 
 
 def test_a_blend_that_was_renamed_or_moved_owns_its_bake(saved, tmp_path):
     scene, path = saved
-    scene.palpate.folder = str(tmp_path / "palpate")
+    scene.palpate.folder = str(tmp_path / "palpate-bake")
     bpy.ops.wm.save_mainfile()
     (tmp_path / "far").mkdir()
     moved = tmp_path / "far" / "renamed.blend"
     path.rename(moved)
     baked(reopen(moved))
-    assert read_manifest(tmp_path / "palpate" / "Pad").scene_path == "../far/renamed.blend"
+    assert read_manifest(tmp_path / "palpate-bake" / "Pad").scene_path == "../far/renamed.blend"
 
 
 def test_a_copy_of_a_blend_does_not_replace_the_bake_of_its_original(saved, tmp_path):
@@ -123,7 +124,7 @@ def test_a_copy_of_a_blend_does_not_replace_the_bake_of_its_original(saved, tmp_
         baked(scene)
     path.unlink()
     baked(scene)
-    assert read_manifest(tmp_path / "palpate" / "Pad").scene_file == "copy.blend"
+    assert read_manifest(tmp_path / "palpate-bake" / "Pad").scene_file == "copy.blend"
 
 
 def copied_scene(original):
@@ -155,11 +156,11 @@ def test_a_bake_that_is_repeated_from_the_same_file_has_the_same_bytes(tmp_path)
     scene, *_ = press(frames=2)
     path = save(tmp_path)
     baked(scene)
-    first = contents(tmp_path / "palpate")
+    first = contents(tmp_path / "palpate-bake")
     scene = reopen(path)  # not saved with its id
     assert scene.palpate.scene_id == ""
     baked(scene)
-    assert contents(tmp_path / "palpate") == first
+    assert contents(tmp_path / "palpate-bake") == first
 
 
 def test_a_copied_scene_is_told_from_its_original_after_saving(saved, tmp_path):

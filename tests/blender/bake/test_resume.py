@@ -54,12 +54,12 @@ def test_sigkill_at_any_moment(tmp_path):
         process.wait()
         assert seen, f"the bake ended by itself before kill {kill}"
         first_frames.append(seen[0])
-        assert not report.exists() and not (tmp_path / "palpate" / "Pad").exists()
+        assert not report.exists() and not (tmp_path / "palpate-bake" / "Pad").exists()
     assert first_frames == sorted(first_frames) and first_frames[-1] > 10  # each went on where the one before was
     process = start(path, report)
     process.communicate(timeout=300)
     assert json.loads(report.read_text())[0] > first_frames[-1]
-    assert contents(tmp_path / "palpate") == expected
+    assert contents(tmp_path / "palpate-bake") == expected
 
 
 def contents_of_a_whole_bake(scene, tmp_path):
@@ -88,7 +88,7 @@ def always_due(monkeypatch):
 
 def growing(tmp_path):
     """The folder in which the only unfinished bake grows."""
-    (found,) = bake_switch.growing_folders(tmp_path / "palpate" / PRIVATE_FOLDER)
+    (found,) = bake_switch.growing_folders(tmp_path / "palpate-bake" / PRIVATE_FOLDER)
     return found
 
 
@@ -113,8 +113,8 @@ def computed(scene, **options):
 def test_the_next_bake_goes_on(killed, tmp_path):
     scene, _ = killed
     assert computed(scene)[0] == 6
-    assert visible(tmp_path / "palpate") == ["Pad", "Pad 2"]
-    assert load_recording(tmp_path / "palpate" / "Pad" / "recording.npz").frames.tolist() == list(range(1, 9))
+    assert visible(tmp_path / "palpate-bake") == ["Pad", "Pad 2"]
+    assert load_recording(tmp_path / "palpate-bake" / "Pad" / "recording.npz").frames.tolist() == list(range(1, 9))
 
 
 def test_rows_that_a_thread_writes_are_the_same(tmp_path, monkeypatch):
@@ -125,10 +125,10 @@ def test_rows_that_a_thread_writes_are_the_same(tmp_path, monkeypatch):
     monkeypatch.setattr(bake_files, "THREADED_ROW_BYTES", 1 << 40)
     expected = contents_of_a_whole_bake(scene, tmp_path)
     monkeypatch.setattr(bake_files, "THREADED_ROW_BYTES", 0)
-    scene.palpate.folder = str(tmp_path / "palpate")
+    scene.palpate.folder = str(tmp_path / "palpate-bake")
     abandon(scene, 8 + 6)
     assert computed(scene)[0] == 6
-    assert contents(tmp_path / "palpate") == expected
+    assert contents(tmp_path / "palpate-bake") == expected
 
 
 @pytest.mark.parametrize("what", ["parameter", "damaged state", "lost frames", "lost images"])
@@ -144,8 +144,8 @@ def test_what_does_not_fit_is_begun_anew(killed, tmp_path, what):
     else:
         shutil.rmtree(growing(tmp_path) / "sensors" / "Pad")
     assert computed(scene)[0] == 1
-    assert visible(tmp_path / "palpate") == ["Pad", "Pad 2"]
-    assert len(load_recording(tmp_path / "palpate" / "Pad" / "recording.npz").frames) == 8
+    assert visible(tmp_path / "palpate-bake") == ["Pad", "Pad 2"]
+    assert len(load_recording(tmp_path / "palpate-bake" / "Pad" / "recording.npz").frames) == 8
 
 
 @pytest.mark.parametrize("what", ["frames.rows", "images.sha256", "tactile_0007.exr", "hard link"])
@@ -183,7 +183,7 @@ def test_a_list_that_leads_out_is_not_followed(killed, tmp_path):
     arrays["sha256"] = np.array(checkpoint.digest(arrays))
     np.savez(state, **arrays)
     (note,) = run_job(bake(scene)).notes
-    assert "frames or images that it lists are not there" in note and str(tmp_path / "palpate") in note
+    assert "frames or images that it lists are not there" in note and str(tmp_path / "palpate-bake") in note
 
 
 def test_a_bake_without_images_goes_on_too(tmp_path, monkeypatch):
@@ -192,7 +192,7 @@ def test_a_bake_without_images_goes_on_too(tmp_path, monkeypatch):
     save(tmp_path)
     abandon(scene, 8 + 6, into_scene=False, images=False)
     assert computed(scene, into_scene=False, images=False)[0] == 6
-    found = contents(tmp_path / "palpate")
+    found = contents(tmp_path / "palpate-bake")
     scene.palpate.folder = str(tmp_path / "whole")
     run_job(bake(scene, into_scene=False, images=False))
     assert found == contents(tmp_path / "whole") and len(found) == 6
@@ -228,7 +228,7 @@ def test_images_that_a_power_cut_has_damaged_are_written_again(killed, tmp_path,
         if damage == "missing":
             path.unlink()
     assert computed(scene)[0] == 6
-    found = contents(tmp_path / "palpate")
+    found = contents(tmp_path / "palpate-bake")
     assert found == contents_of_a_whole_bake(scene, tmp_path)
 
 
@@ -237,18 +237,18 @@ def test_one_bake_at_a_time(tmp_path):
     scene, *_ = press_and_drop(frames=12)
     save(tmp_path)
     expected = contents_of_a_whole_bake(scene, tmp_path)
-    scene.palpate.folder = "//palpate"
+    scene.palpate.folder = "//palpate-bake"
     first = bake(scene)
-    while not (tmp_path / "palpate" / PRIVATE_FOLDER / LOCK_NAME).exists():
+    while not (tmp_path / "palpate-bake" / PRIVATE_FOLDER / LOCK_NAME).exists():
         next(first)
     with pytest.raises(FileError, match="Another bake is writing to"):
         run_job(bake(scene))
     run_job(first)
     bake_switch.wait_for_removals()
-    assert contents(tmp_path / "palpate") == expected
+    assert contents(tmp_path / "palpate-bake") == expected
     run_job(bake(scene))
     bake_switch.wait_for_removals()
-    assert contents(tmp_path / "palpate") == expected
+    assert contents(tmp_path / "palpate-bake") == expected
 
 
 def test_escape_leaves_nothing(tmp_path, monkeypatch):
@@ -259,5 +259,5 @@ def test_escape_leaves_nothing(tmp_path, monkeypatch):
     for _ in range(14):
         work.work(0.0)
     work.cancel()
-    assert visible(tmp_path / "palpate") == []
-    assert [path.name for path in (tmp_path / "palpate" / PRIVATE_FOLDER).iterdir()] == [MARKER_NAME]
+    assert visible(tmp_path / "palpate-bake") == []
+    assert [path.name for path in (tmp_path / "palpate-bake" / PRIVATE_FOLDER).iterdir()] == [MARKER_NAME]

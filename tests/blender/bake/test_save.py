@@ -47,9 +47,9 @@ def saved(tmp_path):
 def found(path):
     """Check that .blend and bake belong together as a later process finds them; return their digest."""
     scene = blender.open_scene(path)
-    read = read_bake(path.parent / "palpate")
+    read = read_bake(path.parent / "palpate-bake")
     (folder,) = baked_scene.bake_folders(scene).values()
-    assert folder == read.folders["Pad"] == path.parent / "palpate" / "Pad"
+    assert folder == read.folders["Pad"] == path.parent / "palpate-bake" / "Pad"
     assert scene.palpate.baked_digest == read.recording.digest
     return read.recording.digest
 
@@ -77,20 +77,20 @@ def test_the_first_bake_is_saved_with_the_blend(saved):
     assert found(path) == digest
     image = next(image for image in bpy.data.images if image.name == "Palpate Pad")
     assert (image.filepath, image.source, image.colorspace_settings.name) == (
-        "//palpate/Pad/tactile_0001.exr",
+        "//palpate-bake/Pad/tactile_0001.exr",
         "SEQUENCE",
         "Non-Color",
     )
-    assert sorted(name.name for name in path.parent.iterdir()) == ["palpate", "scene.blend", "scene.blend1"]
-    assert visible(path.parent / "palpate") == ["Pad"]
+    assert sorted(name.name for name in path.parent.iterdir()) == ["palpate-bake", "scene.blend", "scene.blend1"]
+    assert visible(path.parent / "palpate-bake") == ["Pad"]
 
 
 def check_next_bake(path):
     """Check that the next bake finds its way, removes what is left of the stopped one, and keeps the user's files."""
-    folder = path.parent / "palpate"
+    folder = path.parent / "palpate-bake"
     (folder / "Pad" / "notes.txt").write_text("mine")
     assert bake_and_save(path, k=88.0) == found(path)
-    assert sorted(item.name for item in path.parent.iterdir() if not item.name.startswith("scene.blend")) == ["palpate"]
+    assert sorted(item.name for item in path.parent.iterdir() if not item.name.startswith("scene.blend")) == ["palpate-bake"]
     assert [item.name for item in (folder / PRIVATE_FOLDER).iterdir()] == ["palpate-folder.json"]
     assert (folder / "Pad" / "notes.txt").read_text() == "mine"
 
@@ -103,7 +103,7 @@ def test_stopped_at_every_step_of_the_switch(saved, tmp_path):
         home = tmp_path / f"copy {number}"
         home.mkdir()
         shutil.copy(path, home)
-        shutil.copytree(path.parent / "palpate", home / "palpate")
+        shutil.copytree(path.parent / "palpate-bake", home / "palpate-bake")
         copy = home / path.name
         with pytest.MonkeyPatch.context() as patch:
             calls = stop_at(patch, number)
@@ -126,7 +126,7 @@ def test_a_link_to_a_blend_stays_a_link(saved, tmp_path):
     path, _ = saved
     home = tmp_path / "elsewhere"
     home.mkdir()
-    shutil.copytree(path.parent / "palpate", home / "palpate")
+    shutil.copytree(path.parent / "palpate-bake", home / "palpate-bake")
     link = home / "link.blend"
     link.symlink_to(path)
     bpy.ops.wm.open_mainfile(filepath=str(link))

@@ -361,7 +361,7 @@ def test_a_folder_that_cannot_be_written(pressed):
 
 
 def test_a_file_where_the_folder_should_be(pressed):
-    (pressed.folder / "palpate").write_text("a file")
+    (pressed.folder / "palpate-bake").write_text("a file")
     assert "is a file where a folder is needed" in refusal()
 
 

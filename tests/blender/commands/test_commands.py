@@ -244,7 +244,7 @@ def test_save_keeps_the_bake_in_the_file_itself(tmp_path, demo_blend):
     mine = tmp_path / "mine.blend"
     mine.write_bytes(demo_blend.read_bytes())
     assert main(["bake", str(mine), "--frames", "1", "3", "--save"]) == 0
-    assert (tmp_path / "palpate" / "Finger A" / "recording.npz").is_file()  # the file's own folder, beside it
+    assert (tmp_path / "palpate-bake" / "Finger A" / "recording.npz").is_file()  # the file's own folder, beside it
     bpy.ops.wm.open_mainfile(filepath=str(mine))
     assert bpy.context.scene.objects["Finger A"].palpate.is_baked
 
@@ -386,7 +386,7 @@ def test_export_of_a_baked_file(tmp_path, where, capsys):
     path = save(tmp_path)
     recording = run_job(bake(scene)).recording
     save(tmp_path)
-    source = path if where == "blend" else tmp_path / "palpate"
+    source = path if where == "blend" else tmp_path / "palpate-bake"
     assert main(["export", str(source), "--out", str(tmp_path / "out"), "--format", "npz"]) == 0
     assert capsys.readouterr().out.splitlines()[-1] == str(tmp_path / "out" / "Pad.npz")
     with np.load(tmp_path / "out" / "Pad.npz") as members:

@@ -34,9 +34,9 @@ def test_the_tutorial_does_what_it_says(scene, tmp_path, repository):
     bpy.context.view_layer.objects.active = grid
     assert bpy.ops.palpate.bake() == {"FINISHED"}
 
-    felt = load_recording(tmp_path / "palpate" / "Grid" / "recording.npz").sensors["Grid"]
+    felt = load_recording(tmp_path / "palpate-bake" / "Grid" / "recording.npz").sensors["Grid"]
     assert felt.normal_force.shape == (60, 84)
-    images = sorted(path.name for path in (tmp_path / "palpate" / "Grid").glob("*.exr"))
+    images = sorted(path.name for path in (tmp_path / "palpate-bake" / "Grid").glob("*.exr"))
     assert images[0] == "tactile_0001.exr"
     assert len(images) == 60
     promised = float(re.search(r"about ([\d.]+) N at frame 60", readme).group(1))

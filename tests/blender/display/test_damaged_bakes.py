@@ -38,7 +38,7 @@ def baked(request, tmp_path):
     pad.name = "pad"
     save(tmp_path)
     run_job(bake(scene))
-    path = tmp_path / "palpate" / "pad" / "manifest.json"
+    path = tmp_path / "palpate-bake" / "pad" / "manifest.json"
     if request.param == "older":
         content = json.loads(path.read_text())
         path.write_text(json.dumps({key: value for key, value in content.items() if key not in ("files", "manifest_sha256")}))
@@ -65,14 +65,14 @@ def test_damage_is_one_sentence_and_changes_nothing(baked, tmp_path):
         read()
     assert status(baked) == "Frame 1 of the bake."
     shutil.rmtree(tmp_path / "figures")
-    shutil.copytree(tmp_path / "palpate", tmp_path / "good")
+    shutil.copytree(tmp_path / "palpate-bake", tmp_path / "good")
     before = dump()
     for way in SAMPLE:
         if not way.applies(tmp_path / "good"):
             continue
-        shutil.rmtree(tmp_path / "palpate")
-        shutil.copytree(tmp_path / "good", tmp_path / "palpate")
-        way.damage(tmp_path / "palpate")
+        shutil.rmtree(tmp_path / "palpate-bake")
+        shutil.copytree(tmp_path / "good", tmp_path / "palpate-bake")
+        way.damage(tmp_path / "palpate-bake")
         for what, read in readers(baked, tmp_path / "figures").items():
             verdict, words = damaged_bakes.judge(way, read)
             assert verdict == damaged_bakes.CLEAR, f"{what}, {way.name}: {words}"

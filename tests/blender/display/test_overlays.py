@@ -145,7 +145,7 @@ def test_views_that_change_colours_get_the_overlay(baked):
 
 def test_applying_without_the_files_says_so(baked, tmp_path):
     scene, *_ = baked
-    (tmp_path / "palpate").rename(tmp_path / "lost")
+    (tmp_path / "palpate-bake").rename(tmp_path / "lost")
     with pytest.raises(PalpateError, match="bake"):
         bake_display.refresh(scene, baked_scene.bake_folders(scene))
 
@@ -195,7 +195,7 @@ def test_a_heat_map_of_pressure_divides_by_the_texels_area(tmp_path, around):
 def test_arrows_of_a_lost_image_do_not_show(baked, tmp_path):
     scene, pad, _ = baked
     assert texel_arrows.KINDS.keys() <= ALL
-    (tmp_path / "palpate").rename(tmp_path / "lost")
+    (tmp_path / "palpate-bake").rename(tmp_path / "lost")
     materials.find_block(bpy.data.images, pad.palpate.uid).reload()
     scene.frame_set(7)
     scene.frame_set(8)

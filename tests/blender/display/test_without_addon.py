@@ -103,7 +103,7 @@ def test_outside_of_the_bake_and_without_its_files_nothing_passes_for_a_force(sc
     inside = watch(path, tmp_path, "inside", False)["frames"]
     outside = watch(path, tmp_path, "outside", False, frames=(0, 9))["frames"]
     assert np.array(outside["9"]["pixels"]) == pytest.approx(np.array(inside["8"]["pixels"]), abs=1e-6)
-    (path.parent / "palpate").rename(path.parent / "lost")
+    (path.parent / "palpate-bake").rename(path.parent / "lost")
     lost = watch(path, tmp_path, "lost", False, frames=(7,))["frames"]
     for shot in (outside["0"], lost["7"]):
         width, height = shot["size"]

@@ -133,7 +133,7 @@ def test_targets_of_make_and_tools_exist(page):
 
 @pytest.fixture(scope="module")
 def bake_folder(tmp_path_factory):
-    """Folder in which `palpate` holds the bake of the demo scene's frames 71 and 72, and `rig.toml` the sample rig."""
+    """Folder in which `palpate-bake` holds the bake of the demo scene's frames 71 and 72, and `rig.toml` the sample rig."""
     folder = tmp_path_factory.mktemp("pages")
     shutil.copytree(ROOT / "docs" / "sample-rig", folder, dirs_exist_ok=True)
     scene = str(ROOT / "sample_blends" / "demo.blend")
@@ -147,14 +147,14 @@ def bake_folder(tmp_path_factory):
         "71",
         "72",
         "--out",
-        str(folder / "palpate"),
+        str(folder / "palpate-bake"),
     ]
     subprocess.run(command, check=True, capture_output=True, timeout=300)
     for target in ("probes", "mjcf"):
         scene = str(ROOT / "sample_blends" / "weighing.blend")
         assert main(["sensor", "export", scene, "--to", target, "--sensor", "Finger", "--out", str(folder / "sensors")]) == 0
     pytest.importorskip("mcap")
-    run_job(export(read_bake(folder / "palpate"), "mcap", folder))
+    run_job(export(read_bake(folder / "palpate-bake"), "mcap", folder))
     return folder
 
 

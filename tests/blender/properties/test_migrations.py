@@ -7,6 +7,7 @@ from blender_scenes import press, reopen, save
 
 from palpate.addon.properties import migrations
 from palpate.addon.session import session_state
+from palpate.core.io.private_folder import make_private_folder
 from palpate.core.io.settings_migration import VERSION
 
 
@@ -70,3 +71,43 @@ def test_todays_settings_are_not_touched(tmp_path):
     assert before["schema_version"] == VERSION
     migrations.apply()
     assert migrations.stored(pad) == before
+
+
+def test_an_older_file_finds_its_bake(tmp_path):
+    """Before, the default folder of bakes was palpate/ beside the file; what was baked there is found and replaced there."""
+    scene, _, _ = press()
+    path = save(tmp_path)
+    scene.palpate.folder = "//palpate"
+    bpy.ops.palpate.bake()
+    scene.palpate.property_unset("folder")  # as an older version saved it: the default of its own
+    scene.palpate.property_unset("schema_version")
+    bpy.ops.wm.save_mainfile()
+    reopen(path)
+    assert bpy.context.scene.palpate.folder == "//palpate"
+    bpy.ops.palpate.bake()
+    assert sorted(one.name for one in tmp_path.iterdir() if one.is_dir()) == ["palpate"]
+
+
+def test_an_unfinished_bake_of_an_older_version_goes_on_in_its_folder(tmp_path):
+    path = save_scene_with(tmp_path / "old", private_folder=True)
+    reopen(path)
+    assert bpy.context.scene.palpate.folder == "//palpate"
+
+
+def test_a_package_beside_the_file_is_no_bake(tmp_path):
+    """A folder called palpate that holds no bake, as a checkout of Palpate, is left alone."""
+    path = save_scene_with(tmp_path / "new", private_folder=False)
+    reopen(path)
+    assert bpy.context.scene.palpate.folder == "//palpate-bake"
+    bpy.ops.palpate.bake()
+    reopen(save(path.parent))
+    assert bpy.context.scene.palpate.folder == "//palpate-bake"
+
+
+def save_scene_with(folder, private_folder):
+    """Save a scene that was never baked beside a folder called palpate."""
+    press()
+    (folder / "palpate").mkdir(parents=True)
+    if private_folder:
+        make_private_folder(folder / "palpate")
+    return save(folder)

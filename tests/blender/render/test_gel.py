@@ -39,7 +39,7 @@ def pressed(scene, folder):
         assert main([*command, "--no-markers", "--out", str(folder / "plain")]) == 0
         assert main([*command, "--marker-pitch", "0.004", "--out", str(folder / "printed")]) == 0
     bpy.ops.wm.open_mainfile(filepath=str(folder / "scene.blend"))
-    return SimpleNamespace(folder=folder, recording=load_recording(folder / "palpate" / "Gel" / "recording.npz"))
+    return SimpleNamespace(folder=folder, recording=load_recording(folder / "palpate-bake" / "Gel" / "recording.npz"))
 
 
 def press_gel(scene, folder):

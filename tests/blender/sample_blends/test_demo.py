@@ -80,7 +80,7 @@ def test_demo_prints_and_draws_what_it_promises(tmp_path, capfd):
     assert not (out / "demo.blend1").exists()
     assert (out / "demo.blend").stat().st_size < 1_000_000
 
-    readings = load_recording(out / "palpate" / demo.PAD_A / "recording.npz").sensors[demo.PAD_A]
+    readings = load_recording(out / "palpate-bake" / demo.PAD_A / "recording.npz").sensors[demo.PAD_A]
     normal = readings.normal_force.sum(axis=1)
     shear = np.linalg.norm(readings.shear.sum(axis=1), axis=1)
     share = np.divide(shear, 0.435 * normal, out=np.zeros_like(shear), where=normal > 0.1)
@@ -103,7 +103,7 @@ def test_the_demo_s_scene_shows_its_bake(tmp_path):
     assert sunk == pytest.approx(9.81 / (1000 * 70) * 1000, rel=1e-3)  # mm: 70 texels of 1000 N/m carry it
     images = [image for image in bpy.data.images if image.source == "SEQUENCE"]
     assert len(images) == 2
-    assert all(image.filepath.startswith("//palpate") for image in images)
+    assert all(image.filepath.startswith("//palpate-bake") for image in images)
 
 
 @pytest.mark.slow("a picture by Cycles of the demo itself")

@@ -97,12 +97,12 @@ def road(ui):
     yield from ui.press("palpate.bake()")
     yield from ui.stop("palpate.bake")
     ui.check(not obj("Pad").palpate.is_baked, "nothing is baked")
-    yield from ui.becomes(lambda: not list((ui.out / "palpate").glob("*")), "and no files are left")
+    yield from ui.becomes(lambda: not list((ui.out / "palpate-bake").glob("*")), "and no files are left")
 
     scene.frame_end = 40
     yield from ui.press("palpate.bake()")
     yield from ui.wait_until(lambda: obj("Pad").palpate.is_baked, "the bake is done", timeout=120.0)
-    ui.value("files", sorted(path.name for path in (ui.out / "palpate" / "Pad").iterdir()))
+    ui.value("files", sorted(path.name for path in (ui.out / "palpate-bake" / "Pad").iterdir()))
     arrow = next((o for o in scene.objects if o.name == "Net Force Pad"), None)
     ui.check(arrow is not None, "there is a force arrow")
     view.spaces.active.shading.type = "MATERIAL"

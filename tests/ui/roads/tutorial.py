@@ -154,7 +154,7 @@ def road(ui):
     yield from ui.wait_until(lambda: grid().palpate.is_baked, "the bake is done", timeout=120)
     yield 1.0
     yield from ui.screenshot("6c-baked")
-    ui.value("files", len(list((folder / "palpate" / "Grid").iterdir())))
+    ui.value("files", len(list((folder / "palpate-bake" / "Grid").iterdir())))
     yield from ui.move(*ui.centre(ui.area("VIEW_3D")))
     yield from ui.key("Z")
     yield 0.5

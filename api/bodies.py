@@ -1,0 +1,186 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Bodies that press on sensors or carry them: boxes, spheres and meshes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import Any, TypedDict, Unpack
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..core.geometry.mesh import TriangleMesh, mass_properties
+from ..core.model import body as model
+from . import arguments
+from .arguments import ArgumentError
+from .paths import LEVEL, Path, PathLike, path_of, standing
+
+SPHERE_SUBDIVISIONS = 4
+"""Of an icosahedron: 5120 faces, whose shading is smooth, so that texels meet the normals of the sphere."""
+
+
+class Placement(TypedDict, total=False):
+    """Further arguments of the functions that make bodies; see :meth:`Body.from_mesh`."""
+
+    quaternion: ArrayLike
+    path_of_motion: PathLike
+    velocity: ArrayLike
+    angular_velocity: ArrayLike
+    name: str
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Body:
+    """A rigid body: free when it has a mass, else moved along a path, else fixed.
+
+    Make one with :meth:`box`, :meth:`sphere` or :meth:`from_mesh`.
+
+    Attributes
+    ----------
+    name : str
+    mesh : TriangleMesh
+        In the frame of the body, metres.
+    path : Path
+        Of the frame of the body in the world; of a free body its first pose counts.
+    mass : float or None, kg
+    velocity, angular_velocity : (3,) float, m/s and rad/s, world frame
+        Of a free body at the start.
+    smooth : bool
+        Contact normals are interpolated between vertices.
+    """
+
+    name: str
+    mesh: TriangleMesh
+    path: Path
+    mass: float | None = None
+    velocity: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    angular_velocity: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    smooth: bool = False
+
+    @classmethod
+    def box(
+        cls,
+        size: ArrayLike,
+        mass: float | None = None,
+        position: ArrayLike = (0.0, 0.0, 0.0),
+        **placement: Unpack[Placement],
+    ) -> Body:
+        """Return a box about the origin of its frame; arguments as of :meth:`from_mesh`.
+
+        Parameters
+        ----------
+        size : float or (3,) float, metres
+            Full length of its edges.
+        mass : float, kg, optional
+            Makes it free.
+        position : (3,) float, metres
+        **placement
+        """
+        import trimesh
+
+        edges = arguments.numbers(np.tile(size, 3) if np.ndim(size) == 0 else size, (3,), "size")
+        arguments.number(edges.min(), "size", above_zero=True)
+        placement.setdefault("name", "box")
+        return cls._of(trimesh.creation.box(edges), "size", mass, position, placement)
+
+    @classmethod
+    def sphere(
+        cls,
+        radius: float,
+        mass: float | None = None,
+        position: ArrayLike = (0.0, 0.0, 0.0),
+        **placement: Unpack[Placement],
+    ) -> Body:
+        """Return a sphere about the origin of its frame; arguments as of :meth:`from_mesh`.
+
+        Parameters
+        ----------
+        radius : float, metres
+        mass : float, kg, optional
+            Makes it free.
+        position : (3,) float, metres
+        **placement
+        """
+        import trimesh
+
+        radius = arguments.number(radius, "radius", above_zero=True)
+        ball = trimesh.creation.icosphere(subdivisions=SPHERE_SUBDIVISIONS, radius=radius)
+        placement.setdefault("name", "sphere")
+        return replace(cls._of(ball, "radius", mass, position, placement), smooth=True)
+
+    @classmethod
+    def from_mesh(
+        cls, mesh: Any, mass: float | None = None, position: ArrayLike = (0.0, 0.0, 0.0), **placement: Unpack[Placement]
+    ) -> Body:
+        """Return a body with the surface of a mesh.
+
+        Parameters
+        ----------
+        mesh : path, (vertices, faces) or mesh of trimesh
+            STL, PLY, OBJ or OFF; metres.
+        mass : float, kg, optional
+            Makes it free: forces and gravity move it. Centre of mass and inertia are those of the uniform solid.
+        position : (3,) float, metres
+        quaternion : (4,) float
+            (w, x, y, z).
+        path_of_motion : optional
+            Poses (m, 3) or (m, 7), one for each frame; a pair of times (m,) and poses; or a CSV file with the columns time, x,
+            y, z and, for a turning body, qw, qx, qy, qz.
+        velocity, angular_velocity : (3,) float, m/s and rad/s
+            Of a free body at the start.
+        name : str, optional
+            Default: that of the file.
+
+        Raises
+        ------
+        PalpateError
+            An argument has a wrong type, shape or value, or the mesh is no surface.
+        """
+        return cls._of(mesh, "mesh", mass, position, placement)
+
+    @classmethod
+    def _of(cls, mesh: Any, argument: str, mass: float | None, position: ArrayLike, placement: Placement) -> Body:
+        """Return a body; `argument` is what the size of its mesh follows from."""
+        arguments.known(placement, sorted(Placement.__annotations__), "argument")
+        name = arguments.name_from(mesh, placement.get("name"), "body")
+        surface = arguments.mesh_of(mesh, "mesh", name)
+        arguments.size_checked(surface.vertices, arguments.LARGEST_BODY, argument, f"body '{name}'")
+        path, turn = placement.get("path_of_motion"), placement.get("quaternion", LEVEL)
+        if mass is not None and path is not None:
+            raise ArgumentError(f"Body '{name}' has a mass, so that forces move it, and a path_of_motion: leave one out.")
+        return cls(
+            name,
+            surface,
+            standing(position, turn) if path is None else path_of(path, "path_of_motion", turn),
+            None if mass is None else arguments.number(mass, "mass", above_zero=True),
+            arguments.numbers(placement.get("velocity", np.zeros(3)), (3,), "velocity"),
+            arguments.numbers(placement.get("angular_velocity", np.zeros(3)), (3,), "angular_velocity"),
+        )
+
+    @property
+    def position(self) -> np.ndarray:
+        """(3,) float, metres: where it starts."""
+        return self.path.positions[0]
+
+    @property
+    def quaternion(self) -> np.ndarray:
+        """(4,) float: its orientation at the start, (w, x, y, z)."""
+        return self.path.quaternions[0]
+
+    def moved(self, motion: PathLike | Path, argument: str = "motion") -> Body:
+        """Return the same body, moved along a path instead of by forces; `motion` as `path_of_motion` of :meth:`from_mesh`."""
+        return replace(self, path=path_of(motion, argument, self.quaternion), mass=None)
+
+    def of_model(self, fps: float) -> tuple[model.Body, list[str]]:
+        """Return the body as core has it, and warnings about its mesh."""
+        motion = self.path.motion(fps)
+        if self.mass is None:
+            return model.Body(self.name, motion), []
+        center, inertia, warnings = mass_properties(self.mesh, self.mass, self.name)
+        made = model.Body(self.name, motion, True, self.mass, center, inertia, self.velocity, self.angular_velocity)
+        return made, warnings
+
+    def __repr__(self) -> str:
+        size = " × ".join(f"{1e3 * edge:.3g}" for edge in np.ptp(self.mesh.vertices, axis=0))
+        how = "fixed" if len(self.path.positions) == 1 else f"moved through {len(self.path.positions)} poses"
+        return f"<Body '{self.name}': {size} mm, {f'free, {self.mass:g} kg' if self.mass is not None else how}>"

@@ -1,0 +1,106 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The next experiment on a sensor."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..core.gap.planning.experiment_plan import ExperimentPlan, Wishes
+from ..core.gap.planning.experiment_plan import plan_experiment as plan
+from ..core.gap.report import plan_files
+from . import arguments
+from .arguments import ArgumentError
+from .gap import RigOrFile, rig_of
+from .running import ShowProgress, finished
+
+LIMITS = ("depth", "speed", "duration", "area")
+"""What a plan may be limited in."""
+
+
+class Plan:
+    """What recordings can tell apart, and the experiment that tells more: the result of :func:`plan_experiment`.
+
+    Attributes
+    ----------
+    outlook : ExperimentPlan
+        Every pair of effects.
+    """
+
+    def __init__(self, outlook: ExperimentPlan):
+        self.outlook = outlook
+
+    @property
+    def rows(self) -> list[tuple[str, str]]:
+        """Each effect, and what it may be taken for."""
+        return plan_files.table_rows(self.outlook)
+
+    @property
+    def sentence(self) -> str:
+        """What the planned experiment is good for."""
+        if self.outlook.experiment is None:
+            return "These recordings tell all of these effects from each other: no further one is planned."
+        return plan_files.planned_sentence(plan_files.experiment_words(self.outlook.experiment, plan_files.TRAJECTORY))
+
+    @property
+    def is_complete(self) -> bool:
+        """True when the recordings tell all effects apart, so that nothing is planned."""
+        return self.outlook.experiment is None
+
+    @property
+    def path_of_motion(self) -> tuple[np.ndarray, np.ndarray] | None:
+        """Times (m,), s, and positions (m, 3), m, of the probe in the sensor's frame; None where no poses are planned."""
+        positions = None if self.outlook.experiment is None else self.outlook.experiment.design.trajectory.positions()
+        return None if self.outlook.experiment is None or positions is None else (self._times, positions)
+
+    @property
+    def _times(self) -> np.ndarray:
+        assert self.outlook.experiment is not None
+        return self.outlook.experiment.design.trajectory.time
+
+    def report(self, folder: str | os.PathLike[str]) -> list[Path]:
+        """Write plan.json, and the trajectory as plan.csv where there is one; return the files."""
+        from ..core.io.file_writing import writable_folder
+
+        return plan_files.write_plan(self.outlook, writable_folder(folder, create=True))
+
+    def __repr__(self) -> str:
+        return f"<Plan: {self.sentence}>"
+
+
+def plan_experiment(
+    rig: RigOrFile, limits: Mapping[str, Any] | None = None, between: Sequence[str] = (), progress: ShowProgress = False
+) -> Plan:
+    """Say which effects the recordings of a rig can tell apart, and plan the recording that tells most of the rest.
+
+    Parameters
+    ----------
+    rig : Rig or path of a rig.toml
+    limits : mapping, optional
+        Any of depth (m), speed (m/s), duration (s) and area (least and largest x, least and largest y in the sensor's frame,
+        m); N and N/s where the rig knows forces. Default: as far as the recordings went.
+    between : sequence of str, optional
+        Effects that the recording is to tell apart.
+    progress : bool or callable
+        True for a progress bar.
+
+    Raises
+    ------
+    PalpateError
+        The rig cannot be used, or a limit or an effect is unknown or has no meaning.
+    """
+    words = dict(limits or {})
+    arguments.known(words, LIMITS, "limit of an experiment called")
+    area = words.pop("area", None)
+    for name, value in words.items():
+        if value is not None and not isinstance(value, float | int | np.floating):
+            raise ArgumentError(f"{name} of limits is {arguments.brief(value)}: give a number.")
+    if area is not None:
+        x0, x1, y0, y1 = arguments.numbers(area, (4,), "area of limits").tolist()
+        area = (x0, x1, y0, y1)
+    found = rig_of(rig)
+    return Plan(finished(plan(found, Wishes(tuple(between), area=area, **words)), progress, "plan"))

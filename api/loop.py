@@ -1,0 +1,57 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A sensor inside the loop of another simulator."""
+
+from __future__ import annotations
+
+from ..core.geometry.mesh import TriangleMesh
+from ..core.simulators import pressed_sensor
+from ..core.simulators.sensor_on_mesh import SensorOnMesh
+from . import arguments
+from .arguments import ArgumentError
+from .bodies import Body
+from .running import prepare_solver
+from .sensors import Sensor
+
+Pose = pressed_sensor.Pose
+
+
+class PressedSensor(pressed_sensor.PressedSensor):
+    """A sensor and one thing that presses on it, both moved by another program.
+
+    ``pressed.step(sensor_pose, target_pose)`` goes on by one step and returns forces and readings of the texels, and the force
+    and torque that go back to the other program; a pose is a position (3,), m, and a quaternion (4,), (w, x, y, z).
+
+    Parameters
+    ----------
+    sensor : Sensor
+    target : Body
+        Its shape counts; the other program moves it.
+    dt : float, seconds
+        Step of the other program.
+    sensor_pose, target_pose : pose, optional
+        At the start. Default: those of the sensor and the body.
+
+    Raises
+    ------
+    PalpateError
+        The sensor, the body or the step makes no run.
+    """
+
+    def __init__(
+        self,
+        sensor: SensorOnMesh,
+        target: Body | TriangleMesh,
+        dt: float,
+        sensor_pose: Pose | None = None,
+        target_pose: Pose | None = None,
+    ):
+        if not isinstance(sensor, SensorOnMesh):
+            raise ArgumentError(f"sensor is {arguments.brief(sensor)}: give a Sensor.")
+        prepare_solver()
+        own: Pose = sensor.world_pose() if isinstance(sensor, Sensor) else (sensor.position, sensor.quaternion)
+        if isinstance(target, Body):
+            super().__init__(sensor, target.mesh, dt, sensor_pose or own, target_pose or (target.position, target.quaternion))
+        elif isinstance(target, TriangleMesh) and target_pose is not None:
+            super().__init__(sensor, target, dt, sensor_pose or own, target_pose)
+        else:
+            raise ArgumentError(f"target is {arguments.brief(target)}: give a Body.")

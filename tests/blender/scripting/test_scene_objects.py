@@ -1,0 +1,64 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Scripts take sensors and scenarios from objects of Blender, in an installed extension as well."""
+
+import subprocess
+import sys
+
+import bpy
+import numpy as np
+import pytest
+from blender_scenes import press, save
+
+import palpate as pp
+from palpate.core.io.bake_reader import read_bake
+
+
+def test_a_scene_is_simulated_and_read_back(tmp_path):
+    """A script gets the numbers of a bake."""
+    scene, _, _ = press()
+    save(tmp_path)
+    bpy.ops.palpate.bake()
+    found = pp.simulate(pp.scenario_of(scene))
+    assert (found.normal_force == read_bake(tmp_path / "palpate-bake").recording.sensors["Pad"].normal_force).all()
+    baked = pp.read_bake(tmp_path / "palpate-bake" / "Pad")
+    assert (baked.normal_force == found.normal_force).all() and baked.unit == "N"
+    assert (pp.read_recording(tmp_path / "palpate-bake" / "Pad" / "recording.npz").shear == found.shear).all()
+    with pytest.raises(pp.PalpateError, match="duration is given beside a scenario"):
+        pp.simulate(pp.scenario_of(scene), duration=1.0)
+    with pytest.raises(pp.PalpateError, match="does not say where its texels are"):
+        pp.read_recording(tmp_path / "palpate-bake" / "Pad" / "recording.npz").show(t=0.0)
+
+
+def test_a_sensor_is_taken_from_an_object(tmp_path):
+    _, pad, target = press()
+    pad.location, pad.palpate.k = (0.1, 0.0, 0.02), 123.0
+    sensor = pp.sensor_of(pad)
+    assert (sensor.name, sensor.parameters.k, len(sensor.texels)) == ("Pad", pytest.approx(123.0), len(pad.data.vertices))
+    assert sensor.position == pytest.approx([0.1, 0.0, 0.02])
+    box = pp.Body.box(0.2, position=(0.1, 0.0, 0.1195))  # 0.5 mm deep
+    found = pp.simulate(sensor, box, duration=0.1)
+    assert found.normal_force[-1] == pytest.approx(np.full(len(sensor.texels), 123.0 * 0.5e-3))
+    assert pp.export_sensor(sensor, "probes", tmp_path).files[0].is_file()
+    with pytest.raises(pp.PalpateError, match="There is no sensor"):
+        pp.sensor_of(target)
+    with pytest.raises(pp.PalpateError, match="obj is 'Pad': give an object of Blender"):
+        pp.sensor_of("Pad")
+
+
+def test_an_extension_opens_the_same_door(tmp_path, repository):
+    """Blender loads it as bl_ext.<repository>.palpate."""
+    place = tmp_path / "bl_ext" / "user_default"
+    place.mkdir(parents=True)
+    (place / "palpate").symlink_to(repository, target_is_directory=True)
+    code = (
+        "import sys\nfrom bl_ext.user_default import palpate as pp\n"
+        "assert not {'bpy', 'numpy', 'palpate'} & set(sys.modules)\n"
+        "print(pp.Sensor.grid(2, 3, 1e-3), pp.Body.box(0.01), pp.PalpateError.__module__)\n"
+        "assert 'palpate' not in sys.modules"
+    )
+    run = subprocess.run(
+        [sys.executable, "-P", "-c", code], cwd=tmp_path, env={"PYTHONPATH": str(tmp_path)}, capture_output=True, text=True
+    )
+    assert run.returncode == 0, run.stderr
+    assert run.stdout.startswith("<Sensor 'pad': 2 × 3 texels, k 58.5 N/m> <Body 'box': 10 × 10 × 10 mm, fixed>")
+    assert run.stdout.strip().endswith("bl_ext.user_default.palpate.core.errors")

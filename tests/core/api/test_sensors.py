@@ -1,0 +1,76 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Sensors from grids, meshes and files, and files for other simulators."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import trimesh
+
+import palpate as pp
+
+
+def test_a_grid_lies_about_the_origin_with_normals_up():
+    pad = pp.Sensor.grid(14, 6, 4e-3, k=1000.0, mus=0.2)
+    assert pad.texels.position.mean(axis=0) == pytest.approx([0, 0, 0], abs=1e-15)
+    assert np.ptp(pad.texels.position, axis=0) == pytest.approx([5 * 4e-3, 13 * 4e-3, 0])
+    assert (pad.texels.normal == [0, 0, 1]).all()
+    assert pad.parameters.cn == pytest.approx(10.0)  # 1 % of k, as in rigs
+    assert pad.parameters.mud == 0.2  # dynamic friction does not exceed static friction
+    assert repr(pad) == "<Sensor 'pad': 14 × 6 texels, k 1000 N/m>"
+    assert pad._repr_html_().count("<circle") == 84
+
+
+def test_texels_are_spread_over_a_region():
+    ball = trimesh.creation.icosphere(subdivisions=3, radius=0.02)
+    top = ball.vertices[:, 2] > 0.01
+    skin = pp.Sensor.from_mesh(ball, texels=84, region=top, name="skin")
+    assert abs(len(skin.texels) - 84) <= 4
+    assert skin.texels.position[:, 2].min() > 0.008
+    assert len(skin.surface.vertices) == len(ball.vertices)
+    whole = pp.Sensor.from_mesh((ball.vertices, ball.faces), region=np.flatnonzero(top), k=58.5)
+    assert set(whole.texels.vertex) <= set(np.flatnonzero(top))
+
+
+def test_a_mesh_from_a_file_gives_its_name(tmp_path):
+    trimesh.creation.box((0.01, 0.01, 0.01)).export(tmp_path / "tip.stl")
+    assert pp.Sensor.from_mesh(tmp_path / "tip.stl").name == "tip"
+    assert repr(pp.Body.from_mesh(tmp_path / "tip.stl", mass=0.5)) == "<Body 'tip': 10 × 10 × 10 mm, free, 0.5 kg>"
+
+
+def test_a_sensor_is_saved_and_read(tmp_path):
+    pad = pp.Sensor.grid(7, 3, (3e-3, 4e-3), name="fingertip", k=321.5, unit="V", gain=0.2).with_effects("creep")
+    pad.save(tmp_path / "sensor.toml")
+    read = pp.read_sensor(tmp_path / "sensor.toml")
+    assert (read.name, read.parameters, read.effects) == (pad.name, pad.parameters, pad.effects)
+    assert read.texels.position == pytest.approx(pad.texels.position)
+    pp.Sensor.from_mesh(trimesh.creation.icosphere(radius=0.01), k=2.0).save(tmp_path / "ball.toml")
+    with pytest.raises(pp.PalpateError, match="does not say where the texels are"):
+        pp.read_sensor(tmp_path / "ball.toml")
+
+
+@pytest.mark.parametrize("kind", ["probes", "mjcf", "urdf"])
+def test_an_exported_sensor_is_read_again(tmp_path, kind):
+    pad = pp.Sensor.grid(4, 5, 3e-3, name="pad", k=200.0)
+    written = pp.export_sensor(pad, kind, tmp_path)
+    found = [pp.read_sensor(path) for path in written.files if path.suffix in (".json", ".xml", ".urdf")]
+    assert [np.sort(one.texels.position, axis=0) for one in found[:1]] == [
+        pytest.approx(np.sort(pad.texels.position, axis=0), abs=1e-9)
+    ]
+
+
+def test_an_unknown_format_and_a_missing_file_are_refused(tmp_path):
+    with pytest.raises(pp.PalpateError, match="Sensors are not written as 'mjfc'"):
+        pp.export_sensor(pp.Sensor.grid(4, 4, 1e-3), "mjfc", tmp_path)
+    with pytest.raises(pp.PalpateError, match=r"There is no sensor '.*none\.toml'"):
+        pp.read_sensor(tmp_path / "none.toml")
+
+
+def test_a_pressed_sensor_takes_a_sensor_and_a_body():
+    pad = pp.Sensor.grid(14, 6, 4e-3, k=1000.0, cn=0.0)
+    box = pp.Body.box(0.05, position=(0, 0, 0.026))
+    pressed = pp.PressedSensor(pad, box, dt=1e-3)
+    level = (1.0, 0.0, 0.0, 0.0)
+    for _ in range(2):
+        contact = pressed.step(((0, 0, 0), level), ((0, 0, 0.0249), level))
+    assert contact.force_on_target == pytest.approx([0, 0, 72 * 1000.0 * 1e-4])
