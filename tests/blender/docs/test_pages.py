@@ -172,6 +172,7 @@ def python_blocks() -> list:
     return found
 
 
+@pytest.mark.slow("the first of them makes the bake that all pages share")
 @pytest.mark.parametrize("block", python_blocks())
 def test_python_blocks_run(block, bake_folder, monkeypatch, capsys):
     import dataclasses
