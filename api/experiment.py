@@ -93,6 +93,8 @@ def plan_experiment(
     PalpateError
         The rig cannot be used, or a limit or an effect is unknown or has no meaning.
     """
+    if limits is not None and not isinstance(limits, Mapping):
+        raise ArgumentError(f"limits is {arguments.brief(limits)}: give a mapping, as {{'depth': 0.002}}.")
     words = dict(limits or {})
     arguments.known(words, LIMITS, "limit of an experiment called")
     area = words.pop("area", None)

@@ -82,6 +82,7 @@ def test_wrong_rigs_and_limits_are_refused(rig, tmp_path):
         (lambda: pp.find_gap(tmp_path / "empty.toml"), r"has no \[\[trial\]\]: name at least one CSV file"),
         (lambda: pp.find_gap(3), r"rig is 3: give the path of a rig\.toml"),
         (lambda: pp.plan_experiment(rig, limits={"dept": 1e-3}), r"called 'dept' \(did you mean 'depth'\?\)"),
+        (lambda: pp.plan_experiment(rig, limits=2e-3), "limits is 0.002: give a mapping"),
         (lambda: pp.plan_experiment(rig, limits={"depth": "2 mm"}), "depth of limits is '2 mm': give a number"),
         (lambda: pp.plan_experiment(rig, limits={"speed": -1.0}), "The limit of the speed is -1"),
         (lambda: pp.plan_experiment(rig, limits={"area": (0, 1)}), r"area of limits has the shape \(2,\)"),
