@@ -156,6 +156,7 @@ def test_eight_transducers_of_which_nothing_is_wrong_but_creep(tmp_path):
 )
 def test_mistakes_are_said(tmp_path, old, new, said):
     assert old in RIG
-    (tmp_path / "rig.toml").write_text(RIG.replace(old, new))
+    trial = '\n[[trial]]\nfile = "a.csv"\n'
+    (tmp_path / "rig.toml").write_text(RIG.replace(old, new) + trial)
     with pytest.raises(FileError, match=said):
         read_rig(tmp_path / "rig.toml")
