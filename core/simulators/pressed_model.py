@@ -1,0 +1,124 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What all environments of a pressed sensor have in common: the sensor, its targets and the solver's model of them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..effects.engine.readout_chain import transducers_of
+from ..effects.engine.registry import in_signal_order
+from ..errors import ParameterError
+from ..geometry.mesh import TriangleMesh
+from ..model.body import Body
+from ..model.motion import Motion
+from ..model.scenario import Scenario
+from ..model.target import Target
+from ..response.readings import ReadoutChain
+from ..solver.parallel_loops import prepare_pair_loops
+from ..solver.pressing import (
+    Environment,
+    PressedTexels,
+    Pressing,
+    StepMemory,
+    addresses_of,
+    make_environments,
+    press_environments,
+)
+from ..solver.simulation import Simulation
+from ..solver.workspace_builder import workspace_for
+from .sensor_on_mesh import SensorOnMesh
+
+
+class PressedModel:
+    """A sensor, what presses on it, and the solver's arrays for them.
+
+    Parameters
+    ----------
+    item : SensorOnMesh
+    targets : sequence of TriangleMesh
+        Each in the frame of what presses, metres.
+    dt : float, seconds
+        Of a step.
+    threads : int, optional
+        To compute one step of one environment with (see :func:`.thread_team.make_queue`).
+
+    Raises
+    ------
+    PalpateError
+        The sensor, the meshes or the step make no run.
+
+    Attributes
+    ----------
+    texels : int
+    rate : float, 1/s
+        Steps in a second.
+    helpers : int
+        Threads that help with a step.
+    """
+
+    def __init__(self, item: SensorOnMesh, targets: Sequence[TriangleMesh], dt: float, threads: int | None = None):
+        if not (np.isfinite(dt) and dt > 0):
+            raise ParameterError(f"The step is {dt:g} s: give a number above zero.")
+        if not targets:
+            raise ParameterError(f"Nothing presses on '{item.name}': give a target's mesh, or several.")
+        if item.sensor.deformation is not None:
+            raise ParameterError(f"'{item.name}' deforms by prescription: take a sensor that keeps its shape in this loop.")
+        names = [f"target {number}" for number in range(1, len(targets) + 1)]
+        simulation = self._simulation = Simulation(
+            Scenario(
+                bodies=(Body("sensor", Motion.at_rest()), *(Body(name, Motion.at_rest()) for name in names)),
+                sensors=(item.sensor,),
+                targets=tuple(Target(name, 1 + i, mesh) for i, (name, mesh) in enumerate(zip(names, targets, strict=True))),
+                frame_start=0,
+                frame_end=1,
+                fps=1.0 / dt,
+                dt=dt,
+            ),
+            threads,
+        )
+        self._item = item
+        self.rate = simulation.scenario.fps
+        self.texels = len(item.sensor.texels)
+        self._model, self._detection, self._state, self._workspace = simulation.arrays
+        self.helpers = simulation.helpers
+        transducers = transducers_of(item.sensor)
+        scale = np.broadcast_to(transducers.gain * transducers.painted, self.texels)
+        self._conversion = np.stack([np.full(self.texels, float(transducers.zero)), scale])
+        self._reads_by_chain = bool(in_signal_order(item.sensor.effects, readout=True))
+
+    def readout_chain(self) -> ReadoutChain | None:
+        """Return what turns forces into readings, from its beginning; None where that is a scale and a zero."""
+        return ReadoutChain.of(self._item.sensor) if self._reads_by_chain else None
+
+    def environments(self, count: int) -> list[Environment]:
+        """Return environments at their beginning."""
+        return make_environments(count, self._detection, self._state)
+
+    def bytes_of_environment(self) -> int:
+        """Return what an environment takes in memory: state and neighbour lists."""
+        arrays = (*self._detection.neighbours, *self._state)
+        return sum(field.nbytes for field in arrays) + BYTES_OF_TUPLES
+
+    def pressing(self, memory: StepMemory, pressed: PressedTexels, environments: list[Environment]) -> Pressing:
+        """Return all that a thread needs for these environments, with working memory of its own."""
+        queue = self._workspace.queue
+        workspace = workspace_for(self._model, self._state, self._detection.surfaces, queue)
+        pressing = Pressing(
+            dt=np.array([self._simulation.dt]),
+            conversion=self._conversion,
+            model=self._model,
+            workspace=workspace,
+            memory=memory,
+            pressed=pressed,
+            addresses=addresses_of(environments),
+            example=environments[0],
+        )
+        prepare_pair_loops(self._model, self._detection, self._state, workspace)
+        press_environments(0, 0, pressing)  # compiles it
+        return pressing
+
+
+BYTES_OF_TUPLES = 8000
+"""What Python takes for the tuples of an environment and for its views of arrays."""
