@@ -4,9 +4,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import AbstractContextManager
 
 import numpy as np
 
+from ..compiled.thread_team import helper_threads
 from ..effects.engine.readout_chain import transducers_of
 from ..effects.engine.registry import in_signal_order
 from ..errors import ParameterError
@@ -16,17 +18,18 @@ from ..model.motion import Motion
 from ..model.scenario import Scenario
 from ..model.target import Target
 from ..response.readings import ReadoutChain
-from ..solver.parallel_loops import prepare_pair_loops
+from ..solver.parallel_loops import help_with_loops, prepare_pair_loops
 from ..solver.pressing import (
     Environment,
     PressedTexels,
+    Presser,
     Pressing,
     StepMemory,
     addresses_of,
     make_environments,
-    press_environments,
 )
 from ..solver.simulation import Simulation
+from ..solver.workspace import Workspace
 from ..solver.workspace_builder import workspace_for
 from .sensor_on_mesh import SensorOnMesh
 
@@ -66,7 +69,7 @@ class PressedModel:
         if item.sensor.deformation is not None:
             raise ParameterError(f"'{item.name}' deforms by prescription: take a sensor that keeps its shape in this loop.")
         names = [f"target {number}" for number in range(1, len(targets) + 1)]
-        simulation = self._simulation = Simulation(
+        simulation = Simulation(
             Scenario(
                 bodies=(Body("sensor", Motion.at_rest()), *(Body(name, Motion.at_rest()) for name in names)),
                 sensors=(item.sensor,),
@@ -81,7 +84,9 @@ class PressedModel:
         self._item = item
         self.rate = simulation.scenario.fps
         self.texels = len(item.sensor.texels)
-        self._model, self._detection, self._state, self._workspace = simulation.arrays
+        self._dt = simulation.dt
+        self._model, self._detection, self._state, workspace = simulation.arrays
+        self._queue = workspace.queue
         self.helpers = simulation.helpers
         transducers = transducers_of(item.sensor)
         scale = np.broadcast_to(transducers.gain * transducers.painted, self.texels)
@@ -101,12 +106,18 @@ class PressedModel:
         arrays = (*self._detection.neighbours, *self._state)
         return sum(field.nbytes for field in arrays) + BYTES_OF_TUPLES
 
-    def pressing(self, memory: StepMemory, pressed: PressedTexels, environments: list[Environment]) -> Pressing:
-        """Return all that a thread needs for these environments, with working memory of its own."""
-        queue = self._workspace.queue
-        workspace = workspace_for(self._model, self._state, self._detection.surfaces, queue)
+    def workspace(self) -> Workspace:
+        """Return working memory for one thread."""
+        workspace = workspace_for(self._model, self._state, self._detection.surfaces, self._queue)
+        prepare_pair_loops(self._model, self._detection, self._state, workspace)
+        return workspace
+
+    def presser(
+        self, memory: StepMemory, pressed: PressedTexels, environments: list[Environment], workspace: Workspace
+    ) -> Presser:
+        """Return what runs steps of these environments in one thread."""
         pressing = Pressing(
-            dt=np.array([self._simulation.dt]),
+            dt=np.array([self._dt]),
             conversion=self._conversion,
             model=self._model,
             workspace=workspace,
@@ -115,9 +126,12 @@ class PressedModel:
             addresses=addresses_of(environments),
             example=environments[0],
         )
-        prepare_pair_loops(self._model, self._detection, self._state, workspace)
-        press_environments(0, 0, pressing)  # compiles it
-        return pressing
+        return Presser(pressing, environments)
+
+    def helping(self, environment: Environment, workspace: Workspace) -> AbstractContextManager[None]:
+        """Let other threads help with the steps of an environment meanwhile."""
+        arrays = self._model, environment.detection, environment.state, workspace
+        return helper_threads(workspace.queue, self.helpers, help_with_loops, *arrays)
 
 
 BYTES_OF_TUPLES = 8000

@@ -5,17 +5,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..compiled.thread_team import helper_threads
 from ..errors import ParameterError
 from ..geometry.mesh import TriangleMesh
 from ..model.recording import SENSOR_FIELDS, SensorFrame
 from ..response.readings import ReadoutChain
-from ..solver.parallel_loops import help_with_loops
-from ..solver.pressing import Environment, PressedTexels, StepMemory, begin_at, press
+from ..solver.pressing import PressedTexels, StepMemory, begin_at
 from .pressed_model import PressedModel
 from .sensor_on_mesh import SensorOnMesh
 
@@ -87,10 +86,17 @@ class PressedSensor:
         self._one_target = isinstance(target, TriangleMesh)
         targets = [target] if isinstance(target, TriangleMesh) else list(target)
         model = self._model = PressedModel(item, targets, dt, threads)
-        self._out, self._memory = PressedTexels.zero(1, model.texels, len(targets)), StepMemory.zero(model.texels, len(targets))
-        self._environments: list[Environment] = model.environments(1)
-        self._pressing = model.pressing(self._memory, self._out, self._environments)
-        self._start = self._out.poses.copy()
+        out = self._out = PressedTexels.zero(1, model.texels, len(targets))
+        memory = self._memory = StepMemory.zero(model.texels, len(targets))
+        self._environments, self._workspace = model.environments(1), model.workspace()
+        self._presser = model.presser(memory, out, self._environments, self._workspace)
+        self._rows = [(row[:3], row[3:]) for row in out.poses[0]]
+        self._texels = (
+            memory.force, memory.shear, memory.friction, memory.depth, memory.slip, memory.contact, out.readings[0],
+            memory.whole_net[:3], memory.whole_net[3:], memory.centre,
+        )  # fmt: skip
+        wrench = out.wrench[0, 0] if self._one_target else out.wrench[0]
+        self._force, self._torque = wrench[..., :3], wrench[..., 3:]
         self.reset(sensor_pose, target_pose)
 
     @property
@@ -107,6 +113,7 @@ class PressedSensor:
             A pose is not finite, or a quaternion is zero.
         """
         self._read_poses(sensor_pose, target_pose)
+        self._check_poses()
         self._chain: ReadoutChain | None = self._model.readout_chain()
         self._steps = 0
         begin_at(self._out.poses[0], self._environments[0])
@@ -129,56 +136,50 @@ class PressedSensor:
             A pose is not finite, or a quaternion is zero. The sensor stays at the step before.
         """
         self._read_poses(sensor_pose, target_pose)
-        self._press()
+        if self._model.helpers:
+            with self._model.helping(self._environments[0], self._workspace):
+                self._presser.press(0, 1)
+        else:
+            self._presser.press(0, 1)
+        if not self._out.valid[0]:
+            self._out.begins[0] = False
+            self._check_poses()
         self._steps += 1
-        memory, wrench = self._memory, self._out.wrench[0]
-        moment = memory.moment[0]
         if self._chain is not None:
-            self._out.readings[0] = self._chain.step(self._steps / self._model.rate, memory.force)
-        centre = moment[:3] / moment[3] if moment[3] > 0.0 else np.zeros(3)
-        values = (
-            memory.force, memory.shear, memory.friction, memory.depth, memory.slip, memory.contact, self._out.readings[0],
-            memory.whole_net[:3], memory.whole_net[3:], centre,
-        )  # fmt: skip
-        if self._one_target:
-            wrench = wrench[0]
-        force, torque = wrench[..., :3], wrench[..., 3:]
+            self._out.readings[0] = self._chain.step(self._steps / self._model.rate, self._memory.force)
         if out is None:
-            return Contact(SensorFrame(*[value.copy() for value in values]), force.copy(), torque.copy())
-        for name, value in zip(SENSOR_FIELDS, values, strict=True):
-            getattr(out.texels, name)[...] = value
-        out.force_on_target[...], out.torque_on_target[...] = force, torque
+            texels = SensorFrame(*[values.copy() for values in self._texels])
+            return Contact(texels, self._force.copy(), self._torque.copy())
+        for name, values in zip(SENSOR_FIELDS, self._texels, strict=True):
+            np.copyto(getattr(out.texels, name), values)
+        np.copyto(out.force_on_target, self._force)
+        np.copyto(out.torque_on_target, self._torque)
         return out
 
-    def _press(self) -> None:
-        """Let the solver take one step."""
-        model = self._model
-        if not model.helpers:
-            press(0, 1, self._pressing, self._environments)
-            return
-        (environment,) = self._environments
-        arrays = self._pressing.model, environment.detection, environment.state, self._pressing.workspace
-        with helper_threads(self._pressing.workspace.queue, model.helpers, help_with_loops, *arrays):
-            press(0, 1, self._pressing, self._environments)
-
     def _read_poses(self, sensor_pose: Pose, target_pose: Pose | Sequence[Pose]) -> None:
-        """Write the poses down for the solver, if all of them are some."""
-        rows = self._start[0]
-        poses = [sensor_pose, target_pose] if self._one_target else [sensor_pose, *target_pose]
-        if len(poses) != len(rows):
-            raise ParameterError(f"There are {len(poses) - 1} poses of targets for {len(rows) - 1} targets: give one for each.")
-        for number, (pose, row) in enumerate(zip(poses, rows, strict=True)):
+        """Write the poses down for the solver, which looks whether they are finite."""
+        poses: Sequence[Any] = (sensor_pose, target_pose) if self._one_target else (sensor_pose, *target_pose)
+        if len(poses) != len(self._rows):
+            raise ParameterError(
+                f"There are {len(poses) - 1} poses of targets for {len(self._rows) - 1} targets: give one for each."
+            )
+        for number, (pose, rows) in enumerate(zip(poses, self._rows, strict=True)):
             try:
                 position, quaternion = pose
-                fits = np.shape(position) == (3,) and np.shape(quaternion) == (4,)
-                if fits:
-                    row[:3], row[3:] = position, quaternion
+                fits = len(position) == 3 and len(quaternion) == 4
+                rows[0][:], rows[1][:] = position, quaternion
             except (TypeError, ValueError):
                 fits = False
-            square = float(row[3:] @ row[3:])
-            if not (fits and np.isfinite(row).all() and 0.0 < square < np.inf):
-                whose = "sensor" if number == 0 else "target" if self._one_target else f"target {number}"
-                raise ParameterError(
-                    f"The pose of the {whose} is no position and quaternion of finite numbers: check its simulation."
-                )
-        self._out.poses[0] = rows
+            if not fits:
+                raise self._no_pose(number)
+
+    def _check_poses(self) -> None:
+        """Raise :class:`.ParameterError` for a pose that is none."""
+        for number, row in enumerate(self._out.poses[0]):
+            if not (np.isfinite(row).all() and 0.0 < row[3:] @ row[3:] < np.inf):
+                raise self._no_pose(number)
+
+    def _no_pose(self, number: int) -> ParameterError:
+        """Return the error for a body whose pose is none."""
+        whose = "sensor" if number == 0 else "target" if self._one_target else f"target {number}"
+        return ParameterError(f"The pose of the {whose} is no position and quaternion of finite numbers: check its simulation.")

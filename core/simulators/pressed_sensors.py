@@ -15,7 +15,7 @@ from ..compiled.thread_team import threads_for
 from ..errors import ParameterError
 from ..geometry.mesh import TriangleMesh
 from ..response.readings import ReadoutChain
-from ..solver.pressing import PressedTexels, Pressing, StepMemory, press
+from ..solver.pressing import PressedTexels, Presser, StepMemory
 from .pressed_model import PressedModel
 from .sensor_on_mesh import SensorOnMesh
 
@@ -40,8 +40,8 @@ class Contacts:
     too_deep : (E,) int
         How many contact points are pressed past their maximum penetration, and measure nothing.
     valid : (E,) bool
-        False where a pose is not finite or a quaternion is zero: nothing touches there, and the environment begins anew with its
-        next valid poses.
+        False where a pose is not finite or a quaternion is zero: everything is zero there, and the environment begins anew with
+        its next valid poses.
     """
 
     texels: np.ndarray
@@ -108,8 +108,8 @@ class PressedSensors:
         _check_memory(environments, model.bytes_of_environment() + n * BYTES_OF_TEXEL)
         self._out = PressedTexels.zero(environments, n, len(targets))
         self._environments = model.environments(environments)
-        self._threads: list[Pressing] = [
-            model.pressing(StepMemory.zero(n, len(targets)), self._out, self._environments)
+        self._threads = [
+            model.presser(StepMemory.zero(n, len(targets)), self._out, self._environments, model.workspace())
             for _ in range(min(environments, threads_for(environments * n, threads)))
         ]
         self._chunk = max(1, min(CHUNK_POINTS // n, -(-environments // (4 * len(self._threads)))))
@@ -193,10 +193,10 @@ class PressedSensors:
         for helper in helpers:
             helper.join()
 
-    def _work(self, pressing: Pressing, starts: Iterator[int]) -> None:
+    def _work(self, presser: Presser, starts: Iterator[int]) -> None:
         """Take chunks of environments until none is left."""
         for start in starts:
-            press(start, min(start + self._chunk, len(self)), pressing, self._environments)
+            presser.press(start, min(start + self._chunk, len(self)))
 
     def _read(self, fresh: np.ndarray) -> None:
         """Compute readings that effects act on, environment by environment, as each has a past of its own."""
@@ -223,8 +223,8 @@ def _check_memory(environments: int, size: int) -> None:
     there = _available_memory()
     if environments * size > there:
         raise ParameterError(
-            f"{environments} environments take {environments * size / 2**30:.1f} GiB of memory, and {there / 2**30:.1f} GiB are "
-            f"free: ask for {int(there / size)} at most."
+            f"{environments} environments take {environments * size / 2**30:.1f} GiB of memory, and {there / 2**30:.1f} GiB "
+            f"are free: ask for {int(there / size)} at most."
         )
 
 

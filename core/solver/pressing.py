@@ -7,12 +7,14 @@ state and neighbour lists, and each thread its own working memory, of which noth
 
 from __future__ import annotations
 
+import ctypes
 import math
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 
-from ..compiled.kernels import are_interpreted, kernel, with_plain_form
+from ..compiled.kernels import address_of, addressed_kernel, are_interpreted, kernel
 from ..compiled.struct_reference import address_of_fields, by_reference, reference_at
 from ..geometry.rotations import write_backward_step_motion, write_velocity
 from .detection.detection_data import DetectionData, NeighbourLists
@@ -88,7 +90,8 @@ class PressedTexels(NamedTuple):
 class StepMemory(NamedTuple):
     """Working memory for the step of one environment: its :class:`.FramePath` and its :class:`.TexelReadout`.
 
-    `net` is the part of the target that was read last, and `whole_net` (6,) the sum over targets.
+    `net` is the part of the target that was read last, `whole_net` (6,) the sum over targets, and `centre` (3,), metres, the
+    centre of pressure.
     """
 
     position: np.ndarray
@@ -105,13 +108,14 @@ class StepMemory(NamedTuple):
     net: np.ndarray
     moment: np.ndarray
     whole_net: np.ndarray
+    centre: np.ndarray
 
     @classmethod
     def zero(cls, texels: int, targets: int) -> StepMemory:
         """Allocate it."""
         b = 1 + targets
         path = FramePath(np.zeros((2, b, 3)), np.zeros((2, b, 4)), np.zeros((1, b, 6)), np.zeros((1, 0, 4)))
-        return cls(*path, *TexelReadout.zero(texels, 1), np.zeros(6))
+        return cls(*path, *TexelReadout.zero(texels, 1), np.zeros(6), np.zeros(3))
 
 
 @by_reference
@@ -167,21 +171,34 @@ def begin_at(poses: np.ndarray, environment: Environment) -> None:
     environment.state.quaternion[...] = poses[:, 3:] / np.linalg.norm(poses[:, 3:], axis=1, keepdims=True)
 
 
-def press(first: int, last: int, pressing: Pressing, environments: list[Environment]) -> None:
-    """Run one step of some environments, the last one excluded; several threads may do so at once, each with its own."""
-    if not are_interpreted():
-        press_environments(first, last, pressing)
-        return
-    for number in range(first, last):
-        press_environment(number, pressing, environments[number])
+class Presser:
+    """Runs steps of environments in one thread.
+
+    Parameters
+    ----------
+    pressing : Pressing
+        With working memory that no other thread uses.
+    environments : list of Environment
+    """
+
+    def __init__(self, pressing: Pressing, environments: list[Environment]):
+        self._pressing, self._environments = pressing, environments
+        address = address_of(press_environments, 0, 0, pressing)
+        self._compiled: Callable[[int, int, int], None] | None = None
+        if address:  # numba's own way of calling takes longer than a step of a small sensor
+            self._compiled = ctypes.CFUNCTYPE(None, ctypes.c_int64, ctypes.c_int64, ctypes.c_void_p)(address)
+        self._address = address_of_fields(pressing)
+
+    def press(self, first: int, last: int) -> None:
+        """Run one step of some environments, the last one excluded."""
+        if self._compiled is not None and not are_interpreted():
+            self._compiled(first, last, self._address)
+            return
+        for number in range(first, last):
+            press_environment(number, self._pressing, self._environments[number])
 
 
-def _press_none(first: int, last: int, pressing: Pressing) -> None:
-    """Do nothing: kernels are compiled with a call for no environment, and interpreted ones are called one by one."""
-
-
-@with_plain_form(_press_none)
-@kernel
+@addressed_kernel
 def press_environments(first: int, last: int, pressing: Pressing) -> None:
     """Run one step of some environments, the last one excluded."""
     for number in range(first, last):
@@ -302,6 +319,8 @@ def _read(number: int, pressing: Pressing, state: State) -> None:
             t.whole_net[i] += t.net[0, i]
         _write_reaction(t.net[0], workspace.bodies.rotation[0], state.position[0], state.position[1 + target],
                         out.wrench[number, target])  # fmt: skip
+    for i in range(3):
+        t.centre[i] = t.moment[0, i] / t.moment[0, 3] if t.moment[0, 3] > 0.0 else 0.0
     for texel in range(len(t.force)):
         out.texels[number, texel, 0] = t.force[texel]
         out.texels[number, texel, 1] = t.shear[texel, 0]
