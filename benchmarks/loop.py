@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A sensor in another program's loop: microseconds of a step, calls included, and milliseconds of a step of 4,096 environments.
 
-The object moves to and fro on the pad, about a millimetre deep, so that texels slide and neighbour lists are made anew. The
-peer is a step of MuJoCo with its sensor `tactile`, of as many texels, under a cube of 3,072 faces that rests on it; it computes the
-cube's dynamics too. Times are those of the threads that compute, the least of several rounds, as other work on the machine only
-adds to them.
+The object moves to and fro on the pad, a millimetre deep, so that texels slide and neighbour lists are made anew. The peer
+is a step of MuJoCo with its `tactile` sensor of as many texels, under a cube of 3,072 faces that rests on it; it computes the
+cube's dynamics too. Times are those of the threads that compute, the least of several rounds, as other work on the machine
+only adds to them.
 """
 
 from __future__ import annotations

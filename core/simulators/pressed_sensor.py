@@ -14,8 +14,8 @@ from ..errors import ParameterError
 from ..geometry.mesh import TriangleMesh
 from ..model.recording import SENSOR_FIELDS, SensorFrame
 from ..response.readings import ReadoutChain
+from ..solver.pressed_model import PressedModel
 from ..solver.pressing import PressedTexels, StepMemory, begin_at
-from .pressed_model import PressedModel
 from .sensor_on_mesh import SensorOnMesh
 
 Pose = tuple[ArrayLike, ArrayLike]
@@ -85,7 +85,7 @@ class PressedSensor:
     ):
         self._one_target = isinstance(target, TriangleMesh)
         targets = [target] if isinstance(target, TriangleMesh) else list(target)
-        model = self._model = PressedModel(item, targets, dt, threads)
+        model = self._model = PressedModel(item.sensor, targets, dt, threads)
         out = self._out = PressedTexels.zero(1, model.texels, len(targets))
         memory = self._memory = StepMemory.zero(model.texels, len(targets))
         self._environments, self._workspace = model.environments(1), model.workspace()

@@ -11,12 +11,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..compiled.thread_team import threads_for
 from ..errors import ParameterError
 from ..geometry.mesh import TriangleMesh
 from ..response.readings import ReadoutChain
+from ..solver.pressed_model import PressedModel
 from ..solver.pressing import PressedTexels, Presser, StepMemory
-from .pressed_model import PressedModel
 from .sensor_on_mesh import SensorOnMesh
 
 CHUNK_POINTS = 16384
@@ -103,14 +102,14 @@ class PressedSensors:
             raise ParameterError(f"There are {environments} environments: ask for one at least.")
         self._one_target = isinstance(target, TriangleMesh)
         targets = [target] if isinstance(target, TriangleMesh) else list(target)
-        model = self._model = PressedModel(item, targets, dt, 1)
+        model = self._model = PressedModel(item.sensor, targets, dt, 1)
         n = model.texels
         _check_memory(environments, model.bytes_of_environment() + n * BYTES_OF_TEXEL)
         self._out = PressedTexels.zero(environments, n, len(targets))
         self._environments = model.environments(environments)
         self._threads = [
             model.presser(StepMemory.zero(n, len(targets)), self._out, self._environments, model.workspace())
-            for _ in range(min(environments, threads_for(environments * n, threads)))
+            for _ in range(model.threads(environments, threads))
         ]
         self._chunk = max(1, min(CHUNK_POINTS // n, -(-environments // (4 * len(self._threads)))))
         self._chains: list[ReadoutChain | None] = [None] * environments

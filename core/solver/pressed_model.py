@@ -8,7 +8,7 @@ from contextlib import AbstractContextManager
 
 import numpy as np
 
-from ..compiled.thread_team import helper_threads
+from ..compiled.thread_team import helper_threads, threads_for
 from ..effects.engine.readout_chain import transducers_of
 from ..effects.engine.registry import in_signal_order
 from ..errors import ParameterError
@@ -16,10 +16,11 @@ from ..geometry.mesh import TriangleMesh
 from ..model.body import Body
 from ..model.motion import Motion
 from ..model.scenario import Scenario
+from ..model.sensor import Sensor
 from ..model.target import Target
 from ..response.readings import ReadoutChain
-from ..solver.parallel_loops import help_with_loops, prepare_pair_loops
-from ..solver.pressing import (
+from .parallel_loops import help_with_loops, prepare_pair_loops
+from .pressing import (
     Environment,
     PressedTexels,
     Presser,
@@ -28,10 +29,9 @@ from ..solver.pressing import (
     addresses_of,
     make_environments,
 )
-from ..solver.simulation import Simulation
-from ..solver.workspace import Workspace
-from ..solver.workspace_builder import workspace_for
-from .sensor_on_mesh import SensorOnMesh
+from .simulation import Simulation
+from .workspace import Workspace
+from .workspace_builder import workspace_for
 
 
 class PressedModel:
@@ -39,7 +39,7 @@ class PressedModel:
 
     Parameters
     ----------
-    item : SensorOnMesh
+    sensor : Sensor
     targets : sequence of TriangleMesh
         Each in the frame of what presses, metres.
     dt : float, seconds
@@ -61,18 +61,18 @@ class PressedModel:
         Threads that help with a step.
     """
 
-    def __init__(self, item: SensorOnMesh, targets: Sequence[TriangleMesh], dt: float, threads: int | None = None):
+    def __init__(self, sensor: Sensor, targets: Sequence[TriangleMesh], dt: float, threads: int | None = None):
         if not (np.isfinite(dt) and dt > 0):
             raise ParameterError(f"The step is {dt:g} s: give a number above zero.")
         if not targets:
-            raise ParameterError(f"Nothing presses on '{item.name}': give a target's mesh, or several.")
-        if item.sensor.deformation is not None:
-            raise ParameterError(f"'{item.name}' deforms by prescription: take a sensor that keeps its shape in this loop.")
+            raise ParameterError(f"Nothing presses on '{sensor.name}': give a target's mesh, or several.")
+        if sensor.deformation is not None:
+            raise ParameterError(f"'{sensor.name}' deforms by prescription: take a sensor that keeps its shape in this loop.")
         names = [f"target {number}" for number in range(1, len(targets) + 1)]
         simulation = Simulation(
             Scenario(
                 bodies=(Body("sensor", Motion.at_rest()), *(Body(name, Motion.at_rest()) for name in names)),
-                sensors=(item.sensor,),
+                sensors=(sensor,),
                 targets=tuple(Target(name, 1 + i, mesh) for i, (name, mesh) in enumerate(zip(names, targets, strict=True))),
                 frame_start=0,
                 frame_end=1,
@@ -81,25 +81,29 @@ class PressedModel:
             ),
             threads,
         )
-        self._item = item
+        self._sensor = sensor
         self.rate = simulation.scenario.fps
-        self.texels = len(item.sensor.texels)
+        self.texels = len(sensor.texels)
         self._dt = simulation.dt
         self._model, self._detection, self._state, workspace = simulation.arrays
         self._queue = workspace.queue
         self.helpers = simulation.helpers
-        transducers = transducers_of(item.sensor)
+        transducers = transducers_of(sensor)
         scale = np.broadcast_to(transducers.gain * transducers.painted, self.texels)
         self._conversion = np.stack([np.full(self.texels, float(transducers.zero)), scale])
-        self._reads_by_chain = bool(in_signal_order(item.sensor.effects, readout=True))
+        self._reads_by_chain = bool(in_signal_order(sensor.effects, readout=True))
 
     def readout_chain(self) -> ReadoutChain | None:
         """Return what turns forces into readings, from its beginning; None where that is a scale and a zero."""
-        return ReadoutChain.of(self._item.sensor) if self._reads_by_chain else None
+        return ReadoutChain.of(self._sensor) if self._reads_by_chain else None
 
     def environments(self, count: int) -> list[Environment]:
         """Return environments at their beginning."""
         return make_environments(count, self._detection, self._state)
+
+    def threads(self, environments: int, wanted: int | None) -> int:
+        """Return how many threads to divide environments among, of those that are wanted or, with None, pay off."""
+        return min(environments, threads_for(environments * self.texels, wanted))
 
     def bytes_of_environment(self) -> int:
         """Return what an environment takes in memory: state and neighbour lists."""
