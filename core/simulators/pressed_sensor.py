@@ -13,7 +13,6 @@ from numpy.typing import ArrayLike
 from ..errors import ParameterError
 from ..geometry.mesh import TriangleMesh
 from ..model.recording import SENSOR_FIELDS, SensorFrame
-from ..response.readings import ReadoutChain
 from ..solver.pressed_model import PressedModel
 from ..solver.pressing import PressedTexels, StepMemory, begin_at
 from .sensor_on_mesh import SensorOnMesh
@@ -114,7 +113,7 @@ class PressedSensor:
         """
         self._read_poses(sensor_pose, target_pose)
         self._check_poses()
-        self._chain: ReadoutChain | None = self._model.readout_chain()
+        self._chain = self._model.readout_chain()
         self._steps = 0
         begin_at(self._out.poses[0], self._environments[0])
         self._out.begins[0] = False

@@ -13,7 +13,6 @@ from numpy.typing import ArrayLike
 
 from ..errors import ParameterError
 from ..geometry.mesh import TriangleMesh
-from ..response.readings import ReadoutChain
 from ..solver.pressed_model import PressedModel
 from ..solver.pressing import PressedTexels, Presser, StepMemory
 from .sensor_on_mesh import SensorOnMesh
@@ -112,7 +111,7 @@ class PressedSensors:
             for _ in range(model.threads(environments, threads))
         ]
         self._chunk = max(1, min(CHUNK_POINTS // n, -(-environments // (4 * len(self._threads)))))
-        self._chains: list[ReadoutChain | None] = [None] * environments
+        self._chains = [model.readout_chain()] * environments  # each gets its own with its first step
         self._steps = np.zeros(environments, np.int64)
         self.reset()
 
@@ -201,11 +200,11 @@ class PressedSensors:
         """Compute readings that effects act on, environment by environment, as each has a past of its own."""
         self._steps[fresh] = 0
         self._steps += 1
-        if self._model.readout_chain() is None:
+        if not self._model.reads_by_chain:
             return
         for number in np.flatnonzero(self._out.valid):
             chain = self._chains[number]
-            if fresh[number] or chain is None:
+            if fresh[number]:
                 chain = self._chains[number] = self._model.readout_chain()
             assert chain is not None
             time, force = self._steps[number] / self._model.rate, np.ascontiguousarray(self._out.texels[number, :, 0])

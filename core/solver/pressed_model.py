@@ -59,6 +59,8 @@ class PressedModel:
         Steps in a second.
     helpers : int
         Threads that help with a step.
+    reads_by_chain : bool
+        Effects act on readings; otherwise these are a scale and a zero.
     """
 
     def __init__(self, sensor: Sensor, targets: Sequence[TriangleMesh], dt: float, threads: int | None = None):
@@ -91,11 +93,11 @@ class PressedModel:
         transducers = transducers_of(sensor)
         scale = np.broadcast_to(transducers.gain * transducers.painted, self.texels)
         self._conversion = np.stack([np.full(self.texels, float(transducers.zero)), scale])
-        self._reads_by_chain = bool(in_signal_order(sensor.effects, readout=True))
+        self.reads_by_chain = bool(in_signal_order(sensor.effects, readout=True))
 
     def readout_chain(self) -> ReadoutChain | None:
         """Return what turns forces into readings, from its beginning; None where that is a scale and a zero."""
-        return ReadoutChain.of(self._sensor) if self._reads_by_chain else None
+        return ReadoutChain.of(self._sensor) if self.reads_by_chain else None
 
     def environments(self, count: int) -> list[Environment]:
         """Return environments at their beginning."""
