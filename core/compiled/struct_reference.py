@@ -26,6 +26,7 @@ from .numba_internals import (
     cgutils,
     impl_ret_borrowed,
     infer_getattr,
+    intrinsic,
     ir,
     lower_getattr_generic,
     models,
@@ -43,6 +44,10 @@ if not COMPILED:
     def by_reference(cls: Class) -> Class:
         """Return the class as it is: only compiled code would unpack its instances."""
         return cls
+
+    def reference_at(address: int, example: Any) -> Any:
+        """Raise: only compiled code has addresses."""
+        raise RuntimeError("Nothing has an address without numba: look at are_interpreted() first.")
 
 else:
     _BYTES = cgutils.voidptr_t
@@ -157,3 +162,17 @@ else:
             return cast(Reference, value.numba_type)
 
         return cast(Class, Referred)
+
+    @intrinsic
+    def reference_at(_context, address, example):  # type: ignore[no-untyped-def]
+        """Return the tuple whose :attr:`address` is given, of the type of another one; for kernels that take many of a type."""
+
+        def codegen(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
+            return builder.inttoptr(arguments[0], _BYTES)
+
+        return example(types.int64, example), codegen
+
+
+def address_of_fields(instance: Any) -> int:
+    """Return the address of a tuple that is passed by reference, for :func:`reference_at`; zero without numba."""
+    return int(instance.address) if COMPILED else 0

@@ -168,12 +168,17 @@ def make_queue(points: int, threads: int | None = None) -> tuple[np.ndarray, int
     queue : (QUEUE_SIZE,) int, or (0,) without helpers
     helpers : int
     """
-    threads = threads or int(os.environ.get("PALPATE_THREADS", "0")) or min(_processors(), 1 + points // POINTS_PER_THREAD)
+    threads = threads_for(points, threads)
     if are_interpreted() or threads < 2:
         return np.zeros(0, np.int64), 0
     queue = np.zeros(QUEUE_SIZE, np.int64)
     queue[YIELD_ADDRESS] = _address_of_yield()
     return queue, threads - 1
+
+
+def threads_for(points: int, threads: int | None = None) -> int:
+    """Return how many threads to use; the arguments are those of :func:`make_queue`."""
+    return threads or int(os.environ.get("PALPATE_THREADS", "0")) or min(_processors(), 1 + points // POINTS_PER_THREAD)
 
 
 def _processors() -> int:

@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 
-from ..compiled.kernels import kernel
+from ..compiled.kernels import kernel, plain
 
 
 def rotation_matrices(quaternions: np.ndarray) -> np.ndarray:
@@ -23,16 +23,20 @@ def rotation_matrices(quaternions: np.ndarray) -> np.ndarray:
 
 def quaternion_product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Hamilton product of (…, 4) quaternions: first rotate by `b`, then by `a`."""
-    aw, ax, ay, az = np.moveaxis(np.asarray(a, float), -1, 0)
-    bw, bx, by, bz = np.moveaxis(np.asarray(b, float), -1, 0)
-    return np.stack(
-        [
-            aw * bw - ax * bx - ay * by - az * bz,
-            aw * bx + ax * bw + ay * bz - az * by,
-            aw * by - ax * bz + ay * bw + az * bx,
-            aw * bz + ax * by - ay * bx + az * bw,
-        ],
-        axis=-1,
+    parts = [np.moveaxis(np.asarray(one, float), -1, 0) for one in (a, b)]
+    return np.stack(plain(multiply)(*parts[0], *parts[1]), axis=-1)
+
+
+@kernel
+def multiply(
+    aw: float, ax: float, ay: float, az: float, bw: float, bx: float, by: float, bz: float
+) -> tuple[float, float, float, float]:
+    """Hamilton product of two quaternions (w, x, y, z); also of arrays of them."""
+    return (
+        aw * bw - ax * bx - ay * by - az * bz,
+        aw * bx + ax * bw + ay * bz - az * by,
+        aw * by - ax * bz + ay * bw + az * bx,
+        aw * bz + ax * by - ay * bx + az * bw,
     )
 
 
@@ -78,10 +82,47 @@ def rotate_quaternion(quaternion: np.ndarray, wx: float, wy: float, wz: float) -
     s = 0.5 if angle < 1e-8 else math.sin(0.5 * angle) / angle
     x, y, z = s * wx, s * wy, s * wz
     qw, qx, qy, qz = quaternion[0], quaternion[1], quaternion[2], quaternion[3]
-    rw, rx = c * qw - x * qx - y * qy - z * qz, c * qx + x * qw + y * qz - z * qy
-    ry, rz = c * qy - x * qz + y * qw + z * qx, c * qz + x * qy - y * qx + z * qw
+    rw, rx, ry, rz = multiply(c, x, y, z, qw, qx, qy, qz)
     scale = 1.0 / math.sqrt(rw * rw + rx * rx + ry * ry + rz * rz)
     quaternion[0], quaternion[1], quaternion[2], quaternion[3] = rw * scale, rx * scale, ry * scale, rz * scale
+
+
+@kernel
+def write_velocity(
+    position: np.ndarray,
+    quaternion: np.ndarray,
+    next_position: np.ndarray,
+    next_quaternion: np.ndarray,
+    dt: float,
+    velocity: np.ndarray,
+) -> None:
+    """Write the velocity with which a body goes from one pose to the next in a step, the shorter way round.
+
+    Its angular part is :func:`rotation_vectors` of the turn over `dt`, and zero, not rounding, where the body does not turn.
+
+    Parameters
+    ----------
+    position, next_position : (3,) float, metres
+    quaternion, next_quaternion : (4,) float
+    dt : float, seconds
+    velocity : (6,) float, m/s and rad/s
+        Written.
+    """
+    turns = False
+    for i in range(4):
+        turns = turns or next_quaternion[i] != quaternion[i]
+    for i in range(3):
+        velocity[i] = (next_position[i] - position[i]) / dt
+        velocity[3 + i] = 0.0
+    if turns:
+        w, x, y, z = multiply(
+            next_quaternion[0], next_quaternion[1], next_quaternion[2], next_quaternion[3],
+            quaternion[0], -quaternion[1], -quaternion[2], -quaternion[3],
+        )  # fmt: skip
+        sign = -1.0 if w < 0.0 else 1.0
+        sine = math.sqrt(x * x + y * y + z * z)
+        factor = sign * (2.0 * math.atan2(sine, sign * w) / sine if sine > 1e-12 else 2.0)
+        velocity[3], velocity[4], velocity[5] = x * factor / dt, y * factor / dt, z * factor / dt
 
 
 @kernel

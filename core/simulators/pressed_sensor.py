@@ -3,26 +3,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import ParameterError
 from ..geometry.mesh import TriangleMesh
-from ..geometry.rotations import rotation_matrices
-from ..model.body import Body
-from ..model.motion import Motion
-from ..model.recording import SensorFrame
-from ..model.scenario import Scenario
-from ..model.target import Target
-from ..solver.simulation import Simulation
+from ..model.recording import SENSOR_FIELDS, SensorFrame
+from ..solver.pressed_model import PressedModel
+from ..solver.pressing import PressedTexels, StepMemory, begin_at
 from .sensor_on_mesh import SensorOnMesh
 
 Pose = tuple[ArrayLike, ArrayLike]
 """Position (3,) in metres and quaternion (4,), (w, x, y, z), of a frame in the world."""
-LAST_FRAME = 2**31 - 1
-"""A run ends here: after three days of steps of 0.1 ms."""
 
 
 @dataclass(frozen=True)
@@ -34,7 +30,8 @@ class Contact:
     texels : SensorFrame
         Force, shear, depth, slip and reading of each texel, on the sensor, in the frame of the sensor.
     force_on_target, torque_on_target : (3,) float, N and N·m
-        In the world; the torque is about the origin of the target's frame. On the sensor's body acts the opposite.
+        In the world; the torque is about the origin of the target's frame. On the sensor's body acts the opposite. With
+        several targets (T, 3).
     """
 
     texels: SensorFrame
@@ -43,23 +40,31 @@ class Contact:
 
 
 class PressedSensor:
-    """A sensor and one thing that presses on it, both moved by another program.
+    """A sensor and what presses on it, all moved by another program.
 
     Parameters
     ----------
     item : SensorOnMesh
         As :func:`.read_probe_list` or :func:`.sensors_on_meshes` returns it.
-    target : TriangleMesh
-        In the frame of what presses, metres.
+    target : TriangleMesh or sequence of TriangleMesh
+        Each in the frame of what presses, metres.
     dt : float, seconds
         Step of the other program.
-    sensor_pose, target_pose : Pose
-        At the start.
+    sensor_pose : Pose
+    target_pose : Pose or sequence of Pose
+        At the start; a sequence if `target` is one.
+    threads : int, optional
+        How many to compute with; by default one, and more for thousands of texels.
 
     Raises
     ------
     PalpateError
-        The sensor, the mesh or the step makes no run.
+        The sensor, the mesh or the step makes no run, or a pose is none.
+
+    Attributes
+    ----------
+    too_deep : int
+        How many contact points are pressed past their maximum penetration at the last step, and measure nothing.
 
     Notes
     -----
@@ -68,43 +73,112 @@ class PressedSensor:
     and damping c.
     """
 
-    def __init__(self, item: SensorOnMesh, target: TriangleMesh, dt: float, sensor_pose: Pose, target_pose: Pose):
-        if not (np.isfinite(dt) and dt > 0):
-            raise ParameterError(f"The step is {dt:g} s: give a number above zero.")
-        starts = [Motion.at_rest(*map(np.asarray, pose)) for pose in (sensor_pose, target_pose)]
-        self._name = item.name
-        self._simulation = Simulation(
-            Scenario(
-                bodies=(Body("sensor", starts[0]), Body("target", starts[1])),
-                sensors=(item.sensor,),
-                targets=(Target("target", 1, target),),
-                frame_start=0,
-                frame_end=LAST_FRAME,
-                fps=1.0 / dt,
-                dt=dt,
-            )
-        )
+    def __init__(
+        self,
+        item: SensorOnMesh,
+        target: TriangleMesh | Sequence[TriangleMesh],
+        dt: float,
+        sensor_pose: Pose,
+        target_pose: Pose | Sequence[Pose],
+        threads: int | None = None,
+    ):
+        self._one_target = isinstance(target, TriangleMesh)
+        targets = [target] if isinstance(target, TriangleMesh) else list(target)
+        model = self._model = PressedModel(item.sensor, targets, dt, threads)
+        out = self._out = PressedTexels.zero(1, model.texels, len(targets))
+        memory = self._memory = StepMemory.zero(model.texels, len(targets))
+        self._environments, self._workspace = model.environments(1), model.workspace()
+        self._presser = model.presser(memory, out, self._environments, self._workspace)
+        self._rows = [(row[:3], row[3:]) for row in out.poses[0]]
+        self._texels = (
+            memory.force, memory.shear, memory.friction, memory.depth, memory.slip, memory.contact, out.readings[0],
+            memory.whole_net[:3], memory.whole_net[3:], memory.centre,
+        )  # fmt: skip
+        wrench = out.wrench[0, 0] if self._one_target else out.wrench[0]
+        self._force, self._torque = wrench[..., :3], wrench[..., 3:]
+        self.reset(sensor_pose, target_pose)
 
-    def step(self, sensor_pose: Pose, target_pose: Pose) -> Contact:
-        """Go on by one step, to these poses, and return the forces there.
+    @property
+    def too_deep(self) -> int:
+        """How many contact points are pressed past their maximum penetration at the last step."""
+        return int(self._out.too_deep[0])
+
+    def reset(self, sensor_pose: Pose, target_pose: Pose | Sequence[Pose]) -> None:
+        """Begin anew at these poses, at rest, without bristles and memory of effects.
 
         Raises
         ------
         ParameterError
             A pose is not finite, or a quaternion is zero.
         """
-        poses = {0: _checked(sensor_pose, "sensor"), 1: _checked(target_pose, "target")}
-        self._simulation.extend(poses)
-        texels = self._simulation.advance().sensors[self._name]
-        (origin, turn), (place, _) = poses[0], poses[1]
-        rotation = rotation_matrices(turn[None])[0]
-        force, torque = rotation @ texels.net_force, rotation @ texels.net_torque
-        return Contact(texels, -force, -(torque + np.cross(origin - place, force)))
+        self._read_poses(sensor_pose, target_pose)
+        self._check_poses()
+        self._chain = self._model.readout_chain()
+        self._steps = 0
+        begin_at(self._out.poses[0], self._environments[0])
+        self._out.begins[0] = False
 
+    def step(self, sensor_pose: Pose, target_pose: Pose | Sequence[Pose], out: Contact | None = None) -> Contact:
+        """Go on by one step, to these poses, and return the forces there.
 
-def _checked(pose: Pose, whose: str) -> tuple[np.ndarray, np.ndarray]:
-    position, quaternion = (np.array(part, float) for part in pose)
-    length = np.linalg.norm(quaternion)
-    if position.shape != (3,) or quaternion.shape != (4,) or not np.isfinite(position).all() or not 0 < length < np.inf:
-        raise ParameterError(f"The pose of the {whose} is no position and quaternion of finite numbers: check its simulation.")
-    return position, quaternion / length
+        Parameters
+        ----------
+        sensor_pose : Pose
+        target_pose : Pose or sequence of Pose
+            A sequence if there are several targets.
+        out : Contact, optional
+            Returned by an earlier step, to write into instead of new arrays.
+
+        Raises
+        ------
+        ParameterError
+            A pose is not finite, or a quaternion is zero. The sensor stays at the step before.
+        """
+        self._read_poses(sensor_pose, target_pose)
+        if self._model.helpers:
+            with self._model.helping(self._environments[0], self._workspace):
+                self._presser.press(0, 1)
+        else:
+            self._presser.press(0, 1)
+        if not self._out.valid[0]:
+            self._out.begins[0] = False
+            self._check_poses()
+        self._steps += 1
+        if self._chain is not None:
+            self._out.readings[0] = self._chain.step(self._steps / self._model.rate, self._memory.force)
+        if out is None:
+            texels = SensorFrame(*[values.copy() for values in self._texels])
+            return Contact(texels, self._force.copy(), self._torque.copy())
+        for name, values in zip(SENSOR_FIELDS, self._texels, strict=True):
+            np.copyto(getattr(out.texels, name), values)
+        np.copyto(out.force_on_target, self._force)
+        np.copyto(out.torque_on_target, self._torque)
+        return out
+
+    def _read_poses(self, sensor_pose: Pose, target_pose: Pose | Sequence[Pose]) -> None:
+        """Write the poses down for the solver, which looks whether they are finite."""
+        poses: Sequence[Any] = (sensor_pose, target_pose) if self._one_target else (sensor_pose, *target_pose)
+        if len(poses) != len(self._rows):
+            raise ParameterError(
+                f"There are {len(poses) - 1} poses of targets for {len(self._rows) - 1} targets: give one for each."
+            )
+        for number, (pose, rows) in enumerate(zip(poses, self._rows, strict=True)):
+            try:
+                position, quaternion = pose
+                fits = len(position) == 3 and len(quaternion) == 4
+                rows[0][:], rows[1][:] = position, quaternion
+            except (TypeError, ValueError):
+                fits = False
+            if not fits:
+                raise self._no_pose(number)
+
+    def _check_poses(self) -> None:
+        """Raise :class:`.ParameterError` for a pose that is none."""
+        for number, row in enumerate(self._out.poses[0]):
+            if not (np.isfinite(row).all() and 0.0 < row[3:] @ row[3:] < np.inf):
+                raise self._no_pose(number)
+
+    def _no_pose(self, number: int) -> ParameterError:
+        """Return the error for a body whose pose is none."""
+        whose = "sensor" if number == 0 else "target" if self._one_target else f"target {number}"
+        return ParameterError(f"The pose of the {whose} is no position and quaternion of finite numbers: check its simulation.")

@@ -123,6 +123,11 @@ class Simulation:
         return arrays
 
     @property
+    def helpers(self) -> int:
+        """Threads that help with the steps."""
+        return self._helpers
+
+    @property
     def time(self) -> float:
         """Seconds since the first frame."""
         return (self.frame - self.scenario.frame_start) / self.scenario.fps

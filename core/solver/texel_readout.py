@@ -76,11 +76,17 @@ def read_texels(model: SolverModel, state: State, workspace: Workspace, out: Tex
         Zero at first; written.
     """
     for pair in range(len(model.pairs.sensor)):
-        write_pair_motion(pair, model, state, workspace)
-        motion, law = motion_values(workspace.pairs.motion[pair]), read_law(model.pairs.law, pair)
-        for r in range(workspace.contacts.number[pair]):
-            block, lane = row_of(r, pair, workspace.contacts)
-            _read_contact(pair, block, lane, motion, law, model, state, workspace, out)
+        read_pair(pair, model, state, workspace, out)
+
+
+@kernel
+def read_pair(pair: int, model: SolverModel, state: State, workspace: Workspace, out: TexelReadout) -> None:
+    """Add the contacts of one pair to the readout."""
+    write_pair_motion(pair, model, state, workspace)
+    motion, law = motion_values(workspace.pairs.motion[pair]), read_law(model.pairs.law, pair)
+    for r in range(workspace.contacts.number[pair]):
+        block, lane = row_of(r, pair, workspace.contacts)
+        _read_contact(pair, block, lane, motion, law, model, state, workspace, out)
 
 
 @inlined

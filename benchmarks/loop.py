@@ -1,0 +1,116 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A sensor in another program's loop: microseconds of a step, calls included, and milliseconds of a step of 4,096 environments.
+
+The object moves to and fro on the pad, a millimetre deep, so that texels slide and neighbour lists are made anew. The peer
+is a step of MuJoCo with its `tactile` sensor of as many texels, under a cube of 3,072 faces that rests on it; it computes the
+cube's dynamics too. Times are those of the threads that compute, the least of several rounds, as other work on the machine
+only adds to them.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+
+import numpy as np
+
+from palpate.core.geometry.mesh import TriangleMesh
+from palpate.core.geometry.texels import texels_from_region
+from palpate.core.model.sensor import Sensor
+from palpate.core.model.sensor_parameters import SensorParameters
+from palpate.core.simulators.pressed_sensor import PressedSensor
+from palpate.core.simulators.pressed_sensors import PressedSensors
+from palpate.core.simulators.sensor_on_mesh import SensorOnMesh
+
+from . import solver
+
+DT = 1e-3
+ENVIRONMENTS, THREADS = 4096, 2
+ROUNDS, STEPS = 9, 300
+LEVEL = np.array([1.0, 0.0, 0.0, 0.0])
+GOALS = {84: 25.0, 1024: 150.0}
+"""Microseconds of a step."""
+BATCH_GOAL = 20.0
+"""Milliseconds of a step of all environments."""
+
+
+def item(texels: int) -> SensorOnMesh:
+    """Return the pad of the solver's benchmark."""
+    sheet = solver.pad(*solver.GRIDS[texels])
+    k = 84e3 / texels
+    parameters = SensorParameters(k=k, cn=0.01 * k, sigma0=k, sigma1=0.01 * k)
+    return SensorOnMesh(Sensor("pad", 0, texels_from_region(sheet, np.ones(len(sheet.vertices), bool)), parameters), sheet)
+
+
+def objects() -> dict[str, tuple[TriangleMesh, float]]:
+    """Return what presses and how high its origin is when it touches: a cube that covers all texels, and a ball of 5k faces."""
+    cube = solver.cube(4)
+    flat = TriangleMesh(np.array(cube.vertices), np.array(cube.faces))
+    return {"cube": (flat, solver.CUBE / 2), "ball": (solver.ball(20), solver.BALL)}
+
+
+def positions(height: float, phases: np.ndarray) -> np.ndarray:
+    """Return where the object is (p, 3), pressed in by about a millimetre, at some phases of its motion (p,) rad."""
+    return np.stack([5e-4 * np.sin(phases), 3e-4 * np.cos(phases), height - 1e-3 - 2e-4 * np.sin(2 * phases)], axis=1)
+
+
+def least(measure: Callable[[], float]) -> float:
+    """Return the least of several rounds."""
+    return min(measure() for _ in range(ROUNDS))
+
+
+def single_step(texels: int, mesh: TriangleMesh, height: float) -> Callable[[], float]:
+    """Return a function that gives the microseconds of a step of one sensor."""
+    path = positions(height, np.linspace(0.0, 2 * np.pi, STEPS))
+    still = np.zeros(3), LEVEL
+    pressed = PressedSensor(item(texels), mesh, DT, still, (path[0], LEVEL), 1)
+    out = pressed.step(still, (path[0], LEVEL))
+
+    def measure() -> float:
+        start = time.thread_time()
+        for where in path:
+            pressed.step(still, (where, LEVEL), out)
+        return (time.thread_time() - start) / STEPS * 1e6
+
+    return measure
+
+
+def batch_step(mesh: TriangleMesh, height: float) -> Callable[[], tuple[float, float]]:
+    """Return a function that gives milliseconds of a step of all environments: by the wall, and of processors over threads."""
+    many = PressedSensors(item(84), mesh, DT, ENVIRONMENTS, THREADS)
+    phases = np.random.default_rng(1).random(ENVIRONMENTS) * 2 * np.pi
+    still, poses = np.array([0.0, 0.0, 0.0, *LEVEL]), np.tile([0.0, 0.0, 0.0, *LEVEL], (ENVIRONMENTS, 1))
+
+    def measure() -> tuple[float, float]:
+        phases[:] += 2 * np.pi / STEPS
+        poses[:, :3] = positions(height, phases)
+        wall, used = time.perf_counter(), time.process_time()
+        many.step(still, poses)
+        return (time.perf_counter() - wall) * 1e3, (time.process_time() - used) / THREADS * 1e3
+
+    return measure
+
+
+def run() -> Iterator[dict]:
+    """Steps of one sensor and of many."""
+    import mujoco
+
+    peer = f"mujoco-{mujoco.__version__} tactile"
+    for texels, goal in GOALS.items():
+        theirs = least(solver.mujoco_step(texels, solver.cube(4)))
+        for name, (mesh, height) in objects().items():
+            ours = least(single_step(texels, mesh, height))
+            yield {
+                "name": f"loop.step.{name}.{texels}", "value": ours, "unit": "us",
+                "peer": peer, "peer_value": theirs, "ratio": ours / theirs, "goal": goal / theirs,
+            }  # fmt: skip
+    theirs = least(solver.mujoco_step(84, solver.cube(4))) * ENVIRONMENTS / THREADS / 1e3
+    for name, (mesh, height) in objects().items():
+        measure = batch_step(mesh, height)
+        measured = np.array([measure() for _ in range(3 * ROUNDS)])
+        wall, used = measured.min(axis=0)
+        yield {
+            "name": f"loop.batch.{name}.{ENVIRONMENTS}x84", "value": float(used), "unit": "ms on two processors",
+            "peer": f"{peer}, as many steps", "peer_value": theirs, "ratio": float(used) / theirs, "goal": BATCH_GOAL / theirs,
+        }  # fmt: skip
+        yield {"name": f"loop.batch.{name}.{ENVIRONMENTS}x84.wall", "value": float(wall), "unit": "ms"}

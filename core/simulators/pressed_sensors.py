@@ -1,0 +1,237 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""One sensor in thousands of environments of a program that trains or samples: poses in, forces, readings and wrenches out."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..errors import ParameterError
+from ..geometry.mesh import TriangleMesh
+from ..solver.pressed_model import PressedModel
+from ..solver.pressing import PressedTexels, Presser, StepMemory
+from .sensor_on_mesh import SensorOnMesh
+
+CHUNK_POINTS = 16384
+"""Texels of the environments that a thread takes at once, about a millisecond."""
+
+
+@dataclass(frozen=True)
+class Contacts:
+    """What the sensors of E environments measure at one step, and the reactions.
+
+    The arrays are those of the :class:`PressedSensors` and are overwritten by its next step, unless `out` was given.
+
+    Attributes
+    ----------
+    texels : (E, n, 3) float, N
+        Normal force, and shear along the texel's x and y axis, on the sensor.
+    readings : (E, n) float, the sensor's unit
+    contact : (E, n) bool
+    wrench : (E, 6) float, N and N·m
+        Force on the target in the world, and torque about the origin of its frame. With several targets (E, T, 6).
+    too_deep : (E,) int
+        How many contact points are pressed past their maximum penetration, and measure nothing.
+    valid : (E,) bool
+        False where a pose is not finite or a quaternion is zero: everything is zero there, and the environment begins anew with
+        its next valid poses.
+    """
+
+    texels: np.ndarray
+    readings: np.ndarray
+    contact: np.ndarray
+    wrench: np.ndarray
+    too_deep: np.ndarray
+    valid: np.ndarray
+
+    def fault(self) -> str:
+        """Return one sentence on the environments whose poses are none; empty where there are no such."""
+        bad = np.flatnonzero(~self.valid)
+        if not len(bad):
+            return ""
+        which = ", ".join(map(str, bad[:8])) + (" …" if len(bad) > 8 else "")
+        return (
+            f"{len(bad)} of {len(self.valid)} environments have a pose that is no position and quaternion of finite numbers "
+            f"({which}): reset them in the simulation."
+        )
+
+
+class PressedSensors:
+    """A sensor and what presses on it in many environments, moved by another program.
+
+    Every environment gives the same bits as a :class:`.PressedSensor` of its own that begins where its first step ends,
+    whatever the number of threads.
+
+    Parameters
+    ----------
+    item : SensorOnMesh
+        As :func:`.read_probe_list` or :func:`.sensors_on_meshes` returns it.
+    target : TriangleMesh or sequence of TriangleMesh
+        Each in the frame of what presses, metres.
+    dt : float, seconds
+        Step of the other program.
+    environments : int
+    threads : int, optional
+        How many to compute with; by default the environment variable ``PALPATE_THREADS``, or as many as pay off.
+
+    Raises
+    ------
+    PalpateError
+        The sensor, the meshes or the step make no run, or memory does not suffice.
+
+    Notes
+    -----
+    Effects draw the same random numbers in every environment.
+    """
+
+    def __init__(
+        self,
+        item: SensorOnMesh,
+        target: TriangleMesh | Sequence[TriangleMesh],
+        dt: float,
+        environments: int,
+        threads: int | None = None,
+    ):
+        if environments < 1:
+            raise ParameterError(f"There are {environments} environments: ask for one at least.")
+        self._one_target = isinstance(target, TriangleMesh)
+        targets = [target] if isinstance(target, TriangleMesh) else list(target)
+        model = self._model = PressedModel(item.sensor, targets, dt, 1)
+        n = model.texels
+        _check_memory(environments, model.bytes_of_environment() + n * BYTES_OF_TEXEL)
+        self._out = PressedTexels.zero(environments, n, len(targets))
+        self._environments = model.environments(environments)
+        self._threads = [
+            model.presser(StepMemory.zero(n, len(targets)), self._out, self._environments, model.workspace())
+            for _ in range(model.threads(environments, threads))
+        ]
+        self._chunk = max(1, min(CHUNK_POINTS // n, -(-environments // (4 * len(self._threads)))))
+        self._chains = [model.readout_chain()] * environments  # each gets its own with its first step
+        self._steps = np.zeros(environments, np.int64)
+        self.reset()
+
+    def __len__(self) -> int:
+        """Return the number of environments."""
+        return len(self._environments)
+
+    def reset(self, mask: ArrayLike | None = None) -> None:
+        """Let environments begin anew with their next step: at rest, without bristles and memory of effects.
+
+        Parameters
+        ----------
+        mask : (E,) bool, optional
+            Which; by default all.
+        """
+        chosen = np.ones(len(self), bool) if mask is None else np.asarray(mask)
+        if chosen.dtype != np.bool_ or chosen.shape != (len(self),):
+            raise ParameterError(
+                f"The mask of environments to reset is {chosen.dtype} of shape {chosen.shape}: give ({len(self)},) bool."
+            )
+        self._out.begins[chosen] = True
+
+    def step(self, sensor_poses: ArrayLike, target_poses: ArrayLike, out: Contacts | None = None) -> Contacts:
+        """Go on by one step, to these poses, and return the forces there.
+
+        Parameters
+        ----------
+        sensor_poses : (E, 7) or (7,) float
+            Positions (m) and quaternions (w, x, y, z); (7,) for a sensor that stands at the same place everywhere.
+        target_poses : (E, 7) float, or (E, T, 7) with several targets
+        out : Contacts, optional
+            To write into; by default the arrays that the next step overwrites.
+
+        Raises
+        ------
+        ParameterError
+            The poses have another shape. Poses that are not finite are no error (see :attr:`Contacts.valid`).
+        """
+        e, t = len(self), self._out.wrench.shape[1]
+        self._take("sensor", sensor_poses, [(e, 7), (7,)], self._out.poses[:, 0])
+        if self._one_target:
+            self._take("target", target_poses, [(e, 7)], self._out.poses[:, 1])
+        else:
+            self._take("targets", target_poses, [(e, t, 7)], self._out.poses[:, 1:])
+        fresh = self._out.begins.copy()
+        self._press()
+        self._read(fresh)
+        wrench = self._out.wrench[:, 0] if self._one_target else self._out.wrench
+        o = self._out
+        found = Contacts(o.texels, o.readings, o.contact, wrench, o.too_deep, o.valid)
+        if out is None:
+            return found
+        for name in CONTACT_FIELDS:
+            np.copyto(getattr(out, name), getattr(found, name))
+        return out
+
+    def _take(self, whose: str, poses: ArrayLike, shapes: list[tuple[int, ...]], rows: np.ndarray) -> None:
+        """Write poses into rows."""
+        values = np.asarray(poses)
+        if values.shape not in shapes or values.dtype.kind not in "fiu":
+            wanted = " or ".join(map(str, shapes))
+            raise ParameterError(
+                f"The poses of the {whose} are {values.dtype} of shape {values.shape}: give numbers of shape {wanted}."
+            )
+        rows[...] = values
+
+    def _press(self) -> None:
+        """Let the solver take one step in all environments."""
+        starts = iter(range(0, len(self), self._chunk))
+        helpers = [
+            threading.Thread(target=self._work, args=(one, starts), name="palpate helper", daemon=True)
+            for one in self._threads[1:]
+        ]
+        for helper in helpers:
+            helper.start()
+        self._work(self._threads[0], starts)
+        for helper in helpers:
+            helper.join()
+
+    def _work(self, presser: Presser, starts: Iterator[int]) -> None:
+        """Take chunks of environments until none is left."""
+        for start in starts:
+            presser.press(start, min(start + self._chunk, len(self)))
+
+    def _read(self, fresh: np.ndarray) -> None:
+        """Compute readings that effects act on, environment by environment, as each has a past of its own."""
+        self._steps[fresh] = 0
+        self._steps += 1
+        if not self._model.reads_by_chain:
+            return
+        for number in np.flatnonzero(self._out.valid):
+            chain = self._chains[number]
+            if fresh[number]:
+                chain = self._chains[number] = self._model.readout_chain()
+            assert chain is not None
+            time, force = self._steps[number] / self._model.rate, np.ascontiguousarray(self._out.texels[number, :, 0])
+            self._out.readings[number] = chain.step(float(time), force)
+
+
+CONTACT_FIELDS = tuple(Contacts.__dataclass_fields__)
+BYTES_OF_TEXEL = 3 * 8 + 8 + 1
+"""What the results of a texel take in memory."""
+
+
+def _check_memory(environments: int, size: int) -> None:
+    """Raise :class:`.ParameterError` where so many environments of a size, bytes, are more than memory that is there."""
+    there = _available_memory()
+    if environments * size > there:
+        raise ParameterError(
+            f"{environments} environments take {environments * size / 2**30:.1f} GiB of memory, and {there / 2**30:.1f} GiB "
+            f"are free: ask for {int(there / size)} at most."
+        )
+
+
+def _available_memory() -> float:
+    """Return the bytes of memory that are free; infinite where the system does not say."""
+    try:
+        for line in Path("/proc/meminfo").read_text(encoding="ascii").splitlines():
+            if line.startswith("MemAvailable:"):
+                return 1024.0 * int(line.split()[1])
+    except (OSError, ValueError):
+        pass
+    return float("inf")

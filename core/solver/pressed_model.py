@@ -1,0 +1,144 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What all environments of a pressed sensor have in common: the sensor, its targets and the solver's model of them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextlib import AbstractContextManager
+
+import numpy as np
+
+from ..compiled.thread_team import helper_threads, threads_for
+from ..effects.engine.readout_chain import transducers_of
+from ..effects.engine.registry import in_signal_order
+from ..errors import ParameterError
+from ..geometry.mesh import TriangleMesh
+from ..model.body import Body
+from ..model.motion import Motion
+from ..model.scenario import Scenario
+from ..model.sensor import Sensor
+from ..model.target import Target
+from ..response.readings import ReadoutChain
+from .parallel_loops import help_with_loops, prepare_pair_loops
+from .pressing import (
+    Environment,
+    PressedTexels,
+    Presser,
+    Pressing,
+    StepMemory,
+    addresses_of,
+    make_environments,
+)
+from .simulation import Simulation
+from .workspace import Workspace
+from .workspace_builder import workspace_for
+
+
+class PressedModel:
+    """A sensor, what presses on it, and the solver's arrays for them.
+
+    Parameters
+    ----------
+    sensor : Sensor
+    targets : sequence of TriangleMesh
+        Each in the frame of what presses, metres.
+    dt : float, seconds
+        Of a step.
+    threads : int, optional
+        To compute one step of one environment with (see :func:`.thread_team.make_queue`).
+
+    Raises
+    ------
+    PalpateError
+        The sensor, the meshes or the step make no run.
+
+    Attributes
+    ----------
+    texels : int
+    rate : float, 1/s
+        Steps in a second.
+    helpers : int
+        Threads that help with a step.
+    reads_by_chain : bool
+        Effects act on readings; otherwise these are a scale and a zero.
+    """
+
+    def __init__(self, sensor: Sensor, targets: Sequence[TriangleMesh], dt: float, threads: int | None = None):
+        if not (np.isfinite(dt) and dt > 0):
+            raise ParameterError(f"The step is {dt:g} s: give a number above zero.")
+        if not targets:
+            raise ParameterError(f"Nothing presses on '{sensor.name}': give a target's mesh, or several.")
+        if sensor.deformation is not None:
+            raise ParameterError(f"'{sensor.name}' deforms by prescription: take a sensor that keeps its shape in this loop.")
+        names = [f"target {number}" for number in range(1, len(targets) + 1)]
+        simulation = Simulation(
+            Scenario(
+                bodies=(Body("sensor", Motion.at_rest()), *(Body(name, Motion.at_rest()) for name in names)),
+                sensors=(sensor,),
+                targets=tuple(Target(name, 1 + i, mesh) for i, (name, mesh) in enumerate(zip(names, targets, strict=True))),
+                frame_start=0,
+                frame_end=1,
+                fps=1.0 / dt,
+                dt=dt,
+            ),
+            threads,
+        )
+        self._sensor = sensor
+        self.rate = simulation.scenario.fps
+        self.texels = len(sensor.texels)
+        self._dt = simulation.dt
+        self._model, self._detection, self._state, workspace = simulation.arrays
+        self._queue = workspace.queue
+        self.helpers = simulation.helpers
+        transducers = transducers_of(sensor)
+        scale = np.broadcast_to(transducers.gain * transducers.painted, self.texels)
+        self._conversion = np.stack([np.full(self.texels, float(transducers.zero)), scale])
+        self.reads_by_chain = bool(in_signal_order(sensor.effects, readout=True))
+
+    def readout_chain(self) -> ReadoutChain | None:
+        """Return what turns forces into readings, from its beginning; None where that is a scale and a zero."""
+        return ReadoutChain.of(self._sensor) if self.reads_by_chain else None
+
+    def environments(self, count: int) -> list[Environment]:
+        """Return environments at their beginning."""
+        return make_environments(count, self._detection, self._state)
+
+    def threads(self, environments: int, wanted: int | None) -> int:
+        """Return how many threads to divide environments among, of those that are wanted or, with None, pay off."""
+        return min(environments, threads_for(environments * self.texels, wanted))
+
+    def bytes_of_environment(self) -> int:
+        """Return what an environment takes in memory: state and neighbour lists."""
+        arrays = (*self._detection.neighbours, *self._state)
+        return sum(field.nbytes for field in arrays) + BYTES_OF_TUPLES
+
+    def workspace(self) -> Workspace:
+        """Return working memory for one thread."""
+        workspace = workspace_for(self._model, self._state, self._detection.surfaces, self._queue)
+        prepare_pair_loops(self._model, self._detection, self._state, workspace)
+        return workspace
+
+    def presser(
+        self, memory: StepMemory, pressed: PressedTexels, environments: list[Environment], workspace: Workspace
+    ) -> Presser:
+        """Return what runs steps of these environments in one thread."""
+        pressing = Pressing(
+            dt=np.array([self._dt]),
+            conversion=self._conversion,
+            model=self._model,
+            workspace=workspace,
+            memory=memory,
+            pressed=pressed,
+            addresses=addresses_of(environments),
+            example=environments[0],
+        )
+        return Presser(pressing, environments)
+
+    def helping(self, environment: Environment, workspace: Workspace) -> AbstractContextManager[None]:
+        """Let other threads help with the steps of an environment meanwhile."""
+        arrays = self._model, environment.detection, environment.state, workspace
+        return helper_threads(workspace.queue, self.helpers, help_with_loops, *arrays)
+
+
+BYTES_OF_TUPLES = 8000
+"""What Python takes for the tuples of an environment and for its views of arrays."""
