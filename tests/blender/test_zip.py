@@ -81,7 +81,7 @@ def test_zip_holds_what_the_extension_needs_and_no_more(zip_path, repository):
         manifest = tomllib.loads(archive.read("blender_manifest.toml").decode())
     assert {"__init__.py", "LICENSE", "core/__init__.py", "addon/__init__.py"} <= names
     rooms = {name.split("/")[0] for name in names if "/" in name}
-    assert rooms <= {"core", "addon", "operators", "panels", "commands", "paper", "sample_blends", "wheels"}
+    assert rooms <= {"core", "api", "addon", "operators", "panels", "commands", "paper", "sample_blends", "wheels"}
     assert {f"./{name}" for name in names if name.startswith("wheels/")} == set(manifest["wheels"])
     assert manifest["platforms"] == ["linux-x64"]
     assert (manifest["blender_version_min"], manifest["blender_version_max"]) == ("4.2.0", "5.1.0")
