@@ -184,9 +184,9 @@ if COMPILED:
     class _InterpretedKernel(KernelDispatcher):
         """A kernel that runs as plain Python."""
 
-        def __call__(self, *arguments: Any) -> Any:
+        def __call__(self, *arguments: Any, **named: Any) -> Any:
             """Call the Python function."""
-            return (self.plain_form or self.py_func)(*arguments)
+            return (self.plain_form or self.py_func)(*arguments, **named)
 
 else:
     KernelDispatcher: Any = None  # type: ignore[no-redef]

@@ -8,9 +8,12 @@ import sys
 import numpy as np
 import pytest
 from oracles import interpreted
+from solver_scenes import cube_on_pad
 
 from palpate.core.compiled import kernel_dispatcher, kernels
 from palpate.core.compiled.kernels import inlined, kernel
+from palpate.core.solver.simulation import Simulation
+from palpate.core.solver.substep import advance_frames
 
 pytestmark = pytest.mark.skipif(not kernels.COMPILED, reason="without numba nothing is compiled")
 
@@ -52,6 +55,18 @@ def test_a_kernel_in_another_is_translated_once_whatever_its_constants():
     assert _add_both(np.array([3.0])) == 15.0
     assert len(_add._linked) == 1 and len(_twice._linked) == 1
     assert not _add.overloads and len(_add_both.overloads) == 1
+
+
+def test_a_run_is_compiled_and_has_one_form_of_its_driver():
+    """Otherwise a compiler that fails would show here by slowness alone."""
+    scenario = cube_on_pad(1.0, frames=3, dt=1e-3)
+    for threads in (1, 2):
+        simulation = Simulation(scenario, threads)
+        simulation.advance()
+        simulation.observe()
+        simulation.advance_all()
+    assert not kernels.are_interpreted()
+    assert len(advance_frames.signatures) == 1 and (simulation.arrays[3].pair_loops[2:] > 0).all()
 
 
 def test_a_kernel_that_others_call_can_be_called_from_python_too():
