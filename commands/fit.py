@@ -92,7 +92,7 @@ def _friction(arguments: argparse.Namespace) -> None:
         unit = unit_of(name, "").removeprefix("1")  # no word for a number without a unit
         rows.append((name, f"{estimate.value:.4g}", f"{estimate.low:.4g} to {estimate.high:.4g}", unit))
     print(console.text_table(rows, "<>><"))
-    print(f"\nroot mean square of what is left: {fit.residual:.3g} N")
+    print(f"\nroot mean square residual: {fit.residual:.3g} N")
     if fit.unidentifiable:
         print(f"These measurements do not tell {', '.join(fit.unidentifiable)}: add some at other velocities.")
     if arguments.plot:

@@ -30,7 +30,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--out",
         metavar="DIR",
-        help="folder for gap.json, sensor.toml, report.html and plots; with --plan, which can do without, for the plan",
+        help="folder for gap.json, sensor.toml, report.html and plots; optional with --plan",
     )
     parser.add_argument("--blend", metavar="SCENE.blend", help="also put the amended sensor into this file")
     parser.add_argument("--sensor", metavar="NAME", help="the sensor in it (default: the only one)")

@@ -201,7 +201,7 @@ def _kind_of_runs(opened: OpenStudy) -> str:
         return f"runs by the Python of '{opened.study.scenes[0]}'"
     properties = list(dict.fromkeys(path for plan in opened.plans.values() for path in plan.scene_properties))
     if not properties:
-        return "runs without Blender: all that varies is known to the solver"
+        return "runs without Blender: all varied parameters are handled by the solver directly"
     more = f" and {len(properties) - MOST_NAMED} others" if len(properties) > MOST_NAMED else ""
     return f"each run reads the scene in a Blender of its own, because it sets {', '.join(properties[:MOST_NAMED])}{more}"
 

@@ -84,7 +84,7 @@ class PALPATE_OT_stiffness_fit(MeasurementFit, bpy.types.Operator):
     weight_area: FloatProperty(
         name="Weight Area (m²)", description="What forces or masses rested on, m²; pressures need none", min=0.0, precision=8
     )
-    with_damping: BoolProperty(name="Damping 1 % of k", description="Also set cn, to 1 % of k in number", default=True)
+    with_damping: BoolProperty(name="Damping 1 % of k", description="Also set cn, numerically to 1 % of k", default=True)
 
     fields = ("line", "weight_area", "with_damping")
 

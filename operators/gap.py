@@ -182,7 +182,7 @@ class PALPATE_OT_gap_show(support.ErrorReporting, bpy.types.Operator):
         support.leave_edit_mode(context)
         top = gap_results.show_on_sensor(context, context.object, self.amended)
         gap_results.mark_phases(context.scene, context.object)
-        self.report({"INFO"}, f"The brightest texel errs by {top:.2%} of the range")
+        self.report({"INFO"}, f"Largest texel error: {top:.2%} of the range")
 
 
 class PALPATE_OT_gap_report(modal_job.ModalJob, bpy.types.Operator):

@@ -115,7 +115,7 @@ class PALPATE_OT_sensor_remove(support.ErrorReporting, bpy.types.Operator):
 
 
 class PALPATE_OT_weight_paint(support.ErrorReporting, bpy.types.Operator):
-    """Paint the region of a sensor, with a brush of full weight: what is painted to the threshold or above becomes texels"""
+    """Paint the region of a sensor, with a brush of full weight. Vertices painted at or above the threshold become texels"""
 
     bl_idname = "palpate.weight_paint"
     bl_label = "Paint Region"

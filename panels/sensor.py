@@ -33,7 +33,7 @@ class Root(Subpanel):
             draw_sentences(layout, f"{coming.text}.", "SORTTIME", context)
         if settings.role == "NONE":
             column = layout.box().column()
-            column.label(text=f"'{obj.name}' takes no part.")
+            column.label(text=f"'{obj.name}' is not part of the simulation.")
             column.operator("palpate.sensor_add", text="Make Sensor")
             column.operator("palpate.role_set", text="Make Target").role = "TARGET"
             column.operator("palpate.sensor_add", text="Make Pad").role = "PAD"
@@ -220,7 +220,7 @@ class Readout(Subpanel):
 
 def _measured(readings, unit: str) -> list[tuple[str, str]]:
     """Return names and values of what a sensor measures at a frame; dashes where there is nothing."""
-    names = "Texels that touch", "Sum of normals", "Largest normal", "Largest shear", "Net", "Reading"
+    names = "Texels in contact", "Sum of normals", "Largest normal", "Largest shear", "Net", "Reading"
     if readings is None:
         return [(name, "–") for name in names]
     net = ", ".join(f"{round(value, 3) + 0.0:.3f}" for value in readings.net_force)  # adding zero turns -0.0 into 0.0

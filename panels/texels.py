@@ -32,7 +32,7 @@ class Texels(Subpanel):
         if advice is not None:
             limit = f"{advice.limit * 1e3:.3g} ms" if advice.limit < 1e3 else "none, no body is free"
             box.label(text=f"Stability limit: {limit}")
-            box.label(text=f"Advised step: {advice.dt * 1e3:.3g} ms")
+            box.label(text=f"Recommended step: {advice.dt * 1e3:.3g} ms")
         elif report.missing:
             draw_sentences(box, report.missing, "INFO", context)
         for problem in report.problems:

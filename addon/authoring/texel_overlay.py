@@ -9,7 +9,7 @@ import bpy
 import numpy as np
 
 from ...core.geometry.layout.grid_layout import GridLayout
-from ..session import frame_status, transforms
+from ..session import frame_status, transforms, view_shading
 from . import sensor_report
 
 VALID_COLOR, FAULTY_COLOR, NORMAL_COLOR, REACH_COLOR = (
@@ -110,7 +110,7 @@ def _draw() -> None:
     gpu.state.blend_set("ALPHA")
     with gpu.matrix.push_pop():
         gpu.matrix.multiply_matrix(_frame(obj))
-        gpu.state.depth_test_set("NONE" if bpy.context.space_data.shading.show_xray else "LESS_EQUAL")
+        gpu.state.depth_test_set("NONE" if view_shading.is_xray(bpy.context.space_data.shading) else "LESS_EQUAL")
         readings = frame_status.status_of(bpy.context.scene).frame
         shown = obj.mode == "OBJECT" and readings is not None and obj.name in readings.sensors  # the heat map is where they are
         if own.show_texels and not shown:

@@ -14,7 +14,7 @@ import numpy as np
 
 from ...core.figures import color_maps
 from ...core.io.bake_reader import frame_index
-from ..session import redraw, transforms, units
+from ..session import redraw, transforms, units, view_shading
 from . import bake_display, indentation, indented_surface, inset
 from .indented_surface import IndentedSurface
 
@@ -246,7 +246,7 @@ def _draw() -> None:
     import gpu
 
     scene = bpy.context.scene
-    through = scene.palpate.show_through
+    through = draws_through(scene, space)
     materials_suffice = space.shading.type in SHOWING_MATERIALS and shows_colors_as_they_are(scene) and not through
     gpu.state.depth_test_set("ALWAYS" if through else "LESS_EQUAL")
     gpu.state.face_culling_set("BACK" if through else "NONE")  # of a closed sensor, its far side does not show
@@ -264,6 +264,11 @@ def _draw() -> None:
     gpu.state.depth_mask_set(False)
     gpu.state.face_culling_set("NONE")
     gpu.state.depth_test_set("NONE")
+
+
+def draws_through(scene, space) -> bool:
+    """Return True where a 3D view draws heat maps over what covers them: as set, or in X-ray."""
+    return scene.palpate.show_through or view_shading.is_xray(space.shading)
 
 
 def shows_colors_as_they_are(scene) -> bool:

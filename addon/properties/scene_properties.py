@@ -107,7 +107,7 @@ class PALPATE_PG_scene(bpy.types.PropertyGroup):
     )
     show_through: BoolProperty(
         name="Through Objects",
-        description="Draw the heat map over what covers it in the 3D view",
+        description="Draw the heat map over what covers it in the 3D view, as X-ray does (Alt Z)",
         default=False,
         **SETTING,
     )

@@ -36,5 +36,5 @@ def find_participants(scene) -> tuple[list, list[str]]:
         if obj.visible_get(view_layer=layer):
             found.append(obj)
         else:
-            warnings.append(f"'{obj.name}' is hidden and takes no part.")
+            warnings.append(f"'{obj.name}' is hidden and is not part of the simulation.")
     return found, warnings

@@ -18,4 +18,5 @@ __all__ = [
     "session_state",
     "transforms",
     "units",
+    "view_shading",
 ]

@@ -50,7 +50,7 @@ def show(scene, depsgraph) -> None:
     if other:
         text, note = other, "not the bake of this file"
     elif staleness.is_stale(scene, depsgraph, recording):
-        text, note = "The bake is out of date, something has changed since: bake again.", "out of date: bake again"
+        text, note = "The scene has changed since this bake. Bake again.", "out of date: bake again"
     sensors = recording.at(number).sensors
     frame = Frame(number, 0.0, sensors, poses=np.zeros((0, 7)), velocities=np.zeros((0, 6)))
     frame_status.set_status(scene, text, frame, recording.step_reason)

@@ -46,11 +46,11 @@ class SensorParameters:
     k: float = specified(Parameter(
         "k", "N/m", 58.5, 0.0, inf, "Normal stiffness of one texel",
         above_low=True, label="Stiffness", symbol="k", source="Eq. 8", group=CONTACT, xml_place=1,
-        note="Eq. 18 finds it from foam data. Table 2: 58.5; the pad of Table 3: 1000"))
+        note="Typical: 58.5 for soft foam, 1000 for a firm pad"))
     cn: float = specified(Parameter(
         "cn", "N·s/m", 0.0583, 0.0, inf, "Normal damping of one texel",
         label="Damping", symbol="cn", source="Eq. 8", group=CONTACT, xml_place=2,
-        note="About 1 % of k in number; Table 2 has 0.0583"))
+        note="Numerically about 1 % of k"))
     ct: float = specified(Parameter(
         "ct", "N·s/m", 0.01, 0.0, inf, "Viscous friction: grows with sliding speed",
         label="Viscous", symbol="ct", source="Eq. 13", group=FRICTION, xml_place=6, fit_place=5,

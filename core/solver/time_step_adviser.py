@@ -83,7 +83,7 @@ def advise(scenario: Scenario) -> Advice:
         return Advice(
             LONGEST,
             limit,
-            f"{LONGEST * 1e3:g} ms: nothing that forces move touches a sensor, only the motion has to be followed.",
+            f"{LONGEST * 1e3:g} ms: no free body touches a sensor, so only the animation must be resolved.",
         )
     wanted = SHARE_OF_LIMIT * limit
     of_limit = f"the explicit stability limit of '{culprit}'"
@@ -121,9 +121,9 @@ def plan(scenario: Scenario) -> Plan:
     longest = advice.dt if scenario.dt is None else scenario.dt
     substeps = max(1, math.ceil(1.0 / (scenario.fps * longest) - 1e-9))
     dt = 1.0 / (scenario.fps * substeps)
-    number = f"{substeps} to a frame" if substeps > 1 else "one to a frame"
+    number = f"{substeps} per frame"
     if scenario.dt is None:
-        return Plan(dt, substeps, f"Steps of {dt * 1e3:.3g} ms, {number}. Advised are {advice.reason}")
+        return Plan(dt, substeps, f"Time step {dt * 1e3:.3g} ms ({number}). Recommended: {advice.reason}")
     if dt > FAR_ABOVE_LIMIT * advice.limit:
         warning = (
             f"Frame {scenario.frame_start}: steps of {dt * 1e3:.3g} ms are {dt / advice.limit:,.0f} times the explicit "
@@ -133,7 +133,7 @@ def plan(scenario: Scenario) -> Plan:
     else:
         warning = ""
     beyond = " Longer ones stay bounded, but follow the motion less exactly." if dt > 1.001 * advice.dt else ""
-    return Plan(dt, substeps, f"Steps of {dt * 1e3:.3g} ms, {number}, as set. Advised are {advice.reason}{beyond}", warning)
+    return Plan(dt, substeps, f"Time step {dt * 1e3:.3g} ms ({number}, as set). Recommended: {advice.reason}{beyond}", warning)
 
 
 def _tangent_or_normal(sensor: Sensor) -> tuple[float, float]:

@@ -221,3 +221,24 @@ def test_arrows_rest_while_a_bake_reads_the_scene(baked, end):
         work.close()
     assert [modifier.show_viewport for modifier in own] == [True, False]
     work.close()
+
+
+@pytest.mark.parametrize(
+    ("kind", "solid", "wireframe", "expected"),
+    [
+        ("SOLID", True, False, True),
+        ("SOLID", False, True, False),
+        ("WIREFRAME", False, True, True),
+        ("WIREFRAME", True, False, False),
+        ("MATERIAL", True, True, False),
+    ],
+)
+def test_heat_maps_are_drawn_through_objects_in_x_ray(kind, solid, wireframe, expected):
+    """Blender keeps one X-ray switch for Solid and one for Wireframe; Material Preview has none."""
+    scene = bpy.context.scene
+    space = next(area.spaces.active for screen in bpy.data.screens for area in screen.areas if area.type == "VIEW_3D")
+    space.shading.type, space.shading.show_xray, space.shading.show_xray_wireframe = kind, solid, wireframe
+    assert not scene.palpate.show_through
+    assert overlays.draws_through(scene, space) == expected
+    scene.palpate.show_through = True
+    assert overlays.draws_through(scene, space)

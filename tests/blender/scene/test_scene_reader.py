@@ -180,7 +180,7 @@ def test_hidden_objects_take_no_part_and_are_mentioned():
         reading = sampled(scene)
         scenario = reading.scenario
         assert [t.name for t in scenario.targets] == ["Ball"]
-        assert reading.warnings == ("'Hidden' is hidden and takes no part.",)
+        assert reading.warnings == ("'Hidden' is hidden and is not part of the simulation.",)
         hide(False)
     assert len(sampled(scene).scenario.targets) == 2
 

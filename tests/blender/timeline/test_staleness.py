@@ -11,7 +11,7 @@ from palpate.addon.session import frame_status
 from palpate.addon.timeline import live_cache
 from palpate.core.jobs.job_runner import run_job
 
-FRESH, STALE = "Frame {} of the bake.", "The bake is out of date, something has changed since: bake again."
+FRESH, STALE = "Frame {} of the bake.", "The scene has changed since this bake. Bake again."
 
 
 def bent(scene, target):

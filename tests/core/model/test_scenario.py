@@ -146,9 +146,7 @@ def test_the_step_of_a_run_is_explained():
     scenario = cube_on_pad(1.0, dt=None)
     advised, chosen = advise(scenario), plan(scenario)
     assert chosen.dt <= advised.dt and chosen.dt * chosen.substeps == pytest.approx(1 / 24, rel=1e-12)
-    assert (
-        f"{chosen.substeps} to a frame" in chosen.reason and advised.reason in chosen.reason and "as set" not in chosen.reason
-    )
+    assert f"{chosen.substeps} per frame" in chosen.reason and advised.reason in chosen.reason and "as set" not in chosen.reason
     assert advised.reason.endswith(f"ms: 20% of the explicit stability limit of 'cube' ({advised.limit * 1e3:.3g} ms).")
     long = plan(replace(scenario, dt=0.01))
     assert "as set" in long.reason and advised.reason in long.reason and "less exactly" in long.reason

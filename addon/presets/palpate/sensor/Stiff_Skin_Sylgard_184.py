@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 # A 2 mm skin of PDMS Sylgard 184 cured at 25 °C, texels 2 mm apart. E = 1.32 MPa (Johnston, McCluskey, Tan and Tracey 2014,
 # J. Micromech. Microeng. 24 035017: 1.32 to 2.97 MPa for curing at 25 to 200 °C);
-# k = E · A / h = 1.32 MPa · 4 mm² / 2 mm = 2640 N/m per texel, cn 1 % of k in number.
+# k = E · A / h = 1.32 MPa · 4 mm² / 2 mm = 2640 N/m per texel, cn numerically 1 % of k.
 # Bristles as stiff as the layer. No friction is given there: measure yours, it stays as it is.
 # max_penetration is the thickness: the skin cannot be pressed deeper than down to what carries it.
 # E is that of a bar that can give way sideways. A thin skin that is bonded to its carrier cannot, and is stiffer.

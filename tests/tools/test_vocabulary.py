@@ -1,0 +1,48 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Sentences for a reader use the field's terms: expressions that were replaced by a term do not come back."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+READ_BY_USERS = ("addon", "commands", "core/effects", "core/model", "core/solver", "operators", "panels", "docs")
+"""Folders whose strings and pages a user reads."""
+
+INSTEAD = {
+    r"\bAdvised (step|are)\b": "Recommended",
+    r"' (is hidden and )?takes no part\b": "is not part of the simulation",
+    r"\bTexels that touch\b": "Texels in contact",
+    r"\breading trembles\b": "reading is noisy",
+    r"\bbrightest texel errs\b": "Largest texel error",
+    r"\bsomething has changed since\b": "The scene has changed since this bake",
+    r"\bwhich can do without\b": "optional",
+    r"\broot mean square of what is left\b": "root mean square residual",
+    r"\ball that varies is known\b": "all varied parameters are handled",
+    r"\bnothing that forces move\b": "free body",
+    r"\bk in number\b": "Numerically ... of k",
+}
+"""Each expression, and the words to use in its place."""
+
+
+def findings(text: str) -> list[str]:
+    """Return one line for each expression in a text that has a plainer one."""
+    return [f"{found.group()!r}: write {term!r}" for old, term in INSTEAD.items() for found in re.finditer(old, text)]
+
+
+def files() -> list[Path]:
+    return sorted(path for folder in READ_BY_USERS for path in (ROOT / folder).rglob("*") if path.suffix in {".py", ".md"})
+
+
+def test_no_replaced_expression_is_left():
+    assert len(files()) > 100
+    assert {str(path.relative_to(ROOT)): found for path in files() if (found := findings(path.read_text("utf-8")))} == {}
+
+
+@pytest.mark.parametrize(
+    ("text", "count"),
+    [("Advised step: 1 ms. 'Grid' takes no part.", 2), ("The reading trembles.", 1), ("Recommended step: 1 ms.", 0)],
+)
+def test_an_expression_is_found(text, count):
+    assert len(findings(text)) == count
