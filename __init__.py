@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from .api.experiment import Plan as Plan
     from .api.experiment import plan_experiment as plan_experiment
     from .api.fits import fit_friction as fit_friction
+    from .api.fits import fit_readout as fit_readout
     from .api.fits import fit_stiffness as fit_stiffness
     from .api.gap import Gap as Gap
     from .api.gap import find_gap as find_gap
@@ -48,6 +49,7 @@ _PUBLIC = {
     "export_sensor": "api.sensors",
     "find_gap": "api.gap",
     "fit_friction": "api.fits",
+    "fit_readout": "api.fits",
     "fit_stiffness": "api.fits",
     "plan_experiment": "api.experiment",
     "read_bake": "api.recordings",

@@ -305,7 +305,11 @@ class _Columns:
         for quantity in group:
             for name in self.candidates.get(quantity, []):
                 table, _, short = name.rpartition("/")
-                stem = re.sub(r"[xyzwXYZW](?=[^A-Za-z]*$|[ _(\[].*$)", "", name_and_unit(short)[0], count=1)
+                stem = (
+                    ""
+                    if name in self.behaviours
+                    else re.sub(r"[xyzwXYZW](?=[^A-Za-z]*$|[ _(\[].*$)", "", name_and_unit(short)[0], count=1)
+                )
                 families.setdefault((table, stem), {}).setdefault(quantity, name)
         families = {key: own for key, own in families.items() if any(self.span(name) > 0.0 for name in own.values())}
         if not families:
