@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from .api.sensors import export_sensor as export_sensor
     from .api.sensors import read_sensor as read_sensor
     from .api.simulation import simulate as simulate
+    from .api.skins import magnetic_skin as magnetic_skin
     from .api.study import run_study as run_study
     from .core.errors import PalpateError as PalpateError
     from .core.gap.dataset.rig import Rig as Rig
@@ -51,6 +52,7 @@ _PUBLIC = {
     "fit_friction": "api.fits",
     "fit_readout": "api.fits",
     "fit_stiffness": "api.fits",
+    "magnetic_skin": "api.skins",
     "plan_experiment": "api.experiment",
     "read_bake": "api.recordings",
     "read_recording": "api.recordings",
