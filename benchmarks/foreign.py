@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """``palpate gap`` on openly licensed recordings of other people's sensors, beside a model by hand: one table.
 
-The recordings are looked for in the folder ``PALPATE_REAL_DATA`` (../shared/data beside the checkout); ``PALPATE_FOREIGN_SETS`` names
-some of them. ``PALPATE_FOREIGN_BY_HAND=1`` fits the models by hand alone, which takes seconds. docs/gap-real.md has the table.
+The recordings are looked for in the folder ``PALPATE_REAL_DATA`` (../shared/data beside the checkout);
+``PALPATE_FOREIGN_SETS`` names some of them. ``PALPATE_FOREIGN_BY_HAND=1`` fits the models by hand alone, which takes seconds.
+docs/skins.md has the table.
 """
 
 from __future__ import annotations
