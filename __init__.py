@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from .api.experiment import Plan as Plan
     from .api.experiment import plan_experiment as plan_experiment
     from .api.fits import fit_friction as fit_friction
+    from .api.fits import fit_readout as fit_readout
     from .api.fits import fit_stiffness as fit_stiffness
     from .api.gap import Gap as Gap
     from .api.gap import find_gap as find_gap
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
     from .api.sensors import export_sensor as export_sensor
     from .api.sensors import read_sensor as read_sensor
     from .api.simulation import simulate as simulate
+    from .api.skins import magnetic_skin as magnetic_skin
     from .api.study import run_study as run_study
     from .core.errors import PalpateError as PalpateError
     from .core.gap.dataset.rig import Rig as Rig
@@ -48,7 +50,9 @@ _PUBLIC = {
     "export_sensor": "api.sensors",
     "find_gap": "api.gap",
     "fit_friction": "api.fits",
+    "fit_readout": "api.fits",
     "fit_stiffness": "api.fits",
+    "magnetic_skin": "api.skins",
     "plan_experiment": "api.experiment",
     "read_bake": "api.recordings",
     "read_recording": "api.recordings",

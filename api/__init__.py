@@ -17,5 +17,6 @@ __all__ = [
     "running",
     "sensors",
     "simulation",
+    "skins",
     "study",
 ]

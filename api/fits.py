@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Fits of stiffness and friction to measurements."""
+"""Fits of stiffness, friction and read-outs to measurements."""
 
 from __future__ import annotations
 
 import os
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,7 +15,9 @@ from .arguments import ArgumentError
 
 if TYPE_CHECKING:
     from ..core.gap.calibration.friction import FrictionFit
+    from ..core.gap.calibration.readout import ReadoutFit
     from ..core.gap.calibration.stiffness import StiffnessFit
+    from ..core.gap.dataset.rig import Rig
     from ..core.model.sensor_parameters import SensorParameters
 
 Columns = tuple[ArrayLike, ...]
@@ -94,6 +97,31 @@ def fit_friction(
     else:
         data = friction_data(dict(zip(("velocity", "force", "time"), _columns(curve, "curve", (2, 3)))), texels, "curve")
     return fit(data, normal_force, parameters)
+
+
+def fit_readout(rig: Rig | str | os.PathLike[str]) -> ReadoutFit:
+    """Fit what a skin is for: force and place from its readings, with intervals.
+
+    Parameters
+    ----------
+    rig : Rig or path of a rig.toml
+        Recordings with ``use = "check"`` are not fitted, and tell how good the read-outs are.
+
+    Returns
+    -------
+    ReadoutFit
+        `results` of each method (`check`: root mean square error; `coverage` of the 95 % intervals), `best`, `reasons` where
+        and why it fails, and ``estimate(time, readings)`` with `value`, `low` and `high`.
+
+    Raises
+    ------
+    PalpateError
+        The rig has no readings, nothing that drove the sensor, or too few samples.
+    """
+    from ..core.gap.calibration.readout import fit_readout as fit
+    from ..core.gap.dataset.rig import read_rig
+
+    return fit(read_rig(Path(rig)) if isinstance(rig, str | os.PathLike) else rig)
 
 
 def _columns(value: Columns, argument: str, number: tuple[int, ...]) -> list[np.ndarray]:

@@ -21,9 +21,11 @@ from .running import ShowProgress, finished
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+    from numpy.typing import ArrayLike
 
     from ..core.export.exporter import Exporter
     from ..core.figures.figure_style import FigureStyle
+    from ..core.response.magnetic_skin import MagneticSkin, VectorReadings
 
 UNITS = {"slip": "m/s", "depth": "m", "contact": "", "net_torque": "N m", "centre_of_pressure": "m"}
 """Units of the arrays that are not in newtons; `reading` has that of the sensor."""
@@ -113,6 +115,37 @@ class Recording:
     def dt(self) -> float:
         """Step of the solver, seconds."""
         return self.bake.recording.dt
+
+    def channels(
+        self, skin: MagneticSkin, shear_stiffness: float | None = None, ambient: ArrayLike | None = None
+    ) -> VectorReadings:
+        """Return what the magnetometers of a skin show: readings of three signed channels each.
+
+        Parameters
+        ----------
+        skin : MagneticSkin
+            On the only sensor, see :func:`palpate.magnetic_skin`.
+        shear_stiffness : float, N/m, optional
+            Of one texel; texels are displaced along their surface by their shear divided by it. Default: they are not.
+        ambient : (T, 3) float, T, optional
+            Field of the surroundings in the frame of the sensor's body.
+
+        Returns
+        -------
+        VectorReadings
+            `values` (T, k, 3) in tesla, `clipped` (T, k, 3) bool, and ``said()``, a sentence about what was clipped.
+
+        Raises
+        ------
+        PalpateError
+            The skin belongs to another sensor, or a magnet is pressed into a magnetometer.
+        """
+        from ..core.response.layer import texel_displacements
+
+        stiffness = np.inf if shear_stiffness is None else arguments.number(shear_stiffness, "shear_stiffness", True)
+        field = None if ambient is None else arguments.numbers(ambient, (len(self), 3), "ambient")
+        texels = self._described().texels[self.name]
+        return skin.readings(texel_displacements(texels, self.depth, self.shear, stiffness), field)
 
     def __getitem__(self, name: str) -> Recording:
         arguments.known([name], self.sensors, "sensor")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""``palpate fit``: fits parameters of a sensor to measurements of its foam and of its friction."""
+"""``palpate fit``: fits parameters of a sensor to measurements of its foam and of its friction, and read-outs to rigs."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
+from ..core.errors import counted
 from ..core.figures.figure_canvas import file_type
 from ..core.io.file_writing import writable_file
 from ..core.model.sensor_parameters import DAMPING_PER_STIFFNESS, unit_of
@@ -14,7 +15,7 @@ from . import checks, console
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    kinds = parser.add_subparsers(dest="kind", metavar="stiffness | friction", required=True)
+    kinds = parser.add_subparsers(dest="kind", metavar="stiffness | friction | readout", required=True)
     foam = kinds.add_parser(
         "stiffness",
         help="stiffness k from the compression of the foam (Eq. 18)",
@@ -38,7 +39,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--texels", type=int, default=1, metavar="N", help="number of texels that shared the measured force (default: 1)"
     )
     slide.set_defaults(action=_friction)
-    for kind in (foam, slide):
+    readout = kinds.add_parser(
+        "readout",
+        help="force and place from readings, with intervals",
+        description="Read-outs from the recordings of a rig (docs/gap.md): what drove the sensor from its readings, by a "
+        'forward model that is inverted, ridge regression and a Gaussian process, checked on recordings with use = "check".',
+    )
+    readout.add_argument("file", metavar="RIG", help="rig.toml, as palpate rig new writes it")
+    readout.set_defaults(action=_readout)
+    for kind in (foam, slide, readout):
         kind.add_argument("--plot", metavar="FILE", help="write a plot of measurements and fit: .png, .pdf or .svg")
 
 
@@ -99,3 +108,36 @@ def _friction(arguments: argparse.Namespace) -> None:
         from ..core.gap.calibration.plots import plot_friction
 
         plot_friction(arguments.plot, fit)
+
+
+def _readout(arguments: argparse.Namespace) -> None:
+    from ..api.fits import fit_readout
+
+    fit = fit_readout(arguments.file)
+    data = fit.data
+    print(
+        f"{' and '.join(data.targets)} from {counted(len(data.channels), 'channel')}, fitted to "
+        f"{counted(len(data.fit), 'recording')} and checked on {len(data.check)}\n"
+    )
+    rows = [("method", "of", "memory", "error left out", "error checked", "median", "in 95 % interval")]
+    for one in fit.results:
+        mark = "* " if one is fit.best else "  "
+        for i, target in enumerate(data.targets):
+            checked = "", "", ""
+            if one.check is not None and one.check_median is not None and one.coverage is not None:
+                checked = f"{one.check[i]:.3g}", f"{one.check_median[i]:.3g}", f"{one.coverage[i]:.0%}"
+            memory = " and ".join(f"{tau:g} s" for tau in one.times) or "none"
+            name = f"{target} ({data.unit(target)})"
+            rows.append((f"{mark}{one.method.name}" if i == 0 else "", name, memory, f"{one.left_out[i]:.3g}", *checked))
+    print(console.text_table(rows, "<<<>>>>"))
+    print("\nErrors are root mean squares. * is proposed: the simplest within one standard error of the least error left out.")
+    if fit.forward_check is not None:
+        print(f"forward model: {fit.forward_check:.2%} of the readings' range on the check recordings")
+    if not data.check:
+        print('No recording has use = "check": how good a read-out is on another day is not known.')
+    for note in [*data.notes, *fit.reasons]:
+        print(f"note: {note}")
+    if arguments.plot:
+        from ..core.gap.calibration.plots import plot_readout
+
+        plot_readout(arguments.plot, fit)

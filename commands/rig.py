@@ -38,12 +38,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     from ..core.gap.logs import answers as log_answers
     from ..core.gap.logs.log_file import read_log
+    from ..core.gap.logs.log_table import with_distinct_names
     from ..core.gap.logs.preview import preview_rows
     from ..core.gap.logs.proposal import propose
     from ..core.gap.logs.template import ANSWERS_NAME, PLOT_NAME
 
     with console.Interrupt.raised_at_once():
-        logs = [read_log(path) for path in arguments.logs]
+        logs = with_distinct_names([read_log(path) for path in arguments.logs])
         print(console.text_table(preview_rows(logs), "<<<>>>"))
         if arguments.preview:
             for note in dict.fromkeys(note for log in logs for note in log.notes):
@@ -91,8 +92,8 @@ def _write(logs: list[LogFile], found: Answers, out: str) -> None:
 
     written = console.run_with_progress_bar("rig new", write_rig(logs, found, out), unit="recording")
     rig = read_rig(written.path)
-    plot_rig(rig, written.path.parent / PLOT_NAME)
-    for note in [*written.notes, *rig.warnings]:
+    plot_rig(rig, written.path.parent / PLOT_NAME, written.set_aside)
+    for note in dict.fromkeys([*(note for log in logs for note in log.notes), *written.notes, *rig.warnings]):
         print(f"note: {note}")
     uses = [trial.use for trial in rig.trials]
     shares = f"{uses.count('fit')} to fit and {uses.count('check')} to check"

@@ -173,8 +173,10 @@ def predict_by_hand(model: HandmadeModel, recording: Recording) -> list[np.ndarr
 
     extra = len(fitted) - 1 if free_factors(recording) else 0
     start, low, high = (np.append(v, [e] * extra) for v, e in ((model.start, 0.0), (model.low, -3.0), (model.high, 3.0)))
-    found = least_squares(residual, start, bounds=(low, high), x_scale=np.maximum(np.abs(start), 0.1))
-    return predicted(found.x, [columns for _, _, columns in recording.trials])
+    numbers = start
+    if len(start):
+        numbers = least_squares(residual, start, bounds=(low, high), x_scale=np.maximum(np.abs(start), 0.1)).x
+    return predicted(numbers, [columns for _, _, columns in recording.trials])
 
 
 def free_factors(recording: Recording) -> bool:

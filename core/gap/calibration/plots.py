@@ -11,6 +11,7 @@ import numpy as np
 from ...figures.figure_canvas import new_figure, save_figure
 from ...figures.figure_style import GREY, INK, NORMAL_COLOUR, SHEAR_COLOUR
 from .friction import FrictionFit, friction_over_time, steady_friction
+from .readout import ReadoutFit
 from .stiffness import StiffnessFit
 
 if TYPE_CHECKING:
@@ -61,6 +62,24 @@ def plot_friction(path: str | Path, fit: FrictionFit, dpi: int = 200) -> None:
     if data.force.min() >= 0.0:
         axes.set_ylim(0.0, None)
     _finish(axes)
+    save_figure(figure, path, dpi)
+
+
+def plot_readout(path: str | Path, fit: ReadoutFit, dpi: int = 200) -> None:
+    """Plot what drove the sensor, and what its readings say of it, over a check recording, or else a fitted one."""
+    one = (fit.data.check or fit.data.fit)[0]
+    found = fit.estimate_of(one)
+    figure = new_figure(2.0 * COLUMN, 1.9 * len(fit.data.targets) + 0.4)
+    for i, target in enumerate(fit.data.targets):
+        bottom = 1.0 - (i + 1.0) / len(fit.data.targets)
+        axes = figure.add_axes((0.09, bottom + 0.16 / len(fit.data.targets), 0.89, 0.78 / len(fit.data.targets)))
+        since = one.time - one.time[0]
+        axes.fill_between(since, found.low[:, i], found.high[:, i], color=SHEAR_COLOUR, alpha=0.3, lw=0, label="95 % interval")
+        axes.plot(since, found.value[:, i], color=SHEAR_COLOUR, lw=1.0, label="from readings")
+        axes.plot(since, one.targets[:, i], color=INK, lw=0.7, label="measured")
+        axes.set_ylabel(f"{target} ({fit.data.unit(target)})")
+        _finish(axes)
+    axes.set_xlabel(f"time in {one.name} (s)")
     save_figure(figure, path, dpi)
 
 

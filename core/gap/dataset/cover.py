@@ -19,6 +19,7 @@ from ...geometry.texels import Texels
 from ...io.schema import known_words
 from ...io.sensor_toml import checked_lengths
 from ...io.toml_file import is_number
+from ...response.layer import pressure_below_point_load
 
 COVER_WORDS = {"sensors", "strips", "cover"}
 """Words of a [sensor] that describe such a sensor."""
@@ -169,11 +170,10 @@ def _texels(places: np.ndarray, area: np.ndarray) -> Texels:
 def _load_at_depth(places: np.ndarray, surface: Texels, depth: float) -> np.ndarray:
     """Share of the force at each surface point that loads a unit of area below a place, times that point's area, (p, m).
 
-    The normal stress in a half-space under a point load (Boussinesq; Johnson, Contact Mechanics, 1985, Eq. 3.19):
-    3 d³ / (2 π (d² + r²)^(5/2)). It integrates to one, so that under an even pressure each place has this pressure.
+    The normal stress under a point load integrates to one, so that under an even pressure each place has this pressure.
     """
     squares = ((places[:, None, :] - surface.position[None, :, :2]) ** 2).sum(axis=2)
-    kernel: np.ndarray = 1.5 / np.pi * depth**3 * (depth**2 + squares) ** -2.5 * surface.area
+    kernel: np.ndarray = pressure_below_point_load(depth, squares) * surface.area
     return kernel
 
 

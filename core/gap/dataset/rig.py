@@ -25,6 +25,7 @@ from ...model.sensor_parameters import DEPTH_PER_THICKNESS, SENSOR_PARAMETERS, S
 from .column_names import ColumnRule, read_column_rules, translated
 from .cover import COVER_WORDS, Cover, read_cover
 from .fault_kinds import FAULT_KINDS
+from .missing_samples import bridged
 from .second_logger import SecondLogger, joined
 from .sessions import TrialHistory, on_common_clocks, read_history
 from .trial import Trial
@@ -454,7 +455,7 @@ class _TrialReader:
         kind = _stimulus_kind(columns, file, has_indenter)
         reading, force = _readings(columns, self.texels, file), _vector(columns, FORCE, partial=True)
         has_columns = reading is not None or force is not None
-        reading, force = (None if part is None or np.isnan(part).all() else part for part in (reading, force))
+        reading, force = (_known_responses(part, np.zeros(len(time), bool)) for part in (reading, force))
         if reading is None and force is None:
             raise FileError(
                 f"Every cell of the response in '{file.name}' is empty: record the trial again, or remove its [[trial]]."
@@ -470,7 +471,12 @@ class _TrialReader:
             if kind == "force" and "x" in columns:  # a known weight at a known place, wherever its z is
                 place = [columns["x"], columns["y"], np.zeros(len(time))]
                 position, quaternion = np.stack(place, axis=1), _turns(columns, file)
-        said = _gaps_filled([position, quaternion, level, slide], time, file)
+        unknown, said = _gaps_filled([position, quaternion, level, slide], time, file)
+        reading, force = (_known_responses(part, unknown) for part in (reading, force))
+        if reading is None and force is None:
+            raise FileError(
+                f"No response in '{file.name}' has a stimulus beside it: record both at the same time, or cut the file."
+            )
         if quaternion is not None:
             quaternion = quaternion / np.linalg.norm(quaternion, axis=1, keepdims=True)
         strangers = [name for name in columns if not _meaning(name)]
@@ -611,24 +617,40 @@ def _turns(columns: Mapping[str, np.ndarray], file: Path) -> np.ndarray:
     return turns
 
 
-def _gaps_filled(stimuli: list[np.ndarray | None], time: np.ndarray, file: Path) -> list[str]:
-    """Interpolate missing values of the stimulus in place; return a remark if there were any."""
-    said, total = [], 0
-    for values in stimuli:
-        if values is None:
-            continue
-        for column in values.reshape(len(time), -1).T:
-            missing = np.isnan(column)
-            if missing.mean() > 0.1:
-                raise FileError(
-                    f"{missing.mean():.0%} of the stimulus in '{file.name}' is missing: record the trial again or cut it."
-                )
-            if missing.any():
-                total += int(missing.sum())
-                column[missing] = np.interp(time[missing], time[~missing], column[~missing])
-    if total:
-        said.append(f"'{file.name}': {total} missing values of the stimulus were interpolated.")
-    return said
+def _gaps_filled(stimuli: list[np.ndarray | None], time: np.ndarray, file: Path) -> tuple[np.ndarray, list[str]]:
+    """Interpolate missing values of the stimulus in place.
+
+    Returns
+    -------
+    unknown : (T,) bool
+        Samples in gaps that are too long for it: what answered there cannot be judged.
+    said : list of str
+        Remarks.
+    """
+    unknown, total = np.zeros(len(time), bool), 0
+    for column in (column for values in stimuli if values is not None for column in values.reshape(len(time), -1).T):
+        missing = np.isnan(column)
+        if missing.all():
+            raise FileError(f"Every cell of a column of the stimulus in '{file.name}' is empty: record the trial again.")
+        if missing.any():
+            total += int(missing.sum())
+            unknown |= np.isnan(bridged(time, column))
+            column[missing] = np.interp(time[missing], time[~missing], column[~missing])
+    said = [f"'{file.name}': {total} missing values of the stimulus were interpolated."] if total else []
+    if unknown.any():
+        said.append(
+            f"'{file.name}': responses at {unknown.sum()} samples are not used, because the stimulus is missing for too long "
+            "there."
+        )
+    return unknown, said
+
+
+def _known_responses(part: np.ndarray | None, unknown: np.ndarray) -> np.ndarray | None:
+    """Responses without those whose stimulus is not known; None if none is left."""
+    if part is None:
+        return None
+    part = np.where(unknown[:, None], np.nan, part) if unknown.any() else part
+    return None if np.isnan(part).all() else part
 
 
 def _responds(trial: Trial) -> bool:

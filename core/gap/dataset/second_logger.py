@@ -22,6 +22,7 @@ import numpy as np
 
 from ...errors import FileError
 from ...io.schema import wanted
+from .missing_samples import bridged
 
 TURN = {"qw", "qx", "qy", "qz"}
 LARGEST_SHIFT = 1e10
@@ -92,7 +93,8 @@ def with_steady_signs(columns: Mapping[str, np.ndarray]) -> dict[str, np.ndarray
 
 
 def interpolated(time: np.ndarray, values: np.ndarray, wanted: np.ndarray) -> np.ndarray:
-    """Return values at other times; missing where the sample before or after is missing."""
+    """Return values at other times; missing within gaps that are too long to be interpolated (:mod:`.missing_samples`)."""
+    values = bridged(time, values)
     right = np.clip(np.searchsorted(time, wanted), 1, len(time) - 1)
     share = (wanted - time[right - 1]) / (time[right] - time[right - 1])
     before, after = values[right - 1], values[right]

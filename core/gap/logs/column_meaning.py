@@ -104,9 +104,13 @@ _SINGLE = {
     "temperature": {"temperature", "temp", "temperatur", "thermistor"},
     "depth": {"depth", "indentation", "penetration", "compression", "deflection"},
 }
+SINCE_1970 = 1e9
+"""Seconds: larger time stamps are times of day."""
 LEAST_SPAN, LARGEST_METRES = 1e-7, 0.3
 """Metres: the smallest motion that a rig measures, and the largest that is taken for metres where no unit is known. Rigs for
 touch move by millimetres to some decimetres, so larger numbers are millimetres."""
+LARGEST_NEWTONS = 500.0
+"""Forces of a larger range are grams where no unit is known: probes press a skin with 0.1 to 100 N, and scales show grams."""
 COLDEST_KELVIN = 200.0
 """Temperatures of a larger number are kelvins where no unit is known: nobody presses a sensor at 200 °C, or at 70 K."""
 _BRACKETS = re.compile(r"^(?P<name>.*?)\s*[\[(]\s*(?P<unit>[^\])]+?)\s*[\])]\s*$")
@@ -234,6 +238,12 @@ def time_unit(values: np.ndarray, stated: str) -> tuple[str, str, bool]:
     return "us", f"samples are {step:.4g} apart", False
 
 
+def is_since_1970(values: np.ndarray, unit: str) -> bool:
+    """Return True if all time stamps in a unit are so large that they must count from 1970."""
+    known = values[np.isfinite(values)]
+    return len(known) > 0 and float(known.min()) * LOG_UNITS["s"][unit] > SINCE_1970
+
+
 def length_unit(span: float, stated: str) -> tuple[str, str, bool]:
     """Return the unit of a length whose values span so much, why, and whether that is sure."""
     if stated in LOG_UNITS["m"]:
@@ -254,10 +264,12 @@ def temperature_unit(values: np.ndarray, stated: str) -> tuple[str, str, bool]:
     return "°C", f"it is about {middle:.4g}", False
 
 
-def force_unit(stated: str) -> tuple[str, str, bool]:
-    """Return the unit of a force, why, and whether that is sure."""
+def force_unit(stated: str, span: float = 0.0) -> tuple[str, str, bool]:
+    """Return the unit of a force whose values span so much, why, and whether that is sure."""
     if stated in LOG_UNITS["N"] or stated in PRESSURES:
         return stated, "the file says so", True
     if stated:
         return "?", f"it is in {stated}: write N, and the newtons per {stated} as factor", False
+    if span > LARGEST_NEWTONS:
+        return "g", f"no unit is stated, and it changes by {span:.4g}, too much for newtons: grams on a scale", True
     return "N", "no unit is stated", False

@@ -3,7 +3,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -64,12 +65,44 @@ class LogFile:
     tables : tuple of LogTable
     notes : tuple of str
         What was left out, one sentence each.
+    label : str
+        Name by which answers know it, where the name of the file alone is not enough.
     """
 
     path: Path
     kind: str
     tables: tuple[LogTable, ...]
     notes: tuple[str, ...] = ()
+    label: str = ""
+
+    @property
+    def name(self) -> str:
+        """Name by which answers know the file."""
+        return self.label or self.path.name
+
+    @property
+    def stem(self) -> str:
+        """The name without its ending, fit for that of a recording."""
+        return self.name.removesuffix(self.path.suffix).replace("/", "_")
+
+
+def with_distinct_names(logs: Sequence[LogFile]) -> list[LogFile]:
+    """Return logs of which those in several folders with the same name are called ``FOLDER/NAME``.
+
+    Raises
+    ------
+    FileError
+        Two are still called the same.
+    """
+    paths = [log.path for log in logs]
+    names = [path.name for path in paths]
+    if len(set(names)) < len(names):
+        logs = [replace(log, label=f"{log.path.absolute().parent.name}/{log.path.name}") for log in logs]
+    names = [log.name for log in logs]
+    for one in names:
+        if names.count(one) > 1:
+            raise FileError(f"Two logs are called '{one}': rename one, so that each recording has a name.")
+    return list(logs)
 
 
 def require_size(values: int, columns: int, path: Path) -> None:

@@ -6,12 +6,12 @@ from __future__ import annotations
 import fnmatch
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 
-from ...errors import FileError
+from ...errors import FileError, counted
 from ...io.csv_table import LARGEST_NUMBER
 from ...io.file_list import FileList
 from ...io.file_writing import atomic_write, writable_folder
@@ -21,9 +21,10 @@ from ..dataset.rig import FORMAT, read_rig
 from ..dataset.second_logger import interpolated, with_steady_signs
 from .answers import Answers, ColumnAnswer, LoggerAnswer, RecordingAnswer, toml_value
 from .clock_alignment import ClockShift, clock_shift
-from .column_meaning import LOG_UNITS, PRESSURES, READING_UNITS
-from .log_table import FEWEST_ROWS, LogFile, LogTable
+from .column_meaning import LOG_UNITS, PRESSURES, READING_UNITS, SINCE_1970
+from .log_table import FEWEST_ROWS, LogFile, LogTable, with_distinct_names
 from .proposal import table_of
+from .spoiled_samples import readings_of, spoiled_samples, stimulus_residual
 
 RIG_NAME = "rig.toml"
 MOST_REPEATED = 0.02
@@ -36,12 +37,20 @@ LEAST_CONTACT = 6.0
 """How many times the noise from sample to sample a response must rise above it. Of 1000 recordings of white noise of 20 to
 20,000 samples (evenly on a logarithmic scale) none reaches it after the mean over five samples that is taken here; the largest
 is at 4.2."""
-SINCE_1970, COMPUTERS_APART = 1e9, 5.0
-"""Seconds: stamps above the first are times of day, which two computers or two programs of one show alike to the second."""
+COMPUTERS_APART = 5.0
+"""Seconds by which times of day may differ between two computers or two programs of one."""
+TOLD_APART = 1.96
+"""Standard errors that a shift between clocks that show the time of day must be away from zero to be corrected: 95 %."""
+MOST_LEFT = 0.5
+"""Share of the squared error of the stimulus by the readings that a shift may leave to be corrected. eFlesh's three recordings,
+stamped by one computer, keep 0.81, 0.80 and 1.20 of it with the shifts of 0.27, 0.32 and 0.66 s at which changes agree best."""
 SMALLEST_INVERTED = 1e-30
 """A resistance below it counts as missing: it has no inverse."""
 DIGITS = 10
 """Significant digits of the numbers in the CSV files."""
+
+
+SetAside = tuple[str, np.ndarray, np.ndarray]
 
 
 @dataclass(frozen=True)
@@ -55,11 +64,14 @@ class NewRig:
     files : tuple of Path
     notes : tuple of str
         What a user should know, a sentence each; they stand in the rig as comments, too.
+    set_aside : dict of str to (quantity, (m,) float, (m,) float)
+        By the names of the files of trials: samples of the stimulus that the readings contradict, their times (s) and values.
     """
 
     path: Path
     files: tuple[Path, ...]
     notes: tuple[str, ...]
+    set_aside: dict[str, SetAside] = field(default_factory=dict)
 
 
 def write_rig(logs: Sequence[LogFile], answers: Answers, folder: str | os.PathLike) -> Job[NewRig]:
@@ -86,28 +98,31 @@ def write_rig(logs: Sequence[LogFile], answers: Answers, folder: str | os.PathLi
     """
     for question in answers.open_questions():
         raise FileError(f"{question[:-1]}: answer it before the rig is written.")
+    logs = with_distinct_names(logs)
     folder = writable_folder(folder, create=True)
     recordings = [one for one in answers.recordings if one.use != "leave out"]
     if not recordings:
         raise FileError("All recordings are to be left out: keep at least one.")
     names = _file_names(recordings, folder, logs)
-    by_name = {log.path.name: log for log in logs}
+    by_name = {log.name: log for log in logs}
     files = FileList(folder)
     with files.new_files("rig") as new:
         written: list[Path] = []
         notes: list[str] = []
+        set_aside: dict[str, SetAside] = {}
         trials = []
         for number, recording in enumerate(recordings, start=1):
             yield Progress(recording.name, number, len(recordings) + 1)
             tables = [_columns_of(by_name, file, answers, notes) for file in recording.files]
-            lines = _trial(recording, tables, names[recording.name], new, written, notes)
+            lines, aside = _trial(recording, tables, names[recording.name], new, written, notes)
             trials.append(lines)
+            set_aside |= {names[recording.name]: aside} if aside else {}
         text = _rig_text(logs, answers, trials, notes)
         with atomic_write(new / RIG_NAME) as temporary:
             temporary.write_text(text, encoding="utf-8", newline="\n")
         read_rig(new / RIG_NAME)
         places = files.replace(new, {"rig": [*written, new / RIG_NAME]})
-    return NewRig(folder / RIG_NAME, tuple(places), tuple(dict.fromkeys(notes)))
+    return NewRig(folder / RIG_NAME, tuple(places), tuple(dict.fromkeys(notes)), set_aside)
 
 
 def _file_names(recordings: Sequence[RecordingAnswer], folder: Path, logs: Sequence[LogFile]) -> dict[str, str]:
@@ -176,7 +191,7 @@ def _clock_of(log: LogFile, table: LogTable, logger: LoggerAnswer, columns: Mapp
     """Return the time stamps of a table, in seconds."""
     answer = logger.columns.get("time")
     if answer is None:
-        raise FileError(f"The answers name no time of '{log.path.name}': name its column, or write time = {{ rate = 100.0 }}.")
+        raise FileError(f"The answers name no time of '{log.name}': name its column, or write time = {{ rate = 100.0 }}.")
     if answer.rate:
         return np.arange(table.sample_count) / answer.rate
     for name in answer.names:
@@ -186,18 +201,18 @@ def _clock_of(log: LogFile, table: LogTable, logger: LoggerAnswer, columns: Mapp
         values = found[0].columns[found[1]]
         if len(values) != table.sample_count:
             raise FileError(
-                f"'{name}' of '{log.path.name}' has {len(values)} stamps for {table.sample_count} samples of "
+                f"'{name}' of '{log.name}' has {len(values)} stamps for {table.sample_count} samples of "
                 f"'{next(iter(columns))}': name the clock of these samples."
             )
         return _in_si("time", answer, values)
-    raise FileError(f"'{log.path.name}' has no column '{answer.names[0]}', which the answers name for time: check its name.")
+    raise FileError(f"'{log.name}' has no column '{answer.names[0]}', which the answers name for time: check its name.")
 
 
 def _on_clock(
     columns: dict[str, np.ndarray], time: np.ndarray, answer: ColumnAnswer | None, log: LogFile, notes: list[str]
 ) -> dict[str, np.ndarray]:
     """Return columns with a clock that rises; samples without a stamp are left out, those with equal stamps as answered."""
-    name = log.path.name
+    name = log.name
     known = np.isfinite(time)
     if not known.all():
         notes.append(f"'{name}': {int((~known).sum())} samples without a time were left out.")
@@ -258,13 +273,13 @@ def _on_one_clock(parts: list[dict[str, np.ndarray]], log: LogFile, notes: list[
         return parts[0]
     texels = [part for part in parts if any(name.startswith("texel_") for name in part)]
     if len(texels) > 1:
-        raise FileError(f"The texels of '{log.path.name}' are in {len(texels)} tables: give those of one table.")
+        raise FileError(f"The texels of '{log.name}' are in {len(texels)} tables: give those of one table.")
     base = texels[0] if texels else min(parts, key=lambda part: len(part["time"]))
     begin = max(part["time"][0] for part in parts)
     end = min(part["time"][-1] for part in parts)
     inside = (base["time"] >= begin) & (base["time"] <= end)
     if inside.sum() < 8:
-        raise FileError(f"The topics of '{log.path.name}' have less than eight samples at the same time: record them together.")
+        raise FileError(f"The topics of '{log.name}' have less than eight samples at the same time: record them together.")
     time = base["time"][inside]
     found = {"time": time, **{name: column[inside] for name, column in base.items() if name != "time"}}
     for part in parts:
@@ -272,7 +287,7 @@ def _on_one_clock(parts: list[dict[str, np.ndarray]], log: LogFile, notes: list[
             steady = with_steady_signs(part)
             found |= {name: interpolated(part["time"], column, time) for name, column in steady.items() if name != "time"}
             notes.append(
-                f"'{log.path.name}': {', '.join(sorted(set(part) - {'time'}))} (every {_step(part):.3g} s) were interpolated "
+                f"'{log.name}': {', '.join(sorted(set(part) - {'time'}))} (every {_step(part):.3g} s) were interpolated "
                 f"at the times of {_first_names(base)} (every {_step(base):.3g} s)."
             )
     return found
@@ -297,8 +312,8 @@ def _trial(
     folder: Path,
     written: list[Path],
     notes: list[str],
-) -> list[str]:
-    """Check a recording, write its files, and return the lines of its [[trial]]."""
+) -> tuple[list[str], SetAside | None]:
+    """Check a recording, write its files, and return the lines of its [[trial]] and the samples that were set aside."""
     tables.sort(key=lambda table: any(one in table for one in ("x", "depth", "force")), reverse=True)
     tables[0] = _used_part(recording, tables[0])
     for table in tables:
@@ -306,6 +321,7 @@ def _trial(
     lines = ["[[trial]]", f'file = "{name}.csv"', f'use = "{recording.use}"']
     if len(tables) == 1:
         start = float(tables[0]["time"][0])
+        aside = _set_aside(tables[0], tables[0], 0.0, recording.name, notes)
         _check_contact(tables[0], recording.name)
         written.append(_write_csv(folder / f"{name}.csv", tables[0], start))
     else:
@@ -315,6 +331,7 @@ def _trial(
         second = start if is_one_clock else float(answered["time"][0])
         late, uncertainty, why = _lateness(recording, driven, answered, start - second)
         notes.append(f"'{recording.name}': {why}.")
+        aside = _set_aside(driven, answered, late - (start - second), recording.name, notes)
         _check_contact(answered, recording.name)
         written.append(_write_csv(folder / f"{name}.csv", driven, start))
         written.append(_write_csv(folder / f"{name}_readings.csv", answered, second))
@@ -322,7 +339,27 @@ def _trial(
         readings = {"file": f"{name}_readings.csv", "late": late, "uncertainty": uncertainty}
         lines += [f"readings = {toml_value(readings)}"]
     stamp = f"times count from {start:.3f} s of the log's clock; " if abs(start) > 1e-9 else ""
-    return [*lines, f"# {stamp}read from {', '.join(recording.files)}", ""]
+    return [*lines, f"# {stamp}read from {', '.join(recording.files)}", ""], aside
+
+
+def _set_aside(
+    driven: dict[str, np.ndarray], answered: Mapping[str, np.ndarray], late: float, name: str, notes: list[str]
+) -> SetAside | None:
+    """Empty the samples of a depth or a known force that the readings contradict, and return them."""
+    quantity = next((one for one in ("force", "depth") if one in driven), None)
+    readings = readings_of(answered)
+    if quantity is None or readings is None:
+        return None
+    time, values = driven["time"], driven[quantity]
+    bad = spoiled_samples((time, values), (answered["time"], readings), late)
+    if not bad.any():
+        return None
+    notes.append(
+        f"'{name}': {counted(int(bad.sum()), 'sample')} of {quantity} from {time[bad][0] - time[0]:.4g} s on disagree with the "
+        "readings, while those around them agree; they are left empty, and the plot marks them."
+    )
+    driven[quantity] = np.where(bad, np.nan, values)
+    return quantity, time[bad] - time[0], values[bad]
 
 
 def _used_part(recording: RecordingAnswer, table: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
@@ -350,6 +387,11 @@ def _lateness(
         return late, recording.uncertainty or 0.0, f"the answers say that the second clock is {recording.late:.6g} s late"
     is_stamped = min(driven["time"][0], answered["time"][0]) > SINCE_1970
     found = _shift(driven, answered, COMPUTERS_APART if is_stamped else np.inf)
+    if is_stamped and (found is None or not _is_told_apart(found, driven, answered)):
+        seen = f"changes agree best with {found.late:.2g} ± {found.uncertainty:.2g} s" if found else "nothing changes"
+        if found and abs(found.late) > TOLD_APART * found.uncertainty:
+            seen += ", but the readings together do not"
+        return apart, 0.0, f"the two clocks show the time of day, and no shift is told apart from zero ({seen})"
     if found is None or not found.is_sure:
         seen = (
             "do not change"
@@ -372,6 +414,25 @@ def _lateness(
             f"{found.correlation:.2f}; at any other shift at most {found.correlation * found.rival:.2f})"
         ),
     )
+
+
+def _is_told_apart(found: ClockShift, driven: Mapping[str, np.ndarray], answered: Mapping[str, np.ndarray]) -> bool:
+    """Whether a shift of clocks that show the time of day is told apart from none.
+
+    Changes of a sensor that answers in a curve, and takes another way back, agree best with a shift even where there is none.
+    So the readings together must also explain what drove the sensor better with the shift.
+    """
+    if abs(found.late) <= TOLD_APART * found.uncertainty:
+        return False
+    readings, quantity = readings_of(answered), next((one for one in ("force", "depth") if one in driven), None)
+    if readings is None or quantity is None:
+        return True
+    stimulus, answers = (driven["time"], driven[quantity]), (answered["time"], readings)
+    without, with_shift = stimulus_residual(stimulus, answers), stimulus_residual(stimulus, answers, found.late)
+    if without is None or with_shift is None:
+        return True
+    both = np.isfinite(without) & np.isfinite(with_shift)
+    return bool(np.sum(with_shift[both] ** 2) < MOST_LEFT * np.sum(without[both] ** 2))
 
 
 def _shift(driven: dict[str, np.ndarray], answered: dict[str, np.ndarray], reach: float) -> ClockShift | None:
@@ -459,9 +520,9 @@ def _write_csv(path: Path, table: Mapping[str, np.ndarray], start: float) -> Pat
 def _rig_text(logs: Sequence[LogFile], answers: Answers, trials: Sequence[Sequence[str]], notes: Sequence[str]) -> str:
     lines = [f'format = "{FORMAT}"', f"name = {toml_value(answers.name)}", "", "# Made from logs by `palpate rig new`:"]
     for logger in answers.loggers:
-        files = [log for log in logs if any(fnmatch.fnmatchcase(log.path.name, one) for one in logger.files)]
+        files = [log for log in logs if any(fnmatch.fnmatchcase(log.name, one) for one in logger.files)]
         if files:
-            lines.append(f"# {', '.join(log.path.name for log in files)} ({files[0].kind})")
+            lines.append(f"# {', '.join(log.name for log in files)} ({files[0].kind})")
         lines += [f"#   {_taken(quantity, answer)}" for quantity, answer in logger.columns.items()]
     left = [one.name for one in answers.recordings if one.use == "leave out"]
     lines += [f"# left out: {', '.join(left)}"] if left else []

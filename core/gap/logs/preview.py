@@ -24,17 +24,17 @@ def preview_rows(logs: Sequence[LogFile]) -> list[tuple[str, ...]]:
     for log in logs:
         kind = tuple((table.name, tuple(table.columns)) for table in log.tables)
         if kind in seen:
-            rows.append((log.path.name, "(the same columns)", "", str(max(table.sample_count for table in log.tables)), "", ""))
+            rows.append((log.name, "(the same columns)", "", str(max(table.sample_count for table in log.tables)), "", ""))
             continue
         seen.add(kind)
         for table in log.tables:
             for i, (name, values) in enumerate(table.columns.items()):
                 if i == MOST_COLUMNS:
-                    rows.append((log.path.name, f"{table.full_name('')}… {len(table.columns) - i} more", "", "", "", ""))
+                    rows.append((log.name, f"{table.full_name('')}… {len(table.columns) - i} more", "", "", "", ""))
                     break
                 known = values[np.isfinite(values)]
                 ends = _ends(float(known.min()), float(known.max())) if len(known) else ("", "")
-                rows.append((log.path.name, table.full_name(name), table.units.get(name, ""), str(len(known)), *ends))
+                rows.append((log.name, table.full_name(name), table.units.get(name, ""), str(len(known)), *ends))
     return rows
 
 
@@ -44,8 +44,15 @@ def _ends(least: float, largest: float) -> tuple[str, str]:
     return short if short[0] != short[1] else (f"{least:.14g}", f"{largest:.14g}")
 
 
-def plot_rig(rig: Rig, path: str | Path) -> None:
+def plot_rig(rig: Rig, path: str | Path, set_aside: Mapping[str, tuple[str, np.ndarray, np.ndarray]] | None = None) -> None:
     """Write a picture of the recordings of a rig: what drove the sensor, and what answered, over time.
+
+    Parameters
+    ----------
+    rig : Rig
+    path : path of the PNG file
+    set_aside : mapping of str to (quantity, (m,) float, (m,) float)
+        By the names of trials: times and values of samples of the stimulus that were set aside; they are marked.
 
     Raises
     ------
@@ -60,6 +67,10 @@ def plot_rig(rig: Rig, path: str | Path) -> None:
     axes = np.atleast_2d(figure.subplots(len(trials), 2, squeeze=False))
     for row, trial in zip(axes, trials, strict=True):
         _curves(row[0], trial.time, _driven(trial.stimulus, trial.level, trial.position))
+        if set_aside and trial.name in set_aside:
+            quantity, times, values = set_aside[trial.name]
+            row[0].plot(times, values, "rx", markersize=5.0, label=f"{quantity}, set aside")
+            row[0].legend(fontsize="x-small", loc="upper right")
         answered: dict[str, np.ndarray] = {}
         if trial.reading is not None:
             loudest = np.argsort(-np.nan_to_num(np.nanmax(trial.reading, axis=0) - np.nanmin(trial.reading, axis=0)))

@@ -10,12 +10,13 @@ from typing import Any
 
 import numpy as np
 
-from ...errors import FileError
+from ...errors import FileError, counted
 from .answers import UNKNOWN, Answers, ColumnAnswer, LoggerAnswer, RecordingAnswer, Repeated, Use
 from .column_meaning import (
     READING_UNITS,
     Meaning,
     force_unit,
+    is_since_1970,
     length_unit,
     meaning_of,
     name_and_unit,
@@ -23,7 +24,8 @@ from .column_meaning import (
     texel_family,
     time_unit,
 )
-from .log_table import LogFile, LogTable
+from .log_table import LogFile, LogTable, with_distinct_names
+from .unnamed_columns import ONE_ROW_PITCH, is_force, is_steady, is_unnamed, names_of_what_drove
 
 POSE, TURN, FORCE = ("x", "y", "z"), ("qw", "qx", "qy", "qz"), ("force_x", "force_y", "force_z")
 BEGINNING = 0.05
@@ -56,16 +58,14 @@ def propose(logs: Sequence[LogFile], name: str = "rig") -> Answers:
     """
     if not logs:
         raise FileError("No logs are given: name at least one file.")
-    names = [log.path.name for log in logs]
-    for one in names:
-        if names.count(one) > 1:
-            raise FileError(f"Two logs are called '{one}': rename one, so that each recording has a name.")
+    logs = with_distinct_names(logs)
     groups = _loggers(logs)
     columns = [_Columns(group) for group in groups]
+    _name_by_behaviour(columns)
     found = [one.answers() for one in columns]
     _choose_stimulus(columns, found)
     _say_what_lacks(columns, found)
-    loggers = tuple(LoggerAnswer(tuple(log.path.name for log in group), own) for group, own in zip(groups, found, strict=True))
+    loggers = tuple(LoggerAnswer(tuple(log.name for log in group), own) for group, own in zip(groups, found, strict=True))
     sensor, indenter, why, unsure = _sensor(columns, found)
     notes = [note for log in logs for note in log.notes]
     notes += [note for one in columns for note in one.left_out(found[columns.index(one)])]
@@ -82,21 +82,22 @@ def _loggers(logs: Sequence[LogFile]) -> list[list[LogFile]]:
         own = _column_names(log)
         for group in found:
             other = _column_names(group[0])
-            if len(own & other) >= SAME_COLUMNS * len(own | other):
+            least = 1.0 if is_unnamed([*own, *other]) else SAME_COLUMNS  # numbers of columns are no names that two files share
+            if len(own & other) >= least * len(own | other):
                 group.append(log)
                 break
         else:
             found.append([log])
-    if len(found) == 1 and len(logs) > 1 and all(re.match(r"column_\d+$", name) for t in logs[0].tables for name in t.columns):
+    if len(found) == 1 and len(logs) > 1 and is_unnamed([name for t in logs[0].tables for name in t.columns]):
         apart: dict[tuple[str, ...], list[LogFile]] = {}
         for log in logs:
-            apart.setdefault(tuple(re.findall(r"[A-Za-z]+", log.path.stem)), []).append(log)
+            apart.setdefault(tuple(re.findall(r"[A-Za-z]+", log.stem)), []).append(log)
         parts = list(apart.values())
-        numbers = [sorted(re.findall(r"\d+", log.path.stem) for log in part) for part in parts]
+        numbers = [sorted(re.findall(r"\d+", log.stem) for log in part) for part in parts]
         if len(parts) == 2 and numbers[0] == numbers[1]:  # without names of columns, those of the files tell the loggers
             found = parts
     if len(found) > 2:
-        kinds = "; ".join(f"'{group[0].path.name}' and {len(group) - 1} others" for group in found[:4])
+        kinds = "; ".join(f"'{group[0].name}' and {len(group) - 1} others" for group in found[:4])
         raise FileError(
             f"The logs have {len(found)} kinds of columns ({kinds}): give those of one sensor, of at most two loggers."
         )
@@ -114,13 +115,13 @@ def _recordings(groups: Sequence[Sequence[LogFile]]) -> tuple[RecordingAnswer, .
         for i in range(len(first))
     ]
     if len(groups) == 1:
-        return tuple(RecordingAnswer(log.path.stem, (log.path.name,), use) for log, use in zip(first, uses))
+        return tuple(RecordingAnswer(log.stem, (log.name,), use) for log, use in zip(first, uses))
     others = list(groups[1])
     found = []
     for log, use in zip(first, uses):
         other, why = _partner(log, others, len(first) == len(groups[1]), first)
-        files = (log.path.name, UNKNOWN if other is None else other.path.name)
-        found.append(RecordingAnswer(log.path.stem, files, use, why=why, sure=other is not None))
+        files = (log.name, UNKNOWN if other is None else other.name)
+        found.append(RecordingAnswer(log.stem, files, use, why=why, sure=other is not None))
     return tuple(found)
 
 
@@ -130,14 +131,14 @@ def _partner(
     """Return the file of the other logger that belongs to a file, and why."""
     if len(others) == 1 and len(all_first) == 1:
         return others[0], "one file of each logger"
-    numbers = re.findall(r"\d+", log.path.stem)
-    same = [other for other in others if re.findall(r"\d+", other.path.stem) == numbers]
+    numbers = re.findall(r"\d+", log.stem)
+    same = [other for other in others if re.findall(r"\d+", other.stem) == numbers]
     if len(same) == 1 and numbers:
         return same[0], f"both files have the number {' '.join(numbers)} in their names"
-    words = set(re.findall(r"[a-z]+|\d+", log.path.stem.lower()))
-    ranked = sorted(others, key=lambda other: -len(words & set(re.findall(r"[a-z]+|\d+", other.path.stem.lower()))))
+    words = set(re.findall(r"[a-z]+|\d+", log.stem.lower()))
+    ranked = sorted(others, key=lambda other: -len(words & set(re.findall(r"[a-z]+|\d+", other.stem.lower()))))
     if len(ranked) > 1 and is_complete:
-        counts = [len(words & set(re.findall(r"[a-z]+|\d+", other.path.stem.lower()))) for other in ranked]
+        counts = [len(words & set(re.findall(r"[a-z]+|\d+", other.stem.lower()))) for other in ranked]
         if counts[0] > counts[1]:
             return ranked[0], "their names have the most in common"
     return None, "which file of the other logger belongs to it is not known, write its name"
@@ -158,6 +159,10 @@ class _Columns:
         self.texels: list[str] = []
         self.texels_named = False
         self.candidates: dict[str, list[str]] = {}
+        self.behaviours: dict[str, str] = {}
+        """Why unnamed columns are what they are taken for."""
+        self.is_unnamed_sensor = False
+        self.has_texels = True
 
     def _meaning(self, full: str) -> Meaning:
         table, _, short = full.rpartition("/")
@@ -203,14 +208,14 @@ class _Columns:
             if meaning.quantity and (self.span(name) > 0.0 or meaning.quantity in (*POSE, *TURN, *FORCE)):
                 self.candidates.setdefault(meaning.quantity, []).append(name)
         found: dict[str, ColumnAnswer] = {"time": self._time()}
-        taken = {name for names in self.candidates.values() for name in names}
+        taken = {name for names in self.candidates.values() for name in names} | set(self.clocks(found["time"]))
         self.texels, self.texels_named = texel_family([name for name in self.names if name not in taken])
         for group in (POSE, TURN, FORCE):
             found |= self._vector(group)
         for quantity in ("depth", "force", "slide_x", "slide_y", "temperature"):
             if names := self.candidates.get(quantity):
                 found[quantity] = self._one(quantity, names)
-        if self.texels:
+        if self.texels and self.has_texels:
             found["texel"] = self._texel()
         return found
 
@@ -260,13 +265,24 @@ class _Columns:
         why = why if is_named else f"{why}; it is the column that rises like a clock"
         if share:
             why = f"{why}; {share:.0%} of the stamps repeat, which looks as if they were coarser than the samples"
+        counts_from_1970 = len(rising) == 1 and self.span(best) > 0.0 and is_since_1970(self.values(best, self.logs[0]), unit)
         return ColumnAnswer(
             (short if per_table else best,),
             unit,
             why=why,
-            sure=(sure and is_named or per_table) and not share,
+            sure=(sure and (is_named or counts_from_1970) or per_table) and not share,
             repeated=repeats,
         )
+
+    def clocks(self, time: ColumnAnswer) -> list[str]:
+        """Return the columns that are the clock, and unnamed ones that rise with it."""
+        if UNKNOWN in time.names or not time.names:
+            return []
+        own = [name for name in self.names if name in time.names or name.rpartition("/")[2] in time.names]
+        if len(own) == 1 and is_unnamed(self.names):
+            clock = self.values(own[0], self.logs[0])
+            own += [name for name in self.names if name != own[0] and is_steady(clock, self.values(name, self.logs[0]))]
+        return own
 
     def _repeats(self, name: str) -> tuple[Repeated, float]:
         steps = np.concatenate([np.diff(self.values(name, log)) for log in self.logs])
@@ -289,7 +305,11 @@ class _Columns:
         for quantity in group:
             for name in self.candidates.get(quantity, []):
                 table, _, short = name.rpartition("/")
-                stem = re.sub(r"[xyzwXYZW](?=[^A-Za-z]*$|[ _(\[].*$)", "", name_and_unit(short)[0], count=1)
+                stem = (
+                    ""
+                    if name in self.behaviours
+                    else re.sub(r"[xyzwXYZW](?=[^A-Za-z]*$|[ _(\[].*$)", "", name_and_unit(short)[0], count=1)
+                )
                 families.setdefault((table, stem), {}).setdefault(quantity, name)
         families = {key: own for key, own in families.items() if any(self.span(name) > 0.0 for name in own.values())}
         if not families:
@@ -317,11 +337,13 @@ class _Columns:
         elif quantity == "temperature":
             unit, why, sure = temperature_unit(self.values(name, self.logs[0]), stated)
         else:
-            unit, why, sure = force_unit(stated)
+            unit, why, sure = force_unit(stated, self.span(name))
             if quantity in FORCE and self._is_ros(name):
                 unit, why, sure = "N", "ROS says so", True
         if self._is_ros(name) and not stated and quantity in (*POSE, "slide_x", "slide_y"):
             unit, why, sure = "m", "ROS says so", True
+        if name in self.behaviours:
+            why = f"{self.behaviours[name]}; {why}"
         weak = self.meanings[name].weight == 1 and not set(POSE) <= set(self.candidates)
         if len(names) > 1:
             other = next(one for one in names if one != name)
@@ -335,7 +357,8 @@ class _Columns:
         units = {self.meanings[name].unit for name in self.texels}
         unit = units.pop() if len(units) == 1 else ""
         what = f"{len(self.texels)} columns differ by a number" if len(self.texels) > 1 else "its name is a word for readings"
-        return ColumnAnswer(tuple(self.texels), unit, why=what, sure=self.texels_named)
+        what = f"the {counted(len(self.texels), 'column')} beside the clock" if self.is_unnamed_sensor else what
+        return ColumnAnswer(tuple(self.texels), unit, why=what, sure=self.texels_named or self.is_unnamed_sensor)
 
     def left_out(self, found: Mapping[str, ColumnAnswer]) -> list[str]:
         """Return a sentence about the columns that nothing is made of."""
@@ -343,10 +366,30 @@ class _Columns:
         rest = [name for name in self.names if name not in used and name.rpartition("/")[2] not in used]
         if not rest:
             return []
-        return [f"'{self.logs[0].path.name}': not used: {listed(rest)}."]
+        return [f"'{self.logs[0].name}': not used: {listed(rest)}."]
 
 
 # --- what drove the sensor, and what answered
+
+
+def _name_by_behaviour(columns: Sequence[_Columns]) -> None:
+    """Of two loggers whose columns have no names, say which was the sensor, and what the columns of the other one are."""
+    if len(columns) != 2 or not all(is_unnamed(one.names) for one in columns):
+        return
+    driver, sensor = sorted(columns, key=lambda one: len(one.names))
+    if len(driver.names) == len(sensor.names):
+        return
+    clocks = driver.clocks(driver.answers()["time"])
+    driver.candidates.clear()
+    found = names_of_what_drove({name: driver.values(name) for name in driver.names if name not in clocks})
+    if not found:
+        return
+    for name in driver.names:
+        quantity, why = found.get(name, ("", ""))
+        driver.meanings[name] = Meaning(quantity, "", 2 if quantity else 0)
+        driver.behaviours[name] = why
+    driver.has_texels = False
+    sensor.is_unnamed_sensor = True
 
 
 def _choose_stimulus(columns: Sequence[_Columns], found: list[dict[str, ColumnAnswer]]) -> None:
@@ -371,6 +414,8 @@ def _choose_stimulus(columns: Sequence[_Columns], found: list[dict[str, ColumnAn
         own = found[i]["force"] if "force" in owner else found[i].pop("force_z")
         _drop(found, FORCE)
         zero, way = columns[i].deviation(own.names[0])
+        if is_force(columns[i].values(own.names[0])):
+            zero, way = 0.0, abs(way)  # a recording may begin under load
         is_off = abs(zero) > ZERO_SHARE * abs(way)
         why = f"{own.why}; it is {zero:.4g} without load, which is subtracted" if is_off else own.why
         own = replace(
@@ -430,8 +475,11 @@ def _sensor(
     is_pose = any(set(POSE) <= set(own) for own in found)
     count = len(texels.names) if texels else 1
     rows, across, reason, unsure = _grid_of(count, columns)
-    pitch: Any = [UNKNOWN, UNKNOWN] if is_pose or count > 1 else [0.01, 0.01]
-    why = {"grid": reason + ("; pitch along x and y in metres" if UNKNOWN in pitch else "; its size has no influence here")}
+    if any(one.is_unnamed_sensor for one in columns) and not is_pose:
+        rows, across, reason, unsure = 1, count, f"{counted(count, 'channel')} in one row, as no log has their places", set()
+    is_free = not is_pose and (count == 1 or not unsure and rows == 1)
+    pitch: Any = [ONE_ROW_PITCH, ONE_ROW_PITCH] if is_free else [UNKNOWN, UNKNOWN]
+    why = {"grid": reason + ("; its size has no influence here" if is_free else "; pitch along x and y in metres")}
     sensor: dict[str, Any] = {"grid": {"rows": rows, "columns": across, "pitch": pitch}}
     if texels is not None:
         unit = texels.unit

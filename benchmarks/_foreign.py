@@ -1,0 +1,177 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Openly licensed recordings of other people's sensors, and a model of each by hand of at most five numbers per channel.
+
+The models were written down here, and committed, before they were fitted; only the cubic of eFlesh's normal force had been
+tried before. A model is a list of terms whose weights follow from a linear fit for each channel, in a few numbers that all
+channels share (:mod:`._further.handmade`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from palpate.core.gap.dataset.second_logger import interpolated
+from palpate.core.gap.logs.column_meaning import GRAVITY
+
+from ._further.handmade import HandmadeModel, low_pass
+from ._recordings import SETS, Columns, Recording, thinned
+
+RUNS = (("20250401_014340_probe", "fit"), ("20250401_015037_probe", "check"))
+"""Of eFlesh's normal force: whole runs."""
+SHEAR = "20250416_200533_probe"
+THINNED = 2
+"""Samples of eFlesh of which means are taken."""
+
+
+@dataclass(frozen=True)
+class ForeignSet:
+    """One set.
+
+    Attributes
+    ----------
+    kind : str
+        Of sensor.
+    licence : str
+    split : str
+        What is fitted, and what is checked.
+    read : function
+        From the folder of all data to a recording.
+    by_hand : HandmadeModel
+    """
+
+    kind: str
+    licence: str
+    split: str
+    read: Callable[[Path], Recording]
+    by_hand: HandmadeModel
+
+
+def _eflesh(folder: Path) -> Columns:
+    """Force (N) at the times of the magnetometers, and their channels."""
+    states = np.loadtxt(folder / "states.csv", delimiter=",")
+    sensor = np.loadtxt(folder / "sensor_post_baselines.csv", delimiter=",")
+    force = np.where(states[:, 4] < 0.0, np.nan, states[:, 4]) * 1e-3 * GRAVITY
+    inside = (sensor[:, 0] >= states[0, 0]) & (sensor[:, 0] <= states[-1, 0])
+    at = interpolated(states[:, 0], force, sensor[inside, 0])
+    table = np.column_stack([sensor[inside, 0], at, sensor[inside, 1:]])
+    table = thinned(table[np.isfinite(table).all(axis=1)], THINNED)
+    channels = {f"texel_{i}": column for i, column in enumerate(table[:, 2:].T)}
+    return {"time": table[:, 0] - table[0, 0], "force": table[:, 1], **channels}
+
+
+def _as_recording(name: str, trials: list[tuple[str, str, Columns]]) -> Recording:
+    count = sum(column.startswith("texel_") for column in trials[0][2])
+    # a known force is shared by all texels: each of n channels sees the n-th part, so the number of channels is taken out
+    shared = [(trial, use, columns | {"force": count * columns["force"]}) for trial, use, columns in trials]
+    return Recording(name, f'grid = {{ rows = 1, columns = {count}, pitch = 0.01 }}\nunit = "uT"', shared)
+
+
+def eflesh_normal(data: Path) -> Recording:
+    """15 channels of five magnetometers under a lattice with magnets; one run of presses is fitted, another one checked."""
+    folder = data / "eflesh_magnetic_mit" / "normal_force"
+    return _as_recording("eFlesh, normal force", [(name, use, _eflesh(folder / name)) for name, use in RUNS])
+
+
+def eflesh_shear(data: Path) -> Recording:
+    """30 channels of ten magnetometers; there is one run, of which the first half is fitted."""
+    columns = _eflesh(data / "eflesh_magnetic_mit" / "shear_force" / SHEAR)
+    half = len(columns["time"]) // 2
+    parts = (("first", "fit", slice(0, half)), ("second", "check", slice(half, None)))
+    trials = [(name, use, {key: values[part] for key, values in columns.items()}) for name, use, part in parts]
+    return _as_recording("eFlesh, shear", trials)
+
+
+def _cubic(p, c, channel):
+    """A cubic of the force, and what is there without one."""
+    force = c["force"] / 5e2
+    return [np.ones_like(force), force, force**2, force**3]
+
+
+def _insole(p, c, channel):
+    """A gain that falls with the pressure, and what is there without one."""
+    force = c["force"] / 2.5e3
+    return [np.ones_like(force), force, force**2]
+
+
+def _tube(p, c, channel):
+    """The force behind one low pass, and what is there without one."""
+    return [np.ones_like(c["force"]), low_pass(c["time"], c["force"], p[0])]
+
+
+def _adhesive(p, c, channel):
+    """A spring and two Maxwell branches."""
+    strain = c["depth"] * 1e3
+    return [strain, *(strain - low_pass(c["time"], strain, tau) for tau in p)]
+
+
+def _foam(p, c, channel):
+    """A spring, and a densification that goes with a power of the strain."""
+    strain = c["depth"] * 1e2
+    return [strain, strain ** p[0]]
+
+
+def _brake(p, c, channel):
+    """Dahl's bristles, and viscous friction."""
+    travel = c["slide_x"]
+    bristle = np.zeros_like(travel)
+    for t in range(1, len(travel)):
+        step = travel[t] - travel[t - 1]
+        bristle[t] = (bristle[t - 1] + step) / (1.0 + abs(step) / (1e-3 * p[0]))
+    return [np.ones_like(travel), bristle, np.gradient(travel, c["time"])]
+
+
+FOREIGN: dict[str, ForeignSet] = {
+    "eflesh-normal": ForeignSet(
+        "magnets in a printed lattice", "MIT", "one run, another", eflesh_normal, HandmadeModel(_cubic, (), (), (), "cubic")
+    ),
+    "eflesh-shear": ForeignSet(
+        "magnets in a printed lattice", "MIT", "first half, second", eflesh_shear, HandmadeModel(_cubic, (), (), (), "cubic")
+    ),
+    "insole": ForeignSet(
+        "capacitive texels on foam",
+        "BSD-3-Clause",
+        "two days, three others",
+        SETS["insole"],
+        HandmadeModel(_insole, (), (), (), "parabola"),
+    ),
+    "tube": ForeignSet(
+        "fluid-filled tube",
+        "CC BY 4.0",
+        "two depths of water, two others",
+        SETS["tube"],
+        HandmadeModel(_tube, (0.5,), (0.02,), (5.0,), "one low pass"),
+    ),
+    "tube-by-place": ForeignSet(
+        "fluid-filled tube",
+        "CC BY 4.0",
+        "two depths of water, two others",
+        SETS["tube-by-place"],
+        HandmadeModel(_tube, (0.5,), (0.02,), (5.0,), "one low pass, a gain for each place"),
+    ),
+    "adhesive": ForeignSet(
+        "acrylic adhesive",
+        "MIT",
+        "two rates, a third",
+        SETS["adhesive"],
+        HandmadeModel(_adhesive, (5.0, 100.0), (0.1, 5.0), (50.0, 5000.0), "spring and two Maxwell branches"),
+    ),
+    "foam": ForeignSet(
+        "shoe foam",
+        "MIT",
+        "one foam, another",
+        SETS["foam"],
+        HandmadeModel(_foam, (6.0,), (1.5,), (30.0,), "spring and a power"),
+    ),
+    "brake": ForeignSet(
+        "band brake",
+        "CC BY-SA 4.0",
+        "0.5 Hz, 1 Hz",
+        SETS["brake"],
+        HandmadeModel(_brake, (1.0,), (0.01,), (20.0,), "Dahl and viscous friction"),
+    ),
+}
+"""By name. None is left out because it goes badly."""

@@ -1,0 +1,66 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The magnetic field of point dipoles (Jackson, Classical Electrodynamics, 3rd ed., Eq. 5.56).
+
+A magnet is a dipole where it is seen from farther away than its own size: on the axis of a cylinder as long as its radius, the
+dipole at its centre is off by 12 % at three radii and by 1.6 % at eight.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+MU0_4PI = 1e-7
+"""T·m/A: the magnetic constant divided by 4 π."""
+
+
+def dipole_field(offset: np.ndarray, moment: np.ndarray) -> np.ndarray:
+    """Return the flux density of dipoles.
+
+    Parameters
+    ----------
+    offset : (..., 3) float, m
+        From the dipole to where the field is wanted; not zero.
+    moment : (..., 3) float, A·m²
+
+    Returns
+    -------
+    (..., 3) float, T
+    """
+    square = np.sum(offset**2, axis=-1, keepdims=True)
+    along = np.sum(moment * offset, axis=-1, keepdims=True)
+    field: np.ndarray = MU0_4PI * (3.0 * along * offset / square - moment) / square**1.5
+    return field
+
+
+def dipole_gradient(offset: np.ndarray, moment: np.ndarray) -> np.ndarray:
+    """Return how the flux density of dipoles changes with the place, ``∂Bᵢ/∂rⱼ``.
+
+    Parameters
+    ----------
+    offset : (..., 3) float, m
+    moment : (..., 3) float, A·m²
+
+    Returns
+    -------
+    (..., 3, 3) float, T/m
+        Symmetric and of trace zero: outside of a dipole its field has neither curl nor divergence.
+    """
+    square = np.sum(offset**2, axis=-1)[..., None, None]
+    along = np.sum(moment * offset, axis=-1)[..., None, None]
+    r_i, r_j = offset[..., :, None], offset[..., None, :]
+    m_i, m_j = moment[..., :, None], moment[..., None, :]
+    both = m_j * r_i + m_i * r_j + along * np.eye(3)
+    gradient: np.ndarray = 3.0 * MU0_4PI * (both - 5.0 * along * r_i * r_j / square) / square**2.5
+    return gradient
+
+
+def moment_of_magnet(remanence: float, volume: float) -> float:
+    """Return the dipole moment of a permanent magnet that is magnetised evenly, A·m².
+
+    Parameters
+    ----------
+    remanence : float, T
+        1.43 to 1.48 T for N52.
+    volume : float, m³
+    """
+    return remanence * volume / (4.0 * np.pi * MU0_4PI)

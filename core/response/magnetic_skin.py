@@ -1,0 +1,226 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Magnetic skins: magnets in a compliant layer move with its texels, and magnetometers below see the sum of their fields."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import ParameterError, SensorError, counted
+from ..geometry.texels import Texels
+from .dipoles import dipole_field, dipole_gradient
+from .layer import layer_weights
+
+BLOCK_NUMBERS = 1 << 20
+"""Offsets between magnets and magnetometers that are worked on at once."""
+
+
+@dataclass(frozen=True)
+class Magnets:
+    """Permanent magnets in the layer of a skin, in the frame of the sensor's body.
+
+    Attributes
+    ----------
+    place : (m, 3) float, m
+        At rest.
+    moment : (m, 3) float, A·m²
+        It keeps its direction: a magnet is carried along and does not turn.
+    """
+
+    place: np.ndarray
+    moment: np.ndarray
+
+
+@dataclass(frozen=True)
+class Magnetometers:
+    """Chips that measure the field along three axes, in the frame of the sensor's body.
+
+    Attributes
+    ----------
+    place : (k, 3) float, m
+    axes : (k, 3, 3) float
+        Unit vectors of each chip's x, y and z axis in its rows; they need not be perpendicular.
+    full_scale : float, T
+        Largest field that an axis shows; what is larger is clipped.
+    offset : (k, 3) float, T
+        What each axis shows more: the field of the surroundings, and its own zero.
+    size : float, m
+        Half the height of a chip: magnets cannot be nearer.
+    """
+
+    place: np.ndarray
+    axes: np.ndarray
+    full_scale: float
+    offset: np.ndarray
+    size: float = 5e-4
+
+
+@dataclass(frozen=True)
+class VectorReadings:
+    """Readings of several channels for each place where something is measured.
+
+    Attributes
+    ----------
+    values : (T, k, c) float
+    clipped : (T, k, c) bool
+        Channels beyond their range.
+    unit : str
+    """
+
+    values: np.ndarray
+    clipped: np.ndarray
+    unit: str = "T"
+
+    def said(self) -> str:
+        """Return a sentence about clipped channels, empty if there are none."""
+        places = np.argwhere(self.clipped.any(axis=0))
+        if not len(places):
+            return ""
+        frames = int(self.clipped.any(axis=(1, 2)).sum())
+        first = f"channel {'xyz'[places[0][1]] if self.values.shape[2] == 3 else places[0][1]} of magnetometer {places[0][0]}"
+        more = f" and {counted(len(places) - 1, 'other channel')}" if len(places) > 1 else ""
+        return f"{first}{more}: beyond the range in {counted(frames, 'frame')}, and clipped there."
+
+
+@dataclass(frozen=True)
+class MagneticSkin:
+    """A compliant layer with magnets, over magnetometers.
+
+    Attributes
+    ----------
+    magnets : Magnets
+    magnetometers : Magnetometers
+    weights : (m, n) float
+        Share of each texel's displacement with which each magnet moves (:func:`.layer.layer_weights`).
+    """
+
+    magnets: Magnets
+    magnetometers: Magnetometers
+    weights: np.ndarray
+
+    def field_at_rest(self) -> np.ndarray:
+        """Return what the magnetometers see while nothing moves, without their offsets, (k, 3) float, T."""
+        return self._seen(self.magnets.place[None])[0]
+
+    def readings(self, displacement: np.ndarray, ambient: np.ndarray | None = None) -> VectorReadings:
+        """Return what the magnetometers show while the texels move.
+
+        Parameters
+        ----------
+        displacement : (T, n, 3) float, m
+            Of the texels (:func:`.layer.texel_displacements`).
+        ambient : (T, 3) float, T, or None
+            Field of the surroundings, which all magnetometers share.
+
+        Returns
+        -------
+        VectorReadings
+            (T, k, 3), in tesla.
+
+        Raises
+        ------
+        ParameterError
+            The displacements have another number of texels, or a value that is no number, or a magnet meets a magnetometer.
+        """
+        displacement = np.asarray(displacement, float)
+        texels = self.weights.shape[1]
+        if displacement.ndim != 3 or displacement.shape[1:] != (texels, 3):
+            raise ParameterError(
+                f"The displacements have the shape {displacement.shape} and the skin has {texels} texels: "
+                f"give (T, {texels}, 3)."
+            )
+        if not np.isfinite(displacement).all():
+            raise ParameterError("The displacements hold values that are no numbers: give metres for each texel and frame.")
+        numbers = len(self.magnets.place) * len(self.magnetometers.place)
+        step = max(1, BLOCK_NUMBERS // max(numbers, 1))
+        parts = [self._seen(self.places(displacement[i : i + step])) for i in range(0, len(displacement), step)]
+        values = np.concatenate(parts) if parts else np.zeros((0, len(self.magnetometers.place), 3))
+        if ambient is not None:
+            values = values + np.einsum("kij,tj->tki", self.magnetometers.axes, ambient)
+        values = values + self.magnetometers.offset
+        limit = self.magnetometers.full_scale
+        return VectorReadings(np.clip(values, -limit, limit), np.abs(values) > limit)
+
+    def places(self, displacement: np.ndarray) -> np.ndarray:
+        """Return where the magnets are, (T, m, 3) float, m, from the texels' displacements (T, n, 3)."""
+        found: np.ndarray = self.magnets.place + np.einsum("mn,tnk->tmk", self.weights, displacement)
+        return found
+
+    def jacobian(self, displacement: np.ndarray) -> np.ndarray:
+        """Return how each reading changes with each texel's displacement at one moment, without clipping.
+
+        Parameters
+        ----------
+        displacement : (n, 3) float, m
+
+        Returns
+        -------
+        (k, 3, n, 3) float, T/m
+        """
+        place = self.places(displacement[None])[0]
+        gradient = dipole_gradient(self.magnetometers.place[:, None] - place, self.magnets.moment)
+        seen = -np.einsum("kij,kmjl->kiml", self.magnetometers.axes, gradient)  # a magnet that moves takes its field along
+        found: np.ndarray = np.einsum("kiml,mn->kinl", seen, self.weights)
+        return found
+
+    def _seen(self, place: np.ndarray) -> np.ndarray:
+        """Fields of magnets at some places (T, m, 3) along the axes of the magnetometers, (T, k, 3)."""
+        offset = self.magnetometers.place[None, :, None] - place[:, None]
+        nearest = float(np.sqrt(np.min(np.sum(offset**2, axis=-1)))) if offset.size else np.inf
+        if nearest < self.magnetometers.size:
+            _, chip, magnet = np.unravel_index(int(np.argmin(np.sum(offset**2, axis=-1))), offset.shape[:3])
+            raise ParameterError(
+                f"Magnet {magnet} comes within {1e3 * nearest:.3g} mm of magnetometer {chip}, inside its chip: "
+                "place it higher, or press less deep."
+            )
+        field = dipole_field(offset, self.magnets.moment).sum(axis=2)
+        found: np.ndarray = np.einsum("kij,tkj->tki", self.magnetometers.axes, field)
+        return found
+
+
+def magnetic_skin(texels: Texels, magnets: Magnets, magnetometers: Magnetometers, thickness: float) -> MagneticSkin:
+    """Return a skin whose magnets move with the texels on its surface.
+
+    Parameters
+    ----------
+    texels : Texels
+    magnets : Magnets
+    magnetometers : Magnetometers
+    thickness : float, m
+        Of the compliant layer, whose base is rigid.
+
+    Raises
+    ------
+    SensorError
+        Shapes do not agree, a number cannot be, or a magnet is in no layer or in a chip.
+    """
+    for name, values, shape in (
+        ("places of magnets", magnets.place, (len(magnets.place), 3)),
+        ("moments of magnets", magnets.moment, (len(magnets.place), 3)),
+        ("places of magnetometers", magnetometers.place, (len(magnetometers.place), 3)),
+        ("axes of magnetometers", magnetometers.axes, (len(magnetometers.place), 3, 3)),
+        ("offsets of magnetometers", magnetometers.offset, (len(magnetometers.place), 3)),
+    ):
+        if np.shape(values) != shape or not len(values) or not np.isfinite(values).all():
+            raise SensorError(f"The {name} have the shape {np.shape(values)}: give finite numbers of the shape {shape}.")
+    if not 0.0 < thickness < 1.0 or not magnetometers.full_scale > 0.0:
+        raise SensorError(
+            f"A layer of {thickness:g} m with magnetometers up to {magnetometers.full_scale:g} T cannot be: "
+            "give metres and tesla above zero."
+        )
+    below = np.einsum("mnk,nk->mn", texels.position[None] - magnets.place[:, None], texels.normal)
+    nearest = np.argmin(np.sum((texels.position[None] - magnets.place[:, None]) ** 2, axis=2), axis=1)
+    depth = below[np.arange(len(below)), nearest]
+    (outside,) = np.nonzero((depth < 0.0) | (depth > thickness))
+    if len(outside):
+        raise SensorError(
+            f"Magnet {outside[0]} is {1e3 * depth[outside[0]]:.3g} mm below the texels and the layer is {1e3 * thickness:g} mm "
+            "thick: place it inside."
+        )
+    skin = MagneticSkin(magnets, magnetometers, layer_weights(texels, magnets.place, thickness))
+    try:
+        skin.field_at_rest()
+    except ParameterError as error:
+        raise SensorError(str(error)) from error
+    return skin

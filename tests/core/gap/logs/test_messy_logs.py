@@ -1,0 +1,157 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Logs as magnetic skins have them: two files without headers, signed channels, −1 where the scale was too slow, grams."""
+
+import numpy as np
+import pytest
+
+from palpate.commands import main
+from palpate.core.errors import FileError
+from palpate.core.gap.dataset.rig import read_rig
+from palpate.core.gap.logs.log_file import read_log
+from palpate.core.gap.logs.log_table import with_distinct_names
+from palpate.core.gap.logs.missing_codes import missing_code
+from palpate.core.gap.logs.new_rig import write_rig
+from palpate.core.gap.logs.proposal import propose
+from palpate.core.gap.logs.spoiled_samples import spoiled_samples
+from palpate.core.gap.logs.unnamed_columns import is_force, is_steady, names_of_what_drove
+from palpate.core.jobs.job_runner import run_job
+
+GRAM = 9.80665e-3
+CHANNELS = 6
+
+
+def press(seed, late=0.0):
+    """Two loggers of 120 s at 15 Hz: times, heights (mm) and forces (g) of one, times and six signed channels of the other."""
+    random = np.random.default_rng(seed)
+    time = 1.7e9 + 1000.0 * seed + np.cumsum(random.uniform(0.06, 0.075, 1700))
+
+    def force(at):
+        since = at - time[0]
+        return 2500.0 * np.maximum(0.0, np.sin(2 * np.pi * since / 13.0 + 0.5)) ** 2 * (0.6 + 0.4 * np.sin(since / 31.0))
+
+    clock = time + 0.002
+    load = force(clock - late)[:, None] / 2500.0
+    gain = np.array([1200.0, 350.0, -1300.0, 3000.0, -420.0, 90.0])
+    readings = gain * (load + np.array([0.3, -0.2, 0.5, -0.3, 0.2, 0.0]) * load**2) + random.normal(
+        0.0, 3.0, (len(time), CHANNELS)
+    )
+    return time, 288.0 - 12.0 * (force(time) / 2500.0) ** 0.7, force(time), clock, readings
+
+
+def write_files(folder, seed, spoil=None, late=0.0):
+    """The two files of a recording in a folder of its own, as the robot's program names them."""
+    time, height, force, clock, readings = press(seed, late)
+    force = np.round(force, 2)
+    if spoil is not None:
+        spoil(force)
+    force[1::2] = -1.0
+    random = np.random.default_rng(seed + 50)
+    constant = 315.0 - 3.1e-5 * (random.random(len(time)) < 0.1)
+    folder.mkdir()
+    states, sensor = folder / "states.csv", folder / "sensor.csv"
+    np.savetxt(states, np.stack([time, constant, -100.0 + 0 * time, height, force], axis=1), "%.9f", delimiter=",")
+    np.savetxt(sensor, np.column_stack([clock, readings]), "%.9f", delimiter=",")
+    return [states, sensor]
+
+
+def test_raw_files_become_a_rig_without_an_answer(tmp_path, capsys):
+    logs = write_files(tmp_path / "a_1", 1) + write_files(tmp_path / "b_2", 2)
+    assert main(["rig", "new", *map(str, logs), "--out", str(tmp_path / "rig")]) == 0
+    said = capsys.readouterr().out
+    assert "-1 in 'column_5' (50% of its samples) counts as missing" in said
+    rig = read_rig(tmp_path / "rig" / "rig.toml")
+    assert [trial.use for trial in rig.trials] == ["fit", "check"] and len(rig.texels) == CHANNELS
+    for seed, trial in zip((1, 2), rig.trials, strict=True):
+        time, _, force, clock, readings = press(seed)
+        assert trial.stimulus == "force" and trial.reading.shape[1] == CHANNELS
+        used = np.isfinite(trial.reading).all(axis=1)
+        assert used.mean() > 0.99
+        at = trial.time[used] - trial.time[0]  # both count from the first sample within the other logger's time
+        np.testing.assert_allclose(trial.level[used], GRAM * np.interp(at, clock - clock[0], force), atol=0.01 * 25)
+        assert np.abs(trial.reading[used][:, 2]).max() == pytest.approx(np.abs(readings[:, 2]).max(), rel=1e-6)
+    text = (tmp_path / "rig" / "rig.toml").read_text()
+    assert "force = column_5 in g" in text and "late = 0.0" in text and "texel = column_2 … column_7 (6)" in text
+    assert (tmp_path / "rig" / "recordings.png").stat().st_size > 10_000
+
+
+def test_a_shift_that_is_there_is_corrected(tmp_path):
+    logs = write_files(tmp_path / "a_1", 1, late=0.9)
+    found = propose([read_log(path) for path in logs])
+    written = run_job(write_rig([read_log(path) for path in logs], found, tmp_path / "rig"))
+    assert "late = 0.9" in written.path.read_text() or "late = 0.8" in written.path.read_text()
+
+
+def test_samples_that_the_readings_contradict_are_left_empty_and_shown(tmp_path):
+    def spoil(force):
+        top = int(np.argmax(force)) // 2 * 2
+        force[top + 4 : top + 12] = 0.0  # zeros within a press
+        force[top + 40] += 1500.0  # a spike
+        up = top - 34
+        force[up : up + 20] = force[up - 2]  # a scale that sticks
+
+    logs = write_files(tmp_path / "a_1", 1, spoil)
+    found = propose([read_log(path) for path in logs])
+    written = run_job(write_rig([read_log(path) for path in logs], found, tmp_path / "rig"))
+    ((name, (quantity, times, values)),) = written.set_aside.items()
+    assert quantity == "force" and (values == 0.0).sum() == 4 and 13 <= len(values) <= 17
+    assert any("disagree with the readings" in note for note in written.notes)
+    (trial,) = read_rig(written.path).trials
+    force = GRAM * np.interp(trial.time, press(1)[0] - press(1)[0][0], press(1)[2])
+    assert np.abs(trial.level - force)[np.isfinite(trial.reading[:, 0])].max() < 0.02 * force.max()
+    assert trial.name == name and len(times) == len(values)
+
+
+def test_what_a_slow_sensor_leaves_is_not_set_aside():
+    """A sensor behind a low pass of 0.5 s under steps with holds disagrees after each step, for no fault of the stimulus."""
+    time = np.arange(3000) * 0.05
+    level = np.repeat(np.random.default_rng(3).integers(0, 6, 75), 40).astype(float)
+    reading, state = np.empty(len(level)), 0.0
+    for i, value in enumerate(level):
+        state += (value - state) * (1.0 - np.exp(-0.1))
+        reading[i] = state
+    assert not spoiled_samples((time, level), (time, np.stack([reading, -2.0 * reading], axis=1))).any()
+
+
+def test_codes_for_missing_values():
+    force = np.maximum(0.0, 100.0 * np.sin(np.arange(2000) * 0.02))
+    coded = force.copy()
+    coded[::3] = -1.0
+    assert missing_code(coded) == -1.0 and missing_code(force) is None
+    coded[::3] = 9999.0
+    assert missing_code(coded) == 9999.0
+    noise = np.round(np.random.default_rng(0).normal(0.0, 0.5, 4000)).clip(-1, 1) + np.where(np.arange(4000) > 3000, 50.0, 0.0)
+    assert missing_code(noise) is None  # a converter's −1 around zero
+    rail = np.clip(np.abs(300.0 * np.sin(np.arange(2000) * 0.02)), 0, 255)
+    assert missing_code(rail) is None
+
+
+def test_columns_that_rise_with_the_clock_are_no_texels(tmp_path):
+    time, _, force, clock, readings = press(1)
+    table = np.column_stack([clock, np.arange(len(clock)), readings])
+    np.savetxt(tmp_path / "sensor_1.csv", table, "%.9f", delimiter=",")
+    np.savetxt(tmp_path / "stage_1.csv", np.column_stack([time, force]), "%.9f", delimiter=",")
+    found = propose([read_log(tmp_path / "sensor_1.csv"), read_log(tmp_path / "stage_1.csv")])
+    (names,) = [one.columns["texel"].names for one in found.loggers if "texel" in one.columns]
+    assert names == tuple(f"column_{i}" for i in range(3, 9))
+    assert is_steady(clock, np.arange(len(clock))) and not is_steady(clock, readings[:, 0])
+
+
+def test_what_drove_is_known_by_its_behaviour():
+    _, height, force, _, _ = press(1)
+    still = np.full(len(height), 3.5)
+    assert is_force(force) and not is_force(height) and not is_force(force + 300.0)
+    assert {name: found[0] for name, found in names_of_what_drove({"a": still, "b": height, "c": force}).items()} == {
+        "c": "force"
+    }
+    assert {name: found[0] for name, found in names_of_what_drove({"a": still, "b": height}).items()} == {"b": "z"}
+    three = names_of_what_drove({"a": height, "b": height - 5.0, "c": 2.0 * height})
+    assert [found[0] for found in three.values()] == ["x", "y", "z"]
+    assert names_of_what_drove({"a": height, "b": height - 5.0}) == {}
+
+
+def test_equal_names_in_equal_folders_are_refused(tmp_path):
+    first = write_files(tmp_path / "a_1", 1)[0]
+    (tmp_path / "other").mkdir()
+    second = write_files(tmp_path / "other" / "a_1", 2)[0]
+    with pytest.raises(FileError, match="Two logs are called 'a_1/states.csv'"):
+        with_distinct_names([read_log(first), read_log(second)])

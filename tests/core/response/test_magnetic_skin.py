@@ -1,0 +1,211 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Magnetic skins against closed forms: fields on and off the axis, their symmetries, and what moves them."""
+
+import numpy as np
+import pytest
+
+from palpate.core.errors import ParameterError, SensorError
+from palpate.core.gap.dataset.rig import grid_texels
+from palpate.core.response.dipoles import MU0_4PI, dipole_field, dipole_gradient, moment_of_magnet
+from palpate.core.response.layer import layer_weights, pressure_below_point_load, texel_displacements
+from palpate.core.response.magnetic_skin import Magnetometers, Magnets, magnetic_skin
+
+THICKNESS = 6e-3
+
+
+def random(seed=0):
+    return np.random.default_rng(seed)
+
+
+def skin(rows=4, columns=4, pitch=4.7e-3, full_scale=50e-3, lift=3e-3, **changes):
+    """A layer with a magnet above each of 4 × 4 magnetometers, as in a uSkin: texels are at z = 0."""
+    texels = grid_texels(rows, columns, pitch, pitch)
+    count = rows * columns
+    place = texels.position - [0.0, 0.0, lift]
+    magnets = Magnets(place, np.tile([0.0, 0.0, 4e-3], (count, 1)))
+    chips = Magnetometers(
+        texels.position - [0.0, 0.0, THICKNESS + 1e-3], np.tile(np.eye(3), (count, 1, 1)), full_scale, np.zeros((count, 3))
+    )
+    return texels, magnetic_skin(texels, changes.get("magnets", magnets), changes.get("chips", chips), THICKNESS)
+
+
+def test_on_the_axis_the_field_is_twice_that_beside_it():
+    """B = 2 μ₀ m / (4 π z³) on the axis, −μ₀ m / (4 π x³) beside it (Jackson, Eq. 5.41)."""
+    moment = np.array([0.0, 0.0, 0.02])
+    for distance in (2e-3, 1e-2):
+        size = MU0_4PI * 0.02 / distance**3
+        np.testing.assert_allclose(dipole_field(np.array([0.0, 0.0, distance]), moment), [0.0, 0.0, 2 * size], rtol=1e-14)
+        np.testing.assert_allclose(dipole_field(np.array([distance, 0.0, 0.0]), moment), [0.0, 0.0, -size], rtol=1e-14)
+
+
+def test_off_the_axis_the_field_is_that_of_two_charges():
+    """A dipole is the limit of two magnetic charges: their fields, by Coulomb's law, agree to the square of their distance."""
+    at, moment, apart = np.array([3e-3, -2e-3, 4e-3]), np.array([0.01, 0.02, -0.005]), 1e-6
+    way = moment / np.linalg.norm(moment) * apart / 2
+    charge = np.linalg.norm(moment) / apart
+    expected = MU0_4PI * charge * ((at - way) / np.linalg.norm(at - way) ** 3 - (at + way) / np.linalg.norm(at + way) ** 3)
+    np.testing.assert_allclose(dipole_field(at, moment), expected, rtol=1e-6)
+
+
+def test_far_away_a_cylinder_is_a_dipole():
+    """Axial field of a cylinder that is magnetised evenly (Furlani 2001, Eq. 4.122); the difference falls with the square."""
+    radius, length, remanence = 1e-3, 1e-3, 1.45
+    moment = np.array([0.0, 0.0, moment_of_magnet(remanence, np.pi * radius**2 * length)])
+
+    def error(distance):
+        low, high = distance - length / 2, distance + length / 2
+        exact = remanence / 2 * (high / np.hypot(high, radius) - low / np.hypot(low, radius))
+        return dipole_field(np.array([0.0, 0.0, distance]), moment)[2] / exact - 1.0
+
+    assert error(3e-3) == pytest.approx(0.12, abs=0.005) and error(8e-3) == pytest.approx(0.016, abs=0.001)
+    assert error(2e-2) / error(4e-2) == pytest.approx(4.0, rel=0.02)
+
+
+def test_the_gradient_is_that_of_the_field_without_curl_and_divergence():
+    offset, moment = random().normal(size=(20, 3)) * 5e-3, random(1).normal(size=(20, 3))
+    gradient = dipole_gradient(offset, moment)
+    step = 1e-8
+    moved = np.stack([dipole_field(offset + step * e, moment) - dipole_field(offset - step * e, moment) for e in np.eye(3)], -1)
+    size = np.abs(gradient).max(axis=(1, 2), keepdims=True)
+    assert np.abs(gradient - moved / (2 * step)).max() < 1e-3 * size.max()  # truncation: (h / r)² of the nearest
+    np.testing.assert_allclose(gradient / size, moved / (2 * step) / size, atol=1e-6)
+    assert np.abs(np.trace(gradient, axis1=1, axis2=2) / size[:, 0, 0]).max() < 1e-14
+    assert np.abs(gradient - gradient.transpose(0, 2, 1)).max() < 1e-15 * size.max()
+
+
+def test_two_magnets_have_one_energy():
+    """−m₂·B₁ = −m₁·B₂: which of two magnets is moved in the field of the other one does not matter."""
+    offset, one, other = random(2).normal(size=(3, 50, 3))
+    forth = np.sum(other * dipole_field(offset, one), axis=1)
+    back = np.sum(one * dipole_field(-offset, other), axis=1)
+    np.testing.assert_allclose(forth, back, rtol=1e-12)
+
+
+def test_the_stress_below_a_point_load_carries_it():
+    x = np.linspace(-0.3, 0.3, 1201)
+    stress = pressure_below_point_load(4e-3, x[:, None] ** 2 + x[None] ** 2)
+    assert stress.sum() * (x[1] - x[0]) ** 2 == pytest.approx(
+        1.0, abs=2e-3
+    )  # what lies outside: (d/R)³ / … and the sum's steps
+
+
+def test_a_layer_that_is_pressed_evenly_moves_evenly():
+    """The strain of a layer on a rigid base is the same at all depths: a point at half of it moves half as much."""
+    texels = grid_texels(12, 12, 2e-3, 2e-3)
+    place = np.array([[0.0, 0.0, -1.5e-3], [2e-3, 1e-3, -3e-3], [0.0, 0.0, -6e-3]])
+    moved = layer_weights(texels, place, THICKNESS) @ np.tile([0.0, 3e-4, -1e-3], (len(texels), 1))
+    np.testing.assert_allclose(moved[:, 2], [-0.75e-3, -0.5e-3, 0.0], atol=1e-15)
+    np.testing.assert_allclose(moved[:, 1], [0.225e-3, 0.15e-3, 0.0], atol=1e-15)
+
+
+def test_a_magnet_that_comes_near_is_seen_as_the_dipole_says():
+    texels, one = skin(rows=1, columns=1)
+    displacement = np.zeros((3, 1, 3))
+    displacement[1, 0, 2], displacement[2, 0, 0] = -1e-3, 1e-3
+    values = one.readings(displacement).values[:, 0]
+    moment = 4e-3
+    assert values[0, 2] == pytest.approx(2 * MU0_4PI * moment / 4e-3**3, rel=1e-12)
+    assert values[1, 2] == pytest.approx(2 * MU0_4PI * moment / 3.5e-3**3, rel=1e-12)  # half of the layer's motion
+    assert values[0, 0] == 0.0 and values[2, 0] > 0.0  # below a magnet that moved along +x the field points along +x
+
+
+def test_symmetry_of_a_skin():
+    """A press in the middle of a symmetric pad gives mirrored readings, and shear along y those of shear along x, turned."""
+    _, own = skin()
+    press = np.zeros((1, 16, 3))
+    press[0, [5, 6, 9, 10], 2] = -1e-3
+    values = own.readings(press).values[0].reshape(4, 4, 3)
+    np.testing.assert_allclose(values[:, ::-1] * [-1, 1, 1], values, atol=1e-15)
+    np.testing.assert_allclose(values[::-1] * [1, -1, 1], values, atol=1e-15)
+    sheared, turned = np.zeros((2, 1, 16, 3))
+    sheared[..., 0], turned[..., 1] = 5e-4, 5e-4
+    along_x = own.readings(sheared).values[0].reshape(4, 4, 3)
+    along_y = own.readings(turned).values[0].reshape(4, 4, 3)
+    np.testing.assert_allclose(along_y, along_x.transpose(1, 0, 2)[..., [1, 0, 2]], atol=1e-15)
+
+
+def test_the_jacobian_is_that_of_the_readings():
+    _, own = skin()
+    displacement = 3e-4 * random(5).normal(size=(16, 3))
+    jacobian = own.jacobian(displacement)
+    assert jacobian.shape == (16, 3, 16, 3)
+    step = 1e-8
+    for texel, axis in ((0, 2), (5, 0), (9, 1)):
+        way = np.zeros((16, 3))
+        way[texel, axis] = step
+        ends = own.readings(np.stack([displacement + way, displacement - way])).values
+        difference = (ends[0] - ends[1]) / (2 * step)
+        np.testing.assert_allclose(jacobian[:, :, texel, axis], difference, atol=1e-6 * np.abs(jacobian).max())
+
+
+def test_blocks_of_frames_give_the_same_bytes(monkeypatch):
+    _, own = skin()
+    displacement = 3e-4 * random(5).normal(size=(40, 16, 3))
+    whole = own.readings(displacement).values
+    monkeypatch.setattr("palpate.core.response.magnetic_skin.BLOCK_NUMBERS", 16 * 16 * 7)
+    assert own.readings(displacement).values.tobytes() == whole.tobytes()
+
+
+def test_an_ambient_field_is_shared_and_turned_into_the_axes_of_each_chip():
+    texels, _ = skin()
+    turned = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    chips = Magnetometers(
+        texels.position - [0.0, 0.0, 7e-3], np.stack([np.eye(3)] * 15 + [turned]), 50e-3, np.full((16, 3), 1e-6)
+    )
+    _, own = skin(chips=chips)
+    ambient = np.array([[3e-5, -1e-5, 4e-5]])
+    rest = np.zeros((1, 16, 3))
+    added = own.readings(rest, ambient).values - own.readings(rest).values
+    np.testing.assert_allclose(added[0, 3], ambient[0], atol=1e-17)
+    np.testing.assert_allclose(added[0, 15], [-1e-5, -3e-5, 4e-5], atol=1e-17)
+    np.testing.assert_allclose(own.readings(rest).values[0] - own.field_at_rest(), 1e-6, atol=1e-17)
+
+
+def test_what_exceeds_the_range_is_clipped_and_said():
+    _, own = skin(full_scale=12.6e-3)
+    press = np.zeros((5, 16, 3))
+    press[2:, 5, 2] = -2e-3
+    found = own.readings(press)
+    assert np.abs(found.values).max() == 12.6e-3 and found.clipped[2:, 5, 2].all() and not found.clipped[:2].any()
+    assert found.said() == "channel z of magnetometer 5: beyond the range in 3 frames, and clipped there."
+    assert skin()[1].readings(press).said() == ""
+
+
+def test_displacements_follow_depth_and_shear():
+    texels = grid_texels(1, 2, 1e-3, 1e-3)
+    moved = texel_displacements(texels, np.array([[1e-3, 2e-3]]), np.array([[[0.1, 0.2], [0.0, 0.0]]]), 100.0)
+    np.testing.assert_allclose(moved, [[[1e-3, 2e-3, -1e-3], [0.0, 0.0, -2e-3]]], atol=1e-18)
+
+
+def magnets_at(place, moment=(0.0, 0.0, 4e-3)):
+    return Magnets(np.array([place], float), np.array([moment], float))
+
+
+@pytest.mark.parametrize(
+    ("changes", "sentence"),
+    [
+        ({"magnets": magnets_at([0.0, 0.0, -7e-3])}, "Magnet 0 is 7 mm below the texels and the layer is 6 mm thick"),
+        ({"magnets": magnets_at([0.0, 0.0, -3e-3], (np.nan, 0.0, 0.0))}, "moments of magnets .* give finite numbers"),
+        ({"magnets": Magnets(np.zeros((2, 3)), np.zeros((1, 3)))}, "moments of magnets"),
+        (
+            {"chips": Magnetometers(np.array([[0.0, 0.0, -3.1e-3]]), np.eye(3)[None], 0.05, np.zeros((1, 3)))},
+            "inside its chip: place it higher",
+        ),
+        ({"full_scale": 0.0}, "give metres and tesla above zero"),
+    ],
+)
+def test_skins_that_cannot_be(changes, sentence):
+    with pytest.raises(SensorError, match=sentence):
+        skin(rows=1, columns=1, **changes)
+
+
+def test_displacements_that_cannot_be():
+    _, own = skin()
+    with pytest.raises(ParameterError, match=r"the skin has 16 texels: give \(T, 16, 3\)"):
+        own.readings(np.zeros((2, 15, 3)))
+    with pytest.raises(ParameterError, match="no numbers"):
+        own.readings(np.full((2, 16, 3), np.nan))
+    deep = np.zeros((1, 16, 3))
+    deep[0, :, 2] = -8e-3
+    with pytest.raises(ParameterError, match="inside its chip"):
+        own.readings(deep)
