@@ -179,6 +179,7 @@ def test_friction_goes_along_with_the_engines_motion():
     assert contact.force_on_target[0] == pytest.approx(-sliding, rel=1e-3)
 
 
+@pytest.mark.slow("searches for the load in twelve environments twice, together and one by one")
 def test_environments_have_the_bits_of_single_sensors_under_loads():
     item, dt, count = pad(6, 6, **LAW), 0.005, 12
     draw = np.random.default_rng(4)
