@@ -75,6 +75,26 @@ def single_step(texels: int, mesh: TriangleMesh, height: float) -> Callable[[], 
     return measure
 
 
+def loaded_step(texels: int, mesh: TriangleMesh, height: float) -> Callable[[], float]:
+    """Return a function that gives the microseconds of a step under a given load, which swings by a tenth."""
+    still = np.zeros(3), LEVEL
+    top = np.array([0.0, 0.0, height]), LEVEL
+    pressed = PressedSensor(item(texels), mesh, DT, still, top, 1)
+    loads = np.zeros((STEPS, 6))
+    loads[:, 2] = 9.81 + np.sin(np.linspace(0.0, 2 * np.pi, STEPS))
+    out = pressed.step(still, top, wrench=loads[0])
+
+    def measure() -> float:
+        start = time.thread_time()
+        for load in loads:
+            pressed.step(still, top, out, load)
+        used = (time.thread_time() - start) / STEPS * 1e6
+        assert np.abs(pressed.residual).max() < 1e-6 * loads[-1, 2]
+        return used
+
+    return measure
+
+
 def batch_step(mesh: TriangleMesh, height: float) -> Callable[[], tuple[float, float]]:
     """Return a function that gives milliseconds of a step of all environments: by the wall, and of processors over threads."""
     many = PressedSensors(item(84), mesh, DT, ENVIRONMENTS, THREADS)
@@ -104,7 +124,13 @@ def run() -> Iterator[dict]:
                 "name": f"loop.step.{name}.{texels}", "value": ours, "unit": "us",
                 "peer": peer, "peer_value": theirs, "ratio": ours / theirs, "goal": goal / theirs,
             }  # fmt: skip
-    theirs = least(solver.mujoco_step(84, solver.cube(4))) * ENVIRONMENTS / THREADS / 1e3
+    theirs = least(solver.mujoco_step(84, solver.cube(4)))
+    loaded = least(loaded_step(84, *objects()["cube"]))
+    yield {
+        "name": "loop.load.cube.84", "value": loaded, "unit": "us",
+        "peer": peer, "peer_value": theirs, "ratio": loaded / theirs,
+    }  # fmt: skip
+    theirs *= ENVIRONMENTS / THREADS / 1e3
     for name, (mesh, height) in objects().items():
         measure = batch_step(mesh, height)
         measured = np.array([measure() for _ in range(3 * ROUNDS)])

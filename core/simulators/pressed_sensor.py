@@ -15,6 +15,7 @@ from ..geometry.mesh import TriangleMesh
 from ..model.recording import SENSOR_FIELDS, SensorFrame
 from ..solver.pressed_model import PressedModel
 from ..solver.pressing import PressedTexels, StepMemory, begin_at
+from .load_balance import LoadBalance
 from .sensor_on_mesh import SensorOnMesh
 
 Pose = tuple[ArrayLike, ArrayLike]
@@ -65,6 +66,10 @@ class PressedSensor:
     ----------
     too_deep : int
         How many contact points are pressed past their maximum penetration at the last step, and measure nothing.
+    residual : (1,), (3,) or (6,) float, N and N·m
+        Part of the load given to the last step that no contact balances.
+    displacement : (6,) float, metres and rad
+        Of the target from its pose at the last step, for the load: in the world, and rotation vector about its origin.
 
     Notes
     -----
@@ -96,7 +101,14 @@ class PressedSensor:
         )  # fmt: skip
         wrench = out.wrench[0, 0] if self._one_target else out.wrench[0]
         self._force, self._torque = wrench[..., :3], wrench[..., 3:]
+        self._balance: LoadBalance | None = None
+        self.residual = np.zeros(0)
         self.reset(sensor_pose, target_pose)
+
+    @property
+    def displacement(self) -> np.ndarray:
+        """Of the target from its pose at the last step (6,), metres and rad."""
+        return np.zeros(6) if self._balance is None else self._balance.displacement[0].copy()
 
     @property
     def too_deep(self) -> int:
@@ -117,8 +129,15 @@ class PressedSensor:
         self._steps = 0
         begin_at(self._out.poses[0], self._environments[0])
         self._out.begins[0] = False
+        self._forget_load()
 
-    def step(self, sensor_pose: Pose, target_pose: Pose | Sequence[Pose], out: Contact | None = None) -> Contact:
+    def step(
+        self,
+        sensor_pose: Pose,
+        target_pose: Pose | Sequence[Pose],
+        out: Contact | None = None,
+        wrench: ArrayLike | None = None,
+    ) -> Contact:
         """Go on by one step, to these poses, and return the forces there.
 
         Parameters
@@ -128,18 +147,23 @@ class PressedSensor:
             A sequence if there are several targets.
         out : Contact, optional
             Returned by an earlier step, to write into instead of new arrays.
+        wrench : (6,), (3,) or (1,) float, N and N·m, optional
+            Load that the contact exerts on the target: force and torque about its origin, force alone, or force along the mean
+            normal of the texels. The target is displaced until the contact exerts it (see :mod:`.load_balance`), along and
+            about all axes, along all axes, or along the normal.
 
         Raises
         ------
         ParameterError
-            A pose is not finite, or a quaternion is zero. The sensor stays at the step before.
+            A pose is not finite, or a quaternion is zero; or the load is none. The sensor stays at the step before.
         """
         self._read_poses(sensor_pose, target_pose)
-        if self._model.helpers:
-            with self._model.helping(self._environments[0], self._workspace):
-                self._presser.press(0, 1)
+        if wrench is None:
+            self._forget_load()
+            self._press()
         else:
-            self._presser.press(0, 1)
+            self._check_poses()
+            self._press_under(wrench)
         if not self._out.valid[0]:
             self._out.begins[0] = False
             self._check_poses()
@@ -154,6 +178,34 @@ class PressedSensor:
         np.copyto(out.force_on_target, self._force)
         np.copyto(out.torque_on_target, self._torque)
         return out
+
+    def _press(self) -> None:
+        """Run one step to the poses."""
+        if self._model.helpers:
+            with self._model.helping(self._environments[0], self._workspace):
+                self._presser.press(0, 1)
+        else:
+            self._presser.press(0, 1)
+
+    def _press_under(self, wrench: ArrayLike) -> None:
+        """Run one step under a load."""
+        try:
+            load = np.asarray(wrench, float)
+        except (TypeError, ValueError):
+            load = np.zeros(0)
+        if load.shape not in ((1,), (3,), (6,)) or not np.isfinite(load).all():
+            raise ParameterError(
+                "The wrench is no 1, 3 or 6 finite numbers: give a normal force, a force, or force and torque."
+            )
+        if self._balance is None:
+            self._balance = LoadBalance(self._model, self._out, self._environments, self._press)
+        self.residual = self._balance.step(load[None])[0]
+
+    def _forget_load(self) -> None:
+        """Go on without displacement."""
+        self.residual = np.zeros(0)
+        if self._balance is not None:
+            self._balance.forget(np.ones(1, bool))
 
     def _read_poses(self, sensor_pose: Pose, target_pose: Pose | Sequence[Pose]) -> None:
         """Write the poses down for the solver, which looks whether they are finite."""

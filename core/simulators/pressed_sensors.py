@@ -15,6 +15,7 @@ from ..errors import ParameterError
 from ..geometry.mesh import TriangleMesh
 from ..solver.pressed_model import PressedModel
 from ..solver.pressing import PressedTexels, Presser, StepMemory
+from .load_balance import LoadBalance
 from .sensor_on_mesh import SensorOnMesh
 
 CHUNK_POINTS = 16384
@@ -84,6 +85,13 @@ class PressedSensors:
     PalpateError
         The sensor, the meshes or the step make no run, or memory does not suffice.
 
+    Attributes
+    ----------
+    residual : (E, 1), (E, 3) or (E, 6) float, N and N·m
+        Part of the loads given to the last step that no contact balances.
+    displacement : (E, 6) float, metres and rad
+        Of the targets from their poses at the last step, for the loads: in the world, and rotation vector about their origin.
+
     Notes
     -----
     Effects draw the same random numbers in every environment.
@@ -113,11 +121,18 @@ class PressedSensors:
         self._chunk = max(1, min(CHUNK_POINTS // n, -(-environments // (4 * len(self._threads)))))
         self._chains = [model.readout_chain()] * environments  # each gets its own with its first step
         self._steps = np.zeros(environments, np.int64)
+        self._balance: LoadBalance | None = None
+        self.residual = np.zeros((environments, 0))
         self.reset()
 
     def __len__(self) -> int:
         """Return the number of environments."""
         return len(self._environments)
+
+    @property
+    def displacement(self) -> np.ndarray:
+        """Of the targets from their poses at the last step (E, 6), metres and rad."""
+        return np.zeros((len(self), 6)) if self._balance is None else self._balance.displacement.copy()
 
     def reset(self, mask: ArrayLike | None = None) -> None:
         """Let environments begin anew with their next step: at rest, without bristles and memory of effects.
@@ -134,7 +149,13 @@ class PressedSensors:
             )
         self._out.begins[chosen] = True
 
-    def step(self, sensor_poses: ArrayLike, target_poses: ArrayLike, out: Contacts | None = None) -> Contacts:
+    def step(
+        self,
+        sensor_poses: ArrayLike,
+        target_poses: ArrayLike,
+        out: Contacts | None = None,
+        wrench: ArrayLike | None = None,
+    ) -> Contacts:
         """Go on by one step, to these poses, and return the forces there.
 
         Parameters
@@ -144,11 +165,13 @@ class PressedSensors:
         target_poses : (E, 7) float, or (E, T, 7) with several targets
         out : Contacts, optional
             To write into; by default the arrays that the next step overwrites.
+        wrench : (E, 6), (E, 3) or (E, 1) float, N and N·m, optional
+            Load of each environment, as in :meth:`.PressedSensor.step`.
 
         Raises
         ------
         ParameterError
-            The poses have another shape. Poses that are not finite are no error (see :attr:`Contacts.valid`).
+            Poses or loads have another shape. Those that are not finite are no error (see :attr:`Contacts.valid`).
         """
         e, t = len(self), self._out.wrench.shape[1]
         self._take("sensor", sensor_poses, [(e, 7), (7,)], self._out.poses[:, 0])
@@ -157,7 +180,13 @@ class PressedSensors:
         else:
             self._take("targets", target_poses, [(e, t, 7)], self._out.poses[:, 1:])
         fresh = self._out.begins.copy()
-        self._press()
+        if wrench is None:
+            self.residual = np.zeros((e, 0))
+            if self._balance is not None:
+                self._balance.forget(np.ones(e, bool))
+            self._press()
+        else:
+            self._press_under(wrench)
         self._read(fresh)
         wrench = self._out.wrench[:, 0] if self._one_target else self._out.wrench
         o = self._out
@@ -190,6 +219,17 @@ class PressedSensors:
         self._work(self._threads[0], starts)
         for helper in helpers:
             helper.join()
+
+    def _press_under(self, wrench: ArrayLike) -> None:
+        """Run one step of all environments under their loads."""
+        load, e = np.asarray(wrench), len(self)
+        if load.shape not in ((e, 1), (e, 3), (e, 6)) or load.dtype.kind not in "fiu":
+            raise ParameterError(
+                f"The loads are {load.dtype} of shape {load.shape}: give numbers of shape ({e}, 6), ({e}, 3) or ({e}, 1)."
+            )
+        if self._balance is None:
+            self._balance = LoadBalance(self._model, self._out, self._environments, self._press)
+        self.residual = self._balance.step(load.astype(float))
 
     def _work(self, presser: Presser, starts: Iterator[int]) -> None:
         """Take chunks of environments until none is left."""

@@ -54,7 +54,9 @@ class PressedModel:
 
     Attributes
     ----------
+    sensor : Sensor
     texels : int
+        How many it has.
     rate : float, 1/s
         Steps in a second.
     helpers : int
@@ -83,7 +85,7 @@ class PressedModel:
             ),
             threads,
         )
-        self._sensor = sensor
+        self.sensor = sensor
         self.rate = simulation.scenario.fps
         self.texels = len(sensor.texels)
         self._dt = simulation.dt
@@ -97,7 +99,7 @@ class PressedModel:
 
     def readout_chain(self) -> ReadoutChain | None:
         """Return what turns forces into readings, from its beginning; None where that is a scale and a zero."""
-        return ReadoutChain.of(self._sensor) if self.reads_by_chain else None
+        return ReadoutChain.of(self.sensor) if self.reads_by_chain else None
 
     def environments(self, count: int) -> list[Environment]:
         """Return environments at their beginning."""

@@ -159,6 +159,12 @@ def make_environments(count: int, detection: DetectionData, state: State) -> lis
     ]
 
 
+def stacked_states(environments: list[Environment]) -> State:
+    """Return the state of all environments of :func:`make_environments` at once: each array with a leading axis of length E."""
+    stacks = [field.base for field in environments[0].state]
+    return State(*(stack for stack in stacks if stack is not None))
+
+
 def addresses_of(environments: list[Environment]) -> np.ndarray:
     """Return the addresses of environments."""
     return np.array([address_of_fields(one) for one in environments], np.int64)
