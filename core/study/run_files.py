@@ -97,7 +97,7 @@ def write_run(
     ----------
     place : Path
         Of the batch.
-    run : Run
+    run : study_file.Run
     scenario : Scenario
         That was computed.
     recording : Recording

@@ -26,7 +26,7 @@ def place_run(place: Path, run: Run, compute: Compute, clock: Callable[[], float
     ----------
     place : Path
         Of the batch.
-    run : Run
+    run : study_file.Run
     compute : callable
     clock : callable
         Returns seconds.
