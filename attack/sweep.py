@@ -2,7 +2,7 @@
 """Kills of every process of a study, faults at each of its file operations, and disks that are full or read-only.
 
 After each, the same command again ends with the bytes of an undisturbed study, and nothing is computed twice but what was
-being computed when a process was killed.
+being computed, or was not yet on the disk, when a process was killed.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ from typing import Any
 
 from palpate.core.errors import PalpateError
 from palpate.core.solver import precompile
+from palpate.core.study.run_files import done_runs, failed_runs
 
 from .area import CLEAR, HUNG, LOST, TRACEBACK, WRONG, Area, Case, Outcome
 from .injector import KILL, KINDS, Injector, Stopped
@@ -142,11 +143,11 @@ class Sweep(Area):
                 break  # the study is done
             if pid is None:
                 continue
-            lost_to_kills += children if victim in ("driver", "scheduler") else 1
             hits.append(victim)
             self._begun = sum(count_starts(self.folder).values())
             with suppress(ProcessLookupError):
                 os.kill(pid, signal.SIGKILL)
+            lost_to_kills += 1 if victim == "child" else children + self._runs_in_flight()
             if cluster is not None and victim in ("scheduler", "worker"):
                 time.sleep(0.2)
                 cluster.replace_dead()
@@ -195,6 +196,11 @@ class Sweep(Area):
         if victim in ("child", "worker") and not _descendants(os.getpid(), victim):
             return False
         return not is_working or sum(count_starts(self.folder).values()) > self._begun
+
+    def _runs_in_flight(self) -> int:
+        """Return how many runs were begun and are not in their places: what a worker has written is lost with it, too."""
+        placed = done_runs(self._place / "out") | failed_runs(self._place / "out")
+        return max(0, len(count_starts(self.folder)) - len(placed))
 
     @staticmethod
     def _pick(victim: str, driver: subprocess.Popen, cluster: Cluster | None, dice: random.Random) -> int | None:

@@ -19,8 +19,8 @@ from palpate.core.model.scenario import Scenario
 from palpate.core.model.sensor import Sensor
 from palpate.core.model.sensor_parameters import SensorParameters
 from palpate.core.model.target import Target
-from palpate.core.study.run_files import RUNS, done_runs, failed_runs, make_folders
-from palpate.sweep.child import UNWRITABLE, Scenes, answer_to
+from palpate.core.study.run_files import RUNS, done_runs, failed_runs, make_folders, run_batch
+from palpate.sweep.child import DONE, UNWRITABLE, Scenes, answer_to
 from palpate.sweep.dataset import publish
 from palpate.sweep.study_folder import begin_study
 
@@ -81,10 +81,16 @@ def sweep_here(file: Path, folder: Path, most: int | None = None) -> None:
         make_folders(folder)
         over = done_runs(folder) | failed_runs(folder)
         scenes = Scenes(folder)
-        for run in [run for run in opened.runs if run.digest not in over][:most]:
-            answer = answer_to(scenes, run)
-            if answer["status"] == UNWRITABLE:
-                raise FileError(answer["sentence"])
+        with run_batch(folder) as batch:
+            answers = []
+            for run in [run for run in opened.runs if run.digest not in over][:most]:
+                answers.append(answer_to(scenes, run, batch.place))
+                if answers[-1]["status"] == UNWRITABLE:
+                    break
+                if answers[-1]["status"] == DONE:
+                    batch.add(run.digest)
+        if answers and answers[-1]["status"] == UNWRITABLE:
+            raise FileError(answers[-1]["sentence"])
         publish(folder, opened.runs)
     finally:
         lock.release()

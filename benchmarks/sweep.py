@@ -12,7 +12,7 @@ from __future__ import annotations
 import statistics
 import tempfile
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -29,9 +29,10 @@ from palpate.core.model.sensor import Sensor
 from palpate.core.model.sensor_parameters import SensorParameters
 from palpate.core.model.target import Target
 from palpate.core.solver.simulation import Simulation
+from palpate.core.study import run_files
 from palpate.core.study.design import points_of
 from palpate.core.study.metrics import metrics_of
-from palpate.core.study.run_files import SCENES, STUDY_NAME, make_folders, write_run
+from palpate.core.study.run_files import SCENES, STUDY_NAME, make_folders, run_batch, write_run
 from palpate.core.study.study_file import Run, plan_for, read_study
 from palpate.core.study.variation import varied_scenario
 from palpate.sweep.child import Scenes, compute_run
@@ -88,6 +89,14 @@ def begun(folder: Path, hold: float, count: int) -> list[Run]:
     return [Run(i, "pad", values, f"{i:024x}") for i, values in enumerate(points)]
 
 
+def computed(scenes: Scenes, runs: Sequence[Run]) -> None:
+    """Compute runs as a batch."""
+    with run_batch(scenes.folder) as batch:
+        for run in runs:
+            compute_run(scenes, run, batch.place)
+            batch.add(run.digest)
+
+
 def in_turn(*works: Callable[[int], float]) -> list[tuple[float, float]]:
     """Return the medians of the seconds of the processor and of the clock for each simulated second; works are done in turn.
 
@@ -111,7 +120,7 @@ def shares(name: str, hold: float) -> Iterator[dict]:
         plan = scenes.plan("pad")
         scenarios = [varied_scenario(plan.scenario, {**plan.fixed, **run.values}, plan.press) for run in runs]
         lengths = [(one.frame_end - one.frame_start) / one.fps for one in scenarios]
-        compute_run(scenes, replace(runs[0], digest="f" * 24))  # loads what was compiled
+        computed(scenes, [replace(runs[0], digest="f" * 24)])  # loads what was compiled
 
         def bare(number: int) -> float:
             part = slice(number * RUNS, (number + 1) * RUNS)
@@ -121,8 +130,7 @@ def shares(name: str, hold: float) -> Iterator[dict]:
 
         def whole(number: int) -> float:
             part = slice(number * RUNS, (number + 1) * RUNS)
-            for run in runs[part]:
-                compute_run(scenes, run)
+            computed(scenes, runs[part])
             return sum(lengths[part])
 
         solver, sweep = in_turn(bare, whole)
@@ -142,7 +150,7 @@ def parts() -> Iterator[dict]:
         runs = begun(folder, LENGTHS["50_ms"], RUNS * ROUNDS)
         scenes = Scenes(folder)
         plan = scenes.plan("pad")
-        compute_run(scenes, replace(runs[0], digest="f" * 24))  # loads what was compiled
+        computed(scenes, [replace(runs[0], digest="f" * 24)])  # loads what was compiled
         for run in runs:
             moments = [time.process_time()]
             scenario = scenes.scenario("pad", {**plan.fixed, **run.values})
@@ -153,7 +161,7 @@ def parts() -> Iterator[dict]:
             moments.append(time.process_time())
             metrics = metrics_of(scenario, recording, plan.press)
             moments.append(time.process_time())
-            write_run(folder, run, scenario, recording, metrics, 0.0, shared=scenes.shared)
+            write_run(folder / run_files.RUNS, run, scenario, recording, metrics, 0.0, shared=scenes.shared)
             moments.append(time.process_time())
             for own, seconds in zip(taken.values(), np.diff(moments), strict=True):
                 own.append(float(seconds))
@@ -200,7 +208,7 @@ def against_mujoco() -> Iterator[dict]:
         runs = begun(folder, LENGTHS["500_ms"], count * ROUNDS)
         scenes = Scenes(folder)
         plan = scenes.plan("pad")
-        compute_run(scenes, replace(runs[0], digest="f" * 24))
+        computed(scenes, [replace(runs[0], digest="f" * 24)])
         last = [varied_scenario(plan.scenario, {**plan.fixed, **run.values}, plan.press).frame_end for run in runs]
         model, controls = mujoco_press((float(np.mean(last)) - 1) / FPS)
         data = [mujoco.MjData(model) for _ in range(cores)]
@@ -209,8 +217,7 @@ def against_mujoco() -> Iterator[dict]:
         felt = 0.0
 
         def ours(number: int) -> float:
-            for run in runs[number * count : (number + 1) * count]:
-                compute_run(scenes, run)
+            computed(scenes, runs[number * count : (number + 1) * count])
             return float(sum(last[number * count : (number + 1) * count])) * TEXELS
 
         def theirs(_number: int) -> float:
@@ -257,10 +264,9 @@ def dataset_share() -> Iterator[dict]:
         folder = Path(place)
         runs = begun(folder, 0.97, DATASET_RUNS)
         scenes = Scenes(folder)
-        compute_run(scenes, replace(runs[0], index=DATASET_RUNS, digest="f" * 24))
+        computed(scenes, [replace(runs[0], index=DATASET_RUNS, digest="f" * 24)])
         start = time.process_time()
-        for run in runs:
-            compute_run(scenes, run)
+        computed(scenes, runs)
         computing = time.process_time() - start
         start = time.process_time()
         publish(folder, runs)

@@ -17,16 +17,16 @@ from pathlib import Path
 from typing import Any
 from unittest import mock
 
-from palpate.core.study.run_files import RUNS, done_runs
+from palpate.core.study.run_files import RUNS, done_runs, run_batch
 from palpate.core.study.run_record import RUN_FORMAT, RUN_NAME
 from palpate.core.study.study_file import Run
-from palpate.sweep.child import DONE, Scenes, compute_run
+from palpate.sweep.child import DONE, Scenes
 from palpate.sweep.finished_runs import run_order
 from palpate.sweep.report import write_report
 from palpate.sweep.run_table import write_run_table
 from palpate.sweep.worker import Child, Limits
 
-from .sweep import LENGTHS, begun
+from .sweep import LENGTHS, begun, computed
 
 PLAYED = 100_000
 """Finished runs that are played."""
@@ -88,7 +88,7 @@ def files() -> Iterator[dict]:
     with tempfile.TemporaryDirectory() as place:
         folder = Path(place)
         (run,) = begun(folder, LENGTHS["50_ms"], 1)
-        compute_run(Scenes(folder), run)
+        computed(Scenes(folder), [run])
         found = [path for path in (folder / RUNS / run.digest).rglob("*")]
         taken = sum(path.stat().st_blocks * 512 for path in (folder / RUNS / run.digest, *found))
     yield {"name": "sweep_scale.files", "value": len(found) + 1, "unit": "files and folders per run"}
@@ -133,9 +133,11 @@ def worker_memory() -> Iterator[dict]:
         sizes = []
         try:
             for number, run in enumerate(runs, 1):
-                answer = child.compute(asdict(run))
-                if answer is None or answer["status"] != "done":
-                    raise RuntimeError(f"run {number} is not done: {answer}")
+                with run_batch(Path(place)) as batch:
+                    answer = child.compute(asdict(run), batch.place)
+                    if answer is None or answer["status"] != "done":
+                        raise RuntimeError(f"run {number} is not done: {answer}")
+                    batch.add(run.digest)
                 if number in (WARM, WORKED):
                     sizes.append(resident(str(child.process_id)))
         finally:

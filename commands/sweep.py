@@ -176,9 +176,10 @@ def _estimate(opened: OpenStudy, arguments: argparse.Namespace) -> int:
         from ..sweep import slurm
 
         print(slurm.job_script(slurm.options_of(arguments.slurm_option)))
-    found = try_runs(opened.folder, opened.runs, Limits.of(opened.study), arguments.scripts)
     workers = _workers(arguments)
-    seconds = found.seconds * len(opened.runs) / workers
+    own = None if arguments.slurm or arguments.scheduler else workers
+    found = try_runs(opened.folder, opened.runs, Limits.of(opened.study), arguments.scripts, own)
+    seconds = found.seconds_of(len(opened.runs), workers)
     print(f"{counted(len(opened.runs), 'run')}, {found.seconds:.3g} s and {_size(found.size)} each")
     size = _size(found.size * len(opened.runs))
     print(f"about {_duration(seconds)} with {counted(workers, 'worker')}, {size} in '{opened.folder}'")

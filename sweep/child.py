@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """``python -m palpate.sweep.child FOLDER [SCRIPTS]``: computes runs of a study, one for each line of standard input.
 
-A line is a run as JSON; the answer is a line of JSON on standard output. The process ends when its input does, at once: whoever
-started it is gone then, and an unfinished run is computed again.
+A line is a run as JSON, with the folder of the batch that it is written into; the answer is a line of JSON on standard output.
+The process ends when its input does, at once: whoever started it is gone then, and an unfinished run is computed again.
 """
 
 from __future__ import annotations
@@ -80,8 +80,8 @@ class Scenes:
         return varied_scenario(scenario, rest, plan.press, plan.meshes, self.shared)
 
 
-def compute_run(scenes: Scenes, run: Run) -> None:
-    """Compute a run and write it.
+def compute_run(scenes: Scenes, run: Run, place: Path) -> None:
+    """Compute a run and write it into the folder of a batch (:class:`.RunBatch`).
 
     Raises
     ------
@@ -97,7 +97,7 @@ def compute_run(scenes: Scenes, run: Run) -> None:
     values = {**plan.fixed, **{name: value for name, value in run.values.items() if name != SCENE}}
     if scenes.study.is_job:
         found = scenes.program(run.scene)
-        place_run(scenes.folder, run, lambda place: found.run(values, place), time.perf_counter)
+        place_run(place, run, lambda own: found.run(values, own), time.perf_counter)
         return
     scenario = scenes.scenario(run.scene, values)
     recording = Simulation(scenario, threads=1, shared=scenes.shared).advance_all()
@@ -108,16 +108,16 @@ def compute_run(scenes: Scenes, run: Run) -> None:
         made = replace(made, **own)
     metrics = metrics_of(scenario, recording, made)
     seconds = time.perf_counter() - began
-    write_run(scenes.folder, run, scenario, recording, metrics, seconds, scenes.study.images, scenes.shared)
+    write_run(place, run, scenario, recording, metrics, seconds, scenes.study.images, scenes.shared)
 
 
-def answer_to(scenes: Scenes, run: Run) -> dict[str, Any]:
+def answer_to(scenes: Scenes, run: Run, place: Path) -> dict[str, Any]:
     """Compute a run and return what became of it; a failure is written to the folder of failures."""
     began = time.perf_counter()
     answer: dict[str, Any] = {"digest": run.digest, "status": DONE}
     try:
         try:
-            compute_run(scenes, run)
+            compute_run(scenes, run, place)
         except FileError:
             raise
         except PalpateError as error:
@@ -181,7 +181,8 @@ def main() -> None:
         precompile.compile_solver()  # loads what was compiled, so that the first run is as fast as the others
     print(json.dumps({"status": "ready"}), file=output, flush=True)
     while True:
-        answer = answer_to(scenes, run_from(json.loads(lines.get())))
+        words = json.loads(lines.get())
+        answer = answer_to(scenes, run_from(words), Path(words["place"]))
         print(json.dumps(answer), file=output, flush=True)
 
 

@@ -6,12 +6,14 @@ from __future__ import annotations
 import os
 import shutil
 import tempfile
-from collections.abc import Sequence
+import time
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from ..core.study.run_files import RUNS, SCENES, STUDY_NAME, make_folders
+from ..core.study.run_files import RUNS, SCENES, STUDY_NAME, done_runs, make_folders
 from ..core.study.study_file import Run
+from .driver import dask_client
 from .scene_evaluation import REFUSE
 from .worker import Limits, compute_batch, end_children
 
@@ -32,15 +34,26 @@ class Estimate:
         Sentences of the runs that failed.
     tried : int
         Number of runs that were computed.
+    start : float
+        Seconds until the workers and their processes can take a run.
+    closing, closing_each : float
+        Seconds that dataset and report take for a study of one run, and for each further run.
     """
 
     seconds: float
     size: float
     failures: list[str]
     tried: int
+    start: float = 0.0
+    closing: float = 0.0
+    closing_each: float = 0.0
+
+    def seconds_of(self, runs: int, workers: int) -> float:
+        """Return the seconds of a study from the command to the report."""
+        return self.start + self.seconds * runs / min(workers, runs) + self.closing + self.closing_each * (runs - 1)
 
 
-def try_runs(folder: Path, runs: Sequence[Run], limits: Limits, scripts: str = REFUSE) -> Estimate:
+def try_runs(folder: Path, runs: Sequence[Run], limits: Limits, scripts: str = REFUSE, workers: int | None = None) -> Estimate:
     """Compute some runs, spread over a study, away from its folder.
 
     Parameters
@@ -53,25 +66,60 @@ def try_runs(folder: Path, runs: Sequence[Run], limits: Limits, scripts: str = R
         What a run may take.
     scripts : str
         What is done about the Python in a .blend.
+    workers : int, optional
+        Of this machine, which are started to see how long that takes. None: there are others.
     """
     step = max(1, len(runs) // RUNS_TRIED)
-    chosen = [asdict(run) for run in runs[::step][:RUNS_TRIED]]
+    tried = runs[::step][:RUNS_TRIED]
+    chosen = [asdict(run) for run in tried]
+    start = 0.0 if workers is None else _seconds_of(lambda: _start_workers(min(workers, len(runs))))
     with tempfile.TemporaryDirectory(prefix="palpate-sweep-") as name:
         trial = Path(name)
         make_folders(trial)
         shutil.copy(folder / STUDY_NAME, trial)
         shutil.copytree(folder / SCENES, trial / SCENES, dirs_exist_ok=True)
         try:
-            compute_batch(name, chosen[:1], limits, scripts)  # the first run loads what was compiled
+            began = time.perf_counter()
+            first = compute_batch(name, chosen[:1], limits, scripts)  # the first run loads what was compiled
+            start += time.perf_counter() - began - first[0]["seconds"]
+            closing, one = _seconds_to_close(trial, tried[:1])
             shutil.rmtree(trial / RUNS)
             make_folders(trial)
             answers = compute_batch(name, chosen, limits, scripts)
         finally:
             end_children()
+        _, several = _seconds_to_close(trial, tried)
         written = sum(file.stat().st_size for file in (trial / RUNS).rglob("*") if file.is_file())
     failures = [answer["sentence"] for answer in answers if "sentence" in answer]
     done = max(1, len(answers) - len(failures))
-    return Estimate(sum(answer["seconds"] for answer in answers) / len(answers), written / done, failures, len(answers))
+    seconds = sum(answer["seconds"] for answer in answers) / len(answers)
+    each = max(0.0, several - one) / max(1, done - 1)
+    return Estimate(seconds, written / done, failures, len(answers), start, closing, each)
+
+
+def _seconds_of(work: Callable[[], object]) -> float:
+    began = time.perf_counter()
+    work()
+    return time.perf_counter() - began
+
+
+def _start_workers(count: int) -> None:
+    with dask_client(None, count) as client:
+        client.wait_for_workers(count)
+
+
+def _seconds_to_close(folder: Path, runs: Sequence[Run]) -> tuple[float, float]:
+    """Return the seconds of dataset and report, and those of the dataset when it is written once more; 0 where no run is done.
+
+    The first time includes what Python loads for them, as it does in a study.
+    """
+    from .dataset import publish
+    from .report import write_report
+
+    if not done_runs(folder):
+        return 0.0, 0.0
+    whole = _seconds_of(lambda: publish(folder, runs)) + _seconds_of(lambda: write_report(folder, runs))
+    return whole, min(_seconds_of(lambda: publish(folder, runs)) for _ in range(2))
 
 
 def count_of_cores() -> int:

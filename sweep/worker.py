@@ -23,7 +23,7 @@ from pathlib import Path
 from typing import Any
 
 from ..core.errors import FileError, PalpateError
-from ..core.study.run_files import RUNS, write_failure
+from ..core.study.run_files import RUNS, run_batch, write_failure
 from ..core.study.run_record import RUN_NAME
 from ..core.study.study_file import Study
 from .child import DONE, FAILED, UNWRITABLE
@@ -33,6 +33,9 @@ MOST_DEATHS = 3
 """How often a process may die on a run before the run counts as failed: once may be an accident or an administrator."""
 START_LIMIT = 900.0
 """Seconds that a process may take to start; the first one on a machine compiles the solver, about half a minute."""
+GROUP_SECONDS = 2.0
+"""After this time the runs that are written are brought onto the disk. A power cut loses no more; one wait for the disk, some
+milliseconds, is little beside it."""
 LOOK = 0.1
 """Seconds between two looks at the memory of a run, in which it grows by less than what a machine should have left."""
 
@@ -143,12 +146,15 @@ class Child:
         """Whether it can take a run."""
         return self._process.poll() is None
 
-    def compute(self, words: dict[str, Any], limits: Limits = NO_LIMITS) -> dict[str, Any] | None:
-        """Compute a run; return the answer, None if the process died, and raise :class:`LimitReached` at a limit."""
+    def compute(self, words: dict[str, Any], place: Path, limits: Limits = NO_LIMITS) -> dict[str, Any] | None:
+        """Compute a run into the folder of a batch; return the answer, None if the process died.
+
+        Raises :class:`LimitReached` at a limit.
+        """
         assert self._process.stdin is not None
         self.begun += 1
         try:
-            self._process.stdin.write(json.dumps(words) + "\n")
+            self._process.stdin.write(json.dumps({**words, "place": os.fspath(place)}) + "\n")
             self._process.stdin.flush()
         except OSError:
             return None
@@ -208,25 +214,46 @@ def compute_batch(
         For each run its digest, a status (:data:`.child.DONE`, ``FAILED`` or ``UNWRITABLE``), seconds, and the sentence of a
         failure. After an unwritable run the others are left out.
     """
-    answers = []
-    for words in runs:
-        if (Path(folder) / RUNS / str(words["digest"]) / RUN_NAME).is_file():  # by a worker that Dask had lost
-            answers.append({"digest": words["digest"], "status": DONE, "seconds": 0.0})
-            continue
-        answers.append(_computed(folder, words, limits, scripts))
+    answers: list[dict[str, Any]] = []
+    while len(answers) < len(runs):
+        left = runs[len(answers) :]
+        try:
+            answers += _computed_group(folder, left, limits, scripts)
+        except FileError as error:
+            answers.append({"digest": left[0]["digest"], "status": UNWRITABLE, "sentence": str(error), "seconds": 0.0})
         if answers[-1]["status"] == UNWRITABLE:
             break
     return answers
 
 
-def _computed(folder: str, words: dict[str, Any], limits: Limits, scripts: str) -> dict[str, Any]:
+def _computed_group(folder: str, runs: Sequence[dict[str, Any]], limits: Limits, scripts: str) -> list[dict[str, Any]]:
+    """Compute runs until it is time to bring them onto the disk; return what became of them when they are there.
+
+    Their files are put into place by this process, so that one that dies on a run takes none of the earlier ones with it.
+    """
+    answers: list[dict[str, Any]] = []
+    until = time.monotonic() + GROUP_SECONDS
+    with run_batch(Path(folder)) as batch:
+        for words in runs:
+            if (Path(folder) / RUNS / str(words["digest"]) / RUN_NAME).is_file():  # by a worker that Dask had lost
+                answers.append({"digest": words["digest"], "status": DONE, "seconds": 0.0})
+                continue
+            answers.append(_computed(folder, words, batch.place, limits, scripts))
+            if answers[-1]["status"] == DONE:
+                batch.add(words["digest"])
+            if answers[-1]["status"] == UNWRITABLE or time.monotonic() >= until:
+                break
+    return answers
+
+
+def _computed(folder: str, words: dict[str, Any], place: Path, limits: Limits, scripts: str) -> dict[str, Any]:
     """Return what became of a run; the process is started again where it dies."""
     sentence = ""
     began = time.monotonic()
     for _ in range(MOST_DEATHS):
         try:
             child = _child_for(folder, scripts)
-            answer = child.compute(words, limits)
+            answer = child.compute(words, place, limits)
         except LimitReached as reached:
             _children.pop((folder, scripts)).kill()
             if isinstance(reached, MemoryReached) and child.begun > 1:

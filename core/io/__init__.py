@@ -22,6 +22,7 @@ __all__ = [
     "frame_rows",
     "growing_file",
     "growing_table",
+    "group_sync",
     "html_templates",
     "mesh_file",
     "npz",

@@ -266,8 +266,8 @@ def sync_file(path: Path) -> None:
         os.fsync(file.fileno())
 
 
-def write_synced(path: Path, content: bytes) -> str:
-    """Write a new file in a folder that nobody reads yet, bring it onto the disk, and return the SHA-256 of its content.
+def write_hashed(path: Path, content: bytes) -> str:
+    """Write a new file in a folder that nobody reads yet and return the SHA-256 of its content; it is not yet on the disk.
 
     Raises
     ------
@@ -276,8 +276,6 @@ def write_synced(path: Path, content: bytes) -> str:
     """
     with open(path, "wb") as file:
         file.write(content)
-        file.flush()
-        os.fsync(file.fileno())
     return hashlib.sha256(content).hexdigest()
 
 

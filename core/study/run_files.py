@@ -9,7 +9,8 @@
     runs/<digest>/<sensor>/recording.npz    with sensor.npz and manifest.json, as in a bake without images
     failed/<digest>.txt                     why a run could not be computed: a sentence, and the traceback of a fault
 
-A run is written in a hidden folder, brought onto the disk and renamed, so it is there as a whole or not at all.
+Runs are written in a hidden folder. Those of a batch are brought onto the disk together, and then each is renamed, so that it
+is there as a whole or not at all.
 """
 
 from __future__ import annotations
@@ -26,16 +27,10 @@ import numpy as np
 from ..errors import FileError
 from ..geometry.texels import Texels
 from ..io.bake_folder import MANIFEST_NAME, RECORDING_NAME, folder_names, manifest_bytes
-from ..io.file_writing import (
-    atomic_write,
-    file_sha256,
-    os_error_reason,
-    sync_file,
-    sync_folder,
-    writable_folder,
-    write_synced,
-)
+from ..io.file_writing import atomic_write, file_sha256, os_error_reason, sync_folder, writable_folder, write_hashed
+from ..io.group_sync import GroupSync
 from ..io.npz import PACKED_BYTES, pack_arrays, write_arrays
+from ..io.private_folder import remove_tree
 from ..io.recording_npz import recording_arrays
 from ..io.sensor_manifest import manifest_of
 from ..io.sensor_npz import SENSOR_NAME, sensor_arrays
@@ -51,6 +46,7 @@ from .study_file import Run
 STUDY_NAME = "study.toml"
 RUNS, FAILED, SCENES = "runs", "failed", "scenes"
 
+_REMEDY = "free some space or check the permissions, and give the same command again"
 _DIGEST = re.compile(r"[0-9a-f]{24}")
 
 
@@ -86,7 +82,7 @@ def _digests(folder: Path, suffix: str) -> set[str]:
 
 
 def write_run(
-    folder: Path,
+    place: Path,
     run: Run,
     scenario: Scenario,
     recording: Recording,
@@ -95,12 +91,12 @@ def write_run(
     images: bool = False,
     shared: SharedResults | None = None,
 ) -> None:
-    """Write a run as a whole; a failure of it that was written earlier is removed.
+    """Write the files of a run into the folder of a batch, which brings them onto the disk.
 
     Parameters
     ----------
-    folder : Path
-        Of the study.
+    place : Path
+        Of the batch.
     run : study_file.Run
     scenario : Scenario
         That was computed.
@@ -118,44 +114,108 @@ def write_run(
     FileError
         A file cannot be written.
     """
-    with placed_run(folder, run) as place:
+    with run_folder(place, run) as own:
         names, frames = tuple(recording.sensors), len(recording.frames)
-        _write_sensors(place, scenario, recording, images, shared or SharedResults())
-        write_run_record(RunRecord(place, run.digest, run.index, dict(run.values), dict(metrics), seconds, names, frames))
+        _write_sensors(own, scenario, recording, images, shared or SharedResults())
+        write_run_record(RunRecord(own, run.digest, run.index, dict(run.values), dict(metrics), seconds, names, frames))
 
 
 @contextmanager
-def placed_run(folder: Path, run: Run) -> Iterator[Path]:
-    """Yield a hidden folder for the files of a run, which takes its place when the body ends; an earlier failure is removed.
-
-    The files must be brought onto the disk by the body.
+def run_folder(place: Path, run: Run) -> Iterator[Path]:
+    """Yield a new folder for the files of a run in that of a batch; what a process that died has left of the run is removed.
 
     Raises
     ------
     FileError
         A file cannot be written, which the body may also tell by OSError.
     """
-    runs = folder / RUNS
-    with temporary_folder(runs, "run") as hidden:
-        place = hidden / "run"
+    own = place / run.digest
+    try:
+        remove_tree(own)
+        own.mkdir()
+        yield own
+    except OSError as error:
+        raise FileError(
+            f"Run {run.index} could not be written to '{place.parent}' ({os_error_reason(error)}): {_REMEDY}."
+        ) from error
+
+
+class RunBatch:
+    """Runs whose files are brought onto the disk together.
+
+    Attributes
+    ----------
+    place : Path
+        Hidden folder in which runs are written; that of a run has the name of its digest.
+    """
+
+    def __init__(self, folder: Path, place: Path):
+        self.place = place
+        self._folder = folder
+        self._digests: list[str] = []
+
+    def add(self, digest: str) -> None:
+        """Say that a run is written as a whole."""
+        self._digests.append(digest)
+
+    def commit(self, group: GroupSync) -> None:
+        """Bring the runs onto the disk and put them into their places; failures of them that were written earlier are removed.
+
+        Raises
+        ------
+        FileError
+            That is not possible.
+        """
+        if not self._digests:
+            return
+        runs = self._folder / RUNS
         try:
-            place.mkdir()
-            yield place
-            sync_folder(place)
-            os.rename(place, runs / run.digest)
+            group.sync([self.place / digest for digest in self._digests])
+            for digest in self._digests:
+                self._put_into_place(digest)
         except OSError as error:
-            if not (runs / run.digest / RUN_NAME).is_file():  # else another process was faster
-                raise FileError(
-                    f"Run {run.index} could not be written to '{runs}' ({os_error_reason(error)}): "
-                    "free some space or check the permissions, and give the same command again."
-                ) from error
-    sync_folder(runs)
-    with suppress(OSError):
-        (folder / FAILED / f"{run.digest}.txt").unlink(missing_ok=True)
+            raise FileError(f"Runs could not be written to '{runs}' ({os_error_reason(error)}): {_REMEDY}.") from error
+        sync_folder(runs)
+        for digest in self._digests:
+            with suppress(OSError):
+                (self._folder / FAILED / f"{digest}.txt").unlink(missing_ok=True)
+
+    def _put_into_place(self, digest: str) -> None:
+        target = self._folder / RUNS / digest
+        try:
+            os.rename(self.place / digest, target)
+        except OSError:
+            if not (target / RUN_NAME).is_file():  # else another process was faster
+                raise
+
+
+@contextmanager
+def run_batch(folder: Path) -> Iterator[RunBatch]:
+    """Yield a batch for runs of a study; those that are added to it take their places when the body ends, all with one wait
+    for the disk where the file system allows that.
+
+    Parameters
+    ----------
+    folder : Path
+        Of the study.
+
+    Raises
+    ------
+    FileError
+        Files cannot be written.
+    """
+    with temporary_folder(folder / RUNS, "runs") as place:
+        group = GroupSync(place)
+        try:
+            batch = RunBatch(folder, place)
+            yield batch
+            batch.commit(group)
+        finally:
+            group.close()
 
 
 def _write_sensors(place: Path, scenario: Scenario, recording: Recording, images: bool, shared: SharedResults) -> None:
-    """Write the files of each sensor and bring them onto the disk."""
+    """Write the files of each sensor."""
     names = folder_names(recording.sensors)
     for sensor in scenario.sensors:
         if not sensor.readout:
@@ -165,23 +225,19 @@ def _write_sensors(place: Path, scenario: Scenario, recording: Recording, images
         arrays = recording_arrays(replace(recording, sensors={sensor.name: recording.sensors[sensor.name]}))
         files = {
             RECORDING_NAME: _write_recording(own / RECORDING_NAME, arrays),
-            SENSOR_NAME: write_synced(own / SENSOR_NAME, shared.of(_sensor_bytes, sensor.texels, sensor.painted)),
+            SENSOR_NAME: write_hashed(own / SENSOR_NAME, shared.of(_sensor_bytes, sensor.texels, sensor.painted)),
         }
         if images:
             pictures = write_run_images(own, sensor, recording)
             files[pictures[-1]] = file_sha256(own / pictures[-1])  # it lists the others
-            for name in pictures:
-                sync_file(own / name)
-        write_synced(own / MANIFEST_NAME, manifest_bytes(manifest_of(scenario, sensor, recording, files)))
-        sync_folder(own)
+        write_hashed(own / MANIFEST_NAME, manifest_bytes(manifest_of(scenario, sensor, recording, files)))
 
 
 def _write_recording(path: Path, arrays: Mapping[str, np.ndarray]) -> str:
-    """Write a recording, bring it onto the disk, and return its SHA-256."""
+    """Write a recording and return its SHA-256."""
     if sum(array.nbytes for array in arrays.values()) <= PACKED_BYTES:
-        return write_synced(path, pack_arrays(arrays))
+        return write_hashed(path, pack_arrays(arrays))
     write_arrays(path, arrays, atomic=False)
-    sync_file(path)
     return file_sha256(path)
 
 

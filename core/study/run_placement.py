@@ -1,18 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Puts a run that no solver computes into the folder of a study, as a whole or not at all, as :mod:`.run_files` does."""
+"""Computes a run that no solver computes into the folder of a batch, which puts it into its place (:mod:`.run_files`)."""
 
 from __future__ import annotations
 
 import errno
-import os
 from collections.abc import Callable, Mapping
 from math import isfinite
 from pathlib import Path
 from typing import Any
 
 from ..errors import PalpateError
-from ..io.file_writing import sync_file, sync_folder
-from .run_files import placed_run
+from .run_files import run_folder
 from .run_record import RunRecord, write_run_record
 from .study_file import Run
 
@@ -21,13 +19,13 @@ Compute = Callable[[Path], Mapping[str, Any]]
 _NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EROFS)
 
 
-def place_run(folder: Path, run: Run, compute: Compute, clock: Callable[[], float]) -> None:
-    """Let a run be computed in a hidden folder, and put it into its place; an earlier failure of it is removed.
+def place_run(place: Path, run: Run, compute: Compute, clock: Callable[[], float]) -> None:
+    """Let a run be computed in the folder of a batch.
 
     Parameters
     ----------
-    folder : Path
-        Of the study.
+    place : Path
+        Of the batch.
     run : study_file.Run
     compute : callable
     clock : callable
@@ -40,11 +38,10 @@ def place_run(folder: Path, run: Run, compute: Compute, clock: Callable[[], floa
     PalpateError
         The metrics are no finite numbers by name; and whatever `compute` raises.
     """
-    with placed_run(folder, run) as place:
+    with run_folder(place, run) as own:
         began = clock()
-        metrics = _checked(_computed(compute, place), run)
-        write_run_record(RunRecord(place, run.digest, run.index, dict(run.values), metrics, clock() - began))
-        _sync_tree(place)
+        metrics = _checked(_computed(compute, own), run)
+        write_run_record(RunRecord(own, run.digest, run.index, dict(run.values), metrics, clock() - began))
 
 
 def _computed(compute: Compute, place: Path) -> Mapping[str, Any]:
@@ -72,11 +69,3 @@ def _checked(metrics: Any, run: Run) -> dict[str, float]:
             raise PalpateError(f"Metric {name!r:.60} of run {run.index} is {value!r:.60}: give finite numbers, or None.")
         found[name] = number
     return found
-
-
-def _sync_tree(folder: Path) -> None:
-    """Bring a folder with all that it holds onto the disk."""
-    for parent, _, files in os.walk(folder, topdown=False):
-        for name in files:
-            sync_file(Path(parent) / name)
-        sync_folder(Path(parent))

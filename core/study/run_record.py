@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import FileError
-from ..io.file_writing import write_synced
+from ..io.file_writing import write_hashed
 from ..io.schema import Number, read_json
 
 RUN_FORMAT = "palpate-run/1"
@@ -52,7 +52,7 @@ class RunRecord:
 
 
 def write_run_record(record: RunRecord) -> None:
-    """Write ``run.json`` into the folder of a record and bring it onto the disk; the folder is not yet in its place.
+    """Write ``run.json`` into the folder of a record that is not yet in its place.
 
     Raises
     ------
@@ -70,7 +70,7 @@ def write_run_record(record: RunRecord) -> None:
         "sensors": list(record.sensors),
     }
     text = json.dumps(content, ensure_ascii=False, allow_nan=False) + "\n"
-    write_synced(record.folder / RUN_NAME, text.encode("utf-8", "surrogatepass"))
+    write_hashed(record.folder / RUN_NAME, text.encode("utf-8", "surrogatepass"))
 
 
 def read_run_record(folder: Path) -> RunRecord:

@@ -11,9 +11,9 @@ import pytest
 
 from palpate.benchmarks import _rows, gap
 from palpate.core.errors import PalpateError
-from palpate.core.study.run_files import done_runs
+from palpate.core.study.run_files import done_runs, run_batch
 from palpate.core.study.study_file import Run, study_of
-from palpate.sweep.child import Scenes, answer_to
+from palpate.sweep.child import DONE, Scenes, answer_to
 from palpate.sweep.scene_evaluation import ALLOW, REFUSE
 from palpate.sweep.study_folder import OpenStudy, begin_study, resume_study
 
@@ -63,7 +63,13 @@ def begun(file: Path) -> OpenStudy:
 
 def answers_of(opened: OpenStudy) -> list[dict]:
     scenes = Scenes(opened.folder, ALLOW)
-    return [answer_to(scenes, run) for run in opened.runs]
+    answers = []
+    with run_batch(opened.folder) as batch:
+        for run in opened.runs:
+            answers.append(answer_to(scenes, run, batch.place))
+            if answers[-1]["status"] == DONE:
+                batch.add(run.digest)
+    return answers
 
 
 @pytest.mark.slow("the one study of a job from the command line in this tier")
@@ -151,7 +157,7 @@ def test_what_a_job_calls_may_not_change_either(tmp_path):
     opened = begun(write(tmp_path, job=job))
     assert answers_of(opened)[0]["status"] == "done"
     (tmp_path / "state").write_text("2")
-    answer = answer_to(Scenes(opened.folder, ALLOW), opened.runs[1])
+    answer = answer_to(Scenes(opened.folder, ALLOW), opened.runs[1], tmp_path)
     assert answer["status"] == "unwritable"  # no other run can be, so the study stops
     assert answer["sentence"].startswith("What the job 'count.py' computes with is not what the study in ")
 

@@ -22,7 +22,7 @@ from palpate.core.io.checksum_list import read_checksums
 from palpate.core.io.recording_npz import load_recording
 from palpate.core.io.scenario_npz import save_scenario
 from palpate.core.io.tactile_exr import read_exr
-from palpate.core.study.run_files import SCENES, done_runs, make_folders, write_failure
+from palpate.core.study.run_files import SCENES, done_runs, make_folders, run_batch, write_failure
 from palpate.sweep.driver import dask_client
 from palpate.sweep.study_folder import begin_study
 from palpate.sweep.worker import Child, Limits, compute_batch, end_children
@@ -278,7 +278,8 @@ def test_a_run_that_eats_memory_is_ended(by_hand):
     hungry = words_of(1, **{"press.speed": 1e-9})  # its frames fill some 40 MB a second
     child = Child(str(by_hand))
     try:
-        child.compute(words_of(0))
+        with run_batch(by_hand) as batch:
+            child.compute(words_of(0), batch.place)
         limit = round(child.memory() / 1e6) + 60
     finally:
         child.kill()
