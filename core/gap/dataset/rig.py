@@ -35,6 +35,8 @@ LOWEST_TEMPERATURE, HIGHEST_TEMPERATURE = -273.15, 2000.0
 """°C: what a sensor can have."""
 POSE, TURN, SLIDE = ("x", "y", "z"), ("qw", "qx", "qy", "qz"), ("slide_x", "slide_y")
 FORCE = ("force_x", "force_y", "force_z")
+MOST_MISSING = 0.1
+"""Largest share of a column of the stimulus that may be missing; what is missing is interpolated."""
 SMALLEST_RESPONSE = 1e-30
 """Responses of a smaller magnitude, in any unit, count as zero."""
 RIG_SENSOR_WORDS = {"name", "contact_height", *COVER_WORDS}
@@ -470,7 +472,7 @@ class _TrialReader:
             if kind == "force" and "x" in columns:  # a known weight at a known place, wherever its z is
                 place = [columns["x"], columns["y"], np.zeros(len(time))]
                 position, quaternion = np.stack(place, axis=1), _turns(columns, file)
-        said = _gaps_filled([position, quaternion, level, slide], time, file)
+        said = _gaps_filled([(POSE, position), (TURN, quaternion), ((kind,), level), (SLIDE, slide)], time, file)
         if quaternion is not None:
             quaternion = quaternion / np.linalg.norm(quaternion, axis=1, keepdims=True)
         strangers = [name for name in columns if not _meaning(name)]
@@ -611,17 +613,18 @@ def _turns(columns: Mapping[str, np.ndarray], file: Path) -> np.ndarray:
     return turns
 
 
-def _gaps_filled(stimuli: list[np.ndarray | None], time: np.ndarray, file: Path) -> list[str]:
-    """Interpolate missing values of the stimulus in place; return a remark if there were any."""
+def _gaps_filled(stimuli: list[tuple[tuple[str, ...], np.ndarray | None]], time: np.ndarray, file: Path) -> list[str]:
+    """Interpolate missing values of the stimulus in place, columns with their names; return a remark if there were any."""
     said, total = [], 0
-    for values in stimuli:
+    for names, values in stimuli:
         if values is None:
             continue
-        for column in values.reshape(len(time), -1).T:
+        for name, column in zip(names, values.reshape(len(time), -1).T, strict=True):
             missing = np.isnan(column)
-            if missing.mean() > 0.1:
+            if missing.mean() > MOST_MISSING:
                 raise FileError(
-                    f"{missing.mean():.0%} of the stimulus in '{file.name}' is missing: record the trial again or cut it."
+                    f"{missing.mean():.0%} of column '{name}' in '{file.name}' is missing, and at most {MOST_MISSING:.0%} of a "
+                    "stimulus can be interpolated: record the trial again or cut it."
                 )
             if missing.any():
                 total += int(missing.sum())

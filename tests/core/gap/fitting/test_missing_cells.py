@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The noise is measured from all cells that there are: missing ones, scattered over all texels and samples, do not change it."""
+"""The noise is measured from all cells that there are: missing ones do not change it."""
 
 from dataclasses import replace
 
