@@ -319,13 +319,14 @@ def _name_differences(own: _Search, plain: _Search, session: _Search | None) -> 
     error = _relative_error(before.base, before.noise, before.full)
     texels_alike = session is not None and own.left_of_base < MOST_LEFT * session.left_by_load
     result.between = differences(result.best.model, result.predictors, own.closes, error, result.full[READINGS], texels_alike)
+    result.alike = before
     named = [result.between.name]
     if result.between.rival:
         named.append(result.between.rival)
         result.ambiguous.append(tuple(named))
         result.findings = [_in_doubt(one) if one.name in (*LOAD_HISTORY, DRIFT) else one for one in result.findings]
     result.ruled_out = [(name, why) for name, why in result.ruled_out if name not in named]
-    if result.misleading_faults or result.between.rival:
+    if result.misleading_faults or result.between.rival or result.check.is_refuted:
         result.between = replace(result.between, confidence=min(result.between.confidence, UNSURE_CONFIDENCE))
     most = 1.0 - own.left / plain.left_of_base
     if result.verdict == "no gap" or (most >= EXPLAINED and not result.check.is_refuted):

@@ -118,6 +118,8 @@ class Diagnosis:
         Faults of the data, whether they were put right or not.
     between : RecordingDifferences or None
         Levels and gains by which the recordings differ, if the search was better with them; they are part of both models.
+    alike : Diagnosis or None
+        The same recordings without levels and gains of their own, if `between` is given: what the gap was before them.
     assumed_session : bool
         Whether the recordings, of which the rig names no session, are explained as one session in their order.
     check : CheckOutcome
@@ -151,6 +153,7 @@ class Diagnosis:
     line: SpectralLine | None = None
     faults: list[DataFault] = field(default_factory=list)
     between: RecordingDifferences | None = None
+    alike: Diagnosis | None = None
     assumed_session: bool = False
     check: CheckOutcome = field(default_factory=CheckOutcome)
     outlying: list[OutlyingChannel] = field(default_factory=list)
