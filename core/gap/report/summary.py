@@ -150,6 +150,7 @@ def _found(one: Finding, model: Model, result: Diagnosis, errors: GapErrors) -> 
         "confidence": one.confidence,
         "closes": one.closes,
         "unsettled": list(one.unsettled),
+        "doubts": list(one.doubts),
         "gap_before": errors.stages[one.effect],
         "gap_after": errors.stages[min(one.effect + 1, len(errors.stages) - 1)],
         "next_best": {"effect": one.next_best, "leaves": round(one.leaves, 3)} if one.next_best else None,

@@ -44,6 +44,8 @@ class Finding:
         Share of the whole gap that it closed when it joined.
     unsettled : tuple of str
         What is wrong with its parameters, in words: those at a bound, and those that the recordings leave open.
+    doubts : tuple of str
+        Why else its name is not sure, in words; rivals and `unsettled` say their own.
     """
 
     effect: int
@@ -55,6 +57,7 @@ class Finding:
     leaves: float = np.inf
     closes: float = 0.0
     unsettled: tuple[str, ...] = ()
+    doubts: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

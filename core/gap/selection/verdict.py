@@ -16,12 +16,13 @@ from .candidates import NOT_FITTED, candidates
 from .check_recordings import CheckedRecording
 from .confidence import (
     EXPLAINED,
+    SURE,
     UNLIKELY_CONFIDENCE,
     UNSURE_CONFIDENCE,
-    is_doubtful,
     kinds_can_settle,
     least_share,
     may_absorb_misfit,
+    misfit_of_another,
     probability,
     unsettled_parameters,
     unsure_names,
@@ -42,6 +43,10 @@ RIVAL_EXPONENT = -4.0
 """Weight of an effect among n others that are r₁ … rₙ times as bad: 1 / (1 + Σ rᵢ⁻⁴), as of likelihoods that fall fast."""
 UNRESOLVED_TIMES = 2.0
 """A spreading effect that leaves less than this many times what no fit can resolve has the sensor's own formula."""
+FAULTY = "the data have faults that were not put right"
+REFUTED = "the check recordings do not bear the amended model out"
+ABSORBS = "much of the gap is left, and numbers of single texels may have absorbed a part of it"
+"""Why a name is not sure, in words."""
 MOST_MEAN_SQUARE = 2.0
 """Mean square of the base model's residual, in units of the noise, up to which a residual without structure is no gap. In a
 check recording it may also be as many times that of the fitted ones."""
@@ -53,9 +58,11 @@ def conclude(result: Diagnosis, view_set: ViewSet, state: SelectionState, gap_si
     result.unlike_fitted = _unlike_fitted(result, gap_sizes)
     _judge_effects(result, view_set, state, gap_sizes)
     unsure = unsure_names(result, view_set, state, gap_sizes)
+    if result.misleading_faults:
+        unsure = {one.name: FAULTY for one in result.findings} | unsure
     result.findings = [
-        replace(one, confidence=min(one.confidence, UNSURE_CONFIDENCE))
-        if one.name in unsure or result.misleading_faults
+        replace(one, confidence=min(one.confidence, UNSURE_CONFIDENCE), doubts=(*one.doubts, unsure[one.name]))
+        if one.name in unsure
         else one
         for one in result.findings
     ]
@@ -110,18 +117,37 @@ def _judge_effects(result: Diagnosis, view_set: ViewSet, state: SelectionState, 
         only_height = is_height_alone(result.best.model, index, view_set)
         unsettled += (HEIGHT_ALONE,) if only_height else ()
         support = weight * (0.5 + 0.5 * share if share >= least_share(effect.name, leaves) else 0.5 * share)
-        absorbs = is_open and may_absorb_misfit(effect, state)
-        misfits = chosen is None and len(fitted) > 1 and (absorbs or is_doubtful(effect, state, fitted, gap_sizes))
-        unborne = (unsettled and chosen is None) or only_height or (fitted and result.check.refutes(quantity))
-        confidence = min(support, UNSURE_CONFIDENCE) if rivals or misfits or unborne else probability(support)
+        doubts = _doubts(effect, result, state, gap_sizes, is_open) if chosen is None else ()
+        doubts += (REFUTED,) if fitted and result.check.is_refuted else ()
+        lowered = rivals or doubts or only_height or (unsettled and chosen is None)
+        confidence = min(support, UNSURE_CONFIDENCE) if lowered else probability(support)
+        if confidence < SURE and not (lowered or unsettled):
+            doubts = (_low_support(share, least_share(effect.name, leaves)),)
         if rivals:
             result.ambiguous.append((effect.name, *rivals))
         nearest = min(times_worse, key=lambda name: times_worse[name], default="")
         closes = state.improvements[effect.name].of_gap if effect.name in state.improvements else 0.0
         near = nearest, leaves.get(nearest, np.inf)
         result.findings.append(
-            Finding(index, effect.name, effect.form, round(confidence, 3), rivals, *near, round(closes, 4), unsettled)
+            Finding(index, effect.name, effect.form, round(confidence, 3), rivals, *near, round(closes, 4), unsettled, doubts)
         )
+
+
+def _doubts(effect: Effect, result: Diagnosis, state: SelectionState, gap_sizes: GapSizes, is_open: bool) -> tuple[str, ...]:
+    """Why an effect may only make up for another one's formula, in words; empty if it is alone, or if nothing says so."""
+    fitted = result.best.model.fitted_effects
+    if len(fitted) < 2:
+        return ()
+    absorbs = is_open and may_absorb_misfit(effect, state)
+    why = ABSORBS if absorbs else misfit_of_another(effect, state, fitted, gap_sizes)
+    return (why,) if why else ()
+
+
+def _low_support(share: float, least: float) -> str:
+    """Why the support of an effect is low, in words."""
+    if share < least:
+        return f"the amended model closes {max(share, 0.0):.0%} of the squared gap, and a sure name needs {least:.0%}"
+    return "other kinds together do nearly as well in its place"
 
 
 def _least_share_closed(result: Diagnosis, left_out: list[float], quantity: int) -> float:
