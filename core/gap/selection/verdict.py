@@ -11,7 +11,7 @@ from ...effects.engine.declarations import SILENT_TEXELS
 from ...effects.engine.registry import kind_of, library
 from ...model.effect import Effect
 from ..fitting.repeat_noise import MEASURED_REPEATS, is_scatter_of_repeats
-from ..fitting.residual_tests import LEAST_STRUCTURE
+from ..fitting.residual_tests import LEAST_STRUCTURE, ResidualStructure
 from .candidates import NOT_FITTED, candidates
 from .check_recordings import CheckedRecording
 from .confidence import (
@@ -29,7 +29,7 @@ from .confidence import (
 )
 from .findings import ClosedShares, Diagnosis, Finding
 from .forward_selection import SelectionState, SelectionStep, means_of
-from .gap_sizes import FORCES, LEAST_IMPROVEMENT, READINGS, GapSizes
+from .gap_sizes import FORCES, LEAST_IMPROVEMENT, READINGS, GapSizes, friction_kinds
 from .identifiability import SPREADING, curvature_ratio, hardly_distinguishable, indistinguishable, unidentifiable
 from .plausibility import HEIGHT_ALONE, is_height_alone
 from .view_set import ViewSet
@@ -102,7 +102,10 @@ def _judge_effects(result: Diagnosis, view_set: ViewSet, state: SelectionState, 
     fitted = result.best.model.fitted_effects
     left_out = [gap_sizes.closed_share(state.means, quantity) for quantity in (READINGS, FORCES)]
     closed = [_least_share_closed(result, left_out, quantity) for quantity in (READINGS, FORCES)]
-    is_open = any(gap_sizes.has_gap(quantity) and left_out[quantity] < EXPLAINED for quantity in (READINGS, FORCES))
+    is_open = any(
+        gap_sizes.has_gap(quantity) and left_out[quantity] < EXPLAINED and not _is_out_of_reach(result, gap_sizes, quantity)
+        for quantity in (READINGS, FORCES)
+    )
     result.verdict = _verdict(result, gap_sizes, is_open or (bool(fitted) and result.check.is_refuted))
     for index, effect in enumerate(effects):
         chosen = result.chosen_kinds.get(effect.name) if kinds_can_settle(effect) else None
@@ -156,6 +159,23 @@ def _least_share_closed(result: Diagnosis, left_out: list[float], quantity: int)
     return left_out[quantity] if least is None else float(np.clip(least, 0.0, 1.0))
 
 
+def _is_out_of_reach(result: Diagnosis, gap_sizes: GapSizes, quantity: int) -> bool:
+    """Whether effects on friction are all there is, and what readings leave would be no gap by itself.
+
+    Friction cannot change readings, so it is not held against it that little of them closes.
+    """
+    fitted = result.best.model.fitted_effects
+    only_friction = bool(fitted) and all(effect.name in friction_kinds() for effect in fitted)
+    return only_friction and quantity == READINGS and gap_sizes.both and _is_quiet(result, result.structure, gap_sizes)
+
+
+def _is_quiet(result: Diagnosis, structure: ResidualStructure, gap_sizes: GapSizes) -> bool:
+    """Whether the base model's residual is small, or little more than noise, and what is left of it has no structure."""
+    mean, gap = float(gap_sizes.base[gap_sizes.main_quantity]), gap_sizes.gap(gap_sizes.main_quantity)
+    small = (mean < MOST_MEAN_SQUARE or gap < LEAST_IMPROVEMENT) and not result.unlike_fitted
+    return structure.total < LEAST_STRUCTURE and small and result.line is None
+
+
 def _verdict(result: Diagnosis, gap_sizes: GapSizes, is_open: bool) -> str:
     """Verdict on the whole rig; `is_open` if the amended model leaves much of the gap."""
     effects = result.best.model.effects
@@ -165,9 +185,7 @@ def _verdict(result: Diagnosis, gap_sizes: GapSizes, is_open: bool) -> str:
         return "unexplained" if is_open else "explained"
     if is_scatter_of_repeats(result.noise, result.base.sse, result.base.count) and not result.unlike_fitted:
         return "no gap"
-    mean, gap = float(gap_sizes.base[gap_sizes.main_quantity]), gap_sizes.gap(gap_sizes.main_quantity)
-    small = (mean < MOST_MEAN_SQUARE or gap < LEAST_IMPROVEMENT) and not result.unlike_fitted
-    quiet = result.base_structure.total < LEAST_STRUCTURE and small and result.line is None
+    quiet = _is_quiet(result, result.base_structure, gap_sizes)
     return "no gap" if quiet and not (gap_sizes.both and gap_sizes.has_gap(FORCES)) else "unexplained"
 
 
