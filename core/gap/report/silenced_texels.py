@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..forward.predictor import Model, Predictor
-from ..selection.direct_estimates import LEAST_LOADED_SQUARE, LEAST_SLOPE
+from ..selection.direct_estimates import LEAST_LOADED_SQUARE, LEAST_SLOPE, PRESSED_SHARE
 
 LIVELY_SLOPE = 0.5
 """Least slope of measured over predicted readings, in units of the median texel's, of a texel that answered before."""
@@ -24,7 +24,7 @@ class SilencedTexel:
     texel : int
     recording : str
     seconds : float
-        Time in this recording of the first loaded sample without an answer.
+        Time in this recording of the first pressed sample without an answer.
     """
 
     texel: int
@@ -33,7 +33,7 @@ class SilencedTexel:
 
 
 def silenced_texels(predictors: Sequence[Predictor], model: Model, noise: float) -> list[SilencedTexel]:
-    """Return the texels that answer in the first loaded samples and in none of the last.
+    """Return the texels that answer while they are pressed in the beginning, and no more in the end.
 
     Parameters
     ----------
@@ -49,7 +49,8 @@ def silenced_texels(predictors: Sequence[Predictor], model: Model, noise: float)
         return []
     expected = np.concatenate([one.predict(model).reading for one, _ in pairs]) - model.parameters.zero
     measured = np.concatenate([reading for _, reading in pairs]) - model.parameters.zero
-    known = np.isfinite(measured)
+    # Pressed samples alone: at the end of a release the model may say a load where the sensor has none any more.
+    known = np.isfinite(measured) & (np.abs(expected) > PRESSED_SHARE * np.abs(expected).max(axis=0))
     x, y = np.where(known, expected, 0.0) / noise, np.where(known, measured, 0.0) / noise
     square, product = np.cumsum(x * x, axis=0), np.cumsum(x * y, axis=0)
     whole = square[-1] > 2.0 * LEAST_LOADED_SQUARE
@@ -66,7 +67,7 @@ def silenced_texels(predictors: Sequence[Predictor], model: Model, noise: float)
         last = int(np.argmax(np.where(judged, closes, -np.inf)))  # before it the texel follows the model, behind it nothing
         slopes = product[last, texel] / before[last], (product[-1, texel] - product[last, texel]) / after[last]
         if slopes[0] > LIVELY_SLOPE * usual > 0.0 and slopes[1] < LEAST_SLOPE * usual:
-            loaded = last + 1 + int(np.argmax(x[last + 1 :, texel] ** 2 > 1.0))
+            loaded = last + 1 + int(np.argmax(x[last + 1 :, texel] != 0.0))
             found.append(_at(pairs, int(texel), loaded))
     return found
 

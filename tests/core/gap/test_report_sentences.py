@@ -2,11 +2,13 @@
 """What a report says of recordings that differ, of texels that fall silent, and of what its check recordings did."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import gap_cases as cases
 import numpy as np
 import pytest
 
+from palpate.core.gap.dataset.rig import read_rig
 from palpate.core.gap.forward.predictor import Model, predictors_of
 from palpate.core.gap.report.comparison import gap_errors
 from palpate.core.gap.report.plots import CAPTIONS
@@ -15,7 +17,7 @@ from palpate.core.gap.report.silenced_texels import silenced_texels
 from palpate.core.gap.report.summary import summary
 from palpate.core.gap.selection import screening
 from palpate.core.gap.selection.between_recordings import RecordingDifferences
-from palpate.core.gap.selection.diagnosis import diagnose
+from palpate.core.gap.selection.diagnosis import diagnose, fit_base
 from palpate.core.jobs.job_runner import run_job
 
 
@@ -81,3 +83,10 @@ def test_a_texel_that_dies_midway_is_named_with_the_time(fades):
         return
     (one,) = found
     assert one.texel == texel and (one.recording == "t2" or (one.recording == "t1" and one.seconds > 4.0))
+
+
+@pytest.mark.slow("the base model of the sample rig")
+def test_the_end_of_a_release_is_no_death():
+    """The sample rig creeps: late in a release its texels read nothing where the base model says a small load."""
+    result = run_job(fit_base(read_rig(Path(__file__).parents[3] / "docs" / "sample-rig" / "rig.toml")))
+    assert not silenced_texels(result.predictors, result.base.model, result.noise[0].deviation)
