@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..fitting.noise_floor import SHORTEST_STRETCH
 from ..forward.predictor import Model, Predictor
 from ..selection.direct_estimates import LEAST_LOADED_SQUARE, LEAST_SLOPE, PRESSED_SHARE
 
@@ -50,7 +51,9 @@ def silenced_texels(predictors: Sequence[Predictor], model: Model, noise: float)
     expected = np.concatenate([one.predict(model).reading for one, _ in pairs]) - model.parameters.zero
     measured = np.concatenate([reading for _, reading in pairs]) - model.parameters.zero
     # Pressed samples alone: at the end of a release the model may say a load where the sensor has none any more.
-    known = np.isfinite(measured) & (np.abs(expected) > PRESSED_SHARE * np.abs(expected).max(axis=0))
+    # Nor does a texel at the rim of a contact, which is hardly pressed, say anything.
+    most = np.maximum(np.abs(expected).max(axis=0), PRESSED_SHARE * np.abs(expected).max(initial=0.0))
+    known = np.isfinite(measured) & (np.abs(expected) > PRESSED_SHARE * most)
     x, y = np.where(known, expected, 0.0) / noise, np.where(known, measured, 0.0) / noise
     square, product = np.cumsum(x * x, axis=0), np.cumsum(x * y, axis=0)
     whole = square[-1] > 2.0 * LEAST_LOADED_SQUARE
@@ -61,6 +64,7 @@ def silenced_texels(predictors: Sequence[Predictor], model: Model, noise: float)
     for texel in np.flatnonzero(whole):
         before, after = square[:-1, texel], square[-1, texel] - square[:-1, texel]
         judged = (before > LEAST_LOADED_SQUARE) & (after > LEAST_LOADED_SQUARE)
+        judged &= np.cumsum(x[::-1, texel] != 0.0)[::-1][1:] >= SHORTEST_STRETCH
         if not judged.any():
             continue
         closes = product[:-1, texel] ** 2 / np.maximum(before, 1e-300)
