@@ -13,11 +13,11 @@ from ..selection.check_recordings import CHECK_CLOSED
 from ..selection.confidence import SURE
 from ..selection.findings import Diagnosis, Finding
 from ..selection.gap_sizes import FORCES, READINGS, friction_kinds
+from ..selection.silenced_texels import silenced_texels
 from ..selection.wear_or_drift import CLOCK, NOTHING, TEXELS, USE
 from .comparison import GapErrors, nrmse
 from .experiments import LOUD_NOISE
 from .recording_differences import LEAST_GAIN, LEAST_LEVEL, recording_differences
-from .silenced_texels import silenced_texels
 
 MOST_SAID = 0.99
 """Largest confidence that is said as a number: a few hundred cases do not tell one wrong name in a thousand from none."""

@@ -13,11 +13,11 @@ from palpate.core.gap.forward.predictor import Model, predictors_of
 from palpate.core.gap.report.comparison import gap_errors
 from palpate.core.gap.report.plots import CAPTIONS
 from palpate.core.gap.report.sentences import headline
-from palpate.core.gap.report.silenced_texels import silenced_texels
 from palpate.core.gap.report.summary import summary
 from palpate.core.gap.selection import screening
 from palpate.core.gap.selection.between_recordings import RecordingDifferences
 from palpate.core.gap.selection.diagnosis import diagnose, fit_base
+from palpate.core.gap.selection.silenced_texels import silenced_texels
 from palpate.core.jobs.job_runner import run_job
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..fitting.noise_floor import SHORTEST_STRETCH
 from ..forward.predictor import Model, Predictor
-from ..selection.direct_estimates import LEAST_LOADED_SQUARE, LEAST_SLOPE, PRESSED_SHARE
+from .direct_estimates import LEAST_LOADED_SQUARE, LEAST_SLOPE, PRESSED_SHARE
 
 LIVELY_SLOPE = 0.5
 """Least slope of measured over predicted readings, in units of the median texel's, of a texel that answered before."""
