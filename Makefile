@@ -70,9 +70,8 @@ lint: env
 	$(BIN)/ruff format --check .
 	$(BIN)/python tools/check_types.py
 
-# One process compiles the solver before the tests do, which otherwise compile it in each of theirs.
 compiled: env
-	$(BIN)/python -c 'from palpate.core.solver import precompile as p; p.is_needed() and (p.compile_solver_with_notice(), p.compile_effect_laws(), p.compile_loop())'
+	$(BIN)/python tools/compile_kernels.py
 
 # The tiers are those of docs/testing.md.
 PYTEST := -m pytest --numprocesses=logical --dist=loadfile --durations=10

@@ -10,6 +10,8 @@ sys.path[:0] = [str(ROOT / "tools")]
 os.environ["PALPATE_NUMBA"] = "0"  # kernels stay plain functions, whose signature and docstring Sphinx can read
 
 import api_pages  # noqa: E402
+from docutils import nodes  # noqa: E402
+from sphinx import addnodes  # noqa: E402
 
 project = "Palpate"
 copyright = "the contributors of Palpate"  # noqa: A001
@@ -41,7 +43,23 @@ html_copy_source = False
 def setup(app) -> None:
     """Write the pages of the API before Sphinx looks for its sources, and a page at the top that leads to the first one."""
     api_pages.write(ROOT / "docs" / "api")
+    app.connect("doctree-read", read_shapes_as_words)
     app.connect("build-finished", lead_to_first_page)
+
+
+def read_shapes_as_words(app, doctree) -> None:
+    """Take back the links that Sphinx makes of each word of a type, as of `rows` in "(rows, columns) float".
+
+    No class of Palpate is written in small letters, and several have an attribute of such a name.
+    """
+    for link in list(doctree.findall(addnodes.pending_xref)):
+        if (
+            link.get("reftype") == "class"
+            and not link.get("refexplicit")
+            and link["reftarget"].islower()
+            and "." not in link["reftarget"]
+        ):
+            link.replace_self(nodes.emphasis(text=link["reftarget"]))
 
 
 def lead_to_first_page(app, exception) -> None:

@@ -171,17 +171,6 @@ def compile_effect_laws() -> None:
             Simulation(replace(plain, sensors=(sensor,)), 1).observe()
 
 
-def compile_loop() -> None:
-    """Compile the step of a sensor inside the loop of another program."""
-    from .pressed_model import PressedModel
-    from .pressing import PressedTexels, StepMemory
-
-    plain = scenario()
-    model = PressedModel(plain.sensors[0], [plain.targets[0].mesh], 0.01, 1)
-    out, memory = PressedTexels.zero(1, model.texels, 1), StepMemory.zero(model.texels, 1)
-    model.presser(memory, out, model.environments(1), model.workspace())
-
-
 def scenario() -> Scenario:
     """Return a small box that falls on a pad of four texels, for one frame of 10 ms."""
     import numpy as np
@@ -220,7 +209,7 @@ def _end_with_parent() -> None:
 def main() -> None:
     """Compile in a process of its own; a line of JSON on stdout twice a second tells the progress.
 
-    When the solver is noted as compiled, what is not needed at once follows: the laws of effects and the step of a loop.
+    When the solver is noted as compiled, the laws of effects follow, each of which takes a second when it is first used.
     """
     from ..compiled.kernels import are_interpreted
 
@@ -229,4 +218,3 @@ def main() -> None:
     if are_interpreted():
         sys.exit(1)
     compile_effect_laws()
-    compile_loop()

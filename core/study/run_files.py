@@ -101,7 +101,7 @@ def write_run(
     ----------
     folder : Path
         Of the study.
-    run : Run
+    run : study_file.Run
     scenario : Scenario
         That was computed.
     recording : Recording

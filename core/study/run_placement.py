@@ -28,7 +28,7 @@ def place_run(folder: Path, run: Run, compute: Compute, clock: Callable[[], floa
     ----------
     folder : Path
         Of the study.
-    run : Run
+    run : study_file.Run
     compute : callable
     clock : callable
         Returns seconds.

@@ -78,8 +78,9 @@ def test_a_bake_of_another_state_is_refused(written, capfd):
     scene.objects["Pad"].palpate.k *= 1.01
     save(written)
     assert main(["render", "scene.blend", "--bake", "files", "--only", "curves", "--out", "figures"]) == 1
-    (line,) = capfd.readouterr().err.splitlines()
-    assert "not of 'Scene' as it is now" in line and "files" in line
+    said = capfd.readouterr().err
+    assert said.count("\n") == 1, said
+    assert "not of 'Scene' as it is now" in said and "files" in said
     assert main(["render", "scene.blend", "--bake", "files/Pad", "--only", "curves", "--out", "figures"]) == 1
     assert "give the folder of the whole bake" in capfd.readouterr().err
     bpy.context.scene.objects["Pad"].name = "Plate"

@@ -21,6 +21,7 @@ def gap(rig):
     return pp.find_gap(pp.read_rig(rig))
 
 
+@pytest.mark.slow("finds the gap of the sample rig, for all tests of this file")
 def test_a_gap_names_effects_with_intervals(gap):
     """What tools/sample_rig.py has hidden is found."""
     assert gap.verdict == "explained"
@@ -66,6 +67,7 @@ def test_figures_of_a_gap(gap):
         gap.plot("lops")
 
 
+@pytest.mark.slow("plans a recording for the sample rig")
 def test_a_plan_is_written_and_can_be_simulated(rig, tmp_path):
     plan = pp.plan_experiment(rig, limits={"depth": 2e-3, "duration": 10.0})
     assert len(plan.rows) > 3 and repr(plan) == f"<Plan: {plan.sentence}>"

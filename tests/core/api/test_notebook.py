@@ -30,6 +30,7 @@ def outputs_of(cells):
     return [output for cell in cells if cell.cell_type == "code" for output in cell.outputs]
 
 
+@pytest.mark.slow("executes the notebook, for all tests of this file")
 def test_it_says_what_a_weight_and_a_gap_are(executed):
     texts = "".join(output.get("text", "") for output in outputs_of(executed.cells))
     assert "9.8100 N" in texts

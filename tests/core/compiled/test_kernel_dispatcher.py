@@ -142,6 +142,7 @@ def test_another_numba_gets_a_sentence_and_the_same_numbers(tmp_path):
     assert said == "Palpate computes slowly, as it was never tried with numba 9.1.0: install numba 0.68.*\n"
 
 
+@pytest.mark.slow("starts numba in four processes")
 def test_processes_that_compile_at_once_do_not_disturb_each_other(tmp_path):
     environment = {"PYTHONPATH": os.pathsep.join(sys.path), **os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
     start = {"env": environment, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}

@@ -208,6 +208,7 @@ def copy(tmp_path_factory):
     return folder, run
 
 
+@pytest.mark.slow("runs the tests of effects in a copy of the package")
 def test_a_new_file_is_all_that_a_new_effect_needs(copy):
     """The commands of docs/architecture.md, "How to add an effect"."""
     folder, run = copy
